@@ -29,6 +29,7 @@ pub mod check;
 mod class;
 mod command;
 mod event;
+mod exercise;
 pub mod motion;
 mod params;
 mod plan;
@@ -45,8 +46,9 @@ mod state;
 mod text;
 
 pub use class::{Class, ClassMember, LeaseOrder, LeaseRequest, MAX_CLASS};
-pub use command::{Command, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
+pub use command::{Command, MARK_BYTES, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
 pub use event::{Event, EventKind};
+pub use exercise::{EXERCISE_STIFFNESS_RANGE, Exercise, ExercisesInForce, MOST_MOVED_M};
 pub use params::{
     PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet,
     ParameterSpec, ParametersInForce, folding,
@@ -57,9 +59,9 @@ pub use refusal::{Reason, Refusal, RefusalCode};
 pub use rehearsal::Rehearsal;
 pub use relayed::Relayed;
 pub use request::{
-    ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, NeedleAxis, NeedleRehearsal,
-    ParameterChange, PlannedNeedle, RETRACT_RANGE_M, Request, RequestError, RequestErrors, SPEED_RANGE_M_PER_S,
-    STRAND_PITCH_RANGE_M, StabilisingNeedle,
+    ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, MARK_BEFORE_RANGE_S, Mark, NeedleAxis,
+    NeedleRehearsal, ParameterChange, PlannedNeedle, RETRACT_RANGE_M, Request, RequestError, RequestErrors,
+    SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M, StabilisingNeedle,
 };
 pub use scene::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, SceneId, StructureInfo,
@@ -71,4 +73,4 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 11;
+pub const SCHEMA_VERSION: u32 = 12;

@@ -5,6 +5,7 @@ mod device_libhd;
 mod device_others;
 mod device_procedure;
 mod dose_cli;
+mod exercises;
 mod force_insertions;
 mod formats;
 mod igtl;

@@ -6,7 +6,7 @@ use super::{SceneModel, Snapshot};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::{HapticState, ParametersInForce, PlanInForce, Session, TickRecord};
+use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, Session, TickRecord};
 
 const PASS: Duration = Duration::from_millis(4);
 /// A heartbeat, without which the host would take the core for silent while the recording is held.
@@ -16,6 +16,8 @@ const BEAT: Duration = Duration::from_millis(20);
 pub enum Piece {
     /// A tick of the force loop.
     Tick(Box<TickRecord>),
+    /// Something happened.
+    Event(Box<Event>),
     /// What ticks do not say of the state.
     State(Box<HapticState>),
     /// The scene from now on.
@@ -191,6 +193,7 @@ fn put(
             }
             *last = Some(record);
         }
+        Piece::Event(event) => inbox.put_event(Event { session_id, ..**event }),
         Piece::State(found) => {
             let mut found = **found;
             if let Some(record) = last {

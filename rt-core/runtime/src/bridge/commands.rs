@@ -71,6 +71,12 @@ impl Bridge {
                 number: u64::from(number),
                 speed_m_per_s,
             }),
+            Request::Mark(mark) => {
+                self.mark(ticket, &mark);
+                Ok(())
+            }
+            Request::BeginExercise(exercise) => self.begin_exercise(ticket, exercise),
+            Request::EndExercises => self.end_exercises(ticket),
             Request::StopHand => self.order_haptic(HapticOrder::StopHand { ticket }),
             Request::Engage => self.order_haptic(HapticOrder::Engage { ticket }),
             Request::Disengage => self.order_haptic(HapticOrder::Disengage { ticket }),
@@ -104,7 +110,7 @@ impl Bridge {
         Ok(())
     }
 
-    fn order_haptic(&mut self, order: HapticOrder) -> Result<(), Refusal> {
+    pub(super) fn order_haptic(&mut self, order: HapticOrder) -> Result<(), Refusal> {
         let pushed = self.loops.haptic_orders.push(order);
         pushed.map_err(|_| RefusalCode::TooManyRequests.into())
     }
@@ -169,6 +175,7 @@ impl Bridge {
     fn reset(&mut self, ticket: Ticket) -> Result<(), Refusal> {
         self.order_both((HapticOrder::Reset { ticket }, TissueOrder::Reset))?;
         self.lines.forget_tracks();
+        self.forget_exercises();
         self.link.event(EventKind::Reset, EventDetails::now());
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! The normal-priority thread that owns every port: hosts connect and disconnect here, and the loops do not notice.
 
 mod commands;
+mod exercises;
 mod flight;
 mod line_archive;
 mod lines;

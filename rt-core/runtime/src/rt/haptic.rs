@@ -22,7 +22,10 @@ mod flight;
 mod left;
 mod line;
 mod orders;
+mod put_in;
 mod record;
+
+pub use put_in::PutIn;
 
 /// Everything that the haptic thread owns.
 pub struct HapticLoop {
@@ -43,6 +46,8 @@ pub struct HapticLoop {
     /// Needles that stay in.
     left: left::Left,
     watchdog: Watchdog,
+    /// Faults that an instructor put in.
+    put_in: PutIn,
     /// What the device answered in this tick, for the recording.
     answer: DeviceAnswer,
     /// What hosts see; also holds the counters.
@@ -101,6 +106,7 @@ impl HapticLoop {
                 ..left::Left::default()
             },
             watchdog: memory.watchdog,
+            put_in: memory.put_in,
             answer: DeviceAnswer::default(),
             state: memory.state,
             probe: None,
@@ -147,6 +153,7 @@ impl HapticLoop {
         self.checkpoint();
         self.take_orders();
         self.take_line();
+        self.follow_body();
         self.mark();
         let sample = self.read();
         self.mark();
@@ -187,9 +194,9 @@ impl HapticLoop {
             buttons: 0,
             sequence: 0,
         });
-        self.answer.read = self.device.read(self.period_s);
+        self.answer.read = self.put_in.answer(self.device.read(self.period_s));
         let sample = match self.answer.read {
-            Ok(sample) if sample.is_finite() => sample,
+            Ok(sample) if sample.is_finite() => self.put_in.in_body(sample),
             Ok(_) => {
                 self.raise(Fault::NonFiniteInput);
                 last
@@ -258,7 +265,7 @@ impl HapticLoop {
                 tick,
                 time_ns,
                 depth_m: output.depth_m,
-                position_m: sample.tip_in_world,
+                position_m: self.put_in.in_scene(sample.tip_in_world),
             });
         }
         if output.left {

@@ -27,6 +27,7 @@ impl HapticLoop {
             // Their record stands beside the memory.
             left,
             watchdog,
+            put_in,
             answer: _,
             state,
             probe: _,
@@ -44,6 +45,7 @@ impl HapticLoop {
             on_line: *on_line,
             is_hand_empty: left.is_hand_empty,
             watchdog: *watchdog,
+            put_in: *put_in,
             state: *state,
         }
     }
