@@ -6,6 +6,7 @@ use crate::command::compare::CompareArgs;
 use crate::command::convert::ConvertArgs;
 use crate::command::dicom::DicomArgs;
 use crate::command::dose::DoseArgs;
+use crate::command::export::ExportArgs;
 use crate::command::find_seeds::FindSeedsArgs;
 use crate::command::perturb::PerturbArgs;
 use crate::command::plan::PlanArgs;
@@ -124,16 +125,7 @@ enum Task {
         hand_speed: f64,
     },
     /// Convert a recording into a table, or into a motion for rt-core's replay device
-    Export {
-        /// Recording made by 'host-ui record'
-        recording: PathBuf,
-        /// Table with one row per tick
-        #[arg(long, value_name = "FILE.csv", required_unless_present = "motion")]
-        csv: Option<PathBuf>,
-        /// The hand's motion, for 'rt-core --device replay:FILE'
-        #[arg(long, value_name = "FILE")]
-        motion: Option<PathBuf>,
-    },
+    Export(ExportArgs),
     /// Let rt-core write its flight recording: the last seconds of both loops, for 'rt-core replay'
     Flight {
         /// Name that rt-core was started under
@@ -235,9 +227,7 @@ impl Cli {
                 instance.sweep();
                 Ok(ended?)
             }
-            Some(Task::Export { recording, csv, motion }) => {
-                Ok(record::export(&record::Export { recording, csv, motion })?)
-            }
+            Some(Task::Export(args)) => Ok(args.run()?),
             Some(Task::Flight { instance }) => {
                 println!("written: {}", record::save_flight(&instance)?);
                 Ok(())

@@ -60,6 +60,10 @@ pub enum EventKind {
     ExerciseBegun = 12,
     /// No fault of an instructor's is in force any more.
     ExercisesEnded = 13,
+    /// As [`FaultRaised`](Self::FaultRaised), of the second device; the needle's goes on.
+    SecondFaultRaised = 20,
+    /// The force of the second device was armed again after a fault.
+    SecondRearmed = 21,
 }
 
 impl EventKind {

@@ -5,6 +5,8 @@
 //! | `session` | publish-subscribe, newest one kept | bridge | hosts | [`Session`]: which run this is, what the kernel granted |
 //! | `state/<session>` | blackboard, one per run | haptic thread | hosts | [`HapticState`]: the latest tick |
 //! | `records` | slices of [`TickRecord`] | bridge | hosts | every tick of the force loop |
+//! | `second/<session>` | blackboard, in a run with a second device | its thread | hosts | [`SecondState`]: its latest tick |
+//! | `second_records` | slices of [`SecondRecord`], likewise | bridge | hosts | every tick of the second device's loop |
 //! | `snapshots` | slices of [`Vertex`] under a [`SnapshotHeader`] | tissue thread, sent by the bridge | hosts | the deformed surface, displacements inside, needle and seeds |
 //! | `scene` | words under a [`SceneHeader`], newest one kept | bridge | hosts | rest surface, triangles, structures, labels of the cells |
 //! | `events` | [`Event`], last 64 kept | bridge | hosts | what happened, once each |
@@ -39,6 +41,7 @@ mod rehearsal;
 mod relayed;
 mod request;
 mod scene;
+mod second;
 pub mod service;
 mod session;
 mod snapshot;
@@ -67,6 +70,7 @@ pub use scene::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, SceneId, StructureInfo,
     UploadHeader, UploadStructure, role,
 };
+pub use second::{SecondRecord, SecondState};
 pub use session::{Session, ThreadReport};
 pub use snapshot::{LeftNeedlePose, MAX_BEND_POINTS, SeedPose, SnapshotHeader, Vertex};
 pub use state::{Fault, HapticState, Phase, flags};

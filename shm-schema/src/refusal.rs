@@ -60,6 +60,8 @@ pub enum RefusalCode {
     NeedleWithoutLine = 51,
     /// The tissue model of the run answers no force.
     TissueWithoutStiffness = 52,
+    /// The run has no second device.
+    NoSecondDevice = 55,
     /// Another scene is being loaded.
     SceneLoading = 60,
     /// The uploaded volume is invalid.
@@ -116,6 +118,9 @@ impl RefusalCode {
             }
             Self::TissueWithoutStiffness => {
                 "the tissue of this run has no stiffness: start rt-core with --tissue chainmail or --tissue fem"
+            }
+            Self::NoSecondDevice => {
+                "this run has no second device: start rt-core with --device-2 simulated, or another"
             }
             Self::SceneLoading => "another scene is being loaded; wait until it is ready",
             Self::InvalidVolume => "the volume is invalid",

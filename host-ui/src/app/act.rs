@@ -280,6 +280,8 @@ fn request_name(request: &Request) -> &'static str {
         Request::SaveFlight => "Flight recording",
         Request::Rehearse(_) => "Rehearsal",
         Request::StopHand => "Stop",
+        Request::MoveSecondHand(_) => "Other hand",
+        Request::StopSecondHand => "Stop other hand",
         Request::ExpectNeedle(_) => "Next needle",
         Request::LeaveNeedle => "Leave needle",
         Request::TakeNeedle(_) => "Take up needle",

@@ -7,6 +7,7 @@ pub mod compare;
 pub mod convert;
 pub mod dicom;
 pub mod dose;
+pub mod export;
 pub mod find_seeds;
 pub mod perturb;
 pub mod plan;

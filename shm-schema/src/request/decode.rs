@@ -123,7 +123,7 @@ fn takes(kind: CommandKind) -> String {
         CommandKind::SetPlan => {
             format!("nothing, or entry, direction and at most {MAX_SEEDS} seeds, three values each")
         }
-        CommandKind::MoveHand => "8 values".to_owned(),
+        CommandKind::MoveHand | CommandKind::MoveSecondHand => "8 values".to_owned(),
         CommandKind::LoadBuiltinScene => "one number".to_owned(),
         CommandKind::DropSeed => "nothing, or the pitch of a strand".to_owned(),
         CommandKind::ExpectNeedle => "entry and direction, three values each".to_owned(),
@@ -169,7 +169,7 @@ fn count_fits(kind: CommandKind, count: usize) -> bool {
     match kind {
         CommandKind::SetParameters => count > 0 && count.is_multiple_of(2),
         CommandKind::SetPlan => count == 0 || places_after(PLAN_HEAD).is_some_and(|n| n <= MAX_SEEDS),
-        CommandKind::MoveHand => count == 8,
+        CommandKind::MoveHand | CommandKind::MoveSecondHand => count == 8,
         CommandKind::ExpectNeedle => count == 6,
         CommandKind::TakeNeedle | CommandKind::Mark => count == 1,
         // Which of them the number says; see `Reader::exercise`.
@@ -209,12 +209,8 @@ impl<'a> Reader<'a> {
                 direction: self.direction(),
                 seeds_m: self.rest(Self::place),
             })),
-            CommandKind::MoveHand => Request::MoveHand(HandMove {
-                tip_m: self.place(),
-                direction: self.direction(),
-                speed_m_per_s: self.within("speed in m/s", SPEED_RANGE_M_PER_S),
-                acceleration_m_per_s2: self.within("acceleration in m/s2", ACCELERATION_RANGE_M_PER_S2),
-            }),
+            CommandKind::MoveHand => Request::MoveHand(self.hand_move()),
+            CommandKind::MoveSecondHand => Request::MoveSecondHand(self.hand_move()),
             CommandKind::DropSeed => Request::DropSeed {
                 strand_pitch_m: (!self.values.is_empty())
                     .then(|| self.within("pitch of a strand in m", STRAND_PITCH_RANGE_M)),
@@ -243,6 +239,7 @@ impl<'a> Reader<'a> {
             CommandKind::Mark => Request::Mark(self.mark(command)),
             CommandKind::BeginExercise => Request::BeginExercise(self.exercise()),
             CommandKind::EndExercises => Request::EndExercises,
+            CommandKind::StopSecondHand => Request::StopSecondHand,
             CommandKind::LeaveNeedle => Request::LeaveNeedle,
             CommandKind::TakeNeedle => Request::TakeNeedle(self.needle()),
             CommandKind::DrawNeedle => Request::DrawNeedle {
@@ -253,6 +250,15 @@ impl<'a> Reader<'a> {
                 entry_m: self.place(),
                 direction: self.direction(),
             }),
+        }
+    }
+
+    fn hand_move(&mut self) -> HandMove {
+        HandMove {
+            tip_m: self.place(),
+            direction: self.direction(),
+            speed_m_per_s: self.within("speed in m/s", SPEED_RANGE_M_PER_S),
+            acceleration_m_per_s2: self.within("acceleration in m/s2", ACCELERATION_RANGE_M_PER_S2),
         }
     }
 

@@ -70,7 +70,7 @@ pub enum Request {
     /// Simulate one needle ahead of time, in a body of its own, from rest; a [`crate::Rehearsal`] is sent before the reply.
     #[strum_discriminants(doc = "[`Request::Rehearse`]")]
     Rehearse(NeedleRehearsal) = 12,
-    /// Stop the simulated hand as fast as it can; only the core knows where that is.
+    /// Stop the simulated hand as fast as it can; only the core knows where that is. Of a run with a second device, both hands.
     #[strum_discriminants(doc = "[`Request::StopHand`]")]
     StopHand = 13,
     /// The needle that will come after the planned one: what it needs is prepared meanwhile.
@@ -100,6 +100,12 @@ pub enum Request {
     /// Take every fault away that was put in. A reset does so as well.
     #[strum_discriminants(doc = "[`Request::EndExercises`]")]
     EndExercises = 20,
+    /// Set the goal of the simulated hand that holds the second device.
+    #[strum_discriminants(doc = "[`Request::MoveSecondHand`]")]
+    MoveSecondHand(HandMove) = 30,
+    /// Stop that hand, and not the needle's.
+    #[strum_discriminants(doc = "[`Request::StopSecondHand`]")]
+    StopSecondHand = 31,
 }
 
 /// A moment and what is to be said of it.
@@ -226,7 +232,7 @@ impl Request {
                 .collect(),
             Self::SetPlan(None) => Vec::new(),
             Self::SetPlan(Some(plan)) => joined(&[&plan.entry_m, &plan.direction], &plan.seeds_m),
-            Self::MoveHand(hand) => {
+            Self::MoveHand(hand) | Self::MoveSecondHand(hand) => {
                 let pace = [hand.speed_m_per_s, hand.acceleration_m_per_s2];
                 joined(&[&hand.tip_m, &hand.direction, &pace], &[])
             }
@@ -267,7 +273,8 @@ impl Request {
             | Self::UndoSeed
             | Self::Shutdown
             | Self::SaveFlight
-            | Self::StopHand => Vec::new(),
+            | Self::StopHand
+            | Self::StopSecondHand => Vec::new(),
         }
     }
 }

@@ -43,7 +43,7 @@ fn procedure(link: &mut Link, put_in: Option<Exercise>) -> Seen {
     let seeds = snapshot.header.seeds.iter().take(snapshot.header.seed_count as usize);
     Seen {
         seeds_m: seeds.map(|s| s.position_m).collect(),
-        surface_m: snapshot.positions_m.iter().map(|v| v.position_m).collect(),
+        surface_m: snapshot.positions_m.clone(),
         before_puncture_m,
     }
 }

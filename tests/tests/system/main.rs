@@ -4,6 +4,7 @@ mod device_abi;
 mod device_libhd;
 mod device_others;
 mod device_procedure;
+mod device_second;
 mod dose_cli;
 mod exercises;
 mod force_insertions;

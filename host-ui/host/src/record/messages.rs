@@ -124,7 +124,7 @@ impl From<&TickRecord> for Tick {
     }
 }
 
-fn vector(length: usize, unit: &str) -> Value {
+pub(super) fn vector(length: usize, unit: &str) -> Value {
     json!({ "type": "array", "items": { "type": "number" }, "minItems": length, "maxItems": length, "description": unit })
 }
 
@@ -132,11 +132,11 @@ fn number(unit: &str) -> Value {
     json!({ "type": "number", "description": unit })
 }
 
-fn whole(what: &str) -> Value {
+pub(super) fn whole(what: &str) -> Value {
     json!({ "type": "integer", "minimum": 0, "description": what })
 }
 
-fn object(title: &str, properties: Value) -> Value {
+pub(super) fn object(title: &str, properties: Value) -> Value {
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, "type": "object",
         "properties": properties,

@@ -3,6 +3,7 @@
 use super::error::{RecordError, ShowError};
 use super::messages::{EVENT, GLAND, TICK, TISSUE, Tick, event_of, gland_of, tissue_of};
 use super::scene::{self, FIELD, SCENE};
+use super::second::{SECOND, second_of};
 use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
 use super::stream;
 use crate::link::{Piece, Played, Snapshot};
@@ -71,6 +72,10 @@ impl Reader {
                 // Another version may know more kinds.
                 None => return Ok(()),
             },
+            t if t == SECOND.topic => {
+                let record = second_of(data).filter(|r| r.session_id == session_id && check::second_record(r).is_ok());
+                Piece::Second(Box::new(record.ok_or_else(damaged)?))
+            }
             t if t == STATE.topic => {
                 let state = setting::state_of(data).filter(|state| check::state(state).is_ok());
                 Piece::State(Box::new(state.ok_or_else(damaged)?))

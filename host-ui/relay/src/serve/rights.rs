@@ -18,7 +18,7 @@ pub fn right(role: Role, kind: CommandKind) -> Option<Right> {
     match (role, kind) {
         (Role::Observer, _) | (_, K::Shutdown) => None,
         // What takes force or motion away is nobody's alone.
-        (_, K::StopHand | K::Disengage | K::SaveFlight | K::Rehearse | K::Mark) => Some(Right::Role),
+        (_, K::StopHand | K::StopSecondHand | K::Disengage | K::SaveFlight | K::Rehearse | K::Mark) => Some(Right::Role),
         (Role::Instructor, K::SetParameters | K::LoadBuiltinScene | K::SetPlan) => Some(Right::Role),
         // Faults are for a trainee to find, who operates.
         (role, K::BeginExercise | K::EndExercises) => (role == Role::Instructor).then_some(Right::Role),

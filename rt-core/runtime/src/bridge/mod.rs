@@ -1,5 +1,6 @@
 //! The normal-priority thread that owns every port: hosts connect and disconnect here, and the loops do not notice.
 
+mod batches;
 mod commands;
 mod exercises;
 mod flight;
@@ -14,14 +15,15 @@ pub mod ports;
 mod rehearsals;
 mod requests;
 mod scenes;
+mod second;
 mod snapshots;
 mod supervisor;
 mod upload;
 
 use crate::replay::file::Flight;
 use crate::rt::wiring::BridgePorts;
-use flight::FlightKeeper;
 pub use flight::SaveError;
+use flight::{FlightKeeper, Orders};
 use lines::LinePreparer;
 use link::{EventDetails, Link};
 use loader::SceneLoader;
@@ -30,6 +32,8 @@ use parameters::ParameterChanges;
 pub use picture::ScenePicture;
 use ports::Ports;
 use rehearsals::RehearsalRunner;
+use second::Second;
+pub use second::SecondSetup;
 use snapshots::SnapshotLoans;
 pub use snapshots::SnapshotSize;
 use std::path::PathBuf;
@@ -60,6 +64,8 @@ pub struct BridgeSetup {
     pub tissue: TissueKind,
     /// What the first scene was built from.
     pub source: Arc<SceneSource>,
+    /// The second device, where the run has one.
+    pub second: Option<SecondSetup>,
     /// Folder of the flight recordings.
     pub flight_folder: PathBuf,
     /// The part that is the same in every flight recording.
@@ -93,6 +99,7 @@ pub struct Bridge {
     /// The loops have room for needles that stay in: the force loop, and the tissue loop's tape of that scene.
     left_rooms: (bool, Option<u64>),
     supervisor: Supervisor,
+    second: Option<Second>,
 }
 
 impl Bridge {
@@ -106,7 +113,8 @@ impl Bridge {
         let link = Link::new(node, ports, setup.session);
         let _ = link.ports.parameters.send(parameters.in_force);
         let _ = link.ports.plan.send(plan);
-        let tapes = (loops.haptic_tapes, loops.tissue_tapes);
+        let (second, second_tapes) = setup.second.map(|second| Second::new(second, is_real_time)).unzip();
+        let tapes = (loops.haptic_tapes, loops.tissue_tapes, second_tapes);
         Self {
             link,
             loans: SnapshotLoans::new(loops.slots, loops.filled),
@@ -137,6 +145,7 @@ impl Bridge {
             rehearsals: RehearsalRunner::new(setup.source, setup.tissue, setup.device),
             left_rooms: (false, None),
             supervisor: Supervisor::new(is_real_time, setup.device.simulated),
+            second,
         }
     }
 
@@ -147,6 +156,9 @@ impl Bridge {
             std::thread::sleep(PASS);
         }
         self.link.send_batch();
+        if let Some(second) = &mut self.second {
+            second.send_batch(self.link.session.session_id);
+        }
         Ok(())
     }
 
@@ -166,6 +178,7 @@ impl Bridge {
         self.scene.send(&self.link);
         while self.loops.old_worlds.pop().is_ok() {}
         let made_a_tick = self.link.send_records(&mut self.loops.records);
+        self.pass_second();
         self.serve_flights();
         let generation = self.scene.generation();
         self.lines.pass(self.link.newest_record(), generation, &mut self.loops);
@@ -188,8 +201,12 @@ impl Bridge {
 
     fn serve_flights(&mut self) {
         let generation = self.scene.generation();
-        let (haptic, tissue) = (&mut self.loops.haptic_orders, &mut self.loops.tissue_orders);
-        let Some(saved) = self.flights.pass(generation, haptic, tissue, self.lines.archive()) else {
+        let orders = Orders {
+            haptic: &mut self.loops.haptic_orders,
+            tissue: &mut self.loops.tissue_orders,
+            second: self.second.as_mut().map(|second| &mut second.orders),
+        };
+        let Some(saved) = self.flights.pass(generation, orders, self.lines.archive()) else {
             return;
         };
         let result = saved.result.map_err(|why| why.to_string());

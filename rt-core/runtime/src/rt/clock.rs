@@ -9,6 +9,8 @@ pub const TISSUE_PERIOD_NS: u64 = 5_000_000;
 pub const HAPTIC_PHASE: f64 = 0.25;
 /// The tissue loop's place in the force loop's period: the force is out by then and the pose there, and the two do not wake against each other.
 pub const TISSUE_PHASE: f64 = 0.5;
+/// Where the loop of a second device wakes within its own period: clear of both at the same rate.
+pub const SECOND_PHASE: f64 = 0.75;
 
 /// A place within a period in nanoseconds.
 pub fn phase_ns(phase: f64, period_ns: u64) -> u64 {

@@ -1,16 +1,16 @@
 //! The haptic tick, 1 kHz: read → chain (velocity, needle, force law, gate) → write → pose → record.
 
 use crate::rt::arm::Armed;
-use crate::rt::clock::{self, Grid, HAPTIC_PHASE, Wait};
+use crate::rt::clock::{self, HAPTIC_PHASE, Wait};
+use crate::rt::device_loop::{self, DeviceLoop};
 use crate::rt::exchange::Notice;
 use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::pose::TipPose;
 use crate::rt::response::TissueResponse;
 use crate::rt::timing::Probe;
-use crate::rt::watchdog::{Watchdog, Watched, at_gate, device_fault};
+use crate::rt::watchdog::{Watchdog, Watched, at_gate};
 use crate::rt::wiring::HapticPorts;
-use nalgebra::Vector3;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use stylet_hw::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
 use stylet_shm_schema::{Fault, HapticState};
 use stylet_sim::force::ForceFault;
@@ -123,29 +123,8 @@ impl HapticLoop {
     }
 
     /// Runs on the ideal grid until `stop`, then ramps the force to zero and ends. Returns how often it slept.
-    pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) -> u64 {
-        let period_ns = (self.period_s * 1e9).round() as u64;
-        let mut grid = Grid::at_phase(clock::now_ns(), period_ns, clock::phase_ns(HAPTIC_PHASE, period_ns));
-        let (mut missed, mut sleeps) = (0, 0);
-        let mut last_ticks = self.parameters.force.gate.ramp_out_ticks + 1;
-        while last_ticks > 0 {
-            // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
-            if stop.load(Ordering::Acquire) {
-                self.release_for_the_end();
-                last_ticks -= 1;
-            }
-            sleeps += self.wait.until(grid.due_ns);
-            let woke_ns = clock::now_ns();
-            self.tick(grid.due_ns, woke_ns, missed);
-            publish(&self.state);
-            if let Some(probe) = &mut self.probe {
-                probe.finish(grid.due_ns, woke_ns, missed);
-            }
-            missed = grid.advance(clock::now_ns());
-        }
-        let _ = self.device.write(&Wrench::zero());
-        self.ports.flight.hand_over();
-        sleeps
+    pub fn run(&mut self, armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) -> u64 {
+        device_loop::run(self, armed, stop, |this| publish(&this.state))
     }
 
     /// One tick; in the order of the data. Returns what the force chain gave.
@@ -188,29 +167,16 @@ impl HapticLoop {
 
     /// The newest sample; the last good one when the device has a fault.
     fn read(&mut self) -> Sample {
-        let last = self.sample.unwrap_or(Sample {
-            tip_in_world: Vector3::zeros(),
-            world_from_tool: nalgebra::UnitQuaternion::identity(),
-            buttons: 0,
-            sequence: 0,
-        });
         self.answer.read = self.put_in.answer(self.device.read(self.period_s));
-        let sample = match self.answer.read {
-            Ok(sample) if sample.is_finite() => self.put_in.in_body(sample),
-            Ok(_) => {
-                self.raise(Fault::NonFiniteInput);
-                last
-            }
-            Err(fault) => {
-                self.raise(device_fault(fault));
-                last
-            }
-        };
-        let repeated = self.sample.is_some_and(|s| s.sequence == sample.sequence);
-        if let Some(fault) = self.watchdog.sample(repeated) {
+        let in_body = self.answer.read.map(|sample| self.put_in.in_body(sample));
+        let reading = device_loop::judge(in_body, self.sample);
+        if let Some(fault) = reading.fault {
             self.raise(fault);
         }
-        sample
+        if let Some(fault) = self.watchdog.sample(reading.is_repeated) {
+            self.raise(fault);
+        }
+        reading.sample
     }
 
     fn raise(&mut self, fault: Fault) {
@@ -310,5 +276,40 @@ impl HapticLoop {
         self.pose.seen_layer = self.chain.path.seen();
         self.pose.hand_is_empty = self.left.is_hand_empty;
         self.ports.pose.write(self.pose);
+    }
+}
+
+impl DeviceLoop for HapticLoop {
+    fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    fn wait(&self) -> Wait {
+        self.wait
+    }
+
+    fn phase(&self) -> f64 {
+        HAPTIC_PHASE
+    }
+
+    fn ramp_out_ticks(&self) -> u32 {
+        self.parameters.force.gate.ramp_out_ticks
+    }
+
+    fn release_for_the_end(&mut self) {
+        self.release_with_tape();
+    }
+
+    fn step(&mut self, due_ns: u64, woke_ns: u64, missed: u32) {
+        self.tick(due_ns, woke_ns, missed);
+    }
+
+    fn probe(&mut self) -> Option<&mut Probe> {
+        self.probe.as_deref_mut()
+    }
+
+    fn end(&mut self) {
+        let _ = self.device.write(&Wrench::zero());
+        self.ports.flight.hand_over();
     }
 }

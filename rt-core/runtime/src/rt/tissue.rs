@@ -29,6 +29,7 @@ mod last_carry;
 mod left;
 mod line;
 mod migration;
+mod second;
 mod seeds;
 mod snapshot;
 
@@ -193,6 +194,7 @@ impl TissueLoop {
         self.mark();
         self.migrate();
         self.respond(woke_ns, &report);
+        self.answer_second(woke_ns);
         self.look_for_folds();
         self.tape(woke_ns, report.residual);
         self.mark();

@@ -6,6 +6,7 @@ use crate::rt::line_loads::AllLoads;
 use crate::rt::pose::TipPose;
 use crate::rt::recorder::{Recorder, TapePort, recorder};
 use crate::rt::response::TissueResponse;
+use crate::rt::second::SecondTissuePorts;
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use stylet_shm_schema::TickRecord;
@@ -96,6 +97,8 @@ pub struct TissuePorts {
     pub slots: rtrb::Consumer<SnapshotSlot>,
     /// Loaned memory that goes back to the bridge.
     pub filled: rtrb::Producer<SnapshotReturn>,
+    /// Pose and contact of the second device, in a run that has one.
+    pub second: Option<SecondTissuePorts>,
     /// Flight recording.
     pub flight: Recorder<TissueTape>,
 }
@@ -190,6 +193,7 @@ impl Wiring {
                 loads: loads_out,
                 slots: slot_out,
                 filled: filled_in,
+                second: None,
                 flight: tissue_flight,
             },
             bridge: BridgePorts {

@@ -90,7 +90,7 @@ impl HapticLoop {
     }
 
     /// The end counts as an order, so that its ramp can be repeated.
-    pub(super) fn release_for_the_end(&mut self) {
+    pub(super) fn release_with_tape(&mut self) {
         self.chain.gate.release();
         if let Some(tape) = self.ports.flight.tape() {
             tape.order(HapticOrder::Disengage { ticket: 0 });

@@ -1,6 +1,7 @@
 //! Every cause against the force record of the whole loop: the force ramps out, smoothly and in time, and returns after re-arming.
 
 use super::*;
+use crate::rt::breaking::{BreakingDevice, Cause};
 use crate::rt::exchange::{HapticOrder, Notice};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
@@ -9,82 +10,13 @@ use crate::rt::wiring::{BridgePorts, Capacities, TissuePorts, Wiring};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use stylet_hw::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
+use stylet_hw::{Device, HandGoal};
 use stylet_shm_schema::{TickRecord, flags};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::force::gate::RAMP_OUT_TICKS;
 use stylet_sim::needle::{LayerKind, NeedleParameters};
 
 const TICK_NS: u64 = 1_000_000;
-
-/// What goes wrong.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Cause {
-    Nothing,
-    Silent,
-    ReadFails,
-    NotANumber,
-    WriteFails,
-    TissueStops,
-    TissueUnsolved,
-    Late,
-    ForceNotANumber,
-    Lost,
-}
-
-/// A simulated hand on a device that breaks on command.
-struct BreakingDevice {
-    hand: SimulatedPhantom,
-    cause: Arc<AtomicU32>,
-    last: Option<Sample>,
-}
-
-impl BreakingDevice {
-    fn has(&self, cause: Cause) -> bool {
-        self.cause.load(Ordering::Relaxed) == cause as u32
-    }
-}
-
-impl Device for BreakingDevice {
-    fn info(&self) -> DeviceInfo {
-        self.hand.info()
-    }
-
-    fn read(&mut self, dt_s: f64) -> Result<Sample, DeviceFault> {
-        if self.has(Cause::ReadFails) {
-            return Err(DeviceFault::TimedOut);
-        }
-        if self.has(Cause::Lost) {
-            return Err(DeviceFault::NotConnected);
-        }
-        if let (true, Some(last)) = (self.has(Cause::Silent), self.last) {
-            return Ok(last);
-        }
-        let mut sample = self.hand.read(dt_s)?;
-        self.last = Some(sample);
-        if self.has(Cause::NotANumber) {
-            sample.tip_in_world.x = f64::NAN;
-        }
-        Ok(sample)
-    }
-
-    fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
-        self.hand.write(wrench)?;
-        if self.has(Cause::WriteFails) {
-            Err(DeviceFault::Driver)
-        } else {
-            Ok(())
-        }
-    }
-
-    fn set_hand_goal(&mut self, goal: &HandGoal) {
-        self.hand.set_hand_goal(goal);
-    }
-
-    fn stop_hand(&mut self) {
-        self.hand.stop_hand();
-    }
-}
 
 /// The whole haptic loop against a membrane at z = 0, ticked by hand.
 struct Rig {
@@ -100,16 +32,7 @@ struct Rig {
 
 impl Rig {
     fn new() -> Self {
-        let cause = Arc::new(AtomicU32::new(Cause::Nothing as u32));
-        let hand = SimulatedPhantom::new(SimulatedPhantomConfig {
-            start_tip_in_world: Vector3::new(0.0, 0.0, -0.005),
-            ..SimulatedPhantomConfig::default()
-        });
-        let device = BreakingDevice {
-            hand,
-            cause: Arc::clone(&cause),
-            last: None,
-        };
+        let (device, cause) = BreakingDevice::at(Vector3::new(0.0, 0.0, -0.005));
         let memory = HapticMemory::new(
             &device.info(),
             (NeedleParameters::default(), ForceParameters::default()),
