@@ -20,6 +20,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_shm_schema::{MAX_SEEDS, SeedPose};
 use stylet_sim::force::LocalResponse;
 use stylet_sim::line::{BodyLine, MAX_LEFT};
+use stylet_sim::probe::{BodyProbe, ProbePose};
 use stylet_sim::tissue::{Carried, Deformed, Held, MaterialPoint, StepReport};
 
 mod contact;
@@ -29,6 +30,7 @@ mod last_carry;
 mod left;
 mod line;
 mod migration;
+mod pressed;
 mod second;
 mod seeds;
 mod snapshot;
@@ -53,6 +55,9 @@ pub struct TissueLoop {
     /// Room to record those, until the tape is there.
     left_room: Option<Box<LeftTape>>,
     last_carry: LastCarry,
+    /// The ultrasound probe in this scene, and where it is.
+    pressed: Option<Box<BodyProbe>>,
+    probe_pose: Option<ProbePose>,
     layers: LayersMet,
     /// The tip has been outside since the last contact.
     clear: bool,
@@ -95,6 +100,8 @@ impl TissueLoop {
             left_loads: LeftLoads::default(),
             left_room: None,
             last_carry: LastCarry::new(),
+            pressed: None,
+            probe_pose: None,
             layers: LayersMet::default(),
             clear: true,
             held: None,
@@ -176,6 +183,8 @@ impl TissueLoop {
         self.checkpoint();
         self.follow_left();
         self.take_orders();
+        self.follow_second();
+        self.follow_probe();
         let before = self.pose;
         self.pose = *self.ports.pose.read();
         self.mark();
@@ -236,6 +245,7 @@ impl TissueLoop {
                 }
                 TissueOrder::LeftRoom(room) => self.left_room = self.left_room.take().or(Some(room)),
                 TissueOrder::HandOverTape => self.hand_over_tape(),
+                TissueOrder::Probe(probe) => self.take_probe(probe),
                 TissueOrder::Line(line) => {
                     self.tape_order(TapedOrder::Line {
                         generation: line.generation,
@@ -254,6 +264,7 @@ impl TissueLoop {
     fn reset(&mut self) {
         self.world.tissue.return_to_rest();
         self.last_carry.forget();
+        self.reset_probe();
         self.seeds.clear();
         self.end_contact();
         self.response.worst_residual = 0.0;
@@ -280,6 +291,7 @@ impl TissueLoop {
         }
         self.drop_line();
         self.drop_left();
+        self.drop_probe();
         self.leave_line();
         self.seeds.clear();
         self.response.seed_count = 0;
