@@ -9,6 +9,8 @@ pub mod dicom;
 pub mod dose;
 pub mod find_seeds;
 pub mod perturb;
+pub mod picture;
 pub mod plan;
 pub mod post_implant;
+pub mod scene;
 pub mod study;
