@@ -5,7 +5,7 @@ use egui::{Key, Modifiers};
 use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 26] = [
+pub const KEYS: [(&str, &str); 27] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
@@ -25,7 +25,8 @@ pub const KEYS: [(&str, &str); 26] = [
         "1 to 5",
         "look obliquely, from the perineum, the side, above, along the needle",
     ),
-    ("V", "all views, 3D alone, slices alone"),
+    ("V", "all views, 3D alone, slices alone, the probe"),
+    ("PgUp, PgDn", "probe 5 mm into the patient or out, where it is shown"),
     ("F", "slices follow the tip"),
     ("M", "measure between two clicks"),
     ("I", "isodose lines and surfaces"),
