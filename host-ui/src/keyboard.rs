@@ -5,7 +5,7 @@ use egui::{Key, Modifiers};
 use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 27] = [
+pub const KEYS: [(&str, &str); 28] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
@@ -26,7 +26,8 @@ pub const KEYS: [(&str, &str); 27] = [
         "1 to 5",
         "look obliquely, from the perineum, the side, above, along the needle",
     ),
-    ("V", "all views, 3D alone, slices alone"),
+    ("V", "all views, 3D alone, slices alone, the probe"),
+    ("PgUp, PgDn", "probe 5 mm into the patient or out, where it is shown"),
     ("F", "slices follow the tip"),
     ("M", "measure between two clicks"),
     ("I", "isodose lines and surfaces"),

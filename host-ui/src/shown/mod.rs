@@ -2,6 +2,7 @@
 
 mod bend;
 mod line;
+mod metal;
 mod parts;
 mod seeds;
 
