@@ -9,29 +9,22 @@ use crate::command::dose::DoseArgs;
 use crate::command::export::ExportArgs;
 use crate::command::find_seeds::FindSeedsArgs;
 use crate::command::perturb::PerturbArgs;
+use crate::command::picture::PictureArgs;
 use crate::command::plan::PlanArgs;
 use crate::command::post_implant::PostImplantArgs;
+use crate::command::record::RecordArgs;
+use crate::command::scene;
 use crate::command::study::StudyArgs;
 use clap::{CommandFactory, Parser, Subcommand};
-use std::path::{Path, PathBuf};
-use std::time::Duration;
-use stylet_base::format::printable;
+use std::path::PathBuf;
 use stylet_base::interrupt;
 use stylet_controllers as controller;
-use stylet_files as files;
 use stylet_host::core_args::CoreArgs;
 use stylet_host::record;
 use stylet_implant::procedure;
-use stylet_implant::readers::{SeedDefaults, read_seeds};
 use stylet_manual::ManualArgs;
 use stylet_shm_schema::service::Instance;
 use stylet_shm_schema::{MAX_LEFT_NEEDLES, ParameterChange};
-
-const SCENE_HELP: &str = concat!(
-    "A scene file is TOML. All fields but [volume] may be omitted; omitted fields are inferred from the name of the structure:\n\n",
-    include_str!("../../scenes/example.toml"),
-    "\nNames that are known follow TG-263: Prostate, PTV, CTV (targets), Urethra, Rectum, Bladder, PenileBulb, Bowel (spared), and so on."
-);
 
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
 ///
@@ -103,20 +96,7 @@ enum Task {
         seeds: u16,
     },
     /// Record every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
-    Record {
-        /// Name that rt-core was started under
-        #[arg(long, default_value = "main", value_parser = Instance::new)]
-        instance: Instance,
-        /// File to write
-        #[arg(long, value_name = "FILE.mcap")]
-        out: PathBuf,
-        /// Seconds to record [default: until interrupted or until rt-core ends]
-        #[arg(long, value_name = "S")]
-        duration: Option<f64>,
-        /// Snapshots of the gland per second, 0 to 60; the core sends 67 while the needle moves and 33 while it rests
-        #[arg(long, default_value_t = 20.0, value_name = "HZ")]
-        snapshot_rate: f64,
-    },
+    Record(RecordArgs),
     /// Serve needle, seeds, gland and state to 3D Slicer over OpenIGTLink, until interrupted; anyone who reaches the
     /// address can watch, for the protocol has no passwords
     Igtl {
@@ -154,6 +134,8 @@ enum Task {
     Dicom(Box<DicomArgs>),
     /// Make a plan for the scene that runs: needles through the template, seeds, their strength; or from a table of seeds
     Plan(PlanArgs),
+    /// The ultrasound of a probe, or a radiograph of a C-arm, of the scene that runs, as PNG
+    Picture(PictureArgs),
     /// Dose of seeds (TG-43U1) at points, in structures, or on a grid
     Dose(DoseArgs),
     /// Find the implanted seeds in a CT volume; seeds that touch are split
@@ -173,7 +155,7 @@ enum Task {
 #[derive(Subcommand, Debug)]
 enum SceneTask {
     /// Read a volume or a scene file and print what would be sent to rt-core
-    #[command(after_long_help = SCENE_HELP)]
+    #[command(after_long_help = scene::HELP)]
     Check {
         /// NIfTI-1, NRRD (also Slicer's .seg.nrrd), MetaImage, DICOM RT Structure Set, or a scene file (.toml)
         file: PathBuf,
@@ -213,26 +195,8 @@ impl Cli {
                 Ok(ended?)
             }
             Some(Task::Controllers) => Ok(controller::list()?),
-            Some(Task::Scene(SceneTask::Check { file, label })) => check(&file, label),
-            Some(Task::Record {
-                instance,
-                out,
-                duration,
-                snapshot_rate,
-            }) => {
-                let fits = duration.is_none_or(|s| s > 0.0 && s < 1e6) && (0.0..=60.0).contains(&snapshot_rate);
-                if !fits {
-                    return Err("--duration needs seconds above 0, --snapshot-rate 0 to 60 Hz".into());
-                }
-                let ended = record::run(&record::Options {
-                    instance: instance.clone(),
-                    out,
-                    duration: duration.map(Duration::from_secs_f64),
-                    snapshots_hz: snapshot_rate,
-                });
-                instance.sweep();
-                Ok(ended?)
-            }
+            Some(Task::Scene(SceneTask::Check { file, label })) => scene::check(&file, label),
+            Some(Task::Record(args)) => args.run(),
             Some(Task::Igtl {
                 instance,
                 listen,
@@ -269,6 +233,7 @@ impl Cli {
             Some(Task::PostImplant(args)) => args.run(),
             Some(Task::Compare(args)) => args.run(),
             Some(Task::Plan(args)) => args.run(),
+            Some(Task::Picture(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),
             Some(Task::Perturb(args)) => args.run(),
             Some(Task::Study(args)) => args.run(),
@@ -305,86 +270,4 @@ impl Cli {
             }
         }
     }
-}
-
-fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
-    let v = files::watched(file, |progress| files::read(file, label, progress))?;
-    println!("{}", printable(&v.name));
-    if files::scene::is_scene(file) {
-        check_scene_file(file)?;
-    }
-    for (label, voxels) in &v.voxels_per_label {
-        println!("  label {label}: {voxels} voxels");
-    }
-    let h_mm = v.spacing_m * 1e3;
-    println!(
-        "  sent as {} x {} x {} cells of {h_mm:.3} mm, {:.2} MiB",
-        v.dims[0],
-        v.dims[1],
-        v.dims[2],
-        v.cells.len() as f64 / f64::from(1 << 20)
-    );
-    println!(
-        "  tissue: {} elements, {:.2} cm3",
-        v.tissue_elements(),
-        v.tissue_elements() as f64 * (h_mm / 10.0).powi(3)
-    );
-    for t in &v.structures {
-        let cells = v.cells.iter().filter(|&&c| c == t.label).count();
-        println!(
-            "  {} (label {}, {:?}): {cells} elements, {:.2} cm3, {} kPa{}",
-            printable(&t.name),
-            t.label,
-            t.role,
-            cells as f64 * (h_mm / 10.0).powi(3),
-            t.material.young_pa / 1e3,
-            if t.material.fixed { ", fixed" } else { "" }
-        );
-    }
-    let p = v.patient.to_wire();
-    println!("  patient (RAS, mm) from scene:");
-    for r in 0..3 {
-        println!(
-            "    {:8.4} {:8.4} {:8.4}  {:9.3}",
-            p[3 * r],
-            p[3 * r + 1],
-            p[3 * r + 2],
-            p[9 + r] * 1e3
-        );
-    }
-    for warning in &v.warnings {
-        println!("  note: {}", printable(warning));
-    }
-    Ok(())
-}
-
-/// Prints what a scene file holds besides its volume; its plan is read.
-fn check_scene_file(file: &Path) -> Result<(), CommandError> {
-    let scene = files::scene::read(file)?;
-    let plan = scene
-        .plan
-        .as_ref()
-        .map(|plan| file.parent().unwrap_or(Path::new("")).join(plan));
-    if let Some(path) = plan.as_ref().filter(|p| files::scene::is_scene(p)) {
-        println!("  plan: {}, read when there is a scene", path.display());
-    } else if let Some(path) = plan {
-        let seeds = read_seeds(
-            &path,
-            SeedDefaults {
-                strength_u: Some(0.0),
-                ..SeedDefaults::default()
-            },
-        )?;
-        println!("  plan: {} seeds in {}", seeds.len(), path.display());
-    }
-    if let Some(named) = &scene.image {
-        let path = file.with_file_name(named);
-        let image = files::watched(&path, |progress| files::Image::read(&path, progress))?;
-        let [x, y, z] = image.dims;
-        println!("  image: {x} x {y} x {z} voxels in {}", path.display());
-    }
-    if let Some(device) = &scene.device {
-        println!("  device: {device}, for an rt-core that host-ui starts");
-    }
-    Ok(())
 }

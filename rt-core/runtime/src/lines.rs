@@ -60,6 +60,11 @@ impl LineBody {
         }))
     }
 
+    /// The same with tissue that is so many times as stiff as that of the scene.
+    pub fn of_stiffened(source: &SceneSource, factor: f64, tissue: TissueKind) -> Result<Option<Self>, NoLine> {
+        Self::of_source(&source.stiffened(factor)?, tissue)
+    }
+
     /// Solves for the line of a needle held like this, scene frame, across it as well where the needle `bends`. `goes_on` is asked between slices of work.
     pub fn prepare(
         &self,

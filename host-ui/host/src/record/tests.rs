@@ -171,6 +171,7 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
                 assert!(tick.tick != last.tick || **tick == last);
                 assert!(tick.tip_in_scene_m[2].is_sign_negative());
             }
+            Piece::Event(_) => panic!("no event was recorded"),
             Piece::Second(record) => {
                 kinds[6] += 1;
                 assert_eq!(**record, second_tick(record.tick));

@@ -2,6 +2,7 @@
 
 mod batches;
 mod commands;
+mod exercises;
 mod flight;
 mod line_archive;
 mod lines;

@@ -49,7 +49,21 @@ pub enum HapticOrder {
         /// Number of the request.
         ticket: Ticket,
     },
-    /// End the contact and clear peaks and counters.
+    /// An exercise: the device counts as lost, or no longer.
+    LoseDevice {
+        /// Number of the request.
+        ticket: Ticket,
+        /// From this tick on.
+        lost: bool,
+    },
+    /// An exercise: the body moves there, from where the scene has it, scene frame, m.
+    MoveBody {
+        /// Number of the request.
+        ticket: Ticket,
+        /// At the pace of a patient.
+        to_m: [f64; 3],
+    },
+    /// End the contact and clear peaks and counters, and take out what exercises put in.
     Reset {
         /// Number of the request.
         ticket: Ticket,

@@ -1,7 +1,7 @@
 //! The tissue tick, 200 Hz: newest pose → contact → held element → constraints → seeds → response → work ahead → snapshot.
 
 use crate::rt::arm::Armed;
-use crate::rt::clock::{self, Grid};
+use crate::rt::clock::{self, Grid, Wait};
 use crate::rt::contact::Contact;
 use crate::rt::exchange::{Notice, Ticket, TissueOrder};
 use crate::rt::layers_met::LayersMet;
@@ -69,6 +69,8 @@ pub struct TissueLoop {
     /// Present in a measurement.
     pub probe: Option<Box<Probe>>,
     period_s: f64,
+    /// When it wakes after whole periods of the clock.
+    pub phase_ns: u64,
 }
 
 /// Stages of this tick, as [`Probe`] times them.
@@ -109,6 +111,7 @@ impl TissueLoop {
             shown: snapshot::Shown::default(),
             probe: None,
             period_s,
+            phase_ns: 0,
         }
     }
 
@@ -155,23 +158,24 @@ impl TissueLoop {
         self.world
     }
 
-    /// Runs on the ideal grid until `stop`.
-    pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool) {
-        let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
-        let mut missed = 0;
+    /// Runs on the ideal grid until `stop`. Returns how often it slept.
+    pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool) -> u64 {
+        let mut grid = Grid::at_phase(clock::now_ns(), (self.period_s * 1e9).round() as u64, self.phase_ns);
+        let (mut missed, mut sleeps) = (0, 0);
         // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
         while !stop.load(Ordering::Acquire) {
-            let slept = clock::wait_until(grid.due_ns, 0);
+            sleeps += Wait::default().until(grid.due_ns);
             let woke_ns = clock::now_ns();
             self.response.worst_wake_ns = self.response.worst_wake_ns.max(woke_ns.saturating_sub(grid.due_ns));
             self.tick(woke_ns);
             if let Some(probe) = &mut self.probe {
-                probe.finish(grid.due_ns, woke_ns, missed, slept);
+                probe.finish(grid.due_ns, woke_ns, missed);
             }
             missed = grid.advance(clock::now_ns());
             self.response.missed += u64::from(missed);
         }
         self.hand_over_tape();
+        sleeps
     }
 
     /// One tick; in the order of the data.

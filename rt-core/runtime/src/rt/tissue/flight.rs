@@ -38,6 +38,7 @@ impl TissueLoop {
             response,
             probe: _,
             period_s: _,
+            phase_ns: _,
         } = self;
         to.seeds.clear();
         to.seeds.extend_from_slice(seeds);
