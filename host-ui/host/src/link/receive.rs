@@ -48,6 +48,8 @@ pub struct Latest {
     pub parameters: PerSession<ParametersInForce>,
     pub plan: PerSession<PlanInForce>,
     pub relayed: Option<Relayed>,
+    /// With when it came.
+    pub class: Option<(Instant, Box<Class>)>,
     pub events: VecDeque<Event>,
     early_events: VecDeque<Event>,
     /// Numbers that are missing among the events of this run.
@@ -117,6 +119,7 @@ impl Link {
             self.latest.parameters.put(id, p.session_id, p);
         }
         self.latest.relayed = inbox.relayed.or(self.latest.relayed);
+        self.latest.class = inbox.class.or(self.latest.class.take());
         if let Some(p) = inbox.plan {
             self.latest.plan.put(id, p.session_id, p);
         }
@@ -129,13 +132,9 @@ impl Link {
         for (id, why) in inbox.unsent {
             self.put_answer(id, Answer::unsent(why));
         }
-        match self.records.is_empty() {
-            true => self.records = inbox.records,
-            false => self.records.extend(inbox.records),
-        }
-        // A host that never takes them must not grow.
-        let beyond = self.records.len().saturating_sub(RECORDS_KEPT);
-        self.records.drain(..beyond);
+        self.second_state = inbox.second_state.or(self.second_state);
+        join(&mut self.records, inbox.records);
+        join(&mut self.second_records, inbox.second_records);
     }
 
     fn begin_session(&mut self, session: Session) {
@@ -143,6 +142,8 @@ impl Link {
         self.answers.clear();
         self.rehearsals.clear();
         self.records.clear();
+        self.second_state = None;
+        self.second_records.clear();
         self.latest.begin(session);
     }
 
@@ -172,4 +173,14 @@ impl Link {
             self.answers.pop_first();
         }
     }
+}
+
+/// Records behind those that wait. A host that never takes them must not grow.
+fn join<T>(held: &mut VecDeque<T>, new: VecDeque<T>) {
+    match held.is_empty() {
+        true => *held = new,
+        false => held.extend(new),
+    }
+    let beyond = held.len().saturating_sub(RECORDS_KEPT);
+    held.drain(..beyond);
 }

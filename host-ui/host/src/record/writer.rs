@@ -4,15 +4,18 @@ use super::error::RecordError;
 use super::gaps::{Gap, Gaps};
 use super::messages::{self, Channel, EVENT, GLAND, TICK, TISSUE, Tick};
 use super::scene::{self, FIELD, SCENE};
+use super::second::{SECOND, second};
 use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
 use crate::link::{SceneModel, Snapshot};
 use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Seek, Write};
 use std::path::Path;
+use std::process::ChildStdin;
 use std::sync::{Arc, mpsc};
-use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, Session, TickRecord};
+use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
 
 /// A recording cut off by a crash lacks the last chunk at most: about two seconds.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -25,6 +28,7 @@ const GAPS_PRINTED: usize = 10;
 pub enum Item {
     Session(Box<Session>),
     Records(Vec<TickRecord>),
+    SecondRecords(Vec<SecondRecord>),
     Event(Box<Event>),
     Scene(Arc<SceneModel>),
     Plan(Box<PlanInForce>),
@@ -44,6 +48,8 @@ pub enum Item {
 #[derive(Default)]
 pub struct Totals {
     pub gaps: Gaps,
+    /// Of the second device's ticks.
+    pub second: Gaps,
     pub events: Gaps,
     pub snapshots: u64,
     pub snapshots_left_out: u64,
@@ -56,8 +62,15 @@ pub struct Totals {
 
 impl Totals {
     pub fn words(&self) -> String {
+        let second = match self.second.records() {
+            0 => String::new(),
+            ticks => format!(
+                "{ticks} ticks of the second device, {} missing; ",
+                self.second.missing()
+            ),
+        };
         format!(
-            "{} ticks of {} session(s), {} missing in {} gaps, {} of them lost in the core; {} events, {} missing; \
+            "{} ticks of {} session(s), {} missing in {} gaps, {} of them lost in the core; {second}{} events, {} missing; \
              {} snapshots kept, {} left out, none for {:.1} s in {} gaps; {:.1} MB",
             self.gaps.records(),
             self.gaps.sessions(),
@@ -86,10 +99,14 @@ impl Totals {
             };
             (!first.is_empty()).then(|| format!("missing {what}: {}{more}", first.join(", ")))
         };
-        [("ticks", &self.gaps), ("events", &self.events)]
-            .into_iter()
-            .filter_map(line)
-            .collect()
+        [
+            ("ticks", &self.gaps),
+            ("ticks of the second device", &self.second),
+            ("events", &self.events),
+        ]
+        .into_iter()
+        .filter_map(line)
+        .collect()
     }
 
     fn metadata(&self) -> BTreeMap<String, String> {
@@ -100,6 +117,9 @@ impl Totals {
             ("gaps_listed", listed_gaps(&self.gaps)),
             ("ticks_repeated", self.gaps.repeated().to_string()),
             ("records_lost_in_core", self.lost_in_core.to_string()),
+            ("second_ticks", self.second.records().to_string()),
+            ("second_ticks_missing", self.second.missing().to_string()),
+            ("second_gaps_listed", listed_gaps(&self.second)),
             ("sessions", self.gaps.sessions().to_string()),
             ("events", self.events.records().to_string()),
             ("events_missing", self.events.missing().to_string()),
@@ -121,7 +141,7 @@ fn listed_gaps(gaps: &Gaps) -> String {
 }
 
 /// By their places here.
-const CHANNELS: [&Channel; 10] = [
+const CHANNELS: [&Channel; 11] = [
     &TICK,
     &EVENT,
     &TISSUE,
@@ -132,10 +152,11 @@ const CHANNELS: [&Channel; 10] = [
     &STATE,
     &FIELD,
     &SESSION,
+    &SECOND,
 ];
 
-struct Writer {
-    file: mcap::Writer<BufWriter<File>>,
+struct Writer<W: Write + Seek> {
+    file: mcap::Writer<W>,
     channels: [u16; CHANNELS.len()],
     sequences: [u32; CHANNELS.len()],
     /// `CLOCK_MONOTONIC` of the newest message that has a time of its own.
@@ -150,20 +171,38 @@ pub fn write_all(path: &Path, from: &mpsc::Receiver<Item>) -> Result<Totals, Rec
     let failed = |e: mcap::McapError| RecordError::of_file(path, e);
     let file =
         File::create(path).map_err(|e| RecordError::of_file(path, format!("{e}; choose another file with --out")))?;
-    let mut writer = Writer::new(file).map_err(failed)?;
+    let packed = mcap::WriteOptions::new()
+        .compression(Some(mcap::Compression::Zstd))
+        .chunk_size(Some(CHUNK_BYTES));
+    let mut writer = Writer::new(packed, BufWriter::new(file)).map_err(failed)?;
     for item in from {
         writer.item(item).map_err(failed)?;
     }
-    writer.finish(path).map_err(failed)
+    let mut totals = writer.finish().map_err(failed)?;
+    totals.bytes = std::fs::metadata(path).map_or(0, |m| m.len());
+    Ok(totals)
 }
 
-impl Writer {
-    fn new(file: File) -> mcap::McapResult<Self> {
-        let mut file = mcap::WriteOptions::new()
-            .compression(Some(mcap::Compression::Zstd))
-            .chunk_size(Some(CHUNK_BYTES))
+/// The same to a program that shows it, message by message.
+pub fn send_all(program: ChildStdin, from: &mpsc::Receiver<Item>) -> Result<Totals, RecordError> {
+    let failed = |e: mcap::McapError| RecordError::Live(format!("it ended, or reads no more: {e}"));
+    let plain = mcap::WriteOptions::new()
+        .compression(None)
+        .use_chunks(false)
+        .disable_seeking(true);
+    let mut writer = Writer::new(plain, NoSeek::new(BufWriter::new(program))).map_err(failed)?;
+    for item in from {
+        writer.item(item).map_err(failed)?;
+        writer.file.flush().map_err(failed)?;
+    }
+    writer.finish().map_err(failed)
+}
+
+impl<W: Write + Seek> Writer<W> {
+    fn new(options: mcap::WriteOptions, to: W) -> mcap::McapResult<Self> {
+        let mut file = options
             .library(concat!("stylet ", env!("CARGO_PKG_VERSION")))
-            .create(BufWriter::new(file))?;
+            .create(to)?;
         let mut channels = [0; CHANNELS.len()];
         for (id, channel) in channels.iter_mut().zip(CHANNELS) {
             let Channel { topic, schema, text } = channel;
@@ -188,6 +227,13 @@ impl Writer {
                     if self.totals.gaps.record(record.session_id, record.tick) {
                         let time_ns = record.due_ns + record.wake_latency_ns;
                         self.message(0, time_ns, &serde_json::to_vec(&Tick::from(record)).unwrap_or_default())?;
+                    }
+                }
+            }
+            Item::SecondRecords(records) => {
+                for record in &records {
+                    if self.totals.second.record(record.session_id, record.tick) {
+                        self.message(10, record.due_ns + record.wake_latency_ns, &second(record))?;
                     }
                 }
             }
@@ -243,6 +289,7 @@ impl Writer {
             ("session_id", session.session_id.to_string()),
             ("version", session.version.read()),
             ("device", session.device.read()),
+            ("second_device", session.second_device.read()),
             ("period_ns", session.period_ns.to_string()),
             ("tissue_period_ns", session.tissue_period_ns.to_string()),
             ("started_ns", session.started_ns.to_string()),
@@ -255,13 +302,12 @@ impl Writer {
         })
     }
 
-    fn finish(mut self, path: &Path) -> mcap::McapResult<Totals> {
+    fn finish(mut self) -> mcap::McapResult<Totals> {
         self.file.write_metadata(&Metadata {
             name: "stylet.totals".to_owned(),
             metadata: self.totals.metadata(),
         })?;
         self.file.finish()?;
-        self.totals.bytes = std::fs::metadata(path).map_or(0, |m| m.len());
         Ok(self.totals)
     }
 }
