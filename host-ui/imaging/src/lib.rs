@@ -10,6 +10,7 @@ pub mod fluoroscopy;
 mod gpu;
 mod tissue;
 pub mod ultrasound;
+pub mod xray;
 
 pub use body::{Body, Metal, NEEDLE_RADIUS_M, Needle, SEED_LENGTH_M, SEED_RADIUS_M, Seed};
 pub use gpu::{Gpu, NoGpu};

@@ -1,6 +1,6 @@
 //! What tissues are for sound and X-rays: how bright, how much they take, and what they reflect where they meet.
 
-use crate::fluoroscopy::{BONE_PER_M, SOFT_PER_M};
+use crate::xray::{BONE_PER_M, SOFT_PER_M};
 use stylet_anatomy::{Organ, Part};
 use stylet_shm_schema::{StructureInfo, role};
 
@@ -23,7 +23,7 @@ pub struct Tissue {
 impl Tissue {
     /// Water or jelly around the probe and in the bladder: next to no echo and no loss.
     pub const COUPLING: Self = Self::new(0.0, 0.0, 1.52);
-    /// Prostate and every soft tissue that is not told apart: 0.5 dB per cm and MHz, as scanners assume.
+    /// Prostate and every soft tissue without a row of its own: 0.5 dB per cm and MHz, as scanners assume.
     pub const SOFT: Self = Self::new(0.40, 0.5, 1.63);
     /// Gas: nothing is seen behind it.
     pub const GAS: Self = Self::new(0.0, 25.0, 0.04).with_xray(0.0);

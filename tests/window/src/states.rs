@@ -77,6 +77,9 @@ fn planned_state_is_in_place_and_as_it_was() {
         driven.press(Key::V);
         assert_in_place(&mut driven, &format!("slices, light, {name}"));
         driven.picture(&format!("slices-light-{name}"));
+        driven.press(Key::V);
+        assert_in_place(&mut driven, &format!("probe, light, {name}"));
+        driven.picture(&format!("probe-light-{name}"));
     }
 }
 

@@ -1,7 +1,8 @@
 //! What rays lose in seeds and needles: the length of their way through cylinders, in closed form.
 
-use super::{CArm, SILVER_PER_M, SOFT_PER_M, STEEL_PER_M, TITANIUM_PER_M};
+use super::CArm;
 use crate::body::{Metal, NEEDLE_RADIUS_M, SEED_LENGTH_M, SEED_RADIUS_M};
+use crate::xray::{SILVER_PER_M, SOFT_PER_M, STEEL_PER_M, TITANIUM_PER_M};
 use nalgebra::Vector3;
 
 /// Wall of a seed, and how thick its welded ends are, m: as a 6711.

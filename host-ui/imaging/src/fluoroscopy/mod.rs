@@ -3,11 +3,9 @@
 mod arm;
 mod exposure;
 mod metal;
-mod xray;
 
 pub use arm::CArm;
 pub use exposure::{DoseCounter, Exposure};
-pub use xray::{Attenuation, BONE_PER_M, SILVER_PER_M, SOFT_PER_M, STEEL_PER_M, TITANIUM_PER_M};
 
 use crate::body::{Body, Metal};
 use crate::gpu::{Gpu, READ, SAMPLER, UNIFORM, VOLUME, WRITE};

@@ -3,6 +3,7 @@
 use super::metal::{CORE_LENGTH_M, CORE_RADIUS_M, WALL_M, WELD_M};
 use super::*;
 use crate::body::{NEEDLE_RADIUS_M, SEED_LENGTH_M, SEED_RADIUS_M};
+use crate::xray::{Attenuation, BONE_PER_M, SILVER_PER_M, SOFT_PER_M, STEEL_PER_M, TITANIUM_PER_M};
 use crate::{Needle, Seed, Tissue};
 use nalgebra::{Matrix3, Vector2};
 use stylet_shm_schema::GridInfo;
