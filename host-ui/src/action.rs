@@ -46,6 +46,8 @@ pub enum Action {
     ToggleClass,
     /// Asks the relay for the needle, or hands it over.
     Lease(LeaseRequest),
+    /// Shows or hides the instructor's dialog.
+    ToggleInstructor,
     ToggleHelp,
     ResetView,
     LookFrom(Viewpoint),

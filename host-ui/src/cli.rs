@@ -6,31 +6,25 @@ use crate::command::compare::CompareArgs;
 use crate::command::convert::ConvertArgs;
 use crate::command::dicom::DicomArgs;
 use crate::command::dose::DoseArgs;
+use crate::command::export::ExportArgs;
 use crate::command::find_seeds::FindSeedsArgs;
 use crate::command::perturb::PerturbArgs;
+use crate::command::picture::PictureArgs;
 use crate::command::plan::PlanArgs;
 use crate::command::post_implant::PostImplantArgs;
 use crate::command::record::RecordArgs;
+use crate::command::scene;
 use crate::command::study::StudyArgs;
 use clap::{CommandFactory, Parser, Subcommand};
-use std::path::{Path, PathBuf};
-use stylet_base::format::printable;
+use std::path::PathBuf;
 use stylet_base::interrupt;
 use stylet_controllers as controller;
-use stylet_files as files;
 use stylet_host::core_args::CoreArgs;
 use stylet_host::record;
 use stylet_implant::procedure;
-use stylet_implant::readers::{SeedDefaults, read_seeds};
 use stylet_manual::ManualArgs;
 use stylet_shm_schema::service::Instance;
 use stylet_shm_schema::{MAX_LEFT_NEEDLES, ParameterChange};
-
-const SCENE_HELP: &str = concat!(
-    "A scene file is TOML. All fields but [volume] may be omitted; omitted fields are inferred from the name of the structure:\n\n",
-    include_str!("../../scenes/example.toml"),
-    "\nNames that are known follow TG-263: Prostate, PTV, CTV (targets), Urethra, Rectum, Bladder, PenileBulb, Bowel (spared), and so on."
-);
 
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
 ///
@@ -124,16 +118,7 @@ enum Task {
         hand_speed: f64,
     },
     /// Convert a recording into a table, or into a motion for rt-core's replay device
-    Export {
-        /// Recording made by 'host-ui record'
-        recording: PathBuf,
-        /// Table with one row per tick
-        #[arg(long, value_name = "FILE.csv", required_unless_present = "motion")]
-        csv: Option<PathBuf>,
-        /// The hand's motion, for 'rt-core --device replay:FILE'
-        #[arg(long, value_name = "FILE")]
-        motion: Option<PathBuf>,
-    },
+    Export(ExportArgs),
     /// Let rt-core write its flight recording: the last seconds of both loops, for 'rt-core replay'
     Flight {
         /// Name that rt-core was started under
@@ -149,6 +134,8 @@ enum Task {
     Dicom(Box<DicomArgs>),
     /// Make a plan for the scene that runs: needles through the template, seeds, their strength; or from a table of seeds
     Plan(PlanArgs),
+    /// The ultrasound of a probe, or a radiograph of a C-arm, of the scene that runs, as PNG
+    Picture(PictureArgs),
     /// Dose of seeds (TG-43U1) at points, in structures, or on a grid
     Dose(DoseArgs),
     /// Find the implanted seeds in a CT volume; seeds that touch are split
@@ -168,7 +155,7 @@ enum Task {
 #[derive(Subcommand, Debug)]
 enum SceneTask {
     /// Read a volume or a scene file and print what would be sent to rt-core
-    #[command(after_long_help = SCENE_HELP)]
+    #[command(after_long_help = scene::HELP)]
     Check {
         /// NIfTI-1, NRRD (also Slicer's .seg.nrrd), MetaImage, DICOM RT Structure Set, or a scene file (.toml)
         file: PathBuf,
@@ -208,7 +195,7 @@ impl Cli {
                 Ok(ended?)
             }
             Some(Task::Controllers) => Ok(controller::list()?),
-            Some(Task::Scene(SceneTask::Check { file, label })) => check(&file, label),
+            Some(Task::Scene(SceneTask::Check { file, label })) => scene::check(&file, label),
             Some(Task::Record(args)) => args.run(),
             Some(Task::Igtl {
                 instance,
@@ -235,9 +222,7 @@ impl Cli {
                 instance.sweep();
                 Ok(ended?)
             }
-            Some(Task::Export { recording, csv, motion }) => {
-                Ok(record::export(&record::Export { recording, csv, motion })?)
-            }
+            Some(Task::Export(args)) => Ok(args.run()?),
             Some(Task::Flight { instance }) => {
                 println!("written: {}", record::save_flight(&instance)?);
                 Ok(())
@@ -248,6 +233,7 @@ impl Cli {
             Some(Task::PostImplant(args)) => args.run(),
             Some(Task::Compare(args)) => args.run(),
             Some(Task::Plan(args)) => args.run(),
+            Some(Task::Picture(args)) => args.run(),
             Some(Task::Dose(args)) => args.run(),
             Some(Task::Perturb(args)) => args.run(),
             Some(Task::Study(args)) => args.run(),
@@ -284,86 +270,4 @@ impl Cli {
             }
         }
     }
-}
-
-fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
-    let v = files::watched(file, |progress| files::read(file, label, progress))?;
-    println!("{}", printable(&v.name));
-    if files::scene::is_scene(file) {
-        check_scene_file(file)?;
-    }
-    for (label, voxels) in &v.voxels_per_label {
-        println!("  label {label}: {voxels} voxels");
-    }
-    let h_mm = v.spacing_m * 1e3;
-    println!(
-        "  sent as {} x {} x {} cells of {h_mm:.3} mm, {:.2} MiB",
-        v.dims[0],
-        v.dims[1],
-        v.dims[2],
-        v.cells.len() as f64 / f64::from(1 << 20)
-    );
-    println!(
-        "  tissue: {} elements, {:.2} cm3",
-        v.tissue_elements(),
-        v.tissue_elements() as f64 * (h_mm / 10.0).powi(3)
-    );
-    for t in &v.structures {
-        let cells = v.cells.iter().filter(|&&c| c == t.label).count();
-        println!(
-            "  {} (label {}, {:?}): {cells} elements, {:.2} cm3, {} kPa{}",
-            printable(&t.name),
-            t.label,
-            t.role,
-            cells as f64 * (h_mm / 10.0).powi(3),
-            t.material.young_pa / 1e3,
-            if t.material.fixed { ", fixed" } else { "" }
-        );
-    }
-    let p = v.patient.to_wire();
-    println!("  patient (RAS, mm) from scene:");
-    for r in 0..3 {
-        println!(
-            "    {:8.4} {:8.4} {:8.4}  {:9.3}",
-            p[3 * r],
-            p[3 * r + 1],
-            p[3 * r + 2],
-            p[9 + r] * 1e3
-        );
-    }
-    for warning in &v.warnings {
-        println!("  note: {}", printable(warning));
-    }
-    Ok(())
-}
-
-/// Prints what a scene file holds besides its volume; its plan is read.
-fn check_scene_file(file: &Path) -> Result<(), CommandError> {
-    let scene = files::scene::read(file)?;
-    let plan = scene
-        .plan
-        .as_ref()
-        .map(|plan| file.parent().unwrap_or(Path::new("")).join(plan));
-    if let Some(path) = plan.as_ref().filter(|p| files::scene::is_scene(p)) {
-        println!("  plan: {}, read when there is a scene", path.display());
-    } else if let Some(path) = plan {
-        let seeds = read_seeds(
-            &path,
-            SeedDefaults {
-                strength_u: Some(0.0),
-                ..SeedDefaults::default()
-            },
-        )?;
-        println!("  plan: {} seeds in {}", seeds.len(), path.display());
-    }
-    if let Some(named) = &scene.image {
-        let path = file.with_file_name(named);
-        let image = files::watched(&path, |progress| files::Image::read(&path, progress))?;
-        let [x, y, z] = image.dims;
-        println!("  image: {x} x {y} x {z} voxels in {}", path.display());
-    }
-    if let Some(device) = &scene.device {
-        println!("  device: {device}, for an rt-core that host-ui starts");
-    }
-    Ok(())
 }

@@ -5,7 +5,7 @@ use egui::{Key, Modifiers};
 use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 26] = [
+pub const KEYS: [(&str, &str); 28] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
@@ -20,12 +20,14 @@ pub const KEYS: [(&str, &str); 26] = [
     ("E", "force on; after a fault: re-arm"),
     ("D", "force off"),
     ("P", "parameters"),
+    ("K", "mark this moment; put in exercises"),
     ("R", "reset the view"),
     (
         "1 to 5",
         "look obliquely, from the perineum, the side, above, along the needle",
     ),
-    ("V", "all views, 3D alone, slices alone"),
+    ("V", "all views, 3D alone, slices alone, the probe"),
+    ("PgUp, PgDn", "probe 5 mm into the patient or out, where it is shown"),
     ("F", "slices follow the tip"),
     ("M", "measure between two clicks"),
     ("I", "isodose lines and surfaces"),
@@ -91,6 +93,7 @@ pub fn read(ctx: &egui::Context) -> Keys {
         (Modifiers::NONE, Key::E, Action::Send(Request::Engage)),
         (Modifiers::NONE, Key::D, Action::Send(Request::Disengage)),
         (Modifiers::NONE, Key::P, Action::OpenParameters),
+        (Modifiers::NONE, Key::K, Action::ToggleInstructor),
         (Modifiers::NONE, Key::R, Action::ResetView),
     ];
     ctx.input_mut(|i| {

@@ -67,13 +67,15 @@ impl Pictures {
     }
 }
 
+/// The bytes of a PNG file; four bytes for each pixel.
+pub fn png_of(rgba: Vec<u8>, [width, height]: [u32; 2]) -> Result<Vec<u8>, PictureError> {
+    let icon = IconData { rgba, width, height };
+    icon.to_png_bytes().map_err(PictureError::Encode)
+}
+
 fn save(image: &ColorImage, folder: &Path) -> Saved {
-    let icon = IconData {
-        rgba: image.pixels.iter().flat_map(|p| p.to_array()).collect(),
-        width: image.size[0] as u32,
-        height: image.size[1] as u32,
-    };
-    let png = icon.to_png_bytes().map_err(PictureError::Encode)?;
+    let rgba = image.pixels.iter().flat_map(|p| p.to_array()).collect();
+    let png = png_of(rgba, image.size.map(|side| side as u32))?;
     std::fs::create_dir_all(folder).map_err(PictureError::Folder)?;
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let path = folder.join(format!("stylet-{}.png", now.as_millis()));

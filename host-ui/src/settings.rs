@@ -26,16 +26,19 @@ pub enum Layout {
     Quad,
     Solid,
     Slices,
+    /// What the ultrasound probe sees.
+    Probe,
 }
 
 impl Layout {
-    pub const ALL: [Self; 3] = [Self::Quad, Self::Solid, Self::Slices];
+    pub const ALL: [Self; 4] = [Self::Quad, Self::Solid, Self::Slices, Self::Probe];
 
     pub fn name(self) -> &'static str {
         match self {
             Self::Quad => "All views",
             Self::Solid => "3D",
             Self::Slices => "Slices",
+            Self::Probe => "Probe",
         }
     }
 
@@ -43,7 +46,8 @@ impl Layout {
         match self {
             Self::Quad => Self::Solid,
             Self::Solid => Self::Slices,
-            Self::Slices => Self::Quad,
+            Self::Slices => Self::Probe,
+            Self::Probe => Self::Quad,
         }
     }
 }

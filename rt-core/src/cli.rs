@@ -13,7 +13,7 @@ use stylet_lab::fleet::FleetArgs;
 use stylet_lab::load::LoadProcess;
 use stylet_lab::verify::VerifyArgs;
 use stylet_manual::ManualArgs;
-use stylet_runtime::args::{OptionsError, RealTimeArgs, scenes};
+use stylet_runtime::args::{OptionsError, RealTimeArgs, SecondArgs, scenes};
 use stylet_runtime::device::{self, DeviceChoice, Libraries};
 use stylet_runtime::process::Options;
 use stylet_shm_schema::BUILTIN_SCENES;
@@ -75,6 +75,9 @@ pub enum Task {
     Load {
         /// What to do
         work: LoadProcess,
+        /// Core on which to do it
+        #[arg(long)]
+        core: Option<usize>,
         /// Instance under measurement
         #[arg(long)]
         instance: String,
@@ -104,6 +107,8 @@ pub struct RunArgs {
     // The table of back ends has the help.
     #[arg(long, default_value = "simulated", value_name = "DEVICE", help = device::help())]
     device: DeviceChoice,
+    #[command(flatten)]
+    second: SecondArgs,
     /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
     #[arg(long, value_name = "PATH")]
     libhd: Option<PathBuf>,
@@ -130,6 +135,7 @@ impl RunArgs {
         let mut options = self.real_time.options(&self.instance)?;
         options.tissue = self.tissue;
         options.device = self.device.clone();
+        options.second = self.second.options()?;
         options.libraries =
             Libraries::or_of_environment(self.libhd.as_deref(), self.libdrd.as_deref(), self.haply_url.as_deref());
         if let Some(folder) = &self.flight_dir {

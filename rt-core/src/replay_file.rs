@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use stylet_runtime::replay::file::{Flight, FlightError};
 use stylet_runtime::replay::lines::{self, LinesAgain};
 use stylet_runtime::replay::repeat::{self, RepeatError, Repeated};
+use stylet_runtime::replay::second::second;
 use stylet_runtime::rt::arm::{self, Ask, Refused};
 use stylet_runtime::rt::haptic_tape::HapticFlight;
 use stylet_runtime::rt::tissue_tape::TissueFlight;
@@ -61,7 +62,8 @@ impl Replay {
             print_tissue(recorded);
             repeat::tissue(&flight, recorded, again)
         });
-        Ok(forces_are_same & print_result("tissue", tissue.transpose()?.as_ref()))
+        let tissue_is_same = print_result("tissue", tissue.transpose()?.as_ref());
+        Ok(forces_are_same & tissue_is_same & repeat_second(&flight))
     }
 }
 
@@ -77,6 +79,42 @@ fn solve_again(flight: &Flight, recorded: &TissueFlight) -> Result<LinesAgain, R
             );
         }
     })
+}
+
+/// True as well where the run had no second device.
+fn repeat_second(flight: &Flight) -> bool {
+    let Some(figures) = &flight.second_device else {
+        return true;
+    };
+    println!("second   {}", figures.device_name);
+    let again = flight.second.as_ref().map(|recorded| {
+        let peak_n = recorded
+            .ticks
+            .iter()
+            .map(|e| e.record.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt());
+        let missed: u64 = recorded.ticks.iter().map(|e| u64::from(e.record.missed)).sum();
+        println!(
+            "         {} ticks, peak force {:.3} N, {missed} deadlines missed, {} orders",
+            recorded.ticks.len(),
+            peak_n.fold(0.0, f64::max),
+            recorded.orders.len()
+        );
+        print_faults(recorded.ticks.iter().map(|e| (e.record.tick, e.record.fault)));
+        second(flight, recorded)
+    });
+    print_result("second", again.as_ref())
+}
+
+/// Each change of the fault, with its tick.
+fn print_faults(ticks: impl Iterator<Item = (u64, u32)>) {
+    let mut before = 0;
+    for (tick, fault) in ticks {
+        if fault != before {
+            let text = Fault::from_number(fault).map_or("a fault that is not known", Fault::message);
+            println!("         tick {tick}: {text}");
+        }
+        before = fault;
+    }
 }
 
 fn print_haptic(recorded: &HapticFlight) {
@@ -109,14 +147,7 @@ fn print_haptic(recorded: &HapticFlight) {
             recorded.ticks.len()
         );
     }
-    let mut before = None;
-    for record in records {
-        if before.is_some_and(|fault| fault != record.fault) || (before.is_none() && record.fault != 0) {
-            let text = Fault::from_number(record.fault).map_or("a fault that is not known", Fault::message);
-            println!("         tick {}: {text}", record.tick);
-        }
-        before = Some(record.fault);
-    }
+    print_faults(records.map(|record| (record.tick, record.fault)));
 }
 
 fn print_tissue(recorded: &TissueFlight) {

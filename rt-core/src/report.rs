@@ -3,11 +3,14 @@
 use serde::Serialize;
 use stylet_runtime::process::{LoopReport, RunReport};
 
-/// Both loops.
+/// Every loop.
 #[derive(Serialize)]
 pub struct Report {
     haptic: Loop,
     tissue: Loop,
+    /// Of a run with a second device.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    second: Option<Loop>,
 }
 
 #[derive(Serialize)]
@@ -33,6 +36,7 @@ impl From<&RunReport> for Report {
         Self {
             haptic: (&run.haptic).into(),
             tissue: (&run.tissue).into(),
+            second: run.second.as_ref().map(Loop::from),
         }
     }
 }

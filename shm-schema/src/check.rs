@@ -1,8 +1,8 @@
 //! What a reader verifies before it uses a value that came out of shared memory.
 
 use crate::{
-    GridInfo, HapticState, MAX_LABEL_CELLS, MAX_NODES, MAX_SEEDS, MAX_STRUCTURES, ParametersInForce, PlanInForce,
-    Rehearsal, SceneHeader, SeedPose, SnapshotHeader, TickRecord, Vertex,
+    GridInfo, HapticState, MAX_LABEL_CELLS, MAX_NODES, MAX_SEEDS, MAX_STRUCTURES, MOST_MOVED_M, ParametersInForce,
+    PlanInForce, Rehearsal, SceneHeader, SecondRecord, SecondState, SeedPose, SnapshotHeader, TickRecord, Vertex,
 };
 
 /// What is invalid in a value.
@@ -56,8 +56,51 @@ pub fn record(r: &TickRecord) -> Result<(), Invalid> {
     ensure(within(&[r.speed_m_per_s], MAX_SPEED_M_PER_S), "speed")?;
     ensure(within(&r.force_terms_n, 1e4), "force terms")?;
     ensure(within(&r.world_from_tool, 1.001), "orientation")?;
+    took(r.wake_latency_ns, r.work_ns)
+}
+
+/// Verifies a state of the second device.
+pub fn second_state(s: &SecondState) -> Result<(), Invalid> {
+    second_motion(
+        &s.tip_in_scene_m,
+        &s.world_from_tool,
+        &s.force_on_hand_n,
+        &s.torque_on_hand_nm,
+    )?;
     ensure(
-        r.wake_latency_ns < 3_600_000_000_000 && r.work_ns < 3_600_000_000_000,
+        within(&[s.peak_force_n, s.force_scale, s.device_limit_n], MAX_FORCE_N),
+        "force limits",
+    )?;
+    ensure(within(&[s.energy_j, s.warmth_n], 1e4), "gate figures")
+}
+
+/// Verifies one record of a tick of the second device.
+pub fn second_record(r: &SecondRecord) -> Result<(), Invalid> {
+    second_motion(
+        &r.tip_in_scene_m,
+        &r.world_from_tool,
+        &r.force_on_hand_n,
+        &r.torque_on_hand_nm,
+    )?;
+    ensure(within(&[r.contact_force_n], 1e4), "force of the contact")?;
+    took(r.wake_latency_ns, r.work_ns)
+}
+
+fn second_motion(
+    tip_m: &[f64; 3],
+    world_from_tool: &[f64; 4],
+    force_n: &[f64; 3],
+    torque_nm: &[f64; 3],
+) -> Result<(), Invalid> {
+    ensure(within(tip_m, MAX_COORDINATE_M), "tip position")?;
+    ensure(within(world_from_tool, 1.001), "orientation")?;
+    ensure(within(force_n, MAX_FORCE_N), "force")?;
+    ensure(within(torque_nm, MAX_FORCE_N), "torque")
+}
+
+fn took(wake_latency_ns: u64, work_ns: u64) -> Result<(), Invalid> {
+    ensure(
+        wake_latency_ns < 3_600_000_000_000 && work_ns < 3_600_000_000_000,
         "timing",
     )
 }
@@ -70,6 +113,7 @@ pub fn snapshot(h: &SnapshotHeader, vertices: &[Vertex]) -> Result<(), Invalid> 
     ensure(within(&h.tip_in_scene_m, MAX_COORDINATE_M), "tip position")?;
     ensure(within(&h.needle_direction, 1.001), "needle direction")?;
     ensure(within(&h.held_in_scene_m, MAX_COORDINATE_M), "held position")?;
+    ensure(within(&h.body_moved_m, MOST_MOVED_M), "place of the body")?;
     ensure(h.residual.is_finite() && h.max_displacement_m.is_finite(), "residual")?;
     seeds(&h.seeds[..h.seed_count as usize])?;
     let limit = MAX_COORDINATE_M as f32;
@@ -183,6 +227,10 @@ mod tests {
         assert!(state(&s).is_err());
         let r: TickRecord = bytemuck::pod_read_unaligned(&ones(size_of::<TickRecord>()));
         assert!(record(&r).is_err());
+        let s: SecondState = bytemuck::pod_read_unaligned(&ones(size_of::<SecondState>()));
+        assert!(second_state(&s).is_err() && second_state(&SecondState::zeroed()).is_ok());
+        let r: SecondRecord = bytemuck::pod_read_unaligned(&ones(size_of::<SecondRecord>()));
+        assert!(second_record(&r).is_err() && second_record(&SecondRecord::zeroed()).is_ok());
         let r: Rehearsal = bytemuck::pod_read_unaligned(&ones(size_of::<Rehearsal>()));
         assert!(rehearsal(&r).is_err());
         let mut r = Rehearsal::zeroed();

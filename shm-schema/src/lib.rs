@@ -5,6 +5,8 @@
 //! | `session` | publish-subscribe, newest one kept | bridge | hosts | [`Session`]: which run this is, what the kernel granted |
 //! | `state/<session>` | blackboard, one per run | haptic thread | hosts | [`HapticState`]: the latest tick |
 //! | `records` | slices of [`TickRecord`] | bridge | hosts | every tick of the force loop |
+//! | `second/<session>` | blackboard, in a run with a second device | its thread | hosts | [`SecondState`]: its latest tick |
+//! | `second_records` | slices of [`SecondRecord`], likewise | bridge | hosts | every tick of the second device's loop |
 //! | `snapshots` | slices of [`Vertex`] under a [`SnapshotHeader`] | tissue thread, sent by the bridge | hosts | the deformed surface, displacements inside, needle and seeds |
 //! | `scene` | words under a [`SceneHeader`], newest one kept | bridge | hosts | rest surface, triangles, structures, labels of the cells |
 //! | `events` | [`Event`], last 64 kept | bridge | hosts | what happened, once each |
@@ -29,6 +31,7 @@ pub mod check;
 mod class;
 mod command;
 mod event;
+mod exercise;
 pub mod motion;
 mod params;
 mod plan;
@@ -38,6 +41,7 @@ mod rehearsal;
 mod relayed;
 mod request;
 mod scene;
+mod second;
 pub mod service;
 mod session;
 mod snapshot;
@@ -45,8 +49,9 @@ mod state;
 mod text;
 
 pub use class::{Class, ClassMember, LeaseOrder, LeaseRequest, MAX_CLASS};
-pub use command::{Command, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
+pub use command::{Command, MARK_BYTES, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
 pub use event::{Event, EventKind};
+pub use exercise::{EXERCISE_STIFFNESS_RANGE, Exercise, ExercisesInForce, MOST_MOVED_M};
 pub use params::{
     PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet,
     ParameterSpec, ParametersInForce, folding,
@@ -57,18 +62,19 @@ pub use refusal::{Reason, Refusal, RefusalCode};
 pub use rehearsal::Rehearsal;
 pub use relayed::Relayed;
 pub use request::{
-    ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, NeedleAxis, NeedleRehearsal,
-    ParameterChange, PlannedNeedle, RETRACT_RANGE_M, Request, RequestError, RequestErrors, SPEED_RANGE_M_PER_S,
-    STRAND_PITCH_RANGE_M, StabilisingNeedle,
+    ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, MARK_BEFORE_RANGE_S, Mark, NeedleAxis,
+    NeedleRehearsal, ParameterChange, PlannedNeedle, RETRACT_RANGE_M, Request, RequestError, RequestErrors,
+    SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M, StabilisingNeedle,
 };
 pub use scene::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, SceneId, StructureInfo,
     UploadHeader, UploadStructure, role,
 };
+pub use second::{SecondRecord, SecondState};
 pub use session::{Session, ThreadReport};
 pub use snapshot::{LeftNeedlePose, MAX_BEND_POINTS, SeedPose, SnapshotHeader, Vertex};
 pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 11;
+pub const SCHEMA_VERSION: u32 = 12;

@@ -1,6 +1,6 @@
 //! Which run of `rt-core` this is and what it got from the kernel.
 
-use crate::Text;
+use crate::{ExercisesInForce, Text};
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -23,22 +23,37 @@ pub struct Session {
     pub period_ns: u64,
     /// Period of the tissue loop.
     pub tissue_period_ns: u64,
+    /// Period of the second device's loop; 0 in a run without one.
+    pub second_period_ns: u64,
     /// Thread of the force loop.
     pub haptic: ThreadReport,
     /// Thread of the tissue loop.
     pub tissue: ThreadReport,
+    /// Thread of the second device's loop.
+    pub second: ThreadReport,
     /// 1 when `mlockall` succeeded.
     pub memory_locked: u32,
     /// 1 when `--no-rt` was asked for.
     pub no_rt_asked: u32,
     /// Messages from hosts that were refused in this run.
     pub refused: u64,
+    /// Faults that an instructor put in.
+    pub exercises: ExercisesInForce,
     /// Name of the device.
     pub device: Text<64>,
+    /// Name of the second device; empty without one.
+    pub second_device: Text<64>,
     /// Version of the core.
     pub version: Text<32>,
     /// What was asked for and not granted, and what to do about it; empty when nothing is missing.
     pub advice: Text<512>,
+}
+
+impl Session {
+    /// The run has a second device.
+    pub fn has_second(&self) -> bool {
+        self.second_period_ns > 0
+    }
 }
 
 /// What one thread asked for and what the kernel says it has.

@@ -6,6 +6,7 @@ mod ports;
 mod receive;
 mod received;
 mod receiver;
+mod second;
 mod thread;
 
 use inbox::{Pulse, RECORDS_KEPT};
@@ -55,6 +56,8 @@ pub struct Link {
     answers: BTreeMap<u64, Answer>,
     rehearsals: BTreeMap<u64, Box<Rehearsal>>,
     records: VecDeque<TickRecord>,
+    second_state: Option<SecondState>,
+    second_records: VecDeque<SecondRecord>,
     invalid_dropped: u64,
 }
 
@@ -108,6 +111,8 @@ impl Link {
             answers: BTreeMap::new(),
             rehearsals: BTreeMap::new(),
             records: VecDeque::new(),
+            second_state: None,
+            second_records: VecDeque::new(),
             invalid_dropped: 0,
         }
     }
@@ -170,6 +175,16 @@ impl Link {
     /// The last valid one.
     pub fn state(&self) -> Option<&HapticState> {
         self.state.as_ref()
+    }
+
+    /// The last valid one of the second device; nothing in a run without one.
+    pub fn second_state(&self) -> Option<&SecondState> {
+        self.second_state.as_ref()
+    }
+
+    /// Every record of the second device since the last call.
+    pub fn take_second_records(&mut self) -> Vec<SecondRecord> {
+        std::mem::take(&mut self.second_records).into()
     }
 
     /// The scene that runs.

@@ -74,6 +74,7 @@ impl App {
                 }
             }
             Action::OpenParameters => self.parameters.open = !self.parameters.open,
+            Action::ToggleInstructor => self.instructor.toggle(),
             Action::ResetView => self.middle.reset_view(&self.shown),
             Action::LookFrom(preset) => self.middle.solid.look_from(preset, &self.shown),
             Action::SetLayout(layout) => self.settings.layout = layout,
@@ -104,6 +105,10 @@ impl App {
             Action::Watch(action) => self.act_on_recording(action),
             _ if self.watches() => {
                 self.shown.note = Some(refusal("This is a recording: close it to move the needle.".to_owned()));
+            }
+            // Whoever instructs does so while a script or a trainee moves the needle.
+            Action::Send(request @ (Request::Mark(_) | Request::BeginExercise(_) | Request::EndExercises)) => {
+                self.send(request_name(&request), &request);
             }
             // While the script runs the needle is its own.
             _ if self.run.is_some() && action != Action::Send(Request::Disengage) => {}
@@ -275,10 +280,15 @@ fn request_name(request: &Request) -> &'static str {
         Request::SaveFlight => "Flight recording",
         Request::Rehearse(_) => "Rehearsal",
         Request::StopHand => "Stop",
+        Request::MoveSecondHand(_) => "Other hand",
+        Request::StopSecondHand => "Stop other hand",
         Request::ExpectNeedle(_) => "Next needle",
         Request::LeaveNeedle => "Leave needle",
         Request::TakeNeedle(_) => "Take up needle",
         Request::DrawNeedle { .. } => "Draw out needle",
+        Request::Mark(_) => "Mark",
+        Request::BeginExercise(_) => "Exercise",
+        Request::EndExercises => "End of exercises",
     }
 }
 

@@ -16,6 +16,7 @@ use crate::dialog::Dialogs;
 use crate::dose_worker::DoseWorker;
 use crate::loader::Loader;
 use crate::panel::history::History;
+use crate::panel::instructor::InstructorState;
 use crate::panel::parameters::ParametersState;
 use crate::panel::workflow::{Progress, WorkflowState};
 use crate::picture::Pictures;
@@ -33,6 +34,7 @@ use stylet_controllers::{Controllers, SLOW, System, Wish};
 use stylet_files::Image;
 use stylet_host::core_args::SceneChoice;
 use stylet_host::link::{Link, LinkStatus};
+use stylet_host::moments::Moments;
 use stylet_implant::score::Trace;
 use stylet_implant::workflow::{NeedleTask, Pace, Placed, Run};
 use stylet_shm_schema::affinity::Left;
@@ -88,6 +90,8 @@ pub struct App {
     history: History,
     /// Force and speed since the tip first touched tissue.
     trace: Trace,
+    /// What was marked, put in or went wrong in this run of the core.
+    moments: Moments,
     debrief: Option<Job<debrief::Saved>>,
     summed_up: Instant,
     loader: Loader,
@@ -130,6 +134,7 @@ pub struct App {
     parameters: ParametersState,
     help: bool,
     class: bool,
+    instructor: InstructorState,
     /// What stands in the middle where there is no room for the right panel.
     narrow: layout::Narrow,
 }
@@ -232,6 +237,7 @@ impl App {
             applied: None,
             history: History::default(),
             trace: Trace::default(),
+            moments: Moments::default(),
             debrief: None,
             summed_up: Instant::now(),
             loader: Loader::default(),
@@ -269,6 +275,7 @@ impl App {
             parameters: ParametersState::default(),
             help: false,
             class: false,
+            instructor: InstructorState::default(),
             narrow: layout::Narrow::default(),
         }
     }
@@ -354,6 +361,7 @@ impl eframe::App for App {
         actions.extend(self.picked_file());
         if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
             (self.help, self.class, self.parameters.open) = (false, false, false);
+            self.instructor.close();
         }
         for action in actions {
             self.act(action, &ctx);

@@ -7,6 +7,7 @@ pub mod field;
 pub mod help;
 mod histogram;
 pub mod history;
+pub mod instructor;
 pub mod parameters;
 pub mod plots;
 pub mod setup;

@@ -2,6 +2,7 @@
 
 mod bend;
 mod line;
+mod metal;
 mod parts;
 mod seeds;
 
@@ -40,6 +41,8 @@ pub struct Shown {
     pub plan: Option<PlanInForce>,
     pub parameters: Option<ParametersInForce>,
     pub seeds: Vec<SeedPose>,
+    /// How far an exercise has moved the body, and with it the seeds, from where the scene has it.
+    pub body_moved_m: [f64; 3],
     /// Of the needle in the last snapshot.
     pub bend: Bend,
     /// Needles that stay in while another moves.
@@ -90,6 +93,7 @@ impl Shown {
             plan: None,
             parameters: None,
             seeds: Vec::new(),
+            body_moved_m: [0.0; 3],
             bend: Bend::default(),
             left: Vec::new(),
             snapshot_residual: None,
@@ -134,11 +138,17 @@ impl Shown {
         self.snapshot_residual = None;
         if let Some(snapshot) = link.snapshot() {
             self.bend.take(&snapshot.header);
+            self.body_moved_m = snapshot.header.body_moved_m;
             let count = snapshot.header.seed_count as usize;
             self.seeds.extend(snapshot.header.seeds.iter().take(count).copied());
             self.left.extend_from_slice(snapshot.header.left());
             self.snapshot_residual = Some(snapshot.header.residual);
         }
+    }
+
+    /// Where a seed is drawn: in the body where that is now.
+    pub fn drawn_at_m(&self, seed: &SeedPose) -> [f64; 3] {
+        [0, 1, 2].map(|a| seed.position_m[a] + self.body_moved_m[a])
     }
 
     pub fn is_live(&self) -> bool {

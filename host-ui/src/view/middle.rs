@@ -3,6 +3,7 @@
 use super::body::ShownBody;
 use super::driver::DriverCost;
 use super::orientation::Orientation;
+use super::probe::ProbeView;
 use super::scene3d::Scene3d;
 use super::slice::{ImageError, Plane, Slices};
 use super::state::ViewState;
@@ -17,6 +18,7 @@ use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_files::Image;
 use stylet_host::link::{SceneModel, Snapshot};
+use stylet_imaging::ultrasound::View;
 
 /// Between two pictures.
 const GAP: f32 = 2.0;
@@ -26,6 +28,7 @@ pub struct Middle {
     /// The three-dimensional picture.
     pub(crate) solid: Scene3d,
     slices: Slices,
+    probe: ProbeView,
     body: ShownBody,
     /// What all pictures share.
     pub(crate) view: ViewState,
@@ -37,6 +40,7 @@ pub struct Middle {
 struct Places {
     solid: Option<Rect>,
     slices: Vec<(Orientation, Rect)>,
+    probe: Vec<(View, Rect)>,
 }
 
 impl Middle {
@@ -44,7 +48,8 @@ impl Middle {
     pub(crate) fn new(state: Option<RenderState>) -> Self {
         Self {
             solid: Scene3d::new(state.clone()),
-            slices: Slices::new(state),
+            slices: Slices::new(state.clone()),
+            probe: ProbeView::new(state),
             body: ShownBody::default(),
             view: ViewState::default(),
             pictures_top: 0.0,
@@ -130,6 +135,10 @@ impl Middle {
                     .slice_ui(ui, rect, orientation, (shown, dose, &self.body), &mut self.view),
             );
         }
+        for (view, rect) in places.probe {
+            self.probe
+                .picture_ui(ui, rect, view, (shown, &self.body, self.slices.field()));
+        }
         if let Some(rect) = places.solid {
             self.solid
                 .scene3d_ui(ui, rect, (shown, dose, &self.body), &mut self.view);
@@ -146,6 +155,10 @@ impl Middle {
             {
                 actions.push(Action::SetLayout(one));
             }
+        }
+        if layout == Layout::Probe {
+            ui.separator();
+            self.probe.tools_ui(ui);
         }
         ui.separator();
         ui.toggle_value(&mut self.view.follow_tip, "Follow tip")
@@ -232,10 +245,12 @@ fn places(rect: Rect, layout: Layout) -> Places {
         Layout::Quad => Places {
             solid: Some(cell(1, 0)),
             slices: vec![(axial, cell(0, 0)), (sagittal, cell(0, 1)), (coronal, cell(1, 1))],
+            probe: Vec::new(),
         },
         Layout::Solid => Places {
             solid: Some(rect),
             slices: Vec::new(),
+            probe: Vec::new(),
         },
         Layout::Slices => {
             // The sagittal slice shows most of an insertion and gets the lower half.
@@ -243,8 +258,14 @@ fn places(rect: Rect, layout: Layout) -> Places {
             Places {
                 solid: None,
                 slices: vec![(axial, cell(0, 0)), (coronal, cell(1, 0)), (sagittal, lower)],
+                probe: Vec::new(),
             }
         }
+        Layout::Probe => Places {
+            solid: Some(cell(1, 0)),
+            slices: vec![(coronal, cell(1, 1))],
+            probe: vec![(View::Transverse, cell(0, 0)), (View::Sagittal, cell(0, 1))],
+        },
     }
 }
 
@@ -258,7 +279,9 @@ mod tests {
         let rect = Rect::from_min_size(Pos2::new(286.0, 70.0), Vec2::new(664.0, 730.0));
         for layout in Layout::ALL {
             let places = places(rect, layout);
-            let all: Vec<Rect> = places.slices.iter().map(|(_, r)| *r).chain(places.solid).collect();
+            let slices = places.slices.iter().map(|(_, r)| *r);
+            let probe = places.probe.iter().map(|(_, r)| *r);
+            let all: Vec<Rect> = slices.chain(probe).chain(places.solid).collect();
             for (i, a) in all.iter().enumerate() {
                 assert!(rect.contains_rect(*a), "{layout:?}");
                 assert!(all[i + 1..].iter().all(|b| !a.intersects(*b)), "{layout:?}");

@@ -11,6 +11,7 @@ pub mod middle;
 pub mod orientation;
 pub(crate) mod paste;
 mod pick;
+mod probe;
 mod scene3d;
 pub mod slice;
 mod state;

@@ -303,7 +303,7 @@ impl Scene3d {
             tip: shown.tip_m().unwrap_or_default(),
             needle: bent_part(shown),
             force: shown.state.map_or([0.0; 3], |s| s.force_on_hand_n),
-            seeds: shown.seeds.iter().map(|s| s.position_m).collect(),
+            seeds: shown.seeds.iter().map(|s| shown.drawn_at_m(s)).collect(),
         };
         let moves = !fresh && !self.drawn.as_ref().is_some_and(|drawn| key.looks_as(drawn));
         if fresh || moves || gpu.shows_coarse() {
@@ -392,7 +392,7 @@ fn collect_live(marks: &mut Marks, (shown, view): (&Shown, &ViewState), look: Lo
         marks.needle(&[left.tip_m, hub_m]);
     }
     for seed in &shown.seeds {
-        marks.placed_seed(seed.position_m, seed.axis);
+        marks.placed_seed(shown.drawn_at_m(seed), seed.axis);
     }
     let measured: Vec<Vector3<f32>> = view.measure.points_m().iter().map(|p| p.map(|c| c as f32)).collect();
     marks.measured(&measured);

@@ -1,10 +1,10 @@
 //! Options that a run and a measurement share on the command line, and the settings of a run that they give.
 
 use crate::device::{DeviceChoice, Libraries};
-use crate::process::Options;
+use crate::process::{Options, SecondOptions};
 use crate::replay;
 use crate::rt::arm::{self, Refused};
-use crate::rt::clock::HAPTIC_PERIOD_NS;
+use crate::rt::clock::{HAPTIC_PERIOD_NS, Wait};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use stylet_shm_schema::BUILTIN_SCENES;
@@ -35,6 +35,63 @@ pub struct RealTimeArgs {
     /// SCHED_FIFO priority of the tissue step
     #[arg(long, default_value_t = 70, value_parser = clap::value_parser!(u32).range(1..=98), value_name = "1-98")]
     tissue_priority: u32,
+}
+
+/// Rate of the second device's loop, Hz.
+const SECOND_RATE_HZ: u32 = 1000;
+/// Between the tissue step and the force loop: where it has to share the tissue's core, it goes before it.
+const SECOND_PRIORITY: u32 = 75;
+
+/// Options of the second device.
+#[derive(Args, Debug)]
+pub struct SecondArgs {
+    /// Device of the other hand, which holds the ultrasound probe: any that --device takes, but not the same one
+    #[arg(long, value_name = "DEVICE")]
+    device_2: Option<DeviceChoice>,
+    /// Rate of its loop, Hz
+    #[arg(long, requires = "device_2", default_value_t = SECOND_RATE_HZ, value_parser = clap::value_parser!(u32).range(100..=10_000), value_name = "HZ")]
+    device_2_rate: u32,
+    /// Core of its loop [default: the one before that of the tissue step, where there are three]
+    #[arg(long, requires = "device_2", value_name = "N")]
+    device_2_core: Option<usize>,
+    /// SCHED_FIFO priority of its loop
+    #[arg(long, requires = "device_2", default_value_t = SECOND_PRIORITY, value_parser = clap::value_parser!(u32).range(1..=98), value_name = "1-98")]
+    device_2_priority: u32,
+}
+
+impl SecondArgs {
+    /// What the run does with a second device; nothing where none was named.
+    pub fn options(&self) -> Result<Option<SecondOptions>, OptionsError> {
+        let Some(device) = self.device_2.clone() else {
+            return Ok(None);
+        };
+        let cores = cores();
+        if let Some(core) = self.device_2_core.filter(|core| !cores.contains(core)) {
+            let problem = no_such_core("--device-2-core", core, &cores);
+            return Err(OptionsError(vec![problem]));
+        }
+        Ok(Some(SecondOptions {
+            device,
+            period_ns: 1_000_000_000 / u64::from(self.device_2_rate),
+            core: self
+                .device_2_core
+                .or(cores.iter().rev().nth(2).or(tissue_core(&cores)).copied()),
+            priority: self.device_2_priority,
+        }))
+    }
+}
+
+fn cores() -> Vec<usize> {
+    let cores = core_affinity::get_core_ids().unwrap_or_default();
+    cores.iter().map(|c| c.id).collect()
+}
+
+fn tissue_core(cores: &[usize]) -> Option<&usize> {
+    cores.iter().rev().nth(1).or(cores.last())
+}
+
+fn no_such_core(option: &str, core: usize, cores: &[usize]) -> String {
+    format!("{option} {core}: this process may use cores {cores:?}")
 }
 
 /// Settings that cannot be used: every problem, one a line.
@@ -69,15 +126,11 @@ impl RealTimeArgs {
 
     /// The settings of a run, or every problem with them.
     pub fn options(&self, instance: &str) -> Result<Options, OptionsError> {
-        let cores: Vec<usize> = core_affinity::get_core_ids()
-            .unwrap_or_default()
-            .iter()
-            .map(|c| c.id)
-            .collect();
+        let cores = cores();
         let mut problems = Vec::new();
         for (option, core) in [("--haptic-core", self.haptic_core), ("--tissue-core", self.tissue_core)] {
             if let Some(core) = core.filter(|c| !cores.contains(c)) {
-                problems.push(format!("{option} {core}: this process may use cores {cores:?}"));
+                problems.push(no_such_core(option, core, &cores));
             }
         }
         let instance = Instance::new(instance).map_err(|e| problems.push(e.to_string()));
@@ -94,14 +147,15 @@ impl RealTimeArgs {
                 no_rt_asked: self.no_rt,
                 rights_missing: refused,
                 haptic_core: self.haptic_core.or(cores.last().copied()),
-                tissue_core: self.tissue_core.or(cores.iter().rev().nth(1).or(cores.last()).copied()),
+                tissue_core: self.tissue_core.or(tissue_core(&cores).copied()),
                 haptic_priority: self.haptic_priority,
                 tissue_priority: self.tissue_priority,
                 haptic_period_ns: HAPTIC_PERIOD_NS,
-                spin_ns: 0,
+                wait: Wait::at_period(HAPTIC_PERIOD_NS),
                 flight_folder: replay::file::default_folder(),
                 tissue: TissueKind::default(),
                 device: DeviceChoice::default(),
+                second: None,
                 libraries: Libraries::default(),
             }),
             _ => Err(OptionsError(problems)),

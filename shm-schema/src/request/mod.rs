@@ -4,7 +4,7 @@ mod decode;
 
 pub use decode::{RequestError, RequestErrors};
 
-use crate::{BUILTIN_SCENES, Command, MAX_SEEDS, ParameterId};
+use crate::{BUILTIN_SCENES, Command, Exercise, MAX_SEEDS, ParameterId, Text};
 use bytemuck::Zeroable;
 use num_enum::TryFromPrimitive;
 use strum::EnumDiscriminants;
@@ -20,6 +20,9 @@ pub const RETRACT_RANGE_M: [f64; 2] = [-0.5, 0.5];
 
 /// How deep from its entry a needle that stays in is rehearsed, m.
 pub const LEFT_DEPTH_RANGE_M: [f64; 2] = [1e-3, 0.5];
+
+/// How long before its request a marked moment may lie, s: somebody types the words meanwhile.
+pub const MARK_BEFORE_RANGE_S: [f64; 2] = [0.0, 120.0];
 
 /// One request of a host. The numbers are stable: [`CommandKind`] is made from them, and [`Command::kind`] carries them.
 #[derive(Clone, Debug, PartialEq, EnumDiscriminants)]
@@ -67,7 +70,7 @@ pub enum Request {
     /// Simulate one needle ahead of time, in a body of its own, from rest; a [`crate::Rehearsal`] is sent before the reply.
     #[strum_discriminants(doc = "[`Request::Rehearse`]")]
     Rehearse(NeedleRehearsal) = 12,
-    /// Stop the simulated hand as fast as it can; only the core knows where that is.
+    /// Stop the simulated hand as fast as it can; only the core knows where that is. Of a run with a second device, both hands.
     #[strum_discriminants(doc = "[`Request::StopHand`]")]
     StopHand = 13,
     /// The needle that will come after the planned one: what it needs is prepared meanwhile.
@@ -88,6 +91,30 @@ pub enum Request {
         /// How fast, m/s, within [`SPEED_RANGE_M_PER_S`].
         speed_m_per_s: f64,
     } = 17,
+    /// Put a moment with a few words among the events.
+    #[strum_discriminants(doc = "[`Request::Mark`]")]
+    Mark(Mark) = 18,
+    /// Put a fault in, for a trainee to find; in place of one of the same kind.
+    #[strum_discriminants(doc = "[`Request::BeginExercise`]")]
+    BeginExercise(Exercise) = 19,
+    /// Take every fault away that was put in. A reset does so as well.
+    #[strum_discriminants(doc = "[`Request::EndExercises`]")]
+    EndExercises = 20,
+    /// Set the goal of the simulated hand that holds the second device.
+    #[strum_discriminants(doc = "[`Request::MoveSecondHand`]")]
+    MoveSecondHand(HandMove) = 30,
+    /// Stop that hand, and not the needle's.
+    #[strum_discriminants(doc = "[`Request::StopSecondHand`]")]
+    StopSecondHand = 31,
+}
+
+/// A moment and what is to be said of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// 1 to [`crate::MARK_BYTES`] bytes of UTF-8 without control characters.
+    pub text: String,
+    /// How long before the request it was, s, within [`MARK_BEFORE_RANGE_S`].
+    pub before_s: f64,
 }
 
 /// Where a needle goes in, scene frame.
@@ -188,6 +215,12 @@ impl Request {
         };
         place.copy_from_slice(&values);
         command.value_count = values.len() as u32;
+        if let Self::Mark(mark) = self {
+            command.text = Text::new(&mark.text);
+            if command.text.exact() != Some(&mark.text) {
+                return Err(RequestError::InvalidText.into());
+            }
+        }
         Ok(command)
     }
 
@@ -199,7 +232,7 @@ impl Request {
                 .collect(),
             Self::SetPlan(None) => Vec::new(),
             Self::SetPlan(Some(plan)) => joined(&[&plan.entry_m, &plan.direction], &plan.seeds_m),
-            Self::MoveHand(hand) => {
+            Self::MoveHand(hand) | Self::MoveSecondHand(hand) => {
                 let pace = [hand.speed_m_per_s, hand.acceleration_m_per_s2];
                 joined(&[&hand.tip_m, &hand.direction, &pace], &[])
             }
@@ -223,14 +256,25 @@ impl Request {
             Self::DropSeed { strand_pitch_m } => strand_pitch_m.iter().copied().collect(),
             Self::TakeNeedle(number) => vec![f64::from(*number)],
             Self::DrawNeedle { number, speed_m_per_s } => vec![f64::from(*number), *speed_m_per_s],
-            Self::LeaveNeedle
+            Self::Mark(mark) => vec![mark.before_s],
+            Self::BeginExercise(exercise) => {
+                let number = f64::from(exercise.number());
+                match exercise {
+                    Exercise::DeviceLost => vec![number],
+                    Exercise::StiffTissue { factor } => vec![number, *factor],
+                    Exercise::BodyMoved { by_m } => joined(&[&[number], by_m], &[]),
+                }
+            }
+            Self::EndExercises
+            | Self::LeaveNeedle
             | Self::Engage
             | Self::Disengage
             | Self::Reset
             | Self::UndoSeed
             | Self::Shutdown
             | Self::SaveFlight
-            | Self::StopHand => Vec::new(),
+            | Self::StopHand
+            | Self::StopSecondHand => Vec::new(),
         }
     }
 }

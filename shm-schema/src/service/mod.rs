@@ -14,7 +14,7 @@ mod instance;
 mod ports;
 mod sweep;
 
-pub use board::{StateBoard, StateReader, StateWriter};
+pub use board::{OnBoard, StateBoard, StateReader, StateWriter};
 pub use instance::Instance;
 pub use ports::{
     Connected, Loan, Node, Publisher, SendError, Slice, SlicePublisher, SliceSubscriber, Subscriber, Watch,
@@ -235,6 +235,9 @@ service!(
 service!(
     /// Every tick of the force loop; the header is the run of the core.
     records: [TickRecord] under u64, by Core, history 0, buffer RECORD_BUFFER, loans 2, kept |all| all);
+service!(
+    /// Every tick of the second device's loop, in a run that has one; the header is the run of the core.
+    second_records: [SecondRecord] under u64, by Core, history 0, buffer RECORD_BUFFER, loans 2, kept |all| all);
 
 // Slices that memory is taken for: iceoryx2 would take enough for every host to hold every slice that it may, hundreds of MB of
 // locked memory for a large scene. Two wait in the queues; beside them stand what is being filled and one for each host that

@@ -1,4 +1,4 @@
-//! After arming, neither real-time thread allocates or faults a page, over thousands of ticks of each, with a procedure running.
+//! After arming, no real-time thread allocates or faults a page, over thousands of ticks of each, with a procedure running.
 
 use std::time::Duration;
 use stylet_implant::workflow::{Pace, Run, RunStatus, default_plan};
@@ -17,6 +17,14 @@ fn armed_threads_make_no_heap_call_and_fault_no_page() {
 fn armed_threads_make_no_heap_call_and_fault_no_page_with_finite_elements() {
     where_the_machine_runs(|| {
         the_loops_keep_their_contract(&["--rt-if-allowed", "--tissue", "fem"], 4_000);
+    });
+}
+
+/// The third thread, moved and pressed on by nothing yet, keeps the contract of the others.
+#[test]
+fn armed_threads_make_no_heap_call_and_fault_no_page_with_a_second_device() {
+    where_the_machine_runs(|| {
+        the_loops_keep_their_contract(&["--rt-if-allowed", "--device-2", "simulated"], 10_000);
     });
 }
 
@@ -39,7 +47,8 @@ fn the_loops_keep_their_contract(options: &[&str], ticks: u64) {
     drop(link);
     let report = core.finish();
     println!("{report:#}");
-    for thread in ["haptic", "tissue"] {
+    let third = options.contains(&"--device-2").then_some("second");
+    for thread in ["haptic", "tissue"].into_iter().chain(third) {
         let count = |what: &str| report[thread][what].as_u64().expect("a count");
         assert!(count("ticks") > ticks, "{thread}: {} ticks", count("ticks"));
         assert_eq!(count("heap_calls"), 0, "{thread} called the heap");

@@ -8,7 +8,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
 use stylet_shm_schema::{
-    Class, Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Relayed, Reply, Session, TickRecord,
+    Class, Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Relayed, Reply, SecondRecord, SecondState,
+    Session, TickRecord,
 };
 
 /// Records that wait for the host: five minutes at 1 kHz, 72 MB.
@@ -53,6 +54,8 @@ pub struct Inbox {
     /// Commands and volumes that could not be sent, and why.
     pub unsent: VecDeque<(u64, String)>,
     pub records: VecDeque<TickRecord>,
+    pub second_state: Option<SecondState>,
+    pub second_records: VecDeque<SecondRecord>,
     pub invalid_dropped: u64,
 }
 
@@ -77,10 +80,16 @@ impl Inbox {
         self.replies.clear();
         self.unsent.clear();
         self.records.clear();
+        self.second_state = None;
+        self.second_records.clear();
     }
 
     pub fn put_record(&mut self, record: TickRecord) {
         keep(&mut self.records, record, RECORDS_KEPT);
+    }
+
+    pub fn put_second_record(&mut self, record: SecondRecord) {
+        keep(&mut self.second_records, record, RECORDS_KEPT);
     }
 
     pub fn put_event(&mut self, event: Event) {

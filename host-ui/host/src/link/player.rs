@@ -1,12 +1,13 @@
 //! A recording in place of a core: a thread puts what the core said into the inbox, each at its time.
 
 use super::inbox::Inbox;
+use super::second;
 use super::thread::lock;
 use super::{SceneModel, Snapshot};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::{HapticState, ParametersInForce, PlanInForce, Session, TickRecord};
+use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
 
 const PASS: Duration = Duration::from_millis(4);
 /// A heartbeat, without which the host would take the core for silent while the recording is held.
@@ -16,6 +17,10 @@ const BEAT: Duration = Duration::from_millis(20);
 pub enum Piece {
     /// A tick of the force loop.
     Tick(Box<TickRecord>),
+    /// Something happened.
+    Event(Box<Event>),
+    /// A tick of the second device's loop.
+    Second(Box<SecondRecord>),
     /// What ticks do not say of the state.
     State(Box<HapticState>),
     /// The scene from now on.
@@ -190,6 +195,12 @@ fn put(
                 carry(&record, state);
             }
             *last = Some(record);
+        }
+        Piece::Event(event) => inbox.put_event(Event { session_id, ..**event }),
+        Piece::Second(record) => {
+            let record = SecondRecord { session_id, ..**record };
+            inbox.second_state = Some(second::carry(&record, inbox.second_state.as_ref()));
+            inbox.put_second_record(record);
         }
         Piece::State(found) => {
             let mut found = **found;

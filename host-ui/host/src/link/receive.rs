@@ -132,13 +132,9 @@ impl Link {
         for (id, why) in inbox.unsent {
             self.put_answer(id, Answer::unsent(why));
         }
-        match self.records.is_empty() {
-            true => self.records = inbox.records,
-            false => self.records.extend(inbox.records),
-        }
-        // A host that never takes them must not grow.
-        let beyond = self.records.len().saturating_sub(RECORDS_KEPT);
-        self.records.drain(..beyond);
+        self.second_state = inbox.second_state.or(self.second_state);
+        join(&mut self.records, inbox.records);
+        join(&mut self.second_records, inbox.second_records);
     }
 
     fn begin_session(&mut self, session: Session) {
@@ -146,6 +142,8 @@ impl Link {
         self.answers.clear();
         self.rehearsals.clear();
         self.records.clear();
+        self.second_state = None;
+        self.second_records.clear();
         self.latest.begin(session);
     }
 
@@ -175,4 +173,14 @@ impl Link {
             self.answers.pop_first();
         }
     }
+}
+
+/// Records behind those that wait. A host that never takes them must not grow.
+fn join<T>(held: &mut VecDeque<T>, new: VecDeque<T>) {
+    match held.is_empty() {
+        true => *held = new,
+        false => held.extend(new),
+    }
+    let beyond = held.len().saturating_sub(RECORDS_KEPT);
+    held.drain(..beyond);
 }

@@ -5,6 +5,7 @@
 
 use super::inbox::Inbox;
 use super::ports::Ports;
+use super::second::SecondEnds;
 use super::thread::lock;
 use super::{ABSENT_AFTER, SceneModel, Snapshot};
 use std::sync::{Arc, Mutex, mpsc};
@@ -30,6 +31,7 @@ pub enum Outgoing {
 pub struct Passes {
     // Dropped in this order: handles before the ports, and those before their node.
     board: Option<StateReader>,
+    second: SecondEnds,
     upload_port: Option<SlicePublisher<u8, UploadHeader>>,
     ports: Option<Ports>,
     instance: Instance,
@@ -51,6 +53,7 @@ impl Passes {
     pub fn new(instance: Instance, host_id: u64, inbox: Arc<Mutex<Inbox>>, asked: mpsc::Receiver<Outgoing>) -> Self {
         Self {
             board: None,
+            second: SecondEnds::default(),
             upload_port: None,
             ports: None,
             instance,
@@ -87,6 +90,7 @@ impl Passes {
         let long_ago = |then: Option<Instant>, every| then.is_none_or(|t: Instant| now - t >= every);
         let deaf = self.beat_moved.is_none_or(|t| now - t > ABSENT_AFTER);
         if self.ports.is_some() && deaf && long_ago(self.connect_tried, RECONNECT_EVERY) {
+            self.second.close();
             (self.board, self.upload_port, self.ports) = (None, None, None);
         }
         if self.ports.is_some() || !long_ago(self.connect_tried, CONNECT_EVERY) {
@@ -234,6 +238,7 @@ impl Passes {
             // Everything of an earlier run goes before anything of the new one is opened.
             _ => {
                 (self.board, self.board_tried, self.tick) = (None, None, 0);
+                self.second.close();
                 lock(&self.inbox).begin(session);
             }
         }
@@ -260,9 +265,11 @@ impl Passes {
             self.board_tried = Some(Instant::now());
             self.board = StateReader::open(&ports.node, session.session_id).ok();
         }
+        self.second.open(&ports.node, session);
         let Some(board) = &self.board else { return };
         let state = board.read();
         let inbox = &mut *lock(&self.inbox);
+        inbox.invalid_dropped += self.second.receive(session.session_id, inbox);
         match check::state(&state) {
             Ok(()) => {
                 self.tick = state.tick;
@@ -290,6 +297,7 @@ impl Passes {
         let silent = self.beat_moved.map_or(ABSENT_AFTER, |t| t.elapsed());
         if silent >= ABSENT_AFTER {
             (self.board, self.upload_port) = (None, None);
+            self.second.close();
         }
         if silent > CLEAN_AFTER && self.cleaned.elapsed() >= CLEAN_EVERY {
             self.cleaned = Instant::now();

@@ -2,9 +2,10 @@
 
 use super::error::RecordError;
 use super::messages::Tick;
-use super::read::{Recording, read};
+use super::read::read;
+use super::second;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use stylet_base::{write_streamed, write_whole};
 use stylet_shm_schema::motion::{Motion, MotionSample};
 
@@ -19,6 +20,10 @@ pub struct Export {
     pub csv: Option<PathBuf>,
     /// Motion for the core's replay device.
     pub motion: Option<PathBuf>,
+    /// Table of the ticks of the second device.
+    pub csv_2: Option<PathBuf>,
+    /// Motion of the second device.
+    pub motion_2: Option<PathBuf>,
 }
 
 /// Writes what was asked for, and prints what the recording holds.
@@ -39,16 +44,50 @@ pub fn export(options: &Export) -> Result<(), RecordError> {
         println!("written: {}", path.display());
     }
     if let Some(path) = &options.motion {
-        let (motion, filled) = motion(&recording);
-        write_whole(path, &motion.to_bytes())?;
-        println!(
-            "written: {}, {} samples, {filled} of them held where the recording has none; play it with: rt-core --device replay:{}",
-            path.display(),
-            motion.samples.len(),
-            path.display()
-        );
+        let samples = recording.ticks.iter().map(|t| (t.session_id, t.due_ns, sample(t)));
+        write_motion(path, samples, "--device")?;
+    }
+    let has_second = !recording.second.is_empty();
+    let wanted = options.csv_2.as_ref().or(options.motion_2.as_ref());
+    if let Some(path) = wanted.filter(|_| !has_second) {
+        let why = "the recording holds no tick of a second device: it is of a run without --device-2";
+        return Err(RecordError::of_file(path, why));
+    }
+    if let Some(path) = &options.csv_2 {
+        write_streamed(path, |file| second::csv(&recording.second, file))?;
+        println!("written: {}", path.display());
+    }
+    if let Some(path) = &options.motion_2 {
+        let samples = recording.second.iter();
+        let samples = samples.map(|r| (r.session_id, r.due_ns, second::motion_sample(r)));
+        write_motion(path, samples, "--device-2")?;
     }
     Ok(())
+}
+
+fn write_motion(
+    path: &Path,
+    samples: impl Iterator<Item = (u64, u64, MotionSample)>,
+    option: &str,
+) -> Result<(), RecordError> {
+    let (motion, filled) = motion(samples);
+    write_whole(path, &motion.to_bytes())?;
+    println!(
+        "written: {}, {} samples, {filled} of them held where the recording has none; play it with: rt-core {option} replay:{}",
+        path.display(),
+        motion.samples.len(),
+        path.display()
+    );
+    Ok(())
+}
+
+fn sample(tick: &Tick) -> MotionSample {
+    MotionSample {
+        tip_in_scene_m: tick.tip_in_scene_m,
+        world_from_tool: tick.world_from_tool,
+        buttons: tick.buttons,
+        reserved: 0,
+    }
 }
 
 const COLUMNS: [&str; 34] = [
@@ -128,29 +167,26 @@ fn csv(ticks: &[Tick], file: &mut impl Write) -> std::io::Result<()> {
     table.flush()
 }
 
-/// The hand's motion in the first session, on the grid of the force loop; and how many samples had to be held, because
-/// the loop missed a deadline or the recording a tick.
-fn motion(recording: &Recording) -> (Motion, usize) {
+/// A hand's motion in the first session, on the grid of the force loop, from the session, the due time and the sample of each tick; and
+/// how many samples had to be held, because the loop missed a deadline or the recording a tick.
+fn motion(ticks: impl Iterator<Item = (u64, u64, MotionSample)>) -> (Motion, usize) {
     let mut motion = Motion {
         period_ns: PERIOD_NS,
         samples: Vec::new(),
     };
-    let (mut filled, mut last_due_ns) = (0, None);
-    let first = recording.ticks.first().map(|t| t.session_id);
-    for tick in recording.ticks.iter().filter(|t| Some(t.session_id) == first) {
-        let periods = last_due_ns.map_or(1, |last| tick.due_ns.saturating_sub(last) / PERIOD_NS);
+    let (mut filled, mut last_due_ns, mut first) = (0, None, None);
+    for (session_id, due_ns, sample) in ticks {
+        if *first.get_or_insert(session_id) != session_id {
+            continue;
+        }
+        let periods = last_due_ns.map_or(1, |last| due_ns.saturating_sub(last) / PERIOD_NS);
         if let Some(held) = motion.samples.last().copied() {
             let held = std::iter::repeat_n(held, periods.saturating_sub(1) as usize);
             filled += held.len();
             motion.samples.extend(held);
         }
-        motion.samples.push(MotionSample {
-            tip_in_scene_m: tick.tip_in_scene_m,
-            world_from_tool: tick.world_from_tool,
-            buttons: tick.buttons,
-            reserved: 0,
-        });
-        last_due_ns = Some(tick.due_ns);
+        motion.samples.push(sample);
+        last_due_ns = Some(due_ns);
     }
     (motion, filled)
 }

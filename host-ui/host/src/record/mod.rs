@@ -13,6 +13,7 @@ mod messages;
 mod played;
 mod read;
 mod scene;
+mod second;
 mod setting;
 mod stream;
 mod writer;
@@ -95,6 +96,7 @@ fn find_core(link: &mut Link, stop: impl Fn() -> bool) -> Result<(), RecordError
         if link.status() == LinkStatus::Live && link.scene().is_some() {
             // Records from before the recording began are not part of it.
             link.take_records();
+            link.take_second_records();
             return Ok(());
         }
         std::thread::sleep(POLL_EVERY);
@@ -167,6 +169,10 @@ impl Handed {
         let records = link.take_records();
         if !records.is_empty() {
             items.push(Item::Records(records));
+        }
+        let records = link.take_second_records();
+        if !records.is_empty() {
+            items.push(Item::SecondRecords(records));
         }
         for event in link.events().iter().filter(|e| e.sequence > self.event) {
             items.push(Item::Event(Box::new(*event)));
@@ -241,11 +247,11 @@ pub fn save_flight(instance: &Instance) -> Result<String, RecordError> {
 
 impl Totals {
     fn verdict(&self) -> Result<(), RecordError> {
-        match (self.gaps.missing(), self.events.missing()) {
+        match (self.gaps.missing() + self.second.missing(), self.events.missing()) {
             (0, 0) => Ok(()),
             (ticks, events) => Err(RecordError::Missing {
                 ticks,
-                gaps: self.gaps.gaps().len(),
+                gaps: self.gaps.gaps().len() + self.second.gaps().len(),
                 in_core: self.lost_in_core,
                 events,
             }),

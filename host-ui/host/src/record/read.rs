@@ -3,13 +3,17 @@
 use super::error::RecordError;
 use super::gaps::Gaps;
 use super::messages::{TICK, Tick};
+use super::second::{SECOND, second_of};
 use super::stream;
 use std::path::Path;
+use stylet_shm_schema::SecondRecord;
 
 /// The ticks of a recording, in the order in which they arrived.
 pub struct Recording {
     /// The ticks, without repetitions.
     pub ticks: Vec<Tick>,
+    /// Those of the second device.
+    pub second: Vec<SecondRecord>,
     /// Which ticks are missing.
     pub gaps: Gaps,
     /// Why reading ended before the end of the file, if it did: a recording that was cut off is still of use.
@@ -22,6 +26,7 @@ pub fn read(path: &Path) -> Result<Recording, RecordError> {
     let bytes = std::fs::read(path).map_err(|e| invalid(e.to_string()))?;
     let mut recording = Recording {
         ticks: Vec::new(),
+        second: Vec::new(),
         gaps: Gaps::default(),
         cut_off: None,
     };
@@ -31,6 +36,9 @@ pub fn read(path: &Path) -> Result<Recording, RecordError> {
             if recording.gaps.record(tick.session_id, tick.tick) {
                 recording.ticks.push(tick);
             }
+        }
+        if topic == SECOND.topic {
+            recording.second.extend(second_of(data));
         }
         Ok(())
     });

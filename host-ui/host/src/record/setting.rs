@@ -69,6 +69,16 @@ struct Run {
     memory_locked: u32,
     device: String,
     version: String,
+    /// Of a run with a second device.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    second: Option<Second>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Second {
+    device: String,
+    period_ns: u64,
+    thread: Thread,
 }
 
 impl From<&ThreadReport> for Thread {
@@ -106,6 +116,11 @@ pub fn session(session: &Session) -> Value {
         memory_locked: session.memory_locked,
         device: session.device.read(),
         version: session.version.read(),
+        second: session.has_second().then(|| Second {
+            device: session.second_device.read(),
+            period_ns: session.second_period_ns,
+            thread: Thread::from(&session.second),
+        }),
     };
     serde_json::to_value(run).unwrap_or_default()
 }
@@ -118,6 +133,10 @@ pub fn session_of(data: &[u8]) -> Option<Session> {
     session.memory_locked = run.memory_locked;
     (session.haptic, session.tissue) = (run.haptic.report(), run.tissue.report());
     (session.device, session.version) = (Text::new(&run.device), Text::new(&run.version));
+    if let Some(second) = run.second {
+        (session.second_device, session.second_period_ns) = (Text::new(&second.device), second.period_ns);
+        session.second = second.thread.report();
+    }
     Some(session)
 }
 

@@ -5,7 +5,7 @@ use crate::link::{Piece, SceneModel, Snapshot};
 use bytemuck::Zeroable;
 use std::sync::Arc;
 use stylet_shm_schema::{
-    Event, HapticState, ParameterId, ParameterSet, ParametersInForce, PlanInForce, SceneHeader, Session,
+    Event, HapticState, ParameterId, ParameterSet, ParametersInForce, PlanInForce, SceneHeader, SecondRecord, Session,
     SnapshotHeader, Text, TickRecord,
 };
 
@@ -129,10 +129,19 @@ fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
         Item::Plan(Box::new(plan)),
         Item::Parameters(Box::new(parameters)),
         Item::Records((10..30).map(tick).collect()),
+        Item::SecondRecords((10..30).map(second_tick).collect()),
         Item::State(Box::new(state)),
         Item::Snapshot(Box::new(snapshot.clone())),
     ];
     (items, tick(29), state, snapshot)
+}
+
+fn second_tick(tick: u64) -> SecondRecord {
+    let mut record = SecondRecord::zeroed();
+    (record.session_id, record.tick, record.due_ns) = (1, tick, tick * 1_000_000);
+    record.tip_in_scene_m = [1.0 / 3.0, 1e-3 * tick as f64, -0.0];
+    record.world_from_tool = [0.0, 0.0, 0.0, 1.0];
+    record
 }
 
 fn recorded(name: &str) -> (PathBuf, TickRecord, HapticState, Snapshot) {
@@ -153,7 +162,7 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
     let _removed = std::fs::remove_file(&path);
     assert_eq!((played.session.session_id, played.cut_off.as_deref()), (1, None));
     assert_eq!(played.session.device.read(), "hand");
-    let mut kinds = [0; 6];
+    let mut kinds = [0; 7];
     for (time_ns, piece) in &played.pieces {
         match piece {
             Piece::Tick(tick) => {
@@ -161,6 +170,11 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
                 assert_eq!(*time_ns, (tick.tick - 10) * 1_000_000);
                 assert!(tick.tick != last.tick || **tick == last);
                 assert!(tick.tip_in_scene_m[2].is_sign_negative());
+            }
+            Piece::Event(_) => panic!("no event was recorded"),
+            Piece::Second(record) => {
+                kinds[6] += 1;
+                assert_eq!(**record, second_tick(record.tick));
             }
             Piece::State(found) => {
                 kinds[1] += 1;
@@ -200,7 +214,7 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
             }
         }
     }
-    assert_eq!(kinds, [20, 1, 1, 1, 1, 1]);
+    assert_eq!(kinds, [20, 1, 1, 1, 1, 1, 20]);
     // Cut off or damaged anywhere it ends with a reason or with what came before, and never with a panic.
     for end in (0..bytes.len()).step_by(97) {
         let _ended = played_of(&bytes[..end], &Interrupt::default());
@@ -231,6 +245,9 @@ fn a_recording_is_played_as_a_core_speaks() {
     };
     all(&mut link);
     assert_eq!(link.status(), LinkStatus::Live);
+    let second = *link.second_state().expect("a second device");
+    assert_eq!((second.tick, second.tip_in_scene_m[1]), (29, 0.029));
+    assert_eq!(link.take_second_records().len(), 20);
     let state = *link.state().expect("a state");
     assert_eq!((state.tick, state.tip_in_scene_m), (29, last.tip_in_scene_m));
     assert_eq!((state.puncture_depth_m, state.flags), (8e-3, 5));

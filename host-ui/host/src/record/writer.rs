@@ -4,6 +4,7 @@ use super::error::RecordError;
 use super::gaps::{Gap, Gaps};
 use super::messages::{self, Channel, EVENT, GLAND, TICK, TISSUE, Tick};
 use super::scene::{self, FIELD, SCENE};
+use super::second::{SECOND, second};
 use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
 use crate::link::{SceneModel, Snapshot};
 use mcap::records::{MessageHeader, Metadata};
@@ -14,7 +15,7 @@ use std::io::{BufWriter, Seek, Write};
 use std::path::Path;
 use std::process::ChildStdin;
 use std::sync::{Arc, mpsc};
-use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, Session, TickRecord};
+use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
 
 /// A recording cut off by a crash lacks the last chunk at most: about two seconds.
 const CHUNK_BYTES: u64 = 1 << 20;
@@ -27,6 +28,7 @@ const GAPS_PRINTED: usize = 10;
 pub enum Item {
     Session(Box<Session>),
     Records(Vec<TickRecord>),
+    SecondRecords(Vec<SecondRecord>),
     Event(Box<Event>),
     Scene(Arc<SceneModel>),
     Plan(Box<PlanInForce>),
@@ -46,6 +48,8 @@ pub enum Item {
 #[derive(Default)]
 pub struct Totals {
     pub gaps: Gaps,
+    /// Of the second device's ticks.
+    pub second: Gaps,
     pub events: Gaps,
     pub snapshots: u64,
     pub snapshots_left_out: u64,
@@ -58,8 +62,15 @@ pub struct Totals {
 
 impl Totals {
     pub fn words(&self) -> String {
+        let second = match self.second.records() {
+            0 => String::new(),
+            ticks => format!(
+                "{ticks} ticks of the second device, {} missing; ",
+                self.second.missing()
+            ),
+        };
         format!(
-            "{} ticks of {} session(s), {} missing in {} gaps, {} of them lost in the core; {} events, {} missing; \
+            "{} ticks of {} session(s), {} missing in {} gaps, {} of them lost in the core; {second}{} events, {} missing; \
              {} snapshots kept, {} left out, none for {:.1} s in {} gaps; {:.1} MB",
             self.gaps.records(),
             self.gaps.sessions(),
@@ -88,10 +99,14 @@ impl Totals {
             };
             (!first.is_empty()).then(|| format!("missing {what}: {}{more}", first.join(", ")))
         };
-        [("ticks", &self.gaps), ("events", &self.events)]
-            .into_iter()
-            .filter_map(line)
-            .collect()
+        [
+            ("ticks", &self.gaps),
+            ("ticks of the second device", &self.second),
+            ("events", &self.events),
+        ]
+        .into_iter()
+        .filter_map(line)
+        .collect()
     }
 
     fn metadata(&self) -> BTreeMap<String, String> {
@@ -102,6 +117,9 @@ impl Totals {
             ("gaps_listed", listed_gaps(&self.gaps)),
             ("ticks_repeated", self.gaps.repeated().to_string()),
             ("records_lost_in_core", self.lost_in_core.to_string()),
+            ("second_ticks", self.second.records().to_string()),
+            ("second_ticks_missing", self.second.missing().to_string()),
+            ("second_gaps_listed", listed_gaps(&self.second)),
             ("sessions", self.gaps.sessions().to_string()),
             ("events", self.events.records().to_string()),
             ("events_missing", self.events.missing().to_string()),
@@ -123,7 +141,7 @@ fn listed_gaps(gaps: &Gaps) -> String {
 }
 
 /// By their places here.
-const CHANNELS: [&Channel; 10] = [
+const CHANNELS: [&Channel; 11] = [
     &TICK,
     &EVENT,
     &TISSUE,
@@ -134,6 +152,7 @@ const CHANNELS: [&Channel; 10] = [
     &STATE,
     &FIELD,
     &SESSION,
+    &SECOND,
 ];
 
 struct Writer<W: Write + Seek> {
@@ -211,6 +230,13 @@ impl<W: Write + Seek> Writer<W> {
                     }
                 }
             }
+            Item::SecondRecords(records) => {
+                for record in &records {
+                    if self.totals.second.record(record.session_id, record.tick) {
+                        self.message(10, record.due_ns + record.wake_latency_ns, &second(record))?;
+                    }
+                }
+            }
             Item::Event(event) => {
                 if self.totals.events.record(event.session_id, event.sequence) {
                     self.message(1, event.time_ns, messages::event(&event).to_string().as_bytes())?;
@@ -263,6 +289,7 @@ impl<W: Write + Seek> Writer<W> {
             ("session_id", session.session_id.to_string()),
             ("version", session.version.read()),
             ("device", session.device.read()),
+            ("second_device", session.second_device.read()),
             ("period_ns", session.period_ns.to_string()),
             ("tissue_period_ns", session.tissue_period_ns.to_string()),
             ("started_ns", session.started_ns.to_string()),

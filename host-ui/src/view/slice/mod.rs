@@ -153,6 +153,11 @@ impl Slices {
         Ok(())
     }
 
+    /// The displacements of the tissue in the last snapshot.
+    pub fn field(&self) -> &Field {
+        &self.field
+    }
+
     /// Name of the image that was loaded.
     pub fn image_name(&self) -> Option<&str> {
         self.image.as_ref().map(|(name, _)| name.as_str())

@@ -1,10 +1,10 @@
-//! What the simulated ultrasound is made of: how bright each tissue is, and the grain that belongs to its material.
+//! What the simulated ultrasound of the slices is made of: the brightness of each cell, and the grain that belongs to its material.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
-use stylet_anatomy::{Organ, Part};
-use stylet_shm_schema::{SceneHeader, StructureInfo, role};
+use stylet_imaging::{OUTSIDE, brightness};
+use stylet_shm_schema::SceneHeader;
 
 /// Side of the cube of grain, which repeats.
 pub const GRAINS: usize = 64;
@@ -13,39 +13,6 @@ pub const LARGEST_AMPLITUDE: f32 = 4.0;
 /// Edges of a texel of grain along patient right, anterior and superior: finer along the beam, which starts in the
 /// rectum, as ultrasound resolves.
 pub const GRAIN_M: [f32; 3] = [0.42e-3, 0.24e-3, 0.42e-3];
-
-/// Brightness of what is not tissue: jelly around a gland that stands alone.
-const OUTSIDE: f32 = 0.13;
-/// Brightness of a structure, 0 to 1, as seen in transrectal ultrasound: by its name, otherwise by its role.
-pub fn brightness(structure: &StructureInfo) -> f32 {
-    by_name(&structure.name.read()).unwrap_or(match structure.role {
-        bits if bits & role::TARGET != 0 => 0.40,
-        bits if bits & role::FIXED != 0 => 0.92,
-        bits if bits & role::SPARE != 0 => 0.24,
-        _ => 0.54,
-    })
-}
-
-fn by_name(name: &str) -> Option<f32> {
-    let part = Part::of_name(name);
-    let mentioned = |organ: Organ| organ.is_mentioned_in(name);
-    match part {
-        Some(Part::Content) => Some(0.02),
-        _ if mentioned(Organ::Urethra) => Some(0.20),
-        Some(Part::Capsule) => Some(0.74),
-        Some(Part::Wall) => Some(0.62),
-        None => BY_ORGAN.iter().find(|(organ, _)| mentioned(*organ)).map(|(_, b)| *b),
-    }
-}
-
-/// The first organ that a name mentions.
-const BY_ORGAN: [(Organ, f32); 5] = [
-    (Organ::RectalWall, 0.50),
-    (Organ::Bladder, 0.06),
-    (Organ::Bone, 0.92),
-    (Organ::Fat, 0.54),
-    (Organ::Perineum, 0.48),
-];
 
 /// Cells of nothing around the labels. The outermost must not shine for an edge within the labels, which fill their grid from
 /// face to face: the graphics card goes on with the outermost cell as far as the picture reaches.
@@ -144,7 +111,7 @@ fn blur(cube: &mut [f32], axis: usize) {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
-    use stylet_shm_schema::Text;
+    use stylet_shm_schema::{Text, role};
 
     #[test]
     fn grain_is_rayleigh_and_seamless() {

@@ -5,6 +5,7 @@ use super::link::EventDetails;
 use super::parameters::order_from_both;
 use super::requests::{hand_goal, needle_run, plan_in_force};
 use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
+use crate::rt::second::SecondOrder;
 use crate::rt::tissue_tape::LeftTape;
 use stylet_shm_schema::{EventKind, ParameterChange, PlannedNeedle, Refusal, RefusalCode, Request};
 use stylet_sim::active::activate;
@@ -71,9 +72,26 @@ impl Bridge {
                 number: u64::from(number),
                 speed_m_per_s,
             }),
-            Request::StopHand => self.order_haptic(HapticOrder::StopHand { ticket }),
-            Request::Engage => self.order_haptic(HapticOrder::Engage { ticket }),
-            Request::Disengage => self.order_haptic(HapticOrder::Disengage { ticket }),
+            Request::Mark(mark) => {
+                self.mark(ticket, &mark);
+                Ok(())
+            }
+            Request::BeginExercise(exercise) => self.begin_exercise(ticket, exercise),
+            Request::EndExercises => self.end_exercises(ticket),
+            Request::MoveSecondHand(hand) => self.move_second_hand(ticket, hand_goal(&hand)),
+            Request::StopSecondHand => self.stop_second_hand(ticket),
+            Request::StopHand => {
+                self.order_second(SecondOrder::StopHand { ticket: 0 });
+                self.order_haptic(HapticOrder::StopHand { ticket })
+            }
+            Request::Engage => {
+                self.order_second(SecondOrder::Engage);
+                self.order_haptic(HapticOrder::Engage { ticket })
+            }
+            Request::Disengage => {
+                self.order_second(SecondOrder::Disengage);
+                self.order_haptic(HapticOrder::Disengage { ticket })
+            }
             Request::DropSeed { strand_pitch_m } => self.order_tissue(TissueOrder::DropSeed { ticket, strand_pitch_m }),
             Request::UndoSeed => self.order_tissue(TissueOrder::UndoSeed { ticket }),
             Request::Reset => self.reset(ticket),
@@ -104,7 +122,7 @@ impl Bridge {
         Ok(())
     }
 
-    fn order_haptic(&mut self, order: HapticOrder) -> Result<(), Refusal> {
+    pub(super) fn order_haptic(&mut self, order: HapticOrder) -> Result<(), Refusal> {
         let pushed = self.loops.haptic_orders.push(order);
         pushed.map_err(|_| RefusalCode::TooManyRequests.into())
     }
@@ -137,6 +155,9 @@ impl Bridge {
             force: active.force,
         };
         self.order_both((haptic, TissueOrder::Limits(active.limits)))?;
+        if let Some(second) = &mut self.second {
+            second.set_gate(generation, &active.force.gate);
+        }
         // Both rings were emptied lately: there is room for one more.
         let _ = self.loops.tissue_orders.push(TissueOrder::Migration(active.migration));
         self.parameters.ordered(generation, set);
@@ -168,7 +189,9 @@ impl Bridge {
 
     fn reset(&mut self, ticket: Ticket) -> Result<(), Refusal> {
         self.order_both((HapticOrder::Reset { ticket }, TissueOrder::Reset))?;
+        self.order_second(SecondOrder::Reset);
         self.lines.forget_tracks();
+        self.forget_exercises();
         self.link.event(EventKind::Reset, EventDetails::now());
         Ok(())
     }

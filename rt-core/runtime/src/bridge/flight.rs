@@ -5,6 +5,7 @@ use crate::replay::file::{Flight, FlightError};
 use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
 use crate::rt::haptic_tape::{HapticFlight, HapticTape};
 use crate::rt::recorder::{Tape, TapePort};
+use crate::rt::second::{SecondFlight, SecondOrder, SecondTape};
 use crate::rt::tissue_tape::{TissueFlight, TissueTape};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -64,12 +65,25 @@ struct Gathering {
     since: Instant,
     haptic: Option<Option<HapticFlight>>,
     tissue: Option<Option<TissueFlight>>,
+    /// There is nothing to wait for without a second device.
+    second: Option<Option<SecondFlight>>,
+}
+
+/// The second device's loop has its tapes apart from the others.
+pub type SecondTapes = TapePort<SecondTape>;
+
+/// Ends of the rings of orders to every loop that is recorded.
+pub struct Orders<'a> {
+    pub haptic: &'a mut rtrb::Producer<HapticOrder>,
+    pub tissue: &'a mut rtrb::Producer<TissueOrder>,
+    pub second: Option<&'a mut rtrb::Producer<SecondOrder>>,
 }
 
 /// Everything that the bridge needs for flight recordings.
 pub struct FlightKeeper {
     haptic: TapePort<HapticTape>,
     tissue: TapePort<TissueTape>,
+    second: Option<SecondTapes>,
     folder: PathBuf,
     /// What is the same in every recording of this run.
     common: Flight,
@@ -81,13 +95,14 @@ pub struct FlightKeeper {
 
 impl FlightKeeper {
     pub fn new(
-        (haptic, tissue): (TapePort<HapticTape>, TapePort<TissueTape>),
+        (haptic, tissue, second): (TapePort<HapticTape>, TapePort<TissueTape>, Option<SecondTapes>),
         folder: PathBuf,
         common: Flight,
     ) -> Self {
         Self {
             haptic,
             tissue,
+            second,
             folder,
             common,
             queue: VecDeque::new(),
@@ -129,13 +144,7 @@ impl FlightKeeper {
     }
 
     /// One pass of the bridge; returns what was written since the last.
-    pub fn pass(
-        &mut self,
-        scene_generation: u64,
-        haptic_orders: &mut rtrb::Producer<HapticOrder>,
-        tissue_orders: &mut rtrb::Producer<TissueOrder>,
-        lines: &LineArchive,
-    ) -> Option<Saved> {
+    pub fn pass(&mut self, scene_generation: u64, orders: Orders<'_>, lines: &LineArchive) -> Option<Saved> {
         self.take_tapes(scene_generation);
         if let Some(gathering) = self
             .gathering
@@ -149,9 +158,12 @@ impl FlightKeeper {
             && let Some(wanted) = self.queue.remove(at)
         {
             // A ring that is full leaves its loop out.
-            let _ = haptic_orders.push(HapticOrder::HandOverTape);
-            let _ = tissue_orders.push(TissueOrder::HandOverTape);
-            self.gathering = Some(Gathering::new(wanted));
+            let _ = orders.haptic.push(HapticOrder::HandOverTape);
+            let _ = orders.tissue.push(TissueOrder::HandOverTape);
+            if let Some(second) = orders.second {
+                let _ = second.push(SecondOrder::HandOverTape);
+            }
+            self.gathering = Some(Gathering::new(wanted, self.second.is_some()));
         }
         self.written.1.try_recv().ok()
     }
@@ -162,6 +174,12 @@ impl FlightKeeper {
                 gathering.haptic = Some(tape.flight());
             }
             let _ = self.haptic.back.push(tape);
+        }
+        while let Some(Ok(tape)) = self.second.as_mut().map(|second| second.taken.pop()) {
+            if let Some(gathering) = &mut self.gathering {
+                gathering.second = Some(tape.flight());
+            }
+            let _ = self.second.as_mut().map(|second| second.back.push(tape));
         }
         while let Ok(tape) = self.tissue.taken.pop() {
             // A tape of an earlier scene is dropped here.
@@ -194,12 +212,13 @@ impl FlightKeeper {
     /// After both loops have ended and handed their tapes over.
     pub fn save_at_end(&mut self, scene_generation: u64, lines: &LineArchive) -> Result<PathBuf, SaveError> {
         let reason = "rt-core ended".to_owned();
-        self.gathering = Some(Gathering::new(Wanted {
+        let wanted = Wanted {
             kind: "exit",
             reason,
             due: Instant::now(),
             ticket: None,
-        }));
+        };
+        self.gathering = Some(Gathering::new(wanted, self.second.is_some()));
         self.take_tapes(scene_generation);
         let path = self.next_path("exit");
         match self.gathering.take() {
@@ -220,17 +239,18 @@ impl FlightKeeper {
 }
 
 impl Gathering {
-    fn new(wanted: Wanted) -> Self {
+    fn new(wanted: Wanted, has_second: bool) -> Self {
         Self {
             wanted,
             since: Instant::now(),
             haptic: None,
             tissue: None,
+            second: (!has_second).then_some(None),
         }
     }
 
     fn is_whole(&self) -> bool {
-        self.haptic.is_some() && self.tissue.is_some()
+        self.haptic.is_some() && self.tissue.is_some() && self.second.is_some()
     }
 
     fn into_flight(self, common: &Flight, lines: &LineArchive) -> Flight {
@@ -240,6 +260,7 @@ impl Gathering {
             lines: lines.of(haptic.as_ref(), tissue.as_ref()),
             haptic,
             tissue,
+            second: self.second.flatten(),
             ..common.clone()
         }
     }

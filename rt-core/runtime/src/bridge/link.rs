@@ -1,10 +1,11 @@
 //! The link to the hosts: announcements, events, records, and the answers to their requests.
 
+use super::batches::Batches;
 use super::ports::Ports;
 use crate::rt::clock;
 use crate::rt::exchange::Ticket;
 use std::collections::HashMap;
-use stylet_shm_schema::service::{BATCH_EVERY, MAX_BATCH, Node};
+use stylet_shm_schema::service::Node;
 use stylet_shm_schema::{Event, EventKind, Refusal, Reply, Session, Text, TickRecord};
 
 const ANNOUNCE_NS: u64 = 200_000_000;
@@ -22,10 +23,7 @@ pub struct Link {
     waiting: HashMap<Ticket, Asker>,
     tickets: Ticket,
     events: u64,
-    batch: Vec<TickRecord>,
-    newest: Option<TickRecord>,
-    /// When records were sent last.
-    sent_ns: u64,
+    batches: Batches<TickRecord>,
     announced_ns: u64,
     cleaned_ns: u64,
 }
@@ -68,9 +66,7 @@ impl Link {
             waiting: HashMap::new(),
             tickets: 0,
             events: 0,
-            newest: None,
-            batch: Vec::with_capacity(MAX_BATCH),
-            sent_ns: 0,
+            batches: Batches::default(),
             announced_ns: 0,
             cleaned_ns: 0,
         }
@@ -93,35 +89,17 @@ impl Link {
 
     /// The newest record of the force loop.
     pub fn newest_record(&self) -> Option<&TickRecord> {
-        self.newest.as_ref()
+        self.batches.newest()
     }
 
-    /// Takes what the force loop has made and sends it in batches, each full or [`BATCH_EVERY`] after the last. True when
-    /// the loop has made a tick.
+    /// Takes what the force loop has made and sends it in batches. True when the loop has made a tick.
     pub fn send_records(&mut self, records: &mut rtrb::Consumer<TickRecord>) -> bool {
-        let mut any = false;
-        while let Ok(record) = records.pop() {
-            any = true;
-            self.newest = Some(record);
-            self.batch.push(record);
-            if self.batch.len() == MAX_BATCH {
-                self.send_batch();
-            }
-        }
-        if clock::now_ns() - self.sent_ns >= BATCH_EVERY.as_nanos() as u64 {
-            self.send_batch();
-        }
-        any
+        self.batches.pass(records, &self.ports.records, self.session.session_id)
     }
 
     /// Whatever has not been sent yet.
     pub fn send_batch(&mut self) {
-        if self.batch.is_empty() {
-            return;
-        }
-        self.sent_ns = clock::now_ns();
-        let _ = self.ports.records.send(&self.session.session_id, &self.batch);
-        self.batch.clear();
+        self.batches.send(&self.ports.records, self.session.session_id);
     }
 
     pub fn event(&mut self, kind: EventKind, details: EventDetails<'_>) {

@@ -1,6 +1,8 @@
 //! The normal-priority thread that owns every port: hosts connect and disconnect here, and the loops do not notice.
 
+mod batches;
 mod commands;
+mod exercises;
 mod flight;
 mod line_archive;
 mod lines;
@@ -10,17 +12,19 @@ mod notices;
 mod parameters;
 mod picture;
 pub mod ports;
+mod probe;
 mod rehearsals;
 mod requests;
 mod scenes;
+mod second;
 mod snapshots;
 mod supervisor;
 mod upload;
 
 use crate::replay::file::Flight;
 use crate::rt::wiring::BridgePorts;
-use flight::FlightKeeper;
 pub use flight::SaveError;
+use flight::{FlightKeeper, Orders};
 use lines::LinePreparer;
 use link::{EventDetails, Link};
 use loader::SceneLoader;
@@ -28,7 +32,10 @@ use notices::LoopRings;
 use parameters::ParameterChanges;
 pub use picture::ScenePicture;
 use ports::Ports;
+use probe::ProbePreparer;
 use rehearsals::RehearsalRunner;
+use second::Second;
+pub use second::SecondSetup;
 use snapshots::SnapshotLoans;
 pub use snapshots::SnapshotSize;
 use std::path::PathBuf;
@@ -59,6 +66,8 @@ pub struct BridgeSetup {
     pub tissue: TissueKind,
     /// What the first scene was built from.
     pub source: Arc<SceneSource>,
+    /// The second device, where the run has one.
+    pub second: Option<SecondSetup>,
     /// Folder of the flight recordings.
     pub flight_folder: PathBuf,
     /// The part that is the same in every flight recording.
@@ -89,9 +98,12 @@ pub struct Bridge {
     loader: SceneLoader,
     rehearsals: RehearsalRunner,
     lines: LinePreparer,
+    /// Of a run whose second hand holds the probe.
+    probe: Option<ProbePreparer>,
     /// The loops have room for needles that stay in: the force loop, and the tissue loop's tape of that scene.
     left_rooms: (bool, Option<u64>),
     supervisor: Supervisor,
+    second: Option<Second>,
 }
 
 impl Bridge {
@@ -105,7 +117,8 @@ impl Bridge {
         let link = Link::new(node, ports, setup.session);
         let _ = link.ports.parameters.send(parameters.in_force);
         let _ = link.ports.plan.send(plan);
-        let tapes = (loops.haptic_tapes, loops.tissue_tapes);
+        let (second, second_tapes) = setup.second.map(|second| Second::new(second, is_real_time)).unzip();
+        let tapes = (loops.haptic_tapes, loops.tissue_tapes, second_tapes);
         Self {
             link,
             loans: SnapshotLoans::new(loops.slots, loops.filled),
@@ -121,6 +134,7 @@ impl Bridge {
                 rooms: loops.rooms,
                 old_hand_lines: loops.old_hand_lines,
                 old_body_lines: loops.old_body_lines,
+                old_probes: loops.old_probes,
             },
             device: setup.device,
             tissue: setup.tissue,
@@ -132,10 +146,14 @@ impl Bridge {
                 next: None,
             },
             loader: SceneLoader::default(),
+            probe: second
+                .is_some()
+                .then(|| ProbePreparer::new(Arc::clone(&setup.source), setup.tissue)),
             lines: LinePreparer::new(Arc::clone(&setup.source), setup.tissue),
             rehearsals: RehearsalRunner::new(setup.source, setup.tissue, setup.device),
             left_rooms: (false, None),
             supervisor: Supervisor::new(is_real_time, setup.device.simulated),
+            second,
         }
     }
 
@@ -146,6 +164,9 @@ impl Bridge {
             std::thread::sleep(PASS);
         }
         self.link.send_batch();
+        if let Some(second) = &mut self.second {
+            second.send_batch(self.link.session.session_id);
+        }
         Ok(())
     }
 
@@ -165,9 +186,11 @@ impl Bridge {
         self.scene.send(&self.link);
         while self.loops.old_worlds.pop().is_ok() {}
         let made_a_tick = self.link.send_records(&mut self.loops.records);
+        self.pass_second();
         self.serve_flights();
         let generation = self.scene.generation();
         self.lines.pass(self.link.newest_record(), generation, &mut self.loops);
+        self.serve_probe(generation);
         let (generation, size) = (self.scene.generation(), self.scene.picture.snapshot_size());
         self.loans.pass(&self.link.ports, generation, size);
         if self.supervisor.pass(made_a_tick) {
@@ -185,10 +208,21 @@ impl Bridge {
         Ok(end)
     }
 
+    fn serve_probe(&mut self, generation: u64) {
+        let Some(probe) = &mut self.probe else { return };
+        if let Some(why) = probe.pass(generation, &mut self.loops) {
+            eprintln!("rt-core: the probe presses nothing in this scene: {why}");
+        }
+    }
+
     fn serve_flights(&mut self) {
         let generation = self.scene.generation();
-        let (haptic, tissue) = (&mut self.loops.haptic_orders, &mut self.loops.tissue_orders);
-        let Some(saved) = self.flights.pass(generation, haptic, tissue, self.lines.archive()) else {
+        let orders = Orders {
+            haptic: &mut self.loops.haptic_orders,
+            tissue: &mut self.loops.tissue_orders,
+            second: self.second.as_mut().map(|second| &mut second.orders),
+        };
+        let Some(saved) = self.flights.pass(generation, orders, self.lines.archive()) else {
             return;
         };
         let result = saved.result.map_err(|why| why.to_string());

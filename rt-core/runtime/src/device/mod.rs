@@ -6,6 +6,7 @@ use crate::rt::arm::{self, Ask};
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use stylet_anatomy::Organ;
 use stylet_hw::backend::{self, BackendKind, UnknownBackend};
 use stylet_hw::{
     Arm, ArmError, Axes, Device, ForceDimension, ForceDimensionConfig, Haply, HaplyConfig, Phantom, PhantomConfig,
@@ -33,6 +34,15 @@ impl Default for DeviceChoice {
             kind: BackendKind::Simulated,
             argument: None,
         }
+    }
+}
+
+impl DeviceChoice {
+    /// Both hands cannot hold one device; a recorded motion or a simulation can be had twice. OpenHaptics serves all its devices in one
+    /// loop, which is not built here for two.
+    pub fn excludes(&self, other: &Self) -> bool {
+        let is_hardware = !matches!(self.kind, BackendKind::Simulated | BackendKind::Replay);
+        is_hardware && self.kind == other.kind && (self == other || self.kind == BackendKind::Phantom)
     }
 }
 
@@ -109,22 +119,47 @@ pub enum DeviceError {
     Motion(#[from] motion::MotionError),
 }
 
-/// Opens the device with its tip, or the origin of its frame, outside the body and below the target. `force_loop` is what
-/// the force loop's thread asks for, `servo_core` the processor of the driver's own thread.
+/// How far outside the body a hand begins, m.
+const BEFORE_BODY_M: f64 = 0.03;
+
+/// Where the hand with the needle begins: outside the body and below the target.
+pub fn needle_start(scene: &Scene) -> Vector3<f64> {
+    let (lower, upper) = scene.target_bounds_m();
+    Vector3::new(
+        (lower[0] + upper[0]) / 2.0,
+        (lower[1] + upper[1]) / 2.0,
+        before_body(scene),
+    )
+}
+
+/// Where the other hand begins: outside the body and below the rectum; in a scene without one, behind the target.
+pub fn second_start(scene: &Scene) -> Vector3<f64> {
+    let is_rectum = |name: &str| matches!(Organ::of_name(name), Some(Organ::Rectum | Organ::RectalWall));
+    let extents = scene.lattice.extents(scene.structures.len());
+    let rectum = scene.structures.iter().zip(&extents).find(|(s, _)| is_rectum(&s.name));
+    let z = before_body(scene);
+    if let Some((_, extent)) = rectum {
+        let middle = |axis: usize| (extent.lower_m[axis] + extent.upper_m[axis]) / 2.0;
+        return Vector3::new(middle(0), middle(1), z);
+    }
+    let (lower, upper) = scene.target_bounds_m();
+    Vector3::new((lower[0] + upper[0]) / 2.0, lower[1] - BEFORE_BODY_M, z)
+}
+
+fn before_body(scene: &Scene) -> f64 {
+    let (lowest, _) = scene.lattice.bounds_m();
+    lowest[2] - BEFORE_BODY_M
+}
+
+/// Opens the device with its tip, or the origin of its frame, at `start`. `force_loop` is what the thread of its loop asks for,
+/// `servo_core` the processor of the driver's own thread.
 pub fn open(
     choice: &DeviceChoice,
     libraries: &Libraries,
-    scene: &Scene,
+    start: Vector3<f64>,
     force_loop: Ask,
     servo_core: Option<usize>,
 ) -> Result<Box<dyn Device>, DeviceError> {
-    let (lowest, _) = scene.lattice.bounds_m();
-    let (lower, upper) = scene.target_bounds_m();
-    let start = Vector3::new(
-        (lower[0] + upper[0]) / 2.0,
-        (lower[1] + upper[1]) / 2.0,
-        lowest[2] - 0.03,
-    );
     match choice.kind {
         BackendKind::Simulated => Ok(Box::new(SimulatedPhantom::new(SimulatedPhantomConfig {
             start_tip_in_world: start,
@@ -229,6 +264,41 @@ mod tests {
         assert_eq!("replay:a.motion".parse(), choice(BackendKind::Replay, Some("a.motion")));
         for wrong in ["", "phantom:", "Phantom", "simulated:x", "falcon"] {
             assert!(wrong.parse::<DeviceChoice>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn both_hands_do_not_hold_one_device() {
+        let excludes = |a: &str, b: &str| {
+            let choice = |name: &str| name.parse::<DeviceChoice>().expect("a device");
+            choice(a).excludes(&choice(b))
+        };
+        for (a, b) in [
+            ("haply", "haply"),
+            ("haply:1", "haply:1"),
+            ("phantom", "phantom:Left arm"),
+        ] {
+            assert!(excludes(a, b), "{a} {b}");
+        }
+        for (a, b) in [
+            ("simulated", "simulated"),
+            ("replay:a", "replay:a"),
+            ("haply:0", "haply:1"),
+            ("force-dimension", "haply"),
+        ] {
+            assert!(!excludes(a, b), "{a} {b}");
+        }
+    }
+
+    #[test]
+    fn the_other_hand_begins_below_the_rectum_or_behind_the_target() {
+        for name in ["paper", "pelvis"] {
+            let scene = Scene::builtin(name).expect("built in");
+            let (needle, other) = (needle_start(&scene), second_start(&scene));
+            assert!(
+                other.y < needle.y - 0.02 && other.z == needle.z,
+                "{name}: {needle} {other}"
+            );
         }
     }
 }

@@ -7,6 +7,7 @@ mod threads;
 use crate::bridge::{Bridge, BridgeSetup};
 use crate::device::{DeviceChoice, DeviceError, Libraries};
 use crate::rt::arm::{Refused, Usage};
+use crate::rt::clock::Wait;
 use crate::rt::timing::Probes;
 use crate::rt::world::WorldError;
 use setup::Setup;
@@ -41,16 +42,31 @@ pub struct Options {
     pub tissue_priority: u32,
     /// Time between two ticks of the force loop, ns.
     pub haptic_period_ns: u64,
-    /// Spinning before each deadline of the force loop, ns; 0 for none.
-    pub spin_ns: u64,
+    /// How the force loop waits for each deadline.
+    pub wait: Wait,
     /// Folder of the flight recordings.
     pub flight_folder: PathBuf,
     /// Tissue model of every scene of the run.
     pub tissue: TissueKind,
     /// Haptic device.
     pub device: DeviceChoice,
+    /// The device of the other hand.
+    pub second: Option<SecondOptions>,
     /// Libraries of makers.
     pub libraries: Libraries,
+}
+
+/// The second device, and the thread of its loop.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SecondOptions {
+    /// Haptic device.
+    pub device: DeviceChoice,
+    /// Time between two ticks of its loop, ns.
+    pub period_ns: u64,
+    /// Processor of its loop; `None` for any.
+    pub core: Option<usize>,
+    /// `SCHED_FIFO` priority of its loop.
+    pub priority: u32,
 }
 
 /// What a run cost.
@@ -60,6 +76,8 @@ pub struct RunReport {
     pub haptic: LoopReport,
     /// The tissue loop.
     pub tissue: LoopReport,
+    /// The loop of the second device.
+    pub second: Option<LoopReport>,
     /// All memory of the process was locked.
     pub memory_locked: bool,
     /// Longest exit from a core's sleep state that the kernel allowed, as read back, µs; `None` when it was not asked or
@@ -78,6 +96,8 @@ pub struct LoopReport {
     pub missed: u64,
     /// Latest wake-up after a deadline, ns.
     pub worst_wake_ns: u64,
+    /// Sleeps there was reason for: each costs a switch.
+    pub sleeps: u64,
     /// Page faults, context switches and heap calls.
     pub usage: Usage,
 }
@@ -91,6 +111,15 @@ pub enum RunError {
     /// The device could not be opened.
     #[error(transparent)]
     Device(#[from] DeviceError),
+    /// The second device could not be opened.
+    #[error("--device-2: {0}")]
+    SecondDevice(DeviceError),
+    /// Both hands would hold one device.
+    #[error(
+        "--device and --device-2 name one device, or two that OpenHaptics would serve together, which is not built: name another for \
+         --device-2, such as simulated"
+    )]
+    OneDeviceForBoth,
     /// Every parameter that does not suit the device, one a line.
     #[error(transparent)]
     Parameters(#[from] ParameterProblems),
@@ -132,10 +161,13 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     let setup = Setup::new(options)?;
     let shared = setup.open_shared_memory(options)?;
     let kernel = setup::lock_memory(options)?;
-    let (session_id, info) = (setup.session_id, setup.info);
+    let (session_id, info, second_info) = (setup.session_id, setup.info, setup.second_info);
     let loops = setup.body.into_loops(options, session_id, &setup.source, probes);
-    let threads = Threads::start(options, loops.haptic, loops.tissue, shared.board)?;
-    let session = session::session(options, session_id, &info, &threads, kernel.unlocked.as_deref());
+    let second = loops.second.zip(shared.second);
+    let (second_loop, second_bridge) = second.map(setup::SecondLoops::join).unzip();
+    let threads = Threads::start(options, (loops.haptic, shared.board), loops.tissue, second_loop)?;
+    let devices = (&info, second_info.as_ref());
+    let session = session::session(options, session_id, devices, &threads, kernel.unlocked.as_deref());
     let mut bridge = Bridge::new(
         shared.node,
         shared.ports,
@@ -146,8 +178,9 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
             picture: setup.picture,
             tissue: options.tissue,
             source: setup.source,
+            second: second_bridge,
             flight_folder: options.flight_folder.clone(),
-            flight: session::flight(&info, session_id, options.haptic_period_ns),
+            flight: session::flight(options, session_id, devices),
         },
     );
     // SYNC: set by a signal handler; nothing but the flag is carried.
@@ -157,14 +190,13 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
         // Not joined: a loop that stands still would be waited for in vain.
         return Err(RunError::LoopStopped);
     }
-    let (haptic, tissue) = threads.join()?;
+    let ended = threads.join()?;
     if let Err(why) = bridge.save_last_flight() {
         eprintln!("rt-core: the flight recording was not saved: {why}");
     }
     Ok(RunReport {
-        haptic,
-        tissue,
         memory_locked: kernel.unlocked.is_none(),
         exit_latency_us: kernel.awake.map(|a| a.exit_latency_us),
+        ..ended
     })
 }

@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::threads::Threads;
-use crate::replay::file::Flight;
+use crate::replay::file::{Flight, SecondFigures};
 use crate::rt::clock::{self, TISSUE_PERIOD_NS};
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{Session, Text};
@@ -11,42 +11,57 @@ use stylet_shm_schema::{Session, Text};
 pub(super) fn session(
     options: &Options,
     session_id: u64,
-    device: &DeviceInfo,
+    (device, second): (&DeviceInfo, Option<&DeviceInfo>),
     threads: &Threads,
     unlocked: Option<&str>,
 ) -> Session {
     Session {
         session_id,
+        exercises: Default::default(),
         schema_version: stylet_shm_schema::SCHEMA_VERSION,
         pid: std::process::id(),
         time_ns: 0,
         started_ns: clock::now_ns(),
         period_ns: options.haptic_period_ns,
         tissue_period_ns: TISSUE_PERIOD_NS,
+        second_period_ns: options.second.as_ref().map_or(0, |second| second.period_ns),
         haptic: threads.haptic_grant(),
         tissue: threads.tissue_grant(),
+        second: threads.second_grant().unwrap_or_default(),
         memory_locked: u32::from(unlocked.is_none()),
         no_rt_asked: u32::from(options.no_rt_asked),
         refused: 0,
         device: Text::new(device.name),
+        second_device: Text::new(second.map_or("", |second| second.name)),
         version: Text::new(env!("CARGO_PKG_VERSION")),
         advice: Text::new(&missing_rights(options, unlocked)),
     }
 }
 
 /// The part that is the same in every flight recording of the run.
-pub(super) fn flight(device: &DeviceInfo, session_id: u64, haptic_period_ns: u64) -> Flight {
+pub(super) fn flight(
+    options: &Options,
+    session_id: u64,
+    (device, second): (&DeviceInfo, Option<&DeviceInfo>),
+) -> Flight {
+    let second = second.zip(options.second.as_ref());
     Flight {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         session_id,
         reason: String::new(),
         device_name: device.name.to_owned(),
         device: device.into(),
-        haptic_period_s: haptic_period_ns as f64 / 1e9,
+        haptic_period_s: options.haptic_period_ns as f64 / 1e9,
         tissue_period_s: TISSUE_PERIOD_NS as f64 / 1e9,
         lines: Vec::new(),
         haptic: None,
         tissue: None,
+        second_device: second.map(|(device, options)| SecondFigures {
+            device_name: device.name.to_owned(),
+            device: device.into(),
+            period_s: options.period_ns as f64 / 1e9,
+        }),
+        second: None,
     }
 }
 

@@ -1,15 +1,17 @@
-//! The two real-time threads: started, armed, ended.
+//! The real-time threads: started, armed, ended.
 
-use super::{LoopReport, Options, RunError};
+use super::{LoopReport, Options, RunError, RunReport};
 use crate::rt::arm::{self, Armed, Ask, Usage};
+use crate::rt::device_loop;
 use crate::rt::haptic::HapticLoop;
+use crate::rt::second::SecondLoop;
 use crate::rt::tissue::TissueLoop;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::thread::JoinHandle;
-use stylet_shm_schema::service::StateBoard;
-use stylet_shm_schema::{HapticState, ThreadReport};
+use stylet_shm_schema::service::{OnBoard, StateBoard};
+use stylet_shm_schema::{SecondState, ThreadReport};
 
 /// A loop's thread, and what the kernel granted it.
 struct Started {
@@ -17,40 +19,51 @@ struct Started {
     granted: ThreadReport,
 }
 
-/// Both threads. The loops have a flag of their own: the bridge must be able to end them when a host asks.
+/// All threads. The loops have a flag of their own: the bridge must be able to end them when a host asks.
 pub(super) struct Threads {
     haptic: Started,
     tissue: Started,
+    second: Option<Started>,
     end: Arc<AtomicBool>,
 }
 
 impl Threads {
-    /// Starts and arms both; neither runs when one is refused.
+    /// Starts and arms all; none runs when one is refused.
     pub fn start(
         options: &Options,
-        haptic: HapticLoop,
+        (haptic, board): (HapticLoop, StateBoard),
         tissue: TissueLoop,
-        board: StateBoard,
+        second: Option<(SecondLoop, StateBoard<SecondState>)>,
     ) -> Result<Self, RunError> {
         let ask = |priority, core| Ask {
             priority: (!options.no_rt).then_some(priority),
             core,
         };
         let end = Arc::new(AtomicBool::new(false));
+        let ended_by = |why: RunError| {
+            // SYNC: pairs with the acquire load in the loops that run.
+            end.store(true, Ordering::Release);
+            why
+        };
         let tissue_ask = ask(options.tissue_priority, options.tissue_core);
         let tissue = spawn("tissue", tissue_ask, &end, |armed, end| run_tissue(tissue, armed, end))?;
-        let haptic_ask = ask(options.haptic_priority, options.haptic_core);
-        let started = spawn("haptic", haptic_ask, &end, move |armed, end| {
-            run_haptic(haptic, board, armed, end)
+        let second = second.zip(options.second.as_ref()).map(|((second, board), asked)| {
+            spawn("second", ask(asked.priority, asked.core), &end, move |armed, end| {
+                run_second(second, board, armed, end)
+            })
         });
-        match started {
-            Ok(haptic) => Ok(Self { haptic, tissue, end }),
-            Err(why) => {
-                // SYNC: pairs with the acquire load in the tissue loop.
-                end.store(true, Ordering::Release);
-                Err(why)
-            }
-        }
+        let second = second.transpose().map_err(ended_by)?;
+        let haptic_ask = ask(options.haptic_priority, options.haptic_core);
+        let haptic = spawn("haptic", haptic_ask, &end, move |armed, end| {
+            run_haptic(haptic, board, armed, end)
+        })
+        .map_err(ended_by)?;
+        Ok(Self {
+            haptic,
+            tissue,
+            second,
+            end,
+        })
     }
 
     /// What the kernel granted the force loop.
@@ -63,23 +76,32 @@ impl Threads {
         self.tissue.granted
     }
 
-    /// Asks both loops to end.
+    /// What the kernel granted the second device's loop.
+    pub fn second_grant(&self) -> Option<ThreadReport> {
+        self.second.as_ref().map(|second| second.granted)
+    }
+
+    /// Asks all loops to end.
     pub fn end(&self) {
-        // SYNC: pairs with the acquire loads in both loops.
+        // SYNC: pairs with the acquire loads in the loops.
         self.end.store(true, Ordering::Release);
     }
 
-    /// Waits for both loops; force loop and tissue loop.
-    pub fn join(self) -> Result<(LoopReport, LoopReport), RunError> {
-        let haptic = self.haptic.thread.join().map_err(|_| RunError::ThreadEnded)?;
-        let tissue = self.tissue.thread.join().map_err(|_| RunError::ThreadEnded)?;
-        Ok((haptic, tissue))
+    /// Waits for all loops; what each cost.
+    pub fn join(self) -> Result<RunReport, RunError> {
+        let join = |started: Started| started.thread.join().map_err(|_| RunError::ThreadEnded);
+        Ok(RunReport {
+            haptic: join(self.haptic)?,
+            tissue: join(self.tissue)?,
+            second: self.second.map(join).transpose()?,
+            ..RunReport::default()
+        })
     }
 }
 
 fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopReport {
     let start = Usage::now();
-    tissue.run(armed, end);
+    let sleeps = tissue.run(armed, end);
     let usage = Usage::now().since(start);
     let r = tissue.response();
     LoopReport {
@@ -87,21 +109,16 @@ fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopRe
         ticks: r.tick,
         missed: r.missed,
         worst_wake_ns: r.worst_wake_ns,
+        sleeps,
         usage,
     }
 }
 
 fn run_haptic(mut haptic: HapticLoop, board: StateBoard, armed: &Armed, end: &AtomicBool) -> LoopReport {
-    // The writer is made in the thread that uses it; making it allocates, so it comes before the loop.
-    let writer = board.writer().ok();
-    let publish = |state: &HapticState| {
-        if let Some(writer) = &writer {
-            writer.write(state);
-        }
-    };
+    let publish = publisher(board);
     publish(&haptic.state);
     let start = Usage::now();
-    haptic.run(armed, end, publish);
+    let sleeps = haptic.run(armed, end, &publish);
     let usage = Usage::now().since(start);
     let s = &haptic.state;
     LoopReport {
@@ -109,7 +126,35 @@ fn run_haptic(mut haptic: HapticLoop, board: StateBoard, armed: &Armed, end: &At
         ticks: s.tick,
         missed: s.missed_deadlines,
         worst_wake_ns: s.worst_wake_ns,
+        sleeps,
         usage,
+    }
+}
+
+fn run_second(mut second: SecondLoop, board: StateBoard<SecondState>, armed: &Armed, end: &AtomicBool) -> LoopReport {
+    let publish = publisher(board);
+    publish(second.state());
+    let start = Usage::now();
+    let sleeps = device_loop::run(&mut second, armed, end, |second| publish(second.state()));
+    let usage = Usage::now().since(start);
+    let s = second.state();
+    LoopReport {
+        thread: armed.report,
+        ticks: s.tick,
+        missed: s.missed_deadlines,
+        worst_wake_ns: s.worst_wake_ns,
+        sleeps,
+        usage,
+    }
+}
+
+/// The writer is made in the thread that uses it; making it allocates, so it comes before the loop.
+fn publisher<T: OnBoard>(board: StateBoard<T>) -> impl Fn(&T) {
+    let writer = board.writer().ok();
+    move |state| {
+        if let Some(writer) = &writer {
+            writer.write(state);
+        }
     }
 }
 

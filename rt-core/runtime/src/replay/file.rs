@@ -1,6 +1,7 @@
 //! A flight recording on disk: magic, SHA-256 of the rest, and the recording itself.
 
 use crate::rt::haptic_tape::HapticFlight;
+use crate::rt::second::SecondFlight;
 use crate::rt::tissue_tape::TissueFlight;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -10,7 +11,7 @@ use stylet_hw::DeviceInfo;
 use stylet_sim::line::LineSource;
 
 /// Ends in the version of the layout.
-const MAGIC: &[u8; 8] = b"STYFLT\0\x09";
+const MAGIC: &[u8; 8] = b"STYFLT\0\x0a";
 /// Where the version stands.
 const VERSION_AT: usize = MAGIC.len() - 1;
 const DIGEST: usize = 32;
@@ -127,6 +128,21 @@ pub struct Flight {
     /// The tissue loop. `None`: as above, the body is too large to be recorded, or an elastic body was held without a needle
     /// line for as long as the tape reaches back: its solver's state is not recorded.
     pub tissue: Option<TissueFlight>,
+    /// The second device; `None` in a run without one.
+    pub second_device: Option<SecondFigures>,
+    /// Its loop. `None`: as above.
+    pub second: Option<SecondFlight>,
+}
+
+/// What the second device's loop was.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SecondFigures {
+    /// Name of the device.
+    pub device_name: String,
+    /// Its figures.
+    pub device: DeviceFigures,
+    /// Time between two ticks of its loop, s.
+    pub period_s: f64,
 }
 
 impl Flight {

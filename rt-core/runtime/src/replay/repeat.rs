@@ -42,7 +42,7 @@ impl Repeated {
         self.ticks > 0 && self.different == 0 && self.different_positions == 0 && self.different_lines == 0
     }
 
-    fn count(&mut self, index: usize, same: bool) {
+    pub(super) fn count(&mut self, index: usize, same: bool) {
         self.ticks += 1;
         if !same {
             self.different += 1;
@@ -52,10 +52,21 @@ impl Repeated {
 }
 
 /// A device that gives the recorded answers.
-struct RecordedDevice {
+pub(super) struct RecordedDevice {
     info: DeviceInfo,
     answers: std::vec::IntoIter<(Result<Sample, DeviceFault>, bool)>,
     write_failed: bool,
+}
+
+impl RecordedDevice {
+    /// Each answer with whether the force was refused after it.
+    pub fn new(info: DeviceInfo, answers: Vec<(Result<Sample, DeviceFault>, bool)>) -> Self {
+        Self {
+            info,
+            answers: answers.into_iter(),
+            write_failed: false,
+        }
+    }
 }
 
 impl Device for RecordedDevice {
@@ -95,12 +106,8 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
         mut tissue,
         mut bridge,
     } = Wiring::new(capacities(recorded.orders.len()), Some(tape), None);
-    let answers: Vec<_> = recorded.ticks.iter().map(|e| (e.read, e.write_failed)).collect();
-    let device = RecordedDevice {
-        info: flight.device.info(),
-        answers: answers.into_iter(),
-        write_failed: false,
-    };
+    let answers = recorded.ticks.iter().map(|e| (e.read, e.write_failed)).collect();
+    let device = RecordedDevice::new(flight.device.info(), answers);
     let (session_id, period_s) = (flight.session_id, flight.haptic_period_s);
     let mut again = HapticLoop::new(session_id, Box::new(device), ports, &recorded.memory, period_s);
     if let Some(state) = &recorded.line_state {
@@ -140,7 +147,7 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
 }
 
 /// All orders of the recording may come in one tick.
-fn capacities(orders: usize) -> Capacities {
+pub(super) fn capacities(orders: usize) -> Capacities {
     Capacities {
         orders: orders.max(1),
         notices: 1024,

@@ -168,6 +168,8 @@ impl Recorded {
             device: self.figures,
             haptic_period_s: 1e-3,
             tissue_period_s: 5e-3,
+            second_device: None,
+            second: None,
             lines: self.kept.clone(),
             haptic: haptic.flight(),
             tissue: tissue.flight(),

@@ -1,16 +1,16 @@
 //! The haptic tick, 1 kHz: read → chain (velocity, needle, force law, gate) → write → pose → record.
 
 use crate::rt::arm::Armed;
-use crate::rt::clock::{self, Grid};
+use crate::rt::clock::{self, HAPTIC_PHASE, Wait};
+use crate::rt::device_loop::{self, DeviceLoop};
 use crate::rt::exchange::Notice;
 use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::pose::TipPose;
 use crate::rt::response::TissueResponse;
 use crate::rt::timing::Probe;
-use crate::rt::watchdog::{Watchdog, Watched, at_gate, device_fault};
+use crate::rt::watchdog::{Watchdog, Watched, at_gate};
 use crate::rt::wiring::HapticPorts;
-use nalgebra::Vector3;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use stylet_hw::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
 use stylet_shm_schema::{Fault, HapticState};
 use stylet_sim::force::ForceFault;
@@ -22,7 +22,10 @@ mod flight;
 mod left;
 mod line;
 mod orders;
+mod put_in;
 mod record;
+
+pub use put_in::PutIn;
 
 /// Everything that the haptic thread owns.
 pub struct HapticLoop {
@@ -43,14 +46,16 @@ pub struct HapticLoop {
     /// Needles that stay in.
     left: left::Left,
     watchdog: Watchdog,
+    /// Faults that an instructor put in.
+    put_in: PutIn,
     /// What the device answered in this tick, for the recording.
     answer: DeviceAnswer,
     /// What hosts see; also holds the counters.
     pub state: HapticState,
     /// Present in a measurement.
     pub probe: Option<Box<Probe>>,
-    /// Spinning before each deadline; 0 for none.
-    pub spin_ns: u64,
+    /// How it waits for each deadline.
+    pub wait: Wait,
     period_s: f64,
 }
 
@@ -101,10 +106,11 @@ impl HapticLoop {
                 ..left::Left::default()
             },
             watchdog: memory.watchdog,
+            put_in: memory.put_in,
             answer: DeviceAnswer::default(),
             state: memory.state,
             probe: None,
-            spin_ns: 0,
+            wait: Wait::default(),
             period_s,
         }
     }
@@ -116,28 +122,9 @@ impl HapticLoop {
         }
     }
 
-    /// Runs on the ideal grid until `stop`, then ramps the force to zero and ends.
-    pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) {
-        let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
-        let mut missed = 0;
-        let mut last_ticks = self.parameters.force.gate.ramp_out_ticks + 1;
-        while last_ticks > 0 {
-            // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
-            if stop.load(Ordering::Acquire) {
-                self.release_for_the_end();
-                last_ticks -= 1;
-            }
-            let slept = clock::wait_until(grid.due_ns, self.spin_ns);
-            let woke_ns = clock::now_ns();
-            self.tick(grid.due_ns, woke_ns, missed);
-            publish(&self.state);
-            if let Some(probe) = &mut self.probe {
-                probe.finish(grid.due_ns, woke_ns, missed, slept);
-            }
-            missed = grid.advance(clock::now_ns());
-        }
-        let _ = self.device.write(&Wrench::zero());
-        self.ports.flight.hand_over();
+    /// Runs on the ideal grid until `stop`, then ramps the force to zero and ends. Returns how often it slept.
+    pub fn run(&mut self, armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) -> u64 {
+        device_loop::run(self, armed, stop, |this| publish(&this.state))
     }
 
     /// One tick; in the order of the data. Returns what the force chain gave.
@@ -145,6 +132,7 @@ impl HapticLoop {
         self.checkpoint();
         self.take_orders();
         self.take_line();
+        self.follow_body();
         self.mark();
         let sample = self.read();
         self.mark();
@@ -179,29 +167,16 @@ impl HapticLoop {
 
     /// The newest sample; the last good one when the device has a fault.
     fn read(&mut self) -> Sample {
-        let last = self.sample.unwrap_or(Sample {
-            tip_in_world: Vector3::zeros(),
-            world_from_tool: nalgebra::UnitQuaternion::identity(),
-            buttons: 0,
-            sequence: 0,
-        });
-        self.answer.read = self.device.read(self.period_s);
-        let sample = match self.answer.read {
-            Ok(sample) if sample.is_finite() => sample,
-            Ok(_) => {
-                self.raise(Fault::NonFiniteInput);
-                last
-            }
-            Err(fault) => {
-                self.raise(device_fault(fault));
-                last
-            }
-        };
-        let repeated = self.sample.is_some_and(|s| s.sequence == sample.sequence);
-        if let Some(fault) = self.watchdog.sample(repeated) {
+        self.answer.read = self.put_in.answer(self.device.read(self.period_s));
+        let in_body = self.answer.read.map(|sample| self.put_in.in_body(sample));
+        let reading = device_loop::judge(in_body, self.sample);
+        if let Some(fault) = reading.fault {
             self.raise(fault);
         }
-        sample
+        if let Some(fault) = self.watchdog.sample(reading.is_repeated) {
+            self.raise(fault);
+        }
+        reading.sample
     }
 
     fn raise(&mut self, fault: Fault) {
@@ -256,7 +231,7 @@ impl HapticLoop {
                 tick,
                 time_ns,
                 depth_m: output.depth_m,
-                position_m: sample.tip_in_world,
+                position_m: self.put_in.in_scene(sample.tip_in_world),
             });
         }
         if output.left {
@@ -301,5 +276,40 @@ impl HapticLoop {
         self.pose.seen_layer = self.chain.path.seen();
         self.pose.hand_is_empty = self.left.is_hand_empty;
         self.ports.pose.write(self.pose);
+    }
+}
+
+impl DeviceLoop for HapticLoop {
+    fn period_s(&self) -> f64 {
+        self.period_s
+    }
+
+    fn wait(&self) -> Wait {
+        self.wait
+    }
+
+    fn phase(&self) -> f64 {
+        HAPTIC_PHASE
+    }
+
+    fn ramp_out_ticks(&self) -> u32 {
+        self.parameters.force.gate.ramp_out_ticks
+    }
+
+    fn release_for_the_end(&mut self) {
+        self.release_with_tape();
+    }
+
+    fn step(&mut self, due_ns: u64, woke_ns: u64, missed: u32) {
+        self.tick(due_ns, woke_ns, missed);
+    }
+
+    fn probe(&mut self) -> Option<&mut Probe> {
+        self.probe.as_deref_mut()
+    }
+
+    fn end(&mut self) {
+        let _ = self.device.write(&Wrench::zero());
+        self.ports.flight.hand_over();
     }
 }

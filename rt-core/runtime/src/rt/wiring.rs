@@ -6,10 +6,12 @@ use crate::rt::line_loads::AllLoads;
 use crate::rt::pose::TipPose;
 use crate::rt::recorder::{Recorder, TapePort, recorder};
 use crate::rt::response::TissueResponse;
+use crate::rt::second::SecondTissuePorts;
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use stylet_shm_schema::TickRecord;
 use stylet_sim::line::{BodyLine, HandLine, LeftNeedles, MAX_LEFT};
+use stylet_sim::probe::BodyProbe;
 
 /// Places in each ring, all at least one.
 #[derive(Clone, Copy, Debug)]
@@ -51,6 +53,8 @@ const LINES: usize = 2;
 const OLD_LINES: usize = LINES + 2 * MAX_LEFT;
 /// Room for needles that stay in, sent once.
 const ROOMS: usize = 2;
+/// Probes on their way back: one of each scene.
+const OLD_PROBES: usize = 4;
 
 /// Ends that the force loop owns.
 pub struct HapticPorts {
@@ -90,12 +94,16 @@ pub struct TissuePorts {
     pub old_worlds: rtrb::Producer<Box<World>>,
     /// Replaced columns of a line, to the bridge, which frees them.
     pub old_lines: rtrb::Producer<Box<BodyLine>>,
+    /// Probes of replaced scenes, to the bridge, which frees them.
+    pub old_probes: rtrb::Producer<Box<BodyProbe>>,
     /// Forces on the line, of the force loop.
     pub loads: triple_buffer::Output<AllLoads>,
     /// Loaned snapshot memory.
     pub slots: rtrb::Consumer<SnapshotSlot>,
     /// Loaned memory that goes back to the bridge.
     pub filled: rtrb::Producer<SnapshotReturn>,
+    /// Pose and contact of the second device, in a run that has one.
+    pub second: Option<SecondTissuePorts>,
     /// Flight recording.
     pub flight: Recorder<TissueTape>,
 }
@@ -122,6 +130,8 @@ pub struct BridgePorts {
     pub old_hand_lines: rtrb::Consumer<Box<HandLine>>,
     /// Columns to be freed.
     pub old_body_lines: rtrb::Consumer<Box<BodyLine>>,
+    /// Probes to be freed.
+    pub old_probes: rtrb::Consumer<Box<BodyProbe>>,
     /// Snapshot memory for the tissue loop.
     pub slots: rtrb::Producer<SnapshotSlot>,
     /// Snapshot memory that the tissue loop has returned.
@@ -162,6 +172,7 @@ impl Wiring {
         let (rooms, room_out) = rtrb::RingBuffer::new(ROOMS);
         let (old_hand_line_in, old_hand_lines) = rtrb::RingBuffer::new(OLD_LINES);
         let (old_body_line_in, old_body_lines) = rtrb::RingBuffer::new(OLD_LINES);
+        let (old_probe_in, old_probes) = rtrb::RingBuffer::new(OLD_PROBES);
         let (loads_in, loads_out) = triple_buffer::triple_buffer(&AllLoads::default());
         let (slots, slot_out) = rtrb::RingBuffer::new(capacities.snapshots);
         let (filled_in, filled) = rtrb::RingBuffer::new(capacities.snapshots);
@@ -187,9 +198,11 @@ impl Wiring {
                 notices: tissue_notice_in,
                 old_worlds: old_world_in,
                 old_lines: old_body_line_in,
+                old_probes: old_probe_in,
                 loads: loads_out,
                 slots: slot_out,
                 filled: filled_in,
+                second: None,
                 flight: tissue_flight,
             },
             bridge: BridgePorts {
@@ -203,6 +216,7 @@ impl Wiring {
                 rooms,
                 old_hand_lines,
                 old_body_lines,
+                old_probes,
                 slots,
                 filled,
                 haptic_tapes,

@@ -9,6 +9,8 @@ const WINDOW: &[&str] = &[
     "wgpu",
     "winit",
 ];
+/// What computes pictures without a window uses `wgpu`.
+const TOOLKIT: &[&str] = &["egui", "eframe", "egui-wgpu", "winit"];
 /// `shm-schema` alone makes ports (ADR 19).
 const PORTS: &[&str] = &["iceoryx2"];
 const ARGUMENTS: &[&str] = &["clap"];
@@ -176,6 +178,12 @@ pub const LAYERS: &[Layer] = &[
         not_itself: &[PORTS, ARGUMENTS],
     },
     Layer {
+        folder: "host-ui/imaging",
+        may_use: &["host-ui/surfaces", "shm-schema", "shm-schema/anatomy"],
+        never: &[TOOLKIT, DEVICES, DICOM],
+        not_itself: &[PORTS, ARGUMENTS],
+    },
+    Layer {
         folder: "host-ui/host",
         may_use: &[
             "host-ui/base",
@@ -242,6 +250,7 @@ pub const LAYERS: &[Layer] = &[
             "host-ui/files",
             "host-ui/host",
             "host-ui/igtl",
+            "host-ui/imaging",
             "host-ui/implant",
             "host-ui/population",
             "host-ui/surfaces",

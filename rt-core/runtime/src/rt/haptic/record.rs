@@ -2,23 +2,18 @@
 
 use super::HapticLoop;
 use crate::rt::clock;
+use crate::rt::device_loop::is_at_goal;
 use crate::rt::response::TissueResponse;
 use nalgebra::Vector3;
 use stylet_shm_schema::{TickRecord, flags};
 use stylet_sim::force::chain::ChainOutput;
 use stylet_sim::needle::Phase;
 
-/// The hand is at its goal within this distance, at rest.
-const AT_GOAL_M: f64 = 4e-4;
-const AT_REST_M_PER_S: f64 = 3e-3;
-
 impl HapticLoop {
     fn flags(&self, tissue: &TissueResponse, response: &ChainOutput) -> u32 {
         let always = flags::REAL_TIME | flags::SIMULATED_DEVICE | flags::LINE_NEEDED;
         let speed = self.chain.estimator.velocity_m_per_s().norm();
-        let at_goal = self.goal.is_some_and(|goal| {
-            (self.pose.tip_in_scene - goal.tip_in_world).norm() < AT_GOAL_M && speed < AT_REST_M_PER_S
-        });
+        let at_goal = is_at_goal(self.goal, &self.put_in.in_scene(self.pose.tip_in_scene), speed);
         let bit = |set: bool, flag: u32| if set { flag } else { 0 };
         (self.state.flags & always)
             | bit(self.chain.gate.engaged(), flags::ENGAGED)
@@ -55,9 +50,9 @@ impl HapticLoop {
         let s = &mut self.state;
         s.tick += 1;
         s.time_ns = woke_ns;
-        s.tip_in_scene_m = self.pose.tip_in_scene.into();
+        s.tip_in_scene_m = self.put_in.in_scene(self.pose.tip_in_scene).into();
         s.needle_direction = self.pose.direction.into();
-        s.contact_in_scene_m = tissue.contact_in_scene.into();
+        s.contact_in_scene_m = self.put_in.in_scene(tissue.contact_in_scene).into();
         s.depth_m = response.depth_m;
         s.puncture_depth_m = response.puncture_depth_m;
         s.speed_m_per_s = response.speed_along_m_per_s;

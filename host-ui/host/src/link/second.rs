@@ -1,0 +1,72 @@
+//! The second device, as the receiving thread takes it: only in a run that has one.
+
+use super::inbox::Inbox;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::service::{self, Node, SliceSubscriber, StateReader};
+use stylet_shm_schema::{SecondRecord, SecondState, Session, check};
+
+const OPEN_EVERY: Duration = Duration::from_millis(100);
+
+/// Ports of the second device's services, while the run has one.
+#[derive(Default)]
+pub struct SecondEnds {
+    board: Option<StateReader<SecondState>>,
+    records: Option<SliceSubscriber<SecondRecord, u64>>,
+    tried: Option<Instant>,
+}
+
+impl SecondEnds {
+    /// Of another run, or none.
+    pub fn close(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Opens what the run of `session` has.
+    pub fn open(&mut self, node: &Node, session: &Session) {
+        let is_whole = self.board.is_some() && self.records.is_some();
+        if !session.has_second() || is_whole || self.tried.is_some_and(|t| t.elapsed() < OPEN_EVERY) {
+            return;
+        }
+        self.tried = Some(Instant::now());
+        self.records = self
+            .records
+            .take()
+            .or_else(|| service::second_records::subscriber(node).ok());
+        self.board = StateReader::open(node, session.session_id).ok();
+    }
+
+    /// Takes what has arrived; how much of it was invalid.
+    pub fn receive(&self, session_id: u64, inbox: &mut Inbox) -> u64 {
+        let mut invalid = 0;
+        while let Some(batch) = self.records.as_ref().and_then(SliceSubscriber::receive) {
+            for record in batch.values() {
+                match check::second_record(record) {
+                    Ok(()) if record.session_id == session_id => inbox.put_second_record(*record),
+                    Ok(()) => {}
+                    Err(_) => invalid += 1,
+                }
+            }
+        }
+        if let Some(state) = self.board.as_ref().map(StateReader::read) {
+            match check::second_state(&state) {
+                Ok(()) => inbox.second_state = Some(state),
+                Err(_) => invalid += 1,
+            }
+        }
+        invalid
+    }
+}
+
+/// What a tick says of the state; the rest is as it was, or zero.
+pub fn carry(record: &SecondRecord, before: Option<&SecondState>) -> SecondState {
+    let mut state = before.copied().unwrap_or(bytemuck::Zeroable::zeroed());
+    (state.tick, state.time_ns) = (record.tick, record.due_ns + record.wake_latency_ns);
+    (state.tip_in_scene_m, state.world_from_tool) = (record.tip_in_scene_m, record.world_from_tool);
+    (state.force_on_hand_n, state.torque_on_hand_nm) = (record.force_on_hand_n, record.torque_on_hand_nm);
+    let force_n = record.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+    state.peak_force_n = state.peak_force_n.max(force_n);
+    state.missed_deadlines += u64::from(record.missed);
+    (state.fault, state.flags, state.buttons) = (record.fault, record.flags, record.buttons);
+    state.tissue_tick = record.tissue_tick;
+    state
+}

@@ -1,0 +1,123 @@
+//! The grid of beams and depths, and the scatterers that give speckle.
+
+use super::{Plane, View};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Edges of the cube of scatterers, x fastest: powers of two that the shader knows.
+const WIDE: usize = 128;
+const CUBE: usize = WIDE * 128 * 32;
+/// Depths between two places at which the material point is sought: displacements vary over millimetres.
+pub const MAP_CELL: u32 = 8;
+
+/// Beams, depths and slices across the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grid {
+    pub lines: u32,
+    pub samples: u32,
+    pub slices: u32,
+    /// Distance between scatterers along x, y, z, m. Beams go across the probe, so along z they may lie farther apart. A distance
+    /// below that between samples would let speckle change at once where it should change slowly.
+    pub scatterers_m: [f64; 3],
+}
+
+impl Grid {
+    pub fn of(plane: &Plane) -> Self {
+        const SAMPLE_M: f64 = 0.18e-3;
+        let samples = (plane.depth_m / SAMPLE_M).ceil().clamp(64.0, 1024.0) as u32 + 1;
+        match plane.view {
+            View::Transverse => Self {
+                lines: 320,
+                samples,
+                slices: 5,
+                scatterers_m: [0.25e-3, 0.25e-3, 0.9e-3],
+            },
+            // Here the slices follow each other across the probe, where scatterers lie near each other.
+            View::Sagittal => Self {
+                lines: 192,
+                samples,
+                slices: 11,
+                scatterers_m: [0.3e-3, 0.3e-3, 0.35e-3],
+            },
+        }
+    }
+
+    pub fn count(&self) -> usize {
+        self.lines as usize * self.samples as usize
+    }
+
+    /// Places at which the material point is sought, at both ends of the slices.
+    pub fn map_cells(&self) -> [u32; 2] {
+        [self.lines, self.samples].map(|n| (n - 1) / MAP_CELL + 2)
+    }
+}
+
+/// Power of the sum of echoes of each sample over that of one, beyond what its weights alone would give: neighbours among the
+/// samples share scatterers.
+pub fn powers(plane: &Plane, grid: Grid) -> Vec<f32> {
+    let [fine_m, _, along_m] = grid.scatterers_m;
+    let (across_m, slices_m) = match plane.view {
+        View::Transverse => (fine_m, along_m),
+        View::Sagittal => (along_m, fine_m),
+    };
+    let sample_m = plane.depth_m / f64::from(grid.samples - 1);
+    let pulse = sum_of_neighbours(plane.probe.axial_m / sample_m, sample_m / fine_m);
+    let at = |sample: u32| {
+        let depth_m = f64::from(sample) * sample_m;
+        let pitch_m = plane.pitch_m(grid.lines, depth_m);
+        let across = sum_of_neighbours(plane.probe.lateral_at_m(depth_m) / pitch_m, pitch_m / across_m);
+        // Slices lie two spreads to both sides.
+        let per_spread = f64::from(grid.slices - 1) / 4.0;
+        let slice_m = plane.probe.thickness_at_m(depth_m) / per_spread;
+        (pulse * across * sum_of_neighbours(per_spread, slice_m / slices_m)) as f32
+    };
+    (0..grid.samples).map(at).collect()
+}
+
+/// Gaussian weights with a spread of so many steps, over scatterers at a distance of which a step is this share.
+fn sum_of_neighbours(spread: f64, step: f64) -> f64 {
+    let lags = (1..200).map(f64::from).take_while(|lag| lag * step < 2.0);
+    1.0 + 2.0
+        * lags
+            .map(|lag| (-0.25 * (lag / spread).powi(2)).exp() * shared(lag * step))
+            .sum::<f64>()
+}
+
+/// Correlation of two places on the straight lines between scatterers at distance 1, each of the same power: the mean over where
+/// the first one lies.
+fn shared(apart: f64) -> f64 {
+    const PLACES: u32 = 16;
+    let weights = |at: f64| {
+        let after = at.fract();
+        let power = after.mul_add(after, (1.0 - after).powi(2)).sqrt();
+        (at.floor(), [(1.0 - after) / power, after / power])
+    };
+    let of_place = |n: u32| {
+        let at = (f64::from(n) + 0.5) / f64::from(PLACES);
+        let ((_, one), (cell, other)) = (weights(at), weights(at + apart));
+        match cell {
+            0.0 => one[0] * other[0] + one[1] * other[1],
+            1.0 => one[1] * other[0],
+            _ => 0.0,
+        }
+    };
+    (0..PLACES).map(of_place).sum::<f64>() / f64::from(PLACES)
+}
+
+/// The largest part of an echo that a byte stands for; of the standard deviation of a part it is 5.1 times as much.
+pub const LARGEST_ECHO: f64 = 3.6;
+
+/// Complex echoes, circular Gaussian with mean power 1, the same every time: a byte each for the two parts of one and of the
+/// next along x, so that one word gives both.
+pub fn scatterers() -> Vec<u32> {
+    let mut random = ChaCha8Rng::seed_from_u64(0x5712);
+    let mut byte = || {
+        let x: f64 = StandardNormal.sample(&mut random);
+        let share = x * std::f64::consts::FRAC_1_SQRT_2 / LARGEST_ECHO;
+        u32::from((share * 127.0).round().clamp(-127.0, 127.0) as i8 as u8)
+    };
+    let echoes: Vec<u32> = (0..CUBE).map(|_| byte() | byte() << 8).collect();
+    let beside = |n: usize| echoes[n - n % WIDE + (n + 1) % WIDE];
+    (0..CUBE).map(|n| echoes[n] | beside(n) << 16).collect()
+}

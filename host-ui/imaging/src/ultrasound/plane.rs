@@ -1,0 +1,253 @@
+//! Where the beams of a probe go, how wide they are, and where a place stands in the picture.
+
+use nalgebra::{Vector2, Vector3};
+use stylet_anatomy::Organ;
+use stylet_shm_schema::SceneHeader;
+
+/// How the probe stands: the middle of its array on its axis, the axis, and where its middle beam goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Middle of the array, on the axis of the probe, scene frame, m.
+    pub middle_m: Vector3<f64>,
+    /// Unit vector along the axis, into the patient.
+    pub axis: Vector3<f64>,
+    /// Unit vector along the middle beam, square to the axis: it turns with the probe.
+    pub up: Vector3<f64>,
+}
+
+/// From the middle of a probe to the target, where a scene has no rectum, m.
+const BEHIND_M: f64 = 15e-3;
+
+impl Pose {
+    /// The probe on its stepper, not yet moved: along the patient's axis through the middle of the rectum, or behind the target
+    /// where the scene has none; its array at the middle of the target.
+    pub fn of_scene(scene: &SceneHeader) -> Self {
+        let frame = scene.patient();
+        let [across, axis, up] = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]
+            .map(|d| Vector3::from(frame.scene_from_patient_direction(d)));
+        let middle = |low: [f64; 3], high: [f64; 3]| (Vector3::from(low) + Vector3::from(high)) * 0.5;
+        let target = middle(scene.target_lower_m, scene.target_upper_m);
+        let half = (Vector3::from(scene.target_upper_m) - Vector3::from(scene.target_lower_m)) * 0.5;
+        let is_rectum = |name: &str| Organ::Rectum.is_mentioned_in(name) || Organ::RectalWall.is_mentioned_in(name);
+        let rectum = scene.structures().iter().find(|s| is_rectum(&s.name.read()));
+        let behind_m = half.component_mul(&up.abs()).norm() + BEHIND_M;
+        let place = rectum.map_or(target - up * behind_m, |s| middle(s.lower_m, s.upper_m));
+        let from_target = place - target;
+        Self {
+            middle_m: target + up * from_target.dot(&up) + across * from_target.dot(&across),
+            axis,
+            up,
+        }
+    }
+
+    /// The pose after a turn about the axis, from the patient's right over anterior to the left, and a way along it.
+    pub fn moved(&self, way_m: f64, turn_rad: f64) -> Self {
+        let (sin, cos) = turn_rad.sin_cos();
+        Self {
+            middle_m: self.middle_m + self.axis * way_m,
+            axis: self.axis,
+            up: self.up * cos + self.axis.cross(&self.up) * sin,
+        }
+    }
+}
+
+/// Which of the two planes is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// Across the probe: a sector about its axis.
+    Transverse,
+    /// Along the probe: parallel beams.
+    Sagittal,
+}
+
+impl View {
+    /// Both planes.
+    pub const ALL: [Self; 2] = [Self::Transverse, Self::Sagittal];
+
+    /// Its name, for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Transverse => "Transverse",
+            Self::Sagittal => "Sagittal",
+        }
+    }
+}
+
+/// Sizes of a probe, and how its beams spread.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Probe {
+    /// From its axis to its surface, m.
+    pub radius_m: f64,
+    /// Half the angle of the sector, rad.
+    pub half_angle: f64,
+    /// Half the length of the sagittal array, m.
+    pub half_length_m: f64,
+    /// Middle of the band, MHz.
+    pub mhz: f64,
+    /// Standard deviation of a point's echo along the beam, m.
+    pub axial_m: f64,
+    /// Standard deviation across the beam near the probe, m.
+    pub lateral_m: f64,
+    /// Standard deviation across the beam per depth, where that is more.
+    pub lateral_per_depth: f64,
+    /// Standard deviation across the plane at the focus of the lens, m.
+    pub thickness_m: f64,
+    /// Depth of that focus, m.
+    pub focus_m: f64,
+    /// At so much more or less depth the plane is thicker by the square root of two, m.
+    pub focal_depth_m: f64,
+}
+
+/// Speed of sound that a scanner assumes, m/s.
+const SOUND_M_PER_S: f64 = 1540.0;
+/// Full width at half maximum of a Gaussian in standard deviations.
+pub const FWHM: f64 = 2.354_820_045;
+
+impl Default for Probe {
+    /// 7 MHz, 20 mm thick. Across the beam the width at half maximum is the wavelength times the f-number (2, then depth over an
+    /// aperture of 12 mm); along it 0.3 mm; the plane is 2 mm thick at 25 mm. The sizes are assumed, see `docs/imaging.md`.
+    fn default() -> Self {
+        let mhz = 7.0;
+        let wavelength_m = SOUND_M_PER_S / (mhz * 1e6);
+        Self {
+            radius_m: 10e-3,
+            half_angle: 80_f64.to_radians(),
+            half_length_m: 32.5e-3,
+            mhz,
+            axial_m: 0.3e-3 / FWHM,
+            lateral_m: 2.0 * wavelength_m / FWHM,
+            lateral_per_depth: wavelength_m / 12e-3 / FWHM,
+            thickness_m: 2e-3 / FWHM,
+            focus_m: 25e-3,
+            focal_depth_m: 25e-3,
+        }
+    }
+}
+
+impl Probe {
+    /// Standard deviation of the beam across the plane, m.
+    pub fn thickness_at_m(&self, depth_m: f64) -> f64 {
+        self.thickness_m * (1.0 + ((depth_m - self.focus_m) / self.focal_depth_m).powi(2)).sqrt()
+    }
+
+    /// Standard deviation of a point's echo across the beam, m.
+    pub fn lateral_at_m(&self, depth_m: f64) -> f64 {
+        self.lateral_m.max(self.lateral_per_depth * depth_m)
+    }
+
+    /// Half the fan: an angle of the sector (rad), a length of parallel beams (m).
+    pub fn half(&self, view: View) -> f64 {
+        match view {
+            View::Transverse => self.half_angle,
+            View::Sagittal => self.half_length_m,
+        }
+    }
+}
+
+/// The plane of one picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// How the probe stands.
+    pub pose: Pose,
+    /// Which plane of it.
+    pub view: View,
+    /// The probe.
+    pub probe: Probe,
+    /// How deep it looks, from the surface of the probe, m.
+    pub depth_m: f64,
+    /// Pixels of the picture.
+    pub pixels: [u32; 2],
+}
+
+/// A place in the coordinates of the beams.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InBeams {
+    /// Which beam: an angle from the middle beam (rad), or a way along the probe (m).
+    pub across: f64,
+    /// From the surface of the probe, m.
+    pub depth_m: f64,
+    /// Before or behind the plane, m.
+    pub beside_m: f64,
+}
+
+impl Plane {
+    /// Unit vector to the right of the picture: the patient's left, or superior.
+    pub fn right(&self) -> Vector3<f64> {
+        match self.view {
+            View::Transverse => self.pose.axis.cross(&self.pose.up),
+            View::Sagittal => self.pose.axis,
+        }
+    }
+
+    /// Unit vector across the plane.
+    pub fn normal(&self) -> Vector3<f64> {
+        self.right().cross(&self.pose.up)
+    }
+
+    /// Distance between neighbours among so many beams, m.
+    pub(super) fn pitch_m(&self, lines: u32, depth_m: f64) -> f64 {
+        let per_half = 2.0 * self.probe.half(self.view) / f64::from(lines - 1);
+        match self.view {
+            View::Transverse => per_half * (self.probe.radius_m + depth_m),
+            View::Sagittal => per_half,
+        }
+    }
+
+    /// Where a place of the scene lies among the beams.
+    pub fn in_beams(&self, place_m: Vector3<f64>) -> InBeams {
+        let from = place_m - self.pose.middle_m;
+        let (x, y) = (from.dot(&self.right()), from.dot(&self.pose.up));
+        let (across, r) = match self.view {
+            View::Transverse => (x.atan2(y), x.hypot(y)),
+            View::Sagittal => (x, y),
+        };
+        InBeams {
+            across,
+            depth_m: r - self.probe.radius_m,
+            beside_m: from.dot(&self.normal()),
+        }
+    }
+
+    /// Size of a pixel, m: all of the fan is seen.
+    pub fn m_per_pixel(&self) -> f64 {
+        let high_m = self.probe.radius_m + self.depth_m;
+        let wide_m = match self.view {
+            View::Transverse => 2.0 * high_m * self.probe.half_angle.sin().max(0.1),
+            View::Sagittal => 2.0 * self.probe.half_length_m,
+        };
+        (wide_m / f64::from(self.pixels[0])).max(high_m / f64::from(self.pixels[1]))
+    }
+
+    /// The axis of the probe stands at the lower edge of the picture; what does not fill it lies in its middle.
+    pub fn lowest_m(&self) -> f64 {
+        let high_m = self.probe.radius_m + self.depth_m;
+        0.5 * (high_m - f64::from(self.pixels[1]) * self.m_per_pixel())
+    }
+
+    /// Where a place of the scene, dropped onto the plane, stands in the picture: pixels from its left and upper edge.
+    pub fn pixel_of(&self, place_m: Vector3<f64>) -> Vector2<f64> {
+        let from = place_m - self.pose.middle_m;
+        let scale = self.m_per_pixel();
+        let [wide, high] = self.pixels.map(f64::from);
+        let (x, y) = (from.dot(&self.right()), from.dot(&self.pose.up));
+        Vector2::new(0.5 * wide + x / scale, high - (y - self.lowest_m()) / scale)
+    }
+
+    /// Where a straight line through a place crosses the plane, in the picture; `None` where it runs along it. The holes of a
+    /// template are drawn so.
+    pub fn crossing(&self, place_m: Vector3<f64>, direction: Vector3<f64>) -> Option<Vector2<f64>> {
+        let (beside_m, per) = (self.in_beams(place_m).beside_m, direction.dot(&self.normal()));
+        (per.abs() > 0.2).then(|| self.pixel_of(place_m - direction * (beside_m / per)))
+    }
+
+    /// The place in the plane under a place in the picture.
+    pub fn place_of(&self, pixel: Vector2<f64>) -> Vector3<f64> {
+        let scale = self.m_per_pixel();
+        let [wide, high] = self.pixels.map(f64::from);
+        let (x, y) = (
+            (pixel.x - 0.5 * wide) * scale,
+            (high - pixel.y) * scale + self.lowest_m(),
+        );
+        self.pose.middle_m + self.right() * x + self.pose.up * y
+    }
+}

@@ -1,0 +1,193 @@
+//! `host-ui picture`: what a probe or a C-arm sees of the scene of a running core, as a PNG file.
+
+use super::CommandError;
+use super::dose::common::within;
+use crate::picture::png_of;
+use crate::shown::Shown;
+use clap::{Args, ValueEnum};
+use nalgebra::{Vector2, Vector3};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+use stylet_base::write_whole;
+use stylet_host::core_args::CoreArgs;
+use stylet_host::link::SceneModel;
+use stylet_imaging::fluoroscopy::{CArm, Exposure, Fluoroscope};
+use stylet_imaging::ultrasound::{Plane, Pose, Probe, Scanner, Settings, View};
+use stylet_imaging::{Body, Gpu, Metal};
+use stylet_implant::plan::{Hole, Template};
+use stylet_implant::procedure::{Connect, Live};
+use stylet_surfaces::field::Field;
+
+/// A core sends one at least every 30 ms.
+const SNAPSHOT_WITHIN: Duration = Duration::from_secs(3);
+
+const HELP: &str = "\
+The picture shows the tissue as it lies now, with the needle and the seeds where they are. Ultrasound: the probe lies in the rectum,
+or behind the target where the scene has none; its array stands at the middle of the target. Fluoroscopy: the C-arm turns about the
+middle of the target; 0 degrees looks from behind the patient, positive orbital angles move the detector to his left, positive cranial
+angles towards his head. The dose that is printed is air kerma 15 cm before the isocentre. What is simulated and what is left out
+stands in docs/imaging.md.
+
+Examples:
+  host-ui picture --core target/release/rt-core --scene pelvis --view transverse --template --out prostate.png
+  host-ui picture --view sagittal --turn 10 --out side.png
+  host-ui picture --view fluoroscopy --orbital 30 --out seeds.png";
+
+#[derive(Args, Debug)]
+#[command(after_long_help = HELP)]
+pub struct PictureArgs {
+    #[command(flatten)]
+    asked: CoreArgs,
+    /// Start this rt-core when none is running, and end it afterwards
+    #[arg(long, value_name = "PATH")]
+    core: Option<PathBuf>,
+    /// Which picture
+    #[arg(long, value_enum)]
+    view: Wanted,
+    /// File to write
+    #[arg(long, value_name = "FILE.png")]
+    out: PathBuf,
+    /// Width and height in pixels
+    #[arg(long, default_value_t = 768, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=2048))]
+    pixels: u32,
+    /// Move the probe this far into the patient, -100 to 100 mm
+    #[arg(long, default_value_t = 0.0, value_name = "MM", allow_negative_numbers = true)]
+    way: f64,
+    /// Turn the probe about its axis, -180 to 180 degrees
+    #[arg(long, default_value_t = 0.0, value_name = "DEG", allow_negative_numbers = true)]
+    turn: f64,
+    /// How deep ultrasound looks, 20 to 120 mm
+    #[arg(long, default_value_t = 60.0, value_name = "MM")]
+    depth: f64,
+    /// Gain of ultrasound, -60 to 60 dB
+    #[arg(long, default_value_t = 0.0, value_name = "DB", allow_negative_numbers = true)]
+    gain: f64,
+    /// Draw the holes of the template over the transverse picture
+    #[arg(long)]
+    template: bool,
+    /// Orbital angle of the C-arm, -180 to 180 degrees
+    #[arg(long, default_value_t = 0.0, value_name = "DEG", allow_negative_numbers = true)]
+    orbital: f64,
+    /// Cranial angle of the C-arm, -60 to 60 degrees
+    #[arg(long, default_value_t = 0.0, value_name = "DEG", allow_negative_numbers = true)]
+    cranial: f64,
+}
+
+/// Which picture is wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Wanted {
+    /// Ultrasound across the probe
+    Transverse,
+    /// Ultrasound along the probe
+    Sagittal,
+    /// A radiograph of a C-arm
+    Fluoroscopy,
+}
+
+impl PictureArgs {
+    pub fn run(self) -> Result<(), CommandError> {
+        within("--way", self.way, -100.0, 100.0)?;
+        within("--turn", self.turn, -180.0, 180.0)?;
+        within("--depth", self.depth, 20.0, 120.0)?;
+        within("--gain", self.gain, -60.0, 60.0)?;
+        within("--orbital", self.orbital, -180.0, 180.0)?;
+        within("--cranial", self.cranial, -60.0, 60.0)?;
+        let mut live = Live::connect(&Connect {
+            asked: self.asked.clone(),
+            core: self.core.clone(),
+        })?;
+        let scene = live.scene.clone();
+        let (field, metal) = now(&mut live, &scene)?;
+        let body = Body::of_scene(&scene.header, &scene.labels).ok_or("the scene has no labels to draw")?;
+        let gpu = Gpu::headless(false)?;
+        let rgba = match self.view {
+            Wanted::Transverse => self.ultrasound(View::Transverse, gpu, &scene, (&body, &field, &metal))?,
+            Wanted::Sagittal => self.ultrasound(View::Sagittal, gpu, &scene, (&body, &field, &metal))?,
+            Wanted::Fluoroscopy => self.fluoroscopy(gpu, &scene, (&body, &field, &metal)),
+        };
+        let bytes = rgba.into_iter().flatten().collect();
+        write_whole(&self.out, &png_of(bytes, [self.pixels; 2])?)?;
+        println!("written: {}", self.out.display());
+        Ok(())
+    }
+
+    fn ultrasound(
+        &self,
+        view: View,
+        gpu: Gpu,
+        scene: &SceneModel,
+        (body, field, metal): (&Body, &Field, &Metal),
+    ) -> Result<Vec<[u8; 4]>, CommandError> {
+        let plane = Plane {
+            pose: Pose::of_scene(&scene.header).moved(self.way * 1e-3, self.turn.to_radians()),
+            view,
+            probe: Probe::default(),
+            depth_m: self.depth * 1e-3,
+            pixels: [self.pixels; 2],
+        };
+        let settings = Settings {
+            gain_db: self.gain,
+            ..Settings::default()
+        };
+        let mut scanner = Scanner::new(gpu);
+        scanner.set_body(body, field);
+        scanner
+            .picture(&plane, &settings, metal)
+            .ok_or("the scene is too large for the graphics card")?;
+        let mut pixels = scanner.pixels();
+        if self.template {
+            let template = Template::before(&scene.header);
+            for hole in Hole::all() {
+                let place = Vector3::from(template.hole_m(hole));
+                if let Some(at) = plane.crossing(place, template.inwards.into()) {
+                    dot(&mut pixels, self.pixels, at);
+                }
+            }
+        }
+        Ok(pixels)
+    }
+
+    fn fluoroscopy(&self, gpu: Gpu, scene: &SceneModel, (body, field, metal): (&Body, &Field, &Metal)) -> Vec<[u8; 4]> {
+        let header = &scene.header;
+        let middle = (Vector3::from(header.target_lower_m) + Vector3::from(header.target_upper_m)) * 0.5;
+        let arm = CArm {
+            pixels: [self.pixels; 2],
+            orbital: self.orbital.to_radians(),
+            cranial: self.cranial.to_radians(),
+            ..CArm::about(middle, header.patient().rotation().transpose())
+        };
+        let mut scope = Fluoroscope::new(gpu);
+        let greys = scope.shoot(&arm, &Exposure::default(), body, field, metal).greys();
+        println!("air kerma: {:.0} uGy", scope.dose.air_kerma_gy * 1e6);
+        greys.into_iter().map(|g| [g, g, g, 255]).collect()
+    }
+}
+
+/// The tissue and the metal of the first snapshot that arrives.
+fn now(live: &mut Live, scene: &SceneModel) -> Result<(Field, Metal), CommandError> {
+    let start = Instant::now();
+    while live.link.snapshot().is_none() {
+        if start.elapsed() > SNAPSHOT_WITHIN {
+            return Err("rt-core sends no tissue; see its messages".into());
+        }
+        std::thread::sleep(Duration::from_millis(10));
+        live.link.poll();
+    }
+    let nodes = scene.header.nodes;
+    let snapshot = live.link.snapshot();
+    let field = snapshot.and_then(|s| Field::of(nodes, &s.displacements_m));
+    let mut shown = Shown::empty("");
+    shown.take(&live.link);
+    Ok((field.unwrap_or_else(|| Field::rest(nodes)), shown.metal()))
+}
+
+/// A dot of the template on the screen.
+fn dot(pixels: &mut [[u8; 4]], side: u32, at: Vector2<f64>) {
+    const COLOR: [u8; 4] = [150, 230, 150, 255];
+    for (x, y) in [(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)] {
+        let place = [at.x.floor() as i64 + x, at.y.floor() as i64 + y];
+        if place.iter().all(|c| (0..i64::from(side)).contains(c)) {
+            pixels[place[1] as usize * side as usize + place[0] as usize] = COLOR;
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! The bridge's part for the second device: orders to its loop, records and faults of it to the hosts.
+
+use super::Bridge;
+use super::batches::Batches;
+use super::link::{EventDetails, Link};
+use super::supervisor::Supervisor;
+use crate::rt::exchange::{Notice, Ticket};
+use crate::rt::second::{SecondBridgePorts, SecondOrder, gate_of};
+use stylet_hw::{DeviceInfo, HandGoal};
+use stylet_shm_schema::service::SlicePublisher;
+use stylet_shm_schema::{EventKind, Fault, Refusal, RefusalCode, SecondRecord};
+use stylet_sim::force::GateParameters;
+
+/// What a bridge must know of the second device.
+pub struct SecondSetup {
+    /// Its figures.
+    pub device: DeviceInfo,
+    /// The bridge's ends of its rings, less the tapes.
+    pub ports: SecondBridgePorts,
+    /// Where its records go.
+    pub records: SlicePublisher<SecondRecord, u64>,
+}
+
+/// Of a run with a second device.
+pub(super) struct Second {
+    device: DeviceInfo,
+    pub(super) orders: rtrb::Producer<SecondOrder>,
+    notices: rtrb::Consumer<Notice>,
+    records: rtrb::Consumer<SecondRecord>,
+    port: SlicePublisher<SecondRecord, u64>,
+    batches: Batches<SecondRecord>,
+    supervisor: Supervisor,
+    /// Its loop stands still, and hosts know it.
+    has_stopped: bool,
+}
+
+impl Second {
+    /// Beside its tapes, which go to the keeper of flight recordings.
+    pub fn new(setup: SecondSetup, is_real_time: bool) -> (Self, super::flight::SecondTapes) {
+        let SecondSetup { device, ports, records } = setup;
+        let second = Self {
+            device,
+            orders: ports.orders,
+            notices: ports.notices,
+            records: ports.records,
+            port: records,
+            batches: Batches::default(),
+            supervisor: Supervisor::new(is_real_time, device.simulated),
+            has_stopped: false,
+        };
+        (second, ports.tapes)
+    }
+
+    /// Connects new hosts.
+    pub fn connect(&self) {
+        self.port.connect();
+    }
+
+    /// What has not been sent yet.
+    pub fn send_batch(&mut self, session_id: u64) {
+        self.batches.send(&self.port, session_id);
+    }
+
+    /// An order whose loss its loop survives: one that stands still has no room for it, and takes nothing from the needle's.
+    pub fn order(&mut self, order: SecondOrder) {
+        let _ = self.orders.push(order);
+    }
+
+    /// The gate within the limits of this device.
+    pub fn set_gate(&mut self, generation: u64, run: &GateParameters) {
+        let gate = gate_of(run, &self.device);
+        self.order(SecondOrder::Gate { generation, gate });
+    }
+
+    fn order_answered(&mut self, order: SecondOrder) -> Result<(), Refusal> {
+        let pushed = self.orders.push(order);
+        pushed.map_err(|_| RefusalCode::TooManyRequests.into())
+    }
+
+    /// Records to the hosts, and a word where the loop has stopped. The needle's loop goes on.
+    fn pass(&mut self, link: &mut Link) {
+        let session_id = link.session.session_id;
+        let made_a_tick = self.batches.pass(&mut self.records, &self.port, session_id);
+        let stands_still = self.supervisor.pass(made_a_tick);
+        if stands_still && !std::mem::replace(&mut self.has_stopped, stands_still) {
+            let fault = Fault::LoopStopped;
+            link.event(
+                EventKind::SecondFaultRaised,
+                EventDetails {
+                    code: fault as u32,
+                    text: "the loop of the second device has stopped; the needle's goes on",
+                    ..EventDetails::now()
+                },
+            );
+        }
+        self.has_stopped &= !made_a_tick;
+    }
+}
+
+impl Bridge {
+    /// Records, notices and the state of the second device's loop.
+    pub(super) fn pass_second(&mut self) {
+        while let Some(Ok(notice)) = self.second.as_mut().map(|second| second.notices.pop()) {
+            self.take_second_notice(&notice);
+        }
+        if let Some(second) = &mut self.second {
+            second.connect();
+            second.pass(&mut self.link);
+        }
+    }
+
+    fn take_second_notice(&mut self, notice: &Notice) {
+        match *notice {
+            Notice::Done { ticket, tick } => self.link.answer(ticket, Ok(tick)),
+            Notice::Refused { ticket, why } => self.link.answer(ticket, Err(&why.into())),
+            Notice::Fault { tick, time_ns, fault } => {
+                self.flights.fault(&format!("the second device: {}", fault.message()));
+                self.link.event(
+                    EventKind::SecondFaultRaised,
+                    EventDetails {
+                        code: fault as u32,
+                        text: fault.message(),
+                        ..EventDetails::at(tick, time_ns)
+                    },
+                );
+            }
+            Notice::Rearmed { tick, time_ns } => {
+                self.link
+                    .event(EventKind::SecondRearmed, EventDetails::at(tick, time_ns));
+            }
+            _ => {}
+        }
+    }
+
+    /// What both hands are ordered alike; nothing without a second device.
+    pub(super) fn order_second(&mut self, order: SecondOrder) {
+        if let Some(second) = &mut self.second {
+            second.order(order);
+        }
+    }
+
+    fn second_or_refusal(&mut self) -> Result<&mut Second, Refusal> {
+        self.second.as_mut().ok_or(RefusalCode::NoSecondDevice.into())
+    }
+
+    pub(super) fn move_second_hand(&mut self, ticket: Ticket, goal: HandGoal) -> Result<(), Refusal> {
+        self.second_or_refusal()?
+            .order_answered(SecondOrder::Hand { ticket, goal })
+    }
+
+    pub(super) fn stop_second_hand(&mut self, ticket: Ticket) -> Result<(), Refusal> {
+        self.second_or_refusal()?
+            .order_answered(SecondOrder::StopHand { ticket })
+    }
+}

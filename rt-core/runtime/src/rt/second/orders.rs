@@ -1,0 +1,56 @@
+//! Orders to the second device's loop, taken at the start of a tick.
+
+use super::{SecondLoop, SecondOrder};
+use crate::rt::exchange::Notice;
+use stylet_shm_schema::RefusalCode;
+
+impl SecondLoop {
+    pub(super) fn take_orders(&mut self) {
+        while let Ok(order) = self.ports.orders.pop() {
+            let tick = self.memory.state.tick + 1;
+            if let Some(tape) = self.ports.flight.tape() {
+                tape.order(order);
+            }
+            match order {
+                SecondOrder::Gate { generation, gate } => {
+                    self.memory.gate_parameters = gate;
+                    self.memory.state.parameters_generation = generation;
+                }
+                SecondOrder::Hand { ticket, goal } if goal.is_valid() => {
+                    self.device.set_hand_goal(&goal);
+                    self.memory.goal = Some(goal);
+                    self.notify(Notice::Done { ticket, tick });
+                }
+                SecondOrder::Hand { ticket, .. } => {
+                    let why = RefusalCode::BadGoal;
+                    self.notify(Notice::Refused { ticket, why });
+                }
+                SecondOrder::StopHand { ticket } => {
+                    self.device.stop_hand();
+                    self.memory.goal = None;
+                    self.notify(Notice::Done { ticket, tick });
+                }
+                SecondOrder::Engage => self.engage(tick),
+                SecondOrder::Disengage => self.memory.gate.release(),
+                SecondOrder::Reset => self.reset(),
+                SecondOrder::HandOverTape => self.ports.flight.hand_over(),
+            }
+        }
+    }
+
+    fn engage(&mut self, tick: u64) {
+        if self.memory.watchdog.rearm() {
+            let time_ns = self.memory.state.time_ns;
+            self.notify(Notice::Rearmed { tick, time_ns });
+        }
+        self.memory.gate.engage();
+    }
+
+    fn reset(&mut self) {
+        let state = &mut self.memory.state;
+        state.peak_force_n = 0.0;
+        state.missed_deadlines = 0;
+        state.worst_wake_ns = 0;
+        state.worst_work_ns = 0;
+    }
+}

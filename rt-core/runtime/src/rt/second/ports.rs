@@ -1,0 +1,137 @@
+//! Every ring and triple buffer of the second device's loop; a run without a second device has none.
+
+use super::response::ProbeResponse;
+use super::tape::SecondTape;
+use crate::rt::exchange::{Notice, Ticket};
+use crate::rt::recorder::{Recorder, TapePort, recorder};
+use crate::rt::wiring::Capacities;
+use nalgebra::{UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+use stylet_hw::HandGoal;
+use stylet_shm_schema::SecondRecord;
+use stylet_sim::force::GateParameters;
+
+/// The newest pose of the second device, once in each tick of its loop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SecondPose {
+    /// When the pose was read, `CLOCK_MONOTONIC`, ns; 0 for no pose yet.
+    pub time_ns: u64,
+    /// Tip of what the hand holds, scene frame, m.
+    pub tip_in_scene: Vector3<f64>,
+    /// What the hand holds lies along +z of its own frame, towards its tip.
+    pub world_from_tool: UnitQuaternion<f64>,
+    /// Of the tip, filtered.
+    pub velocity_m_per_s: Vector3<f64>,
+}
+
+impl Default for SecondPose {
+    fn default() -> Self {
+        Self {
+            time_ns: 0,
+            tip_in_scene: Vector3::zeros(),
+            world_from_tool: UnitQuaternion::identity(),
+            velocity_m_per_s: Vector3::zeros(),
+        }
+    }
+}
+
+/// Bridge to the second device's loop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum SecondOrder {
+    /// Use these settings of the gate from this tick on.
+    Gate {
+        /// Rises with each change of a run.
+        generation: u64,
+        /// The settings.
+        gate: GateParameters,
+    },
+    /// Bring the simulated hand to a goal.
+    Hand {
+        /// Number of the request.
+        ticket: Ticket,
+        /// Place, direction, speed and acceleration.
+        goal: HandGoal,
+    },
+    /// Hold the simulated hand where it is.
+    StopHand {
+        /// Number of the request.
+        ticket: Ticket,
+    },
+    /// Turn the force on; re-arms after a fault.
+    Engage,
+    /// Ramp the force out.
+    Disengage,
+    /// Clear peaks and counters.
+    Reset,
+    /// Hand the flight recording over; the loop records anew once it has it back.
+    HandOverTape,
+}
+
+/// Ends that the second device's loop owns.
+pub struct SecondPorts {
+    /// Newest pose, to the tissue loop.
+    pub pose: triple_buffer::Input<SecondPose>,
+    /// Newest response of the tissue loop.
+    pub response: triple_buffer::Output<ProbeResponse>,
+    /// Orders of the bridge.
+    pub orders: rtrb::Consumer<SecondOrder>,
+    /// What happened, to the bridge.
+    pub notices: rtrb::Producer<Notice>,
+    /// One record for each tick, to the bridge.
+    pub records: rtrb::Producer<SecondRecord>,
+    /// Flight recording.
+    pub flight: Recorder<SecondTape>,
+}
+
+/// Ends that the tissue loop owns.
+pub struct SecondTissuePorts {
+    /// Newest pose of the second device's loop.
+    pub pose: triple_buffer::Output<SecondPose>,
+    /// Newest response, to that loop.
+    pub response: triple_buffer::Input<ProbeResponse>,
+}
+
+/// Ends that the bridge owns.
+pub struct SecondBridgePorts {
+    /// Orders to the loop.
+    pub orders: rtrb::Producer<SecondOrder>,
+    /// What the loop reports.
+    pub notices: rtrb::Consumer<Notice>,
+    /// Records of the loop.
+    pub records: rtrb::Consumer<SecondRecord>,
+    /// Its tapes.
+    pub tapes: TapePort<SecondTape>,
+}
+
+/// Joins the loop with the tissue loop and the bridge. A loop without a tape is not recorded.
+// SYNC: every ring and triple buffer is single-producer single-consumer; their crates pair release with acquire.
+pub fn wire(
+    capacities: Capacities,
+    tape: Option<Box<SecondTape>>,
+) -> (SecondPorts, SecondTissuePorts, SecondBridgePorts) {
+    let (pose_in, pose) = triple_buffer::triple_buffer(&SecondPose::default());
+    let (response_in, response) = triple_buffer::triple_buffer(&ProbeResponse::default());
+    let (record_in, records) = rtrb::RingBuffer::new(capacities.records);
+    let (orders, order_out) = rtrb::RingBuffer::new(capacities.orders);
+    let (notice_in, notices) = rtrb::RingBuffer::new(capacities.notices);
+    let (flight, tapes) = recorder(tape);
+    let own = SecondPorts {
+        pose: pose_in,
+        response,
+        orders: order_out,
+        notices: notice_in,
+        records: record_in,
+        flight,
+    };
+    let tissue = SecondTissuePorts {
+        pose,
+        response: response_in,
+    };
+    let bridge = SecondBridgePorts {
+        orders,
+        notices,
+        records,
+        tapes,
+    };
+    (own, tissue, bridge)
+}

@@ -1,0 +1,185 @@
+//! What the tissue loop hands to the second device's loop: the contact near one pose, for a loop that is faster than the tissue.
+
+use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+use stylet_hw::Wrench;
+
+/// The contact is carried on no farther than this from the pose that it was solved at, m: 1 m/s for one tissue tick.
+const FARTHEST_M: f64 = 5e-3;
+/// Likewise, as a turn.
+const FARTHEST_RAD: f64 = 0.2;
+
+/// A contact and how it changes near one pose, once in each tick of the tissue loop.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct ProbeResponse {
+    /// When the tissue tick began, `CLOCK_MONOTONIC`, ns.
+    pub time_ns: u64,
+    /// Tissue ticks made so far.
+    pub tick: u64,
+    /// What the hand holds touches tissue.
+    pub touches: bool,
+    /// The step has not converged and the hand would feel it.
+    pub unsolved: bool,
+    /// Tip of the pose that was solved, scene frame, m.
+    pub tip_in_scene: Vector3<f64>,
+    /// Its orientation.
+    pub world_from_tool: UnitQuaternion<f64>,
+    /// Force and torque about the tip on the hand at that pose.
+    pub wrench: Wrench,
+    /// How much the wrench (force, then torque) falls with a motion of the tip (m, then turn about the scene's axes, rad).
+    pub stiffness: SMatrix<f64, 6, 6>,
+}
+
+impl Default for ProbeResponse {
+    /// No contact.
+    fn default() -> Self {
+        Self {
+            time_ns: 0,
+            tick: 0,
+            touches: false,
+            unsolved: false,
+            tip_in_scene: Vector3::zeros(),
+            world_from_tool: UnitQuaternion::identity(),
+            wrench: Wrench::zero(),
+            stiffness: SMatrix::zeros(),
+        }
+    }
+}
+
+/// The contact at another pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Felt {
+    /// On the hand.
+    pub wrench: Wrench,
+    /// Energy in the springs of the contact.
+    pub stored_j: f64,
+}
+
+impl Felt {
+    /// No contact.
+    pub const NOTHING: Self = Self {
+        wrench: Wrench {
+            force_n: Vector3::new(0.0, 0.0, 0.0),
+            torque_nm: Vector3::new(0.0, 0.0, 0.0),
+        },
+        stored_j: 0.0,
+    };
+}
+
+impl ProbeResponse {
+    /// At the pose of the device. The contact pushes and never pulls; it is no stiffer than the device can render.
+    pub fn at(&self, tip: &Vector3<f64>, world_from_tool: &UnitQuaternion<f64>, max_stiffness_n_per_m: f64) -> Felt {
+        if !self.touches {
+            return Felt::NOTHING;
+        }
+        let moved_m = no_longer(tip - self.tip_in_scene, FARTHEST_M);
+        let turned_rad = no_longer(
+            (world_from_tool * self.world_from_tool.inverse()).scaled_axis(),
+            FARTHEST_RAD,
+        );
+        let motion = SVector::<f64, 6>::from_iterator(moved_m.iter().chain(turned_rad.iter()).copied());
+        let along = self.stiffness.fixed_view::<3, 3>(0, 0);
+        let size = along.norm();
+        let share = if size > max_stiffness_n_per_m {
+            max_stiffness_n_per_m / size
+        } else {
+            1.0
+        };
+        let fall = self.stiffness * motion * share;
+        let force_n = self.wrench.force_n - fall.fixed_rows::<3>(0);
+        let torque_nm = self.wrench.torque_nm - fall.fixed_rows::<3>(3);
+        let Some(outward) = self.wrench.force_n.try_normalize(1e-9) else {
+            return Felt::NOTHING;
+        };
+        // What is not a number goes on to the gate, which turns the force off.
+        if force_n.dot(&outward) <= 0.0 {
+            return Felt::NOTHING;
+        }
+        Felt {
+            stored_j: stored_j(&(along * share), &outward, &force_n),
+            wrench: Wrench { force_n, torque_nm },
+        }
+    }
+}
+
+/// Of a spring that is as stiff as the contact is along its force.
+fn stored_j(stiffness: &Matrix3<f64>, outward: &Vector3<f64>, force_n: &Vector3<f64>) -> f64 {
+    let along = outward.dot(&(stiffness * outward));
+    if along > 0.0 {
+        force_n.norm_squared() / (2.0 * along)
+    } else {
+        0.0
+    }
+}
+
+fn no_longer(v: Vector3<f64>, limit: f64) -> Vector3<f64> {
+    let size = v.norm();
+    if size > limit { v * (limit / size) } else { v }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 2 N upwards, 400 N/m in every direction.
+    fn pressed() -> ProbeResponse {
+        let mut stiffness = SMatrix::zeros();
+        for axis in 0..3 {
+            stiffness[(axis, axis)] = 400.0;
+            stiffness[(axis + 3, axis + 3)] = 0.5;
+        }
+        ProbeResponse {
+            touches: true,
+            wrench: Wrench::from_force(Vector3::y() * 2.0),
+            stiffness,
+            ..ProbeResponse::default()
+        }
+    }
+
+    fn force(at: &ProbeResponse, tip: Vector3<f64>, most: f64) -> Vector3<f64> {
+        at.at(&tip, &UnitQuaternion::identity(), most).wrench.force_n
+    }
+
+    #[test]
+    fn the_contact_pushes_as_its_springs_say_and_never_pulls() {
+        let pressed = pressed();
+        let deeper = force(&pressed, Vector3::new(0.0, -1e-3, 0.0), 1e4);
+        assert!((deeper - Vector3::new(0.0, 2.4, 0.0)).norm() < 1e-12, "{deeper}");
+        for out_m in [5e-3, 6e-3, 0.1] {
+            assert_eq!(force(&pressed, Vector3::new(0.0, out_m, 0.0), 1e4), Vector3::zeros());
+        }
+        // Where nothing presses yet there is no direction that the contact could push in.
+        let begun = ProbeResponse {
+            wrench: Wrench::zero(),
+            ..pressed
+        };
+        assert_eq!(force(&begun, Vector3::new(0.0, -1e-3, 0.0), 1e4), Vector3::zeros());
+        let apart = ProbeResponse {
+            touches: false,
+            ..pressed
+        };
+        assert_eq!(
+            apart.at(&Vector3::zeros(), &UnitQuaternion::identity(), 1e4),
+            Felt::NOTHING
+        );
+    }
+
+    #[test]
+    fn it_is_carried_on_no_farther_and_no_stiffer_than_it_may_be() {
+        let pressed = pressed();
+        let far = force(&pressed, Vector3::new(0.0, -1.0, 0.0), 1e4);
+        assert!((far.y - (2.0 + 400.0 * FARTHEST_M)).abs() < 1e-9, "{far}");
+        // The norm of three springs of 400 N/m is 692.8 N/m.
+        let soft = force(&pressed, Vector3::new(0.0, -1e-3, 0.0), 346.4);
+        assert!((soft.y - 2.2).abs() < 1e-4, "{soft}");
+        let stored = pressed.at(&Vector3::zeros(), &UnitQuaternion::identity(), 1e4).stored_j;
+        assert!((stored - 0.5 * 2.0 * 2.0 / 400.0).abs() < 1e-12, "{stored}");
+    }
+
+    #[test]
+    fn a_turn_is_answered_by_a_torque() {
+        let turned = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.1);
+        let felt = pressed().at(&Vector3::zeros(), &turned, 1e4);
+        assert!((felt.wrench.torque_nm - Vector3::new(-0.05, 0.0, 0.0)).norm() < 1e-12);
+    }
+}
