@@ -142,18 +142,15 @@ fn list_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
 
 fn member_ui(ui: &mut egui::Ui, member: &ClassMember, may_have_it: bool) -> Option<Action> {
     let (name, role) = (member.name.read(), member.role.read());
-    ui.add(egui::Label::new(theme::strong(name.as_str())).wrap());
     let role_words = if role.is_empty() { "revoked" } else { role.as_str() };
     let ms = |ns: u64| ns as f64 * 1e-6;
-    ui.add(
-        egui::Label::new(format!(
-            "{role_words}; round trip {:.1} ms, {} records lost, heard {:.0} ms ago",
-            ms(member.round_trip_ns),
-            member.records_lost,
-            ms(member.silent_ns)
-        ))
-        .wrap(),
+    let words = format!(
+        "{name}: {role_words}; round trip {:.1} ms, {} records lost, heard {:.0} ms ago",
+        ms(member.round_trip_ns),
+        member.records_lost,
+        ms(member.silent_ns)
     );
+    ui.add(egui::Label::new(words).wrap());
     let gives = may_have_it && role == OPERATOR && ui.button(format!("Hand the needle to {name}")).clicked();
     gives.then_some(Action::Lease(LeaseRequest::Give(name)))
 }

@@ -12,13 +12,14 @@ use crate::{RelayError, now_ns};
 use rounds::Rounds;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 use stylet_shm_schema::service::Instance;
 
 /// Messages that may wait for a thread; more are dropped, and records among them asked for again.
 const WAITING: usize = 4096;
 const SNAPSHOTS_WAITING: usize = 32;
+const LOOK_EVERY: Duration = Duration::from_millis(50);
 const PASS: Duration = Duration::from_millis(2);
 /// A server that was not heard for so long is taken for lost, until it is heard again.
 const SILENCE_NS: u64 = 300_000_000;
@@ -132,12 +133,30 @@ fn check_time(invitation: &Invitation) -> Result<(), RelayError> {
     }
 }
 
+/// The session; nothing where `stop` came before a server answered, for which zenoh waits without end.
+fn connect(options: &Options, stop: &AtomicBool) -> Result<Option<Session>, RelayError> {
+    let (server, identity) = (options.server.clone(), options.invitation.identity());
+    let (to_here, opened) = sync_channel(1);
+    std::thread::spawn(move || to_here.send(net::join(&server, &identity)));
+    // SYNC: set by a signal; nothing but the flag is carried.
+    while !stop.load(Ordering::Relaxed) {
+        match opened.recv_timeout(LOOK_EVERY) {
+            Ok(session) => return session.map(Some),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return Err(RelayError("the connection ended by itself".to_owned())),
+        }
+    }
+    Ok(None)
+}
+
 /// Joins until `stop`.
 pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
     check_time(&options.invitation)?;
     // Before there are threads, of zenoh as well.
     crate::slice::shorten();
-    let session = net::join(&options.server, &options.invitation.identity())?;
+    let Some(session) = connect(options, stop)? else {
+        return Ok(());
+    };
     let seat = options.invitation.seat;
     let member = Arc::new(Member {
         session: session.clone(),

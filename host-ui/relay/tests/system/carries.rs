@@ -89,6 +89,21 @@ fn a_late_and_lossy_cable_costs_no_record() {
     seen.has_every_record();
 }
 
+/// It waited for the first answer of a server inside zenoh, and no signal but SIGKILL ended it.
+#[test]
+fn a_join_that_no_server_answers_ends_when_it_is_asked_to() {
+    let (keys, far) = (Keys::new(), Named::new());
+    let mut joined = join(&keys.invite("anna", Role::Observer, Validity::days(1)), &far);
+    std::thread::sleep(Duration::from_millis(500));
+    joined.signal(libc::SIGTERM);
+    let mut status = None;
+    until(Duration::from_secs(10), || {
+        status = joined.child.try_wait().expect("ours");
+        status.is_some()
+    });
+    assert!(status.is_some_and(|status| status.success()), "{status:?}");
+}
+
 fn record(instance: &Instance, out: &Path) -> std::process::Child {
     Command::new(program("host-ui"))
         .args(["record", "--instance", instance.name(), "--duration", "4", "--out"])

@@ -184,12 +184,12 @@ fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece
         if !left.iter().any(|other| std::ptr::eq(*other, piece)) || tried.iter().any(near) {
             continue;
         }
-        tried.push(place);
-        // Under a window that was opened over it; by itself it is tried in another state.
+        // Under a window that was opened over it; by itself it is tried in another state, and what lies over it here.
         if drawn.ctx.layer_id_at(place).is_some_and(|layer| layer != piece.layer) {
             left.retain(|other| other.layer != piece.layer || !near_clip(other, piece));
             continue;
         }
+        tried.push(place);
         for turn in WHEEL {
             let after = drawn.scrolled(
                 place,

@@ -196,9 +196,12 @@ fn whole_class() -> stylet_shm_schema::Class {
         asked: line.name,
         ..Zeroable::zeroed()
     };
-    for member in &mut class.members {
-        (member.name, member.role) = (line.name, Text::new("operator"));
-        (member.round_trip_ns, member.records_lost, member.silent_ns) = (1_234_000_000, 123_456, 1_999_000_000);
+    for (i, member) in class.members.iter_mut().enumerate() {
+        // Each differs, so that one row that scrolls is not taken for another.
+        let name = format!("{}. {}", i + 1, line.name.read());
+        (member.name, member.role) = (Text::new(&name), Text::new("operator"));
+        (member.round_trip_ns, member.silent_ns) = (1_234_000_000, 1_999_000_000);
+        member.records_lost = 123_456 + i as u64;
     }
     class
 }
