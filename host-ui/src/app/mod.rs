@@ -8,6 +8,7 @@ mod frames;
 mod layout;
 mod patch;
 mod plan;
+mod second;
 mod take;
 mod watch;
 
@@ -119,6 +120,7 @@ pub struct App {
     /// The core that was left to the force loop.
     left_core: Left,
     drive: drive::Drive,
+    second_drive: second::SecondDrive,
     /// Buttons of gamepads and 3D mice since the last frame.
     pressed: Vec<Action>,
     /// Where a hand on the tip has drawn it in this frame, and where it was last sent to.
@@ -259,6 +261,7 @@ impl App {
             frames: frames::Frames::new(Instant::now()),
             left_core: Left::default(),
             drive: drive::Drive::default(),
+            second_drive: second::SecondDrive::default(),
             pressed: Vec::new(),
             pulled_to_m: None,
             pulled_goal_m: None,
@@ -358,7 +361,7 @@ impl eframe::App for App {
         }
         let wish = self.wish(&ctx, keys.drive_m_per_s);
         // Not `stable_dt`, which is that of a fast frame whenever a frame was asked for later than at once.
-        self.drive(wish, f64::from(ctx.input(|i| i.unstable_dt)));
+        self.drive_both(wish, keys.second_m_per_s, f64::from(ctx.input(|i| i.unstable_dt)));
         self.send_parameters();
         let asked = self.middle.driver();
         let driver_ns = asked.cpu_ns - driver.cpu_ns;

@@ -3,6 +3,7 @@
 mod bend;
 mod line;
 mod parts;
+mod second;
 mod seeds;
 
 use crate::dose_worker::DoseResult;
@@ -11,6 +12,7 @@ pub use bend::Bend;
 pub use line::NeedleLine;
 use nalgebra::Vector3;
 pub use parts::{FrameCost, LoadState, Note, TipOnPath, Watched};
+pub use second::SecondHand;
 pub use seeds::{SeedError, all_errors, own_errors};
 use std::sync::Arc;
 use stylet_controllers::Latest;
@@ -19,7 +21,7 @@ use stylet_implant::plan::{HOLES, Template};
 use stylet_implant::workflow::{Step, Waiting};
 use stylet_shm_schema::{
     EventKind, Fault, HapticState, LeftNeedlePose, ParametersInForce, Phase, PlanInForce, PlannedSeed, Relayed,
-    SceneHeader, SeedPose, Session, flags,
+    SceneHeader, SecondState, SeedPose, Session, flags,
 };
 
 /// Past the deepest seed the needle may go this far, and the path is drawn this far.
@@ -33,6 +35,8 @@ pub struct Shown {
     /// The line to the core, where that runs on another machine.
     pub relayed: Option<Relayed>,
     pub state: Option<HapticState>,
+    /// Of the second device.
+    pub second: Option<SecondState>,
     pub scene: Option<SceneHeader>,
     /// Only a plan with at least one seed.
     pub plan: Option<PlanInForce>,
@@ -83,6 +87,7 @@ impl Shown {
             session: None,
             relayed: None,
             state: None,
+            second: None,
             scene: None,
             plan: None,
             parameters: None,
@@ -117,6 +122,7 @@ impl Shown {
         self.session = link.session().copied();
         self.relayed = link.relayed().copied();
         self.state = link.state().copied();
+        self.second = link.second_state().copied();
         self.scene = link.scene().map(|s| s.header);
         self.plan = link.plan().filter(|p| p.generation > 0 && p.seed_count > 0).copied();
         self.parameters = link.parameters().copied();

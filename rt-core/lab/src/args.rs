@@ -8,7 +8,7 @@ use crate::spin::Spin;
 use crate::whose::WhoseArgs;
 use clap::Args;
 use std::path::PathBuf;
-use stylet_runtime::args::{OptionsError, RealTimeArgs};
+use stylet_runtime::args::{OptionsError, RealTimeArgs, SecondArgs};
 use stylet_runtime::process::Options;
 use stylet_runtime::rt::pin::Pin;
 
@@ -70,6 +70,8 @@ pub struct LatencyArgs {
     pub(crate) whose: WhoseArgs,
     #[command(flatten)]
     real_time: RealTimeArgs,
+    #[command(flatten)]
+    second: SecondArgs,
 }
 
 /// Settings of the loops that this PC cannot have.
@@ -98,6 +100,7 @@ impl LatencyArgs {
         let instance = format!("lab-{}", std::process::id());
         let mut options = self.real_time.options(&instance)?;
         options.haptic_period_ns = measure::period_ns(self.rate);
+        options.second = self.second.options()?;
         let Spin::Fixed(spin_us) = self.spin_us else {
             return Ok(options);
         };

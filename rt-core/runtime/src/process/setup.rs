@@ -191,7 +191,8 @@ impl Body {
             let tape = Box::new(SecondTape::new(&memory));
             let (ports, tissue, bridge) = second::wire(Capacities::RUN, Some(tape));
             wiring.tissue.second = Some(tissue);
-            let own = SecondLoop::new(session_id, device, ports, &memory, seconds(second.period_ns));
+            let mut own = SecondLoop::new(session_id, device, ports, &memory, seconds(second.period_ns));
+            own.spin_ns = options.spin_ns;
             SecondLoops { own, info, bridge }
         });
         let period_s = seconds(options.haptic_period_ns);
@@ -199,7 +200,11 @@ impl Body {
         haptic.spin_ns = options.spin_ns;
         let period_s = seconds(TISSUE_PERIOD_NS);
         let mut tissue = TissueLoop::new(session_id, wiring.tissue, self.world, period_s);
+        let mut second = second;
         if let Some(probes) = probes {
+            if let Some(second) = &mut second {
+                second.own.probe = probes.second.map(Box::new);
+            }
             haptic.probe = Some(Box::new(probes.haptic));
             tissue.probe = Some(Box::new(probes.tissue));
         }
