@@ -5,7 +5,7 @@ CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -65,6 +65,15 @@ relay-class: deps-test build ## Measure the relay over a line of 100 Mbit/s and 
 
 relay-faults: deps-test build ## Stop, kill and cut off server, observer and operator, 100 times each in an insertion (some 20 minutes)
 	STYLET_RELAY_FAULTS=100 $(RELAY) test --release --test system -- --test-threads=1 --nocapture faults
+
+live: ## Build stylet-live, which 'host-ui record --live' needs to serve Foxglove's app; the other targets neither need nor build it
+	cd host-ui/live && CARGO_TARGET_DIR=$(abspath $(BIN))/../live $(CARGO) build --release
+	cp $(BIN)/../live/release/stylet-live $(BIN)/
+
+live-test: build live ## Watch 'host-ui record --live' for LIVE_SECONDS (60) with a client of Foxglove's protocol, beside one that hangs
+	@docs/tools/need python3-venv
+	python3 -m venv $(BIN)/live-client && $(BIN)/live-client/bin/pip install -q websockets==17.4
+	docs/tools/live-test "$(BIN)" $(BIN)/live-client/bin/python $(or $(LIVE_SECONDS),60)
 
 fuzz: ## Fuzz each file reader for FUZZ_SECONDS (600) seconds
 	docs/tools/fuzz

@@ -4,7 +4,7 @@ use crate::dialog::Purpose;
 use crate::settings::Layout;
 use std::path::PathBuf;
 use stylet_implant::plan::{Hole, Row};
-use stylet_shm_schema::Request;
+use stylet_shm_schema::{LeaseRequest, Request};
 
 /// What the operator asked for. The window carries it out after all panels are drawn.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +42,12 @@ pub enum Action {
     /// Loads the scene of this index in [`stylet_shm_schema::BUILTIN_SCENES`].
     LoadBuiltinScene(usize),
     OpenParameters,
+    /// Shows who is connected over a relay, or no longer.
+    ToggleClass,
+    /// Asks the relay for the needle, or hands it over.
+    Lease(LeaseRequest),
+    /// Shows or hides the instructor's dialog.
+    ToggleInstructor,
     ToggleHelp,
     ResetView,
     LookFrom(Viewpoint),

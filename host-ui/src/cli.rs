@@ -11,10 +11,10 @@ use crate::command::find_seeds::FindSeedsArgs;
 use crate::command::perturb::PerturbArgs;
 use crate::command::plan::PlanArgs;
 use crate::command::post_implant::PostImplantArgs;
+use crate::command::record::RecordArgs;
 use crate::command::study::StudyArgs;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 use stylet_base::format::printable;
 use stylet_base::interrupt;
 use stylet_controllers as controller;
@@ -103,20 +103,7 @@ enum Task {
         seeds: u16,
     },
     /// Record every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
-    Record {
-        /// Name that rt-core was started under
-        #[arg(long, default_value = "main", value_parser = Instance::new)]
-        instance: Instance,
-        /// File to write
-        #[arg(long, value_name = "FILE.mcap")]
-        out: PathBuf,
-        /// Seconds to record [default: until interrupted or until rt-core ends]
-        #[arg(long, value_name = "S")]
-        duration: Option<f64>,
-        /// Snapshots of the gland per second, 0 to 60; the core sends 67 while the needle moves and 33 while it rests
-        #[arg(long, default_value_t = 20.0, value_name = "HZ")]
-        snapshot_rate: f64,
-    },
+    Record(RecordArgs),
     /// Serve needle, seeds, gland and state to 3D Slicer over OpenIGTLink, until interrupted; anyone who reaches the
     /// address can watch, for the protocol has no passwords
     Igtl {
@@ -214,25 +201,7 @@ impl Cli {
             }
             Some(Task::Controllers) => Ok(controller::list()?),
             Some(Task::Scene(SceneTask::Check { file, label })) => check(&file, label),
-            Some(Task::Record {
-                instance,
-                out,
-                duration,
-                snapshot_rate,
-            }) => {
-                let fits = duration.is_none_or(|s| s > 0.0 && s < 1e6) && (0.0..=60.0).contains(&snapshot_rate);
-                if !fits {
-                    return Err("--duration needs seconds above 0, --snapshot-rate 0 to 60 Hz".into());
-                }
-                let ended = record::run(&record::Options {
-                    instance: instance.clone(),
-                    out,
-                    duration: duration.map(Duration::from_secs_f64),
-                    snapshots_hz: snapshot_rate,
-                });
-                instance.sweep();
-                Ok(ended?)
-            }
+            Some(Task::Record(args)) => args.run(),
             Some(Task::Igtl {
                 instance,
                 listen,

@@ -5,7 +5,7 @@ use egui::{Key, Modifiers};
 use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 28] = [
+pub const KEYS: [(&str, &str); 29] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
@@ -25,6 +25,7 @@ pub const KEYS: [(&str, &str); 28] = [
     ("E", "force on; after a fault: re-arm"),
     ("D", "force off"),
     ("P", "parameters"),
+    ("K", "mark this moment; put in exercises"),
     ("R", "reset the view"),
     (
         "1 to 5",
@@ -98,6 +99,7 @@ pub fn read(ctx: &egui::Context) -> Keys {
         (Modifiers::NONE, Key::E, Action::Send(Request::Engage)),
         (Modifiers::NONE, Key::D, Action::Send(Request::Disengage)),
         (Modifiers::NONE, Key::P, Action::OpenParameters),
+        (Modifiers::NONE, Key::K, Action::ToggleInstructor),
         (Modifiers::NONE, Key::R, Action::ResetView),
     ];
     ctx.input_mut(|i| {

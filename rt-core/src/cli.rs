@@ -75,6 +75,9 @@ pub enum Task {
     Load {
         /// What to do
         work: LoadProcess,
+        /// Core on which to do it
+        #[arg(long)]
+        core: Option<usize>,
         /// Instance under measurement
         #[arg(long)]
         instance: String,

@@ -39,7 +39,12 @@ fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
         Some(Task::Manual(args)) => args.run(Cli::command()).map(|()| 0)?,
         Some(Task::Cost { scene }) => cost(scene).map(|()| 0)?,
         Some(Task::TraceKeeper { name }) => stylet_lab::keep_trace_instance(name).map(|()| 0)?,
-        Some(Task::Load { work, instance, file }) => serve_as_load(*work, instance, file).map(|()| 0)?,
+        Some(Task::Load {
+            work,
+            core,
+            instance,
+            file,
+        }) => serve_as_load(*work, *core, instance, file).map(|()| 0)?,
     })
 }
 
@@ -56,12 +61,19 @@ fn stop_on_signal() -> Result<Arc<AtomicBool>, Box<dyn Error>> {
     Ok(stop)
 }
 
-fn serve_as_load(work: load::LoadProcess, instance: &str, file: &std::path::Path) -> Result<(), Box<dyn Error>> {
+fn serve_as_load(
+    work: load::LoadProcess,
+    core: Option<usize>,
+    instance: &str,
+    file: &std::path::Path,
+) -> Result<(), Box<dyn Error>> {
     follow_parent();
     let instance = Instance::new(instance)?;
     let stop = stop_on_signal()?;
     // SYNC: set by a signal handler; nothing but the flag is carried.
-    Ok(load::work(work, &instance, file, || stop.load(Ordering::Acquire))?)
+    Ok(load::work(work, core, &instance, file, || {
+        stop.load(Ordering::Acquire)
+    })?)
 }
 
 fn cost(scene: &str) -> Result<(), Box<dyn Error>> {

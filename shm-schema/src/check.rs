@@ -1,8 +1,8 @@
 //! What a reader verifies before it uses a value that came out of shared memory.
 
 use crate::{
-    GridInfo, HapticState, MAX_LABEL_CELLS, MAX_NODES, MAX_SEEDS, MAX_STRUCTURES, ParametersInForce, PlanInForce,
-    Rehearsal, SceneHeader, SecondRecord, SecondState, SeedPose, SnapshotHeader, TickRecord, Vertex,
+    GridInfo, HapticState, MAX_LABEL_CELLS, MAX_NODES, MAX_SEEDS, MAX_STRUCTURES, MOST_MOVED_M, ParametersInForce,
+    PlanInForce, Rehearsal, SceneHeader, SecondRecord, SecondState, SeedPose, SnapshotHeader, TickRecord, Vertex,
 };
 
 /// What is invalid in a value.
@@ -113,6 +113,7 @@ pub fn snapshot(h: &SnapshotHeader, vertices: &[Vertex]) -> Result<(), Invalid> 
     ensure(within(&h.tip_in_scene_m, MAX_COORDINATE_M), "tip position")?;
     ensure(within(&h.needle_direction, 1.001), "needle direction")?;
     ensure(within(&h.held_in_scene_m, MAX_COORDINATE_M), "held position")?;
+    ensure(within(&h.body_moved_m, MOST_MOVED_M), "place of the body")?;
     ensure(h.residual.is_finite() && h.max_displacement_m.is_finite(), "residual")?;
     seeds(&h.seeds[..h.seed_count as usize])?;
     let limit = MAX_COORDINATE_M as f32;

@@ -8,6 +8,9 @@ use num_enum::TryFromPrimitive;
 /// Values of one command at most: a rehearsal with 128 drops beside as many needles as may stay in fits.
 pub const MAX_COMMAND_VALUES: usize = 432;
 
+/// Bytes of the text of a mark at most.
+pub const MARK_BYTES: usize = 96;
+
 /// A [`crate::Request`] as plain old data, written by a host. Answered by one [`Reply`] with the same `host_id` and
 /// `command_id`. Made and read by [`crate::Request::encode`] and [`crate::Request::decode`] only.
 #[repr(C)]
@@ -24,6 +27,8 @@ pub struct Command {
     pub value_count: u32,
     /// The payload.
     pub values: [f64; MAX_COMMAND_VALUES],
+    /// The words of a request that has some.
+    pub text: Text<MARK_BYTES>,
 }
 
 /// Reasons in one reply at most; a refusal with more names the others in its text only.

@@ -54,6 +54,12 @@ pub enum EventKind {
     InvalidRefused = 9,
     /// `text`: the file, or why none could be written.
     FlightSaved = 10,
+    /// A moment that somebody marked, at its time. `text`: the words.
+    Mark = 11,
+    /// An instructor put a fault in. `code`: number of the [`crate::Exercise`]; `value`: factor or distance; `text`: its words.
+    ExerciseBegun = 12,
+    /// No fault of an instructor's is in force any more.
+    ExercisesEnded = 13,
     /// As [`FaultRaised`](Self::FaultRaised), of the second device; the needle's goes on.
     SecondFaultRaised = 20,
     /// The force of the second device was armed again after a fault.

@@ -16,6 +16,8 @@
 //! | `replies` | [`Reply`] | bridge | hosts | accepted, or refused and why |
 //! | `rehearsals` | [`Rehearsal`] | bridge | hosts | where the seeds of a needle would end |
 //! | `relayed` | [`Relayed`], newest one kept | a relay in place of the core | hosts | server, role, round trip, age and losses |
+//! | `class` | [`Class`], newest one kept | a relay | hosts | who is connected, who operates, who asks to |
+//! | `lease` | [`LeaseOrder`] | hosts | a relay | a [`LeaseRequest`] as plain data |
 //! | `uploads` | label cells under an [`UploadHeader`] | hosts | bridge | a segmented volume |
 //!
 //! Every type is plain old data, valid for every bit pattern: no `bool`, `enum` or `char`, no padding, no pointer.
@@ -26,8 +28,10 @@
 
 pub mod affinity;
 pub mod check;
+mod class;
 mod command;
 mod event;
+mod exercise;
 pub mod motion;
 mod params;
 mod plan;
@@ -44,8 +48,10 @@ mod snapshot;
 mod state;
 mod text;
 
-pub use command::{Command, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
+pub use class::{Class, ClassMember, LeaseOrder, LeaseRequest, MAX_CLASS};
+pub use command::{Command, MARK_BYTES, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
 pub use event::{Event, EventKind};
+pub use exercise::{EXERCISE_STIFFNESS_RANGE, Exercise, ExercisesInForce, MOST_MOVED_M};
 pub use params::{
     PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet,
     ParameterSpec, ParametersInForce, folding,
@@ -56,9 +62,9 @@ pub use refusal::{Reason, Refusal, RefusalCode};
 pub use rehearsal::Rehearsal;
 pub use relayed::Relayed;
 pub use request::{
-    ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, NeedleAxis, NeedleRehearsal,
-    ParameterChange, PlannedNeedle, RETRACT_RANGE_M, Request, RequestError, RequestErrors, SPEED_RANGE_M_PER_S,
-    STRAND_PITCH_RANGE_M, StabilisingNeedle,
+    ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, MARK_BEFORE_RANGE_S, Mark, NeedleAxis,
+    NeedleRehearsal, ParameterChange, PlannedNeedle, RETRACT_RANGE_M, Request, RequestError, RequestErrors,
+    SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M, StabilisingNeedle,
 };
 pub use scene::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, SceneId, StructureInfo,

@@ -24,6 +24,8 @@ pub enum RefusalCode {
     ValueOutOfLimits = 7,
     /// There is no built-in scene of that number.
     UnknownScene = 8,
+    /// The words are no UTF-8 of one line, or there are none.
+    InvalidText = 9,
     /// A parameter is outside its limits. Subject: the parameter.
     ParameterOutOfLimits = 20,
     /// With these shear angles a cell of tissue could fold (paper eq. 1). Subject: one of the parameters involved.
@@ -56,6 +58,8 @@ pub enum RefusalCode {
     NotAtNeedle = 50,
     /// The needle is on no line, and only one on a line may stay in.
     NeedleWithoutLine = 51,
+    /// The tissue model of the run answers no force.
+    TissueWithoutStiffness = 52,
     /// The run has no second device.
     NoSecondDevice = 55,
     /// Another scene is being loaded.
@@ -91,6 +95,7 @@ impl RefusalCode {
             Self::NotUnitDirection => "a direction is not a unit vector",
             Self::ValueOutOfLimits => "a speed, an acceleration or a distance is outside its limits",
             Self::UnknownScene => "there is no such built-in scene",
+            Self::InvalidText => "the words are empty, longer than 96 bytes or not readable",
             Self::ParameterOutOfLimits => "outside its limits",
             Self::CellsFold => "with these shear angles cells fold over (eq. 1); lower one of them",
             Self::TooStiff => "stiffer than the device can hold",
@@ -110,6 +115,9 @@ impl RefusalCode {
             Self::NotAtNeedle => "bring the hand along that needle to within 2 mm of its tip, then take it up",
             Self::NeedleWithoutLine => {
                 "the tissue was not prepared for this needle (no line): draw it back, wait, and go in again"
+            }
+            Self::TissueWithoutStiffness => {
+                "the tissue of this run has no stiffness: start rt-core with --tissue chainmail or --tissue fem"
             }
             Self::NoSecondDevice => {
                 "this run has no second device: start rt-core with --device-2 simulated, or another"

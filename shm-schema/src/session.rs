@@ -1,6 +1,6 @@
 //! Which run of `rt-core` this is and what it got from the kernel.
 
-use crate::Text;
+use crate::{ExercisesInForce, Text};
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -37,6 +37,8 @@ pub struct Session {
     pub no_rt_asked: u32,
     /// Messages from hosts that were refused in this run.
     pub refused: u64,
+    /// Faults that an instructor put in.
+    pub exercises: ExercisesInForce,
     /// Name of the device.
     pub device: Text<64>,
     /// Name of the second device; empty without one.

@@ -19,11 +19,12 @@ pub struct Vertex {
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("stylet.SeedPose")]
 pub struct SeedPose {
-    /// Centre of the seed, scene frame, m.
+    /// Centre of the seed in the body as the scene has it: where the body is moved besides, the seed is
+    /// [`SnapshotHeader::body_moved_m`] from there. Scene frame, m.
     pub position_m: [f64; 3],
     /// Unit vector along the seed; it turns with the tissue.
     pub axis: [f64; 3],
-    /// Where the tip was when the seed left it.
+    /// Where the tip was when the seed left it, in the body as the scene has it.
     pub dropped_at_m: [f64; 3],
 }
 
@@ -94,6 +95,8 @@ pub struct SnapshotHeader {
     pub left_count: u32,
     /// Zero.
     pub reserved: u32,
+    /// How far an exercise has moved all of the body from where the scene has it, m; vertices and displacements are with it.
+    pub body_moved_m: [f64; 3],
     /// In the order of the drops.
     pub seeds: [SeedPose; MAX_SEEDS],
     /// Needles that stay in, in the order in which they were left.

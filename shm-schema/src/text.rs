@@ -28,6 +28,14 @@ impl<const N: usize> Text<N> {
         Self { bytes }
     }
 
+    /// The words, where they are UTF-8 without control characters and followed by zeros alone; `None` for any other bytes.
+    pub fn exact(&self) -> Option<&str> {
+        let end = self.bytes.iter().position(|&b| b == 0).unwrap_or(N);
+        let (words, rest) = self.bytes.split_at(end);
+        let words = std::str::from_utf8(words).ok()?;
+        (rest.iter().all(|&b| b == 0) && !words.chars().any(char::is_control)).then_some(words)
+    }
+
     /// What can be read of it: up to the first zero, with broken UTF-8 and control characters replaced.
     pub fn read(&self) -> String {
         let end = self.bytes.iter().position(|&b| b == 0).unwrap_or(N);
@@ -41,6 +49,16 @@ impl<const N: usize> Text<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn words_are_exact_or_none() {
+        assert_eq!(Text::<8>::new("aé€").exact(), Some("aé€"));
+        assert_eq!(Text::<2>::new("aé€").exact(), Some("a"));
+        assert_eq!(Text::<4>::new("a\nb").exact(), None, "a control character");
+        for bytes in [[0xff; 4], [b'a', 0, b'b', 0], [0xc3, 0, 0, 0]] {
+            assert_eq!(Text::<4> { bytes }.exact(), None, "{bytes:?}");
+        }
+    }
 
     #[test]
     fn text_survives_the_field_and_invalid_bytes_are_readable() {

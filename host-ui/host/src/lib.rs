@@ -4,4 +4,5 @@
 
 pub mod core_args;
 pub mod link;
+pub mod moments;
 pub mod record;

@@ -14,7 +14,7 @@ use receive::Latest;
 use receiver::Outgoing;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use stylet_anatomy::Role;
 use stylet_files::{LabelVolume, Tissue};
 use stylet_shm_schema::service::Instance;
@@ -29,6 +29,8 @@ const SILENT_AFTER: Duration = Duration::from_millis(100);
 /// Without the board, the only heartbeat is the announcement once a second.
 const SILENT_AFTER_WITHOUT_BOARD: Duration = Duration::from_millis(1500);
 const ABSENT_AFTER: Duration = Duration::from_secs(2);
+/// A relay says five times a second who is connected.
+const CLASS_STAYS: Duration = Duration::from_secs(2);
 /// A picture of the tissue is converted at most so often for a window: converting costs more than receiving.
 const SNAPSHOTS_EVERY: Duration = Duration::from_millis(12);
 const EVENTS_KEPT: usize = 256;
@@ -213,6 +215,19 @@ impl Link {
     pub fn relayed(&self) -> Option<&Relayed> {
         let id = self.latest.id();
         self.latest.relayed.as_ref().filter(|r| id == Some(r.session_id))
+    }
+
+    /// Who is connected over a relay of this machine, while that says so.
+    pub fn class(&self) -> Option<&Class> {
+        let (came, class) = self.latest.class.as_ref()?;
+        let is_of_run = self.latest.id() == Some(class.session_id);
+        (is_of_run && came.elapsed() < CLASS_STAYS).then_some(class)
+    }
+
+    /// Asks the relay of this machine for the needle, or to hand it over. [`Link::class`] shows what came of it.
+    pub fn lease(&mut self, request: &LeaseRequest) -> Result<(), LinkError> {
+        let id = self.next_id()?;
+        self.ask(id, Outgoing::Lease(request.encode())).map(|_| ())
     }
 
     /// Every record since the last call. Ticks whose record this host did not see are missing in their numbers.

@@ -5,6 +5,7 @@
 
 #![warn(missing_docs)]
 
+pub mod class;
 pub mod control;
 #[cfg(feature = "net")]
 pub mod join;

@@ -170,8 +170,7 @@ fn run(task: Task) -> Result<ExitCode, RelayError> {
                 listen,
                 lab: Lab::new(&keys),
             };
-            let mut beat = keeper::Beat::of_stdin();
-            match serve::run(&options, &stop, |operated| beat.pass(operated))? {
+            match serve::run(&options, &stop, &mut keeper::Beat::of_stdin())? {
                 End::Stopped => Ok(ExitCode::SUCCESS),
                 End::Closed => Ok(ExitCode::from(keeper::AGAIN)),
             }

@@ -22,6 +22,8 @@ use zenoh::{Config, Wait};
 pub const PORT: u16 = 7461;
 /// A link that is silent for so long is closed, ms.
 const LEASE_MS: u32 = 600;
+/// A connection that is not made after so long is begun again: QUIC sends a first packet that was lost again after a second. Four round trips.
+const OPEN_MS: u32 = 700;
 /// A message of a volume of 64 million cells fits.
 const MAX_MESSAGE_BYTES: usize = 70 << 20;
 
@@ -68,9 +70,10 @@ fn base64(text: &str) -> String {
 fn common(mode: &str, tls: Value) -> Value {
     json!({
         "mode": mode,
-        "scouting": { "multicast": { "enabled": false }, "gossip": { "enabled": false } },
+        // Without its delay a server sends as soon as it listens.
+        "scouting": { "delay": 0, "multicast": { "enabled": false }, "gossip": { "enabled": false } },
         "transport": {
-            "unicast": { "open_timeout": 1000, "accept_timeout": 1000, "max_sessions": 64, "qos": { "enabled": true } },
+            "unicast": { "open_timeout": OPEN_MS, "accept_timeout": 1000, "max_sessions": 64, "qos": { "enabled": true } },
             "link": {
                 "protocols": ["quic"],
                 "tx": {
@@ -118,7 +121,7 @@ pub fn join(server: &str, identity: &Identity) -> Result<Session, RelayError> {
     let mut config = common("client", tls);
     config["connect"] = json!({
         "endpoints": [endpoint(server)], "timeout_ms": -1, "exit_on_failure": false,
-        "retry": { "period_init_ms": 200, "period_max_ms": 400, "period_increase_factor": 1.5 },
+        "retry": { "period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5 },
     });
     open(&config).map_err(|e| RelayError(format!("cannot connect to {server}: {e}")))
 }

@@ -1,5 +1,6 @@
 //! Ports of shared memory: those of a host beside the core, and those of a core for hosts on another machine.
 
+use crate::class::ClassPorts;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use stylet_shm_schema::service::{
@@ -106,6 +107,8 @@ pub struct Far {
     pub rehearsals: Publisher<Rehearsal>,
     /// The line itself.
     pub relayed: Publisher<Relayed>,
+    /// Who is there, and what hosts here ask of the lease.
+    pub class: ClassPorts,
     /// The scene that runs.
     pub scene: SlicePublisher<u32, SceneHeader>,
     /// Requests of hosts here.
@@ -128,6 +131,7 @@ impl Far {
             replies: service::replies::publisher(&node)?,
             rehearsals: service::rehearsals::publisher(&node)?,
             relayed: service::relayed::publisher(&node)?,
+            class: ClassPorts::new(&node)?,
             scene: service::scene::publisher(&node, 1 << 16)?,
             commands: service::commands::subscriber(&node)?,
             uploads: service::uploads::subscriber(&node)?,
@@ -144,6 +148,7 @@ impl Far {
         self.replies.connect();
         self.rehearsals.connect();
         self.relayed.connect();
+        self.class.connect();
         self.scene.connect();
     }
 }

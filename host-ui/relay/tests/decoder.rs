@@ -5,7 +5,7 @@ mod decoders;
 use bytemuck::Zeroable;
 use std::path::Path;
 use stylet_relay::control::Order;
-use stylet_relay::wire::{Batches, Hello, Kind, MAX_THIN_BYTES, Present, Rest, Stamp, Who, encode, encode_snapshot};
+use stylet_relay::wire::{Hello, Kind, MAX_THIN_BYTES, Present, Rest, Stamp, Ticks, Who, encode, encode_snapshot};
 use stylet_shm_schema::{HandMove, HapticState, Request, SceneHeader, SnapshotHeader, TickRecord, Vertex};
 
 /// A message of each kind that is accepted, but for the large plain ones.
@@ -27,6 +27,7 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
     let command = hand.encode(1, 2).expect("fits");
     let who = Who {
         operator: Some("Otto".to_owned()),
+        local: false,
         asked: None,
         present: vec![Present::default()],
     };
@@ -39,7 +40,14 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
         ("command", message(Kind::Command, &[bytemuck::bytes_of(&command)])),
         (
             "again",
-            message(Kind::Again, &[bytemuck::bytes_of(&Batches { from: 1, to: 9 })]),
+            message(
+                Kind::Again,
+                &[bytemuck::bytes_of(&Ticks {
+                    session_id: 3,
+                    from: 1,
+                    to: 9,
+                })],
+            ),
         ),
         (
             "lease",

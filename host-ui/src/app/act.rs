@@ -67,7 +67,14 @@ impl App {
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
         match action {
             Action::ToggleHelp => self.help = !self.help,
+            Action::ToggleClass => self.class = !self.class,
+            Action::Lease(request) => {
+                if let Err(e) = self.link.lease(&request) {
+                    self.shown.note = Some(refusal(format!("Needle: {e}")));
+                }
+            }
             Action::OpenParameters => self.parameters.open = !self.parameters.open,
+            Action::ToggleInstructor => self.instructor.toggle(),
             Action::ResetView => self.middle.reset_view(&self.shown),
             Action::LookFrom(preset) => self.middle.solid.look_from(preset, &self.shown),
             Action::SetLayout(layout) => self.settings.layout = layout,
@@ -98,6 +105,10 @@ impl App {
             Action::Watch(action) => self.act_on_recording(action),
             _ if self.watches() => {
                 self.shown.note = Some(refusal("This is a recording: close it to move the needle.".to_owned()));
+            }
+            // Whoever instructs does so while a script or a trainee moves the needle.
+            Action::Send(request @ (Request::Mark(_) | Request::BeginExercise(_) | Request::EndExercises)) => {
+                self.send(request_name(&request), &request);
             }
             // While the script runs the needle is its own.
             _ if self.run.is_some() && action != Action::Send(Request::Disengage) => {}
@@ -275,6 +286,9 @@ fn request_name(request: &Request) -> &'static str {
         Request::LeaveNeedle => "Leave needle",
         Request::TakeNeedle(_) => "Take up needle",
         Request::DrawNeedle { .. } => "Draw out needle",
+        Request::Mark(_) => "Mark",
+        Request::BeginExercise(_) => "Exercise",
+        Request::EndExercises => "End of exercises",
     }
 }
 

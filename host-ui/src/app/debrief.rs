@@ -9,6 +9,7 @@ use stylet_base::job::{Job, JobUpdate};
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::SceneModel;
+use stylet_host::moments::Moment;
 use stylet_implant::plan::{Anatomy, ImplantPlan, exchange, file};
 use stylet_implant::provenance;
 use stylet_implant::score::{self, Implant, Motion, Score, SeedPair};
@@ -28,6 +29,7 @@ struct Delivered {
     lost: Vec<Seed>,
     motion: Motion,
     records: Vec<TickRecord>,
+    moments: Vec<Moment>,
     /// The plan as its file would be; `None` for one needle by hand.
     plan: Option<ImplantPlan>,
 }
@@ -103,6 +105,7 @@ impl App {
             lost,
             motion: self.trace.motion(),
             records: self.trace.records().to_vec(),
+            moments: self.moments.since(self.trace.began_ns().unwrap_or(u64::MAX)),
             plan: implant.map(|implant| implant.plan.clone()),
         })
     }
@@ -168,6 +171,7 @@ fn write(delivered: &Delivered, folder: PathBuf) -> Result<PathBuf, Failure> {
         prescription_gy: delivered.prescription_gy,
         motion: delivered.motion,
         records: &delivered.records,
+        moments: delivered.moments.clone(),
     })?;
     std::fs::create_dir_all(&folder).map_err(|e| format!("{} cannot be created ({e})", folder.display()))?;
     score::write(&score, delivered.made()?, &folder)?;

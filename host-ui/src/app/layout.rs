@@ -2,9 +2,10 @@
 
 use super::{App, patch};
 use crate::action::Action;
+use crate::panel::instructor::instructor_ui;
 use crate::panel::parameters::parameters_ui;
 use crate::panel::workflow::{Progress, editor_ui, foot_height, foot_ui, run_ui, workflow_ui};
-use crate::panel::{banners, help, plots, status};
+use crate::panel::{banners, class, help, plots, status};
 use crate::theme;
 use egui::{CentralPanel, Frame, Margin, Panel, Rect, ScrollArea};
 
@@ -51,6 +52,13 @@ impl App {
         };
         actions.extend(banners::banners_ui(ui.ctx(), pictures, &banners::banners(&self.shown)));
         parameters_ui(ui.ctx(), &self.shown, &mut self.parameters);
+        actions.extend(class::class_ui(ui.ctx(), &self.shown, &mut self.class));
+        actions.extend(instructor_ui(
+            ui.ctx(),
+            &self.shown,
+            &self.moments,
+            &mut self.instructor,
+        ));
         help::help_ui(ui.ctx(), &self.shown, &mut self.help);
         if let Some(patch) = &mut self.patch {
             let tip = self.shown.state.map(|s| s.tip_in_scene_m);
@@ -84,7 +92,9 @@ impl App {
         }
         // The debrief looks back on all of it, not on the last seconds.
         let whole = self.workflow.is_open(Progress::Debrief).then_some(&self.trace);
-        ScrollArea::vertical().show(ui, |ui| plots::plots_ui(ui, &self.shown, &self.history, whole, height));
+        ScrollArea::vertical().show(ui, |ui| {
+            plots::plots_ui(ui, &self.shown, &self.history, &self.moments, whole, height)
+        });
     }
 
     fn choice_ui(&mut self, ui: &mut egui::Ui) {

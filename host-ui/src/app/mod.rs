@@ -12,13 +12,14 @@ mod second;
 mod take;
 mod watch;
 
-use crate::action::{Action, PlanAction, WatchAction};
+use crate::action::Action;
 use crate::dialog::Dialogs;
 use crate::dose_worker::DoseWorker;
 use crate::loader::Loader;
 use crate::panel::history::History;
+use crate::panel::instructor::InstructorState;
 use crate::panel::parameters::ParametersState;
-use crate::panel::workflow::{Progress, WorkflowState};
+use crate::panel::workflow::WorkflowState;
 use crate::picture::Pictures;
 use crate::planner::Planner;
 use crate::redraw::Redraw;
@@ -34,6 +35,7 @@ use stylet_controllers::{Controllers, SLOW, System, Wish};
 use stylet_files::Image;
 use stylet_host::core_args::SceneChoice;
 use stylet_host::link::{Link, LinkStatus};
+use stylet_host::moments::Moments;
 use stylet_implant::score::Trace;
 use stylet_implant::workflow::{NeedleTask, Pace, Placed, Run};
 use stylet_shm_schema::affinity::Left;
@@ -89,6 +91,8 @@ pub struct App {
     history: History,
     /// Force and speed since the tip first touched tissue.
     trace: Trace,
+    /// What was marked, put in or went wrong in this run of the core.
+    moments: Moments,
     debrief: Option<Job<debrief::Saved>>,
     summed_up: Instant,
     loader: Loader,
@@ -131,6 +135,8 @@ pub struct App {
     workflow: WorkflowState,
     parameters: ParametersState,
     help: bool,
+    class: bool,
+    instructor: InstructorState,
     /// What stands in the middle where there is no room for the right panel.
     narrow: layout::Narrow,
 }
@@ -233,6 +239,7 @@ impl App {
             applied: None,
             history: History::default(),
             trace: Trace::default(),
+            moments: Moments::default(),
             debrief: None,
             summed_up: Instant::now(),
             loader: Loader::default(),
@@ -270,6 +277,8 @@ impl App {
             settings,
             parameters: ParametersState::default(),
             help: false,
+            class: false,
+            instructor: InstructorState::default(),
             narrow: layout::Narrow::default(),
         }
     }
@@ -313,30 +322,6 @@ impl App {
             (true, true) => self.shown.controllers.wish.slower(SLOW),
         }
     }
-
-    /// A folder is an image series; while the plan's step is open, a file that is no volume is a plan.
-    fn dropped_file(&self, ctx: &egui::Context) -> Option<Action> {
-        let path = ctx.input(|i| {
-            i.raw
-                .dropped_files
-                .iter()
-                .map(|f| f.path().to_owned())
-                .find(|p| !p.as_os_str().is_empty())
-        })?;
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
-            return Some(Action::Watch(WatchAction::File(path)));
-        }
-        if path.is_dir() {
-            return Some(Action::LoadImage(path));
-        }
-        let is_plan = ["toml", "csv", "dcm"]
-            .iter()
-            .any(|ending| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)));
-        Some(match is_plan && self.workflow.is_open(Progress::Plan) {
-            true => Action::Plan(PlanAction::Import(path)),
-            false => Action::LoadScene(path),
-        })
-    }
 }
 
 impl eframe::App for App {
@@ -354,7 +339,8 @@ impl eframe::App for App {
         actions.extend(self.dropped_file(&ctx));
         actions.extend(self.picked_file());
         if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
-            (self.help, self.parameters.open) = (false, false);
+            (self.help, self.class, self.parameters.open) = (false, false, false);
+            self.instructor.close();
         }
         for action in actions {
             self.act(action, &ctx);

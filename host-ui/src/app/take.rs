@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 use stylet_controllers::Button;
 use stylet_files::{Image, LabelVolume};
 use stylet_host::core_args::SceneChoice;
+use stylet_implant::score::Trace;
 use stylet_implant::workflow::RunStatus;
 use stylet_shm_schema::Request;
 
@@ -28,6 +29,10 @@ impl App {
         let plan_before = self.shown.plan.map(|p| p.generation);
         self.shown.take(&self.link);
         self.leave_core();
+        // What a reset begins is a procedure of its own.
+        if self.moments.take(self.link.events()) {
+            self.trace = Trace::default();
+        }
         if self.shown.plan.map(|p| p.generation) != plan_before {
             self.drive = Drive::default();
         }

@@ -12,4 +12,5 @@ pub mod find_seeds;
 pub mod perturb;
 pub mod plan;
 pub mod post_implant;
+pub mod record;
 pub mod study;

@@ -1,12 +1,13 @@
 //! The banners under the bar: what is wrong with the core, the force and the controllers, and what to do.
 
+use super::class;
 use crate::action::{Action, WatchAction};
 use crate::shown::{NeedleLine, SecondHand, Shown, Watched};
 use crate::theme;
 use crate::theme::Tokens;
 use egui::{Color32, Rect, RichText};
 use stylet_host::link::LinkStatus;
-use stylet_shm_schema::{Fault, Relayed, Request};
+use stylet_shm_schema::{Exercise, Fault, Relayed, Request};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BannerLevel {
@@ -113,9 +114,11 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
     if shown.state.is_some() && fault == Some(Fault::None) {
         list.extend(force_is_off(shown));
     }
+    list.extend(exercises(shown));
     list.extend(without_line(shown));
     list.extend(folded(shown));
     list.extend(refused(shown));
+    list.extend(class::banners(shown));
     list.extend(shown.relayed.as_ref().map(of_line));
     list
 }
@@ -173,7 +176,7 @@ fn of_line(line: &Relayed) -> Banner {
             line.records_lost,
             line.snapshots_lost
         ),
-        remedy: None,
+        remedy: Some(("Who is there", Action::ToggleClass)),
     }
 }
 
@@ -192,6 +195,18 @@ fn force_is_off(shown: &Shown) -> Option<Banner> {
         text: "It would begin with a jump. Move the needle until it is small, best outside the tissue.".to_owned(),
         remedy: None,
     })
+}
+
+/// What an instructor put in, by name: a trainee must not look for a fault of the machine.
+fn exercises(shown: &Shown) -> Vec<Banner> {
+    let in_force = shown.session.map(|s| s.exercises).unwrap_or_default();
+    let banner = |exercise: Exercise| Banner {
+        level: BannerLevel::Warn,
+        title: "Exercise",
+        text: format!("{}. An instructor put it in.", capital(&exercise.to_string())),
+        remedy: None,
+    };
+    in_force.all().map(banner).collect()
 }
 
 /// While the needle is in tissue that was not prepared for it: force and places are then worth less, and may come late.

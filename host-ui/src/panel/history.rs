@@ -142,6 +142,13 @@ impl History {
     }
 
     /// Smallest and largest over seconds before the newest tick, in pieces: between two of them nothing was seen.
+    /// When it was, s before the newest tick; `None` where that is not plotted.
+    pub fn before_s(&self, time_ns: u64) -> Option<f64> {
+        let newest_ns = self.curves.newest_ns()?;
+        let before_s = format::seconds(newest_ns.saturating_sub(time_ns));
+        (before_s <= WINDOW_S).then_some(-before_s)
+    }
+
     pub fn curve(&self, quantity: Quantity) -> Vec<Vec<[f64; 3]>> {
         let newest_ns = self.curves.newest_ns().unwrap_or(0);
         let before = |time_ns: u64| -format::seconds(newest_ns.saturating_sub(time_ns));

@@ -2,10 +2,12 @@
 
 mod axis;
 pub mod banners;
+pub mod class;
 pub mod field;
 pub mod help;
 mod histogram;
 pub mod history;
+pub mod instructor;
 pub mod parameters;
 pub mod plots;
 pub mod setup;

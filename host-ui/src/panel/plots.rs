@@ -10,6 +10,7 @@ use crate::words::Explained;
 use egui::{Color32, RichText};
 use stylet_base::format;
 use stylet_base::seen::Seen;
+use stylet_host::moments::{Moment, MomentKind, Moments};
 use stylet_implant::score::Trace;
 
 /// What stands between and under the three plots over time.
@@ -19,7 +20,15 @@ const PLOT_HEIGHTS: [f32; 2] = [48.0, 150.0];
 const SEEN_LINE: f32 = 20.0;
 
 /// The plots share what of `height` the rest leaves. With `whole` they look back on all of the procedure.
-pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Option<&Trace>, height: f32) {
+pub fn plots_ui(
+    ui: &mut egui::Ui,
+    shown: &Shown,
+    history: &History,
+    moments: &Moments,
+    whole: Option<&Trace>,
+    height: f32,
+) {
+    let marks = marks(ui, moments, |time_ns| history.before_s(time_ns));
     let whole = whole.filter(|trace| !trace.is_empty());
     let lines = usize::from(!history.timing.seen.is_all())
         + usize::from(whole.is_some_and(|trace| !trace.motion().seen.is_all()));
@@ -33,6 +42,7 @@ pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Opti
             seconds: [-WINDOW_S, 0.0],
             least,
             pieces: &history.curve(quantity),
+            marks: &marks,
             worst_only: matches!(quantity, Quantity::WakeUs),
         }
         .show(ui);
@@ -41,7 +51,7 @@ pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Opti
     tension_ui(ui, shown);
     let now = |value: Option<String>| value.unwrap_or_else(|| "n/a".to_owned());
     match whole {
-        Some(trace) => whole_ui(ui, trace, each),
+        Some(trace) => whole_ui(ui, trace, moments, each),
         None => {
             let force = now(shown.resistance_n().map(format::force));
             title(ui, "Force along the needle, N", &force, tokens.force).explained("force on the hand");
@@ -68,8 +78,30 @@ pub fn plots_ui(ui: &mut egui::Ui, shown: &Shown, history: &History, whole: Opti
     setup::setup_ui(ui, shown);
 }
 
+/// Those that a plot shows, where it has them.
+fn marks(ui: &egui::Ui, moments: &Moments, at_s: impl Fn(u64) -> Option<f64>) -> Vec<(f64, Color32, String)> {
+    let tokens = theme::of(ui);
+    let color = |kind: MomentKind| match kind {
+        MomentKind::Mark => tokens.accent,
+        MomentKind::Exercise => tokens.warn,
+        MomentKind::Fault => tokens.bad,
+    };
+    let shown = |m: &Moment| {
+        Some((
+            at_s(m.time_ns)?,
+            color(m.kind),
+            format!("{}: {}", m.kind.name(), m.text),
+        ))
+    };
+    moments.all().filter_map(shown).collect()
+}
+
 /// From the first contact with tissue on.
-fn whole_ui(ui: &mut egui::Ui, trace: &Trace, height: f32) {
+fn whole_ui(ui: &mut egui::Ui, trace: &Trace, moments: &Moments, height: f32) {
+    let began_ns = trace.began_ns().unwrap_or(u64::MAX);
+    let marks = marks(ui, moments, |time_ns| {
+        time_ns.checked_sub(began_ns).map(format::seconds)
+    });
     let (tokens, motion) = (theme::of(ui), trace.motion());
     let whole = |ui: &mut egui::Ui, name, color, unit, pieces: Vec<Vec<[f64; 3]>>| {
         let last = pieces.last().and_then(|piece| piece.last());
@@ -81,6 +113,7 @@ fn whole_ui(ui: &mut egui::Ui, trace: &Trace, height: f32) {
             seconds: [0.0, last.map_or(1.0, |[seconds, ..]| seconds.max(1.0))],
             least: [0.0, 1.0],
             pieces: &pieces,
+            marks: &marks,
             worst_only: false,
         }
         .show(ui);

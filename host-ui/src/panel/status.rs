@@ -60,7 +60,13 @@ fn buttons_ui(ui: &mut egui::Ui, settings: &mut Settings) -> Option<Action> {
     if ui.button("Help").on_hover_text("Key F1").clicked() {
         action = Some(Action::ToggleHelp);
     }
-    ui.menu_button("Settings", |ui| settings_ui(ui, settings));
+    ui.menu_button("Settings", |ui| {
+        settings_ui(ui, settings);
+        ui.separator();
+        if ui.button("Instructor").on_hover_text("Key K").clicked() {
+            action = Some(Action::ToggleInstructor);
+        }
+    });
     if ui.button("Parameters").on_hover_text("Key P").clicked() {
         action = Some(Action::OpenParameters);
     }

@@ -2,7 +2,7 @@
 
 use super::axis::{grid, number, plot, upwards};
 use egui::Color32;
-use egui_plot::{FilledArea, GridMark, Line, PlotPoints};
+use egui_plot::{FilledArea, GridMark, Line, PlotPoints, VLine};
 use stylet_base::format;
 
 /// Of the axis of time: half of what a point between two gaps covers, and how near to a piece a pointer means it.
@@ -21,6 +21,8 @@ pub struct Strip<'a> {
     pub least: [f64; 2],
     /// Time, smallest and largest, in pieces: between two of them nothing is known.
     pub pieces: &'a [Vec<[f64; 3]>],
+    /// Moments on the axis of time, each with its colour and words.
+    pub marks: &'a [(f64, Color32, String)],
     /// From nothing up to the largest, where only that counts.
     pub worst_only: bool,
 }
@@ -46,6 +48,9 @@ impl Strip<'_> {
                 }
             })
             .show(ui, |plot| {
+                for (at_s, color, _) in self.marks {
+                    plot.vline(VLine::new("moment", *at_s).color(*color).width(1.5));
+                }
                 for piece in self.pieces {
                     let piece = widened(piece, length_s * LONE_SHARE);
                     let [xs, lows, highs] = [0, 1, 2].map(|n| piece.iter().map(|p| p[n]).collect::<Vec<f64>>());
@@ -69,6 +74,11 @@ impl Strip<'_> {
 
     /// The value that is nearest in time.
     fn value_at(&self, seconds: f64) -> Option<String> {
+        let beside_s = (self.seconds[1] - self.seconds[0]) * BESIDE_SHARE;
+        let marked = self.marks.iter().find(|(at_s, ..)| (at_s - seconds).abs() <= beside_s);
+        if let Some((at_s, _, words)) = marked {
+            return Some(format!("{at_s:.1} s: {words}"));
+        }
         let points: Vec<[f64; 3]> = self.pieces.concat();
         if self.is_in_gap(seconds) {
             return Some(format!("{seconds:.1} s: no tick was seen"));
@@ -123,6 +133,7 @@ mod tests {
             seconds: [-10.0, 0.0],
             least: [0.0, 1.0],
             pieces: &pieces,
+            marks: &[],
             worst_only: false,
         };
         let value = |strip: &Strip<'_>, at_s| strip.value_at(at_s).expect("some");
@@ -135,6 +146,10 @@ mod tests {
         strip.pieces = &parted;
         assert_eq!(value(&strip, -2.5), "-2.5 s: no tick was seen");
         assert_eq!(value(&strip, -3.98), "-4.0 s: at most 1.00 N");
+        let marks = [(-2.5, Color32::WHITE, "mark: left lobe".to_owned())];
+        strip.marks = &marks;
+        assert_eq!(value(&strip, -2.46), "-2.5 s: mark: left lobe");
+        assert_eq!(value(&strip, -2.4), "-2.4 s: no tick was seen");
         strip.pieces = &[];
         assert_eq!(strip.value_at(0.0), None);
     }

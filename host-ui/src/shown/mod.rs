@@ -20,7 +20,7 @@ use stylet_host::link::{Link, LinkStatus};
 use stylet_implant::plan::{HOLES, Template};
 use stylet_implant::workflow::{Step, Waiting};
 use stylet_shm_schema::{
-    EventKind, Fault, HapticState, LeftNeedlePose, ParametersInForce, Phase, PlanInForce, PlannedSeed, Relayed,
+    Class, EventKind, Fault, HapticState, LeftNeedlePose, ParametersInForce, Phase, PlanInForce, PlannedSeed, Relayed,
     SceneHeader, SecondState, SeedPose, Session, flags,
 };
 
@@ -34,6 +34,8 @@ pub struct Shown {
     pub session: Option<Session>,
     /// The line to the core, where that runs on another machine.
     pub relayed: Option<Relayed>,
+    /// Who is connected over a relay of this machine.
+    pub class: Option<Class>,
     pub state: Option<HapticState>,
     /// Of the second device.
     pub second: Option<SecondState>,
@@ -42,6 +44,8 @@ pub struct Shown {
     pub plan: Option<PlanInForce>,
     pub parameters: Option<ParametersInForce>,
     pub seeds: Vec<SeedPose>,
+    /// How far an exercise has moved the body, and with it the seeds, from where the scene has it.
+    pub body_moved_m: [f64; 3],
     /// Of the needle in the last snapshot.
     pub bend: Bend,
     /// Needles that stay in while another moves.
@@ -86,12 +90,14 @@ impl Shown {
             status: LinkStatus::Absent { why: String::new() },
             session: None,
             relayed: None,
+            class: None,
             state: None,
             second: None,
             scene: None,
             plan: None,
             parameters: None,
             seeds: Vec::new(),
+            body_moved_m: [0.0; 3],
             bend: Bend::default(),
             left: Vec::new(),
             snapshot_residual: None,
@@ -121,6 +127,7 @@ impl Shown {
         self.status = link.status();
         self.session = link.session().copied();
         self.relayed = link.relayed().copied();
+        self.class = link.class().copied();
         self.state = link.state().copied();
         self.second = link.second_state().copied();
         self.scene = link.scene().map(|s| s.header);
@@ -136,11 +143,17 @@ impl Shown {
         self.snapshot_residual = None;
         if let Some(snapshot) = link.snapshot() {
             self.bend.take(&snapshot.header);
+            self.body_moved_m = snapshot.header.body_moved_m;
             let count = snapshot.header.seed_count as usize;
             self.seeds.extend(snapshot.header.seeds.iter().take(count).copied());
             self.left.extend_from_slice(snapshot.header.left());
             self.snapshot_residual = Some(snapshot.header.residual);
         }
+    }
+
+    /// Where a seed is drawn: in the body where that is now.
+    pub fn drawn_at_m(&self, seed: &SeedPose) -> [f64; 3] {
+        [0, 1, 2].map(|a| seed.position_m[a] + self.body_moved_m[a])
     }
 
     pub fn is_live(&self) -> bool {

@@ -72,7 +72,7 @@ pub fn collect_live(marks: &mut Marks, (shown, view): (&Shown, &ViewState), look
         marks.needle(&[left.tip_m, hub_m]);
     }
     for seed in &shown.seeds {
-        marks.placed_seed(seed.position_m, seed.axis);
+        marks.placed_seed(shown.drawn_at_m(seed), seed.axis);
     }
     let measured: Vec<Vector3<f32>> = view.measure.points_m().iter().map(|p| p.map(|c| c as f32)).collect();
     marks.measured(&measured);

@@ -302,7 +302,7 @@ impl Scene3d {
             tip: shown.tip_m().unwrap_or_default(),
             needle: moving_points(shown),
             force: shown.state.map_or([0.0; 3], |s| s.force_on_hand_n),
-            seeds: shown.seeds.iter().map(|s| s.position_m).collect(),
+            seeds: shown.seeds.iter().map(|s| shown.drawn_at_m(s)).collect(),
         };
         let moves = !fresh && !self.drawn.as_ref().is_some_and(|drawn| key.looks_as(drawn));
         if fresh || moves || gpu.shows_coarse() {

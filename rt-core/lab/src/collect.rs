@@ -74,8 +74,6 @@ pub struct LoopTiming {
     pub missed: u64,
     /// Ticks that ended after the next one was due.
     pub overruns: u64,
-    /// Ticks of the whole run, warm-up included, that found their time already past: they did not sleep.
-    pub unslept: u64,
     /// Ticks that did not fit into the ring.
     pub lost: u64,
     /// When the loop toggled its pin, warm-up included.
@@ -106,7 +104,6 @@ impl LoopTiming {
             ticks: 0,
             missed: 0,
             overruns: 0,
-            unslept: 0,
             lost: 0,
             toggles: Vec::new(),
             late: None,
@@ -163,7 +160,6 @@ impl LoopTiming {
     fn take(&mut self, tick: &TickTimes) {
         self.seen += 1;
         self.lost = u64::from(tick.lost);
-        self.unslept += u64::from(!tick.slept);
         if let Some([before_ns, after_ns]) = tick.toggled_ns {
             self.toggles.push(ToggleTime {
                 due_ns: tick.due_ns,
@@ -263,7 +259,7 @@ mod tests {
     fn tick(due_ns: u64, wake_ns: u64, missed: u32) -> TickTimes {
         let woke_ns = due_ns + wake_ns;
         let mut tick = TickTimes::default();
-        (tick.due_ns, tick.woke_ns, tick.missed, tick.slept) = (due_ns, woke_ns, missed, true);
+        (tick.due_ns, tick.woke_ns, tick.missed) = (due_ns, woke_ns, missed);
         tick.push_mark(woke_ns + 100);
         tick.push_mark(woke_ns + 300);
         tick

@@ -2,6 +2,9 @@
 //!
 //! An insertion at clinical speed is replayed to each part, round by round, so that a noisy machine disturbs all parts alike.
 
+mod probe;
+
+use probe::Pressed;
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 use stylet_sim::limits::TissueParameters;
@@ -98,11 +101,17 @@ fn measure(scene: &Scene) -> Result<Vec<Part>, CostError> {
     ];
     parts.extend(others.map(|name| part(name, TICK_S)));
     let script = Script::through(scene);
+    let pressed = Pressed::of(scene)?;
+    let mut of_probe = pressed.as_ref().map(|pressed| part(&pressed.name(), Pressed::PERIOD_S));
     for round in 1..=ROUNDS {
         for (timed, part) in models.iter_mut().zip(&mut parts) {
             eprintln!("round {round} of {ROUNDS}: {}", part.name.trim_start());
             part.rounds.push(Vec::new());
             play(timed, &script, &mut part.rounds[round - 1], |_, _| ());
+        }
+        if let (Some(pressed), Some(part)) = (&pressed, &mut of_probe) {
+            part.rounds.push(Vec::new());
+            pressed.play(&mut part.rounds[round - 1]);
         }
         let first = parts.len() - others.len();
         let [locate, seeds, surface] = &mut parts[first..] else {
@@ -114,6 +123,7 @@ fn measure(scene: &Scene) -> Result<Vec<Part>, CostError> {
             part.rounds.push(micros);
         }
     }
+    parts.extend(of_probe);
     for part in &mut parts {
         keep_least(part);
     }

@@ -11,6 +11,8 @@ use stylet_runtime::rt::clock;
 
 const PERIOD_NS: u64 = 1_000_000;
 const SPIN_NS: u64 = 100_000;
+/// Away from the wake-ups that are measured: neither the force loop nor the tissue loop wakes while this spins, at 1 kHz.
+const PHASE_NS: u64 = 800_000;
 /// Two reads of the clock are farther apart than this only when the thread was interrupted.
 const GAP_NS: u64 = 20_000;
 /// A wake-up later than this is kept: no tissue step lasts so long.
@@ -64,7 +66,7 @@ pub fn watch(core: Option<usize>, priority: Option<u32>, stop: &AtomicBool) -> G
     };
     // Without the right to a priority it watches at normal priority: it distinguishes gaps from switches either way.
     let _armed = arm::arm(Ask { priority, core }).or_else(|_| arm::arm(Ask { priority: None, core }));
-    let mut grid = clock::Grid::from(clock::now_ns(), PERIOD_NS);
+    let mut grid = clock::Grid::at_phase(clock::now_ns(), PERIOD_NS, PHASE_NS);
     // SYNC: nothing but the flag is carried.
     while !stop.load(Ordering::Acquire) {
         clock::sleep_until(grid.due_ns);

@@ -77,7 +77,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
         let setup = setup_of(args, &options);
         let search = spin::search(&setup, args.longest_spin_us(), interrupted)?;
         println!("{}", search.words());
-        options.spin_ns = search.used_us * 1_000;
+        options.wait.spin_ns = search.used_us * 1_000;
         spin_search = Some(search);
     }
     let setup = setup_of(args, &options);

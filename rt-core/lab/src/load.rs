@@ -44,6 +44,18 @@ pub enum LoadProcess {
     Ui,
 }
 
+impl LoadProcess {
+    /// Where the process runs that has `before` of its kind before it: one on each core. Left to itself the kernel gives a core another
+    /// mixture each time, and a wake-up that ends a stream through memory takes twice as long as one that ends a computation.
+    fn core(self, before: usize) -> Option<usize> {
+        let cores = core_affinity::get_core_ids()?;
+        matches!(self, Self::Cpu | Self::Memory)
+            .then(|| cores.get(before))
+            .flatten()
+            .map(|core| core.id)
+    }
+}
+
 impl Load {
     fn work(self, cores: usize) -> Vec<LoadProcess> {
         let some = |work: LoadProcess, count: usize| std::iter::repeat_n(work, count);
@@ -132,15 +144,19 @@ impl Running {
         let program = std::env::current_exe().map_err(LoadError::Program)?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let mut running = Self(Vec::new());
-        for (index, work) in load.work(cores).into_iter().enumerate() {
+        let all = load.work(cores);
+        for (index, work) in all.iter().enumerate() {
             let name = work.to_possible_value().expect("no variant is skipped");
-            let child = Command::new(&program)
+            let mut command = Command::new(&program);
+            command
                 .args(["load", name.get_name(), "--instance", instance.name(), "--file"])
                 .arg(folder.join(format!("load-{index}.tmp")))
-                .stdin(Stdio::null())
-                .spawn()
-                .map_err(LoadError::Start)?;
-            running.0.push(child);
+                .stdin(Stdio::null());
+            let before = all[..index].iter().filter(|w| *w == work).count();
+            if let Some(core) = work.core(before) {
+                command.arg("--core").arg(core.to_string());
+            }
+            running.0.push(command.spawn().map_err(LoadError::Start)?);
         }
         if load == Load::Window {
             running.0.push(window(&program, instance)?);
@@ -185,11 +201,21 @@ impl Drop for Running {
     }
 }
 
-/// The body of one such process; ends when `stopped`.
+/// The body of one such process, on `core` where one is named; ends when `stopped`.
 ///
 /// # Errors
 /// `file` cannot be written, or the shared memory of `instance` cannot be opened.
-pub fn work(kind: LoadProcess, instance: &Instance, file: &Path, stopped: impl Fn() -> bool) -> Result<(), LoadError> {
+pub fn work(
+    kind: LoadProcess,
+    core: Option<usize>,
+    instance: &Instance,
+    file: &Path,
+    stopped: impl Fn() -> bool,
+) -> Result<(), LoadError> {
+    if let Some(id) = core {
+        // Where it may not, it loads whichever core it gets.
+        core_affinity::set_for_current(core_affinity::CoreId { id });
+    }
     match kind {
         LoadProcess::Cpu => compute(stopped),
         LoadProcess::Memory => stream(stopped),
@@ -253,6 +279,9 @@ fn listen(instance: &Instance) -> Result<(Snapshots, Records), ServiceError> {
 const TRIES: u32 = 200;
 const BETWEEN_TRIES: Duration = Duration::from_millis(25);
 
+/// As many as the largest built-in scene shows.
+const VERTICES: usize = 50_000;
+
 /// A host that never pauses: more load than any window.
 fn copy_all(instance: &Instance, stopped: impl Fn() -> bool) -> Result<(), ServiceError> {
     let mut tries = 0;
@@ -267,7 +296,8 @@ fn copy_all(instance: &Instance, stopped: impl Fn() -> bool) -> Result<(), Servi
             }
         }
     };
-    let mut vertices = Vec::new();
+    // Until there is a picture, and beside a program that publishes none, it goes over as much memory.
+    let mut vertices = vec![Vertex::default(); VERTICES];
     let mut kept = Vec::new();
     while !stopped() {
         let mut idle = true;
@@ -305,6 +335,16 @@ mod tests {
     }
 
     #[test]
+    fn what_runs_once_for_each_core_has_a_core_each() {
+        let cores = core_affinity::get_core_ids().expect("cores");
+        for work in [LoadProcess::Cpu, LoadProcess::Memory] {
+            let on: Vec<_> = (0..cores.len()).filter_map(|before| work.core(before)).collect();
+            assert_eq!(on, cores.iter().map(|c| c.id).collect::<Vec<_>>());
+        }
+        assert_eq!(LoadProcess::Io.core(0), None);
+    }
+
+    #[test]
     fn io_load_writes_and_leaves_nothing() {
         let file = std::env::temp_dir().join(format!("stylet-load-{}", std::process::id()));
         let passes = std::cell::Cell::new(0);
@@ -315,7 +355,7 @@ mod tests {
             passes.get() > 2
         };
         let instance = Instance::default();
-        work(LoadProcess::Io, &instance, &file, stopped).expect("the temporary folder can be written");
+        work(LoadProcess::Io, None, &instance, &file, stopped).expect("the temporary folder can be written");
         assert_eq!(seen.get(), 4 << 20);
         assert!(!file.exists());
     }

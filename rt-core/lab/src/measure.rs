@@ -92,9 +92,9 @@ pub struct Measured {
     pub window_ns: u64,
 }
 
-/// Voluntary switches beyond the one of each sleep. A sleep that was over before it began needs none.
-pub fn switches_beyond_sleep(report: &LoopReport, unslept: u64) -> i64 {
-    (report.usage.voluntary_switches - report.ticks.saturating_sub(unslept) as i64).max(0)
+/// Voluntary switches beyond the one of each sleep.
+pub fn switches_beyond_sleep(report: &LoopReport) -> i64 {
+    (report.usage.voluntary_switches - report.sleeps as i64).max(0)
 }
 
 pub fn window_ns(duration_ns: u64) -> u64 {
@@ -268,17 +268,18 @@ mod tests {
 
     #[test]
     fn a_switch_for_each_sleep_is_not_counted() {
-        let report = |voluntary_switches| LoopReport {
+        let report = |voluntary_switches, sleeps| LoopReport {
             ticks: 100,
+            sleeps,
             usage: Usage {
                 voluntary_switches,
                 ..Usage::default()
             },
             ..LoopReport::default()
         };
-        assert_eq!(switches_beyond_sleep(&report(98), 0), 0);
-        assert_eq!(switches_beyond_sleep(&report(100), 0), 0);
-        assert_eq!(switches_beyond_sleep(&report(103), 0), 3);
-        assert_eq!(switches_beyond_sleep(&report(103), 10), 13);
+        assert_eq!(switches_beyond_sleep(&report(98, 100)), 0);
+        assert_eq!(switches_beyond_sleep(&report(100, 100)), 0);
+        assert_eq!(switches_beyond_sleep(&report(103, 100)), 3);
+        assert_eq!(switches_beyond_sleep(&report(203, 190)), 13);
     }
 }

@@ -314,8 +314,13 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
         awake,
         run.exit_latency_us == Some(0),
     );
-    let spin = format!("{} us", options.spin_ns / 1_000);
-    add("spin before the deadline", spin.clone(), spin, true);
+    for (name, ns) in [
+        ("early wake-up before the deadline", options.wait.early_ns),
+        ("spin before the deadline", options.wait.spin_ns),
+    ] {
+        let us = format!("{} us", ns / 1_000);
+        add(name, us.clone(), us, true);
+    }
     settings
 }
 

@@ -286,7 +286,7 @@ fn read(reading: Reading, m: &Measured, period_ns: u64) -> Read {
         Reading::Overruns => of_ticks(haptic.overruns),
         Reading::HeapCalls => counted(|r, _| r.usage.heap_calls as i64),
         Reading::PageFaults => counted(|r, _| r.usage.minor_faults + r.usage.major_faults),
-        Reading::ExtraSwitches => counted(|r, t| switches_beyond_sleep(r, t.unslept)),
+        Reading::ExtraSwitches => counted(|r, _| switches_beyond_sleep(r)),
         Reading::RecordsMissing => (
             Some(m.host.records_missing as f64),
             format!("{} records seen by the host", m.host.records),

@@ -4,7 +4,7 @@ use crate::device::{DeviceChoice, Libraries};
 use crate::process::{Options, SecondOptions};
 use crate::replay;
 use crate::rt::arm::{self, Refused};
-use crate::rt::clock::HAPTIC_PERIOD_NS;
+use crate::rt::clock::{HAPTIC_PERIOD_NS, Wait};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use stylet_shm_schema::BUILTIN_SCENES;
@@ -151,7 +151,7 @@ impl RealTimeArgs {
                 haptic_priority: self.haptic_priority,
                 tissue_priority: self.tissue_priority,
                 haptic_period_ns: HAPTIC_PERIOD_NS,
-                spin_ns: 0,
+                wait: Wait::at_period(HAPTIC_PERIOD_NS),
                 flight_folder: replay::file::default_folder(),
                 tissue: TissueKind::default(),
                 device: DeviceChoice::default(),

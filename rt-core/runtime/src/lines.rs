@@ -4,6 +4,7 @@ use crate::rt::world::WorldError;
 use std::sync::Arc;
 use stylet_sim::line::{Line, LineError, LineStations, QueueProgress, ReadyLine};
 use stylet_sim::needle::LayerKind;
+use stylet_sim::probe::{BodyProbe, NoWall, PADS_APART_M, ProbePose, ProbeQueue, ProbeShape, Wall};
 use stylet_sim::scene::{Scene, SceneError, SceneSource, TissueKind};
 use stylet_sim::tissue::fem::batch::BatchModel;
 use stylet_sim::tissue::{FemTissue, MaterialPoint};
@@ -59,6 +60,11 @@ impl LineBody {
         }))
     }
 
+    /// The same with tissue that is so many times as stiff as that of the scene.
+    pub fn of_stiffened(source: &SceneSource, factor: f64, tissue: TissueKind) -> Result<Option<Self>, NoLine> {
+        Self::of_source(&source.stiffened(factor)?, tissue)
+    }
+
     /// Solves for the line of a needle held like this, scene frame, across it as well where the needle `bends`. `goes_on` is asked between slices of work.
     pub fn prepare(
         &self,
@@ -83,6 +89,25 @@ impl LineBody {
     ) -> Result<ReadyLine, NoLine> {
         let line = Line::into_body(&self.scene.lattice, tip_m, direction).ok_or(LineError::NoTissue)?;
         self.prepare_along(generation, line, bends, others, &mut |_| goes_on())
+    }
+
+    /// Solves for what an ultrasound probe in the rectum can press. `goes_on` is given how many columns are ready, and of how many.
+    pub fn prepare_probe(
+        &self,
+        shape: ProbeShape,
+        goes_on: &mut dyn FnMut([usize; 2]) -> bool,
+    ) -> Result<BodyProbe, NoWall> {
+        let wall = Wall::of(&self.scene, PADS_APART_M)?;
+        let queue = ProbeQueue::new(&self.batch, wall, shape)?;
+        Ok(BodyProbe::new(queue.prepare(&self.batch, goes_on)?))
+    }
+
+    /// Where a probe lies below the target, pressed so far above where it meets the wall.
+    pub fn probe_below_target(&self, probe: &BodyProbe, pressed_m: f64, beyond_m: f64) -> ProbePose {
+        let ready = probe.ready();
+        ready
+            .wall
+            .pose_below_target(&self.scene, &ready.shape, pressed_m, beyond_m)
     }
 
     /// Solves for a line that enters the body where it says. `report` is called between slices of work and ends it by

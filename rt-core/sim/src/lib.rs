@@ -10,6 +10,7 @@ pub mod limits;
 pub mod line;
 pub mod migration;
 pub mod needle;
+pub mod probe;
 pub mod scene;
 pub mod settings;
 mod simd;

@@ -1,5 +1,7 @@
 //! From a [`Command`] of any bytes to a [`Request`], or every reason against it.
 
+mod exercise;
+
 use super::*;
 use crate::check::{MAX_COORDINATE_M, is_unit};
 use crate::{MAX_COMMAND_VALUES, MAX_EARLIER_NEEDLES, MAX_LEFT_NEEDLES, Reason, Refusal, RefusalCode};
@@ -70,6 +72,9 @@ pub enum RequestError {
         /// The number that came.
         number: f64,
     },
+    /// Words that cannot be shown, or none.
+    #[error("the words are empty, or no UTF-8 of one line in {} bytes", crate::MARK_BYTES)]
+    InvalidText,
     /// No built-in scene has this number.
     #[error("there is no built-in scene number {number}; from 0 they are {}", BUILTIN_SCENES.join(", "))]
     UnknownScene {
@@ -107,6 +112,7 @@ impl RequestError {
             Self::OutOfLimits { at, .. } => (RefusalCode::ValueOutOfLimits, at),
             Self::NoNeedle { at, .. } => (RefusalCode::NoLeftNeedle, at),
             Self::UnknownScene { .. } => (RefusalCode::UnknownScene, 0),
+            Self::InvalidText => (RefusalCode::InvalidText, Reason::NO_SUBJECT),
         }
     }
 }
@@ -122,6 +128,8 @@ fn takes(kind: CommandKind) -> String {
         CommandKind::DropSeed => "nothing, or the pitch of a strand".to_owned(),
         CommandKind::ExpectNeedle => "entry and direction, three values each".to_owned(),
         CommandKind::TakeNeedle => "the number of a needle".to_owned(),
+        CommandKind::Mark => "how long ago, and words".to_owned(),
+        CommandKind::BeginExercise => "the number of an exercise, and its factor or its three distances".to_owned(),
         CommandKind::DrawNeedle => "the number of a needle, and a speed".to_owned(),
         CommandKind::Rehearse => format!(
             "14 values, seven for each of at most {MAX_LEFT_NEEDLES} needles that stay in and at most {MAX_EARLIER_NEEDLES} that were there before, and 1 to {MAX_SEEDS} drops of three values each"
@@ -144,7 +152,7 @@ impl Request {
             return Err(RequestError::NotFinite { at: at as u32 }.into());
         }
         let mut reader = Reader::new(values);
-        let request = reader.request(kind);
+        let request = reader.request(kind, command);
         match reader.errors.is_empty() {
             true => Ok(request),
             false => Err(RequestErrors(reader.errors)),
@@ -163,7 +171,9 @@ fn count_fits(kind: CommandKind, count: usize) -> bool {
         CommandKind::SetPlan => count == 0 || places_after(PLAN_HEAD).is_some_and(|n| n <= MAX_SEEDS),
         CommandKind::MoveHand | CommandKind::MoveSecondHand => count == 8,
         CommandKind::ExpectNeedle => count == 6,
-        CommandKind::TakeNeedle => count == 1,
+        CommandKind::TakeNeedle | CommandKind::Mark => count == 1,
+        // Which of them the number says; see `Reader::exercise`.
+        CommandKind::BeginExercise => matches!(count, 1 | 2 | 4),
         CommandKind::DrawNeedle => count == 2,
         // Without a value: loose.
         CommandKind::DropSeed => count <= 1,
@@ -190,7 +200,7 @@ impl<'a> Reader<'a> {
         Self { values, at: 0, errors }
     }
 
-    fn request(&mut self, kind: CommandKind) -> Request {
+    fn request(&mut self, kind: CommandKind, command: &Command) -> Request {
         match kind {
             CommandKind::SetParameters => Request::SetParameters(self.rest(Self::change)),
             CommandKind::SetPlan if self.values.is_empty() => Request::SetPlan(None),
@@ -226,6 +236,9 @@ impl<'a> Reader<'a> {
                 drops_m: self.drops(),
             }),
             CommandKind::StopHand => Request::StopHand,
+            CommandKind::Mark => Request::Mark(self.mark(command)),
+            CommandKind::BeginExercise => Request::BeginExercise(self.exercise()),
+            CommandKind::EndExercises => Request::EndExercises,
             CommandKind::StopSecondHand => Request::StopSecondHand,
             CommandKind::LeaveNeedle => Request::LeaveNeedle,
             CommandKind::TakeNeedle => Request::TakeNeedle(self.needle()),
@@ -281,8 +294,13 @@ impl<'a> Reader<'a> {
         direction
     }
 
-    fn within(&mut self, what: &'static str, [low, high]: [f64; 2]) -> f64 {
+    fn within(&mut self, what: &'static str, range: [f64; 2]) -> f64 {
         let (at, value) = (self.at as u32, self.next());
+        self.limit(at, what, value, range);
+        value
+    }
+
+    fn limit(&mut self, at: u32, what: &'static str, value: f64, [low, high]: [f64; 2]) {
         if !(low..=high).contains(&value) {
             self.errors.push(RequestError::OutOfLimits {
                 at,
@@ -292,7 +310,6 @@ impl<'a> Reader<'a> {
                 high,
             });
         }
-        value
     }
 
     /// 0 where the seeds are loose.

@@ -4,7 +4,7 @@ mod decode;
 
 pub use decode::{RequestError, RequestErrors};
 
-use crate::{BUILTIN_SCENES, Command, MAX_SEEDS, ParameterId};
+use crate::{BUILTIN_SCENES, Command, Exercise, MAX_SEEDS, ParameterId, Text};
 use bytemuck::Zeroable;
 use num_enum::TryFromPrimitive;
 use strum::EnumDiscriminants;
@@ -20,6 +20,9 @@ pub const RETRACT_RANGE_M: [f64; 2] = [-0.5, 0.5];
 
 /// How deep from its entry a needle that stays in is rehearsed, m.
 pub const LEFT_DEPTH_RANGE_M: [f64; 2] = [1e-3, 0.5];
+
+/// How long before its request a marked moment may lie, s: somebody types the words meanwhile.
+pub const MARK_BEFORE_RANGE_S: [f64; 2] = [0.0, 120.0];
 
 /// One request of a host. The numbers are stable: [`CommandKind`] is made from them, and [`Command::kind`] carries them.
 #[derive(Clone, Debug, PartialEq, EnumDiscriminants)]
@@ -88,12 +91,30 @@ pub enum Request {
         /// How fast, m/s, within [`SPEED_RANGE_M_PER_S`].
         speed_m_per_s: f64,
     } = 17,
+    /// Put a moment with a few words among the events.
+    #[strum_discriminants(doc = "[`Request::Mark`]")]
+    Mark(Mark) = 18,
+    /// Put a fault in, for a trainee to find; in place of one of the same kind.
+    #[strum_discriminants(doc = "[`Request::BeginExercise`]")]
+    BeginExercise(Exercise) = 19,
+    /// Take every fault away that was put in. A reset does so as well.
+    #[strum_discriminants(doc = "[`Request::EndExercises`]")]
+    EndExercises = 20,
     /// Set the goal of the simulated hand that holds the second device.
     #[strum_discriminants(doc = "[`Request::MoveSecondHand`]")]
     MoveSecondHand(HandMove) = 30,
     /// Stop that hand, and not the needle's.
     #[strum_discriminants(doc = "[`Request::StopSecondHand`]")]
     StopSecondHand = 31,
+}
+
+/// A moment and what is to be said of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// 1 to [`crate::MARK_BYTES`] bytes of UTF-8 without control characters.
+    pub text: String,
+    /// How long before the request it was, s, within [`MARK_BEFORE_RANGE_S`].
+    pub before_s: f64,
 }
 
 /// Where a needle goes in, scene frame.
@@ -194,6 +215,12 @@ impl Request {
         };
         place.copy_from_slice(&values);
         command.value_count = values.len() as u32;
+        if let Self::Mark(mark) = self {
+            command.text = Text::new(&mark.text);
+            if command.text.exact() != Some(&mark.text) {
+                return Err(RequestError::InvalidText.into());
+            }
+        }
         Ok(command)
     }
 
@@ -229,7 +256,17 @@ impl Request {
             Self::DropSeed { strand_pitch_m } => strand_pitch_m.iter().copied().collect(),
             Self::TakeNeedle(number) => vec![f64::from(*number)],
             Self::DrawNeedle { number, speed_m_per_s } => vec![f64::from(*number), *speed_m_per_s],
-            Self::LeaveNeedle
+            Self::Mark(mark) => vec![mark.before_s],
+            Self::BeginExercise(exercise) => {
+                let number = f64::from(exercise.number());
+                match exercise {
+                    Exercise::DeviceLost => vec![number],
+                    Exercise::StiffTissue { factor } => vec![number, *factor],
+                    Exercise::BodyMoved { by_m } => joined(&[&[number], by_m], &[]),
+                }
+            }
+            Self::EndExercises
+            | Self::LeaveNeedle
             | Self::Engage
             | Self::Disengage
             | Self::Reset

@@ -87,6 +87,16 @@ fn all() -> Vec<Request> {
             number: 3,
             speed_m_per_s: 0.05,
         },
+        Request::Mark(Mark {
+            text: "é".repeat(crate::MARK_BYTES / 2),
+            before_s: 3.5,
+        }),
+        Request::BeginExercise(Exercise::DeviceLost),
+        Request::BeginExercise(Exercise::StiffTissue { factor: 2.5 }),
+        Request::BeginExercise(Exercise::BodyMoved {
+            by_m: [0.006, 0.0, -0.008],
+        }),
+        Request::EndExercises,
     ]
 }
 
@@ -111,8 +121,8 @@ fn every_request_survives_its_record() {
         numbers.push(command.kind);
     }
     numbers.dedup();
-    // The wire values of schema 5, one of schema 7, and three of schema 9.
-    assert_eq!(numbers, (1..=17).collect::<Vec<u32>>());
+    // The wire values of schema 5, one of schema 7, three of schema 9, and three of schema 12.
+    assert_eq!(numbers, (1..=20).collect::<Vec<u32>>());
 }
 
 #[test]
@@ -241,12 +251,43 @@ fn every_malformed_payload_is_refused_with_its_reason() {
         (K::TakeNeedle, &[1.5], C::NoLeftNeedle),
         (K::DrawNeedle, &[1.0, 9.0], C::ValueOutOfLimits),
         (K::DrawNeedle, &[1.0], C::ValueCount),
+        (K::Mark, &[], C::ValueCount),
+        (K::Mark, &[-1.0], C::ValueOutOfLimits),
+        (K::Mark, &[0.0], C::InvalidText),
+        (K::BeginExercise, &[], C::ValueCount),
+        (K::BeginExercise, &[1.0, 2.0], C::ValueCount),
+        (K::BeginExercise, &[1.5], C::ValueCount),
+        (K::BeginExercise, &[2.0], C::ValueCount),
+        (K::BeginExercise, &[2.0, 0.5], C::ValueOutOfLimits),
+        (K::BeginExercise, &[2.0, 5.1], C::ValueOutOfLimits),
+        (K::BeginExercise, &[4.0, 1.0], C::ValueOutOfLimits),
+        (K::BeginExercise, &[3.0, 0.009, 0.0, 0.009], C::ValueOutOfLimits),
+        (K::BeginExercise, &[3.0, 0.0, f64::NAN, 0.0], C::NotFinite),
         (K::LoadBuiltinScene, &[3.0], C::UnknownScene),
         (K::LoadBuiltinScene, &[0.5], C::UnknownScene),
         (K::LoadBuiltinScene, &[-1.0], C::UnknownScene),
         (K::LoadBuiltinScene, &[0.0, 1.0], C::ValueCount),
     ] {
         assert_eq!(refused(kind, values)[0].reason().0, code, "{kind:?} {values:?}");
+    }
+}
+
+#[test]
+fn words_that_cannot_be_shown_are_neither_sent_nor_taken() {
+    let mark = |text: &str| Mark {
+        text: text.to_owned(),
+        before_s: 0.0,
+    };
+    for text in ["x".repeat(crate::MARK_BYTES + 1), "a\nb".to_owned(), "a\0b".to_owned()] {
+        assert!(Request::Mark(mark(&text)).encode(1, 1).is_err(), "{text:?}");
+    }
+    let good = Request::Mark(mark("left lobe")).encode(1, 1).expect("fits");
+    for bytes in [&[0xff_u8; 3][..], &[b'a', 0, b'b'], b"  ", b"", b"\x1b[m"] {
+        let mut bad = good;
+        bad.text = Text::new("");
+        bytemuck::bytes_of_mut(&mut bad.text)[..bytes.len()].copy_from_slice(bytes);
+        let errors = Request::decode(&bad);
+        assert_eq!(errors, Err(RequestError::InvalidText.into()), "{bytes:?}");
     }
 }
 

@@ -227,6 +227,12 @@ service!(
     /// The line to a core on another machine: [`Relayed`].
     relayed: Relayed, by Core, history 1, buffer 2);
 service!(
+    /// Who is connected over a relay: [`Class`].
+    class: Class, by Core, history 1, buffer 2);
+service!(
+    /// What hosts ask of the needle's lease: [`LeaseOrder`].
+    lease: LeaseOrder, by Hosts, history 0, buffer 8);
+service!(
     /// Every tick of the force loop; the header is the run of the core.
     records: [TickRecord] under u64, by Core, history 0, buffer RECORD_BUFFER, loans 2, kept |all| all);
 service!(

@@ -6,6 +6,7 @@ mod device_others;
 mod device_procedure;
 mod device_second;
 mod dose_cli;
+mod exercises;
 mod force_insertions;
 mod formats;
 mod igtl;

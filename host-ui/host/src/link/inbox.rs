@@ -8,8 +8,8 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
 use stylet_shm_schema::{
-    Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Relayed, Reply, SecondRecord, SecondState, Session,
-    TickRecord,
+    Class, Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Relayed, Reply, SecondRecord, SecondState,
+    Session, TickRecord,
 };
 
 /// Records that wait for the host: five minutes at 1 kHz, 72 MB.
@@ -45,6 +45,8 @@ pub struct Inbox {
     pub parameters: Option<ParametersInForce>,
     pub plan: Option<PlanInForce>,
     pub relayed: Option<Relayed>,
+    /// With when it came.
+    pub class: Option<(Instant, Box<Class>)>,
     pub events: VecDeque<Event>,
     pub rehearsals: VecDeque<Box<Rehearsal>>,
     /// To this host.

@@ -7,7 +7,7 @@ use super::{SceneModel, Snapshot};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::{HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
+use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
 
 const PASS: Duration = Duration::from_millis(4);
 /// A heartbeat, without which the host would take the core for silent while the recording is held.
@@ -17,6 +17,8 @@ const BEAT: Duration = Duration::from_millis(20);
 pub enum Piece {
     /// A tick of the force loop.
     Tick(Box<TickRecord>),
+    /// Something happened.
+    Event(Box<Event>),
     /// A tick of the second device's loop.
     Second(Box<SecondRecord>),
     /// What ticks do not say of the state.
@@ -194,6 +196,7 @@ fn put(
             }
             *last = Some(record);
         }
+        Piece::Event(event) => inbox.put_event(Event { session_id, ..**event }),
         Piece::Second(record) => {
             let record = SecondRecord { session_id, ..**record };
             inbox.second_state = Some(second::carry(&record, inbox.second_state.as_ref()));

@@ -48,6 +48,8 @@ pub struct Latest {
     pub parameters: PerSession<ParametersInForce>,
     pub plan: PerSession<PlanInForce>,
     pub relayed: Option<Relayed>,
+    /// With when it came.
+    pub class: Option<(Instant, Box<Class>)>,
     pub events: VecDeque<Event>,
     early_events: VecDeque<Event>,
     /// Numbers that are missing among the events of this run.
@@ -117,6 +119,7 @@ impl Link {
             self.latest.parameters.put(id, p.session_id, p);
         }
         self.latest.relayed = inbox.relayed.or(self.latest.relayed);
+        self.latest.class = inbox.class.or(self.latest.class.take());
         if let Some(p) = inbox.plan {
             self.latest.plan.put(id, p.session_id, p);
         }

@@ -24,6 +24,7 @@ const OPEN_BOARD_EVERY: Duration = Duration::from_millis(20);
 pub enum Outgoing {
     Command(Box<Command>),
     Upload(Box<UploadHeader>, Vec<u8>),
+    Lease(LeaseOrder),
 }
 
 /// The thread's side: one pass over all ports after the other.
@@ -111,6 +112,11 @@ impl Passes {
             let (id, sent) = match outgoing {
                 Outgoing::Command(command) => (command.command_id, self.send_command(&command)),
                 Outgoing::Upload(header, cells) => (header.command_id, self.send_volume(&header, &cells)),
+                Outgoing::Lease(order) => {
+                    // The list shows what came of it, and goes where there is no relay.
+                    let _ = self.ports.as_ref().map(|ports| ports.lease.send(order));
+                    continue;
+                }
             };
             if let Err(why) = sent {
                 lock(&self.inbox).put_unsent(id, why);
@@ -195,6 +201,9 @@ impl Passes {
         }
         while let Some(relayed) = ports.relayed.receive() {
             inbox.relayed = Some(relayed);
+        }
+        while let Some(class) = ports.class.receive() {
+            inbox.class = Some((Instant::now(), Box::new(class)));
         }
         for scene in scene {
             match scene {

@@ -51,6 +51,9 @@ pub enum RecordError {
         /// What is wrong with it.
         why: String,
     },
+    /// The program that serves viewers cannot be used; the text says why.
+    #[error("stylet-live: {0}")]
+    Live(String),
     /// An exported file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),

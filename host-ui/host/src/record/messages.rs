@@ -8,7 +8,7 @@ use crate::link::Snapshot;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use stylet_shm_schema::{
-    Event, EventKind, MAX_BEND_POINTS, MAX_LEFT_NEEDLES, MAX_SEEDS, SnapshotHeader, TickRecord, Vertex,
+    Event, EventKind, MAX_BEND_POINTS, MAX_LEFT_NEEDLES, MAX_SEEDS, SnapshotHeader, Text, TickRecord, Vertex,
 };
 
 /// Where each kind of message goes, and the name and text of its schema.
@@ -181,6 +181,39 @@ pub fn event(e: &Event) -> Value {
     })
 }
 
+/// The event of [`event`]; `None` for bytes that are none.
+pub fn event_of(data: &[u8]) -> Option<Event> {
+    let e: EventRead = serde_json::from_slice(data).ok()?;
+    let kind = (1..64)
+        .filter_map(EventKind::from_number)
+        .find(|kind| format!("{kind:?}") == e.kind)?;
+    let is_finite = e.value.is_finite() && e.position_m.iter().all(|c| c.is_finite());
+    is_finite.then(|| Event {
+        session_id: e.session_id,
+        sequence: e.sequence,
+        time_ns: e.time_ns,
+        tick: e.tick,
+        kind: kind as u32,
+        code: e.code,
+        value: e.value,
+        position_m: e.position_m,
+        text: Text::new(&e.text),
+    })
+}
+
+#[derive(Deserialize)]
+struct EventRead {
+    session_id: u64,
+    sequence: u64,
+    tick: u64,
+    time_ns: u64,
+    kind: String,
+    code: u32,
+    value: f64,
+    position_m: [f64; 3],
+    text: String,
+}
+
 fn tissue_schema() -> Value {
     object(
         TISSUE.schema,
@@ -189,6 +222,7 @@ fn tissue_schema() -> Value {
             "tip_in_scene_m": vector(3, "m"), "needle_direction": vector(3, "unit vector to the tip"),
             "bend_m": { "type": "array", "items": vector(3, "m, from where a rigid needle would be; from the tip back to the hand") },
             "bend_spacing_m": number("m along the needle from one to the next"),
+            "body_moved_m": vector(3, "m, of all of the body from where the scene has it; seeds are in the body as the scene has it"),
             "held_in_scene_m": vector(3, "m"), "held_element": { "type": ["integer", "null"] }, "phase": whole("as of a tick"),
             "residual": number("of the model"), "max_displacement_m": number("m"), "work_ns": whole("of the tissue tick"),
             "seeds": { "type": "array", "items": { "type": "object", "properties": {
@@ -210,7 +244,7 @@ pub fn tissue(snapshot: &Snapshot) -> Value {
     json!({
         "session_id": h.session_id, "tissue_tick": h.tissue_tick, "time_ns": h.time_ns,
         "tip_in_scene_m": h.tip_in_scene_m, "needle_direction": h.needle_direction, "held_in_scene_m": h.held_in_scene_m,
-        "bend_m": h.bends_m(), "bend_spacing_m": h.bend_spacing_m,
+        "bend_m": h.bends_m(), "bend_spacing_m": h.bend_spacing_m, "body_moved_m": h.body_moved_m,
         "held_element": (h.held_element != u32::MAX).then_some(h.held_element), "phase": h.phase, "residual": h.residual,
         "max_displacement_m": h.max_displacement_m, "work_ns": h.work_ns, "seeds": seeds.collect::<Vec<_>>(),
         "needles_left_in": left.collect::<Vec<_>>(),
@@ -246,6 +280,9 @@ struct Tissue {
     bend_m: Vec<[f64; 3]>,
     #[serde(default)]
     bend_spacing_m: f64,
+    /// As above.
+    #[serde(default)]
+    body_moved_m: [f64; 3],
 }
 
 #[derive(Deserialize)]
@@ -274,6 +311,7 @@ pub fn tissue_of(data: &[u8]) -> Option<SnapshotHeader> {
         left_count: t.needles_left_in.len().min(MAX_LEFT_NEEDLES) as u32,
         bend_count: t.bend_m.len().min(MAX_BEND_POINTS) as u32,
         bend_spacing_m: t.bend_spacing_m,
+        body_moved_m: t.body_moved_m,
         ..SnapshotHeader::default()
     };
     for (to, from) in header.left.iter_mut().zip(t.needles_left_in) {

@@ -8,6 +8,7 @@
 mod error;
 mod export;
 mod gaps;
+mod live;
 mod messages;
 mod played;
 mod read;
@@ -40,12 +41,20 @@ const ITEMS_AHEAD: usize = 32;
 const SNAPSHOT_LATE_S: f64 = 0.1;
 const PRINT_EVERY: Duration = Duration::from_secs(10);
 
+/// Where a session goes.
+pub enum To {
+    /// Into a file, MCAP.
+    File(PathBuf),
+    /// To viewers that connect to this address and port: Foxglove's app.
+    Viewers(String),
+}
+
 /// What to record.
 pub struct Options {
     /// Which core.
     pub instance: Instance,
-    /// The file, MCAP.
-    pub out: PathBuf,
+    /// Where it goes.
+    pub to: To,
     /// Until interrupted, or until the core ends, when not given.
     pub duration: Option<Duration>,
     /// Snapshots of the gland kept in a second; 0 for none.
@@ -59,15 +68,23 @@ pub fn run(options: &Options) -> Result<(), RecordError> {
     let mut link = Link::for_recording(options.instance.clone());
     find_core(&mut link, stop)?;
     let (send, receive) = mpsc::sync_channel(ITEMS_AHEAD);
-    let path = options.out.clone();
-    let writer = std::thread::Builder::new()
-        .name("recording".to_owned())
-        .spawn(move || writer::write_all(&path, &receive))
-        .map_err(RecordError::NoThread)?;
+    let thread = std::thread::Builder::new().name("recording".to_owned());
+    let (name, writer) = match &options.to {
+        To::File(path) => {
+            let to = path.clone();
+            let writer = thread.spawn(move || writer::write_all(&to, &receive));
+            (path.display().to_string(), writer)
+        }
+        To::Viewers(address) => {
+            let server = live::start(address)?;
+            (address.clone(), thread.spawn(move || server.send(&receive)))
+        }
+    };
+    let writer = writer.map_err(RecordError::NoThread)?;
     take(&mut link, options, stop, &send);
     drop(send);
     let totals = writer.join().map_err(|_| RecordError::Panicked)??;
-    println!("{}: {}", options.out.display(), totals.words());
+    println!("{name}: {}", totals.words());
     totals.missing_words().iter().for_each(|line| println!("{line}"));
     totals.verdict()
 }

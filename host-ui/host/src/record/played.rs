@@ -1,7 +1,7 @@
 //! A recording read for a window: what the core said, each with its time.
 
 use super::error::{RecordError, ShowError};
-use super::messages::{GLAND, TICK, TISSUE, Tick, gland_of, tissue_of};
+use super::messages::{EVENT, GLAND, TICK, TISSUE, Tick, event_of, gland_of, tissue_of};
 use super::scene::{self, FIELD, SCENE};
 use super::second::{SECOND, second_of};
 use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
@@ -67,6 +67,11 @@ impl Reader {
                 check::record(&record).map_err(|_| damaged())?;
                 Piece::Tick(Box::new(record))
             }
+            t if t == EVENT.topic => match event_of(data).filter(|e| e.session_id == session_id) {
+                Some(event) => Piece::Event(Box::new(event)),
+                // Another version may know more kinds.
+                None => return Ok(()),
+            },
             t if t == SECOND.topic => {
                 let record = second_of(data).filter(|r| r.session_id == session_id && check::second_record(r).is_ok());
                 Piece::Second(Box::new(record.ok_or_else(damaged)?))

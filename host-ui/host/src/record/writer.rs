@@ -8,10 +8,12 @@ use super::second::{SECOND, second};
 use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
 use crate::link::{SceneModel, Snapshot};
 use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Seek, Write};
 use std::path::Path;
+use std::process::ChildStdin;
 use std::sync::{Arc, mpsc};
 use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
 
@@ -153,8 +155,8 @@ const CHANNELS: [&Channel; 11] = [
     &SECOND,
 ];
 
-struct Writer {
-    file: mcap::Writer<BufWriter<File>>,
+struct Writer<W: Write + Seek> {
+    file: mcap::Writer<W>,
     channels: [u16; CHANNELS.len()],
     sequences: [u32; CHANNELS.len()],
     /// `CLOCK_MONOTONIC` of the newest message that has a time of its own.
@@ -169,20 +171,38 @@ pub fn write_all(path: &Path, from: &mpsc::Receiver<Item>) -> Result<Totals, Rec
     let failed = |e: mcap::McapError| RecordError::of_file(path, e);
     let file =
         File::create(path).map_err(|e| RecordError::of_file(path, format!("{e}; choose another file with --out")))?;
-    let mut writer = Writer::new(file).map_err(failed)?;
+    let packed = mcap::WriteOptions::new()
+        .compression(Some(mcap::Compression::Zstd))
+        .chunk_size(Some(CHUNK_BYTES));
+    let mut writer = Writer::new(packed, BufWriter::new(file)).map_err(failed)?;
     for item in from {
         writer.item(item).map_err(failed)?;
     }
-    writer.finish(path).map_err(failed)
+    let mut totals = writer.finish().map_err(failed)?;
+    totals.bytes = std::fs::metadata(path).map_or(0, |m| m.len());
+    Ok(totals)
 }
 
-impl Writer {
-    fn new(file: File) -> mcap::McapResult<Self> {
-        let mut file = mcap::WriteOptions::new()
-            .compression(Some(mcap::Compression::Zstd))
-            .chunk_size(Some(CHUNK_BYTES))
+/// The same to a program that shows it, message by message.
+pub fn send_all(program: ChildStdin, from: &mpsc::Receiver<Item>) -> Result<Totals, RecordError> {
+    let failed = |e: mcap::McapError| RecordError::Live(format!("it ended, or reads no more: {e}"));
+    let plain = mcap::WriteOptions::new()
+        .compression(None)
+        .use_chunks(false)
+        .disable_seeking(true);
+    let mut writer = Writer::new(plain, NoSeek::new(BufWriter::new(program))).map_err(failed)?;
+    for item in from {
+        writer.item(item).map_err(failed)?;
+        writer.file.flush().map_err(failed)?;
+    }
+    writer.finish().map_err(failed)
+}
+
+impl<W: Write + Seek> Writer<W> {
+    fn new(options: mcap::WriteOptions, to: W) -> mcap::McapResult<Self> {
+        let mut file = options
             .library(concat!("stylet ", env!("CARGO_PKG_VERSION")))
-            .create(BufWriter::new(file))?;
+            .create(to)?;
         let mut channels = [0; CHANNELS.len()];
         for (id, channel) in channels.iter_mut().zip(CHANNELS) {
             let Channel { topic, schema, text } = channel;
@@ -282,13 +302,12 @@ impl Writer {
         })
     }
 
-    fn finish(mut self, path: &Path) -> mcap::McapResult<Totals> {
+    fn finish(mut self) -> mcap::McapResult<Totals> {
         self.file.write_metadata(&Metadata {
             name: "stylet.totals".to_owned(),
             metadata: self.totals.metadata(),
         })?;
         self.file.finish()?;
-        self.totals.bytes = std::fs::metadata(path).map_or(0, |m| m.len());
         Ok(self.totals)
     }
 }

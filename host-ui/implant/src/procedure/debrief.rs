@@ -11,6 +11,7 @@ use stylet_base::nuclide::Nuclide;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::{Link, SceneModel};
+use stylet_host::moments::Moment;
 use stylet_shm_schema::SeedPose;
 
 /// Writes `score.json` and `debrief.html`; nothing without a plan file, whose seeds have no strength. `source` by the plan's name
@@ -70,6 +71,7 @@ pub fn write(
         prescription_gy: implant.prescription_gy,
         motion: Motion::of(&seen.records, drops.first().map_or([0.0, 0.0, 1.0], |d| d.direction)),
         records: &seen.records,
+        moments: seen.events.iter().filter_map(Moment::of).collect(),
     })?;
     score::write(&score, made, out)?;
     print!("planned\n{}", score.judge.table(&score.planned));

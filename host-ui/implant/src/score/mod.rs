@@ -16,6 +16,7 @@ pub use motion::Motion;
 pub use page::STYLE;
 use stylet_dose::report::{Judge, Verdict};
 use stylet_dose::{DoseKernel, Seed};
+use stylet_host::moments::Moment;
 use stylet_shm_schema::TickRecord;
 pub use trace::Trace;
 pub use write::{to_json, write};
@@ -100,6 +101,8 @@ pub struct Implant<'a> {
     pub motion: Motion,
     /// Force and speed over time; every tick or some of them.
     pub records: &'a [TickRecord],
+    /// What was marked, put in by an instructor, or went wrong meanwhile.
+    pub moments: Vec<Moment>,
 }
 
 /// The result.
@@ -144,6 +147,12 @@ impl<'a> Score<'a> {
             costs,
             implant,
         })
+    }
+
+    /// When a moment was, from the first record on, s.
+    pub fn at_s(&self, moment: &Moment) -> f64 {
+        let begin_ns = self.implant.records.first().map_or(moment.time_ns, |r| r.due_ns);
+        (moment.time_ns as f64 - begin_ns as f64) * 1e-9
     }
 
     /// Mean and worst error of the seeds.

@@ -84,6 +84,7 @@ pub fn page(score: &Score) -> Result<String, ScoreError> {
                     (seeds(score))
                     h2 { "Force and speed" }
                     (PreEscaped(over_time))
+                    (moments(score))
                     footer {
                         p {
                             "Made by a simulator for research and training. Not a medical device: no treatment may rest \
@@ -95,6 +96,28 @@ pub fn page(score: &Score) -> Result<String, ScoreError> {
         }
     };
     Ok(page.into_string())
+}
+
+fn moments(score: &Score) -> Markup {
+    html! {
+        @if !score.implant.moments.is_empty() {
+            h2 { "What was marked, put in or went wrong" }
+            div class="scroll" {
+                table {
+                    thead { tr { th { "Time (s)" } th { "what" } th { "words" } } }
+                    tbody {
+                        @for moment in &score.implant.moments {
+                            tr {
+                                td { (format!("{:.1}", score.at_s(moment))) }
+                                td { (moment.kind.name()) }
+                                td { (moment.text) }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
 }
 
 fn lost(score: &Score) -> Markup {

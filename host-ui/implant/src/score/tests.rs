@@ -6,6 +6,7 @@ use bytemuck::Zeroable;
 use stylet_anatomy::PatientFrame;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DosePoints, Dvh, Metric, Source};
+use stylet_host::moments::MomentKind;
 
 const MIDDLE_M: [f64; 3] = [0.05, 0.05, 0.06];
 
@@ -61,6 +62,11 @@ fn score<'a>(off: &[usize], anatomy: &'a Anatomy, kernel: &'a DoseKernel, record
         prescription_gy: 145.0,
         motion: Motion::of(records, [0.0, 0.0, 1.0]),
         records,
+        moments: vec![Moment {
+            time_ns: 2_500_000_000,
+            kind: MomentKind::Mark,
+            text: "apex <left>".to_owned(),
+        }],
     })
     .unwrap()
 }

@@ -102,6 +102,11 @@ impl Trace {
         }
     }
 
+    /// When it began, `CLOCK_MONOTONIC` of the core.
+    pub fn began_ns(&self) -> Option<u64> {
+        self.began_ns
+    }
+
     /// The records that were kept, in their order.
     pub fn records(&self) -> &[TickRecord] {
         &self.records

@@ -1,107 +1,134 @@
-//! Batches of records in the order of their numbers: what the network lost is asked for again, and what is lost for good is counted.
+//! Records in the order of their ticks: what the network lost is asked for again, and what is lost for good is counted.
 
-use std::collections::BTreeMap;
+use crate::wire::Ticks;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::TickRecord;
 
-/// Batches asked for at once.
-const ASK_AT_MOST: u64 = 64;
+/// Ticks asked for at once.
+const ASK_AT_MOST: u64 = 1280;
 /// A request that was not answered for so long is made again.
 const ASK_EVERY: Duration = Duration::from_millis(150);
-/// Batches that did not come for so long, while others came, are given up.
+/// Records that did not come for so long, while later ones came, are given up.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// Batches that may wait for an earlier one: more than a minute of them.
 const HELD_AT_MOST: usize = 4096;
 
-/// One for each connection of a `join` to a server.
+/// Batches are known by the run of the core and their ticks, not by the server: one that was started again goes on with them.
 #[derive(Default)]
 pub struct Order {
-    run: u64,
-    /// The batch that comes next; nothing before the first.
+    /// The run of the core, and the one before it.
+    session: u64,
+    session_before: u64,
+    /// The tick that comes next; nothing before the first.
     next: Option<u64>,
+    /// By their first tick.
     held: BTreeMap<u64, Vec<TickRecord>>,
-    /// When the batch that comes next was missed first, and when it was asked for last.
+    /// What was held when the run ended.
+    ended: VecDeque<Vec<TickRecord>>,
+    /// When the tick that comes next was missed first; when ticks were asked for last, and the last of those.
     missed: Option<Instant>,
-    asked: Option<Instant>,
-    /// Session and number of the last record that was handed on.
-    last: Option<(u64, u64)>,
+    asked: Option<(Instant, u64)>,
     lost: u64,
 }
 
 impl Order {
-    /// A batch that arrived. A server that was started again numbers anew.
-    pub fn put(&mut self, run: u64, number: u64, records: Vec<TickRecord>) {
-        if self.run != run {
-            *self = Self {
-                run,
-                last: self.last,
-                lost: self.lost,
-                ..Self::default()
-            };
+    /// A batch that arrived.
+    pub fn put(&mut self, records: Vec<TickRecord>) {
+        let Some(first) = records.first().copied() else { return };
+        if !is_one_batch(&records) || (first.session_id == self.session_before && first.session_id != self.session) {
+            return;
         }
-        let next = *self.next.get_or_insert(number);
-        if number >= next && self.held.len() < HELD_AT_MOST {
-            self.held.insert(number, records);
+        if self.session != first.session_id {
+            let ended = std::mem::take(self);
+            self.lost = ended.lost;
+            (self.session, self.session_before) = (first.session_id, ended.session);
+            self.ended = ended.ended;
+            self.ended.extend(ended.held.into_values());
+        }
+        let next = *self.next.get_or_insert(first.tick);
+        if last_tick(&records) >= next && self.held.len() < HELD_AT_MOST {
+            self.held.insert(first.tick, records);
         }
     }
 
     /// The server does not keep these any more.
-    pub fn give_up(&mut self, run: u64, to: u64) {
-        if run == self.run
-            && self.next.is_some_and(|next| next <= to)
-            && self.held.keys().next().is_some_and(|first| *first > to)
-        {
-            self.skip();
+    pub fn give_up(&mut self, ticks: Ticks) {
+        let is_missed = self.next.is_some_and(|next| (ticks.from..=ticks.to).contains(&next));
+        if ticks.session_id == self.session && is_missed && self.first_held().is_some_and(|first| ticks.to < first) {
+            self.skip_to(ticks.to + 1);
         }
     }
 
-    fn skip(&mut self) {
-        if let Some(first) = self.held.keys().next() {
-            (self.next, self.missed, self.asked) = (Some(*first), None, None);
-        }
+    fn first_held(&self) -> Option<u64> {
+        self.held.keys().next().copied()
     }
 
-    /// The batch that comes next, once it is there.
+    fn skip_to(&mut self, tick: u64) {
+        self.lost += self.next.map_or(0, |next| tick.saturating_sub(next));
+        (self.next, self.missed, self.asked) = (Some(tick), None, None);
+    }
+
+    /// The records that come next, once they are there.
     pub fn take(&mut self, now: Instant) -> Option<Vec<TickRecord>> {
-        let next = self.next?;
-        let Some(records) = self.held.remove(&next) else {
-            if self.held.is_empty() {
-                self.missed = None;
-            } else if now - *self.missed.get_or_insert(now) > PATIENCE {
-                self.skip();
-            }
-            return None;
-        };
-        (self.next, self.missed, self.asked) = (Some(next + 1), None, None);
-        for record in &records {
-            if let Some((_, tick)) = self.last.filter(|(session, _)| *session == record.session_id) {
-                self.lost += record.tick.saturating_sub(tick + 1);
-            }
-            self.last = Some((record.session_id, record.tick));
+        if let Some(records) = self.ended.pop_front() {
+            return Some(records);
         }
-        Some(records)
+        loop {
+            let (next, first) = (self.next?, self.first_held());
+            let Some(first) = first.filter(|first| *first <= next) else {
+                match first {
+                    None => self.missed = None,
+                    Some(first) if now - *self.missed.get_or_insert(now) > PATIENCE => self.skip_to(first),
+                    Some(_) => {}
+                }
+                return None;
+            };
+            let mut records = self.held.remove(&first)?;
+            // Of a batch that came in two forms.
+            records.retain(|record| record.tick >= next);
+            if records.is_empty() {
+                continue;
+            }
+            let last = last_tick(&records);
+            self.lost += (last - next + 1).saturating_sub(records.len() as u64);
+            (self.next, self.missed) = (Some(last + 1), None);
+            return Some(records);
+        }
     }
 
-    /// The first and the last of the batches to ask for now.
-    pub fn missing(&mut self, now: Instant) -> Option<(u64, u64)> {
-        let (next, first) = (self.next?, *self.held.keys().next()?);
-        let is_due = self.asked.is_none_or(|asked| now - asked >= ASK_EVERY);
+    /// The ticks to ask for now.
+    pub fn missing(&mut self, now: Instant) -> Option<Ticks> {
+        let (next, first) = (self.next?, self.first_held()?);
+        let is_due = self
+            .asked
+            .is_none_or(|(asked, to)| next > to || now - asked >= ASK_EVERY);
         if next >= first || !is_due {
             return None;
         }
-        self.asked = Some(now);
-        Some((next, (first - 1).min(next + ASK_AT_MOST - 1)))
+        let to = (first - 1).min(next.saturating_add(ASK_AT_MOST - 1));
+        self.asked = Some((now, to));
+        Some(Ticks {
+            session_id: self.session,
+            from: next,
+            to,
+        })
     }
 
-    /// Which run of the server the numbers belong to.
-    pub fn run(&self) -> u64 {
-        self.run
-    }
-
-    /// Records of this run of the core that never came.
+    /// Records of the runs of the core that never came.
     pub fn lost(&self) -> u64 {
         self.lost
     }
+}
+
+fn last_tick(records: &[TickRecord]) -> u64 {
+    records.last().map_or(0, |record| record.tick)
+}
+
+/// Of one run, with ticks that rise.
+fn is_one_batch(records: &[TickRecord]) -> bool {
+    let pairs = |pair: &[TickRecord]| pair[0].session_id == pair[1].session_id && pair[0].tick < pair[1].tick;
+    records.windows(2).all(pairs) && last_tick(records) < u64::MAX
 }
 
 #[cfg(test)]
@@ -109,13 +136,17 @@ mod tests {
     use super::*;
     use bytemuck::Zeroable;
 
-    fn batch(number: u64) -> Vec<TickRecord> {
+    fn of_session(session_id: u64, number: u64) -> Vec<TickRecord> {
         let record = |i: u64| TickRecord {
-            session_id: 7,
+            session_id,
             tick: 10 * number + i,
             ..TickRecord::zeroed()
         };
         (0..10).map(record).collect()
+    }
+
+    fn batch(number: u64) -> Vec<TickRecord> {
+        of_session(7, number)
     }
 
     fn taken(order: &mut Order, now: Instant) -> Vec<u64> {
@@ -124,18 +155,23 @@ mod tests {
             .collect()
     }
 
+    fn ticks(from: u64, to: u64) -> Ticks {
+        let session_id = 7;
+        Ticks { session_id, from, to }
+    }
+
     #[test]
     fn what_was_lost_is_asked_for_and_comes_in_its_place() {
         let (mut order, now) = (Order::default(), Instant::now());
         for number in [5, 6, 9, 8] {
-            order.put(1, number, batch(number));
+            order.put(batch(number));
         }
         assert_eq!(taken(&mut order, now), [5, 6]);
-        assert_eq!(order.missing(now), Some((7, 7)));
+        assert_eq!(order.missing(now), Some(ticks(70, 79)));
         assert_eq!(order.missing(now), None, "asked for once in a while");
-        assert_eq!(order.missing(now + ASK_EVERY), Some((7, 7)));
-        order.put(1, 7, batch(7));
-        order.put(1, 6, batch(6));
+        assert_eq!(order.missing(now + ASK_EVERY), Some(ticks(70, 79)));
+        order.put(batch(7));
+        order.put(batch(6));
         assert_eq!(taken(&mut order, now), [7, 8, 9]);
         assert_eq!((order.lost(), order.missing(now + ASK_EVERY)), (0, None));
     }
@@ -144,13 +180,14 @@ mod tests {
     fn what_is_lost_for_good_is_counted_and_holds_nothing_up() {
         let (mut order, now) = (Order::default(), Instant::now());
         for number in [1, 4] {
-            order.put(1, number, batch(number));
+            order.put(batch(number));
         }
         assert_eq!(taken(&mut order, now), [1]);
-        order.give_up(1, 3);
+        order.give_up(ticks(20, u64::MAX));
+        order.give_up(ticks(20, 39));
         assert_eq!(taken(&mut order, now), [4]);
         assert_eq!(order.lost(), 20);
-        order.put(1, 6, batch(6));
+        order.put(batch(6));
         assert!(taken(&mut order, now).is_empty());
         assert_eq!(taken(&mut order, now + PATIENCE), Vec::<u64>::new());
         let late = now + PATIENCE + Duration::from_millis(1);
@@ -159,13 +196,46 @@ mod tests {
         assert_eq!(order.lost(), 30);
     }
 
+    /// A server that is started again has no numbers of its own: what was made meanwhile is asked for.
     #[test]
-    fn a_server_that_was_started_again_goes_on_where_it_is_and_the_gap_is_counted() {
+    fn what_was_made_without_a_server_is_asked_for_part_by_part() {
         let (mut order, now) = (Order::default(), Instant::now());
-        order.put(1, 900, batch(900));
-        assert_eq!(taken(&mut order, now), [900]);
-        order.put(2, 1, batch(905));
-        assert_eq!(taken(&mut order, now), [905]);
-        assert_eq!(order.lost(), 40);
+        order.put(batch(0));
+        assert_eq!(taken(&mut order, now), [0]);
+        order.put(batch(200));
+        assert_eq!(order.missing(now), Some(ticks(10, 10 + ASK_AT_MOST - 1)));
+        for number in 1..129 {
+            order.put(batch(number));
+            assert_eq!(taken(&mut order, now), [number]);
+            assert!(number == 128 || order.missing(now).is_none(), "while they come");
+        }
+        assert_eq!(order.missing(now), Some(ticks(1290, 1999)));
+        assert_eq!(order.lost(), 0);
+    }
+
+    #[test]
+    fn a_run_of_the_core_ends_with_what_was_held_and_the_next_begins_anew() {
+        let (mut order, now) = (Order::default(), Instant::now());
+        order.put(batch(1));
+        order.put(batch(3));
+        assert_eq!(taken(&mut order, now), [1]);
+        order.put(of_session(8, 100));
+        // Late, of the run before.
+        order.put(batch(2));
+        assert_eq!(taken(&mut order, now), [3, 100]);
+        assert_eq!(order.lost(), 0);
+    }
+
+    #[test]
+    fn what_comes_in_two_forms_is_handed_on_once_and_what_is_no_batch_never() {
+        let (mut order, now) = (Order::default(), Instant::now());
+        order.put(batch(1));
+        assert_eq!(taken(&mut order, now), [1]);
+        order.put([batch(1), batch(2)].concat());
+        order.put([batch(4), batch(3)].concat());
+        order.put([batch(5), of_session(8, 6)].concat());
+        assert_eq!(order.take(now).map(|records| records.len()), Some(10));
+        assert_eq!(taken(&mut order, now), Vec::<u64>::new());
+        assert_eq!(order.lost(), 0);
     }
 }

@@ -142,18 +142,25 @@ impl Rounds {
         if let Some(relayed) = self.line.due(&self.member, &self.who, has_server, self.round_trip_ns) {
             let _ = self.far.relayed.send(relayed);
         }
-        let (member, words) = (&self.member, self.words());
-        self.orders.pass(|order| match order {
-            Order::Status => words,
-            order => {
-                member.ask(Kind::Lease, &[order.line().as_bytes()]);
-                "asked; 'relay lease status' shows who operates".to_owned()
-            }
-        });
+        self.take_orders();
         if self.cleaned.elapsed() >= CLEAN_EVERY {
             self.cleaned = Instant::now();
             self.far.node.clean_up();
         }
+    }
+
+    fn take_orders(&self) {
+        let ask = |order: &Order| self.member.ask(Kind::Lease, &[order.line().as_bytes()]);
+        while let Some(order) = self.far.class.order() {
+            ask(&order);
+        }
+        self.orders.pass(|order| match order {
+            Order::Status => self.words(),
+            order => {
+                ask(&order);
+                "asked; 'relay lease status' shows who operates".to_owned()
+            }
+        });
     }
 
     fn ask_for_all(&mut self) {
@@ -217,7 +224,10 @@ impl Rounds {
             Kind::Plan => self.take_plan(message.body),
             Kind::Reply => self.take_reply(message.body),
             Kind::Rehearsal => self.take_rehearsal(message.body),
-            Kind::Who => Who::of_bytes(message.body).map(|who| self.who = who),
+            Kind::Who => Who::of_bytes(message.body).map(|who| {
+                self.far.class.show(&who, self.line.session_id, false);
+                self.who = who;
+            }),
             Kind::Echo => wire::one::<u64>(message.body).map(|sent_ns| {
                 self.round_trip_ns = now_ns().saturating_sub(sent_ns).min(SILENCE_NS * 100);
             }),

@@ -3,7 +3,7 @@
 use super::order::Order;
 use super::{Bytes, Member};
 use crate::ports::{far_records, far_snapshots};
-use crate::wire::{self, Batches, Displacements, Kind, Rest, decode_snapshot};
+use crate::wire::{self, Displacements, Kind, Rest, Ticks, decode_snapshot};
 use crate::{RelayError, now_ns};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
@@ -37,9 +37,8 @@ pub(super) fn records(member: &Member, messages: &Receiver<Bytes>) -> Result<(),
                 let _ = port.send(&first.session_id, &batch);
             }
         }
-        if let Some((from, to)) = order.missing(now) {
-            let batches = Batches { from, to };
-            member.say(Kind::Again, order.run(), bytemuck::bytes_of(&batches));
+        if let Some(ticks) = order.missing(now) {
+            member.say(Kind::Again, 0, bytemuck::bytes_of(&ticks));
         }
         member.lost.store(order.lost(), Ordering::Relaxed);
     }
@@ -56,12 +55,12 @@ fn take(order: &mut Order, bytes: &[u8]) {
                 .ok()
                 .filter(|batch| batch.iter().all(|r| check::record(r).is_ok()));
             if let Some(batch) = valid {
-                order.put(message.stamp.run, message.stamp.number, batch);
+                order.put(batch);
             }
         }
         Kind::Missing => {
-            if let Ok(batches) = wire::one::<Batches>(message.body) {
-                order.give_up(message.stamp.run, batches.to);
+            if let Ok(ticks) = wire::one::<Ticks>(message.body) {
+                order.give_up(ticks);
             }
         }
         _ => {}

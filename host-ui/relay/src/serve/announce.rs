@@ -2,10 +2,10 @@
 
 use super::Server;
 use super::streams::Job;
+use crate::class::ClassPorts;
 use crate::net::{Place, Priority, put};
-use crate::now_ns;
 use crate::ports::Near;
-use crate::wire::{Hello, Kind, Stamp, encode};
+use crate::wire::{Hello, Kind, Who, encode};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
@@ -28,6 +28,7 @@ pub struct Announcements {
     server: Arc<Server>,
     // The board before the ports, and those before their node.
     board: Option<StateReader>,
+    class: Option<ClassPorts>,
     near: Option<Near>,
     tried: Option<Instant>,
     board_tried: Option<Instant>,
@@ -50,6 +51,7 @@ impl Announcements {
         Self {
             server,
             board: None,
+            class: None,
             near: None,
             tried: None,
             board_tried: None,
@@ -71,19 +73,27 @@ impl Announcements {
         self.near.as_ref()
     }
 
+    /// The ports by which hosts beside the core know the class, when there are any.
+    pub fn class(&self) -> Option<&ClassPorts> {
+        self.class.as_ref()
+    }
+
+    /// To everybody and to hosts beside the core.
+    pub fn show(&self, who: &Who) {
+        self.send(Kind::Who, &[&who.to_bytes()]);
+        if let Some(class) = &self.class {
+            class.connect();
+            class.show(who, self.session_id(), true);
+        }
+    }
+
     /// The run of the core.
     pub fn session_id(&self) -> u64 {
         self.session.map_or(0, |session| session.session_id)
     }
 
     fn message(&self, kind: Kind, parts: &[&[u8]]) -> Vec<u8> {
-        let stamp = Stamp {
-            run: self.server.run,
-            number: 0,
-            sent_ns: now_ns(),
-            heard_ns: 0,
-        };
-        encode(kind, stamp, parts)
+        encode(kind, self.server.stamp(), parts)
     }
 
     /// To everybody.
@@ -113,8 +123,10 @@ impl Announcements {
         let now = Instant::now();
         let is_due = self.tried.is_none_or(|tried| now - tried >= OPEN_EVERY);
         if is_due && (self.near.is_none() || now - self.heard >= SILENT_PORTS) {
-            (self.tried, self.board, self.near, self.heard) = (Some(now), None, None, now);
+            (self.tried, self.board, self.heard) = (Some(now), None, now);
+            (self.class, self.near) = (None, None);
             self.near = Near::new(&self.server.instance).ok();
+            self.class = self.near.as_ref().and_then(|near| ClassPorts::new(&near.node).ok());
         }
     }
 

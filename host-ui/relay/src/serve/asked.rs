@@ -6,8 +6,7 @@ use super::rounds::{Presence, Rounds};
 use super::streams::Job;
 use crate::control::Order;
 use crate::keys::{Member, Role, now_s};
-use crate::now_ns;
-use crate::wire::{self, Batches, Hello, Kind, Message, Stamp, encode};
+use crate::wire::{self, Hello, Kind, Message, Ticks, encode};
 use bytemuck::Zeroable;
 use std::time::Instant;
 use stylet_shm_schema::{Command, CommandKind, Reply, ReplyStatus, Request, Text};
@@ -37,12 +36,11 @@ pub(super) fn take(rounds: &mut Rounds, seat: u16, bytes: &[u8], now_ns: u64) {
             }
         }
         Kind::Again => {
-            if let Ok(batches) = wire::one::<Batches>(message.body)
-                && message.stamp.run == rounds.server.run
-                && batches.from <= batches.to
+            if let Ok(ticks) = wire::one::<Ticks>(message.body)
+                && ticks.from <= ticks.to
             {
                 // A full queue is one of members that ask again.
-                let _ = rounds.jobs.try_send(Job::Again(seat, batches));
+                let _ = rounds.jobs.try_send(Job::Again(seat, ticks));
             }
         }
         Kind::Command | Kind::Upload | Kind::Lease if late => {
@@ -92,14 +90,9 @@ fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
 }
 
 fn answer(rounds: &Rounds, seat: u16, kind: Kind, body: &[u8]) {
-    let stamp = Stamp {
-        run: rounds.server.run,
-        number: 0,
-        sent_ns: now_ns(),
-        heard_ns: 0,
-    };
     // A full queue is one of a member that asks again.
-    let _ = rounds.jobs.try_send(Job::Message(seat, encode(kind, stamp, &[body])));
+    let message = encode(kind, rounds.server.stamp(), &[body]);
+    let _ = rounds.jobs.try_send(Job::Message(seat, message));
 }
 
 /// Says so here, and to the host that asked.
@@ -204,16 +197,8 @@ fn lease(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>)
 }
 
 fn give(rounds: &mut Rounds, name: &str) -> Result<(), String> {
-    let operators = rounds
-        .members
-        .members
-        .iter()
-        .filter(|m| m.role == Role::Operator && !m.revoked);
-    let to = operators
-        .filter(|m| rounds.present.contains_key(&m.seat))
-        .find(|m| m.name == name)
-        .map(|m| m.seat)
-        .ok_or_else(|| format!("{name} is no operator who is connected"))?;
+    let to = rounds.operator(name);
+    let to = to.ok_or_else(|| format!("{name} is no operator who is connected"))?;
     rounds.hand_over(Holder::Seat(to), Instant::now());
     Ok(())
 }

@@ -2,6 +2,7 @@
 //! operates, it stops the hand; it starts a server that was killed again.
 
 use super::lease::SILENCE;
+use super::tape::{self, Tape};
 use crate::{RelayError, now_ns};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Read, Write};
@@ -20,8 +21,11 @@ pub const AGAIN: u8 = 3;
 pub const CANNOT: u8 = 1;
 const BEAT_EVERY: Duration = Duration::from_millis(50);
 const LOOK_EVERY: Duration = Duration::from_millis(20);
-/// A server that was killed is started again after so long.
+/// A server that did not run for so long is started again after a pause.
+const SHORT: Duration = Duration::from_secs(1);
 const PAUSE: Duration = Duration::from_millis(100);
+/// A server that takes none of what it asked for is not waited for longer.
+const WRITE_PATIENCE: Duration = Duration::from_millis(100);
 
 /// The server's side: says twenty times a second that it runs, and whether somebody on the net operates.
 pub struct Beat {
@@ -42,6 +46,11 @@ impl Beat {
         }
     }
 
+    /// The keeper's socket, for what is asked of it.
+    pub(super) fn keeper(&self) -> Option<UnixStream> {
+        self.to_keeper.as_ref().and_then(|stream| stream.try_clone().ok())
+    }
+
     /// With each pass of the server.
     pub fn pass(&mut self, operated: bool) {
         if operated != self.operated || self.sent.elapsed() >= BEAT_EVERY {
@@ -57,11 +66,14 @@ impl Beat {
 /// Runs this program with `arguments` and `--kept`, again and again until `stop`.
 pub fn keep(instance: &Instance, arguments: &[OsString], stop: &AtomicBool) -> Result<(), RelayError> {
     let failed = |e: std::io::Error| RelayError(format!("the server cannot be started: {e}"));
+    let mut tape = Tape::new(instance);
     loop {
+        let begun = Instant::now();
         let (mut mine, theirs) = UnixStream::pair().map_err(failed)?;
         mine.set_read_timeout(Some(LOOK_EVERY)).map_err(failed)?;
+        mine.set_write_timeout(Some(WRITE_PATIENCE)).map_err(failed)?;
         let mut child = start(arguments, theirs).map_err(failed)?;
-        watch(instance, &mut mine, &child, stop);
+        watch(instance, &mut mine, &mut tape, &child, stop);
         let status = child.wait().map_err(failed)?;
         // SYNC: set by a signal; nothing but the flag is carried.
         match (stop.load(Ordering::Relaxed), status.code()) {
@@ -72,7 +84,9 @@ pub fn keep(instance: &Instance, arguments: &[OsString], stop: &AtomicBool) -> R
             }
             _ => {
                 println!("the server ended with {status}; it is started again");
-                std::thread::sleep(PAUSE);
+                if begun.elapsed() < SHORT {
+                    std::thread::sleep(PAUSE);
+                }
             }
         }
     }
@@ -99,13 +113,20 @@ fn end_with_keeper() -> std::io::Result<()> {
 }
 
 /// Until the server has ended.
-fn watch(instance: &Instance, from_server: &mut UnixStream, child: &Child, stop: &AtomicBool) {
+fn watch(instance: &Instance, from_server: &mut UnixStream, tape: &mut Tape, child: &Child, stop: &AtomicBool) {
     let (mut operated, mut is_stopped, mut heard, mut asked) = (false, false, Instant::now(), false);
     let mut beats = [0; 64];
     loop {
         match from_server.read(&mut beats) {
             Ok(0) => break,
-            Ok(count) => (operated, is_stopped, heard) = (beats[count - 1] == 1, false, Instant::now()),
+            Ok(count) => {
+                let (said, asked) = (|byte: &&u8| **byte != tape::ASK, beats[..count].contains(&tape::ASK));
+                operated = beats[..count].iter().rfind(said).map_or(operated, |byte| *byte == 1);
+                (is_stopped, heard) = (false, Instant::now());
+                if asked {
+                    tape.send(from_server);
+                }
+            }
             Err(e)
                 if matches!(
                     e.kind(),
@@ -113,6 +134,7 @@ fn watch(instance: &Instance, from_server: &mut UnixStream, child: &Child, stop:
                 ) => {}
             Err(_) => break,
         }
+        tape.pass();
         if operated && !is_stopped && heard.elapsed() >= SILENCE {
             is_stopped = true;
             stop_hand(instance, "the relay stands still");

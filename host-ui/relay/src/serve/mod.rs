@@ -3,26 +3,31 @@
 mod announce;
 mod asked;
 pub mod keeper;
+mod kept;
 pub mod lease;
 mod pace;
 pub mod rights;
 mod rounds;
 mod streams;
+mod tape;
+mod watched;
 
 use crate::keys::{Lab, seat_of};
 use crate::net::{self, Session};
+use crate::wire::{Kind, Stamp, encode};
 use crate::{RelayError, now_ns};
+use keeper::Beat;
+use kept::Kept;
 use pace::Pace;
 use rounds::Rounds;
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+use stylet_shm_schema::TickRecord;
 use stylet_shm_schema::service::Instance;
 
-/// Batches that are kept for members that miss them: a minute, 18 MB.
-const KEPT: usize = 3000;
 /// Requests that may wait; more are dropped and counted.
 const ASKED: usize = 512;
 const JOBS: usize = 1024;
@@ -46,7 +51,7 @@ pub struct Server {
     run: u64,
     // SYNC: a flag alone, no data is published by it.
     end: AtomicBool,
-    kept: Mutex<VecDeque<(u64, Arc<Vec<u8>>)>>,
+    kept: Mutex<Kept>,
     /// Of each member that is connected.
     paces: Mutex<BTreeMap<u16, Pace>>,
 }
@@ -68,22 +73,18 @@ impl Server {
         self.end.load(Ordering::Relaxed)
     }
 
-    fn keep(&self, number: u64, bytes: Vec<u8>) {
-        let mut kept = lock(&self.kept);
-        kept.push_back((number, Arc::new(bytes)));
-        while kept.len() > KEPT {
-            kept.pop_front();
+    fn stamp(&self) -> Stamp {
+        Stamp {
+            run: self.run,
+            number: 0,
+            sent_ns: now_ns(),
+            heard_ns: 0,
         }
     }
 
-    /// Those of the batches that are kept, and the number of the first of them or of the one after all.
-    fn kept(&self, from: u64, to: u64) -> (Vec<Vec<u8>>, u64) {
-        let kept: Vec<(u64, Arc<Vec<u8>>)> = {
-            let all = lock(&self.kept);
-            all.iter().filter(|(n, _)| (from..=to).contains(n)).cloned().collect()
-        };
-        let first = kept.first().map_or(to.saturating_add(1), |(number, _)| *number);
-        (kept.iter().map(|(_, bytes)| bytes.to_vec()).collect(), first)
+    /// The message that carries a batch of records.
+    fn batch(&self, records: &[TickRecord]) -> Vec<u8> {
+        encode(Kind::Records, self.stamp(), &[bytemuck::cast_slice(records)])
     }
 }
 
@@ -96,8 +97,8 @@ pub enum End {
     Closed,
 }
 
-/// Serves until `stop`; calls `beat` with each pass, with whether somebody on the net operates.
-pub fn run(options: &Options, stop: &AtomicBool, beat: impl FnMut(bool)) -> Result<End, RelayError> {
+/// Serves until `stop`; `beat` has with each pass whether somebody on the net operates.
+pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<End, RelayError> {
     // Before there are threads, of zenoh as well.
     crate::slice::shorten();
     let members = options.lab.members()?;
@@ -107,7 +108,7 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: impl FnMut(bool)) -> Resu
         instance: options.instance.clone(),
         run: now_ns(),
         end: AtomicBool::new(false),
-        kept: Mutex::new(VecDeque::new()),
+        kept: Mutex::new(Kept::default()),
         paces: Mutex::new(BTreeMap::new()),
     });
     let (to_asked, asked) = sync_channel(ASKED);
@@ -121,10 +122,12 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: impl FnMut(bool)) -> Resu
         }
     })?;
     let (to_jobs, jobs) = sync_channel(JOBS);
+    let keeper = beat.keeper();
     let threads = [
         spawn("records", &server, streams::records),
         spawn("snapshots", &server, streams::snapshots),
         spawn("again", &server, move |server| streams::jobs(server, &jobs)),
+        spawn("before", &server, move |server| tape::complete(server, keeper)),
     ];
     println!(
         "serving instance \"{}\" on {}",
@@ -143,12 +146,7 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: impl FnMut(bool)) -> Resu
     end
 }
 
-fn serve(
-    mut rounds: Rounds,
-    asked: &Receiver<Asked>,
-    stop: &AtomicBool,
-    mut beat: impl FnMut(bool),
-) -> Result<End, RelayError> {
+fn serve(mut rounds: Rounds, asked: &Receiver<Asked>, stop: &AtomicBool, beat: &mut Beat) -> Result<End, RelayError> {
     let end = loop {
         // SYNC: set by a signal; nothing but the flag is carried.
         if stop.load(Ordering::Relaxed) {
@@ -160,7 +158,7 @@ fn serve(
         for request in asked.try_iter().take(ASKED) {
             rounds.take(request.seat, &request.bytes);
         }
-        beat(rounds.is_operated_from_the_net());
+        beat.pass(rounds.is_operated_from_the_net());
         std::thread::sleep(PASS);
     };
     rounds.stop_hand_of_the_net("the relay ends");

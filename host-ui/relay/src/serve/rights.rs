@@ -18,8 +18,10 @@ pub fn right(role: Role, kind: CommandKind) -> Option<Right> {
     match (role, kind) {
         (Role::Observer, _) | (_, K::Shutdown) => None,
         // What takes force or motion away is nobody's alone.
-        (_, K::StopHand | K::StopSecondHand | K::Disengage | K::SaveFlight | K::Rehearse) => Some(Right::Role),
+        (_, K::StopHand | K::StopSecondHand | K::Disengage | K::SaveFlight | K::Rehearse | K::Mark) => Some(Right::Role),
         (Role::Instructor, K::SetParameters | K::LoadBuiltinScene | K::SetPlan) => Some(Right::Role),
+        // Faults are for a trainee to find, who operates.
+        (role, K::BeginExercise | K::EndExercises) => (role == Role::Instructor).then_some(Right::Role),
         (Role::Instructor, _) => None,
         (Role::Operator, _) => Some(Right::Lease),
     }
@@ -48,7 +50,7 @@ mod tests {
 
     #[test]
     fn an_observer_may_ask_for_nothing_and_nobody_may_end_the_core() {
-        assert!(kinds().count() >= 17);
+        assert!(kinds().count() >= 20);
         for kind in kinds() {
             assert_eq!(right(Role::Observer, kind), None, "{kind:?}");
         }
@@ -73,6 +75,12 @@ mod tests {
             assert_eq!(right(Role::Operator, kind), Some(Right::Lease), "{kind:?}");
             assert_eq!(right(Role::Instructor, kind), None, "{kind:?}");
         }
+        for kind in [K::BeginExercise, K::EndExercises] {
+            assert_eq!(right(Role::Instructor, kind), Some(Right::Role), "{kind:?}");
+            assert_eq!(right(Role::Operator, kind), None, "{kind:?}");
+            assert!(!operates(kind), "an instructor beside the core takes the needle from nobody");
+        }
+        assert_eq!(right(Role::Operator, K::Mark), Some(Right::Role));
         assert_eq!(right(Role::Instructor, K::StopHand), Some(Right::Role));
         assert_eq!(right(Role::Operator, K::StopHand), Some(Right::Role));
     }

@@ -6,8 +6,8 @@ use super::rights::operates;
 use super::streams::Job;
 use super::{Server, asked};
 use crate::control::{Order, Orders};
-use crate::keys::{Lab, Members, Role};
-use crate::wire::{Kind, Present, Who};
+use crate::keys::{Lab, Member, Members, Role};
+use crate::wire::{Present, Who};
 use crate::{RelayError, now_ns};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -105,9 +105,9 @@ impl Rounds {
         super::lock(&self.server.paces).retain(|seat, _| self.present.contains_key(seat));
         if self.who_sent.elapsed() >= WHO_EVERY {
             self.who_sent = now;
-            self.announcements.send(Kind::Who, &[&self.who().to_bytes()]);
+            self.announcements.show(&self.who());
         }
-        self.take_order(now);
+        self.take_orders(now);
         self.read_members()
     }
 
@@ -214,45 +214,49 @@ impl Rounds {
                 Holder::Local => Some(LOCAL.to_owned()),
                 Holder::Seat(seat) => Some(name(seat)),
             },
+            local: self.lease.holder() == Holder::Local,
             asked: self.lease.asked().map(name),
             present: present.collect(),
         }
     }
 
-    /// An order from this machine: whoever sits here decides who operates.
-    fn take_order(&mut self, now: Instant) {
-        let mut given = None;
-        let who = self.who();
-        let members = self
-            .members
-            .members
-            .iter()
-            .filter(|m| self.present.contains_key(&m.seat));
-        let operators: Vec<(u16, String)> = members
-            .filter(|m| m.role == Role::Operator && !m.revoked)
-            .map(|m| (m.seat, m.name.clone()))
+    /// Orders from this machine, of its terminals and windows: whoever sits here decides who operates.
+    fn take_orders(&mut self, now: Instant) {
+        let class = self.announcements.class();
+        let mut given: Vec<Holder> = std::iter::from_fn(|| class?.order())
+            .filter_map(|order| self.decide(&order).1)
             .collect();
-        self.orders.pass(|order| match order {
-            Order::Status => who.words(),
-            Order::Take => {
-                given = Some(Holder::Local);
-                "a window here operates now".to_owned()
-            }
-            Order::Release => {
-                given = Some(Holder::Nobody);
-                "the first operator who asks may operate".to_owned()
-            }
-            Order::Give(name) => match operators.iter().find(|(_, known)| *known == name) {
-                Some((seat, _)) => {
-                    given = Some(Holder::Seat(*seat));
-                    format!("{name} operates now")
-                }
-                None => format!("{name} is no operator who is connected"),
-            },
+        self.orders.pass(|order| {
+            let (words, to) = self.decide(&order);
+            given.extend(to);
+            words
         });
-        if let Some(to) = given {
+        for to in given {
             self.hand_over(to, now);
         }
+    }
+
+    /// What is answered, and who operates then.
+    fn decide(&self, order: &Order) -> (String, Option<Holder>) {
+        match order {
+            Order::Status => (self.who().words(), None),
+            Order::Take => ("a window here operates now".to_owned(), Some(Holder::Local)),
+            Order::Release => (
+                "the first operator who asks may operate".to_owned(),
+                Some(Holder::Nobody),
+            ),
+            Order::Give(name) => match self.operator(name) {
+                Some(seat) => (format!("{name} operates now"), Some(Holder::Seat(seat))),
+                None => (format!("{name} is no operator who is connected"), None),
+            },
+        }
+    }
+
+    /// The seat of an operator who is connected.
+    pub(super) fn operator(&self, name: &str) -> Option<u16> {
+        let valid = |m: &&Member| m.role == Role::Operator && !m.revoked && self.present.contains_key(&m.seat);
+        let mut members = self.members.members.iter().filter(valid);
+        members.find(|m| m.name == name).map(|m| m.seat)
     }
 
     /// The hand does not go on for one who has handed it over.

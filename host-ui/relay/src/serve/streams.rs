@@ -1,53 +1,21 @@
 //! The threads of the streams: records as they come, snapshots thinned, and what one member asks for again.
 
+use super::watched::Watched;
 use super::{Server, lock};
 use crate::net::{Place, Priority, put, put_newest, put_whole};
-use crate::now_ns;
-use crate::wire::{Batches, Kind, Rest, Stamp, encode, encode_snapshot};
+use crate::wire::{Kind, Rest, Stamp, Ticks, encode, encode_snapshot};
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::{self, Node, ServiceError, SliceSubscriber};
+use stylet_shm_schema::service::{self, SliceSubscriber};
 use stylet_shm_schema::{SceneHeader, SnapshotHeader, TickRecord, Vertex};
 
 /// How often the queue of records is looked at: a batch waits half of it on average.
 const RECORDS_EVERY: Duration = Duration::from_micros(200);
 /// 60 a second at most.
 const SNAPSHOTS_EVERY: Duration = Duration::from_micros(16_700);
-/// Ports that have been silent for so long are made anew: another core may have swept their folder.
-const SILENT_PORTS: Duration = Duration::from_secs(4);
-const OPEN_EVERY: Duration = Duration::from_secs(1);
-
-/// Ports of one thread, made again when they are silent.
-struct Watched<P> {
-    ports: Option<(P, Node)>,
-    tried: Option<Instant>,
-    heard: Instant,
-}
-
-impl<P> Watched<P> {
-    fn new() -> Self {
-        Self {
-            ports: None,
-            tried: None,
-            heard: Instant::now(),
-        }
-    }
-
-    fn get(&mut self, make: impl FnOnce() -> Result<(P, Node), ServiceError>) -> Option<&P> {
-        let now = Instant::now();
-        let is_due = self.tried.is_none_or(|tried| now - tried >= OPEN_EVERY);
-        if is_due && (self.ports.is_none() || now - self.heard >= SILENT_PORTS) {
-            (self.tried, self.ports, self.heard) = (Some(now), None, now);
-            self.ports = make().ok();
-        }
-        self.ports.as_ref().map(|(ports, _)| ports)
-    }
-}
-
-/// Sends each batch of records under the next number, and keeps it for those that miss it.
+/// Sends each batch of records, and keeps it for those that miss it.
 pub fn records(server: &Server) {
     let mut watched = Watched::<SliceSubscriber<TickRecord, u64>>::new();
-    let mut number = 0;
     while !server.ends() {
         let make = || {
             let node = server.instance.node()?;
@@ -56,20 +24,14 @@ pub fn records(server: &Server) {
         let mut any = false;
         if let Some(port) = watched.get(make) {
             while let Some(sample) = port.receive() {
-                (number, any) = (number + 1, true);
-                let stamp = Stamp {
-                    run: server.run,
-                    number,
-                    sent_ns: now_ns(),
-                    heard_ns: 0,
-                };
-                let bytes = encode(Kind::Records, stamp, &[bytemuck::cast_slice(sample.values())]);
-                server.keep(number, bytes.clone());
+                any = true;
+                let bytes = server.batch(sample.values());
+                lock(&server.kept).keep(sample.values(), bytes.clone());
                 put(&server.session, Place::Records, Priority::RealTime, bytes);
             }
         }
         if any {
-            watched.heard = Instant::now();
+            watched.heard();
         }
         std::thread::sleep(RECORDS_EVERY);
     }
@@ -108,7 +70,7 @@ pub fn snapshots(server: &Server) {
             }
         }
         if any {
-            watched.heard = Instant::now();
+            watched.heard();
         }
         std::thread::sleep(SNAPSHOTS_EVERY.saturating_sub(begun.elapsed()));
     }
@@ -123,10 +85,8 @@ fn send_snapshot(server: &Server, rest: &Rest, header: &SnapshotHeader, vertices
             return;
         };
         let stamp = Stamp {
-            run: server.run,
             number: pace.next(),
-            sent_ns: now_ns(),
-            heard_ns: 0,
+            ..server.stamp()
         };
         pace.sent(now);
         messages.push((*seat, encode(Kind::Snapshot, stamp, &[&body])));
@@ -141,8 +101,8 @@ fn send_snapshot(server: &Server, rest: &Rest, header: &SnapshotHeader, vertices
 pub enum Job {
     /// A message as it is.
     Message(u16, Vec<u8>),
-    /// Batches that the member missed.
-    Again(u16, Batches),
+    /// Records that the member missed.
+    Again(u16, Ticks),
 }
 
 /// Sends what members ask for; a member that does not take it keeps nobody else waiting but those that ask too.
@@ -152,30 +112,19 @@ pub fn jobs(server: &Server, jobs: &Receiver<Job>) {
             Ok(Job::Message(seat, bytes)) => {
                 put_whole(&server.session, Place::To(seat), Priority::InteractiveLow, bytes)
             }
-            Ok(Job::Again(seat, batches)) => again(server, seat, batches),
+            Ok(Job::Again(seat, ticks)) => again(server, seat, ticks),
             Err(_) => {}
         }
     }
 }
 
-/// Batches sent for one request at most.
-const AGAIN_AT_MOST: u64 = 64;
-
-fn again(server: &Server, seat: u16, Batches { from, to }: Batches) {
-    let to = to.min(from.saturating_add(AGAIN_AT_MOST - 1));
-    let (kept, first) = server.kept(from, to);
-    if first > from {
-        let stamp = Stamp {
-            run: server.run,
-            number: 0,
-            sent_ns: now_ns(),
-            heard_ns: 0,
-        };
-        let lost = Batches { from, to: first - 1 };
-        let bytes = encode(Kind::Missing, stamp, &[bytemuck::bytes_of(&lost)]);
+fn again(server: &Server, seat: u16, ticks: Ticks) {
+    let again = lock(&server.kept).again(ticks);
+    if let Some(lost) = again.lost {
+        let bytes = encode(Kind::Missing, server.stamp(), &[bytemuck::bytes_of(&lost)]);
         put_whole(&server.session, Place::To(seat), Priority::Data, bytes);
     }
-    for bytes in kept {
-        put_whole(&server.session, Place::To(seat), Priority::Data, bytes);
+    for bytes in again.batches {
+        put_whole(&server.session, Place::To(seat), Priority::Data, bytes.to_vec());
     }
 }

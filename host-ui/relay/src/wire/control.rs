@@ -21,13 +21,15 @@ pub struct Hello {
     pub lost: u64,
 }
 
-/// Batches of one run of the server, from the first to the last.
+/// Ticks of one run of the core, from the first to the last.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-pub struct Batches {
-    /// Number of the first.
+pub struct Ticks {
+    /// The run of the core.
+    pub session_id: u64,
+    /// The first.
     pub from: u64,
-    /// Number of the last.
+    /// The last.
     pub to: u64,
 }
 
@@ -51,6 +53,9 @@ pub struct Present {
 pub struct Who {
     /// Name of who operates; "the window beside the core", or nobody.
     pub operator: Option<String>,
+    /// Whether that is a host beside the core.
+    #[serde(default)]
+    pub local: bool,
     /// Name of who asked to operate.
     pub asked: Option<String>,
     /// Everybody who is connected.

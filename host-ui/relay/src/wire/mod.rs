@@ -3,7 +3,7 @@
 mod control;
 mod thin;
 
-pub use control::{Batches, Hello, Present, Who};
+pub use control::{Hello, Present, Ticks, Who};
 pub use thin::{Displacements, MAX_THIN_BYTES, Rest, decode_snapshot, encode_snapshot};
 
 use bytemuck::{Pod, Zeroable};
@@ -12,7 +12,7 @@ use stylet_shm_schema::check::Invalid;
 use stylet_shm_schema::{SCHEMA_VERSION, SceneHeader, UploadHeader};
 
 /// First word of every message: rises with the form of messages and with the schema.
-const MAGIC: u32 = u32::from_le_bytes(*b"sty\0") ^ (SCHEMA_VERSION << 24);
+const MAGIC: u32 = u32::from_le_bytes(*b"st2\0") ^ (SCHEMA_VERSION << 24);
 
 /// What a message holds, by stable number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, TryFromPrimitive)]
@@ -42,7 +42,7 @@ pub enum Kind {
     Who = 11,
     /// Answer to a [`Kind::Hello`]: its `sent_ns`.
     Echo = 12,
-    /// Batches that are not kept any more: the first and the last number.
+    /// `Ticks` whose records are not kept any more.
     Missing = 13,
     /// A member is alive; `number` is its process.
     Hello = 20,
@@ -50,7 +50,7 @@ pub enum Kind {
     Command = 21,
     /// An `UploadHeader` and its cells.
     Upload = 22,
-    /// Batches to send again: the first and the last number.
+    /// `Ticks` whose records are to be sent again.
     Again = 23,
     /// What a member asks of the lease: a word.
     Lease = 24,

@@ -3,7 +3,7 @@
 
 use bytemuck::Zeroable;
 use stylet_relay::control::Order;
-use stylet_relay::wire::{self, Batches, Displacements, Hello, Kind, Rest, Who};
+use stylet_relay::wire::{self, Displacements, Hello, Kind, Rest, Ticks, Who};
 use stylet_shm_schema::service::MAX_BATCH;
 use stylet_shm_schema::{
     Command, Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, Request, SceneHeader, Session,
@@ -33,7 +33,7 @@ pub fn take(bytes: &[u8]) -> bool {
         Kind::Rehearsal => wire::one::<Rehearsal>(body).is_ok_and(|r| check::rehearsal(&r).is_ok()),
         Kind::Who => Who::of_bytes(body).is_ok_and(|who| !who.words().is_empty()),
         Kind::Echo => wire::one::<u64>(body).is_ok(),
-        Kind::Missing | Kind::Again => wire::one::<Batches>(body).is_ok(),
+        Kind::Missing | Kind::Again => wire::one::<Ticks>(body).is_ok(),
         Kind::Hello => wire::one::<Hello>(body).is_ok(),
         Kind::Command => wire::one::<Command>(body).is_ok_and(|command| Request::decode(&command).is_ok()),
         Kind::Upload => wire::upload(body).is_ok(),

@@ -2,6 +2,7 @@
 
 use crate::fixture::{Host, Keys, Named, Running, core, go, join, lease, until};
 use crate::proxy::Proxy;
+use crate::watch::quantile;
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity};
 
@@ -157,58 +158,98 @@ fn through(invitation: &std::path::Path, named: &Named, cable: &Proxy) -> Runnin
     join(&path, named)
 }
 
+/// One fault, and what it did.
+struct Struck {
+    who: Who,
+    fault: Fault,
+    /// From its end until records come again.
+    back_ms: f64,
+    /// Records that the members say they lost for good, together.
+    lost: u64,
+}
+
+/// Records that a member has lost for good since it was started; nothing while it does not answer.
+fn lost(far: &Named) -> Option<u64> {
+    let words = lease(far, &["status"]);
+    let number = words.split(" records lost").next()?.rsplit(' ').next()?;
+    number.parse().ok()
+}
+
+impl Class {
+    fn lost(&self) -> [u64; 2] {
+        [0, 1].map(|i| lost(&self.far[i]).unwrap_or(0))
+    }
+
+    fn suffer(&mut self, who: Who, fault: Fault) -> Struck {
+        let mut before = self.lost();
+        let ended = self.strike(who, fault);
+        if who != Who::Server && fault == Fault::Killed {
+            before[usize::from(who == Who::Observer)] = 0;
+        }
+        self.local.poll();
+        let host = match who {
+            Who::Observer => &mut self.observer,
+            _ => &mut self.operator,
+        };
+        host.poll();
+        host.taken.clear();
+        let back = until(Duration::from_secs(20), || {
+            host.poll();
+            !host.taken.is_empty()
+        });
+        assert!(back, "{who:?} {fault:?}: {}", self.served.log());
+        let back_ms = ended.elapsed().as_secs_f64() * 1e3;
+        // What is asked for again comes meanwhile, or is counted.
+        std::thread::sleep(Duration::from_millis(500));
+        let after = self.lost();
+        Struck {
+            who,
+            fault,
+            back_ms,
+            lost: (0..2).map(|i| after[i].saturating_sub(before[i])).sum(),
+        }
+    }
+}
+
+/// All kinds, or those that `STYLET_RELAY_FAULTS_OF` names, as "Server Killed".
+fn kinds() -> Vec<(Who, Fault)> {
+    let asked = std::env::var("STYLET_RELAY_FAULTS_OF").unwrap_or_default();
+    let all = [Who::Observer, Who::Operator, Who::Server]
+        .into_iter()
+        .flat_map(|who| [Fault::Stopped, Fault::Killed, Fault::Cut].map(|fault| (who, fault)));
+    all.filter(|(who, fault)| format!("{who:?} {fault:?}").contains(&asked))
+        .collect()
+}
+
 #[test]
 fn faults_in_an_insertion_cost_the_core_no_record_and_the_far_side_comes_back() {
     let mut class = Class::begin();
-    let mut back_ms: Vec<(Who, Fault, f64)> = Vec::new();
-    let mut unstopped = 0;
+    let (mut struck, mut unstopped) = (Vec::new(), 0);
     for round in 0..times() {
-        for who in [Who::Observer, Who::Operator, Who::Server] {
-            for fault in [Fault::Stopped, Fault::Killed, Fault::Cut] {
-                let inserted = class.insert();
-                assert_eq!(inserted, Ok(()), "{round} {who:?} {fault:?}: {}", class.served.log());
-                let stops = class.served.log().matches("the hand is stopped").count();
-                let ended = class.strike(who, fault);
-                // Whoever operates is cut off from the hand by all but what befalls the observer.
-                if who != Who::Observer && class.served.log().matches("the hand is stopped").count() == stops {
-                    unstopped += 1;
-                }
-                class.local.poll();
-                let host = if who == Who::Observer {
-                    &mut class.observer
-                } else {
-                    &mut class.operator
-                };
-                host.poll();
-                host.taken.clear();
-                let back = until(Duration::from_secs(20), || {
-                    host.poll();
-                    !host.taken.is_empty()
-                });
-                assert!(back, "{round} {who:?} {fault:?}: {}", class.served.log());
-                back_ms.push((who, fault, ended.elapsed().as_secs_f64() * 1e3));
-                std::thread::sleep(Duration::from_millis(300));
+        for (who, fault) in kinds() {
+            let inserted = class.insert();
+            assert_eq!(inserted, Ok(()), "{round} {who:?} {fault:?}: {}", class.served.log());
+            let stops = class.served.log().matches("the hand is stopped").count();
+            struck.push(class.suffer(who, fault));
+            // Whoever operates is cut off from the hand by all but what befalls the observer.
+            if who != Who::Observer && class.served.log().matches("the hand is stopped").count() == stops {
+                unstopped += 1;
             }
         }
     }
     class.local.poll();
     let ticks: Vec<u64> = class.local.taken.iter().map(|record| record.tick).collect();
     let missing = ticks.windows(2).filter(|pair| pair[1] != pair[0] + 1).count();
-    for who in [Who::Observer, Who::Operator, Who::Server] {
-        for fault in [Fault::Stopped, Fault::Killed, Fault::Cut] {
-            let mut times: Vec<f64> = back_ms
-                .iter()
-                .filter(|b| (b.0, b.1) == (who, fault))
-                .map(|b| b.2)
-                .collect();
-            times.sort_by(f64::total_cmp);
-            let longest = times.last().copied().unwrap_or(0.0);
-            println!(
-                "{who:?} {fault:?}: {} times, back after {:.0} ms, at most {longest:.0} ms",
-                times.len(),
-                times[times.len() / 2]
-            );
-        }
+    for (who, fault) in kinds() {
+        let of_kind = || struck.iter().filter(|s| (s.who, s.fault) == (who, fault));
+        let mut times: Vec<f64> = of_kind().map(|s| s.back_ms).collect();
+        let [median, longest] = [0.5, 1.0].map(|share| quantile(&mut times, share));
+        println!(
+            "{who:?} {fault:?}: {} times, back after {median:.0} ms, at most {longest:.0} ms; {} records lost by the members, {} at most",
+            times.len(),
+            of_kind().map(|s| s.lost).sum::<u64>(),
+            of_kind().map(|s| s.lost).max().unwrap_or(0),
+        );
     }
     println!("{} records beside the core, {missing} gaps", ticks.len());
     println!("{}", lease(&class.far[1], &["status"]));

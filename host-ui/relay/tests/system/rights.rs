@@ -3,7 +3,15 @@
 use crate::fixture::{Host, Keys, Named, core, go, join, still_moving_m, until};
 use std::time::Duration;
 use stylet_relay::keys::{Lab, Role, Validity, write_invitation};
-use stylet_shm_schema::Request;
+use stylet_shm_schema::service;
+use stylet_shm_schema::{EventKind, Exercise, Mark, Request};
+
+fn marked() -> Request {
+    Request::Mark(Mark {
+        text: "left lobe".to_owned(),
+        before_s: 0.0,
+    })
+}
 
 fn hand_of(host: &mut Host) -> [f64; 3] {
     host.state().expect("seen").tip_in_scene_m
@@ -26,6 +34,9 @@ fn an_observer_sees_and_moves_nothing_and_a_revoked_one_sees_no_longer() {
         Request::StopHand,
         Request::Reset,
         Request::Shutdown,
+        Request::BeginExercise(Exercise::DeviceLost),
+        Request::EndExercises,
+        marked(),
     ] {
         let refused = host.ask(&request).expect_err("an observer");
         assert!(refused.contains("observer"), "{refused}");
@@ -82,6 +93,38 @@ fn an_instructor_stops_the_hand_and_does_not_move_it() {
         "the hand goes on"
     );
     host.ask(&Request::SetPlan(None)).expect("allowed");
+    // A fault goes in and out again, and a mark: the events come back to where they were asked for.
+    host.ask(&Request::BeginExercise(Exercise::DeviceLost)).expect("allowed");
+    let lost = |host: &mut Host| host.state().is_some_and(|s| s.fault == stylet_shm_schema::Fault::DeviceLost as u32);
+    assert!(until(Duration::from_secs(3), || lost(&mut local)), "no fault");
+    host.ask(&Request::EndExercises).expect("allowed");
+    local.ask(&Request::Engage).expect("beside the core");
+    assert!(until(Duration::from_secs(3), || !lost(&mut local)), "still lost");
+    host.ask(&marked()).expect("allowed");
+}
+
+/// The trainee operates, and does not put in or take out what is to be found.
+#[test]
+fn an_operator_marks_and_puts_no_fault_in() {
+    let (near, far) = (Named::new(), Named::new());
+    let _core = core(&near, &[]);
+    let keys = Keys::new();
+    let _served = keys.serve(&near);
+    let joined = join(&keys.invite("otto", Role::Operator, Validity::days(1)), &far);
+    let mut host = Host::new(&far);
+    assert!(host.sees_the_core(Duration::from_secs(10)), "{}", joined.log());
+    for request in [Request::BeginExercise(Exercise::StiffTissue { factor: 2.0 }), Request::EndExercises] {
+        let refused = host.ask(&request).expect_err("an operator");
+        assert!(refused.contains("operator"), "{refused}");
+    }
+    host.ask(&marked()).expect("allowed");
+    let is_mark = |e: &stylet_shm_schema::Event| e.kind == EventKind::Mark as u32 && e.text.read() == "left lobe";
+    let node = far.0.node().expect("shared memory");
+    let events = service::events::subscriber(&node).expect("a port");
+    let came = until(Duration::from_secs(3), || {
+        std::iter::from_fn(|| events.receive()).any(|e| is_mark(&e))
+    });
+    assert!(came, "the mark did not come back");
 }
 
 /// Nothing comes to a member whose certificate is not accepted, and nothing of it passes.

@@ -43,6 +43,21 @@ pub const STATES: &[State] = &[
         app.shown = one_needle(0.03, 2);
         app.shown.relayed = Some(line_to_a_core(true));
     }),
+    ("who is there", |app| {
+        app.shown = one_needle(0.03, 2);
+        app.shown.relayed = Some(line_to_a_core(true));
+        app.shown.class = Some(whole_class());
+        app.class = true;
+    }),
+    ("a class beside the core", |app| {
+        app.shown = one_needle(0.03, 2);
+        app.shown.class = Some(stylet_shm_schema::Class {
+            is_beside_core: 1,
+            local_operates: 1,
+            ..whole_class()
+        });
+        app.class = true;
+    }),
     ("over a relay that is not heard", |app| {
         app.shown = one_needle(0.03, 2);
         app.shown.relayed = Some(line_to_a_core(false));
@@ -180,6 +195,23 @@ fn line_to_a_core(is_heard: bool) -> Relayed {
         role: Text::new("instructor"),
         ..Relayed::zeroed()
     }
+}
+
+/// As many as it lists, with the longest names.
+fn whole_class() -> stylet_shm_schema::Class {
+    let line = line_to_a_core(true);
+    let mut class = stylet_shm_schema::Class {
+        count: stylet_shm_schema::MAX_CLASS as u32,
+        unlisted: 12_345,
+        operator: line.operator,
+        asked: line.name,
+        ..Zeroable::zeroed()
+    };
+    for member in &mut class.members {
+        (member.name, member.role) = (line.name, Text::new("operator"));
+        (member.round_trip_ns, member.records_lost, member.silent_ns) = (1_234_000_000, 123_456, 1_999_000_000);
+    }
+    class
 }
 
 /// In place of a core.

@@ -39,6 +39,28 @@ fn a_force_that_is_off_or_waits_and_a_refusal_each_have_their_banner() {
 }
 
 #[test]
+fn an_exercise_has_its_banner_and_a_lost_device_both() {
+    let mut shown = live();
+    let mut session = stylet_shm_schema::Session::zeroed();
+    session.exercises.put(Exercise::DeviceLost);
+    session.exercises.put(Exercise::StiffTissue { factor: 2.0 });
+    shown.session = Some(session);
+    if let Some(state) = &mut shown.state {
+        state.fault = Fault::DeviceLost as u32;
+    }
+    let list = banners(&shown);
+    assert_eq!(
+        list.iter().map(|b| b.title).collect::<Vec<_>>(),
+        ["Fault: the force is off", "Exercise", "Exercise"]
+    );
+    assert!(
+        list[2].text.starts_with("Tissue 2.0 times as stiff."),
+        "{}",
+        list[2].text
+    );
+}
+
+#[test]
 fn a_window_over_a_relay_says_who_sits_there_who_operates_and_what_the_line_costs() {
     let mut shown = live();
     let mut line = stylet_shm_schema::Relayed {

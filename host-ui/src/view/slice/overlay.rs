@@ -168,7 +168,7 @@ impl Overlay<'_> {
     fn placed(&self) {
         let width = (0.8e-3 / self.plane.m_per_point).max(3.0) as f32;
         for seed in &self.shown.seeds {
-            let (place, axis) = (Vector3::from(seed.position_m), Vector3::from(seed.axis));
+            let (place, axis) = (Vector3::from(self.shown.drawn_at_m(seed)), Vector3::from(seed.axis));
             let reach = (axis.dot(&self.plane.normal()).abs() * SEED_HALF_M).max(IN_PLANE_M);
             if self.plane.distance_m(place).abs() > reach {
                 continue;

@@ -25,6 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use stylet_runtime::args::{OptionsError, RealTimeArgs};
 use stylet_runtime::process::Options;
+use stylet_runtime::rt::clock::Wait;
 use stylet_write::{WriteError, write_whole};
 
 const COPY: &str = "campaign.toml";
@@ -207,7 +208,10 @@ fn session(
     let progress = Progress::new(plan, store, number, left_ns)?;
     let options = Options {
         haptic_period_ns: period_ns(part.rate),
-        spin_ns: part.spin_us * 1_000,
+        wait: Wait {
+            spin_ns: part.spin_us * 1_000,
+            ..Wait::at_period(period_ns(part.rate))
+        },
         ..options.clone()
     };
     let checkpoints = Checkpoints {

@@ -73,7 +73,7 @@ pub fn report(parts: &Parts) -> Report {
             duration_s: parts.duration_ns as f64 / 1e9,
             measured_s: parts.measured.haptic.measured_ns() as f64 / 1e9,
             warm_up_s: WARM_UP_S,
-            spin_us: options.spin_ns / 1_000,
+            spin_us: options.wait.spin_ns / 1_000,
             insertions: host.insertions,
         },
         verdict: Verdict {
@@ -149,7 +149,7 @@ fn loop_section(run: &LoopReport, timing: &LoopTiming, rate_hz: f64, [path, outp
             minor_faults: run.usage.minor_faults,
             major_faults: run.usage.major_faults,
             voluntary_switches: run.usage.voluntary_switches,
-            voluntary_switches_beyond_sleep: switches_beyond_sleep(run, timing.unslept),
+            voluntary_switches_beyond_sleep: switches_beyond_sleep(run),
             involuntary_switches: run.usage.involuntary_switches,
         },
         miss_bound: bound::of_misses(timing.missed, timing.ticks + timing.missed, rate_hz),

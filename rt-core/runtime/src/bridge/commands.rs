@@ -72,6 +72,12 @@ impl Bridge {
                 number: u64::from(number),
                 speed_m_per_s,
             }),
+            Request::Mark(mark) => {
+                self.mark(ticket, &mark);
+                Ok(())
+            }
+            Request::BeginExercise(exercise) => self.begin_exercise(ticket, exercise),
+            Request::EndExercises => self.end_exercises(ticket),
             Request::MoveSecondHand(hand) => self.move_second_hand(ticket, hand_goal(&hand)),
             Request::StopSecondHand => self.stop_second_hand(ticket),
             Request::StopHand => {
@@ -116,7 +122,7 @@ impl Bridge {
         Ok(())
     }
 
-    fn order_haptic(&mut self, order: HapticOrder) -> Result<(), Refusal> {
+    pub(super) fn order_haptic(&mut self, order: HapticOrder) -> Result<(), Refusal> {
         let pushed = self.loops.haptic_orders.push(order);
         pushed.map_err(|_| RefusalCode::TooManyRequests.into())
     }
@@ -185,6 +191,7 @@ impl Bridge {
         self.order_both((HapticOrder::Reset { ticket }, TissueOrder::Reset))?;
         self.order_second(SecondOrder::Reset);
         self.lines.forget_tracks();
+        self.forget_exercises();
         self.link.event(EventKind::Reset, EventDetails::now());
         Ok(())
     }

@@ -28,6 +28,7 @@ const IN_USE_AFTER: Duration = Duration::from_secs(1);
 /// What the thread returns.
 struct Finished {
     scene_generation: u64,
+    stiffness: f64,
     bends: bool,
     body: Option<LineBody>,
     line: Result<ReadyLine, NoLine>,
@@ -63,6 +64,9 @@ pub struct LinePreparer {
     kept: Vec<Kept>,
     generation: u64,
     tissue: TissueKind,
+    /// Of an exercise: Young's modulus over that of the scene, and how far the body is moved.
+    stiffness: f64,
+    body_moved_m: [f64; 3],
     /// The needle bends: lines are solved for across as well.
     bends: bool,
     archive: LineArchive,
@@ -83,6 +87,8 @@ impl LinePreparer {
             kept: Vec::new(),
             generation: 0,
             tissue,
+            stiffness: 1.0,
+            body_moved_m: [0.0; 3],
             bends: false,
             archive: LineArchive::default(),
             tracks: Vec::new(),
@@ -106,6 +112,33 @@ impl LinePreparer {
         self.give_up();
     }
 
+    /// Of tissue that is so many times as stiff from now on: lines are solved for anew.
+    pub(super) fn stiffen(&mut self, factor: f64) {
+        if self.stiffness == factor {
+            return;
+        }
+        self.stiffness = factor;
+        self.body = None;
+        self.handed_over = None;
+        self.without.clear();
+        self.kept.clear();
+        self.give_up();
+    }
+
+    /// The body is there from now on, from where the scene has it: planned needles enter it elsewhere.
+    pub(super) fn move_body(&mut self, by_m: [f64; 3]) {
+        let from_m = std::mem::replace(&mut self.body_moved_m, by_m);
+        for axis in &mut self.expected {
+            axis.entry_m = [0, 1, 2].map(|a| axis.entry_m[a] + from_m[a] - by_m[a]);
+        }
+        self.forget_unexpected();
+    }
+
+    /// The axis in the body as the scene has it.
+    fn in_body(&self, entry_m: [f64; 3], direction: [f64; 3]) -> Option<Line> {
+        Line::new([0, 1, 2].map(|a| entry_m[a] - self.body_moved_m[a]), direction)
+    }
+
     /// The needle bends from now on, or no longer. A line for one that does not is of no use to one that does.
     pub(super) fn take_bending(&mut self, bends: bool) {
         if bends && !self.bends {
@@ -124,15 +157,16 @@ impl LinePreparer {
     /// The needle of a plan that has come, entry and direction; `None` where it was withdrawn.
     pub(super) fn expect_planned(&mut self, needle: Option<([f64; 3], [f64; 3])>) {
         self.expected.clear();
-        self.expected
-            .extend(needle.and_then(|(entry_m, direction)| Line::new(entry_m, direction)));
+        let axis = needle.and_then(|(entry_m, direction)| self.in_body(entry_m, direction));
+        self.expected.extend(axis);
         self.forget_unexpected();
     }
 
     /// The needle after the planned one.
     pub(super) fn expect_next(&mut self, entry_m: [f64; 3], direction: [f64; 3]) {
         self.expected.truncate(1);
-        self.expected.extend(Line::new(entry_m, direction));
+        let axis = self.in_body(entry_m, direction);
+        self.expected.extend(axis);
         self.forget_unexpected();
     }
 
@@ -186,7 +220,7 @@ impl LinePreparer {
             self.steady = None;
             return None;
         }
-        let axis = axis(record)?;
+        let axis = self.in_body(record.tip_in_scene_m, direction(record)?)?;
         let now = Instant::now();
         match &self.steady {
             Some((since, _)) if same(since, &axis) => {}
@@ -230,6 +264,7 @@ impl LinePreparer {
         let generation = self.generation;
         let kept = self.body.take().filter(|(of, _)| *of == scene_generation);
         let (source, tissue, bends) = (Arc::clone(&self.source), self.tissue, self.bends);
+        let stiffness = self.stiffness;
         let waiting = self.kept.iter().map(|kept| &kept.line.stations);
         let others: Vec<_> = self.archive.in_use().chain(waiting).cloned().collect();
         let stop = Arc::new(AtomicBool::new(false));
@@ -237,7 +272,7 @@ impl LinePreparer {
         let work = move || {
             let body = match kept {
                 Some((_, body)) => Ok(Some(body)),
-                None => LineBody::of_source(&source, tissue),
+                None => LineBody::of_stiffened(&source, stiffness, tissue),
             };
             // SYNC: nothing but the flag is carried.
             let mut goes_on = || !stopped.load(Ordering::Relaxed);
@@ -252,6 +287,7 @@ impl LinePreparer {
             };
             Finished {
                 scene_generation,
+                stiffness,
                 bends,
                 body,
                 line,
@@ -279,7 +315,7 @@ impl LinePreparer {
             self.do_without(axis);
             return;
         };
-        if finished.scene_generation != scene_generation {
+        if finished.scene_generation != scene_generation || finished.stiffness != self.stiffness {
             return;
         }
         self.body = finished.body.map(|body| (scene_generation, body));
@@ -305,7 +341,8 @@ impl LinePreparer {
         for track in &self.tracks {
             hand.open_track(track);
         }
-        self.archive.keep(hand.source(), stations);
+        let source = hand.source().in_tissue_as_stiff(self.stiffness);
+        self.archive.keep(source, stations);
         // Both rings are emptied at every tick: one that is full belongs to a loop that has ended.
         let _ = loops.tissue_orders.push(TissueOrder::Line(body));
         let _ = loops.lines.push(hand);
@@ -324,11 +361,11 @@ fn same(of: &Line, axis: &Line) -> bool {
     of.is_met_by(&axis.entry_m.into(), &axis.axes[0].into(), SAME_M, SAME_RAD)
 }
 
-/// The line through the tip along the needle.
-fn axis(record: &TickRecord) -> Option<Line> {
+/// That of the needle, from hub to tip.
+fn direction(record: &TickRecord) -> Option<[f64; 3]> {
     let [x, y, z, w] = record.world_from_tool;
     let world_from_tool = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9)?;
-    Line::new(record.tip_in_scene_m, (world_from_tool * Vector3::z()).into())
+    Some((world_from_tool * Vector3::z()).into())
 }
 
 #[cfg(test)]

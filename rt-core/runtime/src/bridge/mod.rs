@@ -2,6 +2,7 @@
 
 mod batches;
 mod commands;
+mod exercises;
 mod flight;
 mod line_archive;
 mod lines;
@@ -11,6 +12,7 @@ mod notices;
 mod parameters;
 mod picture;
 pub mod ports;
+mod probe;
 mod rehearsals;
 mod requests;
 mod scenes;
@@ -30,6 +32,7 @@ use notices::LoopRings;
 use parameters::ParameterChanges;
 pub use picture::ScenePicture;
 use ports::Ports;
+use probe::ProbePreparer;
 use rehearsals::RehearsalRunner;
 use second::Second;
 pub use second::SecondSetup;
@@ -95,6 +98,8 @@ pub struct Bridge {
     loader: SceneLoader,
     rehearsals: RehearsalRunner,
     lines: LinePreparer,
+    /// Of a run whose second hand holds the probe.
+    probe: Option<ProbePreparer>,
     /// The loops have room for needles that stay in: the force loop, and the tissue loop's tape of that scene.
     left_rooms: (bool, Option<u64>),
     supervisor: Supervisor,
@@ -129,6 +134,7 @@ impl Bridge {
                 rooms: loops.rooms,
                 old_hand_lines: loops.old_hand_lines,
                 old_body_lines: loops.old_body_lines,
+                old_probes: loops.old_probes,
             },
             device: setup.device,
             tissue: setup.tissue,
@@ -140,6 +146,9 @@ impl Bridge {
                 next: None,
             },
             loader: SceneLoader::default(),
+            probe: second
+                .is_some()
+                .then(|| ProbePreparer::new(Arc::clone(&setup.source), setup.tissue)),
             lines: LinePreparer::new(Arc::clone(&setup.source), setup.tissue),
             rehearsals: RehearsalRunner::new(setup.source, setup.tissue, setup.device),
             left_rooms: (false, None),
@@ -181,6 +190,7 @@ impl Bridge {
         self.serve_flights();
         let generation = self.scene.generation();
         self.lines.pass(self.link.newest_record(), generation, &mut self.loops);
+        self.serve_probe(generation);
         let (generation, size) = (self.scene.generation(), self.scene.picture.snapshot_size());
         self.loans.pass(&self.link.ports, generation, size);
         if self.supervisor.pass(made_a_tick) {
@@ -196,6 +206,13 @@ impl Bridge {
             return Err(LoopStopped);
         }
         Ok(end)
+    }
+
+    fn serve_probe(&mut self, generation: u64) {
+        let Some(probe) = &mut self.probe else { return };
+        if let Some(why) = probe.pass(generation, &mut self.loops) {
+            eprintln!("rt-core: the probe presses nothing in this scene: {why}");
+        }
     }
 
     fn serve_flights(&mut self) {

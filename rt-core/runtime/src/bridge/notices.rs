@@ -6,6 +6,7 @@ use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
 use crate::rt::world::World;
 use stylet_shm_schema::{EventKind, TickRecord};
 use stylet_sim::line::{BodyLine, HandLine, LeftNeedles};
+use stylet_sim::probe::BodyProbe;
 
 /// Ends of the rings to and from both loops.
 pub(super) struct LoopRings {
@@ -19,6 +20,7 @@ pub(super) struct LoopRings {
     pub rooms: rtrb::Producer<Box<LeftNeedles>>,
     pub old_hand_lines: rtrb::Consumer<Box<HandLine>>,
     pub old_body_lines: rtrb::Consumer<Box<BodyLine>>,
+    pub old_probes: rtrb::Consumer<Box<BodyProbe>>,
 }
 
 impl Bridge {

@@ -124,6 +124,9 @@ impl Bridge {
         if let Some((picture, source)) = self.scene.next.take() {
             self.scene.picture = picture;
             self.lines.change_scene(Arc::clone(&source));
+            if let Some(probe) = &mut self.probe {
+                probe.change_scene(Arc::clone(&source));
+            }
             self.rehearsals.change_scene(source);
             self.scene.sent = false;
             self.scene.send(&self.link);

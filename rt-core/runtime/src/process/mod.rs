@@ -7,6 +7,7 @@ mod threads;
 use crate::bridge::{Bridge, BridgeSetup};
 use crate::device::{DeviceChoice, DeviceError, Libraries};
 use crate::rt::arm::{Refused, Usage};
+use crate::rt::clock::Wait;
 use crate::rt::timing::Probes;
 use crate::rt::world::WorldError;
 use setup::Setup;
@@ -41,8 +42,8 @@ pub struct Options {
     pub tissue_priority: u32,
     /// Time between two ticks of the force loop, ns.
     pub haptic_period_ns: u64,
-    /// Spinning before each deadline of the force loop, ns; 0 for none.
-    pub spin_ns: u64,
+    /// How the force loop waits for each deadline.
+    pub wait: Wait,
     /// Folder of the flight recordings.
     pub flight_folder: PathBuf,
     /// Tissue model of every scene of the run.
@@ -95,6 +96,8 @@ pub struct LoopReport {
     pub missed: u64,
     /// Latest wake-up after a deadline, ns.
     pub worst_wake_ns: u64,
+    /// Sleeps there was reason for: each costs a switch.
+    pub sleeps: u64,
     /// Page faults, context switches and heap calls.
     pub usage: Usage,
 }

@@ -17,6 +17,7 @@ pub(super) fn session(
 ) -> Session {
     Session {
         session_id,
+        exercises: Default::default(),
         schema_version: stylet_shm_schema::SCHEMA_VERSION,
         pid: std::process::id(),
         time_ns: 0,

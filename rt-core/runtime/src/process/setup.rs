@@ -5,7 +5,7 @@ use crate::bridge::ports::Ports;
 use crate::bridge::{ScenePicture, SecondSetup};
 use crate::device;
 use crate::rt::arm::{self, Ask, CoresAwake};
-use crate::rt::clock::{self, TISSUE_PERIOD_NS};
+use crate::rt::clock::{self, TISSUE_PERIOD_NS, TISSUE_PHASE, Wait};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::second::{self, SecondBridgePorts, SecondLoop, SecondMemory, SecondTape, gate_of};
@@ -192,15 +192,16 @@ impl Body {
             let (ports, tissue, bridge) = second::wire(Capacities::RUN, Some(tape));
             wiring.tissue.second = Some(tissue);
             let mut own = SecondLoop::new(session_id, device, ports, &memory, seconds(second.period_ns));
-            own.spin_ns = options.spin_ns;
+            own.wait = Wait::at_period(second.period_ns);
             SecondLoops { own, info, bridge }
         });
         let period_s = seconds(options.haptic_period_ns);
         let mut haptic = HapticLoop::new(session_id, self.device, wiring.haptic, &memory, period_s);
-        haptic.spin_ns = options.spin_ns;
+        haptic.wait = options.wait;
         let period_s = seconds(TISSUE_PERIOD_NS);
         let mut tissue = TissueLoop::new(session_id, wiring.tissue, self.world, period_s);
         let mut second = second;
+        tissue.phase_ns = clock::phase_ns(TISSUE_PHASE, options.haptic_period_ns);
         if let Some(probes) = probes {
             if let Some(second) = &mut second {
                 second.own.probe = probes.second.map(Box::new);

@@ -101,7 +101,7 @@ impl Threads {
 
 fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopReport {
     let start = Usage::now();
-    tissue.run(armed, end);
+    let sleeps = tissue.run(armed, end);
     let usage = Usage::now().since(start);
     let r = tissue.response();
     LoopReport {
@@ -109,6 +109,7 @@ fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopRe
         ticks: r.tick,
         missed: r.missed,
         worst_wake_ns: r.worst_wake_ns,
+        sleeps,
         usage,
     }
 }
@@ -117,7 +118,7 @@ fn run_haptic(mut haptic: HapticLoop, board: StateBoard, armed: &Armed, end: &At
     let publish = publisher(board);
     publish(&haptic.state);
     let start = Usage::now();
-    haptic.run(armed, end, &publish);
+    let sleeps = haptic.run(armed, end, &publish);
     let usage = Usage::now().since(start);
     let s = &haptic.state;
     LoopReport {
@@ -125,6 +126,7 @@ fn run_haptic(mut haptic: HapticLoop, board: StateBoard, armed: &Armed, end: &At
         ticks: s.tick,
         missed: s.missed_deadlines,
         worst_wake_ns: s.worst_wake_ns,
+        sleeps,
         usage,
     }
 }
@@ -133,7 +135,7 @@ fn run_second(mut second: SecondLoop, board: StateBoard<SecondState>, armed: &Ar
     let publish = publisher(board);
     publish(second.state());
     let start = Usage::now();
-    device_loop::run(&mut second, armed, end, |second| publish(second.state()));
+    let sleeps = device_loop::run(&mut second, armed, end, |second| publish(second.state()));
     let usage = Usage::now().since(start);
     let s = second.state();
     LoopReport {
@@ -141,6 +143,7 @@ fn run_second(mut second: SecondLoop, board: StateBoard<SecondState>, armed: &Ar
         ticks: s.tick,
         missed: s.missed_deadlines,
         worst_wake_ns: s.worst_wake_ns,
+        sleeps,
         usage,
     }
 }

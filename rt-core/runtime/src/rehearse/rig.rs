@@ -187,6 +187,16 @@ impl Rig {
     }
 
     #[cfg(test)]
+    pub fn tissue(&mut self) -> &mut crate::rt::tissue::TissueLoop {
+        &mut self.loops.tissue
+    }
+
+    #[cfg(test)]
+    pub fn take_probe(&mut self, probe: Box<stylet_sim::probe::BodyProbe>) {
+        let _ = self.loops.bridge.tissue_orders.push(TissueOrder::Probe(probe));
+    }
+
+    #[cfg(test)]
     pub fn response(&self) -> &crate::rt::response::TissueResponse {
         self.loops.tissue.response()
     }

@@ -13,6 +13,7 @@ mod left;
 mod migration;
 mod order;
 mod paper;
+mod probe;
 mod sequence;
 
 fn stage_of(tissue: TissueKind) -> Stage {

@@ -37,7 +37,7 @@ pub fn solve_again(
     report: &mut dyn FnMut(LineProgress),
 ) -> Result<LinesAgain, RepeatError> {
     let mut again = LinesAgain::default();
-    let mut body = None;
+    let mut body: Option<(f64, LineBody)> = None;
     for generation in recorded.line_numbers() {
         if again.bodies.iter().any(|body| body.generation == generation) {
             continue;
@@ -49,11 +49,13 @@ pub fn solve_again(
             again.bodies.push(BodyLine::new(generation, source.line, 0.0, nothing));
             continue;
         }
-        let body = match &mut body {
-            Some(body) => body,
-            none => {
-                let of_scene = LineBody::of_source(&recorded.scene, recorded.tissue)?;
-                none.insert(of_scene.ok_or(RepeatError::NoLine(generation))?)
+        let stiffness = source.stiffness();
+        let kept = body.take().filter(|(of, _)| *of == stiffness);
+        let (_, body) = match kept {
+            Some(kept) => body.insert(kept),
+            None => {
+                let of_scene = LineBody::of_stiffened(&recorded.scene, stiffness, recorded.tissue)?;
+                body.insert((stiffness, of_scene.ok_or(RepeatError::NoLine(generation))?))
             }
         };
         let ready = body.prepare_along(generation, source.line, source.bends(), &[], &mut |progress| {

@@ -17,6 +17,7 @@ pub enum Cause {
     TissueUnsolved,
     Late,
     ForceNotANumber,
+    Lost,
 }
 
 /// A simulated hand on a device that breaks on command.
@@ -55,6 +56,9 @@ impl Device for BreakingDevice {
     fn read(&mut self, dt_s: f64) -> Result<Sample, DeviceFault> {
         if self.has(Cause::ReadFails) {
             return Err(DeviceFault::TimedOut);
+        }
+        if self.has(Cause::Lost) {
+            return Err(DeviceFault::NotConnected);
         }
         if let (true, Some(last)) = (self.has(Cause::Silent), self.last) {
             return Ok(last);

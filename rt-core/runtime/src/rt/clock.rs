@@ -5,6 +5,18 @@ pub const HAPTIC_PERIOD_NS: u64 = 1_000_000;
 /// Period of the tissue loop: 200 Hz.
 pub const TISSUE_PERIOD_NS: u64 = 5_000_000;
 
+/// Where the force loop wakes within its period of the clock: the kernel's own tick comes at whole ones, and would be run first.
+pub const HAPTIC_PHASE: f64 = 0.25;
+/// The tissue loop's place in the force loop's period: the force is out by then and the pose there, and the two do not wake against each other.
+pub const TISSUE_PHASE: f64 = 0.5;
+/// Where the loop of a second device wakes within its own period: clear of both at the same rate.
+pub const SECOND_PHASE: f64 = 0.75;
+
+/// A place within a period in nanoseconds.
+pub fn phase_ns(phase: f64, period_ns: u64) -> u64 {
+    (phase * period_ns as f64) as u64
+}
+
 /// Nanoseconds of `CLOCK_MONOTONIC`.
 pub fn now_ns() -> u64 {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
@@ -25,15 +37,42 @@ pub fn sleep_until(time_ns: u64) {
     {}
 }
 
-/// Sleeps until `spin_ns` before `time_ns`, then spins; true when the thread had reason to sleep.
-pub fn wait_until(time_ns: u64, spin_ns: u64) -> bool {
-    let sleep_ns = time_ns.saturating_sub(spin_ns);
-    let ahead = now_ns() < sleep_ns;
-    sleep_until(sleep_ns);
-    while spin_ns > 0 && now_ns() < time_ns {
-        std::hint::spin_loop();
+/// How a loop waits for its deadline.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Wait {
+    /// It wakes once so long before, and sleeps again: the core is awake by then, and the way out of the kernel in its caches. 0 for not.
+    pub early_ns: u64,
+    /// It spins so long before; 0 for not.
+    pub spin_ns: u64,
+}
+
+/// The early wake-up, where there is time for one.
+pub const EARLY_NS: u64 = 100_000;
+
+impl Wait {
+    /// Without a spin, at a period: with the early wake-up where that takes up to a fifth of it.
+    pub fn at_period(period_ns: u64) -> Self {
+        Self {
+            early_ns: if period_ns >= 5 * EARLY_NS { EARLY_NS } else { 0 },
+            spin_ns: 0,
+        }
     }
-    ahead
+
+    /// Waits until `time_ns`; how many sleeps there was reason for.
+    pub fn until(self, time_ns: u64) -> u64 {
+        let awake_ns = time_ns.saturating_sub(self.spin_ns);
+        let mut sleeps = 0;
+        for end_ns in [awake_ns.saturating_sub(self.early_ns), awake_ns] {
+            if now_ns() < end_ns {
+                sleep_until(end_ns);
+                sleeps += 1;
+            }
+        }
+        while self.spin_ns > 0 && now_ns() < time_ns {
+            std::hint::spin_loop();
+        }
+        sleeps
+    }
 }
 
 /// The ideal grid of a periodic loop: late wake-ups skip grid points and count them, none is made up for.
@@ -46,12 +85,16 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// The first point is one period, at least 1 ns, after `start_ns`.
-    pub fn from(start_ns: u64, period_ns: u64) -> Self {
+    /// Points at `phase_ns` after whole periods of the clock, so that loops keep clear of each other on purpose and not by chance;
+    /// the first one is more than half a period after `start_ns`.
+    pub fn at_phase(start_ns: u64, period_ns: u64, phase_ns: u64) -> Self {
         let period_ns = period_ns.max(1);
+        let phase_ns = phase_ns % period_ns;
+        let earliest = start_ns + period_ns / 2 + 1;
+        let whole = earliest.saturating_sub(phase_ns).div_ceil(period_ns);
         Self {
             period_ns,
-            due_ns: start_ns + period_ns,
+            due_ns: whole * period_ns + phase_ns,
         }
     }
 
@@ -73,7 +116,7 @@ mod tests {
 
     #[test]
     fn late_ticks_are_skipped_and_counted_and_the_phase_is_kept() {
-        let mut grid = Grid::from(1_000, 100);
+        let mut grid = Grid::at_phase(1_010, 100, 0);
         assert_eq!(grid.due_ns, 1_100);
         assert_eq!((grid.advance(1_150), grid.due_ns), (0, 1_200));
         assert_eq!((grid.advance(1_300), grid.due_ns), (1, 1_400));
@@ -81,12 +124,35 @@ mod tests {
     }
 
     #[test]
+    fn points_have_their_phase_and_the_first_is_not_too_soon() {
+        for (start, phase, first) in [
+            (1_000, 25, 1_125),
+            (1_000, 75, 1_075),
+            (1_060, 25, 1_125),
+            (1_080, 25, 1_225),
+            (3, 0, 100),
+        ] {
+            assert_eq!(Grid::at_phase(start, 100, phase).due_ns, first, "{start}, {phase}");
+        }
+        assert_eq!(Grid::at_phase(1_000, 100, 125).due_ns, 1_125);
+    }
+
+    #[test]
     fn waiting_never_ends_early_with_or_without_a_spin() {
-        for spin_ns in [0, 1_500_000, 5_000_000] {
+        for (early_ns, spin_ns, most) in [
+            (0, 0, 1),
+            (0, 1_500_000, 1),
+            (0, 5_000_000, 0),
+            (500_000, 0, 2),
+            (5_000_000, 500_000, 1),
+        ] {
             let due = now_ns() + 2_000_000;
-            assert_eq!(wait_until(due, spin_ns), spin_ns < 2_000_000);
+            // A machine that stood still meanwhile leaves less to sleep for.
+            assert!(Wait { early_ns, spin_ns }.until(due) <= most);
             assert!(now_ns() >= due);
         }
+        assert_eq!(Wait::at_period(1_000_000).early_ns, EARLY_NS);
+        assert_eq!(Wait::at_period(100_000).early_ns, 0);
     }
 
     #[test]

@@ -1,12 +1,12 @@
 //! What every loop that owns a device does alike: its ticks on the ideal grid, the newest sample, and the end at zero force.
 
 use crate::rt::arm::Armed;
-use crate::rt::clock::{self, Grid};
+use crate::rt::clock::{self, Grid, Wait};
 use crate::rt::timing::Probe;
 use crate::rt::watchdog::device_fault;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_hw::{Device, DeviceFault, HandGoal, Sample};
+use stylet_hw::{DeviceFault, HandGoal, Sample};
 use stylet_shm_schema::Fault;
 
 /// The hand is at its goal within this distance, at rest.
@@ -17,8 +17,10 @@ const AT_REST_M_PER_S: f64 = 3e-3;
 pub trait DeviceLoop {
     /// Time between two ticks, s.
     fn period_s(&self) -> f64;
-    /// Spinning before each deadline, ns; 0 for none.
-    fn spin_ns(&self) -> u64;
+    /// How it waits for each deadline.
+    fn wait(&self) -> Wait;
+    /// Where it wakes within its period of the clock.
+    fn phase(&self) -> f64;
     /// Ticks of the ramp to zero force.
     fn ramp_out_ticks(&self) -> u32;
     /// Begins the ramp to zero force.
@@ -31,10 +33,12 @@ pub trait DeviceLoop {
     fn end(&mut self);
 }
 
-/// Runs on the ideal grid until `stop`, then ramps the force to zero and ends.
-pub fn run<L: DeviceLoop>(device_loop: &mut L, _armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&L)) {
-    let mut grid = Grid::from(clock::now_ns(), (device_loop.period_s() * 1e9) as u64);
-    let mut missed = 0;
+/// Runs on the ideal grid until `stop`, then ramps the force to zero and ends. Returns how often it slept.
+pub fn run<L: DeviceLoop>(device_loop: &mut L, _armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&L)) -> u64 {
+    let period_ns = (device_loop.period_s() * 1e9).round() as u64;
+    let phase_ns = clock::phase_ns(device_loop.phase(), period_ns);
+    let mut grid = Grid::at_phase(clock::now_ns(), period_ns, phase_ns);
+    let (mut missed, mut sleeps) = (0, 0);
     let mut last_ticks = device_loop.ramp_out_ticks() + 1;
     while last_ticks > 0 {
         // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
@@ -42,22 +46,21 @@ pub fn run<L: DeviceLoop>(device_loop: &mut L, _armed: &Armed, stop: &AtomicBool
             device_loop.release_for_the_end();
             last_ticks -= 1;
         }
-        let slept = clock::wait_until(grid.due_ns, device_loop.spin_ns());
+        sleeps += device_loop.wait().until(grid.due_ns);
         let woke_ns = clock::now_ns();
         device_loop.step(grid.due_ns, woke_ns, missed);
         publish(device_loop);
         if let Some(probe) = device_loop.probe() {
-            probe.finish(grid.due_ns, woke_ns, missed, slept);
+            probe.finish(grid.due_ns, woke_ns, missed);
         }
         missed = grid.advance(clock::now_ns());
     }
     device_loop.end();
+    sleeps
 }
 
-/// One read of a device.
+/// What a read of a device is worth.
 pub struct Reading {
-    /// What the device answered, for the recording.
-    pub answer: Result<Sample, DeviceFault>,
     /// The newest sample; the last good one when the device has a fault.
     pub sample: Sample,
     /// What is wrong with it.
@@ -66,22 +69,20 @@ pub struct Reading {
     pub is_repeated: bool,
 }
 
-/// Reads a device whose last good sample is `before`.
-pub fn read(device: &mut dyn Device, period_s: f64, before: Option<Sample>) -> Reading {
+/// Judges the answer of a device whose last good sample is `before`.
+pub fn judge(answer: Result<Sample, DeviceFault>, before: Option<Sample>) -> Reading {
     let last = before.unwrap_or(Sample {
         tip_in_world: Vector3::zeros(),
         world_from_tool: UnitQuaternion::identity(),
         buttons: 0,
         sequence: 0,
     });
-    let answer = device.read(period_s);
     let (sample, fault) = match answer {
         Ok(sample) if sample.is_finite() => (sample, None),
         Ok(_) => (last, Some(Fault::NonFiniteInput)),
         Err(fault) => (last, Some(device_fault(fault))),
     };
     Reading {
-        answer,
         sample,
         fault,
         is_repeated: before.is_some_and(|before| before.sequence == sample.sequence),

@@ -11,6 +11,7 @@ use stylet_sim::limits::Limits;
 use stylet_sim::line::BodyLine;
 use stylet_sim::migration::Migration;
 use stylet_sim::needle::NeedleParameters;
+use stylet_sim::probe::BodyProbe;
 
 /// Number that joins an order to the host's request; 0 when nobody waits for an answer.
 pub type Ticket = u64;
@@ -48,7 +49,21 @@ pub enum HapticOrder {
         /// Number of the request.
         ticket: Ticket,
     },
-    /// End the contact and clear peaks and counters.
+    /// An exercise: the device counts as lost, or no longer.
+    LoseDevice {
+        /// Number of the request.
+        ticket: Ticket,
+        /// From this tick on.
+        lost: bool,
+    },
+    /// An exercise: the body moves there, from where the scene has it, scene frame, m.
+    MoveBody {
+        /// Number of the request.
+        ticket: Ticket,
+        /// At the pace of a patient.
+        to_m: [f64; 3],
+    },
+    /// End the contact and clear peaks and counters, and take out what exercises put in.
     Reset {
         /// Number of the request.
         ticket: Ticket,
@@ -118,6 +133,8 @@ pub enum TissueOrder {
     LeftRoom(Box<LeftTape>),
     /// Columns for a needle that goes in where they were made; the force loop gets its half beside them.
     Line(Box<BodyLine>),
+    /// The ultrasound probe of the scene that runs.
+    Probe(Box<BodyProbe>),
 }
 
 /// Either loop to the bridge: what happened, once each.

@@ -1,11 +1,12 @@
 //! The haptic tick, 1 kHz: read → chain (velocity, needle, force law, gate) → write → pose → record.
 
 use crate::rt::arm::Armed;
-use crate::rt::clock;
+use crate::rt::clock::{self, HAPTIC_PHASE, Wait};
 use crate::rt::device_loop::{self, DeviceLoop};
 use crate::rt::exchange::Notice;
 use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::pose::TipPose;
+use crate::rt::put_in::PutIn;
 use crate::rt::response::TissueResponse;
 use crate::rt::timing::Probe;
 use crate::rt::watchdog::{Watchdog, Watched, at_gate};
@@ -22,6 +23,7 @@ mod flight;
 mod left;
 mod line;
 mod orders;
+mod put_in;
 mod record;
 
 /// Everything that the haptic thread owns.
@@ -43,14 +45,16 @@ pub struct HapticLoop {
     /// Needles that stay in.
     left: left::Left,
     watchdog: Watchdog,
+    /// Faults that an instructor put in.
+    put_in: PutIn,
     /// What the device answered in this tick, for the recording.
     answer: DeviceAnswer,
     /// What hosts see; also holds the counters.
     pub state: HapticState,
     /// Present in a measurement.
     pub probe: Option<Box<Probe>>,
-    /// Spinning before each deadline; 0 for none.
-    pub spin_ns: u64,
+    /// How it waits for each deadline.
+    pub wait: Wait,
     period_s: f64,
 }
 
@@ -101,10 +105,11 @@ impl HapticLoop {
                 ..left::Left::default()
             },
             watchdog: memory.watchdog,
+            put_in: memory.put_in,
             answer: DeviceAnswer::default(),
             state: memory.state,
             probe: None,
-            spin_ns: 0,
+            wait: Wait::default(),
             period_s,
         }
     }
@@ -116,9 +121,9 @@ impl HapticLoop {
         }
     }
 
-    /// Runs on the ideal grid until `stop`, then ramps the force to zero and ends.
-    pub fn run(&mut self, armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) {
-        device_loop::run(self, armed, stop, |this| publish(&this.state));
+    /// Runs on the ideal grid until `stop`, then ramps the force to zero and ends. Returns how often it slept.
+    pub fn run(&mut self, armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) -> u64 {
+        device_loop::run(self, armed, stop, |this| publish(&this.state))
     }
 
     /// One tick; in the order of the data. Returns what the force chain gave.
@@ -126,6 +131,7 @@ impl HapticLoop {
         self.checkpoint();
         self.take_orders();
         self.take_line();
+        self.follow_body();
         self.mark();
         let sample = self.read();
         self.mark();
@@ -160,8 +166,9 @@ impl HapticLoop {
 
     /// The newest sample; the last good one when the device has a fault.
     fn read(&mut self) -> Sample {
-        let reading = device_loop::read(&mut *self.device, self.period_s, self.sample);
-        self.answer.read = reading.answer;
+        self.answer.read = self.put_in.answer(self.device.read(self.period_s));
+        let in_body = self.answer.read.map(|sample| self.put_in.in_body(sample));
+        let reading = device_loop::judge(in_body, self.sample);
         if let Some(fault) = reading.fault {
             self.raise(fault);
         }
@@ -223,7 +230,7 @@ impl HapticLoop {
                 tick,
                 time_ns,
                 depth_m: output.depth_m,
-                position_m: sample.tip_in_world,
+                position_m: self.put_in.in_scene(sample.tip_in_world),
             });
         }
         if output.left {
@@ -276,8 +283,12 @@ impl DeviceLoop for HapticLoop {
         self.period_s
     }
 
-    fn spin_ns(&self) -> u64 {
-        self.spin_ns
+    fn wait(&self) -> Wait {
+        self.wait
+    }
+
+    fn phase(&self) -> f64 {
+        HAPTIC_PHASE
     }
 
     fn ramp_out_ticks(&self) -> u32 {

@@ -2,6 +2,7 @@
 
 use crate::rt::exchange::HapticOrder;
 use crate::rt::pose::TipPose;
+use crate::rt::put_in::PutIn;
 use crate::rt::recorder::{FLIGHT_TICKS, Last, Tape, complete_from};
 use crate::rt::response::TissueResponse;
 use crate::rt::taped::pod;
@@ -44,6 +45,8 @@ pub struct HapticMemory {
     pub is_hand_empty: bool,
     /// Watchdog with the fault that it keeps.
     pub watchdog: Watchdog,
+    /// Faults that an instructor put in.
+    pub put_in: PutIn,
     /// State as hosts see it.
     #[serde(with = "pod")]
     pub state: HapticState,
@@ -67,6 +70,7 @@ impl HapticMemory {
             on_line: false,
             is_hand_empty: false,
             watchdog: Watchdog::default(),
+            put_in: PutIn::default(),
             state,
         }
     }

@@ -9,6 +9,8 @@ use stylet_sim::needle::Phase;
 pub struct TipPose {
     /// When the pose was read, `CLOCK_MONOTONIC`, ns; 0 for no pose yet.
     pub time_ns: u64,
+    /// How far the body is from where the scene has it, m. All else of the pose is in the body as the scene has it.
+    pub body_moved_m: Vector3<f64>,
     /// Place of the tip, scene frame, m.
     pub tip_in_scene: Vector3<f64>,
     /// Direction of the needle, unit vector.
@@ -35,6 +37,7 @@ impl Default for TipPose {
     fn default() -> Self {
         Self {
             time_ns: 0,
+            body_moved_m: Vector3::zeros(),
             tip_in_scene: Vector3::zeros(),
             direction: Vector3::z(),
             speed_along_m_per_s: 0.0,

@@ -29,8 +29,6 @@ pub struct TickTimes {
     pub missed: u32,
     /// Ticks so far that the ring had no room for.
     pub lost: u32,
-    /// False when the tick was already due: there was no sleep.
-    pub slept: bool,
 }
 
 impl TickTimes {
@@ -138,13 +136,12 @@ impl Probe {
     }
 
     /// Ends the last stage and hands the tick over.
-    pub fn finish(&mut self, due_ns: u64, woke_ns: u64, missed: u32, slept: bool) {
+    pub fn finish(&mut self, due_ns: u64, woke_ns: u64, missed: u32) {
         self.mark();
         let done_ns = self.tick.done_ns();
         self.tick.due_ns = due_ns;
         self.tick.woke_ns = woke_ns;
         self.tick.missed = missed;
-        self.tick.slept = slept;
         let full = self.ring.push(self.tick).is_err();
         let lost = self.tick.lost + u32::from(full);
         self.tick = TickTimes {
@@ -178,11 +175,11 @@ mod tests {
         for tick in 1..=11 {
             probe.mark();
             probe.output_for_pose(tick, 0);
-            probe.finish(1, 1, 0, true);
+            probe.finish(1, 1, 0);
         }
         assert_eq!(heap::calls_of_this_thread() - before, 0);
         while ring.pop().is_ok() {}
-        probe.finish(1, 1, 0, true);
+        probe.finish(1, 1, 0);
         let last = ring.pop().expect("room again");
         assert_eq!(last.lost, 3);
         assert!(last.recording_ns > 0 && last.marks().len() == 1);
@@ -196,7 +193,7 @@ mod tests {
             probe.mark();
         }
         probe.output_since_mark(1);
-        probe.finish(0, 0, 0, true);
+        probe.finish(0, 0, 0);
         let tick = ring.pop().expect("one tick");
         assert_eq!(tick.path_ns, Some(tick.marks()[3] - tick.marks()[1]));
         assert_eq!(tick.output_ns, Some(tick.marks()[3]));

@@ -1,7 +1,7 @@
 //! The tissue tick, 200 Hz: newest pose → contact → held element → constraints → seeds → response → work ahead → snapshot.
 
 use crate::rt::arm::Armed;
-use crate::rt::clock::{self, Grid};
+use crate::rt::clock::{self, Grid, Wait};
 use crate::rt::contact::Contact;
 use crate::rt::exchange::{Notice, Ticket, TissueOrder};
 use crate::rt::layers_met::LayersMet;
@@ -20,6 +20,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_shm_schema::{MAX_SEEDS, SeedPose};
 use stylet_sim::force::LocalResponse;
 use stylet_sim::line::{BodyLine, MAX_LEFT};
+use stylet_sim::probe::{BodyProbe, ProbePose};
 use stylet_sim::tissue::{Carried, Deformed, Held, MaterialPoint, StepReport};
 
 mod contact;
@@ -29,6 +30,7 @@ mod last_carry;
 mod left;
 mod line;
 mod migration;
+mod pressed;
 mod second;
 mod seeds;
 mod snapshot;
@@ -53,6 +55,9 @@ pub struct TissueLoop {
     /// Room to record those, until the tape is there.
     left_room: Option<Box<LeftTape>>,
     last_carry: LastCarry,
+    /// The ultrasound probe in this scene, and where it is.
+    pressed: Option<Box<BodyProbe>>,
+    probe_pose: Option<ProbePose>,
     layers: LayersMet,
     /// The tip has been outside since the last contact.
     clear: bool,
@@ -64,6 +69,8 @@ pub struct TissueLoop {
     /// Present in a measurement.
     pub probe: Option<Box<Probe>>,
     period_s: f64,
+    /// When it wakes after whole periods of the clock.
+    pub phase_ns: u64,
 }
 
 /// Stages of this tick, as [`Probe`] times them.
@@ -93,6 +100,8 @@ impl TissueLoop {
             left_loads: LeftLoads::default(),
             left_room: None,
             last_carry: LastCarry::new(),
+            pressed: None,
+            probe_pose: None,
             layers: LayersMet::default(),
             clear: true,
             held: None,
@@ -102,6 +111,7 @@ impl TissueLoop {
             shown: snapshot::Shown::default(),
             probe: None,
             period_s,
+            phase_ns: 0,
         }
     }
 
@@ -148,23 +158,24 @@ impl TissueLoop {
         self.world
     }
 
-    /// Runs on the ideal grid until `stop`.
-    pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool) {
-        let mut grid = Grid::from(clock::now_ns(), (self.period_s * 1e9) as u64);
-        let mut missed = 0;
+    /// Runs on the ideal grid until `stop`. Returns how often it slept.
+    pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool) -> u64 {
+        let mut grid = Grid::at_phase(clock::now_ns(), (self.period_s * 1e9).round() as u64, self.phase_ns);
+        let (mut missed, mut sleeps) = (0, 0);
         // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
         while !stop.load(Ordering::Acquire) {
-            let slept = clock::wait_until(grid.due_ns, 0);
+            sleeps += Wait::default().until(grid.due_ns);
             let woke_ns = clock::now_ns();
             self.response.worst_wake_ns = self.response.worst_wake_ns.max(woke_ns.saturating_sub(grid.due_ns));
             self.tick(woke_ns);
             if let Some(probe) = &mut self.probe {
-                probe.finish(grid.due_ns, woke_ns, missed, slept);
+                probe.finish(grid.due_ns, woke_ns, missed);
             }
             missed = grid.advance(clock::now_ns());
             self.response.missed += u64::from(missed);
         }
         self.hand_over_tape();
+        sleeps
     }
 
     /// One tick; in the order of the data.
@@ -172,6 +183,8 @@ impl TissueLoop {
         self.checkpoint();
         self.follow_left();
         self.take_orders();
+        self.follow_second();
+        self.follow_probe();
         let before = self.pose;
         self.pose = *self.ports.pose.read();
         self.mark();
@@ -232,6 +245,7 @@ impl TissueLoop {
                 }
                 TissueOrder::LeftRoom(room) => self.left_room = self.left_room.take().or(Some(room)),
                 TissueOrder::HandOverTape => self.hand_over_tape(),
+                TissueOrder::Probe(probe) => self.take_probe(probe),
                 TissueOrder::Line(line) => {
                     self.tape_order(TapedOrder::Line {
                         generation: line.generation,
@@ -250,6 +264,7 @@ impl TissueLoop {
     fn reset(&mut self) {
         self.world.tissue.return_to_rest();
         self.last_carry.forget();
+        self.reset_probe();
         self.seeds.clear();
         self.end_contact();
         self.response.worst_residual = 0.0;
@@ -276,6 +291,7 @@ impl TissueLoop {
         }
         self.drop_line();
         self.drop_left();
+        self.drop_probe();
         self.leave_line();
         self.seeds.clear();
         self.response.seed_count = 0;

@@ -1,5 +1,6 @@
 //! Every ring and triple buffer between the two loops and the bridge: made here, in one call, and nowhere else.
 
+pub use crate::rt::capacities::Capacities;
 use crate::rt::exchange::{HapticOrder, Notice, SnapshotReturn, SnapshotSlot, TissueOrder};
 use crate::rt::haptic_tape::HapticTape;
 use crate::rt::line_loads::AllLoads;
@@ -11,40 +12,7 @@ use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use stylet_shm_schema::TickRecord;
 use stylet_sim::line::{BodyLine, HandLine, LeftNeedles, MAX_LEFT};
-
-/// Places in each ring, all at least one.
-#[derive(Clone, Copy, Debug)]
-pub struct Capacities {
-    /// Records of the force loop.
-    pub records: usize,
-    /// Orders to each loop.
-    pub orders: usize,
-    /// Notices from each loop.
-    pub notices: usize,
-    /// Scenes that the tissue loop has replaced.
-    pub old_worlds: usize,
-    /// Snapshot slots in each direction.
-    pub snapshots: usize,
-}
-
-impl Capacities {
-    /// A run: the bridge may be late by four seconds of records.
-    pub const RUN: Self = Self {
-        records: 4096,
-        orders: 256,
-        notices: 1024,
-        old_worlds: 8,
-        snapshots: 32,
-    };
-    /// Loops that are stepped on one thread: whoever steps them empties the rings after each tick.
-    pub const STEPPED: Self = Self {
-        records: 16,
-        orders: 16,
-        notices: 64,
-        old_worlds: 1,
-        snapshots: 1,
-    };
-}
+use stylet_sim::probe::BodyProbe;
 
 /// Lines on their way in each direction; the bridge frees what has come back before it sends another.
 const LINES: usize = 2;
@@ -52,6 +20,8 @@ const LINES: usize = 2;
 const OLD_LINES: usize = LINES + 2 * MAX_LEFT;
 /// Room for needles that stay in, sent once.
 const ROOMS: usize = 2;
+/// Probes on their way back: one of each scene.
+const OLD_PROBES: usize = 4;
 
 /// Ends that the force loop owns.
 pub struct HapticPorts {
@@ -91,6 +61,8 @@ pub struct TissuePorts {
     pub old_worlds: rtrb::Producer<Box<World>>,
     /// Replaced columns of a line, to the bridge, which frees them.
     pub old_lines: rtrb::Producer<Box<BodyLine>>,
+    /// Probes of replaced scenes, to the bridge, which frees them.
+    pub old_probes: rtrb::Producer<Box<BodyProbe>>,
     /// Forces on the line, of the force loop.
     pub loads: triple_buffer::Output<AllLoads>,
     /// Loaned snapshot memory.
@@ -125,6 +97,8 @@ pub struct BridgePorts {
     pub old_hand_lines: rtrb::Consumer<Box<HandLine>>,
     /// Columns to be freed.
     pub old_body_lines: rtrb::Consumer<Box<BodyLine>>,
+    /// Probes to be freed.
+    pub old_probes: rtrb::Consumer<Box<BodyProbe>>,
     /// Snapshot memory for the tissue loop.
     pub slots: rtrb::Producer<SnapshotSlot>,
     /// Snapshot memory that the tissue loop has returned.
@@ -165,6 +139,7 @@ impl Wiring {
         let (rooms, room_out) = rtrb::RingBuffer::new(ROOMS);
         let (old_hand_line_in, old_hand_lines) = rtrb::RingBuffer::new(OLD_LINES);
         let (old_body_line_in, old_body_lines) = rtrb::RingBuffer::new(OLD_LINES);
+        let (old_probe_in, old_probes) = rtrb::RingBuffer::new(OLD_PROBES);
         let (loads_in, loads_out) = triple_buffer::triple_buffer(&AllLoads::default());
         let (slots, slot_out) = rtrb::RingBuffer::new(capacities.snapshots);
         let (filled_in, filled) = rtrb::RingBuffer::new(capacities.snapshots);
@@ -190,6 +165,7 @@ impl Wiring {
                 notices: tissue_notice_in,
                 old_worlds: old_world_in,
                 old_lines: old_body_line_in,
+                old_probes: old_probe_in,
                 loads: loads_out,
                 slots: slot_out,
                 filled: filled_in,
@@ -207,6 +183,7 @@ impl Wiring {
                 rooms,
                 old_hand_lines,
                 old_body_lines,
+                old_probes,
                 slots,
                 filled,
                 haptic_tapes,

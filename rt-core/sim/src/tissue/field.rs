@@ -26,6 +26,11 @@ impl ElementField {
         add_up(Simd::detect(), columns, loads_n, 1.0, &mut self.0);
     }
 
+    /// One of several parts of that, in any order. Does not allocate.
+    pub fn load_part(&mut self, columns: &[PackedField], loads_n: &[f64], part: [usize; 2]) {
+        add_up_part(Simd::detect(), (columns, loads_n), 1.0, &mut self.0, part);
+    }
+
     /// Zeros for that many elements.
     pub fn zeros(elements: usize) -> Self {
         ElementField(std::array::from_fn(|_| vec![0.0; elements]))
@@ -113,8 +118,20 @@ const BLOCK: usize = 2048;
 
 /// The sum of factor times field for each factor other than zero, in place of `sum`.
 pub(crate) fn add_up(simd: Simd, fields: &[PackedField], factors: &[f64], scale: f64, sum: &mut [Vec<f32>; 3]) {
+    add_up_part(simd, (fields, factors), scale, sum, [0, 1]);
+}
+
+/// The blocks of one of so many parts.
+fn add_up_part(
+    simd: Simd,
+    (fields, factors): (&[PackedField], &[f64]),
+    scale: f64,
+    sum: &mut [Vec<f32>; 3],
+    [part, of]: [usize; 2],
+) {
     for (axis, sum) in sum.iter_mut().enumerate() {
-        for (block, sum) in sum.chunks_mut(BLOCK).enumerate() {
+        let blocks = sum.chunks_mut(BLOCK).enumerate();
+        for (block, sum) in blocks.skip(part).step_by(of.max(1)) {
             sum.fill(0.0);
             for (field, &factor) in fields.iter().zip(factors).filter(|(_, factor)| **factor != 0.0) {
                 let from = (block * BLOCK).min(field.steps[axis].len());

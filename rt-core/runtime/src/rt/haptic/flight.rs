@@ -27,10 +27,11 @@ impl HapticLoop {
             // Their record stands beside the memory.
             left,
             watchdog,
+            put_in,
             answer: _,
             state,
             probe: _,
-            spin_ns: _,
+            wait: _,
             period_s: _,
         } = self;
         HapticMemory {
@@ -44,6 +45,7 @@ impl HapticLoop {
             on_line: *on_line,
             is_hand_empty: left.is_hand_empty,
             watchdog: *watchdog,
+            put_in: *put_in,
             state: *state,
         }
     }

@@ -60,6 +60,8 @@ impl HapticLoop {
                     number,
                     speed_m_per_s,
                 } => self.draw_needle(ticket, number, speed_m_per_s),
+                HapticOrder::LoseDevice { ticket, lost } => self.lose_device(ticket, lost, tick),
+                HapticOrder::MoveBody { ticket, to_m } => self.move_body(ticket, to_m, tick),
                 HapticOrder::Reset { ticket } => self.reset(ticket, tick),
                 HapticOrder::HandOverTape => self.ports.flight.hand_over(),
             }
@@ -77,6 +79,7 @@ impl HapticLoop {
 
     fn reset(&mut self, ticket: Ticket, tick: u64) {
         self.end_contact();
+        self.take_faults_out();
         self.state.peak_force_n = 0.0;
         self.state.missed_deadlines = 0;
         self.state.worst_wake_ns = 0;

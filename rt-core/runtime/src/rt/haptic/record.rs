@@ -13,7 +13,7 @@ impl HapticLoop {
     fn flags(&self, tissue: &TissueResponse, response: &ChainOutput) -> u32 {
         let always = flags::REAL_TIME | flags::SIMULATED_DEVICE | flags::LINE_NEEDED;
         let speed = self.chain.estimator.velocity_m_per_s().norm();
-        let at_goal = is_at_goal(self.goal, &self.pose.tip_in_scene, speed);
+        let at_goal = is_at_goal(self.goal, &self.put_in.in_scene(self.pose.tip_in_scene), speed);
         let bit = |set: bool, flag: u32| if set { flag } else { 0 };
         (self.state.flags & always)
             | bit(self.chain.gate.engaged(), flags::ENGAGED)
@@ -50,9 +50,9 @@ impl HapticLoop {
         let s = &mut self.state;
         s.tick += 1;
         s.time_ns = woke_ns;
-        s.tip_in_scene_m = self.pose.tip_in_scene.into();
+        s.tip_in_scene_m = self.put_in.in_scene(self.pose.tip_in_scene).into();
         s.needle_direction = self.pose.direction.into();
-        s.contact_in_scene_m = tissue.contact_in_scene.into();
+        s.contact_in_scene_m = self.put_in.in_scene(tissue.contact_in_scene).into();
         s.depth_m = response.depth_m;
         s.puncture_depth_m = response.puncture_depth_m;
         s.speed_m_per_s = response.speed_along_m_per_s;

@@ -13,13 +13,13 @@ pub use ports::{SecondBridgePorts, SecondOrder, SecondPorts, SecondPose, SecondT
 pub use response::{Felt, ProbeResponse};
 pub use tape::{SecondEntry, SecondFlight, SecondMemory, SecondTape};
 
-use crate::rt::clock;
+use crate::rt::clock::{self, SECOND_PHASE, Wait};
 use crate::rt::device_loop::{self, DeviceLoop, Reading};
 use crate::rt::exchange::Notice;
 use crate::rt::timing::Probe;
 use crate::rt::watchdog::{Watched, at_gate};
 use nalgebra::Vector3;
-use stylet_hw::{Device, DeviceInfo, Sample, Wrench};
+use stylet_hw::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
 use stylet_shm_schema::Fault;
 use stylet_sim::force::{ForceFault, GateInput, GateParameters, Motion, gate};
 
@@ -44,8 +44,8 @@ pub struct SecondLoop {
     memory: SecondMemory,
     /// Present in a measurement.
     pub probe: Option<Box<Probe>>,
-    /// Spinning before each deadline; 0 for none.
-    pub spin_ns: u64,
+    /// How it waits for each deadline.
+    pub wait: Wait,
     period_s: f64,
 }
 
@@ -83,7 +83,7 @@ impl SecondLoop {
             ports,
             memory: *memory,
             probe: None,
-            spin_ns: 0,
+            wait: Wait::default(),
             period_s,
         }
     }
@@ -106,7 +106,7 @@ impl SecondLoop {
         }
         self.take_orders();
         self.mark();
-        let reading = self.read();
+        let (answer, reading) = self.read();
         self.mark();
         let response = *self.ports.response.read();
         self.watch(woke_ns, missed, &response);
@@ -126,7 +126,7 @@ impl SecondLoop {
         if let Some(tape) = self.ports.flight.tape() {
             tape.ticks.push(SecondEntry {
                 woke_ns,
-                read: reading.answer,
+                read: answer,
                 write_failed,
                 response,
                 record,
@@ -140,15 +140,16 @@ impl SecondLoop {
         let _ = self.ports.notices.push(notice);
     }
 
-    fn read(&mut self) -> Reading {
-        let reading = device_loop::read(&mut *self.device, self.period_s, self.memory.sample);
+    fn read(&mut self) -> (Result<Sample, DeviceFault>, Reading) {
+        let answer = self.device.read(self.period_s);
+        let reading = device_loop::judge(answer, self.memory.sample);
         if let Some(fault) = reading.fault {
             self.raise(fault);
         }
         if let Some(fault) = self.memory.watchdog.sample(reading.is_repeated) {
             self.raise(fault);
         }
-        reading
+        (answer, reading)
     }
 
     fn raise(&mut self, fault: Fault) {
@@ -223,8 +224,12 @@ impl DeviceLoop for SecondLoop {
         self.period_s
     }
 
-    fn spin_ns(&self) -> u64 {
-        self.spin_ns
+    fn wait(&self) -> Wait {
+        self.wait
+    }
+
+    fn phase(&self) -> f64 {
+        SECOND_PHASE
     }
 
     fn ramp_out_ticks(&self) -> u32 {

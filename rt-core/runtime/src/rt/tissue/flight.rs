@@ -25,6 +25,9 @@ impl TissueLoop {
             left_room: _,
             // What it leaves out has the same bits.
             last_carry: _,
+            // A recording does not hold what the other hand did: see docs/adr/0021-probe.md.
+            pressed: _,
+            probe_pose: _,
             layers,
             clear,
             held,
@@ -35,6 +38,7 @@ impl TissueLoop {
             response,
             probe: _,
             period_s: _,
+            phase_ns: _,
         } = self;
         to.seeds.clear();
         to.seeds.extend_from_slice(seeds);

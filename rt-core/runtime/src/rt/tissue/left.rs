@@ -11,6 +11,15 @@ pub(super) struct LeftBody {
     pub used: NeedleLoads,
 }
 
+/// How the body takes what displaces it besides the needle that moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Besides {
+    /// It adds it up.
+    Added,
+    /// It is carried by it.
+    Carrying,
+}
+
 impl LeftBody {
     /// Loads the body anew.
     pub fn stay(&mut self, loads: &NeedleLoads) {
@@ -95,7 +104,7 @@ impl TissueLoop {
         } else {
             self.free(line);
         }
-        if self.left.is_empty() {
+        if self.besides().is_none() {
             self.world.tissue.carry(Carry::NOT);
         }
     }
@@ -143,28 +152,28 @@ impl TissueLoop {
         // Taken out meanwhile, so that the body can be moved.
         let left = std::mem::take(&mut self.left);
         let none = ElementField::default();
-        let mut fields = [&none; MAX_LEFT];
-        for (slot, left) in fields.iter_mut().zip(&left) {
-            *slot = &left.line.share;
-        }
-        let result = then(self, fields.get(..left.len()).unwrap_or(&[]));
+        let pressed = self.pressed.take();
+        let of_probe = pressed.as_ref().filter(|p| p.displaces()).map(|p| p.share());
+        let mut fields = [&none; MAX_LEFT + 1];
+        let shares = left.iter().map(|left| &left.line.share).chain(of_probe);
+        let count = fields.iter_mut().zip(shares).map(|(slot, share)| *slot = share).count();
+        let result = then(self, fields.get(..count).unwrap_or(&[]));
         self.left = left;
+        self.pressed = pressed;
         result
     }
 
     /// The step of a tick in which no needle moves on a line.
     pub(super) fn step_off_line(&mut self) -> StepReport {
-        let Some(first) = self.left.first() else {
-            return self.world.tissue.step(self.held, self.period_s);
-        };
-        match &first.line.answer {
-            BodyAnswer::Columns(_) => self.with_left(|this, fields| {
+        match self.besides() {
+            None => self.world.tissue.step(self.held, self.period_s),
+            Some(Besides::Added) => self.with_left(|this, fields| {
                 let tissue = &mut this.world.tissue;
                 tissue.displace(&[], &[], [0.0; 3]);
                 let report = tissue.add(fields);
                 report.unwrap_or_else(|| tissue.step(None, this.period_s))
             }),
-            BodyAnswer::Carrying(_) => self.with_left(|this, fields| {
+            Some(Besides::Carrying) => self.with_left(|this, fields| {
                 if !this.last_carry.is_again(0, &[], [0.0; 3]) {
                     this.world.tissue.carry(Carry { fields, ..Carry::NOT });
                 }
@@ -175,7 +184,18 @@ impl TissueLoop {
 
     /// Whether a needle without a line meets nothing: the body has no answer for one beside needles that stay in.
     pub(super) fn has_no_answer_off_line(&self) -> bool {
-        let first = self.left.first();
-        first.is_some_and(|left| matches!(left.line.answer, BodyAnswer::Columns(_)))
+        self.besides() == Some(Besides::Added)
+    }
+
+    /// Whether needles that stay in, or the probe, displace the body besides the needle that moves, and how.
+    pub(super) fn besides(&self) -> Option<Besides> {
+        let of_probe = self.pressed.as_ref().filter(|p| p.displaces());
+        let of_probe = of_probe.map(|_| self.world.scene.tissue().adds_columns());
+        let of_left = self.left.first();
+        let is_added = of_left.map(|left| matches!(left.line.answer, BodyAnswer::Columns(_)));
+        Some(match is_added.or(of_probe)? {
+            true => Besides::Added,
+            false => Besides::Carrying,
+        })
     }
 }

@@ -57,9 +57,9 @@ impl TissueLoop {
         let report = match &line.answer {
             BodyAnswer::Columns(columns) => {
                 let alone = self.world.tissue.displace(columns, loads.loads_n(), whole_m);
-                match self.left.is_empty() {
-                    true => alone,
-                    false => self.with_left(|this, fields| this.world.tissue.add(fields)),
+                match self.besides() {
+                    None => alone,
+                    Some(_) => self.with_left(|this, fields| this.world.tissue.add(fields)),
                 }
             }
             BodyAnswer::Carrying(columns) => {
@@ -78,9 +78,9 @@ impl TissueLoop {
                 };
                 // A hand that rests loads the line in every tick as in the one before.
                 if !self.last_carry.is_again(line.generation, loads_n, whole_m) {
-                    match self.left.is_empty() {
-                        true => self.world.tissue.carry(by),
-                        false => self.with_left(|this, fields| this.world.tissue.carry(Carry { fields, ..by })),
+                    match self.besides() {
+                        None => self.world.tissue.carry(by),
+                        Some(_) => self.with_left(|this, fields| this.world.tissue.carry(Carry { fields, ..by })),
                     }
                 }
                 Some(self.world.tissue.step(held, self.period_s))
@@ -125,8 +125,8 @@ impl TissueLoop {
     /// The needle is on no line: a contact that was reported ends.
     pub(super) fn leave_line(&mut self) {
         if std::mem::take(&mut self.in_by_line) {
-            // Those that stay in go on carrying the body.
-            if self.left.is_empty() {
+            // Those that stay in go on carrying the body, and so does the probe.
+            if self.besides().is_none() {
                 self.world.tissue.carry(Carry::NOT);
             }
             self.last_carry.forget();

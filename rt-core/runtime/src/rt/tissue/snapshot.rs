@@ -4,6 +4,7 @@ use super::TissueLoop;
 use crate::rt::clock;
 use crate::rt::exchange::{SnapshotReturn, SnapshotSlot};
 use crate::rt::seed;
+use nalgebra::Vector3;
 use stylet_shm_schema::{LeftNeedlePose, MAX_BEND_POINTS, MAX_SEEDS, SnapshotHeader, Vertex};
 use stylet_sim::line::MAX_LEFT;
 use stylet_sim::tissue::StepReport;
@@ -18,6 +19,7 @@ const TICKS_AT_REST: u64 = 6;
 pub struct Shown {
     tick: u64,
     tip_in_scene: [f64; 3],
+    body_moved: [f64; 3],
     direction: [f64; 3],
     seeds: usize,
     left: usize,
@@ -41,6 +43,7 @@ impl TissueLoop {
         let now = Shown {
             tick: self.response.tick,
             tip_in_scene: self.pose.tip_in_scene.into(),
+            body_moved: self.pose.body_moved_m.into(),
             direction: self.pose.direction.into(),
             seeds: self.seeds.len(),
             left: self.left.len(),
@@ -80,6 +83,7 @@ impl TissueLoop {
             let scene = &self.world.scene;
             body.write_surface(&scene.lattice, &scene.surface, surface);
             body.write_displacements(&self.world.scene.nodes.elements, inside);
+            self.move_with_body(surface, inside);
         }
         // SAFETY: as above, for the header.
         let header = unsafe { &mut *slot.header };
@@ -89,9 +93,9 @@ impl TissueLoop {
             scene_generation: self.world.generation,
             tissue_tick: self.response.tick,
             time_ns: woke_ns,
-            tip_in_scene_m: self.pose.tip_in_scene.into(),
+            tip_in_scene_m: self.in_scene(self.pose.tip_in_scene.into()),
             needle_direction: self.pose.direction.into(),
-            held_in_scene_m: self.held.map_or([0.0; 3], |h| h.position_m),
+            held_in_scene_m: self.held.map_or([0.0; 3], |h| self.in_scene(h.position_m)),
             residual: report.residual,
             max_displacement_m: f64::from(report.max_displacement) * spacing_m,
             work_ns,
@@ -106,6 +110,7 @@ impl TissueLoop {
             bend_m: [[0.0; 3]; MAX_BEND_POINTS],
             left_count: self.left.len() as u32,
             reserved: 0,
+            body_moved_m: self.pose.body_moved_m.into(),
             seed_count: self.seeds.len() as u32,
             seeds: [bytemuck::Zeroable::zeroed(); MAX_SEEDS],
             left: [bytemuck::Zeroable::zeroed(); MAX_LEFT],
@@ -114,14 +119,36 @@ impl TissueLoop {
             let line = &left.line.line;
             *slot = LeftNeedlePose {
                 number: left.line.generation,
-                entry_m: line.entry_m,
+                entry_m: self.in_scene(line.entry_m),
                 direction: line.axes[0],
-                tip_m: line.point_m(left.used.tip_m, [0.0; 2]),
+                tip_m: self.in_scene(line.point_m(left.used.tip_m, [0.0; 2])),
             };
         }
         self.fill_bend(header);
         for (slot, pose) in header.seeds.iter_mut().zip(seed::poses(&self.seeds, body)) {
             *slot = pose;
+        }
+    }
+
+    /// Where a place of the body is, which an exercise may have moved.
+    fn in_scene(&self, place_m: [f64; 3]) -> [f64; 3] {
+        let by_m = self.pose.body_moved_m;
+        [0, 1, 2].map(|a| {
+            if by_m[a] == 0.0 {
+                place_m[a]
+            } else {
+                place_m[a] + by_m[a]
+            }
+        })
+    }
+
+    fn move_with_body(&self, surface_m: &mut [[f32; 3]], displacements_m: &mut [[f32; 3]]) {
+        let by_m = self.pose.body_moved_m;
+        if by_m == Vector3::zeros() {
+            return;
+        }
+        for value_m in surface_m.iter_mut().chain(displacements_m) {
+            *value_m = [0, 1, 2].map(|a| value_m[a] + by_m[a] as f32);
         }
     }
 

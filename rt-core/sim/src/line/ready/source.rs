@@ -20,12 +20,24 @@ pub struct LineSource {
     beside: Vec<Cross>,
     /// End of the track that was open there, and the layers that it opened.
     open: (f64, u32),
+    /// Young's modulus of the tissue over that of the scene.
+    stiffness: f64,
 }
 
 impl LineSource {
     /// The body was solved for forces across the line as well.
     pub fn bends(&self) -> bool {
         self.compliance.across[0].size() > 0
+    }
+
+    /// Young's modulus of the tissue that it was solved in, over that of the scene.
+    pub fn stiffness(&self) -> f64 {
+        self.stiffness
+    }
+
+    /// One that was solved in tissue so many times as stiff as that of the scene.
+    pub fn in_tissue_as_stiff(self, stiffness: f64) -> LineSource {
+        LineSource { stiffness, ..self }
     }
 
     /// Stations of the line.
@@ -80,6 +92,7 @@ impl HandLine {
             compliance: self.model.compliance.clone(),
             beside: self.beside.clone(),
             open: (self.state.open_m, self.state.open_layers),
+            stiffness: 1.0,
         }
     }
 
@@ -132,6 +145,7 @@ impl HandLine {
             compliance,
             beside,
             open,
+            stiffness: _,
         } = source;
         if !beside.iter().all(|cross| cross.is_whole(2 * compliance.stations)) {
             return Err(LineError::Unusable(

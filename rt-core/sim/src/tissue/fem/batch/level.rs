@@ -158,6 +158,11 @@ impl<T: Real> BatchModel<T> {
         (shear_pa > 0.0).then_some([shear_pa, poisson])
     }
 
+    /// The element at a point of the scene frame while the body is at rest.
+    pub fn element_at(&self, point_m: [f64; 3]) -> Option<u32> {
+        self.lattice.element_at_rest(point_m)
+    }
+
     /// The nodes around a point in the scene frame and their trilinear weights; `None` where no element is.
     pub fn trilinear(&self, point_m: [f64; 3]) -> Option<[(u32, f64); 8]> {
         let place = [0, 1, 2].map(|a| (point_m[a] - self.low_m[a]) / self.spacing_m);

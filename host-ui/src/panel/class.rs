@@ -1,0 +1,162 @@
+//! Who is connected over a relay, who operates, and how the needle changes hands.
+
+use crate::action::Action;
+use crate::panel::banners::{Banner, BannerLevel};
+use crate::shown::Shown;
+use crate::theme;
+use stylet_shm_schema::{Class, ClassMember, LeaseRequest};
+
+/// The word of the certificates of those who may hold the needle.
+const OPERATOR: &str = "operator";
+const WIDTH: f32 = 420.0;
+const TITLE_AND_EDGES: f32 = 70.0;
+
+/// What whoever sits here may do with the needle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Hand {
+    /// Another role.
+    None,
+    /// May ask for it.
+    Free,
+    /// Has it.
+    Held,
+}
+
+fn hand(shown: &Shown, class: &Class) -> Hand {
+    let (may, has) = match &shown.relayed {
+        Some(line) => (line.role.read() == OPERATOR, line.operates != 0),
+        // Whoever sits beside the core decides who operates.
+        None => (class.is_beside_core != 0, class.local_operates != 0),
+    };
+    match (may, has) {
+        (false, _) => Hand::None,
+        (true, false) => Hand::Free,
+        (true, true) => Hand::Held,
+    }
+}
+
+/// Beside the core, who is there; wherever the needle is, who asks for it.
+pub fn banners(shown: &Shown) -> Vec<Banner> {
+    let Some(class) = shown.class.as_ref().filter(|class| class.count > 0) else {
+        return Vec::new();
+    };
+    let mut list = Vec::new();
+    let asked = class.asked.read();
+    if hand(shown, class) == Hand::Held && !asked.is_empty() {
+        list.push(Banner {
+            level: BannerLevel::Warn,
+            title: "The needle is asked for",
+            text: format!("{asked} asks to operate. The hand stops when you hand over."),
+            remedy: Some(("Hand over", Action::Lease(LeaseRequest::Give(asked)))),
+        });
+    }
+    if shown.relayed.is_none() {
+        list.push(Banner {
+            level: BannerLevel::Info,
+            title: "A class watches",
+            text: format!(
+                "{} connected over the relay. {}",
+                members(class),
+                operates(shown, class)
+            ),
+            remedy: Some(("Who is there", Action::ToggleClass)),
+        });
+    }
+    list
+}
+
+fn members(class: &Class) -> String {
+    match class.count + class.unlisted.min(1_000_000) {
+        1 => "1 member is".to_owned(),
+        n => format!("{n} members are"),
+    }
+}
+
+fn operates(shown: &Shown, class: &Class) -> String {
+    match (hand(shown, class), class.operator.read()) {
+        (Hand::Held, _) => "You operate.".to_owned(),
+        (_, name) if name.is_empty() => "Nobody operates.".to_owned(),
+        (_, name) => format!("{name} operates."),
+    }
+}
+
+/// The list, while the operator wants to see it.
+pub fn class_ui(ctx: &egui::Context, shown: &Shown, open: &mut bool) -> Option<Action> {
+    let window = egui::Window::new("Who is there")
+        .open(open)
+        .collapsible(false)
+        .resizable(false)
+        .anchor(egui::Align2::CENTER_CENTER, egui::Vec2::ZERO);
+    let drawn = window.show(ctx, |ui| {
+        let room = ui.ctx().content_rect().height() - TITLE_AND_EDGES;
+        ui.set_width(WIDTH);
+        let scroll = egui::ScrollArea::vertical().max_height(room).min_scrolled_height(room);
+        scroll.show(ui, |ui| list_ui(ui, shown)).inner
+    });
+    drawn.and_then(|drawn| drawn.inner).flatten()
+}
+
+fn list_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
+    let Some(class) = &shown.class else {
+        ui.label(
+            "No relay of this machine says who is there. Start 'relay serve' beside the core, or 'relay join' here.",
+        );
+        return None;
+    };
+    let (hand, mut action) = (hand(shown, class), None);
+    if let Some(line) = &shown.relayed {
+        let age_ms = line.snapshot_age_ns as f64 * 1e-6;
+        ui.label(theme::weak(format!(
+            "{} shows what was {age_ms:.0} ms ago here.",
+            line.server.read()
+        )));
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.label(theme::strong(operates(shown, class)));
+        let (words, request) = match hand {
+            Hand::None => return,
+            Hand::Held => ("Release the needle", LeaseRequest::Release),
+            Hand::Free if shown.relayed.is_some() => ("Ask for the needle", LeaseRequest::Take),
+            Hand::Free => ("Operate from here", LeaseRequest::Take),
+        };
+        if ui.button(words).clicked() {
+            action = Some(Action::Lease(request));
+        }
+    });
+    let asked = class.asked.read();
+    if !asked.is_empty() {
+        ui.label(format!("{asked} asks to operate."));
+    }
+    // Over a relay only who has the needle gives it.
+    let gives = hand == Hand::Held || (hand == Hand::Free && shown.relayed.is_none());
+    for member in class.members() {
+        ui.separator();
+        let given = member_ui(ui, member, gives && member.name.read() != class.operator.read());
+        action = given.or(action);
+    }
+    if class.unlisted > 0 {
+        ui.label(theme::small(format!("and {} more", class.unlisted)));
+    }
+    action
+}
+
+fn member_ui(ui: &mut egui::Ui, member: &ClassMember, may_have_it: bool) -> Option<Action> {
+    let (name, role) = (member.name.read(), member.role.read());
+    ui.add(egui::Label::new(theme::strong(name.as_str())).wrap());
+    let role_words = if role.is_empty() { "revoked" } else { role.as_str() };
+    let ms = |ns: u64| ns as f64 * 1e-6;
+    ui.add(
+        egui::Label::new(format!(
+            "{role_words}; round trip {:.1} ms, {} records lost, heard {:.0} ms ago",
+            ms(member.round_trip_ns),
+            member.records_lost,
+            ms(member.silent_ns)
+        ))
+        .wrap(),
+    );
+    let gives = may_have_it && role == OPERATOR && ui.button(format!("Hand the needle to {name}")).clicked();
+    gives.then_some(Action::Lease(LeaseRequest::Give(name)))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,70 @@
+//! Marks, and faults that an instructor puts in, from the request to the event that everybody sees.
+
+use super::Bridge;
+use super::link::EventDetails;
+use crate::rt::clock;
+use crate::rt::exchange::{HapticOrder, Ticket};
+use stylet_shm_schema::{EventKind, Exercise, ExercisesInForce, Mark, Refusal, RefusalCode};
+
+impl Bridge {
+    pub(super) fn mark(&mut self, ticket: Ticket, mark: &Mark) {
+        let before_ns = (mark.before_s * 1e9) as u64;
+        let newest = self.link.newest_record().map_or(0, |record| record.tick);
+        let tick = newest.saturating_sub(before_ns / self.link.session.period_ns.max(1));
+        let details = EventDetails {
+            text: &mark.text,
+            ..EventDetails::at(tick, clock::now_ns().saturating_sub(before_ns))
+        };
+        self.link.event(EventKind::Mark, details);
+        self.link.answer(ticket, Ok(tick));
+    }
+
+    pub(super) fn begin_exercise(&mut self, ticket: Ticket, exercise: Exercise) -> Result<(), Refusal> {
+        match exercise {
+            Exercise::DeviceLost => self.order_haptic(HapticOrder::LoseDevice { ticket, lost: true })?,
+            Exercise::BodyMoved { by_m } => self.move_body(ticket, by_m)?,
+            Exercise::StiffTissue { .. } if !self.tissue.has_lines() => {
+                return Err(RefusalCode::TissueWithoutStiffness.into());
+            }
+            Exercise::StiffTissue { factor } => {
+                self.lines.stiffen(factor);
+                self.link.answer(ticket, Ok(0));
+            }
+        }
+        self.link.session.exercises.put(exercise);
+        let details = EventDetails {
+            code: exercise.number(),
+            value: exercise.value(),
+            text: &exercise.to_string(),
+            ..EventDetails::now()
+        };
+        self.link.event(EventKind::ExerciseBegun, details);
+        Ok(())
+    }
+
+    fn move_body(&mut self, ticket: Ticket, to_m: [f64; 3]) -> Result<(), Refusal> {
+        self.order_haptic(HapticOrder::MoveBody { ticket, to_m })?;
+        self.lines.move_body(to_m);
+        Ok(())
+    }
+
+    pub(super) fn end_exercises(&mut self, ticket: Ticket) -> Result<(), Refusal> {
+        // Both or none: the answer comes with the second.
+        if self.loops.haptic_orders.slots() < 2 {
+            return Err(RefusalCode::TooManyRequests.into());
+        }
+        self.move_body(0, [0.0; 3])?;
+        self.order_haptic(HapticOrder::LoseDevice { ticket, lost: false })?;
+        self.forget_exercises();
+        Ok(())
+    }
+
+    /// The loops have none any more.
+    pub(super) fn forget_exercises(&mut self) {
+        self.lines.move_body([0.0; 3]);
+        self.lines.stiffen(1.0);
+        if std::mem::take(&mut self.link.session.exercises) != ExercisesInForce::default() {
+            self.link.event(EventKind::ExercisesEnded, EventDetails::now());
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! The probe in a small body and in the pelvis: what it must not do, and how it compares with the contact solved in full.
+
+use super::wall::Wall;
+use super::*;
+use crate::scene::{Labels, Material, Role, Scene, Structure, Surroundings, TissueKind};
+use crate::tissue::fem::FemTissue;
+use crate::tissue::fem::batch::BatchModel;
+use std::sync::OnceLock;
+use stylet_anatomy::Beyond;
+
+mod hard;
+mod pelvis;
+mod reference;
+
+/// A scene, the body that is solved for, and a probe in it.
+pub(super) struct Fixture {
+    pub scene: Scene,
+    pub body: BatchModel<f32>,
+    pub probe: ReadyProbe,
+}
+
+impl Fixture {
+    pub fn new(scene: Scene, spacing_m: f64) -> Self {
+        let fem = FemTissue::<f32>::new(&scene).expect("valid");
+        let body = BatchModel::new(&fem.model);
+        let wall = Wall::of(&scene, spacing_m).expect("a rectum");
+        let queue = ProbeQueue::new(&body, wall, ProbeShape::default()).expect("in the body");
+        let probe = queue.prepare(&body, &mut |_| true).expect("not stopped");
+        Fixture { scene, body, probe }
+    }
+
+    /// Along z in the middle, so far above where it meets the wall, its tip so far beyond the target's middle.
+    pub fn pose(&self, pressed_m: f64, beyond_m: f64) -> ProbePose {
+        let probe = &self.probe;
+        probe
+            .wall
+            .pose_below_target(&self.scene, &probe.shape, pressed_m, beyond_m)
+    }
+
+    /// So far above where it meets the wall is the axis in the middle of the hollow.
+    pub fn middle_m(&self) -> f64 {
+        let heights = self.probe.wall.pads.iter().map(|p| p.place_m[1]);
+        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
+        0.5 * (low + high) - self.pose(0.0, 0.0).tip_m[1]
+    }
+
+    /// In from outside in the middle of the hollow, to where it meets the wall, then pressed, in ticks at 50 mm/s.
+    pub fn go_in_and_press(&self, state: &mut ProbeState, pressed_m: f64, beyond_m: f64) -> ProbeResponse {
+        const TICK_M: f64 = 0.25e-3;
+        let mut response = ProbeResponse::default();
+        let outside_m = beyond_m - 0.12;
+        for n in 0..=60 {
+            let at = outside_m + (beyond_m - outside_m) * f64::from(n) / 60.0;
+            response = step(&self.probe, state, &self.pose(self.middle_m(), at), &[]);
+        }
+        let down = (self.middle_m() / TICK_M).ceil() as i32;
+        for n in 1..=down {
+            let part = 1.0 - f64::from(n) / f64::from(down);
+            response = step(&self.probe, state, &self.pose(part * self.middle_m(), beyond_m), &[]);
+        }
+        let ticks = (pressed_m / TICK_M).round() as i32;
+        for n in 1..=ticks {
+            response = step(&self.probe, state, &self.pose(f64::from(n) * TICK_M, beyond_m), &[]);
+        }
+        response
+    }
+}
+
+/// A block of gland, a hollow of 28 x 20 mm in rectal wall below it, 4 mm elements: some thousand of them.
+pub(super) fn small() -> &'static Fixture {
+    static SMALL: OnceLock<Fixture> = OnceLock::new();
+    SMALL.get_or_init(|| Fixture::new(block(true), 5e-3))
+}
+
+pub(super) fn block(is_hollow: bool) -> Scene {
+    let dims = [18, 16, 14];
+    let mut cells = Vec::new();
+    for _ in 0..dims[2] {
+        for j in 0..dims[1] {
+            for i in 0..dims[0] {
+                let from_middle = [i as f64 + 0.5 - 9.0, j as f64 + 0.5 - 5.0];
+                let across = (from_middle[0] / 3.5).powi(2) + (from_middle[1] / 2.5).powi(2);
+                cells.push(match across {
+                    a if a <= 1.0 && is_hollow => 0,
+                    a if a <= 2.6 => 2,
+                    _ => 1,
+                });
+            }
+        }
+    }
+    let structure = |name: &str, label, role, beyond| Structure {
+        name: name.to_owned(),
+        label,
+        role,
+        material: Material {
+            limits: None,
+            fixed: false,
+            surroundings: Surroundings::all(beyond),
+            young_pa: 15e3,
+            poisson: 0.45,
+        },
+    };
+    let labels = Labels {
+        dims,
+        spacing_m: 4e-3,
+        cells,
+        structures: vec![
+            structure("gland", 1, Role::Target, Beyond::Fat),
+            structure("rectal wall", 2, Role::Spare, Beyond::Free),
+        ],
+    };
+    let scene = Scene::from_labels("block", &labels).expect("valid");
+    scene.for_lines(TissueKind::ChainMail).expect("a model with lines")
+}
+
+#[test]
+fn the_gap_is_that_of_a_round_shaft_with_half_a_ball_at_its_end() {
+    let probe = ProbeShape { radius_m: 10e-3 };
+    let pose = ProbePose::new([1e-3, 2e-3, 30e-3], [0.1, -0.2, 1.0]).expect("a pose");
+    let axis = nalgebra::Vector3::from(pose.axis);
+    let tip = nalgebra::Vector3::from(pose.tip_m);
+    // Brute force: the nearest of many points of the axis behind the middle of the ball.
+    for n in 0..500 {
+        let f = f64::from(n);
+        let point = tip + nalgebra::Vector3::new((f * 0.7).sin(), (f * 1.3).cos(), (f * 0.37).sin()) * 35e-3;
+        let nearest = (0..20_000).map(|k| (point - tip + axis * (10e-3 + 5e-6 * f64::from(k))).norm());
+        let distance_m = nearest.fold(f64::INFINITY, f64::min) - 10e-3;
+        let (gap_m, outward) = probe.gap_m(&pose, point.into());
+        assert!((gap_m - distance_m).abs() < 1e-8, "{gap_m} {distance_m}");
+        // The gap grows fastest along the direction that is given.
+        let (farther_m, _) = probe.gap_m(&pose, (point + nalgebra::Vector3::from(outward) * 1e-4).into());
+        assert!((farther_m - gap_m - 1e-4).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_scene_without_a_rectum_is_refused_with_words() {
+    let paper = Scene::builtin("paper").expect("built in");
+    let refused = Wall::of(&paper, 5e-3).expect_err("no rectum");
+    assert_eq!(refused, NoWall::NoRectum);
+    assert!(refused.to_string().contains("rectal wall"), "{refused}");
+    assert_eq!(Wall::of(&block(false), 5e-3).expect_err("not hollow"), NoWall::NoRectum);
+}
+
+#[test]
+fn pads_cover_the_wall_that_can_be_reached_once() {
+    let fixture = small();
+    let pads = &fixture.probe.wall.pads;
+    let faces: usize = pads.iter().map(|p| p.faces.len()).sum();
+    let area_m2: f64 = pads.iter().map(|p| p.area_m2).sum();
+    assert!((area_m2 - faces as f64 * 16e-6).abs() < 1e-9);
+    // The perimeter of the staircase is that of its box: 6 and 4 elements, on both sides, over 14.
+    assert_eq!(faces, 2 * (6 + 4) * 14);
+    for pad in pads {
+        let length: f64 = pad.outward.iter().map(|c| c * c).sum();
+        assert!((length - 1.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,267 @@
+//! The wall that the probe can press: the inside of the rectum, in pads.
+
+use super::shape::{ProbePose, ProbeShape};
+use crate::scene::{Lattice, Scene};
+use crate::tissue::fem::batch::BatchModel;
+use stylet_anatomy::{Beyond, Organ};
+
+/// Faces of cells are staircases: each is moved to the mean of those that face the same way and lie so close, m.
+const SMOOTHED_M: f64 = 2.5e-3;
+/// The canal through which the probe comes in is closed in a scene, and wide enough in the patient: what is so close to that end of the hollow
+/// resists nothing.
+const CANAL_M: f64 = 12e-3;
+/// The probe gets so far beyond the target at either end, m.
+const BEYOND_TARGET_M: f64 = 20e-3;
+
+/// Pads are so far apart in a run.
+pub const PADS_APART_M: f64 = 5e-3;
+
+/// Why a scene has no wall for the probe.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoWall {
+    /// No structure is the rectum's wall, or nothing in it is free.
+    #[error(
+        "the scene has no rectum that a probe could lie in: it needs a structure \"rectal wall\" around a hollow, with nothing (\"free\") beyond its inner faces"
+    )]
+    NoRectum,
+    /// Nothing of it is beside the target.
+    #[error("the rectum of the scene is not beside the target: a probe in it would reach nothing")]
+    OutOfReach,
+    /// The tissue model knows no forces.
+    #[error("this tissue answers no force: choose chainmail or fem (--tissue)")]
+    NoForces,
+    /// A pad that no part of the body is at.
+    #[error("a part of the rectum's wall is in no element of the body")]
+    NotInBody,
+    /// It was no longer wanted.
+    #[error("the probe was given up before it was ready")]
+    Stopped,
+}
+
+/// A piece of the wall that is pressed as one.
+#[derive(Clone, Debug)]
+pub struct Pad {
+    /// Its middle at rest, scene frame, m.
+    pub place_m: [f64; 3],
+    /// Unit vector out of the tissue.
+    pub outward: [f64; 3],
+    /// How large it is, m^2.
+    pub area_m2: f64,
+    /// Faces of cells in it.
+    pub faces: Vec<Face>,
+}
+
+/// One face of a cell.
+#[derive(Clone, Copy, Debug)]
+pub struct Face {
+    /// Its middle at rest on the smooth wall, scene frame, m.
+    pub place_m: [f64; 3],
+    /// A point in the tissue behind it, scene frame, m.
+    pub inside_m: [f64; 3],
+    outward: [f64; 3],
+}
+
+/// All pads, in order.
+#[derive(Clone, Debug)]
+pub struct Wall {
+    /// As far apart as they were asked for.
+    pub pads: Vec<Pad>,
+}
+
+impl Wall {
+    /// Pads about `spacing_m` apart on the inside of the scene's rectum.
+    pub fn of(scene: &Scene, spacing_m: f64) -> Result<Self, NoWall> {
+        let all = faces(scene);
+        if all.is_empty() {
+            return Err(NoWall::NoRectum);
+        }
+        let (low, high) = scene.target_bounds_m();
+        // A hollow that goes on to the end of the volume has no end there.
+        let faces_inwards = |f: &&Face| f.outward[2] > 0.5;
+        let end_m = all.iter().filter(faces_inwards).map(|f| f.place_m[2]);
+        let open_m = end_m.fold(f64::INFINITY, f64::min) + CANAL_M;
+        let is_beside = |f: &Face| {
+            let z = f.place_m[2];
+            z >= low[2] - BEYOND_TARGET_M && z <= high[2] + BEYOND_TARGET_M && !(z < open_m && open_m.is_finite())
+        };
+        let within: Vec<Face> = smoothed(&all).into_iter().filter(is_beside).collect();
+        // Straight faces of a staircase say little of how the wall runs; their mean does.
+        let middles = spread(&within, spacing_m);
+        let mut pads: Vec<Vec<Face>> = vec![Vec::new(); middles.len()];
+        for face in &within {
+            let nearest = |a: &usize, b: &usize| {
+                let of = |n: usize| separation(face, &within[middles[n]]);
+                of(*a).total_cmp(&of(*b))
+            };
+            if let Some(at) = (0..middles.len()).min_by(nearest) {
+                pads[at].push(*face);
+            }
+        }
+        let face_m2 = scene.lattice.spacing_m.powi(2);
+        let pads: Vec<Pad> = pads.into_iter().filter_map(|faces| pad(faces, face_m2)).collect();
+        if pads.is_empty() {
+            return Err(NoWall::OutOfReach);
+        }
+        Ok(Wall { pads })
+    }
+
+    /// A probe along z below the middle of the target, whose shaft is so far above where it first meets the wall towards the target, and whose
+    /// tip is so far beyond the target's middle, m.
+    pub fn pose_below_target(&self, scene: &Scene, shape: &ProbeShape, pressed_m: f64, beyond_m: f64) -> ProbePose {
+        let towards_target = self.pads.iter().filter(|pad| pad.outward[1] < -0.5);
+        let lowest_m = towards_target.map(|pad| pad.place_m[1]).fold(f64::INFINITY, f64::min);
+        let (low, high) = scene.target_bounds_m();
+        let middle = [0, 1, 2].map(|a| 0.5 * (low[a] + high[a]));
+        ProbePose {
+            tip_m: [middle[0], lowest_m - shape.radius_m + pressed_m, middle[2] + beyond_m],
+            axis: [0.0, 0.0, 1.0],
+        }
+    }
+}
+
+impl Pad {
+    /// Nodes and weights, which add up to 1, of the mean over its faces; `None` where the body has no element there.
+    pub fn weights(&self, body: &BatchModel<f32>) -> Option<Vec<(u32, f64)>> {
+        let mut all = Vec::new();
+        for face in &self.faces {
+            all.extend(body.trilinear(face.inside_m)?);
+        }
+        all.sort_by_key(|(node, _)| *node);
+        let mut merged: Vec<(u32, f64)> = Vec::new();
+        for (node, weight) in all {
+            let part = weight / self.faces.len() as f64;
+            match merged.last_mut() {
+                Some((last, sum)) if *last == node => *sum += part,
+                _ => merged.push((node, part)),
+            }
+        }
+        Some(merged)
+    }
+}
+
+/// Faces of the rectum's wall with nothing beyond them.
+fn faces(scene: &Scene) -> Vec<Face> {
+    let lattice = &scene.lattice;
+    let is_wall: Vec<bool> = scene
+        .structures
+        .iter()
+        .map(|s| matches!(Organ::of_name(&s.name), Some(Organ::RectalWall | Organ::Rectum)))
+        .collect();
+    let mut found = Vec::new();
+    for element in 0..lattice.element_count() as u32 {
+        let structure = usize::from(lattice.structure(element));
+        if !is_wall.get(structure).copied().unwrap_or(false) {
+            continue;
+        }
+        let beyond = scene.structures[structure].material.surroundings.0;
+        for (side, neighbour) in lattice.neighbours(element).into_iter().enumerate() {
+            if neighbour.is_none() && beyond[side] == Beyond::Free && !at_edge(lattice, element, side) {
+                found.push(face(lattice, element, side));
+            }
+        }
+    }
+    found
+}
+
+/// Faces at the edge of the volume are where the scene ends.
+fn at_edge(lattice: &Lattice, element: u32, side: usize) -> bool {
+    let at = lattice.cell(element)[side / 2];
+    if side % 2 == 0 {
+        at == 0
+    } else {
+        at + 1 == lattice.dims[side / 2]
+    }
+}
+
+fn face(lattice: &Lattice, element: u32, side: usize) -> Face {
+    let sign = if side % 2 == 0 { -1.0 } else { 1.0 };
+    let centre_m = lattice.rest_m(element);
+    let along = |part: f64| {
+        let mut place_m = centre_m;
+        place_m[side / 2] += sign * part * lattice.spacing_m;
+        place_m
+    };
+    let mut outward = [0.0; 3];
+    outward[side / 2] = sign;
+    Face {
+        place_m: along(0.5),
+        inside_m: along(0.49),
+        outward,
+    }
+}
+
+/// What faces away from each other is on two walls, however close.
+fn faces_alike(a: &Face, b: &Face) -> bool {
+    (0..3).map(|c| a.outward[c] * b.outward[c]).sum::<f64>() > -0.3
+}
+
+fn square_m2(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|c| (a[c] - b[c]).powi(2)).sum()
+}
+
+fn separation(a: &Face, b: &Face) -> f64 {
+    if faces_alike(a, b) {
+        square_m2(a.place_m, b.place_m)
+    } else {
+        f64::INFINITY
+    }
+}
+
+fn smoothed(faces: &[Face]) -> Vec<Face> {
+    let smooth = |face: &Face| {
+        let (mut place, mut outward, mut count) = ([0.0; 3], [0.0; 3], 0.0);
+        for other in faces {
+            if separation(face, other) <= SMOOTHED_M * SMOOTHED_M {
+                for c in 0..3 {
+                    place[c] += other.place_m[c];
+                    outward[c] += other.outward[c];
+                }
+                count += 1.0;
+            }
+        }
+        Face {
+            place_m: place.map(|c| c / count),
+            outward: unit(outward).unwrap_or(face.outward),
+            ..*face
+        }
+    };
+    faces.iter().map(smooth).collect()
+}
+
+/// Faces from each of which the next is as far from all before as it can be, until none is farther than the spacing.
+fn spread(faces: &[Face], spacing_m: f64) -> Vec<usize> {
+    let mut chosen = Vec::new();
+    let mut nearest_m2 = vec![f64::INFINITY; faces.len()];
+    let mut next = (!faces.is_empty()).then_some(0);
+    while let Some(at) = next {
+        chosen.push(at);
+        for (slot, face) in nearest_m2.iter_mut().zip(faces) {
+            *slot = slot.min(separation(face, &faces[at]));
+        }
+        let farthest = (0..faces.len()).max_by(|&a, &b| nearest_m2[a].total_cmp(&nearest_m2[b]));
+        next = farthest.filter(|&n| nearest_m2[n] > spacing_m * spacing_m);
+    }
+    chosen
+}
+
+fn pad(faces: Vec<Face>, face_m2: f64) -> Option<Pad> {
+    let count = faces.len() as f64;
+    let mean = |of: &dyn Fn(&Face) -> [f64; 3]| {
+        let sum = faces
+            .iter()
+            .map(of)
+            .fold([0.0; 3], |s, v| [0, 1, 2].map(|c| s[c] + v[c]));
+        sum.map(|c| c / count)
+    };
+    let (place_m, normal) = (mean(&|f| f.place_m), mean(&|f| f.outward));
+    Some(Pad {
+        place_m,
+        outward: unit(normal)?,
+        area_m2: count * face_m2,
+        faces,
+    })
+}
+
+fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
+    nalgebra::Vector3::from(v).try_normalize(1e-9).map(Into::into)
+}

@@ -1,0 +1,133 @@
+//! What an instructor puts in is felt and seen, is announced, and is gone after it was ended.
+
+use std::time::Duration;
+use stylet_host::link::Link;
+use stylet_host::moments::{Moment, MomentKind};
+use stylet_implant::workflow::{Pace, Run, RunStatus, Step, default_plan};
+use stylet_shm_schema::{Exercise, Mark, Phase, Request};
+use stylet_tests::witness::where_the_machine_runs;
+use stylet_tests::{Core, ask, until};
+
+/// What a needle of the scripted procedure left.
+struct Seen {
+    seeds_m: Vec<[f64; 3]>,
+    surface_m: Vec<[f32; 3]>,
+    before_puncture_m: f64,
+}
+
+/// `put_in` once the procedure has begun with its reset, and the needle is not in yet.
+fn procedure(link: &mut Link, put_in: Option<Exercise>) -> Seen {
+    let plan = default_plan(&link.scene().expect("a live core has a scene").header);
+    let mut run = Run::new(plan, Pace::default());
+    let mut put_in = put_in;
+    let (mut status, mut before_puncture_m) = (RunStatus::Working, 0.0_f64);
+    let ended = until(Duration::from_secs(120), || {
+        link.poll();
+        link.take_records();
+        status = run.advance(link);
+        if run.step() >= Step::Place
+            && let Some(exercise) = put_in.take()
+        {
+            ask(link, &Request::BeginExercise(exercise)).expect("taken");
+        }
+        let snapshot = link.snapshot().map(|s| s.header);
+        if let Some(header) = snapshot.filter(|h| h.phase == Phase::Contraction as u32) {
+            before_puncture_m = before_puncture_m.max(header.max_displacement_m);
+        }
+        !matches!(status, RunStatus::Working)
+    });
+    assert!(ended && matches!(status, RunStatus::Done), "{status:?}");
+    std::thread::sleep(Duration::from_secs(2));
+    link.poll();
+    let snapshot = link.snapshot().expect("live");
+    let seeds = snapshot.header.seeds.iter().take(snapshot.header.seed_count as usize);
+    Seen {
+        seeds_m: seeds.map(|s| s.position_m).collect(),
+        surface_m: snapshot.positions_m.clone(),
+        before_puncture_m,
+    }
+}
+
+fn mean<'a>(places: impl Iterator<Item = [f64; 3]> + 'a) -> [f64; 3] {
+    let all: Vec<_> = places.collect();
+    [0, 1, 2].map(|a| all.iter().map(|p| p[a]).sum::<f64>() / all.len() as f64)
+}
+
+fn words(link: &mut Link) -> Vec<(MomentKind, String)> {
+    link.poll();
+    let moments = link.events().iter().filter_map(Moment::of);
+    moments.map(|m| (m.kind, m.text)).collect()
+}
+
+#[test]
+fn a_gland_that_has_moved_gets_its_seeds_beside_their_places_and_stiff_tissue_gives_way_less() {
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut link = core.host();
+        let plain = procedure(&mut link, None);
+        let moved_m = [0.003, 0.0, 0.0];
+        let moved = procedure(&mut link, Some(Exercise::BodyMoved { by_m: moved_m }));
+        let before_m = mean(plain.seeds_m.iter().copied());
+        let after_m = mean(moved.seeds_m.iter().copied());
+        let off_mm = [0, 1, 2].map(|a| (after_m[a] - before_m[a]) * 1e3);
+        println!("gland moved by 3 mm along x: seeds in it {off_mm:.2?} mm from where they were without");
+        assert!((off_mm[0] + 3.0).abs() < 0.5 && off_mm[1].abs() < 0.5, "{off_mm:?}");
+        let surface = |seen: &Seen| mean(seen.surface_m.iter().map(|p| p.map(f64::from)));
+        let drawn_mm = (surface(&moved)[0] - surface(&plain)[0]) * 1e3;
+        assert!(
+            (drawn_mm - 3.0).abs() < 0.2,
+            "the gland is drawn {drawn_mm} mm from before"
+        );
+        assert_eq!(link.snapshot().expect("live").header.body_moved_m, moved_m);
+        // The next procedure begins with a reset: nothing of it is left.
+        let factor = 3.0;
+        let stiff = procedure(&mut link, Some(Exercise::StiffTissue { factor }));
+        assert_eq!(link.snapshot().expect("live").header.body_moved_m, [0.0; 3]);
+        let [soft_mm, stiff_mm] = [plain, stiff].map(|seen| seen.before_puncture_m * 1e3);
+        println!("before puncture the gland moved {soft_mm:.2} mm, and {stiff_mm:.2} mm in tissue 3 times as stiff");
+        assert!(stiff_mm < 0.8 * soft_mm && stiff_mm > 0.1 * soft_mm);
+        drop(link);
+        core.finish();
+    });
+}
+
+#[test]
+fn marks_and_exercises_are_events_with_their_words_and_the_session_says_what_is_in_force() {
+    let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "paper"]);
+    let mut link = core.host();
+    let tick = link.state().expect("live").tick;
+    let mark = |text: &str, before_s| {
+        Request::Mark(Mark {
+            text: text.to_owned(),
+            before_s,
+        })
+    };
+    ask(&mut link, &mark("left lobe", 0.0)).expect("taken");
+    let found = |link: &Link| link.events().iter().rfind(|e| Moment::of(e).is_some()).copied();
+    let event = found(&link).expect("an event");
+    assert!(event.tick >= tick, "{} {tick}", event.tick);
+    ask(&mut link, &mark("earlier", 0.5)).expect("taken");
+    let earlier = found(&link).expect("an event");
+    assert!(earlier.time_ns < event.time_ns, "half a second before its request");
+    let refused = ask(
+        &mut link,
+        &Request::BeginExercise(Exercise::StiffTissue { factor: 2.0 }),
+    );
+    assert!(refused.expect_err("paper").contains("no stiffness"));
+    ask(&mut link, &Request::BeginExercise(Exercise::DeviceLost)).expect("taken");
+    let in_force = |link: &mut Link, count: usize| {
+        until(Duration::from_secs(3), || {
+            link.poll();
+            link.session().is_some_and(|s| s.exercises.all().count() == count)
+        })
+    };
+    assert!(in_force(&mut link, 1), "not announced");
+    ask(&mut link, &Request::EndExercises).expect("taken");
+    assert!(in_force(&mut link, 0), "announced still");
+    let said = words(&mut link);
+    let kinds: Vec<_> = said.iter().map(|(kind, _)| kind.name()).collect();
+    assert_eq!(kinds, ["mark", "mark", "exercise", "fault", "exercise"], "{said:?}");
+    assert_eq!(said[2].1, "device lost");
+    drop(link);
+    core.finish();
+}
