@@ -5,10 +5,15 @@ use egui::{Key, Modifiers};
 use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 28] = [
+pub const KEYS: [(&str, &str); 30] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
+    (
+        "Alt with W, S",
+        "move the other hand in or out while held, where rt-core has --device-2",
+    ),
+    ("Alt with arrows", "move the other hand sideways, up and down"),
     ("Enter", "the main action of the present step"),
     ("Space", "drop a seed at the tip"),
     ("Ctrl+Z", "undo the last seed or plan change; with Shift redo it"),
@@ -52,6 +57,8 @@ pub struct Keys {
     pub actions: Vec<Action>,
     /// Metres per second along the path, positive inwards; 0 when no key is held.
     pub drive_m_per_s: f64,
+    /// Speed of the other hand, scene frame; 0 when no key is held.
+    pub second_m_per_s: [f64; 3],
 }
 
 const DRIVE_M_PER_S: f64 = 0.04;
@@ -105,7 +112,16 @@ pub fn read(ctx: &egui::Context) -> Keys {
         }
         let held = |a, b| f64::from(u8::from(i.key_down(a) || i.key_down(b)));
         let slow = if i.modifiers.shift { 0.25 } else { 1.0 };
-        if !i.modifiers.command {
+        if i.modifiers.alt {
+            let axis = |more, less| {
+                (f64::from(u8::from(i.key_down(more))) - f64::from(u8::from(i.key_down(less)))) * DRIVE_M_PER_S * slow
+            };
+            keys.second_m_per_s = [
+                axis(Key::ArrowRight, Key::ArrowLeft),
+                axis(Key::ArrowUp, Key::ArrowDown),
+                axis(Key::W, Key::S),
+            ];
+        } else if !i.modifiers.command {
             keys.drive_m_per_s = (held(Key::W, Key::ArrowUp) - held(Key::S, Key::ArrowDown)) * DRIVE_M_PER_S * slow;
         }
     });

@@ -3,6 +3,7 @@
 use super::{App, refusal};
 use crate::action::{Action, PlanAction, WatchAction};
 use crate::dialog::{Picked, Purpose};
+use crate::panel::workflow::Progress;
 
 impl App {
     pub(super) fn pick_file(&mut self, purpose: Purpose) {
@@ -40,6 +41,30 @@ impl App {
                 self.workflow.plan.path = typed;
                 Action::Plan(PlanAction::Export(path))
             }
+        })
+    }
+
+    /// A folder is an image series; while the plan's step is open, a file that is no volume is a plan.
+    pub(super) fn dropped_file(&self, ctx: &egui::Context) -> Option<Action> {
+        let path = ctx.input(|i| {
+            i.raw
+                .dropped_files
+                .iter()
+                .map(|f| f.path().to_owned())
+                .find(|p| !p.as_os_str().is_empty())
+        })?;
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
+            return Some(Action::Watch(WatchAction::File(path)));
+        }
+        if path.is_dir() {
+            return Some(Action::LoadImage(path));
+        }
+        let is_plan = ["toml", "csv", "dcm"]
+            .iter()
+            .any(|ending| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)));
+        Some(match is_plan && self.workflow.is_open(Progress::Plan) {
+            true => Action::Plan(PlanAction::Import(path)),
+            false => Action::LoadScene(path),
         })
     }
 }

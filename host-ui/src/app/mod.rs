@@ -8,17 +8,18 @@ mod frames;
 mod layout;
 mod patch;
 mod plan;
+mod second;
 mod take;
 mod watch;
 
-use crate::action::{Action, PlanAction, WatchAction};
+use crate::action::Action;
 use crate::dialog::Dialogs;
 use crate::dose_worker::DoseWorker;
 use crate::loader::Loader;
 use crate::panel::history::History;
 use crate::panel::instructor::InstructorState;
 use crate::panel::parameters::ParametersState;
-use crate::panel::workflow::{Progress, WorkflowState};
+use crate::panel::workflow::WorkflowState;
 use crate::picture::Pictures;
 use crate::planner::Planner;
 use crate::redraw::Redraw;
@@ -123,6 +124,7 @@ pub struct App {
     /// The core that was left to the force loop.
     left_core: Left,
     drive: drive::Drive,
+    second_drive: second::SecondDrive,
     /// Buttons of gamepads and 3D mice since the last frame.
     pressed: Vec<Action>,
     /// Where a hand on the tip has drawn it in this frame, and where it was last sent to.
@@ -266,6 +268,7 @@ impl App {
             frames: frames::Frames::new(Instant::now()),
             left_core: Left::default(),
             drive: drive::Drive::default(),
+            second_drive: second::SecondDrive::default(),
             pressed: Vec::new(),
             pulled_to_m: None,
             pulled_goal_m: None,
@@ -319,30 +322,6 @@ impl App {
             (true, true) => self.shown.controllers.wish.slower(SLOW),
         }
     }
-
-    /// A folder is an image series; while the plan's step is open, a file that is no volume is a plan.
-    fn dropped_file(&self, ctx: &egui::Context) -> Option<Action> {
-        let path = ctx.input(|i| {
-            i.raw
-                .dropped_files
-                .iter()
-                .map(|f| f.path().to_owned())
-                .find(|p| !p.as_os_str().is_empty())
-        })?;
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
-            return Some(Action::Watch(WatchAction::File(path)));
-        }
-        if path.is_dir() {
-            return Some(Action::LoadImage(path));
-        }
-        let is_plan = ["toml", "csv", "dcm"]
-            .iter()
-            .any(|ending| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)));
-        Some(match is_plan && self.workflow.is_open(Progress::Plan) {
-            true => Action::Plan(PlanAction::Import(path)),
-            false => Action::LoadScene(path),
-        })
-    }
 }
 
 impl eframe::App for App {
@@ -368,7 +347,7 @@ impl eframe::App for App {
         }
         let wish = self.wish(&ctx, keys.drive_m_per_s);
         // Not `stable_dt`, which is that of a fast frame whenever a frame was asked for later than at once.
-        self.drive(wish, f64::from(ctx.input(|i| i.unstable_dt)));
+        self.drive_both(wish, keys.second_m_per_s, f64::from(ctx.input(|i| i.unstable_dt)));
         self.send_parameters();
         let asked = self.middle.driver();
         let driver_ns = asked.cpu_ns - driver.cpu_ns;

@@ -40,6 +40,8 @@ impl App {
         let records = self.link.take_records();
         self.history.take(&records, direction);
         self.workflow.guide.felt.take(&records);
+        // Its state says all that the window shows of it.
+        let _second = self.link.take_second_records();
         let scene = self.shown.scene.map(|s| s.id());
         self.trace.take(&records, scene, direction);
         if self.summed_up.elapsed() >= SUM_UP_EVERY {

@@ -2,7 +2,7 @@
 
 use super::class;
 use crate::action::{Action, WatchAction};
-use crate::shown::{NeedleLine, Shown, Watched};
+use crate::shown::{NeedleLine, SecondHand, Shown, Watched};
 use crate::theme;
 use crate::theme::Tokens;
 use egui::{Color32, Rect, RichText};
@@ -107,6 +107,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
             remedy: Some(("Re-arm", Action::Send(Request::Engage))),
         });
     }
+    list.extend(of_second(shown));
     if shown.state.is_some() && !shown.is_real_time() {
         list.push(not_real_time(shown));
     }
@@ -120,6 +121,28 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
     list.extend(class::banners(shown));
     list.extend(shown.relayed.as_ref().map(of_line));
     list
+}
+
+/// What is wrong with the second device; the needle's has its own banner.
+fn of_second(shown: &Shown) -> Option<Banner> {
+    let Some(SecondHand::Faulty(fault)) = shown.second_hand() else {
+        return None;
+    };
+    let text = match fault {
+        Some(Fault::LoopStopped) => {
+            "Its loop in rt-core stands still, so its force is off. The needle goes on; restart rt-core when you are done.".to_owned()
+        }
+        fault => format!(
+            "{} The needle's force is not affected.",
+            sentence(fault.map_or("it reports a fault that this program does not know", Fault::message))
+        ),
+    };
+    Some(Banner {
+        level: BannerLevel::Bad,
+        title: "Second device: its force is off",
+        text,
+        remedy: (fault != Some(Fault::LoopStopped)).then_some(("Re-arm both", Action::Send(Request::Engage))),
+    })
 }
 
 /// Whom the window shows, over which relay, how old that is and what was lost.

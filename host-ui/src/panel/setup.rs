@@ -1,6 +1,6 @@
 //! What the loop got from the kernel, the state of the link, and the cost of a frame.
 
-use crate::shown::Shown;
+use crate::shown::{SecondHand, Shown};
 use crate::theme;
 use egui::RichText;
 use stylet_base::format;
@@ -29,6 +29,10 @@ pub fn setup_ui(ui: &mut egui::Ui, shown: &Shown) {
                 row("device", session.device.read(), true);
                 row("force loop", thread(&session.haptic), session.haptic.is_fifo());
                 row("tissue loop", thread(&session.tissue), session.tissue.is_fifo());
+                if session.has_second() {
+                    let fine = session.second.is_fifo() && !matches!(shown.second_hand(), Some(SecondHand::Faulty(_)));
+                    row("device 2", session.second_device.read(), fine);
+                }
                 let locked = session.memory_locked != 0;
                 let memory = if locked {
                     "locked"

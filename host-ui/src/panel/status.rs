@@ -2,7 +2,7 @@
 
 use crate::action::Action;
 use crate::settings::{SCALES, STRENGTHS_U, Settings, ThemeChoice};
-use crate::shown::{NeedleLine, Shown};
+use crate::shown::{NeedleLine, SecondHand, Shown};
 use crate::theme;
 use crate::words::Explained;
 use egui::{Align, Color32, DragValue, Layout, RichText, Sense, Vec2};
@@ -136,6 +136,22 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
         badge(ui, word, color);
     }
     line_ui(ui, shown);
+    second_ui(ui, shown);
+}
+
+/// The other hand, in a run with a second device.
+fn second_ui(ui: &mut egui::Ui, shown: &Shown) {
+    let tokens = theme::of(ui);
+    let color = match shown.second_hand() {
+        None => return,
+        Some(SecondHand::On) => tokens.good,
+        Some(SecondHand::Off | SecondHand::Unknown) => tokens.warn,
+        Some(SecondHand::Faulty(_)) => tokens.bad,
+    };
+    let response = badge(ui, "HAND 2", color);
+    if let Some(words) = shown.second_words() {
+        response.on_hover_text(words);
+    }
 }
 
 /// With finite elements: whether the tissue is prepared for the needle where it is.

@@ -4,6 +4,7 @@ mod bend;
 mod line;
 mod metal;
 mod parts;
+mod second;
 mod seeds;
 
 use crate::dose_worker::DoseResult;
@@ -12,6 +13,7 @@ pub use bend::Bend;
 pub use line::NeedleLine;
 use nalgebra::Vector3;
 pub use parts::{FrameCost, LoadState, Note, TipOnPath, Watched};
+pub use second::SecondHand;
 pub use seeds::{SeedError, all_errors, own_errors};
 use std::sync::Arc;
 use stylet_controllers::Latest;
@@ -20,7 +22,7 @@ use stylet_implant::plan::{HOLES, Template};
 use stylet_implant::workflow::{Step, Waiting};
 use stylet_shm_schema::{
     Class, EventKind, Fault, HapticState, LeftNeedlePose, ParametersInForce, Phase, PlanInForce, PlannedSeed, Relayed,
-    SceneHeader, SeedPose, Session, flags,
+    SceneHeader, SecondState, SeedPose, Session, flags,
 };
 
 /// Past the deepest seed the needle may go this far, and the path is drawn this far.
@@ -36,6 +38,8 @@ pub struct Shown {
     /// Who is connected over a relay of this machine.
     pub class: Option<Class>,
     pub state: Option<HapticState>,
+    /// Of the second device.
+    pub second: Option<SecondState>,
     pub scene: Option<SceneHeader>,
     /// Only a plan with at least one seed.
     pub plan: Option<PlanInForce>,
@@ -89,6 +93,7 @@ impl Shown {
             relayed: None,
             class: None,
             state: None,
+            second: None,
             scene: None,
             plan: None,
             parameters: None,
@@ -125,6 +130,7 @@ impl Shown {
         self.relayed = link.relayed().copied();
         self.class = link.class().copied();
         self.state = link.state().copied();
+        self.second = link.second_state().copied();
         self.scene = link.scene().map(|s| s.header);
         self.plan = link.plan().filter(|p| p.generation > 0 && p.seed_count > 0).copied();
         self.parameters = link.parameters().copied();

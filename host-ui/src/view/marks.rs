@@ -14,6 +14,8 @@ const NEEDLE_RADIUS_M: f32 = 0.635e-3;
 /// As much of it is drawn.
 pub const NEEDLE_LENGTH_M: f64 = 0.12;
 const BEVEL_M: f32 = 2.5e-3;
+/// Thinner than an ultrasound probe, so that what is behind it is seen.
+const SECOND_RADIUS_M: f32 = 3e-3;
 const RING_RADIUS_M: f32 = 1.6e-3;
 const RING_THICKNESS_M: f32 = 0.16e-3;
 const DASH_M: f32 = 2e-3;
@@ -89,6 +91,14 @@ impl Marks {
         self.cone(grip, hub, [2.6e-3, 2.0e-3], self.tokens.path);
         self.cone(grip - axis * 1e-4, grip, [0.0, 2.6e-3], self.tokens.path);
         self.cone(hub, hub + axis * 1e-4, [2.0e-3, 0.0], self.tokens.path);
+    }
+
+    /// What the other hand holds, from its tip to the hand: a plain rod, whatever it is.
+    pub fn second_tool(&mut self, tip_m: [f64; 3], end_m: [f64; 3]) {
+        let (tip, end) = (single(tip_m), single(end_m));
+        let color = self.tokens.path;
+        self.cone(end, tip, [SECOND_RADIUS_M; 2], color);
+        self.cap(tip, unit_or_z(tip - end), SECOND_RADIUS_M, color);
     }
 
     pub fn placed_seed(&mut self, center_m: [f64; 3], axis: [f64; 3]) {

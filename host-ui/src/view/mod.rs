@@ -2,6 +2,7 @@
 
 mod body;
 mod camera;
+mod collected;
 pub(crate) mod driver;
 mod gpu;
 mod kinds;

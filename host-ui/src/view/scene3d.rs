@@ -2,11 +2,12 @@
 
 use super::body::ShownBody;
 use super::camera::Camera;
+use super::collected::{collect_fixed, collect_live, moving_points};
 use super::driver::DriverCost;
 use super::gpu::Gpu;
 use super::kinds::{kinds, surfaces};
 use super::legend::Legend;
-use super::marks::{Marks, NEEDLE_LENGTH_M};
+use super::marks::Marks;
 use super::orientation::scene_from_patient;
 use super::paste::Pasted;
 use super::pick::pick;
@@ -24,8 +25,6 @@ use stylet_shm_schema::SceneId;
 use stylet_surfaces::mesh::Surface;
 
 const TURN_PER_POINT_RAD: f32 = 0.008;
-/// Behind the entry, where the template is held.
-const TEMPLATE_BEFORE_M: f32 = 0.01;
 /// The needle's own view is from so far behind the tip.
 const NEEDLE_VIEW_M: f32 = 0.06;
 /// A picture wider than this has room for words about doses.
@@ -61,7 +60,7 @@ impl Default for Look {
 struct Key {
     what: What,
     tip: [f64; 3],
-    /// Places along the needle without its hub, which trembles with the hand far more than what is in tissue.
+    /// Places along the needle and of the other hand, as [`moving_points`] has them.
     needle: Vec<[f64; 3]>,
     force: [f64; 3],
     seeds: Vec<[f64; 3]>,
@@ -301,7 +300,7 @@ impl Scene3d {
         let key = Key {
             what,
             tip: shown.tip_m().unwrap_or_default(),
-            needle: bent_part(shown),
+            needle: moving_points(shown),
             force: shown.state.map_or([0.0; 3], |s| s.force_on_hand_n),
             seeds: shown.seeds.iter().map(|s| shown.drawn_at_m(s)).collect(),
         };
@@ -335,65 +334,4 @@ impl Scene3d {
         }
         gpu.picture()
     }
-}
-
-/// What changes with the scene and the plan only. Gives the corner where the axes are drawn.
-fn collect_fixed(marks: &mut Marks, shown: &Shown, look: Look, tokens: &'static Tokens) -> Option<[f32; 3]> {
-    marks.begin(tokens);
-    let corner = shown
-        .scene
-        .map(|scene| marks.grid_and_axes(scene.lower_m, scene.upper_m));
-    let at_work = shown.planning.progress.begun().checked_sub(1);
-    for (number, needle) in shown
-        .planning
-        .implant
-        .iter()
-        .flat_map(|i| i.plan.needles.iter().enumerate())
-    {
-        if Some(number) != at_work {
-            marks.path_thin(needle.entry_m, needle.at_m(needle.depth_m));
-            marks.planned_seeds_thin(needle.seeds_m(), needle.direction);
-        }
-    }
-    let is_other = shown.planning.waits();
-    if let Some(plan) = shown.plan.as_ref().filter(|_| !is_other) {
-        marks.entry(plan.entry_m, plan.direction);
-        if look.template {
-            marks.template(plan.entry_m, plan.direction, TEMPLATE_BEFORE_M);
-        }
-        for seed in shown.planned() {
-            marks.planned_seed(seed.position_m, plan.direction);
-        }
-        if let Some(end) = shown.path_end_m() {
-            marks.path(plan.entry_m, end);
-        }
-    }
-    corner
-}
-
-fn bent_part(shown: &Shown) -> Vec<[f64; 3]> {
-    let mut points_m = shown.needle_points_m(NEEDLE_LENGTH_M).unwrap_or_default();
-    points_m.pop();
-    points_m
-}
-
-fn collect_live(marks: &mut Marks, (shown, view): (&Shown, &ViewState), look: Look, tokens: &'static Tokens) {
-    marks.begin(tokens);
-    if let (Some(tip), Some(state)) = (shown.tip_m(), &shown.state) {
-        if let Some(points_m) = shown.needle_points_m(NEEDLE_LENGTH_M) {
-            marks.needle(&points_m);
-        }
-        if look.force {
-            marks.force(tip, state.force_on_hand_n);
-        }
-    }
-    for left in &shown.left {
-        let hub_m = [0, 1, 2].map(|a| left.tip_m[a] - left.direction[a] * NEEDLE_LENGTH_M);
-        marks.needle(&[left.tip_m, hub_m]);
-    }
-    for seed in &shown.seeds {
-        marks.placed_seed(shown.drawn_at_m(seed), seed.axis);
-    }
-    let measured: Vec<Vector3<f32>> = view.measure.points_m().iter().map(|p| p.map(|c| c as f32)).collect();
-    marks.measured(&measured);
 }

@@ -8,7 +8,7 @@ use crate::spin::Spin;
 use crate::whose::WhoseArgs;
 use clap::Args;
 use std::path::PathBuf;
-use stylet_runtime::args::{OptionsError, RealTimeArgs};
+use stylet_runtime::args::{OptionsError, RealTimeArgs, SecondArgs};
 use stylet_runtime::process::Options;
 use stylet_runtime::rt::clock::Wait;
 use stylet_runtime::rt::pin::Pin;
@@ -74,6 +74,8 @@ pub struct LatencyArgs {
     pub(crate) whose: WhoseArgs,
     #[command(flatten)]
     real_time: RealTimeArgs,
+    #[command(flatten)]
+    second: SecondArgs,
 }
 
 /// Settings of the loops that this PC cannot have.
@@ -102,6 +104,7 @@ impl LatencyArgs {
         let instance = format!("lab-{}", std::process::id());
         let mut options = self.real_time.options(&instance)?;
         options.haptic_period_ns = measure::period_ns(self.rate);
+        options.second = self.second.options()?;
         options.wait = Wait::at_period(options.haptic_period_ns);
         if let Some(early_us) = self.early_us {
             options.wait.early_ns = early_us * 1_000;

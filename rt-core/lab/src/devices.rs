@@ -10,6 +10,10 @@ use stylet_hw::libhd::diagnose::{self as phantom, Surroundings};
 use stylet_hw::{Device, Finding, Severity, SimulatedPhantom, SimulatedPhantomConfig, drd, haply};
 use stylet_runtime::device::Libraries;
 
+/// Below the list.
+const BOTH_HANDS: &str = "--device-2 takes the same names, for the other hand, which holds the ultrasound probe. Both hands cannot hold one \
+                          device, and two Phantoms through OpenHaptics are refused.";
+
 /// A driver that does not answer for this long is left alone.
 const TRIAL_LIMIT: Duration = Duration::from_secs(15);
 /// As many devices of one maker are asked.
@@ -67,6 +71,7 @@ pub fn run(args: &DevicesArgs) -> u8 {
         println!("{:#}", serde_json::json!({ "devices": listed }));
     } else {
         listed.iter().for_each(|l| println!("{}", text(l)));
+        println!("{BOTH_HANDS}");
     }
     0
 }

@@ -50,7 +50,9 @@ pub fn write(folder: &Path, report: &mut Report, measured: &Measured) -> Result<
 /// Every histogram in the interval log format of HdrHistogram, nanoseconds, one tagged line each.
 fn raw_histograms(report: &Report, measured: &Measured) -> Result<Vec<u8>, FilesError> {
     let mut all: Vec<(String, &Histogram<u64>)> = Vec::new();
-    for (name, timing) in [("haptic", &measured.haptic), ("tissue", &measured.tissue)] {
+    let second = measured.second.as_ref().map(|timing| ("second", timing));
+    let loops = [("haptic", &measured.haptic), ("tissue", &measured.tissue)];
+    for (name, timing) in loops.into_iter().chain(second) {
         let mut add = |what: &str, h| all.push((format!("{name}/{}", what.replace(' ', "_")), h));
         add("wake", &timing.wake);
         add("jitter", &timing.jitter);

@@ -85,8 +85,13 @@ pub struct Host {
     last_tick: u64,
     warm_up_ticks: u64,
     step: u64,
+    /// The other hand moves beside the needle's.
+    moves_second: bool,
     report: HostReport,
 }
+
+/// How far behind the needle the other hand moves, m.
+const BEHIND_M: f64 = 0.04;
 
 /// Why the host of the measurement saw nothing.
 #[derive(Debug, thiserror::Error)]
@@ -114,6 +119,7 @@ impl Host {
             sent: 0,
             last_tick: 0,
             step: 0,
+            moves_second: false,
             report: HostReport {
                 tip_to_host: histogram(),
                 tissue_to_host: histogram(),
@@ -124,6 +130,11 @@ impl Host {
                 insertions: 0,
             },
         })
+    }
+
+    /// Where the run has a second device, its hand moves beside the needle's.
+    pub fn with_second(self, moves_second: bool) -> Self {
+        Self { moves_second, ..self }
     }
 
     /// Watches until `duration_ns` after the warm-up, or until `interrupted` or `stop`.
@@ -176,7 +187,10 @@ impl Host {
             }
         }
         while let Some(sample) = self.ports.events.receive() {
-            self.report.faults += u64::from(sample.kind == EventKind::FaultRaised as u32);
+            let is_fault = [EventKind::FaultRaised, EventKind::SecondFaultRaised]
+                .iter()
+                .any(|&kind| sample.kind == kind as u32);
+            self.report.faults += u64::from(is_fault);
         }
     }
 
@@ -200,12 +214,17 @@ impl Host {
     }
 
     fn move_hand(&mut self, tip_m: [f64; 3]) {
-        self.send(&Request::MoveHand(HandMove {
+        let to = |tip_m| HandMove {
             tip_m,
             direction: [0.0, 0.0, 1.0],
             speed_m_per_s: SPEED_M_PER_S,
             acceleration_m_per_s2: ACCELERATION_M_PER_S2,
-        }));
+        };
+        self.send(&Request::MoveHand(to(tip_m)));
+        if self.moves_second {
+            let [x, y, z] = tip_m;
+            self.send(&Request::MoveSecondHand(to([x, y - BEHIND_M, z])));
+        }
     }
 
     fn send(&mut self, request: &Request) {

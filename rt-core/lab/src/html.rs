@@ -36,6 +36,9 @@ pub fn page(report: &Report, measured: &Measured) -> Result<String, DrawError> {
                     (pictures)
                     (times::of_loop("Force loop", &report.haptic))
                     (times::of_loop("Tissue loop", &report.tissue))
+                    @if let Some(second) = &report.second {
+                        (times::of_loop("Loop of the second device", second))
+                    }
                     (times::host(report))
                     (times::comparison(report))
                     (times::spin(report))
@@ -63,7 +66,7 @@ fn header(r: &Report) -> Markup {
         header { h1 { "Latency report" } (badge(r.verdict.overall)) }
         p class="sub" {
             "Scene " b { (p.scene) } ", force loop at " b { (num(p.rate_hz)) " Hz" } ", tissue at " (num(p.tissue_rate_hz))
-            " Hz, load " b { (load) } " (" (p.load_is) "), " b { (num(p.measured_s.round())) " s" } " measured, "
+            " Hz, " @if let Some(hz) = p.second_rate_hz { "second device at " (num(hz)) " Hz, " } "load " b { (load) } " (" (p.load_is) "), " b { (num(p.measured_s.round())) " s" } " measured, "
             (p.insertions) " insertions. " (r.made_at) ", " (r.program) "."
         }
         @if let Some(whose) = whose(r) { p class="sub" { (whose) } }

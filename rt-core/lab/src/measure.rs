@@ -16,6 +16,7 @@ use stylet_runtime::process::{self, LoopReport, Options, RunError, RunReport};
 use stylet_runtime::rt::clock::{HAPTIC_PERIOD_NS, TISSUE_PERIOD_NS};
 use stylet_runtime::rt::haptic::HAPTIC_STAGES;
 use stylet_runtime::rt::pin::{Pin, PinError};
+use stylet_runtime::rt::second::SECOND_STAGES;
 use stylet_runtime::rt::timing::{PoseTimes, Probe, Probes};
 use stylet_runtime::rt::tissue::TISSUE_STAGES;
 use stylet_sim::scene::{Scene, SceneError};
@@ -82,6 +83,8 @@ pub struct Measured {
     pub run: RunReport,
     pub haptic: LoopTiming,
     pub tissue: LoopTiming,
+    /// The loop of the second device, where the run has one.
+    pub second: Option<LoopTiming>,
     pub host: HostReport,
     pub gaps: GapReport,
     pub cores: Vec<CoreWatch>,
@@ -115,10 +118,10 @@ fn plan(period_ns: u64, duration_ns: u64, window_ns: u64) -> Plan {
 /// A core for the gap watch: one that no loop uses, else that of the tissue loop.
 fn watch_core(options: &Options) -> Option<usize> {
     let cores = core_affinity::get_core_ids().unwrap_or_default();
-    let free = cores
-        .iter()
-        .map(|c| c.id)
-        .find(|&id| Some(id) != options.haptic_core && Some(id) != options.tissue_core);
+    let free = cores.iter().map(|c| c.id).find(|&id| {
+        let second = options.second.as_ref().and_then(|second| second.core);
+        ![options.haptic_core, options.tissue_core, second].contains(&Some(id))
+    });
     free.or(options.tissue_core)
 }
 
@@ -130,11 +133,13 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
     let ring = |period_ns| rtrb::RingBuffer::new((RING_NS / period_ns) as usize);
     let (haptic_in, haptic_ring) = ring(options.haptic_period_ns);
     let (tissue_in, tissue_ring) = ring(TISSUE_PERIOD_NS);
+    let (second_in, second_ring) = options.second.as_ref().map(|second| ring(second.period_ns)).unzip();
     // The loops' threads are started by this one and inherit the right to the pin.
     let toggle = setup.toggle.map(Pin::acquire).transpose()?;
     let probes = Probes {
         haptic: Probe::new(haptic_in, Arc::clone(&pose_times)).with_toggle(toggle),
         tissue: Probe::new(tissue_in, Arc::clone(&pose_times)),
+        second: second_in.map(|into| Probe::new(into, Arc::clone(&pose_times))),
     };
     let window_ns = setup
         .checkpoints
@@ -144,6 +149,10 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         plan(options.haptic_period_ns, setup.duration_ns, window_ns),
     );
     let tissue = LoopTiming::new(TISSUE_STAGES, plan(TISSUE_PERIOD_NS, setup.duration_ns, window_ns));
+    let second = options.second.as_ref().zip(second_ring).map(|(second, ring)| {
+        let plan = plan(second.period_ns, setup.duration_ns, window_ns);
+        (LoopTiming::new(SECOND_STAGES, plan), ring)
+    });
     let machine = Machine::this();
     let priority = (!options.no_rt).then(|| {
         options
@@ -151,7 +160,12 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
             .saturating_sub(WATCH_PRIORITY_BELOW_TISSUE)
             .max(1)
     });
-    let (core, watched) = (watch_core(options), [options.haptic_core, options.tissue_core]);
+    let second_core = options.second.as_ref().and_then(|second| second.core);
+    let second_core = second_core.filter(|&core| ![options.haptic_core, options.tissue_core].contains(&Some(core)));
+    let (core, watched) = (
+        watch_core(options),
+        [options.haptic_core, options.tissue_core, second_core],
+    );
     let stop = Arc::new(AtomicBool::new(false));
     let mut load = Running::start(setup.load, &options.instance, setup.folder)?;
     let traced = setup.trace_over_ns.zip(options.haptic_core);
@@ -163,7 +177,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         over_ns,
     });
     let instance = tracing.as_ref().map(|_| trace::Instance::start());
-    let (run, host, gaps, cores, trace, haptic, tissue) = std::thread::scope(|threads| {
+    let (run, host, gaps, cores, trace, haptic, tissue, second) = std::thread::scope(|threads| {
         let stop = &stop;
         let trace = tracing
             .as_ref()
@@ -179,6 +193,8 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         let host = threads.spawn(|| {
             let warm_up = warm_up_ticks(options.haptic_period_ns);
             let host = Host::new(&options.instance, script, pose_times, warm_up);
+            let moves_second = options.second.is_some();
+            let host = host.map(|host| host.with_second(moves_second));
             let report = host.and_then(|h| h.run(setup.duration_ns, || interrupted.load(Ordering::Acquire), stop));
             // SYNC: pairs with the acquire loads of bridge and watches; nothing but the flag is carried.
             stop.store(true, Ordering::Release);
@@ -190,6 +206,8 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         };
         let haptic = threads.spawn(move || gathered(haptic, haptic_ring, "force"));
         let tissue = threads.spawn(move || gathered(tissue, tissue_ring, "tissue"));
+        // A campaign keeps the two loops that every run has.
+        let second = second.map(|(timing, ring)| threads.spawn(move || timing.gather(ring)));
         let gaps = threads.spawn(move || gaps::watch(core, priority, stop));
         let machine = &machine;
         let cores: Vec<_> = watched
@@ -201,9 +219,10 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         stop.store(true, Ordering::Release);
         let cores: Vec<CoreWatch> = cores.into_iter().filter_map(|t| t.join().ok()).collect();
         let (haptic, tissue) = (haptic.join(), tissue.join());
+        let second = second.map(|thread| thread.join());
         // It ends with the gathering of the force loop.
         let trace = trace.map(|started| started.map_or_else(Ok, |thread| thread.join()));
-        (run, host.join(), gaps.join(), cores, trace, haptic, tissue)
+        (run, host.join(), gaps.join(), cores, trace, haptic, tissue, second)
     });
     // A window that could not open draws nothing.
     let loaded = load.ended();
@@ -217,6 +236,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         run,
         haptic: haptic.map_err(panicked)?,
         tissue: tissue.map_err(panicked)?,
+        second: second.transpose().map_err(panicked)?,
         host: host.map_err(panicked)??,
         gaps: gaps.map_err(panicked)?,
         cores,

@@ -183,6 +183,10 @@ pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
     for (role, core) in [
         ("force loop", options.haptic_core),
         ("tissue step", options.tissue_core),
+        (
+            "second device's loop",
+            options.second.as_ref().and_then(|second| second.core),
+        ),
     ] {
         let Some(core) = core else { continue };
         add(
@@ -285,6 +289,9 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
     };
     thread("haptic", &run.haptic);
     thread("tissue", &run.tissue);
+    if let Some(second) = &run.second {
+        thread("second", second);
+    }
     let status = machine.text("proc/self/status").unwrap_or_default();
     let locked = status
         .lines()
@@ -323,8 +330,8 @@ pub fn unqualified(machine: &Machine, run: &RunReport) -> Vec<String> {
     if let Some(name) = machine.hypervisor() {
         reasons.push(format!("virtual machine ({name})"));
     }
-    let fifo = run.haptic.thread.is_fifo() && run.tissue.thread.is_fifo();
-    if !fifo {
+    let loops = [&run.haptic, &run.tissue].into_iter().chain(&run.second);
+    if !loops.into_iter().all(|report| report.thread.is_fifo()) {
         reasons.push("the loops ran without SCHED_FIFO".to_owned());
     }
     if !run.memory_locked {

@@ -39,6 +39,9 @@ pub struct Protocol {
     pub load_is: String,
     pub rate_hz: f64,
     pub tissue_rate_hz: f64,
+    /// Of the second device's loop, in a run that has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_rate_hz: Option<f64>,
     pub duration_s: f64,
     pub measured_s: f64,
     pub warm_up_s: f64,
@@ -152,6 +155,9 @@ pub struct Report {
     pub environment: Environment,
     pub haptic: LoopSection,
     pub tissue: LoopSection,
+    /// The loop of the second device, in a run that has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second: Option<LoopSection>,
     pub host: HostSection,
     pub stiffness: StiffnessSection,
     pub windows: Vec<WindowRow>,

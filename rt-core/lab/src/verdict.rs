@@ -251,11 +251,21 @@ fn percentile(histogram: &Histogram<u64>, quantile: f64) -> Read {
 
 fn read(reading: Reading, m: &Measured, period_ns: u64) -> Read {
     let (haptic, tissue) = (&m.haptic, &m.tissue);
+    let second = m.run.second.as_ref().zip(m.second.as_ref());
+    let second = second.map(|(run, timing)| ("second", run, timing));
     let loops = [("haptic", &m.run.haptic, haptic), ("tissue", &m.run.tissue, tissue)];
     let counted = |what: fn(&LoopReport, &LoopTiming) -> i64| -> Read {
-        let counts = loops.map(|(name, run, timing)| (name, what(run, timing), run.ticks));
-        let said = counts.map(|(name, n, ticks)| format!("{name} {n} in {ticks} ticks"));
-        (Some(counts.iter().map(|c| c.1 as f64).sum()), said.join(", "))
+        let all = loops.into_iter().chain(second);
+        let counts: Vec<_> = all
+            .map(|(name, run, timing)| (name, what(run, timing), run.ticks))
+            .collect();
+        let said = counts
+            .iter()
+            .map(|(name, n, ticks)| format!("{name} {n} in {ticks} ticks"));
+        (
+            Some(counts.iter().map(|c| c.1 as f64).sum()),
+            said.collect::<Vec<_>>().join(", "),
+        )
     };
     let of_ticks = |n: u64| (Some(n as f64), format!("{} ticks", haptic.ticks));
     match reading {

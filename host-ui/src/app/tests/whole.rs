@@ -9,7 +9,7 @@ use crate::shown::{LoadState, Note, Shown, Watched};
 use bytemuck::Zeroable;
 use stylet_host::link::LinkStatus;
 use stylet_procedure::{Step, Waiting, WaitsFor};
-use stylet_shm_schema::{Fault, Relayed, Text, TickRecord, flags};
+use stylet_shm_schema::{Fault, Relayed, SecondState, Text, TickRecord, flags};
 use stylet_shm_schema::{LeftNeedlePose, MAX_LEFT_NEEDLES};
 
 pub type State = (&'static str, fn(&mut App));
@@ -64,6 +64,17 @@ pub const STATES: &[State] = &[
         app.shown.status = LinkStatus::Silent {
             since: std::time::Duration::from_secs(12_345),
         };
+    }),
+    ("second device is lost", |app| {
+        app.shown = one_needle(0.03, 2);
+        second_device(&mut app.shown, Fault::DeviceNotCalibrated);
+    }),
+    ("second device stands still", |app| {
+        app.shown = one_needle(0.03, 2);
+        second_device(&mut app.shown, Fault::None);
+        if let Some(state) = &mut app.shown.state {
+            state.time_ns = 10_000_000_000;
+        }
     }),
     ("recording", |app| recorded(app, one_needle(0.03, 2), false)),
     ("recording with the guide", |app| {
@@ -251,6 +262,17 @@ fn without_line(more: u32) -> Shown {
         state.flags = flags::REAL_TIME | flags::ENGAGED | flags::IN_CONTACT | flags::LINE_NEEDED | more;
     }
     shown
+}
+
+fn second_device(shown: &mut Shown, fault: Fault) {
+    let mut second = SecondState::zeroed();
+    (second.tick, second.fault, second.world_from_tool) = (1, fault as u32, [0.0, 0.0, 0.0, 1.0]);
+    second.tip_in_scene_m = [0.05, 0.02, 0.0];
+    shown.second = Some(second);
+    if let Some(session) = &mut shown.session {
+        session.second_period_ns = 1_000_000;
+        session.second_device = Text::new("Geomagic Touch X, serial number 12345678901234567890, firmware 2");
+    }
 }
 
 fn every_banner(shown: &mut Shown) {

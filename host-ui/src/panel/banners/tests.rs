@@ -203,3 +203,39 @@ fn fault_comes_first_and_an_unknown_one_is_a_fault() {
     assert_eq!(list[0].level, BannerLevel::Bad);
     assert_eq!(list[1].title, "Not real-time");
 }
+
+#[test]
+fn a_second_device_that_is_lost_or_stands_still_has_a_banner_of_its_own() {
+    let mut shown = live();
+    let mut session = stylet_shm_schema::Session::zeroed();
+    session.second_period_ns = 1_000_000;
+    shown.session = Some(session);
+    assert_eq!(banners(&shown).len(), 0, "nothing is known of it yet");
+    let mut second = stylet_shm_schema::SecondState::zeroed();
+    second.flags = flags::ENGAGED;
+    shown.second = Some(second);
+    assert_eq!(banners(&shown).len(), 0);
+    second.fault = Fault::DeviceLost as u32;
+    shown.second = Some(second);
+    let list = banners(&shown);
+    assert_eq!(list.len(), 1);
+    assert!(
+        list[0].title.contains("Second device") && list[0].text.contains("not connected"),
+        "{list:?}"
+    );
+    assert_eq!(list[0].remedy.as_ref().map(|r| r.0), Some("Re-arm both"));
+    // The needle's own device has nothing wrong.
+    second.fault = 0;
+    shown.second = Some(second);
+    if let Some(state) = &mut shown.state {
+        state.time_ns = 1_000_000_000;
+    }
+    let list = banners(&shown);
+    assert!(
+        list.len() == 1 && list[0].text.contains("stands still") && list[0].remedy.is_none(),
+        "{list:?}"
+    );
+    // A run without one says nothing of it.
+    shown.session = None;
+    assert!(banners(&shown).is_empty());
+}

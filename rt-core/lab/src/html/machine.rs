@@ -2,38 +2,34 @@
 
 use super::parts::{Column, cell, count, num, or_na, table};
 use crate::bound::MissBound;
-use crate::report::Report;
+use crate::report::{LoopCounts, Report};
 use maud::{Markup, html};
 
 const COUNTS: [Column; 4] = [Column::Text, Column::Number, Column::Number, Column::Number];
 
 pub fn counters(r: &Report) -> Markup {
-    let (h, t) = (&r.haptic.counts, &r.tissue.counts);
-    let rows = [
-        ("ticks", h.ticks as f64, t.ticks as f64),
-        ("missed deadlines", h.missed_deadlines as f64, t.missed_deadlines as f64),
-        ("overruns", h.overruns as f64, t.overruns as f64),
-        ("ticks not measured", h.unmeasured as f64, t.unmeasured as f64),
-        ("heap calls", h.heap_calls as f64, t.heap_calls as f64),
-        ("minor page faults", h.minor_faults as f64, t.minor_faults as f64),
-        ("major page faults", h.major_faults as f64, t.major_faults as f64),
-        (
-            "voluntary context switches",
-            h.voluntary_switches as f64,
-            t.voluntary_switches as f64,
-        ),
-        (
-            "... beyond one for each sleep",
-            h.voluntary_switches_beyond_sleep as f64,
-            t.voluntary_switches_beyond_sleep as f64,
-        ),
-        (
-            "involuntary context switches",
-            h.involuntary_switches as f64,
-            t.involuntary_switches as f64,
-        ),
+    let of: [(&str, fn(&LoopCounts) -> f64); 10] = [
+        ("ticks", |c| c.ticks as f64),
+        ("missed deadlines", |c| c.missed_deadlines as f64),
+        ("overruns", |c| c.overruns as f64),
+        ("ticks not measured", |c| c.unmeasured as f64),
+        ("heap calls", |c| c.heap_calls as f64),
+        ("minor page faults", |c| c.minor_faults as f64),
+        ("major page faults", |c| c.major_faults as f64),
+        ("voluntary context switches", |c| c.voluntary_switches as f64),
+        ("... beyond one for each sleep", |c| {
+            c.voluntary_switches_beyond_sleep as f64
+        }),
+        ("involuntary context switches", |c| c.involuntary_switches as f64),
     ];
-    let rows = rows.map(|(what, haptic, tissue)| vec![cell(what), count(haptic), count(tissue)]);
+    let loops = [&r.haptic, &r.tissue].into_iter().chain(&r.second);
+    let loops: Vec<_> = loops.map(|section| &section.counts).collect();
+    let rows = of.map(|(what, read)| {
+        let counts = loops.iter().map(|counts| count(read(counts)));
+        std::iter::once(cell(what)).chain(counts).collect::<Vec<_>>()
+    });
+    let names = ["from arming to the end", "force loop", "tissue loop", "second device"];
+    let names = &names[..=loops.len()];
     let cores: Vec<Vec<Markup>> = r
         .cores
         .iter()
@@ -49,11 +45,14 @@ pub fn counters(r: &Report) -> Markup {
     html! {
         h2 { "Counters" }
         div class="pair" {
-            (table(&["from arming to the end", "force loop", "tissue loop"], &rows, &COUNTS))
+            (table(names, &rows, &COUNTS))
             (table(&["core", "MHz", "steal time, s", "interrupts served"], &cores, &COUNTS))
         }
         (miss_bound("Force loop", &r.haptic.miss_bound))
         (miss_bound("Tissue loop", &r.tissue.miss_bound))
+        @if let Some(second) = &r.second {
+            (miss_bound("Loop of the second device", &second.miss_bound))
+        }
     }
 }
 

@@ -41,6 +41,13 @@ pub fn report(parts: &Parts) -> Report {
     let period_ns = options.haptic_period_ns;
     let rate_hz = 1e9 / period_ns as f64;
     let tissue_rate_hz = 1e9 / stylet_runtime::rt::clock::TISSUE_PERIOD_NS as f64;
+    let second_rate_hz = options.second.as_ref().map(|second| 1e9 / second.period_ns as f64);
+    let second = measured
+        .run
+        .second
+        .as_ref()
+        .zip(measured.second.as_ref())
+        .zip(second_rate_hz);
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let unqualified = provenance::unqualified(parts.machine, &measured.run);
     let limits = verdict::evaluate(parts.limits, measured, period_ns, &unqualified);
@@ -62,6 +69,7 @@ pub fn report(parts: &Parts) -> Report {
             load_is: parts.load.describe(cores),
             rate_hz,
             tissue_rate_hz,
+            second_rate_hz,
             duration_s: parts.duration_ns as f64 / 1e9,
             measured_s: parts.measured.haptic.measured_ns() as f64 / 1e9,
             warm_up_s: WARM_UP_S,
@@ -85,6 +93,14 @@ pub fn report(parts: &Parts) -> Report {
             tissue_rate_hz,
             ["tip moved to response published", "due to response published"],
         ),
+        second: second.map(|((run, timing), rate_hz)| {
+            loop_section(
+                run,
+                timing,
+                rate_hz,
+                ["device read to force written", "due to force written"],
+            )
+        }),
         host: HostSection {
             times: vec![
                 summary("tip moved to host saw it", &host.tip_to_host, tissue_rate_hz),

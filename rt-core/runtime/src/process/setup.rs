@@ -200,8 +200,12 @@ impl Body {
         haptic.wait = options.wait;
         let period_s = seconds(TISSUE_PERIOD_NS);
         let mut tissue = TissueLoop::new(session_id, wiring.tissue, self.world, period_s);
+        let mut second = second;
         tissue.phase_ns = clock::phase_ns(TISSUE_PHASE, options.haptic_period_ns);
         if let Some(probes) = probes {
+            if let Some(second) = &mut second {
+                second.own.probe = probes.second.map(Box::new);
+            }
             haptic.probe = Some(Box::new(probes.haptic));
             tissue.probe = Some(Box::new(probes.tissue));
         }

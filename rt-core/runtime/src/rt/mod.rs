@@ -15,6 +15,7 @@
 pub mod arm;
 #[cfg(test)]
 pub(crate) mod breaking;
+pub mod capacities;
 pub mod clock;
 pub mod contact;
 pub mod device_loop;
@@ -26,6 +27,7 @@ pub mod left_loads;
 pub mod line_loads;
 pub mod pin;
 pub mod pose;
+pub mod put_in;
 pub mod recorder;
 pub mod response;
 pub mod second;

@@ -152,8 +152,10 @@ impl Probe {
     }
 }
 
-/// Both loops' probes.
+/// Every loop's probe.
 pub struct Probes {
+    /// For the loop of the second device, where the run has one.
+    pub second: Option<Probe>,
     /// For the force loop.
     pub haptic: Probe,
     /// For the tissue loop.

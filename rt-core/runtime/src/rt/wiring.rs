@@ -1,5 +1,6 @@
 //! Every ring and triple buffer between the two loops and the bridge: made here, in one call, and nowhere else.
 
+pub use crate::rt::capacities::Capacities;
 use crate::rt::exchange::{HapticOrder, Notice, SnapshotReturn, SnapshotSlot, TissueOrder};
 use crate::rt::haptic_tape::HapticTape;
 use crate::rt::line_loads::AllLoads;
@@ -12,40 +13,6 @@ use crate::rt::world::World;
 use stylet_shm_schema::TickRecord;
 use stylet_sim::line::{BodyLine, HandLine, LeftNeedles, MAX_LEFT};
 use stylet_sim::probe::BodyProbe;
-
-/// Places in each ring, all at least one.
-#[derive(Clone, Copy, Debug)]
-pub struct Capacities {
-    /// Records of the force loop.
-    pub records: usize,
-    /// Orders to each loop.
-    pub orders: usize,
-    /// Notices from each loop.
-    pub notices: usize,
-    /// Scenes that the tissue loop has replaced.
-    pub old_worlds: usize,
-    /// Snapshot slots in each direction.
-    pub snapshots: usize,
-}
-
-impl Capacities {
-    /// A run: the bridge may be late by four seconds of records.
-    pub const RUN: Self = Self {
-        records: 4096,
-        orders: 256,
-        notices: 1024,
-        old_worlds: 8,
-        snapshots: 32,
-    };
-    /// Loops that are stepped on one thread: whoever steps them empties the rings after each tick.
-    pub const STEPPED: Self = Self {
-        records: 16,
-        orders: 16,
-        notices: 64,
-        old_worlds: 1,
-        snapshots: 1,
-    };
-}
 
 /// Lines on their way in each direction; the bridge frees what has come back before it sends another.
 const LINES: usize = 2;

@@ -2,9 +2,9 @@
 
 use super::response::ProbeResponse;
 use super::tape::SecondTape;
+use crate::rt::capacities::Capacities;
 use crate::rt::exchange::{Notice, Ticket};
 use crate::rt::recorder::{Recorder, TapePort, recorder};
-use crate::rt::wiring::Capacities;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use stylet_hw::HandGoal;

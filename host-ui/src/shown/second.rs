@@ -1,0 +1,77 @@
+//! The other hand, as the window shows it: only in a run with a second device.
+
+use super::Shown;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use stylet_shm_schema::{Fault, flags};
+
+/// Its loop writes its state each tick; one so much older than the needle's says that it stands still.
+const STANDS_STILL_NS: u64 = 250_000_000;
+
+/// How the second device is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SecondHand {
+    /// The run has one and nothing is known of it yet.
+    Unknown,
+    /// Its force is off because of a fault; `None` for one that this program does not know.
+    Faulty(Option<Fault>),
+    /// Its force is off.
+    Off,
+    /// Its force is on.
+    On,
+}
+
+impl Shown {
+    /// Nothing in a run without a second device.
+    pub fn second_hand(&self) -> Option<SecondHand> {
+        self.session.filter(|session| session.has_second())?;
+        let Some(second) = &self.second else {
+            return Some(SecondHand::Unknown);
+        };
+        // A recording has states of the needle's hand now and then, and every tick of this one.
+        let is_late = self.watched.is_none()
+            && self
+                .state
+                .is_some_and(|state| state.time_ns.saturating_sub(second.time_ns) > STANDS_STILL_NS);
+        Some(match Fault::from_number(second.fault) {
+            _ if is_late => SecondHand::Faulty(Some(Fault::LoopStopped)),
+            Some(Fault::None) if second.flags & flags::ENGAGED != 0 => SecondHand::On,
+            Some(Fault::None) => SecondHand::Off,
+            fault => SecondHand::Faulty(fault),
+        })
+    }
+
+    /// Tip of what the other hand holds, m.
+    pub fn second_tip_m(&self) -> Option<[f64; 3]> {
+        self.second
+            .filter(|second| second.tick > 0)
+            .map(|second| second.tip_in_scene_m)
+    }
+
+    /// Unit vector along what the other hand holds, towards its tip.
+    pub fn second_axis(&self) -> Option<[f64; 3]> {
+        let [i, j, k, w] = self.second.filter(|second| second.tick > 0)?.world_from_tool;
+        let turn = UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 1e-6)?;
+        Some((turn * Vector3::z()).into())
+    }
+
+    /// Its tip, and where it ends towards the hand when it is so long.
+    pub fn second_tool_m(&self, length_m: f64) -> Option<[[f64; 3]; 2]> {
+        let (tip, axis) = (self.second_tip_m()?, self.second_axis()?);
+        Some([tip, [0, 1, 2].map(|a| tip[a] - axis[a] * length_m)])
+    }
+
+    /// Name, place, force and deadlines, for whoever points at its badge.
+    pub fn second_words(&self) -> Option<String> {
+        let (session, second) = (self.session.as_ref()?, self.second.as_ref()?);
+        let force_n = second.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt();
+        let [x, y, z] = second.tip_in_scene_m.map(stylet_base::format::mm);
+        Some(format!(
+            "{}, {}\nat {x:.1}, {y:.1}, {z:.1} mm\nforce {force_n:.2} N of {:.1} N, peak {:.2} N\n{} deadlines missed",
+            session.second_device.read(),
+            stylet_base::format::rate(session.second_period_ns),
+            second.device_limit_n,
+            second.peak_force_n,
+            second.missed_deadlines
+        ))
+    }
+}

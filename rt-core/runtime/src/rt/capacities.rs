@@ -1,0 +1,35 @@
+//! How much each ring between the loops and the bridge holds.
+
+/// Places in each ring, all at least one.
+#[derive(Clone, Copy, Debug)]
+pub struct Capacities {
+    /// Records of the force loop.
+    pub records: usize,
+    /// Orders to each loop.
+    pub orders: usize,
+    /// Notices from each loop.
+    pub notices: usize,
+    /// Scenes that the tissue loop has replaced.
+    pub old_worlds: usize,
+    /// Snapshot slots in each direction.
+    pub snapshots: usize,
+}
+
+impl Capacities {
+    /// A run: the bridge may be late by four seconds of records.
+    pub const RUN: Self = Self {
+        records: 4096,
+        orders: 256,
+        notices: 1024,
+        old_worlds: 8,
+        snapshots: 32,
+    };
+    /// Loops that are stepped on one thread: whoever steps them empties the rings after each tick.
+    pub const STEPPED: Self = Self {
+        records: 16,
+        orders: 16,
+        notices: 64,
+        old_worlds: 1,
+        snapshots: 1,
+    };
+}
