@@ -2,6 +2,7 @@
 
 use crate::app;
 use crate::command::CommandError;
+use crate::command::class::ClassArgs;
 use crate::command::compare::CompareArgs;
 use crate::command::convert::ConvertArgs;
 use crate::command::dicom::DicomArgs;
@@ -10,18 +11,18 @@ use crate::command::find_seeds::FindSeedsArgs;
 use crate::command::perturb::PerturbArgs;
 use crate::command::plan::PlanArgs;
 use crate::command::post_implant::PostImplantArgs;
+use crate::command::scene;
 use crate::command::study::StudyArgs;
 use clap::{CommandFactory, Parser, Subcommand};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
-use stylet_base::format::printable;
 use stylet_base::interrupt;
 use stylet_controllers as controller;
-use stylet_files as files;
 use stylet_host::core_args::CoreArgs;
 use stylet_host::record;
+use stylet_host::roster::Trainee;
+use stylet_implant::class;
 use stylet_implant::procedure;
-use stylet_implant::readers::{SeedDefaults, read_seeds};
 use stylet_manual::ManualArgs;
 use stylet_shm_schema::service::Instance;
 use stylet_shm_schema::{MAX_LEFT_NEEDLES, ParameterChange};
@@ -61,6 +62,16 @@ pub struct Cli {
     /// Show a square in the lower right corner that turns from dark to light or back when the tip has moved by 0.5 mm, for a photodiode
     #[arg(long)]
     patch: bool,
+    /// Show a trainee in a list, with the instance of their rt-core or of a 'relay join'; may be given several times, and the first is
+    /// followed
+    #[arg(long = "trainee", value_name = "NAME=INSTANCE", value_parser = trainee)]
+    trainees: Vec<Trainee>,
+    /// Write a debrief into DIR/NAME/DATE at the end of each procedure, for 'host-ui class'
+    #[arg(long, value_name = "DIR")]
+    class: Option<PathBuf>,
+    /// Who sits at this window, for --class [default: the instance; of a list, whoever is followed]
+    #[arg(long, value_name = "NAME", requires = "class", value_parser = name)]
+    name: Option<String>,
     #[command(subcommand)]
     task: Option<Task>,
 }
@@ -174,6 +185,8 @@ enum Task {
     Perturb(PerturbArgs),
     /// Distributions and dose of the insertions that `rt-core study` simulated, beside published values
     Study(StudyArgs),
+    /// Trainees of a class beside each other, and what each has learned: a page and a table
+    Class(ClassArgs),
     /// Write the man pages and shell completions of this program
     Manual(ManualArgs),
 }
@@ -205,7 +218,8 @@ impl Cli {
                 if self.image.is_some() && self.window.file().is_none() {
                     return Err("--image belongs to a patient: give the segmentation with --scene FILE".into());
                 }
-                let instance = self.window.instance;
+                let first = self.trainees.first().map(|trainee| trainee.instance.clone());
+                let instance = first.unwrap_or(self.window.instance);
                 let ended = app::run(app::Options {
                     instance: instance.clone(),
                     scene: self.window.scene,
@@ -216,12 +230,15 @@ impl Cli {
                     pause: !self.without_pause,
                     count_frames: self.count_frames,
                     patch: self.patch,
+                    trainees: self.trainees,
+                    class: self.class,
+                    name: self.name.unwrap_or_else(|| instance.name().to_owned()),
                 });
                 instance.sweep();
                 Ok(ended?)
             }
             Some(Task::Controllers) => Ok(controller::list()?),
-            Some(Task::Scene(SceneTask::Check { file, label })) => check(&file, label),
+            Some(Task::Scene(SceneTask::Check { file, label })) => scene::check(&file, label),
             Some(Task::Record {
                 instance,
                 out,
@@ -282,6 +299,7 @@ impl Cli {
             Some(Task::Dose(args)) => args.run(),
             Some(Task::Perturb(args)) => args.run(),
             Some(Task::Study(args)) => args.run(),
+            Some(Task::Class(args)) => args.run(),
             Some(Task::Manual(args)) => Ok(args.run(Self::command())?),
             Some(Task::Procedure {
                 common,
@@ -317,84 +335,17 @@ impl Cli {
     }
 }
 
-fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
-    let v = files::watched(file, |progress| files::read(file, label, progress))?;
-    println!("{}", printable(&v.name));
-    if files::scene::is_scene(file) {
-        check_scene_file(file)?;
+fn name(text: &str) -> Result<String, String> {
+    match class::is_name(text) {
+        true => Ok(text.to_owned()),
+        false => Err("a name is 1 to 60 letters, digits, spaces, '-', '_' or '.', and begins with no '.'".to_owned()),
     }
-    for (label, voxels) in &v.voxels_per_label {
-        println!("  label {label}: {voxels} voxels");
-    }
-    let h_mm = v.spacing_m * 1e3;
-    println!(
-        "  sent as {} x {} x {} cells of {h_mm:.3} mm, {:.2} MiB",
-        v.dims[0],
-        v.dims[1],
-        v.dims[2],
-        v.cells.len() as f64 / f64::from(1 << 20)
-    );
-    println!(
-        "  tissue: {} elements, {:.2} cm3",
-        v.tissue_elements(),
-        v.tissue_elements() as f64 * (h_mm / 10.0).powi(3)
-    );
-    for t in &v.structures {
-        let cells = v.cells.iter().filter(|&&c| c == t.label).count();
-        println!(
-            "  {} (label {}, {:?}): {cells} elements, {:.2} cm3, {} kPa{}",
-            printable(&t.name),
-            t.label,
-            t.role,
-            cells as f64 * (h_mm / 10.0).powi(3),
-            t.material.young_pa / 1e3,
-            if t.material.fixed { ", fixed" } else { "" }
-        );
-    }
-    let p = v.patient.to_wire();
-    println!("  patient (RAS, mm) from scene:");
-    for r in 0..3 {
-        println!(
-            "    {:8.4} {:8.4} {:8.4}  {:9.3}",
-            p[3 * r],
-            p[3 * r + 1],
-            p[3 * r + 2],
-            p[9 + r] * 1e3
-        );
-    }
-    for warning in &v.warnings {
-        println!("  note: {}", printable(warning));
-    }
-    Ok(())
 }
 
-/// Prints what a scene file holds besides its volume; its plan is read.
-fn check_scene_file(file: &Path) -> Result<(), CommandError> {
-    let scene = files::scene::read(file)?;
-    let plan = scene
-        .plan
-        .as_ref()
-        .map(|plan| file.parent().unwrap_or(Path::new("")).join(plan));
-    if let Some(path) = plan.as_ref().filter(|p| files::scene::is_scene(p)) {
-        println!("  plan: {}, read when there is a scene", path.display());
-    } else if let Some(path) = plan {
-        let seeds = read_seeds(
-            &path,
-            SeedDefaults {
-                strength_u: Some(0.0),
-                ..SeedDefaults::default()
-            },
-        )?;
-        println!("  plan: {} seeds in {}", seeds.len(), path.display());
-    }
-    if let Some(named) = &scene.image {
-        let path = file.with_file_name(named);
-        let image = files::watched(&path, |progress| files::Image::read(&path, progress))?;
-        let [x, y, z] = image.dims;
-        println!("  image: {x} x {y} x {z} voxels in {}", path.display());
-    }
-    if let Some(device) = &scene.device {
-        println!("  device: {device}, for an rt-core that host-ui starts");
-    }
-    Ok(())
+fn trainee(text: &str) -> Result<Trainee, String> {
+    let (who, instance) = text.split_once('=').ok_or("give NAME=INSTANCE, such as Otto=seat-1")?;
+    Ok(Trainee {
+        name: name(who)?,
+        instance: Instance::new(instance).map_err(|e| e.to_string())?,
+    })
 }

@@ -96,6 +96,7 @@ impl App {
             Action::CancelLoad => self.cancel_load(),
             Action::PickFile(purpose) => self.pick_file(purpose),
             Action::StopRun => self.stop_run(),
+            Action::Trainee(action) => self.act_on_trainees(action),
             Action::Watch(action) => self.act_on_recording(action),
             _ if self.watches() => {
                 self.shown.note = Some(refusal("This is a recording: close it to move the needle.".to_owned()));

@@ -5,7 +5,7 @@ use crate::link::{Piece, SceneModel, Snapshot};
 use bytemuck::Zeroable;
 use std::sync::Arc;
 use stylet_shm_schema::{
-    Event, HapticState, ParameterId, ParameterSet, ParametersInForce, PlanInForce, SceneHeader, Session,
+    Event, EventKind, HapticState, ParameterId, ParameterSet, ParametersInForce, PlanInForce, SceneHeader, Session,
     SnapshotHeader, Text, TickRecord,
 };
 
@@ -86,6 +86,13 @@ fn scene() -> SceneModel {
     SceneModel::new(header, rest_m, vec![[0, 1, 2]], vec![0, 1, 2, 1, 2])
 }
 
+fn marked() -> Event {
+    let mut event = Event::zeroed();
+    (event.session_id, event.sequence, event.time_ns, event.tick) = (1, 9, 1_000_000 * 15, 15);
+    (event.kind, event.value, event.text) = (EventKind::Mark as u32, 1.0 / 3.0, Text::new("left lobe, é"));
+    event
+}
+
 /// What one run of a core said, with numbers that decimal fractions do not have.
 fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
     let tick = |tick: u64| TickRecord {
@@ -111,6 +118,7 @@ fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
         ..SnapshotHeader::default()
     };
     header.seeds[0].position_m = [0.01, 0.02, 1.0 / 7.0];
+    header.body_moved_m = [1e-3 / 3.0, 0.0, -2e-3];
     (header.bend_count, header.bend_spacing_m) = (2, 5e-3);
     header.bend_m[..2].copy_from_slice(&[[1.0 / 3.0 * 1e-3, 0.0, 0.0], [1e-4, -1e-5, 0.0]]);
     let surface_m = vec![[0.1, 0.2, 0.300_001], [0.333, 0.0, 0.0], [0.0, 0.7, 0.0]];
@@ -131,6 +139,7 @@ fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
         Item::Records((10..30).map(tick).collect()),
         Item::State(Box::new(state)),
         Item::Snapshot(Box::new(snapshot.clone())),
+        Item::Event(Box::new(marked())),
     ];
     (items, tick(29), state, snapshot)
 }
@@ -153,7 +162,7 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
     let _removed = std::fs::remove_file(&path);
     assert_eq!((played.session.session_id, played.cut_off.as_deref()), (1, None));
     assert_eq!(played.session.device.read(), "hand");
-    let mut kinds = [0; 6];
+    let mut kinds = [0; 7];
     for (time_ns, piece) in &played.pieces {
         match piece {
             Piece::Tick(tick) => {
@@ -161,6 +170,12 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
                 assert_eq!(*time_ns, (tick.tick - 10) * 1_000_000);
                 assert!(tick.tick != last.tick || **tick == last);
                 assert!(tick.tip_in_scene_m[2].is_sign_negative());
+            }
+            Piece::Event(event) => {
+                kinds[6] += 1;
+                assert_eq!(*time_ns, 5_000_000, "at the moment that was marked");
+                let (found, sent) = (**event, marked());
+                assert_eq!(bytemuck::bytes_of(&found), bytemuck::bytes_of(&sent));
             }
             Piece::State(found) => {
                 kinds[1] += 1;
@@ -200,7 +215,7 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
             }
         }
     }
-    assert_eq!(kinds, [20, 1, 1, 1, 1, 1]);
+    assert_eq!(kinds, [20, 1, 1, 1, 1, 1, 1]);
     // Cut off or damaged anywhere it ends with a reason or with what came before, and never with a panic.
     for end in (0..bytes.len()).step_by(97) {
         let _ended = played_of(&bytes[..end], &Interrupt::default());

@@ -1,0 +1,90 @@
+//! `host-ui scene check`: what a volume or a scene file holds.
+
+use super::CommandError;
+use std::path::Path;
+use stylet_base::format::printable;
+use stylet_files as files;
+use stylet_implant::readers::{SeedDefaults, read_seeds};
+
+/// Prints what would be sent to rt-core.
+pub fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
+    let v = files::watched(file, |progress| files::read(file, label, progress))?;
+    println!("{}", printable(&v.name));
+    if files::scene::is_scene(file) {
+        check_scene_file(file)?;
+    }
+    for (label, voxels) in &v.voxels_per_label {
+        println!("  label {label}: {voxels} voxels");
+    }
+    let h_mm = v.spacing_m * 1e3;
+    println!(
+        "  sent as {} x {} x {} cells of {h_mm:.3} mm, {:.2} MiB",
+        v.dims[0],
+        v.dims[1],
+        v.dims[2],
+        v.cells.len() as f64 / f64::from(1 << 20)
+    );
+    println!(
+        "  tissue: {} elements, {:.2} cm3",
+        v.tissue_elements(),
+        v.tissue_elements() as f64 * (h_mm / 10.0).powi(3)
+    );
+    for t in &v.structures {
+        let cells = v.cells.iter().filter(|&&c| c == t.label).count();
+        println!(
+            "  {} (label {}, {:?}): {cells} elements, {:.2} cm3, {} kPa{}",
+            printable(&t.name),
+            t.label,
+            t.role,
+            cells as f64 * (h_mm / 10.0).powi(3),
+            t.material.young_pa / 1e3,
+            if t.material.fixed { ", fixed" } else { "" }
+        );
+    }
+    let p = v.patient.to_wire();
+    println!("  patient (RAS, mm) from scene:");
+    for r in 0..3 {
+        println!(
+            "    {:8.4} {:8.4} {:8.4}  {:9.3}",
+            p[3 * r],
+            p[3 * r + 1],
+            p[3 * r + 2],
+            p[9 + r] * 1e3
+        );
+    }
+    for warning in &v.warnings {
+        println!("  note: {}", printable(warning));
+    }
+    Ok(())
+}
+
+/// Prints what a scene file holds besides its volume; its plan is read.
+fn check_scene_file(file: &Path) -> Result<(), CommandError> {
+    let scene = files::scene::read(file)?;
+    let plan = scene
+        .plan
+        .as_ref()
+        .map(|plan| file.parent().unwrap_or(Path::new("")).join(plan));
+    if let Some(path) = plan.as_ref().filter(|p| files::scene::is_scene(p)) {
+        println!("  plan: {}, read when there is a scene", path.display());
+    } else if let Some(path) = plan {
+        let seeds = read_seeds(
+            &path,
+            SeedDefaults {
+                strength_u: Some(0.0),
+                ..SeedDefaults::default()
+            },
+        )?;
+        println!("  plan: {} seeds in {}", seeds.len(), path.display());
+    }
+    if let Some(named) = &scene.image {
+        let path = file.with_file_name(named);
+        let image = files::watched(&path, |progress| files::Image::read(&path, progress))?;
+        let [x, y, z] = image.dims;
+        println!("  image: {x} x {y} x {z} voxels in {}", path.display());
+    }
+    if let Some(device) = &scene.device {
+        println!("  device: {device}, for an rt-core that host-ui starts");
+    }
+    Ok(())
+}
