@@ -220,6 +220,7 @@ impl Cli {
                 }
                 let first = self.trainees.first().map(|trainee| trainee.instance.clone());
                 let instance = first.unwrap_or(self.window.instance);
+                let others: Vec<Instance> = self.trainees.iter().skip(1).map(|t| t.instance.clone()).collect();
                 let ended = app::run(app::Options {
                     instance: instance.clone(),
                     scene: self.window.scene,
@@ -234,6 +235,7 @@ impl Cli {
                     class: self.class,
                     name: self.name.unwrap_or_else(|| instance.name().to_owned()),
                 });
+                others.iter().for_each(Instance::sweep);
                 instance.sweep();
                 Ok(ended?)
             }

@@ -192,7 +192,7 @@ impl App {
     }
 
     /// The needle stays where it is; the force stays as it is.
-    fn stop_run(&mut self) {
+    pub(super) fn stop_run(&mut self) {
         self.end_run();
         self.shown.running = false;
         if let Some(tip) = self.shown.tip_on_path() {

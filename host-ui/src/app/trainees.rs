@@ -27,8 +27,8 @@ pub(super) struct Trainees {
     name: String,
     /// The present implant is done since then.
     done: Option<Instant>,
-    /// Its debrief was written.
-    is_written: bool,
+    /// It was seen while seeds of its plan were missing, and its debrief is not written yet.
+    is_begun: bool,
 }
 
 impl Trainees {
@@ -41,7 +41,7 @@ impl Trainees {
             class,
             name,
             done: None,
-            is_written: false,
+            is_begun: false,
         }
     }
 
@@ -69,23 +69,22 @@ impl App {
     /// Once each implant: every planned seed was dropped, and the needle is out.
     fn write_when_done(&mut self) {
         let rows = all_errors(&self.shown);
-        let is_done = !rows.is_empty()
-            && rows.iter().all(|(_, row)| row.placed.is_some())
-            && !self.shown.is_in_tissue()
-            && self.shown.is_live();
-        if self.shown.seeds.is_empty() {
-            self.trainees.is_written = false;
+        if rows.is_empty() || !self.shown.is_live() {
+            return;
         }
-        if !is_done {
+        let is_whole = rows.iter().all(|(_, row)| row.placed.is_some());
+        // What was done before this window was there is not its own.
+        self.trainees.is_begun |= !is_whole;
+        if !is_whole || self.shown.is_in_tissue() {
             self.trainees.done = None;
             return;
         }
         let since = *self.trainees.done.get_or_insert_with(Instant::now);
-        if since.elapsed() >= RESTS_AFTER && !self.trainees.is_written {
-            self.trainees.is_written = true;
-            if let Some(folder) = self.trainees.folder() {
-                self.save_debrief_as(folder);
-            }
+        if since.elapsed() >= RESTS_AFTER
+            && std::mem::take(&mut self.trainees.is_begun)
+            && let Some(folder) = self.trainees.folder()
+        {
+            self.save_debrief_as(folder);
         }
     }
 
@@ -112,7 +111,7 @@ impl App {
             return;
         }
         self.trainees.followed = Some(number);
-        (self.trainees.done, self.trainees.is_written) = (None, true);
+        (self.trainees.done, self.trainees.is_begun) = (None, false);
         self.shown.instance = trainee.instance.name().to_owned();
         self.planner = Planner::default().keeping_in(PathBuf::from(trainee.instance.root()));
         self.change_link(|_| Link::new(trainee.instance));

@@ -158,7 +158,7 @@ fn row_ui(ui: &mut egui::Ui, number: usize, glance: &Glance, is_followed: bool) 
         Level::Warn => tokens.warn,
         Level::Bad => tokens.bad,
     };
-    let name = ui.selectable_label(is_followed, &glance.trainee.name);
+    let name = ui.selectable_label(is_followed, glance.trainee.name.as_str());
     let key = if number < KEYS {
         format!(" (key F{})", number + 2)
     } else {
