@@ -12,7 +12,6 @@ use stylet_shm_schema::{Fault, flags};
 const SILENT_AFTER: Duration = Duration::from_millis(1500);
 /// Keys follow so many of them: F2 to F9.
 pub const KEYS: usize = 8;
-const HEIGHT: f32 = 320.0;
 
 /// How urgent a line of the list is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,10 +120,7 @@ pub fn trainees_ui(ctx: &egui::Context, glances: &[Glance], followed: Option<usi
     if glances.is_empty() {
         return None;
     }
-    let window = egui::Window::new("Trainees")
-        .resizable(false)
-        .vscroll(true)
-        .max_height(HEIGHT);
+    let window = egui::Window::new("Trainees").auto_sized();
     let shown = window
         .anchor(egui::Align2::LEFT_BOTTOM, [theme::LEFT_WIDTH + 24.0, -24.0])
         .show(ctx, |ui| {

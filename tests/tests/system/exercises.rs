@@ -1,4 +1,4 @@
-//! What an instructor puts in is felt and seen, is announced, and is gone after it was ended.
+//! What an instructor puts in is felt and seen, is announced, and ends when it is asked to.
 
 use std::time::Duration;
 use stylet_host::link::Link;

@@ -1,4 +1,4 @@
-//! Means with intervals where there are enough values, and a trend where one can be told from none.
+//! Means with intervals where there are enough values, and a trend where there is one.
 
 /// Fewer values have no interval.
 const LEAST_FOR_INTERVAL: usize = 3;
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trend_is_shown_only_where_it_can_be_told_from_none() {
+    fn a_trend_is_shown_only_where_its_interval_leaves_out_none() {
         assert_eq!(Trend::of(&[5.0, 4.0, 3.0, 2.0]), None, "too few");
         assert_eq!(Trend::of(&[3.0, 2.0, 3.1, 1.9, 3.0, 2.2]), None, "noise");
         let falls = Trend::of(&[5.0, 4.1, 3.0, 1.9, 1.0]).expect("falls");

@@ -46,6 +46,8 @@ pub struct Figure {
     pub name: &'static str,
     /// Of the table's column.
     pub column: &'static str,
+    /// It counts what seldom happens: an interval of Student's t would be wrong.
+    pub is_count: bool,
     /// Decimals that are shown.
     pub decimals: usize,
     /// Of an attempt, where it has one.
@@ -57,54 +59,63 @@ pub const FIGURES: [Figure; 9] = [
     Figure {
         name: "mean seed error (mm)",
         column: "mean_error_mm",
+        is_count: false,
         decimals: 2,
         of: |a| Some(a.mean_error_mm),
     },
     Figure {
         name: "worst seed error (mm)",
         column: "worst_error_mm",
+        is_count: false,
         decimals: 2,
         of: |a| Some(a.worst_error_mm),
     },
     Figure {
         name: "D90 of the target (% of prescription)",
         column: "d90_percent",
+        is_count: false,
         decimals: 1,
         of: |a| a.d90_percent,
     },
     Figure {
         name: "V100 of the target (%)",
         column: "v100_percent",
+        is_count: false,
         decimals: 1,
         of: |a| a.v100_percent,
     },
     Figure {
         name: "time (min)",
         column: "time_min",
+        is_count: false,
         decimals: 1,
         of: |a| Some(a.duration_s / 60.0),
     },
     Figure {
         name: "peak force (N)",
         column: "peak_force_n",
+        is_count: false,
         decimals: 1,
         of: |a| Some(a.peak_force_n),
     },
     Figure {
         name: "seeds lost",
         column: "seeds_lost",
+        is_count: true,
         decimals: 1,
         of: |a| Some(a.seeds[1] as f64),
     },
     Figure {
         name: "stops by the instructor",
         column: "stops",
+        is_count: true,
         decimals: 1,
         of: |a| Some(a.stops as f64),
     },
     Figure {
         name: "faults",
         column: "faults",
+        is_count: true,
         decimals: 1,
         of: |a| Some(a.faults as f64),
     },

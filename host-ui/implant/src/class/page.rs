@@ -13,6 +13,7 @@ const OWN: &str = "\
 .curves p{font-size:13px}
 td small{color:var(--soft);display:block}
 th{white-space:normal}
+th,td{padding:5px 6px}
 @media(max-width:720px){.curves{grid-template-columns:1fr}}
 ";
 
@@ -35,7 +36,7 @@ pub fn page(class: &Class) -> String {
                     h2 { "Trainees beside each other" }
                     p {
                         "Mean of all procedures of each trainee. Below it where the mean of many more would be with a probability of "
-                        "95 % (Student's t), from three procedures on; fewer have no interval. Scenes, plans and exercises may differ "
+                        "95 % (Student's t), from three procedures on; fewer have no interval, nor have counts of what seldom happens. Scenes, plans and exercises may differ "
                         "between procedures: compare trainees who had the same."
                     }
                     (compared(&trainees))
@@ -102,7 +103,7 @@ fn summary(figure: &Figure, own: &[Attempt]) -> Markup {
             None => { "n/a" }
             Some(s) => {
                 (number(s.mean))
-                @if let Some([low, high]) = s.interval { small { (number(low)) " to " (number(high)) } }
+                @if let Some([low, high]) = s.interval.filter(|_| !figure.is_count) { small { (number(low)) " to " (number(high)) } }
             }
         }
     }
@@ -144,7 +145,7 @@ fn in_words(figure: &Figure, trend: Option<&Trend>, count: usize) -> String {
             signed(t.interval[1])
         ),
         None if count < 5 => format!("{}: too few for a trend", counted(count, "session")),
-        None => "no trend that can be told from none".to_owned(),
+        None => "no trend: its interval holds no change at all".to_owned(),
     }
 }
 

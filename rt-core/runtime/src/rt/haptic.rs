@@ -5,6 +5,7 @@ use crate::rt::clock::{self, Grid};
 use crate::rt::exchange::Notice;
 use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::pose::TipPose;
+use crate::rt::put_in::PutIn;
 use crate::rt::response::TissueResponse;
 use crate::rt::timing::Probe;
 use crate::rt::watchdog::{Watchdog, Watched, at_gate, device_fault};
@@ -24,8 +25,6 @@ mod line;
 mod orders;
 mod put_in;
 mod record;
-
-pub use put_in::PutIn;
 
 /// Everything that the haptic thread owns.
 pub struct HapticLoop {

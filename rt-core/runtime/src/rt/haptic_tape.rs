@@ -1,8 +1,8 @@
 //! What the haptic loop writes to its flight recording, each tick.
 
 use crate::rt::exchange::HapticOrder;
-use crate::rt::haptic::PutIn;
 use crate::rt::pose::TipPose;
+use crate::rt::put_in::PutIn;
 use crate::rt::recorder::{FLIGHT_TICKS, Last, Tape, complete_from};
 use crate::rt::response::TissueResponse;
 use crate::rt::taped::pod;

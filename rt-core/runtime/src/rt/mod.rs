@@ -23,6 +23,7 @@ pub mod left_loads;
 pub mod line_loads;
 pub mod pin;
 pub mod pose;
+pub mod put_in;
 pub mod recorder;
 pub mod response;
 pub mod seed;
