@@ -29,6 +29,7 @@ pub enum Action {
     Redo,
     Plan(PlanAction),
     Watch(WatchAction),
+    Trainee(TraineeAction),
     RunAll,
     /// All needles again, from a reset, whatever was done.
     StartOver,
@@ -66,6 +67,17 @@ pub enum Action {
     DismissRefusals,
     /// The message that a device was unplugged was read.
     DismissDisconnected,
+}
+
+/// What an instructor asks for of a trainee, by the place in the list.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TraineeAction {
+    /// The window shows this one.
+    Follow(usize),
+    /// Stops that hand.
+    Stop(usize),
+    /// Stops every hand.
+    StopAll,
 }
 
 /// What the operator asks for of a recording.

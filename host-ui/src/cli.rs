@@ -2,6 +2,7 @@
 
 use crate::app;
 use crate::command::CommandError;
+use crate::command::class::ClassArgs;
 use crate::command::compare::CompareArgs;
 use crate::command::convert::ConvertArgs;
 use crate::command::dicom::DicomArgs;
@@ -21,6 +22,8 @@ use stylet_base::interrupt;
 use stylet_controllers as controller;
 use stylet_host::core_args::CoreArgs;
 use stylet_host::record;
+use stylet_host::roster::Trainee;
+use stylet_implant::class;
 use stylet_implant::procedure;
 use stylet_manual::ManualArgs;
 use stylet_shm_schema::service::Instance;
@@ -55,6 +58,16 @@ pub struct Cli {
     /// Show a square in the lower right corner that turns from dark to light or back when the tip has moved by 0.5 mm, for a photodiode
     #[arg(long)]
     patch: bool,
+    /// Show a trainee in a list, with the instance of their rt-core or of a 'relay join'; may be given several times, and the first is
+    /// followed
+    #[arg(long = "trainee", value_name = "NAME=INSTANCE", value_parser = trainee)]
+    trainees: Vec<Trainee>,
+    /// Write a debrief into DIR/NAME/DATE at the end of each procedure, for 'host-ui class'
+    #[arg(long, value_name = "DIR")]
+    class: Option<PathBuf>,
+    /// Who sits at this window, for --class [default: the instance; of a list, whoever is followed]
+    #[arg(long, value_name = "NAME", requires = "class", value_parser = name)]
+    name: Option<String>,
     #[command(subcommand)]
     task: Option<Task>,
 }
@@ -148,6 +161,8 @@ enum Task {
     Perturb(PerturbArgs),
     /// Distributions and dose of the insertions that `rt-core study` simulated, beside published values
     Study(StudyArgs),
+    /// Trainees of a class beside each other, and what each has learned: a page and a table
+    Class(ClassArgs),
     /// Write the man pages and shell completions of this program
     Manual(ManualArgs),
 }
@@ -179,7 +194,9 @@ impl Cli {
                 if self.image.is_some() && self.window.file().is_none() {
                     return Err("--image belongs to a patient: give the segmentation with --scene FILE".into());
                 }
-                let instance = self.window.instance;
+                let first = self.trainees.first().map(|trainee| trainee.instance.clone());
+                let instance = first.unwrap_or(self.window.instance);
+                let others: Vec<Instance> = self.trainees.iter().skip(1).map(|t| t.instance.clone()).collect();
                 let ended = app::run(app::Options {
                     instance: instance.clone(),
                     scene: self.window.scene,
@@ -190,7 +207,11 @@ impl Cli {
                     pause: !self.without_pause,
                     count_frames: self.count_frames,
                     patch: self.patch,
+                    trainees: self.trainees,
+                    class: self.class,
+                    name: self.name.unwrap_or_else(|| instance.name().to_owned()),
                 });
+                others.iter().for_each(Instance::sweep);
                 instance.sweep();
                 Ok(ended?)
             }
@@ -237,6 +258,7 @@ impl Cli {
             Some(Task::Dose(args)) => args.run(),
             Some(Task::Perturb(args)) => args.run(),
             Some(Task::Study(args)) => args.run(),
+            Some(Task::Class(args)) => args.run(),
             Some(Task::Manual(args)) => Ok(args.run(Self::command())?),
             Some(Task::Procedure {
                 common,
@@ -270,4 +292,19 @@ impl Cli {
             }
         }
     }
+}
+
+fn name(text: &str) -> Result<String, String> {
+    match class::is_name(text) {
+        true => Ok(text.to_owned()),
+        false => Err("a name is 1 to 60 letters, digits, spaces, '-', '_' or '.', and begins with no '.'".to_owned()),
+    }
+}
+
+fn trainee(text: &str) -> Result<Trainee, String> {
+    let (who, instance) = text.split_once('=').ok_or("give NAME=INSTANCE, such as Otto=seat-1")?;
+    Ok(Trainee {
+        name: name(who)?,
+        instance: Instance::new(instance).map_err(|e| e.to_string())?,
+    })
 }

@@ -1,11 +1,11 @@
 //! Keys: which there are, and what is held or pressed in this frame.
 
-use crate::action::{Action, Viewpoint};
+use crate::action::{Action, TraineeAction, Viewpoint};
 use egui::{Key, Modifiers};
 use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 30] = [
+pub const KEYS: [(&str, &str); 31] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
@@ -39,6 +39,7 @@ pub const KEYS: [(&str, &str); 30] = [
     ("G", "image or simulated ultrasound in the slices"),
     ("T", "light or dark"),
     ("Ctrl and +, -, 0", "larger, smaller, default text size"),
+    ("F2 to F9", "follow the first to the eighth trainee of the list"),
     ("F12", "save the window as a picture"),
     ("F1", "this help"),
     ("Esc", "close a dialog, return the keys to the needle"),
@@ -68,6 +69,12 @@ pub fn read(ctx: &egui::Context) -> Keys {
     let mut keys = Keys::default();
     if ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F1)) {
         keys.actions.push(Action::ToggleHelp);
+    }
+    let followers = [Key::F2, Key::F3, Key::F4, Key::F5, Key::F6, Key::F7, Key::F8, Key::F9];
+    for (number, key) in followers.into_iter().enumerate() {
+        if ctx.input_mut(|i| i.consume_key(Modifiers::NONE, key)) {
+            keys.actions.push(Action::Trainee(TraineeAction::Follow(number)));
+        }
     }
     // These two are for whatever is edited but words.
     if !ctx.text_edit_focused() {

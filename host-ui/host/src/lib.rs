@@ -6,3 +6,4 @@ pub mod core_args;
 pub mod link;
 pub mod moments;
 pub mod record;
+pub mod roster;

@@ -6,6 +6,9 @@ use stylet_shm_schema::{Event, EventKind};
 /// More of one run of the core are not kept; the oldest go.
 const MOST: usize = 512;
 
+/// Words of the mark that goes with an instructor's stop.
+pub const STOPPED: &str = "stopped by the instructor";
+
 /// What a moment is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MomentKind {

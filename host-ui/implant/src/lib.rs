@@ -2,6 +2,7 @@
 
 #![warn(missing_docs)]
 
+pub mod class;
 pub mod finder;
 pub mod linked;
 pub mod pairing;

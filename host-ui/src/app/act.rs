@@ -102,6 +102,7 @@ impl App {
             Action::CancelLoad => self.cancel_load(),
             Action::PickFile(purpose) => self.pick_file(purpose),
             Action::StopRun => self.stop_run(),
+            Action::Trainee(action) => self.act_on_trainees(action),
             Action::Watch(action) => self.act_on_recording(action),
             _ if self.watches() => {
                 self.shown.note = Some(refusal("This is a recording: close it to move the needle.".to_owned()));
@@ -197,7 +198,7 @@ impl App {
     }
 
     /// The needle stays where it is; the force stays as it is.
-    fn stop_run(&mut self) {
+    pub(super) fn stop_run(&mut self) {
         self.end_run();
         self.shown.running = false;
         if let Some(tip) = self.shown.tip_on_path() {

@@ -37,12 +37,17 @@ struct Delivered {
 impl App {
     /// Begins to write the files; [`App::take_debrief`] reports when they are written.
     pub(super) fn save_debrief(&mut self) {
+        let own = || PathBuf::from(format!("out/debrief-{}", format::utc_now()));
+        let folder = self.trainees.folder().unwrap_or_else(own);
+        self.save_debrief_as(folder);
+    }
+
+    pub(super) fn save_debrief_as(&mut self, folder: PathBuf) {
         if self.debrief.is_some() {
             return;
         }
         match self.delivered() {
             Ok(delivered) => {
-                let folder = PathBuf::from(format!("out/debrief-{}", format::utc_now()));
                 self.debrief = Some(Job::begin("debrief", move |messages, _| {
                     // The window may be closed by now; then nobody reads the answer.
                     let _ = messages.send(write(&delivered, folder));

@@ -3,6 +3,7 @@
 mod act;
 mod debrief;
 mod drive;
+mod error;
 mod files;
 mod frames;
 mod layout;
@@ -10,6 +11,7 @@ mod patch;
 mod plan;
 mod second;
 mod take;
+mod trainees;
 mod watch;
 
 use crate::action::Action;
@@ -36,6 +38,7 @@ use stylet_files::Image;
 use stylet_host::core_args::SceneChoice;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_host::moments::Moments;
+use stylet_host::roster::Trainee;
 use stylet_implant::score::Trace;
 use stylet_implant::workflow::{NeedleTask, Pace, Placed, Run};
 use stylet_shm_schema::affinity::Left;
@@ -43,6 +46,8 @@ use stylet_shm_schema::service::Instance;
 
 const LIVE_FRAME: Duration = Duration::from_millis(16);
 const ABSENT_FRAME: Duration = Duration::from_millis(250);
+
+pub use error::WindowError;
 
 /// Options of the window.
 #[derive(Clone, Debug)]
@@ -65,6 +70,12 @@ pub struct Options {
     pub count_frames: bool,
     /// Shows a patch that changes when the tip moves.
     pub patch: bool,
+    /// Trainees of a list; the first is followed.
+    pub trainees: Vec<Trainee>,
+    /// Folder for the debriefs of a class.
+    pub class: Option<PathBuf>,
+    /// Who sits here.
+    pub name: String,
 }
 
 /// A command that has not been answered yet.
@@ -137,6 +148,7 @@ pub struct App {
     help: bool,
     class: bool,
     instructor: InstructorState,
+    trainees: trainees::Trainees,
     /// What stands in the middle where there is no room for the right panel.
     narrow: layout::Narrow,
 }
@@ -161,39 +173,10 @@ pub fn run(options: Options) -> Result<(), WindowError> {
     }
     let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options))));
     eframe::run_native("Stylet", native, create).map_err(|why| match why {
-        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => WindowError::Display(shown_on()),
+        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => WindowError::Display(error::shown_on()),
         eframe::Error::Wgpu(why) => WindowError::Driver(why.to_string()),
         other => WindowError::Other(other.to_string()),
     })
-}
-
-/// The display that the environment names, for people.
-fn shown_on() -> String {
-    let named = ["WAYLAND_DISPLAY", "DISPLAY"]
-        .iter()
-        .filter_map(|name| Some(format!("{name}={}", format::printable(&std::env::var(name).ok()?))));
-    let named = named.collect::<Vec<_>>().join(", ");
-    if named.is_empty() {
-        "neither WAYLAND_DISPLAY nor DISPLAY is set".to_owned()
-    } else {
-        named
-    }
-}
-
-/// The window could not be opened.
-#[derive(Debug, thiserror::Error)]
-pub enum WindowError {
-    /// There is no display, or it does not answer.
-    #[error("no display answers ({0}). Start it in a desktop, or use `host-ui procedure`, which needs no window")]
-    Display(String),
-    /// Nothing can draw.
-    #[error(
-        "no graphics driver can draw the window ({0}). Install mesa-vulkan-drivers, or use `host-ui procedure`, which needs no window"
-    )]
-    Driver(String),
-    /// Everything else, as the library has it.
-    #[error("the window cannot be opened: {0}. `host-ui procedure` needs no window")]
-    Other(String),
 }
 
 impl App {
@@ -279,6 +262,7 @@ impl App {
             help: false,
             class: false,
             instructor: InstructorState::default(),
+            trainees: trainees::Trainees::new(options.trainees, options.class, options.name),
             narrow: layout::Narrow::default(),
         }
     }

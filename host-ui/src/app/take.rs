@@ -59,6 +59,7 @@ impl App {
         self.count_refusals();
         self.take_pictures();
         self.take_debrief();
+        self.take_trainees();
         self.middle.take(&self.shown, self.link.scene(), self.link.snapshot());
     }
 

@@ -3,6 +3,7 @@
 /// An error of a command, whatever its type: it is printed for the person at the terminal.
 pub type CommandError = Box<dyn std::error::Error>;
 
+pub mod class;
 pub mod compare;
 pub mod convert;
 pub mod dicom;

@@ -13,4 +13,5 @@ pub mod plots;
 pub mod setup;
 pub mod status;
 mod strip;
+pub mod trainees;
 pub mod workflow;

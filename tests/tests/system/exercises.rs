@@ -1,18 +1,20 @@
-//! What an instructor puts in is felt and seen, is announced, and is gone after it was ended.
+//! What an instructor puts in is felt and seen, is announced, and ends when it is asked to.
 
 use std::time::Duration;
 use stylet_host::link::Link;
-use stylet_host::moments::{Moment, MomentKind};
-use stylet_implant::workflow::{Pace, Run, RunStatus, Step, default_plan};
+use stylet_host::moments::{Moment, MomentKind, STOPPED};
+use stylet_host::roster::{Glance, Roster, Trainee};
+use stylet_implant::workflow::{Pace, Run, RunStatus, Step, default_plan, move_request};
 use stylet_shm_schema::{Exercise, Mark, Phase, Request};
 use stylet_tests::witness::where_the_machine_runs;
-use stylet_tests::{Core, ask, until};
+use stylet_tests::{Core, ask, fresh_instance, until};
 
 /// What a needle of the scripted procedure left.
 struct Seen {
     seeds_m: Vec<[f64; 3]>,
     surface_m: Vec<[f32; 3]>,
-    before_puncture_m: f64,
+    /// Mean over the snapshots with the tip inside of the largest displacement of any tissue.
+    moved_inside_m: f64,
 }
 
 /// `put_in` once the procedure has begun with its reset, and the needle is not in yet.
@@ -20,7 +22,7 @@ fn procedure(link: &mut Link, put_in: Option<Exercise>) -> Seen {
     let plan = default_plan(&link.scene().expect("a live core has a scene").header);
     let mut run = Run::new(plan, Pace::default());
     let mut put_in = put_in;
-    let (mut status, mut before_puncture_m) = (RunStatus::Working, 0.0_f64);
+    let (mut status, mut inside, mut last_tick) = (RunStatus::Working, Vec::new(), 0);
     let ended = until(Duration::from_secs(120), || {
         link.poll();
         link.take_records();
@@ -31,8 +33,10 @@ fn procedure(link: &mut Link, put_in: Option<Exercise>) -> Seen {
             ask(link, &Request::BeginExercise(exercise)).expect("taken");
         }
         let snapshot = link.snapshot().map(|s| s.header);
-        if let Some(header) = snapshot.filter(|h| h.phase == Phase::Contraction as u32) {
-            before_puncture_m = before_puncture_m.max(header.max_displacement_m);
+        let is_inside = |phase: u32| phase == Phase::Penetration as u32 || phase == Phase::Hold as u32;
+        if let Some(header) = snapshot.filter(|h| is_inside(h.phase) && h.tissue_tick != last_tick) {
+            last_tick = header.tissue_tick;
+            inside.push(header.max_displacement_m);
         }
         !matches!(status, RunStatus::Working)
     });
@@ -43,8 +47,8 @@ fn procedure(link: &mut Link, put_in: Option<Exercise>) -> Seen {
     let seeds = snapshot.header.seeds.iter().take(snapshot.header.seed_count as usize);
     Seen {
         seeds_m: seeds.map(|s| s.position_m).collect(),
-        surface_m: snapshot.positions_m.clone(),
-        before_puncture_m,
+        surface_m: snapshot.positions_m.to_vec(),
+        moved_inside_m: inside.iter().sum::<f64>() / inside.len() as f64,
     }
 }
 
@@ -83,8 +87,10 @@ fn a_gland_that_has_moved_gets_its_seeds_beside_their_places_and_stiff_tissue_gi
         let factor = 3.0;
         let stiff = procedure(&mut link, Some(Exercise::StiffTissue { factor }));
         assert_eq!(link.snapshot().expect("live").header.body_moved_m, [0.0; 3]);
-        let [soft_mm, stiff_mm] = [plain, stiff].map(|seen| seen.before_puncture_m * 1e3);
-        println!("before puncture the gland moved {soft_mm:.2} mm, and {stiff_mm:.2} mm in tissue 3 times as stiff");
+        let [soft_mm, stiff_mm] = [plain, stiff].map(|seen| seen.moved_inside_m * 1e3);
+        println!(
+            "with the tip inside tissue moved by {soft_mm:.2} mm, and {stiff_mm:.2} mm in tissue 3 times as stiff"
+        );
         assert!(stiff_mm < 0.8 * soft_mm && stiff_mm > 0.1 * soft_mm);
         drop(link);
         core.finish();
@@ -130,4 +136,52 @@ fn marks_and_exercises_are_events_with_their_words_and_the_session_says_what_is_
     assert_eq!(said[2].1, "device lost");
     drop(link);
     core.finish();
+}
+
+#[test]
+fn a_list_of_trainees_sees_each_stops_one_hand_and_says_who_is_silent() {
+    let mut cores = [(); 2].map(|()| Core::start_with(&["--rt-if-allowed", "--tissue", "paper"]));
+    let mut links = cores.each_mut().map(|core| core.host());
+    let trainee = |(name, link): (&str, &Link)| Trainee {
+        name: name.to_owned(),
+        instance: link.instance().clone(),
+    };
+    let nobody = Trainee {
+        name: "nobody".to_owned(),
+        instance: fresh_instance(),
+    };
+    let named = ["Ida", "Otto"].into_iter().zip(&links).map(trainee).chain([nobody]);
+    let roster = Roster::start(named.collect());
+    let seen = |which: usize, is: &dyn Fn(&Glance) -> bool| {
+        until(Duration::from_secs(5), || roster.glances().get(which).is_some_and(is))
+    };
+    for link in &mut links {
+        let mut request = move_request([0.0, 0.0, -0.2], [0.0, 0.0, 1.0], 0.01, 2.0);
+        if let (Request::MoveHand(hand), Some(state)) = (&mut request, link.state()) {
+            hand.direction = state.needle_direction;
+        }
+        ask(link, &request).expect("taken");
+    }
+    let tip_m = |which: usize| roster.glances()[which].state.map(|s| s.tip_in_scene_m);
+    let moves = |which: usize| {
+        let before = tip_m(which);
+        std::thread::sleep(Duration::from_millis(400));
+        tip_m(which) != before
+    };
+    assert!(seen(0, &|g| g.state.is_some()) && seen(1, &|g| g.state.is_some()));
+    assert!(moves(0) && moves(1), "both hands are on their way");
+    assert!(roster.stop(1));
+    assert!(until(Duration::from_secs(5), || !moves(1)), "the hand goes on");
+    assert!(moves(0), "the other hand has stopped as well");
+    let [first, mut second] = links;
+    assert_eq!(words(&mut second), [(MomentKind::Mark, STOPPED.to_owned())]);
+    drop((first, second));
+    assert!(roster.glances()[2].heard.is_none(), "nobody is there");
+    let [killed, other] = cores;
+    let _instance = killed.kill();
+    let is_silent = |g: &Glance| g.heard.is_some_and(|at| at.elapsed() > Duration::from_millis(1500));
+    assert!(seen(0, &is_silent), "a dead core is heard");
+    assert!(!is_silent(&roster.glances()[1]), "a living one is not");
+    drop(roster);
+    drop(other);
 }

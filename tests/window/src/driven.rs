@@ -52,6 +52,9 @@ impl Driven {
             pause: true,
             count_frames: false,
             patch: false,
+            trainees: Vec::new(),
+            class: None,
+            name: String::new(),
         };
         let window = Harness::builder()
             .with_size(size)

@@ -84,6 +84,9 @@ fn a_window_that_comes_moves_nothing_by_itself() {
         pause: true,
         count_frames: false,
         patch: false,
+        trainees: Vec::new(),
+        class: None,
+        name: String::new(),
     };
     let mut second = Harness::builder()
         .with_size([1280.0, 800.0])

@@ -30,6 +30,9 @@ fn the_example_opens_with_one_click_without_a_core_and_shows_an_insertion() {
         pause: true,
         count_frames: false,
         patch: false,
+        trainees: Vec::new(),
+        class: None,
+        name: String::new(),
     };
     let mut window = Harness::builder()
         .with_size([1280.0, 800.0])

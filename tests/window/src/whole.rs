@@ -45,6 +45,9 @@ fn window_of(instance: &str, size: [f32; 2]) -> Window {
         pause: true,
         count_frames: false,
         patch: false,
+        trainees: Vec::new(),
+        class: None,
+        name: String::new(),
     };
     Window {
         harness: Harness::builder()

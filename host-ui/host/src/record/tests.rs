@@ -5,8 +5,8 @@ use crate::link::{Piece, SceneModel, Snapshot};
 use bytemuck::Zeroable;
 use std::sync::Arc;
 use stylet_shm_schema::{
-    Event, HapticState, ParameterId, ParameterSet, ParametersInForce, PlanInForce, SceneHeader, SecondRecord, Session,
-    SnapshotHeader, Text, TickRecord,
+    Event, EventKind, HapticState, ParameterId, ParameterSet, ParametersInForce, PlanInForce, SceneHeader,
+    SecondRecord, Session, SnapshotHeader, Text, TickRecord,
 };
 
 fn ticks(range: std::ops::Range<u64>) -> Item {
@@ -86,6 +86,13 @@ fn scene() -> SceneModel {
     SceneModel::new(header, rest_m, vec![[0, 1, 2]], vec![0, 1, 2, 1, 2])
 }
 
+fn marked() -> Event {
+    let mut event = Event::zeroed();
+    (event.session_id, event.sequence, event.time_ns, event.tick) = (1, 9, 1_000_000 * 15, 15);
+    (event.kind, event.value, event.text) = (EventKind::Mark as u32, 1.0 / 3.0, Text::new("left lobe, é"));
+    event
+}
+
 /// What one run of a core said, with numbers that decimal fractions do not have.
 fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
     let tick = |tick: u64| TickRecord {
@@ -111,6 +118,7 @@ fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
         ..SnapshotHeader::default()
     };
     header.seeds[0].position_m = [0.01, 0.02, 1.0 / 7.0];
+    header.body_moved_m = [1e-3 / 3.0, 0.0, -2e-3];
     (header.bend_count, header.bend_spacing_m) = (2, 5e-3);
     header.bend_m[..2].copy_from_slice(&[[1.0 / 3.0 * 1e-3, 0.0, 0.0], [1e-4, -1e-5, 0.0]]);
     let surface_m = vec![[0.1, 0.2, 0.300_001], [0.333, 0.0, 0.0], [0.0, 0.7, 0.0]];
@@ -132,6 +140,7 @@ fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
         Item::SecondRecords((10..30).map(second_tick).collect()),
         Item::State(Box::new(state)),
         Item::Snapshot(Box::new(snapshot.clone())),
+        Item::Event(Box::new(marked())),
     ];
     (items, tick(29), state, snapshot)
 }
@@ -162,7 +171,7 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
     let _removed = std::fs::remove_file(&path);
     assert_eq!((played.session.session_id, played.cut_off.as_deref()), (1, None));
     assert_eq!(played.session.device.read(), "hand");
-    let mut kinds = [0; 7];
+    let mut kinds = [0; 8];
     for (time_ns, piece) in &played.pieces {
         match piece {
             Piece::Tick(tick) => {
@@ -171,7 +180,12 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
                 assert!(tick.tick != last.tick || **tick == last);
                 assert!(tick.tip_in_scene_m[2].is_sign_negative());
             }
-            Piece::Event(_) => panic!("no event was recorded"),
+            Piece::Event(event) => {
+                kinds[7] += 1;
+                assert_eq!(*time_ns, 5_000_000, "at the moment that was marked");
+                let (found, sent) = (**event, marked());
+                assert_eq!(bytemuck::bytes_of(&found), bytemuck::bytes_of(&sent));
+            }
             Piece::Second(record) => {
                 kinds[6] += 1;
                 assert_eq!(**record, second_tick(record.tick));
@@ -214,7 +228,7 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
             }
         }
     }
-    assert_eq!(kinds, [20, 1, 1, 1, 1, 1, 20]);
+    assert_eq!(kinds, [20, 1, 1, 1, 1, 1, 20, 1]);
     // Cut off or damaged anywhere it ends with a reason or with what came before, and never with a panic.
     for end in (0..bytes.len()).step_by(97) {
         let _ended = played_of(&bytes[..end], &Interrupt::default());

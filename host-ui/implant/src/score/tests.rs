@@ -86,6 +86,22 @@ fn an_implant_on_plan_has_no_error_and_no_seed_costs_anything() {
 }
 
 #[test]
+fn what_was_marked_stands_on_the_page_and_in_the_figures() {
+    let (anatomy, kernel) = (anatomy(), kernel());
+    let records = [TickRecord {
+        due_ns: 500_000_000,
+        ..bytemuck::Zeroable::zeroed()
+    }];
+    let score = score(&[], &anatomy, &kernel, &records);
+    assert_eq!(
+        to_json(&score)["moments"][0],
+        serde_json::json!({ "at_s": 2.0, "kind": "mark", "text": "apex <left>" })
+    );
+    let page = page::page(&score).expect("drawn");
+    assert!(page.contains("apex &lt;left&gt;"), "the words, escaped");
+}
+
+#[test]
 fn the_cost_of_the_only_seed_off_plan_is_all_that_the_implant_lost() {
     let (anatomy, kernel) = (anatomy(), kernel());
     let score = score(&[4], &anatomy, &kernel, &[]);

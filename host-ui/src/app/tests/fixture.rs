@@ -39,6 +39,9 @@ pub fn options() -> Options {
         pause: true,
         count_frames: false,
         patch: false,
+        trainees: Vec::new(),
+        class: None,
+        name: "Otto".to_owned(),
     }
 }
 

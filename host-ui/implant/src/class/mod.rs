@@ -1,0 +1,125 @@
+//! A class: the debriefs of several trainees over several sessions, compared on one page and in one table.
+
+mod figures;
+mod page;
+mod picture;
+mod read;
+mod table;
+
+pub use figures::{Summary, Trend};
+pub use page::page;
+pub use read::{Class, ClassError, folder_of, is_name};
+pub use table::write as write_table;
+
+/// One procedure of one trainee.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Attempt {
+    /// Name of the trainee's folder.
+    pub trainee: String,
+    /// Name of the procedure's folder, which begins with its date.
+    pub session: String,
+    /// Mean distance of the seeds from plan, mm.
+    pub mean_error_mm: f64,
+    /// The largest, mm.
+    pub worst_error_mm: f64,
+    /// Seeds that were planned, and those that were lost.
+    pub seeds: [u64; 2],
+    /// D90 of the target over the prescription, %.
+    pub d90_percent: Option<f64>,
+    /// V100 of the target, %.
+    pub v100_percent: Option<f64>,
+    /// From the first contact to the last, s.
+    pub duration_s: f64,
+    /// Largest force on the hand, N.
+    pub peak_force_n: f64,
+    /// Times that an instructor stopped the hand.
+    pub stops: u64,
+    /// Faults that took the force off.
+    pub faults: u64,
+    /// Faults that an instructor put in.
+    pub exercises: u64,
+}
+
+/// One figure of an attempt, as page and table show it.
+pub struct Figure {
+    /// For people.
+    pub name: &'static str,
+    /// Of the table's column.
+    pub column: &'static str,
+    /// It counts what seldom happens: an interval of Student's t would be wrong.
+    pub is_count: bool,
+    /// Decimals that are shown.
+    pub decimals: usize,
+    /// Of an attempt, where it has one.
+    pub of: fn(&Attempt) -> Option<f64>,
+}
+
+/// In the order of the columns.
+pub const FIGURES: [Figure; 9] = [
+    Figure {
+        name: "mean seed error (mm)",
+        column: "mean_error_mm",
+        is_count: false,
+        decimals: 2,
+        of: |a| Some(a.mean_error_mm),
+    },
+    Figure {
+        name: "worst seed error (mm)",
+        column: "worst_error_mm",
+        is_count: false,
+        decimals: 2,
+        of: |a| Some(a.worst_error_mm),
+    },
+    Figure {
+        name: "D90 of the target (% of prescription)",
+        column: "d90_percent",
+        is_count: false,
+        decimals: 1,
+        of: |a| a.d90_percent,
+    },
+    Figure {
+        name: "V100 of the target (%)",
+        column: "v100_percent",
+        is_count: false,
+        decimals: 1,
+        of: |a| a.v100_percent,
+    },
+    Figure {
+        name: "time (min)",
+        column: "time_min",
+        is_count: false,
+        decimals: 1,
+        of: |a| Some(a.duration_s / 60.0),
+    },
+    Figure {
+        name: "peak force (N)",
+        column: "peak_force_n",
+        is_count: false,
+        decimals: 1,
+        of: |a| Some(a.peak_force_n),
+    },
+    Figure {
+        name: "seeds lost",
+        column: "seeds_lost",
+        is_count: true,
+        decimals: 1,
+        of: |a| Some(a.seeds[1] as f64),
+    },
+    Figure {
+        name: "stops by the instructor",
+        column: "stops",
+        is_count: true,
+        decimals: 1,
+        of: |a| Some(a.stops as f64),
+    },
+    Figure {
+        name: "faults",
+        column: "faults",
+        is_count: true,
+        decimals: 1,
+        of: |a| Some(a.faults as f64),
+    },
+];
+
+#[cfg(test)]
+mod tests;

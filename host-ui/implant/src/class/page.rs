@@ -1,0 +1,178 @@
+//! The page of a class, which stands by itself.
+
+use super::{Attempt, Class, FIGURES, Figure, Summary, Trend, picture};
+use crate::score::STYLE;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use stylet_base::format;
+
+/// Figures with a curve for each trainee: mean seed error, D90, time.
+const CURVES: [usize; 3] = [0, 2, 4];
+
+const OWN: &str = "\
+.curves{display:grid;grid-template-columns:repeat(3,minmax(0,1fr));gap:14px}
+.curves p{font-size:13px}
+td small{color:var(--soft);display:block}
+th{white-space:normal}
+th,td{padding:5px 6px}
+@media(max-width:720px){.curves{grid-template-columns:1fr}}
+";
+
+/// As HTML.
+pub fn page(class: &Class) -> String {
+    let trainees = class.trainees();
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width";
+                title { "Class" }
+                style { (PreEscaped(STYLE)) (PreEscaped(OWN)) }
+            }
+            body {
+                main {
+                    h1 { "Class" }
+                    p { (counted(trainees.len(), "trainee")) ", " (counted(class.attempts.len(), "procedure")) }
+                    h2 { "Trainees beside each other" }
+                    p {
+                        "Mean of all procedures of each trainee. Below it where the mean of many more would be with a probability of "
+                        "95 % (Student's t), from three procedures on; fewer have no interval, nor have counts of what seldom happens. Scenes, plans and exercises may differ "
+                        "between procedures: compare trainees who had the same."
+                    }
+                    (compared(&trainees))
+                    h2 { "Learning" }
+                    p {
+                        "Session by session. A dashed line is a least-squares trend; it is drawn from five sessions on, and only where "
+                        "its 95 % interval leaves out no change at all. Few sessions say little, and sessions of one trainee are not "
+                        "independent."
+                    }
+                    @for (name, own) in &trainees {
+                        (learning(class, name, own))
+                    }
+                    h2 { "All procedures" }
+                    (every(&class.attempts))
+                    @if !class.left_out.is_empty() {
+                        h2 { "Left out" }
+                        @for why in &class.left_out { p class="bad" { (why) } }
+                    }
+                    footer {
+                        p {
+                            "Made by a simulator for research and training. Not a medical device, and no examination: how a "
+                            "trainee does here says nothing certain of how a trainee does with patients."
+                        }
+                    }
+                }
+            }
+        }
+    };
+    page.into_string()
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+fn of_all(figure: &Figure, attempts: &[Attempt]) -> Vec<f64> {
+    attempts.iter().filter_map(figure.of).collect()
+}
+
+fn compared(trainees: &[(&str, &[Attempt])]) -> Markup {
+    html! {
+        div class="scroll" {
+            table {
+                thead {
+                    tr { th { "Trainee" } th { "procedures" } @for figure in &FIGURES { th { (figure.name) } } }
+                }
+                tbody {
+                    @for (name, own) in trainees {
+                        tr {
+                            td { (name) } td { (own.len()) }
+                            @for figure in &FIGURES { td { (summary(figure, own)) } }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn summary(figure: &Figure, own: &[Attempt]) -> Markup {
+    let number = |v: f64| format::decimal(v, figure.decimals);
+    html! {
+        @match Summary::of(&of_all(figure, own)) {
+            None => { "n/a" }
+            Some(s) => {
+                (number(s.mean))
+                @if let Some([low, high]) = s.interval.filter(|_| !figure.is_count) { small { (number(low)) " to " (number(high)) } }
+            }
+        }
+    }
+}
+
+fn learning(class: &Class, name: &str, own: &[Attempt]) -> Markup {
+    let sessions = class.trainees().iter().map(|(_, own)| own.len()).max().unwrap_or(1);
+    html! {
+        h3 { (name) }
+        div class="curves" {
+            @for figure in CURVES.map(|n| &FIGURES[n]) {
+                @let values: Vec<Option<f64>> = own.iter().map(figure.of).collect();
+                @let all: Vec<f64> = values.iter().copied().flatten().collect();
+                @let most = of_all(figure, &class.attempts).into_iter().fold(0.0, f64::max);
+                @let trend = (all.len() == values.len()).then(|| Trend::of(&all)).flatten();
+                div {
+                    p { (figure.name) }
+                    (picture::curve(&values, upwards(most), sessions, figure.decimals, trend.as_ref()))
+                    p { (in_words(figure, trend.as_ref(), all.len())) }
+                }
+            }
+        }
+    }
+}
+
+/// The next round number, for the scale.
+fn upwards(most: f64) -> f64 {
+    let step = 10_f64.powf(most.max(1e-3).log10().floor()) / 2.0;
+    ((most / step).ceil() * step).max(step)
+}
+
+fn in_words(figure: &Figure, trend: Option<&Trend>, count: usize) -> String {
+    let signed = |v: f64| format::signed(v, figure.decimals);
+    match trend {
+        Some(t) => format!(
+            "{} each session (95 %: {} to {})",
+            signed(t.slope),
+            signed(t.interval[0]),
+            signed(t.interval[1])
+        ),
+        None if count < 5 => format!("{}: too few for a trend", counted(count, "session")),
+        None => "no trend: its interval holds no change at all".to_owned(),
+    }
+}
+
+fn every(attempts: &[Attempt]) -> Markup {
+    let shown = |figure: &Figure, a: &Attempt| {
+        (figure.of)(a).map_or_else(|| "n/a".to_owned(), |v| format::decimal(v, figure.decimals))
+    };
+    html! {
+        div class="scroll" {
+            table {
+                thead {
+                    tr {
+                        th { "Trainee" } th { "session" }
+                        @for figure in &FIGURES { th { (figure.name) } }
+                        th { "exercises" }
+                    }
+                }
+                tbody {
+                    @for a in attempts {
+                        tr {
+                            td { (a.trainee) } td { (a.session) }
+                            @for figure in &FIGURES { td { (shown(figure, a)) } }
+                            td { (a.exercises) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

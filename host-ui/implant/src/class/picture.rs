@@ -1,0 +1,47 @@
+//! One figure of one trainee over the sessions, as SVG in the page.
+
+use super::Trend;
+use maud::{Markup, html};
+use stylet_base::format;
+
+const SIZE: [f64; 2] = [360.0, 190.0];
+/// Left, right, above, below.
+const EDGES: [f64; 4] = [46.0, 12.0, 12.0, 30.0];
+
+/// Session by session; the scale is that of all trainees.
+pub fn curve(values: &[Option<f64>], most: f64, sessions: usize, decimals: usize, trend: Option<&Trend>) -> Markup {
+    let [width, height] = SIZE;
+    let [left, right, above, below] = EDGES;
+    let x = |n: f64| left + (n + 0.5) / sessions.max(1) as f64 * (width - left - right);
+    let y = |value: f64| height - below - value / most * (height - above - below);
+    let places = values.iter().enumerate().filter_map(|(n, v)| Some((n, (*v)?)));
+    let places: Vec<(usize, f64)> = places.collect();
+    let line: Vec<String> = places
+        .iter()
+        .map(|(n, v)| format!("{:.1},{:.1}", x(*n as f64), y(*v)))
+        .collect();
+    let ends = trend.map(|t| [0, values.len().saturating_sub(1)].map(|n| (n as f64, t.first + t.slope * n as f64)));
+    html! {
+        svg viewBox=(format!("0 0 {width} {height}")) role="img" {
+            @for part in [0.0, 0.5, 1.0] {
+                @let at = y(part * most);
+                line x1=(left) x2=(width - right) y1=(at) y2=(at) stroke="#d9dee3" {}
+                text x=(left - 6.0) y=(at + 4.0) text-anchor="end" font-size="12" fill="#5b6570" {
+                    (format::decimal(part * most, decimals))
+                }
+            }
+            @for n in 0..sessions {
+                text x=(x(n as f64)) y=(height - 10.0) text-anchor="middle" font-size="12" fill="#5b6570" { (n + 1) }
+            }
+            polyline points=(line.join(" ")) fill="none" stroke="#0072b2" stroke-width="1.6" {}
+            @for (n, value) in &places {
+                circle cx=(x(*n as f64)) cy=(y(*value)) r="4" fill="#0072b2" {
+                    title { "session " (n + 1) ": " (format::decimal(*value, decimals)) }
+                }
+            }
+            @if let Some([(a, from), (b, to)]) = ends {
+                line x1=(x(a)) y1=(y(from)) x2=(x(b)) y2=(y(to)) stroke="#d55e00" stroke-width="1.6" stroke-dasharray="6 4" {}
+            }
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! Why a window could not be opened.
+
+use stylet_base::format;
+
+/// The display that the environment names, for people.
+pub(super) fn shown_on() -> String {
+    let named = ["WAYLAND_DISPLAY", "DISPLAY"]
+        .iter()
+        .filter_map(|name| Some(format!("{name}={}", format::printable(&std::env::var(name).ok()?))));
+    let named = named.collect::<Vec<_>>().join(", ");
+    if named.is_empty() {
+        "neither WAYLAND_DISPLAY nor DISPLAY is set".to_owned()
+    } else {
+        named
+    }
+}
+
+/// The window could not be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum WindowError {
+    /// There is no display, or it does not answer.
+    #[error("no display answers ({0}). Start it in a desktop, or use `host-ui procedure`, which needs no window")]
+    Display(String),
+    /// Nothing can draw.
+    #[error(
+        "no graphics driver can draw the window ({0}). Install mesa-vulkan-drivers, or use `host-ui procedure`, which needs no window"
+    )]
+    Driver(String),
+    /// Everything else, as the library has it.
+    #[error("the window cannot be opened: {0}. `host-ui procedure` needs no window")]
+    Other(String),
+}

@@ -1,0 +1,52 @@
+//! `host-ui class`: trainees of a class beside each other, and what each has learned.
+
+use super::CommandError;
+use clap::Args;
+use std::path::PathBuf;
+use stylet_base::output::new_folder;
+use stylet_base::{write_streamed, write_whole};
+use stylet_implant::class::{self, Class};
+
+const HELP: &str = "\
+Reads DIR/NAME/DATE/score.json, as 'host-ui --class DIR --name NAME' writes one at the end of each procedure; folders of several rooms or
+days may be given together, and a NAME in two of them is one trainee. A file that is no debrief is left out, and the page names it.
+
+Written to --out, a new or empty folder: class.html (stands by itself) and class.csv.
+
+Example:
+  host-ui class monday tuesday --out class-page";
+
+/// Options of `host-ui class`.
+#[derive(Args, Debug)]
+#[command(after_long_help = HELP)]
+pub struct ClassArgs {
+    /// Folders of a class
+    #[arg(required = true, value_name = "DIR")]
+    folders: Vec<PathBuf>,
+    /// Folder for the page and the table
+    #[arg(long, default_value = "out/class", value_name = "DIR")]
+    out: PathBuf,
+}
+
+impl ClassArgs {
+    /// Carries out the command.
+    pub fn run(self) -> Result<(), CommandError> {
+        let class = Class::read(&self.folders)?;
+        new_folder(&self.out)?;
+        write_whole(&self.out.join("class.html"), class::page(&class).as_bytes())?;
+        let table = self.out.join("class.csv");
+        write_streamed(&table, |file| {
+            class::write_table(&class, file).map_err(std::io::Error::other)
+        })?;
+        for why in &class.left_out {
+            println!("left out: {why}");
+        }
+        println!(
+            "{} trainees, {} procedures",
+            class.trainees().len(),
+            class.attempts.len()
+        );
+        println!("written: {}", self.out.join("class.html").display());
+        Ok(())
+    }
+}
