@@ -7,8 +7,10 @@ use maud::{Markup, html};
 
 const COUNTS: [Column; 4] = [Column::Text, Column::Number, Column::Number, Column::Number];
 
+type ReadCount = fn(&LoopCounts) -> f64;
+
 pub fn counters(r: &Report) -> Markup {
-    let of: [(&str, fn(&LoopCounts) -> f64); 10] = [
+    let of: [(&str, ReadCount); 10] = [
         ("ticks", |c| c.ticks as f64),
         ("missed deadlines", |c| c.missed_deadlines as f64),
         ("overruns", |c| c.overruns as f64),
