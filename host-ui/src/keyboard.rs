@@ -5,15 +5,14 @@ use egui::{Key, Modifiers};
 use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 31] = [
+pub const KEYS: [(&str, &str); 29] = [
     ("W  or  Up", "advance the needle along its path while held"),
     ("S  or  Down", "retract the needle while held"),
     ("Shift with W, S", "four times slower"),
     (
-        "Alt with W, S",
-        "move the other hand in or out while held, where rt-core has --device-2",
+        "Alt with W, S, arrows",
+        "move the other hand, where rt-core has --device-2",
     ),
-    ("Alt with arrows", "move the other hand sideways, up and down"),
     ("Enter", "the main action of the present step"),
     ("Space", "drop a seed at the tip"),
     ("Ctrl+Z", "undo the last seed or plan change; with Shift redo it"),
@@ -22,8 +21,7 @@ pub const KEYS: [(&str, &str); 31] = [
         "in the template: choose a hole, add or show its needle",
     ),
     ("Shift+arrows, Del", "in the template: move the needle, remove it"),
-    ("E", "force on; after a fault: re-arm"),
-    ("D", "force off"),
+    ("E,  D", "force on, after a fault again; force off"),
     ("P", "parameters"),
     ("K", "mark this moment; put in exercises"),
     ("R", "reset the view"),
