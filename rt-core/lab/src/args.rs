@@ -25,7 +25,7 @@ pub struct LatencyArgs {
     /// Rate of the force loop, Hz
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(500..=10_000), value_name = "HZ")]
     pub rate: u32,
-    /// Spin for the last N microseconds before each deadline; auto finds the smallest with which p50 and p99 are half of cyclictest's
+    /// Spin for the last N microseconds before each deadline; auto finds the smallest with which p50 and p99 are a third of cyclictest's
     #[arg(long, default_value = "0", value_name = "N")]
     pub(crate) spin_us: Spin,
     /// Wake once N microseconds before each deadline and sleep again, so that core and caches are ready; 0 for not [default: 100 up to 2,000 Hz, 0 beyond]
