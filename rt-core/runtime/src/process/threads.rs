@@ -2,7 +2,7 @@
 
 use super::{LoopReport, Options, RunError, RunReport};
 use crate::rt::arm::{self, Armed, Ask, Usage};
-use crate::rt::device_loop;
+use crate::rt::device_loop::{self, DeviceLoop};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::second::SecondLoop;
 use crate::rt::tissue::TissueLoop;
@@ -49,13 +49,13 @@ impl Threads {
         let tissue = spawn("tissue", tissue_ask, &end, |armed, end| run_tissue(tissue, armed, end))?;
         let second = second.zip(options.second.as_ref()).map(|((second, board), asked)| {
             spawn("second", ask(asked.priority, asked.core), &end, move |armed, end| {
-                run_second(second, board, armed, end)
+                run_with_device(second, board, armed, end)
             })
         });
         let second = second.transpose().map_err(ended_by)?;
         let haptic_ask = ask(options.haptic_priority, options.haptic_core);
         let haptic = spawn("haptic", haptic_ask, &end, move |armed, end| {
-            run_haptic(haptic, board, armed, end)
+            run_with_device(haptic, board, armed, end)
         })
         .map_err(ended_by)?;
         Ok(Self {
@@ -114,35 +114,23 @@ fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopRe
     }
 }
 
-fn run_haptic(mut haptic: HapticLoop, board: StateBoard, armed: &Armed, end: &AtomicBool) -> LoopReport {
+fn run_with_device<L: DeviceLoop>(
+    mut device_loop: L,
+    board: StateBoard<L::State>,
+    armed: &Armed,
+    end: &AtomicBool,
+) -> LoopReport {
     let publish = publisher(board);
-    publish(&haptic.state);
+    publish(device_loop.state());
     let start = Usage::now();
-    let sleeps = haptic.run(armed, end, &publish);
+    let sleeps = device_loop::run(&mut device_loop, armed, end, publish);
     let usage = Usage::now().since(start);
-    let s = &haptic.state;
+    let counts = device_loop.counts();
     LoopReport {
         thread: armed.report,
-        ticks: s.tick,
-        missed: s.missed_deadlines,
-        worst_wake_ns: s.worst_wake_ns,
-        sleeps,
-        usage,
-    }
-}
-
-fn run_second(mut second: SecondLoop, board: StateBoard<SecondState>, armed: &Armed, end: &AtomicBool) -> LoopReport {
-    let publish = publisher(board);
-    publish(second.state());
-    let start = Usage::now();
-    let sleeps = device_loop::run(&mut second, armed, end, |second| publish(second.state()));
-    let usage = Usage::now().since(start);
-    let s = second.state();
-    LoopReport {
-        thread: armed.report,
-        ticks: s.tick,
-        missed: s.missed_deadlines,
-        worst_wake_ns: s.worst_wake_ns,
+        ticks: counts.ticks,
+        missed: counts.missed,
+        worst_wake_ns: counts.worst_wake_ns,
         sleeps,
         usage,
     }

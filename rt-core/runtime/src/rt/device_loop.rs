@@ -8,13 +8,31 @@ use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_hw::{DeviceFault, HandGoal, Sample};
 use stylet_shm_schema::Fault;
+use stylet_shm_schema::service::OnBoard;
 
 /// The hand is at its goal within this distance, at rest.
 const AT_GOAL_M: f64 = 4e-4;
 const AT_REST_M_PER_S: f64 = 3e-3;
 
+/// Ticks of a loop, and how late they were.
+#[derive(Clone, Copy, Debug)]
+pub struct Counts {
+    /// Ticks made.
+    pub ticks: u64,
+    /// Deadlines missed.
+    pub missed: u64,
+    /// Latest wake-up after a deadline, ns.
+    pub worst_wake_ns: u64,
+}
+
 /// A loop that owns a device.
 pub trait DeviceLoop {
+    /// What hosts see of it.
+    type State: OnBoard;
+    /// What hosts see of it, after the newest tick.
+    fn state(&self) -> &Self::State;
+    /// Since the counters were last reset.
+    fn counts(&self) -> Counts;
     /// Time between two ticks, s.
     fn period_s(&self) -> f64;
     /// How it waits for each deadline.
@@ -34,7 +52,7 @@ pub trait DeviceLoop {
 }
 
 /// Runs on the ideal grid until `stop`, then ramps the force to zero and ends. Returns how often it slept.
-pub fn run<L: DeviceLoop>(device_loop: &mut L, _armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&L)) -> u64 {
+pub fn run<L: DeviceLoop>(device_loop: &mut L, _armed: &Armed, stop: &AtomicBool, publish: impl Fn(&L::State)) -> u64 {
     let period_ns = (device_loop.period_s() * 1e9).round() as u64;
     let phase_ns = clock::phase_ns(device_loop.phase(), period_ns);
     let mut grid = Grid::at_phase(clock::now_ns(), period_ns, phase_ns);
@@ -49,7 +67,7 @@ pub fn run<L: DeviceLoop>(device_loop: &mut L, _armed: &Armed, stop: &AtomicBool
         sleeps += device_loop.wait().until(grid.due_ns);
         let woke_ns = clock::now_ns();
         device_loop.step(grid.due_ns, woke_ns, missed);
-        publish(device_loop);
+        publish(device_loop.state());
         if let Some(probe) = device_loop.probe() {
             probe.finish(grid.due_ns, woke_ns, missed);
         }

@@ -1,8 +1,7 @@
 //! The haptic tick, 1 kHz: read → chain (velocity, needle, force law, gate) → write → pose → record.
 
-use crate::rt::arm::Armed;
 use crate::rt::clock::{self, HAPTIC_PHASE, Wait};
-use crate::rt::device_loop::{self, DeviceLoop};
+use crate::rt::device_loop::{self, Counts, DeviceLoop};
 use crate::rt::exchange::Notice;
 use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::pose::TipPose;
@@ -11,7 +10,6 @@ use crate::rt::response::TissueResponse;
 use crate::rt::timing::Probe;
 use crate::rt::watchdog::{Watchdog, Watched, at_gate};
 use crate::rt::wiring::HapticPorts;
-use std::sync::atomic::AtomicBool;
 use stylet_hw::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
 use stylet_shm_schema::{Fault, HapticState};
 use stylet_sim::force::ForceFault;
@@ -119,11 +117,6 @@ impl HapticLoop {
         if let Some(probe) = &mut self.probe {
             probe.mark();
         }
-    }
-
-    /// Runs on the ideal grid until `stop`, then ramps the force to zero and ends. Returns how often it slept.
-    pub fn run(&mut self, armed: &Armed, stop: &AtomicBool, mut publish: impl FnMut(&HapticState)) -> u64 {
-        device_loop::run(self, armed, stop, |this| publish(&this.state))
     }
 
     /// One tick; in the order of the data. Returns what the force chain gave.
@@ -279,6 +272,20 @@ impl HapticLoop {
 }
 
 impl DeviceLoop for HapticLoop {
+    type State = HapticState;
+
+    fn state(&self) -> &HapticState {
+        &self.state
+    }
+
+    fn counts(&self) -> Counts {
+        Counts {
+            ticks: self.state.tick,
+            missed: self.state.missed_deadlines,
+            worst_wake_ns: self.state.worst_wake_ns,
+        }
+    }
+
     fn period_s(&self) -> f64 {
         self.period_s
     }

@@ -14,13 +14,13 @@ pub use response::{Felt, ProbeResponse};
 pub use tape::{SecondEntry, SecondFlight, SecondMemory, SecondTape};
 
 use crate::rt::clock::{self, SECOND_PHASE, Wait};
-use crate::rt::device_loop::{self, DeviceLoop, Reading};
+use crate::rt::device_loop::{self, Counts, DeviceLoop, Reading};
 use crate::rt::exchange::Notice;
 use crate::rt::timing::Probe;
 use crate::rt::watchdog::{Watched, at_gate};
 use nalgebra::Vector3;
 use stylet_hw::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
-use stylet_shm_schema::Fault;
+use stylet_shm_schema::{Fault, SecondState};
 use stylet_sim::force::{ForceFault, GateInput, GateParameters, Motion, gate};
 
 /// Stages of this tick, as [`Probe`] times them.
@@ -86,11 +86,6 @@ impl SecondLoop {
             wait: Wait::default(),
             period_s,
         }
-    }
-
-    /// What hosts see.
-    pub fn state(&self) -> &stylet_shm_schema::SecondState {
-        &self.memory.state
     }
 
     fn mark(&mut self) {
@@ -220,6 +215,20 @@ impl SecondLoop {
 }
 
 impl DeviceLoop for SecondLoop {
+    type State = SecondState;
+
+    fn state(&self) -> &SecondState {
+        &self.memory.state
+    }
+
+    fn counts(&self) -> Counts {
+        Counts {
+            ticks: self.memory.state.tick,
+            missed: self.memory.state.missed_deadlines,
+            worst_wake_ns: self.memory.state.worst_wake_ns,
+        }
+    }
+
     fn period_s(&self) -> f64 {
         self.period_s
     }
