@@ -123,7 +123,7 @@ fn run_with_device<L: DeviceLoop>(
     let publish = publisher(board);
     publish(device_loop.state());
     let start = Usage::now();
-    let sleeps = device_loop::run(&mut device_loop, armed, end, publish);
+    let sleeps = device_loop::run(&mut device_loop, armed, end, &publish);
     let usage = Usage::now().since(start);
     let counts = device_loop.counts();
     LoopReport {
