@@ -69,6 +69,9 @@ impl Replay {
 
 /// A recording holds no columns of needle lines; those that count take some seconds each.
 fn solve_again(flight: &Flight, recorded: &TissueFlight) -> Result<LinesAgain, RepeatError> {
+    if recorded.has_probe() {
+        println!("probe    solved for again");
+    }
     let mut reported = None;
     lines::solve_again(flight, recorded, &mut |progress| {
         let quarter = (progress.generation, 4 * progress.ready / progress.of.max(1));

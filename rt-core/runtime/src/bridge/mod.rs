@@ -134,6 +134,7 @@ impl Bridge {
                 rooms: loops.rooms,
                 old_hand_lines: loops.old_hand_lines,
                 old_body_lines: loops.old_body_lines,
+                outside_rooms: loops.outside_rooms,
                 old_probes: loops.old_probes,
             },
             device: setup.device,

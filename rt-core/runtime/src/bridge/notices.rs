@@ -3,6 +3,7 @@
 use super::Bridge;
 use super::link::EventDetails;
 use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
+use crate::rt::outside::OutsideTape;
 use crate::rt::world::World;
 use stylet_shm_schema::{EventKind, TickRecord};
 use stylet_sim::line::{BodyLine, HandLine, LeftNeedles};
@@ -18,6 +19,7 @@ pub(super) struct LoopRings {
     pub old_worlds: rtrb::Consumer<Box<World>>,
     pub lines: rtrb::Producer<Box<HandLine>>,
     pub rooms: rtrb::Producer<Box<LeftNeedles>>,
+    pub outside_rooms: rtrb::Producer<Box<OutsideTape>>,
     pub old_hand_lines: rtrb::Consumer<Box<HandLine>>,
     pub old_body_lines: rtrb::Consumer<Box<BodyLine>>,
     pub old_probes: rtrb::Consumer<Box<BodyProbe>>,

@@ -3,6 +3,8 @@
 use super::notices::LoopRings;
 use crate::lines::{LineBody, NoLine};
 use crate::rt::exchange::TissueOrder;
+use crate::rt::outside::OutsideTape;
+use crate::rt::probe_tape::ProbeTape;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -31,6 +33,8 @@ pub struct ProbePreparer {
     under_way: Option<Task>,
     /// The scene has its probe, or has none.
     is_settled: bool,
+    /// The force loop has room to record what probes do to its line.
+    has_sent_room: bool,
 }
 
 impl ProbePreparer {
@@ -40,6 +44,7 @@ impl ProbePreparer {
             tissue,
             under_way: None,
             is_settled: false,
+            has_sent_room: false,
         }
     }
 
@@ -68,8 +73,12 @@ impl ProbePreparer {
         self.is_settled = true;
         match task.thread.join() {
             Ok(Ok(probe)) => {
+                if !std::mem::replace(&mut self.has_sent_room, true) {
+                    let _ = loops.outside_rooms.push(OutsideTape::new());
+                }
                 let _ = loops.tissue_orders.push(TissueOrder::Probe {
                     generation: scene_generation,
+                    room: ProbeTape::new(&probe),
                     probe: Box::new(probe),
                 });
                 None

@@ -193,11 +193,11 @@ impl Rig {
 
     #[cfg(test)]
     pub fn take_probe(&mut self, probe: Box<stylet_sim::probe::BodyProbe>) {
-        let _ = self
-            .loops
-            .bridge
-            .tissue_orders
-            .push(TissueOrder::Probe { generation: 1, probe });
+        let _ = self.loops.bridge.tissue_orders.push(TissueOrder::Probe {
+            generation: 1,
+            room: crate::rt::probe_tape::ProbeTape::new(&probe),
+            probe,
+        });
     }
 
     #[cfg(test)]

@@ -5,6 +5,7 @@ use super::repeat::RepeatError;
 use crate::lines::LineBody;
 use crate::rt::tissue_tape::TissueFlight;
 use stylet_sim::line::{BodyAnswer, BodyLine, HandLine, LineSource};
+use stylet_sim::probe::{BodyProbe, NoWall, ProbeShape};
 
 /// How far the columns of one line are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,13 +22,15 @@ pub struct LineProgress {
 #[derive(Debug, Default)]
 pub struct LinesAgain {
     bodies: Vec<BodyLine>,
+    /// The probe, where there was one.
+    pub(super) probe: Option<BodyProbe>,
     /// Lines whose columns were solved again.
     pub solved: usize,
     /// How many of them are not the recorded ones in every bit.
     pub different: usize,
 }
 
-/// Solves for the columns of every line that the recorded tissue was pushed by: some seconds each for a body of 20,000
+/// Solves for the columns of every line that the recorded tissue was pushed by, and for its probe: some seconds each for a body of 20,000
 /// elements. No recording holds them; they follow from the scene and the line.
 ///
 /// To be called before this thread turns denormal numbers off as the loops do: the thread that prepared the lines did not.
@@ -69,6 +72,12 @@ pub fn solve_again(
         again.solved += 1;
         again.different += usize::from(!ready.hand.source().is_identical(source));
         again.bodies.push(*ready.body);
+    }
+    if recorded.has_probe() {
+        let body =
+            LineBody::of_source(&recorded.scene, recorded.tissue)?.ok_or(RepeatError::NoProbe(NoWall::NoForces))?;
+        let probe = body.prepare_probe(ProbeShape::default(), &mut |_| true);
+        again.probe = Some(probe.map_err(RepeatError::NoProbe)?);
     }
     Ok(again)
 }

@@ -7,6 +7,7 @@ use crate::rt::exchange::{HapticOrder, TissueOrder};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticEntry, HapticFlight, HapticTape};
 use crate::rt::line_loads::AllLoads;
+use crate::rt::probe_tape::{ProbeEntry, ProbeTape};
 use crate::rt::response::TissueResponse;
 use crate::rt::tissue::TissueLoop;
 use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueFlight, TissueMemory, TissueTape};
@@ -16,6 +17,7 @@ use std::sync::Arc;
 use stylet_hw::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
 use stylet_shm_schema::TickRecord;
 use stylet_sim::line::LeftNeedles;
+use stylet_sim::probe::NoWall;
 
 /// The result of repeating one loop.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -127,6 +129,7 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
     let mut found = Repeated::default();
     let mut orders = recorded.orders.iter().peekable();
     let mut lines = recorded.lines.iter().peekable();
+    let mut outside = recorded.outside.iter().peekable();
     for (index, entry) in recorded.ticks.iter().enumerate() {
         while let Some((_, line)) = lines.next_if(|(tick, _)| *tick == index as u64) {
             let _ = bridge.lines.push(hand_line(flight, *line)?);
@@ -136,6 +139,9 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
             if !matches!(order, HapticOrder::HandOverTape) {
                 let _ = bridge.haptic_orders.push(*order);
             }
+        }
+        while let Some((_, outside)) = outside.next_if(|(tick, _)| *tick == index as u64) {
+            tissue.outside.write(*outside);
         }
         tissue.response.write(entry.tissue);
         again.tick(entry.record.due_ns, entry.woke_ns, entry.record.missed);
@@ -183,6 +189,12 @@ pub enum RepeatError {
     /// A line cannot be used, or its columns cannot be solved again.
     #[error(transparent)]
     Line(#[from] NoLine),
+    /// What its probe can press cannot be solved for again.
+    #[error("the recording has an ultrasound probe, which its scene does not give: {0}")]
+    NoProbe(NoWall),
+    /// The wall of the recorded probe is not that of the scene.
+    #[error("the recorded ultrasound probe does not fit its scene: another version recorded it")]
+    OtherProbe,
 }
 
 /// The tissue chain: response and held element of each tick, and every element's position at each checkpoint. `lines` are
@@ -212,6 +224,12 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
     });
     let left = left.collect::<Result<Vec<_>, _>>()?;
     again.remember(&recorded.memory, before, left);
+    if recorded.memory.probe.is_there {
+        let probe = lines.probe.clone().ok_or(RepeatError::OtherProbe)?;
+        if !again.resume_probe(Box::new(probe), &recorded.memory) {
+            return Err(RepeatError::OtherProbe);
+        }
+    }
     let mut all = AllLoads {
         line: recorded.memory.loads,
         ..AllLoads::default()
@@ -229,6 +247,7 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
     let mut loads = recorded.loads.iter().peekable();
     let mut left = recorded.left.iter().peekable();
     let mut orders = recorded.orders.iter().peekable();
+    let mut probe = recorded.probe.iter().peekable();
     for (index, entry) in recorded.ticks.iter().enumerate() {
         if let Some((_, memory)) = recorded.middle.as_ref().filter(|(tick, _)| *tick == index as u64) {
             compare.positions(&again, memory);
@@ -246,11 +265,17 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
             *haptic.loads.input_buffer_mut() = all;
             haptic.loads.publish();
         }
+        let pressed = probe.next_if(|(tick, _)| *tick == index as u64).map(|(_, entry)| entry);
+        if let Some(entry) = pressed {
+            again.move_probe(entry.pose);
+        }
         haptic.pose.write(entry.pose);
         again.tick(entry.woke_ns);
         while bridge.tissue_notices.pop().is_ok() {}
         while bridge.old_body_lines.pop().is_ok() {}
-        compare.found.count(index, same_step(&again, entry));
+        compare
+            .found
+            .count(index, same_step(&again, entry) && is_pressed_so(&again, pressed));
     }
     compare.positions(&again, &recorded.end);
     Ok(compare.found)
@@ -269,6 +294,14 @@ fn order_of(order: &TapedOrder, lines: &mut LinesAgain) -> Result<TissueOrder, R
         TapedOrder::Line { generation } => {
             TissueOrder::Line(lines.take(*generation).ok_or(RepeatError::NoLine(*generation))?)
         }
+        TapedOrder::Probe => {
+            let probe = Box::new(lines.probe.clone().ok_or(RepeatError::OtherProbe)?);
+            TissueOrder::Probe {
+                generation: 1,
+                room: ProbeTape::new(&probe),
+                probe,
+            }
+        }
     })
 }
 
@@ -283,7 +316,7 @@ fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
             r.tick,
             r.contact,
             r.line,
-            r.seed_count,
+            (r.seed_count, r.outside),
             (r.unsolved, r.solved_ns),
             numbers,
             places,
@@ -297,6 +330,13 @@ fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
         && residual.to_bits() == entry.residual.to_bits()
 }
 
+/// The probe pushes the hand with the same bits.
+fn is_pressed_so(again: &TissueLoop, entry: Option<&ProbeEntry>) -> bool {
+    let bits = |wrench: &[f64; 6]| wrench.map(f64::to_bits);
+    let now = again.probe_response().map(|response| bits(&response.wrench.0));
+    entry.is_none_or(|entry| now == Some(bits(&entry.wrench)))
+}
+
 /// Compares whole bodies.
 struct Bodies {
     /// Loads the recorded bodies.
@@ -306,6 +346,9 @@ struct Bodies {
 
 impl Bodies {
     fn positions(&mut self, again: &TissueLoop, recorded: &TissueMemory) {
+        if recorded.probe.is_there && again.probe_memory() != recorded.probe {
+            self.found.different_positions += 1;
+        }
         self.reference.tissue.load(&recorded.body);
         let (then, now) = (self.reference.tissue.deformed(), again.body());
         let bits = |u: [f64; 3]| u.map(f64::to_bits);

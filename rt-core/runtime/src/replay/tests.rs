@@ -20,6 +20,7 @@ use stylet_sim::needle::NeedleParameters;
 use stylet_sim::scene::{Labels, SceneSource, TissueKind};
 
 mod left;
+mod probe;
 
 /// The loops with their tapes, and what the bridge would keep beside them.
 struct Recorded {
@@ -46,10 +47,14 @@ fn block() -> SceneSource {
 
 impl Recorded {
     fn new(tissue: TissueKind, force: &ForceParameters) -> Self {
-        let source = block();
+        Self::of(block(), tissue, force, 0.0)
+    }
+
+    /// With a needle that goes in so far above the middle.
+    fn of(source: SceneSource, tissue: TissueKind, force: &ForceParameters, above_m: f64) -> Self {
         let scene = source.build().expect("valid").with_tissue(tissue);
         let (low, high) = scene.lattice.bounds_m();
-        let entry_m = Vector3::new((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0, low[2]);
+        let entry_m = Vector3::new((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0 + above_m, low[2]);
         let body = LineBody::of_source(&source, tissue).expect("valid").expect("has lines");
         let line = body.prepare(1, entry_m.into(), [0.0, 0.0, 1.0], force.bending.is_on(), &mut || true);
         let limits = TissueParameters::default().validate().expect("valid");

@@ -1,5 +1,6 @@
 //! What the bridge and the loops hand each other: orders, notices and snapshot slots, through wait-free rings.
 
+use crate::rt::probe_tape::ProbeTape;
 use crate::rt::tissue_tape::{LeftTape, TissueTape};
 use crate::rt::world::World;
 use nalgebra::Vector3;
@@ -139,6 +140,8 @@ pub enum TissueOrder {
         generation: u64,
         /// What it can press.
         probe: Box<BodyProbe>,
+        /// Room to record it.
+        room: Box<ProbeTape>,
     },
 }
 

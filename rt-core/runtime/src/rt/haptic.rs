@@ -38,6 +38,8 @@ pub struct HapticLoop {
     goal: Option<HandGoal>,
     /// Ready for a needle that goes in where it lies.
     line: Option<Box<HandLine>>,
+    /// Number of what the probe does to it, as it was last taken up.
+    outside: u64,
     /// The last tick was one on it.
     on_line: bool,
     /// Needles that stay in.
@@ -97,6 +99,7 @@ impl HapticLoop {
             pose: memory.pose,
             goal: memory.goal,
             line: None,
+            outside: memory.outside,
             on_line: memory.on_line,
             left: left::Left {
                 is_hand_empty: memory.is_hand_empty,
@@ -129,6 +132,7 @@ impl HapticLoop {
         let sample = self.read();
         self.mark();
         let tissue = *self.ports.response.read();
+        self.follow_outside(&tissue);
         self.look_after_left(&sample, &tissue);
         self.watch(woke_ns, missed, &tissue);
         let response = self.respond(&sample, &tissue);

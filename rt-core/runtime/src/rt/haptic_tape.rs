@@ -1,6 +1,7 @@
 //! What the haptic loop writes to its flight recording, each tick.
 
 use crate::rt::exchange::HapticOrder;
+use crate::rt::outside::{Outside, OutsideTape};
 use crate::rt::pose::TipPose;
 use crate::rt::put_in::PutIn;
 use crate::rt::recorder::{FLIGHT_TICKS, Last, Tape, complete_from};
@@ -39,6 +40,8 @@ pub struct HapticMemory {
     pub goal: Option<HandGoal>,
     /// Number of the needle line that the loop has; 0 for none. Its state stands beside the memory.
     pub line: u64,
+    /// Number of what the probe does to it, as it was last taken up.
+    pub outside: u64,
     /// The last tick was one on it.
     pub on_line: bool,
     /// The hand holds no needle. The record of those that stay in stands beside the memory.
@@ -67,6 +70,7 @@ impl HapticMemory {
             pose: TipPose::default(),
             goal: None,
             line: 0,
+            outside: 0,
             on_line: false,
             is_hand_empty: false,
             watchdog: Watchdog::default(),
@@ -106,6 +110,8 @@ pub struct HapticTape {
     line_states: Last<LineState>,
     /// The needles that stay in, beside each checkpoint.
     left: Last<LeftRecord>,
+    /// What the probe does to the line; room from when there is one on.
+    outside: Option<Box<OutsideTape>>,
 }
 
 impl HapticTape {
@@ -125,6 +131,7 @@ impl HapticTape {
             checkpoints: Last::new(&(0, *memory), CHECKPOINTS),
             line_states: Last::of_slots((0..CHECKPOINTS).map(|_| LineState::with_room()).collect()),
             left: Last::of_slots((0..CHECKPOINTS).map(|_| LeftRecord::with_room()).collect()),
+            outside: None,
         }
     }
 
@@ -156,6 +163,24 @@ impl HapticTape {
         self.lines.push((self.ticks.next(), generation));
     }
 
+    /// Whether there is no room yet for what the probe does to the line.
+    pub fn lacks_outside_room(&self) -> bool {
+        self.outside.is_none()
+    }
+
+    /// From now on there is.
+    pub fn take_outside_room(&mut self, room: Box<OutsideTape>) {
+        self.outside.get_or_insert(room);
+    }
+
+    /// Keeps what the probe does to the line from the tick that runs on.
+    pub fn outside(&mut self, outside: &Outside) {
+        let tick = self.ticks.next();
+        if let Some(tape) = &mut self.outside {
+            tape.0.push((tick, *outside));
+        }
+    }
+
     /// Keeps an order of the tick that runs.
     pub fn order(&mut self, order: HapticOrder) {
         self.orders.push((self.ticks.next(), order));
@@ -164,6 +189,7 @@ impl HapticTape {
     /// The longest stretch that can be repeated: from the oldest checkpoint after which nothing was overwritten.
     pub fn flight(&self) -> Option<HapticFlight> {
         let complete = complete_from(&self.orders).max(complete_from(&self.lines));
+        let complete = complete.max(self.outside.as_ref().map_or(0, |outside| complete_from(&outside.0)));
         let possible = self.ticks.first().max(complete)..self.ticks.next();
         let points = self
             .checkpoints
@@ -174,6 +200,8 @@ impl HapticTape {
             points.into_iter().find(|(((tick, _), _), _)| possible.contains(tick))?;
         let orders = self.orders.since(0).filter(|(tick, _)| tick >= first);
         let lines = self.lines.since(0).filter(|(tick, _)| tick >= first);
+        let outside = self.outside.iter().flat_map(|outside| outside.0.since(0));
+        let outside = outside.filter(|(tick, _)| tick >= first);
         Some(HapticFlight {
             memory: *memory,
             ticks: self.ticks.since(*first).copied().collect(),
@@ -181,6 +209,7 @@ impl HapticTape {
             left: left.clone(),
             line_state: (memory.line != 0).then(|| line_state.clone()),
             lines: lines.map(|(tick, line)| (tick - first, *line)).collect(),
+            outside: outside.map(|(tick, outside)| (tick - first, *outside)).collect(),
         })
     }
 }
@@ -193,6 +222,9 @@ impl Tape for HapticTape {
         self.checkpoints.clear();
         self.line_states.clear();
         self.left.clear();
+        if let Some(outside) = &mut self.outside {
+            outside.0.clear();
+        }
     }
 
     fn is_for(&self, _scene_generation: u64) -> bool {
@@ -215,6 +247,8 @@ pub struct HapticFlight {
     pub left: LeftRecord,
     /// Numbers of lines, each with the index of the tick that took it up.
     pub lines: Vec<(u64, u64)>,
+    /// What the probe does to the line, each with the index of the tick that took it up.
+    pub outside: Vec<(u64, Outside)>,
 }
 
 impl HapticFlight {

@@ -6,7 +6,7 @@ use stylet_sim::line::MAX_STATIONS;
 use stylet_sim::line::beam::{BentNeedle, MAX_ACROSS};
 
 /// Shaft and tip of each station, and stations across along both directions.
-const MOST: usize = 2 * MAX_STATIONS + 2 * MAX_ACROSS;
+pub(crate) const MOST: usize = 2 * MAX_STATIONS + 2 * MAX_ACROSS;
 
 /// Forces of all needles in the newest tick.
 #[derive(Clone, Copy, Debug, Default)]

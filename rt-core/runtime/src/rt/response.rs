@@ -51,6 +51,8 @@ pub struct TissueResponse {
     pub solved_tip_in_scene: Vector3<f64>,
     /// Those of needles that stay in, whose columns it has; 0 for none.
     pub left: [u64; MAX_LEFT],
+    /// Number of what the probe does to the line, which rises with each that is shown; 0 where there was none yet.
+    pub outside: u64,
     /// The step has not converged and the needle would feel it.
     pub unsolved: bool,
 }
@@ -92,6 +94,7 @@ impl Default for TissueResponse {
             solved_ns: 0,
             solved_tip_in_scene: Vector3::zeros(),
             left: [0; MAX_LEFT],
+            outside: 0,
             unsolved: false,
         }
     }

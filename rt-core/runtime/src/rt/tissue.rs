@@ -8,6 +8,7 @@ use crate::rt::layers_met::LayersMet;
 use crate::rt::left_loads::LeftLoads;
 use crate::rt::line_loads::LineLoads;
 use crate::rt::pose::TipPose;
+use crate::rt::probe_tape::ProbeTape;
 use crate::rt::response::TissueResponse;
 use crate::rt::seed::{self, Seed};
 use crate::rt::timing::Probe;
@@ -58,6 +59,10 @@ pub struct TissueLoop {
     /// The ultrasound probe in this scene, and where it is.
     pressed: Option<Box<BodyProbe>>,
     probe_pose: Option<ProbePose>,
+    /// Room to record it, until the tape is there.
+    probe_room: Option<Box<ProbeTape>>,
+    /// What it does to the line was shown to the force loop.
+    is_outside_shown: bool,
     layers: LayersMet,
     /// The tip has been outside since the last contact.
     clear: bool,
@@ -102,6 +107,8 @@ impl TissueLoop {
             last_carry: LastCarry::new(),
             pressed: None,
             probe_pose: None,
+            probe_room: None,
+            is_outside_shown: false,
             layers: LayersMet::default(),
             clear: true,
             held: None,
@@ -245,7 +252,11 @@ impl TissueLoop {
                 }
                 TissueOrder::LeftRoom(room) => self.left_room = self.left_room.take().or(Some(room)),
                 TissueOrder::HandOverTape => self.hand_over_tape(),
-                TissueOrder::Probe { generation, probe } => self.take_probe(generation, probe),
+                TissueOrder::Probe {
+                    generation,
+                    probe,
+                    room,
+                } => self.take_probe(generation, probe, room),
                 TissueOrder::Line(line) => {
                     self.tape_order(TapedOrder::Line {
                         generation: line.generation,

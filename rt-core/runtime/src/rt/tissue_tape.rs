@@ -5,6 +5,7 @@ use crate::rt::layers_met::LayersMet;
 use crate::rt::left_loads::{LeftLoads, NeedleLoads};
 use crate::rt::line_loads::LineLoads;
 use crate::rt::pose::TipPose;
+use crate::rt::probe_tape::{ProbeEntry, ProbeTape};
 use crate::rt::recorder::{Last, Tape, complete_from};
 use crate::rt::response::TissueResponse;
 use crate::rt::seed::Seed;
@@ -15,11 +16,14 @@ use stylet_shm_schema::MAX_SEEDS;
 use stylet_sim::limits::Limits;
 use stylet_sim::line::MAX_LEFT;
 use stylet_sim::migration::Migration;
+use stylet_sim::probe::{ProbeMemory, ProbePose};
 use stylet_sim::scene::{SceneSource, TissueKind};
 use stylet_sim::tissue::Held;
 
 /// Ticks between two checkpoints: 5 s at 200 Hz. Two are kept, so that a tape reaches back at least 5 s.
 const CHECKPOINT_EVERY: u64 = 1000;
+/// Of a tape.
+pub const TAPE_TICKS: usize = 2 * CHECKPOINT_EVERY as usize;
 const ORDERS: usize = 1024;
 /// Larger bodies are not recorded: a copy of one would take too much of a tick.
 pub const MAX_BODY_BYTES: usize = 8 << 20;
@@ -45,6 +49,8 @@ pub enum TapedOrder {
         /// Number of the line.
         generation: u64,
     },
+    /// See [`TissueOrder::Probe`](crate::rt::exchange::TissueOrder).
+    Probe,
 }
 
 /// Everything that one tick of the tissue loop leaves to the next.
@@ -62,6 +68,12 @@ pub struct TissueMemory {
     pub loads: LineLoads,
     /// Needles that stay in: the loads that the body's share of each was made from.
     pub left: Vec<NeedleLoads>,
+    /// The probe.
+    pub probe: ProbeMemory,
+    /// Where the second hand had it.
+    pub probe_pose: Option<ProbePose>,
+    /// What it does to the line was shown to the force loop.
+    pub is_outside_shown: bool,
     /// Layers on the path of the needle.
     pub layers: LayersMet,
     /// The tip has been outside since the last contact.
@@ -101,10 +113,7 @@ pub struct LeftTape(Last<(u64, LeftLoads)>);
 impl LeftTape {
     /// Blank.
     pub fn new() -> Box<Self> {
-        Box::new(Self(Last::new(
-            &(0, LeftLoads::default()),
-            2 * CHECKPOINT_EVERY as usize,
-        )))
+        Box::new(Self(Last::new(&(0, LeftLoads::default()), TAPE_TICKS)))
     }
 }
 
@@ -120,6 +129,8 @@ pub struct TissueTape {
     loads: Last<(u64, LineLoads)>,
     /// Those of needles that stay in; room from when the first is left on.
     left: Option<Box<LeftTape>>,
+    /// Where the probe was; room from when there is one on.
+    probe: Option<Box<ProbeTape>>,
     /// Written alternately, each with the tick that it comes before.
     checkpoints: [(u64, TissueMemory); 2],
     /// Checkpoints so far, and the tick from which on the next is due.
@@ -143,6 +154,9 @@ impl TissueTape {
             in_by_line: false,
             loads: LineLoads::default(),
             left: Vec::with_capacity(MAX_LEFT),
+            probe: ProbeMemory::default(),
+            probe_pose: None,
+            is_outside_shown: false,
             layers: LayersMet::default(),
             clear: true,
             held: None,
@@ -160,7 +174,7 @@ impl TissueTape {
             response: TissueResponse::default(),
         };
         let tissue = world.scene.tissue();
-        let room = |is_needed: bool| if is_needed { 2 * CHECKPOINT_EVERY as usize } else { 1 };
+        let room = |is_needed: bool| if is_needed { TAPE_TICKS } else { 1 };
         Self {
             scene_generation: world.generation,
             scene,
@@ -168,6 +182,7 @@ impl TissueTape {
             orders: Last::new(&(0, TapedOrder::Reset), ORDERS),
             loads: Last::new(&(0, LineLoads::default()), room(!not_kept && tissue.has_lines())),
             left: None,
+            probe: None,
             checkpoints: [(0, memory()), (0, memory())],
             points: 0,
             next_due: 0,
@@ -218,6 +233,26 @@ impl TissueTape {
         }
     }
 
+    /// From now on there is room for the probe.
+    pub fn take_probe_room(&mut self, room: &mut Option<Box<ProbeTape>>) {
+        if let Some(mut room) = room.take() {
+            let [even, odd, end] = &mut room.memories;
+            let [before, after] = &mut self.checkpoints;
+            std::mem::swap(even, &mut before.1.probe);
+            std::mem::swap(odd, &mut after.1.probe);
+            std::mem::swap(end, &mut self.end.probe);
+            self.probe = Some(room);
+        }
+    }
+
+    /// Keeps where the probe was in the tick that runs, and what it did to the hand.
+    pub fn probe(&mut self, entry: ProbeEntry) {
+        let tick = self.ticks.next();
+        if let Some(room) = &mut self.probe {
+            room.entries.push((tick, entry));
+        }
+    }
+
     /// Keeps an order of the tick that runs.
     pub fn order(&mut self, order: TapedOrder) {
         self.orders.push((self.ticks.next(), order));
@@ -236,6 +271,7 @@ impl TissueTape {
         }
         let complete = complete_from(&self.orders).max(complete_from(&self.loads));
         let complete = complete.max(self.left.as_ref().map_or(0, |left| complete_from(&left.0)));
+        let complete = complete.max(self.probe.as_ref().map_or(0, |probe| complete_from(&probe.entries)));
         let possible = self.ticks.first().max(complete)..next;
         let written = self.checkpoints.iter().take(self.points);
         let mut points: Vec<&(u64, TissueMemory)> = written.filter(|(tick, _)| possible.contains(tick)).collect();
@@ -243,6 +279,8 @@ impl TissueTape {
         let (first, memory) = points.first()?;
         let loads = self.loads.since(0).filter(|(tick, _)| tick >= first);
         let orders = self.orders.since(0).filter(|(tick, _)| tick >= first);
+        let probe = self.probe.iter().flat_map(|probe| probe.entries.since(0));
+        let probe = probe.filter(|(tick, _)| tick >= first);
         let left = self.left.iter().flat_map(|left| left.0.since(0)).copied();
         // What was so before the stretch holds on in it.
         let (before, left): (Vec<_>, Vec<_>) = left.partition(|(tick, _)| tick < first);
@@ -256,6 +294,7 @@ impl TissueTape {
             ticks: self.ticks.since(*first).copied().collect(),
             orders: orders.map(|(tick, order)| (tick - first, order.clone())).collect(),
             loads: loads.map(|(tick, loads)| (tick - first, *loads)).collect(),
+            probe: probe.map(|(tick, entry)| (tick - first, *entry)).collect(),
             left: before
                 .into_iter()
                 .chain(left.into_iter().map(|(tick, loads)| (tick - first, loads)))
@@ -271,6 +310,9 @@ impl Tape for TissueTape {
         self.loads.clear();
         if let Some(left) = &mut self.left {
             left.0.clear();
+        }
+        if let Some(probe) = &mut self.probe {
+            probe.entries.clear();
         }
         self.points = 0;
         self.next_due = 0;
@@ -302,6 +344,8 @@ pub struct TissueFlight {
     pub loads: Vec<(u64, LineLoads)>,
     /// Those of needles that stay in, likewise.
     pub left: Vec<(u64, LeftLoads)>,
+    /// Where the probe was, with the index of each tick.
+    pub probe: Vec<(u64, ProbeEntry)>,
 }
 
 impl TissueFlight {
@@ -315,6 +359,11 @@ impl TissueFlight {
         });
         let left = self.memory.left.iter().map(|left| left.generation);
         first.into_iter().chain(left).chain(taken)
+    }
+
+    /// Whether the loop had a probe.
+    pub fn has_probe(&self) -> bool {
+        self.memory.probe.is_there || self.orders.iter().any(|(_, order)| *order == TapedOrder::Probe)
     }
 
     /// Whether a needle on that line pushed tissue, so that its columns count.

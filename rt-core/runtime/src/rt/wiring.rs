@@ -4,6 +4,7 @@ pub use crate::rt::capacities::Capacities;
 use crate::rt::exchange::{HapticOrder, Notice, SnapshotReturn, SnapshotSlot, TissueOrder};
 use crate::rt::haptic_tape::HapticTape;
 use crate::rt::line_loads::AllLoads;
+use crate::rt::outside::{Outside, OutsideTape};
 use crate::rt::pose::TipPose;
 use crate::rt::recorder::{Recorder, TapePort, recorder};
 use crate::rt::response::TissueResponse;
@@ -29,6 +30,10 @@ pub struct HapticPorts {
     pub pose: triple_buffer::Input<TipPose>,
     /// Newest response of the tissue loop.
     pub response: triple_buffer::Output<TissueResponse>,
+    /// What the probe does to the line.
+    pub outside: triple_buffer::Output<Outside>,
+    /// Room to record it.
+    pub outside_rooms: rtrb::Consumer<Box<OutsideTape>>,
     /// Orders of the bridge.
     pub orders: rtrb::Consumer<HapticOrder>,
     /// What happened, to the bridge.
@@ -53,6 +58,8 @@ pub struct TissuePorts {
     pub pose: triple_buffer::Output<TipPose>,
     /// Newest response, to the force loop.
     pub response: triple_buffer::Input<TissueResponse>,
+    /// What the probe does to the line, to the force loop.
+    pub outside: triple_buffer::Input<Outside>,
     /// Orders of the bridge.
     pub orders: rtrb::Consumer<TissueOrder>,
     /// What happened, to the bridge.
@@ -93,6 +100,8 @@ pub struct BridgePorts {
     pub lines: rtrb::Producer<Box<HandLine>>,
     /// Room for needles that stay in, to the force loop.
     pub rooms: rtrb::Producer<Box<LeftNeedles>>,
+    /// Room to record what the probe does to the line, to the force loop.
+    pub outside_rooms: rtrb::Producer<Box<OutsideTape>>,
     /// Lines to be freed.
     pub old_hand_lines: rtrb::Consumer<Box<HandLine>>,
     /// Columns to be freed.
@@ -129,6 +138,8 @@ impl Wiring {
     ) -> Self {
         let (pose_in, pose_out) = triple_buffer::triple_buffer(&TipPose::default());
         let (response_in, response_out) = triple_buffer::triple_buffer(&TissueResponse::default());
+        let (outside_in, outside_out) = triple_buffer::triple_buffer(&Outside::default());
+        let (outside_rooms, outside_room_out) = rtrb::RingBuffer::new(ROOMS);
         let (record_in, records) = rtrb::RingBuffer::new(capacities.records);
         let (haptic_orders, haptic_order_out) = rtrb::RingBuffer::new(capacities.orders);
         let (haptic_notice_in, haptic_notices) = rtrb::RingBuffer::new(capacities.notices);
@@ -149,6 +160,8 @@ impl Wiring {
             haptic: HapticPorts {
                 pose: pose_in,
                 response: response_out,
+                outside: outside_out,
+                outside_rooms: outside_room_out,
                 orders: haptic_order_out,
                 notices: haptic_notice_in,
                 records: record_in,
@@ -161,6 +174,7 @@ impl Wiring {
             tissue: TissuePorts {
                 pose: pose_out,
                 response: response_in,
+                outside: outside_in,
                 orders: tissue_order_out,
                 notices: tissue_notice_in,
                 old_worlds: old_world_in,
@@ -181,6 +195,7 @@ impl Wiring {
                 old_worlds,
                 lines,
                 rooms,
+                outside_rooms,
                 old_hand_lines,
                 old_body_lines,
                 old_probes,

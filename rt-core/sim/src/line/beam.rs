@@ -45,6 +45,8 @@ pub struct BeamState {
     forces_n: [[f64; MAX_ACROSS]; 2],
     /// Where each station's track lies in the tissue at rest, across the line.
     track_m: [[f64; MAX_ACROSS]; 2],
+    /// How far the probe moves the tissue at each station, across the line.
+    outside_m: [[f64; MAX_ACROSS]; 2],
     /// Stations that the shaft is in. One that it leaves forgets its track: a needle that came back to it beside its own would be
     /// bent by nobody's work.
     in_contact: u32,
@@ -107,10 +109,29 @@ impl BeamState {
         &self.forces_n[side.min(1)]
     }
 
+    /// Where the track of a station would lie across the line without the needle.
+    fn lies_m(&self, side: usize, n: usize) -> f64 {
+        self.track_m[side][n] + self.outside_m[side][n]
+    }
+
     /// No tissue holds the needle across.
     pub(super) fn release(&mut self) {
         if self.in_contact > 0 {
             *self = BeamState::default();
+        }
+    }
+
+    /// The probe moves some tissue across the line.
+    pub(super) fn is_moved(&self) -> bool {
+        self.outside_m.iter().flatten().any(|m| *m != 0.0)
+    }
+
+    /// The probe moves the tissue at the first so many stations so far along each direction, m.
+    pub(super) fn move_from_outside(&mut self, by_m: impl Fn(usize, usize) -> f64, stations: usize) {
+        for (side, outside_m) in self.outside_m.iter_mut().enumerate() {
+            for (n, slot) in outside_m.iter_mut().enumerate().take(stations) {
+                *slot = by_m(side, n);
+            }
         }
     }
 
@@ -216,7 +237,7 @@ fn balance(
     let by_whole_m = model.whole_m_per_n * needle.tip_n[side];
     for n in 0..tied {
         let at_m = needle.station_m(n);
-        state.forces_n[side][n] = needle.without_tissue_m(side, at_m) - state.track_m[side][n] + by_whole_m;
+        state.forces_n[side][n] = needle.without_tissue_m(side, at_m) - state.lies_m(side, n) + by_whole_m;
         scratch.by_hole[side][n] = needle.flexibility(at_m, needle.hole_m);
     }
     solve(factor, tied, &mut state.forces_n[side]);
@@ -280,7 +301,8 @@ fn lead(model: &BeamModel, state: &mut BeamState, scratch: &BeamScratch, needle:
 
 /// Displacement of the tissue at a station, across the line.
 fn displacement_m(model: &BeamModel, state: &BeamState, needle: &BentNeedle, side: usize, n: usize) -> f64 {
-    dot(model.across[side].row(n), &state.forces_n[side]) - model.whole_m_per_n * needle.tip_n[side]
+    let by_needle_m = dot(model.across[side].row(n), &state.forces_n[side]) - model.whole_m_per_n * needle.tip_n[side];
+    by_needle_m + state.outside_m[side][n]
 }
 
 /// New stations are tied to the tissue where the needle goes through it now: without a force.
@@ -326,7 +348,7 @@ fn answer(model: &BeamModel, state: &BeamState, needle: BentNeedle, now: usize) 
 fn stored_j(model: &BeamModel, state: &BeamState, needle: &BentNeedle, side: usize, now: usize, tip_m: f64) -> f64 {
     let forces = &state.forces_n[side][..now];
     let bent = |at_m: f64| needle.across_m(side, at_m, forces) - needle.straight_m(side, at_m);
-    let each = |(n, f): (usize, &f64)| f * (needle.straight_m(side, needle.station_m(n)) - state.track_m[side][n]);
+    let each = |(n, f): (usize, &f64)| f * (needle.straight_m(side, needle.station_m(n)) - state.lies_m(side, n));
     let in_tissue: f64 = forces.iter().enumerate().map(each).sum();
     let (tip_n, sum_n) = (needle.tip_n[side], forces.iter().sum::<f64>());
     let by_whole = model.whole_m_per_n * tip_n * (sum_n - tip_n);

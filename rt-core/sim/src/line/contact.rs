@@ -63,6 +63,7 @@ pub(super) fn step_in(
     state
         .memory
         .begin(rows, common_m_per_n, &model.settings.prony, input.dt_s);
+    state.move_from_outside();
     scratch.begin();
     advance(model, state, input, &mut Alone(scratch))
 }
@@ -91,6 +92,7 @@ struct Alone<'a>(&'a mut Scratch);
 impl Company for Alone<'_> {
     fn begin(&mut self, model: &LineModel, state: &mut LineState, tip_m: f64, membrane: Option<usize>) {
         touch(model, state, tip_m, self.0);
+        state.move_membrane_from_outside(model);
         meet(model, state, membrane);
         press(model, state, membrane);
         if let Some(spring) = Spring::of(model, state) {

@@ -30,6 +30,7 @@ mod contact;
 mod cross;
 mod left;
 mod model;
+mod outside;
 pub mod prony;
 mod ready;
 mod rows;

@@ -232,6 +232,16 @@ impl HandLine {
         (BONE_N_PER_M * in_bone_m, 0.5 * BONE_N_PER_M * in_bone_m * in_bone_m)
     }
 
+    /// The tissue is displaced past the needle so far at each row, in the order of [`BodyLine::answer`], m: after so many ticks. Does not allocate.
+    pub fn displace_from_outside(&mut self, rows_m: &[f64], ticks: u32) {
+        self.state.outside.set(rows_m, ticks);
+    }
+
+    /// Something displaces it so.
+    pub fn is_displaced_from_outside(&self) -> bool {
+        self.state.outside.is_on()
+    }
+
     /// What the state is.
     pub fn state(&self) -> &LineState {
         &self.state

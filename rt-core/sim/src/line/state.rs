@@ -2,6 +2,7 @@
 
 use super::beam::BeamState;
 use super::model::LineModel;
+use super::outside::Outside;
 use super::prony::Memory;
 use super::rows::dot;
 use serde::{Deserialize, Serialize};
@@ -85,6 +86,8 @@ pub struct LineState {
     pub(super) beside_whole_m: f64,
     /// The last tick was one beside other needles: what they move is in the memory's offset.
     pub(super) is_beside: bool,
+    /// How the probe moves the tissue past the needle.
+    pub(super) outside: Outside,
     /// How far the tip is ahead of where the hand has it: a needle that was taken up again, m.
     pub(super) grip_m: f64,
     /// End of a track that an earlier needle cut where this line lies, and the layers that it opened.
@@ -124,6 +127,7 @@ impl LineState {
             beam: BeamState::default(),
             beside_whole_m: 0.0,
             is_beside: false,
+            outside: Outside::new(stations, value),
             grip_m: 0.0,
             open_m: 0.0,
             open_layers: 0,
@@ -209,6 +213,7 @@ impl LineState {
         self.tip_own = 0.0;
         (self.tip_offset_m, self.membrane_n_per_m, self.whole_n) = (0.0, 0.0, 0.0);
         self.memory.reset();
+        self.outside.reset();
         self.beam = BeamState::default();
         (self.beside_whole_m, self.is_beside, self.grip_m) = (0.0, false, 0.0);
         self.last = LineOutput::default();
@@ -227,7 +232,7 @@ impl LineState {
     pub(super) fn leave_company(&mut self) {
         if std::mem::take(&mut self.is_beside) {
             self.memory.offset_m.fill(0.0);
-            self.beside_whole_m = 0.0;
+            self.beside_whole_m = self.outside.at_tip_m;
         }
     }
 

@@ -1,7 +1,9 @@
 //! A probe as the tissue loop has it: what it can press, what it has done, and its share of the body's displacement.
 
+use super::beside::LinesBeside;
 use super::columns::ReadyProbe;
 use super::contact::{ContactReport, ProbeState, step};
+use super::memory::ProbeMemory;
 use super::response::ProbeResponse;
 use super::shape::ProbePose;
 use crate::tissue::{ElementField, PackedField};
@@ -12,7 +14,8 @@ pub struct BodyProbe {
     ready: ReadyProbe,
     state: ProbeState,
     response: ProbeResponse,
-    /// How far others displace each pad, along x, y, z, m.
+    /// Needle lines in the same body, and how far they displace each pad, along x, y, z, m.
+    lines: LinesBeside,
     beside_m: Vec<f64>,
     share: ElementField,
     /// Loads that the share was made from.
@@ -24,7 +27,7 @@ pub struct BodyProbe {
 }
 
 /// A larger body is added up over several ticks, so many elements in each: the picture is late by so many, the force is not.
-const ELEMENTS_A_TICK: usize = 16_384;
+const ELEMENTS_A_TICK: usize = 8_192;
 
 impl BodyProbe {
     /// Out of the body.
@@ -38,6 +41,7 @@ impl BodyProbe {
             parts: elements.div_ceil(ELEMENTS_A_TICK).max(1),
             state: ProbeState::new(&ready),
             response: ProbeResponse::default(),
+            lines: LinesBeside::with_room(rows),
             beside_m: vec![0.0; rows],
             shared_n: vec![0.0; rows],
             ready,
@@ -69,35 +73,74 @@ impl BodyProbe {
         self.shared_n.iter().any(|n| *n != 0.0)
     }
 
-    /// No other load displaces the wall.
-    pub fn nothing_beside(&mut self) {
+    /// No other load displaces the wall, and lines that are not kept are forgotten.
+    pub fn nothing_beside(&mut self, is_kept: impl Fn(u64) -> bool) {
+        self.lines.keep(is_kept);
         self.beside_m.fill(0.0);
     }
 
-    /// Other loads displace the wall as well: `columns` of the same body with their loads. Columns of another body do not count.
-    pub fn beside(&mut self, columns: &[PackedField], loads_n: &[f64]) {
+    /// The loads on a line displace the wall as well: by its columns, of the same body; those of another do not count. Reads these columns where the
+    /// line is new.
+    pub fn beside(&mut self, generation: u64, columns: &[PackedField], loads_n: &[f64]) {
         let own = self.ready.columns.first().map(PackedField::elements);
-        for (column, load_n) in columns.iter().zip(loads_n).filter(|(_, n)| **n != 0.0) {
-            if Some(column.elements()) == own {
-                self.displace_pads(|element| column.at(element).map(|m| load_n * f64::from(m)));
+        self.lines.join(generation, columns, &self.ready.elements, own);
+        self.lines.displace_pads(generation, loads_n, &mut self.beside_m);
+    }
+
+    /// How far the probe displaces the rows of a line along it, in the order of its columns, m; says how many there are.
+    pub fn displace_line(&self, generation: u64, rows_m: &mut [f64]) -> usize {
+        self.lines.displace_line(generation, self.state.loads_n(), rows_m)
+    }
+
+    /// How far needles displace each pad in this tick, along x, y, z, m.
+    pub fn beside_m(&self) -> &[f64] {
+        &self.beside_m
+    }
+
+    /// Loads of the probe on the pads, along x, y, z, N.
+    pub fn loads_n(&self) -> &[f64] {
+        self.state.loads_n()
+    }
+
+    /// Keeps what this tick leaves to the next. Allocates nothing where the room is of this probe; else there is no probe in it.
+    pub fn save(&self, to: &mut ProbeMemory) {
+        let rows = self.shared_n.len();
+        let fits =
+            to.pressed.len() == self.ready.wall.points.len() && [to.shared_n.len(), to.coming_n.len()] == [rows; 2];
+        to.is_there = fits;
+        if fits {
+            to.pose = self.state.pose();
+            for (slot, pressed) in to.pressed.iter_mut().zip(self.state.pressed()) {
+                *slot = pressed;
             }
+            to.shared_n.copy_from_slice(&self.shared_n);
+            to.coming_n.copy_from_slice(&self.coming_n);
+            to.made = self.made as u64;
         }
     }
 
-    /// The same for a displacement that is added up already.
-    pub fn beside_field(&mut self, field: &ElementField) {
-        if Some(field.elements()) == self.ready.columns.first().map(PackedField::elements) {
-            let at = |axis: &Vec<f32>, e: u32| axis.get(e as usize).copied().map_or(0.0, f64::from);
-            self.displace_pads(|element| field.0.each_ref().map(|axis| at(axis, element)));
+    /// Goes on from what another probe of the same wall has left; false, and nothing changes, where it is of another.
+    pub fn load(&mut self, from: &ProbeMemory) -> bool {
+        let rows = self.shared_n.len();
+        let fits = from.pressed.len() == self.ready.wall.points.len()
+            && [from.shared_n.len(), from.coming_n.len()] == [rows; 2]
+            && from.made < self.parts as u64;
+        if !fits {
+            return false;
         }
-    }
-
-    fn displace_pads(&mut self, by_m: impl Fn(u32) -> [f64; 3]) {
-        for (moved_m, &element) in self.beside_m.chunks_exact_mut(3).zip(&self.ready.elements) {
-            for (slot, by_m) in moved_m.iter_mut().zip(by_m(element)) {
-                *slot += by_m;
-            }
+        self.reset();
+        self.state.take_up(&self.ready, from.pose, &from.pressed);
+        self.shared_n.copy_from_slice(&from.shared_n);
+        self.coming_n.copy_from_slice(&from.coming_n);
+        self.made = from.made as usize;
+        let columns = &self.ready.columns;
+        for part in 0..self.parts {
+            self.share.load_part(columns, &self.shared_n, [part, self.parts]);
         }
+        for part in 0..self.made {
+            self.state.share.load_part(columns, &self.coming_n, [part, self.parts]);
+        }
+        true
     }
 
     /// The probe is at this pose. Whether it displaces the body otherwise than before.

@@ -1,5 +1,6 @@
 //! The body's answer to a newton along x, y and z on each pad, eight at once, in slices of bounded work.
 
+use super::between::Between;
 use super::shape::ProbeShape;
 use super::wall::{NoWall, Wall};
 use crate::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight};
@@ -22,6 +23,10 @@ pub struct ReadyProbe {
     pub columns: Vec<PackedField>,
     /// Displacement of pads along x, y, z with a newton on each, m/N: row after row, symmetric.
     pub(super) compliance: Vec<f64>,
+    /// Loads of the pads by a newton on each point along x, y, z: row after row.
+    shares: Vec<f32>,
+    /// How points move with a newton on each, m/N: row after row of blocks of 3 x 3.
+    between: Vec<[[f32; 3]; 3]>,
     /// The element of that body behind the middle of each pad.
     pub elements: Vec<u32>,
     /// Residual over load of the worst column.
@@ -39,11 +44,28 @@ impl ReadyProbe {
         self.compliance.get(a * self.rows() + b).copied().unwrap_or(0.0)
     }
 
+    /// How all points move along x, y, z with a newton along x, y, z on point `n`, m/N.
+    #[inline]
+    pub(super) fn between(&self, n: usize) -> &[[[f32; 3]; 3]] {
+        let points = self.wall.points.len();
+        self.between.get(n * points..(n + 1) * points).unwrap_or(&[])
+    }
+
+    /// Loads of the pads' rows by a newton on point `n` along each direction; and how it moves where they do.
+    #[inline]
+    pub(super) fn shares(&self, n: usize) -> impl Iterator<Item = &[f32]> {
+        let rows = self.rows();
+        self.shares
+            .get(3 * n * rows..3 * (n + 1) * rows)
+            .unwrap_or(&[])
+            .chunks_exact(rows.max(1))
+    }
+
     /// Bytes of the columns, and of the compliance.
     pub fn bytes(&self) -> [usize; 2] {
         [
             self.columns.iter().map(PackedField::bytes).sum(),
-            8 * self.compliance.len(),
+            8 * self.compliance.len() + size_of_val(&*self.between) + size_of_val(&*self.shares),
         ]
     }
 }
@@ -51,8 +73,11 @@ impl ReadyProbe {
 /// Columns of a probe, ready ones first.
 pub struct ProbeQueue {
     ready: ReadyProbe,
-    /// Of each pad.
-    weights: Vec<Vec<(u32, f64)>>,
+    /// Loads of each row of the pads, and of the points.
+    loads: Vec<Vec<NodeWeight>>,
+    read: Vec<Vec<NodeWeight>>,
+    /// How each row of the points moves with a newton on each of the pads', m/N.
+    answers: Vec<f64>,
     state: BatchState<f32>,
     unpacked: ElementField,
     next: usize,
@@ -64,6 +89,8 @@ impl ProbeQueue {
     pub fn new(body: &BatchModel<f32>, wall: Wall, shape: ProbeShape) -> Result<Self, NoWall> {
         let weights = wall.pads.iter().map(|pad| pad.weights(body));
         let weights: Vec<_> = weights.collect::<Option<_>>().ok_or(NoWall::NotInBody)?;
+        let points = wall.points.iter().map(|point| point.weights(body));
+        let points: Vec<_> = points.collect::<Option<_>>().ok_or(NoWall::NotInBody)?;
         let elements = wall.pads.iter().map(|pad| {
             let nearest = |f: &&super::wall::Face| (0..3).map(|c| (f.place_m[c] - pad.place_m[c]).powi(2)).sum::<f64>();
             let face = pad.faces.iter().min_by(|a, b| nearest(a).total_cmp(&nearest(b)));
@@ -77,9 +104,13 @@ impl ProbeQueue {
                 wall,
                 columns: Vec::with_capacity(rows),
                 compliance: vec![0.0; rows * rows],
+                shares: Vec::new(),
+                between: Vec::new(),
                 residual: 0.0,
             },
-            weights,
+            answers: vec![0.0; 3 * points.len() * rows],
+            loads: rows_of(&weights),
+            read: rows_of(&points),
             state: BatchState::new(body),
             unpacked: ElementField::zeros(body.element_count()),
             next: 0,
@@ -112,6 +143,8 @@ impl ProbeQueue {
                 self.ready.compliance[b * rows + a] = mean;
             }
         }
+        let joined = Between::of(&self.answers, &self.ready.compliance, rows);
+        (self.ready.shares, self.ready.between) = (joined.shares, joined.blocks);
         Ok(self.ready)
     }
 
@@ -119,7 +152,7 @@ impl ProbeQueue {
         let rows = self.ready.rows();
         let lanes = LOADS.min(rows - self.next);
         if !self.is_begun {
-            let loads: Vec<Vec<NodeWeight>> = (self.next..self.next + lanes).map(|row| self.load(row)).collect();
+            let loads = &self.loads[self.next..self.next + lanes];
             let slices: Vec<&[NodeWeight]> = loads.iter().map(Vec::as_slice).collect();
             self.state.begin(body, &slices);
             self.is_begun = true;
@@ -132,9 +165,14 @@ impl ProbeQueue {
             return;
         }
         for lane in 0..lanes {
-            for other in 0..rows {
-                let load = self.load(other);
-                self.ready.compliance[other * rows + self.next + lane] = self.state.sample(lane, &load);
+            let column = self.next + lane;
+            for (values, read) in [
+                (&mut self.ready.compliance, &self.loads),
+                (&mut self.answers, &self.read),
+            ] {
+                for (row, load) in values.chunks_exact_mut(rows).zip(read) {
+                    row[column] = self.state.sample(lane, load);
+                }
             }
             self.state.write(body, lane, &mut self.unpacked);
             let mut column = PackedField::zeros(body.element_count());
@@ -145,19 +183,17 @@ impl ProbeQueue {
         self.next += lanes;
         self.is_begun = false;
     }
+}
 
-    fn load(&self, row: usize) -> Vec<NodeWeight> {
-        let weight = |part: f64| {
-            let mut along = [0.0; 3];
-            along[row % 3] = part;
-            along
-        };
-        let of_pad = self.weights[row / 3].iter();
-        of_pad
-            .map(|&(node, part)| NodeWeight {
-                node,
-                weight: weight(part),
-            })
-            .collect()
-    }
+/// Along x, y and z of each.
+fn rows_of(places: &[Vec<(u32, f64)>]) -> Vec<Vec<NodeWeight>> {
+    let row = |n: usize| {
+        let of_place = places[n / 3].iter();
+        of_place.map(move |&(node, part)| {
+            let mut weight = [0.0; 3];
+            weight[n % 3] = part;
+            NodeWeight { node, weight }
+        })
+    };
+    (0..3 * places.len()).map(|n| row(n).collect()).collect()
 }

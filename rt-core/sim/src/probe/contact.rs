@@ -2,14 +2,16 @@
 
 use super::columns::ReadyProbe;
 use super::complementarity::Problem;
+use super::moves;
 use super::response::ProbeResponse;
 use super::shape::ProbePose;
 use crate::tissue::ElementField;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
-/// Pads farther from the probe than that are not looked at in a pass.
-const NEAR_M: f64 = 4e-3;
-/// A pad is pressed from the side of the hollow: the probe's surface there faces into the wall.
+/// Points farther from the probe than that are not looked at on the way to a pose, and in a pass.
+const REACH_M: f64 = 4e-3;
+const NEAR_M: f64 = 0.15e-3;
+/// A point is pressed from the side of the hollow: the probe's surface there faces into the wall.
 const FACING: f64 = 0.2;
 /// A pose farther from the one before is reached in steps, since the wall's way out of the probe is that to the nearest side.
 const STEP_M: f64 = 2e-3;
@@ -18,8 +20,8 @@ const MOST_STEPS: usize = 8;
 const PASSES: usize = 40;
 const PASSES_ON_THE_WAY: usize = 2;
 /// A pass that leaves no pad farther than that from the probe's surface, on the wrong side, and no force turned farther from it, is the last.
-const CLOSED_M: f64 = 2e-8;
-const TURNED: f64 = 1e-5;
+const CLOSED_M: f64 = 4e-7;
+const TURNED: f64 = 2e-4;
 /// From that pass on a force turns half as far as the surface does: a pad that is hardly pressed may be in contact in every other pass.
 const HALF_FROM: usize = 12;
 
@@ -44,10 +46,16 @@ pub struct ProbeState {
     pose: Option<ProbePose>,
     /// On the tissue at each pad, along x, y, z, N.
     loads_n: Vec<f64>,
-    /// How far each pad is displaced by them, m.
-    moved_m: Vec<f64>,
-    /// How hard each pad is pressed, N.
+    /// How far each point is displaced by them, and by others, m.
+    moved_m: Vec<[f64; 3]>,
+    beside_m: Vec<[f64; 3]>,
+    /// Room for how others displace the pads.
+    pads_m: Vec<f64>,
+    /// How hard each point is pressed, N, and where to.
     pressed_n: Vec<f64>,
+    pushed: Vec<[f64; 3]>,
+    /// Points that are looked at, and of these those that may be in contact.
+    reach: Vec<u32>,
     near: Vec<u32>,
     outward: Vec<[f64; 3]>,
     problem: Problem,
@@ -59,16 +67,20 @@ pub struct ProbeState {
 impl ProbeState {
     /// No contact yet.
     pub fn new(probe: &ReadyProbe) -> Self {
-        let pads = probe.wall.pads.len();
+        let (rows, points) = (probe.rows(), probe.wall.points.len());
         let elements = probe.columns.first().map_or(0, crate::tissue::PackedField::elements);
         ProbeState {
             pose: None,
-            loads_n: vec![0.0; 3 * pads],
-            moved_m: vec![0.0; 3 * pads],
-            pressed_n: vec![0.0; pads],
-            near: Vec::with_capacity(pads),
-            outward: vec![[0.0; 3]; pads],
-            problem: Problem::with_room(pads),
+            loads_n: vec![0.0; rows],
+            moved_m: vec![[0.0; 3]; points],
+            beside_m: vec![[0.0; 3]; points],
+            pads_m: vec![0.0; rows],
+            pressed_n: vec![0.0; points],
+            pushed: vec![[0.0; 3]; points],
+            reach: Vec::with_capacity(points),
+            near: Vec::with_capacity(points),
+            outward: vec![[0.0; 3]; points],
+            problem: Problem::with_room(points),
             share: ElementField::with_room(elements),
             report: ContactReport::default(),
         }
@@ -79,9 +91,46 @@ impl ProbeState {
         &self.loads_n
     }
 
-    /// Displacements of the pads by these loads, pad after pad, along x, y, z, m.
-    pub fn moved_m(&self) -> &[f64] {
+    /// Displacements of the points of the wall by these loads, along x, y, z, m.
+    pub fn moved_m(&self) -> &[[f64; 3]] {
         &self.moved_m
+    }
+
+    /// How hard the probe presses each point of the wall, N, and where to; no direction where it does not.
+    pub fn pressed(&self) -> impl Iterator<Item = (f64, [f64; 3])> {
+        let pressed = self.pressed_n.iter().copied().zip(self.pushed.iter().copied());
+        pressed.map(|(force_n, to)| (force_n, if force_n > 0.0 { to } else { [0.0; 3] }))
+    }
+
+    /// Where the last tick had the probe.
+    pub(super) fn pose(&self) -> Option<ProbePose> {
+        self.pose
+    }
+
+    /// Goes on from forces on the points of the wall.
+    pub(super) fn take_up(&mut self, probe: &ReadyProbe, pose: Option<ProbePose>, pressed: &[(f64, [f64; 3])]) {
+        self.reset();
+        self.pose = pose;
+        let slots = self.pressed_n.iter_mut().zip(&mut self.pushed);
+        for ((force_n, pushed), pressed) in slots.zip(pressed) {
+            (*force_n, *pushed) = *pressed;
+        }
+        self.reach_all(probe);
+        self.move_wall(probe);
+        self.load_pads(probe);
+    }
+
+    fn move_wall(&mut self, probe: &ReadyProbe) {
+        moves::wall(probe, &self.pressed_n, &self.pushed, &self.reach, &mut self.moved_m);
+    }
+
+    fn load_pads(&mut self, probe: &ReadyProbe) {
+        moves::pads(probe, &self.pressed_n, &self.pushed, &mut self.loads_n);
+    }
+
+    fn reach_all(&mut self, probe: &ReadyProbe) {
+        self.reach.clear();
+        self.reach.extend(0..probe.wall.points.len() as u32);
     }
 
     /// What came of the last tick.
@@ -97,9 +146,10 @@ impl ProbeState {
     /// Tissue at rest, and the probe out of it.
     pub fn reset(&mut self) {
         self.pose = None;
-        for values in [&mut self.loads_n, &mut self.moved_m, &mut self.pressed_n] {
+        for values in [&mut self.loads_n, &mut self.pressed_n] {
             values.fill(0.0);
         }
+        self.moved_m.fill([0.0; 3]);
     }
 }
 
@@ -110,20 +160,16 @@ pub fn step(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside
     let pose = if is_finite { *pose } else { from };
     state.report = ContactReport::default();
     if is_finite || state.pose.is_some() {
+        moves::beside(probe, beside_m, &mut state.pads_m, &mut state.beside_m);
         let steps = steps_between(&from, &pose);
         for n in 1..=steps {
             let here = from.towards(&pose, n as f64 / steps as f64);
-            press(
-                probe,
-                state,
-                &here,
-                beside_m,
-                if n < steps { PASSES_ON_THE_WAY } else { PASSES },
-            );
+            press(probe, state, &here, if n < steps { PASSES_ON_THE_WAY } else { PASSES });
         }
+        state.load_pads(probe);
         state.pose = Some(pose);
     }
-    respond(state, probe, &pose, beside_m)
+    respond(state, probe, &pose)
 }
 
 /// Adds up what the loads do to the body; where they are others than before, which this does not look for. Does not allocate.
@@ -141,49 +187,75 @@ fn steps_between(from: &ProbePose, to: &ProbePose) -> usize {
     (((moved_m + turned_m) / STEP_M).ceil() as usize).clamp(1, MOST_STEPS)
 }
 
-fn press(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside_m: &[f64], passes: usize) {
+fn press(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, passes: usize) {
+    reach(probe, state, pose);
     for pass in 0..passes {
         state.report.passes += 1;
-        look(probe, state, pose, beside_m, if pass < HALF_FROM { 1.0 } else { 0.5 });
+        look(probe, state, pose, if pass < HALF_FROM { 1.0 } else { 0.5 });
         let n = state.near.len();
         state.problem.count = n;
         for a in 0..n {
-            let (pad, outward) = (state.near[a] as usize, Vector3::from(state.outward[a]));
-            state.problem.forces_n[a] = state.pressed_n[pad];
+            let (point, outward) = (state.near[a] as usize, state.outward[a]);
+            state.problem.forces_n[a] = state.pressed_n[point];
+            let row = probe.between(point);
             for b in 0..=a {
-                let other = state.near[b] as usize;
-                let between = block(probe, pad, other) * Vector3::from(state.outward[b]);
-                let value = outward.dot(&between);
+                let value = along(&row[state.near[b] as usize], outward, state.outward[b]);
                 state.problem.matrix[a * n + b] = value;
                 state.problem.matrix[b * n + a] = value;
             }
         }
-        state.problem.solve();
+        state.problem.solve(pass >= HALF_FROM);
         state.report.rounds = state.report.rounds.max(state.problem.rounds as u32);
         state.report.near = n as u32;
         take_forces(probe, state);
-        [state.report.open_m, state.report.turned] = left_over(probe, state, pose, beside_m);
+        [state.report.open_m, state.report.turned] = left_over(probe, state, pose);
         if state.report.open_m <= CLOSED_M && state.report.turned <= TURNED {
             break;
         }
     }
+    state.reach_all(probe);
+    state.move_wall(probe);
+    // A point that was not looked at may have got there.
+    state.report.open_m = left_over(probe, state, pose)[0];
 }
 
-/// Pads near the probe, where its surface is there, and how far each gap would be without the forces. Forces turn that part of the way.
-fn look(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside_m: &[f64], part: f64) {
+/// Points that are looked at on the way to a pose: those near the probe whose wall it faces, and those that were pressed.
+fn reach(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose) {
+    state.reach.clear();
+    for (n, point) in probe.wall.points.iter().enumerate() {
+        let (gap_m, outward) = gap(probe, state, pose, n);
+        let facing = (0..3).map(|c| outward[c] * point.outward[c]).sum::<f64>();
+        if state.pressed_n[n] > 0.0 || (facing < FACING && gap_m < REACH_M) {
+            state.reach.push(n as u32);
+        }
+    }
+}
+
+/// How far the one moves along its direction by a newton on the other along its own.
+#[inline]
+fn along(block: &[[f32; 3]; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
+    let row = |r: usize| f64::from(block[r][0]) * b[0] + f64::from(block[r][1]) * b[1] + f64::from(block[r][2]) * b[2];
+    a[0] * row(0) + a[1] * row(1) + a[2] * row(2)
+}
+
+/// Points near the probe, where its surface is there, and how far each gap would be without the forces. Forces turn that part of the way.
+fn look(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, part: f64) {
     state.near.clear();
-    for (n, pad) in probe.wall.pads.iter().enumerate() {
-        let (gap_m, outward) = gap(probe, state, pose, beside_m, n);
-        let facing = (0..3).map(|c| outward[c] * pad.outward[c]).sum::<f64>();
+    for at in 0..state.reach.len() {
+        let n = state.reach[at] as usize;
+        let (gap_m, outward) = gap(probe, state, pose, n);
+        let facing = (0..3)
+            .map(|c| outward[c] * probe.wall.points[n].outward[c])
+            .sum::<f64>();
         let is_pressed = state.pressed_n[n] > 0.0;
         if facing < FACING && (is_pressed || gap_m < NEAR_M) {
             let at = state.near.len();
             let outward = if is_pressed {
-                turned(state, n, outward, part)
+                turned(state.pushed[n], outward, part)
             } else {
                 outward
             };
-            let moved_m: f64 = (0..3).map(|c| outward[c] * state.moved_m[3 * n + c]).sum();
+            let moved_m: f64 = (0..3).map(|c| outward[c] * state.moved_m[n][c]).sum();
             state.outward[at] = outward;
             state.problem.free_m[at] = gap_m - moved_m;
             state.near.push(n as u32);
@@ -191,64 +263,48 @@ fn look(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside_m: 
     }
 }
 
-/// The direction of the force on a pad, that part of the way to another.
-fn turned(state: &ProbeState, n: usize, outward: [f64; 3], part: f64) -> [f64; 3] {
-    let before = Vector3::from_fn(|c, _| state.loads_n[3 * n + c] / state.pressed_n[n]);
+/// The direction of a force, that part of the way to another.
+fn turned(before: [f64; 3], outward: [f64; 3], part: f64) -> [f64; 3] {
+    let before = Vector3::from(before);
     let mixed = before + (Vector3::from(outward) - before) * part;
     mixed.try_normalize(1e-9).map_or(outward, Into::into)
 }
 
-fn gap(probe: &ReadyProbe, state: &ProbeState, pose: &ProbePose, beside_m: &[f64], n: usize) -> (f64, [f64; 3]) {
-    let rest_m = probe.wall.pads[n].place_m;
-    let by_others = |c: usize| {
-        beside_m
-            .get(3 * n + c)
-            .copied()
-            .filter(|m| m.is_finite())
-            .unwrap_or(0.0)
-    };
-    let place_m = [0, 1, 2].map(|c| rest_m[c] + state.moved_m[3 * n + c] + by_others(c));
-    probe.shape.gap_m(pose, place_m)
+fn gap(probe: &ReadyProbe, state: &ProbeState, pose: &ProbePose, n: usize) -> (f64, [f64; 3]) {
+    probe.shape.gap_m(pose, place_m(probe, state, n))
 }
 
-fn block(probe: &ReadyProbe, a: usize, b: usize) -> Matrix3<f64> {
-    Matrix3::from_fn(|r, c| probe.at(3 * a + r, 3 * b + c))
+/// Where a point of the wall is.
+fn place_m(probe: &ReadyProbe, state: &ProbeState, n: usize) -> [f64; 3] {
+    let rest_m = probe.wall.points[n].place_m;
+    [0, 1, 2].map(|c| rest_m[c] + state.moved_m[n][c] + state.beside_m[n][c])
 }
 
 fn take_forces(probe: &ReadyProbe, state: &mut ProbeState) {
-    state.loads_n.fill(0.0);
     state.pressed_n.fill(0.0);
-    for (at, &pad) in state.near.iter().enumerate() {
+    for (at, &point) in state.near.iter().enumerate() {
         let force_n = state.problem.forces_n[at].max(0.0);
-        let pad = pad as usize;
-        state.pressed_n[pad] = force_n;
-        for c in 0..3 {
-            state.loads_n[3 * pad + c] = force_n * state.outward[at][c];
+        if force_n > 0.0 {
+            (state.pressed_n[point as usize], state.pushed[point as usize]) = (force_n, state.outward[at]);
         }
     }
-    state.moved_m.fill(0.0);
-    let rows = probe.rows();
-    for (row, &load_n) in state.loads_n.iter().enumerate().filter(|(_, n)| **n != 0.0) {
-        // Symmetric: a row is a column.
-        let column = probe.compliance.get(row * rows..(row + 1) * rows).unwrap_or(&[]);
-        for (moved_m, c) in state.moved_m.iter_mut().zip(column) {
-            *moved_m += load_n * c;
-        }
-    }
+    state.move_wall(probe);
 }
 
-/// How far pads are on the wrong side: those that are pressed on either, the others in the probe. And how far a force is from square to the
+/// How far points are on the wrong side: those that are pressed on either, the others in the probe. And how far a force is from square to the
 /// probe's surface.
-fn left_over(probe: &ReadyProbe, state: &ProbeState, pose: &ProbePose, beside_m: &[f64]) -> [f64; 2] {
+fn left_over(probe: &ReadyProbe, state: &ProbeState, pose: &ProbePose) -> [f64; 2] {
     let (mut open_m, mut turned) = (0.0_f64, 0.0_f64);
-    for (n, pad) in probe.wall.pads.iter().enumerate() {
-        let (gap_m, outward) = gap(probe, state, pose, beside_m, n);
-        let facing = (0..3).map(|c| outward[c] * pad.outward[c]).sum::<f64>();
-        let pressed_n = state.pressed_n[n];
-        if pressed_n > 0.0 {
+    for &n in &state.reach {
+        let n = n as usize;
+        let (gap_m, outward) = gap(probe, state, pose, n);
+        let facing = (0..3)
+            .map(|c| outward[c] * probe.wall.points[n].outward[c])
+            .sum::<f64>();
+        if state.pressed_n[n] > 0.0 {
             open_m = open_m.max(gap_m.abs());
-            let off = |c: usize| state.loads_n[3 * n + c] / pressed_n - outward[c];
-            turned = turned.max((0..3).map(|c| off(c).powi(2)).sum::<f64>().sqrt());
+            let off = (0..3).map(|c| (state.pushed[n][c] - outward[c]).powi(2)).sum::<f64>();
+            turned = turned.max(off.sqrt());
         } else if facing < FACING {
             open_m = open_m.max(-gap_m);
         }
@@ -256,17 +312,14 @@ fn left_over(probe: &ReadyProbe, state: &ProbeState, pose: &ProbePose, beside_m:
     [open_m, turned]
 }
 
-fn respond(state: &mut ProbeState, probe: &ReadyProbe, pose: &ProbePose, beside_m: &[f64]) -> ProbeResponse {
+fn respond(state: &mut ProbeState, probe: &ReadyProbe, pose: &ProbePose) -> ProbeResponse {
     let mut response = ProbeResponse::nothing(*pose);
     let tip = Vector3::from(pose.tip_m);
-    // Of the pads in contact: how each gap closes with the six motions of the probe.
+    // Of the points in contact: how each gap closes with the six motions of the probe.
     let arm = |state: &ProbeState, at: usize| {
-        let pad = state.near[at] as usize;
-        let rest_m = Vector3::from(probe.wall.pads[pad].place_m);
-        let moved_m =
-            Vector3::from_fn(|c, _| state.moved_m[3 * pad + c] + beside_m.get(3 * pad + c).copied().unwrap_or(0.0));
+        let place_m = Vector3::from(place_m(probe, state, state.near[at] as usize));
         let outward = Vector3::from(state.outward[at]);
-        let turning = (rest_m + moved_m - tip).cross(&outward);
+        let turning = (place_m - tip).cross(&outward);
         [outward.x, outward.y, outward.z, turning.x, turning.y, turning.z]
     };
     for at in 0..state.near.len() {

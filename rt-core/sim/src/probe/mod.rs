@@ -22,10 +22,14 @@
     deny(clippy::disallowed_macros, clippy::disallowed_methods, clippy::disallowed_types)
 )]
 
+mod beside;
+mod between;
 mod body;
 mod columns;
 mod complementarity;
 mod contact;
+mod memory;
+mod moves;
 mod response;
 mod shape;
 mod wall;
@@ -33,9 +37,10 @@ mod wall;
 pub use body::BodyProbe;
 pub use columns::{ProbeQueue, ReadyProbe};
 pub use contact::{ContactReport, ProbeState, displace, step};
+pub use memory::ProbeMemory;
 pub use response::{ProbeResponse, Wrench};
 pub use shape::{ProbePose, ProbeShape};
-pub use wall::{NoWall, PADS_APART_M, Pad, Wall};
+pub use wall::{NoWall, PADS_APART_M, Pad, Point, Wall};
 
 #[cfg(test)]
 mod tests;

@@ -9,6 +9,8 @@ use std::sync::OnceLock;
 use stylet_anatomy::Beyond;
 
 mod hard;
+mod lines;
+mod oracle;
 mod pelvis;
 mod reference;
 
@@ -64,6 +66,12 @@ impl Fixture {
         }
         response
     }
+}
+
+/// The same with pads that are closer than its elements are wide: all that forces on its wall can do to it.
+pub(super) fn finely() -> &'static Fixture {
+    static FINELY: OnceLock<Fixture> = OnceLock::new();
+    FINELY.get_or_init(|| Fixture::new(block(true), 3.5e-3))
 }
 
 /// A block of gland, a hollow of 28 x 20 mm in rectal wall below it, 4 mm elements: some thousand of them.

@@ -1,4 +1,4 @@
-//! The wall that the probe can press: the inside of the rectum, in pads.
+//! The wall that the probe can press: the inside of the rectum, in pads that load the body and points at which it touches the probe.
 
 use super::shape::{ProbePose, ProbeShape};
 use crate::scene::{Lattice, Scene};
@@ -15,6 +15,10 @@ const BEYOND_TARGET_M: f64 = 20e-3;
 
 /// Pads are so far apart in a run.
 pub const PADS_APART_M: f64 = 5e-3;
+/// Points, at most: between two of them a flat wall is in a shaft of 10 mm by 0.07 mm.
+const POINTS_APART_M: f64 = 2.3e-3;
+/// A point is the mean of the faces so far around it, those close to it more than the others.
+const AROUND_M: f64 = 5.5e-3;
 
 /// Why a scene has no wall for the probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -61,11 +65,24 @@ pub struct Face {
     outward: [f64; 3],
 }
 
-/// All pads, in order.
+/// A place of the smooth wall: the mean of faces around it at rest, and however they move.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// At rest, scene frame, m.
+    pub place_m: [f64; 3],
+    /// Unit vector out of the tissue.
+    pub outward: [f64; 3],
+    /// Faces around it with their shares, which add up to 1.
+    faces: Vec<(Face, f64)>,
+}
+
+/// All pads and points, in order.
 #[derive(Clone, Debug)]
 pub struct Wall {
-    /// As far apart as they were asked for.
+    /// What loads the body: as far apart as they were asked for.
     pub pads: Vec<Pad>,
+    /// Where it touches the probe.
+    pub points: Vec<Point>,
 }
 
 impl Wall {
@@ -102,7 +119,19 @@ impl Wall {
         if pads.is_empty() {
             return Err(NoWall::OutOfReach);
         }
-        Ok(Wall { pads })
+        let points = spread(&within, POINTS_APART_M);
+        let points = points.into_iter().filter_map(|n| point(&within[n], &all));
+        Ok(Wall {
+            pads,
+            points: points.collect(),
+        })
+    }
+
+    /// The smooth wall at each of its faces, for a measurement.
+    #[cfg(test)]
+    pub fn finely(&self, scene: &Scene) -> Vec<Point> {
+        let (all, own) = (faces(scene), self.pads.iter().flat_map(|pad| &pad.faces));
+        own.filter_map(|face| point(face, &all)).collect()
     }
 
     /// A probe along z below the middle of the target, whose shaft is so far above where it first meets the wall towards the target, and whose
@@ -122,21 +151,33 @@ impl Wall {
 impl Pad {
     /// Nodes and weights, which add up to 1, of the mean over its faces; `None` where the body has no element there.
     pub fn weights(&self, body: &BatchModel<f32>) -> Option<Vec<(u32, f64)>> {
-        let mut all = Vec::new();
-        for face in &self.faces {
-            all.extend(body.trilinear(face.inside_m)?);
-        }
-        all.sort_by_key(|(node, _)| *node);
-        let mut merged: Vec<(u32, f64)> = Vec::new();
-        for (node, weight) in all {
-            let part = weight / self.faces.len() as f64;
-            match merged.last_mut() {
-                Some((last, sum)) if *last == node => *sum += part,
-                _ => merged.push((node, part)),
-            }
-        }
-        Some(merged)
+        let share = 1.0 / self.faces.len() as f64;
+        mean_weights(body, self.faces.iter().map(|face| (face, share)))
     }
+}
+
+impl Point {
+    /// Nodes and weights as of a [`Pad`].
+    pub fn weights(&self, body: &BatchModel<f32>) -> Option<Vec<(u32, f64)>> {
+        mean_weights(body, self.faces.iter().map(|(face, share)| (face, *share)))
+    }
+}
+
+fn mean_weights<'a>(body: &BatchModel<f32>, faces: impl Iterator<Item = (&'a Face, f64)>) -> Option<Vec<(u32, f64)>> {
+    let mut all = Vec::new();
+    for (face, share) in faces {
+        let nodes = body.trilinear(face.inside_m)?;
+        all.extend(nodes.map(|(node, weight)| (node, share * weight)));
+    }
+    all.sort_by_key(|(node, _)| *node);
+    let mut merged: Vec<(u32, f64)> = Vec::new();
+    for (node, part) in all {
+        match merged.last_mut() {
+            Some((last, sum)) if *last == node => *sum += part,
+            _ => merged.push((node, part)),
+        }
+    }
+    Some(merged)
 }
 
 /// Faces of the rectum's wall with nothing beyond them.
@@ -258,6 +299,30 @@ fn pad(faces: Vec<Face>, face_m2: f64) -> Option<Pad> {
         place_m,
         outward: unit(normal)?,
         area_m2: count * face_m2,
+        faces,
+    })
+}
+
+/// The smooth wall at a face.
+fn point(at: &Face, all: &[Face]) -> Option<Point> {
+    let mut faces = Vec::new();
+    let mut sum = 0.0;
+    for face in all {
+        let part = 1.0 - separation(at, face) / (AROUND_M * AROUND_M);
+        if part > 0.0 {
+            faces.push((*face, part * part));
+            sum += part * part;
+        }
+    }
+    faces.iter_mut().for_each(|(_, share)| *share /= sum);
+    let mean = |of: fn(&Face) -> [f64; 3]| {
+        faces.iter().fold([0.0; 3], |mean, (face, share)| {
+            [0, 1, 2].map(|c| mean[c] + share * of(face)[c])
+        })
+    };
+    Some(Point {
+        place_m: mean(|f| f.place_m),
+        outward: unit(mean(|f| f.outward))?,
         faces,
     })
 }

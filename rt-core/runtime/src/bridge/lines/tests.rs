@@ -19,6 +19,7 @@ fn rings() -> (LoopRings, HapticPorts, TissuePorts) {
         rooms: bridge.rooms,
         old_hand_lines: bridge.old_hand_lines,
         old_body_lines: bridge.old_body_lines,
+        outside_rooms: bridge.outside_rooms,
         old_probes: bridge.old_probes,
     };
     (rings, haptic, tissue)

@@ -116,6 +116,58 @@ fn a_probe_presses_the_gland_and_lets_it_go() {
     theatre.stage.world = Some(rig.into_world());
 }
 
+/// Tissue that the probe moves past a needle which the hand holds still pulls at it the way that it goes.
+#[test]
+fn a_needle_in_the_gland_feels_the_probe() {
+    let mut theatre = Theatre::new(TissueKind::ChainMail);
+    let mut rig = theatre.rig(true);
+    rig.take_probe(Box::new(theatre.probe.clone()));
+    rig.move_hand(&stylet_shm_schema::HandMove {
+        tip_m: theatre.run.drops_m[0].into(),
+        direction: theatre.run.direction.into(),
+        speed_m_per_s: theatre.run.insert_m_per_s,
+        acceleration_m_per_s2: theatre.run.acceleration_m_per_s2,
+    });
+    let press = |rig: &mut Rig, from_m: [f64; 2], to_m: [f64; 2], ticks: u32| {
+        for n in 1..=ticks {
+            let part = f64::from(n) / f64::from(ticks);
+            let [pressed_m, beyond_m] = [0, 1].map(|c| from_m[c] + part * (to_m[c] - from_m[c]));
+            rig.tissue().move_probe(theatre.pose(pressed_m, beyond_m));
+            while !rig.tick() {}
+        }
+    };
+    press(
+        &mut rig,
+        [BALANCED_M, BEYOND_M - 0.2],
+        [BALANCED_M, BEYOND_M - 0.2],
+        700,
+    );
+    let alone_n = rig.state().force_on_hand_n[2];
+    assert!(
+        rig.response().line != 0 && alone_n < -0.1,
+        "in tissue on its line: {alone_n}"
+    );
+    press(&mut rig, [BALANCED_M, BEYOND_M - 0.2], [BALANCED_M, BEYOND_M], 200);
+    let lies_n = rig.state().force_on_hand_n[2];
+    press(&mut rig, [BALANCED_M, BEYOND_M], [12e-3, BEYOND_M], 50);
+    let pressed_n = rig.state().force_on_hand_n[2];
+    let mut rows_m = [0.0; 64];
+    let generation = rig.response().line;
+    let rows = rig
+        .tissue()
+        .pressed()
+        .expect("a probe")
+        .displace_line(generation, &mut rows_m);
+    let shaft = &rows_m[..(rows / 2).min(20)];
+    let mean_m = shaft.iter().sum::<f64>() / shaft.len() as f64;
+    println!(
+        "{alone_n:.3} N alone, {lies_n:.3} N beside the probe, {pressed_n:.3} N pressed; the shaft's tissue moves by {:.3} mm",
+        1e3 * mean_m
+    );
+    assert!((pressed_n - alone_n) * mean_m > 0.0 && (pressed_n - alone_n).abs() > 0.01);
+    theatre.stage.world = Some(rig.into_world());
+}
+
 /// The second device's own loop, five ticks for each of the tissue's, on the ports of a run.
 #[test]
 fn the_second_hand_presses_the_gland_and_feels_it() {
@@ -142,7 +194,12 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
     let probe = Box::new(theatre.probe.clone());
     // One of another scene is of no use.
     for (generation, probe) in [(1, probe.clone()), (2, probe)] {
-        let order = TissueOrder::Probe { generation, probe };
+        let room = crate::rt::probe_tape::ProbeTape::new(&probe);
+        let order = TissueOrder::Probe {
+            generation,
+            probe,
+            room,
+        };
         assert!(wiring.bridge.tissue_orders.push(order).is_ok());
     }
     let mut now_ns = 1_000_000_000;

@@ -23,6 +23,7 @@ impl HapticLoop {
             pose,
             goal,
             line,
+            outside,
             on_line,
             // Their record stands beside the memory.
             left,
@@ -42,6 +43,7 @@ impl HapticLoop {
             pose: *pose,
             goal: *goal,
             line: line.as_ref().map_or(0, |line| line.generation),
+            outside: *outside,
             on_line: *on_line,
             is_hand_empty: left.is_hand_empty,
             watchdog: *watchdog,

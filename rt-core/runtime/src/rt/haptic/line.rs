@@ -1,6 +1,7 @@
 //! The needle on a prepared line: taking lines up, one tick on one, and the forces that the tissue loop hears of.
 
 use super::HapticLoop;
+use crate::rt::clock::TISSUE_PERIOD_NS;
 use crate::rt::line_loads::{BentTip, LineLoads};
 use crate::rt::response::TissueResponse;
 use stylet_hw::Sample;
@@ -11,6 +12,9 @@ use stylet_sim::line::beam::BeamOutput;
 /// A needle is taken for one outside up to so far behind the entry: plans name entries on the surface, which is one of cells.
 const BEGINS_WITHIN_M: f64 = 1e-3;
 
+/// What the probe does to the line is reached within a tick of the tissue.
+const TISSUE_PERIOD_S: f64 = TISSUE_PERIOD_NS as f64 * 1e-9;
+
 /// A needle that was taken up again is released that far before the entry, m.
 const OUT_M: f64 = 4e-3;
 
@@ -18,6 +22,26 @@ impl HapticLoop {
     /// The track that the needle on the present line has cut.
     pub fn line_track(&self) -> Option<Track> {
         self.line.as_ref()?.track()
+    }
+
+    /// What the probe does to the line in this tick of the tissue. One comparison without a probe.
+    pub(super) fn follow_outside(&mut self, tissue: &TissueResponse) {
+        if tissue.outside == self.outside {
+            return;
+        }
+        self.outside = tissue.outside;
+        let outside = self.ports.outside.read();
+        if let Some(tape) = self.ports.flight.tape() {
+            if tape.lacks_outside_room()
+                && let Ok(room) = self.ports.outside_rooms.pop()
+            {
+                tape.take_outside_room(room);
+            }
+            tape.outside(outside);
+        }
+        if let Some(line) = self.line.as_mut().filter(|line| line.generation == outside.generation) {
+            line.displace_from_outside(outside.rows_m(), (TISSUE_PERIOD_S / self.period_s).round() as u32);
+        }
     }
 
     /// A line is changed only while the needle is out of the tissue; the old one goes back to be freed.

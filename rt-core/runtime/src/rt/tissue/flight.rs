@@ -2,8 +2,10 @@
 
 use super::TissueLoop;
 use super::left::LeftBody;
+use crate::rt::probe_tape::ProbeEntry;
 use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueMemory, TissueTape};
 use stylet_sim::line::BodyLine;
+use stylet_sim::probe::{BodyProbe, ProbeMemory};
 use stylet_sim::tissue::{Deformed, Held};
 
 impl TissueLoop {
@@ -25,9 +27,10 @@ impl TissueLoop {
             left_room: _,
             // What it leaves out has the same bits.
             last_carry: _,
-            // A recording does not hold what the other hand did: see docs/adr/0021-probe.md.
-            pressed: _,
-            probe_pose: _,
+            pressed,
+            probe_pose,
+            probe_room: _,
+            is_outside_shown,
             layers,
             clear,
             held,
@@ -48,6 +51,12 @@ impl TissueLoop {
         to.loads = *loads;
         to.left.clear();
         to.left.extend(left.iter().map(|left| left.used));
+        match pressed {
+            Some(pressed) => pressed.save(&mut to.probe),
+            None => to.probe.clear(),
+        }
+        to.probe_pose = *probe_pose;
+        to.is_outside_shown = *is_outside_shown;
         to.layers = *layers;
         to.clear = *clear;
         to.held = *held;
@@ -74,6 +83,8 @@ impl TissueLoop {
         self.line = line;
         self.in_by_line = memory.in_by_line;
         self.loads = memory.loads;
+        self.probe_pose = memory.probe_pose;
+        self.is_outside_shown = memory.is_outside_shown;
         self.layers = memory.layers;
         self.clear = memory.clear;
         self.held = memory.held;
@@ -82,6 +93,23 @@ impl TissueLoop {
         self.world.set_limits(memory.limits.clone());
         self.world.migration = memory.migration;
         self.world.tissue.load(&memory.body);
+    }
+
+    /// Goes on with the probe of that memory; false where it is of another wall.
+    pub fn resume_probe(&mut self, mut probe: Box<BodyProbe>, memory: &TissueMemory) -> bool {
+        let fits = probe.load(&memory.probe);
+        self.pressed = Some(probe);
+        fits
+    }
+
+    /// What the probe leaves to the next tick.
+    pub fn probe_memory(&self) -> ProbeMemory {
+        let mut memory = ProbeMemory::default();
+        if let Some(pressed) = &self.pressed {
+            memory = ProbeMemory::with_room(pressed);
+            pressed.save(&mut memory);
+        }
+        memory
     }
 
     /// The deformed body.
@@ -97,6 +125,7 @@ impl TissueLoop {
     pub(super) fn checkpoint(&mut self) {
         let generation = self.world.generation;
         self.ports.flight.begin_tick(generation);
+        self.give_probe_room();
         self.with_tape(|this, tape| {
             if let Some(memory) = tape.checkpoint_due(this.world.tissue.is_all_saved()) {
                 this.copy_memory(memory);
@@ -117,6 +146,8 @@ impl TissueLoop {
         {
             tape.take_left_room(&mut self.left_room);
         }
+        self.give_probe_room();
+        self.tape_probe();
         if let Some(tape) = self.ports.flight.tape() {
             tape.loads(&self.loads);
             tape.left_loads(&self.left_loads);
@@ -127,6 +158,23 @@ impl TissueLoop {
                 residual,
                 response,
             });
+        }
+    }
+
+    fn give_probe_room(&mut self) {
+        if self.probe_room.is_some()
+            && let Some(tape) = self.ports.flight.tape()
+        {
+            tape.take_probe_room(&mut self.probe_room);
+        }
+    }
+
+    fn tape_probe(&mut self) {
+        if let (Some(pressed), Some(pose)) = (&self.pressed, self.probe_pose)
+            && let Some(tape) = self.ports.flight.tape()
+        {
+            let wrench = pressed.response().wrench.0;
+            tape.probe(ProbeEntry { pose, wrench });
         }
     }
 

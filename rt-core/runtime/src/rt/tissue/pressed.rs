@@ -1,6 +1,8 @@
 //! The body under the ultrasound probe: where it is in this tick, what it presses, and what else displaces the wall.
 
 use super::TissueLoop;
+use crate::rt::probe_tape::ProbeTape;
+use crate::rt::tissue_tape::TapedOrder;
 use stylet_sim::probe::{BodyProbe, ProbePose, ProbeResponse};
 use stylet_sim::tissue::Carry;
 
@@ -21,11 +23,16 @@ impl TissueLoop {
     }
 
     /// One of a scene that was replaced meanwhile goes back.
-    pub(super) fn take_probe(&mut self, generation: u64, probe: Box<BodyProbe>) {
+    pub(super) fn take_probe(&mut self, generation: u64, probe: Box<BodyProbe>, room: Box<ProbeTape>) {
+        // Freeing has no place in a tick: room that finds no tape is kept for good.
+        if let Some(unused) = self.probe_room.replace(room) {
+            std::mem::forget(unused);
+        }
         if generation != self.world.generation {
             return self.free_probe(probe);
         }
         self.drop_probe();
+        self.tape_order(TapedOrder::Probe);
         self.pressed = Some(probe);
     }
 
@@ -49,18 +56,29 @@ impl TissueLoop {
         }
     }
 
-    /// The contact of this tick. Needles displace the wall as well: with the loads of this tick, each by its columns.
+    /// The contact of this tick. Needles displace the wall as well, and the probe what is around them: with the loads of this tick, by one
+    /// table for both.
     pub(super) fn follow_probe(&mut self) {
         let (Some(pressed), Some(pose)) = (&mut self.pressed, self.probe_pose) else {
             return;
         };
         let was_displaced = pressed.displaces();
-        pressed.nothing_beside();
-        if let Some(line) = self.line.as_ref().filter(|l| l.generation == self.loads.generation) {
-            pressed.beside(line.answer.columns(), self.loads.loads_n());
+        let (line, left) = (&self.line, &self.left);
+        pressed.nothing_beside(|generation| {
+            let moves = line.as_ref().is_some_and(|line| line.generation == generation);
+            moves || left.iter().any(|left| left.line.generation == generation)
+        });
+        if let Some(line) = line {
+            let loads = if line.generation == self.loads.generation {
+                self.loads.loads_n()
+            } else {
+                &[]
+            };
+            pressed.beside(line.generation, line.answer.columns(), loads);
         }
-        for left in &self.left {
-            pressed.beside_field(&left.line.share);
+        for left in left {
+            let (line, loads_n) = (&left.line, left.used.of_columns());
+            pressed.beside(line.generation, line.answer.columns(), &loads_n);
         }
         if pressed.follow(&pose) {
             self.last_carry.forget();
@@ -68,6 +86,22 @@ impl TissueLoop {
             if was_displaced && !is_displaced && self.besides().is_none() {
                 self.world.tissue.carry(Carry::NOT);
             }
+        }
+        self.show_outside();
+    }
+
+    /// What the probe does to the line of the needle that moves, as long as it does something, and once more when it no longer does.
+    fn show_outside(&mut self) {
+        let (Some(pressed), Some(line)) = (&self.pressed, &self.line) else {
+            return;
+        };
+        let is_pressed = pressed.response().contacts > 0;
+        if is_pressed || self.is_outside_shown {
+            let outside = self.ports.outside.input_buffer_mut();
+            outside.set(line.generation, |rows_m| pressed.displace_line(line.generation, rows_m));
+            self.ports.outside.publish();
+            self.response.outside += 1;
+            self.is_outside_shown = is_pressed;
         }
     }
 }

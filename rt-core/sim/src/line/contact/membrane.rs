@@ -48,7 +48,8 @@ pub(in crate::line) fn press(model: &LineModel, state: &mut LineState, membrane:
     state.tip_offset_m = (1.0 - kept) * state.tip.met_dent_m;
     if state.memory.is_on() {
         // Of the dent that the past leaves, the spring leaves that part as well.
-        state.tip_offset_m -= (1.0 - kept) * (past_at_tip_m(model, state) - state.memory.whole_offset_m);
+        state.tip_offset_m -=
+            (1.0 - kept) * (past_at_tip_m(model, state) - state.memory.whole_offset_m - state.outside.at_tip_m);
     }
     Some(kept)
 }
@@ -155,6 +156,6 @@ impl LineState {
         }
         let shaft = self.shaft_n.iter().zip(&self.u_m).take(self.in_contact);
         let moved_j = 0.5 * (shaft.map(|(f, u)| f * u).sum::<f64>() + self.tip.force_n * self.tip_u_m);
-        moved_j - 0.5 * self.whole_n * self.tip.met_dent_m
+        moved_j - 0.5 * (self.whole_n * self.tip.met_dent_m + self.outside_j())
     }
 }

@@ -13,6 +13,7 @@ mod behaviour;
 mod bits;
 mod creep;
 mod membrane;
+mod outside;
 mod twin;
 
 const DT_S: f64 = 1e-3;

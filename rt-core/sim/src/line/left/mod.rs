@@ -360,6 +360,10 @@ impl LeftNeedles {
         state.tip.track_m = state.tip.track_m.max(reached_m);
         state.tip.material_m = reached_m.min(needle.held_m - self.u_m[tip]);
         state.in_contact = needle.stations;
+        // What the probe moves the line by was none of these displacements.
+        if state.outside.is_on() {
+            state.come_back_moved();
+        }
         // Those behind it move up.
         let gap = needle.stations + 1;
         let end = self.count;

@@ -37,6 +37,7 @@ pub(super) fn step_beside(left: &mut LeftNeedles, line: &mut HandLine, input: &L
 impl Company for LeftNeedles {
     fn begin(&mut self, model: &LineModel, state: &mut LineState, tip_m: f64, membrane: Option<usize>) {
         let before = lay(model, state);
+        state.move_membrane_from_outside(model);
         let goes_on = self.stations_go_on(model, state, tip_m, before);
         if !goes_on {
             stick(model, state, tip_m, before, &mut self.scratch);
@@ -109,6 +110,7 @@ impl LeftNeedles {
             state.memory.offset_m.fill(0.0);
         }
         state.memory.begin(rows, model.compliance.common_m_per_n(), terms, dt_s);
+        state.move_from_outside();
         state.is_beside = true;
         self.added_m.fill(0.0);
         self.without_tip.stations = None;
@@ -133,7 +135,7 @@ impl LeftNeedles {
         for (offset, added) in state.memory.offset_m.iter_mut().zip(&self.added_m[..rows]) {
             *offset += *added;
         }
-        state.beside_whole_m = dot(&self.whole[..self.count], &self.force_n[..self.count]);
+        state.beside_whole_m = dot(&self.whole[..self.count], &self.force_n[..self.count]) + state.outside.at_tip_m;
     }
 
     /// How each element moves with the tip's force where it is now; a membrane that holds it takes its part of the dent.

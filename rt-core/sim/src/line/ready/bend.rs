@@ -88,6 +88,7 @@ impl HandLine {
         let [axis, first, second] = self.line.axes.map(Vector3::from);
         let sides = [first, second];
         let bending = self.bending.as_mut()?;
+        self.state.bend_from_outside(bending.model.stations());
         let direction = world_from_tool * Vector3::z();
         let along = direction.dot(&axis);
         if along < 0.5 {

@@ -21,9 +21,11 @@ impl LineState {
             tip_column,
             loads_n,
             memory,
+            outside,
             ..
         } = self;
         let own = [shaft_n, anchor_m, u_m, tip_column, loads_n];
+        outside.clear();
         own.into_iter().chain(memory.vectors_mut()).for_each(Vec::clear);
     }
 
@@ -45,6 +47,7 @@ impl LineState {
             membrane_n_per_m,
             whole_n,
             memory,
+            outside,
             beam,
             beside_whole_m,
             is_beside,
@@ -68,6 +71,7 @@ impl LineState {
         self.membrane_n_per_m = *membrane_n_per_m;
         self.whole_n = *whole_n;
         self.memory.copy_from(memory);
+        self.outside.copy_from(outside);
         self.beam = *beam;
         (self.beside_whole_m, self.is_beside, self.grip_m) = (*beside_whole_m, *is_beside, *grip_m);
         (self.open_m, self.open_layers) = (*open_m, *open_layers);
@@ -83,6 +87,7 @@ impl LineState {
         each.iter().all(|v| v.len() == m)
             && self.loads_n.len() == 2 * m
             && self.memory.fits(2 * m)
+            && self.outside.fits(m)
             && self.beam.is_whole()
             && self.in_contact <= m
             && tip.start <= tip.end

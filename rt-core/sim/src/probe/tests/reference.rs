@@ -2,7 +2,7 @@
 //!
 //! Nothing is condensed and nothing packed: each product with the compliance is a solution for the whole body.
 
-use super::{Fixture, small};
+use super::{Fixture, finely};
 use crate::probe::wall::Wall;
 use crate::probe::{ProbePose, ProbeState, displace};
 use crate::tissue::ElementField;
@@ -11,10 +11,10 @@ use nalgebra::Vector3;
 
 /// Of a solution, over its load.
 const TOLERANCE: f64 = 3e-6;
-/// Of the gaps of pads in contact, m.
+/// Of the gaps of points in contact, m.
 const CLOSED_M: f64 = 2e-7;
 
-/// The contact of a probe with pads, in full.
+/// The contact of a probe with the points of a wall, in full: each force is on the faces around its point.
 pub(in crate::probe) struct Reference<'a> {
     fixture: &'a Fixture,
     wall: &'a Wall,
@@ -32,14 +32,17 @@ pub(in crate::probe) struct Reference<'a> {
 
 impl<'a> Reference<'a> {
     pub fn new(fixture: &'a Fixture, wall: &'a Wall) -> Self {
-        let weights = wall.pads.iter().map(|p| p.weights(&fixture.body).expect("in the body"));
+        let weights = wall
+            .points
+            .iter()
+            .map(|p| p.weights(&fixture.body).expect("in the body"));
         Reference {
             weights: weights.collect(),
             solver: BatchState::new(&fixture.body),
-            moved: vec![[0.0; 3]; wall.pads.len()],
-            is_in: vec![false; wall.pads.len()],
-            pressed: vec![0.0; wall.pads.len()],
-            loads_n: vec![[0.0; 3]; wall.pads.len()],
+            moved: vec![[0.0; 3]; wall.points.len()],
+            is_in: vec![false; wall.points.len()],
+            pressed: vec![0.0; wall.points.len()],
+            loads_n: vec![[0.0; 3]; wall.points.len()],
             field: ElementField::zeros(fixture.body.element_count()),
             solutions: 0,
             fixture,
@@ -47,14 +50,14 @@ impl<'a> Reference<'a> {
         }
     }
 
-    /// How all pads move with these loads.
+    /// How all points move with these loads.
     fn answer(&mut self, loads_n: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let load: Vec<NodeWeight> = loads_n
             .iter()
             .zip(&self.weights)
             .filter(|(force, _)| **force != [0.0; 3])
-            .flat_map(|(force, of_pad)| {
-                of_pad.iter().map(|&(node, part)| NodeWeight {
+            .flat_map(|(force, of_point)| {
+                of_point.iter().map(|&(node, part)| NodeWeight {
                     node,
                     weight: force.map(|f| f * part),
                 })
@@ -68,12 +71,19 @@ impl<'a> Reference<'a> {
             }
         }
         self.solutions += 1;
-        self.weights.iter().map(|of_pad| self.sample(of_pad)).collect()
+        self.weights.iter().map(|of_point| self.sample(of_point)).collect()
     }
 
-    /// The body under these loads.
-    pub fn load(&mut self, loads_n: &[[f64; 3]]) {
+    /// The body under these loads on the pads.
+    pub fn load_pads(&mut self, loads_n: &[[f64; 3]]) {
+        let pads = self
+            .wall
+            .pads
+            .iter()
+            .map(|p| p.weights(&self.fixture.body).expect("in the body"));
+        let points = std::mem::replace(&mut self.weights, pads.collect());
         self.answer(loads_n);
+        self.weights = points;
     }
 
     /// Displacement of the last answer under weights, m.
@@ -88,16 +98,16 @@ impl<'a> Reference<'a> {
         })
     }
 
-    /// Forces with which no pad is in the probe and none is pulled, from those of the pose before.
+    /// Forces with which no point is in the probe and none is pulled, from those of the pose before.
     pub fn press(&mut self, pose: &ProbePose) {
-        let count = self.wall.pads.len();
+        let count = self.wall.points.len();
         let mut moved = std::mem::take(&mut self.moved);
         let mut is_in = std::mem::take(&mut self.is_in);
         let mut pressed = std::mem::take(&mut self.pressed);
         for _ in 0..40 {
             let gaps: Vec<_> = (0..count)
                 .map(|n| {
-                    let rest = self.wall.pads[n].place_m;
+                    let rest = self.wall.points[n].place_m;
                     let at = [0, 1, 2].map(|c| rest[c] + moved[n][c]);
                     self.fixture.probe.shape.gap_m(pose, at)
                 })
@@ -115,7 +125,7 @@ impl<'a> Reference<'a> {
                 self.loads_n = loads;
                 let mut changed = false;
                 for n in 0..count {
-                    let facing = outward[n].dot(&Vector3::from(self.wall.pads[n].outward)) < 0.2;
+                    let facing = outward[n].dot(&Vector3::from(self.wall.points[n].outward)) < 0.2;
                     let gap_m = free[n] + outward[n].dot(&Vector3::from(moved[n]));
                     let stays = facing && if is_in[n] { pressed[n] > 0.0 } else { gap_m < -CLOSED_M };
                     changed |= stays != is_in[n];
@@ -130,7 +140,7 @@ impl<'a> Reference<'a> {
                 }
             }
             let open_m = (0..count).filter(|&n| is_in[n]).map(|n| {
-                let rest = self.wall.pads[n].place_m;
+                let rest = self.wall.points[n].place_m;
                 let at = [0, 1, 2].map(|c| rest[c] + moved[n][c]);
                 self.fixture.probe.shape.gap_m(pose, at).0.abs()
             });
@@ -254,7 +264,7 @@ pub(in crate::probe) fn beside_reference(
 
 #[test]
 fn a_small_body_moves_as_with_the_contact_solved_in_full() {
-    let fixture = small();
+    let fixture = finely();
     let ([_, largest_m, _, worst_m], force_off) = beside_reference(fixture, &fixture.probe.wall, 5e-3, 20e-3);
     assert!(force_off < 0.01, "{force_off}");
     assert!(worst_m < 0.01 * largest_m, "{worst_m} of {largest_m}");

@@ -1,0 +1,127 @@
+//! A probe that presses beside a needle, in a recording that repeats in every bit, in both loops.
+
+use super::*;
+use crate::rt::outside::OutsideTape;
+use crate::rt::probe_tape::ProbeTape;
+use stylet_anatomy::Beyond;
+use stylet_sim::probe::{ProbePose, ProbeShape};
+use stylet_sim::scene::{Material, Role, Structure, Surroundings};
+
+/// Of the needle above the middle of the block.
+const ABOVE_M: f64 = 8e-3;
+
+/// A gland with a hollow of 24 x 16 mm in rectal wall below it.
+fn hollow() -> SceneSource {
+    let dims = [12, 14, 12];
+    let mut cells = Vec::new();
+    for _ in 0..dims[2] {
+        for j in 0..dims[1] {
+            for i in 0..dims[0] {
+                let from_middle = [i as f64 + 0.5 - 6.0, j as f64 + 0.5 - 4.0];
+                let across = (from_middle[0] / 3.0).powi(2) + (from_middle[1] / 2.5).powi(2);
+                cells.push(match across {
+                    a if a <= 1.0 => 0,
+                    a if a <= 2.4 => 2,
+                    _ => 1,
+                });
+            }
+        }
+    }
+    let structure = |name: &str, label, role, beyond| Structure {
+        name: name.to_owned(),
+        label,
+        role,
+        material: Material {
+            limits: None,
+            fixed: false,
+            surroundings: Surroundings::all(beyond),
+            young_pa: 15e3,
+            poisson: 0.45,
+        },
+    };
+    SceneSource::of_labels(
+        "hollow",
+        &Labels {
+            dims,
+            spacing_m: 4e-3,
+            cells,
+            structures: vec![
+                structure("gland", 1, Role::Target, Beyond::Fat),
+                structure("rectal wall", 2, Role::Spare, Beyond::Free),
+            ],
+        },
+    )
+}
+
+impl Recorded {
+    /// With a probe in the hollow.
+    fn with_probe(kind: TissueKind) -> Self {
+        let mut run = Self::of(hollow(), kind, &ForceParameters::default(), ABOVE_M);
+        let body = LineBody::of_source(&hollow(), kind).expect("valid").expect("has lines");
+        let probe = body
+            .prepare_probe(ProbeShape::default(), &mut |_| true)
+            .expect("a rectum");
+        let bridge = &mut run.loops.bridge;
+        assert!(bridge.outside_rooms.push(OutsideTape::new()).is_ok());
+        let order = TissueOrder::Probe {
+            generation: 1,
+            room: ProbeTape::new(&probe),
+            probe: Box::new(probe),
+        };
+        assert!(bridge.tissue_orders.push(order).is_ok());
+        run
+    }
+
+    /// The probe goes on from one height of its axis to another.
+    fn press(&mut self, [from_m, to_m]: [f64; 2], seconds: f64) {
+        let ticks = (200.0 * seconds) as u32;
+        for n in 1..=ticks {
+            let y = from_m + (to_m - from_m) * f64::from(n) / f64::from(ticks);
+            let pose = ProbePose::new([24e-3, y, 40e-3], [0.02, 0.0, 1.0]).expect("a pose");
+            self.loops.tissue.move_probe(pose);
+            self.run(5e-3);
+        }
+    }
+}
+
+#[test]
+fn a_recording_with_a_probe_repeats_in_every_bit() {
+    for kind in [TissueKind::Fem, TissueKind::ChainMail] {
+        let mut run = Recorded::with_probe(kind);
+        run.haptic(HapticOrder::Engage { ticket: 0 });
+        run.give_line(1);
+        run.run(0.1);
+        run.go(14e-3);
+        run.press([16e-3, 18e-3], 2.0);
+        run.press([18e-3, 23e-3], 2.0);
+        run.go(20e-3);
+        run.press([23e-3, 17e-3], 2.0);
+        run.press([17e-3, 24e-3], 2.5);
+        run.go(16e-3);
+        run.press([24e-3, 19e-3], 3.0);
+        let flight = through_a_file(&run.flight());
+        assert_eq!(run.heap_calls, 0, "heap calls of the loops");
+        let tissue = flight.tissue.as_ref().expect("recorded");
+        assert!(tissue.memory.probe.is_there, "it begins with a probe");
+        assert!(tissue.probe.len() > 1000 && tissue.probe.iter().any(|(_, entry)| entry.wrench[1] < -0.5));
+        let haptic = flight.haptic.as_ref().expect("recorded");
+        let moved = haptic.outside.iter().flat_map(|(_, outside)| outside.rows_m());
+        assert!(haptic.ticks_on_line() > 3000 && moved.fold(0.0, |most: f64, m| most.max(m.abs())) > 1e-5);
+        assert_repeats(&flight, true);
+        // Where the probe was counts, and what it did to the line.
+        let mut other = flight.clone();
+        other.tissue.as_mut().expect("recorded").probe[300].1.pose.tip_m[1] += 1e-5;
+        other.haptic.as_mut().expect("recorded").outside.clear();
+        assert_repeats(&other, false);
+    }
+}
+
+fn assert_repeats(flight: &Flight, is_same: bool) {
+    let found = repeat::haptic(flight, flight.haptic.as_ref().expect("recorded")).expect("can be run");
+    assert_eq!(found.is_identical(), is_same, "forces: {found:?}");
+    let tissue = flight.tissue.as_ref().expect("recorded");
+    let lines = solve_again(flight, tissue, &mut |_| {}).expect("solved");
+    let found = repeat::tissue(flight, tissue, lines).expect("can be run");
+    assert_eq!(found.is_identical(), is_same, "tissue: {found:?}");
+    assert!(found.positions > 0);
+}

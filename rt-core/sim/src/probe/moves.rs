@@ -1,0 +1,82 @@
+//! What forces on the points of the wall do to points and pads, and what others that move the pads do to the points.
+
+use super::columns::ReadyProbe;
+
+/// How far the points of `reach` are displaced by forces on all of them, m.
+pub(super) fn wall(
+    probe: &ReadyProbe,
+    pressed_n: &[f64],
+    pushed: &[[f64; 3]],
+    reach: &[u32],
+    moved_m: &mut [[f64; 3]],
+) {
+    for &n in reach {
+        moved_m[n as usize] = [0.0; 3];
+    }
+    for (n, (force_n, pushed)) in pressed_n.iter().zip(pushed).enumerate() {
+        if *force_n > 0.0 {
+            // Symmetric: how this point moves with the others is how they move with it.
+            let (row, force_n) = (probe.between(n), pushed.map(|c| force_n * c));
+            for &other in reach {
+                let (block, moved_m) = (&row[other as usize], &mut moved_m[other as usize]);
+                for c in 0..3 {
+                    for r in 0..3 {
+                        moved_m[c] += f64::from(block[r][c]) * force_n[r];
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// How these forces load the pads, which load the body, N.
+pub(super) fn pads(probe: &ReadyProbe, pressed_n: &[f64], pushed: &[[f64; 3]], loads_n: &mut [f64]) {
+    loads_n.fill(0.0);
+    for (n, (force_n, pushed)) in pressed_n.iter().zip(pushed).enumerate() {
+        if *force_n > 0.0 {
+            for (shares, along) in probe.shares(n).zip(pushed) {
+                for (load_n, share) in loads_n.iter_mut().zip(shares) {
+                    *load_n += force_n * along * f64::from(*share);
+                }
+            }
+        }
+    }
+}
+
+/// How far others displace the points, who displace the pads by `beside_m`: all of the wall by its mean, and each point by what is beyond that. What is no number displaces none.
+pub(super) fn beside(probe: &ReadyProbe, beside_m: &[f64], pads_m: &mut [f64], points_m: &mut [[f64; 3]]) {
+    let is_moved = beside_m.iter().any(|m| *m != 0.0) && beside_m.iter().all(|m| m.is_finite());
+    if !is_moved || beside_m.len() != pads_m.len() {
+        return points_m.fill([0.0; 3]);
+    }
+    let pads = (beside_m.len() / 3) as f64;
+    let mut mean_m = [0.0; 3];
+    for pad in beside_m.chunks_exact(3) {
+        for (mean, moved) in mean_m.iter_mut().zip(pad) {
+            *mean += moved / pads;
+        }
+    }
+    for (to, from) in pads_m.chunks_exact_mut(3).zip(beside_m.chunks_exact(3)) {
+        for c in 0..3 {
+            to[c] = from[c] - mean_m[c];
+        }
+    }
+    for (n, point_m) in points_m.iter_mut().enumerate() {
+        for ((along_m, shares), mean) in point_m.iter_mut().zip(probe.shares(n)).zip(mean_m) {
+            *along_m = mean + dot(shares, pads_m);
+        }
+    }
+}
+
+/// In eight sums side by side.
+fn dot(shares: &[f32], values: &[f64]) -> f64 {
+    let mut sums = [0.0; 8];
+    let (a8, b8) = (shares.as_chunks::<8>(), values.as_chunks::<8>());
+    for (a, b) in a8.0.iter().zip(b8.0) {
+        for n in 0..8 {
+            sums[n] += f64::from(a[n]) * b[n];
+        }
+    }
+    let rest: f64 = a8.1.iter().zip(b8.1).map(|(a, b)| f64::from(*a) * b).sum();
+    sums.iter().sum::<f64>() + rest
+}
