@@ -11,7 +11,7 @@ impl Shown {
     /// All metal as it lies now.
     pub fn metal(&self) -> Metal {
         let seeds = self.seeds.iter().map(|seed| Seed {
-            middle_m: seed.position_m.into(),
+            middle_m: self.drawn_at_m(seed).into(),
             axis: seed.axis.into(),
         });
         let left = self.left.iter().map(|left| {

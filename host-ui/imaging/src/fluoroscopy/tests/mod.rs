@@ -340,4 +340,14 @@ fn each_pulse_counts_by_the_inverse_square_law_and_the_last_picture_is_held() {
         scope.dose.air_kerma_gy
     );
     assert_eq!(scope.held().map(|held| held.transmission.len()), Some(128 * 128));
+    // The field is as wide as the detector, narrower by the way to it, and the product is the same at any distance.
+    let edge_m = arm.detector_m * 0.5 / 1.0;
+    assert!((scope.dose.kerma_area_gy_m2 / (expected * edge_m * edge_m) - 1.0).abs() < 1e-12);
+    let far = CArm {
+        source_to_isocentre_m: 0.9,
+        ..arm
+    };
+    let [near, far] = [arm, far].map(|arm| Exposure::FLUOROSCOPY.kerma_area_gy_m2(&arm));
+    assert!((near / far - 1.0).abs() < 1e-12);
+    assert!((scope.dose.beam_s - 0.024).abs() < 1e-12);
 }
