@@ -74,9 +74,15 @@ pub enum Action {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ProbeAction {
     /// By the stepper, whether its brake is on or off.
-    Step { way_m: f64, turn_rad: f64 },
+    Step {
+        way_m: f64,
+        turn_rad: f64,
+    },
     /// By hand, which the brake does not allow.
-    Drag { way_m: f64, turn_rad: f64 },
+    Drag {
+        way_m: f64,
+        turn_rad: f64,
+    },
     ToggleBrake,
 }
 

@@ -5,9 +5,12 @@ use egui::{Key, Modifiers};
 use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 30] = [
+pub const KEYS: [(&str, &str); 26] = [
     ("W  or  Up", "advance the needle along its path while held"),
-    ("S  or  Down", "retract the needle while held; Shift with both: four times slower"),
+    (
+        "S  or  Down",
+        "retract the needle while held; Shift with both: four times slower",
+    ),
     (
         "Alt with W, S, arrows",
         "move the other hand, where rt-core has --device-2",
@@ -23,30 +26,32 @@ pub const KEYS: [(&str, &str); 30] = [
     ("Shift+arrows, Del", "in the template: move the needle, remove it"),
     ("E,  D", "force on, after a fault again; force off"),
     ("P,  K", "parameters; mark this moment, put in exercises"),
-    ("R", "reset the view"),
     (
         "1 to 5",
         "look obliquely, from the perineum, the side, above, along the needle",
     ),
-    ("V", "all views, 3D alone, slices alone, the probe, fluoroscopy"),
+    ("V,  R", "all views, 3D, slices, the probe, fluoroscopy; reset the view"),
     ("PgUp, PgDn, Home, End", "probe 5 mm in or out, 5° to the left or right"),
     ("X;  Ctrl with arrows", "X-ray while held; turn the C-arm"),
-    ("F", "slices follow the tip"),
-    ("M", "measure between two clicks"),
-    ("I", "isodose lines and surfaces"),
-    ("G", "image or simulated ultrasound in the slices"),
+    ("F,  M", "slices follow the tip; measure between two clicks"),
+    (
+        "I,  G",
+        "isodose lines and surfaces; image or simulated ultrasound in the slices",
+    ),
     ("T", "light or dark"),
     ("Ctrl and +, -, 0", "larger, smaller, default text size"),
     ("F2 to F9", "follow the first to the eighth trainee of the list"),
-    ("F12", "save the window as a picture"),
-    ("F1", "this help"),
+    ("F12,  F1", "save the window as a picture; this help"),
     ("Esc", "close a dialog, return the keys to the needle"),
     ("Drag in 3D", "left button rotates, right button pans, wheel zooms"),
     (
         "Drag in a slice",
         "left button moves the cross, or the needle by its tip; right button pans",
     ),
-    ("Drag in the probe's", "in, out and a turn; in fluoroscopy turns the C-arm"),
+    (
+        "Drag in the probe's",
+        "in, out and a turn; in fluoroscopy turns the C-arm",
+    ),
     ("Wheel in a slice", "through the slices; with Ctrl zooms"),
 ];
 

@@ -33,13 +33,7 @@ pub enum Layout {
 }
 
 impl Layout {
-    pub const ALL: [Self; 5] = [
-        Self::Quad,
-        Self::Solid,
-        Self::Slices,
-        Self::Probe,
-        Self::Fluoroscopy,
-    ];
+    pub const ALL: [Self; 5] = [Self::Quad, Self::Solid, Self::Slices, Self::Probe, Self::Fluoroscopy];
 
     pub fn name(self) -> &'static str {
         match self {

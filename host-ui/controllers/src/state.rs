@@ -201,7 +201,11 @@ impl State {
             Kind::Mouse3d => down,
         };
         // A hand that pushes also leans a little to the side.
-        let (along, turn) = if along.abs() >= right.abs() { (along, 0.0) } else { (0.0, right) };
+        let (along, turn) = if along.abs() >= right.abs() {
+            (along, 0.0)
+        } else {
+            (0.0, right)
+        };
         ProbeWish {
             along_m_per_s: along * ALONG_M_PER_S * self.slow(),
             turn_rad_per_s: turn * TURN_RAD_PER_S * self.slow(),

@@ -194,7 +194,11 @@ mod tests {
 
     #[test]
     fn a_probe_is_turned_about_its_axis_too() {
-        let (mut hand, now, frame) = (Hand::new(Held::Probe, options()), Instant::now(), PatientFrame::default());
+        let (mut hand, now, frame) = (
+            Hand::new(Held::Probe, options()),
+            Instant::now(),
+            PatientFrame::default(),
+        );
         let taken = hand.take(&sent(1, "Stylus", UPRIGHT), &frame, now);
         let goal = taken.expect("possible").expect("new");
         assert_eq!((goal.hand.direction, goal.up), ([0.0, 0.0, 1.0], Some([0.0, 1.0, 0.0])));

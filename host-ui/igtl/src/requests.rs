@@ -67,7 +67,11 @@ impl Requests {
         };
         let patient = scene.header.patient();
         let [needle, probe] = &mut self.hands;
-        let hand = if probe.is_moved_by(&received.device) { probe } else { needle };
+        let hand = if probe.is_moved_by(&received.device) {
+            probe
+        } else {
+            needle
+        };
         if let Some(goal) = hand.take(received, &patient, Instant::now())? {
             let sent = link.send(&hand.held().moved(goal));
             let id = sent.map_err(|error| not_ready(error.to_string()))?;

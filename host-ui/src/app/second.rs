@@ -79,7 +79,8 @@ impl SecondDrive {
     /// Where the stepper was set to, unless another has moved the probe since.
     fn goal(&mut self, now: &Pose) -> Option<Pose> {
         let is_off = |goal: &Pose| (goal.middle_m - now.middle_m).norm() > MOVED_M;
-        self.stepper.take_if(|(goal, at)| at.elapsed() > MOVED_AFTER && is_off(goal));
+        self.stepper
+            .take_if(|(goal, at)| at.elapsed() > MOVED_AFTER && is_off(goal));
         self.stepper.map(|(goal, _)| goal)
     }
 }
@@ -204,7 +205,9 @@ mod tests {
         let goal = start().moved(5e-3, 0.1);
         drive.stepper = Some((goal, Instant::now()));
         assert_eq!(drive.goal(&start()), Some(goal), "it is on its way");
-        let Some(long_ago) = Instant::now().checked_sub(MOVED_AFTER * 2) else { return };
+        let Some(long_ago) = Instant::now().checked_sub(MOVED_AFTER * 2) else {
+            return;
+        };
         drive.stepper = Some((goal, long_ago));
         assert_eq!(drive.goal(&goal), Some(goal), "it is there");
         assert_eq!(drive.goal(&start()), None, "another has moved it");

@@ -156,11 +156,17 @@ impl FluoroView {
             ui.ctx().request_repaint_after(LOOK_AGAIN);
         }
         if self.screen.is_none() {
-            slice::words(&painter, rect, "No fluoroscopy: no wgpu device that computes", IMAGE.text);
+            slice::words(
+                &painter,
+                rect,
+                "No fluoroscopy: no wgpu device that computes",
+                IMAGE.text,
+            );
             return;
         }
         let edge = rect.width().min(rect.height());
-        let square = Rect::from_center_size(rect.center(), Vec2::splat(edge)).round_to_pixels(ui.ctx().pixels_per_point());
+        let square =
+            Rect::from_center_size(rect.center(), Vec2::splat(edge)).round_to_pixels(ui.ctx().pixels_per_point());
         if let Some(held) = &self.held {
             held.pasted.paint(&ui.painter_at(square), square);
         }
@@ -243,7 +249,9 @@ impl Screen {
             bytes_per_row: Some(width * 4),
             rows_per_image: Some(height),
         };
-        self.gpu.queue.write_texture(texture.as_image_copy(), &pixels, layout, size);
+        self.gpu
+            .queue
+            .write_texture(texture.as_image_copy(), &pixels, layout, size);
         let view = texture.create_view(&Default::default());
         Some(Held {
             pasted: self.paste.enlarged(&view),

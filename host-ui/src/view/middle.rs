@@ -298,7 +298,7 @@ fn places(rect: Rect, layout: Layout) -> Places {
                 solid: None,
                 slices: vec![(axial, cell(0, 0)), (coronal, cell(1, 0)), (sagittal, lower)],
                 probe: Vec::new(),
-            fluoro: None,
+                fluoro: None,
             }
         }
         Layout::Probe => Places {

@@ -245,7 +245,9 @@ fn unit_or_z(v: &Vector3<f64>) -> Vector3<f64> {
 fn upright(aim: &Vector3<f64>, up: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
     let up = (up - aim * up.dot(aim)).try_normalize(1e-6)?;
     let axes = Matrix3::from_columns(&[up.cross(aim), up, *aim]);
-    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes)))
+    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(
+        axes,
+    )))
 }
 
 /// The rotation, or as much of it as is within `limit_rad`.

@@ -247,18 +247,23 @@ fn a_hand_turns_what_it_holds_about_its_axis_only_when_it_is_asked_to() {
         direction: aim,
         ..goal(0.0, 0.0, 0.0)
     });
-    let mut after = |device: &mut SimulatedPhantom, ticks: u32| {
+    let after = |device: &mut SimulatedPhantom, ticks: u32| {
         let mut turn = nalgebra::UnitQuaternion::identity();
         for _ in 0..ticks {
             let sample = device.read(DT_S).expect("a sample");
-            assert!(turn == nalgebra::UnitQuaternion::identity() || turn.angle_to(&sample.world_from_tool) < 2.1 * DT_S);
+            assert!(
+                turn == nalgebra::UnitQuaternion::identity() || turn.angle_to(&sample.world_from_tool) < 2.1 * DT_S
+            );
             turn = sample.world_from_tool;
         }
         turn
     };
     let straight = after(&mut device, 2000);
     assert!((straight * Vector3::z() - aim).norm() < 1e-9);
-    assert!((straight * Vector3::y() - Vector3::new(0.0, 0.8, -0.6)).norm() < 1e-9, "no roll");
+    assert!(
+        (straight * Vector3::y() - Vector3::new(0.0, 0.8, -0.6)).norm() < 1e-9,
+        "no roll"
+    );
     // Half square to the axis: what is along it does not count.
     device.set_hand_up(Some(Vector3::x() + aim));
     let turned = after(&mut device, 2000);

@@ -147,7 +147,10 @@ fn the_other_hand_turns_what_it_holds_or_does_not() {
     assert!(matches!(refused.0[..], [RequestError::NotUnit { .. }]), "{refused:?}");
     assert!(matches!(
         refused_of_ten(hand)[..],
-        [RequestError::Count { kind: CommandKind::MoveSecondHand, .. }]
+        [RequestError::Count {
+            kind: CommandKind::MoveSecondHand,
+            ..
+        }]
     ));
 }
 

@@ -95,7 +95,11 @@ fn both_hands_are_seen_and_each_goes_where_it_is_asked_to() {
         // Turned about its axis by atan2(0.6, 0.8), whichever of both came first.
         let turned = |link: &Link| link.second_state().expect("seen").world_from_tool;
         let half = 0.6_f64.atan2(0.8) / 2.0;
-        assert!(rig.waits_for(|link| (turned(link)[2] - half.sin()).abs() < 1e-3), "{:?}", turned(&rig.link));
+        assert!(
+            rig.waits_for(|link| (turned(link)[2] - half.sin()).abs() < 1e-3),
+            "{:?}",
+            turned(&rig.link)
+        );
         let records = rig.link.take_second_records();
         let numbers: Vec<_> = records.iter().map(|r| r.tick).collect();
         assert!(

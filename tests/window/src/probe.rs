@@ -61,11 +61,11 @@ fn the_picture_is_of_the_probe_in_the_hand_which_stepper_and_pointer_move_until_
     until_at(&mut driven, "the start", start);
     // It begins outside, and goes in by steps of the stepper.
     let mut goal = start;
-    for _ in 0..16 {
+    for _ in 0..28 {
         driven.press(Key::PageUp);
         goal = goal.moved(5e-3, 0.0);
     }
-    until_at(&mut driven, "80 mm in", goal);
+    until_at(&mut driven, "140 mm in", goal);
     for _ in 0..4 {
         driven.press(Key::Home);
     }
@@ -112,9 +112,15 @@ fn a_patient_who_moves_is_seen_by_a_probe_that_does_not() {
     driven.until("a picture", |app| seen(app).is_some());
     let before = seen(driven.window.state()).expect("a picture");
     let mut link = driven.core.host();
-    ask(&mut link, &Request::BeginExercise(Exercise::BodyMoved { by_m: [4e-3, 0.0, 0.0] })).expect("put in");
+    ask(
+        &mut link,
+        &Request::BeginExercise(Exercise::BodyMoved { by_m: [4e-3, 0.0, 0.0] }),
+    )
+    .expect("put in");
     driven.until("the body where it goes", |app| {
-        app.link().snapshot().is_some_and(|s| (s.header.body_moved_m[0] - 4e-3).abs() < 1e-6)
+        app.link()
+            .snapshot()
+            .is_some_and(|s| (s.header.body_moved_m[0] - 4e-3).abs() < 1e-6)
     });
     wait(&mut driven, 10);
     assert_eq!(seen(driven.window.state()), Some(before), "the stepper stands still");
@@ -128,6 +134,7 @@ fn the_beam_is_on_while_it_is_asked_for_the_last_image_is_held_and_the_dose_is_c
     let mut driven = open("Fluoroscopy", &[]);
     let pulses = |app: &App| app.middle().spent().pulses;
     driven.until("a patient", |app| app.link().scene().is_some());
+    driven.press(Key::E);
     wait(&mut driven, 20);
     assert_eq!(pulses(driven.window.state()), 0, "no beam that nobody asked for");
     driven.window.key_down(Key::X);
@@ -139,7 +146,10 @@ fn the_beam_is_on_while_it_is_asked_for_the_last_image_is_held_and_the_dose_is_c
     assert_eq!(pulses(driven.window.state()), held, "the beam goes on");
     let spent = driven.window.state().middle().spent();
     assert!((spent.beam_s - 0.125 * spent.pulses as f64).abs() < 1e-9);
-    assert!((spent.air_kerma_gy / spent.pulses as f64 - 20.5e-6).abs() < 0.5e-6, "{spent:?}");
+    assert!(
+        (spent.air_kerma_gy / spent.pulses as f64 - 20.5e-6).abs() < 0.5e-6,
+        "{spent:?}"
+    );
     // The switch of the window, then another angle, which the held image does not have.
     driven.click("X-ray");
     driven.until("more pulses", |app| pulses(app) > held + 1);
@@ -150,7 +160,13 @@ fn the_beam_is_on_while_it_is_asked_for_the_last_image_is_held_and_the_dose_is_c
     keep_for_docs(&picture, "fluoroscopy");
     assert_drawn_by_changes(&mut driven.window, "an image that is held");
     let rect = driven.window.get_by_label("C-arm screen").rect();
-    let own = image::imageops::crop_imm(&picture, rect.left() as u32, rect.top() as u32, rect.width() as u32, rect.height() as u32);
+    let own = image::imageops::crop_imm(
+        &picture,
+        rect.left() as u32,
+        rect.top() as u32,
+        rect.width() as u32,
+        rect.height() as u32,
+    );
     // Age and dose may differ; bones that lie elsewhere are thousands of pixels.
     let options = tolerant().max_failed_pixels(2500);
     image_snapshot_options(&with_fewer_greys(&own.to_image(), 51), "fluoroscopy_held", &options);

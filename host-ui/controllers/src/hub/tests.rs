@@ -136,7 +136,11 @@ fn with_two_hands_the_other_device_moves_the_probe_and_stops_but_drops_no_seed()
     assert_eq!(holder(hub.read(0.0)), "pad a");
     table.pushes(1, 100);
     let latest = hub.read(0.0);
-    assert_eq!((holder(latest), latest.wish), ("pad a", Wish::REST), "the needle keeps its device");
+    assert_eq!(
+        (holder(latest), latest.wish),
+        ("pad a", Wish::REST),
+        "the needle keeps its device"
+    );
     assert_eq!(latest.probe_holder.as_ref().map(|h| h.name.as_str()), Some("pad b"));
     assert!(latest.probe.along_m_per_s > 0.039 && latest.probe.turn_rad_per_s == 0.0);
     for pad in [0, 1] {
@@ -150,7 +154,10 @@ fn with_two_hands_the_other_device_moves_the_probe_and_stops_but_drops_no_seed()
     table.there.borrow_mut().pop();
     hub.look();
     let latest = hub.read(0.0);
-    assert_eq!((latest.probe_holder.clone(), latest.probe), (None, ProbeWish::default()));
+    assert_eq!(
+        (latest.probe_holder.clone(), latest.probe),
+        (None, ProbeWish::default())
+    );
     hub.use_two_hands(false);
     assert_eq!(hub.read(0.0).probe_holder, None);
 }

@@ -275,7 +275,8 @@ impl Plane {
 
     /// Where that place stands in the picture.
     pub fn crossing(&self, place_m: Vector3<f64>, direction: Vector3<f64>) -> Option<Vector2<f64>> {
-        self.crossing_m(place_m, direction).map(|place_m| self.pixel_of(place_m))
+        self.crossing_m(place_m, direction)
+            .map(|place_m| self.pixel_of(place_m))
     }
 
     /// The place in the plane under a place in the picture.

@@ -13,16 +13,27 @@ impl FluoroView {
         beam.on_hover_text("Key X while held: 8 pulses a second; afterwards the last image is held");
         angle_ui(
             ui,
-            ("Orbital", ORBITAL_DEG, "Ctrl with left, right: the detector about the patient, to his left"),
+            (
+                "Orbital",
+                ORBITAL_DEG,
+                "Ctrl with left, right: the detector about the patient, to his left",
+            ),
             &mut self.angles.orbital,
         );
         angle_ui(
             ui,
-            ("Cranial", CRANIAL_DEG, "Ctrl with up, down: the detector towards his head"),
+            (
+                "Cranial",
+                CRANIAL_DEG,
+                "Ctrl with up, down: the detector towards his head",
+            ),
             &mut self.angles.cranial,
         );
         let case = ui.button("New case");
-        if case.on_hover_text("Sets the dose to zero and clears the screen; another scene does so too").clicked() {
+        if case
+            .on_hover_text("Sets the dose to zero and clears the screen; another scene does so too")
+            .clicked()
+        {
             self.begin_case();
         }
         self.keys(ui);

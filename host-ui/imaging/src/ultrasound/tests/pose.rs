@@ -58,7 +58,11 @@ fn a_probe_in_the_hand_looks_where_its_tool_says() {
     // Turned by 30 degrees from y towards -x, the patient's left in a scene that is not turned.
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 30_f64.to_radians());
     let turned = Pose::of_tool(tip_m, &turn, &probe);
-    assert!((turned.up - Vector3::new(-0.5, 0.75_f64.sqrt(), 0.0)).norm() < 1e-12, "{}", turned.up);
+    assert!(
+        (turned.up - Vector3::new(-0.5, 0.75_f64.sqrt(), 0.0)).norm() < 1e-12,
+        "{}",
+        turned.up
+    );
     let (way_m, turn_rad) = turned.way_and_turn(&straight);
     assert!(way_m.abs() < 1e-12 && (turn_rad - 30_f64.to_radians()).abs() < 1e-12);
     assert!((straight.moved(0.0, turn_rad).up - turned.up).norm() < 1e-12);
@@ -82,9 +86,16 @@ fn a_probe_in_the_hand_looks_where_its_tool_says() {
 
 #[test]
 fn way_and_turn_are_what_a_stepper_was_set_to() {
-    let base = Pose::of_tool(Vector3::new(0.01, 0.02, 0.03), &UnitQuaternion::from_euler_angles(0.3, -0.2, 0.5), &Probe::default());
+    let base = Pose::of_tool(
+        Vector3::new(0.01, 0.02, 0.03),
+        &UnitQuaternion::from_euler_angles(0.3, -0.2, 0.5),
+        &Probe::default(),
+    );
     for (way_m, turn_rad) in [(5e-3, 0.4), (-60e-3, -1.5), (0.0, 0.0)] {
         let (way, turn) = base.moved(way_m, turn_rad).way_and_turn(&base);
-        assert!((way - way_m).abs() < 1e-12 && (turn - turn_rad).abs() < 1e-12, "{way} {turn}");
+        assert!(
+            (way - way_m).abs() < 1e-12 && (turn - turn_rad).abs() < 1e-12,
+            "{way} {turn}"
+        );
     }
 }
