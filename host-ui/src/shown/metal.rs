@@ -26,3 +26,26 @@ impl Shown {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_shm_schema::SeedPose;
+
+    /// They stayed in the picture where the scene has the body, and the tissue around them moved.
+    #[test]
+    fn seeds_are_seen_in_the_body_where_an_exercise_has_moved_it() {
+        let mut shown = Shown::empty("lab");
+        shown.seeds = vec![SeedPose {
+            position_m: [0.01, 0.02, 0.03],
+            axis: [0.0, 0.0, 1.0],
+            ..bytemuck::Zeroable::zeroed()
+        }];
+        shown.body_moved_m = [4e-3, 0.0, -1e-3];
+        let middle_m = shown.metal().seeds[0].middle_m;
+        assert!(
+            (middle_m - Vector3::new(0.014, 0.02, 0.029)).norm() < 1e-12,
+            "{middle_m}"
+        );
+    }
+}

@@ -60,11 +60,11 @@ impl FluoroView {
 }
 
 fn angle_ui(ui: &mut egui::Ui, (name, most, hint): (&str, f64, &str), degrees: &mut f64) {
-    let label = ui.label(name);
     let drag = egui::DragValue::new(degrees)
         .range(-most..=most)
         .speed(0.5)
         .fixed_decimals(0)
+        .prefix(format!("{name} "))
         .suffix("°");
-    ui.add(drag).labelled_by(label.id).on_hover_text(hint);
+    ui.add(drag).on_hover_text(hint);
 }

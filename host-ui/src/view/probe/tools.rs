@@ -129,16 +129,15 @@ struct Knob(&'static str, [f64; 2], &'static str, &'static str);
 impl Knob {
     fn ui(self, ui: &mut egui::Ui, value: &mut f64, is_enabled: bool) {
         let Self(name, [least, most], unit, hint) = self;
-        let label = ui.label(name);
         // A hand may hold the probe beyond the stepper.
         let range = least.min(*value)..=most.max(*value);
         let drag = egui::DragValue::new(value)
             .range(range)
             .speed(0.5)
             .fixed_decimals(1)
+            .prefix(format!("{name} "))
             .suffix(unit);
-        ui.add_enabled(is_enabled, drag)
-            .labelled_by(label.id)
-            .on_hover_text(hint);
+        // In one widget, so that no line ends between name and value.
+        ui.add_enabled(is_enabled, drag).on_hover_text(hint);
     }
 }
