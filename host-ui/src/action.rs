@@ -30,6 +30,7 @@ pub enum Action {
     Plan(PlanAction),
     Watch(WatchAction),
     Trainee(TraineeAction),
+    Probe(ProbeAction),
     RunAll,
     /// All needles again, from a reset, whatever was done.
     StartOver,
@@ -67,6 +68,22 @@ pub enum Action {
     DismissRefusals,
     /// The message that a device was unplugged was read.
     DismissDisconnected,
+}
+
+/// What is asked of the simulated hand that holds the ultrasound probe: ways along its axis (m), turns about it (rad).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ProbeAction {
+    /// By the stepper, whether its brake is on or off.
+    Step {
+        way_m: f64,
+        turn_rad: f64,
+    },
+    /// By hand, which the brake does not allow.
+    Drag {
+        way_m: f64,
+        turn_rad: f64,
+    },
+    ToggleBrake,
 }
 
 /// What an instructor asks for of a trainee, by the place in the list.

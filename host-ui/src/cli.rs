@@ -126,8 +126,11 @@ enum Task {
         /// send them
         #[arg(long, value_name = "NAME")]
         hand: Option<String>,
-        /// As fast as this at most, 0.1 to 1000 mm/s
-        #[arg(long, default_value_t = 100.0, value_name = "MM/S", requires = "hand")]
+        /// Let transforms of this name, such as ProbeToScene, move the simulated hand with the ultrasound probe (rt-core --device-2)
+        #[arg(long, value_name = "NAME")]
+        probe: Option<String>,
+        /// As fast as this at most, both hands, 0.1 to 1000 mm/s
+        #[arg(long, default_value_t = 100.0, value_name = "MM/S")]
         hand_speed: f64,
     },
     /// Convert a recording into a table, or into a motion for rt-core's replay device
@@ -223,6 +226,7 @@ impl Cli {
                 listen,
                 hz,
                 hand,
+                probe,
                 hand_speed,
             }) => {
                 if !(1.0..=200.0).contains(&hz) {
@@ -231,14 +235,18 @@ impl Cli {
                 if !(0.1..=1000.0).contains(&hand_speed) {
                     return Err(format!("--hand-speed {hand_speed}: 0.1 to 1000 mm/s are possible").into());
                 }
+                let moved_by = |device: Option<String>| {
+                    device.map(|device| stylet_igtl::hand::HandOptions {
+                        device,
+                        speed_m_per_s: hand_speed * 1e-3,
+                    })
+                };
                 let ended = stylet_igtl::serve::run(&stylet_igtl::serve::Options {
                     instance: instance.clone(),
                     listen,
                     rate_hz: hz,
-                    hand: hand.map(|device| stylet_igtl::hand::HandOptions {
-                        device,
-                        speed_m_per_s: hand_speed * 1e-3,
-                    }),
+                    hand: moved_by(hand),
+                    probe: moved_by(probe),
                 });
                 instance.sweep();
                 Ok(ended?)

@@ -1,18 +1,21 @@
 //! Keys: which there are, and what is held or pressed in this frame.
 
-use crate::action::{Action, TraineeAction, Viewpoint};
+use crate::action::{Action, ProbeAction, TraineeAction, Viewpoint};
 use egui::{Key, Modifiers};
 use stylet_shm_schema::Request;
 
 /// Every key, for the overlay and the manual.
-pub const KEYS: [(&str, &str); 29] = [
+pub const KEYS: [(&str, &str); 26] = [
     ("W  or  Up", "advance the needle along its path while held"),
-    ("S  or  Down", "retract the needle while held"),
-    ("Shift with W, S", "four times slower"),
+    (
+        "S  or  Down",
+        "retract the needle while held; Shift with both: four times slower",
+    ),
     (
         "Alt with W, S, arrows",
         "move the other hand, where rt-core has --device-2",
     ),
+    ("B", "brake of the probe's stepper, likewise"),
     ("Enter", "the main action of the present step"),
     ("Space", "drop a seed at the tip"),
     ("Ctrl+Z", "undo the last seed or plan change; with Shift redo it"),
@@ -22,29 +25,32 @@ pub const KEYS: [(&str, &str); 29] = [
     ),
     ("Shift+arrows, Del", "in the template: move the needle, remove it"),
     ("E,  D", "force on, after a fault again; force off"),
-    ("P", "parameters"),
-    ("K", "mark this moment; put in exercises"),
-    ("R", "reset the view"),
+    ("P,  K", "parameters; mark this moment, put in exercises"),
     (
         "1 to 5",
         "look obliquely, from the perineum, the side, above, along the needle",
     ),
-    ("V", "all views, 3D alone, slices alone, the probe"),
-    ("PgUp, PgDn", "probe 5 mm into the patient or out, where it is shown"),
-    ("F", "slices follow the tip"),
-    ("M", "measure between two clicks"),
-    ("I", "isodose lines and surfaces"),
-    ("G", "image or simulated ultrasound in the slices"),
+    ("V,  R", "all views, 3D, slices, the probe, fluoroscopy; reset the view"),
+    ("PgUp, PgDn, Home, End", "probe 5 mm in or out, 5° to the left or right"),
+    ("X;  Ctrl with arrows", "X-ray while held; turn the C-arm"),
+    ("F,  M", "slices follow the tip; measure between two clicks"),
+    (
+        "I,  G",
+        "isodose lines and surfaces; image or simulated ultrasound in the slices",
+    ),
     ("T", "light or dark"),
     ("Ctrl and +, -, 0", "larger, smaller, default text size"),
     ("F2 to F9", "follow the first to the eighth trainee of the list"),
-    ("F12", "save the window as a picture"),
-    ("F1", "this help"),
+    ("F12,  F1", "save the window as a picture; this help"),
     ("Esc", "close a dialog, return the keys to the needle"),
     ("Drag in 3D", "left button rotates, right button pans, wheel zooms"),
     (
         "Drag in a slice",
         "left button moves the cross, or the needle by its tip; right button pans",
+    ),
+    (
+        "Drag in the probe's",
+        "in, out and a turn; in fluoroscopy turns the C-arm",
     ),
     ("Wheel in a slice", "through the slices; with Ctrl zooms"),
 ];
@@ -107,6 +113,7 @@ pub fn read(ctx: &egui::Context) -> Keys {
         (Modifiers::NONE, Key::P, Action::OpenParameters),
         (Modifiers::NONE, Key::K, Action::ToggleInstructor),
         (Modifiers::NONE, Key::R, Action::ResetView),
+        (Modifiers::NONE, Key::B, Action::Probe(ProbeAction::ToggleBrake)),
     ];
     ctx.input_mut(|i| {
         for (modifiers, key, action) in pressed {

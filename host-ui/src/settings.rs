@@ -28,10 +28,12 @@ pub enum Layout {
     Slices,
     /// What the ultrasound probe sees.
     Probe,
+    /// The screen of a C-arm, beside the probe's.
+    Fluoroscopy,
 }
 
 impl Layout {
-    pub const ALL: [Self; 4] = [Self::Quad, Self::Solid, Self::Slices, Self::Probe];
+    pub const ALL: [Self; 5] = [Self::Quad, Self::Solid, Self::Slices, Self::Probe, Self::Fluoroscopy];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -39,6 +41,7 @@ impl Layout {
             Self::Solid => "3D",
             Self::Slices => "Slices",
             Self::Probe => "Probe",
+            Self::Fluoroscopy => "Fluoroscopy",
         }
     }
 
@@ -47,7 +50,8 @@ impl Layout {
             Self::Quad => Self::Solid,
             Self::Solid => Self::Slices,
             Self::Slices => Self::Probe,
-            Self::Probe => Self::Quad,
+            Self::Probe => Self::Fluoroscopy,
+            Self::Fluoroscopy => Self::Quad,
         }
     }
 }

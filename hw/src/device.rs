@@ -38,6 +38,10 @@ pub trait Device: Send {
     /// Sets the goal to which a simulated hand moves the tip. A device held by a real hand ignores it.
     fn set_hand_goal(&mut self, _goal: &HandGoal) {}
 
+    /// Where +y of the tool goes from now on, as far as that is square to the direction of the goal; without it a simulated hand does
+    /// not turn the tool about its axis. A device held by a real hand ignores it.
+    fn set_hand_up(&mut self, _up: Option<Vector3<f64>>) {}
+
     /// Stops a simulated hand with the acceleration of its last goal. A device held by a real hand ignores it.
     fn stop_hand(&mut self) {}
 }

@@ -63,7 +63,7 @@ pub use rehearsal::Rehearsal;
 pub use relayed::Relayed;
 pub use request::{
     ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, MARK_BEFORE_RANGE_S, Mark, NeedleAxis,
-    NeedleRehearsal, ParameterChange, PlannedNeedle, RETRACT_RANGE_M, Request, RequestError, RequestErrors,
+    NeedleRehearsal, ParameterChange, PlannedNeedle, ProbeMove, RETRACT_RANGE_M, Request, RequestError, RequestErrors,
     SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M, StabilisingNeedle,
 };
 pub use scene::{

@@ -3,7 +3,7 @@
 use super::error::OpenError;
 use super::found::Found;
 use super::kind::{Button, Kind};
-use super::state::{DeviceState, State, Taken, Wish};
+use super::state::{DeviceState, ProbeWish, State, Taken, Wish};
 use evdev::InputEvent;
 use std::io::{self, ErrorKind};
 use std::path::PathBuf;
@@ -50,6 +50,10 @@ pub struct Latest {
     pub holder: Option<Device>,
     /// Speed that it asks for.
     pub wish: Wish,
+    /// In a run with two hands: the device that controls the probe.
+    pub probe_holder: Option<Device>,
+    /// Speed that it asks for.
+    pub probe: ProbeWish,
     /// How often each of [`Button::ALL`] was pressed since the start.
     pub presses: [u32; Button::ALL.len()],
     /// Devices that are there and cannot be read, each with the reason and what to do.
@@ -74,6 +78,7 @@ pub struct DeviceHub<G: DeviceSource> {
     holder: Option<PathBuf>,
     latest: Latest,
     events: Vec<InputEvent>,
+    two_hands: bool,
 }
 
 impl<G: DeviceSource> DeviceHub<G> {
@@ -86,7 +91,13 @@ impl<G: DeviceSource> DeviceHub<G> {
             holder: None,
             latest: Latest::default(),
             events: Vec::new(),
+            two_hands: false,
         }
+    }
+
+    /// With two hands the device that controls the needle keeps it, and another one controls the probe.
+    pub fn use_two_hands(&mut self, two_hands: bool) {
+        self.two_hands = two_hands;
     }
 
     /// Adds devices that were plugged in since the last call, and removes unplugged ones.
@@ -149,7 +160,16 @@ impl<G: DeviceSource> DeviceHub<G> {
         let mut failed = Vec::new();
         for held in &mut self.held {
             self.events.clear();
-            let read = read_one(held, &mut self.events, now_s, &mut self.latest.presses);
+            // A thumb on the probe drops no seed.
+            let stops_only = self.two_hands && Some(&held.found.path) != self.holder.as_ref();
+            let presses = &mut self.latest.presses;
+            let count = |button: Button| {
+                if !stops_only || button == Button::Stop {
+                    let count = &mut presses[button as usize];
+                    *count = count.wrapping_add(1);
+                }
+            };
+            let read = read_one(held, &mut self.events, now_s, count);
             if read.is_err() {
                 failed.push(held.found.path.clone());
             }
@@ -167,17 +187,23 @@ impl<G: DeviceSource> DeviceHub<G> {
         let holds = |h: &&Held<G::Device>| Some(&h.found.path) == self.holder.as_ref();
         let present = self.held.iter().find(holds);
         let holder = present
-            .filter(|h| wish(h) != Wish::REST)
+            .filter(|h| self.two_hands || wish(h) != Wish::REST)
             .or_else(|| self.held.iter().find(|h| wish(h) != Wish::REST))
             .or(present)
             .or(self.held.first());
         self.latest.wish = holder.map_or(Wish::REST, wish);
-        self.latest.holder = holder.map(|h| Device {
+        let device = |h: &Held<G::Device>| Device {
             name: h.found.name.clone(),
             kind: h.found.kind,
             was_released: h.state.was_released(),
-        });
-        self.holder = holder.map(|h| h.found.path.clone());
+        };
+        self.latest.holder = holder.map(device);
+        let path = holder.map(|h| h.found.path.clone());
+        let mut others = self.held.iter().filter(|h| Some(&h.found.path) != path.as_ref());
+        let other = others.next().filter(|_| self.two_hands);
+        self.latest.probe_holder = other.map(device);
+        self.latest.probe = other.map_or_else(ProbeWish::default, |h| h.state.probe_wish(now_s));
+        self.holder = path;
     }
 
     /// Waits until a device has events, at most for this time.
@@ -191,16 +217,12 @@ fn read_one<O: OpenDevice>(
     held: &mut Held<O>,
     events: &mut Vec<InputEvent>,
     now_s: f64,
-    presses: &mut [u32; Button::ALL.len()],
+    mut count: impl FnMut(Button),
 ) -> io::Result<()> {
     match held.opened.fetch(events) {
         Err(e) if ![ErrorKind::WouldBlock, ErrorKind::Interrupted].contains(&e.kind()) => return Err(e),
         _ => {}
     }
-    let mut count = |button: Button| {
-        let count = &mut presses[button as usize];
-        *count = count.wrapping_add(1);
-    };
     for event in events.drain(..) {
         match held.state.take(event, now_s) {
             Taken::Nothing => {}
@@ -216,175 +238,4 @@ fn read_one<O: OpenDevice>(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use evdev::{AbsInfo, AbsoluteAxisCode, AttributeSet, EventType, KeyCode};
-    use std::cell::RefCell;
-    use std::collections::VecDeque;
-    use std::rc::Rc;
-
-    type Queue = Rc<RefCell<VecDeque<io::Result<InputEvent>>>>;
-
-    /// Two gamepads at most, with the events that they are to send.
-    #[derive(Clone, Default)]
-    struct Table {
-        there: Rc<RefCell<Vec<&'static str>>>,
-        locked: Rc<RefCell<bool>>,
-        queues: [Queue; 2],
-    }
-
-    struct Pad(Queue);
-
-    impl DeviceSource for Table {
-        type Device = Pad;
-
-        fn list(&mut self) -> Vec<Found> {
-            let found = |name: &&str| Found {
-                path: PathBuf::from(name),
-                name: format!("pad {name}"),
-                kind: Kind::Gamepad,
-            };
-            self.there.borrow().iter().map(found).collect()
-        }
-
-        fn open(&mut self, found: &Found) -> io::Result<Pad> {
-            if *self.locked.borrow() {
-                return Err(ErrorKind::PermissionDenied.into());
-            }
-            Ok(Pad(self.queues[usize::from(found.path.ends_with("b"))].clone()))
-        }
-
-        fn wait(&mut self, _: &[&Pad], _: Duration) {}
-    }
-
-    impl OpenDevice for Pad {
-        fn fetch(&mut self, into: &mut Vec<InputEvent>) -> io::Result<()> {
-            while let Some(event) = self.0.borrow_mut().pop_front() {
-                into.push(event?);
-            }
-            Err(ErrorKind::WouldBlock.into())
-        }
-
-        fn state(&self) -> io::Result<DeviceState> {
-            Ok(DeviceState {
-                axes: vec![(AbsoluteAxisCode::ABS_Y, AbsInfo::new(0, -100, 100, 0, 0, 0))],
-                keys: AttributeSet::new(),
-            })
-        }
-    }
-
-    impl Table {
-        fn with(there: &[&'static str]) -> (Self, DeviceHub<Self>) {
-            let table = Self::default();
-            *table.there.borrow_mut() = there.to_vec();
-            let mut hub = DeviceHub::new(table.clone());
-            hub.look();
-            (table, hub)
-        }
-
-        fn sends(&self, pad: usize, kind: EventType, code: u16, value: i32) {
-            let mut queue = self.queues[pad].borrow_mut();
-            queue.push_back(Ok(InputEvent::new(kind.0, code, value)));
-            queue.push_back(Ok(InputEvent::new(EventType::SYNCHRONIZATION.0, 0, 0)));
-        }
-
-        /// Away from the operator by so many of 100.
-        fn pushes(&self, pad: usize, by: i32) {
-            self.sends(pad, EventType::ABSOLUTE, AbsoluteAxisCode::ABS_Y.0, -by);
-        }
-    }
-
-    fn holder(latest: &Latest) -> &str {
-        latest.holder.as_ref().map_or("n/a", |h| h.name.as_str())
-    }
-
-    #[test]
-    fn a_plugged_in_device_controls_the_needle_and_an_unplugged_one_leaves_it_at_rest_and_is_reported() {
-        let (table, mut hub) = Table::with(&[]);
-        assert_eq!(holder(hub.read(0.0)), "n/a");
-        table.there.borrow_mut().push("a");
-        hub.look();
-        assert_eq!(holder(hub.read(0.0)), "pad a");
-        table.pushes(0, 100);
-        assert!(hub.read(0.0).wish.along_m_per_s > 0.039);
-        table.there.borrow_mut().clear();
-        hub.look();
-        let latest = hub.read(0.0);
-        assert_eq!((holder(latest), latest.wish), ("n/a", Wish::REST));
-        assert_eq!((latest.disconnected.as_str(), latest.disconnections), ("pad a", 1));
-    }
-
-    #[test]
-    fn a_device_that_fails_while_it_is_read_is_unplugged_at_once() {
-        let (table, mut hub) = Table::with(&["a"]);
-        table.pushes(0, 100);
-        assert!(hub.read(0.0).wish != Wish::REST);
-        // ENODEV, what the kernel says of a device that was pulled out.
-        table.queues[0]
-            .borrow_mut()
-            .push_back(Err(io::Error::from_raw_os_error(19)));
-        let latest = hub.read(0.0);
-        assert_eq!(
-            (latest.wish, latest.disconnections, holder(latest)),
-            (Wish::REST, 1, "n/a")
-        );
-    }
-
-    #[test]
-    fn another_device_takes_over_only_while_the_needle_is_at_rest() {
-        let (table, mut hub) = Table::with(&["a", "b"]);
-        assert_eq!(holder(hub.read(0.0)), "pad a");
-        table.pushes(1, 50);
-        assert_eq!(holder(hub.read(0.0)), "pad b");
-        table.pushes(0, -100);
-        let latest = hub.read(0.0);
-        assert_eq!(holder(latest), "pad b");
-        assert!(latest.wish.along_m_per_s > 0.0, "the other one pulls in vain");
-        table.pushes(1, 0);
-        let latest = hub.read(0.0);
-        assert_eq!(holder(latest), "pad a");
-        assert!(latest.wish.along_m_per_s < 0.0);
-    }
-
-    #[test]
-    fn buttons_of_every_device_are_counted() {
-        let (table, mut hub) = Table::with(&["a", "b"]);
-        for pad in [0, 1] {
-            table.sends(pad, EventType::KEY, KeyCode::BTN_SOUTH.0, 1);
-        }
-        table.sends(0, EventType::KEY, KeyCode::BTN_START.0, 1);
-        let latest = hub.read(0.0);
-        let pressed = |button: Button| latest.presses[button as usize];
-        assert_eq!(
-            (pressed(Button::Drop), pressed(Button::Engage), pressed(Button::Undo)),
-            (2, 1, 0)
-        );
-    }
-
-    #[test]
-    fn lost_events_have_the_state_read_again() {
-        let (table, mut hub) = Table::with(&["a"]);
-        table.pushes(0, 100);
-        hub.read(0.0);
-        table.sends(0, EventType::SYNCHRONIZATION, 3, 0);
-        // The stick of the device is in the middle.
-        assert_eq!(hub.read(0.0).wish, Wish::REST);
-    }
-
-    #[test]
-    fn a_device_without_permission_is_reported_with_its_cure_until_it_can_be_read() {
-        let (table, mut hub) = Table::with(&[]);
-        *table.locked.borrow_mut() = true;
-        table.there.borrow_mut().push("a");
-        hub.look();
-        assert!(hub.read(0.0).denied.is_empty(), "rights follow the node");
-        hub.look();
-        let denied = hub.read(0.0).denied.clone();
-        assert_eq!(denied.len(), 1);
-        assert!(denied[0].contains("usermod -aG input"), "{denied:?}");
-        *table.locked.borrow_mut() = false;
-        hub.look();
-        let latest = hub.read(0.0);
-        assert_eq!((holder(latest), latest.denied.len()), ("pad a", 0));
-    }
-}
+mod tests;

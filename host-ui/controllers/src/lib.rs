@@ -21,11 +21,13 @@ pub use hub::{Device, DeviceHub, DeviceSource, Latest, OpenDevice};
 pub use kind::{Button, Kind};
 pub use list::list;
 pub use reader::{Controllers, System};
-pub use state::{DeviceState, Wish};
+pub use state::{DeviceState, ProbeWish, Wish};
 
 /// Speed of the tip along the needle with the stick or the cap as far as it goes; that of the keys.
 pub const ALONG_M_PER_S: f64 = 0.04;
 /// The same across the template: a hole in half a second.
 pub const ACROSS_M_PER_S: f64 = 0.01;
+/// Of the probe about its axis: 40 degrees in a second.
+pub const TURN_RAD_PER_S: f64 = 0.7;
 /// What the shoulder buttons and Shift leave of it.
 pub const SLOW: f64 = 0.25;

@@ -3,12 +3,14 @@
 use super::found::{Found, Places, find};
 use super::hub::{DeviceHub, DeviceSource, Latest, OpenDevice};
 use super::kind::Button;
-use super::state::{DeviceState, Wish};
+use super::state::{DeviceState, ProbeWish, Wish};
 use evdev::InputEvent;
 use evdev::raw_stream::RawDevice;
 use std::io;
 use std::os::fd::AsRawFd;
 use std::os::unix::fs::OpenOptionsExt;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -80,6 +82,7 @@ pub struct Controllers {
     /// The thread ends when this is dropped.
     open: Option<Sender<()>>,
     counted: [u32; Button::ALL.len()],
+    two_hands: Arc<AtomicBool>,
 }
 
 impl Controllers {
@@ -90,15 +93,24 @@ impl Controllers {
     {
         let (input, latest) = triple_buffer(&(Instant::now(), Latest::default()));
         let (open, window) = channel();
+        let two_hands = Arc::new(AtomicBool::new(false));
+        let asked = Arc::clone(&two_hands);
         let thread = std::thread::Builder::new()
             .name("controllers".to_owned())
-            .spawn(move || read_all(DeviceHub::new(source), input, &window));
+            .spawn(move || read_all(DeviceHub::new(source), input, &window, &asked));
         Self {
             latest,
             thread: thread.ok(),
             open: Some(open),
             counted: [0; Button::ALL.len()],
+            two_hands,
         }
+    }
+
+    /// Whether a second device moves the probe.
+    pub fn use_two_hands(&self, two_hands: bool) {
+        // SYNC: no other memory depends on it; the thread sees it within its next reading.
+        self.two_hands.store(two_hands, Ordering::Relaxed);
     }
 
     /// No device holds the needle, whatever is plugged in.
@@ -108,6 +120,7 @@ impl Controllers {
             thread: None,
             open: None,
             counted: [0; Button::ALL.len()],
+            two_hands: Arc::default(),
         }
     }
 
@@ -116,10 +129,10 @@ impl Controllers {
         let (at, latest) = self.latest.read();
         let mut latest = latest.clone();
         if at.elapsed() > WISH_LASTS {
-            latest.wish = Wish::REST;
+            (latest.wish, latest.probe) = (Wish::REST, ProbeWish::default());
         }
         if self.open.is_some() && self.thread.as_ref().is_none_or(JoinHandle::is_finished) {
-            latest.holder = None;
+            (latest.holder, latest.probe_holder) = (None, None);
             latest.denied = vec![
                 "Gamepads and 3D mice are not read: the thread for it has ended. Open the window again.".to_owned(),
             ];
@@ -134,7 +147,12 @@ impl Controllers {
     }
 }
 
-fn read_all<G: DeviceSource>(mut hub: DeviceHub<G>, mut latest: Input<(Instant, Latest)>, window: &Receiver<()>) {
+fn read_all<G: DeviceSource>(
+    mut hub: DeviceHub<G>,
+    mut latest: Input<(Instant, Latest)>,
+    window: &Receiver<()>,
+    two_hands: &AtomicBool,
+) {
     let begun = Instant::now();
     let mut looked: Option<Instant> = None;
     while window.try_recv() == Err(TryRecvError::Empty) {
@@ -142,8 +160,10 @@ fn read_all<G: DeviceSource>(mut hub: DeviceHub<G>, mut latest: Input<(Instant, 
             looked = Some(Instant::now());
             hub.look();
         }
+        // SYNC: see `use_two_hands`.
+        hub.use_two_hands(two_hands.load(Ordering::Relaxed));
         let read = hub.read(begun.elapsed().as_secs_f64()).clone();
-        let is_moving = read.wish != Wish::REST;
+        let is_moving = read.wish != Wish::REST || read.probe != ProbeWish::default();
         latest.write((Instant::now(), read));
         std::thread::sleep(READ_EVERY);
         let until_look = LOOK_EVERY.saturating_sub(looked.map_or(LOOK_EVERY, |at| at.elapsed()));

@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::kind::{Button, Kind};
-use super::{ACROSS_M_PER_S, ALONG_M_PER_S, SLOW, SLOWEST_M_PER_S};
+use super::{ACROSS_M_PER_S, ALONG_M_PER_S, SLOW, SLOWEST_M_PER_S, TURN_RAD_PER_S};
 use evdev::{
     AbsInfo, AbsoluteAxisCode, AttributeSet, EventSummary, InputEvent, KeyCode, RelativeAxisCode, SynchronizationCode,
 };
@@ -31,6 +31,25 @@ impl Wish {
         Self {
             along_m_per_s: self.along_m_per_s * by,
             across_m_per_s: self.across_m_per_s.map(|v| v * by),
+        }
+    }
+}
+
+/// How the hand wants the ultrasound probe to go.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ProbeWish {
+    /// Along its axis, positive into the patient.
+    pub along_m_per_s: f64,
+    /// About its axis, positive to the patient's left.
+    pub turn_rad_per_s: f64,
+}
+
+impl ProbeWish {
+    /// The same direction at a share of the speed.
+    pub fn slower(self, by: f64) -> Self {
+        Self {
+            along_m_per_s: self.along_m_per_s * by,
+            turn_rad_per_s: self.turn_rad_per_s * by,
         }
     }
 }
@@ -149,11 +168,7 @@ impl State {
             return Wish::REST;
         }
         let [right, back, down] = [0, 1, 2].map(|axis| self.share(axis, now_s));
-        let slow = if self.keys.iter().any(|k| self.kind.slows(k)) {
-            SLOW
-        } else {
-            1.0
-        };
+        let slow = self.slow();
         let speed = |share: f64, full: f64| {
             let speed = share * full * slow;
             if speed.abs() < SLOWEST_M_PER_S { 0.0 } else { speed }
@@ -173,6 +188,33 @@ impl State {
                 across_m_per_s: [speed(right, ACROSS_M_PER_S), speed(-back, ACROSS_M_PER_S)],
             },
         }
+    }
+
+    /// What the hand on the device wants of the probe at this time: in, out and a turn.
+    pub fn probe_wish(&self, now_s: f64) -> ProbeWish {
+        if !self.was_released {
+            return ProbeWish::default();
+        }
+        let [right, back, down] = [0, 1, 2].map(|axis| self.share(axis, now_s));
+        let along = match self.kind {
+            Kind::Gamepad => -back,
+            Kind::Mouse3d => down,
+        };
+        // A hand that pushes also leans a little to the side.
+        let (along, turn) = if along.abs() >= right.abs() {
+            (along, 0.0)
+        } else {
+            (0.0, right)
+        };
+        ProbeWish {
+            along_m_per_s: along * ALONG_M_PER_S * self.slow(),
+            turn_rad_per_s: turn * TURN_RAD_PER_S * self.slow(),
+        }
+    }
+
+    fn slow(&self) -> f64 {
+        let is_slowed = self.keys.iter().any(|k| self.kind.slows(k));
+        if is_slowed { SLOW } else { 1.0 }
     }
 
     fn take_whole(&mut self, whole: &DeviceState) {
@@ -205,7 +247,7 @@ impl State {
 
     /// The second stick and the triggers of a gamepad rest where they like.
     fn ignores(&self, axis: usize) -> bool {
-        self.kind == Kind::Gamepad && axis != usize::from(AbsoluteAxisCode::ABS_Y.0)
+        self.kind == Kind::Gamepad && axis > usize::from(AbsoluteAxisCode::ABS_Y.0)
     }
 
     fn share(&self, axis: usize, now_s: f64) -> f64 {

@@ -47,8 +47,19 @@ pub fn unit(v: [f64; 3]) -> [f64; 3] {
     }
 }
 
-/// Tip (m) and direction in the scene by a transform of the same form; nothing where its axes are not those of a rigid body.
-pub fn tip_and_direction(patient: &PatientFrame, columns: &[[f32; 3]; 4]) -> Option<([f64; 3], [f64; 3])> {
+/// What a hand holds, in the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tool {
+    /// Its foremost point, m.
+    pub tip_m: [f64; 3],
+    /// Unit vector along it, towards the tip.
+    pub direction: [f64; 3],
+    /// Unit vector of its second axis: the middle beam of a probe.
+    pub up: [f64; 3],
+}
+
+/// By a transform of the same form; nothing where its axes are not those of a rigid body.
+pub fn tool(patient: &PatientFrame, columns: &[[f32; 3]; 4]) -> Option<Tool> {
     let [x, y, z, origin_mm] = columns.map(|column| column.map(f64::from));
     let product = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
     let is = |value: f64, expected: f64| (value - expected).abs() <= AXES_OFF;
@@ -56,7 +67,11 @@ pub fn tip_and_direction(patient: &PatientFrame, columns: &[[f32; 3]; 4]) -> Opt
     let stand_on_each_other = [(x, y), (y, z), (z, x)].iter().all(|(a, b)| is(product(*a, *b), 0.0));
     let is_rigid = have_length_one && stand_on_each_other && product(cross(x, y), z) > 0.0;
     let tip_m = patient.scene_from_patient(origin_mm.map(|mm| mm / MM_PER_M));
-    is_rigid.then(|| (tip_m, unit(patient.scene_from_patient_direction(z))))
+    is_rigid.then(|| Tool {
+        tip_m,
+        direction: unit(patient.scene_from_patient_direction(z)),
+        up: unit(patient.scene_from_patient_direction(y)),
+    })
 }
 
 #[cfg(test)]
@@ -80,11 +95,11 @@ mod tests {
         let turned = PatientFrame::of_wire(&[0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.1, 0.2, -0.3]);
         let (tip_m, direction) = ([0.01, -0.02, 0.03], unit([0.3, -0.4, 0.866]));
         let columns = needle(&turned, tip_m, direction);
-        let (its_tip_m, its_direction) = tip_and_direction(&turned, &columns).expect("rigid");
-        assert!((0..3).all(|a| (its_tip_m[a] - tip_m[a]).abs() < 1e-7), "{its_tip_m:?}");
-        assert!(
-            (0..3).all(|a| (its_direction[a] - direction[a]).abs() < 1e-6),
-            "{its_direction:?}"
-        );
+        let its = tool(&turned, &columns).expect("rigid");
+        let is = |a: [f64; 3], b: [f64; 3]| (0..3).all(|c| (a[c] - b[c]).abs() < 1e-6);
+        assert!(is(its.tip_m, tip_m) && is(its.direction, direction), "{its:?}");
+        // The second axis in RAS is the second column; the patient is turned by a right angle about superior.
+        let second = columns[1].map(f64::from);
+        assert!(is(its.up, turned.scene_from_patient_direction(second)), "{its:?}");
     }
 }

@@ -1,11 +1,11 @@
-//! The simulated hand that a tracker or a stepper moves: which client's transforms count, and which of them are possible.
+//! A simulated hand that a tracker or a stepper moves: which client's transforms count, and which of them are possible.
 
-use crate::frame::tip_and_direction;
+use crate::frame;
 use crate::server::{Received, Refusal};
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 use stylet_anatomy::PatientFrame;
-use stylet_shm_schema::HandMove;
+use stylet_shm_schema::{HandMove, ProbeMove, Request};
 
 /// A client that is silent for so long moves the hand no longer, and the hand stops.
 pub const SILENCE: Duration = Duration::from_millis(300);
@@ -20,22 +20,69 @@ pub struct HandOptions {
     pub speed_m_per_s: f64,
 }
 
+/// What a hand holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Held {
+    /// The needle.
+    Needle,
+    /// The ultrasound probe, which a transform turns about its axis as well.
+    Probe,
+}
+
+impl Held {
+    /// Its name, for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Needle => "needle",
+            Self::Probe => "probe",
+        }
+    }
+
+    /// What moves the hand.
+    pub fn moved(self, goal: ProbeMove) -> Request {
+        match self {
+            Self::Needle => Request::MoveHand(goal.hand),
+            Self::Probe => Request::MoveSecondHand(goal),
+        }
+    }
+
+    /// What stops the hand.
+    pub fn stopped(self) -> Request {
+        match self {
+            Self::Needle => Request::StopHand,
+            Self::Probe => Request::StopSecondHand,
+        }
+    }
+}
+
 /// Who moves the hand.
 pub struct Hand {
+    held: Held,
     options: Option<HandOptions>,
     holder: Option<(SocketAddr, Instant)>,
     /// The last goal, which is not sent again while it does not change.
-    goal: Option<HandMove>,
+    goal: Option<ProbeMove>,
 }
 
 impl Hand {
     /// That nobody moves; without options nobody may.
-    pub fn new(options: Option<HandOptions>) -> Self {
+    pub fn new(held: Held, options: Option<HandOptions>) -> Self {
         Self {
+            held,
             options,
             holder: None,
             goal: None,
         }
+    }
+
+    /// What it holds.
+    pub fn held(&self) -> Held {
+        self.held
+    }
+
+    /// Whether the transforms of this name move it.
+    pub fn is_moved_by(&self, device: &str) -> bool {
+        self.options.as_ref().is_some_and(|options| options.device == device)
     }
 
     /// Where the hand goes by a transform; nothing where it goes there already.
@@ -44,36 +91,42 @@ impl Hand {
         received: &Received,
         patient: &PatientFrame,
         now: Instant,
-    ) -> Result<Option<HandMove>, Refusal> {
+    ) -> Result<Option<ProbeMove>, Refusal> {
+        let name = self.held.name();
         let options = self.options.as_ref().ok_or_else(|| Refusal {
             code: 5,
             name: "Access denied",
-            words: "this server takes no transforms: start it with --hand NAME to let one move the needle".to_owned(),
+            words: "this server takes no transforms: start it with --hand NAME to let one move the needle, with --probe NAME \
+                    to let one move the probe"
+                .to_owned(),
         })?;
         if options.device != received.device {
             return Err(Refusal {
                 code: 4,
                 name: "Not found",
-                words: format!("the needle is moved by the transform \"{}\" alone", options.device),
+                words: format!("the {name} is moved by the transform \"{}\" alone", options.device),
             });
         }
-        let (tip_m, direction) = tip_and_direction(patient, &received.columns).ok_or_else(|| Refusal {
+        let tool = frame::tool(patient, &received.columns).ok_or_else(|| Refusal {
             code: 10,
             name: "Configuration error",
             words: "its axes are not those of a rigid body: three of length 1 that stand on each other, right-handed"
                 .to_owned(),
         })?;
-        let goal = HandMove {
-            tip_m,
-            direction,
-            speed_m_per_s: options.speed_m_per_s,
-            acceleration_m_per_s2: ACCELERATION_M_PER_S2,
+        let goal = ProbeMove {
+            hand: HandMove {
+                tip_m: tool.tip_m,
+                direction: tool.direction,
+                speed_m_per_s: options.speed_m_per_s,
+                acceleration_m_per_s2: ACCELERATION_M_PER_S2,
+            },
+            up: (self.held == Held::Probe).then_some(tool.up),
         };
         match self.holder {
             Some((holder, heard)) if holder != received.from && now - heard < SILENCE => Err(Refusal {
                 code: 6,
                 name: "Busy",
-                words: "another client moves the needle".to_owned(),
+                words: format!("another client moves the {name}"),
             }),
             _ => {
                 self.holder = Some((received.from, now));
@@ -119,25 +172,48 @@ mod tests {
         }
     }
 
-    fn code(taken: Result<Option<HandMove>, Refusal>) -> u16 {
+    fn hand(options: Option<HandOptions>) -> Hand {
+        Hand::new(Held::Needle, options)
+    }
+
+    fn code(taken: Result<Option<ProbeMove>, Refusal>) -> u16 {
         taken.expect_err("refused").code
     }
 
     #[test]
     fn a_transform_moves_the_tip_to_its_origin_along_its_third_axis_and_is_sent_once() {
-        let (mut hand, now, frame) = (Hand::new(options()), Instant::now(), PatientFrame::default());
+        let (mut hand, now, frame) = (hand(options()), Instant::now(), PatientFrame::default());
         let goal = hand.take(&sent(1, "Stylus", UPRIGHT), &frame, now).expect("possible");
         let goal = goal.expect("new");
+        assert_eq!(goal.up, None, "a needle is round");
+        let goal = goal.hand;
         assert!((0..3).all(|a| (goal.tip_m[a] - [0.01, -0.02, 0.03][a]).abs() < 1e-9));
         assert_eq!((goal.direction, goal.speed_m_per_s), ([0.0, 0.0, 1.0], 0.1));
         assert_eq!(hand.take(&sent(1, "Stylus", UPRIGHT), &frame, now), Ok(None));
     }
 
     #[test]
+    fn a_probe_is_turned_about_its_axis_too() {
+        let (mut hand, now, frame) = (
+            Hand::new(Held::Probe, options()),
+            Instant::now(),
+            PatientFrame::default(),
+        );
+        let taken = hand.take(&sent(1, "Stylus", UPRIGHT), &frame, now);
+        let goal = taken.expect("possible").expect("new");
+        assert_eq!((goal.hand.direction, goal.up), ([0.0, 0.0, 1.0], Some([0.0, 1.0, 0.0])));
+        let turned = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], UPRIGHT[3]];
+        let taken = hand.take(&sent(1, "Stylus", turned), &frame, now);
+        assert_eq!(taken.expect("possible").expect("new").up, Some([-1.0, 0.0, 0.0]));
+        assert!(matches!(Held::Probe.moved(goal), Request::MoveSecondHand(_)));
+        assert_eq!(Held::Probe.stopped(), Request::StopSecondHand);
+    }
+
+    #[test]
     fn what_is_not_agreed_or_no_rigid_body_is_refused() {
         let (now, frame) = (Instant::now(), PatientFrame::default());
-        assert_eq!(code(Hand::new(None).take(&sent(1, "Stylus", UPRIGHT), &frame, now)), 5);
-        let mut hand = Hand::new(options());
+        assert_eq!(code(hand(None).take(&sent(1, "Stylus", UPRIGHT), &frame, now)), 5);
+        let mut hand = hand(options());
         assert_eq!(code(hand.take(&sent(1, "Probe", UPRIGHT), &frame, now)), 4);
         let mut longer = UPRIGHT;
         longer[0][0] = 1.1;
@@ -153,7 +229,7 @@ mod tests {
 
     #[test]
     fn one_client_holds_the_hand_until_it_is_silent_and_then_it_stops_once() {
-        let (mut hand, start, frame) = (Hand::new(options()), Instant::now(), PatientFrame::default());
+        let (mut hand, start, frame) = (hand(options()), Instant::now(), PatientFrame::default());
         assert!(hand.take(&sent(1, "Stylus", UPRIGHT), &frame, start).is_ok());
         let soon = start + SILENCE / 2;
         assert_eq!(code(hand.take(&sent(2, "Stylus", UPRIGHT), &frame, soon)), 6);

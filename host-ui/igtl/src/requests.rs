@@ -1,11 +1,10 @@
 //! From the transforms of clients to requests, and from the core's answers to clients.
 
-use crate::hand::{Hand, HandOptions};
+use crate::hand::{Hand, HandOptions, Held};
 use crate::server::{Received, Refusal, Server};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkStatus};
-use stylet_shm_schema::Request;
 
 /// Requests whose answer may be awaited.
 const AWAITED_AT_MOST: usize = 64;
@@ -14,16 +13,17 @@ const SENT_AFTER: Duration = Duration::from_millis(100);
 
 /// What clients asked for.
 pub struct Requests {
-    hand: Hand,
+    /// That with the needle, and that with the probe.
+    hands: [Hand; 2],
     /// Requests that the core has not answered yet, and for whom they were made.
     awaited: VecDeque<(u64, Received)>,
 }
 
 impl Requests {
-    /// Of clients that may move the hand as `options` say, or not at all.
-    pub fn new(options: Option<HandOptions>) -> Self {
+    /// Of clients that may move needle and probe as these say, or not at all.
+    pub fn new(needle: Option<HandOptions>, probe: Option<HandOptions>) -> Self {
         Self {
-            hand: Hand::new(options),
+            hands: [Hand::new(Held::Needle, needle), Hand::new(Held::Probe, probe)],
             awaited: VecDeque::new(),
         }
     }
@@ -35,9 +35,11 @@ impl Requests {
                 server.refuse(received.from, &received.device, &refusal);
             }
         }
-        if self.hand.falls_silent(Instant::now()) {
-            // Without a core there is no hand to stop.
-            let _ = link.send(&Request::StopHand);
+        for hand in &mut self.hands {
+            if hand.falls_silent(Instant::now()) {
+                // Without a core there is no hand to stop.
+                let _ = link.send(&hand.held().stopped());
+            }
         }
         self.awaited.retain(|(id, received)| match link.reply(*id) {
             Some(answer) if !answer.accepted => {
@@ -50,7 +52,9 @@ impl Requests {
 
     /// The hand does not go on for a client that is served no longer.
     pub fn end(&mut self, link: &mut Link) {
-        if self.hand.is_held() && link.send(&Request::StopHand).is_ok() {
+        let held = self.hands.iter().filter(|hand| hand.is_held());
+        let stopped = held.filter(|hand| link.send(&hand.held().stopped()).is_ok()).count();
+        if stopped > 0 {
             std::thread::sleep(SENT_AFTER);
         }
     }
@@ -62,8 +66,14 @@ impl Requests {
             _ => return Err(not_ready("rt-core is silent".to_owned())),
         };
         let patient = scene.header.patient();
-        if let Some(goal) = self.hand.take(received, &patient, Instant::now())? {
-            let sent = link.send(&Request::MoveHand(goal));
+        let [needle, probe] = &mut self.hands;
+        let hand = if probe.is_moved_by(&received.device) {
+            probe
+        } else {
+            needle
+        };
+        if let Some(goal) = hand.take(received, &patient, Instant::now())? {
+            let sent = link.send(&hand.held().moved(goal));
             let id = sent.map_err(|error| not_ready(error.to_string()))?;
             self.awaited.push_back((id, received.clone()));
             self.awaited.drain(..self.awaited.len().saturating_sub(AWAITED_AT_MOST));

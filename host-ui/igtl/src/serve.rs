@@ -1,5 +1,5 @@
 //! Sends what the core publishes: the needle, the seeds, the surface of the gland and the state in words, in RAS and mm. Moves the
-//! simulated hand where a client may.
+//! simulated hands where a client may.
 
 use crate::codec::{Body, CodecError, Message, Point, PolyData, Timestamp};
 use crate::frame::{needle, place_mm};
@@ -28,8 +28,10 @@ pub struct Options {
     pub listen: SocketAddr,
     /// Transforms of the needle in a second.
     pub rate_hz: f64,
-    /// Whose transforms move the hand, if any do.
+    /// Whose transforms move the needle, if any do.
     pub hand: Option<HandOptions>,
+    /// Whose transforms move the probe, if any do.
+    pub probe: Option<HandOptions>,
 }
 
 /// Why serving ended with an error.
@@ -53,7 +55,7 @@ pub fn run(options: &Options) -> Result<(), ServeError> {
     println!("OpenIGTLink on {}; end with Ctrl-C", server.address());
     let mut link = Link::new(options.instance.clone());
     let every = Duration::from_secs_f64(1.0 / options.rate_hz);
-    let mut requests = Requests::new(options.hand.clone());
+    let mut requests = Requests::new(options.hand.clone(), options.probe.clone());
     let mut slow: Option<Instant> = None;
     let mut next = Instant::now();
     while !interrupted.asked() {

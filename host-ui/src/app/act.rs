@@ -111,6 +111,8 @@ impl App {
             Action::Send(request @ (Request::Mark(_) | Request::BeginExercise(_) | Request::EndExercises)) => {
                 self.send(request_name(&request), &request);
             }
+            // The other hand is nobody's but the operator's.
+            Action::Probe(action) => self.act_on_probe(action),
             // While the script runs the needle is its own.
             _ if self.run.is_some() && action != Action::Send(Request::Disengage) => {}
             Action::Next => {

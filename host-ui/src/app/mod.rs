@@ -33,7 +33,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use stylet_base::format;
 use stylet_base::job::Job;
-use stylet_controllers::{Controllers, SLOW, System, Wish};
+use stylet_controllers::{Controllers, ProbeWish, SLOW, System, Wish};
 use stylet_files::Image;
 use stylet_host::core_args::SceneChoice;
 use stylet_host::link::{Link, LinkStatus};
@@ -308,6 +308,17 @@ impl App {
     }
 }
 
+impl App {
+    /// Of a second gamepad.
+    fn probe_wish(&self, ctx: &egui::Context) -> ProbeWish {
+        match (self.shown.has_focus, ctx.input(|i| i.modifiers.shift)) {
+            (false, _) => ProbeWish::default(),
+            (true, false) => self.shown.controllers.probe,
+            (true, true) => self.shown.controllers.probe.slower(SLOW),
+        }
+    }
+}
+
 impl eframe::App for App {
     fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
@@ -331,7 +342,9 @@ impl eframe::App for App {
         }
         let wish = self.wish(&ctx, keys.drive_m_per_s);
         // Not `stable_dt`, which is that of a fast frame whenever a frame was asked for later than at once.
-        self.drive_both(wish, keys.second_m_per_s, f64::from(ctx.input(|i| i.unstable_dt)));
+        let frame_s = f64::from(ctx.input(|i| i.unstable_dt));
+        self.drive(wish, frame_s);
+        self.drive_second(keys.second_m_per_s, self.probe_wish(&ctx), frame_s);
         self.send_parameters();
         let asked = self.middle.driver();
         let driver_ns = asked.cpu_ns - driver.cpu_ns;

@@ -29,6 +29,7 @@ impl App {
         let plan_before = self.shown.plan.map(|p| p.generation);
         self.shown.take(&self.link);
         self.leave_core();
+        self.take_stepper();
         // What a reset begins is a procedure of its own.
         if self.moments.take(self.link.events()) {
             self.trace = Trace::default();
@@ -92,6 +93,7 @@ impl App {
     }
 
     fn take_controllers(&mut self) {
+        self.controllers.use_two_hands(self.shown.is_second_simulated());
         let (latest, pressed) = self.controllers.take();
         let before = std::mem::replace(&mut self.shown.controllers, latest);
         let now = &self.shown.controllers;

@@ -56,10 +56,15 @@ fn controllers_ui(ui: &mut egui::Ui, shown: &Shown) {
     ui.heading("Controls the needle");
     let holder = shown.controllers.holder.as_ref();
     ui.label(holder.map_or("n/a", |device| device.name.as_str()));
+    if let Some(device) = &shown.controllers.probe_holder {
+        ui.heading("Controls the probe");
+        ui.label(device.name.as_str());
+    }
     for words in [
         "Devices may be plugged in at any time.",
         "The one that was moved last controls the needle.",
         "It must be released once before the needle follows it.",
+        "Beside a simulated --device-2, another one controls the probe.",
     ] {
         ui.label(theme::small(words));
     }

@@ -18,6 +18,8 @@ const BESIDE_PLOTS: f32 = 492.0;
 const PLOT_HEIGHTS: [f32; 2] = [48.0, 150.0];
 /// A line on ticks that were not seen.
 const SEEN_LINE: f32 = 20.0;
+/// That of the second device.
+const SECOND_LINE: f32 = 16.0;
 
 /// The plots share what of `height` the rest leaves. With `whole` they look back on all of the procedure.
 pub fn plots_ui(
@@ -32,7 +34,13 @@ pub fn plots_ui(
     let whole = whole.filter(|trace| !trace.is_empty());
     let lines = usize::from(!history.timing.seen.is_all())
         + usize::from(whole.is_some_and(|trace| !trace.motion().seen.is_all()));
-    let each = ((height - BESIDE_PLOTS - lines as f32 * SEEN_LINE) / 3.0).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
+    let second = if shown.second_hand().is_some() {
+        SECOND_LINE
+    } else {
+        0.0
+    };
+    let each =
+        ((height - BESIDE_PLOTS - second - lines as f32 * SEEN_LINE) / 3.0).clamp(PLOT_HEIGHTS[0], PLOT_HEIGHTS[1]);
     let recent = |ui: &mut egui::Ui, name, color, unit, least, quantity| {
         Strip {
             name,

@@ -11,7 +11,7 @@ impl Shown {
     /// All metal as it lies now.
     pub fn metal(&self) -> Metal {
         let seeds = self.seeds.iter().map(|seed| Seed {
-            middle_m: seed.position_m.into(),
+            middle_m: self.drawn_at_m(seed).into(),
             axis: seed.axis.into(),
         });
         let left = self.left.iter().map(|left| {
@@ -24,5 +24,28 @@ impl Shown {
             seeds: seeds.collect(),
             needles: left.chain(moving).map(|points_m| Needle { points_m }).collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_shm_schema::SeedPose;
+
+    /// They stayed in the picture where the scene has the body, and the tissue around them moved.
+    #[test]
+    fn seeds_are_seen_in_the_body_where_an_exercise_has_moved_it() {
+        let mut shown = Shown::empty("lab");
+        shown.seeds = vec![SeedPose {
+            position_m: [0.01, 0.02, 0.03],
+            axis: [0.0, 0.0, 1.0],
+            ..bytemuck::Zeroable::zeroed()
+        }];
+        shown.body_moved_m = [4e-3, 0.0, -1e-3];
+        let middle_m = shown.metal().seeds[0].middle_m;
+        assert!(
+            (middle_m - Vector3::new(0.014, 0.02, 0.029)).norm() < 1e-12,
+            "{middle_m}"
+        );
     }
 }

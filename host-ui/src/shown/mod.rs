@@ -13,7 +13,7 @@ pub use bend::Bend;
 pub use line::NeedleLine;
 use nalgebra::Vector3;
 pub use parts::{FrameCost, LoadState, Note, TipOnPath, Watched};
-pub use second::SecondHand;
+pub use second::{SecondHand, Stepper};
 pub use seeds::{SeedError, all_errors, own_errors};
 use std::sync::Arc;
 use stylet_controllers::Latest;
@@ -40,6 +40,7 @@ pub struct Shown {
     pub state: Option<HapticState>,
     /// Of the second device.
     pub second: Option<SecondState>,
+    pub stepper: Stepper,
     pub scene: Option<SceneHeader>,
     /// Only a plan with at least one seed.
     pub plan: Option<PlanInForce>,
@@ -94,6 +95,7 @@ impl Shown {
             class: None,
             state: None,
             second: None,
+            stepper: Stepper::default(),
             scene: None,
             plan: None,
             parameters: None,

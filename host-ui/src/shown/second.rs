@@ -2,6 +2,7 @@
 
 use super::Shown;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use stylet_imaging::ultrasound::{Pose, Probe};
 use stylet_shm_schema::{Fault, flags};
 
 /// Its loop writes its state each tick; one so much older than the needle's says that it stands still.
@@ -18,6 +19,15 @@ pub enum SecondHand {
     Off,
     /// Its force is on.
     On,
+}
+
+/// The stepper that drives the simulated hand with the probe.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stepper {
+    /// Where it was last set to, until a hand moves the probe.
+    pub goal: Option<Pose>,
+    /// Its brake is on: no hand moves the probe.
+    pub is_locked: bool,
 }
 
 impl Shown {
@@ -47,11 +57,27 @@ impl Shown {
             .map(|second| second.tip_in_scene_m)
     }
 
+    /// From the frame of what the other hand holds, which lies along +z of it.
+    fn scene_from_second(&self) -> Option<UnitQuaternion<f64>> {
+        let [i, j, k, w] = self.second.filter(|second| second.tick > 0)?.world_from_tool;
+        UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 1e-6)
+    }
+
     /// Unit vector along what the other hand holds, towards its tip.
     pub fn second_axis(&self) -> Option<[f64; 3]> {
-        let [i, j, k, w] = self.second.filter(|second| second.tick > 0)?.world_from_tool;
-        let turn = UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 1e-6)?;
-        Some((turn * Vector3::z()).into())
+        Some((self.scene_from_second()? * Vector3::z()).into())
+    }
+
+    /// The ultrasound probe as the other hand holds it; nothing in a run without a second device, and before its first tick.
+    pub fn probe_pose(&self) -> Option<Pose> {
+        let (tip, turn) = (self.second_tip_m()?, self.scene_from_second()?);
+        Some(Pose::of_tool(tip.into(), &turn, &Probe::default()))
+    }
+
+    /// Whether the core moves the other hand when it is asked to: a simulated one of a run that goes on.
+    pub fn is_second_simulated(&self) -> bool {
+        let is_simulated = self.second.is_some_and(|s| s.flags & flags::SIMULATED_DEVICE != 0);
+        is_simulated && self.is_live() && self.watched.is_none()
     }
 
     /// Its tip, and where it ends towards the hand when it is so long.
@@ -73,5 +99,30 @@ impl Shown {
             second.peak_force_n,
             second.missed_deadlines
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use stylet_shm_schema::SecondState;
+
+    #[test]
+    fn the_probe_stands_as_its_tool_does_and_only_after_a_tick() {
+        let mut shown = Shown::empty("lab");
+        assert_eq!(shown.probe_pose(), None);
+        let mut second = SecondState::zeroed();
+        // A third of a turn about (1, 1, 1): z goes to x, y to z.
+        second.world_from_tool = [0.5, 0.5, 0.5, 0.5];
+        second.tip_in_scene_m = [0.05, 0.02, 0.01];
+        shown.second = Some(second);
+        assert_eq!(shown.probe_pose(), None, "no tick yet");
+        second.tick = 1;
+        shown.second = Some(second);
+        let pose = shown.probe_pose().expect("a pose");
+        assert!((pose.axis - Vector3::x()).norm() < 1e-12 && (pose.up - Vector3::z()).norm() < 1e-12);
+        let middle_m = Vector3::new(0.05 - Probe::default().behind_tip_m, 0.02, 0.01);
+        assert!((pose.middle_m - middle_m).norm() < 1e-12, "{}", pose.middle_m);
     }
 }

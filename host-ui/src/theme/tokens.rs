@@ -131,6 +131,8 @@ pub struct ImageTokens {
     /// Half, whole, one and a half and double the prescription; each with dashes of its own as well.
     pub isodose: [Color32; 4],
     pub measure: Color32,
+    /// The sign that a beam is on.
+    pub beam: Color32,
 }
 
 pub const IMAGE: ImageTokens = ImageTokens {
@@ -150,6 +152,7 @@ pub const IMAGE: ImageTokens = ImageTokens {
         Color32::from_rgb(238, 120, 52),
     ],
     measure: Color32::from_rgb(255, 255, 255),
+    beam: Color32::from_rgb(255, 214, 60),
 };
 
 #[cfg(test)]
@@ -219,6 +222,7 @@ mod tests {
             i.seed_placed,
             i.seed_planned,
             i.measure,
+            i.beam,
         ];
         for ink in lines.into_iter().chain(i.isodose) {
             assert!(contrast(ink, i.background) >= 4.5, "{ink:?}");

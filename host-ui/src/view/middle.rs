@@ -2,8 +2,9 @@
 
 use super::body::ShownBody;
 use super::driver::DriverCost;
+use super::fluoro::FluoroView;
 use super::orientation::Orientation;
-use super::probe::ProbeView;
+use super::probe::{ProbePicture, ProbeView};
 use super::scene3d::Scene3d;
 use super::slice::{ImageError, Plane, Slices};
 use super::state::ViewState;
@@ -18,10 +19,13 @@ use nalgebra::Vector3;
 use std::sync::Arc;
 use stylet_files::Image;
 use stylet_host::link::{SceneModel, Snapshot};
+use stylet_imaging::fluoroscopy::DoseCounter;
 use stylet_imaging::ultrasound::View;
 
 /// Between two pictures.
 const GAP: f32 = 2.0;
+/// Of the height, for the screen of the C-arm.
+const FLUORO_SHARE: f32 = 0.6;
 
 /// The three-dimensional picture and the slices.
 pub struct Middle {
@@ -29,6 +33,7 @@ pub struct Middle {
     pub(crate) solid: Scene3d,
     slices: Slices,
     probe: ProbeView,
+    fluoro: FluoroView,
     body: ShownBody,
     /// What all pictures share.
     pub(crate) view: ViewState,
@@ -41,6 +46,7 @@ struct Places {
     solid: Option<Rect>,
     slices: Vec<(Orientation, Rect)>,
     probe: Vec<(View, Rect)>,
+    fluoro: Option<Rect>,
 }
 
 impl Middle {
@@ -49,7 +55,8 @@ impl Middle {
         Self {
             solid: Scene3d::new(state.clone()),
             slices: Slices::new(state.clone()),
-            probe: ProbeView::new(state),
+            probe: ProbeView::new(state.clone()),
+            fluoro: FluoroView::new(state),
             body: ShownBody::default(),
             view: ViewState::default(),
             pictures_top: 0.0,
@@ -82,6 +89,16 @@ impl Middle {
     /// The plane that a slice at this place of the window shows.
     pub fn plane(&self, orientation: Orientation, rect: Rect) -> Plane {
         self.slices.plane(orientation, &self.view, rect)
+    }
+
+    /// A picture of the probe as it stood in the window in the last frame; `None` where the layout has none.
+    pub fn probe_picture(&self, view: View) -> Option<&ProbePicture> {
+        self.probe.picture(view)
+    }
+
+    /// What fluoroscopy has cost this patient.
+    pub fn spent(&self) -> DoseCounter {
+        self.fluoro.dose
     }
 
     /// Shows an image in the slices, of the patient of the scene of this name.
@@ -121,7 +138,7 @@ impl Middle {
         let places = places(rect, layout);
         if layout != Layout::Solid {
             // Only what is seen between the pictures: each layer of a pixel costs as much as the last on a driver in software.
-            let whole = Rect::from_center_size(rect.center(), egui::Vec2::splat(GAP));
+            let whole = Rect::from_center_size(meet(rect, layout), egui::Vec2::splat(GAP));
             for strip in [
                 Rect::from_x_y_ranges(rect.x_range(), whole.y_range()),
                 Rect::from_x_y_ranges(whole.x_range(), rect.y_range()),
@@ -135,9 +152,17 @@ impl Middle {
                     .slice_ui(ui, rect, orientation, (shown, dose, &self.body), &mut self.view),
             );
         }
+        self.probe.forget_pictures();
         for (view, rect) in places.probe {
-            self.probe
-                .picture_ui(ui, rect, view, (shown, &self.body, self.slices.field()));
+            let seen = (shown, &self.body, self.slices.field());
+            actions.extend(self.probe.picture_ui(ui, rect, view, seen));
+        }
+        match places.fluoro {
+            Some(rect) => {
+                let seen = (shown, &self.body, self.slices.field());
+                self.fluoro.picture_ui(ui, rect, seen);
+            }
+            None => self.fluoro.release(),
         }
         if let Some(rect) = places.solid {
             self.solid
@@ -158,7 +183,11 @@ impl Middle {
         }
         if layout == Layout::Probe {
             ui.separator();
-            self.probe.tools_ui(ui);
+            actions.extend(self.probe.tools_ui(ui, shown));
+        }
+        if layout == Layout::Fluoroscopy {
+            ui.separator();
+            self.fluoro.tools_ui(ui);
         }
         ui.separator();
         ui.toggle_value(&mut self.view.follow_tip, "Follow tip")
@@ -231,9 +260,17 @@ fn is_near_body(shown: &Shown, tip_m: &[f64; 3]) -> bool {
         .is_some_and(|s| (0..3).all(|a| (s.lower_m[a] - NEAR_M..=s.upper_m[a] + NEAR_M).contains(&tip_m[a])))
 }
 
+/// Where the pictures of a layout meet.
+fn meet(rect: Rect, layout: Layout) -> Pos2 {
+    match layout {
+        Layout::Fluoroscopy => Pos2::new(rect.center().x, (rect.top() + FLUORO_SHARE * rect.height()).round()),
+        _ => rect.center(),
+    }
+}
+
 fn places(rect: Rect, layout: Layout) -> Places {
     let [axial, sagittal, coronal] = Orientation::ALL;
-    let middle = rect.center();
+    let middle = meet(rect, layout);
     let cell = |column: usize, row: usize| {
         let (x, y) = (rect.x_range(), rect.y_range());
         let half = GAP / 2.0;
@@ -246,11 +283,13 @@ fn places(rect: Rect, layout: Layout) -> Places {
             solid: Some(cell(1, 0)),
             slices: vec![(axial, cell(0, 0)), (sagittal, cell(0, 1)), (coronal, cell(1, 1))],
             probe: Vec::new(),
+            fluoro: None,
         },
         Layout::Solid => Places {
             solid: Some(rect),
             slices: Vec::new(),
             probe: Vec::new(),
+            fluoro: None,
         },
         Layout::Slices => {
             // The sagittal slice shows most of an insertion and gets the lower half.
@@ -259,12 +298,20 @@ fn places(rect: Rect, layout: Layout) -> Places {
                 solid: None,
                 slices: vec![(axial, cell(0, 0)), (coronal, cell(1, 0)), (sagittal, lower)],
                 probe: Vec::new(),
+                fluoro: None,
             }
         }
         Layout::Probe => Places {
             solid: Some(cell(1, 0)),
             slices: vec![(coronal, cell(1, 1))],
             probe: vec![(View::Transverse, cell(0, 0)), (View::Sagittal, cell(0, 1))],
+            fluoro: None,
+        },
+        Layout::Fluoroscopy => Places {
+            solid: Some(cell(1, 1)),
+            slices: Vec::new(),
+            probe: vec![(View::Transverse, cell(0, 1))],
+            fluoro: Some(cell(0, 0).union(cell(1, 0))),
         },
     }
 }
@@ -281,7 +328,7 @@ mod tests {
             let places = places(rect, layout);
             let slices = places.slices.iter().map(|(_, r)| *r);
             let probe = places.probe.iter().map(|(_, r)| *r);
-            let all: Vec<Rect> = slices.chain(probe).chain(places.solid).collect();
+            let all: Vec<Rect> = slices.chain(probe).chain(places.solid).chain(places.fluoro).collect();
             for (i, a) in all.iter().enumerate() {
                 assert!(rect.contains_rect(*a), "{layout:?}");
                 assert!(all[i + 1..].iter().all(|b| !a.intersects(*b)), "{layout:?}");

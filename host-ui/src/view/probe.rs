@@ -1,37 +1,34 @@
 //! What the ultrasound probe sees: both of its planes, with the template's grid over the one across it.
 
+mod picture;
+mod tools;
+
 use super::body::ShownBody;
 use super::paste::{Paste, Pasted};
 use super::slice::{ROOM_FOR_REASON, words};
+use crate::action::{Action, ProbeAction};
 use crate::shown::Shown;
 use crate::theme::IMAGE;
 use eframe::egui_wgpu::RenderState;
-use egui::{Align2, FontId, Key, Pos2, Rect, Sense, Vec2};
+use egui::{Align2, FontId, Pos2, Rect, Sense, Vec2};
 use nalgebra::Vector3;
+pub use picture::ProbePicture;
 use stylet_base::format;
 use stylet_imaging::ultrasound::{Plane, Pose, Probe, Scanner, Settings, View};
 use stylet_imaging::{Body, Gpu, Metal};
 use stylet_implant::plan::{Hole, Template};
-use stylet_shm_schema::SceneId;
+use stylet_shm_schema::{SceneHeader, SceneId};
 use stylet_surfaces::field::Field;
+use tools::Knobs;
 
-/// A step of the stepper, mm.
-const STEP_MM: f64 = 5.0;
-/// Half the way of the stepper, mm.
-const WAY_MM: f64 = 60.0;
-const LARGEST_SIDE: u32 = 1024;
+/// Pixels of the longer side.
+const LARGEST_SIDE: f32 = 1024.0;
+/// A drag of so many points moves the probe by 1 mm, or turns it by 1 degree.
+const POINTS_PER_MM: f64 = 4.0;
+const POINTS_PER_DEG: f64 = 3.0;
 
-/// How the probe stands on its stepper, and the knobs of the machine.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Knobs {
-    /// Into the patient from the middle of the target, mm.
-    way_mm: f64,
-    /// About its axis, degrees.
-    turn_deg: f64,
-    depth_mm: f64,
-    gain_db: f64,
-    template: bool,
-}
+/// What one frame has of the scene.
+pub(super) type Seen<'a> = (&'a Shown, &'a ShownBody, &'a Field);
 
 /// The picture of one plane, and what it was drawn of.
 struct Pane {
@@ -39,6 +36,8 @@ struct Pane {
     scene: Option<SceneId>,
     drawn: Option<(Plane, Settings, Metal, Field)>,
     pasted: Option<Pasted>,
+    /// As it stands in the window.
+    shown: Option<ProbePicture>,
 }
 
 /// Both planes of the probe.
@@ -48,6 +47,14 @@ pub(super) struct ProbeView {
     knobs: Knobs,
     /// The frame in which a picture was computed last.
     computed_in: u64,
+}
+
+/// Whose pose a picture has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stand {
+    pub pose: Pose,
+    /// In the hand that holds the second device, else on the window's own stepper.
+    pub is_in_hand: bool,
 }
 
 impl ProbeView {
@@ -68,120 +75,79 @@ impl ProbeView {
                     scene: None,
                     drawn: None,
                     pasted: None,
+                    shown: None,
                 };
                 View::ALL.map(pane).into()
             }),
-            knobs: Knobs {
-                way_mm: 0.0,
-                turn_deg: 0.0,
-                depth_mm: 60.0,
-                gain_db: 0.0,
-                template: true,
-            },
+            knobs: Knobs::default(),
             computed_in: 0,
         }
     }
 
-    /// Stepper and knobs.
-    pub fn tools_ui(&mut self, ui: &mut egui::Ui) {
-        let knobs = &mut self.knobs;
-        if ui.memory(|m| m.focused().is_none()) {
-            let pressed = |key| f64::from(u8::from(ui.input(|i| i.key_pressed(key))));
-            knobs.way_mm += STEP_MM * (pressed(Key::PageUp) - pressed(Key::PageDown));
-            knobs.way_mm = knobs.way_mm.clamp(-WAY_MM, WAY_MM);
-        }
-        let mut value = |name: &str, value: &mut f64, most: [f64; 2], unit: &str, hint: &str| {
-            let label = ui.label(name);
-            let drag = egui::DragValue::new(value)
-                .range(most[0]..=most[1])
-                .speed(0.5)
-                .fixed_decimals(1)
-                .suffix(unit);
-            ui.add(drag).labelled_by(label.id).on_hover_text(hint);
-        };
-        let way = "Keys PgUp, PgDn: 5 mm. 0 is the middle of the target, positive into the patient";
-        value("Way", &mut knobs.way_mm, [-WAY_MM, WAY_MM], " mm", way);
-        value(
-            "Turn",
-            &mut knobs.turn_deg,
-            [-90.0, 90.0],
-            "°",
-            "About the probe's axis",
-        );
-        value(
-            "Depth",
-            &mut knobs.depth_mm,
-            [30.0, 100.0],
-            " mm",
-            "From the probe's surface",
-        );
-        value("Gain", &mut knobs.gain_db, [-30.0, 30.0], " dB", "Of the whole picture");
-        ui.toggle_value(&mut knobs.template, "Grid")
-            .on_hover_text("Holes of the template in the transverse picture");
+    /// The picture of a plane as it stood in the window in the last frame; `None` where it was not shown.
+    pub fn picture(&self, view: View) -> Option<&ProbePicture> {
+        self.panes.get(view as usize)?.shown.as_ref()
     }
 
-    /// Draws one plane.
-    pub fn picture_ui(
-        &mut self,
-        ui: &mut egui::Ui,
-        rect: Rect,
-        view: View,
-        (shown, body, field): (&Shown, &ShownBody, &Field),
-    ) {
-        let response = ui.interact(rect, ui.scope_id().with(view.name()), Sense::hover());
+    /// Of a frame that is over.
+    pub fn forget_pictures(&mut self) {
+        for pane in &mut self.panes {
+            pane.shown = None;
+        }
+    }
+
+    /// Where the probe stands: in the hand that holds the second device, or on the stepper where there is none.
+    pub fn stand(&self, shown: &Shown, scene: &SceneHeader) -> Stand {
+        let on_stepper = || self.knobs.stepper(&Pose::of_scene(scene));
+        let in_hand = shown.probe_pose();
+        Stand {
+            pose: in_hand.unwrap_or_else(on_stepper),
+            is_in_hand: in_hand.is_some(),
+        }
+    }
+
+    /// Draws one plane; what the pointer asks for.
+    pub fn picture_ui(&mut self, ui: &mut egui::Ui, rect: Rect, view: View, seen: Seen<'_>) -> Option<Action> {
+        let (shown, body, field) = seen;
+        let response = ui.interact(rect, ui.scope_id().with(view.name()), Sense::click_and_drag());
         let name = format!("{} ultrasound", view.name());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, &name));
         let painter = ui.painter_at(rect);
         let Some(model) = body.model().filter(|_| shown.scene.is_some()) else {
             painter.rect_filled(rect, 0.0, IMAGE.background);
             words(&painter, rect, &format!("{name}: no scene yet"), IMAGE.text);
-            return;
+            return None;
         };
-        let scale = ui.ctx().pixels_per_point();
-        let side = |points: f32| ((points * scale).round() as u32).clamp(16, LARGEST_SIDE);
-        let knobs = self.knobs;
+        let action = self.dragged(&response, view, shown);
+        let stand = self.stand(shown, &model.header);
         let plane = Plane {
-            pose: Pose::of_scene(&model.header).moved(knobs.way_mm * 1e-3, knobs.turn_deg.to_radians()),
+            pose: stand.pose,
             view,
             probe: Probe::default(),
-            depth_m: knobs.depth_mm * 1e-3,
-            pixels: [side(rect.width()), side(rect.height())],
+            depth_m: self.knobs.depth_mm * 1e-3,
+            pixels: pixels(rect, ui.ctx().pixels_per_point()),
         };
         let settings = Settings {
-            gain_db: knobs.gain_db,
+            gain_db: self.knobs.gain_db,
             ..Settings::default()
         };
-        let metal = shown.metal();
         let pass = ui.ctx().cumulative_pass_nr();
         // One picture a frame, so that no frame waits for both.
         let may_compute = self.computed_in != pass;
         if let (Some(pane), Some(paste)) = (self.panes.get_mut(view as usize), &self.paste) {
-            let is_new_scene = pane.scene != Some(model.header.id());
-            let is_old = pane
-                .drawn
-                .as_ref()
-                .is_none_or(|drawn| (&drawn.0, &drawn.1, &drawn.2, &drawn.3) != (&plane, &settings, &metal, field));
-            if is_new_scene && may_compute {
-                pane.scene = Some(model.header.id());
-                if let Some(body) = Body::of_scene(&model.header, &model.labels) {
-                    pane.scanner.set_body(&body, field);
-                }
-            }
-            if (is_new_scene || is_old) && may_compute {
+            let wanted = (plane, settings, shown.metal(), field);
+            let (is_new, is_old) = pane.bring_up_to_date(model, wanted, paste, may_compute);
+            if is_new {
                 self.computed_in = pass;
-                pane.scanner.set_field(field);
-                pane.pasted = pane
-                    .scanner
-                    .picture(&plane, &settings, &metal)
-                    .map(|view| paste.of(&view));
-                pane.drawn = Some((plane, settings, metal, field.clone()));
             } else if is_old {
                 ui.ctx().request_repaint();
             }
-            if let Some(pasted) = &pane.pasted {
+            if let (Some(pasted), Some((drawn, ..))) = (&pane.pasted, &pane.drawn) {
+                let picture = ProbePicture::new(*drawn, rect, !is_old);
+                pane.shown = Some(picture);
                 pasted.paint(&painter, rect);
-                self.over(&painter, rect, &plane, model);
-                return;
+                self.over(&painter, &picture, stand, &model.header);
+                return action;
             }
         }
         painter.rect_filled(rect, 0.0, IMAGE.background);
@@ -189,24 +155,93 @@ impl ProbeView {
             let why = "No ultrasound: no wgpu device that computes, or the scene is too large for it";
             words(&painter, rect, why, IMAGE.text);
         }
+        action
+    }
+
+    /// Along the picture's height the probe goes in and out, along its width it turns.
+    fn dragged(&mut self, response: &egui::Response, view: View, shown: &Shown) -> Option<Action> {
+        if !response.dragged() {
+            return None;
+        }
+        let by = response.drag_delta();
+        let (across, up) = (f64::from(by.x), f64::from(-by.y));
+        // In the sagittal picture the way into the patient is to the right.
+        let (way_mm, turn_deg) = match view {
+            View::Transverse => (up / POINTS_PER_MM, across / POINTS_PER_DEG),
+            View::Sagittal => (across / POINTS_PER_MM, up / POINTS_PER_DEG),
+        };
+        self.knobs.step(shown, way_mm, turn_deg).then(|| {
+            Action::Probe(ProbeAction::Drag {
+                way_m: way_mm * 1e-3,
+                turn_rad: turn_deg.to_radians(),
+            })
+        })
     }
 
     /// Title and template.
-    fn over(&self, painter: &egui::Painter, rect: Rect, plane: &Plane, model: &stylet_host::link::SceneModel) {
+    fn over(&self, painter: &egui::Painter, picture: &ProbePicture, stand: Stand, scene: &SceneHeader) {
+        let (plane, rect) = (picture.plane(), picture.rect());
         if self.knobs.template && plane.view == View::Transverse {
-            let template = Template::before(&model.header);
-            let per_pixel = rect.width() / plane.pixels[0] as f32;
+            let template = Template::before(scene);
             for hole in Hole::all() {
-                let place = Vector3::from(template.hole_m(hole));
-                if let Some(at) = plane.crossing(place, template.inwards.into()) {
-                    let at = rect.min + Vec2::new(at.x as f32, at.y as f32) * per_pixel;
-                    painter.circle_filled(at, 1.3, IMAGE.gland.gamma_multiply(0.8));
+                let place_m = Vector3::from(template.hole_m(hole));
+                if let Some(place_m) = plane.crossing_m(place_m, template.inwards.into()) {
+                    painter.circle_filled(picture.at(place_m), 1.3, IMAGE.gland.gamma_multiply(0.8));
                 }
             }
         }
-        let way = format::length(self.knobs.way_mm * 1e-3);
-        let text = format!("{}  {way}", plane.view.name());
+        let (way_m, turn_rad) = stand.pose.way_and_turn(&Pose::of_scene(scene));
+        let whose = if stand.is_in_hand { "Hand 2" } else { "Stepper" };
+        let (name, way, turn) = (plane.view.name(), format::length(way_m), turn_rad.to_degrees());
+        // No minus before a zero.
+        let turn = if turn.abs() < 0.05 { 0.0 } else { turn };
         let at: Pos2 = rect.left_top() + Vec2::new(9.0, 6.0);
+        let text = format!("{name}\n{whose}  {way}  {turn:.1}°");
         painter.text(at, Align2::LEFT_TOP, text, FontId::proportional(12.5), IMAGE.text);
     }
+}
+
+impl Pane {
+    /// Computes the picture where it is not that of what is wanted: whether it did, and whether it is old now.
+    fn bring_up_to_date(
+        &mut self,
+        model: &stylet_host::link::SceneModel,
+        (plane, settings, metal, field): (Plane, Settings, Metal, &Field),
+        paste: &Paste,
+        may_compute: bool,
+    ) -> (bool, bool) {
+        let is_new_scene = self.scene != Some(model.header.id());
+        let is_drawn = self
+            .drawn
+            .as_ref()
+            .is_some_and(|drawn| (&drawn.0, &drawn.1, &drawn.2, &drawn.3) == (&plane, &settings, &metal, field));
+        if is_drawn && !is_new_scene {
+            return (false, false);
+        }
+        if !may_compute {
+            return (false, true);
+        }
+        if is_new_scene {
+            self.scene = Some(model.header.id());
+            if let Some(body) = Body::of_scene(&model.header, &model.labels) {
+                self.scanner.set_body(&body, field);
+            }
+        }
+        self.scanner.set_field(field);
+        let view = self.scanner.picture(&plane, &settings, &metal);
+        let is_enlarged = plane.pixels.iter().any(|&side| side as f32 >= LARGEST_SIDE);
+        self.pasted = view.map(|view| match is_enlarged {
+            true => paste.enlarged(&view),
+            false => paste.of(&view),
+        });
+        self.drawn = Some((plane, settings, metal, field.clone()));
+        (true, false)
+    }
+}
+
+/// Pixels of a picture at this place; a large one has fewer and is enlarged.
+fn pixels(rect: Rect, per_point: f32) -> [u32; 2] {
+    let size = rect.size() * per_point;
+    let share = (LARGEST_SIDE / size.max_elem().max(1.0)).min(1.0);
+    [size.x, size.y].map(|side| ((side * share).round() as u32).max(16))
 }

@@ -90,6 +90,10 @@ impl<D: Device> Device for BadLink<D> {
         self.device.set_hand_goal(goal);
     }
 
+    fn set_hand_up(&mut self, up: Option<Vector3<f64>>) {
+        self.device.set_hand_up(up);
+    }
+
     fn stop_hand(&mut self) {
         self.device.stop_hand();
     }

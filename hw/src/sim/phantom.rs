@@ -1,6 +1,6 @@
 //! A Phantom Premium 1.5 in the grip of a hand: inertia, dry friction, encoders, amplifiers.
 
-use nalgebra::{Unit, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion, Vector3};
 
 use crate::convert::quantise;
 use crate::device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
@@ -61,6 +61,8 @@ pub struct SimulatedPhantom {
     velocity_m_per_s: Vector3<f64>,
     push_n: Vector3<f64>,
     world_from_tool: UnitQuaternion<f64>,
+    /// Where +y of the tool goes, where the hand turns it about its axis.
+    up: Option<Vector3<f64>>,
     wrench: Wrench,
     work_j: f64,
     buttons: u32,
@@ -78,6 +80,7 @@ impl SimulatedPhantom {
             velocity_m_per_s: Vector3::zeros(),
             push_n: Vector3::zeros(),
             world_from_tool: turn(&Vector3::z(), &direction, core::f64::consts::PI),
+            up: None,
             wrench: Wrench::zero(),
             work_j: 0.0,
             buttons: 0,
@@ -196,7 +199,11 @@ impl Device for SimulatedPhantom {
             let aim = unit_or_z(&self.path.goal().direction);
             let step_rad = self.config.turn_rate_rad_per_s * span_s;
             let axis = self.world_from_tool * Vector3::z();
-            self.world_from_tool = turn(&axis, &aim, step_rad) * self.world_from_tool;
+            let by = match self.up.and_then(|up| upright(&aim, &up)) {
+                Some(goal) => part_of(&(goal * self.world_from_tool.inverse()), step_rad),
+                None => turn(&axis, &aim, step_rad),
+            };
+            self.world_from_tool = by * self.world_from_tool;
             self.world_from_tool.renormalize_fast();
             self.sequence = self.sequence.wrapping_add(1);
         }
@@ -221,6 +228,10 @@ impl Device for SimulatedPhantom {
         self.path.set_goal(goal);
     }
 
+    fn set_hand_up(&mut self, up: Option<Vector3<f64>>) {
+        self.up = up.filter(|up| up.iter().all(|x| x.is_finite()));
+    }
+
     fn stop_hand(&mut self) {
         self.path.stop();
     }
@@ -228,6 +239,23 @@ impl Device for SimulatedPhantom {
 
 fn unit_or_z(v: &Vector3<f64>) -> Vector3<f64> {
     v.try_normalize(1e-9).unwrap_or_else(Vector3::z)
+}
+
+/// The tool along `aim`, its +y as near to `up` as it can be; `None` where both are parallel.
+fn upright(aim: &Vector3<f64>, up: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
+    let up = (up - aim * up.dot(aim)).try_normalize(1e-6)?;
+    let axes = Matrix3::from_columns(&[up.cross(aim), up, *aim]);
+    Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(
+        axes,
+    )))
+}
+
+/// The rotation, or as much of it as is within `limit_rad`.
+fn part_of(rotation: &UnitQuaternion<f64>, limit_rad: f64) -> UnitQuaternion<f64> {
+    let turn = rotation.scaled_axis();
+    let angle = turn.norm();
+    let share = if angle > limit_rad { limit_rad / angle } else { 1.0 };
+    UnitQuaternion::from_scaled_axis(turn * share)
 }
 
 /// The rotation that takes `from` towards `to` (unit vectors) by at most `limit_rad`.

@@ -237,3 +237,40 @@ fn a_script_visits_its_waypoints_in_order_and_ends() {
         .count();
     assert!((ticks as f64 * DT_S - 5.0).abs() < 0.01);
 }
+
+/// The tool lies along +z of its own frame, and its +y goes where the hand was asked to turn it.
+#[test]
+fn a_hand_turns_what_it_holds_about_its_axis_only_when_it_is_asked_to() {
+    let mut device = SimulatedPhantom::new(SimulatedPhantomConfig::default());
+    let aim = Vector3::new(0.0, 0.6, 0.8);
+    device.set_hand_goal(&HandGoal {
+        direction: aim,
+        ..goal(0.0, 0.0, 0.0)
+    });
+    let after = |device: &mut SimulatedPhantom, ticks: u32| {
+        let mut turn = nalgebra::UnitQuaternion::identity();
+        for _ in 0..ticks {
+            let sample = device.read(DT_S).expect("a sample");
+            assert!(
+                turn == nalgebra::UnitQuaternion::identity() || turn.angle_to(&sample.world_from_tool) < 2.1 * DT_S
+            );
+            turn = sample.world_from_tool;
+        }
+        turn
+    };
+    let straight = after(&mut device, 2000);
+    assert!((straight * Vector3::z() - aim).norm() < 1e-9);
+    assert!(
+        (straight * Vector3::y() - Vector3::new(0.0, 0.8, -0.6)).norm() < 1e-9,
+        "no roll"
+    );
+    // Half square to the axis: what is along it does not count.
+    device.set_hand_up(Some(Vector3::x() + aim));
+    let turned = after(&mut device, 2000);
+    assert!((turned * Vector3::z() - aim).norm() < 1e-9 && (turned * Vector3::y() - Vector3::x()).norm() < 1e-9);
+    // Along the axis there is no roll, and what is no number is none.
+    for up in [aim, Vector3::repeat(f64::NAN)] {
+        device.set_hand_up(Some(up));
+        assert!(after(&mut device, 2000).angle_to(&turned) < 1e-9);
+    }
+}

@@ -8,7 +8,7 @@ use std::time::Duration;
 use stylet_runtime::rt::clock;
 use stylet_runtime::rt::timing::PoseTimes;
 use stylet_shm_schema::service::{self, Instance, Publisher, ServiceError, SliceSubscriber, Subscriber};
-use stylet_shm_schema::{Command, Event, EventKind, HandMove, Request, SnapshotHeader, TickRecord, Vertex};
+use stylet_shm_schema::{Command, Event, EventKind, HandMove, ProbeMove, Request, SnapshotHeader, TickRecord, Vertex};
 use stylet_sim::scene::Scene;
 
 /// One insertion and one retraction.
@@ -223,7 +223,8 @@ impl Host {
         self.send(&Request::MoveHand(to(tip_m)));
         if self.moves_second {
             let [x, y, z] = tip_m;
-            self.send(&Request::MoveSecondHand(to([x, y - BEHIND_M, z])));
+            let hand = to([x, y - BEHIND_M, z]);
+            self.send(&Request::MoveSecondHand(ProbeMove { hand, up: None }));
         }
     }
 

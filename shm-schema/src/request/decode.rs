@@ -123,7 +123,8 @@ fn takes(kind: CommandKind) -> String {
         CommandKind::SetPlan => {
             format!("nothing, or entry, direction and at most {MAX_SEEDS} seeds, three values each")
         }
-        CommandKind::MoveHand | CommandKind::MoveSecondHand => "8 values".to_owned(),
+        CommandKind::MoveHand => "8 values".to_owned(),
+        CommandKind::MoveSecondHand => "8 values, and three more where it turns about its axis".to_owned(),
         CommandKind::LoadBuiltinScene => "one number".to_owned(),
         CommandKind::DropSeed => "nothing, or the pitch of a strand".to_owned(),
         CommandKind::ExpectNeedle => "entry and direction, three values each".to_owned(),
@@ -169,7 +170,9 @@ fn count_fits(kind: CommandKind, count: usize) -> bool {
     match kind {
         CommandKind::SetParameters => count > 0 && count.is_multiple_of(2),
         CommandKind::SetPlan => count == 0 || places_after(PLAN_HEAD).is_some_and(|n| n <= MAX_SEEDS),
-        CommandKind::MoveHand | CommandKind::MoveSecondHand => count == 8,
+        CommandKind::MoveHand => count == 8,
+        // With or without where it turns to about its axis.
+        CommandKind::MoveSecondHand => matches!(count, 8 | 11),
         CommandKind::ExpectNeedle => count == 6,
         CommandKind::TakeNeedle | CommandKind::Mark => count == 1,
         // Which of them the number says; see `Reader::exercise`.
@@ -210,7 +213,10 @@ impl<'a> Reader<'a> {
                 seeds_m: self.rest(Self::place),
             })),
             CommandKind::MoveHand => Request::MoveHand(self.hand_move()),
-            CommandKind::MoveSecondHand => Request::MoveSecondHand(self.hand_move()),
+            CommandKind::MoveSecondHand => Request::MoveSecondHand(ProbeMove {
+                hand: self.hand_move(),
+                up: (self.at < self.values.len()).then(|| self.direction()),
+            }),
             CommandKind::DropSeed => Request::DropSeed {
                 strand_pitch_m: (!self.values.is_empty())
                     .then(|| self.within("pitch of a strand in m", STRAND_PITCH_RANGE_M)),

@@ -102,7 +102,7 @@ pub enum Request {
     EndExercises = 20,
     /// Set the goal of the simulated hand that holds the second device.
     #[strum_discriminants(doc = "[`Request::MoveSecondHand`]")]
-    MoveSecondHand(HandMove) = 30,
+    MoveSecondHand(ProbeMove) = 30,
     /// Stop that hand, and not the needle's.
     #[strum_discriminants(doc = "[`Request::StopSecondHand`]")]
     StopSecondHand = 31,
@@ -157,6 +157,16 @@ pub struct HandMove {
     pub speed_m_per_s: f64,
     /// Largest acceleration, m/s², within [`ACCELERATION_RANGE_M_PER_S2`].
     pub acceleration_m_per_s2: f64,
+}
+
+/// Goal of the simulated hand that holds the ultrasound probe, scene frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProbeMove {
+    /// Of its tip.
+    pub hand: HandMove,
+    /// Unit vector where +y of the tool goes, the probe's middle beam, as far as that is square to the direction. Without it the hand
+    /// does not turn the probe about its axis.
+    pub up: Option<[f64; 3]>,
 }
 
 /// One needle to rehearse, scene frame.
@@ -232,10 +242,8 @@ impl Request {
                 .collect(),
             Self::SetPlan(None) => Vec::new(),
             Self::SetPlan(Some(plan)) => joined(&[&plan.entry_m, &plan.direction], &plan.seeds_m),
-            Self::MoveHand(hand) | Self::MoveSecondHand(hand) => {
-                let pace = [hand.speed_m_per_s, hand.acceleration_m_per_s2];
-                joined(&[&hand.tip_m, &hand.direction, &pace], &[])
-            }
+            Self::MoveHand(hand) => hand_values(hand),
+            Self::MoveSecondHand(probe) => [hand_values(&probe.hand), probe.up.as_slice().concat()].concat(),
             Self::LoadBuiltinScene(number) => vec![f64::from(*number)],
             Self::ExpectNeedle(axis) => joined(&[&axis.entry_m, &axis.direction], &[]),
             Self::Rehearse(run) => {
@@ -277,6 +285,11 @@ impl Request {
             | Self::StopSecondHand => Vec::new(),
         }
     }
+}
+
+fn hand_values(hand: &HandMove) -> Vec<f64> {
+    let pace = [hand.speed_m_per_s, hand.acceleration_m_per_s2];
+    joined(&[&hand.tip_m, &hand.direction, &pace], &[])
 }
 
 /// How many there are, then entry, direction and depth of each.

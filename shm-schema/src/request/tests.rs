@@ -126,6 +126,42 @@ fn every_request_survives_its_record() {
 }
 
 #[test]
+fn the_other_hand_turns_what_it_holds_or_does_not() {
+    let hand = HandMove {
+        tip_m: [0.1, 0.2, -0.3],
+        direction: [1.0, 0.0, 0.0],
+        speed_m_per_s: 0.05,
+        acceleration_m_per_s2: 2.0,
+    };
+    for up in [None, Some([0.0, 0.6, -0.8])] {
+        let request = Request::MoveSecondHand(ProbeMove { hand, up });
+        let command = request.encode(3, 4).expect("fits");
+        assert_eq!(command.value_count, if up.is_some() { 11 } else { 8 });
+        assert_eq!(Request::decode(&command), Ok(request));
+    }
+    let long = Request::MoveSecondHand(ProbeMove {
+        hand,
+        up: Some([0.0, 0.6, 0.9]),
+    });
+    let refused = Request::decode(&long.encode(3, 4).expect("fits")).expect_err("not of length 1");
+    assert!(matches!(refused.0[..], [RequestError::NotUnit { .. }]), "{refused:?}");
+    assert!(matches!(
+        refused_of_ten(hand)[..],
+        [RequestError::Count {
+            kind: CommandKind::MoveSecondHand,
+            ..
+        }]
+    ));
+}
+
+fn refused_of_ten(hand: HandMove) -> Vec<RequestError> {
+    let whole = Request::MoveSecondHand(ProbeMove { hand, up: None });
+    let mut command = whole.encode(3, 4).expect("fits");
+    command.value_count = 10;
+    Request::decode(&command).expect_err("malformed").0
+}
+
+#[test]
 fn a_payload_that_does_not_fit_is_not_sent() {
     let long = Request::SetPlan(Some(needle(MAX_SEEDS + 20)));
     assert!(long.encode(1, 1).is_err());

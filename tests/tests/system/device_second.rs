@@ -4,7 +4,7 @@ use fake_haply::{Server, Service, Wrong};
 use nalgebra::Vector3;
 use std::time::Duration;
 use stylet_host::link::Link;
-use stylet_shm_schema::{EventKind, Fault, HandMove, RefusalCode, Request, flags};
+use stylet_shm_schema::{EventKind, Fault, HandMove, ProbeMove, RefusalCode, Request, flags};
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, until};
 
@@ -87,10 +87,19 @@ fn both_hands_are_seen_and_each_goes_where_it_is_asked_to() {
             speed_m_per_s: 0.05,
             acceleration_m_per_s2: 2.0,
         };
-        ask(&mut rig.link, &Request::MoveSecondHand(hand)).expect("carried out");
+        let up = Some([-0.6, 0.8, 0.0]);
+        ask(&mut rig.link, &Request::MoveSecondHand(ProbeMove { hand, up })).expect("carried out");
         assert!(rig.waits_for(|link| is_on(link, flags::AT_GOAL)[1]));
         let there = Vector3::from(rig.link.second_state().expect("seen").tip_in_scene_m);
         assert!((there - goal).norm() < 5e-4, "{there} {goal}");
+        // Turned about its axis by atan2(0.6, 0.8), whichever of both came first.
+        let turned = |link: &Link| link.second_state().expect("seen").world_from_tool;
+        let half = 0.6_f64.atan2(0.8) / 2.0;
+        assert!(
+            rig.waits_for(|link| (turned(link)[2] - half.sin()).abs() < 1e-3),
+            "{:?}",
+            turned(&rig.link)
+        );
         let records = rig.link.take_second_records();
         let numbers: Vec<_> = records.iter().map(|r| r.tick).collect();
         assert!(

@@ -13,6 +13,8 @@ mod plan;
 #[cfg(test)]
 mod plugged;
 #[cfg(test)]
+mod probe;
+#[cfg(test)]
 mod states;
 #[cfg(test)]
 mod terminal;

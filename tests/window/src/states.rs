@@ -80,6 +80,8 @@ fn planned_state_is_in_place_and_as_it_was() {
         driven.press(Key::V);
         assert_in_place(&mut driven, &format!("probe, light, {name}"));
         driven.picture(&format!("probe-light-{name}"));
+        driven.press(Key::V);
+        assert_in_place(&mut driven, &format!("fluoroscopy, light, {name}"));
     }
 }
 
@@ -119,7 +121,7 @@ fn an_insertion_drawn_by_its_changes_is_the_insertion_drawn_at_once() {
     for round in 0..3 {
         driven.pull_tip(0.006);
         assert_drawn_by_changes(&mut driven.window, &format!("round {round}"));
-        for _ in 0..4 {
+        for _ in 0..5 {
             driven.press(Key::V);
             assert_drawn_by_changes(&mut driven.window, &format!("round {round}, other pictures"));
         }

@@ -180,3 +180,30 @@ fn any_event_gives_a_wish_that_the_core_takes() {
         }
     }
 }
+
+#[test]
+fn a_stick_moves_the_probe_in_or_turns_it_and_never_both_at_once() {
+    const X: u16 = AbsoluteAxisCode::ABS_X.0;
+    let mut state = State::new(Kind::Gamepad, &stick(0));
+    feed(
+        &mut state,
+        0.0,
+        &[(EventType::ABSOLUTE, Y, -32768), (EventType::ABSOLUTE, X, 9000)],
+    );
+    let wish = state.probe_wish(0.0);
+    assert!(
+        (wish.along_m_per_s - 0.04).abs() < 1e-6 && wish.turn_rad_per_s == 0.0,
+        "{wish:?}"
+    );
+    feed(
+        &mut state,
+        0.0,
+        &[(EventType::ABSOLUTE, Y, 0), (EventType::ABSOLUTE, X, -32768)],
+    );
+    let wish = state.probe_wish(0.0);
+    assert!(
+        wish.along_m_per_s == 0.0 && (wish.turn_rad_per_s + 0.7).abs() < 1e-3,
+        "{wish:?}"
+    );
+    assert_eq!(wish.slower(SLOW).turn_rad_per_s, wish.turn_rad_per_s * SLOW);
+}

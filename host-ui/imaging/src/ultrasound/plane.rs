@@ -1,6 +1,6 @@
 //! Where the beams of a probe go, how wide they are, and where a place stands in the picture.
 
-use nalgebra::{Vector2, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
 use stylet_anatomy::Organ;
 use stylet_shm_schema::SceneHeader;
 
@@ -49,6 +49,35 @@ impl Pose {
             up: self.up * cos + self.axis.cross(&self.up) * sin,
         }
     }
+
+    /// The probe in a hand, by the frame of what the hand holds: its axis is +z of that frame, towards the tip, and its middle
+    /// beam +y. So a probe that is held straight looks where the scene's y goes.
+    pub fn of_tool(tip_m: Vector3<f64>, scene_from_tool: &UnitQuaternion<f64>, probe: &Probe) -> Self {
+        let axis = scene_from_tool * Vector3::z();
+        Self {
+            middle_m: tip_m - axis * probe.behind_tip_m,
+            axis,
+            up: scene_from_tool * Vector3::y(),
+        }
+    }
+
+    /// The foremost point of the probe, m.
+    pub fn tip_m(&self, probe: &Probe) -> Vector3<f64> {
+        self.middle_m + self.axis * probe.behind_tip_m
+    }
+
+    /// The frame of what the hand holds, as [`Pose::of_tool`] takes it.
+    pub fn scene_from_tool(&self) -> UnitQuaternion<f64> {
+        let columns = Matrix3::from_columns(&[self.up.cross(&self.axis), self.up, self.axis]);
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(columns))
+    }
+
+    /// How far it is along the axis of another pose (m), and turned about that (rad): what [`Pose::moved`] takes.
+    pub fn way_and_turn(&self, from: &Self) -> (f64, f64) {
+        let aside = from.axis.cross(&from.up);
+        let turn_rad = self.up.dot(&aside).atan2(self.up.dot(&from.up));
+        ((self.middle_m - from.middle_m).dot(&from.axis), turn_rad)
+    }
 }
 
 /// Which of the two planes is seen.
@@ -78,6 +107,8 @@ impl View {
 pub struct Probe {
     /// From its axis to its surface, m.
     pub radius_m: f64,
+    /// From its tip back to the middle of both arrays, m.
+    pub behind_tip_m: f64,
     /// Half the angle of the sector, rad.
     pub half_angle: f64,
     /// Half the length of the sagittal array, m.
@@ -105,12 +136,14 @@ pub const FWHM: f64 = 2.354_820_045;
 
 impl Default for Probe {
     /// 7 MHz, 20 mm thick. Across the beam the width at half maximum is the wavelength times the f-number (2, then depth over an
-    /// aperture of 12 mm); along it 0.3 mm; the plane is 2 mm thick at 25 mm. The sizes are assumed, see `docs/imaging.md`.
+    /// aperture of 12 mm); along it 0.3 mm; the plane is 2 mm thick at 25 mm. The arrays end where the half ball of the tip begins.
+    /// The sizes are assumed, see `docs/imaging.md`.
     fn default() -> Self {
         let mhz = 7.0;
         let wavelength_m = SOUND_M_PER_S / (mhz * 1e6);
         Self {
             radius_m: 10e-3,
+            behind_tip_m: 42.5e-3,
             half_angle: 80_f64.to_radians(),
             half_length_m: 32.5e-3,
             mhz,
@@ -233,11 +266,17 @@ impl Plane {
         Vector2::new(0.5 * wide + x / scale, high - (y - self.lowest_m()) / scale)
     }
 
-    /// Where a straight line through a place crosses the plane, in the picture; `None` where it runs along it. The holes of a
+    /// Where a straight line through a place crosses the plane, scene frame, m; `None` where it runs along it. The holes of a
     /// template are drawn so.
-    pub fn crossing(&self, place_m: Vector3<f64>, direction: Vector3<f64>) -> Option<Vector2<f64>> {
+    pub fn crossing_m(&self, place_m: Vector3<f64>, direction: Vector3<f64>) -> Option<Vector3<f64>> {
         let (beside_m, per) = (self.in_beams(place_m).beside_m, direction.dot(&self.normal()));
-        (per.abs() > 0.2).then(|| self.pixel_of(place_m - direction * (beside_m / per)))
+        (per.abs() > 0.2).then(|| place_m - direction * (beside_m / per))
+    }
+
+    /// Where that place stands in the picture.
+    pub fn crossing(&self, place_m: Vector3<f64>, direction: Vector3<f64>) -> Option<Vector2<f64>> {
+        self.crossing_m(place_m, direction)
+            .map(|place_m| self.pixel_of(place_m))
     }
 
     /// The place in the plane under a place in the picture.

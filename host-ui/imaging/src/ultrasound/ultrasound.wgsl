@@ -110,13 +110,12 @@ fn shift_m(line: u32, sample: u32, side: u32) -> vec3<f32> {
     return mix(low, mix(shifts_m[at + columns].xyz, shifts_m[at + columns + 1u].xyz, x), y);
 }
 
-// Two scatterers beside each other along x. The cube goes on in all directions, each copy shifted so that no pattern repeats in
-// a plane.
+// Two scatterers beside each other along x. Where a row begins among those that are kept is a hash of its place, so that no pattern
+// repeats.
 fn pair(cell: vec3<i32>) -> vec4<f32> {
-    let z = cell.z >> 5u;
-    let y = cell.y >> 7u;
-    let at = vec3((cell.x + 37 * z + 53 * y) & 127, (cell.y + 71 * z) & 127, cell.z & 31);
-    return unpack4x8snorm(grains[(at.z * 128 + at.y) * 128 + at.x]);
+    let mixed = (u32(cell.y) * 0x9E3779B1u) ^ (u32(cell.z) * 0x85EBCA77u);
+    let row = (mixed ^ (mixed >> 15u)) * 0x2C1B3C6Du;
+    return unpack4x8snorm(grains[((row >> 12u) + u32(cell.x)) & 0x1FFFFu]);
 }
 
 // Between the scatterers of a material point, of the same mean power everywhere.

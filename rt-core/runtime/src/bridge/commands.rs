@@ -78,7 +78,7 @@ impl Bridge {
             }
             Request::BeginExercise(exercise) => self.begin_exercise(ticket, exercise),
             Request::EndExercises => self.end_exercises(ticket),
-            Request::MoveSecondHand(hand) => self.move_second_hand(ticket, hand_goal(&hand)),
+            Request::MoveSecondHand(hand) => self.move_second_hand(ticket, &hand),
             Request::StopSecondHand => self.stop_second_hand(ticket),
             Request::StopHand => {
                 self.order_second(SecondOrder::StopHand { ticket: 0 });

@@ -3,12 +3,14 @@
 use super::Bridge;
 use super::batches::Batches;
 use super::link::{EventDetails, Link};
+use super::requests::hand_goal;
 use super::supervisor::Supervisor;
 use crate::rt::exchange::{Notice, Ticket};
 use crate::rt::second::{SecondBridgePorts, SecondOrder, gate_of};
-use stylet_hw::{DeviceInfo, HandGoal};
+use nalgebra::Vector3;
+use stylet_hw::DeviceInfo;
 use stylet_shm_schema::service::SlicePublisher;
-use stylet_shm_schema::{EventKind, Fault, Refusal, RefusalCode, SecondRecord};
+use stylet_shm_schema::{EventKind, Fault, ProbeMove, Refusal, RefusalCode, SecondRecord};
 use stylet_sim::force::GateParameters;
 
 /// What a bridge must know of the second device.
@@ -143,9 +145,11 @@ impl Bridge {
         self.second.as_mut().ok_or(RefusalCode::NoSecondDevice.into())
     }
 
-    pub(super) fn move_second_hand(&mut self, ticket: Ticket, goal: HandGoal) -> Result<(), Refusal> {
-        self.second_or_refusal()?
-            .order_answered(SecondOrder::Hand { ticket, goal })
+    pub(super) fn move_second_hand(&mut self, ticket: Ticket, probe: &ProbeMove) -> Result<(), Refusal> {
+        let goal = hand_goal(&probe.hand);
+        let second = self.second_or_refusal()?;
+        second.order_answered(SecondOrder::Up(probe.up.map(Vector3::from)))?;
+        second.order_answered(SecondOrder::Hand { ticket, goal })
     }
 
     pub(super) fn stop_second_hand(&mut self, ticket: Ticket) -> Result<(), Refusal> {

@@ -84,6 +84,10 @@ impl Device for BreakingDevice {
         self.hand.set_hand_goal(goal);
     }
 
+    fn set_hand_up(&mut self, up: Option<Vector3<f64>>) {
+        self.hand.set_hand_up(up);
+    }
+
     fn stop_hand(&mut self) {
         self.hand.stop_hand();
     }

@@ -53,7 +53,7 @@ impl PutIn {
 }
 
 /// Bit-identical where nothing has moved, a negative zero as well.
-fn moved(place_m: Vector3<f64>, by_m: Vector3<f64>) -> Vector3<f64> {
+pub fn moved(place_m: Vector3<f64>, by_m: Vector3<f64>) -> Vector3<f64> {
     match by_m == Vector3::zeros() {
         true => place_m,
         false => place_m + by_m,

@@ -190,10 +190,10 @@ impl TissueLoop {
         self.checkpoint();
         self.follow_left();
         self.take_orders();
-        self.follow_second();
-        self.follow_probe();
         let before = self.pose;
         self.pose = *self.ports.pose.read();
+        self.follow_second();
+        self.follow_probe();
         self.mark();
         let travel = self.pose.held_travel_m - before.held_travel_m;
         let on_line = self.step_on_line();

@@ -340,4 +340,46 @@ fn each_pulse_counts_by_the_inverse_square_law_and_the_last_picture_is_held() {
         scope.dose.air_kerma_gy
     );
     assert_eq!(scope.held().map(|held| held.transmission.len()), Some(128 * 128));
+    // The field is as wide as the detector, narrower by the way to it, and the product is the same at any distance.
+    let edge_m = arm.detector_m * 0.5 / 1.0;
+    assert!((scope.dose.kerma_area_gy_m2 / (expected * edge_m * edge_m) - 1.0).abs() < 1e-12);
+    let far = CArm {
+        source_to_isocentre_m: 0.9,
+        ..arm
+    };
+    let [near, far] = [arm, far].map(|arm| Exposure::FLUOROSCOPY.kerma_area_gy_m2(&arm));
+    assert!((near / far - 1.0).abs() < 1e-12);
+    assert!((scope.dose.beam_s - 0.024).abs() < 1e-12);
+}
+
+#[test]
+#[ignore = "a measurement, not a claim: cargo test --release -p stylet-imaging pulses_a_second -- --ignored --nocapture"]
+fn pulses_a_second() {
+    let (body, mut scope) = (body(), fluoroscope());
+    let moved = field(|p| Vector3::new(0.0, 0.1 * p.x, 1e-3));
+    let arm = CArm {
+        pixels: [512, 512],
+        detector_m: 0.21,
+        ..arm(20.0, 10.0)
+    };
+    let seeds = (0..60).map(|n| Seed {
+        middle_m: Vector3::new(f64::from(n % 8) - 4.0, f64::from(n / 8) - 4.0, 0.0) * 4e-3,
+        axis: Vector3::z(),
+    });
+    let metal = Metal {
+        seeds: seeds.collect(),
+        ..Metal::default()
+    };
+    let mut times: Vec<f64> = (0..20)
+        .map(|_| {
+            let start = std::time::Instant::now();
+            scope.shoot(&arm, &Exposure::FLUOROSCOPY, &body, &moved, &metal).greys();
+            start.elapsed().as_secs_f64() * 1e3
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    println!(
+        "radiograph of 512 x 512: p50 {:.1} ms, most {:.1} ms",
+        times[10], times[19]
+    );
 }

@@ -1,9 +1,9 @@
 //! Where the probe stands in a scene, and where the holes of a template are drawn.
 
 use super::plane;
-use crate::ultrasound::{Pose, View};
+use crate::ultrasound::{Plane, Pose, Probe, View};
 use bytemuck::Zeroable;
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use stylet_shm_schema::{SceneHeader, Text};
 
 #[test]
@@ -44,4 +44,58 @@ fn the_probe_lies_in_the_rectum_at_the_middle_of_the_target() {
     assert!((moved.middle_m - within.middle_m - within.axis * 5e-3).norm() < 1e-12);
     // From anterior to the patient's left: his right is z here.
     assert!((moved.up + Vector3::z()).norm() < 1e-9, "{}", moved.up);
+}
+
+/// The convention of roll: the axis of the probe is +z of the tool, its middle beam +y.
+#[test]
+fn a_probe_in_the_hand_looks_where_its_tool_says() {
+    let probe = Probe::default();
+    let tip_m = Vector3::new(1e-3, -30e-3, 40e-3);
+    let straight = Pose::of_tool(tip_m, &UnitQuaternion::identity(), &probe);
+    let (axis, up) = (Vector3::z(), Vector3::y());
+    assert!((straight.axis - axis).norm() < 1e-12 && (straight.up - up).norm() < 1e-12);
+    assert!((straight.middle_m - Vector3::new(1e-3, -30e-3, -2.5e-3)).norm() < 1e-12);
+    // Turned by 30 degrees from y towards -x, the patient's left in a scene that is not turned.
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 30_f64.to_radians());
+    let turned = Pose::of_tool(tip_m, &turn, &probe);
+    assert!(
+        (turned.up - Vector3::new(-0.5, 0.75_f64.sqrt(), 0.0)).norm() < 1e-12,
+        "{}",
+        turned.up
+    );
+    let (way_m, turn_rad) = turned.way_and_turn(&straight);
+    assert!(way_m.abs() < 1e-12 && (turn_rad - 30_f64.to_radians()).abs() < 1e-12);
+    assert!((straight.moved(0.0, turn_rad).up - turned.up).norm() < 1e-12);
+    // Tipped by 90 degrees about x: the tip goes where -y was, and the beam along z.
+    let tip = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 90_f64.to_radians());
+    let tipped = Pose::of_tool(tip_m, &tip, &probe);
+    assert!((tipped.axis + Vector3::y()).norm() < 1e-12 && (tipped.up - Vector3::z()).norm() < 1e-12);
+    assert!((tipped.middle_m - tip_m - Vector3::y() * 42.5e-3).norm() < 1e-12);
+    // A place before the middle of the array, 20 mm deep, stands in the middle of the picture.
+    for pose in [straight, turned, tipped] {
+        let plane = Plane {
+            pose,
+            ..plane(View::Transverse)
+        };
+        let before = pose.middle_m + pose.up * 30e-3;
+        assert!((plane.in_beams(before).depth_m - 20e-3).abs() < 1e-12 && plane.in_beams(before).across.abs() < 1e-12);
+        let again = Pose::of_tool(pose.tip_m(&probe), &pose.scene_from_tool(), &probe);
+        assert!((again.up - pose.up).norm() < 1e-12 && (again.middle_m - pose.middle_m).norm() < 1e-12);
+    }
+}
+
+#[test]
+fn way_and_turn_are_what_a_stepper_was_set_to() {
+    let base = Pose::of_tool(
+        Vector3::new(0.01, 0.02, 0.03),
+        &UnitQuaternion::from_euler_angles(0.3, -0.2, 0.5),
+        &Probe::default(),
+    );
+    for (way_m, turn_rad) in [(5e-3, 0.4), (-60e-3, -1.5), (0.0, 0.0)] {
+        let (way, turn) = base.moved(way_m, turn_rad).way_and_turn(&base);
+        assert!(
+            (way - way_m).abs() < 1e-12 && (turn - turn_rad).abs() < 1e-12,
+            "{way} {turn}"
+        );
+    }
 }

@@ -28,18 +28,15 @@ struct Twin {
     plane: Plane,
     grid: Grid,
     field: Field,
-    cube: Vec<u32>,
+    kept: Vec<u32>,
 }
 
 impl Twin {
     fn scatterer(&self, cell: [i64; 3]) -> Vector2<f64> {
-        let (z, y) = (cell[2].div_euclid(32), cell[1].div_euclid(128));
-        let at = [
-            (cell[0] + 37 * z + 53 * y).rem_euclid(128),
-            (cell[1] + 71 * z).rem_euclid(128),
-            cell[2].rem_euclid(32),
-        ];
-        let word = self.cube[((at[2] * 128 + at[1]) * 128 + at[0]) as usize];
+        let [x, y, z] = cell.map(|c| c as i32 as u32);
+        let mixed = y.wrapping_mul(0x9E37_79B1) ^ z.wrapping_mul(0x85EB_CA77);
+        let row = (mixed ^ (mixed >> 15)).wrapping_mul(0x2C1B_3C6D) >> 12;
+        let word = self.kept[row.wrapping_add(x) as usize % self.kept.len()];
         let part = |byte: u32| f64::from((word >> byte & 0xff) as u8 as i8) / 127.0 * LARGEST_ECHO;
         Vector2::new(part(0), part(8))
     }
@@ -135,7 +132,7 @@ fn the_shader_computes_what_a_slow_sum_in_double_precision_does() {
             plane,
             grid,
             field: field.clone(),
-            cube: scatterers(),
+            kept: scatterers(),
         };
         let mut worst_db: f64 = 0.0;
         for (line, sample) in [

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::rt::exchange::TissueOrder;
+use crate::rt::pose::TipPose;
 use crate::rt::second::{SecondLoop, SecondMemory, SecondOrder, gate_of, wire};
 use crate::rt::tissue::TissueLoop;
 use crate::rt::wiring::{Capacities, Wiring};
@@ -238,6 +239,17 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
         "{pressed_n} {lies_n}"
     );
     assert!(pressed_m.y > lies_m.y + 1e-3);
+    // The patient moves away from the probe, which goes after him.
+    let by_m = Vector3::new(0.0, 2e-3, 0.0);
+    wiring.haptic.pose.write(TipPose {
+        body_moved_m: by_m,
+        ..TipPose::default()
+    });
+    let after = theatre.pose(BALANCED_M + 5e-3, BEYOND_M);
+    let after = ProbePose::new((Vector3::from(after.tip_m) + by_m).into(), after.axis).expect("a pose");
+    let (moved_n, moved_m) = go(after, 2000);
+    assert!((moved_n - pressed_n).norm() < 0.15, "{moved_n} {pressed_n}");
+    assert!((moved_m - pressed_m).norm() < 0.15e-3, "{moved_m} {pressed_m}");
     let (out_n, out_m) = go(theatre.pose(BALANCED_M, BEYOND_M - 0.2), 4000);
     assert_eq!((out_n, out_m), (Vector3::zeros(), Vector3::zeros()));
 }

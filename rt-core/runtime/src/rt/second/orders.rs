@@ -33,6 +33,7 @@ impl SecondLoop {
                 SecondOrder::Engage => self.engage(tick),
                 SecondOrder::Disengage => self.memory.gate.release(),
                 SecondOrder::Reset => self.reset(),
+                SecondOrder::Up(up) => self.device.set_hand_up(up),
                 SecondOrder::HandOverTape => self.ports.flight.hand_over(),
             }
         }

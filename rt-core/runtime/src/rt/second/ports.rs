@@ -65,6 +65,8 @@ pub enum SecondOrder {
     Reset,
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
+    /// Where +y of the tool goes with the next goal; without it the simulated hand does not turn it about its axis.
+    Up(Option<Vector3<f64>>),
 }
 
 /// Ends that the second device's loop owns.

@@ -1,6 +1,7 @@
 //! The tissue loop's answer to the second device: what the probe that its hand holds presses.
 
 use super::TissueLoop;
+use crate::rt::put_in::moved;
 use crate::rt::second::ProbeResponse;
 use nalgebra::{SMatrix, Vector3};
 use stylet_hw::Wrench;
@@ -10,13 +11,14 @@ use stylet_sim::probe::ProbePose;
 const FELT_M: f64 = 1e-4;
 
 impl TissueLoop {
-    /// Where the second hand has the probe.
+    /// Where the second hand has the probe: in the body as the scene has it, from which an exercise may have moved it.
     pub(super) fn follow_second(&mut self) {
         let Some(second) = &mut self.ports.second else { return };
         let pose = second.pose.read();
         if pose.time_ns > 0 {
             let axis = pose.world_from_tool * Vector3::z();
-            self.probe_pose = ProbePose::new(pose.tip_in_scene.into(), axis.into()).or(self.probe_pose);
+            let tip_in_body = moved(pose.tip_in_scene, -self.pose.body_moved_m);
+            self.probe_pose = ProbePose::new(tip_in_body.into(), axis.into()).or(self.probe_pose);
         }
     }
 

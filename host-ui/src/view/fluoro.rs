@@ -1,0 +1,267 @@
+//! Fluoroscopy: a C-arm that turns, its beam while it is asked for, the last picture held, and what was spent.
+//!
+//! A pulse is computed on a thread of its own, so that no frame waits for it.
+
+mod tools;
+mod words;
+
+use super::body::ShownBody;
+use super::paste::{Paste, Pasted};
+use super::slice;
+use crate::shown::Shown;
+use crate::theme::IMAGE;
+use eframe::egui_wgpu::RenderState;
+use eframe::wgpu;
+use egui::emath::GuiRounding as _;
+use egui::{Pos2, Rect, Sense, Vec2};
+use nalgebra::Vector3;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use stylet_base::job::{Job, JobUpdate};
+use stylet_imaging::fluoroscopy::{CArm, DoseCounter, Exposure, Fluoroscope};
+use stylet_imaging::{Body, Gpu};
+use stylet_shm_schema::{SceneHeader, SceneId};
+use stylet_surfaces::field::Field;
+
+/// Pixels of a picture along an edge.
+const SIDE: u32 = 512;
+/// How far the arm turns, degrees.
+const ORBITAL_DEG: f64 = 100.0;
+const CRANIAL_DEG: f64 = 40.0;
+/// A drag of so many points turns the arm by a degree.
+const POINTS_PER_DEG: f64 = 3.0;
+/// A frame looks for a picture again after so long.
+const LOOK_AGAIN: Duration = Duration::from_millis(10);
+
+/// What stands for a patient: a run of the core and its scene.
+type Case = (u64, SceneId);
+
+/// A pulse that was computed: the tube comes back with it.
+type Pulse = (Fluoroscope, CArm, Vec<u8>);
+
+/// Tube, arm and screen.
+pub(super) struct FluoroView {
+    screen: Option<Screen>,
+    tube: Option<Tube>,
+    case: Option<(Case, Arc<Body>)>,
+    held: Option<Held>,
+    pub dose: DoseCounter,
+    angles: Angles,
+    /// Its switch stays where it is put; a key counts while it is held.
+    is_switched_on: bool,
+    is_key_held: bool,
+}
+
+/// How the arm stands, degrees.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Angles {
+    orbital: f64,
+    cranial: f64,
+}
+
+impl Angles {
+    fn turn(&mut self, orbital: f64, cranial: f64) {
+        self.orbital = (self.orbital + orbital).clamp(-ORBITAL_DEG, ORBITAL_DEG);
+        self.cranial = (self.cranial + cranial).clamp(-CRANIAL_DEG, CRANIAL_DEG);
+    }
+}
+
+/// Where pictures are shown.
+struct Screen {
+    gpu: Gpu,
+    paste: Paste,
+}
+
+enum Tube {
+    Ready(Box<Fluoroscope>),
+    AtWork(Job<Pulse>),
+}
+
+/// The last picture.
+struct Held {
+    pasted: Pasted,
+    arm: CArm,
+    /// When its pulse began.
+    at: Instant,
+}
+
+impl FluoroView {
+    /// Without a graphics device that computes there are no pictures.
+    pub fn new(state: Option<RenderState>) -> Self {
+        let screen = state.and_then(|state| {
+            let gpu = Gpu {
+                device: state.device.clone(),
+                queue: state.queue.clone(),
+            };
+            gpu.computes().then(|| Screen {
+                gpu,
+                paste: Paste::new(&state),
+            })
+        });
+        Self {
+            screen,
+            tube: None,
+            case: None,
+            held: None,
+            dose: DoseCounter::default(),
+            angles: Angles::default(),
+            is_switched_on: false,
+            is_key_held: false,
+        }
+    }
+
+    fn is_on(&self) -> bool {
+        self.is_switched_on || self.is_key_held
+    }
+
+    /// What the layout that was left behind does not keep on.
+    pub fn release(&mut self) {
+        (self.is_switched_on, self.is_key_held) = (false, false);
+    }
+
+    /// Another patient: nothing was spent, and no picture is held.
+    pub fn begin_case(&mut self) {
+        self.held = None;
+        self.dose = DoseCounter::default();
+        self.tube = None;
+    }
+
+    /// Draws the screen, and takes the next pulse while the beam is on.
+    pub fn picture_ui(&mut self, ui: &mut egui::Ui, rect: Rect, (shown, body, field): (&Shown, &ShownBody, &Field)) {
+        let response = ui.interact(rect, ui.scope_id().with("fluoroscopy"), Sense::drag());
+        let name = "C-arm screen";
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, name));
+        let by = response.drag_delta();
+        self.angles
+            .turn(f64::from(by.x) / POINTS_PER_DEG, f64::from(-by.y) / POINTS_PER_DEG);
+        let painter = ui.painter_at(rect);
+        painter.rect_filled(rect, 0.0, IMAGE.background);
+        let Some(model) = body.model().filter(|_| shown.scene.is_some()) else {
+            self.release();
+            slice::words(&painter, rect, &format!("{name}: no scene yet"), IMAGE.text);
+            return;
+        };
+        let case = (shown.session.map_or(0, |s| s.session_id), model.header.id());
+        if self.case.as_ref().is_none_or(|(before, _)| *before != case) {
+            self.begin_case();
+            self.release();
+            self.case = Body::of_scene(&model.header, &model.labels).map(|body| (case, Arc::new(body)));
+        }
+        let arm = self.arm(&model.header);
+        self.take_pulse();
+        if self.is_on() {
+            self.begin_pulse(arm, shown, field);
+        }
+        if self.is_on() || matches!(self.tube, Some(Tube::AtWork(_))) {
+            ui.ctx().request_repaint_after(LOOK_AGAIN);
+        }
+        if self.screen.is_none() {
+            slice::words(
+                &painter,
+                rect,
+                "No fluoroscopy: no wgpu device that computes",
+                IMAGE.text,
+            );
+            return;
+        }
+        let edge = rect.width().min(rect.height());
+        let square =
+            Rect::from_center_size(rect.center(), Vec2::splat(edge)).round_to_pixels(ui.ctx().pixels_per_point());
+        if let Some(held) = &self.held {
+            held.pasted.paint(&ui.painter_at(square), square);
+        }
+        self.words_over(&painter, rect, square, arm);
+    }
+
+    fn arm(&self, scene: &SceneHeader) -> CArm {
+        let middle_m = (Vector3::from(scene.target_lower_m) + Vector3::from(scene.target_upper_m)) * 0.5;
+        CArm {
+            pixels: [SIDE; 2],
+            orbital: self.angles.orbital.to_radians(),
+            cranial: self.angles.cranial.to_radians(),
+            ..CArm::about(middle_m, scene.patient().rotation().transpose())
+        }
+    }
+
+    fn begin_pulse(&mut self, arm: CArm, shown: &Shown, field: &Field) {
+        let exposure = Exposure::FLUOROSCOPY;
+        let is_due = |held: &Held| held.at.elapsed().as_secs_f64() >= exposure.beam_s;
+        if matches!(self.tube, Some(Tube::AtWork(_))) || !self.held.as_ref().is_none_or(is_due) {
+            return;
+        }
+        let (Some(screen), Some((_, body))) = (&self.screen, &self.case) else {
+            return;
+        };
+        let (body, field, metal) = (Arc::clone(body), field.clone(), shown.metal());
+        let mut tube = match self.tube.take() {
+            Some(Tube::Ready(tube)) => *tube,
+            _ => Fluoroscope::new(screen.gpu.clone()),
+        };
+        self.tube = Some(Tube::AtWork(Job::begin("fluoroscopy", move |sender, _| {
+            let greys = tube.shoot(&arm, &exposure, &body, &field, &metal).greys();
+            // Nobody waits for a picture of a window that was closed.
+            let _ = sender.send((tube, arm, greys));
+        })));
+        self.dose.count(&exposure, &arm);
+        if let Some(held) = &mut self.held {
+            held.at = Instant::now();
+        }
+    }
+
+    fn take_pulse(&mut self) {
+        let Some(Tube::AtWork(job)) = &self.tube else { return };
+        match job.poll() {
+            JobUpdate::Pending => {}
+            JobUpdate::Ended => self.tube = None,
+            JobUpdate::Message((tube, arm, greys)) => {
+                self.tube = Some(Tube::Ready(Box::new(tube)));
+                let at = self.held.take().map_or_else(Instant::now, |held| held.at);
+                self.held = self.screen.as_ref().and_then(|screen| screen.held(arm, &greys, at));
+            }
+        }
+    }
+}
+
+impl Screen {
+    fn held(&self, arm: CArm, greys: &[u8], at: Instant) -> Option<Held> {
+        let [width, height] = arm.pixels;
+        if greys.len() != width as usize * height as usize {
+            return None;
+        }
+        let size = wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        };
+        let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("stylet fluoroscopy"),
+            size,
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba8Unorm,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        let pixels: Vec<u8> = greys.iter().flat_map(|&grey| [grey, grey, grey, 255]).collect();
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(width * 4),
+            rows_per_image: Some(height),
+        };
+        self.gpu
+            .queue
+            .write_texture(texture.as_image_copy(), &pixels, layout, size);
+        let view = texture.create_view(&Default::default());
+        Some(Held {
+            pasted: self.paste.enlarged(&view),
+            arm,
+            at,
+        })
+    }
+}
+
+/// Beside the corner of a rectangle.
+fn inside(corner: Pos2, by: [f32; 2]) -> Pos2 {
+    corner + Vec2::from(by)
+}

@@ -1,0 +1,70 @@
+//! The switch of the beam and the angles of the arm.
+
+use super::{CRANIAL_DEG, FluoroView, ORBITAL_DEG};
+use egui::{Key, Modifiers};
+
+/// Of the keys, degrees.
+const STEP_DEG: f64 = 5.0;
+
+impl FluoroView {
+    /// Switch, angles, and another patient.
+    pub fn tools_ui(&mut self, ui: &mut egui::Ui) {
+        let beam = ui.toggle_value(&mut self.is_switched_on, "X-ray");
+        beam.on_hover_text("Key X while held: 8 pulses a second; afterwards the last image is held");
+        angle_ui(
+            ui,
+            (
+                "Orbital",
+                ORBITAL_DEG,
+                "Ctrl with left, right: the detector about the patient, to his left",
+            ),
+            &mut self.angles.orbital,
+        );
+        angle_ui(
+            ui,
+            (
+                "Cranial",
+                CRANIAL_DEG,
+                "Ctrl with up, down: the detector towards his head",
+            ),
+            &mut self.angles.cranial,
+        );
+        let case = ui.button("New case");
+        if case
+            .on_hover_text("Sets the dose to zero and clears the screen; another scene does so too")
+            .clicked()
+        {
+            self.begin_case();
+        }
+        self.keys(ui);
+    }
+
+    fn keys(&mut self, ui: &egui::Ui) {
+        self.is_key_held = false;
+        if ui.memory(|m| m.focused().is_some()) {
+            return;
+        }
+        ui.input_mut(|i| {
+            self.is_key_held = i.focused && i.key_down(Key::X);
+            let mut steps = |more, less| {
+                let mut count = |key| i.count_and_consume_key(Modifiers::CTRL, key) as f64;
+                STEP_DEG * (count(more) - count(less))
+            };
+            let (orbital, cranial) = (
+                steps(Key::ArrowRight, Key::ArrowLeft),
+                steps(Key::ArrowUp, Key::ArrowDown),
+            );
+            self.angles.turn(orbital, cranial);
+        });
+    }
+}
+
+fn angle_ui(ui: &mut egui::Ui, (name, most, hint): (&str, f64, &str), degrees: &mut f64) {
+    let drag = egui::DragValue::new(degrees)
+        .range(-most..=most)
+        .speed(0.5)
+        .fixed_decimals(0)
+        .prefix(format!("{name} "))
+        .suffix("°");
+    ui.add(drag).on_hover_text(hint);
+}

@@ -1,0 +1,125 @@
+//! What a picture of the probe shows, for whatever is drawn or clicked over it.
+
+use egui::{Pos2, Rect, Vec2};
+use nalgebra::{Vector2, Vector3};
+use stylet_imaging::ultrasound::{Plane, View};
+
+/// One picture of the probe as it stands in the window: from places of the window to places of the scene and back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProbePicture {
+    /// Of the picture that is seen, not of one that is yet to be computed.
+    plane: Plane,
+    rect: Rect,
+    is_live: bool,
+}
+
+impl ProbePicture {
+    pub(super) fn new(plane: Plane, rect: Rect, is_live: bool) -> Self {
+        Self { plane, rect, is_live }
+    }
+
+    /// Which of the probe's two planes it is.
+    pub fn view(&self) -> View {
+        self.plane.view
+    }
+
+    /// The plane, scene frame.
+    pub fn plane(&self) -> &Plane {
+        &self.plane
+    }
+
+    /// Where the picture stands, points of the window.
+    pub fn rect(&self) -> Rect {
+        self.rect
+    }
+
+    /// Whether it shows the probe, the tissue and the metal as they are in this frame; else it is that of a frame before.
+    pub fn is_live(&self) -> bool {
+        self.is_live
+    }
+
+    /// The place in the plane under a place of the window, scene frame, m; `None` beside the picture and outside of what its beams
+    /// reach.
+    pub fn place_m(&self, at: Pos2) -> Option<Vector3<f64>> {
+        let off = at - self.rect.min;
+        let per_point = self.pixels_per_point();
+        let pixel = Vector2::new(f64::from(off.x) * per_point.x, f64::from(off.y) * per_point.y);
+        let place_m = self.plane.place_of(pixel);
+        (self.rect.contains(at) && self.sees(place_m)).then_some(place_m)
+    }
+
+    /// Where a place of the scene, dropped onto the plane, stands in the window; it may be beside the picture.
+    pub fn at(&self, place_m: Vector3<f64>) -> Pos2 {
+        let (pixel, per_point) = (self.plane.pixel_of(place_m), self.pixels_per_point());
+        self.rect.min + Vec2::new((pixel.x / per_point.x) as f32, (pixel.y / per_point.y) as f32)
+    }
+
+    /// How far a place of the scene is from the plane, m: positive along the plane's normal.
+    pub fn beside_m(&self, place_m: Vector3<f64>) -> f64 {
+        self.plane.in_beams(place_m).beside_m
+    }
+
+    /// Whether the beams reach a place of the scene, dropped onto the plane.
+    pub fn sees(&self, place_m: Vector3<f64>) -> bool {
+        let at = self.plane.in_beams(place_m);
+        (0.0..=self.plane.depth_m).contains(&at.depth_m) && at.across.abs() <= self.plane.probe.half(self.plane.view)
+    }
+
+    fn pixels_per_point(&self) -> Vector2<f64> {
+        let [wide, high] = self.plane.pixels.map(f64::from);
+        let size = self.rect.size();
+        Vector2::new(wide / f64::from(size.x.max(1.0)), high / f64::from(size.y.max(1.0)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+    use stylet_imaging::ultrasound::{Pose, Probe};
+
+    fn picture(view: View) -> ProbePicture {
+        let probe = Probe::default();
+        let turn = UnitQuaternion::from_euler_angles(0.2, -0.1, 0.4);
+        let plane = Plane {
+            pose: Pose::of_tool(Vector3::new(5e-3, -20e-3, 60e-3), &turn, &probe),
+            view,
+            probe,
+            depth_m: 60e-3,
+            pixels: [660, 720],
+        };
+        // One and a half pixels to a point.
+        let rect = Rect::from_min_size(Pos2::new(286.0, 70.0), Vec2::new(440.0, 480.0));
+        ProbePicture::new(plane, rect, true)
+    }
+
+    #[test]
+    fn a_click_is_the_place_that_is_drawn_under_it() {
+        for view in View::ALL {
+            let picture = picture(view);
+            let mut seen = 0;
+            for at in [[506.0, 300.0], [450.0, 350.0], [560.0, 250.0]] {
+                let at = Pos2::from(at);
+                let Some(place_m) = picture.place_m(at) else { continue };
+                seen += 1;
+                assert!((picture.at(place_m) - at).length() < 1e-3, "{view:?} {at}");
+                assert!(picture.beside_m(place_m).abs() < 1e-12);
+            }
+            assert!(seen > 1, "{view:?}");
+            assert_eq!(picture.place_m(Pos2::new(200.0, 300.0)), None, "beside the picture");
+        }
+    }
+
+    #[test]
+    fn the_middle_beam_goes_up_from_the_middle_of_the_lower_edge() {
+        let picture = picture(View::Transverse);
+        let pose = picture.plane().pose;
+        let deep = picture.at(pose.middle_m + pose.up * 40e-3);
+        assert!((deep.x - picture.rect().center().x).abs() < 1e-3, "{deep}");
+        assert!(picture.sees(pose.middle_m + pose.up * 40e-3));
+        assert!(!picture.sees(pose.middle_m + pose.up * 5e-3), "in the probe");
+        assert!(!picture.sees(pose.middle_m + pose.up * 71e-3), "too deep");
+        let before = pose.middle_m + pose.axis * 3e-3;
+        assert!((picture.beside_m(before).abs() - 3e-3).abs() < 1e-12);
+    }
+}
