@@ -257,7 +257,7 @@ fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
     let own = review.drawn.contour.planes()[1].at_m;
     assert!(review.outline_at(own).is_some_and(|(_, is_own)| is_own));
     assert!(review.outline_at(own + 2.5e-3).is_some_and(|(_, is_own)| !is_own));
-    driven.picture("update-contour");
+    keep_for_docs(&driven.picture("update-contour"), "update");
     println!("{:.1} s: contoured", begun.elapsed().as_secs_f64());
 
     driven.click("Seeds");
@@ -307,7 +307,7 @@ fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
     driven.window.get_by_label("The update keeps the limits better.");
     let problems = misplaced(&driven.window);
     assert!(problems.is_empty(), "{}", problems.join("\n"));
-    keep_for_docs(&driven.picture("update-decision"), "update");
+    driven.picture("update-decision");
     driven.click("Accept");
     let after = plan(&driven);
     assert_eq!(after.needles[..BEFORE], before.needles[..BEFORE], "what is in stays");
