@@ -315,14 +315,14 @@ fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
     driven.click("Close");
 
     let needles = after.needles.len();
-    let go_on = format!("Continue at needle {} of {needles}", BEFORE + 1);
+    let next = format!("Continue at needle {} of {needles}", BEFORE + 1);
     let start = Instant::now();
-    while driven.window.query_by_label(&go_on).is_none() {
-        assert!(start.elapsed() < Duration::from_secs(20), "no {go_on}");
+    while driven.window.query_by_label(&next).is_none() {
+        assert!(start.elapsed() < Duration::from_secs(20), "no {next}");
         driven.window.run_steps(1);
         std::thread::sleep(Duration::from_millis(10));
     }
-    driven.click(&go_on);
+    driven.click(&next);
     wait_long(&mut driven, "all needles", |app| {
         app.planner().progress().done() == needles
     });

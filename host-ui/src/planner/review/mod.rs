@@ -325,7 +325,7 @@ impl Planner {
     }
 
     pub(super) fn take_update(&mut self, found: Proposed) {
-        // Needles may have gone in meanwhile.
+        // Needles may have been inserted meanwhile.
         if found.update.begun != self.progress.begun() {
             let why = "A needle went in while the others were planned; update the plan again.";
             self.message = Some(Message::Refused(why.to_owned()));
