@@ -1,8 +1,10 @@
 //! What the operator asks for, as plain data: pictures, panels and keys return it, the window carries it out.
 
 use crate::dialog::Purpose;
+use crate::planner::Edit;
 use crate::settings::Layout;
 use std::path::PathBuf;
+use stylet_implant::intraoperative::SeedsFrom;
 use stylet_implant::plan::{Hole, Row};
 use stylet_shm_schema::{LeaseRequest, Request};
 
@@ -138,6 +140,16 @@ pub enum PlanAction {
     NextNeedle,
     /// Moves the slices to this depth from the template's face, m.
     LookAt(f64),
+    /// Changes what is drawn on the live picture.
+    Draw(Edit),
+    /// Which seeds the dose of a moment is of.
+    SeedsFrom(SeedsFrom),
+    /// Plans the needles that are left anew.
+    Update,
+    /// Takes the update that waits, or leaves the plan as it is.
+    Decide(bool),
+    /// The plan before the last update again.
+    WithdrawUpdate,
 }
 
 /// A place that the three-dimensional picture is looked at from.

@@ -4,6 +4,7 @@ use super::drive::{BEFORE_ENTRY_M, Drive, Goal};
 use super::{App, Waiting, refusal};
 use crate::action::Action;
 use crate::panel::workflow::{Undo, next_action, undo_action};
+use crate::planner::Edit;
 use crate::settings::ThemeChoice;
 use crate::shown::LoadState;
 use std::time::Instant;
@@ -121,6 +122,8 @@ impl App {
                     self.act(action, ctx);
                 }
             }
+            Action::Undo if self.draws() => self.planner.draw(Edit::Undo),
+            Action::Redo if self.draws() => self.planner.draw(Edit::Redo),
             Action::Undo if self.edits_plan() => self.planner.undo(),
             Action::Redo if self.edits_plan() => self.planner.redo(),
             Action::Redo => {}

@@ -10,6 +10,7 @@ use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::SceneModel;
 use stylet_host::moments::Moment;
+use stylet_implant::intraoperative::Reviewed;
 use stylet_implant::plan::{Anatomy, ImplantPlan, exchange, file};
 use stylet_implant::provenance;
 use stylet_implant::score::{self, Implant, Motion, Score, SeedPair};
@@ -30,6 +31,7 @@ struct Delivered {
     motion: Motion,
     records: Vec<TickRecord>,
     moments: Vec<Moment>,
+    updates: Vec<Reviewed>,
     /// The plan as its file would be; `None` for one needle by hand.
     plan: Option<ImplantPlan>,
 }
@@ -111,6 +113,7 @@ impl App {
             motion: self.trace.motion(),
             records: self.trace.records().to_vec(),
             moments: self.moments.since(self.trace.began_ns().unwrap_or(u64::MAX)),
+            updates: self.planner.reviewed().to_vec(),
             plan: implant.map(|implant| implant.plan.clone()),
         })
     }
@@ -177,6 +180,7 @@ fn write(delivered: &Delivered, folder: PathBuf) -> Result<PathBuf, Failure> {
         motion: delivered.motion,
         records: &delivered.records,
         moments: delivered.moments.clone(),
+        updates: delivered.updates.clone(),
     })?;
     std::fs::create_dir_all(&folder).map_err(|e| format!("{} cannot be created ({e})", folder.display()))?;
     score::write(&score, delivered.made()?, &folder)?;

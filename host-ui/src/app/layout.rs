@@ -4,6 +4,7 @@ use super::{App, patch};
 use crate::action::Action;
 use crate::panel::instructor::instructor_ui;
 use crate::panel::parameters::parameters_ui;
+use crate::panel::review::review_ui;
 use crate::panel::trainees::trainees_ui;
 use crate::panel::workflow::{Progress, editor_ui, foot_height, foot_ui, run_ui, workflow_ui};
 use crate::panel::{banners, class, help, plots, status};
@@ -84,9 +85,16 @@ impl App {
         });
     }
 
-    /// Needles while a plan is edited, otherwise the instruments.
+    /// What is drawn on the live picture, or needles while a plan is edited, otherwise the instruments.
     fn right_ui(&mut self, ui: &mut egui::Ui, actions: &mut Vec<Action>) {
         let height = ui.available_height();
+        if self.draws() {
+            let at_m = self.middle.transverse_at_m(&self.shown);
+            ScrollArea::vertical().id_salt("review").show(ui, |ui| {
+                actions.extend(review_ui(ui, &self.shown, &mut self.middle.view.tool, at_m));
+            });
+            return;
+        }
         if self.edits_plan() {
             ScrollArea::vertical().id_salt("editor").show(ui, |ui| {
                 actions.extend(editor_ui(ui, &self.shown, &mut self.workflow.plan, height));
@@ -101,9 +109,10 @@ impl App {
     }
 
     fn choice_ui(&mut self, ui: &mut egui::Ui) {
-        let right = match self.edits_plan() {
-            true => "Needles",
-            false => "Instruments",
+        let right = match (self.draws(), self.edits_plan()) {
+            (true, _) => "Update",
+            (false, true) => "Needles",
+            (false, false) => "Instruments",
         };
         let strip = Frame::new()
             .fill(theme::of(ui).panel)

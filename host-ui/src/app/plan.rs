@@ -5,6 +5,7 @@ use super::{App, refusal};
 use crate::action::PlanAction;
 use crate::panel::workflow::Progress;
 use crate::planner::Message;
+use crate::settings::Layout;
 use crate::shown::Note;
 use nalgebra::Vector3;
 use std::path::PathBuf;
@@ -21,8 +22,16 @@ impl App {
         self.shown.planning.implant.is_some() && self.workflow.is_open(Progress::Plan)
     }
 
+    /// Whether clicks on the live picture draw.
+    pub(super) fn draws(&self) -> bool {
+        self.settings.layout == Layout::Probe && self.middle.view.tool.is_some()
+    }
+
     pub(super) fn take_plan(&mut self) {
         self.planner.take(self.link.scene(), self.shown.seeds.len());
+        if let (true, Some(scene), Some(snapshot)) = (self.draws(), self.link.scene(), self.link.snapshot()) {
+            self.planner.take_review(scene, snapshot);
+        }
         if let Some(message) = self.planner.take_message() {
             self.shown.note = Some(match message {
                 Message::Done(text) => Note { refused: false, text },
@@ -38,7 +47,7 @@ impl App {
     pub(super) fn act_on_plan(&mut self, action: PlanAction) {
         if !matches!(
             action,
-            PlanAction::Export(_) | PlanAction::ExportStudy | PlanAction::LookAt(_)
+            PlanAction::Export(_) | PlanAction::ExportStudy | PlanAction::LookAt(_) | PlanAction::Draw(_)
         ) {
             self.shown.note = None;
         }
@@ -73,6 +82,11 @@ impl App {
             }
             PlanAction::NextNeedle => self.next_needle(),
             PlanAction::LookAt(depth_m) => self.look_at(depth_m),
+            PlanAction::Draw(edit) => planner.draw(edit),
+            PlanAction::SeedsFrom(which) => planner.set_seeds_from(which),
+            PlanAction::Update => planner.update(self.link.scene(), self.link.snapshot()),
+            PlanAction::Decide(accept) => planner.decide(accept),
+            PlanAction::WithdrawUpdate => planner.withdraw_update(),
         }
     }
 

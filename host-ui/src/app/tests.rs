@@ -5,4 +5,5 @@ mod guide;
 mod held;
 mod pictures;
 mod text;
+mod update;
 mod whole;

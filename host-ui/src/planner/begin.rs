@@ -22,7 +22,7 @@ impl Planner {
         self.job = None;
     }
 
-    fn begin_job(
+    pub(super) fn begin_job(
         &mut self,
         what: &str,
         begin: impl FnOnce(&Self, Arc<AnatomyOutlines>) -> Result<Job<JobMessage>, Failure>,

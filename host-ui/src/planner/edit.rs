@@ -99,11 +99,11 @@ impl Planner {
         self.step(History::redo, History::undo);
     }
 
-    fn step(&mut self, step: fn(&mut History) -> bool, back: fn(&mut History) -> bool) {
+    fn step(&mut self, step: fn(&mut History<ImplantPlan>) -> bool, back: fn(&mut History<ImplantPlan>) -> bool) {
         let Some(mut history) = self.history.take() else { return };
-        let before = history.plan().clone();
+        let before = history.now().clone();
         if step(&mut history)
-            && let Err(why) = self.keeps(&before, history.plan())
+            && let Err(why) = self.keeps(&before, history.now())
         {
             back(&mut history);
             self.message = Some(Message::Refused(why.to_string()));
@@ -144,7 +144,7 @@ impl Planner {
     /// The plan or its anatomy has changed.
     pub(super) fn change(&mut self) {
         self.revision += 1;
-        let plan = self.history.as_ref().map(History::plan);
+        let plan = self.history.as_ref().map(History::now);
         let needles = plan.map_or(&[][..], |p| &p.needles[..]);
         self.compensated.retain(|(needle, _)| needles.contains(needle));
     }

@@ -12,6 +12,7 @@ use stylet_base::job::Job;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Source};
 use stylet_host::link::{Link, SceneModel};
+use stylet_implant::intraoperative::Proposed;
 use stylet_implant::linked::scene as study;
 use stylet_implant::plan::automatic::{self, Aims};
 use stylet_implant::plan::first::{self, FirstPlan};
@@ -42,6 +43,7 @@ pub(super) enum JobMessage {
     /// Plans to choose from, with what there is to know about them.
     First(Vec<FirstPlan>),
     Compensated(Box<(Needle, Compensation)>),
+    Update(Result<Box<Proposed>, Failure>),
     /// The last message, in words.
     End(Result<String, Failure>),
 }

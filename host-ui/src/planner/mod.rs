@@ -8,6 +8,7 @@ mod jobs;
 mod kept;
 mod needles;
 mod outlines;
+mod review;
 mod shown;
 
 use jobs::JobMessage;
@@ -16,6 +17,10 @@ use kept::Kept;
 pub(crate) use needles::NeedleProgress;
 pub use needles::NeedleState;
 pub(crate) use outlines::{AnatomyOutlines, Outline};
+#[cfg(test)]
+pub(crate) use review::Drawn;
+use review::Review;
+pub(crate) use review::{Edit, ReviewShown};
 pub(crate) use shown::{Implant, Planning};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -52,7 +57,7 @@ pub struct Planner {
     failed: Option<(SceneId, Template)>,
     /// The scene that the plan is for: its name and box.
     of_scene: Option<(String, [f64; 3])>,
-    history: Option<History>,
+    history: Option<History<ImplantPlan>>,
     /// Rises with each change of what is shown.
     revision: u64,
     problems: Option<Arc<Vec<Problem>>>,
@@ -68,6 +73,7 @@ pub struct Planner {
     /// Of the last automatic plan.
     proposals: Option<Arc<Vec<FirstPlan>>>,
     progress: NeedleProgress,
+    review: Review,
     /// The needle whose seeds were changed last, and when.
     drawn: Option<(usize, Instant)>,
     implant: Option<Arc<Implant>>,
@@ -79,7 +85,7 @@ pub struct Planner {
 impl Planner {
     /// The plan, where there is one.
     pub fn plan(&self) -> Option<&ImplantPlan> {
-        self.history.as_ref().map(History::plan)
+        self.history.as_ref().map(History::now)
     }
 
     /// Progress of its needles.
@@ -100,6 +106,7 @@ impl Planner {
             job: self.job.as_ref().map(|(_, progress)| progress.clone()),
             progress: self.progress.clone(),
             proposals: self.proposals.clone(),
+            review: self.review.shown(self.can_withdraw()),
         }
     }
 
@@ -111,7 +118,7 @@ impl Planner {
         self.take_job();
         self.take_problems();
         if self.progress.is_undone(seeds) {
-            self.set_progress(NeedleProgress::default());
+            self.restart();
         }
         self.show();
     }
@@ -237,6 +244,13 @@ impl Planner {
                 self.proposals = Some(Arc::new(found));
                 self.choose(0);
             }
+            JobUpdate::Message(JobMessage::Update(found)) => {
+                self.job = None;
+                match found {
+                    Ok(found) => self.take_update(*found),
+                    Err(why) => self.message = Some(Message::Refused(why.to_string())),
+                }
+            }
             JobUpdate::Message(JobMessage::Compensated(done)) => {
                 self.compensated.retain(|(needle, _)| *needle != done.0);
                 self.compensated.push(*done);
@@ -311,6 +325,7 @@ impl Planner {
 
     /// Begins the implantation again: no needle is inserted.
     pub fn restart(&mut self) {
+        self.review.restart();
         self.set_progress(NeedleProgress::default());
     }
 }

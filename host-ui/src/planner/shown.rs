@@ -3,6 +3,7 @@
 use super::jobs::JobProgress;
 use super::needles::{NeedleProgress, NeedleState};
 use super::outlines::AnatomyOutlines;
+use super::review::ReviewShown;
 use std::sync::Arc;
 use stylet_dose::Seed;
 use stylet_implant::plan::check::Problem;
@@ -23,6 +24,8 @@ pub struct Planning {
     pub progress: NeedleProgress,
     /// Plans of the last search, to choose from.
     pub proposals: Option<Arc<Vec<FirstPlan>>>,
+    /// What is drawn on the live picture, and the update of the plan by it.
+    pub review: ReviewShown,
 }
 
 impl Planning {
@@ -83,12 +86,12 @@ pub struct Implant {
 impl Implant {
     pub(super) fn of(
         revision: u64,
-        history: &History,
+        history: &History<ImplantPlan>,
         problems: Option<Arc<Vec<Problem>>>,
         progress: &NeedleProgress,
         compensated: &[(Needle, Compensation)],
     ) -> Self {
-        let plan = history.plan().clone();
+        let plan = history.now().clone();
         let found = |needle: &Needle| compensated.iter().find(|(n, _)| n == needle).map(|(_, done)| done);
         let rest_error_m = |needle: &Needle| {
             let done = found(needle)?;

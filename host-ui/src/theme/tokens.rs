@@ -133,6 +133,8 @@ pub struct ImageTokens {
     pub measure: Color32,
     /// The sign that a beam is on.
     pub beam: Color32,
+    /// What the operator draws.
+    pub drawn: Color32,
 }
 
 pub const IMAGE: ImageTokens = ImageTokens {
@@ -153,6 +155,7 @@ pub const IMAGE: ImageTokens = ImageTokens {
     ],
     measure: Color32::from_rgb(255, 255, 255),
     beam: Color32::from_rgb(255, 214, 60),
+    drawn: Color32::from_rgb(126, 224, 129),
 };
 
 #[cfg(test)]
@@ -223,6 +226,7 @@ mod tests {
             i.seed_planned,
             i.measure,
             i.beam,
+            i.drawn,
         ];
         for ink in lines.into_iter().chain(i.isodose) {
             assert!(contrast(ink, i.background) >= 4.5, "{ink:?}");

@@ -1,13 +1,14 @@
 //! What stands in the middle of the window: the three-dimensional picture, the slices, and the tools over them.
 
 use super::body::ShownBody;
+use super::draw::Drawing;
 use super::driver::DriverCost;
 use super::fluoro::FluoroView;
 use super::orientation::Orientation;
 use super::probe::{ProbePicture, ProbeView};
 use super::scene3d::Scene3d;
 use super::slice::{ImageError, Plane, Slices};
-use super::state::ViewState;
+use super::state::{Tool, ViewState};
 use crate::action::{Action, Viewpoint};
 use crate::dose_worker::DoseResult;
 use crate::settings::Layout;
@@ -33,6 +34,8 @@ pub struct Middle {
     pub(crate) solid: Scene3d,
     slices: Slices,
     probe: ProbeView,
+    /// One for each plane of the probe.
+    drawings: [Drawing; 2],
     fluoro: FluoroView,
     body: ShownBody,
     /// What all pictures share.
@@ -56,6 +59,7 @@ impl Middle {
             solid: Scene3d::new(state.clone()),
             slices: Slices::new(state.clone()),
             probe: ProbeView::new(state.clone()),
+            drawings: Default::default(),
             fluoro: FluoroView::new(state),
             body: ShownBody::default(),
             view: ViewState::default(),
@@ -94,6 +98,12 @@ impl Middle {
     /// A picture of the probe as it stood in the window in the last frame; `None` where the layout has none.
     pub fn probe_picture(&self, view: View) -> Option<&ProbePicture> {
         self.probe.picture(view)
+    }
+
+    /// Where the transverse plane of the probe is along its axis, m.
+    pub(crate) fn transverse_at_m(&self, shown: &Shown) -> Option<f64> {
+        let (frame, picture) = (shown.planning.review.frame?, self.probe.picture(View::Transverse)?);
+        Some(frame.in_plane_m(picture.plane().pose.middle_m).1)
     }
 
     /// What fluoroscopy has cost this patient.
@@ -156,6 +166,10 @@ impl Middle {
         for (view, rect) in places.probe {
             let seen = (shown, &self.body, self.slices.field());
             actions.extend(self.probe.picture_ui(ui, rect, view, seen));
+            if let Some(picture) = self.probe.picture(view).filter(|_| layout == Layout::Probe) {
+                let (tool, review) = (self.view.tool, &shown.planning.review);
+                actions.extend(self.drawings[view as usize].draw_ui(ui, picture, tool, review));
+            }
         }
         match places.fluoro {
             Some(rect) => {
@@ -184,6 +198,12 @@ impl Middle {
         if layout == Layout::Probe {
             ui.separator();
             actions.extend(self.probe.tools_ui(ui, shown));
+            let mut draws = self.view.tool.is_some();
+            let toggle = ui.toggle_value(&mut draws, "Update plan");
+            let hint = "Contour the gland and mark seeds on the live picture, and plan the needles that are left anew";
+            if toggle.on_hover_text(hint).clicked() {
+                self.view.tool = draws.then_some(Tool::Contour);
+            }
         }
         if layout == Layout::Fluoroscopy {
             ui.separator();

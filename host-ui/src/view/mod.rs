@@ -3,6 +3,7 @@
 mod body;
 mod camera;
 mod collected;
+mod draw;
 pub(crate) mod driver;
 mod fluoro;
 mod gpu;
@@ -16,5 +17,5 @@ mod pick;
 pub mod probe;
 mod scene3d;
 pub mod slice;
-mod state;
+pub(crate) mod state;
 mod uniforms;

@@ -37,6 +37,26 @@ impl Measure {
     }
 }
 
+/// What clicks on the picture of the probe draw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tool {
+    /// The edge of the gland.
+    Contour,
+    /// Seeds where they are seen.
+    Seeds,
+}
+
+impl Tool {
+    pub const ALL: [Self; 2] = [Self::Contour, Self::Seeds];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Contour => "Contour",
+            Self::Seeds => "Seeds",
+        }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewState {
     /// Where the three slices meet, scene frame.
@@ -44,6 +64,8 @@ pub struct ViewState {
     /// The slices go through the tip of the needle.
     pub follow_tip: bool,
     pub measure: Measure,
+    /// What is drawn on the picture of the probe.
+    pub tool: Option<Tool>,
     /// Half of the body is cut away at this slice.
     pub section: Option<Orientation>,
     pub isodose: bool,
@@ -57,6 +79,7 @@ impl Default for ViewState {
             cursor_m: Vector3::repeat(0.03),
             follow_tip: true,
             measure: Measure::default(),
+            tool: None,
             section: None,
             isodose: true,
             image: true,

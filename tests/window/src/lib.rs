@@ -19,6 +19,8 @@ mod states;
 #[cfg(test)]
 mod terminal;
 #[cfg(test)]
+mod update;
+#[cfg(test)]
 mod watch;
 #[cfg(test)]
 mod whole;

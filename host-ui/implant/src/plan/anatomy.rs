@@ -23,6 +23,10 @@ pub struct Body {
     /// Name as the scene gives it.
     pub name: String,
     mesh: Mesh,
+    /// Of the closed surface that decides what is inside.
+    corners_m: Vec<[f64; 3]>,
+    faces: Vec<[usize; 3]>,
+    /// Of the surface that is drawn.
     points_m: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
 }
@@ -36,6 +40,8 @@ impl Body {
                 name: name.to_owned(),
                 why: why.to_string(),
             })?,
+            corners_m: points_m.to_vec(),
+            faces: triangles.to_vec(),
             points_m: points_m.iter().map(|p| p.map(|c| c as f32)).collect(),
             triangles: triangles.iter().map(|t| t.map(|i| i as u32)).collect(),
         })
@@ -54,6 +60,17 @@ impl Body {
             self.triangles = triangles.iter().map(|t| t.map(|v| v - first)).collect();
         }
         self
+    }
+
+    /// The same structure with each of its corners moved, as by the tissue that it is part of; drawn by its closed surface.
+    pub fn moved(&self, to_m: impl Fn([f64; 3]) -> [f64; 3]) -> Result<Self, PlanError> {
+        let moved: Vec<[f64; 3]> = self.corners_m.iter().map(|corner| to_m(*corner)).collect();
+        Self::new(&self.name, &moved, &self.faces)
+    }
+
+    /// Corners and triangles of the closed surface that decides what is inside, m.
+    pub fn closed_surface(&self) -> (&[[f64; 3]], &[[usize; 3]]) {
+        (&self.corners_m, &self.faces)
     }
 
     /// Its surface, as it is drawn.
@@ -161,6 +178,17 @@ impl Anatomy {
             lower_m: header.lower_m,
             upper_m: header.upper_m,
             patient: header.patient(),
+        })
+    }
+
+    /// The anatomy of a moment: this target, and all else moved with the tissue.
+    pub fn seen_as(&self, target: Body, to_m: &dyn Fn([f64; 3]) -> [f64; 3]) -> Result<Self, PlanError> {
+        let moved = |bodies: &[Body]| bodies.iter().map(|body| body.moved(to_m)).collect::<Result<_, _>>();
+        Ok(Self {
+            target,
+            spared: moved(&self.spared)?,
+            bone: moved(&self.bone)?,
+            ..*self
         })
     }
 

@@ -192,44 +192,44 @@ impl ImplantPlan {
     }
 }
 
-/// A plan with the plans that it was before, and those that were taken back.
-#[derive(Clone, Debug, PartialEq)]
-pub struct History {
-    now: ImplantPlan,
-    before: Vec<ImplantPlan>,
-    taken_back: Vec<ImplantPlan>,
+/// A value that is edited, such as a plan, with the values that it was before, and those that were taken back.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct History<T> {
+    now: T,
+    before: Vec<T>,
+    taken_back: Vec<T>,
 }
 
-impl History {
-    /// A history that begins with this plan.
-    pub fn new(plan: ImplantPlan) -> Self {
+impl<T: Clone + PartialEq> History<T> {
+    /// A history that begins with this value.
+    pub fn new(value: T) -> Self {
         Self {
-            now: plan,
+            now: value,
             before: Vec::new(),
             taken_back: Vec::new(),
         }
     }
 
-    /// The present plan.
-    pub fn plan(&self) -> &ImplantPlan {
+    /// The present value.
+    pub fn now(&self) -> &T {
         &self.now
     }
 
-    /// A plan that is the same is no step.
-    pub fn put(&mut self, plan: ImplantPlan) {
-        if plan == self.now {
+    /// A value that is the same is no step.
+    pub fn put(&mut self, value: T) {
+        if value == self.now {
             return;
         }
-        self.before.push(std::mem::replace(&mut self.now, plan));
+        self.before.push(std::mem::replace(&mut self.now, value));
         self.taken_back.clear();
         if self.before.len() > STEPS {
             self.before.remove(0);
         }
     }
 
-    /// In place of the present plan, without a step: a value that is still being drawn.
-    pub fn replace(&mut self, plan: ImplantPlan) {
-        self.now = plan;
+    /// In place of the present value, without a step: one that is still being drawn.
+    pub fn replace(&mut self, value: T) {
+        self.now = value;
         self.taken_back.clear();
     }
 
@@ -245,17 +245,17 @@ impl History {
 
     /// False when there is nothing to take back.
     pub fn undo(&mut self) -> bool {
-        let Some(plan) = self.before.pop() else { return false };
-        self.taken_back.push(std::mem::replace(&mut self.now, plan));
+        let Some(value) = self.before.pop() else { return false };
+        self.taken_back.push(std::mem::replace(&mut self.now, value));
         true
     }
 
     /// False when there is nothing to redo.
     pub fn redo(&mut self) -> bool {
-        let Some(plan) = self.taken_back.pop() else {
+        let Some(value) = self.taken_back.pop() else {
             return false;
         };
-        self.before.push(std::mem::replace(&mut self.now, plan));
+        self.before.push(std::mem::replace(&mut self.now, value));
         true
     }
 }

@@ -43,6 +43,9 @@ pub enum PlanError {
     /// The strength cannot follow from the dose.
     #[error("the seeds give the target no dose")]
     NoDose,
+    /// Seeds beside those that lie in the tissue have one strength.
+    #[error("where seeds lie in the tissue, those to be added have one strength")]
+    Strengths,
     /// Whoever asked for the plan ended the search.
     #[error("the search was cancelled")]
     Cancelled,

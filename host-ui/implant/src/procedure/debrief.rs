@@ -72,6 +72,7 @@ pub fn write(
         motion: Motion::of(&seen.records, drops.first().map_or([0.0, 0.0, 1.0], |d| d.direction)),
         records: &seen.records,
         moments: seen.events.iter().filter_map(Moment::of).collect(),
+        updates: Vec::new(),
     })?;
     score::write(&score, made, out)?;
     print!("planned\n{}", score.judge.table(&score.planned));

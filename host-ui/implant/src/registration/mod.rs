@@ -5,6 +5,8 @@
 
 mod assign;
 
+pub(crate) use assign::least_cost;
+
 use crate::pairing;
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
@@ -68,7 +70,7 @@ impl RigidFit {
         };
         let optimal = |moved: &[Vector3<f64>]| {
             let cost = |p: usize, f: usize| (planned[p] - moved[f]).norm_squared();
-            assign::least_cost(planned.len(), moved.len(), &cost)
+            least_cost(planned.len(), moved.len(), &cost)
         };
         let starts = std::iter::once(Matrix3::identity()).chain(turns);
         let fits = starts.map(|rotation| {

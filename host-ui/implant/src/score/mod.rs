@@ -7,8 +7,10 @@ mod outline;
 mod page;
 mod picture;
 mod trace;
+mod updates;
 mod write;
 
+use crate::intraoperative::Reviewed;
 use crate::pairing::SeedOffset;
 use crate::plan::{Anatomy, Hole};
 pub use dose_cost::{Cost, costs};
@@ -103,6 +105,8 @@ pub struct Implant<'a> {
     pub records: &'a [TickRecord],
     /// What was marked, put in by an instructor, or went wrong meanwhile.
     pub moments: Vec<Moment>,
+    /// Updates of the plan while needles went in, taken or not.
+    pub updates: Vec<Reviewed>,
 }
 
 /// The result.

@@ -1,6 +1,6 @@
 //! The debrief: one page that stands by itself, with the pictures in it.
 
-use super::{Score, ScoreError, picture};
+use super::{Score, ScoreError, picture, updates};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use stylet_base::format;
 
@@ -76,6 +76,7 @@ pub fn page(score: &Score) -> Result<String, ScoreError> {
                     }
                     (PreEscaped(dvh))
                     (measures(score))
+                    (updates::section(&i.updates))
                     h2 { "Cost of each seed" }
                     p {
                         "Each line: what the implant would gain if this one seed lay on plan and all others stayed where \

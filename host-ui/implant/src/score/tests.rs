@@ -1,7 +1,9 @@
 //! Scores of implants whose errors are known, against dose computed anew.
 
 use super::*;
+use crate::intraoperative::{Agreement, Doses, SeedsFrom};
 use crate::plan::anatomy::ball;
+use crate::plan::optimise::Figures;
 use bytemuck::Zeroable;
 use stylet_anatomy::PatientFrame;
 use stylet_dose::decay::Interval;
@@ -67,6 +69,7 @@ fn score<'a>(off: &[usize], anatomy: &'a Anatomy, kernel: &'a DoseKernel, record
             kind: MomentKind::Mark,
             text: "apex <left>".to_owned(),
         }],
+        updates: Vec::new(),
     })
     .unwrap()
 }
@@ -99,6 +102,58 @@ fn what_was_marked_stands_on_the_page_and_in_the_figures() {
     );
     let page = page::page(&score).expect("drawn");
     assert!(page.contains("apex &lt;left&gt;"), "the words, escaped");
+}
+
+#[test]
+fn an_update_of_the_plan_is_in_the_debrief_with_the_contour_against_the_true_gland() {
+    let (anatomy, kernel) = (anatomy(), kernel());
+    let records = [<TickRecord as Zeroable>::zeroed()];
+    let mut score = score(&[], &anatomy, &kernel, &records);
+    let section = |score: &Score| page::page(score).expect("drawn").contains("Updates of the plan");
+    assert!(!section(&score));
+    let figures = |d90: f64| Figures {
+        d90,
+        ..Figures::default()
+    };
+    score.implant.updates.push(Reviewed {
+        begun: 7,
+        lying: 21,
+        seeds_from: SeedsFrom::Marks,
+        agreement: Some(Agreement {
+            dice: 0.9312,
+            mean_m: 0.81e-3,
+            hausdorff_m: 3.2e-3,
+            volumes_m3: [38.2e-6, 40.1e-6],
+        }),
+        marked: [19, 1],
+        residuals_m: Some([1.24e-3, 3.9e-3]),
+        doses: Doses {
+            now: figures(41.0),
+            continued: figures(88.25),
+        },
+        updated: figures(103.0),
+        left: [[8, 30], [7, 28]],
+        accepted: true,
+    });
+    let json = &to_json(&score)["updates"][0];
+    assert_eq!(json["contour"]["dice"], 0.9312);
+    assert_eq!(
+        (&json["continued"]["target_d90_percent"], &json["accepted"]),
+        (&88.25.into(), &true.into())
+    );
+    assert_eq!(
+        (&json["marked"], &json["left_updated"]["seeds"]),
+        (&19.into(), &28.into())
+    );
+    let page = page::page(&score).expect("drawn");
+    for words in [
+        "Dice 0.931, surfaces 0.81 mm apart on average and 3.2 mm at most, 38.2 cc of 40.1 cc",
+        "Update 1, taken",
+        "19 seeds were marked, 1.2 mm off on average and 3.9 mm at most; marks of no seed: 1",
+        "8 needles with 30 seeds were left, 7 with 28 in the update",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A score as JSON and as a page.
 
-use super::{Score, ScoreError, page};
+use super::{Score, ScoreError, page, updates};
 use serde_json::{Value, json};
 use std::path::Path;
 use stylet_base::write_whole;
@@ -33,6 +33,7 @@ pub fn to_json(score: &Score) -> Value {
         "delivered": score.judge.to_json(&score.delivered),
         "cost_is": "gain if this seed alone lay on plan: D90 and V100 lost, dose to the urethra saved",
         "moments": i.moments.iter().map(|m| json!({ "at_s": score.at_s(m), "kind": m.kind.name(), "text": m.text })).collect::<Vec<_>>(),
+        "updates": i.updates.iter().map(updates::to_json).collect::<Vec<_>>(),
         "seeds": i.pairs.iter().zip(&score.costs).map(seed).collect::<Vec<_>>(),
         "motion": {
             "duration_s": m.duration_s, "in_tissue_s": m.in_tissue_s,

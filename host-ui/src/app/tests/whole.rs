@@ -2,11 +2,13 @@
 
 use super::fixture::{Drawn, LONG_PATH, dose, live, many_needles, one_needle, proposals};
 use super::text::misplaced;
+use super::update::{deciding, drawing, searching};
 use crate::app::App;
 use crate::app::layout::Narrow;
 use crate::panel::workflow::Progress;
 use crate::settings::Layout;
 use crate::shown::{LoadState, Note, Shown, Watched};
+use crate::view::state::Tool;
 use bytemuck::Zeroable;
 use stylet_host::link::LinkStatus;
 use stylet_procedure::{Step, Waiting, WaitsFor};
@@ -178,6 +180,10 @@ pub const STATES: &[State] = &[
         app.shown = many_needles(24, 0);
         app.narrow = Narrow::Right;
     }),
+    ("gland is contoured", |app| drawing(app, Tool::Contour)),
+    ("seeds are marked", |app| drawing(app, Tool::Seeds)),
+    ("needles that are left are planned", searching),
+    ("update of the plan", deciding),
     ("goes on at needle 2 of 19", |app| {
         app.shown = many_needles(19, 2);
         app.shown.continues_at = Some((1, 19));

@@ -15,6 +15,7 @@ const TABLE_HEIGHT: f32 = 150.0;
 
 pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     seeds_ui(ui, shown, &all_errors(shown));
+    updates_ui(ui, shown);
     dose_ui(ui, shown, 60.0, "The dose is computed once seeds lie in the tissue.");
     let save = ui.add_enabled(!shown.seeds.is_empty(), egui::Button::new("Save the debrief"));
     if save
@@ -22,6 +23,19 @@ pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         .clicked()
     {
         actions.push(Action::SaveDebrief);
+    }
+}
+
+/// One line for each update of the plan: how near its contour was to the true gland.
+fn updates_ui(ui: &mut egui::Ui, shown: &Shown) {
+    for update in &shown.planning.review.reviewed {
+        let what = if update.accepted { "updated" } else { "kept" };
+        let contour = update.agreement.map_or_else(String::new, |a| {
+            format!(": contour Dice {:.2}, {:.1} mm off", a.dice, format::mm(a.mean_m))
+        });
+        let text = format!("Plan {what} after needle {}{contour}", update.begun);
+        let label = ui.add(egui::Label::new(theme::small(text)).truncate());
+        label.on_hover_text("The gland as it was contoured on the live picture, against the true gland at that moment");
     }
 }
 

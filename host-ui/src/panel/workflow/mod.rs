@@ -2,7 +2,7 @@
 
 mod debrief;
 mod guide;
-mod job;
+pub(super) mod job;
 mod left;
 mod plan;
 mod progress;

@@ -137,15 +137,15 @@ fn undo_gives_back_each_plan_and_redo_the_next() {
     plans.iter().for_each(|p| history.put(p.clone()));
     for plan in plans[..3].iter().rev() {
         assert!(history.undo());
-        assert_eq!(history.plan(), plan);
+        assert_eq!(history.now(), plan);
     }
     assert!(!history.undo());
     assert!(history.redo());
-    assert_eq!(history.plan(), &plans[1]);
+    assert_eq!(history.now(), &plans[1]);
     history.put(good());
     assert!(!history.redo(), "a new plan forgets those that were taken back");
     assert!(history.undo());
-    assert_eq!(history.plan(), &plans[1]);
+    assert_eq!(history.now(), &plans[1]);
 }
 
 #[test]
@@ -190,10 +190,10 @@ fn a_value_that_is_being_drawn_is_one_step() {
     let mut history = History::new(empty());
     history.put(good());
     for deepest_m in [0.081, 0.082, 0.083] {
-        let mut row = Row::of(&history.plan().needles[0]).unwrap();
+        let mut row = Row::of(&history.now().needles[0]).unwrap();
         row.deepest_m = deepest_m;
-        history.replace(history.plan().with_row(0, row).unwrap());
+        history.replace(history.now().with_row(0, row).unwrap());
     }
     assert!(history.undo());
-    assert_eq!(history.plan(), &empty());
+    assert_eq!(history.now(), &empty());
 }

@@ -46,15 +46,15 @@ pub struct Candidates {
 }
 
 impl Candidates {
-    /// Every hole with enough target behind it that is reached past bone and past what is spared.
-    pub fn new(template: &Template, anatomy: &Anatomy) -> Self {
+    /// Every hole but the used ones with enough target behind it that is reached past bone and past what is spared.
+    pub fn new(template: &Template, anatomy: &Anatomy, used: &[Hole]) -> Self {
         let mut found = Self {
             template: *template,
             ways: Vec::new(),
             places: Vec::new(),
             behind_bone: 0,
         };
-        for hole in Hole::all() {
+        for hole in Hole::all().filter(|hole| !used.contains(hole)) {
             found.add(hole, anatomy);
         }
         found

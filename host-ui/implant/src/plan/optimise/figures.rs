@@ -17,6 +17,8 @@ pub struct Figures {
     pub d90: f64,
     /// Share of the target with 150 % of the prescription.
     pub v150: f64,
+    /// Share of the target with 200 % of the prescription; it has no limit.
+    pub v200: f64,
     /// Dose to the hottest tenth of the urethra.
     pub urethra_d10: Option<f64>,
     /// Dose to the hottest 30 % of the urethra.
@@ -36,6 +38,11 @@ pub struct Measure {
 }
 
 impl Measure {
+    /// Structure and measure, for people.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
     /// How far it is beyond its limits, percent; 0 within them.
     pub fn beyond(&self) -> f64 {
         let [least, most] = self.limits;
@@ -69,6 +76,7 @@ impl Figures {
             v100: share(1.0),
             d90: to_share(target, 0.9)?,
             v150: share(1.5),
+            v200: share(2.0),
             urethra_d10: urethra.as_ref().and_then(|dvh| to_share(dvh, 0.1)),
             urethra_d30: urethra.as_ref().and_then(|dvh| to_share(dvh, 0.3)),
             rectum_d2cc: other.as_ref().and_then(|dvh| percent(dvh.dose_of_gy(rectum))),

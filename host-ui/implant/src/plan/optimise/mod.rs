@@ -22,8 +22,8 @@ pub use search::Search;
 use super::anatomy::Body;
 use super::dose::criteria::DoseStructure;
 use super::dose::perturb::{Errors, Perturbation};
-use super::dose::{DoseKernel, Source};
-use super::{Anatomy, ImplantPlan, PlanError, Template};
+use super::dose::{DoseKernel, Seed, Source};
+use super::{Anatomy, Hole, ImplantPlan, PlanError, Template};
 use std::ops::ControlFlow;
 
 /// How the search goes on from the greedy choice of seeds.
@@ -51,6 +51,18 @@ pub struct Objectives {
     pub robust: Statistic,
     /// What a needle costs beside [`Objectives::USUAL_NEEDLE`]: more of it gives a plan with fewer needles.
     pub needle_cost: f32,
+    /// What lies in the tissue before the search begins.
+    pub present: Present,
+}
+
+/// Seeds that lie in the tissue and holes that were used: a search adds to them and changes none of them. Where there are such seeds,
+/// those at hand have one strength, and [`Objectives::strengths_u`] is that one alone.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Present {
+    /// Seeds as they lie, scene frame. They no longer miss their places.
+    pub seeds: Vec<Seed>,
+    /// Holes that needles went through.
+    pub holes: Vec<Hole>,
 }
 
 /// The mean distance of a seed from its place is about 5 mm in the clinic; 4 mm along each axis is the usual figure for studies.
@@ -73,6 +85,16 @@ impl Objectives {
             misplacement: MISPLACEMENT,
             robust: Statistic::USUAL,
             needle_cost: Self::USUAL_NEEDLE,
+            present: Present::default(),
+        }
+    }
+
+    /// The usual ones where seeds lie in the tissue already; those to be added have this strength, U.
+    pub fn beside(present: Present, strength_u: f64, source: &Source, prescription_gy: f64) -> Self {
+        Self {
+            strengths_u: vec![strength_u],
+            present,
+            ..Self::new(source, prescription_gy)
         }
     }
 }

@@ -45,12 +45,23 @@ pub struct Trials {
 }
 
 impl Trials {
-    /// Moves seeds and computes the dose of the target for each trial. Seeds with the same number in `needles` may share their errors.
-    pub fn new(target: &Body, kernel: &DoseKernel, (seeds, needles): (&[Seed], &[usize]), how: Perturbation) -> Self {
+    /// Moves seeds and computes the dose of the target for each trial. Seeds with the same number in `needles` may share their errors;
+    /// those that lie there already stay.
+    pub fn new(
+        target: &Body,
+        kernel: &DoseKernel,
+        (seeds, needles): (&[Seed], &[usize]),
+        present: &[Seed],
+        how: Perturbation,
+    ) -> Self {
         let target = target.structure(PITCH_M);
-        let points = DosePoints::new(&target.points_m);
+        let mut points = DosePoints::new(&target.points_m);
+        points.add(kernel, present);
         let d90_gy = |trial: usize| {
-            let gy = points.of_seeds_gy(kernel, &moved(seeds, needles, how, trial));
+            let mut gy = points.of_seeds_gy(kernel, &moved(seeds, needles, how, trial));
+            gy.iter_mut()
+                .zip(points.dose_gy())
+                .for_each(|(gy, of_present)| *gy += of_present);
             let dvh = Dvh::new(&gy, &target.volumes_m3)?;
             dvh.dose_of_gy(0.9 * dvh.volume_m3())
         };

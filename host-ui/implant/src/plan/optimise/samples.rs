@@ -34,19 +34,22 @@ pub struct Samples {
     pub variance: Range<usize>,
     /// Weight of each point.
     pub weights: Vec<f32>,
+    /// Dose of the seeds that lie there already, for each U of those that are added: zeros where there are none.
+    pub present: Vec<f32>,
     /// Dose of 1 U as a share of the prescription, place by place.
     of_one_u: Vec<f32>,
 }
 
 impl Samples {
     /// Draws the points and computes the dose of each place at each of them, where it is planned and over the errors of `how`.
-    /// `usual_u` is a strength in the middle of the catalogue.
+    /// `usual_u` is a strength in the middle of the catalogue; seeds that are `present` have their strength for each U of the others.
     pub fn new(
         bodies: [Option<&Body>; 3],
         candidates: &Candidates,
         kernel: &DoseKernel,
         (prescription_gy, usual_u): (f64, f64),
         how: Perturbation,
+        present: &[Seed],
     ) -> Self {
         let axis = Some(candidates.inwards());
         let seeds: Vec<Seed> = candidates
@@ -81,7 +84,16 @@ impl Samples {
             misplaced.moments(kernel, seed.position_m, &mut row);
             row
         };
+        // What lies there no longer misses its place: its mean is its dose, and nothing varies.
+        let share = |gy: f64| (gy / prescription_gy) as f32;
+        let mut of_present: Vec<f32> = DosePoints::new(&drawn.points_m)
+            .of_seeds_gy(kernel, present)
+            .into_iter()
+            .map(share)
+            .collect();
+        of_present.resize(variance.end, 0.0);
         Self {
+            present: of_present,
             of_one_u: seeds.par_iter().flat_map_iter(of_seed).collect(),
             target: of_target,
             urethra: of_urethra,

@@ -8,7 +8,7 @@ use super::robust::Trials;
 use super::samples::Samples;
 use super::state::State;
 use super::{Method, Objectives, Proposal, bodies, greedy};
-use crate::plan::dose::DoseKernel;
+use crate::plan::dose::{DoseKernel, Seed};
 use crate::plan::{Anatomy, PlanError, Template};
 use std::ops::ControlFlow;
 
@@ -55,10 +55,13 @@ pub struct Search<'a> {
     candidates: Candidates,
     samples: Samples,
     engine: Engine<'a>,
+    /// Seeds that lie there already, each with its strength for each U of those that are added.
+    present: Vec<Seed>,
 }
 
 impl<'a> Search<'a> {
-    /// Doses of all places; prescription, strengths and misplacement are those of `objectives`. `report` as for [`super::plan`].
+    /// Doses of all places; prescription, strengths, misplacement and what is present are those of `objectives`. `report` as for
+    /// [`super::plan`].
     pub fn new(
         template: Template,
         anatomy: &'a Anatomy,
@@ -68,14 +71,22 @@ impl<'a> Search<'a> {
         report: Report<'_>,
     ) -> Result<Self, PlanError> {
         go_on(report(0.0))?;
-        let candidates = Candidates::new(&template, anatomy);
+        let candidates = Candidates::new(&template, anatomy, &objectives.present.holes);
         let strengths_u = &objectives.strengths_u;
         if candidates.ways.is_empty() || strengths_u.is_empty() {
             return Err(PlanError::NoWay);
         }
+        if strengths_u.len() > 1 && !objectives.present.seeds.is_empty() {
+            return Err(PlanError::Strengths);
+        }
+        let per_u = |seed: &Seed| Seed {
+            strength_u: seed.strength_u / strengths_u[0],
+            ..*seed
+        };
+        let present: Vec<Seed> = objectives.present.seeds.iter().map(per_u).collect();
         let bodies = bodies(anatomy);
         let usual = (objectives.prescription_gy, strengths_u[strengths_u.len() / 2]);
-        let samples = Samples::new(bodies, &candidates, kernel, usual, objectives.misplacement);
+        let samples = Samples::new(bodies, &candidates, kernel, usual, objectives.misplacement, &present);
         go_on(report(ATTEMPTED[0]))?;
         Ok(Self {
             anatomy,
@@ -84,6 +95,7 @@ impl<'a> Search<'a> {
             candidates,
             samples,
             engine: Engine::new(kernel, bodies),
+            present,
         })
     }
 
@@ -152,7 +164,12 @@ impl<'a> Search<'a> {
     ) -> Result<State<'s>, PlanError> {
         let (strengths_u, limits) = (&objectives.strengths_u, limits(objectives, FIRST_KEPT, None));
         let mut begun: Option<State> = None;
-        for &strength in first_strengths.iter().filter(|s| **s < strengths_u.len()) {
+        let mut begins: Vec<usize> = first_strengths
+            .iter()
+            .map(|s| (*s).min(strengths_u.len() - 1))
+            .collect();
+        begins.dedup();
+        for strength in begins {
             let mut state = State::empty(&self.candidates, &self.samples, strengths_u, strength, limits);
             go_on(greedy::build(&mut state, &|_| report(GREEDY)))?;
             if begun.as_ref().is_none_or(|begun| state.cost < begun.cost) {
@@ -169,11 +186,12 @@ impl<'a> Search<'a> {
         let of_one_u = self.candidates.plan(&state.chosen, 1.0, &self.source, prescription_gy);
         let seeds = of_one_u.seeds();
         let needles = of_one_u.needle_of_seeds();
-        let histograms = self.engine.histograms(&seeds);
+        let histograms = self.engine.histograms(&[&seeds[..], &self.present].concat());
         let trials = Trials::new(
             &self.anatomy.target,
             self.kernel,
             (&seeds, &needles),
+            &self.present,
             objectives.misplacement,
         );
         let mut best: Option<(usize, Proposal)> = None;

@@ -199,7 +199,7 @@ impl<'a> State<'a> {
     }
 
     fn refresh(&mut self) {
-        self.of_one_u.fill(0.0);
+        self.of_one_u.copy_from_slice(&self.samples.present);
         for &place in &self.seeds {
             let row = self.samples.of_place(place);
             self.of_one_u.iter_mut().zip(row).for_each(|(sum, d)| *sum += d);

@@ -46,7 +46,7 @@ fn robustness(anatomy: &Anatomy, engine: &Engine, kernel: &DoseKernel, plan: &Im
         trials: 1000,
         random_seed: 1,
     };
-    let trials = Trials::new(&anatomy.target, kernel, (&plan.seeds(), &[]), how);
+    let trials = Trials::new(&anatomy.target, kernel, (&plan.seeds(), &[]), &[], how);
     let factor = trials.strengthening(Statistic::USUAL, 145.0).unwrap().max(1.0);
     let stronger = engine.histograms(&plan.seeds()).figures(factor, 145.0).unwrap();
     [
@@ -136,14 +136,14 @@ fn a_plan_keeps_its_limits_by_the_full_engine() {
 fn no_needle_is_offered_through_bone() {
     let mut anatomy = GLANDS[2].anatomy();
     let holes = |anatomy: &Anatomy| {
-        Candidates::new(&TEMPLATE, anatomy)
+        Candidates::new(&TEMPLATE, anatomy, &[])
             .ways
             .iter()
             .map(|w| w.hole)
             .collect::<Vec<_>>()
     };
     let past_bone = holes(&anatomy);
-    let behind_bone = Candidates::new(&TEMPLATE, &anatomy).behind_bone;
+    let behind_bone = Candidates::new(&TEMPLATE, &anatomy, &[]).behind_bone;
     let crosses = |hole: &crate::plan::Hole, anatomy: &Anatomy| {
         let entry_m = TEMPLATE.hole_m(*hole);
         anatomy
@@ -153,7 +153,7 @@ fn no_needle_is_offered_through_bone() {
     };
     assert!(!past_bone.is_empty() && past_bone.iter().all(|hole| !crosses(hole, &anatomy)));
     let bone = std::mem::take(&mut anatomy.bone);
-    let candidates = Candidates::new(&TEMPLATE, &anatomy);
+    let candidates = Candidates::new(&TEMPLATE, &anatomy, &[]);
     let mut chosen = vec![false; candidates.places.len()];
     candidates.ways.iter().for_each(|way| chosen[way.places.start] = true);
     let unaware = candidates.plan(&chosen, 0.5, "6711", 145.0);
@@ -208,6 +208,7 @@ fn what_is_beyond_a_limit_says_by_how_much() {
         v100: 94.0,
         d90: 101.0,
         v150: 84.5,
+        v200: 0.0,
         urethra_d10: Some(200.7),
         urethra_d30: Some(130.0),
         rectum_d2cc: None,

@@ -1,0 +1,261 @@
+//! Seeds that landed beside their places in a gland that moved: what planning anew is worth, on the true result.
+
+use super::*;
+use crate::intraoperative::{Agreement, Contour, Solid, Transverse};
+use crate::plan::anatomy::{Body, ball};
+use crate::plan::optimise::plan as first_plan;
+use crate::plan::{PITCH_M, Template};
+use nalgebra::Vector3;
+use stylet_anatomy::PatientFrame;
+use stylet_dose::decay::Interval;
+
+const MIDDLE_M: [f64; 3] = [0.05, 0.05, 0.07];
+const HALF_M: [f64; 3] = [0.021, 0.016, 0.019];
+const TEMPLATE: Template = Template {
+    middle_m: [0.05, 0.05, -0.01],
+    columns: [-1.0, 0.0, 0.0],
+    rows: [0.0, 1.0, 0.0],
+    inwards: [0.0, 0.0, 1.0],
+    pitch_m: PITCH_M,
+};
+
+fn proceed(_: f32) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+fn iodine() -> (Source, DoseKernel) {
+    let source = Source::known("6711").unwrap();
+    let kernel = DoseKernel::new(&source, Interval::ALL);
+    (source, kernel)
+}
+
+fn anatomy() -> Anatomy {
+    let [x, y, z] = MIDDLE_M;
+    Anatomy {
+        target: ball("prostate", MIDDLE_M, HALF_M),
+        spared: vec![
+            ball("urethra", [x, y + 2e-3, z], [2.5e-3, 2.5e-3, 0.028]),
+            ball("rectum", [x, y - HALF_M[1] - 12e-3, z], [0.014, 0.010, 0.04]),
+        ],
+        bone: Vec::new(),
+        lower_m: [0.0; 3],
+        upper_m: [0.1, 0.1, 0.14],
+        patient: PatientFrame::default(),
+    }
+}
+
+/// Towards the patient's left and back and deeper, and swollen by so much.
+fn moved(by_m: [f64; 3], swollen: f64) -> impl Fn([f64; 3]) -> [f64; 3] {
+    move |p| [0, 1, 2].map(|a| MIDDLE_M[a] + (p[a] - MIDDLE_M[a]) * swollen + by_m[a])
+}
+
+/// Clicked at six points in five planes: the ellipsoid that the target is now, by its closed form.
+fn contoured(by_m: [f64; 3], swollen: f64) -> Body {
+    let frame = Transverse {
+        origin_m: Vector3::from(MIDDLE_M),
+        right: Vector3::x(),
+        up: Vector3::y(),
+        along: Vector3::z(),
+    };
+    let half_m = HALF_M.map(|h| h * swollen);
+    let mut contour = Contour::default();
+    for share in [-0.75, -0.4, 0.0, 0.4, 0.75] {
+        let at_m = share * half_m[2] + by_m[2];
+        let size = (1.0_f64 - share * share).sqrt();
+        for n in 0..6 {
+            let (sine, cosine) = (f64::from(n) / 6.0 * std::f64::consts::TAU + 0.3).sin_cos();
+            contour = contour.with(
+                at_m,
+                [cosine * half_m[0] * size + by_m[0], sine * half_m[1] * size + by_m[1]],
+            );
+        }
+    }
+    let solid = Solid::of(&contour).expect("five planes");
+    solid.body(&frame, "prostate").expect("closed")
+}
+
+/// The first plan of the anatomy, and the seeds of its first needles moved.
+fn half_done(landed: impl Fn([f64; 3]) -> [f64; 3]) -> (ImplantPlan, usize, Vec<Seed>) {
+    let (source, kernel) = iodine();
+    let objectives = Objectives::new(&source, 145.0);
+    let found = first_plan(
+        TEMPLATE,
+        &anatomy(),
+        &kernel,
+        "6711",
+        &objectives,
+        Method::default(),
+        proceed,
+    )
+    .unwrap();
+    let begun = found.plan.needles.len() / 2;
+    let first = ImplantPlan {
+        needles: found.plan.needles[..begun].to_vec(),
+        ..found.plan.clone()
+    };
+    let landed = |seed: Seed| Seed {
+        position_m: landed(seed.position_m),
+        ..seed
+    };
+    let lying = first.seeds().into_iter().map(landed).collect();
+    (found.plan, begun, lying)
+}
+
+/// Half of the needles are in when the gland turns out to lie 4 mm deeper, 3 mm aside and 10 % larger, and their seeds 5 mm too shallow.
+/// The null model carries the plan on.
+#[test]
+fn needles_planned_anew_give_the_true_gland_more_than_the_plan_carried_on() {
+    let (by_m, swollen) = ([3e-3, -1e-3, 4e-3], 1.1);
+    let (plan, begun, lying) = half_done(|p| [p[0], p[1], p[2] - 5e-3]);
+    let (source, kernel) = iodine();
+    let to_m = moved(by_m, swollen);
+    let rest = anatomy();
+    let seen = rest.seen_as(contoured(by_m, swollen), &to_m).unwrap();
+    let truth = rest.seen_as(rest.target.moved(&to_m).unwrap(), &to_m).unwrap();
+    let agreement = Agreement::of(&seen.target, &truth.target).unwrap();
+    let situation = Situation {
+        plan: &plan,
+        begun,
+        lying,
+        to_drop: Vec::new(),
+        anatomy: &seen,
+        kernel: &kernel,
+        source: &source,
+    };
+    let started = std::time::Instant::now();
+    let update = situation.update(proceed).unwrap();
+    let seconds = started.elapsed().as_secs_f64();
+    // What was inserted stays, and no hole is used twice.
+    assert_eq!(update.plan.needles[..begun], plan.needles[..begun]);
+    let mut holes: Vec<_> = update.plan.needles.iter().filter_map(|n| n.hole).collect();
+    holes.sort();
+    holes.dedup();
+    assert_eq!(holes.len(), update.plan.needles.len());
+    assert!(update.plan.needles.len() <= 25);
+    let strengths: Vec<f64> = update.plan.seeds().iter().map(|s| s.strength_u).collect();
+    assert!(strengths.iter().all(|s| *s == strengths[0]), "the seeds at hand");
+    let engine = Engine::new(&kernel, optimise::bodies(&truth));
+    let on_truth = |plan: &ImplantPlan| engine.histograms(&situation.with(plan)).figures(1.0, 145.0).unwrap();
+    let [continued, updated] = [&plan, &update.plan].map(on_truth);
+    println!(
+        "contour: Dice {:.3}, mean {:.2} mm; D90 on the true gland: {:.1} % carried on, {:.1} % updated; V100 {:.1}, {:.1}; V150 {:.1}, \
+         {:.1}; beyond limits {:.1}, {:.1}; {begun} of {} needles were in, {} now; {seconds:.1} s",
+        agreement.dice,
+        agreement.mean_m * 1e3,
+        continued.d90,
+        updated.d90,
+        continued.v100,
+        updated.v100,
+        continued.v150,
+        updated.v150,
+        continued.beyond(),
+        updated.beyond(),
+        plan.needles.len(),
+        update.plan.needles.len(),
+    );
+    assert!(agreement.dice > 0.97, "{agreement:?}");
+    assert!(update.improves());
+    assert!(updated.d90 > continued.d90 + 3.0, "{} {}", updated.d90, continued.d90);
+    assert!(updated.d90 >= 98.0, "{}", updated.d90);
+    assert!(updated.beyond() < continued.beyond());
+    // What the operator is shown is what comes true, as near as the contour is.
+    assert!(
+        (update.updated.d90 - updated.d90).abs() < 3.0,
+        "{} {}",
+        update.updated.d90,
+        updated.d90
+    );
+    assert!((update.doses.continued.d90 - continued.d90).abs() < 3.0);
+}
+
+/// The dose of 1 U and that of what lies there are added by the search; the full engine must say the same.
+#[test]
+fn the_dose_of_what_lies_there_counts_once() {
+    let (source, kernel) = iodine();
+    let anatomy = anatomy();
+    let present = ImplantPlan {
+        template: TEMPLATE,
+        source: "6711".to_owned(),
+        prescription_gy: 145.0,
+        needles: Vec::new(),
+    };
+    let present = present.with_needle("F7".parse().unwrap(), 0.09).unwrap();
+    let present = present.with_strand(0, 4, 0.095, 0.7).unwrap();
+    let present = Present {
+        seeds: present.seeds(),
+        holes: vec!["F7".parse().unwrap()],
+    };
+    let objectives = Objectives::beside(present.clone(), 0.5, &source, 145.0);
+    let found = first_plan(
+        TEMPLATE,
+        &anatomy,
+        &kernel,
+        "6711",
+        &objectives,
+        Method::GreedyExchange,
+        proceed,
+    )
+    .unwrap();
+    assert!(found.plan.needles.iter().all(|n| n.hole != Some("F7".parse().unwrap())));
+    assert!(found.plan.seeds().iter().all(|s| s.strength_u == 0.5));
+    let engine = Engine::new(&kernel, optimise::bodies(&anatomy));
+    let all = [found.plan.seeds(), present.seeds.clone()].concat();
+    let full = engine.histograms(&all).figures(1.0, 145.0).unwrap();
+    assert!(
+        (full.d90 - found.figures.d90).abs() < 1e-6,
+        "{} {}",
+        full.d90,
+        found.figures.d90
+    );
+    assert!(
+        (full.v100 - found.sampled.v100).abs() < 2.0,
+        "{} {}",
+        full.v100,
+        found.sampled.v100
+    );
+    assert!(
+        (full.v150 - found.sampled.v150).abs() < 4.0,
+        "{} {}",
+        full.v150,
+        found.sampled.v150
+    );
+    let two = Objectives {
+        strengths_u: vec![0.4, 0.5],
+        ..objectives
+    };
+    let refused = Search::new(TEMPLATE, &anatomy, &kernel, "6711", &two, &proceed);
+    assert!(matches!(refused.err(), Some(PlanError::Strengths)));
+}
+
+#[test]
+fn doses_now_and_carried_on_are_those_of_the_full_engine_and_a_search_can_be_cancelled() {
+    let (plan, begun, lying) = half_done(|p| p);
+    let (source, kernel) = iodine();
+    let anatomy = anatomy();
+    // The last seed of the needle at work is still to be dropped.
+    let (to_drop, lying) = lying
+        .split_last()
+        .map(|(last, others)| (vec![*last], others.to_vec()))
+        .unwrap();
+    let situation = Situation {
+        plan: &plan,
+        begun,
+        lying: lying.clone(),
+        to_drop,
+        anatomy: &anatomy,
+        kernel: &kernel,
+        source: &source,
+    };
+    let engine = Engine::new(&kernel, optimise::bodies(&anatomy));
+    let doses = situation.doses().unwrap();
+    let of = |seeds: &[Seed]| engine.histograms(seeds).figures(1.0, 145.0).unwrap();
+    assert_eq!(doses.now, of(&lying));
+    // On plan so far: carried on, it is the plan. Sums in another order round otherwise.
+    let planned = of(&plan.seeds());
+    assert!((doses.continued.d90 - planned.d90).abs() < 1e-6 && doses.now.d90 < planned.d90);
+    let cancelled = situation.update(|share| match share > 0.1 {
+        true => ControlFlow::Break(()),
+        false => ControlFlow::Continue(()),
+    });
+    assert!(matches!(cancelled, Err(PlanError::Cancelled)));
+}

@@ -1,0 +1,379 @@
+//! What the operator sees on the live picture while needles go in, and the plan brought up to date by it.
+
+mod assess;
+
+use super::jobs::{JobMessage, JobProgress};
+use super::{Message, Planner};
+use assess::{Assessed, Moment};
+use nalgebra::Vector3;
+use std::sync::Arc;
+use stylet_base::job::{Job, JobUpdate};
+use stylet_host::link::{SceneModel, Snapshot};
+use stylet_imaging::ultrasound::Pose;
+use stylet_implant::intraoperative::{
+    Contour, Doses, Marks, Outline, Proposed, Reviewed, SeedsFrom, Solid, Transverse, proposed_at,
+};
+use stylet_implant::plan::History;
+use stylet_shm_schema::SceneId;
+
+/// A mark is taken hold of within this distance, m.
+const SAME_PLACE_M: f64 = 0.2e-3;
+pub(super) const UPDATE: &str = "Planning the needles that are left";
+
+/// What was clicked on the picture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Drawn {
+    /// The edge of the gland.
+    pub contour: Contour,
+    /// Seeds where they are seen, scene frame, m.
+    pub marks_m: Vec<[f64; 3]>,
+}
+
+/// A change of what is drawn. Places in a plane are to the right and up, m; a plane is where it is along the axis of the probe, m.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Edit {
+    /// One more click in the plane.
+    Add {
+        at_m: f64,
+        point_m: [f64; 2],
+    },
+    /// A click that is being dragged; `is_first` where it was taken hold of.
+    Move {
+        at_m: f64,
+        number: usize,
+        to_m: [f64; 2],
+        is_first: bool,
+    },
+    /// Removes a click.
+    Remove {
+        at_m: f64,
+        number: usize,
+    },
+    /// Takes the proposed outline of a plane over as clicks.
+    TakeOver {
+        at_m: f64,
+    },
+    /// Marks a seed, scene frame, m.
+    Mark([f64; 3]),
+    /// A mark that is being dragged.
+    MoveMark {
+        number: usize,
+        to_m: [f64; 3],
+        is_first: bool,
+    },
+    /// Removes a mark.
+    RemoveMark(usize),
+    /// Begins anew.
+    Clear,
+    Undo,
+    Redo,
+}
+
+/// Points that a proposed outline is taken over as.
+const TAKEN_OVER: usize = 8;
+
+/// The state of it, for one scene.
+#[derive(Default)]
+pub(super) struct Review {
+    scene: Option<SceneId>,
+    frame: Option<Transverse>,
+    history: History<Drawn>,
+    solid: Option<Arc<Solid>>,
+    seeds_from: SeedsFrom,
+    /// What was assessed last, and what is being assessed.
+    assessed: Option<(Moment, Arc<Assessed>)>,
+    assessing: Option<(Moment, Job<Result<Assessed, String>>)>,
+    trouble: Option<(Moment, String)>,
+    proposed: Option<Arc<Proposed>>,
+    reviewed: Vec<Reviewed>,
+}
+
+/// What a frame shows of it.
+#[derive(Clone, Default)]
+pub struct ReviewShown {
+    /// The planes across the probe; `None` before a scene.
+    pub frame: Option<Transverse>,
+    /// What is drawn.
+    pub drawn: Drawn,
+    /// The contoured gland; `None` while it has too few planes.
+    pub solid: Option<Arc<Solid>>,
+    /// Which seeds the dose is of.
+    pub seeds_from: SeedsFrom,
+    /// Dose of what lies there, as it was assessed last, and the marks by their seeds.
+    pub doses: Option<Doses>,
+    /// Volume of the contoured gland, m³.
+    pub volume_m3: Option<f64>,
+    /// Marks by their seeds.
+    pub marks: Marks,
+    /// Whether something is being assessed.
+    pub is_assessing: bool,
+    /// Why nothing can be assessed.
+    pub trouble: Option<String>,
+    /// The update that waits for a decision.
+    pub update: Option<Arc<Proposed>>,
+    /// Whether the last update was taken and can be taken back.
+    pub can_withdraw: bool,
+    /// Updates so far, taken or not.
+    pub reviewed: Vec<Reviewed>,
+}
+
+impl ReviewShown {
+    /// The outline in a plane, and whether it goes through clicks of that plane; else it is proposed by the others.
+    pub fn outline_at(&self, at_m: f64) -> Option<(Outline, bool)> {
+        let clicks = self.drawn.contour.at(at_m);
+        if let Some(own) = clicks.and_then(|clicks| Outline::through(&clicks.points_m)) {
+            return Some((own, true));
+        }
+        let proposed = match &self.solid {
+            Some(solid) => solid.at(at_m),
+            None => proposed_at(&self.drawn.contour, at_m),
+        };
+        Some((proposed?, false))
+    }
+}
+
+impl Review {
+    pub(super) fn shown(&self, can_withdraw: bool) -> ReviewShown {
+        let assessed = self.assessed.as_ref().map(|(_, assessed)| assessed);
+        ReviewShown {
+            frame: self.frame,
+            drawn: self.history.now().clone(),
+            solid: self.solid.clone(),
+            seeds_from: self.seeds_from,
+            doses: assessed.map(|a| a.doses),
+            volume_m3: assessed.map(|a| a.volume_m3),
+            marks: assessed.map_or_else(Marks::default, |a| a.marks.clone()),
+            is_assessing: self.assessing.is_some(),
+            trouble: self.trouble.as_ref().map(|(_, why)| why.clone()),
+            update: self.proposed.clone(),
+            can_withdraw,
+            reviewed: self.reviewed.clone(),
+        }
+    }
+
+    fn edit(&mut self, edit: Edit) {
+        let now = self.history.now().clone();
+        let contour = &now.contour;
+        let with_contour = |contour: Contour| Drawn { contour, ..now.clone() };
+        let with_marks = |marks_m: Vec<[f64; 3]>| Drawn { marks_m, ..now.clone() };
+        let (next, is_step) = match edit {
+            Edit::Undo => return self.step(History::undo),
+            Edit::Redo => return self.step(History::redo),
+            Edit::Clear => (Drawn::default(), true),
+            Edit::Add { at_m, point_m } => (with_contour(contour.with(at_m, point_m)), true),
+            Edit::Move {
+                at_m,
+                number,
+                to_m,
+                is_first,
+            } => (with_contour(contour.with_moved(at_m, number, to_m)), is_first),
+            Edit::Remove { at_m, number } => (with_contour(contour.without(at_m, number)), true),
+            Edit::TakeOver { at_m } => match proposed_at(contour, at_m) {
+                Some(outline) => (
+                    with_contour(contour.with_all(at_m, &outline.some_points_m(TAKEN_OVER))),
+                    true,
+                ),
+                None => return,
+            },
+            Edit::Mark(place_m) => (with_marks([&now.marks_m[..], &[place_m]].concat()), true),
+            Edit::MoveMark { number, to_m, is_first } => {
+                let mut marks_m = now.marks_m.clone();
+                let Some(mark) = marks_m.get_mut(number) else { return };
+                *mark = to_m;
+                (with_marks(marks_m), is_first)
+            }
+            Edit::RemoveMark(number) => {
+                let mut marks_m = now.marks_m.clone();
+                if number < marks_m.len() {
+                    marks_m.remove(number);
+                }
+                (with_marks(marks_m), true)
+            }
+        };
+        match is_step {
+            true => self.history.put(next),
+            false => self.history.replace(next),
+        }
+        self.redraw();
+    }
+
+    /// Another implantation begins; what is drawn stays.
+    pub(super) fn restart(&mut self) {
+        self.reviewed.clear();
+        self.proposed = None;
+    }
+
+    fn step(&mut self, step: fn(&mut History<Drawn>) -> bool) {
+        if step(&mut self.history) {
+            self.redraw();
+        }
+    }
+
+    fn redraw(&mut self) {
+        self.solid = Solid::of(&self.history.now().contour).ok().map(Arc::new);
+        // It was made for another contour.
+        self.proposed = None;
+    }
+}
+
+impl Planner {
+    /// Changes what is drawn on the picture.
+    pub fn draw(&mut self, edit: Edit) {
+        self.review.edit(edit);
+    }
+
+    /// Chooses which seeds the dose of a moment is of.
+    pub fn set_seeds_from(&mut self, seeds_from: SeedsFrom) {
+        (self.review.seeds_from, self.review.proposed) = (seeds_from, None);
+    }
+
+    /// Updates of the plan in this scene.
+    pub fn reviewed(&self) -> &[Reviewed] {
+        &self.review.reviewed
+    }
+
+    /// Takes what is new since the last frame; assesses what is drawn where that, the plan or the seeds have changed.
+    pub fn take_review(&mut self, scene: &Arc<SceneModel>, snapshot: &Snapshot) {
+        if self.review.scene != Some(scene.header.id()) {
+            let pose = Pose::of_scene(&scene.header);
+            let frame = Transverse {
+                origin_m: pose.middle_m,
+                right: pose.axis.cross(&pose.up),
+                up: pose.up,
+                along: pose.axis,
+            };
+            self.review = Review {
+                scene: Some(scene.header.id()),
+                frame: Some(frame),
+                ..Review::default()
+            };
+        }
+        self.take_assessed();
+        let Some(moment) = self.moment(snapshot) else { return };
+        let review = &mut self.review;
+        let is_known = review.assessed.as_ref().is_some_and(|(of, _)| of.is_as(&moment))
+            || review.trouble.as_ref().is_some_and(|(of, _)| of.is_as(&moment));
+        if is_known || review.assessing.is_some() {
+            return;
+        }
+        let Some(outlines) = self.outlines.clone() else { return };
+        let (scene, snapshot) = (scene.clone(), snapshot.clone());
+        let of = moment.clone();
+        let job = Job::begin("assessment", move |messages, _| {
+            let found = of.assess(&outlines.anatomy, &scene, &snapshot);
+            let _ = messages.send(found.map_err(|why| why.to_string()));
+        });
+        self.review.assessing = Some((moment, job));
+    }
+
+    fn take_assessed(&mut self) {
+        let Some((moment, job)) = &self.review.assessing else {
+            return;
+        };
+        let moment = moment.clone();
+        match job.poll() {
+            JobUpdate::Pending => return,
+            JobUpdate::Message(Ok(found)) => {
+                self.review.assessed = Some((moment, Arc::new(found)));
+                self.review.trouble = None;
+            }
+            JobUpdate::Message(Err(why)) => self.review.trouble = Some((moment, why)),
+            JobUpdate::Ended => self.review.trouble = Some((moment, "the dose could not be computed".to_owned())),
+        }
+        self.review.assessing = None;
+    }
+
+    /// What there is to assess; `None` without a plan, a seed or a contoured gland.
+    fn moment(&self, snapshot: &Snapshot) -> Option<Moment> {
+        let review = &self.review;
+        let (plan, solid, frame) = (self.plan()?, review.solid.clone()?, review.frame?);
+        Moment::of(
+            plan,
+            &self.progress,
+            (solid, frame),
+            (review.history.now(), review.seeds_from),
+            snapshot,
+        )
+    }
+
+    /// Begins to plan the needles that are left beside what lies in the tissue now.
+    pub fn update(&mut self, scene: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
+        let (Some(scene), Some(snapshot)) = (scene, snapshot) else {
+            return;
+        };
+        let moment = self.moment(snapshot);
+        let (scene, snapshot) = (scene.clone(), snapshot.clone());
+        self.review.proposed = None;
+        self.begin_job(UPDATE, move |_, outlines| {
+            let moment = moment.ok_or("contour the gland in three planes first, with a seed in the tissue")?;
+            Ok(Job::begin("update of the plan", move |messages, interrupt| {
+                let report = |share: f32| {
+                    let progress = JobProgress {
+                        what: UPDATE.to_owned(),
+                        share: Some(share),
+                    };
+                    let _ = messages.send(JobMessage::Progress(progress));
+                    match interrupt.asked() {
+                        true => std::ops::ControlFlow::Break(()),
+                        false => std::ops::ControlFlow::Continue(()),
+                    }
+                };
+                let found = moment.update(&outlines.anatomy, &scene, &snapshot, &report);
+                let _ = messages.send(JobMessage::Update(found.map(Box::new)));
+            }))
+        });
+    }
+
+    pub(super) fn take_update(&mut self, found: Proposed) {
+        // Needles may have been inserted meanwhile.
+        if found.update.begun != self.progress.begun() {
+            let why = "A needle went in while the others were planned; update the plan again.";
+            self.message = Some(Message::Refused(why.to_owned()));
+            return;
+        }
+        self.review.proposed = Some(Arc::new(found));
+    }
+
+    /// Takes the update that waits, or leaves the plan as it is; either is kept for the debrief.
+    pub fn decide(&mut self, accept: bool) {
+        let Some(proposed) = self.review.proposed.take() else {
+            return;
+        };
+        if accept {
+            match self.can_be(proposed.update.plan.clone()) {
+                Ok(plan) => self.put(plan),
+                Err(why) => {
+                    self.message = Some(Message::Refused(why.to_string()));
+                    self.review.proposed = Some(proposed);
+                    return;
+                }
+            }
+        }
+        self.review.reviewed.push(Reviewed {
+            accepted: accept,
+            ..proposed.reviewed.clone()
+        });
+    }
+
+    /// Takes back the last update: the plan before it.
+    pub fn withdraw_update(&mut self) {
+        if self.can_withdraw() {
+            self.undo();
+            if let Some(last) = self.review.reviewed.last_mut() {
+                last.accepted = false;
+            }
+        }
+    }
+
+    pub(super) fn can_withdraw(&self) -> bool {
+        let is_last = |last: &Reviewed| last.accepted && last.begun == self.progress.begun();
+        self.review.reviewed.last().is_some_and(is_last) && self.history.as_ref().is_some_and(History::can_undo)
+    }
+}
+
+fn is_near(a: [f64; 3], b: [f64; 3]) -> bool {
+    (Vector3::from(a) - Vector3::from(b)).norm() < SAME_PLACE_M
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,373 @@
+//! The plan brought up to date on the live picture of the probe: the whole procedure in the window, by label.
+
+use crate::driven::{Driven, is_at_rest, keep_for_docs, misplaced};
+use egui::{Key, Modifiers, Pos2};
+use egui_kittest::kittest::{NodeT, Queryable};
+use host_ui::app::App;
+use host_ui::view::probe::ProbePicture;
+use nalgebra::Vector3;
+use std::time::{Duration, Instant};
+use stylet_imaging::ultrasound::View;
+use stylet_implant::plan::{ImplantPlan, Row, Template, exchange};
+use stylet_shm_schema::SceneHeader;
+use stylet_tests::scratch;
+
+const SIZE: [f32; 2] = [1280.0, 800.0];
+const PATH: &str = "Plan file: .toml, .csv or .dcm";
+/// Strong seeds: few needles are left to plan and to insert.
+const STRENGTH_U: f64 = 1.6;
+/// Needles that go in before the update.
+const BEFORE: usize = 2;
+/// Clicks in a plane.
+const CLICKS: usize = 6;
+
+/// Needles through holes, three seeds each, about the middle of the target.
+fn planned(scene: &SceneHeader) -> ImplantPlan {
+    let template = Template::before(scene);
+    let (source, prescription_gy) = exchange::usual().expect("known");
+    let plan = ImplantPlan {
+        template,
+        source: source.model,
+        prescription_gy,
+        needles: Vec::new(),
+    };
+    let middle = |a: usize| (scene.target_lower_m[a] + scene.target_upper_m[a]) / 2.0 - template.middle_m[a];
+    let middle_m: f64 = (0..3).map(|a| middle(a) * template.inwards[a]).sum();
+    let row = Row {
+        count: 3,
+        deepest_m: middle_m + 10e-3,
+        pitch_m: 10e-3,
+        stranded: true,
+        strength_u: STRENGTH_U,
+    };
+    let add = |(plan, number): (ImplantPlan, usize), hole: &&str| {
+        let added = plan
+            .with_needle(hole.parse().expect("a hole"), row.deepest_m)
+            .expect("free");
+        (added.with_row(number, row).expect("a row"), number + 1)
+    };
+    ["F8", "H8", "F6", "H6"].iter().fold((plan, 0), add).0
+}
+
+fn plan(driven: &Driven) -> ImplantPlan {
+    driven.window.state().planner().plan().expect("a plan").clone()
+}
+
+fn import(driven: &mut Driven, plan: &ImplantPlan) {
+    let path = scratch("ui-update").join("plan.toml");
+    let frames = driven
+        .window
+        .state()
+        .planner()
+        .planning()
+        .outlines
+        .expect("known")
+        .frames;
+    exchange::write(&path, plan, &frames).expect("written");
+    driven.window.get_by_label(PATH).focus();
+    driven.window.run_steps(1);
+    driven
+        .window
+        .get_by_label(PATH)
+        .type_text(path.to_str().expect("words"));
+    driven.window.run_steps(2);
+    driven.click("Import");
+    driven.until("the file", |app| !app.planner().is_busy());
+    driven.window.run_steps(3);
+}
+
+/// As [`Driven::until`], for what takes minutes on a busy machine.
+fn wait_long(driven: &mut Driven, what: &str, ready: impl Fn(&App) -> bool) {
+    let start = Instant::now();
+    while !ready(driven.window.state()) {
+        assert!(start.elapsed() < Duration::from_secs(180), "waited in vain for {what}");
+        driven.window.run_steps(1);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    driven.window.run_steps(3);
+}
+
+fn by_enter_until(driven: &mut Driven, done: usize) {
+    let start = Instant::now();
+    while driven.window.state().planner().progress().done() < done {
+        assert!(start.elapsed() < Duration::from_secs(180), "the needles do not go in");
+        driven.press(Key::Enter);
+        for _ in 0..20 {
+            driven.window.run_steps(1);
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        driven.until("rest", is_at_rest);
+    }
+}
+
+fn transverse(driven: &Driven) -> ProbePicture {
+    *driven
+        .window
+        .state()
+        .middle()
+        .probe_picture(View::Transverse)
+        .expect("a picture")
+}
+
+/// A step of the stepper, and the picture from there.
+fn step(driven: &mut Driven, key: Key) {
+    driven.press(key);
+    driven.until("the picture", |app| {
+        app.middle()
+            .probe_picture(View::Transverse)
+            .is_some_and(|picture| picture.is_live())
+    });
+}
+
+fn click_at(driven: &mut Driven, at: Pos2) {
+    driven.window.hover_at(at);
+    driven.window.run_steps(1);
+    driven.window.drag_at(at);
+    driven.window.run_steps(1);
+    driven.window.drop_at(at);
+    driven.window.run_steps(2);
+}
+
+fn points(driven: &Driven) -> usize {
+    driven.window.state().planner().planning().review.drawn.contour.points()
+}
+
+/// Where the edge of the gland is in the transverse plane, seen from the gland's middle.
+fn edge(driven: &Driven) -> Vec<Pos2> {
+    let picture = transverse(driven);
+    let outlines = driven.window.state().planner().planning().outlines.expect("known");
+    let target = &outlines.anatomy.target;
+    let (low, high) = target.bounds_m();
+    let middle = (Vector3::from(low) + Vector3::from(high)) / 2.0;
+    let plane = picture.plane();
+    let middle = middle - plane.normal() * plane.in_beams(middle).beside_m;
+    let on_edge = |n: usize| {
+        let (sine, cosine) = ((n as f64 + 0.25) / CLICKS as f64 * std::f64::consts::TAU).sin_cos();
+        let out = plane.right() * cosine + plane.pose.up * sine;
+        let steps = (1..400).map(|step| f64::from(step) * 0.1e-3);
+        let inside = steps.take_while(|way_m| target.contains((middle + out * *way_m).into()));
+        middle + out * inside.last().unwrap_or(0.0)
+    };
+    (0..CLICKS).map(|n| picture.at(on_edge(n))).collect()
+}
+
+/// Clicks the edge in five planes, from the middle 10 mm to either side.
+fn contour(driven: &mut Driven) {
+    step(driven, Key::PageDown);
+    step(driven, Key::PageDown);
+    for plane in 1..=5 {
+        for at in edge(driven) {
+            click_at(driven, at);
+        }
+        assert_eq!(points(driven), plane * CLICKS);
+        if plane < 5 {
+            step(driven, Key::PageUp);
+        }
+    }
+}
+
+/// A drag, the right button, Del and Ctrl+Z, each on a point of the plane that is shown.
+fn edits(driven: &mut Driven) {
+    let drawn = |driven: &Driven| driven.window.state().planner().planning().review.drawn;
+    let before = drawn(driven);
+    let [first, second] = [0, 1].map(|n| edge(driven)[n]);
+    driven.window.hover_at(first);
+    driven.window.run_steps(1);
+    driven.window.drag_at(first);
+    driven.window.run_steps(1);
+    for _ in 0..3 {
+        driven.window.hover_at(first + egui::vec2(12.0, 3.0));
+        driven.window.run_steps(1);
+    }
+    driven.window.drop_at(first + egui::vec2(12.0, 3.0));
+    driven.window.run_steps(2);
+    assert_ne!(drawn(driven), before, "the point was dragged");
+    assert_eq!(points(driven), 5 * CLICKS);
+    driven.window.key_press_modifiers(Modifiers::CTRL, Key::Z);
+    driven.window.run_steps(2);
+    assert_eq!(drawn(driven), before, "one step");
+    driven.window.hover_at(second);
+    driven.window.run_steps(1);
+    for pressed in [true, false] {
+        driven.window.event(egui::Event::PointerButton {
+            pos: second,
+            button: egui::PointerButton::Secondary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        });
+        driven.window.run_steps(1);
+    }
+    assert_eq!(points(driven), 5 * CLICKS - 1, "the right button");
+    driven.window.key_press_modifiers(Modifiers::CTRL, Key::Z);
+    driven.window.run_steps(2);
+    driven.window.hover_at(second);
+    driven.window.run_steps(2);
+    driven.press(Key::Delete);
+    assert_eq!(points(driven), 5 * CLICKS - 1, "Del");
+    driven.window.key_press_modifiers(Modifiers::CTRL, Key::Z);
+    driven.window.run_steps(2);
+    assert_eq!(drawn(driven), before);
+}
+
+/// Marks every seed in the transverse plane nearest to it, each once.
+fn mark(driven: &mut Driven) {
+    for _ in 0..8 {
+        step(driven, Key::PageDown);
+    }
+    let mut marked = Vec::new();
+    for _ in 0..17 {
+        let picture = transverse(driven);
+        let header = driven.window.state().link().snapshot().expect("a snapshot").header;
+        for (n, seed) in header.seeds[..header.seed_count as usize].iter().enumerate() {
+            let place = Vector3::from(seed.position_m);
+            if picture.beside_m(place).abs() <= 2.5e-3 && !marked.contains(&n) {
+                marked.push(n);
+                click_at(driven, picture.at(place));
+            }
+        }
+        step(driven, Key::PageUp);
+    }
+}
+
+#[test]
+fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
+    let begun = Instant::now();
+    let mut driven = Driven::open_plain(SIZE);
+    driven.until("the anatomy", |app| app.planner().planning().outlines.is_some());
+    driven.window.run_steps(2);
+    let scene = driven.window.state().link().scene().expect("live").header;
+    import(&mut driven, &planned(&scene));
+    driven.click("Engage force");
+    by_enter_until(&mut driven, BEFORE);
+    let before = plan(&driven);
+    println!("{:.1} s: {BEFORE} needles are in", begun.elapsed().as_secs_f64());
+
+    driven.click("Probe");
+    driven.click("Update plan");
+    driven
+        .window
+        .get_by_label_contains("Missing: an outline of the gland in 3 planes; 0 so far");
+    contour(&mut driven);
+    driven
+        .window
+        .get_by_label_contains(&format!("{} points in 5 planes", 5 * CLICKS));
+    edits(&mut driven);
+    // Between two planes that were clicked there is a dashed proposal, which can be taken over.
+    let review = driven.window.state().planner().planning().review;
+    let own = review.drawn.contour.planes()[1].at_m;
+    assert!(review.outline_at(own).is_some_and(|(_, is_own)| is_own));
+    assert!(review.outline_at(own + 2.5e-3).is_some_and(|(_, is_own)| !is_own));
+    keep_for_docs(&driven.picture("update-contour"), "update");
+    println!("{:.1} s: contoured", begun.elapsed().as_secs_f64());
+
+    driven.click("Seeds");
+    mark(&mut driven);
+    let seeds = driven
+        .window
+        .state()
+        .link()
+        .snapshot()
+        .expect("a snapshot")
+        .header
+        .seed_count;
+    assert_eq!(seeds, 6);
+    driven.window.get_by_label("6 marks for 6 seeds");
+    wait_long(&mut driven, "the dose", |app| {
+        let review = app.planner().planning().review;
+        review.doses.is_some() && review.marks.without_mark() == 0 && review.marks.of_seeds.len() == 6
+    });
+    driven.window.get_by_label_contains("Marks off their seeds, mm");
+    driven.click("as marked");
+    driven.click("as they lie");
+
+    driven.click("Plan the rest anew");
+    wait_long(&mut driven, "the update", |app| !app.planner().is_busy());
+    let update = driven
+        .window
+        .state()
+        .planner()
+        .planning()
+        .review
+        .update
+        .expect("an update");
+    assert_eq!(update.update.begun, BEFORE);
+    let agreement = update.reviewed.agreement.expect("two bodies");
+    println!(
+        "{:.1} s: Dice {:.3}, {:.2} mm; D90 {:.1} % now, {:.1} % carried on, {:.1} % updated; {:?} needles and seeds left",
+        begun.elapsed().as_secs_f64(),
+        agreement.dice,
+        agreement.mean_m * 1e3,
+        update.update.doses.now.d90,
+        update.update.doses.continued.d90,
+        update.update.updated.d90,
+        update.reviewed.left
+    );
+    assert!(agreement.dice > 0.9, "{agreement:?}");
+    assert!(update.update.improves());
+    driven.window.get_by_label("The update keeps the limits better.");
+    let problems = misplaced(&driven.window);
+    assert!(problems.is_empty(), "{}", problems.join("\n"));
+    driven.picture("update-decision");
+    driven.click("Accept");
+    let after = plan(&driven);
+    assert_eq!(after.needles[..BEFORE], before.needles[..BEFORE], "what is in stays");
+    assert_eq!(after, update.update.plan);
+    driven.click("Close");
+
+    let needles = after.needles.len();
+    let next = format!("Continue at needle {} of {needles}", BEFORE + 1);
+    let start = Instant::now();
+    while driven.window.query_by_label(&next).is_none() {
+        assert!(start.elapsed() < Duration::from_secs(20), "no {next}");
+        driven.window.run_steps(1);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    driven.click(&next);
+    wait_long(&mut driven, "all needles", |app| {
+        app.planner().progress().done() == needles
+    });
+    println!("{:.1} s: all {needles} needles are in", begun.elapsed().as_secs_f64());
+    let placed = driven
+        .window
+        .state()
+        .link()
+        .snapshot()
+        .expect("a snapshot")
+        .header
+        .seed_count;
+    assert_eq!(placed as usize, after.seed_count());
+    debrief_says_so(&mut driven);
+    println!("{:.1} s in all", begun.elapsed().as_secs_f64());
+}
+
+fn debrief_says_so(driven: &mut Driven) {
+    let start = Instant::now();
+    while driven.window.query_by_label("Save the debrief").is_none() {
+        assert!(start.elapsed() < Duration::from_secs(30), "no debrief");
+        driven.window.run_steps(1);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    driven.click("Save the debrief");
+    let start = Instant::now();
+    let said = loop {
+        assert!(start.elapsed() < Duration::from_secs(60), "no debrief was saved");
+        driven.window.run_steps(1);
+        if let Some(node) = driven.window.query_by_label_contains("Debrief saved as") {
+            let inner = node.accesskit_node();
+            break inner.label().or(inner.value()).expect("words");
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    };
+    let folder = std::path::PathBuf::from(said.trim_start_matches("Debrief saved as "));
+    let page = std::fs::read_to_string(folder.join("debrief.html")).expect("a page");
+    assert!(page.contains("Updates of the plan") && page.contains("Update 1, taken"));
+    let json = std::fs::read_to_string(folder.join("score.json")).expect("figures");
+    let score: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    let update = &score["updates"][0];
+    assert_eq!((&update["accepted"], &update["marked"]), (&true.into(), &6.into()));
+    assert!(
+        update["contour"]["dice"].as_f64().is_some_and(|dice| dice > 0.9),
+        "{update}"
+    );
+    std::fs::remove_dir_all(folder).expect("ours");
+}
