@@ -217,9 +217,17 @@ impl Host {
     pub fn new(named: &Named) -> Self {
         let node = named.0.node().expect("shared memory");
         let records = service::records::subscriber(&node).expect("a port");
+        // While another program makes a service it cannot be opened; on a busy machine that takes longer than an attempt does.
+        let mut near = Near::new(&named.0);
+        until(Duration::from_secs(5), || {
+            if near.is_err() {
+                near = Near::new(&named.0);
+            }
+            near.is_ok()
+        });
         Self {
             board: None,
-            near: Near::new(&named.0).expect("ports"),
+            near: near.expect("ports"),
             records,
             _node: node,
             session: None,
