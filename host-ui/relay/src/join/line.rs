@@ -48,7 +48,7 @@ impl Line {
         Some(Relayed {
             session_id: self.session_id,
             round_trip_ns,
-            snapshot_age_ns: now_ns().saturating_sub(made_ns) + round_trip_ns / 2,
+            snapshot_age_ns: now_ns().saturating_sub(made_ns),
             records_lost: member.lost.load(Ordering::Relaxed),
             snapshots_lost: member.snapshots_lost.load(Ordering::Relaxed),
             is_heard: u32::from(is_heard),

@@ -1,5 +1,7 @@
 //! On another machine: the services of the core as if it ran here, and the requests of hosts here to the server.
 
+mod clock;
+mod last;
 mod line;
 mod order;
 mod rounds;
@@ -9,10 +11,11 @@ use crate::keys::{Invitation, now_s};
 use crate::net::{self, Place, Priority, Session};
 use crate::wire::{self, Kind, Stamp, encode};
 use crate::{RelayError, now_ns};
+use clock::Clock;
 use rounds::Rounds;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use stylet_shm_schema::service::Instance;
 
@@ -48,10 +51,13 @@ struct Member {
     heard_at_ns: AtomicU64,
     /// Records lost for good.
     lost: AtomicU64,
-    /// Snapshots that never came.
+    clock: Mutex<Clock>,
+    /// Snapshots that never came, or came too late to be shown.
     snapshots_lost: AtomicU64,
-    /// When the newest snapshot was made, by this machine's clock but for half a round trip; 0 for none.
+    /// When the newest snapshot that was shown was made, by this machine's clock; 0 for none.
     snapshot_made_ns: AtomicU64,
+    /// Hosts here have been announced a run of the core: what comes before that they drop.
+    is_announced: AtomicBool,
     /// Changes the number of the core's run for hosts here, where its board cannot be made under its own.
     salt: AtomicU64,
 }
@@ -71,7 +77,14 @@ impl Member {
             self.heard_ns.store(stamp.sent_ns, Ordering::Relaxed);
         }
         self.heard_ns.fetch_max(stamp.sent_ns, Ordering::Relaxed);
-        self.heard_at_ns.store(now_ns(), Ordering::Relaxed);
+        let now_ns = now_ns();
+        self.heard_at_ns.store(now_ns, Ordering::Relaxed);
+        self.clock().heard(stamp, now_ns);
+    }
+
+    fn clock(&self) -> MutexGuard<'_, Clock> {
+        // What is behind the lock is whole after each statement.
+        self.clock.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn has_server(&self) -> bool {
@@ -167,8 +180,10 @@ pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
         heard_ns: AtomicU64::new(0),
         heard_at_ns: AtomicU64::new(0),
         lost: AtomicU64::new(0),
+        clock: Mutex::new(Clock::new()),
         snapshots_lost: AtomicU64::new(0),
         snapshot_made_ns: AtomicU64::new(0),
+        is_announced: AtomicBool::new(false),
         salt: AtomicU64::new(0),
     });
     let (to_records, records) = sync_channel(WAITING);

@@ -1,5 +1,6 @@
 //! Records in the order of their ticks: what the network lost is asked for again, and what is lost for good is counted.
 
+use super::last::Next;
 use crate::wire::Ticks;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
@@ -33,6 +34,21 @@ pub struct Order {
 }
 
 impl Order {
+    /// Goes on where another has ended.
+    pub(super) fn from(next: Option<Next>) -> Self {
+        Self {
+            session: next.map_or(0, |next| next.session_id),
+            next: next.map(|next| next.tick),
+            ..Self::default()
+        }
+    }
+
+    /// What comes after all that was taken.
+    pub(super) fn next(&self) -> Option<Next> {
+        let session_id = self.session;
+        self.next.map(|tick| Next { session_id, tick })
+    }
+
     /// A batch that arrived.
     pub fn put(&mut self, records: Vec<TickRecord>) {
         let Some(first) = records.first().copied() else { return };
@@ -211,6 +227,21 @@ mod tests {
         }
         assert_eq!(order.missing(now), Some(ticks(1290, 1999)));
         assert_eq!(order.lost(), 0);
+    }
+
+    #[test]
+    fn one_that_goes_on_asks_for_what_was_made_between_and_in_another_run_for_nothing() {
+        let (mut before, now) = (Order::default(), Instant::now());
+        before.put(batch(1));
+        assert_eq!(taken(&mut before, now), [1]);
+        let next = before.next();
+        let mut order = Order::from(next);
+        order.put(batch(4));
+        assert_eq!(order.missing(now), Some(ticks(20, 39)));
+        let mut of_another = Order::from(next);
+        of_another.put(of_session(8, 4));
+        assert_eq!((of_another.missing(now), taken(&mut of_another, now)), (None, vec![4]));
+        assert_eq!(of_another.lost(), 0);
     }
 
     #[test]

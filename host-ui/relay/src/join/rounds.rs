@@ -229,7 +229,9 @@ impl Rounds {
                 self.who = who;
             }),
             Kind::Echo => wire::one::<u64>(message.body).map(|sent_ns| {
-                self.round_trip_ns = now_ns().saturating_sub(sent_ns).min(SILENCE_NS * 100);
+                let now_ns = now_ns();
+                self.round_trip_ns = now_ns.saturating_sub(sent_ns).min(SILENCE_NS * 100);
+                self.member.clock().answered(self.round_trip_ns, now_ns);
             }),
             _ => Err(Invalid("kind of message")),
         };
@@ -252,6 +254,7 @@ impl Rounds {
         session.session_id = self.member.run(session.session_id);
         self.line.session_id = session.session_id;
         let _ = self.far.session.send(session);
+        self.member.is_announced.store(true, Ordering::Relaxed);
         Ok(())
     }
 

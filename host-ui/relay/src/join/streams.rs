@@ -1,5 +1,6 @@
 //! The threads of the streams: records in order and whole, snapshots made whole again. What is invalid is dropped.
 
+use super::last::Last;
 use super::order::Order;
 use super::{Bytes, Member};
 use crate::ports::{far_records, far_snapshots};
@@ -9,17 +10,23 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::MAX_BATCH;
+use stylet_shm_schema::service::{MAX_BATCH, SlicePublisher};
 use stylet_shm_schema::{TickRecord, check};
 
 const WAIT: Duration = Duration::from_millis(5);
+
+/// A snapshot that is older is not shown: the next one is on its way. A line on which all of them take long gets half of it more than its way.
+const LATE_NS: u64 = 200_000_000;
+/// Where none was shown for so long, one that is late is.
+const BLIND: Duration = Duration::from_secs(2);
 
 /// What the scene at rest is, as the thread of the rest has it.
 pub type Scenes = Arc<Mutex<Arc<Rest>>>;
 
 pub(super) fn records(member: &Member, messages: &Receiver<Bytes>) -> Result<(), RelayError> {
     let (port, _node) = far_records(&member.instance)?;
-    let mut order = Order::default();
+    let (last, next) = Last::open(&member.instance, now_ns())?;
+    let mut order = Order::from(next);
     while !member.ends() {
         if let Ok(bytes) = messages.recv_timeout(WAIT) {
             take(&mut order, &bytes);
@@ -29,12 +36,10 @@ pub(super) fn records(member: &Member, messages: &Receiver<Bytes>) -> Result<(),
                 .for_each(|bytes| take(&mut order, &bytes));
         }
         let now = Instant::now();
-        while let Some(mut batch) = order.take(now) {
-            for record in &mut batch {
-                record.session_id = member.run(record.session_id);
-            }
-            if let Some(first) = batch.first() {
-                let _ = port.send(&first.session_id, &batch);
+        // Until then they wait here, where more of them fit than come in a minute.
+        if member.is_announced.load(Ordering::Relaxed) && hand_on(member, &port, &mut order, now) {
+            if let Some(next) = order.next() {
+                last.note(next, now_ns());
             }
         }
         if let Some(ticks) = order.missing(now) {
@@ -43,6 +48,21 @@ pub(super) fn records(member: &Member, messages: &Receiver<Bytes>) -> Result<(),
         member.lost.store(order.lost(), Ordering::Relaxed);
     }
     Ok(())
+}
+
+/// What comes next to hosts here; whether there was anything.
+fn hand_on(member: &Member, port: &SlicePublisher<TickRecord, u64>, order: &mut Order, now: Instant) -> bool {
+    let mut any = false;
+    while let Some(mut batch) = order.take(now) {
+        for record in &mut batch {
+            record.session_id = member.run(record.session_id);
+        }
+        if let Some(first) = batch.first() {
+            any = true;
+            let _ = port.send(&first.session_id, &batch);
+        }
+    }
+    any
 }
 
 fn take(order: &mut Order, bytes: &[u8]) {
@@ -69,7 +89,7 @@ fn take(order: &mut Order, bytes: &[u8]) {
 
 pub(super) fn snapshots(member: &Member, messages: &Receiver<Bytes>, scenes: &Scenes) -> Result<(), RelayError> {
     let (port, _node) = far_snapshots(&member.instance)?;
-    let (mut known, mut newest) = (Displacements::default(), (0, 0));
+    let (mut known, mut newest, mut shown) = (Displacements::default(), (0, 0), Instant::now());
     while !member.ends() {
         let Ok(bytes) = messages.recv_timeout(WAIT) else {
             continue;
@@ -86,10 +106,17 @@ pub(super) fn snapshots(member: &Member, messages: &Receiver<Bytes>, scenes: &Sc
         member.say(Kind::Seen, at.1, &[]);
         let rest = Arc::clone(&scenes.lock().unwrap_or_else(PoisonError::into_inner));
         if let Ok(Some((mut header, vertices))) = decode_snapshot(&rest, &mut known, message.body) {
-            let age_ns = message.stamp.sent_ns.saturating_sub(header.time_ns);
-            member
-                .snapshot_made_ns
-                .store(now_ns().saturating_sub(age_ns), Ordering::Relaxed);
+            let (made_ns, way_ns) = {
+                let clock = member.clock();
+                (clock.here_ns(header.time_ns), clock.way_ns())
+            };
+            // What came late was worth having for what it holds.
+            if now_ns().saturating_sub(made_ns) > LATE_NS.max(way_ns + LATE_NS / 2) && shown.elapsed() < BLIND {
+                member.snapshots_lost.fetch_add(1, Ordering::Relaxed);
+                continue;
+            }
+            shown = Instant::now();
+            member.snapshot_made_ns.store(made_ns, Ordering::Relaxed);
             header.session_id = member.run(header.session_id);
             let _ = port.send(&header, &vertices);
         }

@@ -18,7 +18,9 @@ pub fn right(role: Role, kind: CommandKind) -> Option<Right> {
     match (role, kind) {
         (Role::Observer, _) | (_, K::Shutdown) => None,
         // What takes force or motion away is nobody's alone.
-        (_, K::StopHand | K::StopSecondHand | K::Disengage | K::SaveFlight | K::Rehearse | K::Mark) => Some(Right::Role),
+        (_, K::StopHand | K::StopSecondHand | K::Disengage | K::SaveFlight | K::Rehearse | K::Mark) => {
+            Some(Right::Role)
+        }
         (Role::Instructor, K::SetParameters | K::LoadBuiltinScene | K::SetPlan) => Some(Right::Role),
         // Faults are for a trainee to find, who operates.
         (role, K::BeginExercise | K::EndExercises) => (role == Role::Instructor).then_some(Right::Role),
@@ -78,7 +80,10 @@ mod tests {
         for kind in [K::BeginExercise, K::EndExercises] {
             assert_eq!(right(Role::Instructor, kind), Some(Right::Role), "{kind:?}");
             assert_eq!(right(Role::Operator, kind), None, "{kind:?}");
-            assert!(!operates(kind), "an instructor beside the core takes the needle from nobody");
+            assert!(
+                !operates(kind),
+                "an instructor beside the core takes the needle from nobody"
+            );
         }
         assert_eq!(right(Role::Operator, K::Mark), Some(Right::Role));
         assert_eq!(right(Role::Instructor, K::StopHand), Some(Right::Role));

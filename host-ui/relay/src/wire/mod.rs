@@ -1,5 +1,6 @@
 //! Messages between the two sides: a head and a payload; one encoder, one decoder that trusts no length.
 
+mod between;
 mod control;
 mod thin;
 
@@ -12,7 +13,7 @@ use stylet_shm_schema::check::Invalid;
 use stylet_shm_schema::{SCHEMA_VERSION, SceneHeader, UploadHeader};
 
 /// First word of every message: rises with the form of messages and with the schema.
-const MAGIC: u32 = u32::from_le_bytes(*b"st2\0") ^ (SCHEMA_VERSION << 24);
+const MAGIC: u32 = u32::from_le_bytes(*b"st3\0") ^ (SCHEMA_VERSION << 24);
 
 /// What a message holds, by stable number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, TryFromPrimitive)]

@@ -72,11 +72,12 @@ fn a_small_snapshot_survives_but_for_the_error_of_half_floats() {
 #[test]
 fn a_large_snapshot_is_shared_among_messages_and_whole_after_them() {
     let rest = scene(12_000, 8192);
-    let (header, vertices) = snapshot(12_000, 8192, 10e-3);
+    let (mut header, vertices) = snapshot(12_000, 8192, 10e-3);
     let mut known = Displacements::default();
     let mut last = Vec::new();
     let stride = (20_192_usize * 6).div_ceil(MAX_THIN_BYTES - 2000);
     for number in 0..stride as u64 {
+        header.time_ns += 30_000_000;
         let body = encode_snapshot(&rest, &header, &vertices, number, MAX_THIN_BYTES).expect("of this scene");
         assert!(body.len() <= MAX_THIN_BYTES, "{} bytes", body.len());
         last = decode_snapshot(&rest, &mut known, &body)
@@ -87,6 +88,57 @@ fn a_large_snapshot_is_shared_among_messages_and_whole_after_them() {
         assert_eq!(whole, number + 1 == stride as u64, "message {number} of {stride}");
     }
     assert_eq!(last.len(), vertices.len());
+}
+
+/// Outlines were ragged while tissue moved fast: each message moved every n-th place alone.
+#[test]
+fn places_between_those_that_a_message_holds_move_with_them() {
+    let sides = [20_u32, 24, 25];
+    let (vertices, spacing_m) = (sides.iter().product::<u32>(), 2.5e-3_f32);
+    let place_m =
+        |i: u32| [i % sides[0], i / sides[0] % sides[1], i / sides[0] / sides[1]].map(|n| spacing_m * n as f32);
+    let mut header = SceneHeader::zeroed();
+    (header.session_id, header.generation, header.vertex_count) = (3, 2, vertices);
+    let words: Vec<u32> = (0..vertices).flat_map(|i| place_m(i).map(f32::to_bits)).collect();
+    let rest = Rest::of_scene(&header, &words);
+    // Tissue around a needle along z that is drawn out at 100 mm/s: up to 5 mm with it, less with the distance.
+    let moved_z_m = |at: [f32; 3], time_s: f32| {
+        let [x, y] = [at[0] - 0.02, at[1] - 0.03];
+        let along = at[2] - 0.05 + 0.1 * time_s;
+        -5e-3 * (-(x * x + y * y + along * along) / (2.0 * 0.012 * 0.012)).exp()
+    };
+    let (mut known, mut kept) = (Displacements::default(), vec![Vertex::default(); vertices as usize]);
+    let (mut drawn_m, mut as_before_m) = (0.0_f32, 0.0_f32);
+    for number in 0..20_u64 {
+        let (mut header, _) = snapshot(vertices, 0, 0.0);
+        header.time_ns = 30_000_000 * (number + 1);
+        let truth: Vec<Vertex> = (0..vertices)
+            .map(|i| {
+                let at = place_m(i);
+                let position_m = [at[0], at[1], at[2] + moved_z_m(at, 0.03 * number as f32)];
+                Vertex { position_m }
+            })
+            .collect();
+        let body = encode_snapshot(&rest, &header, &truth, number, 20_000).expect("of this scene");
+        let (_, shown) = decode_snapshot(&rest, &mut known, &body)
+            .expect("valid")
+            .expect("of this scene");
+        let stride = vertices.div_ceil(20_000 / 6) as usize;
+        assert_eq!(stride, 4);
+        let phase = number as usize % stride;
+        (phase..vertices as usize)
+            .step_by(stride)
+            .for_each(|i| kept[i] = truth[i]);
+        if number as usize > 2 * stride {
+            drawn_m = drawn_m.max(largest_error_m(&truth, &shown));
+            as_before_m = as_before_m.max(largest_error_m(&truth, &kept));
+        }
+    }
+    assert!(as_before_m > 1e-3, "{as_before_m} m: too slow to show anything");
+    assert!(
+        drawn_m < 0.35 * as_before_m,
+        "{drawn_m} m, {as_before_m} m where they stand still between"
+    );
 }
 
 #[test]

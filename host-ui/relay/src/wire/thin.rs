@@ -1,9 +1,11 @@
 //! A snapshot as a screen needs it: what moved from rest, in half floats, within a bound of bytes.
 //!
 //! A half float has 11 bits: a displacement is wrong by at most 1/2048 of its larger coordinate's power of two, 3.8 um up to
-//! 15.6 mm and 7.6 um up to 31 mm. Where all of a scene does not fit, each message holds every n-th place and the next
-//! message the next ones; the header, needle, seeds and needles that stay in are whole in each.
+//! 15.6 mm and 7.6 um up to 31 mm. Where all of a scene does not fit, each message holds one of n places and the next
+//! message the next ones, and the places in between move with those around them; the header, needle, seeds and needles that stay in are
+//! whole in each.
 
+use super::between::{Bounds, Lattice};
 use bytemuck::{Pod, Zeroable};
 use half::f16;
 use std::mem::offset_of;
@@ -20,7 +22,7 @@ const MAX_VERTICES: usize = 4 * MAX_LABEL_CELLS;
 /// The part of the header before its arrays of seeds and needles.
 const PREFIX: usize = offset_of!(SnapshotHeader, seeds);
 
-/// Which places a message holds: `phase`, `phase + stride`, and so on.
+/// Which places a message holds, see [`held_by`].
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Share {
@@ -32,36 +34,50 @@ struct Share {
 #[derive(Clone, Debug, Default)]
 pub struct Rest {
     id: SceneId,
-    vertices_m: Vec<[f32; 3]>,
-    nodes: usize,
+    vertices: usize,
+    /// Vertices, then nodes.
+    places_m: Vec<[f32; 3]>,
+    bounds: Bounds,
 }
 
 impl Rest {
     /// Of a scene that was checked.
     pub fn of_scene(header: &SceneHeader, words: &[u32]) -> Self {
-        let places = words.get(..3 * header.vertex_count as usize).unwrap_or_default();
+        let vertices = words.get(..3 * header.vertex_count as usize).unwrap_or_default();
+        let vertices = vertices
+            .chunks_exact(3)
+            .map(|w| [0, 1, 2].map(|a| f32::from_bits(w[a])));
+        let mut places_m: Vec<[f32; 3]> = vertices.collect();
+        let (count, grid) = (places_m.len(), header.nodes);
+        places_m.extend((0..grid.node_count().unwrap_or(0).min(MAX_NODES)).map(|i| {
+            let [x, y, _] = grid.dims.map(|n| n as usize);
+            let at = [i % x, i / x % y, i / x / y];
+            [0, 1, 2].map(|a| (grid.origin_m[a] + at[a] as f64 * grid.spacing_m) as f32)
+        }));
         Self {
             id: header.id(),
-            vertices_m: places
-                .chunks_exact(3)
-                .map(|w| [0, 1, 2].map(|a| f32::from_bits(w[a])))
-                .collect(),
-            nodes: header.nodes.node_count().unwrap_or(0),
+            vertices: count,
+            bounds: Bounds::of(&places_m),
+            places_m,
         }
     }
 
     fn total(&self) -> usize {
-        self.vertices_m.len() + self.nodes
+        self.places_m.len()
     }
 
     fn fits(&self, header: &SnapshotHeader) -> bool {
         header.scene_id() == self.id
-            && header.vertex_count as usize == self.vertices_m.len()
-            && header.node_count as usize == self.nodes
+            && header.vertex_count as usize == self.vertices
+            && header.node_count as usize == self.total() - self.vertices
     }
 
-    fn place_m(&self, i: usize) -> [f32; 3] {
-        self.vertices_m.get(i).copied().unwrap_or_default()
+    /// From where a place's displacement counts: of a node the snapshot has the displacement itself.
+    fn origin_m(&self, i: usize) -> [f32; 3] {
+        match i < self.vertices {
+            true => self.places_m.get(i).copied().unwrap_or_default(),
+            false => [0.0; 3],
+        }
     }
 }
 
@@ -88,24 +104,66 @@ pub fn encode_snapshot(
         phase: phase as u32,
     };
     bytes.extend_from_slice(bytemuck::bytes_of(&share));
-    for (i, vertex) in vertices.iter().enumerate().skip(phase).step_by(stride) {
-        let place = rest.place_m(i);
-        for (at, rest) in vertex.position_m.iter().zip(place) {
+    for i in held_by(stride, phase, vertices.len()) {
+        let origin_m = rest.origin_m(i);
+        for (at, rest) in vertices[i].position_m.iter().zip(origin_m) {
             bytes.extend_from_slice(&f16::from_f32(at - rest).to_le_bytes());
         }
     }
     Some(bytes)
 }
 
-/// The displacements that the far side knows, by place.
-#[derive(Clone, Debug, Default)]
-pub struct Displacements {
-    of: SceneId,
-    moved_m: Vec<[f32; 3]>,
+/// Of each `stride` places that follow one another one, and the next one in the next `stride` of them: neighbours in a grid, whose rows are
+/// as long as they may be, do not all fall to one message.
+fn held_by(stride: usize, phase: usize, total: usize) -> impl Iterator<Item = usize> + Clone {
+    let of_group = move |group: usize| group * stride + (phase + group) % stride;
+    (0..total.div_ceil(stride)).map(of_group).filter(move |i| *i < total)
 }
 
-/// The snapshot in `body`, whole: places that it does not hold are as they were in an earlier one. `None` for one of another
-/// scene.
+fn is_held_by(stride: usize, phase: usize, i: usize) -> bool {
+    i % stride == (phase + i / stride) % stride
+}
+
+/// The displacements that the far side knows, by place.
+#[derive(Debug, Default)]
+pub struct Displacements {
+    of: SceneId,
+    held: Vec<Held>,
+}
+
+/// What a message held of a place last, and when that was so; a guess by the places around it until one has.
+#[derive(Clone, Copy, Debug, Default)]
+struct Held {
+    moved_m: [f32; 3],
+    time_ns: u64,
+    is_guess: bool,
+}
+
+impl Held {
+    /// In s, from then to `time_ns`.
+    fn age_s(&self, time_ns: u64) -> f32 {
+        time_ns.saturating_sub(self.time_ns) as f32 * 1e-9
+    }
+
+    /// From this to the next, with the time between them.
+    fn change(&self, next: &Self) -> [f32; 4] {
+        let [x, y, z] = [0, 1, 2].map(|a| next.moved_m[a] - self.moved_m[a]);
+        [x, y, z, self.age_s(next.time_ns)]
+    }
+
+    /// Where it is at `time_ns`, when the places around it have moved by `change`: no further than they have in a longer time.
+    fn moved_on_m(&self, [x, y, z, time_s]: [f32; 4], time_ns: u64) -> [f32; 3] {
+        let share = match time_s > 0.0 {
+            true => (self.age_s(time_ns) / time_s).min(1.0),
+            false => 0.0,
+        };
+        let change_m = [x, y, z];
+        [0, 1, 2].map(|a| self.moved_m[a] + share * change_m[a])
+    }
+}
+
+/// The snapshot in `body`, whole: places that it does not hold are as they were in an earlier one, moved on as those around them have
+/// moved since. `None` for one of another scene.
 pub fn decode_snapshot(
     rest: &Rest,
     known: &mut Displacements,
@@ -132,35 +190,76 @@ pub fn decode_snapshot(
         return Err(Invalid("share of a snapshot"));
     }
     let (stride, phase, total) = (share.stride as usize, share.phase as usize, total as usize);
-    if body.len() != 6 * total.saturating_sub(phase).div_ceil(stride) {
-        return Err(Invalid("length of a snapshot"));
-    }
     if !rest.fits(&header) {
         return Ok(None);
     }
-    if known.of != rest.id || known.moved_m.len() != rest.total() {
-        (known.of, known.moved_m) = (rest.id, vec![[0.0; 3]; rest.total()]);
+    if body.len() != 6 * held_by(stride, phase, total).count() {
+        return Err(Invalid("length of a snapshot"));
     }
-    for (at, halves) in known
-        .moved_m
-        .iter_mut()
-        .skip(phase)
-        .step_by(stride)
-        .zip(body.chunks_exact(6))
-    {
-        *at = [0, 2, 4].map(|b| f16::from_le_bytes([halves[b], halves[b + 1]]).to_f32());
+    let halves = |b: &[u8]| [0, 2, 4].map(|i| f16::from_le_bytes([b[i], b[i + 1]]).to_f32());
+    let moved = body.chunks_exact(6).map(halves);
+    if known.of != rest.id || known.held.len() != rest.total() {
+        let places = held_by(stride, phase, total);
+        *known = Displacements::guess(rest, header.time_ns, places.zip(moved.clone()));
     }
-    let whole = known.moved_m.iter().enumerate().map(|(i, moved)| {
-        let place = rest.place_m(i);
-        Vertex {
-            position_m: [0, 1, 2].map(|a| place[a] + moved[a]),
-        }
-    });
-    let vertices: Vec<Vertex> = whole.collect();
+    let vertices = known.take(rest, header.time_ns, (stride, phase), moved);
     if let Err(invalid) = check::snapshot(&header, &vertices) {
         // What is invalid is not kept for the next one.
         *known = Displacements::default();
         return Err(invalid);
     }
     Ok(Some((header, vertices)))
+}
+
+impl Displacements {
+    /// Of a scene of which nothing was held before: places lie as far from rest as those around them of which it is known.
+    fn guess(rest: &Rest, time_ns: u64, moved: impl Iterator<Item = (usize, [f32; 3])> + Clone) -> Self {
+        let mut lattice = Lattice::new(&rest.bounds, moved.clone().count());
+        moved.for_each(|(i, [x, y, z])| lattice.add(rest.places_m[i], [x, y, z, 0.0]));
+        let guessed = rest.places_m.iter().map(|place_m| {
+            let [x, y, z, _] = lattice.at(*place_m);
+            Held {
+                moved_m: [x, y, z],
+                time_ns,
+                is_guess: true,
+            }
+        });
+        Self {
+            of: rest.id,
+            held: guessed.collect(),
+        }
+    }
+
+    /// All places, by those that a message holds.
+    fn take(
+        &mut self,
+        rest: &Rest,
+        time_ns: u64,
+        (stride, phase): (usize, usize),
+        moved: impl ExactSizeIterator<Item = [f32; 3]>,
+    ) -> Vec<Vertex> {
+        let mut changes = Lattice::new(&rest.bounds, moved.len());
+        for (i, moved_m) in held_by(stride, phase, rest.total()).zip(moved) {
+            let next = Held {
+                moved_m,
+                time_ns,
+                is_guess: false,
+            };
+            let before = std::mem::replace(&mut self.held[i], next);
+            if stride > 1 && !before.is_guess {
+                changes.add(rest.places_m[i], before.change(&next));
+            }
+        }
+        let places = self.held.iter().enumerate().map(|(i, held)| {
+            let origin_m = rest.origin_m(i);
+            let moved_m = match is_held_by(stride, phase, i) {
+                true => held.moved_m,
+                false => held.moved_on_m(changes.at(rest.places_m[i]), time_ns),
+            };
+            Vertex {
+                position_m: [0, 1, 2].map(|a| origin_m[a] + moved_m[a]),
+            }
+        });
+        places.collect()
+    }
 }

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity, write_invitation};
+use stylet_shm_schema::TickRecord;
 use stylet_shm_schema::service::Instance;
 use stylet_test_kit::witness::where_the_machine_runs;
 
@@ -209,4 +210,38 @@ fn a_core_and_a_server_that_are_started_again_are_seen_again() {
         host.taken.len() > 100
     });
     assert!(again, "{}", joined.log());
+}
+
+/// Each recording on its machine had a gap of what was made while it was down.
+#[test]
+fn a_member_that_was_killed_hands_on_what_was_made_until_it_was_started_again() {
+    let (near, far) = (Named::new(), Named::new());
+    let _core = core(&near, &[]);
+    let keys = Keys::new();
+    let served = keys.serve(&near);
+    let invitation = keys.invite("anna", Role::Observer, Validity::days(1));
+    let mut killed = join(&invitation, &far);
+    let mut host = Host::new(&far);
+    assert!(host.sees_the_core(Duration::from_secs(10)), "{}", killed.log());
+    let mut ticks = Vec::new();
+    // As a window does: records of another run than the one that was announced are dropped.
+    let mut takes = |host: &mut Host, more: usize| {
+        let enough = ticks.len() + more;
+        let came = until(Duration::from_secs(15), || {
+            host.poll();
+            let run = host.session.map(|session| session.session_id);
+            let of_run = |record: &TickRecord| Some(record.session_id) == run;
+            ticks.extend(host.taken.drain(..).filter(of_run).map(|record| record.tick));
+            ticks.len() > enough
+        });
+        assert!(came, "{} records: {}", ticks.len(), served.log());
+    };
+    takes(&mut host, 500);
+    killed.signal(libc::SIGKILL);
+    let _ = killed.child.wait();
+    std::thread::sleep(Duration::from_secs(1));
+    let _again = join(&invitation, &far);
+    takes(&mut host, 2500);
+    let missing = ticks.windows(2).find(|pair| pair[1] != pair[0] + 1);
+    assert_eq!(missing, None, "of {} records", ticks.len());
 }

@@ -1,6 +1,7 @@
 //! A core, a lab, and the two sides of the relay, each ended when it is dropped.
 
 use std::fs::File;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -50,6 +51,8 @@ impl Running {
     pub fn start(command: &mut Command, log: PathBuf) -> Self {
         let out = File::create(&log).expect("the log can be written");
         let err = out.try_clone().expect("a second handle");
+        // SAFETY: between fork and exec it only makes a system call.
+        unsafe { command.pre_exec(end_with_the_test) };
         let child = command
             .stdin(Stdio::null())
             .stdout(out)
@@ -70,6 +73,15 @@ impl Running {
 
     pub fn says(&self, words: &str, limit: Duration) -> bool {
         until(limit, || self.log().contains(words))
+    }
+}
+
+/// A test that is killed cannot end what it started.
+fn end_with_the_test() -> std::io::Result<()> {
+    // SAFETY: a system call with plain arguments.
+    match unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGTERM) } {
+        0 => Ok(()),
+        _ => Err(std::io::Error::last_os_error()),
     }
 }
 
@@ -205,9 +217,17 @@ impl Host {
     pub fn new(named: &Named) -> Self {
         let node = named.0.node().expect("shared memory");
         let records = service::records::subscriber(&node).expect("a port");
+        // While another program makes a service it cannot be opened; on a busy machine that takes longer than an attempt does.
+        let mut near = Near::new(&named.0);
+        until(Duration::from_secs(5), || {
+            if near.is_err() {
+                near = Near::new(&named.0);
+            }
+            near.is_ok()
+        });
         Self {
             board: None,
-            near: Near::new(&named.0).expect("ports"),
+            near: near.expect("ports"),
             records,
             _node: node,
             session: None,

@@ -1,9 +1,9 @@
 //! Members behind lines of their own, in network namespaces: a line of 100 Mbit/s, and a class of twenty. As root, by `make relay-class`.
 
-use crate::fixture::{Host, Keys, Named, Running, core, scratch, until};
-use crate::watch::{Seen, quantile, seconds, settle};
-use std::path::Path;
-use std::process::Command;
+use crate::fixture::{Host, Keys, Named, Running, core, lease, until};
+use crate::space::Line;
+use crate::watch::{Seen, gaps, quantile, seconds, settle};
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity};
 
@@ -22,84 +22,6 @@ fn observers() -> usize {
 fn rounds() -> usize {
     let asked = std::env::var("STYLET_RELAY_ROUNDS").ok().and_then(|s| s.parse().ok());
     asked.unwrap_or(3)
-}
-
-fn run(words: &str) {
-    let mut parts = words.split_whitespace();
-    let output = Command::new(parts.next().expect("a program"))
-        .args(parts)
-        .output()
-        .expect("runs");
-    assert!(
-        output.status.success(),
-        "{words}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
-}
-
-/// A namespace with a cable to this one; removed when it is dropped.
-struct Line {
-    name: String,
-    number: usize,
-}
-
-impl Line {
-    /// Of `rate` each way, in the words of `tc`, or as fast as it can.
-    fn new(number: usize, rate: Option<&str>) -> Self {
-        let line = Self {
-            name: format!("stylet{}-{number}", std::process::id()),
-            number,
-        };
-        let (name, here, there) = (&line.name, line.cable("a"), line.cable("b"));
-        run(&format!("ip netns add {name}"));
-        run(&format!("ip link add {here} type veth peer name {there} netns {name}"));
-        run(&format!("ip addr add {}/30 dev {here}", Self::server(number)));
-        run(&format!("ip link set {here} up"));
-        run(&format!("ip -n {name} addr add 10.77.{number}.2/30 dev {there}"));
-        run(&format!("ip -n {name} link set {there} up"));
-        if let Some(rate) = rate {
-            run(&format!(
-                "tc qdisc add dev {here} root tbf rate {rate} burst 64kb latency 50ms"
-            ));
-            run(&format!(
-                "tc -n {name} qdisc add dev {there} root tbf rate {rate} burst 64kb latency 50ms"
-            ));
-        }
-        line
-    }
-
-    fn cable(&self, end: &str) -> String {
-        format!("st{}{end}{}", std::process::id() % 100_000, self.number)
-    }
-
-    fn server(number: usize) -> String {
-        format!("10.77.{number}.1")
-    }
-
-    fn join(&self, invitation: &Path, named: &Named) -> Running {
-        let mut command = Command::new("ip");
-        command
-            .args([
-                "netns",
-                "exec",
-                &self.name,
-                env!("CARGO_BIN_EXE_relay"),
-                "join",
-                "--instance",
-                named.0.name(),
-                "--invitation",
-            ])
-            .arg(invitation);
-        Running::start(&mut command, scratch("join").join("log"))
-    }
-}
-
-impl Drop for Line {
-    fn drop(&mut self) {
-        // The cable goes with its end.
-        let _ = Command::new("ip").args(["netns", "del", &self.name]).output();
-        let _ = Command::new("ip").args(["link", "del", &self.cable("a")]).output();
-    }
 }
 
 #[test]
@@ -128,6 +50,45 @@ fn a_line_of_100_megabits_carries_records_whole_and_snapshots_in_time() {
     drop(joined);
 }
 
+/// Of the core's loop, while a host beside it takes the records; they stay there.
+fn wake_p99_us(local: &mut Host) -> f64 {
+    local.poll();
+    local.taken.clear();
+    until(measured(), || {
+        local.poll();
+        false
+    });
+    assert!(local.taken.len() > 500, "{} records", local.taken.len());
+    let wakes = local.taken.iter().map(|r| r.wake_latency_ns as f64 * 1e-3);
+    quantile(&mut wakes.collect::<Vec<f64>>(), 0.99)
+}
+
+/// How many of the ticks that were `made` a member's host has, once the last of them is there or has not come for a while. What is missing is printed.
+fn share_of(made: &BTreeSet<u64>, host: &mut Host, named: &Named) -> f64 {
+    let last = made.last().copied();
+    until(Duration::from_secs(5), || {
+        host.poll();
+        host.taken.last().map(|record| record.tick) >= last
+    });
+    let had: BTreeSet<u64> = host.taken.iter().map(|record| record.tick).collect();
+    let missing: Vec<u64> = made.difference(&had).copied().collect();
+    if let Some(first) = made.first().filter(|_| !missing.is_empty()) {
+        println!(
+            "{}: {} of {} records are missing, those {:?} after the first; {} came\n{}",
+            named.0.name(),
+            missing.len(),
+            made.len(),
+            gaps(&missing)
+                .iter()
+                .map(|(from, to)| (from - first, to - first))
+                .collect::<Vec<_>>(),
+            had.len(),
+            lease(named, &["status"]).lines().next().unwrap_or_default()
+        );
+    }
+    1.0 - missing.len() as f64 / made.len() as f64
+}
+
 #[test]
 #[ignore = "as root: it makes a network namespace for each member"]
 fn a_class_of_twenty_gets_its_records_and_the_core_does_not_notice() {
@@ -144,19 +105,8 @@ fn a_class_of_twenty_gets_its_records_and_the_core_does_not_notice() {
     assert!(local.sees_the_core(Duration::from_secs(10)));
     // The p99 of each round: a bad one is not hidden among the others.
     let (mut without_us, mut with_us, mut shares) = (Vec::new(), Vec::new(), Vec::new());
-    let mut wake = |length: Duration| {
-        local.poll();
-        local.taken.clear();
-        until(length, || {
-            local.poll();
-            false
-        });
-        assert!(local.taken.len() > 500, "{} records", local.taken.len());
-        let wakes = local.taken.iter().map(|r| r.wake_latency_ns as f64 * 1e-3);
-        quantile(&mut wakes.collect::<Vec<f64>>(), 0.99)
-    };
     for _ in 0..rounds() {
-        without_us.push(wake(measured()));
+        without_us.push(wake_p99_us(&mut local));
         let far: Vec<Named> = lines.iter().map(|_| Named::new()).collect();
         let joined: Vec<Running> = (0..lines.len())
             .map(|i| lines[i].join(&invitations[i], &far[i]))
@@ -176,14 +126,10 @@ fn a_class_of_twenty_gets_its_records_and_the_core_does_not_notice() {
             host.poll();
             host.taken.clear();
         }
-        with_us.push(wake(measured()));
-        for host in &mut hosts {
-            host.poll();
-            let (first, last) = (
-                host.taken.first().expect("records").tick,
-                host.taken.last().expect("records").tick,
-            );
-            shares.push(host.taken.len() as f64 / (last - first + 1) as f64);
+        with_us.push(wake_p99_us(&mut local));
+        let made: BTreeSet<u64> = local.taken.iter().map(|record| record.tick).collect();
+        for (host, named) in hosts.iter_mut().zip(&far) {
+            shares.push(share_of(&made, host, named));
         }
         drop(hosts);
         drop(joined);

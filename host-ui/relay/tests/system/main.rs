@@ -3,8 +3,11 @@
 mod carries;
 mod faults;
 mod fixture;
+mod hand_over;
 mod lease;
 mod line;
+mod outlines;
 mod proxy;
 mod rights;
+mod space;
 mod watch;

@@ -94,8 +94,12 @@ fn an_instructor_stops_the_hand_and_does_not_move_it() {
     );
     host.ask(&Request::SetPlan(None)).expect("allowed");
     // A fault goes in and out again, and a mark: the events come back to where they were asked for.
-    host.ask(&Request::BeginExercise(Exercise::DeviceLost)).expect("allowed");
-    let lost = |host: &mut Host| host.state().is_some_and(|s| s.fault == stylet_shm_schema::Fault::DeviceLost as u32);
+    host.ask(&Request::BeginExercise(Exercise::DeviceLost))
+        .expect("allowed");
+    let lost = |host: &mut Host| {
+        host.state()
+            .is_some_and(|s| s.fault == stylet_shm_schema::Fault::DeviceLost as u32)
+    };
     assert!(until(Duration::from_secs(3), || lost(&mut local)), "no fault");
     host.ask(&Request::EndExercises).expect("allowed");
     local.ask(&Request::Engage).expect("beside the core");
@@ -113,7 +117,10 @@ fn an_operator_marks_and_puts_no_fault_in() {
     let joined = join(&keys.invite("otto", Role::Operator, Validity::days(1)), &far);
     let mut host = Host::new(&far);
     assert!(host.sees_the_core(Duration::from_secs(10)), "{}", joined.log());
-    for request in [Request::BeginExercise(Exercise::StiffTissue { factor: 2.0 }), Request::EndExercises] {
+    for request in [
+        Request::BeginExercise(Exercise::StiffTissue { factor: 2.0 }),
+        Request::EndExercises,
+    ] {
         let refused = host.ask(&request).expect_err("an operator");
         assert!(refused.contains("operator"), "{refused}");
     }

@@ -53,6 +53,12 @@ pub fn quantile(values: &mut [f64], share: f64) -> f64 {
         .unwrap_or(f64::NAN)
 }
 
+/// First and last of each run of ticks that follow one another.
+pub fn gaps(ticks: &[u64]) -> Vec<(u64, u64)> {
+    let runs = ticks.chunk_by(|a, b| a + 1 == *b);
+    runs.filter_map(|run| Some((*run.first()?, *run.last()?))).collect()
+}
+
 /// Records and snapshots of one host for a while.
 pub struct Seen {
     pub records: BTreeMap<u64, Instant>,

@@ -1,0 +1,93 @@
+//! Which record hosts here had last, kept where a member that is killed and started again finds it: it asks for what was made meanwhile.
+
+use crate::RelayError;
+use std::fs::File;
+use std::os::unix::fs::{FileExt, OpenOptionsExt};
+use std::path::PathBuf;
+use stylet_shm_schema::service::Instance;
+
+/// Servers keep records for so long.
+const KEPT_NS: u64 = 60_000_000_000;
+const LENGTH: usize = 24;
+
+/// The tick that comes next in a run of the core.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Next {
+    pub session_id: u64,
+    pub tick: u64,
+}
+
+/// The file; removed by a member that ends, since hosts of a later one have no gap to fill.
+pub(super) struct Last {
+    file: File,
+    path: PathBuf,
+}
+
+impl Last {
+    /// Where the member of `instance` notes it, and what one that was killed has noted less than a minute ago.
+    pub fn open(instance: &Instance, now_ns: u64) -> Result<(Self, Option<Next>), RelayError> {
+        let path = PathBuf::from(format!("/dev/shm/{}relay.last", instance.prefix()));
+        let mut options = File::options();
+        options.read(true).write(true).create(true).truncate(false).mode(0o600);
+        let file = options
+            .open(&path)
+            .map_err(|e| RelayError(format!("{}: {e}", path.display())))?;
+        let last = Self { file, path };
+        let noted = last.noted(now_ns);
+        Ok((last, noted))
+    }
+
+    fn noted(&self, now_ns: u64) -> Option<Next> {
+        let mut bytes = [0; LENGTH];
+        self.file.read_exact_at(&mut bytes, 0).ok()?;
+        let [session_id, tick, time_ns]: [u64; 3] = bytemuck::pod_read_unaligned(&bytes);
+        // A clock that another start of this machine had is ahead.
+        let is_recent = now_ns.checked_sub(time_ns).is_some_and(|age_ns| age_ns < KEPT_NS);
+        is_recent.then_some(Next { session_id, tick })
+    }
+
+    /// Hosts here have all before `next`.
+    pub fn note(&self, next: Next, now_ns: u64) {
+        // Where it cannot be written, a member that is killed costs what it did without it.
+        let _ = self
+            .file
+            .write_all_at(bytemuck::bytes_of(&[next.session_id, next.tick, now_ns]), 0);
+    }
+}
+
+impl Drop for Last {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_noted_less_than_a_minute_ago_is_found_and_what_is_invalid_is_not() {
+        let instance = Instance::new(&format!("last-{}", std::process::id())).expect("valid");
+        let next = Next {
+            session_id: 7,
+            tick: 1234,
+        };
+        let now_ns = 5 * KEPT_NS;
+        let (killed, before) = Last::open(&instance, now_ns).expect("shared memory");
+        assert_eq!(before, None);
+        killed.note(next, now_ns);
+        std::mem::forget(killed);
+        for (later_ns, found) in [(0, Some(next)), (KEPT_NS, None)] {
+            let (again, before) = Last::open(&instance, now_ns + later_ns).expect("shared memory");
+            assert_eq!(before, found);
+            std::mem::forget(again);
+        }
+        let (ended, _) = Last::open(&instance, now_ns).expect("shared memory");
+        ended.file.set_len(9).expect("ours");
+        let (same, before) = Last::open(&instance, now_ns).expect("shared memory");
+        assert_eq!(before, None, "too short");
+        drop((ended, same));
+        assert_eq!(Last::open(&instance, now_ns).expect("shared memory").1, None);
+        let _ = std::fs::remove_file(format!("/dev/shm/{}relay.last", instance.prefix()));
+    }
+}

@@ -1,0 +1,93 @@
+//! Places between those that a message holds: until they are held themselves they move as those around them do.
+//!
+//! What the places of the message have moved by since they were held before, and how long that was, is spread to the corners of a lattice,
+//! with the weights by which it is read there (normalised convolution, Knutsson and Westin 1993). Where nothing has moved nothing is added.
+
+/// The box around all places at rest, m.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Bounds {
+    lower: [f32; 3],
+    upper: [f32; 3],
+}
+
+impl Bounds {
+    pub fn of(places_m: &[[f32; 3]]) -> Self {
+        let first = places_m.first().copied().unwrap_or_default();
+        let both = |f: fn(f32, f32) -> f32| places_m.iter().fold(first, |a, b| [0, 1, 2].map(|i| f(a[i], b[i])));
+        Self {
+            lower: both(f32::min),
+            upper: both(f32::max),
+        }
+    }
+}
+
+/// Corners along an axis at most.
+const MOST_CORNERS: f32 = 64.0;
+
+/// Displacements with times on a lattice about as fine as the places that a message holds are apart.
+pub(super) struct Lattice {
+    lower_m: [f32; 3],
+    per_m: f32,
+    corners: [usize; 3],
+    /// Weighted values, and the weights.
+    sums: Vec<[f32; 5]>,
+}
+
+impl Lattice {
+    /// For so many places within `bounds`.
+    pub fn new(bounds: &Bounds, places: usize) -> Self {
+        let extent_m = [0, 1, 2].map(|i| bounds.upper[i] - bounds.lower[i]);
+        let longest_m = extent_m.into_iter().fold(0.0, f32::max);
+        let volume_m3: f32 = extent_m.iter().product();
+        let cell_m = (volume_m3 / places.max(1) as f32).cbrt().max(longest_m / MOST_CORNERS);
+        // A scene without an extent has one corner, and one with places that are no numbers as well.
+        let per_m = Some(1.0 / cell_m).filter(|per_m| per_m.is_finite()).unwrap_or(0.0);
+        let corners = extent_m.map(|extent_m| (extent_m * per_m).clamp(0.0, MOST_CORNERS) as usize + 2);
+        Self {
+            lower_m: bounds.lower,
+            per_m,
+            corners,
+            sums: vec![[0.0; 5]; corners.iter().product()],
+        }
+    }
+
+    /// The eight corners around a place, with their weights.
+    fn around(&self, place_m: [f32; 3]) -> [(usize, f32); 8] {
+        let mut low = [0; 3];
+        let mut share = [0.0; 3];
+        for i in 0..3 {
+            let at = (place_m[i] - self.lower_m[i]) * self.per_m;
+            low[i] = (at as usize).min(self.corners[i] - 2);
+            share[i] = (at - low[i] as f32).clamp(0.0, 1.0);
+        }
+        std::array::from_fn(|corner| {
+            let up = [corner & 1, (corner >> 1) & 1, corner >> 2];
+            let [x, y, z] = [0, 1, 2].map(|i| low[i] + up[i]);
+            let weight: f32 = (0..3)
+                .map(|i| if up[i] == 1 { share[i] } else { 1.0 - share[i] })
+                .product();
+            (x + self.corners[0] * (y + self.corners[1] * z), weight)
+        })
+    }
+
+    /// At a place that the message holds: a displacement, m, in a time, s.
+    pub fn add(&mut self, place_m: [f32; 3], [x, y, z, time_s]: [f32; 4]) {
+        for (corner, weight) in self.around(place_m) {
+            let sum = &mut self.sums[corner];
+            let values = [x, y, z, time_s, 1.0];
+            (0..5).for_each(|i| sum[i] += weight * values[i]);
+        }
+    }
+
+    /// At any place, by those around it; 0 where there are none.
+    pub fn at(&self, place_m: [f32; 3]) -> [f32; 4] {
+        let mut total = [0.0_f32; 5];
+        for (corner, weight) in self.around(place_m) {
+            (0..5).for_each(|i| total[i] += weight * self.sums[corner][i]);
+        }
+        match total[4] > 1e-6 {
+            true => [0, 1, 2, 3].map(|i| total[i] / total[4]),
+            false => [0.0; 4],
+        }
+    }
+}
