@@ -4,8 +4,6 @@
 //! where they are with it.
 
 use super::beam::MAX_ACROSS;
-use super::model::LineModel;
-use super::state::LineState;
 use serde::{Deserialize, Serialize};
 
 /// Displacement of each row of a line: shaft of each station, then tip at each, then stations across along each direction.
@@ -81,12 +79,18 @@ impl Outside {
         self.is_on
     }
 
+    /// Of each row, m.
+    pub fn now_m(&self) -> &[f64] {
+        &self.now_m
+    }
+
     /// Of one row, m.
     pub fn at_m(&self, row: usize) -> f64 {
         self.now_m.get(row).copied().unwrap_or(0.0)
     }
 
-    fn go_on(&mut self) {
+    /// One tick nearer to where it has to be.
+    pub fn go_on(&mut self) {
         if self.ticks == 0 {
             return;
         }
@@ -105,66 +109,4 @@ impl Outside {
 
 fn rows(stations: usize) -> usize {
     2 * (stations + MAX_ACROSS)
-}
-
-impl LineState {
-    /// The tissue is displaced past the needle by what the probe does in this tick: beside what the past leaves. One comparison where nothing is.
-    pub(super) fn move_from_outside(&mut self) {
-        if !self.outside.is_on {
-            return;
-        }
-        if !self.memory.is_on() {
-            self.memory.offset_m.fill(0.0);
-        }
-        self.outside.go_on();
-        for (offset_m, moved_m) in self.memory.offset_m.iter_mut().zip(&self.outside.now_m) {
-            *offset_m += moved_m;
-        }
-        if !self.outside.is_on {
-            (self.outside.at_tip_m, self.beside_whole_m) = (0.0, 0.0);
-        }
-    }
-
-    /// The same for the membrane at the tip, once it is known where that is: it is no more stretched by it than by tissue that is moved as a whole.
-    pub(super) fn move_membrane_from_outside(&mut self, model: &LineModel) {
-        if !self.outside.is_on {
-            return;
-        }
-        let first = model.compliance.stations;
-        let tip = self.tip_range.clone().zip(self.tip_weights);
-        let at_tip_m: f64 = tip.map(|(n, weight)| weight * self.outside.at_m(first + n)).sum();
-        self.beside_whole_m += at_tip_m - self.outside.at_tip_m;
-        self.outside.at_tip_m = at_tip_m;
-    }
-
-    /// A needle that is taken up again after it stayed in: places count with what the probe moves the tissue by.
-    pub(super) fn come_back_moved(&mut self) {
-        for n in 0..self.in_contact {
-            let moved_m = self.outside.at_m(n);
-            self.u_m[n] += moved_m;
-            self.anchor_m[n] -= moved_m;
-        }
-        let at_tip_m = self.outside.at_tip_m;
-        self.tip_u_m += at_tip_m;
-        self.tip.material_m -= at_tip_m;
-    }
-
-    /// The same across the line, at so many stations along each direction.
-    pub(super) fn bend_from_outside(&mut self, across: usize) {
-        let first = 2 * self.shaft_n.len();
-        let outside = &self.outside;
-        if outside.is_on || self.beam.is_moved() {
-            self.beam
-                .move_from_outside(|side, n| outside.at_m(first + side * across + n), across);
-        }
-    }
-
-    /// Work of the needle's forces over what moves the tissue from outside, J: no energy that they have stored.
-    pub(super) fn outside_j(&self) -> f64 {
-        if !self.outside.is_on {
-            return 0.0;
-        }
-        let shaft = self.shaft_n.iter().enumerate().take(self.in_contact);
-        shaft.map(|(n, f)| f * self.outside.at_m(n)).sum::<f64>() + self.tip.force_n * self.outside.at_tip_m
-    }
 }

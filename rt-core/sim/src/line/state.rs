@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
 
 mod kept;
+mod moved;
 
 /// The tip in the material of the line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
