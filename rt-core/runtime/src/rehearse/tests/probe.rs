@@ -233,7 +233,7 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
         (wrench.force_n, gland)
     };
     let (lies_n, lies_m) = go(theatre.pose(BALANCED_M, BEYOND_M), 3000);
-    let (pressed_n, pressed_m) = go(theatre.pose(BALANCED_M + 5e-3, BEYOND_M), 1000);
+    let (pressed_n, pressed_m) = go(theatre.pose(BALANCED_M + 5e-3, BEYOND_M), 4000);
     assert!(
         pressed_n.y < lies_n.y - 0.5 && pressed_n.y < -0.5,
         "{pressed_n} {lies_n}"
