@@ -4,7 +4,7 @@ mod decode;
 
 pub use decode::{RequestError, RequestErrors};
 
-use crate::{BUILTIN_SCENES, Command, Exercise, MAX_SEEDS, ParameterId, Text};
+use crate::{BUILTIN_SCENES, Command, Exercise, MAX_SEEDS, ParameterId, Prescribed, Text};
 use bytemuck::Zeroable;
 use num_enum::TryFromPrimitive;
 use strum::EnumDiscriminants;
@@ -144,6 +144,8 @@ pub struct PlannedNeedle {
     pub direction: [f64; 3],
     /// Positions of at most [`MAX_SEEDS`] seeds, m.
     pub seeds_m: Vec<[f64; 3]>,
+    /// What the seeds are.
+    pub prescribed: Prescribed,
 }
 
 /// Goal of the simulated hand, scene frame.
@@ -221,6 +223,9 @@ impl Request {
                 return Err(RequestError::InvalidText.into());
             }
         }
+        if let Self::SetPlan(Some(plan)) = self {
+            command.text = Text::new(&plan.prescribed.source.read());
+        }
         Ok(command)
     }
 
@@ -231,7 +236,12 @@ impl Request {
                 .flat_map(|change| [f64::from(change.id as u32), change.value])
                 .collect(),
             Self::SetPlan(None) => Vec::new(),
-            Self::SetPlan(Some(plan)) => joined(&[&plan.entry_m, &plan.direction], &plan.seeds_m),
+            Self::SetPlan(Some(plan)) => {
+                let of = &plan.prescribed;
+                let numbers = [of.needle, of.last_needle].map(f64::from);
+                let amounts = [of.strength_u, of.dose_gy];
+                joined(&[&plan.entry_m, &plan.direction, &numbers, &amounts], &plan.seeds_m)
+            }
             Self::MoveHand(hand) | Self::MoveSecondHand(hand) => {
                 let pace = [hand.speed_m_per_s, hand.acceleration_m_per_s2];
                 joined(&[&hand.tip_m, &hand.direction, &pace], &[])
