@@ -74,7 +74,7 @@ fn the_automatic_plan_of_the_pelvis_keeps_its_limits() {
                 trials: 1000,
                 random_seed: 1,
             };
-            let trials = Trials::new(&anatomy.target, &kernel, (&seeds, &[]), how);
+            let trials = Trials::new(&anatomy.target, &kernel, (&seeds, &[]), &[], how);
             println!("  D90 is kept in {:.1} % of 1,000 trials", trials.kept(145.0) * 100.0);
             assert!(trials.kept(145.0) >= 0.95, "{}", trials.kept(145.0));
         }
