@@ -1,7 +1,7 @@
 //! The debrief as files: the same page as `host-ui procedure` writes, from the data of the window.
 
 use super::{App, refusal};
-use crate::planner::Implant;
+use crate::planner;
 use crate::shown::{Note, SeedError, all_errors};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -128,7 +128,7 @@ impl App {
     }
 
     /// A planned seed, as if it lay on plan, and the one that was dropped for it.
-    fn pair(&self, implant: &Implant, needle: usize, row: &SeedError) -> Option<(SeedPair, Option<SeedPose>)> {
+    fn pair(&self, implant: &planner::Implant, needle: usize, row: &SeedError) -> Option<(SeedPair, Option<SeedPose>)> {
         let shown = &self.shown;
         let of = implant.plan.needles.get(needle)?;
         let seed = of.seeds.get(row.planned)?;
