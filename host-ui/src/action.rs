@@ -95,6 +95,8 @@ pub enum TraineeAction {
     Follow(usize),
     /// Stops that hand.
     Stop(usize),
+    /// Writes the debrief of this one, from what the window has heard.
+    Debrief(usize),
     /// Stops every hand.
     StopAll,
 }

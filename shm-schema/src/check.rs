@@ -1,8 +1,9 @@
 //! What a reader verifies before it uses a value that came out of shared memory.
 
 use crate::{
-    GridInfo, HapticState, MAX_LABEL_CELLS, MAX_NODES, MAX_SEEDS, MAX_STRUCTURES, MOST_MOVED_M, ParametersInForce,
-    PlanInForce, Rehearsal, SceneHeader, SecondRecord, SecondState, SeedPose, SnapshotHeader, TickRecord, Vertex,
+    GridInfo, HapticState, MAX_LABEL_CELLS, MAX_NODES, MAX_SEEDS, MAX_STRUCTURES, MOST_MOVED_M, MOST_PLANNED_NEEDLES,
+    PRESCRIPTION_RANGE_GY, ParametersInForce, PlanInForce, Rehearsal, SEED_STRENGTH_RANGE_U, SceneHeader, SecondRecord,
+    SecondState, SeedPose, SnapshotHeader, TickRecord, Vertex,
 };
 
 /// What is invalid in a value.
@@ -181,6 +182,15 @@ pub fn plan(p: &PlanInForce) -> Result<(), Invalid> {
     ensure(p.seed_count as usize <= MAX_SEEDS, "seed count")?;
     ensure(within(&p.entry_m, MAX_COORDINATE_M), "entry")?;
     ensure(p.generation == 0 || is_unit(&p.direction), "direction")?;
+    let of = &p.prescribed;
+    ensure(
+        of.needle.max(of.last_needle) <= MOST_PLANNED_NEEDLES,
+        "number of a needle",
+    )?;
+    let is_in = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
+    ensure(is_in(of.strength_u, SEED_STRENGTH_RANGE_U), "strength of the seeds")?;
+    ensure(is_in(of.dose_gy, PRESCRIPTION_RANGE_GY), "prescribed dose")?;
+    ensure(of.source.exact().is_some(), "source")?;
     ensure(
         p.seeds[..p.seed_count as usize]
             .iter()

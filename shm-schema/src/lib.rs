@@ -56,7 +56,10 @@ pub use params::{
     PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet,
     ParameterSpec, ParametersInForce, folding,
 };
-pub use plan::{MAX_EARLIER_NEEDLES, MAX_LEFT_NEEDLES, MAX_SEEDS, PlanInForce, PlannedSeed};
+pub use plan::{
+    MAX_EARLIER_NEEDLES, MAX_LEFT_NEEDLES, MAX_SEEDS, MOST_PLANNED_NEEDLES, PRESCRIPTION_RANGE_GY, PlanInForce,
+    PlannedSeed, Prescribed, SEED_STRENGTH_RANGE_U, SOURCE_BYTES,
+};
 pub use record::TickRecord;
 pub use refusal::{Reason, Refusal, RefusalCode};
 pub use rehearsal::Rehearsal;
@@ -77,4 +80,4 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 12;
+pub const SCHEMA_VERSION: u32 = 13;

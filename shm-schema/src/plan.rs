@@ -1,5 +1,6 @@
 //! The plan that `rt-core` keeps, whichever hosts are connected.
 
+use crate::Text;
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -20,6 +21,38 @@ pub struct PlannedSeed {
     pub position_m: [f64; 3],
 }
 
+/// Strength of a planned seed, U.
+pub const SEED_STRENGTH_RANGE_U: [f64; 2] = [0.0, 1e5];
+/// Prescribed dose, Gy.
+pub const PRESCRIPTION_RANGE_GY: [f64; 2] = [0.0, 1e4];
+/// Bytes of the model of a source.
+pub const SOURCE_BYTES: usize = 32;
+/// Needles of a plan of many.
+pub const MOST_PLANNED_NEEDLES: u32 = 1000;
+
+/// What the seeds of a planned needle are, for other hosts that count their dose; the core passes it on. All zero where it is not known.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
+#[type_name("stylet.Prescribed")]
+pub struct Prescribed {
+    /// Which needle of a plan of many it is, counted from 1, and its seeds are dropped in their order; 0 for one by hand.
+    pub needle: u32,
+    /// The last needle of that plan that has seeds; 0 for one by hand.
+    pub last_needle: u32,
+    /// Strength of each seed, U.
+    pub strength_u: f64,
+    /// Prescribed dose, Gy.
+    pub dose_gy: f64,
+    /// Model of the source.
+    pub source: Text<SOURCE_BYTES>,
+}
+
+impl Default for Prescribed {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
 /// The needle's path and the seeds planned along it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
@@ -37,6 +70,8 @@ pub struct PlanInForce {
     pub direction: [f64; 3],
     /// How many of `seeds` count.
     pub seed_count: u64,
+    /// What they are.
+    pub prescribed: Prescribed,
     /// In the order in which the host sent them.
     pub seeds: [PlannedSeed; MAX_SEEDS],
 }

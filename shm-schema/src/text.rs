@@ -5,7 +5,7 @@ use iceoryx2::prelude::ZeroCopySend;
 
 /// UTF-8 in a fixed field, padded with zeros.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, ZeroCopySend)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ZeroCopySend)]
 #[type_name("stylet.Text")]
 pub struct Text<const N: usize> {
     bytes: [u8; N],

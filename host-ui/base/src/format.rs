@@ -5,6 +5,17 @@ pub fn utc_now() -> String {
     jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ").to_string()
 }
 
+/// A time as [`utc_now`] writes it, as a person here reads it; `None` for any other text.
+pub fn local_time(utc: &str) -> Option<String> {
+    time_in(utc, jiff::tz::TimeZone::system())
+}
+
+fn time_in(utc: &str, zone: jiff::tz::TimeZone) -> Option<String> {
+    let civil = jiff::civil::DateTime::strptime("%Y%m%dT%H%M%SZ", utc).ok()?;
+    let there = civil.to_zoned(jiff::tz::TimeZone::UTC).ok()?.with_time_zone(zone);
+    Some(there.strftime("%-d %b %Y, %H:%M").to_string())
+}
+
 /// Millimetres from metres.
 pub fn mm(metres: f64) -> f64 {
     metres * 1e3
@@ -116,6 +127,19 @@ pub fn printable(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_time_is_read_where_the_reader_is() {
+        let east = jiff::tz::TimeZone::fixed(jiff::tz::offset(2));
+        assert_eq!(
+            time_in("20261101T230512Z", east.clone()).as_deref(),
+            Some("2 Nov 2026, 01:05")
+        );
+        assert!(time_in(&utc_now(), east.clone()).is_some());
+        for other in ["", "monday", "20261301T090000Z", "2026-11-01"] {
+            assert_eq!(time_in(other, east.clone()), None, "{other}");
+        }
+    }
 
     #[test]
     fn figures_read_as_a_person_writes_them() {

@@ -92,7 +92,8 @@ impl Link {
         self.playback.as_ref()
     }
 
-    fn with_snapshots_every(instance: Instance, every: Duration) -> Self {
+    /// Takes a picture of the tissue only so often; all else as it comes.
+    pub fn with_snapshots_every(instance: Instance, every: Duration) -> Self {
         let host_id = random_host_id();
         let receiver = Receiver::start(instance.clone(), host_id, every);
         Self::of(instance, host_id, receiver, None)

@@ -118,7 +118,7 @@ fn seeds(patient: &PatientFrame, snapshot: &Snapshot) -> Vec<Point> {
             name: format!("Seed {}", index + 1),
             group: "Seeds".to_owned(),
             rgba: [255, 200, 0, 255],
-            place_mm: place_mm(patient, seed.position_m),
+            place_mm: place_mm(patient, [0, 1, 2].map(|a| seed.position_m[a] + header.body_moved_m[a])),
             diameter_mm: 0.0,
             owner: String::new(),
         })

@@ -4,6 +4,7 @@
 
 pub mod class;
 pub mod finder;
+pub mod heard;
 pub mod intraoperative;
 pub mod linked;
 pub mod pairing;

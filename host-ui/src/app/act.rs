@@ -137,8 +137,8 @@ impl App {
             Action::StartOver => self.start_over(),
             Action::PlanSeeds => {
                 if let Some(scene) = &self.shown.scene {
-                    let request = plan_request(&default_plan(scene));
-                    self.send("Plan five seeds", &request);
+                    let plan = self.by_hand(default_plan(scene));
+                    self.send("Plan five seeds", &plan_request(&plan));
                 }
             }
             Action::LoadBuiltinScene(number) => self.load_builtin(number),
@@ -171,6 +171,7 @@ impl App {
                 entry_m: plan.entry_m,
                 direction: plan.direction,
                 seeds_m: Vec::new(),
+                prescribed: Default::default(),
             };
             self.planner.step_back();
             self.send("Withdraw the plan", &Request::SetPlan(Some(withdrawn)));

@@ -1,6 +1,7 @@
 //! The debrief as files: the same page as `host-ui procedure` writes, from the data of the window.
 
 use super::{App, refusal};
+use crate::planner;
 use crate::shown::{Note, SeedError, all_errors};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -8,22 +9,24 @@ use stylet_base::format;
 use stylet_base::job::{Job, JobUpdate};
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Seed, Source};
-use stylet_host::link::SceneModel;
+use stylet_host::link::{Link, SceneModel};
 use stylet_host::moments::Moment;
+use stylet_implant::heard::Heard;
 use stylet_implant::intraoperative::Reviewed;
 use stylet_implant::plan::{Anatomy, ImplantPlan, exchange, file};
 use stylet_implant::provenance;
 use stylet_implant::score::{self, Implant, Motion, Score, SeedPair};
-use stylet_shm_schema::{SeedPose, TickRecord};
+use stylet_shm_schema::{Prescribed, SeedPose, TickRecord};
 
 /// The folder of what was written, or why it could not be.
 pub(super) type Saved = Result<PathBuf, Failure>;
 /// Whatever was wrong, to be shown as text.
-type Failure = Box<dyn std::error::Error + Send + Sync>;
+pub(super) type Failure = Box<dyn std::error::Error + Send + Sync>;
 
 /// Everything that a debrief is made of, as it was when it was asked for.
-struct Delivered {
+pub(super) struct Delivered {
     scene: Arc<SceneModel>,
+    title: String,
     source: Source,
     prescription_gy: f64,
     pairs: Vec<SeedPair>,
@@ -32,23 +35,33 @@ struct Delivered {
     records: Vec<TickRecord>,
     moments: Vec<Moment>,
     updates: Vec<Reviewed>,
-    /// The plan as its file would be; `None` for one needle by hand.
+    /// The plan as its file would be; `None` for one needle by hand, and for a plan that was only heard of.
     plan: Option<ImplantPlan>,
 }
 
 impl App {
     /// Begins to write the files; [`App::take_debrief`] reports when they are written.
     pub(super) fn save_debrief(&mut self) {
+        if let Some(number) = self.trainees.followed {
+            return self.debrief_trainee(number);
+        }
         let own = || PathBuf::from(format!("out/debrief-{}", format::utc_now()));
         let folder = self.trainees.folder().unwrap_or_else(own);
         self.save_debrief_as(folder);
     }
 
     pub(super) fn save_debrief_as(&mut self, folder: PathBuf) {
+        let delivered = self.delivered();
+        self.write_debrief(delivered, folder);
+    }
+
+    /// One at a time.
+    pub(super) fn write_debrief(&mut self, delivered: Result<Delivered, Failure>, folder: PathBuf) {
         if self.debrief.is_some() {
+            self.shown.note = Some(refusal("A debrief is being written: try again in a moment.".to_owned()));
             return;
         }
-        match self.delivered() {
+        match delivered {
             Ok(delivered) => {
                 self.debrief = Some(Job::begin("debrief", move |messages, _| {
                     // The window may be closed by now; then nobody reads the answer.
@@ -77,19 +90,14 @@ impl App {
     }
 
     fn delivered(&self) -> Result<Delivered, Failure> {
-        let scene = self.link.scene().ok_or("there is no scene yet")?.clone();
-        let implant = self.shown.planning.implant.as_ref();
-        let (source, prescription_gy) = match implant {
-            None => exchange::usual()?,
-            Some(implant) => {
-                let model = &implant.plan.source;
-                let source = Source::known(model).ok_or_else(|| format!("no source is known as \"{model}\""))?;
-                (source, implant.plan.prescription_gy)
-            }
+        let Some(implant) = &self.shown.planning.implant else {
+            return Delivered::of_heard(&self.link, &self.heard, self.planned_as(), None);
         };
+        let scene = self.link.scene().ok_or("there is no scene yet")?.clone();
+        let (source, prescription_gy) = source_of(&implant.plan.source, implant.plan.prescription_gy)?;
         let (mut pairs, mut lost) = (Vec::new(), Vec::new());
         for (needle, row) in all_errors(&self.shown) {
-            let Some((pair, placed)) = self.pair(needle, &row) else {
+            let Some((pair, placed)) = self.pair(implant, needle, &row) else {
                 continue;
             };
             match placed {
@@ -105,51 +113,84 @@ impl App {
             }
         }
         Ok(Delivered {
+            title: format!("Scene {}", scene.header.name.read()),
             scene,
             source,
             prescription_gy,
             pairs,
             lost,
-            motion: self.trace.motion(),
-            records: self.trace.records().to_vec(),
-            moments: self.moments.since(self.trace.began_ns().unwrap_or(u64::MAX)),
+            motion: self.heard.trace().motion(),
+            records: self.heard.trace().records().to_vec(),
+            moments: self.heard.own_moments(),
             updates: self.planner.reviewed().to_vec(),
-            plan: implant.map(|implant| implant.plan.clone()),
+            plan: Some(implant.plan.clone()),
         })
     }
 
     /// A planned seed, as if it lay on plan, and the one that was dropped for it.
-    fn pair(&self, needle: usize, row: &SeedError) -> Option<(SeedPair, Option<SeedPose>)> {
+    fn pair(&self, implant: &planner::Implant, needle: usize, row: &SeedError) -> Option<(SeedPair, Option<SeedPose>)> {
         let shown = &self.shown;
-        let of_needle = |hole, position_m, direction: [f64; 3], strength_u| {
-            let planned = Seed {
-                position_m,
-                axis: Some(direction),
-                strength_u,
-            };
-            SeedPair {
-                needle,
-                hole,
-                planned,
-                delivered: planned,
-                direction,
-            }
-        };
-        let Some(implant) = &shown.planning.implant else {
-            let planned = shown.planned().get(row.planned)?;
-            let direction = shown.plan.as_ref()?.direction;
-            let pair = of_needle(None, planned.position_m, direction, self.settings.seed_strength_u);
-            return Some((pair, row.placed.and_then(|n| shown.seeds.get(n)).copied()));
-        };
         let of = implant.plan.needles.get(needle)?;
         let seed = of.seeds.get(row.planned)?;
-        let pair = of_needle(of.hole, of.at_m(seed.along_m), of.direction, seed.strength_u);
+        let planned = Seed {
+            position_m: of.at_m(seed.along_m),
+            axis: Some(of.direction),
+            strength_u: seed.strength_u,
+        };
+        let pair = SeedPair {
+            needle,
+            hole: of.hole,
+            planned,
+            delivered: planned,
+            direction: of.direction,
+        };
         let own = shown.planning.progress.seeds_of(needle, shown.seeds.len());
         Some((pair, row.placed.and_then(|n| shown.seeds[own].get(n)).copied()))
     }
 }
 
+/// Where none is named, the usual one and its prescription.
+fn source_of(model: &str, prescription_gy: f64) -> Result<(Source, f64), Failure> {
+    if model.is_empty() {
+        return Ok(exchange::usual()?);
+    }
+    let source = Source::known(model).ok_or_else(|| format!("no source is known as \"{model}\""))?;
+    Ok((source, prescription_gy))
+}
+
 impl Delivered {
+    /// Of a procedure that another window planned and drove; `planned`: what its seeds are, where its plan does not say.
+    pub(super) fn of_heard(
+        link: &Link,
+        heard: &Heard,
+        planned: Prescribed,
+        trainee: Option<&str>,
+    ) -> Result<Self, Failure> {
+        let scene = link.scene().ok_or("there is no scene yet")?.clone();
+        let (source, prescription_gy) = source_of(&planned.source.read(), planned.dose_gy)?;
+        let (pairs, lost) = heard.pairs(planned.strength_u);
+        let mut title = format!("Scene {}", scene.header.name.read());
+        if let Some(name) = trainee {
+            title = format!("{title}, {name}");
+        }
+        if heard.seeds_before() > 0 {
+            title = format!("{title}, without the first {} seeds", heard.seeds_before());
+        }
+        Ok(Self {
+            title,
+            scene,
+            source,
+            prescription_gy,
+            pairs,
+            lost,
+            motion: heard.trace().motion(),
+            records: heard.trace().records().to_vec(),
+            moments: heard.own_moments(),
+            updates: Vec::new(),
+            plan: None,
+        })
+    }
+
     /// The scene by its labels, the plan by the text of its file, and the source by its model.
     fn made(&self) -> Result<serde_json::Value, Failure> {
         let plan = match &self.plan {
@@ -170,7 +211,7 @@ fn write(delivered: &Delivered, folder: PathBuf) -> Result<PathBuf, Failure> {
     let anatomy = Anatomy::of(&delivered.scene)?;
     let kernel = DoseKernel::new(&delivered.source, Interval::ALL);
     let score = Score::of(Implant {
-        title: format!("Scene {}", delivered.scene.header.name.read()),
+        title: delivered.title.clone(),
         pairs: delivered.pairs.clone(),
         lost: delivered.lost.clone(),
         anatomy: &anatomy,

@@ -58,7 +58,7 @@ impl App {
         actions.extend(instructor_ui(
             ui.ctx(),
             &self.shown,
-            &self.moments,
+            self.heard.moments(),
             &mut self.instructor,
         ));
         let list = &self.trainees;
@@ -102,9 +102,9 @@ impl App {
             return;
         }
         // The debrief looks back on all of it, not on the last seconds.
-        let whole = self.workflow.is_open(Progress::Debrief).then_some(&self.trace);
+        let whole = self.workflow.is_open(Progress::Debrief).then_some(self.heard.trace());
         ScrollArea::vertical().show(ui, |ui| {
-            plots::plots_ui(ui, &self.shown, &self.history, &self.moments, whole, height)
+            plots::plots_ui(ui, &self.shown, &self.history, self.heard.moments(), whole, height)
         });
     }
 

@@ -37,9 +37,8 @@ use stylet_controllers::{Controllers, ProbeWish, SLOW, System, Wish};
 use stylet_files::Image;
 use stylet_host::core_args::SceneChoice;
 use stylet_host::link::{Link, LinkStatus};
-use stylet_host::moments::Moments;
 use stylet_host::roster::Trainee;
-use stylet_implant::score::Trace;
+use stylet_implant::heard::Heard;
 use stylet_implant::workflow::{NeedleTask, Pace, Placed, Run};
 use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::service::Instance;
@@ -100,10 +99,8 @@ pub struct App {
     /// As they were when they were last brought into force.
     applied: Option<Settings>,
     history: History,
-    /// Force and speed since the tip first touched tissue.
-    trace: Trace,
-    /// What was marked, put in or went wrong in this run of the core.
-    moments: Moments,
+    /// The procedure as any host hears it.
+    heard: Heard,
     debrief: Option<Job<debrief::Saved>>,
     summed_up: Instant,
     loader: Loader,
@@ -208,8 +205,11 @@ impl App {
         }
         let settings = Settings::read(cc.storage);
         let shown = Shown::empty(options.instance.name());
-        // It goes with the core.
-        let kept_in = PathBuf::from(options.instance.root());
+        // A plan that is kept goes with the core. Whoever follows a trainee hears of their plan from the core.
+        let planner = match options.trainees.is_empty() {
+            true => Planner::default().keeping_in(PathBuf::from(options.instance.root())),
+            false => Planner::default(),
+        };
         Self {
             link: Link::new(options.instance),
             label: options.label,
@@ -221,8 +221,7 @@ impl App {
             pictures: Pictures::default(),
             applied: None,
             history: History::default(),
-            trace: Trace::default(),
-            moments: Moments::default(),
+            heard: Heard::default(),
             debrief: None,
             summed_up: Instant::now(),
             loader: Loader::default(),
@@ -236,7 +235,7 @@ impl App {
             run_placed: Placed::default(),
             run_lost: Default::default(),
             placed_found: Instant::now(),
-            planner: Planner::default().keeping_in(kept_in),
+            planner,
             recording: watch::Recording::beginning_with(options.watch),
             pace: Pace::default(),
             waiting: Vec::new(),

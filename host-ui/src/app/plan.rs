@@ -11,7 +11,9 @@ use nalgebra::Vector3;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use stylet_base::format;
-use stylet_implant::workflow::{NeedleTask, Placed, Run, default_plan, plan_request};
+use stylet_implant::plan::exchange;
+use stylet_implant::workflow::{NeedlePlan, NeedleTask, Placed, Run, default_plan, plan_request};
+use stylet_shm_schema::{Prescribed, Text};
 
 /// Looking for what is in the tissue compares every planned drop with every seed.
 const FIND_PLACED_EVERY: Duration = Duration::from_millis(300);
@@ -188,9 +190,23 @@ impl App {
             self.drive = Drive::default();
         } else if let Some(scene) = &self.shown.scene {
             self.run_needles.clear();
-            self.run = Some(Run::new(default_plan(scene), self.pace));
+            self.run = Some(Run::new(self.by_hand(default_plan(scene)), self.pace));
             self.drive = Drive::default();
         }
+    }
+
+    /// With seeds as the settings have them.
+    pub(super) fn by_hand(&self, plan: NeedlePlan) -> NeedlePlan {
+        let Ok((source, dose_gy)) = exchange::usual() else {
+            return plan;
+        };
+        let prescribed = Prescribed {
+            strength_u: self.settings.seed_strength_u,
+            dose_gy,
+            source: Text::new(&source.model),
+            ..Default::default()
+        };
+        NeedlePlan { prescribed, ..plan }
     }
 
     /// The plan's progress goes with the script's.

@@ -3,7 +3,7 @@
 use super::drive::Drive;
 use super::{App, refusal};
 use crate::action::Action;
-use crate::dose_worker::{DoseOf, DoseRequest};
+use crate::dose_worker::DoseRequest;
 use crate::loader::Loaded;
 use crate::panel::workflow::SCRIPTED_STEPS;
 use crate::recent;
@@ -13,9 +13,8 @@ use std::time::{Duration, Instant};
 use stylet_controllers::Button;
 use stylet_files::{Image, LabelVolume};
 use stylet_host::core_args::SceneChoice;
-use stylet_implant::score::Trace;
 use stylet_implant::workflow::RunStatus;
-use stylet_shm_schema::Request;
+use stylet_shm_schema::{Prescribed, Request};
 
 const SUM_UP_EVERY: Duration = Duration::from_millis(500);
 /// A request that waits for its answer for longer is shown.
@@ -30,10 +29,6 @@ impl App {
         self.shown.take(&self.link);
         self.leave_core();
         self.take_stepper();
-        // What a reset begins is a procedure of its own.
-        if self.moments.take(self.link.events()) {
-            self.trace = Trace::default();
-        }
         if self.shown.plan.map(|p| p.generation) != plan_before {
             self.drive = Drive::default();
         }
@@ -43,8 +38,8 @@ impl App {
         self.workflow.guide.felt.take(&records);
         // Its state says all that the window shows of it.
         let _second = self.link.take_second_records();
-        let scene = self.shown.scene.map(|s| s.id());
-        self.trace.take(&records, scene, direction);
+        self.heard.take(&self.link, &records);
+        self.shown.heard = self.heard.planned(self.settings.seed_strength_u);
         if self.summed_up.elapsed() >= SUM_UP_EVERY {
             self.summed_up = Instant::now();
             self.history.sum_up();
@@ -78,18 +73,27 @@ impl App {
     fn dose_request(&self) -> DoseRequest {
         let implant = self.shown.planning.implant.as_ref();
         match implant.filter(|_| self.edits_plan() || self.shown.seeds.is_empty()) {
-            Some(implant) => DoseRequest {
-                of: DoseOf::Plan,
-                source: implant.plan.source.clone(),
-                prescription_gy: Some(implant.plan.prescription_gy),
-                seeds: implant.seeds.clone(),
-            },
-            None => {
-                let planned = implant.and_then(|i| i.seeds.first());
-                let strength_u = planned.map_or(self.settings.seed_strength_u, |s| s.strength_u);
-                DoseRequest::in_tissue(&self.shown.seeds, strength_u)
-            }
+            Some(implant) => DoseRequest::of_plan(&implant.plan, &implant.seeds, self.shown.body_moved_m),
+            None => DoseRequest::in_tissue(&self.shown.seeds, &self.planned_as()),
         }
+    }
+
+    /// What the seeds are: of the plan of this window, or of that which was heard of, or of the settings.
+    pub(super) fn planned_as(&self) -> Prescribed {
+        let implant = self.shown.planning.implant.as_ref();
+        let first = implant.and_then(|i| i.plan.needles.iter().position(|n| !n.seeds.is_empty()));
+        let own = implant
+            .zip(first)
+            .map(|(implant, first)| implant.plan.prescribed(first));
+        own.unwrap_or_else(|| {
+            let mut heard = self.heard.prescribed().unwrap_or_default();
+            let is_others = self.trainees.followed.is_some() || self.watches();
+            // One by hand here is of the seeds that are set here, as soon as they are.
+            if heard.strength_u == 0.0 || heard.needle == 0 && !is_others {
+                heard.strength_u = self.settings.seed_strength_u;
+            }
+            heard
+        })
     }
 
     fn take_controllers(&mut self) {

@@ -1,19 +1,55 @@
-//! Several trainees in one window: which is followed, and debriefs into the folder of a class.
+//! Several trainees in one window: which is followed, what is heard of each, and debriefs into the folder of a class.
 
+use super::debrief::Delivered;
 use super::{App, refusal};
 use crate::action::TraineeAction;
 use crate::planner::Planner;
 use crate::shown::all_errors;
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use stylet_host::link::Link;
+use stylet_base::format;
+use stylet_host::link::{Link, LinkStatus};
 use stylet_host::moments::STOPPED;
 use stylet_host::roster::{Glance, Roster, Trainee};
 use stylet_implant::class;
-use stylet_shm_schema::{Mark, Request};
+use stylet_implant::heard::Heard;
+use stylet_shm_schema::{Mark, Request, flags};
 
 /// Seeds still move with the tissue for so long after the needle is out.
 const RESTS_AFTER: Duration = Duration::from_secs(3);
+/// Of whoever is not followed nothing is drawn: the picture of the tissue says only where the seeds lie.
+const SEEDS_EVERY: Duration = Duration::from_millis(250);
+
+/// When the procedure of somebody is done: once, and only if this window has seen it begin.
+#[derive(Default)]
+struct Ending {
+    /// Every planned seed is in, and the needle is out, since then.
+    done: Option<Instant>,
+    /// It was seen while seeds of its plan were missing, and its debrief is not written yet.
+    is_begun: bool,
+}
+
+impl Ending {
+    /// Whether a debrief is due now.
+    fn take(&mut self, is_whole: bool, is_in_tissue: bool) -> bool {
+        // What was done before this window was there is not its own.
+        self.is_begun |= !is_whole;
+        if !is_whole || is_in_tissue {
+            self.done = None;
+            return false;
+        }
+        let since = *self.done.get_or_insert_with(Instant::now);
+        since.elapsed() >= RESTS_AFTER && std::mem::take(&mut self.is_begun)
+    }
+}
+
+/// One trainee, as this window hears them.
+struct Seat {
+    link: Link,
+    heard: Heard,
+    ending: Ending,
+}
 
 /// The list of a window, and where its debriefs go.
 pub(super) struct Trainees {
@@ -25,10 +61,12 @@ pub(super) struct Trainees {
     class: Option<PathBuf>,
     /// Who sits here, where there is no list.
     name: String,
-    /// The present implant is done since then.
-    done: Option<Instant>,
-    /// It was seen while seeds of its plan were missing, and its debrief is not written yet.
-    is_begun: bool,
+    /// The implant of this window itself.
+    ending: Ending,
+    /// In the order of the list.
+    seats: Vec<Seat>,
+    /// Whose debriefs are to be written.
+    due: VecDeque<usize>,
 }
 
 impl Trainees {
@@ -36,23 +74,49 @@ impl Trainees {
         Self {
             roster: (!all.is_empty()).then(|| Roster::start(all.clone())),
             followed: (!all.is_empty()).then_some(0),
+            seats: all.iter().map(Seat::new).collect(),
             all,
             glances: Vec::new(),
             class,
             name,
-            done: None,
-            is_begun: false,
+            ending: Ending::default(),
+            due: VecDeque::new(),
         }
     }
 
-    /// Whose debriefs are written.
-    fn name(&self) -> &str {
+    /// Where the debrief of whoever is shown goes.
+    pub(super) fn folder(&self) -> Option<PathBuf> {
         let followed = self.followed.and_then(|number| self.all.get(number));
-        followed.map_or(&self.name, |trainee| &trainee.name)
+        self.folder_of(followed.map_or(&self.name, |trainee| &trainee.name))
     }
 
-    pub(super) fn folder(&self) -> Option<PathBuf> {
-        Some(class::folder_of(self.class.as_ref()?, self.name()))
+    fn folder_of(&self, name: &str) -> Option<PathBuf> {
+        Some(class::folder_of(self.class.as_ref()?, name))
+    }
+}
+
+impl Seat {
+    fn new(trainee: &Trainee) -> Self {
+        Self {
+            link: Link::with_snapshots_every(trainee.instance.clone(), SEEDS_EVERY),
+            heard: Heard::default(),
+            ending: Ending::default(),
+        }
+    }
+
+    /// Whether a debrief is due.
+    fn take(&mut self) -> bool {
+        self.link.poll();
+        let records = self.link.take_records();
+        let _second = self.link.take_second_records();
+        self.heard.take(&self.link, &records);
+        let in_tissue = flags::IN_CONTACT | flags::PUNCTURED;
+        let state = self.link.state().filter(|_| self.link.status() == LinkStatus::Live);
+        // A core that has gone silent ends nothing.
+        state.is_some_and(|s| {
+            let is_whole = self.heard.is_whole();
+            self.heard.prescribed().is_some() && self.ending.take(is_whole, s.flags & in_tissue != 0)
+        })
     }
 }
 
@@ -61,8 +125,19 @@ impl App {
         if let Some(roster) = &self.trainees.roster {
             self.trainees.glances = roster.glances();
         }
-        if self.trainees.class.is_some() && !self.watches() {
+        for number in 0..self.trainees.seats.len() {
+            let is_due = self.trainees.seats[number].take();
+            if is_due && self.trainees.class.is_some() {
+                self.trainees.due.push_back(number);
+            }
+        }
+        if self.trainees.seats.is_empty() && self.trainees.class.is_some() && !self.watches() {
             self.write_when_done();
+        }
+        if self.debrief.is_none()
+            && let Some(number) = self.trainees.due.pop_front()
+        {
+            self.debrief_trainee(number);
         }
     }
 
@@ -73,25 +148,34 @@ impl App {
             return;
         }
         let is_whole = rows.iter().all(|(_, row)| row.placed.is_some());
-        // What was done before this window was there is not its own.
-        self.trainees.is_begun |= !is_whole;
-        if !is_whole || self.shown.is_in_tissue() {
-            self.trainees.done = None;
-            return;
-        }
-        let since = *self.trainees.done.get_or_insert_with(Instant::now);
-        if since.elapsed() >= RESTS_AFTER
-            && std::mem::take(&mut self.trainees.is_begun)
+        if self.trainees.ending.take(is_whole, self.shown.is_in_tissue())
             && let Some(folder) = self.trainees.folder()
         {
             self.save_debrief_as(folder);
         }
     }
 
+    /// From what this window has heard of them, into the folder of the class or one of its own.
+    pub(super) fn debrief_trainee(&mut self, number: usize) {
+        let list = &self.trainees;
+        let (Some(seat), Some(trainee)) = (list.seats.get(number), list.all.get(number)) else {
+            return;
+        };
+        let own = || PathBuf::from(format!("out/debrief-{}-{}", trainee.name, format::utc_now()));
+        let folder = list.folder_of(&trainee.name).unwrap_or_else(own);
+        let mut planned = seat.heard.prescribed().unwrap_or_default();
+        if planned.strength_u == 0.0 {
+            planned.strength_u = self.settings.seed_strength_u;
+        }
+        let delivered = Delivered::of_heard(&seat.link, &seat.heard, planned, Some(&trainee.name));
+        self.write_debrief(delivered, folder);
+    }
+
     pub(super) fn act_on_trainees(&mut self, action: TraineeAction) {
         match action {
             TraineeAction::Follow(number) => self.follow(number),
             TraineeAction::Stop(number) => self.stop_trainee(number),
+            TraineeAction::Debrief(number) => self.debrief_trainee(number),
             TraineeAction::StopAll => (0..self.trainees.all.len()).for_each(|number| self.stop_trainee(number)),
         }
     }
@@ -111,9 +195,8 @@ impl App {
             return;
         }
         self.trainees.followed = Some(number);
-        (self.trainees.done, self.trainees.is_begun) = (None, false);
         self.shown.instance = trainee.instance.name().to_owned();
-        self.planner = Planner::default().keeping_in(PathBuf::from(trainee.instance.root()));
+        self.planner = Planner::default();
         self.change_link(|_| Link::new(trainee.instance));
     }
 

@@ -9,8 +9,9 @@ use stylet_dose::decay::Interval;
 use stylet_dose::isodose::isodose;
 use stylet_dose::{DoseGrid, DoseKernel, Seed, Source};
 use stylet_host::link::SceneModel;
+use stylet_implant::plan::ImplantPlan;
 use stylet_implant::plan::exchange::USUAL_SOURCE;
-use stylet_shm_schema::{SceneId, SeedPose};
+use stylet_shm_schema::{Prescribed, SceneId, SeedPose};
 use stylet_surfaces::mesh::{self, SurfaceVertex};
 
 /// Doses that are drawn, as shares of the prescription.
@@ -29,7 +30,7 @@ const SPACING_M: f64 = 1.5e-3;
 pub struct IsodoseShell {
     /// Which of [`LEVELS`].
     pub level: usize,
-    /// Vertices, scene frame.
+    /// Vertices, in the body as the scene has it.
     pub points_m: Vec<[f32; 3]>,
     /// Three places in `points_m` each.
     pub triangles: Vec<[u32; 3]>,
@@ -57,18 +58,42 @@ pub struct DoseRequest {
     pub source: String,
     /// Prescribed dose; without one that of the source.
     pub prescription_gy: Option<f64>,
-    /// Place, axis and strength of each.
+    /// How far an exercise has moved the body, m.
+    pub body_moved_m: [f64; 3],
+    /// Place, axis and strength of each, in the body as the scene has it.
     pub seeds: Vec<Seed>,
 }
 
 impl DoseRequest {
-    /// Request for seeds as they lie, all of one strength (U) and of the usual source.
-    pub fn in_tissue(poses: &[SeedPose], strength_u: f64) -> Self {
+    /// Request for seeds as they lie: of the source, strength and prescription of what they were planned as, or of the usual source
+    /// where that is not known.
+    pub fn in_tissue(poses: &[SeedPose], planned: &Prescribed) -> Self {
+        let source = planned.source.read();
         Self {
             of: DoseOf::Tissue,
-            source: USUAL_SOURCE.to_owned(),
-            prescription_gy: None,
-            seeds: poses.iter().map(|p| seed(p, strength_u)).collect(),
+            source: if source.is_empty() {
+                USUAL_SOURCE.to_owned()
+            } else {
+                source
+            },
+            prescription_gy: (planned.dose_gy > 0.0).then_some(planned.dose_gy),
+            body_moved_m: [0.0; 3],
+            seeds: poses.iter().map(|p| seed(p, planned.strength_u)).collect(),
+        }
+    }
+
+    /// Request for the seeds of a plan: they stay where the template is, whichever way the body was moved.
+    pub fn of_plan(plan: &ImplantPlan, seeds: &[Seed], body_moved_m: [f64; 3]) -> Self {
+        let in_body = |seed: &Seed| Seed {
+            position_m: [0, 1, 2].map(|a| seed.position_m[a] - body_moved_m[a]),
+            ..*seed
+        };
+        Self {
+            of: DoseOf::Plan,
+            source: plan.source.clone(),
+            prescription_gy: Some(plan.prescription_gy),
+            body_moved_m,
+            seeds: seeds.iter().map(in_body).collect(),
         }
     }
 
@@ -87,6 +112,8 @@ pub struct DoseResult {
     pub of: DoseOf,
     /// Number of seeds.
     pub seeds: usize,
+    /// How far the body was moved then, m.
+    pub body_moved_m: [f64; 3],
     /// Nuclide and model.
     pub source: String,
     /// Dose that the levels are shares of.
@@ -103,6 +130,16 @@ struct DoseTask {
     number: u64,
     request: DoseRequest,
     scene: Arc<SceneModel>,
+}
+
+impl DoseResult {
+    /// From the body as the scene has it to where this dose is drawn, m. Seeds in the tissue go with the body, those of a plan do not.
+    pub fn shift_m(&self, body_moved_m: [f64; 3]) -> [f64; 3] {
+        match self.of {
+            DoseOf::Tissue => body_moved_m,
+            DoseOf::Plan => self.body_moved_m,
+        }
+    }
 }
 
 /// The thread that computes doses: one set of seeds at a time, then the newest that was requested meanwhile.
@@ -250,6 +287,7 @@ fn compute(task: &DoseTask, source: &Source, kernel: &DoseKernel) -> DoseResult 
         number: task.number,
         of: task.request.of,
         seeds: seeds.len(),
+        body_moved_m: task.request.body_moved_m,
         source: if source.model == task.request.source {
             format!("{} {}", source.nuclide, source.model)
         } else {

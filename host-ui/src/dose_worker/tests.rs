@@ -13,6 +13,14 @@ fn pose(z_m: f64) -> SeedPose {
     }
 }
 
+fn in_tissue(poses: &[SeedPose]) -> DoseRequest {
+    let planned = Prescribed {
+        strength_u: 0.5,
+        ..Default::default()
+    };
+    DoseRequest::in_tissue(poses, &planned)
+}
+
 fn scene() -> Arc<SceneModel> {
     let mut header = SceneHeader::zeroed();
     header.labels.dims = [20, 20, 20];
@@ -26,7 +34,7 @@ fn scene() -> Arc<SceneModel> {
 fn wait(worker: &mut DoseWorker, scene: &Arc<SceneModel>, poses: &[SeedPose]) -> Arc<DoseResult> {
     let start = Instant::now();
     loop {
-        worker.take(Some(scene), &DoseRequest::in_tissue(poses, 0.5));
+        worker.take(Some(scene), &in_tissue(poses));
         if let Some(picture) = worker.latest()
             && picture.seeds == poses.len()
             && !worker.is_computing()
@@ -73,10 +81,10 @@ fn it_is_computed_again_only_when_a_seed_was_moved_added_or_removed() {
     let first = wait(&mut worker, &scene, &[pose(0.02)]).number;
     let same = wait(&mut worker, &scene, &[pose(0.0201)]).number;
     assert_eq!(first, same, "a tenth of a millimetre");
-    worker.take(Some(&scene), &DoseRequest::in_tissue(&[pose(0.023)], 0.5));
+    worker.take(Some(&scene), &in_tissue(&[pose(0.023)]));
     assert!(worker.is_computing());
     let two = wait(&mut worker, &scene, &[pose(0.023), pose(0.03)]);
     assert_eq!(two.seeds, 2);
-    worker.take(Some(&scene), &DoseRequest::in_tissue(&[], 0.5));
+    worker.take(Some(&scene), &in_tissue(&[]));
     assert!(worker.latest().is_none(), "no seeds, no dose");
 }

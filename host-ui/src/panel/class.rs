@@ -4,11 +4,15 @@ use crate::action::Action;
 use crate::panel::banners::{Banner, BannerLevel};
 use crate::shown::Shown;
 use crate::theme;
+use egui::RichText;
 use stylet_shm_schema::{Class, ClassMember, LeaseRequest};
 
 /// The word of the certificates of those who may hold the needle.
 const OPERATOR: &str = "operator";
-const WIDTH: f32 = 420.0;
+const WIDTH: f32 = 480.0;
+const NAME_WIDTH: f32 = 190.0;
+/// A member is heard five times a second.
+const SILENT_NS: u64 = 1_000_000_000;
 const TITLE_AND_EDGES: f32 = 70.0;
 
 /// What whoever sits here may do with the needle.
@@ -129,30 +133,67 @@ fn list_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
     }
     // Over a relay only who has the needle gives it.
     let gives = hand == Hand::Held || (hand == Hand::Free && shown.relayed.is_none());
-    for member in class.members() {
-        ui.separator();
-        let given = member_ui(ui, member, gives && member.name.read() != class.operator.read());
-        action = given.or(action);
-    }
+    ui.add_space(4.0);
+    let rows = egui::Grid::new("members")
+        .num_columns(5)
+        .striped(true)
+        .spacing([14.0, 6.0]);
+    rows.show(ui, |ui| {
+        for head in ["who", "role", "round trip", "lost", "heard"] {
+            ui.label(theme::small(head));
+        }
+        ui.end_row();
+        for member in class.members() {
+            let given = member_ui(ui, member, gives && member.name.read() != class.operator.read());
+            action = given.or(action.take());
+            ui.end_row();
+        }
+    });
     if class.unlisted > 0 {
         ui.label(theme::small(format!("and {} more", class.unlisted)));
     }
     action
 }
 
+/// One row; under the name the button that hands the needle over.
 fn member_ui(ui: &mut egui::Ui, member: &ClassMember, may_have_it: bool) -> Option<Action> {
     let (name, role) = (member.name.read(), member.role.read());
-    let role_words = if role.is_empty() { "revoked" } else { role.as_str() };
-    let ms = |ns: u64| ns as f64 * 1e-6;
-    let words = format!(
-        "{name}: {role_words}; round trip {:.1} ms, {} records lost, heard {:.0} ms ago",
-        ms(member.round_trip_ns),
-        member.records_lost,
-        ms(member.silent_ns)
-    );
-    ui.add(egui::Label::new(words).wrap());
-    let gives = may_have_it && role == OPERATOR && ui.button(format!("Hand the needle to {name}")).clicked();
-    gives.then_some(Action::Lease(LeaseRequest::Give(name)))
+    let (role_words, color) = match role.is_empty() {
+        true => ("revoked", theme::of(ui).bad),
+        false => (role.as_str(), theme::of(ui).text),
+    };
+    let gives = ui.vertical(|ui| {
+        ui.set_width(NAME_WIDTH);
+        ui.add(egui::Label::new(&name).wrap());
+        let give = || egui::Button::new(format!("Hand the needle to {name}")).wrap();
+        may_have_it && role == OPERATOR && ui.add(give()).clicked()
+    });
+    ui.label(RichText::new(role_words).color(color));
+    ui.monospace(milliseconds(member.round_trip_ns));
+    let lost = RichText::new(member.records_lost.to_string()).monospace();
+    ui.label(if member.records_lost > 0 {
+        lost.color(theme::of(ui).warn)
+    } else {
+        lost
+    });
+    let heard = RichText::new(format!("{} ago", milliseconds(member.silent_ns))).small();
+    let is_silent = member.silent_ns > SILENT_NS;
+    ui.label(if is_silent {
+        heard.color(theme::of(ui).warn)
+    } else {
+        heard.weak()
+    });
+    gives.inner.then_some(Action::Lease(LeaseRequest::Give(name)))
+}
+
+/// Short times to a tenth, long ones in seconds.
+fn milliseconds(ns: u64) -> String {
+    let ms = ns as f64 * 1e-6;
+    match ms {
+        ..10.0 => format!("{ms:.1} ms"),
+        10.0..1000.0 => format!("{ms:.0} ms"),
+        _ => format!("{:.1} s", ms * 1e-3),
+    }
 }
 
 #[cfg(test)]

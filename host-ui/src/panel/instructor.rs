@@ -14,6 +14,7 @@ use stylet_shm_schema::{
 /// So many of the last moments are listed.
 const LISTED: usize = 5;
 const WIDTH: f32 = 420.0;
+const TITLE_AND_EDGES: f32 = 70.0;
 
 pub struct InstructorState {
     open: bool,
@@ -75,18 +76,24 @@ pub fn instructor_ui(
     let window = window.collapsible(false).resizable(false).default_width(WIDTH);
     let answer = window.show(ctx, |ui| {
         ui.set_max_width(WIDTH);
-        let live = ui.add_enabled_ui(shown.is_live(), |ui| {
-            let mark = mark_ui(ui, state);
-            ui.separator();
-            mark.or(exercises_ui(ui, shown, state))
-        });
-        ui.separator();
-        moments_ui(ui, moments);
-        live.inner
+        let room = ui.ctx().content_rect().height() - TITLE_AND_EDGES;
+        let scroll = egui::ScrollArea::vertical().max_height(room).min_scrolled_height(room);
+        scroll.show(ui, |ui| dialog_ui(ui, shown, moments, state)).inner
     });
     state.open &= open;
     state.is_new = false;
     answer.and_then(|shown| shown.inner.flatten()).map(Action::Send)
+}
+
+fn dialog_ui(ui: &mut egui::Ui, shown: &Shown, moments: &Moments, state: &mut InstructorState) -> Option<Request> {
+    let live = ui.add_enabled_ui(shown.is_live(), |ui| {
+        let mark = mark_ui(ui, state);
+        ui.separator();
+        mark.or(exercises_ui(ui, shown, state))
+    });
+    ui.separator();
+    moments_ui(ui, moments);
+    live.inner
 }
 
 fn mark_ui(ui: &mut egui::Ui, state: &mut InstructorState) -> Option<Request> {

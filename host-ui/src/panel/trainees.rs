@@ -10,6 +10,9 @@ use stylet_shm_schema::{Fault, flags};
 
 /// A core that was not heard for longer is said to be silent.
 const SILENT_AFTER: Duration = Duration::from_millis(1500);
+const NAME_WIDTH: f32 = 130.0;
+const STATE_WIDTH: f32 = 210.0;
+const TITLE_AND_EDGES: f32 = 110.0;
 /// Keys follow so many of them: F2 to F9.
 pub const KEYS: usize = 8;
 
@@ -124,27 +127,33 @@ pub fn trainees_ui(ctx: &egui::Context, glances: &[Glance], followed: Option<usi
     let shown = window
         .anchor(egui::Align2::LEFT_BOTTOM, [theme::LEFT_WIDTH + 24.0, -24.0])
         .show(ctx, |ui| {
-            let mut asked = None;
-            egui::Grid::new("trainees")
-                .num_columns(6)
-                .striped(true)
-                .spacing([12.0, 4.0])
-                .show(ui, |ui| {
-                    for head in ["trainee", "needle", "force", "seeds", "heard", ""] {
-                        ui.label(theme::small(head));
-                    }
-                    ui.end_row();
-                    for (number, glance) in glances.iter().enumerate() {
-                        asked = row_ui(ui, number, glance, followed == Some(number)).or(asked.take());
-                        ui.end_row();
-                    }
-                });
-            if ui.button("Stop every hand").clicked() {
-                asked = Some(TraineeAction::StopAll);
-            }
-            asked
+            let room = ui.ctx().content_rect().height() - TITLE_AND_EDGES;
+            let scroll = egui::ScrollArea::vertical().max_height(room).min_scrolled_height(room);
+            scroll.show(ui, |ui| list_ui(ui, glances, followed)).inner
         });
     shown.and_then(|shown| shown.inner.flatten()).map(Action::Trainee)
+}
+
+fn list_ui(ui: &mut egui::Ui, glances: &[Glance], followed: Option<usize>) -> Option<TraineeAction> {
+    let mut asked = None;
+    egui::Grid::new("trainees")
+        .num_columns(7)
+        .striped(true)
+        .spacing([12.0, 4.0])
+        .show(ui, |ui| {
+            for head in ["trainee", "needle", "force", "seeds", "heard", "", ""] {
+                ui.label(theme::small(head));
+            }
+            ui.end_row();
+            for (number, glance) in glances.iter().enumerate() {
+                asked = row_ui(ui, number, glance, followed == Some(number)).or(asked.take());
+                ui.end_row();
+            }
+        });
+    if ui.button("Stop every hand").clicked() {
+        asked = Some(TraineeAction::StopAll);
+    }
+    asked
 }
 
 fn row_ui(ui: &mut egui::Ui, number: usize, glance: &Glance, is_followed: bool) -> Option<TraineeAction> {
@@ -154,14 +163,19 @@ fn row_ui(ui: &mut egui::Ui, number: usize, glance: &Glance, is_followed: bool) 
         Level::Warn => tokens.warn,
         Level::Bad => tokens.bad,
     };
-    let name = ui.selectable_label(is_followed, glance.trainee.name.as_str());
+    let name = egui::Button::selectable(is_followed, glance.trainee.name.as_str()).wrap();
+    let name = column(ui, NAME_WIDTH, name);
     let key = if number < KEYS {
         format!(" (key F{})", number + 2)
     } else {
         String::new()
     };
     let name = name.on_hover_text(format!("Follow{key}; instance {}", glance.trainee.instance.name()));
-    ui.label(RichText::new(&line.state).color(color));
+    column(
+        ui,
+        STATE_WIDTH,
+        egui::Label::new(RichText::new(&line.state).color(color)).wrap(),
+    );
     ui.monospace(&line.force);
     ui.monospace(&line.seeds);
     ui.label(theme::small(&line.heard));
@@ -171,7 +185,27 @@ fn row_ui(ui: &mut egui::Ui, number: usize, glance: &Glance, is_followed: bool) 
     if stop.clicked() {
         return Some(TraineeAction::Stop(number));
     }
+    let has_seeds = glance.state.is_some_and(|state| state.seed_count > 0);
+    let debrief = ui
+        .add_enabled(has_seeds, egui::Button::new("Debrief"))
+        .on_hover_text(format!(
+            "Writes the debrief of {} from what this window has heard: debrief.html and score.json",
+            glance.trainee.name
+        ))
+        .on_disabled_hover_text("No seed lies in the tissue yet");
+    if debrief.clicked() {
+        return Some(TraineeAction::Debrief(number));
+    }
     name.clicked().then_some(TraineeAction::Follow(number))
+}
+
+/// As wide as its words, and no wider: longer ones are wrapped.
+fn column(ui: &mut egui::Ui, most: f32, widget: impl egui::Widget) -> egui::Response {
+    let shown = ui.vertical(|ui| {
+        ui.set_max_width(most);
+        ui.add(widget)
+    });
+    shown.inner
 }
 
 #[cfg(test)]

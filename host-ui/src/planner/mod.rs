@@ -281,10 +281,11 @@ impl Planner {
 
     /// Path and drops of a needle.
     pub fn task(&self, number: usize) -> Option<NeedleTask> {
-        let needle = self.plan()?.needles.get(number)?;
+        let plan = self.plan()?;
+        let needle = plan.needles.get(number)?;
         let found = self.compensated.iter().find(|(n, _)| n == needle);
         let drops = found.map_or_else(|| Drops::as_planned(needle), |(_, done)| done.drops.clone());
-        Some(NeedleTask::of(needle, drops))
+        NeedleTask::of(plan, number, drops)
     }
 
     /// The next needle that has seeds.

@@ -18,6 +18,7 @@ pub use seeds::{SeedError, all_errors, own_errors};
 use std::sync::Arc;
 use stylet_controllers::Latest;
 use stylet_host::link::{Link, LinkStatus};
+use stylet_implant::heard::HeardSeed;
 use stylet_implant::plan::{HOLES, Template};
 use stylet_implant::workflow::{Step, Waiting};
 use stylet_shm_schema::{
@@ -46,6 +47,8 @@ pub struct Shown {
     pub plan: Option<PlanInForce>,
     pub parameters: Option<ParametersInForce>,
     pub seeds: Vec<SeedPose>,
+    /// What they were planned as, by what was heard of the plans in force.
+    pub heard: Vec<HeardSeed>,
     /// How far an exercise has moved the body, and with it the seeds, from where the scene has it.
     pub body_moved_m: [f64; 3],
     /// Of the needle in the last snapshot.
@@ -100,6 +103,7 @@ impl Shown {
             plan: None,
             parameters: None,
             seeds: Vec::new(),
+            heard: Vec::new(),
             body_moved_m: [0.0; 3],
             bend: Bend::default(),
             left: Vec::new(),

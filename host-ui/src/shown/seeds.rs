@@ -27,6 +27,13 @@ pub fn seed_errors(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64
 /// one at the place of another.
 pub fn own_errors(shown: &Shown) -> Vec<SeedError> {
     let Some(plan) = &shown.plan else { return Vec::new() };
+    if shown.planning.at_work().is_none() && plan.prescribed.needle > 0 {
+        let of_needle = shown.heard.last().map(|seed| seed.needle);
+        return heard_rows(shown)
+            .filter(|(n, _)| Some(*n) == of_needle)
+            .map(|(_, row)| row)
+            .collect();
+    }
     if shown.planning.at_work().is_none() {
         return seed_errors(shown.planned(), &shown.seeds, plan.direction);
     }
@@ -36,6 +43,9 @@ pub fn own_errors(shown: &Shown) -> Vec<SeedError> {
 /// Errors of all needles that have begun, each with the number of its needle.
 pub fn all_errors(shown: &Shown) -> Vec<(usize, SeedError)> {
     let Some(implant) = &shown.planning.implant else {
+        if shown.plan.is_some_and(|plan| plan.prescribed.needle > 0) {
+            return heard_rows(shown).collect();
+        }
         return own_errors(shown).into_iter().map(|row| (0, row)).collect();
     };
     let progress = &shown.planning.progress;
@@ -49,6 +59,29 @@ pub fn all_errors(shown: &Shown) -> Vec<(usize, SeedError)> {
     (0..progress.begun().min(implant.plan.needles.len()))
         .flat_map(of_needle)
         .collect()
+}
+
+/// Errors of a plan of many needles that another window inserts, each with the number of its needle.
+fn heard_rows(shown: &Shown) -> impl Iterator<Item = (usize, SeedError)> {
+    let mut before = (0, 0);
+    shown.heard.iter().map(move |seed| {
+        // Seeds are counted from 0 in each needle.
+        before = if before.0 == seed.needle {
+            (seed.needle, before.1 + 1)
+        } else {
+            (seed.needle, 1)
+        };
+        let pose = seed.placed.and_then(|place| shown.seeds.get(place));
+        let direction = seed.planned.axis.unwrap_or_default();
+        let offset = pose.map(|pose| SeedOffset::of(seed.planned.position_m, pose.position_m, direction));
+        let row = SeedError {
+            planned: before.1 - 1,
+            placed: seed.placed,
+            along_m: offset.map_or(0.0, |o| o.along_m),
+            across_m: offset.map_or(0.0, |o| o.across_m),
+        };
+        (seed.needle, row)
+    })
 }
 
 /// Seeds in the order of the drops; planned seeds that are still missing come last.

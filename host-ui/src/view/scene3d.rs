@@ -12,7 +12,7 @@ use super::orientation::scene_from_patient;
 use super::paste::Pasted;
 use super::pick::pick;
 use super::state::ViewState;
-use super::uniforms::{SceneUniform, section, tint, uniform};
+use super::uniforms::{SceneUniform, section, shifted, tint, uniform};
 use crate::action::Viewpoint;
 use crate::dose_worker::DoseResult;
 use crate::shown::Shown;
@@ -321,10 +321,11 @@ impl Scene3d {
             let looks: Vec<SceneUniform> = kinds(shown.scene.as_ref())
                 .map(|kind| tinted(kind.color(tokens), opacity * kind.share(), cut))
                 .collect();
+            let shift_m = dose.map_or([0.0; 3], |d| d.shift_m(shown.body_moved_m));
             let shells: Vec<SceneUniform> = dose
                 .iter()
                 .flat_map(|d| &d.shells)
-                .map(|shell| tinted(IMAGE.isodose[shell.level], SHELL, cut))
+                .map(|shell| shifted(tinted(IMAGE.isodose[shell.level], SHELL, cut), shift_m))
                 .collect();
             let ghost = tinted(tokens.ghost, 0.22, [0.0; 4]);
             let clear = theme::rgba(tokens.background, 1.0);

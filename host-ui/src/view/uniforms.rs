@@ -58,6 +58,20 @@ pub fn uniform(camera: &Camera, aspect: f32) -> SceneUniform {
     }
 }
 
+/// Of what stands so far from where its vertices are, m.
+pub fn shifted(of: SceneUniform, by_m: [f64; 3]) -> SceneUniform {
+    let by = by_m.map(|c| c as f32);
+    let mut shifted = of;
+    for row in 0..4 {
+        shifted.clip_from_scene[3][row] += (0..3).map(|a| of.clip_from_scene[a][row] * by[a]).sum::<f32>();
+    }
+    for (a, by) in by.into_iter().enumerate() {
+        shifted.eye_m[a] -= by;
+        shifted.section[3] -= of.section[a] * by;
+    }
+    shifted
+}
+
 /// Of one surface.
 pub fn tint(whole: SceneUniform, color: Color32, opacity: f32, section: [f32; 4]) -> SceneUniform {
     SceneUniform {
@@ -65,5 +79,32 @@ pub fn tint(whole: SceneUniform, color: Color32, opacity: f32, section: [f32; 4]
         look: [1.0, 0.25 * (1.0 - opacity), 0.0, 0.0],
         section,
         ..whole
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where a place is on the screen, and how far before the section.
+    fn seen(of: &SceneUniform, at: [f32; 3]) -> [f32; 5] {
+        let at = [at[0], at[1], at[2], 1.0];
+        let clip: [f32; 4] = std::array::from_fn(|row| (0..4).map(|a| of.clip_from_scene[a][row] * at[a]).sum());
+        let before = (0..3).map(|a| of.section[a] * at[a]).sum::<f32>() - of.section[3];
+        [clip[0], clip[1], clip[2], clip[3], before]
+    }
+
+    #[test]
+    fn what_is_shifted_is_seen_and_cut_where_it_stands() {
+        let camera = Camera::looking_at([0.03, 0.04, 0.05], 0.05);
+        let whole = tint(uniform(&camera, 1.5), Color32::RED, 0.5, [0.6, 0.0, 0.8, 0.05]);
+        let moved = shifted(whole, [0.003, -0.002, 0.004]);
+        for at in [[0.0, 0.0, 0.0], [0.02, 0.05, 0.01]] {
+            let there = [at[0] + 0.003, at[1] - 0.002, at[2] + 0.004];
+            let (one, other) = (seen(&moved, at), seen(&whole, there));
+            let off = one.iter().zip(other).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(off < 1e-5, "{one:?} {other:?}");
+        }
+        assert_eq!(moved.eye_m[0], whole.eye_m[0] - 0.003);
     }
 }

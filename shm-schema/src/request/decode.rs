@@ -1,6 +1,7 @@
 //! From a [`Command`] of any bytes to a [`Request`], or every reason against it.
 
 mod exercise;
+mod prescribed;
 
 use super::*;
 use crate::check::{MAX_COORDINATE_M, is_unit};
@@ -121,7 +122,9 @@ fn takes(kind: CommandKind) -> String {
     match kind {
         CommandKind::SetParameters => "pairs of number and value".to_owned(),
         CommandKind::SetPlan => {
-            format!("nothing, or entry, direction and at most {MAX_SEEDS} seeds, three values each")
+            format!(
+                "nothing, or entry and direction, four values on the seeds, and at most {MAX_SEEDS} seeds of three values each"
+            )
         }
         CommandKind::MoveHand => "8 values".to_owned(),
         CommandKind::MoveSecondHand => "8 values, and three more where it turns about its axis".to_owned(),
@@ -161,7 +164,7 @@ impl Request {
     }
 }
 
-const PLAN_HEAD: usize = 6;
+const PLAN_HEAD: usize = 10;
 const REHEARSAL_HEAD: usize = 14;
 const STABILISING: usize = 7;
 
@@ -210,6 +213,7 @@ impl<'a> Reader<'a> {
             CommandKind::SetPlan => Request::SetPlan(Some(PlannedNeedle {
                 entry_m: self.place(),
                 direction: self.direction(),
+                prescribed: self.prescribed(command),
                 seeds_m: self.rest(Self::place),
             })),
             CommandKind::MoveHand => Request::MoveHand(self.hand_move()),

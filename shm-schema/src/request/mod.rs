@@ -4,7 +4,7 @@ mod decode;
 
 pub use decode::{RequestError, RequestErrors};
 
-use crate::{BUILTIN_SCENES, Command, Exercise, MAX_SEEDS, ParameterId, Text};
+use crate::{BUILTIN_SCENES, Command, Exercise, MAX_SEEDS, ParameterId, Prescribed, Text};
 use bytemuck::Zeroable;
 use num_enum::TryFromPrimitive;
 use strum::EnumDiscriminants;
@@ -144,6 +144,8 @@ pub struct PlannedNeedle {
     pub direction: [f64; 3],
     /// Positions of at most [`MAX_SEEDS`] seeds, m.
     pub seeds_m: Vec<[f64; 3]>,
+    /// What the seeds are.
+    pub prescribed: Prescribed,
 }
 
 /// Goal of the simulated hand, scene frame.
@@ -231,6 +233,9 @@ impl Request {
                 return Err(RequestError::InvalidText.into());
             }
         }
+        if let Self::SetPlan(Some(plan)) = self {
+            command.text = Text::new(&plan.prescribed.source.read());
+        }
         Ok(command)
     }
 
@@ -241,7 +246,12 @@ impl Request {
                 .flat_map(|change| [f64::from(change.id as u32), change.value])
                 .collect(),
             Self::SetPlan(None) => Vec::new(),
-            Self::SetPlan(Some(plan)) => joined(&[&plan.entry_m, &plan.direction], &plan.seeds_m),
+            Self::SetPlan(Some(plan)) => {
+                let of = &plan.prescribed;
+                let numbers = [of.needle, of.last_needle].map(f64::from);
+                let amounts = [of.strength_u, of.dose_gy];
+                joined(&[&plan.entry_m, &plan.direction, &numbers, &amounts], &plan.seeds_m)
+            }
             Self::MoveHand(hand) => hand_values(hand),
             Self::MoveSecondHand(probe) => [hand_values(&probe.hand), probe.up.as_slice().concat()].concat(),
             Self::LoadBuiltinScene(number) => vec![f64::from(*number)],

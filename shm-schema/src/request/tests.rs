@@ -8,6 +8,13 @@ fn needle(seeds: usize) -> PlannedNeedle {
         entry_m: [0.01, -0.02, 0.03],
         direction: [0.0, 0.6, 0.8],
         seeds_m: (0..seeds).map(|i| [1e-3 * i as f64, 0.5, -0.25]).collect(),
+        prescribed: Prescribed {
+            needle: 3,
+            last_needle: 18,
+            strength_u: 0.5,
+            dose_gy: 145.0,
+            source: Text::new("6711"),
+        },
     }
 }
 
@@ -263,12 +270,25 @@ fn every_malformed_payload_is_refused_with_its_reason() {
         (K::SetParameters, &[], C::ValueCount),
         (K::SetParameters, &[0.0, f64::NAN], C::NotFinite),
         (K::SetParameters, &[0.0, f64::INFINITY], C::NotFinite),
-        (K::SetPlan, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], C::NotUnitDirection),
-        (K::SetPlan, &[0.0; 5], C::ValueCount),
+        (
+            K::SetPlan,
+            &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0],
+            C::NotUnitDirection,
+        ),
+        (
+            K::SetPlan,
+            &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -0.1, 0.0],
+            C::ValueOutOfLimits,
+        ),
+        (K::SetPlan, &[0.0; 6], C::ValueCount),
         (K::ExpectNeedle, &[0.0; 5], C::ValueCount),
         (K::ExpectNeedle, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.5], C::NotUnitDirection),
-        (K::SetPlan, &[0.0; 396], C::ValueCount),
-        (K::SetPlan, &[21.0, 0.0, 0.0, 0.0, 0.0, 1.0], C::PlaceTooFar),
+        (K::SetPlan, &[0.0; 397], C::ValueCount),
+        (
+            K::SetPlan,
+            &[21.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+            C::PlaceTooFar,
+        ),
         (K::MoveHand, &[0.0, 0.0, 1e30, 0.0, 0.0, 1.0, 0.1, 1.0], C::PlaceTooFar),
         (
             K::MoveHand,

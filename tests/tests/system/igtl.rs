@@ -8,8 +8,10 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use stylet_host::link::Link;
 use stylet_igtl::codec::{Body, HEADER_BYTES, Header, Message, Status, Timestamp};
+use stylet_shm_schema::{Exercise, Request};
+use stylet_tests::hand::Insertion;
 use stylet_tests::witness::where_the_machine_runs;
-use stylet_tests::{Core, program, until};
+use stylet_tests::{Core, ask, program, until};
 
 /// The process, where it listens, and what it printed.
 pub struct Served {
@@ -163,6 +165,54 @@ fn a_client_gets_needle_gland_and_state_where_the_core_has_them() {
     let words = words.expect("received");
     assert!(words.contains("0 seeds") && words.contains("N"), "{words}");
     drop((served, stream, link));
+    core.finish();
+}
+
+/// The seeds stood where the gland had been before an exercise moved it.
+#[test]
+fn seeds_go_with_a_gland_that_moves() {
+    let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "paper"]);
+    let mut hand = Insertion::begin(&mut core, 0.02);
+    hand.watch(Duration::from_secs(4));
+    ask(&mut hand.link, &Request::DropSeed { strand_pitch_m: None }).expect("dropped");
+    hand.go(-0.005, 0.05);
+    hand.watch(Duration::from_secs(2));
+    let served = Served::start(&core, &[]);
+    let mut stream = served.connect();
+    let shown = |stream: &mut TcpStream| {
+        let seeds = receive_one(stream, |message| match message.body {
+            Body::Points(seeds) if !seeds.is_empty() => Some(seeds[0].place_mm),
+            _ => None,
+        });
+        let gland = receive_one(stream, |message| match message.body {
+            Body::PolyData(surface) => Some(surface.points),
+            _ => None,
+        });
+        let middle = [0, 1, 2].map(|a| gland.iter().map(|p| f64::from(p[a])).sum::<f64>() / gland.len() as f64);
+        [seeds.map(f64::from), middle]
+    };
+    let before = shown(&mut stream);
+    let by_m = [0.003, 0.0, -0.004];
+    ask(&mut hand.link, &Request::BeginExercise(Exercise::BodyMoved { by_m })).expect("taken");
+    let is_there = hand.watch_until(Duration::from_secs(5), |link| {
+        link.snapshot().is_some_and(|s| s.header.body_moved_m == by_m)
+    });
+    assert!(is_there, "the body rests");
+    // What was underway, and what is sent twice a second.
+    std::thread::sleep(Duration::from_secs(1));
+    drop(stream);
+    let mut stream = served.connect();
+    let after = shown(&mut stream);
+    let patient = hand.link.scene().expect("live").header.patient();
+    let way_mm = patient.patient_from_scene_direction(by_m).map(|c| c * 1e3);
+    for (what, before, after) in [("seed", before[0], after[0]), ("gland", before[1], after[1])] {
+        let off_mm = (0..3)
+            .map(|a| (after[a] - before[a] - way_mm[a]).abs())
+            .fold(0.0, f64::max);
+        println!("{what} moved {off_mm:.3} mm from where the exercise moves it");
+        assert!(off_mm < 0.2, "{what}: {before:?} to {after:?}");
+    }
+    drop((served, stream, hand));
     core.finish();
 }
 

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::time::Duration;
 use stylet_runtime::replay::{file::Flight, lines::LinesAgain, repeat};
-use stylet_shm_schema::{EventKind, ParameterChange, ParameterId, Request, TickRecord};
+use stylet_runtime::rt::exchange::HapticOrder;
+use stylet_shm_schema::{EventKind, Exercise, ParameterChange, ParameterId, Request, TickRecord};
 use stylet_tests::hand::Insertion;
 use stylet_tests::stopped::StoppedThread;
 use stylet_tests::witness::where_the_machine_runs;
@@ -184,6 +185,56 @@ fn repeats_on_a_line(tissue: &str) {
     assert_eq!(haptic.ticks_on_line(), haptic.ticks.len());
     assert!(haptic.line_state.as_ref().is_some_and(|state| state.is_in_contact()));
     assert!(tissue.loads.iter().any(|(_, loads)| loads.is_any()) && !flight.lines.is_empty());
+}
+
+/// Each exercise is on the tapes: a stiff line, a device that was lost, a body that moved with a needle in it.
+#[test]
+fn exercises_repeat_bit_for_bit() {
+    where_the_machine_runs(|| {
+        let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "fem"]);
+        let mut link = core.host();
+        ask(
+            &mut link,
+            &Request::BeginExercise(Exercise::StiffTissue { factor: 2.5 }),
+        )
+        .expect("taken");
+        drop(link);
+        let mut hand = Insertion::begin(&mut core, 0.015);
+        hand.watch(Duration::from_secs(3));
+        let moved = Exercise::BodyMoved {
+            by_m: [0.002, 0.0, -0.001],
+        };
+        ask(&mut hand.link, &Request::BeginExercise(moved)).expect("taken");
+        ask(&mut hand.link, &Request::DropSeed { strand_pitch_m: None }).expect("dropped");
+        hand.watch(Duration::from_secs(1));
+        let before = request(&core, &mut hand);
+        ask(&mut hand.link, &Request::BeginExercise(Exercise::DeviceLost)).expect("taken");
+        assert!(hand.watch_until(Duration::from_secs(3), |link| {
+            link.state().is_some_and(|s| s.fault != 0)
+        }));
+        hand.watch(Duration::from_millis(500));
+        ask(&mut hand.link, &Request::EndExercises).expect("taken");
+        ask(&mut hand.link, &Request::Engage).expect("re-armed");
+        hand.watch(Duration::from_secs(2));
+        let after = request(&core, &mut hand);
+        drop(hand);
+        core.finish();
+        for (file, is_lost) in [(before, false), (after, true)] {
+            let flight = assert_identical(&file);
+            let haptic = flight.haptic.as_ref().expect("recorded");
+            let has = |is: fn(&HapticOrder) -> bool| haptic.orders.iter().any(|(_, order)| is(order));
+            let was_moved = haptic.memory.put_in.body_moved_m.norm() > 0.0;
+            assert!(was_moved || has(|order| matches!(order, HapticOrder::MoveBody { .. })));
+            assert_eq!(
+                has(|order| matches!(order, HapticOrder::LoseDevice { lost: true, .. })),
+                is_lost
+            );
+            assert!(
+                flight.lines.iter().any(|line| line.stiffness() == 2.5),
+                "a line of stiff tissue"
+            );
+        }
+    });
 }
 
 /// One bit of one input makes another outcome, and the comparison says so; a damaged file is refused.

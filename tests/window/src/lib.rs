@@ -7,6 +7,8 @@ mod driven;
 #[cfg(test)]
 mod image;
 #[cfg(test)]
+mod instructor;
+#[cfg(test)]
 mod live;
 #[cfg(test)]
 mod plan;

@@ -11,11 +11,11 @@ use stylet_implant::plan::{Hole, ImplantPlan, Loading, Row, Template, exchange};
 use stylet_shm_schema::SceneHeader;
 use stylet_tests::scratch;
 
-const SMALL: [f32; 2] = [1280.0, 800.0];
+pub const SMALL: [f32; 2] = [1280.0, 800.0];
 const LARGE: [f32; 2] = [1920.0, 1080.0];
 const PATH: &str = "Plan file: .toml, .csv or .dcm";
 
-fn open(size: [f32; 2]) -> Driven {
+pub fn open(size: [f32; 2]) -> Driven {
     let mut driven = Driven::open_plain(size);
     driven.until("the anatomy", |app| app.planner().planning().outlines.is_some());
     driven.window.run_steps(2);
@@ -30,12 +30,12 @@ fn seeds(app: &App) -> u32 {
     app.link().snapshot().map_or(0, |s| s.header.seed_count)
 }
 
-fn header(driven: &Driven) -> SceneHeader {
+pub fn header(driven: &Driven) -> SceneHeader {
     driven.window.state().link().scene().expect("live").header
 }
 
 /// Needles through holes, `count` seeds each, about the middle of the target.
-fn plan_through(scene: &SceneHeader, holes: &[&str], count: usize) -> ImplantPlan {
+pub fn plan_through(scene: &SceneHeader, holes: &[&str], count: usize) -> ImplantPlan {
     let template = Template::before(scene);
     let (source, prescription_gy) = exchange::usual().expect("known");
     let mut plan = ImplantPlan {
@@ -79,7 +79,7 @@ fn import(driven: &mut Driven, path: &Path) {
     driven.window.run_steps(3);
 }
 
-fn put(driven: &mut Driven, name: &str, plan: &ImplantPlan) {
+pub fn put(driven: &mut Driven, name: &str, plan: &ImplantPlan) {
     let path = scratch(name).join("plan.toml");
     let frames = driven
         .window

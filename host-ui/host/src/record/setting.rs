@@ -147,6 +147,18 @@ struct Plan {
     entry_m: [f64; 3],
     direction: [f64; 3],
     seeds_m: Vec<[f64; 3]>,
+    /// Recordings of earlier versions have none.
+    #[serde(default)]
+    prescribed: Prescribed,
+}
+
+#[derive(Default, Serialize, Deserialize)]
+struct Prescribed {
+    needle: u32,
+    last_needle: u32,
+    strength_u: f64,
+    dose_gy: f64,
+    source: String,
 }
 
 pub fn plan(plan: &PlanInForce) -> Value {
@@ -157,6 +169,13 @@ pub fn plan(plan: &PlanInForce) -> Value {
         entry_m: plan.entry_m,
         direction: plan.direction,
         seeds_m: seeds.map(|seed| seed.position_m).collect(),
+        prescribed: Prescribed {
+            needle: plan.prescribed.needle,
+            last_needle: plan.prescribed.last_needle,
+            strength_u: plan.prescribed.strength_u,
+            dose_gy: plan.prescribed.dose_gy,
+            source: plan.prescribed.source.read(),
+        },
     };
     serde_json::to_value(plan).unwrap_or_default()
 }
@@ -167,6 +186,13 @@ pub fn plan_of(data: &[u8], session_id: u64) -> Option<PlanInForce> {
     (plan.session_id, plan.generation, plan.scene_generation) = (session_id, p.generation, p.scene_generation);
     (plan.entry_m, plan.direction) = (p.entry_m, p.direction);
     plan.seed_count = p.seeds_m.len().min(MAX_SEEDS) as u64;
+    plan.prescribed = stylet_shm_schema::Prescribed {
+        needle: p.prescribed.needle,
+        last_needle: p.prescribed.last_needle,
+        strength_u: p.prescribed.strength_u,
+        dose_gy: p.prescribed.dose_gy,
+        source: Text::new(&p.prescribed.source),
+    };
     for (to, from) in plan.seeds.iter_mut().zip(p.seeds_m) {
         to.position_m = from;
     }

@@ -18,6 +18,8 @@ pub struct Attempt {
     pub trainee: String,
     /// Name of the procedure's folder, which begins with its date.
     pub session: String,
+    /// Heading of the debrief: its scene, for one.
+    pub title: String,
     /// Mean distance of the seeds from plan, mm.
     pub mean_error_mm: f64,
     /// The largest, mm.
@@ -102,21 +104,21 @@ pub const FIGURES: [Figure; 9] = [
         name: "seeds lost",
         column: "seeds_lost",
         is_count: true,
-        decimals: 1,
+        decimals: 0,
         of: |a| Some(a.seeds[1] as f64),
     },
     Figure {
         name: "stops by the instructor",
         column: "stops",
         is_count: true,
-        decimals: 1,
+        decimals: 0,
         of: |a| Some(a.stops as f64),
     },
     Figure {
         name: "faults",
         column: "faults",
         is_count: true,
-        decimals: 1,
+        decimals: 0,
         of: |a| Some(a.faults as f64),
     },
 ];

@@ -97,7 +97,15 @@ fn compared(trainees: &[(&str, &[Attempt])]) -> Markup {
 }
 
 fn summary(figure: &Figure, own: &[Attempt]) -> Markup {
-    let number = |v: f64| format::decimal(v, figure.decimals);
+    // The mean of counts is seldom one.
+    let decimals = |v: f64| {
+        if figure.is_count && v.fract() != 0.0 {
+            1
+        } else {
+            figure.decimals
+        }
+    };
+    let number = |v: f64| format::decimal(v, decimals(v));
     html! {
         @match Summary::of(&of_all(figure, own)) {
             None => { "n/a" }
@@ -149,6 +157,11 @@ fn in_words(figure: &Figure, trend: Option<&Trend>, count: usize) -> String {
     }
 }
 
+/// Names of folders that are no times are names that somebody gave.
+fn when(attempt: &Attempt) -> String {
+    format::local_time(&attempt.session).unwrap_or_else(|| attempt.session.clone())
+}
+
 fn every(attempts: &[Attempt]) -> Markup {
     let shown = |figure: &Figure, a: &Attempt| {
         (figure.of)(a).map_or_else(|| "n/a".to_owned(), |v| format::decimal(v, figure.decimals))
@@ -166,7 +179,7 @@ fn every(attempts: &[Attempt]) -> Markup {
                 tbody {
                     @for a in attempts {
                         tr {
-                            td { (a.trainee) } td { (a.session) }
+                            td { (a.trainee) } td { (when(a)) @if !a.title.is_empty() { small { (a.title) } } }
                             @for figure in &FIGURES { td { (shown(figure, a)) } }
                             td { (a.exercises) }
                         }

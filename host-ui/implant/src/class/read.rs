@@ -131,6 +131,7 @@ fn attempt(score: &Value) -> Option<Attempt> {
         of_kind.filter(|m| is(m["text"].as_str().unwrap_or(""))).count() as u64
     };
     Some(Attempt {
+        title: score["title"].as_str().unwrap_or_default().to_owned(),
         mean_error_mm: number(&score["mean_error_mm"])?,
         worst_error_mm: number(&score["worst_error_mm"])?,
         seeds: [score["seeds_planned"].as_u64()?, score["seeds_lost"].as_u64()?],

@@ -8,7 +8,7 @@ use stylet_host::moments::STOPPED;
 /// As `score::to_json` has it, as far as a class needs it.
 fn debrief(folder: &Path, name: &str, session: &str, mean_error_mm: f64, d90_gy: f64) {
     let score = json!({
-        "prescription_gy": 160.0, "seeds_planned": 40, "seeds_lost": 1,
+        "title": "Scene pelvis", "prescription_gy": 160.0, "seeds_planned": 40, "seeds_lost": 1,
         "mean_error_mm": mean_error_mm, "worst_error_mm": 2.0 * mean_error_mm,
         "delivered": {
             "structures": [
@@ -76,6 +76,7 @@ fn debriefs_are_read_with_their_figures_and_what_is_none_is_named() {
         Attempt {
             trainee: "Otto".to_owned(),
             session: "20261101T090000Z".to_owned(),
+            title: "Scene pelvis".to_owned(),
             mean_error_mm: 5.0,
             worst_error_mm: 10.0,
             seeds: [40, 1],
@@ -114,6 +115,13 @@ fn the_page_compares_trainees_and_shows_a_trend_only_of_who_has_one() {
     assert!(
         page.contains("<small>1.00 to 5.00</small>"),
         "the interval of Otto's mean error"
+    );
+    // Counts are whole, and a session is named by its local time.
+    assert!(page.contains("<td>1</td>") && !page.contains("<td>1.0</td>"), "counts");
+    let first = stylet_base::format::local_time("20261101T090000Z").expect("a time");
+    assert!(
+        page.contains(&first) && !page.contains("<td>20261101T090000Z"),
+        "{first}"
     );
     assert_eq!(page.matches("stroke-dasharray").count(), 1, "one trend");
     assert!(!page.contains("src=") && !page.contains("href="), "it stands by itself");

@@ -25,6 +25,7 @@ pub use error::PlanError;
 pub use needle::{Loading, Needle, NeedleSeed, SEED_LENGTH_M, SPACER_M};
 pub use rehearse::{Drops, LinkRehearser, RehearsalError, Rehearser};
 use stylet_dose as dose;
+use stylet_shm_schema::{Prescribed, Text};
 pub use template::{HOLES, Hole, NotAHole, PITCH_M, Template};
 
 /// Everything that is decided before the first needle goes in.
@@ -50,6 +51,19 @@ impl ImplantPlan {
     pub fn needle_of_seeds(&self) -> Vec<usize> {
         let of_needle = |(n, needle): (usize, &Needle)| vec![n; needle.seeds.len()];
         self.needles.iter().enumerate().flat_map(of_needle).collect()
+    }
+
+    /// What other hosts are shown of the seeds of a needle, counted from 0. Where they differ in strength, it is that of the first.
+    pub fn prescribed(&self, needle: usize) -> Prescribed {
+        let number = |n: usize| u32::try_from(n + 1).unwrap_or(0);
+        let seeds = self.needles.get(needle).map_or(&[][..], |n| &n.seeds[..]);
+        Prescribed {
+            needle: number(needle),
+            last_needle: self.needles.iter().rposition(|n| !n.seeds.is_empty()).map_or(0, number),
+            strength_u: seeds.first().map_or(0.0, |seed| seed.strength_u),
+            dose_gy: self.prescription_gy,
+            source: Text::new(&self.source),
+        }
     }
 
     /// As dose takes them, needle by needle, deepest first.

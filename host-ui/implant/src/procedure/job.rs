@@ -80,9 +80,12 @@ impl Job {
         for problem in check::problems(&plan, &Anatomy::of(scene)?) {
             println!("note: {}: {problem}", path.display());
         }
-        let loaded = plan.needles.iter().filter(|n| !n.seeds.is_empty());
+        let task = |(number, needle): (usize, &Needle)| {
+            let drops = (!needle.seeds.is_empty()).then(|| Drops::as_planned(needle))?;
+            NeedleTask::of(&plan, number, drops)
+        };
         Ok(Self {
-            tasks: loaded.map(|n| NeedleTask::of(n, Drops::as_planned(n))).collect(),
+            tasks: plan.needles.iter().enumerate().filter_map(task).collect(),
             implant: Some(plan),
             compensations: BTreeMap::new(),
             stabilising: Vec::new(),

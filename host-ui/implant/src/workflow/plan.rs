@@ -1,8 +1,9 @@
 //! One needle through the gland and the seeds along it (paper fig. 6).
 
 use crate::patient::patient_axis;
+use crate::plan::ImplantPlan;
 use nalgebra::Vector3;
-use stylet_shm_schema::{HandMove, MAX_SEEDS, PlannedNeedle, Request, SceneHeader, StructureInfo, role};
+use stylet_shm_schema::{HandMove, MAX_SEEDS, PlannedNeedle, Prescribed, Request, SceneHeader, StructureInfo, role};
 
 /// The needle begins this far outside the body.
 const ENTRY_CLEARANCE_M: f64 = 0.010;
@@ -23,9 +24,22 @@ pub struct NeedlePlan {
     pub direction: [f64; 3],
     /// In the order in which they are dropped: deepest first.
     pub seeds_m: Vec<[f64; 3]>,
+    /// What they are, for other hosts.
+    pub prescribed: Prescribed,
 }
 
 impl NeedlePlan {
+    /// A needle of a plan, counted from 0; `None` where it has no such needle.
+    pub fn of(plan: &ImplantPlan, number: usize) -> Option<Self> {
+        let needle = plan.needles.get(number)?;
+        Some(Self {
+            entry_m: needle.entry_m,
+            direction: needle.direction,
+            seeds_m: needle.seeds_m().collect(),
+            prescribed: plan.prescribed(number),
+        })
+    }
+
     /// Distance of a point from the entry, along the needle.
     pub fn along_m(&self, point: [f64; 3]) -> f64 {
         (Vector3::from(point) - Vector3::from(self.entry_m)).dot(&Vector3::from(self.direction))
@@ -77,6 +91,7 @@ pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> NeedlePlan {
         entry_m: (centre - direction * out_m).into(),
         direction: direction.into(),
         seeds_m,
+        prescribed: Prescribed::default(),
     }
 }
 
@@ -166,6 +181,7 @@ pub fn plan_request(plan: &NeedlePlan) -> Request {
         entry_m: plan.entry_m,
         direction: plan.direction,
         seeds_m: plan.seeds_m.clone(),
+        prescribed: plan.prescribed,
     }))
 }
 

@@ -3,7 +3,7 @@
 use super::{NeedlePlan, plan_request};
 use crate::pairing;
 use crate::plan::stabilise::{Stabilising, first_left, shows_left};
-use crate::plan::{Drops, Needle};
+use crate::plan::{Drops, ImplantPlan};
 use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkError, LinkStatus};
 use stylet_procedure::{
@@ -63,16 +63,10 @@ pub struct NeedleTask {
 }
 
 impl NeedleTask {
-    /// A needle of a plan, its seeds dropped so.
-    pub fn of(needle: &Needle, drops: Drops) -> Self {
-        Self {
-            plan: NeedlePlan {
-                entry_m: needle.entry_m,
-                direction: needle.direction,
-                seeds_m: needle.seeds_m().collect(),
-            },
-            drops,
-        }
+    /// A needle of a plan, counted from 0, its seeds dropped so; `None` where the plan has no such needle.
+    pub fn of(plan: &ImplantPlan, number: usize, drops: Drops) -> Option<Self> {
+        let plan = NeedlePlan::of(plan, number)?;
+        Some(Self { plan, drops })
     }
 
     /// Each seed dropped where it is planned.
@@ -372,6 +366,7 @@ mod tests {
             entry_m: [x, 0.0, 0.0],
             direction: [0.0, 0.0, 1.0],
             seeds_m: vec![[x, 0.0, 0.05], [x, 0.0, 0.04]],
+            prescribed: Default::default(),
         };
         [0.0, 0.01].map(needle).map(NeedleTask::as_planned).to_vec()
     }

@@ -309,6 +309,7 @@ pub fn dose(seeds: usize) -> Arc<DoseResult> {
         number: 1,
         of: DoseOf::Plan,
         seeds,
+        body_moved_m: [0.0; 3],
         source: "Pd-103 TheraSeed 200".to_owned(),
         prescription_gy: 145.0,
         shells: Vec::new(),

@@ -1,5 +1,6 @@
 //! Every state of the window in all its sizes, with the longest words that there are.
 
+use super::class::{line_to_a_core, put_in, trainees, whole_class};
 use super::fixture::{Drawn, LONG_PATH, dose, live, many_needles, one_needle, proposals};
 use super::text::misplaced;
 use super::update::{deciding, drawing, searching};
@@ -12,7 +13,7 @@ use crate::view::state::Tool;
 use bytemuck::Zeroable;
 use stylet_host::link::LinkStatus;
 use stylet_procedure::{Step, Waiting, WaitsFor};
-use stylet_shm_schema::{Fault, Relayed, SecondState, Text, TickRecord, flags};
+use stylet_shm_schema::{Fault, SecondState, Text, TickRecord, flags};
 use stylet_shm_schema::{LeftNeedlePose, MAX_LEFT_NEEDLES};
 
 pub type State = (&'static str, fn(&mut App));
@@ -60,6 +61,16 @@ pub const STATES: &[State] = &[
             ..whole_class()
         });
         app.class = true;
+    }),
+    ("instructor with every exercise", |app| {
+        app.shown = one_needle(0.03, 2);
+        put_in(app);
+        app.instructor.toggle();
+    }),
+    ("list of trainees", |app| {
+        app.shown = one_needle(0.03, 2);
+        put_in(app);
+        trainees(app);
     }),
     ("over a relay that is not heard", |app| {
         app.shown = one_needle(0.03, 2);
@@ -189,42 +200,6 @@ pub const STATES: &[State] = &[
         app.shown.continues_at = Some((1, 19));
     }),
 ];
-
-/// To another machine, with the longest names that it takes.
-fn line_to_a_core(is_heard: bool) -> Relayed {
-    Relayed {
-        is_heard: u32::from(is_heard),
-        snapshot_age_ns: 12_345_000_000,
-        round_trip_ns: 1_234_000_000,
-        records_lost: 123_456,
-        snapshots_lost: 12_345,
-        server: Text::new("simulator-of-the-department-of-radiation-oncology.example:65535"),
-        name: Text::new("Prof. Dr. Maximiliane Wolfeschlegelsteinhausenbergerdorff"),
-        operator: Text::new("Dr. Bartholomew Featherstonehaugh-Cholmondeley, visiting"),
-        role: Text::new("instructor"),
-        ..Relayed::zeroed()
-    }
-}
-
-/// As many as it lists, with the longest names.
-fn whole_class() -> stylet_shm_schema::Class {
-    let line = line_to_a_core(true);
-    let mut class = stylet_shm_schema::Class {
-        count: stylet_shm_schema::MAX_CLASS as u32,
-        unlisted: 12_345,
-        operator: line.operator,
-        asked: line.name,
-        ..Zeroable::zeroed()
-    };
-    for (i, member) in class.members.iter_mut().enumerate() {
-        // Each differs, so that one row that scrolls is not taken for another.
-        let name = format!("{}. {}", i + 1, line.name.read());
-        (member.name, member.role) = (Text::new(&name), Text::new("operator"));
-        (member.round_trip_ns, member.silent_ns) = (1_234_000_000, 1_999_000_000);
-        member.records_lost = 123_456 + i as u64;
-    }
-    class
-}
 
 /// In place of a core.
 fn recorded(app: &mut App, shown: Shown, has_ended: bool) {

@@ -1,7 +1,7 @@
 //! The debrief: the error of each seed, the dose against its limits, the histogram of the target.
 
 use crate::action::Action;
-use crate::dose_worker::{DoseResult, Figure, Limit};
+use crate::dose_worker::{DoseOf, DoseResult, Figure, Limit};
 use crate::panel::axis::{plot, upwards};
 use crate::shown::{SeedError, Shown, all_errors};
 use crate::theme;
@@ -50,6 +50,9 @@ pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, height: f32, otherwise: &str) {
         dose.seeds, dose.source, dose.prescription_gy
     );
     ui.label(what).explained("source").explained("prescription");
+    if let Some(words) = moved_words(dose, shown.body_moved_m) {
+        ui.label(theme::small(&words));
+    }
     ui.spacing_mut().interact_size.y = 16.0;
     egui::Grid::new("dose")
         .num_columns(4)
@@ -110,12 +113,23 @@ fn dvh_ui(ui: &mut egui::Ui, dose: &DoseResult, height: f32) {
         });
 }
 
+/// What the figures are of, while an exercise has moved the body.
+fn moved_words(dose: &DoseResult, body_moved_m: [f64; 3]) -> Option<String> {
+    let moved_mm = body_moved_m.iter().map(|c| c * c).sum::<f64>().sqrt() * 1e3;
+    let words = match dose.of {
+        DoseOf::Tissue => "with its seeds",
+        DoseOf::Plan => "and the plan has not",
+    };
+    (moved_mm > 0.05).then(|| format!("The gland has moved by {moved_mm:.1} mm, {words}."))
+}
+
 /// Nothing until the first seed is placed.
 pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     if shown.seeds.is_empty() || rows.is_empty() {
         return;
     }
-    let has_many = shown.planning.implant.is_some();
+    let is_one_of_many = shown.plan.is_some_and(|plan| plan.prescribed.needle > 0);
+    let has_many = is_one_of_many || shown.planning.implant.is_some();
     ui.horizontal(|ui| {
         ui.label(theme::strong("Seed error, mm"))
             .explained("error of a seed")

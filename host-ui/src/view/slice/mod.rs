@@ -231,7 +231,9 @@ impl Slices {
         // One slice a frame, so that no frame waits for all three.
         let pass = ui.ctx().cumulative_pass_nr();
         let surface = (body.positions_m(), body.moved());
-        if self.lines[number].update(&plane, surface, &self.contours, dose, self.dose_cut_in != pass) {
+        let shift_m = dose.map_or([0.0; 3], |d| d.shift_m(shown.body_moved_m));
+        let may_cut_dose = self.dose_cut_in != pass;
+        if self.lines[number].update(&plane, surface, &self.contours, (dose, shift_m), may_cut_dose) {
             self.dose_cut_in = pass;
         }
         let overlay = Overlay {
@@ -241,7 +243,7 @@ impl Slices {
             shown,
             view,
         };
-        overlay.draw(&self.lines[number], dose.is_some());
+        overlay.draw(&self.lines[number], dose.is_some(), shift_m);
         if let Some(place) = response.hover_pos() {
             overlay.tissue(&self.tissue_at(plane.in_scene(place)));
         }

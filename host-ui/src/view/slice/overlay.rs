@@ -29,18 +29,18 @@ pub struct Lines {
     body: Option<([f64; 4], u64)>,
     dose: Option<([f64; 4], u64)>,
     contours: Vec<(Color32, cut::Line)>,
-    /// By level.
+    /// By level, in the body as the scene has it.
     isodoses: Vec<(usize, cut::Line)>,
 }
 
 impl Lines {
-    /// A new dose is cut where `may_cut_dose`, else in a later frame; gives whether it was cut.
+    /// `shift_m`: from the body as the scene has it to where the dose is drawn. A new dose is cut where `may_cut_dose`, else in a later frame; gives whether it was cut.
     pub fn update(
         &mut self,
         plane: &Plane,
         (positions_m, moved): (&[[f32; 3]], u64),
         contours: &[Contour],
-        dose: Option<&Arc<DoseResult>>,
+        (dose, shift_m): (Option<&Arc<DoseResult>>, [f64; 3]),
         may_cut_dose: bool,
     ) -> bool {
         let normal = plane.normal();
@@ -57,6 +57,8 @@ impl Lines {
                     .extend(lines.into_iter().map(|line| (contour.color, line)));
             }
         }
+        let offset_m = offset_m - plane.normal().dot(&Vector3::from(shift_m));
+        let at = [at[0], at[1], at[2], offset_m];
         let key = (at, dose.map_or(0, |d| d.number));
         let is_old_plane = self.dose.is_some_and(|(plane, _)| plane == at);
         if self.dose == Some(key) || (is_old_plane && !may_cut_dose) {
@@ -98,13 +100,14 @@ pub struct Overlay<'a> {
 }
 
 impl Overlay<'_> {
-    pub fn draw(&self, lines: &Lines, with_dose: bool) {
+    /// `shift_m`: from the body as the scene has it to where the dose is.
+    pub fn draw(&self, lines: &Lines, with_dose: bool, shift_m: [f64; 3]) {
         for (color, line) in &lines.contours {
             let stroke = Stroke::new(1.3, color.gamma_multiply(0.9));
-            self.painter.add(Shape::line(self.points(line), stroke));
+            self.painter.add(Shape::line(self.points(line, [0.0; 3]), stroke));
         }
         for (level, line) in &lines.isodoses {
-            self.isodose(*level, line);
+            self.isodose(*level, line, shift_m);
         }
         self.crosshair();
         self.planned();
@@ -119,14 +122,15 @@ impl Overlay<'_> {
         }
     }
 
-    fn points(&self, line: &cut::Line) -> Vec<Pos2> {
-        let place = |p: &[f32; 3]| self.plane.on_screen(Vector3::from(*p).map(f64::from));
+    fn points(&self, line: &cut::Line, shift_m: [f64; 3]) -> Vec<Pos2> {
+        let shift = Vector3::from(shift_m);
+        let place = |p: &[f32; 3]| self.plane.on_screen(Vector3::from(*p).map(f64::from) + shift);
         line.iter().map(place).collect()
     }
 
-    fn isodose(&self, level: usize, line: &cut::Line) {
+    fn isodose(&self, level: usize, line: &cut::Line, shift_m: [f64; 3]) {
         let (stroke, [dash, gap]) = (Stroke::new(1.4, IMAGE.isodose[level]), DASHES[level]);
-        let points = self.points(line);
+        let points = self.points(line, shift_m);
         if gap > 0.0 {
             self.painter.extend(Shape::dashed_line(&points, stroke, dash, gap));
         } else {

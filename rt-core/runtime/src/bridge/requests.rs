@@ -38,12 +38,14 @@ pub fn plan_in_force(plan: Option<&PlannedNeedle>) -> PlanInForce {
         seed.position_m = position_m;
     }
     sent.seed_count = plan.seeds_m.len().min(sent.seeds.len()) as u64;
+    sent.prescribed = plan.prescribed;
     sent
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stylet_shm_schema::Prescribed;
 
     #[test]
     fn a_plan_keeps_its_seeds_in_order() {
@@ -51,9 +53,13 @@ mod tests {
             entry_m: [0.0, 0.0, -0.01],
             direction: [0.0, 0.0, 1.0],
             seeds_m: vec![[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]],
+            prescribed: Prescribed {
+                strength_u: 0.5,
+                ..Default::default()
+            },
         }));
         assert_eq!((plan.seed_count, plan.seeds[1].position_m), (2, [0.4, 0.5, 0.6]));
-        assert_eq!(plan.entry_m, [0.0, 0.0, -0.01]);
+        assert_eq!((plan.entry_m, plan.prescribed.strength_u), ([0.0, 0.0, -0.01], 0.5));
     }
 
     #[test]

@@ -1,0 +1,229 @@
+//! A procedure as any host hears it, with no hand in it: what a debrief is made of where another window plans and drives.
+
+use crate::pairing;
+use crate::plan::{Hole, Template};
+use crate::score::{SeedPair, Trace};
+use nalgebra::Vector3;
+use stylet_dose::Seed;
+use stylet_host::link::Link;
+use stylet_host::moments::{Moment, Moments};
+use stylet_shm_schema::{HapticState, PlanInForce, Prescribed, SceneHeader, SeedPose, TickRecord};
+
+/// Seeds that left a needle which was there before this host did so no farther from its axis, m.
+const OF_NEEDLE_M: f64 = 3e-3;
+/// A needle that is planned farther from a hole goes through none, m.
+const BESIDE_HOLE_M: f64 = 0.5e-3;
+
+/// A plan that was in force, and the seeds in the tissue when it came.
+#[derive(Clone, Debug)]
+struct HeardNeedle {
+    plan: PlanInForce,
+    first_seed: usize,
+}
+
+/// One procedure, from when this host began to listen.
+#[derive(Clone, Debug, Default)]
+pub struct Heard {
+    trace: Trace,
+    moments: Moments,
+    scene: Option<SceneHeader>,
+    needles: Vec<HeardNeedle>,
+    /// The plan that was looked at last.
+    generation: Option<(u64, u64)>,
+    seeds: Vec<SeedPose>,
+}
+
+/// A planned seed and the one that was dropped for it, by its place among those in the tissue.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeardSeed {
+    /// Which needle it was planned for, counted from 0.
+    pub needle: usize,
+    /// As planned.
+    pub planned: Seed,
+    /// `None` while it is missing.
+    pub placed: Option<usize>,
+}
+
+impl Heard {
+    /// What is new since the last call; `records` are those that the link gave.
+    pub fn take(&mut self, link: &Link, records: &[TickRecord]) {
+        // What a reset begins is a procedure of its own.
+        if self.moments.take(link.events()) {
+            self.begin_anew();
+        }
+        let scene = link.scene().map(|scene| scene.header);
+        if scene.map(|s| s.id()) != self.scene.map(|s| s.id()) {
+            self.begin_needles();
+            self.scene = scene;
+        }
+        let direction = link.state().map_or([0.0, 0.0, 1.0], |s| s.needle_direction);
+        self.trace.take(records, scene.as_ref().map(SceneHeader::id), direction);
+        if let Some(snapshot) = link.snapshot() {
+            let seeds = &snapshot.header.seeds[..snapshot.header.seed_count as usize];
+            self.seeds.clear();
+            self.seeds.extend_from_slice(seeds);
+            self.take_plan(link.plan(), link.state());
+        }
+    }
+
+    fn begin_anew(&mut self) {
+        self.trace = Trace::default();
+        self.begin_needles();
+    }
+
+    fn begin_needles(&mut self) {
+        (self.generation, self.scene) = (None, None);
+        self.needles.clear();
+        self.seeds.clear();
+    }
+
+    fn take_plan(&mut self, plan: Option<&PlanInForce>, state: Option<&HapticState>) {
+        // That of the board is newer than that of the last picture.
+        let seeds = state.map_or(self.seeds.len(), |s| s.seed_count as usize);
+        if self.needles.last().is_some_and(|last| seeds < last.first_seed) {
+            self.needles.clear();
+            self.generation = None;
+        }
+        let Some(plan) = plan.filter(|p| p.generation > 0 && p.seed_count > 0) else {
+            return;
+        };
+        let generation = (plan.session_id, plan.generation);
+        // Seeds that were there before are looked at one by one.
+        if self.generation == Some(generation) || self.needles.is_empty() && self.seeds.len() != seeds {
+            return;
+        }
+        let number = plan.prescribed.needle;
+        let again = self.needles.iter().find(|heard| heard.plan.prescribed.needle == number);
+        let first_seed = match (again, number) {
+            (_, 0) => 0,
+            (Some(heard), _) => heard.first_seed,
+            (None, _) if self.needles.is_empty() => seeds - own_seeds(plan, &self.seeds),
+            (None, _) => seeds,
+        };
+        self.generation = Some(generation);
+        // A needle that is planned again, or one by hand, is in place of what was heard of it.
+        let goes_on = |of: &Prescribed| number > of.needle && of.needle > 0;
+        self.needles.retain(|heard| goes_on(&heard.plan.prescribed));
+        self.needles.push(HeardNeedle {
+            plan: *plan,
+            first_seed,
+        });
+    }
+
+    /// Force and speed, and how the hand moved.
+    pub fn trace(&self) -> &Trace {
+        &self.trace
+    }
+
+    /// What was marked, put in or went wrong in this run of the core.
+    pub fn moments(&self) -> &Moments {
+        &self.moments
+    }
+
+    /// Those of this procedure.
+    pub fn own_moments(&self) -> Vec<Moment> {
+        self.moments.since(self.trace.began_ns().unwrap_or(u64::MAX))
+    }
+
+    /// What the seeds of the newest plan are.
+    pub fn prescribed(&self) -> Option<Prescribed> {
+        self.needles.last().map(|heard| heard.plan.prescribed)
+    }
+
+    /// Seeds in the tissue of which nobody here knows what they were planned for.
+    pub fn seeds_before(&self) -> usize {
+        self.needles.first().map_or(self.seeds.len(), |heard| heard.first_seed)
+    }
+
+    /// Every seed that was planned in the needles that were heard of; `strength_u` is that of seeds by hand, and of those whose plan
+    /// names none.
+    pub fn planned(&self, strength_u: f64) -> Vec<HeardSeed> {
+        let of_needle = |(number, heard): (usize, &HeardNeedle)| {
+            let (plan, count) = (&heard.plan, self.seeds.len());
+            let next = self.needles.get(number + 1).map_or(count, |next| next.first_seed);
+            let from = heard.first_seed.min(count);
+            let own = &self.seeds[from..next.clamp(from, count)];
+            let planned_m: Vec<[f64; 3]> = (plan.seeds.iter().take(plan.seed_count as usize))
+                .map(|seed| seed.position_m)
+                .collect();
+            let pairs = match plan.prescribed.needle {
+                0 => {
+                    let dropped_at_m: Vec<[f64; 3]> = own.iter().map(|seed| seed.dropped_at_m).collect();
+                    pairing::nearest(&planned_m, &dropped_at_m)
+                }
+                _ => pairing::in_order(planned_m.len(), &[], own.len()),
+            };
+            let seed = move |(position_m, placed): ([f64; 3], Option<usize>)| HeardSeed {
+                needle: plan.prescribed.needle.saturating_sub(1) as usize,
+                planned: Seed {
+                    position_m,
+                    axis: Some(plan.direction),
+                    strength_u: match plan.prescribed {
+                        Prescribed { needle: 0, .. } => strength_u,
+                        known if known.strength_u == 0.0 => strength_u,
+                        known => known.strength_u,
+                    },
+                },
+                placed: placed.map(|place| from + place),
+            };
+            planned_m.into_iter().zip(pairs).map(seed).collect::<Vec<_>>()
+        };
+        self.needles.iter().enumerate().flat_map(of_needle).collect()
+    }
+
+    /// What a score is made of: the seeds in the tissue, each beside its planned one, and those that are missing.
+    pub fn pairs(&self, strength_u: f64) -> (Vec<SeedPair>, Vec<Seed>) {
+        let template = self.scene.as_ref().map(Template::before);
+        let hole = |planned_m, direction| template.and_then(|t| hole_of(&t, planned_m, direction));
+        let (mut pairs, mut lost) = (Vec::new(), Vec::new());
+        for heard in self.planned(strength_u) {
+            let (planned, direction) = (heard.planned, heard.planned.axis.unwrap_or_default());
+            let Some(pose) = heard.placed.and_then(|place| self.seeds.get(place)) else {
+                lost.push(planned);
+                continue;
+            };
+            pairs.push(SeedPair {
+                needle: heard.needle,
+                hole: hole(planned.position_m, direction),
+                planned,
+                delivered: Seed {
+                    position_m: pose.position_m,
+                    axis: Some(pose.axis),
+                    ..planned
+                },
+                direction,
+            });
+        }
+        (pairs, lost)
+    }
+
+    /// Every planned seed lies in the tissue, of the last needle of the plan as well.
+    pub fn is_whole(&self) -> bool {
+        let is_last = |of: Prescribed| of.needle == of.last_needle;
+        self.prescribed().is_some_and(is_last) && self.planned(0.0).iter().all(|seed| seed.placed.is_some())
+    }
+}
+
+/// The hole of the usual template that a needle along this line came through; `None` for one beside its holes.
+fn hole_of(template: &Template, place_m: [f64; 3], direction: [f64; 3]) -> Option<Hole> {
+    let hole = template.nearest(place_m)?;
+    let (off, direction) = (
+        Vector3::from(template.hole_m(hole)) - Vector3::from(place_m),
+        Vector3::from(direction),
+    );
+    ((off - direction * off.dot(&direction)).norm() < BESIDE_HOLE_M).then_some(hole)
+}
+
+/// How many of the last seeds left a needle on the axis of the plan.
+fn own_seeds(plan: &PlanInForce, seeds: &[SeedPose]) -> usize {
+    let (entry, direction) = (Vector3::from(plan.entry_m), Vector3::from(plan.direction));
+    let is_near = |seed: &&SeedPose| {
+        let off = Vector3::from(seed.dropped_at_m) - entry;
+        (off - direction * off.dot(&direction)).norm() <= OF_NEEDLE_M
+    };
+    let own = seeds.iter().rev().take_while(is_near).count();
+    own.min(plan.seed_count as usize)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,106 @@
+//! Plans as they are heard one after the other, with the seeds that are in the tissue then.
+
+use super::*;
+use bytemuck::Zeroable;
+use stylet_shm_schema::PlannedSeed;
+
+/// Needle `number` of three, at its own x, with two seeds.
+fn plan(generation: u64, number: u32) -> PlanInForce {
+    let mut plan = PlanInForce::zeroed();
+    (plan.session_id, plan.generation, plan.seed_count) = (1, generation, 2);
+    (plan.entry_m, plan.direction) = ([0.01 * f64::from(number), 0.0, 0.0], [0.0, 0.0, 1.0]);
+    for (seed, z) in plan.seeds.iter_mut().zip([0.05, 0.04]) {
+        *seed = PlannedSeed {
+            position_m: [plan.entry_m[0], 0.0, z],
+        };
+    }
+    plan.prescribed = Prescribed {
+        needle: number,
+        last_needle: 3,
+        strength_u: 0.4,
+        ..Prescribed::default()
+    };
+    plan
+}
+
+/// As the needle of that number leaves it, 2 mm too deep.
+fn seed(number: u32, z: f64) -> SeedPose {
+    let x = 0.01 * f64::from(number);
+    SeedPose {
+        position_m: [x, 0.0, z + 2e-3],
+        axis: [0.0, 0.0, 1.0],
+        dropped_at_m: [x, 0.0, z],
+    }
+}
+
+impl Heard {
+    fn hear(&mut self, plan: &PlanInForce, seeds: &[SeedPose]) {
+        self.seeds = seeds.to_vec();
+        self.take_plan(Some(plan), None);
+    }
+}
+
+fn placed(heard: &Heard) -> Vec<(usize, Option<usize>)> {
+    heard
+        .planned(0.5)
+        .iter()
+        .map(|seed| (seed.needle, seed.placed))
+        .collect()
+}
+
+#[test]
+fn each_needle_has_the_seeds_that_came_after_its_plan() {
+    let mut heard = Heard::default();
+    let seeds = [seed(1, 0.05), seed(1, 0.04), seed(3, 0.05), seed(3, 0.04)];
+    heard.hear(&plan(1, 1), &[]);
+    heard.hear(&plan(1, 1), &seeds[..2]);
+    assert!(!heard.is_whole(), "it is not the last needle");
+    heard.hear(&plan(2, 3), &seeds[..2]);
+    assert_eq!(placed(&heard), [(0, Some(0)), (0, Some(1)), (2, None), (2, None)]);
+    heard.hear(&plan(2, 3), &seeds);
+    assert!(heard.is_whole());
+    assert_eq!(placed(&heard)[2..], [(2, Some(2)), (2, Some(3))]);
+    let (pairs, lost) = heard.pairs(0.5);
+    assert!(lost.is_empty() && pairs.iter().all(|p| (p.error_along_m() - 2e-3).abs() < 1e-12));
+    assert!(
+        pairs
+            .iter()
+            .all(|p| p.planned.strength_u == 0.4 && p.delivered.strength_u == 0.4)
+    );
+    // A needle that is planned again keeps its seeds; one by hand stands by itself.
+    heard.hear(&plan(3, 3), &seeds[..3]);
+    assert_eq!(placed(&heard)[2..], [(2, Some(2)), (2, None)]);
+    let mut by_hand = plan(4, 0);
+    by_hand.prescribed = Prescribed::default();
+    heard.hear(&by_hand, &[seed(0, 0.04), seed(0, 0.05)]);
+    assert_eq!(
+        placed(&heard),
+        [(0, Some(1)), (0, Some(0))],
+        "by where they were dropped"
+    );
+    assert_eq!(heard.pairs(0.5).0[0].planned.strength_u, 0.5);
+}
+
+#[test]
+fn an_implant_that_begins_anew_is_heard_anew() {
+    let mut heard = Heard::default();
+    let seeds = [seed(1, 0.05), seed(1, 0.04), seed(2, 0.05), seed(2, 0.04)];
+    heard.hear(&plan(1, 1), &[]);
+    heard.hear(&plan(2, 2), &seeds[..2]);
+    heard.hear(&plan(2, 2), &seeds);
+    // A reset takes all seeds away; the plan of the first needle comes a moment later.
+    heard.hear(&plan(2, 2), &[]);
+    heard.hear(&plan(3, 1), &[]);
+    assert_eq!(placed(&heard), [(0, None), (0, None)]);
+    heard.hear(&plan(3, 1), &seeds[..1]);
+    assert_eq!(placed(&heard), [(0, Some(0)), (0, None)]);
+}
+
+#[test]
+fn who_comes_late_knows_whose_seeds_lie_on_the_needle_and_counts_the_others() {
+    let mut heard = Heard::default();
+    let seeds = [seed(1, 0.05), seed(1, 0.04), seed(2, 0.05)];
+    heard.hear(&plan(7, 2), &seeds);
+    assert_eq!(heard.seeds_before(), 2);
+    assert_eq!(placed(&heard), [(1, Some(2)), (1, None)]);
+}
