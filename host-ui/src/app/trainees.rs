@@ -112,7 +112,7 @@ impl Seat {
         self.heard.take(&self.link, &records);
         let in_tissue = flags::IN_CONTACT | flags::PUNCTURED;
         let state = self.link.state().filter(|_| self.link.status() == LinkStatus::Live);
-        // A core that has gone silent ends nothing.
+        // A core that is silent ends nothing.
         state.is_some_and(|s| {
             let is_whole = self.heard.is_whole();
             self.heard.prescribed().is_some() && self.ending.take(is_whole, s.flags & in_tissue != 0)

@@ -181,10 +181,8 @@ fn count_fits(kind: CommandKind, count: usize) -> bool {
         // Which of them the number says; see `Reader::exercise`.
         CommandKind::BeginExercise => matches!(count, 1 | 2 | 4),
         CommandKind::DrawNeedle => count == 2,
-        // Without a value: loose.
-        CommandKind::DropSeed => count <= 1,
-        // Without a value: the first scene.
-        CommandKind::LoadBuiltinScene => count <= 1,
+        // Without a value: loose, and the first scene.
+        CommandKind::DropSeed | CommandKind::LoadBuiltinScene => count <= 1,
         // How many needles stay in, and how many were there before, are values; see `Reader::drops`.
         CommandKind::Rehearse => (0..=MAX_LEFT_NEEDLES + MAX_EARLIER_NEEDLES)
             .any(|n| places_after(REHEARSAL_HEAD + STABILISING * n).is_some_and(|n| (1..=MAX_SEEDS).contains(&n))),

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use stylet_host::roster::Trainee;
 use stylet_shm_schema::service::Instance;
 use stylet_shm_schema::{Class, ClassMember, Exercise, Relayed, Request, Text, service};
-use stylet_tests::{Core, ask, scratch, until};
+use stylet_tests::{ask, scratch, until};
 
 /// That of whoever follows one trainee, on a core that is live.
 fn instructor(instance: &Instance, class: Option<PathBuf>) -> Harness<'static, App> {
