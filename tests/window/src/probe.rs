@@ -96,14 +96,6 @@ fn the_picture_is_of_the_probe_in_the_hand_which_stepper_and_pointer_move_until_
     driven.press(Key::PageDown);
     goal = goal.moved(-5e-3, 0.0);
     until_at(&mut driven, "a step back", goal);
-    driven.press(Key::B);
-    driven.window.key_down_modifiers(Modifiers::ALT, Key::W);
-    // A machine that is busy moves it late.
-    let is_farther =
-        |app: &App| in_hand(app).is_some_and(|pose| (pose.middle_m - goal.middle_m).dot(&goal.axis) > 3e-3);
-    driven.until("the hand to move it", is_farther);
-    driven.window.key_up_modifiers(Modifiers::ALT, Key::W);
-    wait(&mut driven, 2);
 }
 
 /// Marks of the seeds stayed where the scene has the body, and the rest of the picture moved.

@@ -7,7 +7,6 @@ use super::update::{deciding, drawing, searching};
 use crate::app::App;
 use crate::app::layout::Narrow;
 use crate::panel::workflow::Progress;
-use crate::settings::Layout;
 use crate::shown::{LoadState, Note, Shown, Watched};
 use crate::view::state::Tool;
 use bytemuck::Zeroable;
@@ -82,12 +81,10 @@ pub const STATES: &[State] = &[
     ("second device is lost", |app| {
         app.shown = one_needle(0.03, 2);
         second_device(&mut app.shown, Fault::DeviceNotCalibrated);
-        app.settings.layout = Layout::Probe;
     }),
     ("second device stands still", |app| {
         app.shown = one_needle(0.03, 2);
         second_device(&mut app.shown, Fault::None);
-        app.settings.layout = Layout::Fluoroscopy;
         if let Some(state) = &mut app.shown.state {
             state.time_ns = 10_000_000_000;
         }
@@ -251,7 +248,7 @@ fn without_line(more: u32) -> Shown {
 fn second_device(shown: &mut Shown, fault: Fault) {
     let mut second = SecondState::zeroed();
     (second.tick, second.fault, second.world_from_tool) = (1, fault as u32, [0.0, 0.0, 0.0, 1.0]);
-    (second.tip_in_scene_m, second.flags) = ([0.05, 0.02, 0.0], flags::SIMULATED_DEVICE);
+    second.tip_in_scene_m = [0.05, 0.02, 0.0];
     shown.second = Some(second);
     if let Some(session) = &mut shown.session {
         session.second_period_ns = 1_000_000;
