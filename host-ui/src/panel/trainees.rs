@@ -10,9 +10,14 @@ use stylet_shm_schema::{Fault, flags};
 
 /// A core that was not heard for longer is said to be silent.
 const SILENT_AFTER: Duration = Duration::from_millis(1500);
-const NAME_WIDTH: f32 = 130.0;
-const STATE_WIDTH: f32 = 210.0;
+/// Of name and state, where there is room and where there is little.
+const WIDTHS: [f32; 2] = [130.0, 210.0];
+const NARROW_WIDTHS: [f32; 2] = [100.0, 140.0];
 const TITLE_AND_EDGES: f32 = 110.0;
+/// Of the whole list with wide columns, and its distance from what is beside it.
+const LIST_WIDTH: f32 = 720.0;
+const MARGIN: f32 = 24.0;
+const NARROW_MARGIN: f32 = 8.0;
 /// Keys follow so many of them: F2 to F9.
 pub const KEYS: usize = 8;
 
@@ -124,17 +129,22 @@ pub fn trainees_ui(ctx: &egui::Context, glances: &[Glance], followed: Option<usi
         return None;
     }
     let window = egui::Window::new("Trainees").auto_sized();
+    let is_narrow = ctx.content_rect().width() < theme::LEFT_WIDTH + LIST_WIDTH + 2.0 * MARGIN;
+    let (left, widths) = match is_narrow {
+        true => (NARROW_MARGIN, NARROW_WIDTHS),
+        false => (theme::LEFT_WIDTH + MARGIN, WIDTHS),
+    };
     let shown = window
-        .anchor(egui::Align2::LEFT_BOTTOM, [theme::LEFT_WIDTH + 24.0, -24.0])
+        .anchor(egui::Align2::LEFT_BOTTOM, [left, -MARGIN])
         .show(ctx, |ui| {
             let room = ui.ctx().content_rect().height() - TITLE_AND_EDGES;
             let scroll = egui::ScrollArea::vertical().max_height(room).min_scrolled_height(room);
-            scroll.show(ui, |ui| list_ui(ui, glances, followed)).inner
+            scroll.show(ui, |ui| list_ui(ui, glances, followed, widths)).inner
         });
     shown.and_then(|shown| shown.inner.flatten()).map(Action::Trainee)
 }
 
-fn list_ui(ui: &mut egui::Ui, glances: &[Glance], followed: Option<usize>) -> Option<TraineeAction> {
+fn list_ui(ui: &mut egui::Ui, glances: &[Glance], followed: Option<usize>, widths: [f32; 2]) -> Option<TraineeAction> {
     let mut asked = None;
     egui::Grid::new("trainees")
         .num_columns(7)
@@ -146,7 +156,7 @@ fn list_ui(ui: &mut egui::Ui, glances: &[Glance], followed: Option<usize>) -> Op
             }
             ui.end_row();
             for (number, glance) in glances.iter().enumerate() {
-                asked = row_ui(ui, number, glance, followed == Some(number)).or(asked.take());
+                asked = row_ui(ui, (number, glance), followed == Some(number), widths).or(asked.take());
                 ui.end_row();
             }
         });
@@ -156,7 +166,12 @@ fn list_ui(ui: &mut egui::Ui, glances: &[Glance], followed: Option<usize>) -> Op
     asked
 }
 
-fn row_ui(ui: &mut egui::Ui, number: usize, glance: &Glance, is_followed: bool) -> Option<TraineeAction> {
+fn row_ui(
+    ui: &mut egui::Ui,
+    (number, glance): (usize, &Glance),
+    is_followed: bool,
+    [name_width, state_width]: [f32; 2],
+) -> Option<TraineeAction> {
     let (tokens, line) = (theme::of(ui), Line::of(glance));
     let color: Color32 = match line.level {
         Level::Good => tokens.text,
@@ -164,7 +179,7 @@ fn row_ui(ui: &mut egui::Ui, number: usize, glance: &Glance, is_followed: bool) 
         Level::Bad => tokens.bad,
     };
     let name = egui::Button::selectable(is_followed, glance.trainee.name.as_str()).wrap();
-    let name = column(ui, NAME_WIDTH, name);
+    let name = column(ui, name_width, name);
     let key = if number < KEYS {
         format!(" (key F{})", number + 2)
     } else {
@@ -173,7 +188,7 @@ fn row_ui(ui: &mut egui::Ui, number: usize, glance: &Glance, is_followed: bool) 
     let name = name.on_hover_text(format!("Follow{key}; instance {}", glance.trainee.instance.name()));
     column(
         ui,
-        STATE_WIDTH,
+        state_width,
         egui::Label::new(RichText::new(&line.state).color(color)).wrap(),
     );
     ui.monospace(&line.force);
