@@ -153,7 +153,7 @@ fn the_whole_procedure_by_one_key_ends_in_a_debrief() {
     driven.press(Key::T);
     assert_in_place(&mut driven, "debrief, light");
     driven.picture("debrief-light");
-    for _ in 0..3 {
+    for _ in 0..4 {
         driven.press(Key::V);
     }
     driven.window.set_size(LARGE.into());

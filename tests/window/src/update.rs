@@ -327,15 +327,11 @@ fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
         app.planner().progress().done() == needles
     });
     println!("{:.1} s: all {needles} needles are in", begun.elapsed().as_secs_f64());
-    let placed = driven
-        .window
-        .state()
-        .link()
-        .snapshot()
-        .expect("a snapshot")
-        .header
-        .seed_count;
-    assert_eq!(placed as usize, after.seed_count());
+    wait_long(&mut driven, "every seed in the picture", |app| {
+        app.link()
+            .snapshot()
+            .is_some_and(|s| s.header.seed_count as usize == after.seed_count())
+    });
     debrief_says_so(&mut driven);
     println!("{:.1} s in all", begun.elapsed().as_secs_f64());
 }
