@@ -5,7 +5,7 @@ CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -45,6 +45,9 @@ causes: ## Inject ten causes of late ticks into measurements, and see which of t
 ratios: build ## Measure the force loop beside cyclictest in alternating rounds and print the ratios, RATIOS_SECONDS (30) each (as root, quiet machine)
 	@docs/tools/need rt-tests python3
 	docs/tools/ratios "$(BIN)"
+
+procedure-test: deps-test build ## Drive a whole procedure with probe, contour, update of the plan and debrief through the window (three minutes)
+	$(CARGO) test --release -p stylet-tests-window --lib update:: -- --ignored --nocapture
 
 igtl-test: deps-test build ## Compare OpenIGTLink with libOpenIGTLink and pyigtl, then serve IGTL_SECONDS (600) beside clients that hang (11 minutes)
 	@docs/tools/need g++ libopenigtlink-dev python3-venv

@@ -159,7 +159,7 @@ impl App {
         if self.planner.is_busy() || !placed.is_partial() {
             return self.start_over();
         }
-        self.planner.restart();
+        self.planner.count_none();
         self.mark_placed(&numbers, &placed);
         self.run = Some(Run::continuing(tasks, self.pace, &placed));
         (self.run_needles, self.run_placed) = (numbers, placed);

@@ -327,6 +327,11 @@ impl Planner {
     /// Begins the implantation again: no needle is inserted.
     pub fn restart(&mut self) {
         self.review.restart();
+        self.count_none();
+    }
+
+    /// Counts no needle as inserted, in an implantation that goes on: its updates are kept.
+    pub fn count_none(&mut self) {
         self.set_progress(NeedleProgress::default());
     }
 }
