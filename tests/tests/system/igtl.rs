@@ -171,8 +171,8 @@ fn a_client_gets_needle_gland_and_state_where_the_core_has_them() {
 /// The seeds stood where the gland had been before an exercise moved it.
 #[test]
 fn seeds_go_with_a_gland_that_moves() {
-    let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "paper"]);
-    let mut hand = Insertion::begin(&mut core, 0.02);
+    let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "fem"]);
+    let mut hand = Insertion::begin(&mut core, 0.015);
     hand.watch(Duration::from_secs(4));
     ask(&mut hand.link, &Request::DropSeed { strand_pitch_m: None }).expect("dropped");
     hand.go(-0.005, 0.05);
