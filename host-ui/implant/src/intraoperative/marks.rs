@@ -16,7 +16,7 @@ pub struct Marks {
 }
 
 impl Marks {
-    /// The pairs of least total square; pairs farther apart than [`FAR_M`] are none.
+    /// The pairs of least total square; pairs farther apart than 10 mm are none.
     pub fn of(seeds_m: &[[f64; 3]], marks_m: &[[f64; 3]]) -> Self {
         let off_m = |seed: usize, mark: usize| (Vector3::from(seeds_m[seed]) - Vector3::from(marks_m[mark])).norm();
         let cost = |seed: usize, mark: usize| off_m(seed, mark).min(FAR_M).powi(2);

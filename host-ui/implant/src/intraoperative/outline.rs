@@ -20,7 +20,7 @@ const ROUNDS: usize = 6;
 pub struct Outline {
     /// Middle: to the right and up in the plane, m.
     pub middle_m: Vector2<f64>,
-    /// From the middle to the line, one for each of [`DIRECTIONS`], from the right over up, m.
+    /// From the middle to the line, one for each of `DIRECTIONS`, from the right over up, m.
     pub radii_m: Vec<f64>,
 }
 
