@@ -350,7 +350,14 @@ fn debrief_says_so(driven: &mut Driven) {
     driven.click("Save the debrief");
     let start = Instant::now();
     let said = loop {
-        assert!(start.elapsed() < Duration::from_secs(60), "no debrief was saved");
+        if start.elapsed() > Duration::from_secs(60) {
+            let said: Vec<_> = driven
+                .window
+                .query_all_by_label_contains("ebrief")
+                .map(|node| format!("{:?}", node.accesskit_node().label()))
+                .collect();
+            panic!("no debrief was saved: {said:?}");
+        }
         driven.window.run_steps(1);
         if let Some(node) = driven.window.query_by_label_contains("Debrief saved as") {
             let inner = node.accesskit_node();
