@@ -60,6 +60,16 @@ impl Theatre {
         rig
     }
 
+    /// The hand goes to the place of the first drop.
+    fn insert(&self, rig: &mut Rig) {
+        rig.move_hand(&stylet_shm_schema::HandMove {
+            tip_m: self.run.drops_m[0].into(),
+            direction: self.run.direction.into(),
+            speed_m_per_s: self.run.insert_m_per_s,
+            acceleration_m_per_s2: self.run.acceleration_m_per_s2,
+        });
+    }
+
     fn pose(&self, pressed_m: f64, beyond_m: f64) -> ProbePose {
         let body = self.stage.lines.as_ref().expect("it has lines");
         body.probe_below_target(&self.probe, pressed_m, beyond_m)
@@ -123,12 +133,7 @@ fn a_needle_in_the_gland_feels_the_probe() {
     let mut theatre = Theatre::new(TissueKind::ChainMail);
     let mut rig = theatre.rig(true);
     rig.take_probe(Box::new(theatre.probe.clone()));
-    rig.move_hand(&stylet_shm_schema::HandMove {
-        tip_m: theatre.run.drops_m[0].into(),
-        direction: theatre.run.direction.into(),
-        speed_m_per_s: theatre.run.insert_m_per_s,
-        acceleration_m_per_s2: theatre.run.acceleration_m_per_s2,
-    });
+    theatre.insert(&mut rig);
     let press = |rig: &mut Rig, from_m: [f64; 2], to_m: [f64; 2], ticks: u32| {
         for n in 1..=ticks {
             let part = f64::from(n) / f64::from(ticks);
@@ -297,12 +302,7 @@ fn session(theatre: &mut Theatre, with_probe: bool) -> Vec<f64> {
     if with_probe {
         rig.take_probe(Box::new(theatre.probe.clone()));
     }
-    rig.move_hand(&stylet_shm_schema::HandMove {
-        tip_m: theatre.run.drops_m[0].into(),
-        direction: theatre.run.direction.into(),
-        speed_m_per_s: theatre.run.insert_m_per_s,
-        acceleration_m_per_s2: theatre.run.acceleration_m_per_s2,
-    });
+    theatre.insert(&mut rig);
     let mut times = Vec::new();
     let mut tick = 0_u32;
     for n in 0..4000_u32 {
