@@ -115,6 +115,8 @@ pub fn read(ctx: &egui::Context) -> Keys {
         (Modifiers::NONE, Key::R, Action::ResetView),
         (Modifiers::NONE, Key::B, Action::Probe(ProbeAction::ToggleBrake)),
     ];
+    let (others, mut is_others) = (egui::Id::unique("keys of the other hand"), false);
+    ctx.data(|d| is_others = d.get_temp(others).unwrap_or(false));
     ctx.input_mut(|i| {
         for (modifiers, key, action) in pressed {
             // A key that repeats while held must not drop a row of seeds.
@@ -124,6 +126,11 @@ pub fn read(ctx: &egui::Context) -> Keys {
         }
         let held = |a, b| f64::from(u8::from(i.key_down(a) || i.key_down(b)));
         let slow = if i.modifiers.shift { 0.25 } else { 1.0 };
+        // Who releases Alt before the rest has not begun to move the needle.
+        let is_held = [Key::W, Key::S, Key::ArrowUp, Key::ArrowDown]
+            .iter()
+            .any(|key| i.key_down(*key));
+        is_others = is_held && (is_others || i.modifiers.alt);
         if i.modifiers.alt {
             let axis = |more, less| {
                 (f64::from(u8::from(i.key_down(more))) - f64::from(u8::from(i.key_down(less)))) * DRIVE_M_PER_S * slow
@@ -133,10 +140,11 @@ pub fn read(ctx: &egui::Context) -> Keys {
                 axis(Key::ArrowUp, Key::ArrowDown),
                 axis(Key::W, Key::S),
             ];
-        } else if !i.modifiers.command {
+        } else if !i.modifiers.command && !is_others {
             keys.drive_m_per_s = (held(Key::W, Key::ArrowUp) - held(Key::S, Key::ArrowDown)) * DRIVE_M_PER_S * slow;
         }
     });
+    ctx.data_mut(|d| d.insert_temp(others, is_others));
     keys
 }
 
@@ -145,4 +153,39 @@ fn fresh_press(input: &egui::InputState, modifiers: Modifiers, wanted: Key) -> b
         matches!(event, egui::Event::Key { key, pressed: true, repeat: false, modifiers: held, .. }
             if *key == wanted && held.matches_logically(modifiers))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::{Event, RawInput};
+
+    fn read_after(ctx: &egui::Context, events: Vec<Event>) -> Keys {
+        let mut keys = Keys::default();
+        let input = RawInput {
+            events,
+            ..RawInput::default()
+        };
+        let _ = ctx.run_ui(input, |ui| keys = read(ui.ctx()));
+        keys
+    }
+
+    #[test]
+    fn alt_that_is_released_before_the_other_key_does_not_move_the_needle() {
+        let ctx = egui::Context::default();
+        let w = |pressed| Event::Key {
+            key: Key::W,
+            physical_key: None,
+            pressed,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        };
+        let alt = |modifiers| Event::ModifiersChanged(modifiers);
+        let keys = read_after(&ctx, vec![alt(Modifiers::ALT), w(true)]);
+        assert!(keys.second_m_per_s[2] > 0.0 && keys.drive_m_per_s == 0.0);
+        let keys = read_after(&ctx, vec![alt(Modifiers::NONE)]);
+        assert_eq!((keys.second_m_per_s, keys.drive_m_per_s), ([0.0; 3], 0.0));
+        read_after(&ctx, vec![w(false)]);
+        assert!(read_after(&ctx, vec![w(true)]).drive_m_per_s > 0.0);
+    }
 }
