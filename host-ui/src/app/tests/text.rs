@@ -179,14 +179,17 @@ fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece
             false if rect.top() >= clip.bottom() => Pos2::new(rect.center().x, clip.bottom() - 4.0),
             false => Pos2::new(rect.center().x, clip.top() + 4.0),
         };
-        // Once in each column and stretch of it.
-        let near = |other: &Pos2| (other.x - place.x).abs() < 150.0 && (other.y - place.y).abs() < 60.0;
-        if !left.iter().any(|other| std::ptr::eq(*other, piece)) || tried.iter().any(near) {
+        if !left.iter().any(|other| std::ptr::eq(*other, piece)) {
             continue;
         }
         // Under a window that was opened over it; by itself it is tried in another state, and what lies over it here.
         if drawn.ctx.layer_id_at(place).is_some_and(|layer| layer != piece.layer) {
             left.retain(|other| other.layer != piece.layer || !near_clip(other, piece));
+            continue;
+        }
+        // Once in each column and stretch of it.
+        let near = |other: &Pos2| (other.x - place.x).abs() < 150.0 && (other.y - place.y).abs() < 60.0;
+        if tried.iter().any(near) {
             continue;
         }
         tried.push(place);
