@@ -22,6 +22,8 @@ use zenoh::{Config, Wait};
 pub const PORT: u16 = 7461;
 /// A link that is silent for so long is closed, ms.
 const LEASE_MS: u32 = 600;
+/// What is sent whole waits so long for room. A peer that is silent is gone after [`LEASE_MS`]; one that is heard is slow, and waited for.
+const PATIENCE_US: u64 = 3_000_000;
 /// A connection that is not made after so long is begun again: QUIC sends a first packet that was lost again after a second. Four round trips.
 const OPEN_MS: u32 = 700;
 /// A message of a volume of 64 million cells fits.
@@ -78,7 +80,7 @@ fn common(mode: &str, tls: Value) -> Value {
                 "protocols": ["quic"],
                 "tx": {
                     "lease": LEASE_MS, "keep_alive": 6,
-                    "queue": { "size": { "data_low": 4 }, "congestion_control": { "drop": { "wait_before_drop": 1000 }, "block": { "wait_before_close": 500_000 } } },
+                    "queue": { "size": { "data_low": 4 }, "congestion_control": { "drop": { "wait_before_drop": 1000 }, "block": { "wait_before_close": PATIENCE_US } } },
                 },
                 "rx": { "max_message_size": MAX_MESSAGE_BYTES },
                 "tls": tls,
@@ -207,7 +209,7 @@ pub fn put_newest(session: &Session, place: Place, priority: Priority, bytes: Ve
     let _ = sent;
 }
 
-/// The same, but waits for room up to half a second: for the one member that asked for it, on a thread of its own.
+/// The same, but waits for room: for the one member that asked for it, on a thread of its own.
 pub fn put_whole(session: &Session, place: Place, priority: Priority, bytes: Vec<u8>) {
     let sent = session
         .put(place.key(), bytes)

@@ -5,7 +5,7 @@ mod decoders;
 use bytemuck::Zeroable;
 use std::path::Path;
 use stylet_relay::control::Order;
-use stylet_relay::wire::{Hello, Kind, MAX_THIN_BYTES, Present, Rest, Stamp, Ticks, Who, encode, encode_snapshot};
+use stylet_relay::wire::{Hello, Kind, MAX_THIN_BYTES, Present, Rest, Stamp, Thin, Ticks, Who, encode};
 use stylet_shm_schema::{HandMove, HapticState, Request, SceneHeader, SnapshotHeader, TickRecord, Vertex};
 
 /// A message of each kind that is accepted, but for the large plain ones.
@@ -17,7 +17,7 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
     let (mut scene, mut header) = (SceneHeader::zeroed(), SnapshotHeader::zeroed());
     (scene.vertex_count, header.vertex_count, header.seed_count) = (20, 20, 1);
     let rest = Rest::of_scene(&scene, &[0; 60]);
-    let snapshot = encode_snapshot(&rest, &header, &[Vertex::zeroed(); 20], 0, MAX_THIN_BYTES).expect("fits");
+    let snapshot = Thin::of(&rest, &header, &[Vertex::zeroed(); 20]).expect("fits").with_places(0, MAX_THIN_BYTES);
     let hand = Request::MoveHand(HandMove {
         tip_m: [0.01, 0.0, 0.0],
         direction: [0.0, 0.0, 1.0],
@@ -34,6 +34,10 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("state", message(Kind::State, &[bytemuck::bytes_of(&state)])),
         ("records", message(Kind::Records, &[bytemuck::cast_slice(&records)])),
+        (
+            "newest",
+            message(Kind::Newest, &[bytemuck::bytes_of(&state), bytemuck::cast_slice(&records)]),
+        ),
         ("snapshot", message(Kind::Snapshot, &[&snapshot])),
         ("who", message(Kind::Who, &[&who.to_bytes()])),
         ("hello", message(Kind::Hello, &[bytemuck::bytes_of(&Hello::default())])),

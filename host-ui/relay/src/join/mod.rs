@@ -23,7 +23,6 @@ use stylet_shm_schema::service::Instance;
 const WAITING: usize = 4096;
 const SNAPSHOTS_WAITING: usize = 32;
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-const PASS: Duration = Duration::from_millis(2);
 /// A server that was not heard for so long is taken for lost, until it is heard again.
 const SILENCE_NS: u64 = 300_000_000;
 
@@ -128,6 +127,13 @@ impl Queues {
     fn take(&self, member: &Member, bytes: &[u8]) {
         let Ok(message) = wire::decode(bytes) else { return };
         member.heard(&message.stamp);
+        if message.kind == Kind::Newest
+            && let Ok((state, records)) = wire::state_and_records(message.body)
+        {
+            let _ = self.rest.try_send(encode(Kind::State, message.stamp, &[state]));
+            let _ = self.records.try_send(encode(Kind::Records, message.stamp, &[records]));
+            return;
+        }
         let queue = match message.kind {
             Kind::Records | Kind::Missing => &self.records,
             Kind::Snapshot => &self.snapshots,
@@ -216,7 +222,7 @@ pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
     while !stop.load(Ordering::Relaxed) && !threads.iter().any(std::thread::JoinHandle::is_finished) {
         rounds.pass();
         // One wait for a message in place of a pause, so that a message does not wait.
-        if let Ok(bytes) = rest.recv_timeout(PASS) {
+        if let Ok(bytes) = rest.recv_timeout(rounds.pause()) {
             rounds.take(&bytes);
             rest.try_iter().take(WAITING).for_each(|bytes| rounds.take(&bytes));
         }

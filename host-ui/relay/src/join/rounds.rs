@@ -19,6 +19,12 @@ use stylet_shm_schema::{
     Session, Text,
 };
 
+/// Requests of hosts here wait for half of it on average: while they come, as from a hand, and after a while without any.
+const PASS: Duration = Duration::from_millis(2);
+const QUIET_PASS: Duration = Duration::from_millis(10);
+const QUIET: Duration = Duration::from_secs(1);
+/// For hosts that come and orders of a terminal, which no operator waits for.
+const LOOK_EVERY: Duration = Duration::from_millis(10);
 const HELLO_EVERY: Duration = Duration::from_millis(50);
 /// A greeting that did not come whole is asked for again after so long.
 const GREETING_EVERY: Duration = Duration::from_millis(400);
@@ -74,6 +80,8 @@ pub(super) struct Rounds {
     has_server: bool,
     round_trip_ns: u64,
     cleaned: Instant,
+    looked: Instant,
+    asked: Instant,
     process: u64,
 }
 
@@ -98,6 +106,8 @@ impl Rounds {
             has_server: false,
             round_trip_ns: 0,
             cleaned: now,
+            looked: now,
+            asked: now,
             process: now_ns(),
         })
     }
@@ -106,7 +116,20 @@ impl Rounds {
         Arc::clone(&self.scenes)
     }
 
+    /// From one pass to the next, where no message comes.
+    pub(super) fn pause(&self) -> Duration {
+        match self.asked.elapsed() < QUIET {
+            true => PASS,
+            false => QUIET_PASS,
+        }
+    }
+
     pub(super) fn pass(&mut self) {
+        self.take_requests();
+        if self.looked.elapsed() < LOOK_EVERY {
+            return;
+        }
+        self.looked = Instant::now();
         self.far.connect();
         let has_server = self.member.has_server();
         if has_server != self.has_server {
@@ -138,7 +161,6 @@ impl Rounds {
             };
             self.member.say(Kind::Hello, self.process, bytemuck::bytes_of(&hello));
         }
-        self.take_requests();
         if let Some(relayed) = self.line.due(&self.member, &self.who, has_server, self.round_trip_ns) {
             let _ = self.far.relayed.send(relayed);
         }
@@ -188,6 +210,7 @@ impl Rounds {
     /// Without a server each request is answered at once: none waits and is carried out later.
     fn take_requests(&mut self) {
         while let Some(command) = self.far.commands.receive() {
+            self.asked = Instant::now();
             match self.has_server {
                 true => self.member.ask(Kind::Command, &[bytemuck::bytes_of(&command)]),
                 false => self.refuse((command.host_id, command.command_id)),

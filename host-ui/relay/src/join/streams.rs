@@ -13,7 +13,8 @@ use std::time::{Duration, Instant};
 use stylet_shm_schema::service::{MAX_BATCH, SlicePublisher};
 use stylet_shm_schema::{TickRecord, check};
 
-const WAIT: Duration = Duration::from_millis(5);
+/// Without a message they look so often whether the end has come, and what is to be asked for.
+const WAIT: Duration = Duration::from_millis(20);
 
 /// A snapshot that is older is not shown: the next one is on its way. A line on which all of them take long gets half of it more than its way.
 const LATE_NS: u64 = 200_000_000;
@@ -103,9 +104,11 @@ pub(super) fn snapshots(member: &Member, messages: &Receiver<Bytes>, scenes: &Sc
         let missed = if at.0 == newest.0 { at.1 - newest.1 - 1 } else { 0 };
         member.snapshots_lost.fetch_add(missed, Ordering::Relaxed);
         newest = at;
-        member.say(Kind::Seen, at.1, &[]);
         let rest = Arc::clone(&scenes.lock().unwrap_or_else(PoisonError::into_inner));
-        if let Ok(Some((mut header, vertices))) = decode_snapshot(&rest, &mut known, message.body) {
+        let decoded = decode_snapshot(&rest, &mut known, message.body);
+        let is_of_use = matches!(decoded, Ok(Some(_)));
+        member.say(Kind::Seen, at.1, if is_of_use { wire::OF_USE } else { &[] });
+        if let Ok(Some((mut header, vertices))) = decoded {
             let (made_ns, way_ns) = {
                 let clock = member.clock();
                 (clock.here_ns(header.time_ns), clock.way_ns())

@@ -1,4 +1,4 @@
-//! What the core publishes beside records and snapshots: sent to all as it comes, and to one member all that is in force.
+//! What the core publishes beside its state, records and snapshots: sent to all as it comes, and to one member all that is in force.
 
 use super::Server;
 use super::streams::Job;
@@ -11,11 +11,8 @@ use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::affinity::Left;
-use stylet_shm_schema::service::StateReader;
 use stylet_shm_schema::{Event, ParametersInForce, PlanInForce, Reply, SCHEMA_VERSION, Session, check};
 
-const STATE_EVERY: Duration = Duration::from_millis(10);
-const BOARD_EVERY: Duration = Duration::from_millis(20);
 const OPEN_EVERY: Duration = Duration::from_secs(1);
 /// Ports that have heard no announcement for so long are made anew: another core may have swept their folder.
 const SILENT_PORTS: Duration = Duration::from_secs(4);
@@ -26,15 +23,12 @@ const REPLIES_KEPT: usize = 32;
 /// The ports, and what is in force.
 pub struct Announcements {
     server: Arc<Server>,
-    // The board before the ports, and those before their node.
-    board: Option<StateReader>,
+    // The ports before their node.
     class: Option<ClassPorts>,
     near: Option<Near>,
     tried: Option<Instant>,
-    board_tried: Option<Instant>,
     heard: Instant,
     cleaned: Instant,
-    state_sent: Instant,
     left_core: Left,
     session: Option<Session>,
     parameters: Option<ParametersInForce>,
@@ -50,14 +44,11 @@ impl Announcements {
         let now = Instant::now();
         Self {
             server,
-            board: None,
             class: None,
             near: None,
             tried: None,
-            board_tried: None,
             heard: now,
             cleaned: now,
-            state_sent: now,
             left_core: Left::default(),
             session: None,
             parameters: None,
@@ -99,7 +90,6 @@ impl Announcements {
     /// To everybody.
     pub fn send(&self, kind: Kind, parts: &[&[u8]]) {
         let priority = match kind {
-            Kind::State => Priority::InteractiveHigh,
             Kind::Scene => Priority::Data,
             _ => Priority::InteractiveLow,
         };
@@ -110,7 +100,6 @@ impl Announcements {
         self.open();
         if let Some(near) = self.near.take() {
             self.receive(&near);
-            self.read_board(&near);
             if self.heard.elapsed() > CLEAN_EVERY && self.cleaned.elapsed() > CLEAN_EVERY {
                 self.cleaned = Instant::now();
                 near.node.clean_up();
@@ -123,7 +112,7 @@ impl Announcements {
         let now = Instant::now();
         let is_due = self.tried.is_none_or(|tried| now - tried >= OPEN_EVERY);
         if is_due && (self.near.is_none() || now - self.heard >= SILENT_PORTS) {
-            (self.tried, self.board, self.heard) = (Some(now), None, now);
+            (self.tried, self.heard) = (Some(now), now);
             (self.class, self.near) = (None, None);
             self.near = Near::new(&self.server.instance).ok();
             self.class = self.near.as_ref().and_then(|near| ClassPorts::new(&near.node).ok());
@@ -137,7 +126,6 @@ impl Announcements {
                 continue;
             }
             if self.session.is_none_or(|old| old.session_id != session.session_id) {
-                (self.board, self.board_tried) = (None, None);
                 self.events.clear();
                 self.replies.clear();
             }
@@ -174,22 +162,6 @@ impl Announcements {
             self.replies.push_back(reply);
             self.replies.drain(..self.replies.len().saturating_sub(REPLIES_KEPT));
             self.send(Kind::Reply, &[bytemuck::bytes_of(&reply)]);
-        }
-    }
-
-    fn read_board(&mut self, near: &Near) {
-        let Some(session) = &self.session else { return };
-        if self.board.is_none() && self.board_tried.is_none_or(|tried| tried.elapsed() >= BOARD_EVERY) {
-            self.board_tried = Some(Instant::now());
-            self.board = StateReader::open(&near.node, session.session_id).ok();
-        }
-        if self.state_sent.elapsed() < STATE_EVERY {
-            return;
-        }
-        if let Some(board) = &self.board {
-            let state = board.read();
-            self.state_sent = Instant::now();
-            self.send(Kind::State, &[bytemuck::bytes_of(&state)]);
         }
     }
 

@@ -32,7 +32,7 @@ pub(super) fn take(rounds: &mut Rounds, seat: u16, bytes: &[u8], now_ns: u64) {
         Kind::Hello => greeting(rounds, seat, &message, late),
         Kind::Seen => {
             if let Some(pace) = super::lock(&rounds.server.paces).get_mut(&seat) {
-                pace.seen(message.stamp.number, Instant::now());
+                pace.seen(message.stamp.number, message.body == wire::OF_USE, Instant::now());
             }
         }
         Kind::Again => {
@@ -77,7 +77,7 @@ fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
             println!("connected: {}", rounds.name(seat));
         }
         rounds.announcements.greet(seat, &hello, &rounds.jobs);
-        super::lock(&rounds.server.paces).entry(seat).or_default();
+        super::lock(&rounds.server.paces).entry(seat).or_default().forget();
     }
     let presence = Presence {
         epoch,

@@ -25,7 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use stylet_shm_schema::TickRecord;
+use stylet_shm_schema::{HapticState, TickRecord};
 use stylet_shm_schema::service::Instance;
 
 /// Requests that may wait; more are dropped and counted.
@@ -80,6 +80,12 @@ impl Server {
             sent_ns: now_ns(),
             heard_ns: 0,
         }
+    }
+
+    /// The message that carries the state and the newest batch of records.
+    fn newest(&self, state: &HapticState, records: &[TickRecord]) -> Vec<u8> {
+        let parts = [bytemuck::bytes_of(state), bytemuck::cast_slice(records)];
+        encode(Kind::Newest, self.stamp(), &parts)
     }
 
     /// The message that carries a batch of records.

@@ -18,10 +18,47 @@ const MORE_BYTES: usize = 500;
 
 /// Of one member.
 pub struct Pace {
-    /// Number and time of those on their way.
-    away: VecDeque<(u64, Instant)>,
+    /// Those on their way.
+    away: VecDeque<Away>,
     number: u64,
     bytes: usize,
+    had: Had,
+}
+
+struct Away {
+    number: u64,
+    at: Instant,
+    places: Places,
+}
+
+/// The places of a message: the fingerprint of all of them, and the part that it holds; of a stride of 0 none.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Places {
+    pub fingerprint: u64,
+    pub stride: usize,
+}
+
+/// The parts that a member has had of the places of one fingerprint.
+#[derive(Default)]
+struct Had {
+    fingerprint: u64,
+    parts: Vec<bool>,
+}
+
+impl Had {
+    fn note(&mut self, number: u64, places: Places) {
+        if places.stride == 0 {
+            return;
+        }
+        if (self.fingerprint, self.parts.len()) != (places.fingerprint, places.stride) {
+            (self.fingerprint, self.parts) = (places.fingerprint, vec![false; places.stride]);
+        }
+        self.parts[(number % places.stride as u64) as usize] = true;
+    }
+
+    fn has_all(&self, fingerprint: u64) -> bool {
+        self.fingerprint == fingerprint && !self.parts.is_empty() && self.parts.iter().all(|part| *part)
+    }
 }
 
 impl Default for Pace {
@@ -30,6 +67,7 @@ impl Default for Pace {
             away: VecDeque::new(),
             number: 0,
             bytes: MAX_THIN_BYTES,
+            had: Had::default(),
         }
     }
 }
@@ -37,11 +75,14 @@ impl Default for Pace {
 impl Pace {
     /// Bytes of places that the next snapshot may have; nothing while the line is full.
     pub fn room(&mut self, now: Instant) -> Option<usize> {
-        while self.away.front().is_some_and(|(_, at)| now - *at >= LOST) {
-            self.away.pop_front();
+        while let Some(lost) = self.away.pop_front_if(|away| now - away.at >= LOST) {
             self.less();
+            // A member that lost what it had does not say so.
+            if lost.places.stride == 0 {
+                self.had = Had::default();
+            }
         }
-        let is_slow = self.away.front().is_some_and(|(_, at)| now - *at >= SLOW);
+        let is_slow = self.away.front().is_some_and(|away| now - away.at >= SLOW);
         (self.away.len() < AT_MOST && !is_slow).then_some(self.bytes)
     }
 
@@ -50,19 +91,42 @@ impl Pace {
         self.number
     }
 
-    /// It is on its way.
-    pub fn sent(&mut self, now: Instant) {
-        self.away.push_back((self.number, now));
+    /// Whether the member has had all places of the fingerprint.
+    pub fn has_all(&self, fingerprint: u64) -> bool {
+        self.had.has_all(fingerprint)
+    }
+
+    /// It is on its way, with these places.
+    pub fn sent(&mut self, now: Instant, places: Places) {
+        self.away.push_back(Away {
+            number: self.number,
+            at: now,
+            places,
+        });
         self.number += 1;
     }
 
-    /// The member has had it.
-    pub fn seen(&mut self, number: u64, now: Instant) {
-        let Some(earlier) = self.away.iter().position(|(away, _)| *away == number) else {
+    /// The member begins anew: it has had nothing.
+    pub fn forget(&mut self) {
+        self.had = Had::default();
+        self.away.clear();
+    }
+
+    /// The member has had it, and could use it or not: one of a scene that it has not got yet, or without places that it knows.
+    pub fn seen(&mut self, number: u64, is_of_use: bool, now: Instant) {
+        let Some(earlier) = self.away.iter().position(|away| away.number == number) else {
             return;
         };
-        let at = self.away[earlier].1;
+        let Away { at, places, .. } = self.away[earlier];
         self.away.drain(..=earlier);
+        match is_of_use {
+            true => self.had.note(number, places),
+            false => self.had = Had::default(),
+        }
+        // A line that carries next to nothing says nothing of what it can carry.
+        if places.stride == 0 {
+            return;
+        }
         match now - at {
             late if late >= SLOW => self.less(),
             // Snapshots are datagrams: of one that has lost a datagram nothing arrives, and a smaller one has fewer.
@@ -81,6 +145,48 @@ impl Pace {
 mod tests {
     use super::*;
 
+    const WHOLE: Places = Places {
+        fingerprint: 7,
+        stride: 1,
+    };
+
+    /// Sent and seen at once.
+    fn pass(pace: &mut Pace, fingerprint: u64, stride: usize, is_seen: bool) {
+        let (number, now) = (pace.next(), Instant::now());
+        pace.sent(now, Places { fingerprint, stride });
+        if is_seen {
+            pace.seen(number, true, now);
+        }
+    }
+
+    #[test]
+    fn a_member_has_all_places_once_it_has_had_each_part_of_them() {
+        let mut pace = Pace::default();
+        for is_seen in [true, true, false, true, true] {
+            assert!(!pace.has_all(7));
+            pass(&mut pace, 7, 3, is_seen);
+        }
+        assert!(!pace.has_all(7), "the third part was lost");
+        pass(&mut pace, 7, 3, true);
+        assert!(pace.has_all(7) && !pace.has_all(8));
+        pass(&mut pace, 7, 0, true);
+        assert!(pace.has_all(7));
+        // One without places that is lost: the member may have lost what it had.
+        let long_ago = Instant::now();
+        pass(&mut pace, 7, 0, false);
+        pace.room(long_ago + 2 * LOST);
+        assert!(!pace.has_all(7));
+        pass(&mut pace, 8, 1, true);
+        assert!(pace.has_all(8));
+        let number = pace.next();
+        pass(&mut pace, 8, 0, false);
+        pace.seen(number, false, Instant::now());
+        assert!(!pace.has_all(8), "it does not know them");
+        pass(&mut pace, 8, 1, true);
+        pace.forget();
+        assert!(!pace.has_all(8));
+    }
+
     #[test]
     fn a_line_that_is_slow_gets_less_and_one_that_is_fast_gets_more_again() {
         let (mut pace, start) = (Pace::default(), Instant::now());
@@ -88,17 +194,17 @@ mod tests {
         for _ in 0..8 {
             assert!(pace.room(now).is_some());
             let number = pace.next();
-            pace.sent(now);
+            pace.sent(now, WHOLE);
             now += SLOW;
             assert_eq!(pace.room(now), None, "one is late");
-            pace.seen(number, now);
+            pace.seen(number, true, now);
         }
         assert_eq!(pace.room(now), Some(LEAST_BYTES));
         for _ in 0..100 {
             let number = pace.next();
-            pace.sent(now);
+            pace.sent(now, WHOLE);
             now += FAST / 2;
-            pace.seen(number, now);
+            pace.seen(number, true, now);
         }
         assert_eq!(pace.room(now), Some(MAX_THIN_BYTES));
     }
@@ -107,16 +213,16 @@ mod tests {
     fn a_line_that_loses_gets_less() {
         let (mut pace, now) = (Pace::default(), Instant::now());
         for lost in [true, false] {
-            pace.sent(now);
+            pace.sent(now, WHOLE);
             if !lost {
-                pace.seen(pace.next() - 1, now + FAST / 2);
+                pace.seen(pace.next() - 1, true, now + FAST / 2);
             }
         }
         assert_eq!(pace.room(now), Some(MAX_THIN_BYTES / 4 * 3));
         for _ in 0..100 {
-            pace.sent(now);
-            pace.sent(now);
-            pace.seen(pace.next() - 1, now);
+            pace.sent(now, WHOLE);
+            pace.sent(now, WHOLE);
+            pace.seen(pace.next() - 1, true, now);
         }
         assert_eq!(pace.room(now), Some(LEAST_BYTES));
     }
@@ -124,7 +230,7 @@ mod tests {
     #[test]
     fn a_member_that_says_nothing_has_few_on_their_way_and_is_tried_again() {
         let (mut pace, now) = (Pace::default(), Instant::now());
-        let sent = std::iter::from_fn(|| pace.room(now).map(|_| pace.sent(now))).count();
+        let sent = std::iter::from_fn(|| pace.room(now).map(|_| pace.sent(now, WHOLE))).count();
         assert_eq!(sent, AT_MOST);
         assert_eq!(pace.room(now + SLOW), None);
         assert!(pace.room(now + LOST).is_some_and(|room| room < MAX_THIN_BYTES));

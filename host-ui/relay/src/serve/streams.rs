@@ -1,21 +1,52 @@
-//! The threads of the streams: records as they come, snapshots thinned, and what one member asks for again.
+//! The threads of the streams: state and records as they come, snapshots thinned, and what one member asks for again.
 
+use super::pace::Places;
 use super::watched::Watched;
 use super::{Server, lock};
 use crate::net::{Place, Priority, put, put_newest, put_whole};
-use crate::wire::{Kind, Rest, Stamp, Ticks, encode, encode_snapshot};
+use crate::wire::{Kind, Rest, Stamp, Thin, Ticks, encode};
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::{self, SliceSubscriber};
-use stylet_shm_schema::{SceneHeader, SnapshotHeader, TickRecord, Vertex};
+use stylet_shm_schema::service::{self, Instance, Node, ServiceError, SliceSubscriber, StateReader};
+use stylet_shm_schema::{HapticState, SceneHeader, SnapshotHeader, TickRecord, Vertex};
 
 /// How often the queue of records is looked at: a batch waits half of it on average.
 const RECORDS_EVERY: Duration = Duration::from_micros(200);
+/// After a batch for half of the time that the batch before it took to come, and no longer.
+const RECORDS_PAUSE: Duration = Duration::from_millis(10);
 /// 60 a second at most.
 const SNAPSHOTS_EVERY: Duration = Duration::from_micros(16_700);
-/// Sends each batch of records, and keeps it for those that miss it.
+const BOARD_EVERY: Duration = Duration::from_millis(20);
+
+/// Where the core writes its state.
+#[derive(Default)]
+struct Board {
+    // The reader before its node.
+    reader: Option<(u64, StateReader, Node)>,
+    tried: Option<Instant>,
+}
+
+impl Board {
+    /// The state of the run, once its board is there.
+    fn state(&mut self, instance: &Instance, session_id: u64) -> Option<HapticState> {
+        let is_of_it = self.reader.as_ref().is_some_and(|(id, ..)| *id == session_id);
+        if !is_of_it && self.tried.is_none_or(|tried| tried.elapsed() >= BOARD_EVERY) {
+            self.tried = Some(Instant::now());
+            let open = || {
+                let node = instance.node()?;
+                Ok::<_, ServiceError>((session_id, StateReader::open(&node, session_id)?, node))
+            };
+            self.reader = open().ok();
+        }
+        let (id, board, _) = self.reader.as_ref()?;
+        (*id == session_id).then(|| board.read())
+    }
+}
+
+/// Sends each batch of records with the state of the moment, and keeps it for those that miss it.
 pub fn records(server: &Server) {
     let mut watched = Watched::<SliceSubscriber<TickRecord, u64>>::new();
+    let (mut board, mut last) = (Board::default(), Instant::now());
     while !server.ends() {
         let make = || {
             let node = server.instance.node()?;
@@ -25,15 +56,22 @@ pub fn records(server: &Server) {
         if let Some(port) = watched.get(make) {
             while let Some(sample) = port.receive() {
                 any = true;
-                let bytes = server.batch(sample.values());
-                lock(&server.kept).keep(sample.values(), bytes.clone());
-                put(&server.session, Place::Records, Priority::RealTime, bytes);
+                let kept = server.batch(sample.values());
+                let newest = match board.state(&server.instance, *sample.header()) {
+                    Some(state) => server.newest(&state, sample.values()),
+                    None => kept.clone(),
+                };
+                lock(&server.kept).keep(sample.values(), kept);
+                put(&server.session, Place::Records, Priority::RealTime, newest);
             }
         }
+        let mut pause = RECORDS_EVERY;
         if any {
             watched.heard();
+            pause = (last.elapsed() / 2).clamp(RECORDS_EVERY, RECORDS_PAUSE);
+            last = Instant::now();
         }
-        std::thread::sleep(RECORDS_EVERY);
+        std::thread::sleep(pause);
     }
 }
 
@@ -77,18 +115,21 @@ pub fn snapshots(server: &Server) {
 }
 
 fn send_snapshot(server: &Server, rest: &Rest, header: &SnapshotHeader, vertices: &[Vertex]) {
-    let now = Instant::now();
+    let Some(thin) = Thin::of(rest, header, vertices) else { return };
+    let (now, fingerprint) = (Instant::now(), thin.fingerprint());
     let mut messages = Vec::new();
     for (seat, pace) in lock(&server.paces).iter_mut() {
         let Some(room) = pace.room(now) else { continue };
-        let Some(body) = encode_snapshot(rest, header, vertices, pace.next(), room) else {
-            return;
+        let number = pace.next();
+        let (stride, body) = match pace.has_all(fingerprint) {
+            true => (0, thin.without_places()),
+            false => (thin.stride(room), thin.with_places(number, room)),
         };
         let stamp = Stamp {
-            number: pace.next(),
+            number,
             ..server.stamp()
         };
-        pace.sent(now);
+        pace.sent(now, Places { fingerprint, stride });
         messages.push((*seat, encode(Kind::Snapshot, stamp, &[&body])));
     }
     // Without the lock: this may wait for a line.

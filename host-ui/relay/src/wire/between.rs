@@ -31,6 +31,7 @@ pub(super) struct Lattice {
     corners: [usize; 3],
     /// Weighted values, and the weights.
     sums: Vec<[f32; 5]>,
+    has_moved: bool,
 }
 
 impl Lattice {
@@ -48,30 +49,44 @@ impl Lattice {
             per_m,
             corners,
             sums: vec![[0.0; 5]; corners.iter().product()],
+            has_moved: false,
         }
     }
 
+    /// Whether any displacement was not 0: where none was there is nothing to read.
+    pub fn has_moved(&self) -> bool {
+        self.has_moved
+    }
+
     /// The eight corners around a place, with their weights.
+    #[inline]
     fn around(&self, place_m: [f32; 3]) -> [(usize, f32); 8] {
-        let mut low = [0; 3];
-        let mut share = [0.0; 3];
+        let (mut low, mut share) = ([0; 3], [0.0; 3]);
         for i in 0..3 {
             let at = (place_m[i] - self.lower_m[i]) * self.per_m;
             low[i] = (at as usize).min(self.corners[i] - 2);
             share[i] = (at - low[i] as f32).clamp(0.0, 1.0);
         }
-        std::array::from_fn(|corner| {
-            let up = [corner & 1, (corner >> 1) & 1, corner >> 2];
-            let [x, y, z] = [0, 1, 2].map(|i| low[i] + up[i]);
-            let weight: f32 = (0..3)
-                .map(|i| if up[i] == 1 { share[i] } else { 1.0 - share[i] })
-                .product();
-            (x + self.corners[0] * (y + self.corners[1] * z), weight)
-        })
+        let [nx, ny, _] = self.corners;
+        let first = low[0] + nx * (low[1] + ny * low[2]);
+        let [x, y, z] = share;
+        let (left, right) = (1.0 - x, x);
+        let [near, near_up, far, far_up] = [(1.0 - y) * (1.0 - z), y * (1.0 - z), (1.0 - y) * z, y * z];
+        [
+            (first, left * near),
+            (first + 1, right * near),
+            (first + nx, left * near_up),
+            (first + nx + 1, right * near_up),
+            (first + nx * ny, left * far),
+            (first + nx * ny + 1, right * far),
+            (first + nx * (ny + 1), left * far_up),
+            (first + nx * (ny + 1) + 1, right * far_up),
+        ]
     }
 
     /// At a place that the message holds: a displacement, m, in a time, s.
     pub fn add(&mut self, place_m: [f32; 3], [x, y, z, time_s]: [f32; 4]) {
+        self.has_moved |= x != 0.0 || y != 0.0 || z != 0.0;
         for (corner, weight) in self.around(place_m) {
             let sum = &mut self.sums[corner];
             let values = [x, y, z, time_s, 1.0];

@@ -5,15 +5,15 @@ mod control;
 mod thin;
 
 pub use control::{Hello, Present, Ticks, Who};
-pub use thin::{Displacements, MAX_THIN_BYTES, Rest, decode_snapshot, encode_snapshot};
+pub use thin::{Displacements, MAX_THIN_BYTES, Rest, Thin, decode_snapshot};
 
 use bytemuck::{Pod, Zeroable};
 use num_enum::TryFromPrimitive;
 use stylet_shm_schema::check::Invalid;
-use stylet_shm_schema::{SCHEMA_VERSION, SceneHeader, UploadHeader};
+use stylet_shm_schema::{HapticState, SCHEMA_VERSION, SceneHeader, UploadHeader};
 
 /// First word of every message: rises with the form of messages and with the schema.
-const MAGIC: u32 = u32::from_le_bytes(*b"st3\0") ^ (SCHEMA_VERSION << 24);
+const MAGIC: u32 = u32::from_le_bytes(*b"st4\0") ^ (SCHEMA_VERSION << 24);
 
 /// What a message holds, by stable number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, TryFromPrimitive)]
@@ -23,7 +23,7 @@ pub enum Kind {
     Session = 1,
     /// A `HapticState`.
     State = 2,
-    /// `TickRecord`s of one batch.
+    /// `TickRecord`s of one batch, as they are sent again.
     Records = 3,
     /// A thinned snapshot.
     Snapshot = 4,
@@ -45,6 +45,8 @@ pub enum Kind {
     Echo = 12,
     /// `Ticks` whose records are not kept any more.
     Missing = 13,
+    /// A `HapticState` and the newest batch of `TickRecord`s, in one packet: each of them costs either side as much as its bytes do.
+    Newest = 14,
     /// A member is alive; `number` is its process.
     Hello = 20,
     /// A `Command` of a member's host.
@@ -55,9 +57,12 @@ pub enum Kind {
     Again = 23,
     /// What a member asks of the lease: a word.
     Lease = 24,
-    /// A member has had the snapshot of that number.
+    /// A member has had the snapshot of that number; [`OF_USE`] where it could take it.
     Seen = 25,
 }
+
+/// The payload of [`Kind::Seen`] for a snapshot that a member could take; another says that it could not.
+pub const OF_USE: &[u8] = &[1];
 
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -148,6 +153,12 @@ pub fn many<T: Pod>(body: &[u8], most: usize) -> Result<Vec<T>, Invalid> {
         .chunks_exact(size_of::<T>())
         .map(bytemuck::pod_read_unaligned)
         .collect())
+}
+
+/// The payloads of a state and of records in one of both.
+pub fn state_and_records(body: &[u8]) -> Result<(&[u8], &[u8]), Invalid> {
+    body.split_at_checked(size_of::<HapticState>())
+        .ok_or(Invalid("records without a state"))
 }
 
 fn headed<H: Pod, T: Pod>(body: &[u8], most: usize) -> Result<(H, Vec<T>), Invalid> {

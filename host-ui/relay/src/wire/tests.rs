@@ -54,7 +54,7 @@ fn a_small_snapshot_survives_but_for_the_error_of_half_floats() {
     let rest = scene(2000, 500);
     for (most_m, bound_m) in [(15.6e-3, 3.9e-6), (31e-3, 7.7e-6), (1e-3, 0.49e-6)] {
         let (header, vertices) = snapshot(2000, 500, most_m);
-        let body = encode_snapshot(&rest, &header, &vertices, 0, MAX_THIN_BYTES).expect("of this scene");
+        let body = Thin::of(&rest, &header, &vertices).expect("of this scene").with_places(0, MAX_THIN_BYTES);
         assert!(body.len() < MAX_THIN_BYTES);
         let (back, places) = decode_snapshot(&rest, &mut Displacements::default(), &body)
             .expect("valid")
@@ -78,7 +78,7 @@ fn a_large_snapshot_is_shared_among_messages_and_whole_after_them() {
     let stride = (20_192_usize * 6).div_ceil(MAX_THIN_BYTES - 2000);
     for number in 0..stride as u64 {
         header.time_ns += 30_000_000;
-        let body = encode_snapshot(&rest, &header, &vertices, number, MAX_THIN_BYTES).expect("of this scene");
+        let body = Thin::of(&rest, &header, &vertices).expect("of this scene").with_places(number, MAX_THIN_BYTES);
         assert!(body.len() <= MAX_THIN_BYTES, "{} bytes", body.len());
         last = decode_snapshot(&rest, &mut known, &body)
             .expect("valid")
@@ -119,7 +119,7 @@ fn places_between_those_that_a_message_holds_move_with_them() {
                 Vertex { position_m }
             })
             .collect();
-        let body = encode_snapshot(&rest, &header, &truth, number, 20_000).expect("of this scene");
+        let body = Thin::of(&rest, &header, &truth).expect("of this scene").with_places(number, 20_000);
         let (_, shown) = decode_snapshot(&rest, &mut known, &body)
             .expect("valid")
             .expect("of this scene");
@@ -142,12 +142,42 @@ fn places_between_those_that_a_message_holds_move_with_them() {
 }
 
 #[test]
+fn a_snapshot_without_places_shows_those_that_are_known_and_nothing_where_they_are_not() {
+    let rest = scene(3000, 5000);
+    let (mut header, vertices) = snapshot(3000, 5000, 10e-3);
+    let thin = Thin::of(&rest, &header, &vertices).expect("of this scene");
+    let mut known = Displacements::default();
+    let still = thin.without_places();
+    assert!(still.len() < 2000, "{} bytes", still.len());
+    assert_eq!(decode_snapshot(&rest, &mut known, &still).expect("valid"), None);
+    let stride = thin.stride(MAX_THIN_BYTES);
+    assert!(stride > 1);
+    let mut last = None;
+    for number in 0..stride as u64 {
+        let body = thin.with_places(number, MAX_THIN_BYTES);
+        last = decode_snapshot(&rest, &mut known, &body).expect("valid");
+    }
+    header.time_ns += 1_000_000_000;
+    header.max_displacement_m = 0.05;
+    let later = Thin::of(&rest, &header, &vertices).expect("of this scene");
+    assert_eq!(later.fingerprint(), thin.fingerprint());
+    let decoded = decode_snapshot(&rest, &mut known, &later.without_places()).expect("valid");
+    let (shown, places) = decoded.expect("of this scene");
+    assert_eq!((shown.time_ns, shown.max_displacement_m), (header.time_ns, 0.05));
+    assert_eq!(Some(&places), last.as_ref().map(|(_, places)| places));
+    let mut moved = vertices.clone();
+    moved[7].position_m[0] += 1e-3;
+    let moved = Thin::of(&rest, &header, &moved).expect("of this scene");
+    assert_ne!(moved.fingerprint(), thin.fingerprint());
+}
+
+#[test]
 fn a_snapshot_of_another_scene_and_one_of_wrong_lengths_are_not_taken() {
     let rest = scene(100, 0);
     let (header, vertices) = snapshot(100, 0, 1e-3);
-    let body = encode_snapshot(&rest, &header, &vertices, 0, MAX_THIN_BYTES).expect("of this scene");
+    let body = Thin::of(&rest, &header, &vertices).expect("of this scene").with_places(0, MAX_THIN_BYTES);
     let other = scene(101, 0);
-    assert!(encode_snapshot(&other, &header, &vertices, 0, MAX_THIN_BYTES).is_none());
+    assert!(Thin::of(&other, &header, &vertices).is_none());
     assert_eq!(
         decode_snapshot(&other, &mut Displacements::default(), &body).expect("valid"),
         None

@@ -20,10 +20,10 @@ pub fn take(bytes: &[u8]) -> bool {
     match message.kind {
         Kind::Session => wire::one::<Session>(body).is_ok(),
         Kind::State => wire::one::<HapticState>(body).is_ok_and(|state| check::state(&state).is_ok()),
-        Kind::Records => {
-            let records = wire::many::<TickRecord>(body, MAX_BATCH);
-            records.is_ok_and(|batch| batch.iter().all(|record| check::record(record).is_ok()))
-        }
+        Kind::Records => records(body),
+        Kind::Newest => wire::state_and_records(body).is_ok_and(|(state, batch)| {
+            wire::one::<HapticState>(state).is_ok_and(|state| check::state(&state).is_ok()) && records(batch)
+        }),
         Kind::Snapshot => snapshot(body),
         Kind::Scene => scene(body),
         Kind::Event => wire::one::<Event>(body).is_ok(),
@@ -40,6 +40,11 @@ pub fn take(bytes: &[u8]) -> bool {
         Kind::Lease => std::str::from_utf8(body).ok().and_then(Order::of_line).is_some(),
         Kind::Seen => true,
     }
+}
+
+fn records(body: &[u8]) -> bool {
+    let records = wire::many::<TickRecord>(body, MAX_BATCH);
+    records.is_ok_and(|batch| batch.iter().all(|record| check::record(record).is_ok()))
 }
 
 fn scene(body: &[u8]) -> bool {

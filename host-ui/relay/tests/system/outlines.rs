@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity};
 use stylet_relay::now_ns;
-use stylet_relay::wire::{Displacements, MAX_THIN_BYTES, Rest, decode_snapshot, encode_snapshot};
+use stylet_relay::wire::{Displacements, MAX_THIN_BYTES, Rest, Thin, decode_snapshot};
 use stylet_shm_schema::service::{self, Instance};
 use stylet_shm_schema::{SnapshotHeader, Vertex};
 use stylet_test_kit::witness::where_the_machine_runs;
@@ -125,7 +125,7 @@ fn places_that_move_with_their_neighbours_are_nearer_to_the_tissue_than_those_th
         let (mut known, mut standing) = (Displacements::default(), Standing::new(resting));
         let (mut drawn_mm, mut standing_mm) = (Errors::default(), Errors::default());
         for (number, (_, header, truth)) in here.values().enumerate() {
-            let body = encode_snapshot(&rest, header, truth, number as u64, MAX_THIN_BYTES).expect("of this scene");
+            let body = Thin::of(&rest, header, truth).expect("of this scene").with_places(number as u64, MAX_THIN_BYTES);
             let decoded = decode_snapshot(&rest, &mut known, &body).expect("valid");
             let (_, drawn) = decoded.expect("of this scene");
             standing.take(truth);
