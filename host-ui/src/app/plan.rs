@@ -42,7 +42,7 @@ impl App {
         }
         self.shown.planning = self.planner.planning();
         if self.run.is_none() && crate::panel::workflow::is_needle_done(&self.shown) {
-            self.planner.finish_needle();
+            self.planner.finish_needle(self.shown.seeds.len());
         }
     }
 
@@ -146,8 +146,8 @@ impl App {
         let mut before = 0;
         for (at, &number) in numbers.iter().enumerate().take(placed.next_needle()) {
             self.planner.begin_needle(number, before);
-            self.planner.finish_needle();
             before += placed.seeds_of(at);
+            self.planner.finish_needle(before);
         }
     }
 
@@ -223,7 +223,7 @@ impl App {
             self.planner.begin_needle(number, seeds);
         }
         if is_done {
-            self.planner.finish_needle();
+            self.planner.finish_needle(self.shown.seeds.len());
         }
     }
 }

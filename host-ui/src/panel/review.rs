@@ -2,7 +2,7 @@
 
 use crate::action::{Action, PlanAction};
 use crate::panel::workflow::job::job_ui;
-use crate::planner::{Edit, ReviewShown};
+use crate::planner::{Edit, Implant, ReviewShown};
 use crate::shown::Shown;
 use crate::theme;
 use crate::view::state::Tool;
@@ -24,7 +24,7 @@ pub fn review_ui(ui: &mut egui::Ui, shown: &Shown, tool: &mut Option<Tool>, at_m
     }
     ui.separator();
     let missing = missing(shown);
-    dose_ui(ui, review, &mut actions);
+    dose_ui(ui, shown, &mut actions);
     ui.separator();
     if let Some(work) = &shown.planning.job {
         if job_ui(ui, &work.what, work.share) {
@@ -139,7 +139,8 @@ fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-fn dose_ui(ui: &mut egui::Ui, review: &ReviewShown, actions: &mut Vec<Action>) {
+fn dose_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
+    let review = &shown.planning.review;
     ui.horizontal(|ui| {
         ui.label(theme::strong("Dose"));
         ui.label(theme::small("of the seeds"));
@@ -186,6 +187,35 @@ fn dose_ui(ui: &mut egui::Ui, review: &ReviewShown, actions: &mut Vec<Action>) {
             }
             ui.end_row();
         });
+    let planning = &shown.planning;
+    if let Some(text) = planning
+        .implant
+        .as_ref()
+        .and_then(|i| rehearsed(i, planning.progress.begun()))
+    {
+        ui.label(theme::small(text));
+    }
+}
+
+/// How much of the dose of the plan carried on is rehearsed; nothing where no needle is left.
+fn rehearsed(implant: &Implant, begun: usize) -> Option<String> {
+    let left = || implant.plan.needles.iter().zip(&implant.rest_errors_m).skip(begun);
+    let with_seeds = || left().filter(|(needle, _)| !needle.seeds.is_empty());
+    let (needles, rehearsed) = (
+        with_seeds().count(),
+        with_seeds().filter(|(_, error)| error.is_some()).count(),
+    );
+    match (needles, rehearsed) {
+        (0, _) => None,
+        (_, 0) => Some("Carried on: seeds as planned. Compensate rehearses where they come to rest.".to_owned()),
+        (n, m) if n == m => Some(format!(
+            "Carried on: seeds of {} where they rest when rehearsed.",
+            counted(n, "needle")
+        )),
+        (n, m) => Some(format!(
+            "Carried on: seeds of {m} of {n} needles where they rest when rehearsed, others as planned."
+        )),
+    }
 }
 
 /// In the colour of a warning where it does not keep its limit.
@@ -226,11 +256,18 @@ fn update_ui(ui: &mut egui::Ui, shown: &Shown, missing: Option<String>, actions:
         ui.label(RichText::new(format!("Missing: {why}.")).color(theme::of(ui).warn));
     }
     let free = shown.is_live() && !shown.running && missing.is_none();
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let plan = ui.add_enabled(free, Button::new("Plan the rest anew"));
         let hint = "Needles that are not inserted yet, through free holes, beside the dose of what lies there";
         if plan.on_hover_text(hint).clicked() {
             actions.push(Action::Plan(PlanAction::Update));
+        }
+        let can_rehearse = shown.is_live() && !shown.running && shown.planning.next_needle().is_some();
+        let compensate = ui.add_enabled(can_rehearse, Button::new("Compensate"));
+        let hint =
+            "Rehearses the needles that are left and moves their drops so that seeds rest where they are planned";
+        if compensate.on_hover_text(hint).clicked() {
+            actions.push(Action::Plan(PlanAction::Compensate));
         }
         if shown.planning.review.can_withdraw {
             let withdraw = ui.add_enabled(!shown.running, Button::new("Withdraw the update"));

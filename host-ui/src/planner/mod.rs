@@ -310,10 +310,10 @@ impl Planner {
         self.set_progress(progress);
     }
 
-    /// The inserted needle is done.
-    pub fn finish_needle(&mut self) {
+    /// The inserted needle is done, with so many seeds in the tissue.
+    pub fn finish_needle(&mut self, seeds: usize) {
         let mut progress = self.progress.clone();
-        progress.finish();
+        progress.finish(seeds);
         self.set_progress(progress);
     }
 

@@ -30,6 +30,8 @@ pub struct NeedleProgress {
     /// For each needle that has begun, the number of seeds in the tissue before it.
     first_seed: Vec<usize>,
     is_done: bool,
+    /// In the tissue when the last needle that is done was finished.
+    seeds_when_done: usize,
 }
 
 impl NeedleProgress {
@@ -41,6 +43,11 @@ impl NeedleProgress {
     /// Whether all needles that have begun are done.
     pub fn is_done(&self) -> bool {
         self.begun() > 0 && self.is_done
+    }
+
+    /// Whether they are, with so many seeds in the tissue: one that was taken back is to be dropped again.
+    pub fn is_done_with(&self, seeds: usize) -> bool {
+        self.is_done() && seeds >= self.seeds_when_done
     }
 
     /// Number of needles that are done.
@@ -66,15 +73,18 @@ impl NeedleProgress {
         self.is_done = false;
     }
 
-    /// The inserted needle is done.
-    pub fn finish(&mut self) {
-        self.is_done = true;
+    /// The inserted needle is done, with so many seeds in the tissue.
+    pub fn finish(&mut self, seeds: usize) {
+        if !self.is_done {
+            (self.is_done, self.seeds_when_done) = (true, seeds);
+        }
     }
 
     /// The inserted needle is withdrawn from the plan again.
     pub fn step_back(&mut self) {
-        self.first_seed.pop();
-        self.is_done = true;
+        if let Some(seeds) = self.first_seed.pop() {
+            (self.is_done, self.seeds_when_done) = (true, seeds);
+        }
     }
 
     /// Seeds of a needle, as a range of all seeds in the order in which they were dropped.
@@ -109,8 +119,9 @@ mod tests {
         progress.begin(0, 0);
         assert_eq!(progress.state(0), NeedleState::Inserted);
         assert_eq!(progress.own_seeds(4), 0..4);
-        progress.finish();
+        progress.finish(4);
         assert_eq!((progress.state(0), progress.done()), (NeedleState::Done, 1));
+        assert!(progress.is_done_with(4) && !progress.is_done_with(3));
         // The second has no seeds and is skipped.
         progress.begin(2, 4);
         assert_eq!(progress.own_seeds(6), 4..6);

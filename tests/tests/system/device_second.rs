@@ -117,6 +117,59 @@ fn both_hands_are_seen_and_each_goes_where_it_is_asked_to() {
     });
 }
 
+/// The whole way: the hand's goal, its loop, the contact in the tissue loop, the snapshot that a window draws, and the force that comes back.
+#[test]
+fn a_probe_that_is_pressed_is_felt_and_moves_the_gland_and_withdrawn_leaves_nothing() {
+    where_the_machine_runs(|| {
+        let mut rig = Rig::start(&["--device-2", "simulated", "--scene", "pelvis"]);
+        rig.engage();
+        let scene = rig.link.scene().expect("live").header;
+        let outside = Vector3::from(rig.link.second_state().expect("seen").tip_in_scene_m);
+        let gland_m = (scene.target_lower_m[2] + scene.target_upper_m[2]) / 2.0;
+        let within = Vector3::new(outside.x, outside.y, gland_m + 35e-3);
+        let go = |rig: &mut Rig, to: Vector3<f64>| {
+            let hand = HandMove {
+                tip_m: to.into(),
+                direction: [0.0, 0.0, 1.0],
+                speed_m_per_s: 0.04,
+                acceleration_m_per_s2: 1.0,
+            };
+            ask(&mut rig.link, &Request::MoveSecondHand(ProbeMove { hand, up: None })).expect("carried out");
+            assert!(
+                rig.waits_for(|link| is_on(link, flags::AT_GOAL)[1]),
+                "{:?}",
+                faults(&rig.link)
+            );
+        };
+        let force_n = |link: &Link| Vector3::from(link.second_state().expect("seen").force_on_hand_n);
+        let moved_m = |link: &Link| link.snapshot().map_or(0.0, |s| s.header.max_displacement_m);
+        assert_eq!((force_n(&rig.link).norm(), moved_m(&rig.link)), (0.0, 0.0));
+        go(&mut rig, within);
+        // The rectum is lower than the probe is thick: both walls are moved, and push against each other.
+        assert!(rig.waits_for(|link| moved_m(link) > 1e-3), "{}", moved_m(&rig.link));
+        let lies_n = force_n(&rig.link);
+        go(&mut rig, within + Vector3::new(0.0, 6e-3, 0.0));
+        let is_pressed = |link: &Link| force_n(link).y < lies_n.y - 1.0 && force_n(link).y < -0.5;
+        let (force, moved) = (force_n(&rig.link), moved_m(&rig.link));
+        assert!(
+            rig.waits_for(is_pressed),
+            "{lies_n:?} lies, {force:?} pressed, {moved} m"
+        );
+        assert!((2e-3..20e-3).contains(&moved_m(&rig.link)), "{}", moved_m(&rig.link));
+        assert_eq!(faults(&rig.link), [Fault::None; 2]);
+        go(&mut rig, within);
+        go(&mut rig, outside);
+        assert!(
+            rig.waits_for(|link| force_n(link).norm() < 1e-9 && moved_m(link) < 1e-6),
+            "{} N, {} m remain",
+            force_n(&rig.link).norm(),
+            moved_m(&rig.link)
+        );
+        drop(rig.link);
+        rig.core.finish();
+    });
+}
+
 #[test]
 fn a_run_without_a_second_device_refuses_to_move_one_and_says_what_to_do() {
     let mut core = Core::start_with(&["--rt-if-allowed"]);

@@ -1,7 +1,7 @@
 //! Dose of what lies in the tissue now, and the needles that are left planned anew beside it.
 
 use crate::plan::optimise::{self, Engine, Figures, Method, Objectives, Present, Search};
-use crate::plan::{Anatomy, Hole, ImplantPlan, Needle, NeedleSeed, PlanError};
+use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Needle, NeedleSeed, PlanError};
 use std::ops::ControlFlow;
 use stylet_dose::{DoseKernel, Seed, Source};
 
@@ -40,6 +40,8 @@ pub struct Situation<'a> {
     pub to_drop: Vec<Seed>,
     /// Target and what is spared, as they are now.
     pub anatomy: &'a Anatomy,
+    /// Needles that were rehearsed, with where their seeds would rest. Of those that were not, seeds are taken to rest as planned.
+    pub rehearsed: &'a [(Needle, Compensation)],
     /// Dose of one seed.
     pub kernel: &'a DoseKernel,
     /// Source of the seeds.
@@ -51,7 +53,7 @@ pub struct Situation<'a> {
 pub struct Doses {
     /// Of the seeds that lie in the tissue.
     pub now: Figures,
-    /// Of all seeds if the plan is carried on unchanged.
+    /// Of all seeds if the plan is carried on unchanged, those of needles that were rehearsed where they would rest.
     pub continued: Figures,
 }
 
@@ -122,11 +124,24 @@ impl Situation<'_> {
 
     /// All seeds once the needles that are left in a plan are in.
     pub fn with(&self, plan: &ImplantPlan) -> Vec<Seed> {
-        let left = ImplantPlan {
-            needles: left_of(plan, self.begun).to_vec(),
-            ..plan.clone()
-        };
-        [&self.lying[..], &self.to_drop, &left.seeds()].concat()
+        let left = left_of(plan, self.begun).iter().flat_map(|needle| self.resting(needle));
+        self.lying.iter().chain(&self.to_drop).copied().chain(left).collect()
+    }
+
+    /// The seeds of a needle where they would rest.
+    fn resting(&self, needle: &Needle) -> Vec<Seed> {
+        let rehearsed = self.rehearsed.iter().find(|(of, _)| of == needle);
+        let off_m = rehearsed.map_or(&[][..], |(_, done)| &done.after_m);
+        let seeds = needle.seeds.iter().zip(needle.seeds_m()).enumerate();
+        let resting = seeds.map(|(n, (seed, planned_m))| {
+            let off_m = off_m.get(n).copied().unwrap_or_default();
+            Seed {
+                position_m: [0, 1, 2].map(|a| planned_m[a] + off_m[a]),
+                axis: Some(needle.direction),
+                strength_u: seed.strength_u,
+            }
+        });
+        resting.collect()
     }
 
     /// Searches for the needles that are left, through holes that are not used yet, with seeds of the strength at hand. `report` gets

@@ -7,6 +7,7 @@ use super::update::{deciding, drawing, searching};
 use crate::app::App;
 use crate::app::layout::Narrow;
 use crate::panel::workflow::Progress;
+use crate::settings::Layout;
 use crate::shown::{LoadState, Note, Shown, Watched};
 use crate::view::state::Tool;
 use bytemuck::Zeroable;
@@ -187,6 +188,14 @@ pub const STATES: &[State] = &[
     ("needles in a narrow window", |app| {
         app.shown = many_needles(24, 0);
         app.narrow = Narrow::Right;
+    }),
+    ("picture of the probe", |app| {
+        app.shown = one_needle(0.03, 2);
+        app.settings.layout = Layout::Probe;
+    }),
+    ("fluoroscopy", |app| {
+        app.shown = one_needle(0.03, 2);
+        app.settings.layout = Layout::Fluoroscopy;
     }),
     ("gland is contoured", |app| drawing(app, Tool::Contour)),
     ("seeds are marked", |app| drawing(app, Tool::Seeds)),

@@ -54,6 +54,10 @@ pub fn progress(shown: &Shown) -> Progress {
     if shown.planning.waits() {
         return Progress::Plan;
     }
+    // The last needle of a plan is done as well where it has lost a seed.
+    if shown.planning.progress.is_done_with(shown.seeds.len()) && shown.planning.next_needle().is_none() {
+        return Progress::Debrief;
+    }
     match needle_at_hand(shown).map(|needle| needle.step()) {
         None | Some(Step::Plan) => Progress::Plan,
         Some(Step::Place) => Progress::Place,
@@ -247,6 +251,17 @@ mod tests {
         assert_eq!(undo_action(&shown(0.0, &[])), Some(Undo::Plan));
         assert_eq!(undo_action(&shown(0.02, &[])), None);
         assert_eq!(undo_action(&Shown::empty("lab")), None);
+    }
+
+    #[test]
+    fn a_last_needle_that_has_lost_a_seed_is_done_until_one_is_taken_back() {
+        let mut shown = shown(-0.05, &[0.03]);
+        assert_eq!(progress(&shown), Progress::Drop);
+        shown.planning.progress.begin(0, 0);
+        shown.planning.progress.finish(1);
+        assert_eq!(progress(&shown), Progress::Debrief);
+        shown.seeds.clear();
+        assert_eq!(progress(&shown), Progress::Insert);
     }
 
     #[test]

@@ -61,7 +61,7 @@ fn the_next_needle_is_the_thing_to_do_once_one_is_outside_and_its_seeds_are_drop
     let out = shown(&mut planner, 0.0, &[0.08, 0.07]);
     assert!(is_needle_done(&out));
     assert_eq!((progress(&out), next_action(&out)), (Progress::Place, next));
-    planner.finish_needle();
+    planner.finish_needle(2);
     planner.begin_needle(1, 2);
     // Those of the first needle are not its own.
     let second = shown(&mut planner, 0.0, &[0.08, 0.07]);

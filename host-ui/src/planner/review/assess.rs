@@ -12,7 +12,7 @@ use stylet_host::link::{SceneModel, Snapshot};
 use stylet_implant::intraoperative::{
     Agreement, Doses, Marks, Proposed, Reviewed, SeedsFrom, Situation, Solid, Transverse,
 };
-use stylet_implant::plan::{Anatomy, ImplantPlan};
+use stylet_implant::plan::{Anatomy, Compensation, ImplantPlan, Needle};
 use stylet_surfaces::field::Field;
 
 /// Plan, seeds and drawing as they were.
@@ -23,6 +23,7 @@ pub(super) struct Moment {
     /// As they lie.
     lying: Vec<Seed>,
     to_drop: Vec<Seed>,
+    rehearsed: Vec<(Needle, Compensation)>,
     solid: Arc<Solid>,
     frame: Transverse,
     drawn: Drawn,
@@ -40,7 +41,7 @@ impl Moment {
     /// `None` where no seed lies in the tissue.
     pub fn of(
         plan: &ImplantPlan,
-        progress: &NeedleProgress,
+        (progress, rehearsed): (&NeedleProgress, &[(Needle, Compensation)]),
         (solid, frame): (Arc<Solid>, Transverse),
         (drawn, seeds_from): (&Drawn, SeedsFrom),
         snapshot: &Snapshot,
@@ -73,6 +74,7 @@ impl Moment {
             begun,
             lying,
             to_drop,
+            rehearsed: rehearsed.to_vec(),
             solid,
             frame,
             drawn: drawn.clone(),
@@ -89,6 +91,7 @@ impl Moment {
             && self.seeds_from == other.seeds_from
             && self.begun == other.begun
             && self.plan == other.plan
+            && self.rehearsed == other.rehearsed
             && near(&self.lying, &other.lying)
             && near(&self.to_drop, &other.to_drop)
     }
@@ -160,6 +163,7 @@ impl Moment {
             lying,
             to_drop: self.to_drop.clone(),
             anatomy,
+            rehearsed: &self.rehearsed,
             kernel,
             source,
         }

@@ -289,7 +289,7 @@ impl Planner {
         let (plan, solid, frame) = (self.plan()?, review.solid.clone()?, review.frame?);
         Moment::of(
             plan,
-            &self.progress,
+            (&self.progress, &self.compensated),
             (solid, frame),
             (review.history.now(), review.seeds_from),
             snapshot,

@@ -115,7 +115,7 @@ fn an_update_is_taken_as_one_step_and_either_decision_is_kept() {
 fn an_update_for_fewer_needles_than_are_in_is_refused() {
     let mut planner = planner();
     planner.begin_needle(0, 0);
-    planner.finish_needle();
+    planner.finish_needle(2);
     planner.begin_needle(1, 2);
     planner.take_update(proposed(1));
     assert!(planner.planning().review.update.is_none());

@@ -4,7 +4,7 @@ use super::*;
 use crate::intraoperative::{Agreement, Contour, Solid, Transverse};
 use crate::plan::anatomy::{Body, ball};
 use crate::plan::optimise::plan as first_plan;
-use crate::plan::{PITCH_M, Template};
+use crate::plan::{Drops, PITCH_M, Template};
 use nalgebra::Vector3;
 use stylet_anatomy::PatientFrame;
 use stylet_dose::decay::Interval;
@@ -119,6 +119,7 @@ fn needles_planned_anew_give_the_true_gland_more_than_the_plan_carried_on() {
         lying,
         to_drop: Vec::new(),
         anatomy: &seen,
+        rehearsed: &[],
         kernel: &kernel,
         source: &source,
     };
@@ -243,6 +244,7 @@ fn doses_now_and_carried_on_are_those_of_the_full_engine_and_a_search_can_be_can
         lying: lying.clone(),
         to_drop,
         anatomy: &anatomy,
+        rehearsed: &[],
         kernel: &kernel,
         source: &source,
     };
@@ -258,4 +260,49 @@ fn doses_now_and_carried_on_are_those_of_the_full_engine_and_a_search_can_be_can
         false => ControlFlow::Continue(()),
     });
     assert!(matches!(cancelled, Err(PlanError::Cancelled)));
+}
+
+#[test]
+fn carried_on_a_needle_that_was_rehearsed_counts_where_its_seeds_would_rest_and_others_as_planned() {
+    let (plan, begun, lying) = half_done(|p| p);
+    let (source, kernel) = iodine();
+    let anatomy = anatomy();
+    let rehearsed_one = plan.needles[begun].clone();
+    let shallow = |count: usize| Compensation {
+        drops: Drops::as_planned(&rehearsed_one),
+        before_m: None,
+        after_m: (0..count).map(|n| [0.0, 1e-3 * n as f64, -8e-3]).collect(),
+        rehearsals: 1,
+        for_edges: 0,
+        sensitive: Vec::new(),
+    };
+    let rehearsed = [(rehearsed_one.clone(), shallow(rehearsed_one.seeds.len()))];
+    let situation = |rehearsed| Situation {
+        plan: &plan,
+        begun,
+        lying: lying.clone(),
+        to_drop: Vec::new(),
+        anatomy: &anatomy,
+        rehearsed,
+        kernel: &kernel,
+        source: &source,
+    };
+    let [as_planned, as_rehearsed] = [&[][..], &rehearsed].map(|rehearsed| situation(rehearsed).with(&plan));
+    let own = lying.len()..lying.len() + rehearsed_one.seeds.len();
+    for (n, (planned, rests)) in as_planned.iter().zip(&as_rehearsed).enumerate() {
+        let off_m = [0, 1, 2].map(|a| rests.position_m[a] - planned.position_m[a]);
+        let expected_m = match own.contains(&n) {
+            true => [0.0, 1e-3 * (n - own.start) as f64, -8e-3],
+            false => [0.0; 3],
+        };
+        assert!(
+            (0..3).all(|a| (off_m[a] - expected_m[a]).abs() < 1e-12),
+            "seed {n}: {off_m:?}"
+        );
+    }
+    let [planned, rehearsed] = [&[][..], &rehearsed].map(|r| situation(r).doses().unwrap().continued.d90);
+    assert!(
+        rehearsed < planned - 0.5,
+        "{planned} as planned, {rehearsed} as rehearsed"
+    );
 }
