@@ -27,7 +27,7 @@ pub struct BodyProbe {
 }
 
 /// A larger body is added up over several ticks, so many elements in each: the picture is late by so many, the force is not.
-const ELEMENTS_A_TICK: usize = 8_192;
+const ELEMENTS_A_TICK: usize = 4_096;
 
 impl BodyProbe {
     /// Out of the body.

@@ -133,10 +133,24 @@ fn add_up_part(
         let blocks = sum.chunks_mut(BLOCK).enumerate();
         for (block, sum) in blocks.skip(part).step_by(of.max(1)) {
             sum.fill(0.0);
+            let (mut waiting, mut count) = ([(0.0, &[][..]); 4], 0);
             for (field, &factor) in fields.iter().zip(factors).filter(|(_, factor)| **factor != 0.0) {
                 let from = (block * BLOCK).min(field.steps[axis].len());
                 let factor = (factor * scale * f64::from(field.step_m)) as f32;
-                add(simd, sum, factor, &field.steps[axis][from..]);
+                waiting[count] = (factor, &field.steps[axis][from..]);
+                count += 1;
+                if count == waiting.len() {
+                    add_four(
+                        simd,
+                        sum,
+                        waiting.map(|(factor, _)| factor),
+                        waiting.map(|(_, steps)| steps),
+                    );
+                    count = 0;
+                }
+            }
+            for (factor, steps) in &waiting[..count] {
+                add(simd, sum, *factor, steps);
             }
         }
     }
@@ -157,6 +171,20 @@ vectorised! {
     fn add(sum: &mut [f32], factor: f32, steps: &[i16]) {
         for (sum, &steps) in sum.iter_mut().zip(steps) {
             *sum += factor * f32::from(steps);
+        }
+    }
+}
+
+vectorised! {
+    /// As one after the other, in every bit; the sum is read and written once in place of four times.
+    fn add_four(sum: &mut [f32], factors: [f32; 4], steps: [&[i16]; 4]) {
+        let [a, b, c, d] = steps;
+        let both = a.iter().zip(b).zip(c.iter().zip(d));
+        for (sum, ((a, b), (c, d))) in sum.iter_mut().zip(both) {
+            let mut added = *sum + factors[0] * f32::from(*a);
+            added += factors[1] * f32::from(*b);
+            added += factors[2] * f32::from(*c);
+            *sum = added + factors[3] * f32::from(*d);
         }
     }
 }
