@@ -67,7 +67,7 @@ relay-class: deps-test build ## Measure the relay over a line of 100 Mbit/s and 
 	$(RELAY) test --release --test system -- --test-threads=1 --nocapture --ignored line
 
 relay-faults: deps-test build ## Stop, kill and cut off server, observer and operator, 100 times each in an insertion (some 20 minutes)
-	STYLET_RELAY_FAULTS=100 $(RELAY) test --release --test system -- --test-threads=1 --nocapture faults
+	export STYLET_RELAY_FAULTS=100; $(RELAY) test --release --test system -- --test-threads=1 --nocapture faults
 
 live: ## Build stylet-live, which 'host-ui record --live' needs to serve Foxglove's app; the other targets neither need nor build it
 	cd host-ui/live && CARGO_TARGET_DIR=$(abspath $(BIN))/../live $(CARGO) build --release

@@ -261,7 +261,7 @@ mod tests {
         shown.planning.progress.finish(1);
         assert_eq!(progress(&shown), Progress::Debrief);
         shown.seeds.clear();
-        assert_eq!(progress(&shown), Progress::Insert);
+        assert_eq!(progress(&shown), Progress::Place);
     }
 
     #[test]
