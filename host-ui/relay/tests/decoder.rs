@@ -17,7 +17,9 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
     let (mut scene, mut header) = (SceneHeader::zeroed(), SnapshotHeader::zeroed());
     (scene.vertex_count, header.vertex_count, header.seed_count) = (20, 20, 1);
     let rest = Rest::of_scene(&scene, &[0; 60]);
-    let snapshot = Thin::of(&rest, &header, &[Vertex::zeroed(); 20]).expect("fits").with_places(0, MAX_THIN_BYTES);
+    let snapshot = Thin::of(&rest, &header, &[Vertex::zeroed(); 20])
+        .expect("fits")
+        .with_places(0, MAX_THIN_BYTES);
     let hand = Request::MoveHand(HandMove {
         tip_m: [0.01, 0.0, 0.0],
         direction: [0.0, 0.0, 1.0],
@@ -36,7 +38,10 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
         ("records", message(Kind::Records, &[bytemuck::cast_slice(&records)])),
         (
             "newest",
-            message(Kind::Newest, &[bytemuck::bytes_of(&state), bytemuck::cast_slice(&records)]),
+            message(
+                Kind::Newest,
+                &[bytemuck::bytes_of(&state), bytemuck::cast_slice(&records)],
+            ),
         ),
         ("snapshot", message(Kind::Snapshot, &[&snapshot])),
         ("who", message(Kind::Who, &[&who.to_bytes()])),

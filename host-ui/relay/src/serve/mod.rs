@@ -25,8 +25,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use stylet_shm_schema::{HapticState, TickRecord};
 use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::{HapticState, TickRecord};
 
 /// Requests that may wait; more are dropped and counted.
 const ASKED: usize = 512;

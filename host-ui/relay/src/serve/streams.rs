@@ -115,7 +115,9 @@ pub fn snapshots(server: &Server) {
 }
 
 fn send_snapshot(server: &Server, rest: &Rest, header: &SnapshotHeader, vertices: &[Vertex]) {
-    let Some(thin) = Thin::of(rest, header, vertices) else { return };
+    let Some(thin) = Thin::of(rest, header, vertices) else {
+        return;
+    };
     let (now, fingerprint) = (Instant::now(), thin.fingerprint());
     let mut messages = Vec::new();
     for (seat, pace) in lock(&server.paces).iter_mut() {

@@ -54,7 +54,9 @@ fn a_small_snapshot_survives_but_for_the_error_of_half_floats() {
     let rest = scene(2000, 500);
     for (most_m, bound_m) in [(15.6e-3, 3.9e-6), (31e-3, 7.7e-6), (1e-3, 0.49e-6)] {
         let (header, vertices) = snapshot(2000, 500, most_m);
-        let body = Thin::of(&rest, &header, &vertices).expect("of this scene").with_places(0, MAX_THIN_BYTES);
+        let body = Thin::of(&rest, &header, &vertices)
+            .expect("of this scene")
+            .with_places(0, MAX_THIN_BYTES);
         assert!(body.len() < MAX_THIN_BYTES);
         let (back, places) = decode_snapshot(&rest, &mut Displacements::default(), &body)
             .expect("valid")
@@ -78,7 +80,9 @@ fn a_large_snapshot_is_shared_among_messages_and_whole_after_them() {
     let stride = (20_192_usize * 6).div_ceil(MAX_THIN_BYTES - 2000);
     for number in 0..stride as u64 {
         header.time_ns += 30_000_000;
-        let body = Thin::of(&rest, &header, &vertices).expect("of this scene").with_places(number, MAX_THIN_BYTES);
+        let body = Thin::of(&rest, &header, &vertices)
+            .expect("of this scene")
+            .with_places(number, MAX_THIN_BYTES);
         assert!(body.len() <= MAX_THIN_BYTES, "{} bytes", body.len());
         last = decode_snapshot(&rest, &mut known, &body)
             .expect("valid")
@@ -119,7 +123,9 @@ fn places_between_those_that_a_message_holds_move_with_them() {
                 Vertex { position_m }
             })
             .collect();
-        let body = Thin::of(&rest, &header, &truth).expect("of this scene").with_places(number, 20_000);
+        let body = Thin::of(&rest, &header, &truth)
+            .expect("of this scene")
+            .with_places(number, 20_000);
         let (_, shown) = decode_snapshot(&rest, &mut known, &body)
             .expect("valid")
             .expect("of this scene");
@@ -175,7 +181,9 @@ fn a_snapshot_without_places_shows_those_that_are_known_and_nothing_where_they_a
 fn a_snapshot_of_another_scene_and_one_of_wrong_lengths_are_not_taken() {
     let rest = scene(100, 0);
     let (header, vertices) = snapshot(100, 0, 1e-3);
-    let body = Thin::of(&rest, &header, &vertices).expect("of this scene").with_places(0, MAX_THIN_BYTES);
+    let body = Thin::of(&rest, &header, &vertices)
+        .expect("of this scene")
+        .with_places(0, MAX_THIN_BYTES);
     let other = scene(101, 0);
     assert!(Thin::of(&other, &header, &vertices).is_none());
     assert_eq!(

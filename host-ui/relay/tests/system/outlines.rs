@@ -125,7 +125,9 @@ fn places_that_move_with_their_neighbours_are_nearer_to_the_tissue_than_those_th
         let (mut known, mut standing) = (Displacements::default(), Standing::new(resting));
         let (mut drawn_mm, mut standing_mm) = (Errors::default(), Errors::default());
         for (number, (_, header, truth)) in here.values().enumerate() {
-            let body = Thin::of(&rest, header, truth).expect("of this scene").with_places(number as u64, MAX_THIN_BYTES);
+            let body = Thin::of(&rest, header, truth)
+                .expect("of this scene")
+                .with_places(number as u64, MAX_THIN_BYTES);
             let decoded = decode_snapshot(&rest, &mut known, &body).expect("valid");
             let (_, drawn) = decoded.expect("of this scene");
             standing.take(truth);
