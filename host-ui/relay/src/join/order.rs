@@ -11,7 +11,7 @@ const ASK_AT_MOST: u64 = 1280;
 /// A request that was not answered for so long is made again.
 const ASK_EVERY: Duration = Duration::from_millis(150);
 /// Records that did not come for so long, while later ones came, are given up.
-const PATIENCE: Duration = Duration::from_secs(3);
+const PATIENCE: Duration = Duration::from_secs(6);
 /// Batches that may wait for an earlier one: more than a minute of them.
 const HELD_AT_MOST: usize = 4096;
 

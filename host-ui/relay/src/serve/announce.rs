@@ -1,7 +1,7 @@
 //! What the core publishes beside its state, records and snapshots: sent to all as it comes, and to one member all that is in force.
 
 use super::Server;
-use super::streams::Job;
+use super::streams::Message;
 use crate::class::ClassPorts;
 use crate::net::{Place, Priority, put};
 use crate::ports::Near;
@@ -166,10 +166,10 @@ impl Announcements {
     }
 
     /// All that is in force, to a member that has just come or was cut off.
-    pub fn greet(&self, seat: u16, hello: &Hello, jobs: &SyncSender<Job>) {
+    pub fn greet(&self, seat: u16, hello: &Hello, messages: &SyncSender<Message>) {
         let send = |kind, parts: &[&[u8]]| {
             // A full queue is one of a member that asks again.
-            let _ = jobs.try_send(Job::Message(seat, self.message(kind, parts)));
+            let _ = messages.try_send(Message(seat, self.message(kind, parts)));
         };
         if let Some(session) = &self.session {
             send(Kind::Session, &[bytemuck::bytes_of(session)]);

@@ -3,7 +3,7 @@
 use super::lease::Holder;
 use super::rights::{Right, right, right_to_upload};
 use super::rounds::{Presence, Rounds};
-use super::streams::Job;
+use super::streams;
 use crate::control::Order;
 use crate::keys::{Member, Role, now_s};
 use crate::wire::{self, Hello, Kind, Message, Ticks, encode};
@@ -40,7 +40,7 @@ pub(super) fn take(rounds: &mut Rounds, seat: u16, bytes: &[u8], now_ns: u64) {
                 && ticks.from <= ticks.to
             {
                 // A full queue is one of members that ask again.
-                let _ = rounds.jobs.try_send(Job::Again(seat, ticks));
+                let _ = rounds.jobs.again.try_send(streams::Missed(seat, ticks));
             }
         }
         Kind::Command | Kind::Upload | Kind::Lease if late => {
@@ -76,7 +76,7 @@ fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
         if known.is_none() {
             println!("connected: {}", rounds.name(seat));
         }
-        rounds.announcements.greet(seat, &hello, &rounds.jobs);
+        rounds.announcements.greet(seat, &hello, &rounds.jobs.messages);
         super::lock(&rounds.server.paces).entry(seat).or_default().forget();
     }
     let presence = Presence {
@@ -92,7 +92,7 @@ fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
 fn answer(rounds: &Rounds, seat: u16, kind: Kind, body: &[u8]) {
     // A full queue is one of a member that asks again.
     let message = encode(kind, rounds.server.stamp(), &[body]);
-    let _ = rounds.jobs.try_send(Job::Message(seat, message));
+    let _ = rounds.jobs.messages.try_send(streams::Message(seat, message));
 }
 
 /// Says so here, and to the host that asked.

@@ -25,6 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+use streams::Jobs;
 use stylet_shm_schema::service::Instance;
 use stylet_shm_schema::{HapticState, TickRecord};
 
@@ -127,12 +128,18 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<End,
             });
         }
     })?;
-    let (to_jobs, jobs) = sync_channel(JOBS);
+    let (to_messages, messages) = sync_channel(JOBS);
+    let (to_again, missed) = sync_channel(JOBS);
+    let jobs = Jobs {
+        messages: to_messages,
+        again: to_again,
+    };
     let keeper = beat.keeper();
     let threads = [
         spawn("records", &server, streams::records),
         spawn("snapshots", &server, streams::snapshots),
-        spawn("again", &server, move |server| streams::jobs(server, &jobs)),
+        spawn("messages", &server, move |server| streams::messages(server, &messages)),
+        spawn("again", &server, move |server| streams::again(server, &missed)),
         spawn("before", &server, move |server| tape::complete(server, keeper)),
     ];
     println!(
@@ -140,7 +147,7 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<End,
         options.instance.name(),
         options.listen.join(", ")
     );
-    let rounds = Rounds::new(Arc::clone(&server), options.lab.clone(), members, to_jobs);
+    let rounds = Rounds::new(Arc::clone(&server), options.lab.clone(), members, jobs);
     let end = rounds.and_then(|rounds| serve(rounds, &asked, stop, beat));
     // SYNC: see the field.
     server.end.store(true, Ordering::Relaxed);

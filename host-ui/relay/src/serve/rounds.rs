@@ -3,7 +3,7 @@
 use super::announce::Announcements;
 use super::lease::{Held, Holder, Lease};
 use super::rights::operates;
-use super::streams::Job;
+use super::streams::Jobs;
 use super::{Server, asked};
 use crate::control::{Order, Orders};
 use crate::keys::{Lab, Member, Members, Role};
@@ -11,7 +11,6 @@ use crate::wire::{Present, Who};
 use crate::{RelayError, now_ns};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::service::SlicePublisher;
 use stylet_shm_schema::{Request, UploadHeader};
@@ -43,7 +42,7 @@ pub(super) struct Rounds {
     pub(super) lease: Lease,
     pub(super) present: BTreeMap<u16, Presence>,
     pub(super) members: Members,
-    pub(super) jobs: SyncSender<Job>,
+    pub(super) jobs: Jobs,
     pub(super) upload: Option<SlicePublisher<u8, UploadHeader>>,
     closed_at_start: Vec<u16>,
     refusals: BTreeMap<u16, Instant>,
@@ -58,12 +57,7 @@ pub(super) struct Rounds {
 }
 
 impl Rounds {
-    pub(super) fn new(
-        server: Arc<Server>,
-        lab: Lab,
-        members: Members,
-        jobs: SyncSender<Job>,
-    ) -> Result<Self, RelayError> {
+    pub(super) fn new(server: Arc<Server>, lab: Lab, members: Members, jobs: Jobs) -> Result<Self, RelayError> {
         let now = Instant::now();
         Ok(Self {
             announcements: Announcements::new(Arc::clone(&server)),

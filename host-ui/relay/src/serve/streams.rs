@@ -5,7 +5,7 @@ use super::watched::Watched;
 use super::{Server, lock};
 use crate::net::{Place, Priority, put, put_newest, put_whole};
 use crate::wire::{Kind, Rest, Stamp, Thin, Ticks, encode};
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::service::{self, Instance, Node, ServiceError, SliceSubscriber, StateReader};
 use stylet_shm_schema::{HapticState, SceneHeader, SnapshotHeader, TickRecord, Vertex};
@@ -140,34 +140,49 @@ fn send_snapshot(server: &Server, rest: &Rest, header: &SnapshotHeader, vertices
     }
 }
 
-/// What is sent to one member, on a thread that may wait for it.
-pub enum Job {
-    /// A message as it is.
-    Message(u16, Vec<u8>),
-    /// Records that the member missed.
-    Again(u16, Ticks),
+/// A message to one seat.
+pub struct Message(pub u16, pub Vec<u8>);
+
+/// Records that a seat has missed.
+pub struct Missed(pub u16, pub Ticks);
+
+/// The queues of what is sent to one member, each with a thread that may wait for it: a scene that takes seconds on a slow line does not hold up records.
+#[derive(Clone)]
+pub struct Jobs {
+    pub messages: SyncSender<Message>,
+    pub again: SyncSender<Missed>,
 }
 
-/// Sends what members ask for; a member that does not take it keeps nobody else waiting but those that ask too.
-pub fn jobs(server: &Server, jobs: &Receiver<Job>) {
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// A message that is larger, as a scene is, goes behind records that are sent again.
+const SMALL_BYTES: usize = 16_384;
+
+/// Sends messages; a member that does not take its own keeps the others waiting that have just come, for [`crate::net::PATIENCE_US`] at most.
+pub fn messages(server: &Server, jobs: &Receiver<Message>) {
     while !server.ends() {
-        match jobs.recv_timeout(Duration::from_millis(50)) {
-            Ok(Job::Message(seat, bytes)) => {
-                put_whole(&server.session, Place::To(seat), Priority::InteractiveLow, bytes)
-            }
-            Ok(Job::Again(seat, ticks)) => again(server, seat, ticks),
-            Err(_) => {}
+        if let Ok(Message(seat, bytes)) = jobs.recv_timeout(LOOK_EVERY) {
+            let priority = match bytes.len() <= SMALL_BYTES {
+                true => Priority::InteractiveLow,
+                false => Priority::Data,
+            };
+            put_whole(&server.session, Place::To(seat), priority, bytes);
         }
     }
 }
 
-fn again(server: &Server, seat: u16, ticks: Ticks) {
-    let again = lock(&server.kept).again(ticks);
-    if let Some(lost) = again.lost {
-        let bytes = encode(Kind::Missing, server.stamp(), &[bytemuck::bytes_of(&lost)]);
-        put_whole(&server.session, Place::To(seat), Priority::Data, bytes);
-    }
-    for bytes in again.batches {
-        put_whole(&server.session, Place::To(seat), Priority::Data, bytes.to_vec());
+/// Sends what members ask for; a member that does not take it keeps nobody else waiting but those that ask too.
+pub fn again(server: &Server, jobs: &Receiver<Missed>) {
+    while !server.ends() {
+        let Ok(Missed(seat, ticks)) = jobs.recv_timeout(LOOK_EVERY) else {
+            continue;
+        };
+        let again = lock(&server.kept).again(ticks);
+        if let Some(lost) = again.lost {
+            let bytes = encode(Kind::Missing, server.stamp(), &[bytemuck::bytes_of(&lost)]);
+            put_whole(&server.session, Place::To(seat), Priority::DataHigh, bytes);
+        }
+        for bytes in again.batches {
+            put_whole(&server.session, Place::To(seat), Priority::DataHigh, bytes.to_vec());
+        }
     }
 }
