@@ -16,11 +16,9 @@ const FACING: f64 = 0.2;
 /// A pose farther from the one before is reached in steps, since the wall's way out of the probe is that to the nearest side.
 const STEP_M: f64 = 2e-3;
 const MOST_STEPS: usize = 8;
-/// Passes over the directions of the forces in a tick, at most: what they leave after a jump the next tick goes on with. In a step on the way there
-/// are fewer; the end of it has some whatever the way took.
-const PASSES: usize = 14;
-const PASSES_ON_THE_WAY: usize = 1;
-const LAST_PASSES: usize = 6;
+/// Passes over the directions of the forces at the end of a tick, at most, and in a step on the way there.
+const PASSES: usize = 40;
+const PASSES_ON_THE_WAY: usize = 2;
 /// A pass that leaves no pad farther than that from the probe's surface, on the wrong side, and no force turned farther from it, is the last.
 const CLOSED_M: f64 = 4e-7;
 const TURNED: f64 = 2e-4;
@@ -166,11 +164,7 @@ pub fn step(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside
         let steps = steps_between(&from, &pose);
         for n in 1..=steps {
             let here = from.towards(&pose, n as f64 / steps as f64);
-            let passes = match n < steps {
-                true => PASSES_ON_THE_WAY,
-                false => PASSES.saturating_sub(state.report.passes as usize).max(LAST_PASSES),
-            };
-            press(probe, state, &here, passes);
+            press(probe, state, &here, if n < steps { PASSES_ON_THE_WAY } else { PASSES });
         }
         state.load_pads(probe);
         state.pose = Some(pose);

@@ -61,8 +61,7 @@ fn nothing_sinks_in_or_pulls_whatever_the_hand_does() {
     let fixture = small();
     let mut state = ProbeState::new(&fixture.probe);
     let middle = fixture.pose(0.0, 20e-3).tip_m;
-    let (mut worst_m, mut passes) = ([0.0_f64; 2], Vec::new());
-    let (mut unfinished, mut longest) = (0, 0);
+    let (mut worst_m, mut passes) = (0.0_f64, Vec::new());
     // A hand that presses obliquely, slides, jumps by 5 mm in a tick, lifts and comes back: drawn by a fixed rule.
     let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = || {
@@ -89,13 +88,10 @@ fn nothing_sinks_in_or_pulls_whatever_the_hand_does() {
         displace(&fixture.probe, &mut state);
         assert_eq!(heap::calls_of_this_thread(), calls, "tick {tick} touched the heap");
         let report = state.report();
+        worst_m = worst_m.max(report.open_m);
         passes.push(report.passes);
         assert!(response.wrench.0.iter().all(|c| c.is_finite()));
-        // A tick has a bound; after a jump the next ones go on.
-        let is_open = report.open_m >= OPEN_M;
-        unfinished = if is_open { unfinished + 1 } else { 0 };
-        longest = longest.max(unfinished);
-        worst_m[usize::from(is_open)] = worst_m[usize::from(is_open)].max(report.open_m);
+        assert!(report.open_m < OPEN_M, "tick {tick}: {report:?}");
         // Nothing pulls: each force pushes its point out of the hollow, or along it.
         for (point, (force_n, to)) in fixture.probe.wall.points.iter().zip(state.pressed()) {
             let push: f64 = (0..3).map(|c| to[c] * point.outward[c]).sum();
@@ -109,12 +105,10 @@ fn nothing_sinks_in_or_pulls_whatever_the_hand_does() {
             assert!(response.stiffness[row][row] <= 0.0);
         }
     }
-    assert!(longest <= 2 && worst_m[1] < 1e-3, "{longest} ticks, {worst_m:?}");
     passes.sort_unstable();
     println!(
-        "deepest at a point after a tick: {:.4} um, {:.1} um where passes ran out, in at most {longest} ticks one after the other; passes p50 {}, p99 {}, most {}",
-        1e6 * worst_m[0],
-        1e6 * worst_m[1],
+        "deepest at a point after a tick: {:.4} um; passes p50 {}, p99 {}, most {}",
+        1e6 * worst_m,
         passes[750],
         passes[1485],
         passes[1499]
