@@ -22,7 +22,7 @@ use zenoh::{Config, Wait};
 pub const PORT: u16 = 7461;
 /// A link that is silent for so long is closed, ms.
 const LEASE_MS: u32 = 600;
-/// What is sent whole waits so long for room. A peer that is silent is gone after [`LEASE_MS`]; one that is heard is slow, and waited for.
+/// What is sent whole waits so long for room. A peer that is silent is lost after [`LEASE_MS`]; one that is heard is slow, and waited for.
 pub const PATIENCE_US: u64 = 3_000_000;
 /// A connection that is not made after so long is begun again: QUIC sends a first packet that was lost again after a second. Four round trips.
 const OPEN_MS: u32 = 700;

@@ -127,7 +127,7 @@ fn a_probe_that_is_pressed_is_felt_and_moves_the_gland_and_withdrawn_leaves_noth
         let outside = Vector3::from(rig.link.second_state().expect("seen").tip_in_scene_m);
         let gland_m = (scene.target_lower_m[2] + scene.target_upper_m[2]) / 2.0;
         let within = Vector3::new(outside.x, outside.y, gland_m + 35e-3);
-        let go = |rig: &mut Rig, to: Vector3<f64>| {
+        let bring = |rig: &mut Rig, to: Vector3<f64>| {
             let hand = HandMove {
                 tip_m: to.into(),
                 direction: [0.0, 0.0, 1.0],
@@ -144,11 +144,11 @@ fn a_probe_that_is_pressed_is_felt_and_moves_the_gland_and_withdrawn_leaves_noth
         let force_n = |link: &Link| Vector3::from(link.second_state().expect("seen").force_on_hand_n);
         let moved_m = |link: &Link| link.snapshot().map_or(0.0, |s| s.header.max_displacement_m);
         assert_eq!((force_n(&rig.link).norm(), moved_m(&rig.link)), (0.0, 0.0));
-        go(&mut rig, within);
+        bring(&mut rig, within);
         // The rectum is lower than the probe is thick: both walls are moved, and push against each other.
         assert!(rig.waits_for(|link| moved_m(link) > 1e-3), "{}", moved_m(&rig.link));
         let lies_n = force_n(&rig.link);
-        go(&mut rig, within + Vector3::new(0.0, 6e-3, 0.0));
+        bring(&mut rig, within + Vector3::new(0.0, 6e-3, 0.0));
         let is_pressed = |link: &Link| force_n(link).y < lies_n.y - 1.0 && force_n(link).y < -0.5;
         let (force, moved) = (force_n(&rig.link), moved_m(&rig.link));
         assert!(
@@ -157,8 +157,8 @@ fn a_probe_that_is_pressed_is_felt_and_moves_the_gland_and_withdrawn_leaves_noth
         );
         assert!((2e-3..20e-3).contains(&moved_m(&rig.link)), "{}", moved_m(&rig.link));
         assert_eq!(faults(&rig.link), [Fault::None; 2]);
-        go(&mut rig, within);
-        go(&mut rig, outside);
+        bring(&mut rig, within);
+        bring(&mut rig, outside);
         assert!(
             rig.waits_for(|link| force_n(link).norm() < 1e-9 && moved_m(link) < 1e-6),
             "{} N, {} m remain",
