@@ -38,7 +38,7 @@ pub struct Places {
     pub stride: usize,
 }
 
-/// The parts that a member has had of the places of one fingerprint.
+/// The parts that a member has had of the places that were sent last. Those before them it may have lost to these, whether it says so or not.
 #[derive(Default)]
 struct Had {
     fingerprint: u64,
@@ -46,14 +46,20 @@ struct Had {
 }
 
 impl Had {
-    fn note(&mut self, number: u64, places: Places) {
-        if places.stride == 0 {
-            return;
-        }
-        if (self.fingerprint, self.parts.len()) != (places.fingerprint, places.stride) {
+    fn is_of(&self, places: Places) -> bool {
+        (self.fingerprint, self.parts.len()) == (places.fingerprint, places.stride)
+    }
+
+    fn sent(&mut self, places: Places) {
+        if places.stride > 0 && !self.is_of(places) {
             (self.fingerprint, self.parts) = (places.fingerprint, vec![false; places.stride]);
         }
-        self.parts[(number % places.stride as u64) as usize] = true;
+    }
+
+    fn note(&mut self, number: u64, places: Places) {
+        if places.stride > 0 && self.is_of(places) {
+            self.parts[(number % places.stride as u64) as usize] = true;
+        }
     }
 
     fn has_all(&self, fingerprint: u64) -> bool {
@@ -98,6 +104,7 @@ impl Pace {
 
     /// It is on its way, with these places.
     pub fn sent(&mut self, now: Instant, places: Places) {
+        self.had.sent(places);
         self.away.push_back(Away {
             number: self.number,
             at: now,
@@ -183,6 +190,17 @@ mod tests {
         pace.seen(number, false, Instant::now());
         assert!(!pace.has_all(8), "it does not know them");
         pass(&mut pace, 8, 1, true);
+        // Others were sent and nothing is heard of them: the member may have them in place of these.
+        pass(&mut pace, 9, 1, false);
+        assert!(!pace.has_all(8) && !pace.has_all(9));
+        pass(&mut pace, 8, 1, true);
+        let (late, now) = (pace.next(), Instant::now());
+        pass(&mut pace, 8, 1, false);
+        pass(&mut pace, 9, 1, false);
+        pace.seen(late, true, now);
+        assert!(!pace.has_all(8), "it was had before the others were sent");
+        pass(&mut pace, 8, 1, true);
+        assert!(pace.has_all(8));
         pace.forget();
         assert!(!pace.has_all(8));
     }
