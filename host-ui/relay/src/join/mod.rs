@@ -1,6 +1,7 @@
 //! On another machine: the services of the core as if it ran here, and the requests of hosts here to the server.
 
 mod clock;
+mod connection;
 mod last;
 mod line;
 mod order;
@@ -8,13 +9,14 @@ mod rounds;
 mod streams;
 
 use crate::keys::{Invitation, now_s};
-use crate::net::{self, Place, Priority, Session};
+use crate::net::{self, Place, Priority};
 use crate::wire::{self, Kind, Stamp, encode};
 use crate::{RelayError, now_ns};
 use clock::Clock;
+use connection::{Connection, InUse};
 use rounds::Rounds;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use stylet_shm_schema::service::Instance;
@@ -22,9 +24,8 @@ use stylet_shm_schema::service::Instance;
 /// Messages that may wait for a thread; more are dropped, and records among them asked for again.
 const WAITING: usize = 4096;
 const SNAPSHOTS_WAITING: usize = 32;
-const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// A server that was not heard for so long is taken for lost, until it is heard again.
-const SILENCE_NS: u64 = 300_000_000;
+const SILENCE: Duration = Duration::from_millis(300);
 
 /// How to join.
 pub struct Options {
@@ -38,7 +39,7 @@ pub struct Options {
 
 /// What the threads of a member share.
 struct Member {
-    session: Session,
+    session: InUse,
     instance: Instance,
     seat: u16,
     // SYNC: what follows are figures on their own; no other data is published by them.
@@ -86,9 +87,14 @@ impl Member {
         self.clock.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn has_server(&self) -> bool {
+    /// Within that time.
+    fn has_heard(&self, within: Duration) -> bool {
         let at = self.heard_at_ns.load(Ordering::Relaxed);
-        at != 0 && now_ns().saturating_sub(at) < SILENCE_NS
+        at != 0 && u128::from(now_ns().saturating_sub(at)) < within.as_nanos()
+    }
+
+    fn has_server(&self) -> bool {
+        self.has_heard(SILENCE)
     }
 
     fn stamp(&self, number: u64) -> Stamp {
@@ -103,13 +109,23 @@ impl Member {
     /// A message that may be lost: another comes soon.
     fn say(&self, kind: Kind, number: u64, body: &[u8]) {
         let bytes = encode(kind, self.stamp(number), &[body]);
-        net::put(&self.session, Place::Ask(self.seat), Priority::InteractiveHigh, bytes);
+        net::put(
+            &self.session.get(),
+            Place::Ask(self.seat),
+            Priority::InteractiveHigh,
+            bytes,
+        );
     }
 
     /// A message that is not to be lost while there is a connection.
     fn ask(&self, kind: Kind, parts: &[&[u8]]) {
         let bytes = encode(kind, self.stamp(0), parts);
-        net::put_whole(&self.session, Place::Ask(self.seat), Priority::InteractiveHigh, bytes);
+        net::put_whole(
+            &self.session.get(),
+            Place::Ask(self.seat),
+            Priority::InteractiveHigh,
+            bytes,
+        );
     }
 }
 
@@ -152,33 +168,18 @@ fn check_time(invitation: &Invitation) -> Result<(), RelayError> {
     }
 }
 
-/// The session; nothing where `stop` came before a server answered, for which zenoh waits without end.
-fn connect(options: &Options, stop: &AtomicBool) -> Result<Option<Session>, RelayError> {
-    let (server, identity) = (options.server.clone(), options.invitation.identity());
-    let (to_here, opened) = sync_channel(1);
-    std::thread::spawn(move || to_here.send(net::join(&server, &identity)));
-    // SYNC: set by a signal; nothing but the flag is carried.
-    while !stop.load(Ordering::Relaxed) {
-        match opened.recv_timeout(LOOK_EVERY) {
-            Ok(session) => return session.map(Some),
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => return Err(RelayError("the connection ended by itself".to_owned())),
-        }
-    }
-    Ok(None)
-}
-
 /// Joins until `stop`.
 pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
     check_time(&options.invitation)?;
     // Before there are threads, of zenoh as well.
     crate::slice::shorten();
-    let Some(session) = connect(options, stop)? else {
+    let mut connection = Connection::new(options);
+    let Some(session) = connection.first(stop)? else {
         return Ok(());
     };
     let seat = options.invitation.seat;
     let member = Arc::new(Member {
-        session: session.clone(),
+        session: InUse::new(session),
         instance: options.instance.clone(),
         seat,
         end: AtomicBool::new(false),
@@ -208,10 +209,7 @@ pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
         snapshots: to_snapshots,
         rest: to_rest,
     });
-    for place in [Place::Records, Place::Rest, Place::To(seat)] {
-        let (queues, member) = (Arc::clone(&queues), Arc::clone(&member));
-        net::hear(&session, &place.key(), move |_, bytes| queues.take(&member, bytes))?;
-    }
+    connection::listen(&member.session.get(), &member, &queues)?;
     println!(
         "joining {} as {} ({}); hosts here use instance \"{}\"",
         options.server,
@@ -221,6 +219,7 @@ pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
     );
     while !stop.load(Ordering::Relaxed) && !threads.iter().any(std::thread::JoinHandle::is_finished) {
         rounds.pass();
+        connection.pass(&member, &queues)?;
         // One wait for a message in place of a pause, so that a message does not wait.
         if let Ok(bytes) = rest.recv_timeout(rounds.pause()) {
             rounds.take(&bytes);
@@ -234,7 +233,7 @@ pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
         ended = thread.join().unwrap_or(Ok(())).and(ended);
     }
     drop(rounds);
-    net::close(session);
+    net::close(member.session.get());
     ended
 }
 

@@ -2,7 +2,7 @@
 
 use super::line::Line;
 use super::streams::Scenes;
-use super::{Member, Options, SILENCE_NS};
+use super::{Member, Options, SILENCE};
 use crate::control::{Order, Orders};
 use crate::ports::Far;
 use crate::wire::{self, Hello, Kind, Rest, Who};
@@ -253,7 +253,7 @@ impl Rounds {
             }),
             Kind::Echo => wire::one::<u64>(message.body).map(|sent_ns| {
                 let now_ns = now_ns();
-                self.round_trip_ns = now_ns.saturating_sub(sent_ns).min(SILENCE_NS * 100);
+                self.round_trip_ns = now_ns.saturating_sub(sent_ns).min(100 * SILENCE.as_nanos() as u64);
                 self.member.clock().answered(self.round_trip_ns, now_ns);
             }),
             _ => Err(Invalid("kind of message")),

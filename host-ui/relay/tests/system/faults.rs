@@ -197,7 +197,8 @@ impl Class {
             host.poll();
             !host.taken.is_empty()
         });
-        assert!(back, "{who:?} {fault:?}: {}", self.served.log());
+        let far = self.joined.iter().flatten().map(Running::log).collect::<String>();
+        assert!(back, "{who:?} {fault:?}: {}\nmembers: {far}", self.served.log());
         let back_ms = ended.elapsed().as_secs_f64() * 1e3;
         // What is asked for again comes meanwhile, or is counted.
         std::thread::sleep(Duration::from_millis(500));

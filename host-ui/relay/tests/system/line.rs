@@ -121,6 +121,11 @@ fn a_class_of_twenty_gets_its_records_and_the_core_does_not_notice() {
         let all_see = until(Duration::from_secs(30), || {
             hosts.iter_mut().map(Host::sees_it_now).filter(|sees| *sees).count() == far.len()
         });
+        for ((host, joined), named) in hosts.iter_mut().zip(&joined).zip(&far) {
+            if !host.sees_it_now() {
+                println!("sees nothing: {}\n{}", lease(named, &["status"]), joined.log());
+            }
+        }
         assert!(all_see, "{}", served.log());
         for host in &mut hosts {
             host.poll();

@@ -1,0 +1,119 @@
+//! The session with the server. zenoh connects again by itself; where that brings nothing a session of its own takes its place.
+
+use super::{Member, Options, Queues};
+use crate::RelayError;
+use crate::keys::Identity;
+use crate::net::{self, Place, Session};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// A server that a session has not heard for so long is called by a new one. zenoh tries five times a second, but a transport that is closed
+/// while it is being opened is not opened again (zenoh 1.10, `closed_session` without endpoints).
+const DEAF: Duration = Duration::from_secs(2);
+
+type Opening = Receiver<Result<Session, RelayError>>;
+
+/// Of a member.
+pub(super) struct Connection {
+    server: String,
+    identity: Identity,
+    since: Instant,
+    opening: Option<Opening>,
+}
+
+impl Connection {
+    pub fn new(options: &Options) -> Self {
+        Self {
+            server: options.server.clone(),
+            identity: options.invitation.identity(),
+            since: Instant::now(),
+            opening: None,
+        }
+    }
+
+    /// On a thread of its own: zenoh waits without end for a server that does not answer.
+    fn open(&self) -> Opening {
+        let (server, identity) = (self.server.clone(), self.identity.clone());
+        let (to_here, opened) = sync_channel(1);
+        std::thread::spawn(move || to_here.send(net::join(&server, &identity)));
+        opened
+    }
+
+    /// The first session; nothing where `stop` came before a server answered.
+    pub fn first(&mut self, stop: &AtomicBool) -> Result<Option<Session>, RelayError> {
+        let opening = self.open();
+        // SYNC: set by a signal; nothing but the flag is carried.
+        while !stop.load(Ordering::Relaxed) {
+            match opening.recv_timeout(LOOK_EVERY) {
+                Ok(session) => {
+                    self.since = Instant::now();
+                    return session.map(Some);
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(RelayError("the connection ended by itself".to_owned()));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Calls the server anew where it is not heard; the new session takes the place of the old one unless that was heard meanwhile.
+    pub fn pass(&mut self, member: &Arc<Member>, queues: &Arc<Queues>) -> Result<(), RelayError> {
+        match self.opening.as_ref().map(Receiver::try_recv) {
+            None if self.since.elapsed() >= DEAF && !member.has_heard(DEAF) => self.opening = Some(self.open()),
+            None | Some(Err(TryRecvError::Empty)) => {}
+            Some(Err(TryRecvError::Disconnected)) => self.again(),
+            Some(Ok(opened)) => {
+                self.again();
+                let session = opened?;
+                if member.has_server() {
+                    return close_aside(session);
+                }
+                listen(&session, member, queues)?;
+                println!("connected anew: the session before brought nothing");
+                return close_aside(member.session.replace(session));
+            }
+        }
+        Ok(())
+    }
+
+    fn again(&mut self) {
+        (self.opening, self.since) = (None, Instant::now());
+    }
+}
+
+/// Which may take two seconds.
+fn close_aside(session: Session) -> Result<(), RelayError> {
+    std::thread::spawn(move || net::close(session));
+    Ok(())
+}
+
+/// What the server sends to this member goes to its queues.
+pub(super) fn listen(session: &Session, member: &Arc<Member>, queues: &Arc<Queues>) -> Result<(), RelayError> {
+    for place in [Place::Records, Place::Rest, Place::To(member.seat)] {
+        let (queues, member) = (Arc::clone(queues), Arc::clone(member));
+        net::hear(session, &place.key(), move |_, bytes| queues.take(&member, bytes))?;
+    }
+    Ok(())
+}
+
+/// The session in use, which may be another from one message to the next.
+pub(super) struct InUse(Mutex<Session>);
+
+impl InUse {
+    pub fn new(session: Session) -> Self {
+        Self(Mutex::new(session))
+    }
+
+    pub fn get(&self) -> Session {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn replace(&self, session: Session) -> Session {
+        std::mem::replace(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner), session)
+    }
+}
