@@ -59,6 +59,7 @@ pub struct TissueLoop {
     /// The ultrasound probe in this scene, and where it is.
     pressed: Option<Box<BodyProbe>>,
     probe_pose: Option<ProbePose>,
+    answered: second::Answered,
     /// Room to record it, until the tape is there.
     probe_room: Option<Box<ProbeTape>>,
     /// What it does to the line was shown to the force loop.
@@ -107,6 +108,7 @@ impl TissueLoop {
             last_carry: LastCarry::new(),
             pressed: None,
             probe_pose: None,
+            answered: second::Answered::default(),
             probe_room: None,
             is_outside_shown: false,
             layers: LayersMet::default(),

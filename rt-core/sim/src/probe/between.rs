@@ -14,8 +14,8 @@ const MOST_RIDGE: f64 = 1.0;
 pub(super) struct Between {
     /// Loads of the pads' rows by a newton on each row of the points: one row of the points after another.
     pub shares: Vec<f32>,
-    /// How points move with a newton on each, m/N: row after row of blocks of 3 x 3.
-    pub blocks: Vec<[[f32; 3]; 3]>,
+    /// How all points move along x, y, z with a newton on each point along x, y, z, m/N: one row of so many after another.
+    pub rows: Vec<f32>,
 }
 
 impl Between {
@@ -28,14 +28,11 @@ impl Between {
         let half = half.unwrap_or_else(|| DMatrix::zeros(rows, 3 * points));
         let all = half.tr_mul(&half);
         let shares = factor.solve(&answers.transpose());
-        let block = |n: usize| {
-            let (a, b) = (n / points, n % points);
-            std::array::from_fn(|r| std::array::from_fn(|c| all[(3 * a + r, 3 * b + c)] as f32))
-        };
         Between {
             // Column after column of `C^-1 S'`.
             shares: shares.iter().map(|share| *share as f32).collect(),
-            blocks: (0..points * points).map(block).collect(),
+            // Symmetric: columns are rows.
+            rows: all.iter().map(|moved| *moved as f32).collect(),
         }
     }
 }
@@ -77,13 +74,13 @@ mod tests {
             }
         }));
         let between = Between::of(&answers, &compliance, rows);
-        let block = |a: usize, b: usize| f64::from(between.blocks[3 * a + b][1][1]);
+        let along_y = |a: usize, b: usize| f64::from(between.rows[(3 * a + 1) * 9 + 3 * b + 1]);
         for (found, wanted) in [
-            (block(0, 0), 1e-3),
-            (block(1, 1), 2e-3),
-            (block(0, 1), 0.0),
-            (block(0, 2), 0.5e-3),
-            (block(2, 2), 0.75e-3),
+            (along_y(0, 0), 1e-3),
+            (along_y(1, 1), 2e-3),
+            (along_y(0, 1), 0.0),
+            (along_y(0, 2), 0.5e-3),
+            (along_y(2, 2), 0.75e-3),
         ] {
             assert!((found - wanted).abs() < 3e-4 * 1e-3, "{found} {wanted}");
         }

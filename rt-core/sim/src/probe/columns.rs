@@ -25,8 +25,8 @@ pub struct ReadyProbe {
     pub(super) compliance: Vec<f64>,
     /// Loads of the pads by a newton on each point along x, y, z: row after row.
     shares: Vec<f32>,
-    /// How points move with a newton on each, m/N: row after row of blocks of 3 x 3.
-    between: Vec<[[f32; 3]; 3]>,
+    /// How all points move along x, y, z with a newton on each along each of these, m/N: row after row.
+    between: Vec<f32>,
     /// The element of that body behind the middle of each pad.
     pub elements: Vec<u32>,
     /// Residual over load of the worst column.
@@ -44,11 +44,15 @@ impl ReadyProbe {
         self.compliance.get(a * self.rows() + b).copied().unwrap_or(0.0)
     }
 
-    /// How all points move along x, y, z with a newton along x, y, z on point `n`, m/N.
+    /// How all points move along x, y, z, point after point, with a newton on point `n` along x; along y; along z, m/N.
     #[inline]
-    pub(super) fn between(&self, n: usize) -> &[[[f32; 3]; 3]] {
-        let points = self.wall.points.len();
-        self.between.get(n * points..(n + 1) * points).unwrap_or(&[])
+    pub(super) fn between(&self, n: usize) -> [&[f32]; 3] {
+        let all = 3 * self.wall.points.len();
+        [0, 1, 2].map(|r| {
+            self.between
+                .get((3 * n + r) * all..(3 * n + r + 1) * all)
+                .unwrap_or(&[])
+        })
     }
 
     /// Loads of the pads' rows by a newton on point `n` along each direction; and how it moves where they do.
@@ -144,7 +148,7 @@ impl ProbeQueue {
             }
         }
         let joined = Between::of(&self.answers, &self.ready.compliance, rows);
-        (self.ready.shares, self.ready.between) = (joined.shares, joined.blocks);
+        (self.ready.shares, self.ready.between) = (joined.shares, joined.rows);
         Ok(self.ready)
     }
 

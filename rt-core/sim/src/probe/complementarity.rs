@@ -1,9 +1,15 @@
 //! Forces that only push: `gap = q + A p`, `gap >= 0`, `p >= 0`, `gap p = 0`.
 //!
-//! By active sets: which points are in contact says the forces, the forces and gaps say which points are in contact.
+//! By active sets: which points are in contact says the forces, the forces and gaps say which points are in contact. Sets that do not settle are
+//! left for a way downhill, on which forces push at each step: what a wrong set says may be a thousand times too much.
 
-/// Rounds of active sets, at most: what they leave is found in the next pass over the directions, which begins from the set that they leave.
+/// Rounds of active sets, at most.
 const ROUNDS: usize = 6;
+/// Turns of the way downhill, at most, and sweeps in each.
+const TURNS: usize = 6;
+const SWEEPS: usize = 8;
+/// A gap that is deeper is not closed, m.
+const CLOSED_M: f64 = 1e-10;
 /// Of the mean of the diagonal, added to it: pads share nodes of a coarse body.
 const RIDGE: f64 = 1e-5;
 
@@ -19,9 +25,12 @@ pub struct Problem {
     pub free_m: Vec<f64>,
     /// `p`, N: the first guess, then the answer.
     pub forces_n: Vec<f64>,
-    /// Numbers of those in contact.
+    /// The first guess, on the way downhill the forces before a step.
+    before_n: Vec<f64>,
+    /// Numbers of those in contact, of which the factor is.
     pub set: Vec<u32>,
     factor: Vec<f64>,
+    is_factored: bool,
     /// Room for one number a pad.
     pub work: Vec<f64>,
     is_in: Vec<bool>,
@@ -38,7 +47,9 @@ impl Problem {
             matrix: vec![0.0; most * most],
             free_m: vec![0.0; most],
             forces_n: vec![0.0; most],
+            before_n: vec![0.0; most],
             set: Vec::with_capacity(most),
+            is_factored: false,
             factor: vec![0.0; most * most],
             work: vec![0.0; most],
             is_in: vec![false; most],
@@ -46,28 +57,53 @@ impl Problem {
         }
     }
 
-    /// Finds the forces. Where sets go round in a circle, one point at a time is to change.
-    pub fn solve(&mut self, one_at_a_time: bool) {
+    /// The matrix is another than before.
+    pub fn is_new(&mut self) {
+        self.is_factored = false;
+    }
+
+    /// Finds the forces from a guess.
+    pub fn solve(&mut self) {
         let n = self.count.min(self.most);
-        for i in 0..n {
-            self.is_in[i] = self.forces_n[i] > 0.0;
-        }
+        self.before_n[..n].copy_from_slice(&self.forces_n[..n]);
         self.rounds = 0;
+        self.take_set();
         while self.rounds < ROUNDS {
             self.rounds += 1;
-            if !self.solve_set() || !self.change_set(one_at_a_time) {
+            if !self.solve_set() {
+                break;
+            }
+            if !self.change_set() {
                 return;
             }
         }
-        self.solve_set();
+        self.forces_n[..n].copy_from_slice(&self.before_n[..n]);
+        self.go_downhill();
+    }
+
+    /// Those that push are in contact.
+    fn take_set(&mut self) {
+        let n = self.count.min(self.most);
+        for (is_in, force_n) in self.is_in.iter_mut().zip(&self.forces_n[..n]) {
+            *is_in = *force_n > 0.0;
+        }
     }
 
     /// Forces with which the gaps of the set are closed and the others are 0; false where the matrix has no factor.
-    pub fn solve_set(&mut self) -> bool {
+    fn solve_set(&mut self) -> bool {
         let n = self.count.min(self.most);
-        self.set.clear();
-        self.set.extend((0..n as u32).filter(|&i| self.is_in[i as usize]));
-        if !self.decompose() {
+        let is_in = &self.is_in[..n];
+        let is_same = self
+            .set
+            .iter()
+            .all(|&i| is_in.get(i as usize).is_some_and(|is_in| *is_in))
+            && is_in.iter().filter(|is_in| **is_in).count() == self.set.len();
+        if !is_same || !self.is_factored {
+            self.set.clear();
+            self.set.extend((0..n as u32).filter(|&i| is_in[i as usize]));
+            self.is_factored = self.decompose();
+        }
+        if !self.is_factored {
             return false;
         }
         let m = self.set.len();
@@ -83,29 +119,67 @@ impl Problem {
         true
     }
 
-    /// Takes those that pull out of the set, and those that overlap into it; or only the one that is farthest from where it should be.
-    fn change_set(&mut self, is_one: bool) -> bool {
+    /// Takes those that pull out of the set, and those that overlap into it; whether there were any.
+    fn change_set(&mut self) -> bool {
         let n = self.count.min(self.most);
-        let (mut worst_m, mut worst) = (0.0, None);
+        let mut any = false;
         for i in 0..n {
             let row = &self.matrix[i * n..(i + 1) * n];
-            let wrong_m = if self.is_in[i] {
-                -self.forces_n[i] * row[i]
-            } else {
-                -1e-10 - self.free_m[i] - dot(row, &self.forces_n[..n])
+            let is_wrong = match self.is_in[i] {
+                true => self.forces_n[i] <= 0.0,
+                false => self.free_m[i] + dot(row, &self.forces_n[..n]) < -CLOSED_M,
             };
-            let is_wrong = wrong_m > 0.0 || (self.is_in[i] && self.forces_n[i] <= 0.0);
-            if is_wrong && (worst.is_none() || wrong_m > worst_m) {
-                (worst_m, worst) = (wrong_m, Some(i));
-            }
-            if is_wrong && !is_one {
+            if is_wrong {
                 self.is_in[i] = !self.is_in[i];
+                any = true;
             }
         }
-        if let Some(i) = worst.filter(|_| is_one) {
-            self.is_in[i] = !self.is_in[i];
+        any
+    }
+
+    /// Sweeps of projected Gauss-Seidel say who pushes, and the forces go towards those of that set until the first of them would pull. The energy falls with
+    /// each step.
+    fn go_downhill(&mut self) {
+        let n = self.count.min(self.most);
+        for _ in 0..TURNS {
+            self.rounds += 1;
+            for _ in 0..SWEEPS {
+                self.sweep();
+            }
+            self.before_n[..n].copy_from_slice(&self.forces_n[..n]);
+            self.take_set();
+            if !self.solve_set() {
+                self.forces_n[..n].copy_from_slice(&self.before_n[..n]);
+                return;
+            }
+            let mut part = 1.0_f64;
+            for (before, after) in self.before_n[..n].iter().zip(&self.forces_n) {
+                if *after < 0.0 {
+                    part = part.min(before / (before - after));
+                }
+            }
+            for (before, after) in self.before_n[..n].iter().zip(&mut self.forces_n) {
+                *after = (before + part * (*after - before)).max(0.0);
+            }
+            if part == 1.0 && !self.change_set() {
+                return;
+            }
         }
-        worst.is_some()
+    }
+
+    fn sweep(&mut self) {
+        let n = self.count.min(self.most);
+        for i in 0..n {
+            let row = &self.matrix[i * n..(i + 1) * n];
+            let gap_m = self.free_m[i] + dot(row, &self.forces_n[..n]);
+            self.forces_n[i] = (self.forces_n[i] - gap_m / row[i]).max(0.0);
+        }
+    }
+
+    /// What the forces close of the gap of each, m.
+    pub fn closes_m(&self, i: usize) -> f64 {
+        let n = self.count.min(self.most);
+        dot(&self.matrix[i * n..(i + 1) * n], &self.forces_n[..n])
     }
 
     /// Cholesky of the rows and columns in the set.

@@ -17,13 +17,22 @@ const FACING: f64 = 0.2;
 const STEP_M: f64 = 2e-3;
 const MOST_STEPS: usize = 8;
 /// Passes over the directions of the forces at the end of a tick, at most, and in a step on the way there.
-const PASSES: usize = 40;
+const PASSES: usize = 16;
 const PASSES_ON_THE_WAY: usize = 2;
 /// A pass that leaves no pad farther than that from the probe's surface, on the wrong side, and no force turned farther from it, is the last.
 const CLOSED_M: f64 = 4e-7;
 const TURNED: f64 = 2e-4;
-/// From that pass on a force turns half as far as the surface does: a pad that is hardly pressed may be in contact in every other pass.
-const HALF_FROM: usize = 12;
+/// A problem is condensed anew where a force has turned by more than that since.
+const OTHERWISE: f64 = 0.03;
+/// How far a force turns in a pass, of the way to the surface: farther in every other pass, since one that has turned moves its point on by up to half
+/// as much again; and half as far from the 12th on, since a point that is hardly pressed may be in contact in every other pass.
+fn part_of(pass: usize) -> f64 {
+    match pass {
+        12.. => 0.5,
+        2.. if pass.is_multiple_of(2) => 1.8,
+        _ => 1.0,
+    }
+}
 
 /// What came of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -54,10 +63,17 @@ pub struct ProbeState {
     /// How hard each point is pressed, N, and where to.
     pressed_n: Vec<f64>,
     pushed: Vec<[f64; 3]>,
-    /// Points that are looked at, and of these those that may be in contact.
+    /// Points that are looked at; how far each is from the probe, m, and where its surface faces there.
     reach: Vec<u32>,
+    gaps_m: Vec<f64>,
+    surface: Vec<[f64; 3]>,
+    /// Those that may be in contact, where their forces go, and where these went when the problem was condensed.
     near: Vec<u32>,
+    is_near: Vec<bool>,
     outward: Vec<[f64; 3]>,
+    condensed: Vec<[f64; 3]>,
+    /// One that may not be in contact overlaps.
+    is_missed: bool,
     problem: Problem,
     /// What the loads do to the body, m.
     pub share: ElementField,
@@ -78,8 +94,13 @@ impl ProbeState {
             pressed_n: vec![0.0; points],
             pushed: vec![[0.0; 3]; points],
             reach: Vec::with_capacity(points),
+            gaps_m: vec![0.0; points],
+            surface: vec![[0.0; 3]; points],
             near: Vec::with_capacity(points),
+            is_near: vec![false; points],
             outward: vec![[0.0; 3]; points],
+            condensed: vec![[0.0; 3]; points],
+            is_missed: false,
             problem: Problem::with_room(points),
             share: ElementField::with_room(elements),
             report: ContactReport::default(),
@@ -115,13 +136,20 @@ impl ProbeState {
         for ((force_n, pushed), pressed) in slots.zip(pressed) {
             (*force_n, *pushed) = *pressed;
         }
-        self.reach_all(probe);
         self.move_wall(probe);
         self.load_pads(probe);
     }
 
+    /// Where the force of a point turns in a pass: one that did not press has no direction before.
+    fn turned(&self, n: usize, pass: usize) -> [f64; 3] {
+        match self.pressed_n[n] > 0.0 {
+            true => turned(self.pushed[n], self.surface[n], part_of(pass)),
+            false => self.surface[n],
+        }
+    }
+
     fn move_wall(&mut self, probe: &ReadyProbe) {
-        moves::wall(probe, &self.pressed_n, &self.pushed, &self.reach, &mut self.moved_m);
+        moves::wall(probe, &self.pressed_n, &self.pushed, &mut self.moved_m);
     }
 
     fn load_pads(&mut self, probe: &ReadyProbe) {
@@ -188,79 +216,122 @@ fn steps_between(from: &ProbePose, to: &ProbePose) -> usize {
 }
 
 fn press(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, passes: usize) {
-    reach(probe, state, pose);
+    state.reach_all(probe);
+    measure(probe, state, pose);
+    reach(probe, state);
     for pass in 0..passes {
         state.report.passes += 1;
-        look(probe, state, pose, if pass < HALF_FROM { 1.0 } else { 0.5 });
-        let n = state.near.len();
-        state.problem.count = n;
-        for a in 0..n {
-            let (point, outward) = (state.near[a] as usize, state.outward[a]);
-            state.problem.forces_n[a] = state.pressed_n[point];
-            let row = probe.between(point);
-            for b in 0..=a {
-                let value = along(&row[state.near[b] as usize], outward, state.outward[b]);
-                state.problem.matrix[a * n + b] = value;
-                state.problem.matrix[b * n + a] = value;
-            }
+        if pass == 0 || !turn(probe, state, pass) {
+            list(probe, state, pass);
+            condense(probe, state);
         }
-        state.problem.solve(pass >= HALF_FROM);
+        for (at, &point) in state.near.iter().enumerate() {
+            state.pushed[point as usize] = state.outward[at];
+        }
+        state.move_wall(probe);
+        measure(probe, state, pose);
+        let n = state.near.len();
+        for (a, &point) in state.near.iter().enumerate() {
+            state.problem.forces_n[a] = state.pressed_n[point as usize];
+        }
+        // The problem may be that of directions which have turned a little since: what its forces close is taken from the gaps as they are.
+        for (a, &point) in state.near.iter().enumerate() {
+            state.problem.free_m[a] = state.gaps_m[point as usize] - state.problem.closes_m(a);
+        }
+        state.problem.solve();
         state.report.rounds = state.report.rounds.max(state.problem.rounds as u32);
         state.report.near = n as u32;
         take_forces(probe, state);
-        [state.report.open_m, state.report.turned] = left_over(probe, state, pose);
+        measure(probe, state, pose);
+        [state.report.open_m, state.report.turned] = left_over(probe, state);
         if state.report.open_m <= CLOSED_M && state.report.turned <= TURNED {
             break;
         }
     }
-    state.reach_all(probe);
-    state.move_wall(probe);
     // A point that was not looked at may have got there.
-    state.report.open_m = left_over(probe, state, pose)[0];
+    state.reach_all(probe);
+    measure(probe, state, pose);
+    state.report.open_m = left_over(probe, state)[0];
+}
+
+/// How far the points that are looked at are from the probe.
+fn measure(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose) {
+    for &n in &state.reach {
+        let n = n as usize;
+        (state.gaps_m[n], state.surface[n]) = probe.shape.gap_m(pose, place_m(probe, state, n));
+    }
+}
+
+/// The probe's surface there faces into the wall.
+fn faces(probe: &ReadyProbe, state: &ProbeState, n: usize) -> bool {
+    let along: f64 = (0..3)
+        .map(|c| state.surface[n][c] * probe.wall.points[n].outward[c])
+        .sum();
+    along < FACING
 }
 
 /// Points that are looked at on the way to a pose: those near the probe whose wall it faces, and those that were pressed.
-fn reach(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose) {
+fn reach(probe: &ReadyProbe, state: &mut ProbeState) {
     state.reach.clear();
-    for (n, point) in probe.wall.points.iter().enumerate() {
-        let (gap_m, outward) = gap(probe, state, pose, n);
-        let facing = (0..3).map(|c| outward[c] * point.outward[c]).sum::<f64>();
-        if state.pressed_n[n] > 0.0 || (facing < FACING && gap_m < REACH_M) {
+    for n in 0..probe.wall.points.len() {
+        if state.pressed_n[n] > 0.0 || (faces(probe, state, n) && state.gaps_m[n] < REACH_M) {
             state.reach.push(n as u32);
         }
     }
 }
 
-/// How far the one moves along its direction by a newton on the other along its own.
-#[inline]
-fn along(block: &[[f32; 3]; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
-    let row = |r: usize| f64::from(block[r][0]) * b[0] + f64::from(block[r][1]) * b[1] + f64::from(block[r][2]) * b[2];
-    a[0] * row(0) + a[1] * row(1) + a[2] * row(2)
+/// Forces turn to the probe's surface. False where other points may be in contact than before, or the directions are others than those of the problem.
+fn turn(probe: &ReadyProbe, state: &mut ProbeState, pass: usize) -> bool {
+    for at in 0..state.near.len() {
+        let n = state.near[at] as usize;
+        let outward = state.turned(n, pass);
+        let off: f64 = (0..3).map(|c| (outward[c] - state.condensed[at][c]).powi(2)).sum();
+        if state.is_missed || !faces(probe, state, n) || off > OTHERWISE * OTHERWISE {
+            return false;
+        }
+        state.outward[at] = outward;
+    }
+    true
 }
 
-/// Points near the probe, where its surface is there, and how far each gap would be without the forces. Forces turn that part of the way.
-fn look(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, part: f64) {
+/// Points that may be in contact.
+fn list(probe: &ReadyProbe, state: &mut ProbeState, pass: usize) {
     state.near.clear();
+    state.is_near.fill(false);
     for at in 0..state.reach.len() {
         let n = state.reach[at] as usize;
-        let (gap_m, outward) = gap(probe, state, pose, n);
-        let facing = (0..3)
-            .map(|c| outward[c] * probe.wall.points[n].outward[c])
-            .sum::<f64>();
-        let is_pressed = state.pressed_n[n] > 0.0;
-        if facing < FACING && (is_pressed || gap_m < NEAR_M) {
-            let at = state.near.len();
-            let outward = if is_pressed {
-                turned(state.pushed[n], outward, part)
-            } else {
-                outward
-            };
-            let moved_m: f64 = (0..3).map(|c| outward[c] * state.moved_m[n][c]).sum();
-            state.outward[at] = outward;
-            state.problem.free_m[at] = gap_m - moved_m;
+        if faces(probe, state, n) && (state.pressed_n[n] > 0.0 || state.gaps_m[n] < NEAR_M) {
+            state.outward[state.near.len()] = state.turned(n, pass);
             state.near.push(n as u32);
+            state.is_near[n] = true;
         }
     }
+}
+
+/// How the gaps of the points that are near close with the forces on each.
+fn condense(probe: &ReadyProbe, state: &mut ProbeState) {
+    let n = state.near.len();
+    state.problem.count = n;
+    for a in 0..n {
+        let (rows, outward) = (probe.between(state.near[a] as usize), state.outward[a]);
+        for b in 0..=a {
+            let value = along(rows, state.near[b] as usize, outward, state.outward[b]);
+            state.problem.matrix[a * n + b] = value;
+            state.problem.matrix[b * n + a] = value;
+        }
+    }
+    state.condensed[..n].copy_from_slice(&state.outward[..n]);
+    state.problem.is_new();
+}
+
+/// How far point `b` moves along a direction by a newton on another along its own.
+#[inline]
+fn along(rows: [&[f32]; 3], b: usize, own: [f64; 3], to: [f64; 3]) -> f64 {
+    let moved = |row: &[f32]| match row.get(3 * b..3 * b + 3) {
+        Some(m) => f64::from(m[0]) * to[0] + f64::from(m[1]) * to[1] + f64::from(m[2]) * to[2],
+        None => 0.0,
+    };
+    own[0] * moved(rows[0]) + own[1] * moved(rows[1]) + own[2] * moved(rows[2])
 }
 
 /// The direction of a force, that part of the way to another.
@@ -268,10 +339,6 @@ fn turned(before: [f64; 3], outward: [f64; 3], part: f64) -> [f64; 3] {
     let before = Vector3::from(before);
     let mixed = before + (Vector3::from(outward) - before) * part;
     mixed.try_normalize(1e-9).map_or(outward, Into::into)
-}
-
-fn gap(probe: &ReadyProbe, state: &ProbeState, pose: &ProbePose, n: usize) -> (f64, [f64; 3]) {
-    probe.shape.gap_m(pose, place_m(probe, state, n))
 }
 
 /// Where a point of the wall is.
@@ -293,20 +360,20 @@ fn take_forces(probe: &ReadyProbe, state: &mut ProbeState) {
 
 /// How far points are on the wrong side: those that are pressed on either, the others in the probe. And how far a force is from square to the
 /// probe's surface.
-fn left_over(probe: &ReadyProbe, state: &ProbeState, pose: &ProbePose) -> [f64; 2] {
+fn left_over(probe: &ReadyProbe, state: &mut ProbeState) -> [f64; 2] {
     let (mut open_m, mut turned) = (0.0_f64, 0.0_f64);
-    for &n in &state.reach {
-        let n = n as usize;
-        let (gap_m, outward) = gap(probe, state, pose, n);
-        let facing = (0..3)
-            .map(|c| outward[c] * probe.wall.points[n].outward[c])
-            .sum::<f64>();
+    state.is_missed = false;
+    for at in 0..state.reach.len() {
+        let n = state.reach[at] as usize;
         if state.pressed_n[n] > 0.0 {
-            open_m = open_m.max(gap_m.abs());
-            let off = (0..3).map(|c| (state.pushed[n][c] - outward[c]).powi(2)).sum::<f64>();
+            open_m = open_m.max(state.gaps_m[n].abs());
+            let off = (0..3)
+                .map(|c| (state.pushed[n][c] - state.surface[n][c]).powi(2))
+                .sum::<f64>();
             turned = turned.max(off.sqrt());
-        } else if facing < FACING {
-            open_m = open_m.max(-gap_m);
+        } else if faces(probe, state, n) {
+            open_m = open_m.max(-state.gaps_m[n]);
+            state.is_missed |= !state.is_near[n] && state.gaps_m[n] < 0.0;
         }
     }
     [open_m, turned]

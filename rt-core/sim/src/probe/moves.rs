@@ -1,30 +1,29 @@
 //! What forces on the points of the wall do to points and pads, and what others that move the pads do to the points.
 
 use super::columns::ReadyProbe;
+use crate::simd::{Simd, vectorised};
 
-/// How far the points of `reach` are displaced by forces on all of them, m.
-pub(super) fn wall(
-    probe: &ReadyProbe,
-    pressed_n: &[f64],
-    pushed: &[[f64; 3]],
-    reach: &[u32],
-    moved_m: &mut [[f64; 3]],
-) {
-    for &n in reach {
-        moved_m[n as usize] = [0.0; 3];
-    }
+/// How far the points are displaced by forces on them, m.
+pub(super) fn wall(probe: &ReadyProbe, pressed_n: &[f64], pushed: &[[f64; 3]], moved_m: &mut [[f64; 3]]) {
+    let simd = Simd::detect();
+    moved_m.fill([0.0; 3]);
     for (n, (force_n, pushed)) in pressed_n.iter().zip(pushed).enumerate() {
         if *force_n > 0.0 {
-            // Symmetric: how this point moves with the others is how they move with it.
-            let (row, force_n) = (probe.between(n), pushed.map(|c| force_n * c));
-            for &other in reach {
-                let (block, moved_m) = (&row[other as usize], &mut moved_m[other as usize]);
-                for c in 0..3 {
-                    for r in 0..3 {
-                        moved_m[c] += f64::from(block[r][c]) * force_n[r];
-                    }
-                }
-            }
+            add_three(
+                simd,
+                moved_m.as_flattened_mut(),
+                pushed.map(|c| force_n * c),
+                probe.between(n),
+            );
+        }
+    }
+}
+
+vectorised! {
+    fn add_three(sum: &mut [f64], factors: [f64; 3], rows: [&[f32]; 3]) {
+        let [x, y, z] = rows;
+        for (sum, ((x, y), z)) in sum.iter_mut().zip(x.iter().zip(y).zip(z)) {
+            *sum += factors[0] * f64::from(*x) + factors[1] * f64::from(*y) + factors[2] * f64::from(*z);
         }
     }
 }
@@ -49,6 +48,7 @@ pub(super) fn beside(probe: &ReadyProbe, beside_m: &[f64], pads_m: &mut [f64], p
     if !is_moved || beside_m.len() != pads_m.len() {
         return points_m.fill([0.0; 3]);
     }
+    let simd = Simd::detect();
     let pads = (beside_m.len() / 3) as f64;
     let mut mean_m = [0.0; 3];
     for pad in beside_m.chunks_exact(3) {
@@ -63,11 +63,12 @@ pub(super) fn beside(probe: &ReadyProbe, beside_m: &[f64], pads_m: &mut [f64], p
     }
     for (n, point_m) in points_m.iter_mut().enumerate() {
         for ((along_m, shares), mean) in point_m.iter_mut().zip(probe.shares(n)).zip(mean_m) {
-            *along_m = mean + dot(shares, pads_m);
+            *along_m = mean + dot(simd, shares, pads_m);
         }
     }
 }
 
+vectorised! {
 /// In eight sums side by side.
 fn dot(shares: &[f32], values: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
@@ -79,4 +80,5 @@ fn dot(shares: &[f32], values: &[f64]) -> f64 {
     }
     let rest: f64 = a8.1.iter().zip(b8.1).map(|(a, b)| f64::from(*a) * b).sum();
     sums.iter().sum::<f64>() + rest
+}
 }

@@ -29,6 +29,8 @@ impl TissueLoop {
             last_carry: _,
             pressed,
             probe_pose,
+            // What the second hand was given is in the tape of its own loop.
+            answered: _,
             probe_room: _,
             is_outside_shown,
             layers,

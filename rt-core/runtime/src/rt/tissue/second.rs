@@ -9,6 +9,37 @@ use stylet_sim::probe::ProbePose;
 
 /// A pad that is farther on the wrong side of the probe's surface than that after a tick is not to be felt, m.
 const FELT_M: f64 = 1e-4;
+/// A contact that is not solved in one tick goes on in the next; for so many ticks the hand has the last one that was. Longer, and its force is off.
+const MOST_HELD: u32 = 4;
+
+/// The last contact that was solved, and for how many ticks the hand has had it since.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Answered {
+    solved: ProbeResponse,
+    held: u32,
+}
+
+impl Answered {
+    /// What the hand gets in place of `response`.
+    fn next(&mut self, response: ProbeResponse) -> ProbeResponse {
+        if !response.unsolved {
+            *self = Answered {
+                solved: response,
+                held: 0,
+            };
+            return response;
+        }
+        if self.held == MOST_HELD {
+            return response;
+        }
+        self.held += 1;
+        ProbeResponse {
+            time_ns: response.time_ns,
+            tick: response.tick,
+            ..self.solved
+        }
+    }
+}
 
 impl TissueLoop {
     /// Where the second hand has the probe: in the body as the scene has it, from which an exercise may have moved it.
@@ -45,6 +76,45 @@ impl TissueLoop {
             };
             response.stiffness = SMatrix::from_fn(|row, column| -contact.stiffness[row][column]);
         }
-        second.response.write(response);
+        second.response.write(self.answered.next(response));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_contact_that_is_not_solved_leaves_the_hand_the_last_one_for_a_while() {
+        let mut answered = Answered::default();
+        let solved = ProbeResponse {
+            tick: 1,
+            touches: true,
+            tip_in_scene: Vector3::x(),
+            wrench: Wrench::from_force(Vector3::y()),
+            ..ProbeResponse::default()
+        };
+        let unsolved = |tick| ProbeResponse {
+            tick,
+            unsolved: true,
+            touches: true,
+            wrench: Wrench::from_force(Vector3::y() * 9.0),
+            ..ProbeResponse::default()
+        };
+        // Nothing was solved yet: nothing is felt.
+        assert!(!answered.next(unsolved(0)).touches);
+        answered.next(solved);
+        for tick in 2..2 + u64::from(MOST_HELD) {
+            let held = answered.next(unsolved(tick));
+            assert!(held.touches && !held.unsolved);
+            assert_eq!(
+                (held.tick, held.wrench, held.tip_in_scene),
+                (tick, solved.wrench, solved.tip_in_scene)
+            );
+        }
+        assert!(answered.next(unsolved(9)).unsolved);
+        assert!(answered.next(unsolved(10)).unsolved, "and it stays so");
+        answered.next(solved);
+        assert!(!answered.next(unsolved(12)).unsolved);
     }
 }
