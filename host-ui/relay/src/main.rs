@@ -122,6 +122,7 @@ enum LeaseTask {
 }
 
 fn main() -> ExitCode {
+    stylet_relay::net::one_thread();
     match run(Cli::parse().task) {
         Ok(code) => code,
         Err(why) => {

@@ -23,7 +23,7 @@ pub const PORT: u16 = 7461;
 /// A link that is silent for so long is closed, ms.
 const LEASE_MS: u32 = 600;
 /// What is sent whole waits so long for room. A peer that is silent is lost after [`LEASE_MS`]; one that is heard is slow, and waited for.
-pub const PATIENCE_US: u64 = 3_000_000;
+pub const PATIENCE_US: u64 = 10_000_000;
 /// A connection that is not made after so long is begun again: QUIC sends a first packet that was lost again after a second. Four round trips.
 const OPEN_MS: u32 = 700;
 /// A message of a volume of 64 million cells fits.
@@ -126,6 +126,18 @@ pub fn join(server: &str, identity: &Identity) -> Result<Session, RelayError> {
         "retry": { "period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5 },
     });
     open(&config).map_err(|e| RelayError(format!("cannot connect to {server}: {e}")))
+}
+
+/// Lets zenoh do its work on one thread in place of six: a message is handed from part to part without a thread that has to wake for it. Before there are
+/// threads; whoever has set it otherwise is left alone.
+pub fn one_thread() {
+    const NAME: &str = "ZENOH_RUNTIME";
+    if std::env::var_os(NAME).is_none() {
+        let of = |part: &str| format!("{part}: (handover: app)");
+        let parts = ["rx", "acc", "tx", "net"].map(of).join(", ");
+        // SAFETY: called by `main` while this thread is the only one.
+        unsafe { std::env::set_var(NAME, format!("({parts}, app: (worker_threads: 1))")) };
+    }
 }
 
 fn open(config: &Value) -> Result<Session, zenoh::Error> {

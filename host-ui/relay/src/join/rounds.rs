@@ -26,8 +26,9 @@ const QUIET: Duration = Duration::from_secs(1);
 /// For hosts that come and orders of a terminal, which no operator waits for.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 const HELLO_EVERY: Duration = Duration::from_millis(50);
-/// A greeting that did not come whole is asked for again after so long.
-const GREETING_EVERY: Duration = Duration::from_millis(400);
+/// A greeting that did not come whole is asked for again after so long, each time after twice as long as the time before.
+const GREETING_AFTER: Duration = Duration::from_millis(400);
+const GREETING_AFTER_AT_MOST: Duration = Duration::from_millis(3_200);
 /// For so long an event that was missed is waited for.
 const EVENT_PATIENCE: Duration = Duration::from_millis(500);
 const CLEAN_EVERY: Duration = Duration::from_secs(1);
@@ -38,22 +39,24 @@ struct Awaited {
     parameters: bool,
     plan: bool,
     since: Instant,
+    patience: Duration,
 }
 
 impl Awaited {
-    fn now() -> Self {
+    fn now(patience: Duration) -> Self {
         Self {
             session: true,
             parameters: true,
             plan: true,
             since: Instant::now(),
+            patience,
         }
     }
 
     /// A greeting may be sent before the server knows that this member listens.
     fn is_due(&self, has_scene: bool) -> bool {
         let complete = has_scene && !self.session && !self.parameters && !self.plan;
-        !complete && self.since.elapsed() >= GREETING_EVERY
+        !complete && self.since.elapsed() >= self.patience
     }
 }
 
@@ -102,7 +105,7 @@ impl Rounds {
             line: Line::new(options),
             hello: now,
             epoch: 0,
-            awaited: Awaited::now(),
+            awaited: Awaited::now(GREETING_AFTER),
             has_server: false,
             round_trip_ns: 0,
             cleaned: now,
@@ -148,7 +151,9 @@ impl Rounds {
             );
         }
         if has_server && self.awaited.is_due(self.scene != (0, 0)) {
+            let patience = (2 * self.awaited.patience).min(GREETING_AFTER_AT_MOST);
             self.ask_for_all();
+            self.awaited.patience = patience;
         }
         if self.hello.elapsed() >= HELLO_EVERY {
             self.hello = Instant::now();
@@ -187,7 +192,7 @@ impl Rounds {
 
     fn ask_for_all(&mut self) {
         self.epoch += 1;
-        self.awaited = Awaited::now();
+        self.awaited = Awaited::now(GREETING_AFTER);
     }
 
     fn words(&self) -> String {

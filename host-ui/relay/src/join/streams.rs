@@ -18,6 +18,8 @@ const WAIT: Duration = Duration::from_millis(20);
 
 /// A snapshot that is older is not shown: the next one is on its way. A line on which all of them take long gets half of it more than its way.
 const LATE_NS: u64 = 200_000_000;
+/// Snapshots that overtake one another are so many numbers apart at most.
+const LATE_NUMBERS: u64 = 32;
 /// Where none was shown for so long, one that is late is.
 const BLIND: Duration = Duration::from_secs(2);
 
@@ -88,6 +90,15 @@ fn take(order: &mut Order, bytes: &[u8]) {
     }
 }
 
+/// How many between the newest snapshot and another are missed; nothing where that is older and came late. Numbers of a server that took this member for
+/// one that had left begin anew.
+fn missed(newest: (u64, u64), other: (u64, u64)) -> Option<u64> {
+    if other.0 != newest.0 || other.1 + LATE_NUMBERS < newest.1 {
+        return Some(0);
+    }
+    other.1.checked_sub(newest.1 + 1)
+}
+
 pub(super) fn snapshots(member: &Member, messages: &Receiver<Bytes>, scenes: &Scenes) -> Result<(), RelayError> {
     let (port, _node) = far_snapshots(&member.instance)?;
     let (mut known, mut newest, mut shown) = (Displacements::default(), (0, 0), Instant::now());
@@ -97,11 +108,7 @@ pub(super) fn snapshots(member: &Member, messages: &Receiver<Bytes>, scenes: &Sc
         };
         let Ok(message) = wire::decode(&bytes) else { continue };
         let at = (message.stamp.run, message.stamp.number);
-        // An older one of the same run came late.
-        if at.0 == newest.0 && at.1 <= newest.1 {
-            continue;
-        }
-        let missed = if at.0 == newest.0 { at.1 - newest.1 - 1 } else { 0 };
+        let Some(missed) = missed(newest, at) else { continue };
         member.snapshots_lost.fetch_add(missed, Ordering::Relaxed);
         newest = at;
         let rest = Arc::clone(&scenes.lock().unwrap_or_else(PoisonError::into_inner));
@@ -125,4 +132,24 @@ pub(super) fn snapshots(member: &Member, messages: &Receiver<Bytes>, scenes: &Sc
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::missed;
+
+    #[test]
+    fn a_late_snapshot_is_dropped_and_one_of_numbers_that_began_anew_is_not() {
+        assert_eq!(missed((0, 0), (7, 900)), Some(0), "the first");
+        assert_eq!(missed((7, 900), (7, 901)), Some(0));
+        assert_eq!(missed((7, 900), (7, 904)), Some(3));
+        assert_eq!(missed((7, 900), (7, 900)), None);
+        assert_eq!(missed((7, 900), (7, 898)), None);
+        assert_eq!(
+            missed((7, 900), (7, 0)),
+            Some(0),
+            "the server had forgotten this member"
+        );
+        assert_eq!(missed((7, 900), (8, 0)), Some(0), "another server");
+    }
 }

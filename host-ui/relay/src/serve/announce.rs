@@ -1,14 +1,13 @@
 //! What the core publishes beside its state, records and snapshots: sent to all as it comes, and to one member all that is in force.
 
 use super::Server;
-use super::streams::Message;
+use super::streams::{Jobs, Message};
 use crate::class::ClassPorts;
 use crate::net::{Place, Priority, put};
 use crate::ports::Near;
 use crate::wire::{Hello, Kind, Who, encode};
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::{Event, ParametersInForce, PlanInForce, Reply, SCHEMA_VERSION, Session, check};
@@ -165,19 +164,29 @@ impl Announcements {
         }
     }
 
+    /// The member has the scene that is in force, or there is none.
+    pub fn has_scene(&self, hello: &Hello) -> bool {
+        let theirs = (hello.scene_session, hello.scene_generation);
+        self.scene.as_ref().is_none_or(|(id, _)| *id == theirs)
+    }
+
     /// All that is in force, to a member that has just come or was cut off.
-    pub fn greet(&self, seat: u16, hello: &Hello, messages: &SyncSender<Message>) {
+    pub fn greet(&self, seat: u16, hello: &Hello, jobs: &Jobs) {
         let send = |kind, parts: &[&[u8]]| {
             // A full queue is one of a member that asks again.
-            let _ = messages.try_send(Message(seat, self.message(kind, parts)));
+            let _ = jobs.messages.try_send(Message(seat, self.message(kind, parts)));
         };
         if let Some(session) = &self.session {
             send(Kind::Session, &[bytemuck::bytes_of(session)]);
         }
-        if let Some((id, body)) = &self.scene
-            && *id != (hello.scene_session, hello.scene_generation)
+        if let Some((_, body)) = &self.scene
+            && !self.has_scene(hello)
+            && super::lock(&self.server.scenes_away).insert(seat)
         {
-            send(Kind::Scene, &[body]);
+            let message = Message(seat, self.message(Kind::Scene, &[body]));
+            if jobs.scenes.try_send(message).is_err() {
+                super::lock(&self.server.scenes_away).remove(&seat);
+            }
         }
         if let Some(parameters) = &self.parameters {
             send(Kind::Parameters, &[bytemuck::bytes_of(parameters)]);

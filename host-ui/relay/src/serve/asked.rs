@@ -76,8 +76,11 @@ fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
         if known.is_none() {
             println!("connected: {}", rounds.name(seat));
         }
-        rounds.announcements.greet(seat, &hello, &rounds.jobs.messages);
+        rounds.announcements.greet(seat, &hello, &rounds.jobs);
         super::lock(&rounds.server.paces).entry(seat).or_default().forget();
+    }
+    if let Some(pace) = super::lock(&rounds.server.paces).get_mut(&seat) {
+        pace.has_scene(rounds.announcements.has_scene(&hello));
     }
     let presence = Presence {
         epoch,

@@ -20,7 +20,7 @@ use keeper::Beat;
 use kept::Kept;
 use pace::Pace;
 use rounds::Rounds;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -55,6 +55,8 @@ pub struct Server {
     kept: Mutex<Kept>,
     /// Of each member that is connected.
     paces: Mutex<BTreeMap<u16, Pace>>,
+    /// Seats to which a scene is on its way: whoever asks again has one coming.
+    scenes_away: Mutex<BTreeSet<u16>>,
 }
 
 /// What one request came as.
@@ -117,6 +119,7 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<End,
         end: AtomicBool::new(false),
         kept: Mutex::new(Kept::default()),
         paces: Mutex::new(BTreeMap::new()),
+        scenes_away: Mutex::new(BTreeSet::new()),
     });
     let (to_asked, asked) = sync_channel(ASKED);
     net::hear(&session, &net::every_ask(), move |key, bytes| {
@@ -129,9 +132,11 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<End,
         }
     })?;
     let (to_messages, messages) = sync_channel(JOBS);
+    let (to_scenes, scenes) = sync_channel(JOBS);
     let (to_again, missed) = sync_channel(JOBS);
     let jobs = Jobs {
         messages: to_messages,
+        scenes: to_scenes,
         again: to_again,
     };
     let keeper = beat.keeper();
@@ -139,6 +144,7 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<End,
         spawn("records", &server, streams::records),
         spawn("snapshots", &server, streams::snapshots),
         spawn("messages", &server, move |server| streams::messages(server, &messages)),
+        spawn("scenes", &server, move |server| streams::scenes(server, &scenes)),
         spawn("again", &server, move |server| streams::again(server, &missed)),
         spawn("before", &server, move |server| tape::complete(server, keeper)),
     ];

@@ -15,6 +15,8 @@ const LOST: Duration = Duration::from_millis(400);
 /// Bytes of places in a snapshot at least.
 const LEAST_BYTES: usize = 1500;
 const MORE_BYTES: usize = 500;
+/// In the first of a line that is not known yet.
+const FIRST_BYTES: usize = MAX_THIN_BYTES / 4;
 
 /// Of one member.
 pub struct Pace {
@@ -23,6 +25,8 @@ pub struct Pace {
     number: u64,
     bytes: usize,
     had: Had,
+    /// Without the scene a snapshot is of no use, and takes the line from it.
+    has_scene: bool,
 }
 
 struct Away {
@@ -72,13 +76,19 @@ impl Default for Pace {
         Self {
             away: VecDeque::new(),
             number: 0,
-            bytes: MAX_THIN_BYTES,
+            bytes: FIRST_BYTES,
             had: Had::default(),
+            has_scene: false,
         }
     }
 }
 
 impl Pace {
+    /// Whether the member has the scene of the snapshots.
+    pub fn has_scene(&mut self, has_scene: bool) {
+        self.has_scene = has_scene;
+    }
+
     /// Bytes of places that the next snapshot may have; nothing while the line is full.
     pub fn room(&mut self, now: Instant) -> Option<usize> {
         while let Some(lost) = self.away.pop_front_if(|away| now - away.at >= LOST) {
@@ -89,7 +99,7 @@ impl Pace {
             }
         }
         let is_slow = self.away.front().is_some_and(|away| now - away.at >= SLOW);
-        (self.away.len() < AT_MOST && !is_slow).then_some(self.bytes)
+        (self.has_scene && self.away.len() < AT_MOST && !is_slow).then_some(self.bytes)
     }
 
     /// The number of the next snapshot.
@@ -157,6 +167,14 @@ mod tests {
         stride: 1,
     };
 
+    /// Of a member with the scene.
+    fn pace() -> Pace {
+        let mut pace = Pace::default();
+        assert_eq!(pace.room(Instant::now()), None, "no scene yet");
+        pace.has_scene(true);
+        pace
+    }
+
     /// Sent and seen at once.
     fn pass(pace: &mut Pace, fingerprint: u64, stride: usize, is_seen: bool) {
         let (number, now) = (pace.next(), Instant::now());
@@ -168,7 +186,7 @@ mod tests {
 
     #[test]
     fn a_member_has_all_places_once_it_has_had_each_part_of_them() {
-        let mut pace = Pace::default();
+        let mut pace = pace();
         for is_seen in [true, true, false, true, true] {
             assert!(!pace.has_all(7));
             pass(&mut pace, 7, 3, is_seen);
@@ -207,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_line_that_is_slow_gets_less_and_one_that_is_fast_gets_more_again() {
-        let (mut pace, start) = (Pace::default(), Instant::now());
+        let (mut pace, start) = (pace(), Instant::now());
         let mut now = start;
         for _ in 0..8 {
             assert!(pace.room(now).is_some());
@@ -229,14 +247,14 @@ mod tests {
 
     #[test]
     fn a_line_that_loses_gets_less() {
-        let (mut pace, now) = (Pace::default(), Instant::now());
+        let (mut pace, now) = (pace(), Instant::now());
         for lost in [true, false] {
             pace.sent(now, WHOLE);
             if !lost {
                 pace.seen(pace.next() - 1, true, now + FAST / 2);
             }
         }
-        assert_eq!(pace.room(now), Some(MAX_THIN_BYTES / 4 * 3));
+        assert_eq!(pace.room(now), Some(FIRST_BYTES / 4 * 3));
         for _ in 0..100 {
             pace.sent(now, WHOLE);
             pace.sent(now, WHOLE);
@@ -247,7 +265,7 @@ mod tests {
 
     #[test]
     fn a_member_that_says_nothing_has_few_on_their_way_and_is_tried_again() {
-        let (mut pace, now) = (Pace::default(), Instant::now());
+        let (mut pace, now) = (pace(), Instant::now());
         let sent = std::iter::from_fn(|| pace.room(now).map(|_| pace.sent(now, WHOLE))).count();
         assert_eq!(sent, AT_MOST);
         assert_eq!(pace.room(now + SLOW), None);

@@ -11,7 +11,7 @@ use stylet_shm_schema::service::{self, Instance, Node, ServiceError, SliceSubscr
 use stylet_shm_schema::{HapticState, SceneHeader, SnapshotHeader, TickRecord, Vertex};
 
 /// How often the queue of records is looked at: a batch waits half of it on average.
-const RECORDS_EVERY: Duration = Duration::from_micros(200);
+const RECORDS_EVERY: Duration = Duration::from_micros(100);
 /// After a batch for half of the time that the batch before it took to come, and no longer.
 const RECORDS_PAUSE: Duration = Duration::from_millis(10);
 /// 60 a second at most.
@@ -150,22 +150,27 @@ pub struct Missed(pub u16, pub Ticks);
 #[derive(Clone)]
 pub struct Jobs {
     pub messages: SyncSender<Message>,
+    pub scenes: SyncSender<Message>,
     pub again: SyncSender<Missed>,
 }
 
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// A message that is larger, as a scene is, goes behind records that are sent again.
-const SMALL_BYTES: usize = 16_384;
 
 /// Sends messages; a member that does not take its own keeps the others waiting that have just come, for [`crate::net::PATIENCE_US`] at most.
 pub fn messages(server: &Server, jobs: &Receiver<Message>) {
     while !server.ends() {
         if let Ok(Message(seat, bytes)) = jobs.recv_timeout(LOOK_EVERY) {
-            let priority = match bytes.len() <= SMALL_BYTES {
-                true => Priority::InteractiveLow,
-                false => Priority::Data,
-            };
-            put_whole(&server.session, Place::To(seat), priority, bytes);
+            put_whole(&server.session, Place::To(seat), Priority::InteractiveLow, bytes);
+        }
+    }
+}
+
+/// Sends scenes, each of which may take seconds, behind records that are sent again.
+pub fn scenes(server: &Server, jobs: &Receiver<Message>) {
+    while !server.ends() {
+        if let Ok(Message(seat, bytes)) = jobs.recv_timeout(LOOK_EVERY) {
+            put_whole(&server.session, Place::To(seat), Priority::Data, bytes);
+            lock(&server.scenes_away).remove(&seat);
         }
     }
 }

@@ -87,6 +87,7 @@ fn a_late_and_lossy_cable_costs_no_record() {
     settle(&far);
     let seen = Seen::until(&far, Instant::now() + Duration::from_secs_f64(seconds(5.0)));
     println!("{}", seen.words("20 ms and 1 % each way"));
+    println!("server: {}\nmember: {}", served.log(), joined.log());
     seen.has_every_record();
 }
 

@@ -243,3 +243,77 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     let rest: f64 = a[whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum();
     sums.iter().sum::<f64>() + rest
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const N: usize = 40;
+
+    /// Points along a line, each of which moves those beside it nearly as much as itself: sets of such problems go round in circles.
+    fn problem(turn: u32) -> Problem {
+        let mut problem = Problem::with_room(N);
+        problem.count = N;
+        let mut seed = 12_345 + turn;
+        let mut random = || {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(seed >> 8) / f64::from(1_u32 << 23) - 1.0
+        };
+        for i in 0..N {
+            for j in 0..N {
+                let apart = (i as f64 - j as f64) / 6.0;
+                problem.matrix[i * N + j] = 1e-3 * (-apart * apart).exp();
+            }
+            problem.matrix[i * N + i] *= 1.0 + 1e-4;
+            problem.free_m[i] = 1e-3 * random();
+        }
+        problem
+    }
+
+    fn energy_j(problem: &Problem) -> f64 {
+        let p = &problem.forces_n;
+        (0..N)
+            .map(|i| p[i] * (0.5 * problem.closes_m(i) + problem.free_m[i]))
+            .sum()
+    }
+
+    /// Brute force.
+    fn swept(turn: u32) -> Problem {
+        let mut problem = problem(turn);
+        (0..400_000).for_each(|_| problem.sweep());
+        problem
+    }
+
+    #[test]
+    fn forces_are_those_of_many_sweeps_whichever_way_they_are_found() {
+        let mut downhill = 0;
+        for turn in 0..20 {
+            let wanted = swept(turn);
+            let mut found = problem(turn);
+            found.solve();
+            downhill += usize::from(found.rounds > ROUNDS);
+            let off = wanted.forces_n.iter().zip(&found.forces_n).map(|(a, b)| (a - b).abs());
+            let largest = wanted.forces_n.iter().fold(0.0_f64, |m, f| m.max(*f));
+            assert!(off.fold(0.0, f64::max) < 0.05 * largest, "{turn}");
+            assert!(
+                (energy_j(&found) - energy_j(&wanted)).abs() < 1e-3 * energy_j(&wanted).abs(),
+                "{turn}"
+            );
+        }
+        assert!(downhill > 0, "none of the sets went round");
+    }
+
+    #[test]
+    fn what_is_left_early_pushes_and_is_nearer_than_the_guess() {
+        for turn in 0..20 {
+            let mut problem = problem(turn);
+            for i in 0..N {
+                problem.forces_n[i] = f64::from(turn) * 0.1 * ((i * i) as f64).sin().max(0.0);
+            }
+            let before_j = energy_j(&problem);
+            problem.go_downhill();
+            assert!(problem.forces_n.iter().all(|f| *f >= 0.0));
+            assert!(energy_j(&problem) < before_j, "{turn}");
+        }
+    }
+}
