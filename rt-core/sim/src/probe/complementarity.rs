@@ -5,8 +5,8 @@
 
 /// Rounds of active sets, at most.
 const ROUNDS: usize = 6;
-/// Turns of the way downhill, at most, and sweeps in each.
-const TURNS: usize = 6;
+/// Legs of the way downhill, at most, and sweeps in each.
+const LEGS: usize = 6;
 const SWEEPS: usize = 8;
 /// A gap that is deeper is not closed, m.
 const CLOSED_M: f64 = 1e-10;
@@ -141,7 +141,7 @@ impl Problem {
     /// each step.
     fn go_downhill(&mut self) {
         let n = self.count.min(self.most);
-        for _ in 0..TURNS {
+        for _ in 0..LEGS {
             self.rounds += 1;
             for _ in 0..SWEEPS {
                 self.sweep();
