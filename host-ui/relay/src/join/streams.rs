@@ -100,6 +100,7 @@ fn missed(newest: (u64, u64), other: (u64, u64)) -> Option<u64> {
 }
 
 pub(super) fn snapshots(member: &Member, messages: &Receiver<Bytes>, scenes: &Scenes) -> Result<(), RelayError> {
+    crate::slice::let_others_first();
     let (port, _node) = far_snapshots(&member.instance)?;
     let (mut known, mut newest, mut shown) = (Displacements::default(), (0, 0), Instant::now());
     while !member.ends() {

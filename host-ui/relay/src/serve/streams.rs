@@ -82,6 +82,7 @@ type Pictures = (
 
 /// Sends the newest snapshot, thinned, 60 times a second, to each member as much of it as its line carries.
 pub fn snapshots(server: &Server) {
+    crate::slice::let_others_first();
     let mut watched = Watched::<Pictures>::new();
     let mut rest = Rest::default();
     while !server.ends() {

@@ -26,8 +26,9 @@ pub struct BodyProbe {
     parts: usize,
 }
 
-/// A larger body is added up over several ticks, so many elements in each: the picture is late by so many, the force is not.
-const ELEMENTS_A_TICK: usize = 4_096;
+/// A body is added up over several ticks, so many elements in each where that takes no more ticks than this: the picture is late by them, the force is not.
+const ELEMENTS_A_TICK: usize = 2_048;
+const MOST_PARTS: usize = 14;
 
 impl BodyProbe {
     /// Out of the body.
@@ -38,7 +39,7 @@ impl BodyProbe {
             share: ElementField::with_room(elements),
             coming_n: vec![0.0; rows],
             made: 0,
-            parts: elements.div_ceil(ELEMENTS_A_TICK).max(1),
+            parts: elements.div_ceil(ELEMENTS_A_TICK).clamp(1, MOST_PARTS),
             state: ProbeState::new(&ready),
             response: ProbeResponse::default(),
             lines: LinesBeside::with_room(rows),

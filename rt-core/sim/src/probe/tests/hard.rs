@@ -181,12 +181,25 @@ fn the_loop_s_probe_displaces_the_body_as_its_loads_do_and_lets_it_go() {
     let mut body = BodyProbe::new(fixture.probe.clone());
     let mut state = ProbeState::new(&fixture.probe);
     for beyond_m in [-0.1, -0.02, 20e-3] {
-        assert!(body.follow(&fixture.pose(3e-3, beyond_m)) == (beyond_m > -0.05));
-        step(&fixture.probe, &mut state, &fixture.pose(3e-3, beyond_m), &[]);
+        let pose = fixture.pose(3e-3, beyond_m);
+        let mut is_shown = false;
+        for tick in 0..4 {
+            is_shown = body.follow(&pose);
+            step(&fixture.probe, &mut state, &pose, &[]);
+            if tick == 0 {
+                // What is begun is added up to its end, over ticks that may have others.
+                displace(&fixture.probe, &mut state);
+            }
+            if is_shown {
+                break;
+            }
+        }
+        assert_eq!(is_shown, beyond_m > -0.05);
     }
-    displace(&fixture.probe, &mut state);
     assert!(body.displaces() && body.share() == &state.share);
     assert!(!body.follow(&fixture.pose(3e-3, 20e-3)) || body.report().passes > 0);
-    body.follow(&fixture.pose(3e-3, -0.1));
+    for _ in 0..6 {
+        body.follow(&fixture.pose(3e-3, -0.1));
+    }
     assert!(!body.displaces() && body.share().0.iter().flatten().all(|u| *u == 0.0));
 }
