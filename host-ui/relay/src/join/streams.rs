@@ -40,10 +40,11 @@ pub(super) fn records(member: &Member, messages: &Receiver<Bytes>) -> Result<(),
         }
         let now = Instant::now();
         // Until then they wait here, where more of them fit than come in a minute.
-        if member.is_announced.load(Ordering::Relaxed) && hand_on(member, &port, &mut order, now) {
-            if let Some(next) = order.next() {
-                last.note(next, now_ns());
-            }
+        if member.is_announced.load(Ordering::Relaxed)
+            && hand_on(member, &port, &mut order, now)
+            && let Some(next) = order.next()
+        {
+            last.note(next, now_ns());
         }
         if let Some(ticks) = order.missing(now) {
             member.say(Kind::Again, 0, bytemuck::bytes_of(&ticks));
