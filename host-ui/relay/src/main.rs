@@ -122,7 +122,6 @@ enum LeaseTask {
 }
 
 fn main() -> ExitCode {
-    stylet_relay::net::one_thread();
     match run(Cli::parse().task) {
         Ok(code) => code,
         Err(why) => {

@@ -128,18 +128,6 @@ pub fn join(server: &str, identity: &Identity) -> Result<Session, RelayError> {
     open(&config).map_err(|e| RelayError(format!("cannot connect to {server}: {e}")))
 }
 
-/// Lets zenoh do its work on one thread in place of six: a message is handed from part to part without a thread that has to wake for it. Before there are
-/// threads; whoever has set it otherwise is left alone.
-pub fn one_thread() {
-    const NAME: &str = "ZENOH_RUNTIME";
-    if std::env::var_os(NAME).is_none() {
-        let of = |part: &str| format!("{part}: (handover: app)");
-        let parts = ["rx", "acc", "tx", "net"].map(of).join(", ");
-        // SAFETY: called by `main` while this thread is the only one.
-        unsafe { std::env::set_var(NAME, format!("({parts}, app: (worker_threads: 1))")) };
-    }
-}
-
 fn open(config: &Value) -> Result<Session, zenoh::Error> {
     claimed::note_refused();
     // A second session of one program has the log already.
