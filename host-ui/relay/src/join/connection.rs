@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// A server that a session has not heard for so long is called by a new one. zenoh tries five times a second, but a transport that is closed
-/// while it is being opened is not opened again (zenoh 1.10, `closed_session` without endpoints).
+/// while it is being opened is not opened again (zenoh 1.10: a session that has not noted its endpoints yet).
 const DEAF: Duration = Duration::from_secs(2);
 
 type Opening = Receiver<Result<Session, RelayError>>;
@@ -69,13 +69,16 @@ impl Connection {
             Some(Err(TryRecvError::Disconnected)) => self.again(),
             Some(Ok(opened)) => {
                 self.again();
-                let session = opened?;
-                if member.has_server() {
-                    return close_aside(session);
+                match opened {
+                    // It was heard meanwhile.
+                    Ok(session) if member.has_server() => close_aside(session),
+                    Ok(session) => {
+                        listen(&session, member, queues)?;
+                        println!("connected anew: the session before brought nothing");
+                        close_aside(member.session.replace(session));
+                    }
+                    Err(why) => println!("not connected anew, which is tried again: {why}"),
                 }
-                listen(&session, member, queues)?;
-                println!("connected anew: the session before brought nothing");
-                return close_aside(member.session.replace(session));
             }
         }
         Ok(())
@@ -87,9 +90,8 @@ impl Connection {
 }
 
 /// Which may take two seconds.
-fn close_aside(session: Session) -> Result<(), RelayError> {
+fn close_aside(session: Session) {
     std::thread::spawn(move || net::close(session));
-    Ok(())
 }
 
 /// What the server sends to this member goes to its queues.

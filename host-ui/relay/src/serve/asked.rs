@@ -80,7 +80,7 @@ fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
         super::lock(&rounds.server.paces).entry(seat).or_default().forget();
     }
     if let Some(pace) = super::lock(&rounds.server.paces).get_mut(&seat) {
-        pace.has_scene(rounds.announcements.has_scene(&hello));
+        pace.note_scene(rounds.announcements.has_scene(&hello));
     }
     let presence = Presence {
         epoch,

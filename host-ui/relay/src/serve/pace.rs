@@ -84,8 +84,8 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// Whether the member has the scene of the snapshots.
-    pub fn has_scene(&mut self, has_scene: bool) {
+    /// What the member says: whether it has the scene of the snapshots.
+    pub fn note_scene(&mut self, has_scene: bool) {
         self.has_scene = has_scene;
     }
 
@@ -171,7 +171,7 @@ mod tests {
     fn pace() -> Pace {
         let mut pace = Pace::default();
         assert_eq!(pace.room(Instant::now()), None, "no scene yet");
-        pace.has_scene(true);
+        pace.note_scene(true);
         pace
     }
 

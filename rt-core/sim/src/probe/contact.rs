@@ -20,6 +20,7 @@ const PASSES_ON_THE_WAY: usize = 2;
 /// A pass that leaves no pad farther than that from the probe's surface, on the wrong side, and no force turned farther from it, is the last.
 const CLOSED_M: f64 = 4e-7;
 const TURNED: f64 = 2e-4;
+
 /// What came of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactReport {

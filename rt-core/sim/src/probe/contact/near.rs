@@ -12,6 +12,7 @@ const NEAR_M: f64 = 0.15e-3;
 const FACING: f64 = 0.2;
 /// A problem is condensed anew where a force has turned by more than that since.
 const OTHERWISE: f64 = 0.03;
+
 /// How far a force turns in a pass, of the way to the surface: farther in every other pass, since one that has turned moves its point on by up to half
 /// as much again; and half as far from the 12th on, since a point that is hardly pressed may be in contact in every other pass.
 fn part_of(pass: usize) -> f64 {
@@ -72,6 +73,9 @@ pub(super) fn list(probe: &ReadyProbe, state: &mut ProbeState, pass: usize) {
             state.outward[state.near.len()] = towards(state, n, pass);
             state.near.push(n as u32);
             state.is_near[n] = true;
+        } else {
+            // The probe is no longer on its side of the wall.
+            state.pressed_n[n] = 0.0;
         }
     }
 }
