@@ -280,14 +280,14 @@ mod tests {
     /// Brute force.
     fn swept(turn: u32) -> Problem {
         let mut problem = problem(turn);
-        (0..400_000).for_each(|_| problem.sweep());
+        (0..200_000).for_each(|_| problem.sweep());
         problem
     }
 
     #[test]
     fn forces_are_those_of_many_sweeps_whichever_way_they_are_found() {
         let mut downhill = 0;
-        for turn in 0..20 {
+        for turn in 0..8 {
             let wanted = swept(turn);
             let mut found = problem(turn);
             found.solve();
@@ -295,12 +295,10 @@ mod tests {
             let off = wanted.forces_n.iter().zip(&found.forces_n).map(|(a, b)| (a - b).abs());
             let largest = wanted.forces_n.iter().fold(0.0_f64, |m, f| m.max(*f));
             let off = off.fold(0.0, f64::max);
-            println!("OFF {turn}: {:.2e} energy {:.2e} rounds {}", off / largest, (energy_j(&found) / energy_j(&wanted) - 1.0).abs(), found.rounds);
-            assert!(off < 0.05 * largest, "{turn}");
-            assert!(
-                (energy_j(&found) - energy_j(&wanted)).abs() < 1e-3 * energy_j(&wanted).abs(),
-                "{turn}"
-            );
+            // The ridge in the factor, a tenth of the smallest eigenvalue, is not in the sweeps.
+            assert!(off < 1e-3 * largest, "{turn}: {off} of {largest}");
+            let worse = energy_j(&found) / energy_j(&wanted) - 1.0;
+            assert!(worse.abs() < 1e-8, "{turn}: {worse}");
         }
         assert!(downhill > 0, "none of the sets went round");
     }
