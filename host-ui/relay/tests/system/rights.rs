@@ -155,6 +155,9 @@ fn is_shut_out(validity: Validity, of_another_lab: bool) -> String {
         let mut invitation = crate::fixture::invitation(&path);
         invitation.until_s = i64::MAX;
         write_invitation(&path, &invitation).expect("written");
+        // The server reads the list twice a second, and shuts a seat out of what is seen with a new session.
+        let is_read = || served.log().matches("serving instance").count() >= 2;
+        assert!(until(Duration::from_secs(5), is_read), "{}", served.log());
     }
     let joined = join(&path, &far);
     let mut host = Host::new(&far);
