@@ -5,7 +5,7 @@ CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: compensation procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: compensation envelope procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -18,10 +18,10 @@ build: ## Build both programs
 	$(CARGO) build --release --workspace --bin rt-core --bin host-ui
 
 test: deps-test ## Install what the tests need, build everything, run all tests
-# Both commands take the same packages: otherwise features differ and everything is built twice. Tests run one at a time,
-# because each system test starts its own real-time core.
+# Both commands take the same packages: otherwise features differ and everything is built twice. Tests of what runs in real
+# time run one at a time.
 	$(CARGO) build --release --workspace --all-targets
-	$(CARGO) test --release --workspace -- --test-threads=1
+	$(CARGO) test --release --workspace --config 'target."cfg(all())".runner="$(abspath docs/tools/test-program)"'
 
 package: deps-package build ## Build the Debian packages of both programs, into target/package
 	docs/tools/package "$(BIN)"
@@ -71,6 +71,9 @@ relay-faults: deps-test build ## Stop, kill and cut off server, observer and ope
 
 compensation: deps-test build ## Compensate every needle of every plan of docs/compensation.md, and write that page (four minutes)
 	UPDATE_DOCS=1 $(CARGO) test --release --workspace --test system -- --ignored --nocapture compensation_of_every
+
+envelope: deps-test ## Hold needles on lines with every hand over links of every lateness (20 minutes)
+	$(CARGO) test --release --workspace --lib -- --ignored --nocapture no_hand_sings_on_a_line_at_any
 
 live: ## Build stylet-live, which 'host-ui record --live' needs to serve Foxglove's app; the other targets neither need nor build it
 	cd host-ui/live && CARGO_TARGET_DIR=$(abspath $(BIN))/../live $(CARGO) build --release

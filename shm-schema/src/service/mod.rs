@@ -219,7 +219,7 @@ service!(
     commands: Command, by Hosts, history 0, buffer 64);
 service!(
     /// Answers to them: [`Reply`].
-    replies: Reply, by Core, history 0, buffer 64);
+    replies: Reply, by Core, history 0, buffer 128);
 service!(
     /// Results of rehearsals: [`Rehearsal`].
     rehearsals: Rehearsal, by Core, history 0, buffer 8);

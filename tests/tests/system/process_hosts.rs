@@ -197,25 +197,41 @@ fn a_flood_of_good_commands_reaches_neither_hand_nor_loop_and_the_operator_can_s
         let mut hand = Insertion::begin(&mut core, 0.004);
         hand.press();
         let instance = core.instance.clone();
-        let plan = move |id: u64| {
+        let plan = |host: u64, id: u64| {
             let id_of_change = ParameterId::MembranePeak;
             let value = 5.0 + (id % 10) as f64 * 0.01;
             let change = ParameterChange {
                 id: id_of_change,
                 value,
             };
-            Request::SetParameters(vec![change]).encode(77, id).expect("fits")
+            Request::SetParameters(vec![change]).encode(host, id).expect("fits")
         };
-        let flooder = std::thread::spawn(move || flood(&instance, Duration::from_secs(3), plan));
-        hand.watch(Duration::from_millis(2000));
+        let begin = |host: u64, seconds: u64| {
+            let instance = instance.clone();
+            std::thread::spawn(move || flood(&instance, Duration::from_secs(seconds), |id| plan(host, id)))
+        };
+        // One that came between two that flood: its queue is read after that of one of them.
+        let first = begin(77, 4);
+        hand.watch(Duration::from_millis(500));
+        let mut another = core.host();
+        let second = begin(78, 3);
+        hand.watch(Duration::from_millis(1500));
+        let mark = Request::Mark(Mark {
+            text: "seen".to_owned(),
+            before_s: 0.0,
+        });
+        let asked = Instant::now();
+        ask(&mut another, &mark).expect("a request of another host is taken");
+        println!("marked for another host in {:?}, under a flood", asked.elapsed());
+        drop(another);
         let asked = Instant::now();
         ask(&mut hand.link, &Request::Disengage).expect("a release is never refused");
         println!("released {:?} after it was asked, under a flood", asked.elapsed());
-        assert!(hand.watch_until(Duration::from_secs(10), |_| flooder.is_finished()));
-        let sent = flooder.join().expect("ours");
+        assert!(hand.watch_until(Duration::from_secs(10), |_| first.is_finished() && second.is_finished()));
+        let sent = first.join().expect("ours") + second.join().expect("ours");
         hand.watch(Duration::from_millis(500));
         let session = *hand.link.session().expect("live");
-        println!("{sent} commands sent in 3 s, {} refused", session.refused);
+        println!("{sent} commands sent in 4 s, {} refused", session.refused);
         assert!(sent > 10_000 && session.refused > 1000, "{sent} {}", session.refused);
         stylet_tests::hand::assert_smooth(&hand.records);
         assert!(hand.records.iter().all(|r| r.fault == 0));

@@ -9,7 +9,9 @@ use stylet_shm_schema::{EventKind, Exercise, ExercisesInForce, Mark, Refusal, Re
 impl Bridge {
     pub(super) fn mark(&mut self, ticket: Ticket, mark: &Mark) {
         let before_ns = (mark.before_s * 1e9) as u64;
-        let newest = self.link.newest_record().map_or(0, |record| record.tick);
+        // Whoever marks has seen the loop's own state, which is newer than the records of the last pass.
+        self.link.send_records(&mut self.loops.records);
+        let newest = self.newest_tick().unwrap_or(0);
         let tick = newest.saturating_sub(before_ns / self.link.session.period_ns.max(1));
         let details = EventDetails {
             text: &mark.text,

@@ -92,9 +92,9 @@ impl Link {
         self.batches.newest()
     }
 
-    /// Takes what the force loop has made and sends it in batches. True when the loop has made a tick.
-    pub fn send_records(&mut self, records: &mut rtrb::Consumer<TickRecord>) -> bool {
-        self.batches.pass(records, &self.ports.records, self.session.session_id)
+    /// Takes what the force loop has made and sends it in batches.
+    pub fn send_records(&mut self, records: &mut rtrb::Consumer<TickRecord>) {
+        self.batches.pass(records, &self.ports.records, self.session.session_id);
     }
 
     /// Whatever has not been sent yet.

@@ -179,6 +179,7 @@ impl Bridge {
     /// One pass; true when a host asked to end.
     fn pass(&mut self) -> Result<bool, LoopStopped> {
         self.link.announce();
+        let before = self.newest_tick();
         let end = self.take_commands();
         self.take_uploads();
         self.take_loaded();
@@ -186,7 +187,8 @@ impl Bridge {
         self.take_notices();
         self.scene.send(&self.link);
         while self.loops.old_worlds.pop().is_ok() {}
-        let made_a_tick = self.link.send_records(&mut self.loops.records);
+        self.link.send_records(&mut self.loops.records);
+        let made_a_tick = self.newest_tick() != before;
         self.pass_second();
         self.serve_flights();
         let generation = self.scene.generation();
@@ -207,6 +209,10 @@ impl Bridge {
             return Err(LoopStopped);
         }
         Ok(end)
+    }
+
+    fn newest_tick(&self) -> Option<u64> {
+        self.link.newest_record().map(|record| record.tick)
     }
 
     fn serve_probe(&mut self, generation: u64) {

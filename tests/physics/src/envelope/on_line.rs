@@ -122,15 +122,44 @@ impl Theatre {
     }
 }
 
-fn no_hand_sings(tissue: TissueKind) {
+/// Links that are so many ticks late, and every so many-th hand of the envelope: of every second one all corners are among them.
+#[derive(Clone, Copy)]
+struct Extent {
+    lateness: &'static [usize],
+    every: usize,
+}
+
+const LATE: Extent = Extent {
+    lateness: &[3],
+    every: 1,
+};
+const ALL: Extent = Extent {
+    lateness: &[0, 1, 2, 3],
+    every: 1,
+};
+
+impl Extent {
+    fn cases(self, theatre: &mut Theatre, place: (&str, f64)) -> Vec<Case> {
+        let links = self.lateness.iter();
+        let pairs = links.flat_map(|&late| hand_envelope().step_by(self.every).map(move |hand| (hand, late)));
+        pairs.map(|pair| theatre.session(pair, place, true)).collect()
+    }
+}
+
+fn no_hand_sings(tissue: TissueKind, extent: Extent) {
     let mut theatre = Theatre::of("paper", tissue);
     for place in [("pressed 4 mm", 4e-3), ("45 mm deep", 45e-3)] {
-        let mut all = Vec::new();
-        for late_ticks in 0..=3 {
-            all.extend(hand_envelope().map(|hand| theatre.session((hand, late_ticks), place, true)));
-        }
+        let all = extent.cases(&mut theatre, place);
         report(place.0, &all);
         all.iter().for_each(Case::assert_rests);
+    }
+}
+
+fn no_hand_sings_in(theatre: &mut Theatre, name: &str, places: [(&str, f64); 2], extent: Extent) {
+    for place in places {
+        let all = extent.cases(theatre, place);
+        report(&format!("{name}, {}", place.0), &all);
+        assert!(!all.iter().any(Case::sings), "{name}, {}", place.0);
     }
 }
 
@@ -150,12 +179,23 @@ fn report(place: &str, all: &[Case]) {
 
 #[test]
 fn no_hand_sings_on_a_line_of_chainmail() {
-    no_hand_sings(TissueKind::ChainMail);
+    let lateness = &[0, 3];
+    no_hand_sings(TissueKind::ChainMail, Extent { lateness, every: 1 });
 }
 
 #[test]
 fn no_hand_sings_on_a_line_of_finite_elements() {
-    no_hand_sings(TissueKind::Fem);
+    no_hand_sings(TissueKind::Fem, Extent { every: 2, ..LATE });
+}
+
+#[test]
+#[ignore = "a quarter of an hour: every hand on links of every lateness, make envelope"]
+fn no_hand_sings_on_a_line_at_any_lateness() {
+    for tissue in [TissueKind::ChainMail, TissueKind::Fem] {
+        no_hand_sings(tissue, ALL);
+    }
+    no_hand_sings_in_stiff_tissue(ALL);
+    no_hand_sings_on_bone(ALL);
 }
 
 /// The tests above can fail. Tissue in series is softer than a membrane before a rigid hand: it takes eight ticks.
@@ -180,31 +220,27 @@ fn without_control_a_link_eight_ticks_late_sings_on_a_line() {
 /// three ticks late, and in stiffer tissue all were thrown out.
 #[test]
 fn no_hand_sings_on_a_line_in_tissue_of_any_stiffness() {
+    no_hand_sings_in_stiff_tissue(LATE);
+}
+
+fn no_hand_sings_in_stiff_tissue(extent: Extent) {
     for young_pa in [17e3, 170e3, 1.7e6] {
-        let mut theatre = Theatre::of_stiffness(young_pa);
-        for place in [("pressed 4 mm", 4e-3), ("45 mm deep", 45e-3)] {
-            let mut all = Vec::new();
-            for late_ticks in [0, 3] {
-                all.extend(hand_envelope().map(|hand| theatre.session((hand, late_ticks), place, true)));
-            }
-            report(&format!("{} kPa, {}", young_pa / 1e3, place.0), &all);
-            assert!(!all.iter().any(Case::sings), "at {young_pa} Pa, {}", place.0);
-        }
+        let places = [("pressed 4 mm", 4e-3), ("45 mm deep", 45e-3)];
+        let name = format!("{} kPa", young_pa / 1e3);
+        no_hand_sings_in(&mut Theatre::of_stiffness(young_pa), &name, places, extent);
     }
 }
 
 /// Bone is a wall, and the shaft in the tissue before it holds as well.
 #[test]
 fn no_hand_sings_on_bone_at_the_end_of_a_line() {
+    no_hand_sings_on_bone(LATE);
+}
+
+fn no_hand_sings_on_bone(extent: Extent) {
     for young_pa in [17e3, 170e3] {
-        let mut theatre = Theatre::of_block(young_pa, 15);
-        for place in [("3 mm into bone", 33e-3), ("1 mm into bone", 31e-3)] {
-            let mut all = Vec::new();
-            for late_ticks in [0, 3] {
-                all.extend(hand_envelope().map(|hand| theatre.session((hand, late_ticks), place, true)));
-            }
-            report(&format!("{} kPa, {}", young_pa / 1e3, place.0), &all);
-            assert!(!all.iter().any(Case::sings), "at {young_pa} Pa, {}", place.0);
-        }
+        let places = [("3 mm into bone", 33e-3), ("1 mm into bone", 31e-3)];
+        let name = format!("bone behind {} kPa", young_pa / 1e3);
+        no_hand_sings_in(&mut Theatre::of_block(young_pa, 15), &name, places, extent);
     }
 }
