@@ -122,7 +122,13 @@ enum LeaseTask {
 }
 
 fn main() -> ExitCode {
-    match run(Cli::parse().task) {
+    let task = Cli::parse().task;
+    match task {
+        Task::Serve { .. } => stylet_relay::net::share_threads(&["tx"], "acc"),
+        Task::Join { .. } => stylet_relay::net::share_threads(&["rx", "acc", "tx", "net"], "app"),
+        _ => {}
+    }
+    match run(task) {
         Ok(code) => code,
         Err(why) => {
             eprintln!("relay: {why}");

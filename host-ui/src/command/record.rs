@@ -21,7 +21,7 @@ pub struct RecordArgs {
     /// Seconds to record [default: until interrupted or until rt-core ends]
     #[arg(long, value_name = "S")]
     duration: Option<f64>,
-    /// Snapshots of the gland per second, 0 to 60; the core sends 67 while the needle moves and 33 while it rests
+    /// Snapshots of the gland per second, 0 to 60; the core sends 67 while the needle moves, 33 while it rests, and 17 where nothing displaces the gland
     #[arg(long, default_value_t = 20.0, value_name = "HZ")]
     snapshot_rate: f64,
 }

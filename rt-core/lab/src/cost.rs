@@ -291,7 +291,7 @@ fn read_body(scene: &Scene, timed: &mut Timed, script: &Script, [locate, seeds, 
             }
         });
         timed(surface, &mut || {
-            body.write_surface(&scene.lattice, &scene.surface, &mut positions_m);
+            body.write_surface(&scene.surface, &mut positions_m);
             std::hint::black_box(&positions_m);
         });
     });

@@ -12,8 +12,8 @@ use stylet_shm_schema::{HapticState, SceneHeader, SnapshotHeader, TickRecord, Ve
 
 /// How often the queue of records is looked at: a batch waits half of it on average.
 const RECORDS_EVERY: Duration = Duration::from_micros(100);
-/// After a batch for half of the time that the batch before it took to come, and no longer.
-const RECORDS_PAUSE: Duration = Duration::from_millis(10);
+/// After a batch for most of the time that the batch before it took to come, and no longer.
+const RECORDS_PAUSE: Duration = Duration::from_millis(16);
 /// 60 a second at most.
 const SNAPSHOTS_EVERY: Duration = Duration::from_micros(16_700);
 const BOARD_EVERY: Duration = Duration::from_millis(20);
@@ -68,7 +68,7 @@ pub fn records(server: &Server) {
         let mut pause = RECORDS_EVERY;
         if any {
             watched.heard();
-            pause = (last.elapsed() / 2).clamp(RECORDS_EVERY, RECORDS_PAUSE);
+            pause = (last.elapsed() * 3 / 4).clamp(RECORDS_EVERY, RECORDS_PAUSE);
             last = Instant::now();
         }
         std::thread::sleep(pause);

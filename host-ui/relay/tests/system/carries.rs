@@ -2,7 +2,7 @@
 
 use crate::fixture::{Host, Keys, Named, core, invitation, join, lease, program, scratch, until};
 use crate::proxy::Proxy;
-use crate::watch::{Seen, arrivals, quantile, seconds, settle, snapshots_lost};
+use crate::watch::{Seen, arrivals, quantile, seconds, settle, snapshots_lost, socket_ages_ms};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -40,10 +40,11 @@ fn every_record_comes_in_order_and_snapshots_come_as_a_screen_shows_them() {
         let length = seconds(5.0);
         let end = Instant::now() + Duration::from_secs_f64(length);
         let lost_before = lease(&far, &["status"]);
-        let (here, seen) = std::thread::scope(|scope| {
+        let (here, mut bare_ms, seen) = std::thread::scope(|scope| {
             let here = scope.spawn(|| arrivals(&near.0, end));
+            let bare = scope.spawn(|| socket_ages_ms(end));
             let seen = Seen::until(&far, end);
-            (here.join().expect("ran"), seen)
+            (here.join().expect("ran"), bare.join().expect("ran"), seen)
         });
         let there = &seen.records;
         let mut ages_ms: Vec<f64> = there
@@ -52,6 +53,10 @@ fn every_record_comes_in_order_and_snapshots_come_as_a_screen_shows_them() {
             .collect();
         let [median, most, longest] = [0.5, 0.99, 1.0].map(|share| quantile(&mut ages_ms, share));
         println!("age over the host beside the core: p50 {median:.2}, p99 {most:.2}, longest {longest:.2} ms");
+        let [median, most, longest] = [0.5, 0.99, 1.0].map(|share| quantile(&mut bare_ms, share));
+        println!(
+            "a bare socket from thread to thread meanwhile: p50 {median:.2}, p99 {most:.2}, longest {longest:.2} ms"
+        );
         println!("{}", seen.words("one machine"));
         seen.has_every_record();
         assert!(there.len() as f64 > 0.9 * here.len() as f64, "{} records", there.len());

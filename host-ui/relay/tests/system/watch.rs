@@ -2,9 +2,11 @@
 
 use crate::fixture::{Named, lease, until};
 use std::collections::BTreeMap;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::time::{Duration, Instant};
 use stylet_relay::now_ns;
-use stylet_shm_schema::service::{self, Instance};
+use stylet_shm_schema::service::{self, BATCH_EVERY, Instance};
 
 /// Of each measurement, s; `STYLET_RELAY_S` makes it longer for a figure.
 pub fn seconds(everyday: f64) -> f64 {
@@ -12,7 +14,10 @@ pub fn seconds(everyday: f64) -> f64 {
     asked.unwrap_or(everyday)
 }
 
-/// When each tick was seen first, by a host that looks every 0.1 ms.
+const LOOK_EVERY: Duration = Duration::from_micros(100);
+
+/// When each tick was seen first, by a host that looks every 0.1 ms; not while no batch can come, so that the looking takes
+/// less of the processor than what is looked at.
 pub fn arrivals(instance: &Instance, until: Instant) -> BTreeMap<u64, Instant> {
     // So that it is the relay that is measured, not when this thread gets its turn.
     stylet_relay::slice::shorten();
@@ -20,13 +25,41 @@ pub fn arrivals(instance: &Instance, until: Instant) -> BTreeMap<u64, Instant> {
     let port = service::records::subscriber(&node).expect("a port");
     let mut seen = BTreeMap::new();
     while Instant::now() < until {
+        let mut pause = LOOK_EVERY;
         while let Some(sample) = port.receive() {
+            pause = BATCH_EVERY / 2;
             let now = Instant::now();
             seen.extend(sample.values().iter().map(|record| (record.tick, now)));
         }
-        std::thread::sleep(Duration::from_micros(100));
+        std::thread::sleep(pause);
     }
     seen
+}
+
+/// What a socket of this machine takes for a batch from one thread to another, ms: what no relay can be faster than here.
+pub fn socket_ages_ms(until: Instant) -> Vec<f64> {
+    const BATCH_BYTES: usize = 7_000;
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("bound");
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            let mut line = TcpStream::connect(address).expect("listens");
+            line.set_nodelay(true).expect("a socket");
+            while Instant::now() < until {
+                let mut batch = vec![0; BATCH_BYTES];
+                batch[..8].copy_from_slice(&now_ns().to_le_bytes());
+                line.write_all(&batch).expect("taken");
+                std::thread::sleep(BATCH_EVERY);
+            }
+        });
+        let (mut line, _) = listener.accept().expect("called");
+        let (mut batch, mut ages_ms) = (vec![0; BATCH_BYTES], Vec::new());
+        while line.read_exact(&mut batch).is_ok() {
+            let sent_ns = u64::from_le_bytes(batch[..8].try_into().expect("eight"));
+            ages_ms.push(now_ns().saturating_sub(sent_ns) as f64 * 1e-6);
+        }
+        ages_ms
+    })
 }
 
 /// How old each snapshot was when it came, ms, by its tissue tick. Both sides are on this machine, so their clock is one.

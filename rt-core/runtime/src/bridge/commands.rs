@@ -16,7 +16,7 @@ use stylet_sim::line::LeftNeedles;
 const MAX_OF_A_HOST: u32 = 16;
 /// Refusals for that reason that are answered in one pass, the others are counted: every host has all answers in its queue, and
 /// those to one that floods would drive out those to the others.
-const MAX_TOLD: u32 = 4;
+const MAX_ANSWERED: u32 = 4;
 /// Commands taken from the queues in one pass. Queues are read one after the other, so that a host that fills its own faster than
 /// it is read would keep the core from those behind it; a refusal that is counted alone takes less time than a request.
 const MAX_TAKEN: usize = 4096;
@@ -26,7 +26,7 @@ const MAX_TAKEN: usize = 4096;
 struct Taken {
     /// By host.
     of_host: Vec<(u64, u32)>,
-    told: u32,
+    answered: u32,
 }
 
 impl Taken {
@@ -43,10 +43,10 @@ impl Taken {
         has_room
     }
 
-    /// Counts a refusal for want of room; false when nobody is told of it.
-    fn is_told(&mut self) -> bool {
-        self.told += 1;
-        self.told <= MAX_TOLD
+    /// Counts a refusal for want of room; false when it is not answered.
+    fn is_answered(&mut self) -> bool {
+        self.answered += 1;
+        self.answered <= MAX_ANSWERED
     }
 }
 
@@ -62,7 +62,7 @@ impl Bridge {
             // A request that takes the force off is never too much.
             let is_free = [CommandKind::Disengage, CommandKind::Shutdown].map(|kind| kind as u32);
             if !taken.count(command.host_id) && !is_free.contains(&command.kind) {
-                match taken.is_told() {
+                match taken.is_answered() {
                     true => self.link.refuse(asker, &RefusalCode::TooManyRequests.into()),
                     false => self.link.session.refused += 1,
                 }

@@ -14,6 +14,8 @@ use super::{Lattice, Role, Structure};
 pub struct Surface {
     /// Every element on one of the surfaces, in the order of elements.
     pub vertex_elements: Vec<u32>,
+    /// Where each vertex is at rest: the centre of its element, m.
+    pub rest_m: Vec<[f32; 3]>,
     /// The element of a coarser body that each vertex goes with; empty where bodies are not coarser.
     pub moved_by: Vec<u32>,
     /// Indices into `vertex_elements`: the body's first, then the parts'.
@@ -68,7 +70,10 @@ impl Surface {
             let mesh = Mesh::of(lattice, |element| members[lattice.structure(element) as usize]);
             meshes.push((first, mesh));
         }
-        Surface::joined(&meshes)
+        let mut surface = Surface::joined(&meshes);
+        let centre_m = |&e: &u32| lattice.rest_m(e).map(|c| c as f32);
+        surface.rest_m = surface.vertex_elements.iter().map(centre_m).collect();
+        surface
     }
 
     /// Vertices go with the elements of `body`, which is `lattice` or coarser.
@@ -100,6 +105,7 @@ impl Surface {
         let body = parts.remove(0);
         Surface {
             vertex_elements,
+            rest_m: Vec::new(),
             moved_by: Vec::new(),
             triangles,
             body_triangles: body.triangles.len(),

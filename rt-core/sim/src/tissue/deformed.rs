@@ -46,30 +46,39 @@ impl Deformed<'_> {
 
     /// Writes the displacements of elements in metres; stops at the shorter of the two.
     pub fn write_displacements(&self, elements: &[u32], displacements_m: &mut [[f32; 3]]) {
-        for (slot, &element) in displacements_m.iter_mut().zip(elements) {
-            *slot = self.displacement(element).map(|u| (self.lattice.spacing_m * u) as f32);
-        }
+        self.for_each(elements, displacements_m, |slot, moved_m, _| *slot = moved_m);
     }
 
-    /// Writes the positions of the surface's vertices in metres; stops at the shorter of the two. `at_rest` is the lattice that
-    /// the surface was cut from.
-    pub fn write_surface(&self, at_rest: &Lattice, surface: &Surface, positions_m: &mut [[f32; 3]]) {
-        let vertices = surface.vertex_elements.iter();
-        if surface.moved_by.is_empty() {
-            let place_m = |element: u32, u: [f64; 3]| {
-                let rest = self.lattice.rest_m(element);
-                [0, 1, 2].map(|a| (rest[a] + self.lattice.spacing_m * u[a]) as f32)
-            };
-            let slots = positions_m.iter_mut().zip(vertices);
-            match self.carried {
-                Carried::Not => slots.for_each(|(slot, &e)| *slot = place_m(e, self.not_carried(e))),
-                _ => slots.for_each(|(slot, &e)| *slot = place_m(e, self.displacement(e))),
-            }
-            return;
+    /// Writes the positions of the surface's vertices in metres; stops at the shorter of the two.
+    pub fn write_surface(&self, surface: &Surface, positions_m: &mut [[f32; 3]]) {
+        let elements = match surface.moved_by.is_empty() {
+            true => &surface.vertex_elements,
+            false => &surface.moved_by,
+        };
+        let count = positions_m.len().min(surface.rest_m.len());
+        let (positions_m, rest_m) = (&mut positions_m[..count], &surface.rest_m[..count]);
+        self.for_each(elements, positions_m, |slot, moved_m, n| {
+            *slot = [0, 1, 2].map(|a| rest_m[n][a] + moved_m[a]);
+        });
+    }
+
+    /// Gives `put` each slot, the displacement of its element in metres, and its number.
+    #[inline(always)]
+    fn for_each(&self, elements: &[u32], slots: &mut [[f32; 3]], mut put: impl FnMut(&mut [f32; 3], [f32; 3], usize)) {
+        let slots = slots.iter_mut().zip(elements).enumerate();
+        if matches!(self.carried, Carried::Not) {
+            let unit_m = self.lattice.spacing_m as f32 * self.scale;
+            let moved_m = |e: u32| self.u.map(|c| c.get(e as usize).map_or(0.0, |u| unit_m * u));
+            return slots.for_each(|(n, (slot, &element))| put(slot, moved_m(element), n));
         }
-        for ((slot, &element), &moved_by) in positions_m.iter_mut().zip(vertices).zip(&surface.moved_by) {
-            let (rest_m, u) = (at_rest.rest_m(element), self.displacement(moved_by));
-            *slot = [0, 1, 2].map(|a| (rest_m[a] + self.lattice.spacing_m * u[a]) as f32);
+        // Neighbours on a surface go with the same element of a coarser body.
+        let mut last = (u32::MAX, [0.0; 3]);
+        for (n, (slot, &element)) in slots {
+            if last.0 != element {
+                let u = self.displacement(element);
+                last = (element, u.map(|u| (self.lattice.spacing_m * u) as f32));
+            }
+            put(slot, last.1, n);
         }
     }
 }

@@ -10,9 +10,10 @@ use stylet_sim::line::MAX_LEFT;
 use stylet_sim::tissue::StepReport;
 
 /// Ticks from one snapshot to the next while the needle moves: 67 Hz, above the rate of most screens. What moves by itself,
-/// with the needle at rest, is seen at 33 Hz.
+/// with the needle at rest, is seen at 33 Hz, and a body that nothing displaces at 17 Hz: there each snapshot shows the same.
 const TICKS_MOVING: u64 = 3;
 const TICKS_AT_REST: u64 = 6;
+const TICKS_UNDISPLACED: u64 = 12;
 
 /// What the last snapshot showed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,6 +25,8 @@ pub struct Shown {
     seeds: usize,
     left: usize,
     scene_generation: u64,
+    /// Some part of the body is not where it is at rest.
+    is_displaced: bool,
 }
 
 impl TissueLoop {
@@ -33,7 +36,11 @@ impl TissueLoop {
             tick: now.tick,
             ..self.shown
         };
-        let least = if *now == same { TICKS_AT_REST } else { TICKS_MOVING };
+        let least = match *now == same {
+            false => TICKS_MOVING,
+            true if now.is_displaced => TICKS_AT_REST,
+            true => TICKS_UNDISPLACED,
+        };
         now.tick.wrapping_sub(self.shown.tick) >= least || now.scene_generation != self.shown.scene_generation
     }
 
@@ -48,6 +55,7 @@ impl TissueLoop {
             seeds: self.seeds.len(),
             left: self.left.len(),
             scene_generation: self.world.generation,
+            is_displaced: self.is_displaced(report),
         };
         if !self.is_snapshot_due(&now) {
             return;
@@ -57,7 +65,7 @@ impl TissueLoop {
                 && slot.vertex_count == self.world.scene.surface.vertex_elements.len()
                 && slot.node_count == self.world.scene.nodes.elements.len();
             if filled {
-                self.fill(&slot, woke_ns, work_ns, report);
+                self.fill(&slot, woke_ns, work_ns, report, now.is_displaced);
             }
             let _ = self.ports.filled.push(SnapshotReturn {
                 index: slot.index,
@@ -70,7 +78,13 @@ impl TissueLoop {
         }
     }
 
-    fn fill(&self, slot: &SnapshotSlot, woke_ns: u64, work_ns: u64, report: &StepReport) {
+    /// Also where that is no number.
+    fn is_displaced(&self, report: &StepReport) -> bool {
+        let body = self.world.tissue.deformed();
+        report.max_displacement != 0.0 || body.carried.largest_m(body.lattice.spacing_m) != 0.0
+    }
+
+    fn fill(&self, slot: &SnapshotSlot, woke_ns: u64, work_ns: u64, report: &StepReport, is_displaced: bool) {
         let sent = slot.vertex_count + slot.node_count;
         // SAFETY: the bridge loaned `vertex_count + node_count` vertices at this address to us alone and keeps them mapped
         // until the slot is returned; they were zeroed, and Vertex is valid for every bit pattern.
@@ -81,8 +95,16 @@ impl TissueLoop {
             && let Some((surface, inside)) = positions.split_at_mut_checked(slot.vertex_count)
         {
             let scene = &self.world.scene;
-            body.write_surface(&scene.lattice, &scene.surface, surface);
-            body.write_displacements(&self.world.scene.nodes.elements, inside);
+            if is_displaced {
+                body.write_surface(&scene.surface, surface);
+                body.write_displacements(&scene.nodes.elements, inside);
+            } else {
+                surface
+                    .iter_mut()
+                    .zip(&scene.surface.rest_m)
+                    .for_each(|(slot, rest_m)| *slot = *rest_m);
+                inside.fill([0.0; 3]);
+            }
             self.move_with_body(surface, inside);
         }
         // SAFETY: as above, for the header.

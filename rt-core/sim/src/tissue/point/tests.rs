@@ -119,9 +119,7 @@ fn direction_is_that_of_two_points_a_little_apart() {
 fn surface_is_written_in_metres() {
     let (scene, model, state) = deformed();
     let mut positions = vec![[0.0; 3]; scene.surface.vertex_elements.len()];
-    state
-        .deformed(&model)
-        .write_surface(&scene.lattice, &scene.surface, &mut positions);
+    state.deformed(&model).write_surface(&scene.surface, &mut positions);
     for (position, &element) in positions.iter().zip(&scene.surface.vertex_elements) {
         let expected = state.position_m(&model, element);
         assert!(distance(position.map(f64::from), expected) < 1e-7);
