@@ -24,7 +24,7 @@ fn armed_threads_make_no_heap_call_and_fault_no_page_with_finite_elements() {
 #[test]
 fn armed_threads_make_no_heap_call_and_fault_no_page_with_a_second_device() {
     where_the_machine_runs(|| {
-        the_loops_keep_their_contract(&["--rt-if-allowed", "--device-2", "simulated"], 10_000);
+        the_loops_keep_their_contract(&["--rt-if-allowed", "--device-2", "simulated"], 4_000);
     });
 }
 

@@ -179,8 +179,7 @@ fn report(place: &str, all: &[Case]) {
 
 #[test]
 fn no_hand_sings_on_a_line_of_chainmail() {
-    let lateness = &[0, 3];
-    no_hand_sings(TissueKind::ChainMail, Extent { lateness, every: 1 });
+    no_hand_sings(TissueKind::ChainMail, LATE);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::drive::{Seen, drive};
 use super::models::{Kind, block, block_on_bone, body};
 use super::table::Row;
+use rayon::prelude::*;
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::{Scene, Structure};
 use stylet_sim::tissue::{Deformed, Held, TissueModel};
@@ -136,8 +137,12 @@ const CASES: [Case; 15] = [
 ];
 
 pub fn all() -> Vec<Row> {
-    let pairs = CASES.iter().flat_map(|case| Kind::ALL.map(|kind| (case, kind)));
-    pairs
+    let pairs: Vec<_> = CASES
+        .iter()
+        .flat_map(|case| Kind::ALL.map(|kind| (case, kind)))
+        .collect();
+    let rows: Vec<Row> = pairs
+        .into_par_iter()
         .filter_map(|(case, kind)| {
             let (happened, met) = (case.run)(kind)?;
             Some(Row {
@@ -149,8 +154,8 @@ pub fn all() -> Vec<Row> {
                 met,
             })
         })
-        .chain(far_from_origin())
-        .collect()
+        .collect();
+    rows.into_iter().chain(far_from_origin()).collect()
 }
 
 fn held_at(body: &Deformed, element: u32, way: [f64; 3]) -> Held {
