@@ -122,13 +122,7 @@ enum LeaseTask {
 }
 
 fn main() -> ExitCode {
-    let task = Cli::parse().task;
-    match task {
-        Task::Serve { .. } => stylet_relay::net::share_threads(&["tx"], "acc"),
-        Task::Join { .. } => stylet_relay::net::share_threads(&["rx", "acc", "tx", "net"], "app"),
-        _ => {}
-    }
-    match run(task) {
+    match run(Cli::parse().task) {
         Ok(code) => code,
         Err(why) => {
             eprintln!("relay: {why}");

@@ -128,17 +128,6 @@ pub fn join(server: &str, identity: &Identity) -> Result<Session, RelayError> {
     open(&config).map_err(|e| RelayError(format!("cannot connect to {server}: {e}")))
 }
 
-/// Lets zenoh do the work of some of its threads on another one: a message is handed from part to part without a thread that has to wake for
-/// it, 0.1 ms each. Before there are threads; whoever has set it otherwise is left alone.
-pub fn share_threads(parts: &[&str], with: &str) {
-    const NAME: &str = "ZENOH_RUNTIME";
-    if std::env::var_os(NAME).is_none() {
-        let handed: Vec<String> = parts.iter().map(|part| format!("{part}: (handover: {with})")).collect();
-        // SAFETY: called by `main` while this thread is the only one.
-        unsafe { std::env::set_var(NAME, format!("({})", handed.join(", "))) };
-    }
-}
-
 fn open(config: &Value) -> Result<Session, zenoh::Error> {
     claimed::note_refused();
     // A second session of one program has the log already.
