@@ -21,7 +21,7 @@ test: deps-test ## Install what the tests need, build everything, run all tests
 # Both commands take the same packages: otherwise features differ and everything is built twice. Tests of what runs in real
 # time run one at a time.
 	$(CARGO) build --release --workspace --all-targets
-	$(CARGO) test --release --workspace --config 'target."cfg(all())".runner="$(abspath docs/tools/test-program)"'
+	$(CARGO) test --release --workspace --config 'target."cfg(all())".runner=["$(abspath docs/tools/test-program)"]'
 
 package: deps-package build ## Build the Debian packages of both programs, into target/package
 	docs/tools/package "$(BIN)"
