@@ -30,8 +30,8 @@ struct Taken {
 }
 
 impl Taken {
-    /// Counts a command; false when it is too much.
-    fn count(&mut self, host_id: u64) -> bool {
+    /// Counts a command; false where it is one too many.
+    fn admits(&mut self, host_id: u64) -> bool {
         if let Some((_, count)) = self.of_host.iter_mut().find(|(id, _)| *id == host_id) {
             *count += 1;
             return *count <= MAX_OF_A_HOST;
@@ -43,8 +43,8 @@ impl Taken {
         has_room
     }
 
-    /// Counts a refusal for want of room; false when it is not answered.
-    fn is_answered(&mut self) -> bool {
+    /// Counts a refusal for that reason; false where it is not answered.
+    fn answers(&mut self) -> bool {
         self.answered += 1;
         self.answered <= MAX_ANSWERED
     }
@@ -61,8 +61,8 @@ impl Bridge {
             let asker = (command.host_id, command.command_id);
             // A request that takes the force off is never too much.
             let is_free = [CommandKind::Disengage, CommandKind::Shutdown].map(|kind| kind as u32);
-            if !taken.count(command.host_id) && !is_free.contains(&command.kind) {
-                match taken.is_answered() {
+            if !taken.admits(command.host_id) && !is_free.contains(&command.kind) {
+                match taken.answers() {
                     true => self.link.refuse(asker, &RefusalCode::TooManyRequests.into()),
                     false => self.link.session.refused += 1,
                 }
