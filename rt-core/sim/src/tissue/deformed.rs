@@ -71,14 +71,9 @@ impl Deformed<'_> {
             let moved_m = |e: u32| self.u.map(|c| c.get(e as usize).map_or(0.0, |u| unit_m * u));
             return slots.for_each(|(n, (slot, &element))| put(slot, moved_m(element), n));
         }
-        // Neighbours on a surface go with the same element of a coarser body.
-        let mut last = (u32::MAX, [0.0; 3]);
         for (n, (slot, &element)) in slots {
-            if last.0 != element {
-                let u = self.displacement(element);
-                last = (element, u.map(|u| (self.lattice.spacing_m * u) as f32));
-            }
-            put(slot, last.1, n);
+            let u = self.displacement(element);
+            put(slot, u.map(|u| (self.lattice.spacing_m * u) as f32), n);
         }
     }
 }
