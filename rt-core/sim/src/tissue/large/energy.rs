@@ -13,6 +13,20 @@ use crate::simd::{Vector, in_vectors};
 /// Volume of a corner, over that at rest, below which the logarithm is a parabola.
 const OPEN: f32 = 0.1;
 
+/// For corners 0 to 7, each with code of its own: which links it has is known when that is compiled.
+macro_rules! each_corner {
+    ($corner:ident $body:block) => {
+        each_corner!(@ $corner $body 0 1 2 3 4 5 6 7)
+    };
+    (@ $corner:ident $body:block $($number:literal)*) => {
+        $({
+            const CORNER: usize = $number;
+            let $corner = CORNER;
+            $body
+        })*
+    };
+}
+
 /// Three numbers for each node.
 pub(super) type Nodes = [Vec<f32>; 3];
 
@@ -25,10 +39,45 @@ pub(super) struct Cells {
     pub lambda: Vec<f32>,
 }
 
+/// Forces on nodes, in two parts while they are added up: what a row of cells does to the nodes behind it along x lies in
+/// memory where the cells do. A vector that is read across two that were just written waits for both.
+#[derive(Clone, Debug)]
+pub(super) struct Sides {
+    /// All of it, once it is added up.
+    pub sum: Nodes,
+    next: Nodes,
+}
+
+impl Sides {
+    pub fn new(grid: &Grid) -> Self {
+        let zero = || std::array::from_fn(|_| vec![0.0; grid.len()]);
+        Sides {
+            sum: zero(),
+            next: zero(),
+        }
+    }
+
+    #[inline(always)]
+    fn clear(&mut self) {
+        for axis in self.sum.iter_mut().chain(&mut self.next) {
+            axis.fill(0.0);
+        }
+    }
+
+    #[inline(always)]
+    fn join(&mut self) {
+        for (sum, next) in self.sum.iter_mut().zip(&self.next) {
+            for (sum, next) in sum.iter_mut().skip(1).zip(next) {
+                *sum += next;
+            }
+        }
+    }
+}
+
 in_vectors! {
 /// Becomes the gradient of the energy where centres are displaced by `u` elements.
-fn neo_hookean<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut Nodes) {
-    out.iter_mut().for_each(|axis| axis.fill(0.0));
+fn neo_hookean<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut Sides) {
+    out.clear();
     let one = V::splat(1.0);
     for at in grid.rows_of_cells() {
         let mut links = links::<V>(grid, u, at);
@@ -39,14 +88,14 @@ fn neo_hookean<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut 
         }
         let mut j = [V::splat(0.0); 8];
         let mut mean = V::splat(0.0);
-        for corner in 0..8 {
+        each_corner!(corner {
             let f = at_corner(&links, corner);
             j[corner] = dot(f[0], cross(f[1], f[2]));
             mean = mean.add(load::<V>(&cells.mu[corner], at).mul(j[corner].sub(one)));
-        }
+        });
         let mean = mean.mul(load::<V>(&cells.lambda, at));
         let mut forces = [[[V::splat(0.0); 3]; 4]; 3];
-        for corner in 0..8 {
+        each_corner!(corner {
             let mu = load::<V>(&cells.mu[corner], at);
             let f = at_corner(&links, corner);
             let cof = [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])];
@@ -57,16 +106,17 @@ fn neo_hookean<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut 
                     force[c] = force[c].add(mu.mul(f[axis][c]).add(pressure.mul(cof[axis][c])));
                 }
             }
-        }
+        });
         spread(grid, &forces, out, at);
     }
+    out.join();
 }
 }
 
 in_vectors! {
 /// The same of the linear energy that it has near rest.
-fn linear<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut Nodes) {
-    out.iter_mut().for_each(|axis| axis.fill(0.0));
+fn linear<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut Sides) {
+    out.clear();
     for at in grid.rows_of_cells() {
         let links = links::<V>(grid, u, at);
         let mut mean = V::splat(0.0);
@@ -89,6 +139,7 @@ fn linear<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut Nodes
         }
         spread(grid, &forces, out, at);
     }
+    out.join();
 }
 }
 
@@ -178,7 +229,7 @@ fn dot<V: Vector<f32>>(a: [V; 3], b: [V; 3]) -> V {
 
 /// From links to nodes.
 #[inline(always)]
-fn spread<V: Vector<f32>>(grid: &Grid, forces: &Links<V>, out: &mut Nodes, at: usize) {
+fn spread<V: Vector<f32>>(grid: &Grid, forces: &Links<V>, out: &mut Sides, at: usize) {
     for c in 0..3 {
         let mut nodes = [V::splat(0.0); 8];
         for axis in 0..3 {
@@ -190,8 +241,9 @@ fn spread<V: Vector<f32>>(grid: &Grid, forces: &Links<V>, out: &mut Nodes, at: u
             }
         }
         for (n, node) in nodes.into_iter().enumerate() {
-            let from = at + grid.step(n);
-            let to: &mut [f32; ROW] = (&mut out[c][from..from + ROW]).try_into().expect("a row");
+            let side = if n & 1 == 0 { &mut out.sum } else { &mut out.next };
+            let from = at + grid.step(n & !1);
+            let to: &mut [f32; ROW] = (&mut side[c][from..from + ROW]).try_into().expect("a row");
             V::load(to).add(node).store(to);
         }
     }

@@ -58,7 +58,7 @@ impl LargeStrain {
         let shear = materials.map(|m| if m.fixed { 0.0 } else { m.young_pa / (1.0 + m.poisson) });
         let shear: Vec<f64> = shear.collect();
         let first = shear.iter().copied().find(|&s| s > 0.0).unwrap_or(1.0);
-        let solver = Solver::new(SIDE);
+        let solver = Solver::new();
         LargeStrain {
             off: solve::nodes(&solver.grid),
             moved: solve::nodes(&solver.grid),

@@ -1,13 +1,20 @@
 //! The inverse of the seven-point Laplacian with its rim held: what a solver's steps are measured with.
 
+use super::SIDE;
 use super::energy::Nodes;
 use super::grid::{Grid, ROW};
-use crate::simd::{Simd, vectorised};
+use crate::simd::{Simd, Vector, in_vectors, vectorised};
+
+/// Nodes along an edge without the rim: an odd number, with one in the middle.
+const INNER: usize = SIDE - 2;
+const HALF: usize = INNER / 2;
 
 /// Sines along an axis, in which the Laplacian is a number for each.
 #[derive(Clone, Debug)]
 pub(super) struct Laplacian {
-    /// Rows as long as those of the grid.
+    /// Of each sine at the inner nodes up to the middle: beyond it they are those, or their negatives.
+    halves: [[f32; HALF + 1]; INNER],
+    /// By node and sine, in rows as long as those of the grid.
     sines: Vec<f32>,
     /// By node.
     inverse: Vec<f32>,
@@ -15,78 +22,114 @@ pub(super) struct Laplacian {
 
 impl Laplacian {
     pub fn new(grid: &Grid) -> Self {
-        let (n, stride) = (grid.side, grid.stride);
-        let inner = n - 2;
-        let angle = std::f64::consts::PI / (inner + 1) as f64;
-        let mut sines = vec![0.0; n * stride];
-        for a in 1..=inner {
-            for b in 1..=inner {
-                let value = (2.0 / (inner + 1) as f64).sqrt() * (angle * (a * b) as f64).sin();
-                sines[a * stride + b] = value as f32;
+        let stride = grid.stride;
+        let angle = std::f64::consts::PI / (INNER + 1) as f64;
+        let sine = |a: usize, b: usize| ((2.0 / (INNER + 1) as f64).sqrt() * (angle * (a * b) as f64).sin()) as f32;
+        let mut sines = vec![0.0; SIDE * stride];
+        for a in 1..=INNER {
+            for b in 1..=INNER {
+                sines[a * stride + b] = sine(a, b);
             }
         }
         let of = |k: usize| 2.0 - 2.0 * (angle * k as f64).cos();
         let mut inverse = vec![0.0; grid.len()];
-        for place in grid.places().filter(|p| p.iter().all(|&c| c > 0 && c < n - 1)) {
+        for place in grid.places().filter(|p| p.iter().all(|&c| c > 0 && c < SIDE - 1)) {
             inverse[grid.at(place)] = (1.0 / place.iter().map(|&c| of(c)).sum::<f64>()) as f32;
         }
-        Laplacian { sines, inverse }
+        Laplacian {
+            halves: std::array::from_fn(|k| std::array::from_fn(|i| sine(k + 1, i + 1))),
+            sines,
+            inverse,
+        }
     }
 
-    /// In place; `room` is as long as one component.
-    pub fn apply(&self, simd: Simd, grid: &Grid, of: &mut Nodes, room: &mut [f32]) {
+    /// In place; the rim keeps what it has.
+    pub fn apply(&self, simd: Simd, grid: &Grid, of: &mut Nodes) {
         for axis in of {
-            along_x(simd, grid, &self.sines, axis, room);
-            across(simd, grid, &self.sines, [1, 0], room, axis);
-            across(simd, grid, &self.sines, [0, 1], axis, room);
-            for (value, inverse) in room.iter_mut().zip(&self.inverse) {
-                *value *= inverse;
-            }
-            across(simd, grid, &self.sines, [0, 1], room, axis);
-            across(simd, grid, &self.sines, [1, 0], axis, room);
-            along_x(simd, grid, &self.sines, room, axis);
+            along_x(simd, grid, &self.sines, axis);
+            along_y(simd, grid, &self.halves, axis);
+            there_and_back_along_z(simd, grid, &self.halves, &self.inverse, axis);
+            along_y(simd, grid, &self.halves, axis);
+            along_x(simd, grid, &self.sines, axis);
         }
     }
 }
 
 vectorised! {
-fn along_x(grid: &Grid, sines: &[f32], from: &[f32], to: &mut [f32]) {
+fn along_x(grid: &Grid, sines: &[f32], values: &mut [f32]) {
     let stride = grid.stride;
-    for (from, to) in from.chunks_exact(stride).zip(to.chunks_exact_mut(stride)) {
+    for (y, z) in (0..INNER * INNER).map(|line| (1 + line % INNER, 1 + line / INNER)) {
+        let at = grid.at([0, y, z]);
+        let row = &mut values[at..at + stride];
+        let from: [f32; INNER] = row[1..=INNER].try_into().expect("a row");
         for at in (0..stride).step_by(ROW) {
             let mut sum = [0.0_f32; ROW];
-            for (x, &value) in from.iter().enumerate().take(grid.side - 1).skip(1) {
-                let sines: &[f32; ROW] = sines[x * stride + at..][..ROW].try_into().expect("a row");
+            for (x, value) in from.iter().enumerate() {
+                let sines: &[f32; ROW] = sines[(x + 1) * stride + at..][..ROW].try_into().expect("a row");
                 for l in 0..ROW {
                     sum[l] += value * sines[l];
                 }
             }
-            to[at..at + ROW].copy_from_slice(&sum);
+            row[at..at + ROW].copy_from_slice(&sum);
         }
     }
 }
 }
 
-vectorised! {
-/// Along y by `[1, 0]`, along z by `[0, 1]`.
-fn across(grid: &Grid, sines: &[f32], along: [usize; 2], from: &[f32], to: &mut [f32]) {
-    let (n, stride) = (grid.side, grid.stride);
-    let step = stride * (along[0] + n * along[1]);
-    let other = stride * (along[1] + n * along[0]);
-    for line in 0..n {
-        for at in (0..stride).step_by(ROW) {
-            for out in 0..n {
-                let mut sum = [0.0_f32; ROW];
-                for inner in 1..n - 1 {
-                    let value = sines[out * stride + inner];
-                    let from: &[f32; ROW] = from[line * other + inner * step + at..][..ROW].try_into().expect("a row");
-                    for l in 0..ROW {
-                        sum[l] += value * from[l];
-                    }
-                }
-                to[line * other + out * step + at..][..ROW].copy_from_slice(&sum);
-            }
+in_vectors! {
+fn along_y<V: Vector<f32>>(grid: &Grid, halves: &[[f32; HALF + 1]; INNER], values: &mut [f32]) {
+    for z in 1..=INNER {
+        for x in (0..grid.stride).step_by(ROW) {
+            let at = grid.at([x, 1, z]);
+            let line = line::<V>(values, at, grid.stride);
+            put(values, at, grid.stride, &in_sines(&line, halves));
         }
     }
 }
+}
+
+in_vectors! {
+fn there_and_back_along_z<V: Vector<f32>>(grid: &Grid, halves: &[[f32; HALF + 1]; INNER], inverse: &[f32], values: &mut [f32]) {
+    let step = grid.stride * grid.side;
+    for y in 1..=INNER {
+        for x in (0..grid.stride).step_by(ROW) {
+            let at = grid.at([x, y, 1]);
+            let mut of_sines = in_sines(&line::<V>(values, at, step), halves);
+            for (value, inverse) in of_sines.iter_mut().zip(line::<V>(inverse, at, step)) {
+                *value = value.mul(inverse);
+            }
+            put(values, at, step, &in_sines(&of_sines, halves));
+        }
+    }
+}
+}
+
+#[inline(always)]
+fn line<V: Vector<f32>>(values: &[f32], at: usize, step: usize) -> [V; INNER] {
+    std::array::from_fn(|n| V::load(values[at + n * step..][..ROW].try_into().expect("a row")))
+}
+
+#[inline(always)]
+fn put<V: Vector<f32>>(values: &mut [f32], at: usize, step: usize, line: &[V; INNER]) {
+    for (n, value) in line.iter().enumerate() {
+        value.store((&mut values[at + n * step..][..ROW]).try_into().expect("a row"));
+    }
+}
+
+/// Sines are symmetric about the middle or the opposite, by turns: what both sides have together or apart is looked at once.
+#[inline(always)]
+fn in_sines<V: Vector<f32>>(line: &[V; INNER], halves: &[[f32; HALF + 1]; INNER]) -> [V; INNER] {
+    let (mut together, mut apart) = ([line[HALF]; HALF + 1], [line[HALF]; HALF]);
+    for n in 0..HALF {
+        together[n] = line[n].add(line[INNER - 1 - n]);
+        apart[n] = line[n].sub(line[INNER - 1 - n]);
+    }
+    let mut sums = [V::splat(0.0); INNER];
+    for (k, (sum, half)) in sums.iter_mut().zip(halves).enumerate() {
+        let both = if k % 2 == 0 { &together[..] } else { &apart[..] };
+        for (value, sine) in both.iter().zip(half) {
+            *sum = sum.add(value.mul(V::splat(*sine)));
+        }
+    }
+    sums
 }

@@ -1,6 +1,7 @@
 //! Minimises the energy of a window under its loads: L-BFGS on top of the Laplacian, a bounded number of evaluations.
 
-use super::energy::{Cells, Nodes, linear, neo_hookean};
+use super::SIDE;
+use super::energy::{Cells, Nodes, Sides, linear, neo_hookean};
 use super::grid::Grid;
 use super::kernels::{add, differ, dot, farthest, mask};
 use super::precondition::Laplacian;
@@ -40,10 +41,9 @@ pub(super) struct Solver {
     length: f32,
     /// The load over its length.
     along: Nodes,
-    gradient: Nodes,
+    gradient: Sides,
     pub before: Nodes,
     direction: Nodes,
-    room: Vec<f32>,
     pairs: Vec<Pair>,
     alphas: [f32; KEPT],
     used: usize,
@@ -68,8 +68,8 @@ pub(super) fn nodes(grid: &Grid) -> Nodes {
 }
 
 impl Solver {
-    pub fn new(side: usize) -> Self {
-        let grid = Grid::new(side);
+    pub fn new() -> Self {
+        let grid = Grid::new(SIDE);
         let zero = || nodes(&grid);
         Solver {
             cells: Cells {
@@ -85,10 +85,9 @@ impl Solver {
             load: zero(),
             length: 0.0,
             along: zero(),
-            gradient: zero(),
+            gradient: Sides::new(&grid),
             before: zero(),
             direction: zero(),
-            room: vec![0.0; grid.len()],
             pairs: (0..KEPT)
                 .map(|_| Pair {
                     step: zero(),
@@ -111,7 +110,8 @@ impl Solver {
     /// Takes the loads that the linear answer stands for.
     pub fn begin(&mut self) {
         self.used = 0;
-        linear(self.simd, &self.grid, &self.cells, &self.linear, &mut self.load);
+        linear(self.simd, &self.grid, &self.cells, &self.linear, &mut self.gradient);
+        keep(&self.gradient.sum, &mut self.load);
         mask(self.simd, &mut self.load, &self.free);
         self.length = dot(self.simd, &self.load, &self.load).sqrt();
         let length = self.length.max(f32::MIN_POSITIVE);
@@ -123,8 +123,7 @@ impl Solver {
         for (answer, along) in self.answer.iter_mut().zip(&self.along) {
             answer.copy_from_slice(along);
         }
-        self.laplacian
-            .apply(self.simd, &self.grid, &mut self.answer, &mut self.room);
+        self.laplacian.apply(self.simd, &self.grid, &mut self.answer);
         mask(self.simd, &mut self.answer, &self.free);
         self.share = dot(self.simd, &self.along, &self.answer).max(f32::MIN_POSITIVE);
     }
@@ -138,11 +137,11 @@ impl Solver {
     /// Forces less the loads, and less what holds the place of the load; returns their square.
     fn evaluate(&mut self) -> f32 {
         neo_hookean(self.simd, &self.grid, &self.cells, &self.now, &mut self.gradient);
-        mask(self.simd, &mut self.gradient, &self.free);
-        add(self.simd, &mut self.gradient, -1.0, &self.load);
-        let held = dot(self.simd, &self.answer, &self.gradient) / self.share;
-        add(self.simd, &mut self.gradient, -held, &self.along);
-        dot(self.simd, &self.gradient, &self.gradient)
+        mask(self.simd, &mut self.gradient.sum, &self.free);
+        add(self.simd, &mut self.gradient.sum, -1.0, &self.load);
+        let held = dot(self.simd, &self.answer, &self.gradient.sum) / self.share;
+        add(self.simd, &mut self.gradient.sum, -held, &self.along);
+        dot(self.simd, &self.gradient.sum, &self.gradient.sum)
     }
 
     /// Evaluations of the gradient: as many as it takes until the window rests, at most `evaluations`, and where it is folded then at
@@ -164,7 +163,7 @@ impl Solver {
                 smallest = there;
                 keep(&self.now, &mut self.best);
             }
-            let slope = dot(self.simd, &self.direction, &self.gradient);
+            let slope = dot(self.simd, &self.direction, &self.gradient.sum);
             let is_far = slope > OVERSHOT * -self.slope || there.is_nan() || there >= GREW * square;
             self.is_trial = is_far;
             if is_far {
@@ -184,11 +183,11 @@ impl Solver {
     /// A step down from where the gradient was taken; false where there is none.
     fn set_out(&mut self) -> bool {
         self.aim();
-        self.slope = dot(self.simd, &self.direction, &self.gradient);
+        self.slope = dot(self.simd, &self.direction, &self.gradient.sum);
         if self.slope.is_nan() || self.slope >= 0.0 {
             return false;
         }
-        keep(&self.gradient, &mut self.before);
+        keep(&self.gradient.sum, &mut self.before);
         self.part = (FARTHEST / farthest(self.simd, &self.direction)).min(1.0);
         add(self.simd, &mut self.now, self.part, &self.direction);
         true
@@ -202,7 +201,7 @@ impl Solver {
             pair,
             self.part,
             &self.direction,
-            &self.gradient,
+            &self.gradient.sum,
             &self.before,
         );
         let curvature = dot(self.simd, &pair.step, &pair.change);
@@ -216,7 +215,7 @@ impl Solver {
 
     /// Down, by what the last steps have shown.
     fn aim(&mut self) {
-        for (direction, gradient) in self.direction.iter_mut().zip(&self.gradient) {
+        for (direction, gradient) in self.direction.iter_mut().zip(&self.gradient.sum) {
             for (direction, gradient) in direction.iter_mut().zip(gradient) {
                 *direction = -gradient;
             }
@@ -225,8 +224,7 @@ impl Solver {
             *alpha = pair.inverse * dot(self.simd, &pair.step, &self.direction);
             add(self.simd, &mut self.direction, -*alpha, &pair.change);
         }
-        self.laplacian
-            .apply(self.simd, &self.grid, &mut self.direction, &mut self.room);
+        self.laplacian.apply(self.simd, &self.grid, &mut self.direction);
         mask(self.simd, &mut self.direction, &self.free);
         for (pair, alpha) in self.pairs[..self.used].iter().zip(&self.alphas).rev() {
             let beta = pair.inverse * dot(self.simd, &pair.change, &self.direction);
