@@ -40,6 +40,57 @@ fn add(to: &mut Nodes, factor: f32, by: &Nodes) {
 }
 
 vectorised! {
+/// Adds, and says what the sum then is along `with`.
+fn add_dot(to: &mut Nodes, factor: f32, by: &Nodes, with: &Nodes) -> f32 {
+    let mut sum = [0.0_f32; ROW];
+    for ((to, by), with) in to.iter_mut().zip(by).zip(with) {
+        let rows = to.as_chunks_mut::<ROW>().0.iter_mut();
+        for ((to, by), with) in rows.zip(by.as_chunks::<ROW>().0).zip(with.as_chunks::<ROW>().0) {
+            for l in 0..ROW {
+                to[l] += factor * by[l];
+                sum[l] += to[l] * with[l];
+            }
+        }
+    }
+    sum.iter().sum()
+}
+}
+
+vectorised! {
+/// Adds, and says how long the sum then is, squared.
+fn add_square(to: &mut Nodes, factor: f32, by: &Nodes) -> f32 {
+    let mut sum = [0.0_f32; ROW];
+    for (to, by) in to.iter_mut().zip(by) {
+        for (to, by) in to.as_chunks_mut::<ROW>().0.iter_mut().zip(by.as_chunks::<ROW>().0) {
+            for l in 0..ROW {
+                to[l] += factor * by[l];
+                sum[l] += to[l] * to[l];
+            }
+        }
+    }
+    sum.iter().sum()
+}
+}
+
+vectorised! {
+/// What may move, less a load, and what that is along `with`.
+fn less_load(of: &mut Nodes, free: &[f32], load: &Nodes, with: &Nodes) -> f32 {
+    let mut sum = [0.0_f32; ROW];
+    for ((of, load), with) in of.iter_mut().zip(load).zip(with) {
+        let rows = of.as_chunks_mut::<ROW>().0.iter_mut().zip(free.as_chunks::<ROW>().0);
+        let others = load.as_chunks::<ROW>().0.iter().zip(with.as_chunks::<ROW>().0);
+        for ((of, free), (load, with)) in rows.zip(others) {
+            for l in 0..ROW {
+                of[l] = of[l] * free[l] - load[l];
+                sum[l] += of[l] * with[l];
+            }
+        }
+    }
+    sum.iter().sum()
+}
+}
+
+vectorised! {
 /// Largest of all numbers.
 fn farthest(of: &Nodes) -> f32 {
     let mut most = [f32::MIN_POSITIVE; ROW];

@@ -3,7 +3,7 @@
 use super::SIDE;
 use super::energy::{Cells, Nodes, Sides, linear, neo_hookean};
 use super::grid::Grid;
-use super::kernels::{add, differ, dot, farthest, mask};
+use super::kernels::{add, add_dot, add_square, differ, dot, farthest, less_load, mask};
 use super::precondition::Laplacian;
 use crate::simd::Simd;
 
@@ -137,11 +137,9 @@ impl Solver {
     /// Forces less the loads, and less what holds the place of the load; returns their square.
     fn evaluate(&mut self) -> f32 {
         neo_hookean(self.simd, &self.grid, &self.cells, &self.now, &mut self.gradient);
-        mask(self.simd, &mut self.gradient.sum, &self.free);
-        add(self.simd, &mut self.gradient.sum, -1.0, &self.load);
-        let held = dot(self.simd, &self.answer, &self.gradient.sum) / self.share;
-        add(self.simd, &mut self.gradient.sum, -held, &self.along);
-        dot(self.simd, &self.gradient.sum, &self.gradient.sum)
+        let gradient = &mut self.gradient.sum;
+        let along = less_load(self.simd, gradient, &self.free, &self.load, &self.answer);
+        add_square(self.simd, gradient, -along / self.share, &self.along)
     }
 
     /// Evaluations of the gradient: as many as it takes until the window rests, at most `evaluations`, and where it is folded then at
@@ -220,15 +218,28 @@ impl Solver {
                 *direction = -gradient;
             }
         }
-        for (pair, alpha) in self.pairs[..self.used].iter().zip(&mut self.alphas) {
-            *alpha = pair.inverse * dot(self.simd, &pair.step, &self.direction);
-            add(self.simd, &mut self.direction, -*alpha, &pair.change);
+        let pairs = &self.pairs[..self.used];
+        let mut along = pairs
+            .first()
+            .map_or(0.0, |pair| dot(self.simd, &pair.step, &self.direction));
+        for (n, (pair, alpha)) in pairs.iter().zip(&mut self.alphas).enumerate() {
+            *alpha = pair.inverse * along;
+            match pairs.get(n + 1) {
+                Some(next) => along = add_dot(self.simd, &mut self.direction, -*alpha, &pair.change, &next.step),
+                None => add(self.simd, &mut self.direction, -*alpha, &pair.change),
+            }
         }
         self.laplacian.apply(self.simd, &self.grid, &mut self.direction);
         mask(self.simd, &mut self.direction, &self.free);
-        for (pair, alpha) in self.pairs[..self.used].iter().zip(&self.alphas).rev() {
-            let beta = pair.inverse * dot(self.simd, &pair.change, &self.direction);
-            add(self.simd, &mut self.direction, alpha - beta, &pair.step);
+        let mut along = pairs
+            .last()
+            .map_or(0.0, |pair| dot(self.simd, &pair.change, &self.direction));
+        for (n, (pair, alpha)) in pairs.iter().zip(&self.alphas).enumerate().rev() {
+            let by = alpha - pair.inverse * along;
+            match n.checked_sub(1).and_then(|before| pairs.get(before)) {
+                Some(next) => along = add_dot(self.simd, &mut self.direction, by, &pair.step, &next.change),
+                None => add(self.simd, &mut self.direction, by, &pair.step),
+            }
         }
     }
 }
