@@ -5,7 +5,7 @@ mod decoders;
 use bytemuck::Zeroable;
 use std::path::Path;
 use stylet_relay::control::Order;
-use stylet_relay::wire::{Hello, Kind, MAX_THIN_BYTES, Present, Rest, Stamp, Thin, Ticks, Who, encode};
+use stylet_relay::wire::{self, Hello, Kind, MAX_THIN_BYTES, Present, Rest, Stamp, Thin, Ticks, Who, encode};
 use stylet_shm_schema::{HandMove, HapticState, Request, SceneHeader, SnapshotHeader, TickRecord, Vertex};
 
 /// A message of each kind that is accepted, but for the large plain ones.
@@ -35,13 +35,10 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
     };
     vec![
         ("state", message(Kind::State, &[bytemuck::bytes_of(&state)])),
-        ("records", message(Kind::Records, &[bytemuck::cast_slice(&records)])),
+        ("records", message(Kind::Records, &[&wire::pack(&records)])),
         (
             "newest",
-            message(
-                Kind::Newest,
-                &[bytemuck::bytes_of(&state), bytemuck::cast_slice(&records)],
-            ),
+            message(Kind::Newest, &[bytemuck::bytes_of(&state), &wire::pack(&records)]),
         ),
         ("snapshot", message(Kind::Snapshot, &[&snapshot])),
         ("who", message(Kind::Who, &[&who.to_bytes()])),

@@ -31,7 +31,8 @@ const GREETING_AFTER: Duration = Duration::from_millis(400);
 const GREETING_AFTER_AT_MOST: Duration = Duration::from_millis(3_200);
 /// For so long an event that was missed is waited for.
 const EVENT_PATIENCE: Duration = Duration::from_millis(500);
-const CLEAN_EVERY: Duration = Duration::from_secs(1);
+/// Takes two milliseconds, in which records may wait.
+const CLEAN_EVERY: Duration = Duration::from_secs(10);
 
 /// What a greeting brings.
 struct Awaited {

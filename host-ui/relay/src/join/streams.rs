@@ -10,7 +10,7 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::{MAX_BATCH, SlicePublisher};
+use stylet_shm_schema::service::SlicePublisher;
 use stylet_shm_schema::{TickRecord, check};
 
 /// Without a message they look so often whether the end has come, and what is to be asked for.
@@ -73,7 +73,7 @@ fn take(order: &mut Order, bytes: &[u8]) {
     let Ok(message) = wire::decode(bytes) else { return };
     match message.kind {
         Kind::Records => {
-            let records = wire::many::<TickRecord>(message.body, MAX_BATCH);
+            let records = wire::unpack(message.body);
             // A batch with an invalid record is one that was lost.
             let valid = records
                 .ok()

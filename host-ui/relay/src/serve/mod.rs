@@ -26,8 +26,8 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use streams::Jobs;
+use stylet_shm_schema::HapticState;
 use stylet_shm_schema::service::Instance;
-use stylet_shm_schema::{HapticState, TickRecord};
 
 /// Requests that may wait; more are dropped and counted.
 const ASKED: usize = 512;
@@ -86,14 +86,14 @@ impl Server {
     }
 
     /// The message that carries the state and the newest batch of records.
-    fn newest(&self, state: &HapticState, records: &[TickRecord]) -> Vec<u8> {
-        let parts = [bytemuck::bytes_of(state), bytemuck::cast_slice(records)];
+    fn newest(&self, state: &HapticState, packed: &[u8]) -> Vec<u8> {
+        let parts = [bytemuck::bytes_of(state), packed];
         encode(Kind::Newest, self.stamp(), &parts)
     }
 
-    /// The message that carries a batch of records.
-    fn batch(&self, records: &[TickRecord]) -> Vec<u8> {
-        encode(Kind::Records, self.stamp(), &[bytemuck::cast_slice(records)])
+    /// The message that carries a packed batch of records.
+    fn batch(&self, packed: &[u8]) -> Vec<u8> {
+        encode(Kind::Records, self.stamp(), &[packed])
     }
 }
 

@@ -4,7 +4,7 @@ use super::pace::Places;
 use super::watched::Watched;
 use super::{Server, lock};
 use crate::net::{Place, Priority, put, put_newest, put_whole};
-use crate::wire::{Kind, Rest, Stamp, Thin, Ticks, encode};
+use crate::wire::{self, Kind, Rest, Stamp, Thin, Ticks, encode};
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::service::{self, Instance, Node, ServiceError, SliceSubscriber, StateReader};
@@ -56,9 +56,10 @@ pub fn records(server: &Server) {
         if let Some(port) = watched.get(make) {
             while let Some(sample) = port.receive() {
                 any = true;
-                let kept = server.batch(sample.values());
+                let packed = wire::pack(sample.values());
+                let kept = server.batch(&packed);
                 let newest = match board.state(&server.instance, *sample.header()) {
-                    Some(state) => server.newest(&state, sample.values()),
+                    Some(state) => server.newest(&state, &packed),
                     None => kept.clone(),
                 };
                 lock(&server.kept).keep(sample.values(), kept);

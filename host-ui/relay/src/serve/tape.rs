@@ -89,7 +89,7 @@ pub(super) fn complete(server: &Server, keeper: Option<UnixStream>) {
     }
     let batches = keeper.and_then(|keeper| ask(&keeper)).unwrap_or_default();
     let messages = batches.into_iter().map(|batch| {
-        let bytes = server.batch(&batch);
+        let bytes = server.batch(&wire::pack(&batch));
         (batch, bytes)
     });
     Kept::complete(&mut lock(&server.kept), messages);

@@ -2,9 +2,11 @@
 
 mod between;
 mod control;
+mod packed;
 mod thin;
 
 pub use control::{Hello, Present, Ticks, Who};
+pub use packed::{pack, unpack};
 pub use thin::{Displacements, MAX_THIN_BYTES, Rest, Thin, decode_snapshot};
 
 use bytemuck::{Pod, Zeroable};
@@ -13,7 +15,7 @@ use stylet_shm_schema::check::Invalid;
 use stylet_shm_schema::{HapticState, SCHEMA_VERSION, SceneHeader, UploadHeader};
 
 /// First word of every message: rises with the form of messages and with the schema.
-const MAGIC: u32 = u32::from_le_bytes(*b"st4\0") ^ (SCHEMA_VERSION << 24);
+const MAGIC: u32 = u32::from_le_bytes(*b"st5\0") ^ (SCHEMA_VERSION << 24);
 
 /// What a message holds, by stable number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, TryFromPrimitive)]
@@ -23,7 +25,7 @@ pub enum Kind {
     Session = 1,
     /// A `HapticState`.
     State = 2,
-    /// `TickRecord`s of one batch, as they are sent again.
+    /// `TickRecord`s of one batch, packed, as they are sent again.
     Records = 3,
     /// A thinned snapshot.
     Snapshot = 4,
@@ -45,7 +47,7 @@ pub enum Kind {
     Echo = 12,
     /// `Ticks` whose records are not kept any more.
     Missing = 13,
-    /// A `HapticState` and the newest batch of `TickRecord`s, in one packet: each of them costs either side as much as its bytes do.
+    /// A `HapticState` and the newest batch of `TickRecord`s, packed, in one message: each of them costs either side as much as its bytes do.
     Newest = 14,
     /// A member is alive; `number` is its process.
     Hello = 20,

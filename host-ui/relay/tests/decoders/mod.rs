@@ -4,10 +4,9 @@
 use bytemuck::Zeroable;
 use stylet_relay::control::Order;
 use stylet_relay::wire::{self, Displacements, Hello, Kind, Rest, Ticks, Who};
-use stylet_shm_schema::service::MAX_BATCH;
 use stylet_shm_schema::{
     Command, Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, Request, SceneHeader, Session,
-    SnapshotHeader, TickRecord, check,
+    SnapshotHeader, check,
 };
 
 /// Takes the bytes for one message, at the server's end and at a member's. What is accepted is valid by the checks of shared memory.
@@ -43,7 +42,7 @@ pub fn take(bytes: &[u8]) -> bool {
 }
 
 fn records(body: &[u8]) -> bool {
-    let records = wire::many::<TickRecord>(body, MAX_BATCH);
+    let records = wire::unpack(body);
     records.is_ok_and(|batch| batch.iter().all(|record| check::record(record).is_ok()))
 }
 

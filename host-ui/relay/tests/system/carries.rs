@@ -2,10 +2,11 @@
 
 use crate::fixture::{Host, Keys, Named, core, invitation, join, lease, program, scratch, until};
 use crate::proxy::Proxy;
-use crate::watch::{Seen, arrivals, quantile, seconds, settle, snapshots_lost, socket_ages_ms};
+use crate::watch::{Beside, Seen, arrivals, quantile, seconds, settle, snapshots_lost, socket_ages_ms};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity, write_invitation};
 use stylet_shm_schema::TickRecord;
@@ -41,9 +42,10 @@ fn every_record_comes_in_order_and_snapshots_come_as_a_screen_shows_them() {
         let end = Instant::now() + Duration::from_secs_f64(length);
         let lost_before = lease(&far, &["status"]);
         let (here, mut bare_ms, seen) = std::thread::scope(|scope| {
-            let here = scope.spawn(|| arrivals(&near.0, end));
+            let (bell, rung) = channel();
+            let here = scope.spawn(|| arrivals(&near.0, end, &Beside::Ringing(bell)));
             let bare = scope.spawn(|| socket_ages_ms(end));
-            let seen = Seen::until(&far, end);
+            let seen = Seen::beside(Beside::Rung(rung), &far, end);
             (here.join().expect("ran"), bare.join().expect("ran"), seen)
         });
         let there = &seen.records;

@@ -4,6 +4,7 @@ use crate::fixture::{Named, lease, until};
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::sync::mpsc::{Receiver, Sender};
 use std::time::{Duration, Instant};
 use stylet_relay::now_ns;
 use stylet_shm_schema::service::{self, BATCH_EVERY, Instance};
@@ -16,9 +17,21 @@ pub fn seconds(everyday: f64) -> f64 {
 
 const LOOK_EVERY: Duration = Duration::from_micros(100);
 
+/// No record passes a relay sooner, by half.
+const SOONEST: Duration = Duration::from_micros(300);
+
+/// Whom a host that looks for records looks beside.
+pub enum Beside {
+    Nobody,
+    /// One that is rung when a batch is there.
+    Ringing(Sender<()>),
+    /// One by which it is rung.
+    Rung(Receiver<()>),
+}
+
 /// When each tick was seen first, by a host that looks every 0.1 ms; not while no batch can come, so that the looking takes
 /// less of the processor than what is looked at.
-pub fn arrivals(instance: &Instance, until: Instant) -> BTreeMap<u64, Instant> {
+pub fn arrivals(instance: &Instance, until: Instant, beside: &Beside) -> BTreeMap<u64, Instant> {
     // So that it is the relay that is measured, not when this thread gets its turn.
     stylet_relay::slice::shorten();
     let node = instance.node().expect("shared memory");
@@ -27,9 +40,20 @@ pub fn arrivals(instance: &Instance, until: Instant) -> BTreeMap<u64, Instant> {
     while Instant::now() < until {
         let mut pause = LOOK_EVERY;
         while let Some(sample) = port.receive() {
-            pause = BATCH_EVERY / 2;
+            pause = BATCH_EVERY * 3 / 4;
             let now = Instant::now();
             seen.extend(sample.values().iter().map(|record| (record.tick, now)));
+        }
+        match beside {
+            Beside::Ringing(bell) if pause != LOOK_EVERY => {
+                let _ = bell.send(());
+            }
+            // One that rang while this host was looking for the batch before is not missed: it is in the queue.
+            Beside::Rung(bell) if pause != LOOK_EVERY => {
+                let _ = bell.recv_timeout(BATCH_EVERY);
+                pause = SOONEST;
+            }
+            _ => {}
         }
         std::thread::sleep(pause);
     }
@@ -102,8 +126,12 @@ pub struct Seen {
 
 impl Seen {
     pub fn until(far: &Named, end: Instant) -> Self {
+        Self::beside(Beside::Nobody, far, end)
+    }
+
+    pub fn beside(beside: Beside, far: &Named, end: Instant) -> Self {
         let (records, snapshots) = std::thread::scope(|scope| {
-            let records = scope.spawn(|| arrivals(&far.0, end));
+            let records = scope.spawn(move || arrivals(&far.0, end, &beside));
             let snapshots = scope.spawn(|| pictures(&far.0, end));
             (records.join().expect("ran"), snapshots.join().expect("ran"))
         });
