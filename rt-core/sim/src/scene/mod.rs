@@ -124,7 +124,7 @@ impl Scene {
         body
     }
 
-    fn with_body(mut self, tissue: TissueKind, most_elements: usize) -> Scene {
+    pub(crate) fn with_body(mut self, tissue: TissueKind, most_elements: usize) -> Scene {
         self.tissue = tissue;
         self.body = self.coarser_body(most_elements);
         self.nodes = NodeGrid::of(&self.body);

@@ -143,6 +143,12 @@ fn pressed_step_by_step() {
     println!("elements half as large, of finite elements:");
     let scene = Scene::builtin("pelvis").expect("built in").for_lines(TissueKind::Fem);
     pressed_in(&Fixture::new(scene.expect("has lines"), PADS_APART_M));
+    println!("half as large again, the scene's own cells:");
+    let scene = Scene::builtin("pelvis").expect("built in");
+    pressed_in(&Fixture::new(
+        scene.with_body(TissueKind::Fem, usize::MAX),
+        PADS_APART_M,
+    ));
 }
 
 fn pressed_in(fixture: &Fixture) {
