@@ -6,6 +6,8 @@ use stylet_shm_schema::{StructureInfo, role};
 
 /// Brightness of what is not tissue: jelly around a gland that stands alone.
 pub const OUTSIDE: f32 = 0.13;
+/// Brightness of the gland: 14 dB below fat, and a whole number of the steps in which a graphics card keeps it.
+const GLAND: f32 = 77.0 / 255.0;
 
 /// What one tissue is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +26,7 @@ impl Tissue {
     /// Water or jelly around the probe and in the bladder: next to no echo and no loss.
     pub const COUPLING: Self = Self::new(0.0, 0.0, 1.52);
     /// Prostate and every soft tissue without a row of its own: 0.5 dB per cm and MHz, as scanners assume.
-    pub const SOFT: Self = Self::new(0.40, 0.5, 1.63);
+    pub const SOFT: Self = Self::new(GLAND, 0.5, 1.63);
     /// Gas: nothing is seen behind it.
     pub const GAS: Self = Self::new(0.0, 25.0, 0.04).with_xray(0.0);
     const BONE: Self = Self::new(0.92, 10.0, 6.5).with_xray(BONE_PER_M);
@@ -68,7 +70,7 @@ impl Tissue {
 /// Brightness of a structure, 0 to 1, as seen in transrectal ultrasound: by its name, otherwise by its role.
 pub fn brightness(structure: &StructureInfo) -> f32 {
     by_name(&structure.name.read()).unwrap_or(match structure.role {
-        bits if bits & role::TARGET != 0 => 0.40,
+        bits if bits & role::TARGET != 0 => GLAND,
         bits if bits & role::FIXED != 0 => 0.92,
         bits if bits & role::SPARE != 0 => 0.24,
         _ => 0.54,
@@ -81,7 +83,8 @@ fn by_name(name: &str) -> Option<f32> {
     match part {
         Some(Part::Content) => Some(0.02),
         _ if mentioned(Organ::Urethra) => Some(0.20),
-        Some(Part::Capsule) => Some(0.74),
+        // As the fat and fascia round it: a rim, not a line.
+        Some(Part::Capsule) => Some(0.54),
         Some(Part::Wall) => Some(0.62),
         None => BY_ORGAN.iter().find(|(organ, _)| mentioned(*organ)).map(|(_, b)| *b),
     }

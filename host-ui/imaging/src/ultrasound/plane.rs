@@ -135,7 +135,7 @@ const SOUND_M_PER_S: f64 = 1540.0;
 pub const FWHM: f64 = 2.354_820_045;
 
 impl Default for Probe {
-    /// 7 MHz, 20 mm thick. Across the beam the width at half maximum is the wavelength times the f-number (2, then depth over an
+    /// 7 MHz, 20 mm thick. Across the beam the width at half maximum is the wavelength times the f-number (3.5, then depth over an
     /// aperture of 12 mm); along it 0.3 mm; the plane is 2 mm thick at 25 mm. The arrays end where the half ball of the tip begins.
     /// The sizes are assumed, see `docs/imaging.md`.
     fn default() -> Self {
@@ -148,7 +148,7 @@ impl Default for Probe {
             half_length_m: 32.5e-3,
             mhz,
             axial_m: 0.3e-3 / FWHM,
-            lateral_m: 2.0 * wavelength_m / FWHM,
+            lateral_m: 3.5 * wavelength_m / FWHM,
             lateral_per_depth: wavelength_m / 12e-3 / FWHM,
             thickness_m: 2e-3 / FWHM,
             focus_m: 25e-3,

@@ -5,6 +5,7 @@ mod passes;
 use super::beams::{Grid, LARGEST_ECHO, MAP_CELL, powers, scatterers};
 use super::marks::Marks;
 use super::{Plane, Probe, View};
+use crate::Tissue;
 use crate::body::{Body, Metal};
 use crate::gpu::Gpu;
 use bytemuck::{Pod, Zeroable};
@@ -19,9 +20,11 @@ pub(super) const LARGEST_IMPEDANCE: f32 = 10.2;
 /// Decibels from black to white of an unaltered picture.
 pub(super) const RANGE_DB: f32 = 60.0;
 /// Tissue of this brightness has a mean echo of 0 dB: the gland.
-pub(super) const ZERO_BRIGHTNESS: f32 = 0.40;
+pub(super) const ZERO_BRIGHTNESS: f32 = Tissue::SOFT.brightness;
+/// Between places so far apart the brightness of soft tissue goes in straight lines, so patches are some 4 mm across; m.
+pub(super) const PATCH_M: f64 = 3e-3;
 /// Brightness of edges: where impedance steps by a share, that share times this is the amplitude over the gland's.
-const EDGE: f32 = 45.0;
+const EDGE: f32 = 90.0;
 
 /// What the operator sets on the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +35,9 @@ pub struct Settings {
     pub tgc_db_per_cm: f64,
     /// Decibels from black to white.
     pub range_db: f64,
+    /// How uneven soft tissue is: standard deviation of its level from place to place, dB. Not a knob of a machine, but of what
+    /// is simulated; 0 leaves speckle alone.
+    pub texture_db: f64,
 }
 
 impl Default for Settings {
@@ -41,6 +47,7 @@ impl Default for Settings {
             gain_db: 0.0,
             tgc_db_per_cm: 7.0,
             range_db: f64::from(RANGE_DB),
+            texture_db: 3.5,
         }
     }
 }
@@ -193,7 +200,7 @@ impl Scanner {
     }
 }
 
-fn texel(tissue: &crate::Tissue) -> [u8; 4] {
+fn texel(tissue: &Tissue) -> [u8; 4] {
     let byte = |share: f32| (share * 255.0).round().clamp(0.0, 255.0) as u8;
     [
         byte(tissue.brightness),
@@ -231,7 +238,7 @@ fn shot(plane: &Plane, settings: &Settings, grid: Grid, body: &OnCard) -> Shot {
         ),
         four(
             Vector3::new(settings.tgc_db_per_cm * 100.0, settings.gain_db, f64::from(EDGE)),
-            0.0,
+            settings.texture_db,
         ),
         four(body.corner_m, 0.0),
         four(body.size_m, 0.0),

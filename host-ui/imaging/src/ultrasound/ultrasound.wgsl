@@ -16,7 +16,7 @@ struct Shot {
     spread: vec4<f32>,
     // Spread across the plane at its focus (m), depth of the focus (m), depth over which it widens (m), MHz.
     thickness: vec4<f32>,
-    // Gain with depth (dB/m), gain (dB), brightness of an edge.
+    // Gain with depth (dB/m), gain (dB), brightness of an edge, texture of soft tissue (dB).
     gain: vec4<f32>,
     volume_corner_m: vec4<f32>,
     volume_size_m: vec4<f32>,
@@ -34,6 +34,9 @@ override LARGEST_IMPEDANCE: f32;
 // Decibels from black to white, and the brightness whose mean echo is 0 dB.
 override RANGE_DB: f32;
 override ZERO_BRIGHTNESS: f32;
+// Distance between places of which each has a texture of its own (m), and the loss below which texture fades.
+override PATCH_M: f32;
+override SOFT_LOSS: f32;
 
 @group(0) @binding(0) var<uniform> shot: Shot;
 @group(0) @binding(1) var tissues: texture_3d<f32>;
@@ -118,9 +121,8 @@ fn pair(cell: vec3<i32>) -> vec4<f32> {
     return unpack4x8snorm(grains[((row >> 12u) + u32(cell.x)) & 0x1FFFFu]);
 }
 
-// Between the scatterers of a material point, of the same mean power everywhere.
-fn scattering(rest_m: vec3<f32>) -> vec2<f32> {
-    let at = rest_m * shot.scatterers.xyz;
+// Between the scatterers of a grid, in its steps; of the same mean power everywhere.
+fn scattering(at: vec3<f32>) -> vec2<f32> {
     let low = floor(at);
     let b = at - low;
     let a = 1.0 - b;
@@ -130,6 +132,15 @@ fn scattering(rest_m: vec3<f32>) -> vec2<f32> {
     let both = bottom * a.z + top * b.z;
     let power = a * a + b * b;
     return (both.xy * a.x + both.zw * b.x) * shot.scatterers.w * inverseSqrt(power.x * power.y * power.z);
+}
+
+// By how much a material point is brighter than its tissue. Fluids take no sound and have no texture.
+fn texture_db(rest_m: vec3<f32>, loss: f32) -> f32 {
+    if (shot.gain.w == 0.0) {
+        return 0.0;
+    }
+    // One of two parts of an echo has half of its power.
+    return shot.gain.w * min(loss / SOFT_LOSS, 1.0) * sqrt(2.0) * scattering(rest_m / PATCH_M).x;
 }
 
 @compute @workgroup_size(64)
@@ -142,7 +153,8 @@ fn echo(@builtin(global_invocation_id) id: vec3<u32>) {
     let thick_m = thickness_of(depth_of(f32(id.y)));
     let before_m = shift_m(id.x, id.y, 0u);
     let behind_m = shift_m(id.x, id.y, 1u);
-    let at = (place_m - 0.5 * (before_m + behind_m) - shot.volume_corner_m.xyz) / shot.volume_size_m.xyz;
+    let middle_m = place_m - 0.5 * (before_m + behind_m);
+    let at = (middle_m - shot.volume_corner_m.xyz) / shot.volume_size_m.xyz;
     let tissue = textureSampleLevel(tissues, clamped, at, 0.0);
     var sum = vec2(0.0);
     var power = 0.0;
@@ -152,10 +164,10 @@ fn echo(@builtin(global_invocation_id) id: vec3<u32>) {
         let e = REACH * (2.0 * part - 1.0);
         let weight = exp(-0.5 * e * e);
         let rest_m = place_m + e * thick_m * shot.normal.xyz - mix(before_m, behind_m, part);
-        sum += weight * scattering(rest_m);
+        sum += weight * scattering(rest_m * shot.scatterers.xyz);
         power += weight * weight;
     }
-    let echo_db = (tissue.x - ZERO_BRIGHTNESS) * RANGE_DB;
+    let echo_db = (tissue.x - ZERO_BRIGHTNESS) * RANGE_DB + texture_db(middle_m, tissue.y * LARGEST_LOSS);
     let strength = select(0.0, pow(10.0, echo_db / 20.0), tissue.x > 0.0);
     near[id.y * lines + id.x] = vec4(sum * strength * inverseSqrt(power), tissue.y * LARGEST_LOSS, tissue.z * LARGEST_IMPEDANCE);
 }

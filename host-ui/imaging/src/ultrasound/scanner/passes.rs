@@ -1,6 +1,7 @@
 //! Pipelines of the passes in their order, and the buffers between them.
 
-use super::{LARGEST_IMPEDANCE, LARGEST_LOSS, RANGE_DB, SCAN_BYTES, SHOT_BYTES, ZERO_BRIGHTNESS};
+use super::{LARGEST_IMPEDANCE, LARGEST_LOSS, PATCH_M, RANGE_DB, SCAN_BYTES, SHOT_BYTES, ZERO_BRIGHTNESS};
+use crate::Tissue;
 use crate::gpu::{Gpu, READ, SAMPLER, UNIFORM, VOLUME, WRITE};
 use crate::ultrasound::beams::Grid;
 use std::mem::size_of;
@@ -53,6 +54,8 @@ impl Passes {
             ("LARGEST_IMPEDANCE", f64::from(LARGEST_IMPEDANCE)),
             ("RANGE_DB", f64::from(RANGE_DB)),
             ("ZERO_BRIGHTNESS", f64::from(ZERO_BRIGHTNESS)),
+            ("PATCH_M", PATCH_M),
+            ("SOFT_LOSS", f64::from(Tissue::SOFT.loss_db_per_cm_mhz)),
         ];
         Self {
             scan: scan_pipeline(&gpu.device, &scan_layout),

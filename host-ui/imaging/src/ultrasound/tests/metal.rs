@@ -12,6 +12,7 @@ const FLAT: Settings = Settings {
     gain_db: 0.0,
     tgc_db_per_cm: 0.0,
     range_db: 60.0,
+    texture_db: 0.0,
 };
 
 fn water() -> Scanner {
@@ -184,7 +185,7 @@ fn shadows_are_as_deep_as_the_loss_and_as_wide_as_what_throws_them() {
     let mut scanner = scanner();
     let plane = plane(View::Sagittal);
     let grid = Grid::of(&plane);
-    let soft = Tissue::new(0.40, 0.5, 1.63);
+    let soft = Tissue::new(Tissue::SOFT.brightness, 0.5, 1.63);
     let levels = |scanner: &mut Scanner, slab: Tissue, metal: &Metal| {
         // 2 mm thick, 10 mm deep, under the superior half of the array.
         let body = block([soft, soft, slab], |p| {
@@ -203,7 +204,7 @@ fn shadows_are_as_deep_as_the_loss_and_as_wide_as_what_throws_them() {
     let line = |z_m: f64| ((z_m / plane.probe.half_length_m + 1.0) * 0.5 * f64::from(grid.lines - 1)) as usize;
     let (behind, shadow, beside) = (100..300, line(3e-3)..line(30e-3), line(-30e-3)..line(-3e-3));
     for (name, loss) in [("bone", 10.0), ("gas", 25.0)] {
-        let dark = levels(&mut scanner, Tissue::new(0.40, loss, 1.63), &none);
+        let dark = levels(&mut scanner, Tissue::new(Tissue::SOFT.brightness, loss, 1.63), &none);
         let expected_db = -2.0 * (f64::from(loss) - 0.5) * 7.0 * 0.2;
         let [found_db, beside_db] = [shadow.clone(), beside.clone()].map(|lines| {
             mean_db(&dark, grid, behind.clone(), lines.clone()) - mean_db(&clear, grid, behind.clone(), lines)

@@ -4,6 +4,7 @@ mod metal;
 mod pose;
 mod speckle;
 mod speed;
+mod texture;
 mod twin;
 
 use super::{Plane, Pose, Probe, Scanner, View};

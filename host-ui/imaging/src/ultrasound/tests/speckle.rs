@@ -7,11 +7,12 @@ use crate::{Metal, Tissue};
 use nalgebra::Vector3;
 use std::ops::Range;
 
-const SCATTERING: Tissue = Tissue::new(0.40, 0.0, 1.63);
+const SCATTERING: Tissue = Tissue::new(Tissue::SOFT.brightness, 0.0, 1.63);
 const FLAT: Settings = Settings {
     gain_db: 0.0,
     tgc_db_per_cm: 0.0,
     range_db: 60.0,
+    texture_db: 0.0,
 };
 
 fn scattering() -> Scanner {
@@ -31,7 +32,7 @@ fn intensities(scanner: &mut Scanner, plane: &Plane) -> Vec<Vec<f64>> {
         .collect()
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> f64 {
+pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
     sum / count
 }
@@ -104,7 +105,7 @@ fn many_scatterers_give_rayleigh_speckle() {
 
 /// Correlation of places that lie apart by a share of the distance between scatterers, on straight lines between them that are
 /// made of the same power everywhere: an integral over where they lie.
-fn between_scatterers(apart: f64) -> f64 {
+pub(super) fn between_scatterers(apart: f64) -> f64 {
     let at = |place: f64, node: f64| (1.0 - (place - node).abs()).max(0.0);
     let power = |place: f64| (-1..6).map(|n| at(place, f64::from(n)).powi(2)).sum::<f64>();
     let places = (0..200).map(|n| (f64::from(n) + 0.5) / 200.0);

@@ -116,13 +116,14 @@ impl Twin {
 #[test]
 fn the_shader_computes_what_a_slow_sum_in_double_precision_does() {
     let mut scanner = scanner();
-    let body = block([Tissue::new(0.40, 0.0, 1.63); 3], |_| 1);
+    let body = block([Tissue::new(Tissue::SOFT.brightness, 0.0, 1.63); 3], |_| 1);
     let field = field(|p| Vector3::new(0.05 * p.y, 2e-3 - 0.1 * p.y + 0.04 * p.z, 0.1 * p.x + 1e-3));
     scanner.set_body(&body, &field);
     for view in View::ALL {
         let plane = plane(view);
         let settings = Settings {
             tgc_db_per_cm: 0.0,
+            texture_db: 0.0,
             ..Settings::default()
         };
         scanner.picture(&plane, &settings, &Metal::default());
