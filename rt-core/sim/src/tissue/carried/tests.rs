@@ -1,6 +1,6 @@
 use super::*;
 use crate::scene::{Labels, Structure};
-use crate::tissue::ElementField;
+use crate::tissue::{Deformed, ElementField};
 
 /// A block of 16 x 16 x 16 cells; the two lowest layers are fixed.
 fn held_scene() -> (Scene, Arc<Lattice>) {
@@ -106,4 +106,77 @@ fn a_saved_field_is_the_same_in_every_bit_and_another_length_changes_nothing() {
         assert_eq!(a.map(f64::to_bits), b.map(f64::to_bits));
     }
     assert!(!other.is_at_rest());
+}
+
+/// The surface of a body that is carried, and displaced by itself besides: each vertex goes with its element, and bone stays.
+#[test]
+fn a_carried_surface_goes_with_what_carries_it() {
+    let (scene, coarse) = held_scene();
+    let columns = [packed(&coarse, affine)];
+    let mut field = CarriedField::new(&scene, coarse);
+    field.set(Carry {
+        columns: &columns,
+        loads_n: &[1.0],
+        ..Carry::NOT
+    });
+    let own: Vec<f32> = (0..scene.lattice.element_count())
+        .map(|e| (e % 7) as f32 * 0.1)
+        .collect();
+    let body = Deformed {
+        lattice: &scene.lattice,
+        u: [&own, &own, &own],
+        scale: 1.0,
+        carried: Carried::Field(&field),
+        reach: 1.0,
+    };
+    let mut places = vec![[0.0; 3]; scene.surface.vertex_elements.len()];
+    body.write_surface(&scene.surface, &mut places);
+    let mut inside = 0;
+    for ((place, rest_m), &element) in places
+        .iter()
+        .zip(&scene.surface.rest_m)
+        .zip(&scene.surface.vertex_elements)
+    {
+        let cell = scene.lattice.cell(element);
+        let own_m = scene.lattice.spacing_m * f64::from(own[element as usize]);
+        let moved = [0, 1, 2].map(|a| f64::from(place[a]) - f64::from(rest_m[a]) - own_m);
+        if cell[2] < 2 {
+            assert!(off(moved, [0.0; 3]) < 1e-8, "bone is moved: {moved:?}");
+        } else {
+            // At the rim half a coarse element beyond the last centre, in 8 % of strain.
+            assert!(off(moved, affine(scene.lattice.rest_m(element))) < 0.09e-3, "{cell:?}");
+            inside += 1;
+        }
+    }
+    assert!(inside > 1000, "{inside}");
+}
+
+/// The surface of a scene whose body has elements of twice the edge goes with the element around each vertex.
+#[test]
+fn a_surface_goes_with_the_coarser_element_around_it() {
+    let fine = held_scene().0;
+    let mut scene = fine.clone();
+    scene = scene.with_body(crate::scene::TissueKind::Fem, fine.lattice.element_count() / 2);
+    assert_eq!(scene.coarseness(), 2);
+    let u: Vec<f32> = (0..scene.body.element_count()).map(|e| e as f32 * 1e-3).collect();
+    let body = Deformed {
+        lattice: &scene.body,
+        u: [&u, &u, &u],
+        scale: 1.0,
+        carried: Carried::Not,
+        reach: 1.0,
+    };
+    let mut places = vec![[0.0; 3]; scene.surface.vertex_elements.len()];
+    body.write_surface(&scene.surface, &mut places);
+    for ((place, rest_m), &element) in places
+        .iter()
+        .zip(&scene.surface.rest_m)
+        .zip(&scene.surface.vertex_elements)
+    {
+        let [i, j, k] = scene.lattice.cell(element).map(|c| c / 2);
+        let around = scene.body.element_of_cell(i, j, k).expect("in the body");
+        let expected_m = scene.body.spacing_m * f64::from(u[around as usize]);
+        let moved_m = [0, 1, 2].map(|a| f64::from(place[a]) - f64::from(rest_m[a]));
+        assert!(off(moved_m, [expected_m; 3]) < 1e-8, "{moved_m:?} for {expected_m}");
+    }
 }
