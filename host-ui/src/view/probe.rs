@@ -2,6 +2,7 @@
 
 mod picture;
 mod tools;
+mod turns;
 
 use super::body::ShownBody;
 use super::paste::{Paste, Pasted};
@@ -20,6 +21,7 @@ use stylet_implant::plan::{Hole, Template};
 use stylet_shm_schema::{SceneHeader, SceneId};
 use stylet_surfaces::field::Field;
 use tools::Knobs;
+use turns::Turns;
 
 /// Pixels of the longer side.
 const LARGEST_SIDE: f32 = 1024.0;
@@ -45,8 +47,7 @@ pub(super) struct ProbeView {
     paste: Option<Paste>,
     panes: Vec<Pane>,
     knobs: Knobs,
-    /// The frame in which a picture was computed last.
-    computed_in: u64,
+    turns: Turns,
 }
 
 /// Whose pose a picture has.
@@ -80,7 +81,7 @@ impl ProbeView {
                 View::ALL.map(pane).into()
             }),
             knobs: Knobs::default(),
-            computed_in: 0,
+            turns: Turns::default(),
         }
     }
 
@@ -132,14 +133,14 @@ impl ProbeView {
             ..Settings::default()
         };
         let pass = ui.ctx().cumulative_pass_nr();
-        // One picture a frame, so that no frame waits for both.
-        let may_compute = self.computed_in != pass;
         if let (Some(pane), Some(paste)) = (self.panes.get_mut(view as usize), &self.paste) {
             let wanted = (plane, settings, shown.metal(), field);
+            let may_compute = self.turns.is_on(view, pass);
             let (is_new, is_old) = pane.bring_up_to_date(model, wanted, paste, may_compute);
             if is_new {
-                self.computed_in = pass;
+                self.turns.took(view, pass);
             } else if is_old {
+                self.turns.waits(view, pass);
                 ui.ctx().request_repaint();
             }
             if let (Some(pasted), Some((drawn, ..))) = (&pane.pasted, &pane.drawn) {
@@ -147,6 +148,11 @@ impl ProbeView {
                 pane.shown = Some(picture);
                 pasted.paint(&painter, rect);
                 self.over(&painter, &picture, stand, &model.header);
+                return action;
+            }
+            if is_old {
+                // The other plane's turn; this one's is next.
+                painter.rect_filled(rect, 0.0, IMAGE.background);
                 return action;
             }
         }
