@@ -22,32 +22,29 @@ const SLICE_NS: u64 = 100_000;
 pub fn shorten() {
     // SAFETY: numbers alone.
     let nice = unsafe { libc::getpriority(libc::PRIO_PROCESS, 0) };
-    set(nice, SLICE_NS);
-    // SAFETY: numbers alone. The slack, which lets the kernel wake several threads at once, 50 us late, is a figure of this thread as well.
-    unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1_usize) };
-}
-
-fn set(nice: i32, slice_ns: u64) {
     let attributes = Attributes {
         size: size_of::<Attributes>() as u32,
         policy: libc::SCHED_OTHER as u32,
         flags: 0,
         nice,
         priority: 0,
-        runtime: slice_ns,
+        runtime: SLICE_NS,
         deadline: 0,
         period: 0,
     };
-    // SAFETY: `attributes` is valid for reads and for its size; 0 is this thread.
-    unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &attributes, 0) };
+    // SAFETY: `attributes` is valid for reads and for its size; 0 is this thread. The slack, which lets the kernel wake several threads at
+    // once, 50 us late, is a figure of this thread as well.
+    unsafe {
+        libc::syscall(libc::SYS_sched_setattr, 0, &attributes, 0);
+        libc::prctl(libc::PR_SET_TIMERSLACK, 1_usize);
+    }
 }
 
-/// For this thread: those that wake to hand something on go before it, and in the middle of its slice, since theirs are shorter. What it makes takes
-/// milliseconds and is late by as many anyway.
+/// For this thread: those that wake to hand something on go before it. What it makes takes milliseconds and is late by as many anyway.
 pub fn let_others_first() {
     const NICE: i32 = 5;
-    const SLICE_NS: u64 = 3_000_000;
-    set(NICE, SLICE_NS);
+    // SAFETY: numbers alone; 0 is this thread. Where it is refused everything stays as it is.
+    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
 }
 
 #[cfg(test)]
