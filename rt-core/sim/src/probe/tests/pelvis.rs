@@ -36,7 +36,7 @@ fn pelvis() -> &'static Fixture {
 
 /// `cargo test --release -p stylet-sim --lib probe::tests::pelvis -- --ignored --nocapture`
 #[test]
-#[ignore = "half a minute"]
+#[ignore = "takes minutes"]
 fn the_gland_moves_as_with_the_contact_solved_in_full() {
     let fixture = pelvis();
     let ([_, largest_m, _, worst_m], force_off) = beside_reference(fixture, &fixture.probe.wall, PRESSED_M, BEYOND_M);
