@@ -78,11 +78,8 @@ impl Gpu {
         dims: [u32; 3],
         dimension: wgpu::TextureDimension,
         format: wgpu::TextureFormat,
+        usage: wgpu::TextureUsages,
     ) -> wgpu::Texture {
-        let drawn = match dimension {
-            wgpu::TextureDimension::D2 => wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-            _ => wgpu::TextureUsages::COPY_DST,
-        };
         self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("stylet imaging"),
             size: wgpu::Extent3d {
@@ -94,7 +91,7 @@ impl Gpu {
             sample_count: 1,
             dimension,
             format,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | drawn,
+            usage,
             view_formats: &[],
         })
     }
@@ -124,8 +121,8 @@ impl Gpu {
         self.mapped(&near)
     }
 
-    /// The pixels of a picture of four bytes each, row by row.
-    pub(crate) fn pixels(&self, texture: &wgpu::Texture) -> Vec<[u8; 4]> {
+    /// The texels of a texture of four bytes each, row by row.
+    pub(crate) fn pixels<T: bytemuck::Pod>(&self, texture: &wgpu::Texture) -> Vec<T> {
         let size = texture.size();
         let row = (size.width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
         let near = self.device.create_buffer(&wgpu::BufferDescriptor {
@@ -145,8 +142,8 @@ impl Gpu {
         };
         encoder.copy_texture_to_buffer(texture.as_image_copy(), to, size);
         self.queue.submit([encoder.finish()]);
-        let bytes: Vec<[u8; 4]> = self.mapped(&near);
-        let rows = bytes.chunks_exact(row as usize / 4);
+        let texels: Vec<T> = self.mapped(&near);
+        let rows = texels.chunks_exact(row as usize / 4);
         rows.flat_map(|row| row[..size.width as usize].to_vec()).collect()
     }
 
@@ -242,6 +239,15 @@ pub(crate) const WRITE: wgpu::BindingType = buffer(wgpu::BufferBindingType::Stor
 pub(crate) const VOLUME: wgpu::BindingType = wgpu::BindingType::Texture {
     sample_type: wgpu::TextureSampleType::Float { filterable: true },
     view_dimension: wgpu::TextureViewDimension::D3,
+    multisampled: false,
+};
+/// For a texture that is filled from here and read by passes.
+pub(crate) const FILLED: wgpu::TextureUsages =
+    wgpu::TextureUsages::TEXTURE_BINDING.union(wgpu::TextureUsages::COPY_DST);
+/// Numbers by column and row, read one by one.
+pub(crate) const GRID: wgpu::BindingType = wgpu::BindingType::Texture {
+    sample_type: wgpu::TextureSampleType::Float { filterable: false },
+    view_dimension: wgpu::TextureViewDimension::D2,
     multisampled: false,
 };
 pub(crate) const SAMPLER: wgpu::BindingType = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);

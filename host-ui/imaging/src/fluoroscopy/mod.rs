@@ -8,7 +8,7 @@ pub use arm::CArm;
 pub use exposure::{DoseCounter, Exposure};
 
 use crate::body::{Body, Metal};
-use crate::gpu::{Gpu, READ, SAMPLER, UNIFORM, VOLUME, WRITE};
+use crate::gpu::{FILLED, Gpu, READ, SAMPLER, UNIFORM, VOLUME, WRITE};
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 use std::mem::size_of;
@@ -106,6 +106,7 @@ impl Fluoroscope {
             field.info.dims,
             wgpu::TextureDimension::D3,
             wgpu::TextureFormat::Rgba16Float,
+            FILLED,
         );
         gpu.write(&nodes, bytemuck::cast_slice(&texels), 8);
         let nodes = nodes.create_view(&Default::default());

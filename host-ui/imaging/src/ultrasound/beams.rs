@@ -1,12 +1,7 @@
-//! The grid of beams and depths, and the scatterers that give speckle.
+//! The grid of beams and depths, and the distances between the scatterers that give speckle.
 
 use super::{Plane, View};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
 
-/// Scatterers that are kept: a power of two that the shader knows.
-const KEPT: usize = 1 << 17;
 /// Depths between two places at which the material point is sought: displacements vary over millimetres.
 pub const MAP_CELL: u32 = 8;
 
@@ -102,21 +97,4 @@ fn shared(apart: f64) -> f64 {
         }
     };
     (0..PLACES).map(of_place).sum::<f64>() / f64::from(PLACES)
-}
-
-/// The largest part of an echo that a byte stands for; of the standard deviation of a part it is 5.1 times as much.
-pub const LARGEST_ECHO: f64 = 3.6;
-
-/// Complex echoes, circular Gaussian with mean power 1, the same every time: a byte each for the two parts of one and of the
-/// next along x, so that one word gives both. Each row along x goes through all of them from a place of its own, by a hash of where the
-/// row is; so neither a plane nor a block is ever met again, and a row only after 30 m.
-pub fn scatterers() -> Vec<u32> {
-    let mut random = ChaCha8Rng::seed_from_u64(0x5712);
-    let mut byte = || {
-        let x: f64 = StandardNormal.sample(&mut random);
-        let share = x * std::f64::consts::FRAC_1_SQRT_2 / LARGEST_ECHO;
-        u32::from((share * 127.0).round().clamp(-127.0, 127.0) as i8 as u8)
-    };
-    let echoes: Vec<u32> = (0..KEPT).map(|_| byte() | byte() << 8).collect();
-    (0..KEPT).map(|n| echoes[n] | echoes[(n + 1) % KEPT] << 16).collect()
 }

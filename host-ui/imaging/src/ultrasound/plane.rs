@@ -1,6 +1,7 @@
 //! Where the beams of a probe go, how wide they are, and where a place stands in the picture.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
+use std::f64::consts::FRAC_PI_2;
 use stylet_anatomy::Organ;
 use stylet_shm_schema::SceneHeader;
 
@@ -255,6 +256,30 @@ impl Plane {
     pub fn lowest_m(&self) -> f64 {
         let high_m = self.probe.radius_m + self.depth_m;
         0.5 * (high_m - f64::from(self.pixels[1]) * self.m_per_pixel())
+    }
+
+    /// What the fan covers of the picture: x and y from its left and upper edge, width and height, pixels.
+    pub(super) fn covered(&self) -> [u32; 4] {
+        let half_m = match self.view {
+            View::Transverse => (self.probe.radius_m + self.depth_m) * self.probe.half_angle.min(FRAC_PI_2).sin(),
+            View::Sagittal => self.probe.half_length_m,
+        };
+        // The arc ends over the axis, or under it.
+        let least_m = match self.view {
+            View::Transverse => (self.probe.radius_m * self.probe.half_angle.cos())
+                .min((self.probe.radius_m + self.depth_m) * self.probe.half_angle.cos()),
+            View::Sagittal => self.probe.radius_m,
+        };
+        let scale = self.m_per_pixel();
+        let [wide, high] = self.pixels.map(f64::from);
+        let row = |y_m: f64| high - (y_m - self.lowest_m()) / scale;
+        let span = |from: f64, to: f64, all: f64| {
+            let (from, to) = ((from - 1.0).floor().clamp(0.0, all), (to + 1.0).ceil().clamp(0.0, all));
+            [from as u32, (to - from) as u32]
+        };
+        let [x, width] = span(0.5 * wide - half_m / scale, 0.5 * wide + half_m / scale, wide);
+        let [y, height] = span(row(self.probe.radius_m + self.depth_m), row(least_m), high);
+        [x, y, width, height]
     }
 
     /// Where a place of the scene, dropped onto the plane, stands in the picture: pixels from its left and upper edge.

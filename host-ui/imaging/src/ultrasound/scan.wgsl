@@ -10,11 +10,15 @@ struct Scan {
 }
 
 @group(0) @binding(0) var<uniform> scan: Scan;
-@group(0) @binding(1) var<storage, read> levels_db: array<f32>;
+@group(0) @binding(1) var levels_db: texture_2d<f32>;
 
 @vertex
 fn scan_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4<f32> {
     return vec4(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+}
+
+fn level_of(line: u32, sample: u32) -> f32 {
+    return textureLoad(levels_db, vec2(line, sample), 0).x;
 }
 
 @fragment
@@ -33,9 +37,8 @@ fn scan_fragment(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     let l = min(u32(line), lines - 2u);
     let k = min(u32(sample), u32(scan.levels.y) - 2u);
     let b = vec2(line - f32(l), sample - f32(k));
-    let n = k * lines + l;
-    let low = mix(levels_db[n], levels_db[n + 1u], b.x);
-    let level_db = mix(low, mix(levels_db[n + lines], levels_db[n + lines + 1u], b.x), b.y);
+    let low = mix(level_of(l, k), level_of(l + 1u, k), b.x);
+    let level_db = mix(low, mix(level_of(l, k + 1u), level_of(l + 1u, k + 1u), b.x), b.y);
     let grey = clamp(1.0 - (scan.levels.z - level_db) / scan.levels.w, 0.0, 1.0);
     return vec4(grey, grey, grey, 1.0);
 }

@@ -2,12 +2,12 @@
 
 mod passes;
 
-use super::beams::{Grid, LARGEST_ECHO, MAP_CELL, powers, scatterers};
+use super::beams::{Grid, MAP_CELL, powers};
 use super::marks::Marks;
 use super::{Plane, Probe, View};
 use crate::Tissue;
 use crate::body::{Body, Metal};
-use crate::gpu::Gpu;
+use crate::gpu::{FILLED, Gpu};
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 use passes::{Buffers, Passes};
@@ -75,7 +75,6 @@ struct OnCard {
 pub struct Scanner {
     gpu: Gpu,
     passes: Passes,
-    grains: wgpu::Buffer,
     body: Option<OnCard>,
     buffers: Option<Buffers>,
     marks: Marks,
@@ -87,10 +86,8 @@ pub struct Scanner {
 impl Scanner {
     /// Without a body yet.
     pub fn new(gpu: Gpu) -> Self {
-        let grains = gpu.filled(bytemuck::cast_slice(&scatterers()), wgpu::BufferUsages::STORAGE);
         Self {
             passes: Passes::new(&gpu),
-            grains,
             body: None,
             buffers: None,
             marks: Marks::default(),
@@ -120,11 +117,11 @@ impl Scanner {
             }
         }
         let (three, rgba) = (wgpu::TextureDimension::D3, wgpu::TextureFormat::Rgba8Unorm);
-        let tissues = self.gpu.texture(dims, three, rgba);
+        let tissues = self.gpu.texture(dims, three, rgba, FILLED);
         self.gpu.write(&tissues, bytemuck::cast_slice(&texels), 4);
         let nodes = self
             .gpu
-            .texture(field.info.dims, three, wgpu::TextureFormat::Rgba16Float);
+            .texture(field.info.dims, three, wgpu::TextureFormat::Rgba16Float, FILLED);
         self.body = Some(OnCard {
             tissues: tissues.create_view(&Default::default()),
             nodes,
@@ -158,11 +155,10 @@ impl Scanner {
         if self.buffers.as_ref().is_none_or(|b| !b.fit(grid, plane.pixels)) {
             self.powers = None;
             let nodes = body.nodes.create_view(&Default::default());
-            self.buffers =
-                Some(
-                    self.passes
-                        .buffers(&self.gpu, grid, plane.pixels, [&body.tissues, &nodes], &self.grains),
-                );
+            self.buffers = Some(
+                self.passes
+                    .buffers(&self.gpu, grid, plane.pixels, [&body.tissues, &nodes]),
+            );
         }
         let buffers = self.buffers.as_ref()?;
         self.marks.draw(plane, grid, metal);
@@ -175,7 +171,7 @@ impl Scanner {
         }
         queue.write_buffer(&buffers.shot, 0, bytemuck::bytes_of(&shot(plane, settings, grid, body)));
         queue.write_buffer(&buffers.scan, 0, bytemuck::bytes_of(&scan(plane, settings, grid)));
-        self.passes.run(&self.gpu, buffers);
+        self.passes.run(&self.gpu, buffers, plane.covered());
         Some(buffers.target.create_view(&Default::default()))
     }
 
@@ -190,7 +186,7 @@ impl Scanner {
     pub fn levels_db(&self) -> Vec<f32> {
         self.buffers
             .as_ref()
-            .map_or_else(Vec::new, |b| self.gpu.read(&b.levels))
+            .map_or_else(Vec::new, |b| self.gpu.pixels(&b.levels))
     }
 
     /// Waits until the last picture is computed.
@@ -244,7 +240,7 @@ fn shot(plane: &Plane, settings: &Settings, grid: Grid, body: &OnCard) -> Shot {
         four(body.size_m, 0.0),
         four(Vector3::from(info.origin_m).add_scalar(-0.5 * info.spacing_m), 0.0),
         four(nodes_m, 0.0),
-        four(Vector3::from(grid.scatterers_m).map(f64::recip), LARGEST_ECHO),
+        four(Vector3::from(grid.scatterers_m).map(f64::recip), 0.0),
     ])
 }
 

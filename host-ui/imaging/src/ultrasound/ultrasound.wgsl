@@ -1,4 +1,4 @@
-// The echoes of one plane of a probe, from tissue to decibels, on a grid of beams and depths: beam l, sample k at k * lines + l.
+// The echoes of one plane of a probe, from tissue to decibels, on a grid of beams and depths: beam l, sample k in column l, row k.
 // In this order: rest_map, echo, beam, axial, lateral. What each number means stands in plane.rs and docs/imaging.md.
 
 struct Shot {
@@ -22,7 +22,7 @@ struct Shot {
     volume_size_m: vec4<f32>,
     nodes_corner_m: vec4<f32>,
     nodes_size_m: vec4<f32>,
-    // Scatterers per m along each axis, and the largest amplitude that is kept of one.
+    // Scatterers per m along each axis.
     scatterers: vec4<f32>,
 }
 
@@ -42,14 +42,14 @@ override SOFT_LOSS: f32;
 @group(0) @binding(1) var tissues: texture_3d<f32>;
 @group(0) @binding(2) var nodes: texture_3d<f32>;
 @group(0) @binding(3) var clamped: sampler;
-@group(0) @binding(4) var<storage, read> grains: array<u32>;
-@group(0) @binding(5) var<storage, read> marks: array<vec2<f32>>;
-@group(0) @binding(6) var<storage, read_write> shifts_m: array<vec4<f32>>;
-@group(0) @binding(7) var<storage, read_write> near: array<vec4<f32>>;
-@group(0) @binding(8) var<storage, read_write> far: array<vec4<f32>>;
-@group(0) @binding(9) var<storage, read_write> levels_db: array<f32>;
+@group(0) @binding(4) var<storage, read> marks: array<vec2<f32>>;
 // Of each sample: power of its sum of echoes, beyond that of its weights.
-@group(0) @binding(10) var<storage, read> powers: array<f32>;
+@group(0) @binding(5) var<storage, read> powers: array<f32>;
+// What the pass before left and what this one leaves, by beam and sample. They are textures since Mesa's software driver reads
+// those eight at once, but one word of a buffer after the other.
+@group(0) @binding(6) var before: texture_2d<f32>;
+@group(0) @binding(7) var after: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(8) var levels_db: texture_storage_2d<r32float, write>;
 
 // Slices reach so many spreads to both sides.
 const REACH: f32 = 2.0;
@@ -63,19 +63,31 @@ fn thickness_of(depth_m: f32) -> f32 {
     return shot.thickness.x * sqrt(1.0 + x * x);
 }
 
-// In the plane.
-fn place_of(line: f32, sample: f32) -> vec3<f32> {
+// Where a beam goes, in the plane: its place at depth r from the axis is that of its start and r times its direction.
+struct Beam {
+    start_m: vec3<f32>,
+    along: vec3<f32>,
+}
+
+fn beam_of(line: f32) -> Beam {
     let across = shot.normal.w * (2.0 * line / (shot.counts.x - 1.0) - 1.0);
-    let r = shot.right.w + depth_of(sample);
     if (shot.origin_m.w > 0.5) {
-        return shot.origin_m.xyz + r * shot.up.xyz + across * shot.right.xyz;
+        return Beam(shot.origin_m.xyz + across * shot.right.xyz, shot.up.xyz);
     }
-    return shot.origin_m.xyz + r * (cos(across) * shot.up.xyz + sin(across) * shot.right.xyz);
+    return Beam(shot.origin_m.xyz, cos(across) * shot.up.xyz + sin(across) * shot.right.xyz);
+}
+
+fn place_of(beam: Beam, sample: f32) -> vec3<f32> {
+    return beam.start_m + (shot.right.w + depth_of(sample)) * beam.along;
 }
 
 fn displacement_m(rest_m: vec3<f32>) -> vec3<f32> {
     let at = (rest_m - shot.nodes_corner_m.xyz) / shot.nodes_size_m.xyz;
     return textureSampleLevel(nodes, clamped, at, 0.0).xyz;
+}
+
+fn kept_at(at: vec2<u32>) -> vec4<f32> {
+    return textureLoad(before, at, 0);
 }
 
 // How far what lies at a place now is from where it was at rest, at the edges of cells of the grid, at both ends of the slices.
@@ -89,7 +101,7 @@ fn rest_map(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let sample = f32(id.y * cell);
     let e = (f32(id.z) * 2.0 - 1.0) * REACH * thickness_of(depth_of(sample));
-    let place_m = place_of(f32(id.x * cell), sample) + e * shot.normal.xyz;
+    let place_m = place_of(beam_of(f32(id.x * cell)), sample) + e * shot.normal.xyz;
     var rest_m = place_m;
     for (var step = 0; step < STEPS; step++) {
         let next_m = place_m - displacement_m(rest_m);
@@ -99,39 +111,40 @@ fn rest_map(@builtin(global_invocation_id) id: vec3<u32>) {
             break;
         }
     }
-    shifts_m[(id.z * rows + id.y) * columns + id.x] = vec4(place_m - rest_m, 0.0);
+    textureStore(after, vec2(id.x, id.z * rows + id.y), vec4(place_m - rest_m, 0.0));
 }
 
-fn shift_m(line: u32, sample: u32, side: u32) -> vec3<f32> {
-    let cell = u32(shot.counts.w);
-    let columns = (u32(shot.counts.x) - 1u) / cell + 2u;
-    let rows = (u32(shot.counts.y) - 1u) / cell + 2u;
-    let at = (side * rows + sample / cell) * columns + line / cell;
-    let x = f32(line % cell) / f32(cell);
-    let y = f32(sample % cell) / f32(cell);
-    let low = mix(shifts_m[at].xyz, shifts_m[at + 1u].xyz, x);
-    return mix(low, mix(shifts_m[at + columns].xyz, shifts_m[at + columns + 1u].xyz, x), y);
+fn shift_m(at: vec2<u32>, x: f32) -> vec3<f32> {
+    return mix(kept_at(at).xyz, kept_at(at + vec2(1u, 0u)).xyz, x);
 }
 
-// Two scatterers beside each other along x. Where a row begins among those that are kept is a hash of its place, so that no pattern
-// repeats.
-fn pair(cell: vec3<i32>) -> vec4<f32> {
-    let mixed = (u32(cell.y) * 0x9E3779B1u) ^ (u32(cell.z) * 0x85EBCA77u);
-    let row = (mixed ^ (mixed >> 15u)) * 0x2C1B3C6Du;
-    return unpack4x8snorm(grains[((row >> 12u) + u32(cell.x)) & 0x1FFFFu]);
+// Two parts of the echo of a scatterer, from a hash of where it stands (the end of MurmurHash3), so that none is met again; evenly
+// spread, which their sums do not show. A row is a hash of its own.
+fn scatterer(row: u32, x: i32) -> vec2<f32> {
+    var h = row + u32(x) * 0x9E3779B1u;
+    h = (h ^ (h >> 16u)) * 0x85EBCA6Bu;
+    h = (h ^ (h >> 13u)) * 0xC2B2AE35u;
+    return unpack2x16snorm(h ^ (h >> 16u));
 }
 
-// Between the scatterers of a grid, in its steps; of the same mean power everywhere.
+// Between the scatterers of a grid, in its steps; of mean power 1 everywhere: an even spread over -1 to 1 has a variance of a third.
 fn scattering(at: vec3<f32>) -> vec2<f32> {
     let low = floor(at);
     let b = at - low;
     let a = 1.0 - b;
     let i = vec3<i32>(low);
-    let bottom = pair(i) * a.y + pair(i + vec3(0, 1, 0)) * b.y;
-    let top = pair(i + vec3(0, 0, 1)) * a.y + pair(i + vec3(0, 1, 1)) * b.y;
-    let both = bottom * a.z + top * b.z;
+    let y = vec2(u32(i.y), u32(i.y) + 1u) * 0x27D4EB2Fu;
+    let z = vec2(u32(i.z), u32(i.z) + 1u) * 0x165667B1u;
+    let weights = vec4(a.y * a.z, b.y * a.z, a.y * b.z, b.y * b.z);
+    let rows = y.xyxy ^ z.xxyy;
+    var near = weights.x * scatterer(rows.x, i.x);
+    var far = weights.x * scatterer(rows.x, i.x + 1);
+    for (var n = 1; n < 4; n++) {
+        near += weights[n] * scatterer(rows[n], i.x);
+        far += weights[n] * scatterer(rows[n], i.x + 1);
+    }
     let power = a * a + b * b;
-    return (both.xy * a.x + both.zw * b.x) * shot.scatterers.w * inverseSqrt(power.x * power.y * power.z);
+    return (near * a.x + far * b.x) * sqrt(1.5) * inverseSqrt(power.x * power.y * power.z);
 }
 
 // By how much a material point is brighter than its tissue. Fluids take no sound and have no texture.
@@ -143,16 +156,11 @@ fn texture_db(rest_m: vec3<f32>, loss: f32) -> f32 {
     return shot.gain.w * min(loss / SOFT_LOSS, 1.0) * sqrt(2.0) * scattering(rest_m / PATCH_M).x;
 }
 
-@compute @workgroup_size(64)
-fn echo(@builtin(global_invocation_id) id: vec3<u32>) {
-    let lines = u32(shot.counts.x);
-    if (id.x >= lines) {
-        return;
-    }
-    let place_m = place_of(f32(id.x), f32(id.y));
-    let thick_m = thickness_of(depth_of(f32(id.y)));
-    let before_m = shift_m(id.x, id.y, 0u);
-    let behind_m = shift_m(id.x, id.y, 1u);
+// What a sample of a beam sends back: two parts of its echo, loss, impedance. Its material points lie this far from it at both
+// ends of the slices.
+fn sent_back(beam: Beam, sample: f32, before_m: vec3<f32>, behind_m: vec3<f32>) -> vec4<f32> {
+    let place_m = place_of(beam, sample);
+    let thick_m = thickness_of(depth_of(sample));
     let middle_m = place_m - 0.5 * (before_m + behind_m);
     let at = (middle_m - shot.volume_corner_m.xyz) / shot.volume_size_m.xyz;
     let tissue = textureSampleLevel(tissues, clamped, at, 0.0);
@@ -169,11 +177,37 @@ fn echo(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let echo_db = (tissue.x - ZERO_BRIGHTNESS) * RANGE_DB + texture_db(middle_m, tissue.y * LARGEST_LOSS);
     let strength = select(0.0, pow(10.0, echo_db / 20.0), tissue.x > 0.0);
-    near[id.y * lines + id.x] = vec4(sum * strength * inverseSqrt(power), tissue.y * LARGEST_LOSS, tissue.z * LARGEST_IMPEDANCE);
+    return vec4(sum * strength * inverseSqrt(power), tissue.y * LARGEST_LOSS, tissue.z * LARGEST_IMPEDANCE);
+}
+
+// Four samples of a beam, between the same places of the map.
+@compute @workgroup_size(64)
+fn echo(@builtin(global_invocation_id) id: vec3<u32>) {
+    let lines = u32(shot.counts.x);
+    let samples = u32(shot.counts.y);
+    if (id.x >= lines) {
+        return;
+    }
+    let cell = u32(shot.counts.w);
+    let rows = (samples - 1u) / cell + 2u;
+    let first = 4u * id.y;
+    let at = vec2(id.x / cell, first / cell);
+    let x = f32(id.x % cell) / f32(cell);
+    let beam = beam_of(f32(id.x));
+    let above_before_m = shift_m(at, x);
+    let below_before_m = shift_m(at + vec2(0u, 1u), x);
+    let above_behind_m = shift_m(at + vec2(0u, rows), x);
+    let below_behind_m = shift_m(at + vec2(0u, rows + 1u), x);
+    for (var k = first; k < min(first + 4u, samples); k++) {
+        let y = f32(k % cell) / f32(cell);
+        let before_m = mix(above_before_m, below_before_m, y);
+        let behind_m = mix(above_behind_m, below_behind_m, y);
+        textureStore(after, vec2(id.x, k), sent_back(beam, f32(k), before_m, behind_m));
+    }
 }
 
 // One beam: what is left of the sound, edges that it meets, marks of metal and their shadow.
-@compute @workgroup_size(64)
+@compute @workgroup_size(16)
 fn beam(@builtin(global_invocation_id) id: vec3<u32>) {
     let lines = u32(shot.counts.x);
     let samples = u32(shot.counts.y);
@@ -182,47 +216,64 @@ fn beam(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let step_cm = 100.0 * depth_of(1.0);
     var lost_db = 0.0;
-    var before = near[id.x].w;
+    var impedance = kept_at(vec2(id.x, 0u)).w;
     for (var k = 0u; k < samples; k++) {
-        let n = k * lines + id.x;
-        let here = near[n];
-        let mark = marks[n];
+        let here = kept_at(vec2(id.x, k));
+        let mark = marks[k * lines + id.x];
         let left = pow(10.0, -0.1 * lost_db);
-        let edge = 0.5 * abs(log(here.w / before)) * shot.gain.z;
-        far[n] = vec4(here.xy * left, (edge + mark.x) * left, 0.0);
+        let edge = 0.5 * abs(log(here.w / impedance)) * shot.gain.z;
+        textureStore(after, vec2(id.x, k), vec4(here.xy * left, (edge + mark.x) * left, 0.0));
         lost_db += here.z * shot.thickness.w * step_cm + mark.y;
-        before = here.w;
+        impedance = here.w;
     }
 }
 
-// The pulse. Echoes of scatterers keep their mean power, bright lines their height where they are long across the beam.
+// How the sums of four neighbours weigh what lies n steps after the first of them, by their weights one step before.
+fn weights(n: i32, spread: f32, reach: i32, before: vec4<f32>) -> vec4<f32> {
+    let x = f32(n) / spread;
+    return vec4(select(0.0, exp(-0.5 * x * x), abs(n) <= reach), before.xyz);
+}
+
+// The pulse, over four samples of a beam. Echoes of scatterers keep their mean power, bright lines their height where they are
+// long across the beam.
 @compute @workgroup_size(64)
 fn axial(@builtin(global_invocation_id) id: vec3<u32>) {
     let lines = u32(shot.counts.x);
+    let samples = i32(shot.counts.y);
     if (id.x >= lines) {
         return;
     }
     let spread = shot.spread.x / depth_of(1.0);
     let reach = i32(ceil(3.0 * spread));
-    var sum = vec3(0.0);
-    var power = 0.0;
-    for (var j = -reach; j <= reach; j++) {
-        let x = f32(j) / spread;
-        let weight = exp(-0.5 * x * x);
-        let k = i32(id.y) + j;
-        if (k >= 0 && k < i32(shot.counts.y)) {
-            sum += weight * far[u32(k) * lines + id.x].xyz;
+    let first = 4 * i32(id.y);
+    var real = vec4(0.0);
+    var imaginary = vec4(0.0);
+    var edge = vec4(0.0);
+    var power = vec4(0.0);
+    var weight = vec4(0.0);
+    for (var j = -reach; j <= reach + 3; j++) {
+        weight = weights(j, spread, reach, weight);
+        let k = first + j;
+        if (k >= 0 && k < samples) {
+            let here = kept_at(vec2(id.x, u32(k)));
+            real += weight * here.x;
+            imaginary += weight * here.y;
+            edge += weight * here.z;
             power += weight * weight;
         }
     }
-    near[id.y * lines + id.x] = vec4(sum.xy * inverseSqrt(power), sum.z, 0.0);
+    for (var i = 0; i < min(4, samples - first); i++) {
+        let kept = vec4(vec2(real[i], imaginary[i]) * inverseSqrt(power[i]), edge[i], 0.0);
+        textureStore(after, vec2(i32(id.x), first + i), kept);
+    }
 }
 
-// The beam, wider with depth; then the envelope in dB.
-@compute @workgroup_size(64)
+// Four beams, wider with depth; then the envelope in dB.
+@compute @workgroup_size(16, 4)
 fn lateral(@builtin(global_invocation_id) id: vec3<u32>) {
-    let lines = u32(shot.counts.x);
-    if (id.x >= lines) {
+    let lines = i32(shot.counts.x);
+    let first = 4 * i32(id.x);
+    if (first >= lines || id.y >= u32(shot.counts.y)) {
         return;
     }
     let depth_m = depth_of(f32(id.y));
@@ -230,20 +281,28 @@ fn lateral(@builtin(global_invocation_id) id: vec3<u32>) {
     let pitch_m = r * 2.0 * shot.normal.w / (shot.counts.x - 1.0);
     let spread = max(max(shot.spread.y, shot.spread.z * depth_m) / pitch_m, 0.1);
     let reach = min(i32(ceil(2.7 * spread)), 40);
-    var sum = vec3(0.0);
-    var power = 0.0;
-    var whole = 0.0;
-    for (var j = -reach; j <= reach; j++) {
-        let x = f32(j) / spread;
-        let weight = exp(-0.5 * x * x);
-        let l = i32(id.x) + j;
-        if (l >= 0 && l < i32(lines)) {
-            sum += weight * near[id.y * lines + u32(l)].xyz;
+    var real = vec4(0.0);
+    var imaginary = vec4(0.0);
+    var edge = vec4(0.0);
+    var power = vec4(0.0);
+    var whole = vec4(0.0);
+    var weight = vec4(0.0);
+    for (var j = -reach; j <= reach + 3; j++) {
+        weight = weights(j, spread, reach, weight);
+        let l = first + j;
+        if (l >= 0 && l < lines) {
+            let here = kept_at(vec2(u32(l), id.y));
+            real += weight * here.x;
+            imaginary += weight * here.y;
+            edge += weight * here.z;
             power += weight * weight;
             whole += weight;
         }
     }
-    let bright = sum.z / whole;
-    let echo = dot(sum.xy, sum.xy) / (power * powers[id.y]) + bright * bright;
-    levels_db[id.y * lines + id.x] = 10.0 * log(max(echo, 1e-20)) / log(10.0) + shot.gain.x * depth_m + shot.gain.y;
+    let bright = edge / whole;
+    let echo = (real * real + imaginary * imaginary) / (power * powers[id.y]) + bright * bright;
+    let level_db = 10.0 * log(max(echo, vec4(1e-20))) / log(10.0) + shot.gain.x * depth_m + shot.gain.y;
+    for (var i = 0; i < min(4, lines - first); i++) {
+        textureStore(levels_db, vec2(first + i, i32(id.y)), vec4(level_db[i], 0.0, 0.0, 0.0));
+    }
 }

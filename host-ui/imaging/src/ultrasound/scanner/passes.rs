@@ -2,12 +2,14 @@
 
 use super::{LARGEST_IMPEDANCE, LARGEST_LOSS, PATCH_M, RANGE_DB, SCAN_BYTES, SHOT_BYTES, ZERO_BRIGHTNESS};
 use crate::Tissue;
-use crate::gpu::{Gpu, READ, SAMPLER, UNIFORM, VOLUME, WRITE};
+use crate::gpu::{GRID, Gpu, READ, SAMPLER, UNIFORM, VOLUME};
 use crate::ultrasound::beams::Grid;
 use std::mem::size_of;
 use stylet_surfaces::field::{SEEN_M, STEPS};
 
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+const BETWEEN: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+const LEVELS: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
 const BEAMS_AT_ONCE: u32 = 64;
 const ENTRIES: [&str; 5] = ["rest_map", "echo", "beam", "axial", "lateral"];
 
@@ -27,10 +29,11 @@ pub struct Buffers {
     pub shot: wgpu::Buffer,
     pub scan: wgpu::Buffer,
     pub marks: wgpu::Buffer,
-    pub levels: wgpu::Buffer,
+    pub levels: wgpu::Texture,
     pub powers: wgpu::Buffer,
     pub target: wgpu::Texture,
-    bind: wgpu::BindGroup,
+    /// Passes read and write by turns: the first of two textures from the second, then the second from the first.
+    bind: [wgpu::BindGroup; 2],
     scan_bind: wgpu::BindGroup,
 }
 
@@ -43,10 +46,18 @@ impl Buffers {
 impl Passes {
     pub fn new(gpu: &Gpu) -> Self {
         let types = [
-            UNIFORM, VOLUME, VOLUME, SAMPLER, READ, READ, WRITE, WRITE, WRITE, WRITE, READ,
+            UNIFORM,
+            VOLUME,
+            VOLUME,
+            SAMPLER,
+            READ,
+            READ,
+            GRID,
+            written(BETWEEN),
+            written(LEVELS),
         ];
         let layout = gpu.layout(wgpu::ShaderStages::COMPUTE, &types);
-        let scan_layout = gpu.layout(wgpu::ShaderStages::FRAGMENT, &[UNIFORM, READ]);
+        let scan_layout = gpu.layout(wgpu::ShaderStages::FRAGMENT, &[UNIFORM, GRID]);
         let constants = [
             ("STEPS", f64::from(STEPS)),
             ("SEEN_M", f64::from(SEEN_M)),
@@ -72,32 +83,45 @@ impl Passes {
         grid: Grid,
         pixels: [u32; 2],
         [tissues, nodes]: [&wgpu::TextureView; 2],
-        grains: &wgpu::Buffer,
     ) -> Buffers {
-        let count = grid.count() as u64;
-        let four = size_of::<[f32; 4]>() as u64;
-        let [columns, rows] = grid.map_cells().map(u64::from);
+        let word = size_of::<f32>() as u64;
         let [shot, scan] = [SHOT_BYTES, SCAN_BYTES].map(|bytes| gpu.uniform(bytes));
-        let [shifts, near, far] = [2 * columns * rows, count, count].map(|n| gpu.storage(n * four));
-        let (marks, levels) = (gpu.storage(count * four / 2), gpu.storage(count * four / 4));
-        let powers = gpu.storage(u64::from(grid.samples) * four / 4);
+        let marks = gpu.storage(grid.count() as u64 * 2 * word);
+        let powers = gpu.storage(u64::from(grid.samples) * word);
+        let two = wgpu::TextureDimension::D2;
+        let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+        let beams = |format| {
+            let usage = read | wgpu::TextureUsages::STORAGE_BINDING;
+            gpu.texture([grid.lines, grid.samples, 1], two, format, usage)
+        };
+        let levels = beams(LEVELS);
         let [wide, high] = pixels;
-        let target = gpu.texture([wide, high, 1], wgpu::TextureDimension::D2, COLOR);
-        let resources = [
-            shot.as_entire_binding(),
-            wgpu::BindingResource::TextureView(tissues),
-            wgpu::BindingResource::TextureView(nodes),
-            wgpu::BindingResource::Sampler(&self.sampler),
-            grains.as_entire_binding(),
-            marks.as_entire_binding(),
-            shifts.as_entire_binding(),
-            near.as_entire_binding(),
-            far.as_entire_binding(),
-            levels.as_entire_binding(),
-            powers.as_entire_binding(),
+        let target = gpu.texture(
+            [wide, high, 1],
+            two,
+            COLOR,
+            read | wgpu::TextureUsages::RENDER_ATTACHMENT,
+        );
+        let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
+        let (one, other, levels_view) = (view(&beams(BETWEEN)), view(&beams(BETWEEN)), view(&levels));
+        let bind = [[&one, &other], [&other, &one]].map(|[before, after]| {
+            let resources = [
+                shot.as_entire_binding(),
+                wgpu::BindingResource::TextureView(tissues),
+                wgpu::BindingResource::TextureView(nodes),
+                wgpu::BindingResource::Sampler(&self.sampler),
+                marks.as_entire_binding(),
+                powers.as_entire_binding(),
+                wgpu::BindingResource::TextureView(before),
+                wgpu::BindingResource::TextureView(after),
+                wgpu::BindingResource::TextureView(&levels_view),
+            ];
+            gpu.bind(&self.layout, &resources)
+        });
+        let shown = [
+            scan.as_entire_binding(),
+            wgpu::BindingResource::TextureView(&levels_view),
         ];
-        let bind = gpu.bind(&self.layout, &resources);
-        let shown = [scan.as_entire_binding(), levels.as_entire_binding()];
         let scan_bind = gpu.bind(&self.scan_layout, &shown);
         Buffers {
             grid,
@@ -113,22 +137,23 @@ impl Passes {
         }
     }
 
-    pub fn run(&self, gpu: &Gpu, buffers: &Buffers) {
+    /// Beyond `covered`, x, y, width and height in pixels, no beam goes.
+    pub fn run(&self, gpu: &Gpu, buffers: &Buffers, covered: [u32; 4]) {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let Grid { lines, samples, .. } = buffers.grid;
         let [columns, rows] = buffers.grid.map_cells();
-        let groups = lines.div_ceil(BEAMS_AT_ONCE);
+        let (beams, four_samples) = (lines.div_ceil(BEAMS_AT_ONCE), samples.div_ceil(4));
         let sizes = [
             [columns.div_ceil(BEAMS_AT_ONCE), rows, 2],
-            [groups, samples, 1],
-            [groups, 1, 1],
-            [groups, samples, 1],
-            [groups, samples, 1],
+            [beams, four_samples, 1],
+            [lines.div_ceil(16), 1, 1],
+            [beams, four_samples, 1],
+            [lines.div_ceil(4 * 16), four_samples, 1],
         ];
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            pass.set_bind_group(0, &buffers.bind, &[]);
-            for (pipeline, [x, y, z]) in self.compute.iter().zip(sizes) {
+            for ((pipeline, [x, y, z]), bind) in self.compute.iter().zip(sizes).zip(buffers.bind.iter().cycle()) {
+                pass.set_bind_group(0, bind, &[]);
                 pass.set_pipeline(pipeline);
                 pass.dispatch_workgroups(x, y, z);
             }
@@ -150,9 +175,20 @@ impl Passes {
             });
             pass.set_pipeline(&self.scan);
             pass.set_bind_group(0, &buffers.scan_bind, &[]);
+            let [x, y, wide, high] = covered;
+            pass.set_scissor_rect(x, y, wide, high);
             pass.draw(0..3, 0..1);
         }
         gpu.queue.submit([encoder.finish()]);
+    }
+}
+
+/// A texture that a pass writes.
+fn written(format: wgpu::TextureFormat) -> wgpu::BindingType {
+    wgpu::BindingType::StorageTexture {
+        access: wgpu::StorageTextureAccess::WriteOnly,
+        format,
+        view_dimension: wgpu::TextureViewDimension::D2,
     }
 }
 

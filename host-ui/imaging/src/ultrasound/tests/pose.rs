@@ -3,7 +3,7 @@
 use super::plane;
 use crate::ultrasound::{Plane, Pose, Probe, View};
 use bytemuck::Zeroable;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use stylet_shm_schema::{SceneHeader, Text};
 
 #[test]
@@ -81,6 +81,43 @@ fn a_probe_in_the_hand_looks_where_its_tool_says() {
         assert!((plane.in_beams(before).depth_m - 20e-3).abs() < 1e-12 && plane.in_beams(before).across.abs() < 1e-12);
         let again = Pose::of_tool(pose.tip_m(&probe), &pose.scene_from_tool(), &probe);
         assert!((again.up - pose.up).norm() < 1e-12 && (again.middle_m - pose.middle_m).norm() < 1e-12);
+    }
+}
+
+/// Pixel by pixel: the rectangle that is drawn holds all of the fan, and little else.
+#[test]
+fn what_the_fan_covers_is_drawn() {
+    for (view, half_deg, pixels) in [
+        (View::Transverse, 80.0_f64, [640, 480]),
+        (View::Transverse, 80.0, [300, 500]),
+        (View::Transverse, 110.0, [400, 400]),
+        (View::Sagittal, 80.0, [640, 480]),
+        (View::Sagittal, 80.0, [200, 700]),
+    ] {
+        let mut plane = Plane { pixels, ..plane(view) };
+        plane.probe.half_angle = half_deg.to_radians();
+        let is_lit = |x: u32, y: u32| {
+            let place_m = plane.place_of(Vector2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+            let at = plane.in_beams(place_m);
+            at.across.abs() <= plane.probe.half(view) && (0.0..=plane.depth_m).contains(&at.depth_m)
+        };
+        let all = (0..pixels[1]).flat_map(|y| (0..pixels[0]).map(move |x| [x, y]));
+        let lit: Vec<[u32; 2]> = all.filter(|[x, y]| is_lit(*x, *y)).collect();
+        let [x, y, wide, high] = plane.covered();
+        for (axis, from, size) in [(0, x, wide), (1, y, high)] {
+            let least = lit.iter().map(|at| at[axis]).min().expect("lit");
+            let most = lit.iter().map(|at| at[axis]).max().expect("lit");
+            let end = from + size;
+            assert!(
+                from <= least && end > most,
+                "{view:?} {half_deg} {axis}: {from} to {end} for {least} to {most}"
+            );
+            assert!(
+                least - from <= 3 && end - most <= 4,
+                "{view:?} {half_deg} {axis}: {from} to {end} for {least} to {most}"
+            );
+            assert!(end <= pixels[axis]);
+        }
     }
 }
 

@@ -57,8 +57,9 @@ fn correlation(one: &[Vec<f64>], other: &[Vec<f64>], [down, right]: [usize; 2], 
 fn many_scatterers_give_rayleigh_speckle() {
     let mut scanner = scattering();
     for view in View::ALL {
-        // Samples and beams apart; how often the cube of scatterers is used again: what is seen over what it holds.
-        let (apart, again) = match view {
+        // Samples and beams apart; how many places count as one, since the power of a plane changes by up to 15 % with where it
+        // lies among the scatterers.
+        let (apart, alike) = match view {
             View::Transverse => ([8, 14], 4.0),
             View::Sagittal => ([8, 8], 3.0),
         };
@@ -77,7 +78,7 @@ fn many_scatterers_give_rayleigh_speckle() {
             }
         }
         let count = amplitudes.len() as f64;
-        let independent = count / again;
+        let independent = count / alike;
         let level = mean(amplitudes.iter().copied());
         let power = mean(amplitudes.iter().map(|a| a * a));
         let ratio = level / (power - level * level).sqrt();
@@ -193,7 +194,7 @@ fn speckle_follows_the_tissue() {
     assert!(with > 0.95, "{with}");
 }
 
-/// Scatterers lay in a cube that was used again: a picture 32 mm to the right was the same (correlation 1.00).
+/// Scatterers that were kept in a cube, and used again, gave the same picture 32 mm to the right (correlation 1.00).
 #[test]
 fn no_grain_is_seen_again_elsewhere() {
     let mut scanner = scattering();

@@ -1,7 +1,7 @@
 //! The same echoes in double precision, each from its own sum over places, with the material point by Newton's method.
 
 use super::{block, field, plane, scanner};
-use crate::ultrasound::beams::{Grid, LARGEST_ECHO, powers as of_neighbours, scatterers};
+use crate::ultrasound::beams::{Grid, powers as of_neighbours};
 use crate::ultrasound::{Plane, Settings, View};
 use crate::{Metal, Tissue};
 use nalgebra::{Matrix3, Vector2, Vector3};
@@ -28,17 +28,18 @@ struct Twin {
     plane: Plane,
     grid: Grid,
     field: Field,
-    kept: Vec<u32>,
 }
 
 impl Twin {
-    fn scatterer(&self, cell: [i64; 3]) -> Vector2<f64> {
+    fn scatterer(cell: [i64; 3]) -> Vector2<f64> {
         let [x, y, z] = cell.map(|c| c as i32 as u32);
-        let mixed = y.wrapping_mul(0x9E37_79B1) ^ z.wrapping_mul(0x85EB_CA77);
-        let row = (mixed ^ (mixed >> 15)).wrapping_mul(0x2C1B_3C6D) >> 12;
-        let word = self.kept[row.wrapping_add(x) as usize % self.kept.len()];
-        let part = |byte: u32| f64::from((word >> byte & 0xff) as u8 as i8) / 127.0 * LARGEST_ECHO;
-        Vector2::new(part(0), part(8))
+        let row = y.wrapping_mul(0x27D4_EB2F) ^ z.wrapping_mul(0x1656_67B1);
+        let mut h = row.wrapping_add(x.wrapping_mul(0x9E37_79B1));
+        for (shift, factor) in [(16, 0x85EB_CA6B), (13, 0xC2B2_AE35), (16, 1)] {
+            h = (h ^ (h >> shift)).wrapping_mul(factor);
+        }
+        let part = |word: u32| f64::from(word as u16 as i16) / 32767.0 * 1.5_f64.sqrt();
+        Vector2::new(part(h), part(h >> 16))
     }
 
     fn scattering(&self, rest_m: Vector3<f64>) -> Vector2<f64> {
@@ -48,7 +49,7 @@ impl Twin {
             let step = [corner & 1, corner >> 1 & 1, corner >> 2];
             let cell = [0, 1, 2].map(|a| at[a].floor() as i64 + step[a] as i64);
             let weight: f64 = (0..3).map(|a| 1.0 - (at[a] - cell[a] as f64).abs()).product();
-            sum += self.scatterer(cell) * weight;
+            sum += Self::scatterer(cell) * weight;
             power += weight * weight;
         }
         sum / power.sqrt()
@@ -133,7 +134,6 @@ fn the_shader_computes_what_a_slow_sum_in_double_precision_does() {
             plane,
             grid,
             field: field.clone(),
-            kept: scatterers(),
         };
         let mut worst_db: f64 = 0.0;
         for (line, sample) in [
