@@ -140,9 +140,15 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
                 let _ = bridge.haptic_orders.push(*order);
             }
         }
-        while let Some((_, outside)) = outside.next_if(|(tick, _)| *tick == index as u64) {
-            tissue.outside.write(*outside);
+        // Where the probe did nothing to a line, or there was none, the loop is to find none: it would meet what an older tick left.
+        let of_lines = tissue.outside.input_buffer_mut();
+        of_lines.clear();
+        while let Some((_, of_line)) = outside.next_if(|(tick, _)| *tick == index as u64) {
+            if let Some(line) = of_lines.add() {
+                *line = *of_line;
+            }
         }
+        tissue.outside.publish();
         tissue.response.write(entry.tissue);
         again.tick(entry.record.due_ns, entry.woke_ns, entry.record.missed);
         while bridge.haptic_notices.pop().is_ok() {}

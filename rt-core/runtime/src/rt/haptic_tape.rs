@@ -1,7 +1,7 @@
 //! What the haptic loop writes to its flight recording, each tick.
 
 use crate::rt::exchange::HapticOrder;
-use crate::rt::outside::{Outside, OutsideTape};
+use crate::rt::outside::{LineOutside, OutsideTape};
 use crate::rt::pose::TipPose;
 use crate::rt::put_in::PutIn;
 use crate::rt::recorder::{FLIGHT_TICKS, Last, Tape, complete_from};
@@ -173,8 +173,8 @@ impl HapticTape {
         self.outside.get_or_insert(room);
     }
 
-    /// Keeps what the probe does to the line from the tick that runs on.
-    pub fn outside(&mut self, outside: &Outside) {
+    /// Keeps what the probe does to a line from the tick that runs on.
+    pub fn outside(&mut self, outside: &LineOutside) {
         let tick = self.ticks.next();
         if let Some(tape) = &mut self.outside {
             tape.0.push((tick, *outside));
@@ -247,8 +247,8 @@ pub struct HapticFlight {
     pub left: LeftRecord,
     /// Numbers of lines, each with the index of the tick that took it up.
     pub lines: Vec<(u64, u64)>,
-    /// What the probe does to the line, each with the index of the tick that took it up.
-    pub outside: Vec<(u64, Outside)>,
+    /// What the probe does to each line, with the index of the tick that took it up.
+    pub outside: Vec<(u64, LineOutside)>,
 }
 
 impl HapticFlight {

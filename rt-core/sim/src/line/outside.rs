@@ -4,7 +4,12 @@
 //! where they are with it.
 
 use super::beam::MAX_ACROSS;
+use super::model::MAX_STATIONS;
 use serde::{Deserialize, Serialize};
+use serde_big_array::BigArray;
+
+/// Rows of the longest line.
+const MOST: usize = rows(MAX_STATIONS);
 
 /// Displacement of each row of a line: shaft of each station, then tip at each, then stations across along each direction.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -20,7 +25,56 @@ pub(super) struct Outside {
     pub at_tip_m: f64,
 }
 
+/// The same in a flight recording of a needle that stays in, with room for the longest line.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct OutsideRecord {
+    #[serde(with = "BigArray")]
+    now_m: [f64; MOST],
+    #[serde(with = "BigArray")]
+    to_m: [f64; MOST],
+    ticks: u32,
+    is_on: bool,
+    at_tip_m: f64,
+}
+
+impl OutsideRecord {
+    /// Blank; every page is written to.
+    pub const BLANK: Self = OutsideRecord {
+        now_m: [1.0; MOST],
+        to_m: [1.0; MOST],
+        ticks: 1,
+        is_on: false,
+        at_tip_m: 1.0,
+    };
+
+    pub fn of(outside: &Outside) -> Self {
+        let mut record = OutsideRecord {
+            now_m: [0.0; MOST],
+            to_m: [0.0; MOST],
+            ticks: outside.ticks,
+            is_on: outside.is_on,
+            at_tip_m: outside.at_tip_m,
+        };
+        for (slots, rows_m) in [(&mut record.now_m, &outside.now_m), (&mut record.to_m, &outside.to_m)] {
+            for (slot, row_m) in slots.iter_mut().zip(rows_m) {
+                *slot = *row_m;
+            }
+        }
+        record
+    }
+}
+
 impl Outside {
+    /// Goes on from `record`, as far as the line has rows.
+    pub fn take_record(&mut self, record: &OutsideRecord) {
+        for (rows_m, kept) in [(&mut self.now_m, &record.now_m), (&mut self.to_m, &record.to_m)] {
+            for (row_m, kept_m) in rows_m.iter_mut().zip(kept) {
+                *row_m = *kept_m;
+            }
+        }
+        (self.ticks, self.is_on, self.at_tip_m) = (record.ticks, record.is_on, record.at_tip_m);
+    }
+
     /// Of a line of so many stations, with room for any across.
     pub fn new(stations: usize, value: f64) -> Self {
         let rows = rows(stations);
@@ -79,6 +133,11 @@ impl Outside {
         self.is_on
     }
 
+    /// It is not yet where it has to be.
+    pub fn is_going(&self) -> bool {
+        self.ticks > 0
+    }
+
     /// Of each row, m.
     pub fn now_m(&self) -> &[f64] {
         &self.now_m
@@ -107,6 +166,6 @@ impl Outside {
     }
 }
 
-fn rows(stations: usize) -> usize {
+const fn rows(stations: usize) -> usize {
     2 * (stations + MAX_ACROSS)
 }

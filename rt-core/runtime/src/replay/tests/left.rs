@@ -5,14 +5,19 @@ use stylet_shm_schema::{RefusalCode, flags};
 use stylet_sim::line::LeftNeedles;
 
 /// Of the second needle from the first, across.
-const APART_M: f64 = 4e-3;
+pub(super) const APART_M: f64 = 4e-3;
 
 impl Recorded {
     /// In tissue that does not move whole, with room for needles that stay in.
     fn with_left(kind: TissueKind) -> Self {
         let mut run = Self::new(kind, &ForceParameters::default());
-        run.haptic(HapticOrder::Engage { ticket: 0 });
-        run.haptic(HapticOrder::Parameters {
+        run.make_room_to_leave();
+        run
+    }
+
+    pub(super) fn make_room_to_leave(&mut self) {
+        self.haptic(HapticOrder::Engage { ticket: 0 });
+        self.haptic(HapticOrder::Parameters {
             ticket: 0,
             generation: 2,
             needle: NeedleParameters::default(),
@@ -23,16 +28,19 @@ impl Recorded {
                 ..ForceParameters::default()
             },
         });
-        let bridge = &mut run.loops.bridge;
+        let bridge = &mut self.loops.bridge;
         assert!(bridge.rooms.push(LeftNeedles::with_room()).is_ok());
         let room = TissueOrder::LeftRoom(crate::rt::tissue_tape::LeftTape::new());
         assert!(bridge.tissue_orders.push(room).is_ok());
-        run
     }
 
     /// A line beside the first one, which knows it.
     fn beside(&self, kind: TissueKind, generation: u64, apart_m: f64) -> ReadyLine {
-        let body = LineBody::of_source(&block(), kind).expect("valid").expect("has lines");
+        self.beside_in(&block(), kind, generation, apart_m)
+    }
+
+    pub(super) fn beside_in(&self, source: &SceneSource, kind: TissueKind, generation: u64, apart_m: f64) -> ReadyLine {
+        let body = LineBody::of_source(source, kind).expect("valid").expect("has lines");
         let entry_m = self.entry_m + Vector3::x() * apart_m;
         let others = [self.line.stations.clone()];
         let line = body.prepare_beside(generation, entry_m.into(), [0.0, 0.0, 1.0], false, &others, &mut || {
@@ -41,7 +49,7 @@ impl Recorded {
         line.expect("through the block")
     }
 
-    fn give(&mut self, line: &ReadyLine) {
+    pub(super) fn give(&mut self, line: &ReadyLine) {
         self.kept.push(line.hand.source());
         let bridge = &mut self.loops.bridge;
         bridge.lines.push(line.hand.clone()).expect("room");
@@ -50,18 +58,18 @@ impl Recorded {
     }
 
     /// The hand on the axis that far beside the first needle's.
-    fn go_beside(&mut self, apart_m: f64, depth_m: f64) {
+    pub(super) fn go_beside(&mut self, apart_m: f64, depth_m: f64) {
         let entry_m = self.entry_m;
         self.entry_m += Vector3::x() * apart_m;
         self.go(depth_m);
         self.entry_m = entry_m;
     }
 
-    fn has(&self, flag: u32) -> bool {
+    pub(super) fn has(&self, flag: u32) -> bool {
         self.loops.haptic.state.flags & flag != 0
     }
 
-    fn left_count(&self) -> u32 {
+    pub(super) fn left_count(&self) -> u32 {
         self.loops.haptic.state.left_count
     }
 

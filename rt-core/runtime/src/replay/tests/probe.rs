@@ -1,9 +1,11 @@
 //! A probe that presses beside a needle, in a recording that repeats in every bit, in both loops.
 
+use super::left::APART_M;
 use super::*;
 use crate::rt::outside::OutsideTape;
 use crate::rt::probe_tape::ProbeTape;
 use stylet_anatomy::Beyond;
+use stylet_shm_schema::flags;
 use stylet_sim::probe::{ProbePose, ProbeShape};
 use stylet_sim::scene::{Material, Role, Structure, Surroundings};
 
@@ -113,6 +115,49 @@ fn a_recording_with_a_probe_repeats_in_every_bit() {
         other.tissue.as_mut().expect("recorded").probe[300].1.pose.tip_m[1] += 1e-5;
         other.haptic.as_mut().expect("recorded").outside.clear();
         assert_repeats(&other, false);
+    }
+}
+
+/// The probe presses while one needle stays in and another goes in beside it; what it does to both lines is recorded, and counts.
+#[test]
+fn a_recording_with_a_probe_and_a_needle_that_stays_in_repeats_in_every_bit() {
+    for kind in [TissueKind::Fem, TissueKind::ChainMail] {
+        let mut run = Recorded::with_probe(kind);
+        run.make_room_to_leave();
+        run.give_line(1);
+        run.press([16e-3, 16e-3], 0.1);
+        run.go(14e-3);
+        run.press([16e-3, 16e-3], 1.6);
+        run.haptic(HapticOrder::LeaveNeedle { ticket: 0 });
+        run.press([16e-3, 16e-3], 0.1);
+        assert!(run.left_count() == 1 && run.has(flags::HAND_EMPTY));
+        run.go(-8e-3);
+        run.press([16e-3, 18e-3], 1.5);
+        let second = run.beside_in(&hollow(), kind, 2, APART_M);
+        run.go_beside(APART_M, -8e-3);
+        run.press([18e-3, 18e-3], 0.6);
+        run.give(&second);
+        run.press([18e-3, 20e-3], 0.5);
+        run.go_beside(APART_M, 12e-3);
+        run.press([20e-3, 24e-3], 1.5);
+        run.press([24e-3, 19e-3], 1.5);
+        let flight = through_a_file(&run.flight());
+        assert_eq!(run.heap_calls, 0, "heap calls of the loops");
+        assert_repeats(&flight, true);
+        let haptic = flight.haptic.as_ref().expect("recorded");
+        assert_eq!(haptic.left.line_numbers().collect::<Vec<_>>(), [1]);
+        assert!(haptic.ticks_on_line() > 1000);
+        let mut other = flight.clone();
+        let outside = &mut other.haptic.as_mut().expect("recorded").outside;
+        let before = outside.len();
+        outside.retain(|(_, of_line)| of_line.generation != 1);
+        assert!(
+            outside.len() > 200 && before > 2 * outside.len() - 100,
+            "{before} {}",
+            outside.len()
+        );
+        let found = repeat::haptic(&other, other.haptic.as_ref().expect("recorded")).expect("can be run");
+        assert!(!found.is_identical(), "the needle that stays in feels the probe");
     }
 }
 

@@ -24,7 +24,7 @@ impl HapticLoop {
         self.line.as_ref()?.track()
     }
 
-    /// What the probe does to the line in this tick of the tissue. One comparison without a probe.
+    /// What the probe does to the lines in this tick of the tissue. One comparison without a probe.
     pub(super) fn follow_outside(&mut self, tissue: &TissueResponse) {
         if tissue.outside == self.outside {
             return;
@@ -37,10 +37,19 @@ impl HapticLoop {
             {
                 tape.take_outside_room(room);
             }
-            tape.outside(outside);
+            outside.lines().iter().for_each(|line| tape.outside(line));
         }
-        if let Some(line) = self.line.as_mut().filter(|line| line.generation == outside.generation) {
-            line.displace_from_outside(outside.rows_m(), (TISSUE_PERIOD_S / self.period_s).round() as u32);
+        let ticks = (TISSUE_PERIOD_S / self.period_s).round() as u32;
+        for of_line in outside.lines() {
+            let (generation, rows_m) = (of_line.generation, of_line.rows_m());
+            match self.line.as_mut().filter(|line| line.generation == generation) {
+                Some(line) => line.displace_from_outside(rows_m, ticks),
+                None => {
+                    if let Some(left) = self.left.any_mut() {
+                        left.displace_from_outside(generation, rows_m, ticks);
+                    }
+                }
+            }
         }
     }
 

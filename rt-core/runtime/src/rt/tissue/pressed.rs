@@ -90,15 +90,20 @@ impl TissueLoop {
         self.show_outside();
     }
 
-    /// What the probe does to the line of the needle that moves, as long as it does something, and once more when it no longer does.
+    /// What the probe does to the lines of the needle that moves and of those that stay in, as long as it does something, and once more when it no
+    /// longer does.
     fn show_outside(&mut self) {
-        let (Some(pressed), Some(line)) = (&self.pressed, &self.line) else {
-            return;
-        };
+        let Some(pressed) = &self.pressed else { return };
         let is_pressed = pressed.response().contacts > 0;
         if is_pressed || self.is_outside_shown {
             let outside = self.ports.outside.input_buffer_mut();
-            outside.set(line.generation, |rows_m| pressed.displace_line(line.generation, rows_m));
+            outside.clear();
+            let moves = self.line.iter().map(|line| line.generation);
+            for generation in moves.chain(self.left.iter().map(|left| left.line.generation)) {
+                if let Some(line) = outside.add() {
+                    line.set(generation, |rows_m| pressed.displace_line(generation, rows_m));
+                }
+            }
             self.ports.outside.publish();
             self.response.outside += 1;
             self.is_outside_shown = is_pressed;

@@ -37,7 +37,7 @@ impl Between<'_> {
 
 impl LeftNeedle {
     /// Rows of its line that an element loads, each with its share.
-    fn rows(&self, element: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
+    pub(super) fn rows(&self, element: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
         let state = &self.line.state;
         let m = self.line.model.compliance.stations;
         let is_tip = element == self.stations;

@@ -7,6 +7,7 @@
 
 mod assemble;
 mod by_sets;
+mod moved;
 mod needle;
 mod onward;
 mod record;
@@ -77,6 +78,8 @@ pub struct LeftNeedles {
     /// Displacement along its own needle at which the element holds nothing, and that it has.
     rest_m: Vec<f64>,
     u_m: Vec<f64>,
+    /// What the probe moves the tissue by at the element, along its own needle: taken from `rest_m`.
+    moved_m: Vec<f64>,
     low_n: Vec<f64>,
     high_n: Vec<f64>,
     /// The line of the needle that moves, and how its rows move with a newton at each element.
@@ -122,6 +125,7 @@ impl LeftNeedles {
             force_n: each(MAX_ELEMENTS),
             rest_m: each(MAX_ELEMENTS),
             u_m: each(MAX_ELEMENTS),
+            moved_m: each(MAX_ELEMENTS),
             low_n: each(MAX_ELEMENTS),
             high_n: each(MAX_ELEMENTS),
             moving: 0,
@@ -147,6 +151,7 @@ impl LeftNeedles {
             &self.force_n,
             &self.rest_m,
             &self.u_m,
+            &self.moved_m,
             &self.low_n,
             &self.high_n,
             &self.to_moving,
@@ -211,6 +216,7 @@ impl LeftNeedles {
         self.assemble(None);
         self.displace(None);
         self.rest_where_it_is(self.needles.len() - 1);
+        self.begin_moved(self.needles.len() - 1);
         Ok(())
     }
 
@@ -264,6 +270,7 @@ impl LeftNeedles {
     pub fn step_alone(&mut self, dt_s: f64) {
         self.taken_n_per_m = 0.0;
         self.draw(dt_s);
+        self.move_from_outside();
         if !self.is_still {
             self.displace(None);
             self.solve_alone();
@@ -274,6 +281,7 @@ impl LeftNeedles {
     pub fn step_beside(&mut self, line: &mut HandLine, tip_m: f64, dt_s: f64) -> LineOutput {
         let tip_m = tip_m - line.in_bone_m(tip_m);
         self.draw(dt_s);
+        self.move_from_outside();
         solve::step_beside(self, line, &LineInput { tip_m, dt_s })
     }
 
@@ -349,25 +357,24 @@ impl LeftNeedles {
         let mut needle = self.needles.remove(at);
         let (first, tip) = (needle.first, needle.first + needle.stations);
         let state = &mut needle.line.state;
+        // A needle in the hand is displaced by what the probe moves as well; here that was taken from where it is at rest.
         for (n, k) in (first..tip).enumerate() {
+            let moved_m = state.outside.at_m(n);
             state.shaft_n[n] = self.force_n[k];
-            state.u_m[n] = self.u_m[k];
-            state.anchor_m[n] = needle.held_m - self.rest_m[k];
+            state.u_m[n] = self.u_m[k] + moved_m;
+            state.anchor_m[n] = needle.held_m - self.rest_m[k] - moved_m;
         }
-        let reached_m = needle.held_m - self.rest_m[tip];
-        state.tip_u_m = self.u_m[tip];
+        let at_tip_m = state.outside.at_tip_m;
+        let reached_m = needle.held_m - self.rest_m[tip] - at_tip_m;
+        state.tip_u_m = self.u_m[tip] + at_tip_m;
         state.tip.force_n = self.force_n[tip];
         state.tip.track_m = state.tip.track_m.max(reached_m);
-        state.tip.material_m = reached_m.min(needle.held_m - self.u_m[tip]);
+        state.tip.material_m = reached_m.min(needle.held_m - state.tip_u_m);
         state.in_contact = needle.stations;
-        // What the probe moves the line by was none of these displacements.
-        if state.outside.is_on() {
-            state.come_back_moved();
-        }
         // Those behind it move up.
         let gap = needle.stations + 1;
         let end = self.count;
-        for values in [&mut self.force_n, &mut self.rest_m, &mut self.u_m] {
+        for values in [&mut self.force_n, &mut self.rest_m, &mut self.u_m, &mut self.moved_m] {
             values.copy_within(first + gap..end, first);
         }
         for later in &mut self.needles[at..] {

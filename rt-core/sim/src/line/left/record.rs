@@ -2,6 +2,7 @@
 
 use super::{LeftNeedle, LeftNeedles, MAX_LEFT};
 use crate::line::model::MAX_STATIONS;
+use crate::line::outside::OutsideRecord;
 use crate::line::ready::HandLine;
 use crate::line::state::TipState;
 use serde::{Deserialize, Serialize};
@@ -27,6 +28,7 @@ struct NeedleRecord {
     rest_m: [f64; MAX_STATIONS + 1],
     #[serde(with = "BigArray")]
     u_m: [f64; MAX_STATIONS + 1],
+    outside: OutsideRecord,
 }
 
 /// All of them at one tick; copied without allocating.
@@ -65,6 +67,7 @@ impl LeftRecord {
             force_n: [1.0; MAX_STATIONS + 1],
             rest_m: [1.0; MAX_STATIONS + 1],
             u_m: [1.0; MAX_STATIONS + 1],
+            outside: OutsideRecord::BLANK,
         };
         let mut record = LeftRecord::default();
         record.needles.resize(MAX_LEFT, blank);
@@ -101,6 +104,7 @@ impl LeftRecord {
                 force_n: [0.0; MAX_STATIONS + 1],
                 rest_m: [0.0; MAX_STATIONS + 1],
                 u_m: [0.0; MAX_STATIONS + 1],
+                outside: OutsideRecord::of(&state.outside),
             };
             record.force_n[..count].copy_from_slice(&left.force_n[first..first + count]);
             record.rest_m[..count].copy_from_slice(&left.rest_m[first..first + count]);
@@ -143,6 +147,7 @@ impl LeftNeedles {
             line.state.tip_range = tip;
             line.state.tip_weights = kept.tip_weights;
             line.state.in_contact = stations;
+            line.state.outside.take_record(&kept.outside);
             let (first, count) = (self.count, stations + 1);
             self.force_n[first..first + count].copy_from_slice(&kept.force_n[..count]);
             self.rest_m[first..first + count].copy_from_slice(&kept.rest_m[..count]);
@@ -155,6 +160,7 @@ impl LeftNeedles {
                 drawn_m: kept.drawn_m,
                 drawing_m_per_s: kept.drawing_m_per_s,
             });
+            self.begin_moved(self.needles.len() - 1);
             self.count = first + count;
         }
         self.assemble(moving.filter(|line| line.generation == record.moving));

@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 mod behaviour;
 mod body;
+mod moved;
 
 const STATIONS: usize = 24;
 const SPACING_M: f64 = 1.364e-3;

@@ -33,18 +33,6 @@ impl LineState {
         self.outside.at_tip_m = at_tip_m;
     }
 
-    /// A needle that is taken up again after it stayed in: places count with what the probe moves the tissue by.
-    pub(in crate::line) fn come_back_moved(&mut self) {
-        for n in 0..self.in_contact {
-            let moved_m = self.outside.at_m(n);
-            self.u_m[n] += moved_m;
-            self.anchor_m[n] -= moved_m;
-        }
-        let at_tip_m = self.outside.at_tip_m;
-        self.tip_u_m += at_tip_m;
-        self.tip.material_m -= at_tip_m;
-    }
-
     /// The same across the line, at so many stations along each direction.
     pub(in crate::line) fn bend_from_outside(&mut self, across: usize) {
         let first = 2 * self.shaft_n.len();
