@@ -5,6 +5,7 @@ use crate::action::{Action, WatchAction};
 use crate::shown::{NeedleLine, SecondHand, Shown, Watched};
 use crate::theme;
 use crate::theme::Tokens;
+use crate::view::free::BANNERS;
 use egui::{Color32, Rect, RichText};
 use stylet_host::link::LinkStatus;
 use stylet_shm_schema::{Exercise, Fault, Relayed, Request};
@@ -313,7 +314,7 @@ pub fn banners_ui(ctx: &egui::Context, pictures: Rect, list: &[Banner]) -> Optio
     if list.is_empty() {
         return None;
     }
-    let area = egui::Area::new(egui::Id::unique("banners"))
+    let area = egui::Area::new(egui::Id::unique(BANNERS))
         .fixed_pos(pictures.min)
         .movable(false)
         .constrain(false)

@@ -6,6 +6,7 @@ mod collected;
 mod draw;
 pub(crate) mod driver;
 mod fluoro;
+pub(crate) mod free;
 mod gpu;
 mod kinds;
 mod legend;

@@ -5,6 +5,7 @@ mod tools;
 mod turns;
 
 use super::body::ShownBody;
+use super::free::free_of_banners;
 use super::paste::{Paste, Pasted};
 use super::slice::{ROOM_FOR_REASON, words};
 use crate::action::{Action, ProbeAction};
@@ -201,7 +202,7 @@ impl ProbeView {
         let (name, way, turn) = (plane.view.name(), format::length(way_m), turn_rad.to_degrees());
         // No minus before a zero.
         let turn = if turn.abs() < 0.05 { 0.0 } else { turn };
-        let at: Pos2 = rect.left_top() + Vec2::new(9.0, 6.0);
+        let at: Pos2 = free_of_banners(painter.ctx(), rect).left_top() + Vec2::new(9.0, 6.0);
         let text = format!("{name}\n{whose}  {way}  {turn:.1}°");
         painter.text(at, Align2::LEFT_TOP, text, FontId::proportional(12.5), IMAGE.text);
     }

@@ -239,3 +239,32 @@ fn a_second_device_that_is_lost_or_stands_still_has_a_banner_of_its_own() {
     shown.session = None;
     assert!(banners(&shown).is_empty());
 }
+
+/// Which picture it is stays legible under banners, in a picture that they all but cover as well, and as before without one.
+#[test]
+fn words_of_a_picture_stand_below_banners() {
+    use crate::view::free::free_of_banners;
+    use std::cell::Cell;
+    let pictures = Rect::from_min_size(egui::pos2(20.0, 30.0), egui::vec2(700.0, 400.0));
+    let low = Rect::from_min_size(pictures.min, egui::vec2(300.0, 70.0));
+    let beside = Rect::from_min_size(egui::pos2(20.0, 240.0), egui::vec2(300.0, 190.0));
+    let (count, seen) = (Cell::new(0), Cell::new([0.0; 3]));
+    let mut harness = egui_kittest::Harness::new_ui(|ui| {
+        seen.set([pictures, low, beside].map(|rect| free_of_banners(ui.ctx(), rect).top()));
+        let refused = banners(&Shown::empty("lab"));
+        let list: Vec<Banner> = refused.iter().cycle().take(count.get()).cloned().collect();
+        banners_ui(ui.ctx(), pictures, &list);
+    });
+    let mut tops = |banners: usize| {
+        count.set(banners);
+        harness.run_steps(3);
+        seen.get()
+    };
+    assert_eq!(tops(0), [30.0, 30.0, 240.0]);
+    let [one, lowest, other] = tops(1);
+    assert!(one > 50.0 && one < 120.0, "{one}");
+    assert_eq!((lowest, other), (40.0_f32.min(one), 240.0));
+    let [three, ..] = tops(3);
+    assert!(three > one + 40.0, "{three} {one}");
+    assert_eq!(tops(0), [30.0, 30.0, 240.0], "gone");
+}

@@ -2,6 +2,7 @@
 
 use super::{FluoroView, inside};
 use crate::theme::IMAGE;
+use crate::view::free::free_of_banners;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Vec2};
 use stylet_imaging::fluoroscopy::{CArm, DoseCounter};
 
@@ -15,7 +16,8 @@ impl FluoroView {
     pub(super) fn words_over(&self, painter: &Painter, rect: Rect, square: Rect, arm: CArm) {
         let text = |at, align, words: &str, color| backed(painter, at, align, words, color);
         let name = "Fluoroscopy";
-        text(inside(rect.left_top(), [9.0, 6.0]), Align2::LEFT_TOP, name, IMAGE.text);
+        let free = free_of_banners(painter.ctx(), rect);
+        text(inside(free.left_top(), [9.0, 6.0]), Align2::LEFT_TOP, name, IMAGE.text);
         let (sign, color) = match &self.held {
             _ if self.is_on() => ("X-RAY ON".to_owned(), IMAGE.beam),
             Some(held) => {

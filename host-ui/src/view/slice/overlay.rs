@@ -5,6 +5,7 @@ use super::plane::Plane;
 use crate::dose_worker::{DoseResult, LEVELS};
 use crate::shown::Shown;
 use crate::theme::IMAGE;
+use crate::view::free::free_of_banners;
 use crate::view::orientation::Orientation;
 use crate::view::state::ViewState;
 use egui::text::LayoutJob;
@@ -281,8 +282,14 @@ impl Overlay<'_> {
         rect
     }
 
+    /// What banners leave of the picture.
+    fn free(&self) -> Rect {
+        free_of_banners(self.painter.ctx(), self.plane.rect)
+    }
+
     fn letters(&self) {
         let rect = self.plane.rect.shrink(6.0);
+        let free = self.free().shrink(6.0);
         let [left, right, top, bottom] = self.orientation.letters();
         let word = |at, anchor, text| self.word(at, anchor, text, 12.0, IMAGE.text);
         if rect.height() >= ROOM_FOR_LETTERS {
@@ -290,12 +297,12 @@ impl Overlay<'_> {
             word(rect.right_center(), Align2::RIGHT_CENTER, right);
         }
         if rect.width() >= ROOM_FOR_UPPER_LETTER {
-            word(rect.center_top(), Align2::CENTER_TOP, top);
+            word(free.center_top(), Align2::CENTER_TOP, top);
         }
         word(rect.center_bottom(), Align2::CENTER_BOTTOM, bottom);
         let title = format!("{}  {}", self.orientation.name(), self.place());
         self.word(
-            rect.left_top() + Vec2::new(3.0, 0.0),
+            free.left_top() + Vec2::new(3.0, 0.0),
             Align2::LEFT_TOP,
             &title,
             12.5,
@@ -320,7 +327,7 @@ impl Overlay<'_> {
     /// Under the title: what the pointer is on.
     pub fn tissue(&self, name: &str) {
         if !name.is_empty() {
-            let at = self.plane.rect.left_top() + Vec2::new(9.0, 24.0);
+            let at = self.free().left_top() + Vec2::new(9.0, 24.0);
             self.word(at, Align2::LEFT_TOP, name, 12.0, IMAGE.text);
         }
     }
