@@ -266,5 +266,5 @@ fn words_of_a_picture_stand_below_banners() {
     assert_eq!((lowest, other), (40.0_f32.min(one), 240.0));
     let [three, ..] = tops(3);
     assert!(three > one + 40.0, "{three} {one}");
-    assert_eq!(tops(0), [30.0, 30.0, 240.0], "gone");
+    assert_eq!(tops(0), [30.0, 30.0, 240.0], "none any more");
 }
