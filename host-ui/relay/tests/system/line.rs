@@ -1,6 +1,6 @@
 //! Members behind lines of their own, in network namespaces: a line of 100 Mbit/s, and a class of twenty. As root, by `make relay-class`.
 
-use crate::fixture::{Host, Keys, Named, Running, core, lease, until};
+use crate::fixture::{Host, Keys, Named, Running, core, lease, scratch, until};
 use crate::space::Line;
 use crate::watch::{Seen, gaps, quantile, seconds, settle};
 use std::collections::BTreeSet;
@@ -92,7 +92,8 @@ fn share_of(made: &BTreeSet<u64>, host: &mut Host, named: &Named) -> f64 {
 #[ignore = "as root: it makes a network namespace for each member"]
 fn a_class_of_twenty_gets_its_records_and_the_core_does_not_notice() {
     let near = Named::new();
-    let _core = core(&near, &[]);
+    let report = scratch("report").join("core.json");
+    let core = core(&near, &["--report", report.to_str().expect("plain")]);
     let servers: Vec<String> = (1..=observers()).map(Line::server).collect();
     let keys = Keys::reached_at(&servers);
     let lines: Vec<Line> = (1..=observers()).map(|number| Line::new(number, None)).collect();
@@ -160,4 +161,13 @@ fn a_class_of_twenty_gets_its_records_and_the_core_does_not_notice() {
         busy / quiet
     );
     assert!(least >= 0.999, "{shares:?}");
+    drop(core);
+    let text = std::fs::read_to_string(&report).expect("the core reports what its loops did");
+    let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    for name in ["haptic", "tissue"] {
+        let own = &report[name];
+        println!("{name}: {own}");
+        let disturbed = ["heap_calls", "minor_faults", "major_faults"].map(|what| own[what].as_i64());
+        assert_eq!(disturbed, [Some(0); 3], "{name}: heap calls and page faults");
+    }
 }
