@@ -260,15 +260,18 @@ impl Plane {
 
     /// What the fan covers of the picture: x and y from its left and upper edge, width and height, pixels.
     pub(super) fn covered(&self) -> [u32; 4] {
-        let half_m = match self.view {
-            View::Transverse => (self.probe.radius_m + self.depth_m) * self.probe.half_angle.min(FRAC_PI_2).sin(),
-            View::Sagittal => self.probe.half_length_m,
-        };
-        // The arc ends over the axis, or under it.
-        let least_m = match self.view {
-            View::Transverse => (self.probe.radius_m * self.probe.half_angle.cos())
-                .min((self.probe.radius_m + self.depth_m) * self.probe.half_angle.cos()),
-            View::Sagittal => self.probe.radius_m,
+        let near_m = self.probe.radius_m;
+        let far_m = near_m + self.depth_m;
+        let (half_m, least_m) = match self.view {
+            // Its ends are lowest at the probe, or at the depth where they go under the axis.
+            View::Transverse => {
+                let half = self.probe.half_angle;
+                (
+                    far_m * half.min(FRAC_PI_2).sin(),
+                    (near_m * half.cos()).min(far_m * half.cos()),
+                )
+            }
+            View::Sagittal => (self.probe.half_length_m, near_m),
         };
         let scale = self.m_per_pixel();
         let [wide, high] = self.pixels.map(f64::from);
@@ -278,7 +281,7 @@ impl Plane {
             [from as u32, (to - from) as u32]
         };
         let [x, width] = span(0.5 * wide - half_m / scale, 0.5 * wide + half_m / scale, wide);
-        let [y, height] = span(row(self.probe.radius_m + self.depth_m), row(least_m), high);
+        let [y, height] = span(row(far_m), row(least_m), high);
         [x, y, width, height]
     }
 

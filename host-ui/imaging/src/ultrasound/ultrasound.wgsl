@@ -53,6 +53,8 @@ override SOFT_LOSS: f32;
 
 // Slices reach so many spreads to both sides.
 const REACH: f32 = 2.0;
+// Neighbours that are computed together, as in passes.rs: they share what they read.
+const AT_ONCE: i32 = 4;
 
 fn depth_of(sample: f32) -> f32 {
     return sample * shot.up.w / (shot.counts.y - 1.0);
@@ -90,7 +92,8 @@ fn kept_at(at: vec2<u32>) -> vec4<f32> {
     return textureLoad(before, at, 0);
 }
 
-// How far what lies at a place now is from where it was at rest, at the edges of cells of the grid, at both ends of the slices.
+// How far what lies at a place now is from where it was at rest, at the edges of cells of the grid, at both ends of the slices: one
+// end under the other in a corner of the texture, which has more columns and rows than both.
 @compute @workgroup_size(64)
 fn rest_map(@builtin(global_invocation_id) id: vec3<u32>) {
     let cell = u32(shot.counts.w);
@@ -180,7 +183,7 @@ fn sent_back(beam: Beam, sample: f32, before_m: vec3<f32>, behind_m: vec3<f32>) 
     return vec4(sum * strength * inverseSqrt(power), tissue.y * LARGEST_LOSS, tissue.z * LARGEST_IMPEDANCE);
 }
 
-// Four samples of a beam, between the same places of the map.
+// Four samples of a beam, between the same places of the map, whose cells are a multiple of four.
 @compute @workgroup_size(64)
 fn echo(@builtin(global_invocation_id) id: vec3<u32>) {
     let lines = u32(shot.counts.x);
@@ -190,7 +193,7 @@ fn echo(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let cell = u32(shot.counts.w);
     let rows = (samples - 1u) / cell + 2u;
-    let first = 4u * id.y;
+    let first = u32(AT_ONCE) * id.y;
     let at = vec2(id.x / cell, first / cell);
     let x = f32(id.x % cell) / f32(cell);
     let beam = beam_of(f32(id.x));
@@ -198,7 +201,7 @@ fn echo(@builtin(global_invocation_id) id: vec3<u32>) {
     let below_before_m = shift_m(at + vec2(0u, 1u), x);
     let above_behind_m = shift_m(at + vec2(0u, rows), x);
     let below_behind_m = shift_m(at + vec2(0u, rows + 1u), x);
-    for (var k = first; k < min(first + 4u, samples); k++) {
+    for (var k = first; k < min(first + u32(AT_ONCE), samples); k++) {
         let y = f32(k % cell) / f32(cell);
         let before_m = mix(above_before_m, below_before_m, y);
         let behind_m = mix(above_behind_m, below_behind_m, y);
@@ -228,43 +231,51 @@ fn beam(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 
-// How the sums of four neighbours weigh what lies n steps after the first of them, by their weights one step before.
-fn weights(n: i32, spread: f32, reach: i32, before: vec4<f32>) -> vec4<f32> {
-    let x = f32(n) / spread;
-    return vec4(select(0.0, exp(-0.5 * x * x), abs(n) <= reach), before.xyz);
+// Weighted sums around four neighbours: of both parts of the echoes, of bright lines, of squared weights and of weights.
+struct Sums {
+    real: vec4<f32>,
+    imaginary: vec4<f32>,
+    edge: vec4<f32>,
+    power: vec4<f32>,
+    whole: vec4<f32>,
+}
+
+// From a texel on along `step`, of which there are so many that way; `from_edge` is where the first of the four stands among them.
+fn sums_of_four(at: vec2<i32>, step: vec2<i32>, from_edge: i32, size: i32, spread: f32, reach: i32) -> Sums {
+    var sums = Sums();
+    var weight = vec4(0.0);
+    for (var j = -reach; j <= reach + 3; j++) {
+        // What lies j from the first lies j - 1 from the second.
+        let x = f32(j) / spread;
+        weight = vec4(select(0.0, exp(-0.5 * x * x), abs(j) <= reach), weight.xyz);
+        let n = from_edge + j;
+        if (n >= 0 && n < size) {
+            let here = kept_at(vec2<u32>(at + j * step));
+            sums.real += weight * here.x;
+            sums.imaginary += weight * here.y;
+            sums.edge += weight * here.z;
+            sums.power += weight * weight;
+            sums.whole += weight;
+        }
+    }
+    return sums;
 }
 
 // The pulse, over four samples of a beam. Echoes of scatterers keep their mean power, bright lines their height where they are
 // long across the beam.
 @compute @workgroup_size(64)
 fn axial(@builtin(global_invocation_id) id: vec3<u32>) {
-    let lines = u32(shot.counts.x);
     let samples = i32(shot.counts.y);
-    if (id.x >= lines) {
+    if (id.x >= u32(shot.counts.x)) {
         return;
     }
     let spread = shot.spread.x / depth_of(1.0);
-    let reach = i32(ceil(3.0 * spread));
-    let first = 4 * i32(id.y);
-    var real = vec4(0.0);
-    var imaginary = vec4(0.0);
-    var edge = vec4(0.0);
-    var power = vec4(0.0);
-    var weight = vec4(0.0);
-    for (var j = -reach; j <= reach + 3; j++) {
-        weight = weights(j, spread, reach, weight);
-        let k = first + j;
-        if (k >= 0 && k < samples) {
-            let here = kept_at(vec2(id.x, u32(k)));
-            real += weight * here.x;
-            imaginary += weight * here.y;
-            edge += weight * here.z;
-            power += weight * weight;
-        }
-    }
-    for (var i = 0; i < min(4, samples - first); i++) {
-        let kept = vec4(vec2(real[i], imaginary[i]) * inverseSqrt(power[i]), edge[i], 0.0);
-        textureStore(after, vec2(i32(id.x), first + i), kept);
+    let at = vec2(i32(id.x), AT_ONCE * i32(id.y));
+    let sums = sums_of_four(at, vec2(0, 1), at.y, samples, spread, i32(ceil(3.0 * spread)));
+    let root = inverseSqrt(sums.power);
+    for (var i = 0; i < min(AT_ONCE, samples - at.y); i++) {
+        let kept = vec4(sums.real[i] * root[i], sums.imaginary[i] * root[i], sums.edge[i], 0.0);
+        textureStore(after, at + vec2(0, i), kept);
     }
 }
 
@@ -272,37 +283,20 @@ fn axial(@builtin(global_invocation_id) id: vec3<u32>) {
 @compute @workgroup_size(16, 4)
 fn lateral(@builtin(global_invocation_id) id: vec3<u32>) {
     let lines = i32(shot.counts.x);
-    let first = 4 * i32(id.x);
-    if (first >= lines || id.y >= u32(shot.counts.y)) {
+    let at = vec2(AT_ONCE * i32(id.x), i32(id.y));
+    if (at.x >= lines || id.y >= u32(shot.counts.y)) {
         return;
     }
     let depth_m = depth_of(f32(id.y));
     let r = select(shot.right.w + depth_m, 1.0, shot.origin_m.w > 0.5);
     let pitch_m = r * 2.0 * shot.normal.w / (shot.counts.x - 1.0);
     let spread = max(max(shot.spread.y, shot.spread.z * depth_m) / pitch_m, 0.1);
-    let reach = min(i32(ceil(2.7 * spread)), 40);
-    var real = vec4(0.0);
-    var imaginary = vec4(0.0);
-    var edge = vec4(0.0);
-    var power = vec4(0.0);
-    var whole = vec4(0.0);
-    var weight = vec4(0.0);
-    for (var j = -reach; j <= reach + 3; j++) {
-        weight = weights(j, spread, reach, weight);
-        let l = first + j;
-        if (l >= 0 && l < lines) {
-            let here = kept_at(vec2(u32(l), id.y));
-            real += weight * here.x;
-            imaginary += weight * here.y;
-            edge += weight * here.z;
-            power += weight * weight;
-            whole += weight;
-        }
-    }
-    let bright = edge / whole;
-    let echo = (real * real + imaginary * imaginary) / (power * powers[id.y]) + bright * bright;
+    let sums = sums_of_four(at, vec2(1, 0), at.x, lines, spread, min(i32(ceil(2.7 * spread)), 40));
+    let bright = sums.edge / sums.whole;
+    let square = sums.real * sums.real + sums.imaginary * sums.imaginary;
+    let echo = square / (sums.power * powers[id.y]) + bright * bright;
     let level_db = 10.0 * log(max(echo, vec4(1e-20))) / log(10.0) + shot.gain.x * depth_m + shot.gain.y;
-    for (var i = 0; i < min(4, lines - first); i++) {
-        textureStore(levels_db, vec2(first + i, i32(id.y)), vec4(level_db[i], 0.0, 0.0, 0.0));
+    for (var i = 0; i < min(AT_ONCE, lines - at.x); i++) {
+        textureStore(levels_db, at + vec2(i, 0), vec4(level_db[i], 0.0, 0.0, 0.0));
     }
 }

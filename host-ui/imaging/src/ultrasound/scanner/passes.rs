@@ -10,7 +10,11 @@ use stylet_surfaces::field::{SEEN_M, STEPS};
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const BETWEEN: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 const LEVELS: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
-const BEAMS_AT_ONCE: u32 = 64;
+/// Groups of the passes, and neighbours that are computed together, as the shader has them.
+const GROUP: u32 = 64;
+const BEAM_GROUP: u32 = 16;
+const LATERAL_GROUP: [u32; 2] = [16, 4];
+const AT_ONCE: u32 = 4;
 const ENTRIES: [&str; 5] = ["rest_map", "echo", "beam", "axial", "lateral"];
 
 pub struct Passes {
@@ -142,13 +146,17 @@ impl Passes {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let Grid { lines, samples, .. } = buffers.grid;
         let [columns, rows] = buffers.grid.map_cells();
-        let (beams, four_samples) = (lines.div_ceil(BEAMS_AT_ONCE), samples.div_ceil(4));
+        let (beams, four_samples) = (lines.div_ceil(GROUP), samples.div_ceil(AT_ONCE));
         let sizes = [
-            [columns.div_ceil(BEAMS_AT_ONCE), rows, 2],
+            [columns.div_ceil(GROUP), rows, 2],
             [beams, four_samples, 1],
-            [lines.div_ceil(16), 1, 1],
+            [lines.div_ceil(BEAM_GROUP), 1, 1],
             [beams, four_samples, 1],
-            [lines.div_ceil(4 * 16), four_samples, 1],
+            [
+                lines.div_ceil(AT_ONCE * LATERAL_GROUP[0]),
+                samples.div_ceil(LATERAL_GROUP[1]),
+                1,
+            ],
         ];
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
