@@ -3,5 +3,6 @@
 #![warn(missing_docs)]
 
 pub mod cli;
+pub mod probe_task;
 pub mod replay_file;
 pub mod report;

@@ -37,6 +37,7 @@ fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
         #[cfg(feature = "study")]
         Some(Task::Study(args)) => args.run(&*stop_on_signal()?)?,
         Some(Task::Manual(args)) => args.run(Cli::command()).map(|()| 0)?,
+        Some(Task::Probe(args)) => args.run(&*stop_on_signal()?).map(|()| 0)?,
         Some(Task::Cost { scene }) => cost(scene).map(|()| 0)?,
         Some(Task::TraceKeeper { name }) => stylet_lab::keep_trace_instance(name).map(|()| 0)?,
         Some(Task::Load {

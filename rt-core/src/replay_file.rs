@@ -2,6 +2,7 @@
 
 use clap::Args;
 use std::path::PathBuf;
+use stylet_runtime::kept_probe;
 use stylet_runtime::replay::file::{Flight, FlightError};
 use stylet_runtime::replay::lines::{self, LinesAgain};
 use stylet_runtime::replay::repeat::{self, RepeatError, Repeated};
@@ -69,19 +70,27 @@ impl Replay {
 
 /// A recording holds no columns of needle lines; those that count take some seconds each.
 fn solve_again(flight: &Flight, recorded: &TissueFlight) -> Result<LinesAgain, RepeatError> {
-    if recorded.has_probe() {
-        println!("probe    solved for again");
+    if let Some(edge_m) = recorded.probe_edge_m() {
+        println!(
+            "probe    in elements of {:.1} mm, solved for again or kept",
+            1e3 * edge_m
+        );
     }
     let mut reported = None;
-    lines::solve_again(flight, recorded, &mut |progress| {
-        let quarter = (progress.generation, 4 * progress.ready / progress.of.max(1));
-        if reported.replace(quarter) != Some(quarter) {
-            println!(
-                "line {}   {} of {} columns solved again",
-                progress.generation, progress.ready, progress.of
-            );
-        }
-    })
+    lines::solve_again(
+        flight,
+        recorded,
+        kept_probe::default_folder().as_deref(),
+        &mut |progress| {
+            let quarter = (progress.generation, 4 * progress.ready / progress.of.max(1));
+            if reported.replace(quarter) != Some(quarter) {
+                println!(
+                    "line {}   {} of {} columns solved again",
+                    progress.generation, progress.ready, progress.of
+                );
+            }
+        },
+    )
 }
 
 /// True as well where the run had no second device.

@@ -52,8 +52,8 @@ pub struct SecondState {
     pub flags: u32,
     /// Bits of the buttons that are pressed.
     pub buttons: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// Edge of the elements that what the probe presses was solved for in, um; 0 before that is there.
+    pub probe_edge_um: u32,
 }
 
 /// Written by the second device's thread into a ring, sent by the bridge in batches.

@@ -1,12 +1,13 @@
 //! Options that a run and a measurement share on the command line, and the settings of a run that they give.
 
 use crate::device::{DeviceChoice, Libraries};
+use crate::kept_probe;
 use crate::process::{Options, SecondOptions};
 use crate::replay;
 use crate::rt::arm::{self, Refused};
 use crate::rt::clock::{HAPTIC_PERIOD_NS, Wait};
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use stylet_shm_schema::BUILTIN_SCENES;
 use stylet_shm_schema::service::Instance;
 use stylet_sim::scene::TissueKind;
@@ -99,6 +100,12 @@ fn no_such_core(option: &str, core: usize, cores: &[usize]) -> String {
 #[error("{}", .0.join("\n"))]
 pub struct OptionsError(pub Vec<String>);
 
+/// Names of the tissue models, with a line of help for each.
+pub fn tissue_kinds() -> impl TypedValueParser<Value = TissueKind> {
+    let kinds = TissueKind::ALL.map(|kind| PossibleValue::new(kind.name()).help(kind.help()));
+    PossibleValuesParser::new(kinds).map(|name| TissueKind::of_name(&name).unwrap_or_default())
+}
+
 /// Names of the built-in scenes, with a line of help for each.
 pub fn scenes() -> PossibleValuesParser {
     let help = |name| match name {
@@ -153,6 +160,7 @@ impl RealTimeArgs {
                 haptic_period_ns: HAPTIC_PERIOD_NS,
                 wait: Wait::at_period(HAPTIC_PERIOD_NS),
                 flight_folder: replay::file::default_folder(),
+                probe_folder: kept_probe::default_folder(),
                 tissue: TissueKind::default(),
                 device: DeviceChoice::default(),
                 second: None,

@@ -5,6 +5,7 @@
 pub mod args;
 pub mod bridge;
 pub mod device;
+pub mod kept_probe;
 pub mod lines;
 pub mod process;
 pub mod rehearse;

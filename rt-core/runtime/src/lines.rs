@@ -1,10 +1,14 @@
 //! Lines for needles: the body at rest that they are solved in, apart from the one that moves.
 
+use crate::kept_probe::{self, KeptError};
 use crate::rt::world::WorldError;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use stylet_sim::line::{Line, LineError, LineStations, QueueProgress, ReadyLine};
 use stylet_sim::needle::LayerKind;
-use stylet_sim::probe::{BodyProbe, NoWall, PADS_APART_M, ProbePose, ProbeQueue, ProbeShape, Wall};
+use stylet_sim::probe::{BodyProbe, NoWall, PADS_APART_M, ProbePose, ProbeQueue, ProbeShape, ReadyProbe, Wall};
 use stylet_sim::scene::{Scene, SceneError, SceneSource, TissueKind};
 use stylet_sim::tissue::fem::batch::BatchModel;
 use stylet_sim::tissue::{FemTissue, MaterialPoint};
@@ -26,6 +30,17 @@ pub enum NoLine {
         "nothing holds the part of the body that the needle enters: let fat or something fixed lie beyond one of its faces (surroundings)"
     )]
     NothingHolds,
+}
+
+/// Why there is no probe; the text is for people.
+#[derive(Debug, thiserror::Error)]
+pub enum NoProbe {
+    /// The body that it would be solved for in.
+    #[error(transparent)]
+    Body(#[from] NoLine),
+    /// What it could press.
+    #[error(transparent)]
+    Wall(#[from] NoWall),
 }
 
 /// A body at rest with its solver for eight loads at once.
@@ -98,8 +113,85 @@ impl LineBody {
         goes_on: &mut dyn FnMut([usize; 2]) -> bool,
     ) -> Result<BodyProbe, NoWall> {
         let wall = Wall::of(&self.scene, PADS_APART_M)?;
-        let queue = ProbeQueue::new(&self.batch, wall, shape)?;
+        let queue = ProbeQueue::new(&self.batch, &self.scene.body, wall, shape)?;
         Ok(BodyProbe::new(queue.prepare(&self.batch, goes_on)?))
+    }
+
+    /// The same from answers that were kept, as [`solve_in_cells`](Self::solve_in_cells) had them; `None` where there are none.
+    pub fn kept_probe(&self, shape: ProbeShape, folder: &Path) -> Result<Option<BodyProbe>, KeptError> {
+        let path = self.probe_file(&shape, folder);
+        let Some(solved) = kept_probe::read(&path, &self.scene, &shape)? else {
+            return Ok(None);
+        };
+        let ready = Wall::of(&self.scene, PADS_APART_M)
+            .ok()
+            .and_then(|wall| ReadyProbe::of_solved(solved, &self.scene.body, wall, shape));
+        ready
+            .map(|ready| Some(BodyProbe::new(ready)))
+            .ok_or(KeptError::Other(path))
+    }
+
+    /// Solves in the scene's own cells for what a probe can press: on so many threads, for minutes. `goes_on` is given how many columns are ready,
+    /// and of how many; the answers do not depend on the number of threads.
+    pub fn solve_in_cells(
+        &self,
+        shape: ProbeShape,
+        threads: usize,
+        goes_on: &mut dyn FnMut([usize; 2]) -> bool,
+    ) -> Result<ReadyProbe, NoProbe> {
+        let wall = Wall::of(&self.scene, PADS_APART_M)?;
+        let rows = 3 * wall.pads.len();
+        let body = FemTissue::<f32>::new(&self.scene.clone().in_cells())
+            .map(|fem| BatchModel::new(&fem.model))
+            .map_err(|problems| NoLine::World(WorldError(problems.iter().map(ToString::to_string).collect())))?;
+        let queue = ProbeQueue::new(&body, &self.scene.body, wall, shape)?;
+        let (next, is_stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let solved = Mutex::new(Vec::new());
+        let work = |goes_on: &mut dyn FnMut() -> bool| {
+            let mut room = queue.room(&body);
+            loop {
+                // SYNC: each batch is taken once; nothing else is carried.
+                let batch = next.fetch_add(1, Ordering::Relaxed);
+                if batch >= queue.batches() {
+                    return;
+                }
+                let Some(answers) = queue.solve(&body, batch, &mut room, goes_on) else {
+                    return;
+                };
+                solved.lock().unwrap_or_else(PoisonError::into_inner).push(answers);
+            }
+        };
+        let ready = || solved.lock().unwrap_or_else(PoisonError::into_inner).len() * rows / queue.batches().max(1);
+        // SYNC: nothing but the flag is carried.
+        let is_wanted = || !is_stopped.load(Ordering::Relaxed);
+        std::thread::scope(|scope| {
+            for _ in 1..threads {
+                scope.spawn(|| work(&mut || is_wanted()));
+            }
+            work(&mut || {
+                let goes_on = goes_on([ready(), rows]);
+                is_stopped.store(!goes_on, Ordering::Relaxed);
+                goes_on
+            });
+        });
+        let solved = solved.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok(queue.finish(solved)?)
+    }
+
+    /// Where it is kept.
+    pub fn probe_file(&self, shape: &ProbeShape, folder: &Path) -> PathBuf {
+        kept_probe::path(folder, &self.scene, shape)
+    }
+
+    /// Keeps what was solved for.
+    pub fn keep_probe(&self, ready: &ReadyProbe, folder: &Path) -> Result<(), KeptError> {
+        let path = self.probe_file(&ready.shape, folder);
+        kept_probe::write(&path, &self.scene, &ready.shape, &ready.solved)
+    }
+
+    /// Edge of the elements that a probe is solved for in within seconds, and of those in which it takes minutes, m.
+    pub fn probe_edges_m(&self) -> [f64; 2] {
+        [self.scene.body.spacing_m, self.scene.clone().in_cells().body.spacing_m]
     }
 
     /// Where a probe lies below the target, pressed so far above where it meets the wall.

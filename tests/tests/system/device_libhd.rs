@@ -364,7 +364,7 @@ fn a_force_that_nobody_renews_is_released() {
         until(LONG, || fake.control.force() == [0.0; 3]),
         "the force loop has stopped"
     );
-    // The force goes out first, the fault is told at the end of the same tick.
+    // The force goes out first, the fault is reported at the end of the same tick.
     assert!(until(LONG, || device.read(1e-3) == Err(DeviceFault::TimedOut)));
     assert!(
         drive(&mut device, &push(), LONG, |s| s.is_ok() && feels(&fake, 1.0)()),

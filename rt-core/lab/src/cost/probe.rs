@@ -41,7 +41,8 @@ impl Pressed {
         let shape = ProbeShape::default();
         let at = |tick| wall.pose_below_target(&scene, &shape, pressed_m(tick), BEYOND_TARGET_M);
         let poses = (0..TICKS).map(at).collect();
-        let ready = ProbeQueue::new(&body, wall, shape).and_then(|queue| queue.prepare(&body, &mut |_| true));
+        let ready =
+            ProbeQueue::new(&body, &scene.body, wall, shape).and_then(|queue| queue.prepare(&body, &mut |_| true));
         Ok(ready.ok().map(|ready| Pressed {
             at_rest: BodyProbe::new(ready),
             poses,

@@ -70,6 +70,8 @@ pub struct BridgeSetup {
     pub second: Option<SecondSetup>,
     /// Folder of the flight recordings.
     pub flight_folder: PathBuf,
+    /// Folder of the answers to the probe that were kept.
+    pub probe_folder: Option<PathBuf>,
     /// The part that is the same in every flight recording.
     pub flight: Flight,
 }
@@ -149,7 +151,7 @@ impl Bridge {
             loader: SceneLoader::default(),
             probe: second
                 .is_some()
-                .then(|| ProbePreparer::new(Arc::clone(&setup.source), setup.tissue)),
+                .then(|| ProbePreparer::new(Arc::clone(&setup.source), setup.tissue, setup.probe_folder)),
             lines: LinePreparer::new(Arc::clone(&setup.source), setup.tissue),
             rehearsals: RehearsalRunner::new(setup.source, setup.tissue, setup.device),
             left_rooms: (false, None),
@@ -218,7 +220,7 @@ impl Bridge {
     fn serve_probe(&mut self, generation: u64) {
         let Some(probe) = &mut self.probe else { return };
         if let Some(why) = probe.pass(generation, &mut self.loops) {
-            eprintln!("rt-core: the probe presses nothing in this scene: {why}");
+            eprintln!("rt-core: {why}");
         }
     }
 

@@ -1,28 +1,26 @@
 //! What the ultrasound probe can press is solved for beside the loops, once for each scene of a run whose second hand holds it.
 
 use super::notices::LoopRings;
-use crate::lines::{LineBody, NoLine};
+use crate::lines::{LineBody, NoProbe};
 use crate::rt::exchange::TissueOrder;
 use crate::rt::outside::OutsideTape;
 use crate::rt::probe_tape::ProbeTape;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use stylet_sim::probe::{BodyProbe, NoWall, ProbeShape};
 use stylet_sim::scene::{SceneSource, TissueKind};
 
-/// Why there is no probe; the text is for people.
-#[derive(Debug, thiserror::Error)]
-enum NoProbe {
-    #[error(transparent)]
-    Body(#[from] NoLine),
-    #[error(transparent)]
-    Wall(#[from] NoWall),
+/// A probe, and what is to be said of it.
+struct Found {
+    probe: BodyProbe,
+    said: Option<String>,
 }
 
 struct Task {
     scene_generation: u64,
-    thread: JoinHandle<Result<BodyProbe, NoProbe>>,
+    thread: JoinHandle<Result<Found, NoProbe>>,
     stop: Arc<AtomicBool>,
 }
 
@@ -30,6 +28,8 @@ struct Task {
 pub struct ProbePreparer {
     source: Arc<SceneSource>,
     tissue: TissueKind,
+    /// Answers that took minutes.
+    kept_in: Option<PathBuf>,
     under_way: Option<Task>,
     /// The scene has its probe, or has none.
     is_settled: bool,
@@ -38,10 +38,11 @@ pub struct ProbePreparer {
 }
 
 impl ProbePreparer {
-    pub fn new(source: Arc<SceneSource>, tissue: TissueKind) -> Self {
+    pub fn new(source: Arc<SceneSource>, tissue: TissueKind, kept_in: Option<PathBuf>) -> Self {
         Self {
             source,
             tissue,
+            kept_in,
             under_way: None,
             is_settled: false,
             has_sent_room: false,
@@ -55,7 +56,7 @@ impl ProbePreparer {
         self.give_up();
     }
 
-    /// Frees what came back, hands over what is ready, and begins what is missing. Why a scene has no probe, once.
+    /// Frees what came back, hands over what is ready, and begins what is missing. What there is to say of it, once.
     pub(super) fn pass(&mut self, scene_generation: u64, loops: &mut LoopRings) -> Option<String> {
         while loops.old_probes.pop().is_ok() {}
         if self.is_settled {
@@ -72,7 +73,7 @@ impl ProbePreparer {
         }
         self.is_settled = true;
         match task.thread.join() {
-            Ok(Ok(probe)) => {
+            Ok(Ok(Found { probe, said })) => {
                 if !std::mem::replace(&mut self.has_sent_room, true) {
                     let _ = loops.outside_rooms.push(OutsideTape::new());
                 }
@@ -81,21 +82,23 @@ impl ProbePreparer {
                     room: ProbeTape::new(&probe),
                     probe: Box::new(probe),
                 });
-                None
+                said
             }
-            Ok(Err(why)) => Some(why.to_string()),
-            Err(_) => Some("the thread that solved for the probe has panicked".to_owned()),
+            Ok(Err(why)) => Some(format!("the probe presses nothing in this scene: {why}")),
+            Err(_) => Some("the probe presses nothing: the thread that solved for it has panicked".to_owned()),
         }
     }
 
     fn begin(&mut self, scene_generation: u64) {
-        let (source, tissue) = (Arc::clone(&self.source), self.tissue);
+        let (source, tissue, kept_in) = (Arc::clone(&self.source), self.tissue, self.kept_in.clone());
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
         let work = move || {
             let body = LineBody::of_source(&source, tissue)?.ok_or(NoWall::NoForces)?;
             // SYNC: nothing but the flag is carried.
-            Ok(body.prepare_probe(ProbeShape::default(), &mut |_| !stopped.load(Ordering::Relaxed))?)
+            find(&body, &source, kept_in.as_deref(), &mut |_| {
+                !stopped.load(Ordering::Relaxed)
+            })
         };
         // Without a thread there is no probe; it is tried again at the next pass.
         if let Ok(thread) = std::thread::Builder::new().name("probe".to_owned()).spawn(work) {
@@ -111,6 +114,45 @@ impl ProbePreparer {
         if let Some(task) = &self.under_way {
             // SYNC: read by the thread; nothing but the flag is carried.
             task.stop.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+/// What was kept for this scene, or what is solved for within seconds.
+fn find(
+    body: &LineBody,
+    source: &SceneSource,
+    kept_in: Option<&Path>,
+    goes_on: &mut dyn FnMut([usize; 2]) -> bool,
+) -> Result<Found, NoProbe> {
+    let shape = ProbeShape::default();
+    let kept = kept_in.map(|folder| body.kept_probe(shape, folder)).transpose();
+    let mut said = None;
+    match kept.map(Option::flatten) {
+        Ok(Some(probe)) => return Ok(Found { probe, said }),
+        Ok(None) => {}
+        Err(why) => said = Some(format!("the probe that was kept is not used: {why}")),
+    }
+    let probe = body.prepare_probe(shape, goes_on)?;
+    let [edge_mm, fine_mm] = body.probe_edges_m().map(|edge_m| 1e3 * edge_m);
+    if edge_mm > 1.01 * fine_mm {
+        said.get_or_insert_with(|| {
+            format!(
+                "the probe is solved for in elements of {edge_mm:.1} mm: in 'pelvis' its press is 6 to 11 % too strong. {} solves in cells of \
+                 {fine_mm:.1} mm once, for minutes, and later runs use that",
+                command_for(source)
+            )
+        });
+    }
+    Ok(Found { probe, said })
+}
+
+/// What to type for a scene.
+fn command_for(source: &SceneSource) -> String {
+    match source {
+        SceneSource::Builtin(name) => format!("'rt-core probe --scene {name}'"),
+        SceneSource::Labels { .. } => {
+            "'rt-core probe --flight FILE', with a flight recording of this scene,".to_owned()
         }
     }
 }

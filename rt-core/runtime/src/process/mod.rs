@@ -46,6 +46,8 @@ pub struct Options {
     pub wait: Wait,
     /// Folder of the flight recordings.
     pub flight_folder: PathBuf,
+    /// Folder of the answers to the probe that were kept.
+    pub probe_folder: Option<PathBuf>,
     /// Tissue model of every scene of the run.
     pub tissue: TissueKind,
     /// Haptic device.
@@ -180,6 +182,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
             source: setup.source,
             second: second_bridge,
             flight_folder: options.flight_folder.clone(),
+            probe_folder: options.probe_folder.clone(),
             flight: session::flight(options, session_id, devices),
         },
     );

@@ -2,8 +2,9 @@
 
 use super::file::Flight;
 use super::repeat::RepeatError;
-use crate::lines::LineBody;
+use crate::lines::{LineBody, NoProbe};
 use crate::rt::tissue_tape::TissueFlight;
+use std::path::Path;
 use stylet_sim::line::{BodyAnswer, BodyLine, HandLine, LineSource};
 use stylet_sim::probe::{BodyProbe, NoWall, ProbeShape};
 
@@ -31,12 +32,14 @@ pub struct LinesAgain {
 }
 
 /// Solves for the columns of every line that the recorded tissue was pushed by, and for its probe: some seconds each for a body of 20,000
-/// elements. No recording holds them; they follow from the scene and the line.
+/// elements, minutes for a probe in the scene's own cells that is not kept in `kept_in`. No recording holds them; they follow from the scene and the
+/// line.
 ///
 /// To be called before this thread turns denormal numbers off as the loops do: the thread that prepared the lines did not.
 pub fn solve_again(
     flight: &Flight,
     recorded: &TissueFlight,
+    kept_in: Option<&Path>,
     report: &mut dyn FnMut(LineProgress),
 ) -> Result<LinesAgain, RepeatError> {
     let mut again = LinesAgain::default();
@@ -73,13 +76,29 @@ pub fn solve_again(
         again.different += usize::from(!ready.hand.source().is_identical(source));
         again.bodies.push(*ready.body);
     }
-    if recorded.has_probe() {
-        let body =
-            LineBody::of_source(&recorded.scene, recorded.tissue)?.ok_or(RepeatError::NoProbe(NoWall::NoForces))?;
-        let probe = body.prepare_probe(ProbeShape::default(), &mut |_| true);
-        again.probe = Some(probe.map_err(RepeatError::NoProbe)?);
+    if let Some(edge_m) = recorded.probe_edge_m() {
+        let body = LineBody::of_source(&recorded.scene, recorded.tissue)?.ok_or(NoProbe::from(NoWall::NoForces))?;
+        again.probe = Some(probe_again(&body, edge_m, kept_in)?);
     }
     Ok(again)
+}
+
+/// In the elements that it was solved for in: from what was kept, where it is of those.
+fn probe_again(body: &LineBody, edge_m: f64, kept_in: Option<&Path>) -> Result<BodyProbe, RepeatError> {
+    let shape = ProbeShape::default();
+    let [quick_m, fine_m] = body.probe_edges_m();
+    if edge_m == quick_m {
+        return Ok(body.prepare_probe(shape, &mut |_| true).map_err(NoProbe::from)?);
+    }
+    if edge_m != fine_m {
+        return Err(RepeatError::OtherProbe);
+    }
+    let kept = kept_in.and_then(|folder| body.kept_probe(shape, folder).ok().flatten());
+    if let Some(probe) = kept {
+        return Ok(probe);
+    }
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    Ok(BodyProbe::new(body.solve_in_cells(shape, threads, &mut |_| true)?))
 }
 
 impl LinesAgain {

@@ -2,7 +2,7 @@
 
 use super::file::Flight;
 use super::lines::{LinesAgain, hand_line};
-use crate::lines::NoLine;
+use crate::lines::{NoLine, NoProbe};
 use crate::rt::exchange::{HapticOrder, TissueOrder};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticEntry, HapticFlight, HapticTape};
@@ -17,7 +17,6 @@ use std::sync::Arc;
 use stylet_hw::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
 use stylet_shm_schema::TickRecord;
 use stylet_sim::line::LeftNeedles;
-use stylet_sim::probe::NoWall;
 
 /// The result of repeating one loop.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -197,7 +196,7 @@ pub enum RepeatError {
     Line(#[from] NoLine),
     /// What its probe can press cannot be solved for again.
     #[error("the recording has an ultrasound probe, which its scene does not give: {0}")]
-    NoProbe(NoWall),
+    NoProbe(#[from] NoProbe),
     /// The wall of the recorded probe is not that of the scene.
     #[error("the recorded ultrasound probe does not fit its scene: another version recorded it")]
     OtherProbe,
@@ -300,7 +299,7 @@ fn order_of(order: &TapedOrder, lines: &mut LinesAgain) -> Result<TissueOrder, R
         TapedOrder::Line { generation } => {
             TissueOrder::Line(lines.take(*generation).ok_or(RepeatError::NoLine(*generation))?)
         }
-        TapedOrder::Probe => {
+        TapedOrder::Probe { .. } => {
             let probe = Box::new(lines.probe.clone().ok_or(RepeatError::OtherProbe)?);
             TissueOrder::Probe {
                 generation: 1,

@@ -209,7 +209,7 @@ fn assert_identical(flight: &Flight) {
     assert!(found.is_identical(), "forces: {found:?}");
     let tissue = flight.tissue.as_ref().expect("recorded");
     let mut last = None;
-    let lines = solve_again(flight, tissue, &mut |p| last = Some(p)).expect("solved");
+    let lines = solve_again(flight, tissue, None, &mut |p| last = Some(p)).expect("solved");
     let wanted = if flight.lines.iter().all(|line| line.bends()) {
         30
     } else {
@@ -336,7 +336,7 @@ fn what_was_changed_is_found(flight: &Flight) {
     let late = tissue.loads.last_mut().expect("on a line");
     late.1.loads_n[0] += 0.1;
     let tissue = other.tissue.as_ref().expect("recorded");
-    let lines = solve_again(&other, tissue, &mut |_| {}).expect("solved");
+    let lines = solve_again(&other, tissue, None, &mut |_| {}).expect("solved");
     let found = repeat::tissue(&other, tissue, lines).expect("can be run");
     assert!(found.different_positions > 0, "{found:?}");
 

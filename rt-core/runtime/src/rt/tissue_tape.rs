@@ -50,7 +50,10 @@ pub enum TapedOrder {
         generation: u64,
     },
     /// See [`TissueOrder::Probe`](crate::rt::exchange::TissueOrder).
-    Probe,
+    Probe {
+        /// Edge of the elements that it was solved for in, m.
+        edge_m: f64,
+    },
 }
 
 /// Everything that one tick of the tissue loop leaves to the next.
@@ -361,9 +364,14 @@ impl TissueFlight {
         first.into_iter().chain(left).chain(taken)
     }
 
-    /// Whether the loop had a probe.
-    pub fn has_probe(&self) -> bool {
-        self.memory.probe.is_there || self.orders.iter().any(|(_, order)| *order == TapedOrder::Probe)
+    /// Edge of the elements that its probe was solved for in, m; `None` where the loop had no probe.
+    pub fn probe_edge_m(&self) -> Option<f64> {
+        let taken = self.orders.iter().find_map(|(_, order)| match order {
+            TapedOrder::Probe { edge_m } => Some(*edge_m),
+            _ => None,
+        });
+        let before = &self.memory.probe;
+        before.is_there.then_some(before.edge_m).or(taken)
     }
 
     /// Whether a needle on that line pushed tissue, so that its columns count.

@@ -34,7 +34,7 @@ impl BodyProbe {
     /// Out of the body.
     pub fn new(ready: ReadyProbe) -> Self {
         let rows = ready.rows();
-        let elements = ready.columns.first().map_or(0, PackedField::elements);
+        let elements = ready.solved.columns.first().map_or(0, PackedField::elements);
         BodyProbe {
             share: ElementField::with_room(elements),
             coming_n: vec![0.0; rows],
@@ -83,7 +83,7 @@ impl BodyProbe {
     /// The loads on a line displace the wall as well: by its columns, of the same body; those of another do not count. Reads these columns where the
     /// line is new.
     pub fn beside(&mut self, generation: u64, columns: &[PackedField], loads_n: &[f64]) {
-        let own = self.ready.columns.first().map(PackedField::elements);
+        let own = self.ready.solved.columns.first().map(PackedField::elements);
         self.lines.join(generation, columns, &self.ready.elements, own);
         self.lines.displace_pads(generation, loads_n, &mut self.beside_m);
     }
@@ -110,6 +110,7 @@ impl BodyProbe {
             to.pressed.len() == self.ready.wall.points.len() && [to.shared_n.len(), to.coming_n.len()] == [rows; 2];
         to.is_there = fits;
         if fits {
+            to.edge_m = self.ready.solved.edge_m;
             to.pose = self.state.pose();
             for (slot, pressed) in to.pressed.iter_mut().zip(self.state.pressed()) {
                 *slot = pressed;
@@ -134,7 +135,7 @@ impl BodyProbe {
         self.shared_n.copy_from_slice(&from.shared_n);
         self.coming_n.copy_from_slice(&from.coming_n);
         self.made = from.made as usize;
-        let columns = &self.ready.columns;
+        let columns = &self.ready.solved.columns;
         for part in 0..self.parts {
             self.share.load_part(columns, &self.shared_n, [part, self.parts]);
         }
@@ -154,7 +155,7 @@ impl BodyProbe {
             self.coming_n.copy_from_slice(self.state.loads_n());
         }
         let making = &mut self.state.share;
-        making.load_part(&self.ready.columns, &self.coming_n, [self.made, self.parts]);
+        making.load_part(&self.ready.solved.columns, &self.coming_n, [self.made, self.parts]);
         self.made += 1;
         let is_whole = self.made == self.parts;
         if is_whole {

@@ -1,16 +1,17 @@
 //! The body's answer to a newton along x, y and z on each pad, eight at once, in slices of bounded work.
 
 use super::between::Between;
+use super::onto::Onto;
 use super::shape::ProbeShape;
 use super::wall::{NoWall, Wall};
+use crate::scene::Lattice;
 use crate::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight};
 use crate::tissue::{ElementField, PackedField};
+use serde::{Deserialize, Serialize};
 
 /// Residual over load down to which columns are solved.
 const TOLERANCE: f64 = 1e-2;
 const MOST_ITERATIONS: u32 = 60;
-/// Iterations of eight loads between two looks at whether the probe is still wanted.
-const TOGETHER: usize = 1;
 
 /// What a probe can press, and what the body answers: made beside the loops, never changed.
 #[derive(Clone, Debug)]
@@ -19,21 +20,55 @@ pub struct ReadyProbe {
     pub shape: ProbeShape,
     /// What it can press.
     pub wall: Wall,
-    /// Displacement of the element centres of the body that was solved for, m/N; pad after pad, along x, y, z.
+    /// The element behind the middle of each pad.
+    pub elements: Vec<u32>,
+    /// What was solved for.
+    pub solved: SolvedProbe,
+}
+
+/// The answers of a body to a probe: what takes long, and can be kept.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SolvedProbe {
+    /// Displacement of the body's elements, m/N; pad after pad, along x, y, z.
     pub columns: Vec<PackedField>,
     /// Displacement of pads along x, y, z with a newton on each, m/N: row after row, symmetric.
     pub(super) compliance: Vec<f64>,
     /// Loads of the pads by a newton on each point along x, y, z: row after row.
-    shares: Vec<f32>,
+    pub(super) shares: Vec<f32>,
     /// How all points move along x, y, z with a newton on each along each of these, m/N: row after row.
-    between: Vec<f32>,
-    /// The element of that body behind the middle of each pad.
-    pub elements: Vec<u32>,
+    pub(super) between: Vec<f32>,
     /// Residual over load of the worst column.
     pub residual: f64,
+    /// Edge of the elements that were solved in, m: as large as those that are displaced, or smaller.
+    pub edge_m: f64,
+}
+
+impl SolvedProbe {
+    /// They are of a wall with so many pads and points in a body of so many elements, and every number is finite.
+    fn is_of(&self, wall: &Wall, elements: usize) -> bool {
+        let (rows, points) = (3 * wall.pads.len(), 3 * wall.points.len());
+        let is_field = |field: &PackedField| field.elements() == elements && field.is_sound();
+        self.columns.len() == rows
+            && self.columns.iter().all(is_field)
+            && [self.compliance.len(), self.shares.len(), self.between.len()]
+                == [rows * rows, points * rows, points * points]
+            && self.compliance.iter().all(|c| c.is_finite())
+            && self.shares.iter().chain(&self.between).all(|c| c.is_finite())
+            && self.edge_m.is_finite()
+    }
 }
 
 impl ReadyProbe {
+    /// From answers that were kept: of that wall, in a body with those elements. `None` where they are of another, or no numbers.
+    pub fn of_solved(solved: SolvedProbe, elements: &Lattice, wall: Wall, shape: ProbeShape) -> Option<Self> {
+        solved.is_of(&wall, elements.element_count()).then(|| ReadyProbe {
+            shape,
+            elements: wall.elements_behind(elements),
+            wall,
+            solved,
+        })
+    }
+
     /// Rows of the compliance: three for each pad.
     pub fn rows(&self) -> usize {
         3 * self.wall.pads.len()
@@ -41,7 +76,7 @@ impl ReadyProbe {
 
     /// How row `a` moves with a newton at row `b`, m/N.
     pub fn at(&self, a: usize, b: usize) -> f64 {
-        self.compliance.get(a * self.rows() + b).copied().unwrap_or(0.0)
+        self.solved.compliance.get(a * self.rows() + b).copied().unwrap_or(0.0)
     }
 
     /// How all points move along x, y, z, point after point, with a newton on point `n` along x; along y; along z, m/N.
@@ -49,7 +84,8 @@ impl ReadyProbe {
     pub(super) fn between(&self, n: usize) -> [&[f32]; 3] {
         let all = 3 * self.wall.points.len();
         [0, 1, 2].map(|r| {
-            self.between
+            self.solved
+                .between
                 .get((3 * n + r) * all..(3 * n + r + 1) * all)
                 .unwrap_or(&[])
         })
@@ -59,7 +95,8 @@ impl ReadyProbe {
     #[inline]
     pub(super) fn shares(&self, n: usize) -> impl Iterator<Item = &[f32]> {
         let rows = self.rows();
-        self.shares
+        self.solved
+            .shares
             .get(3 * n * rows..3 * (n + 1) * rows)
             .unwrap_or(&[])
             .chunks_exact(rows.max(1))
@@ -68,124 +105,159 @@ impl ReadyProbe {
     /// Bytes of the columns, and of the compliance.
     pub fn bytes(&self) -> [usize; 2] {
         [
-            self.columns.iter().map(PackedField::bytes).sum(),
-            8 * self.compliance.len() + size_of_val(&*self.between) + size_of_val(&*self.shares),
+            self.solved.columns.iter().map(PackedField::bytes).sum(),
+            8 * self.solved.compliance.len() + size_of_val(&*self.solved.between) + size_of_val(&*self.solved.shares),
         ]
     }
 }
 
-/// Columns of a probe, ready ones first.
+/// Columns of a probe that are to be solved for, eight in each batch; batches may be solved for by several threads.
 pub struct ProbeQueue {
-    ready: ReadyProbe,
+    shape: ProbeShape,
+    wall: Wall,
+    elements: Vec<u32>,
+    edge_m: f64,
     /// Loads of each row of the pads, and of the points.
     loads: Vec<Vec<NodeWeight>>,
     read: Vec<Vec<NodeWeight>>,
-    /// How each row of the points moves with a newton on each of the pads', m/N.
-    answers: Vec<f64>,
+    onto: Onto,
+}
+
+/// What the solution of a batch works in.
+pub struct BatchRoom {
     state: BatchState<f32>,
-    unpacked: ElementField,
-    next: usize,
-    is_begun: bool,
+    solved: ElementField,
+    onto: ElementField,
+}
+
+/// Answers to newtons on the rows of one batch.
+pub struct BatchAnswers {
+    batch: usize,
+    residual: f64,
+    answers: Vec<Answer>,
+}
+
+/// How rows of the pads and of the points move, and the body, m/N.
+struct Answer {
+    pads: Vec<f64>,
+    points: Vec<f64>,
+    field: PackedField,
 }
 
 impl ProbeQueue {
-    /// For the wall of a scene in the body that is solved for.
-    pub fn new(body: &BatchModel<f32>, wall: Wall, shape: ProbeShape) -> Result<Self, NoWall> {
+    /// For the wall of a scene in the body that is solved for. What is displaced are the elements of `displaced`, whose edge is as long or some
+    /// times as long.
+    pub fn new(body: &BatchModel<f32>, displaced: &Lattice, wall: Wall, shape: ProbeShape) -> Result<Self, NoWall> {
         let weights = wall.pads.iter().map(|pad| pad.weights(body));
         let weights: Vec<_> = weights.collect::<Option<_>>().ok_or(NoWall::NotInBody)?;
         let points = wall.points.iter().map(|point| point.weights(body));
         let points: Vec<_> = points.collect::<Option<_>>().ok_or(NoWall::NotInBody)?;
-        let elements = wall.pads.iter().map(|pad| {
-            let nearest = |f: &&super::wall::Face| (0..3).map(|c| (f.place_m[c] - pad.place_m[c]).powi(2)).sum::<f64>();
-            let face = pad.faces.iter().min_by(|a, b| nearest(a).total_cmp(&nearest(b)));
-            face.and_then(|f| body.element_at(f.inside_m)).unwrap_or(0)
-        });
-        let rows = 3 * wall.pads.len();
         Ok(ProbeQueue {
-            ready: ReadyProbe {
-                shape,
-                elements: elements.collect(),
-                wall,
-                columns: Vec::with_capacity(rows),
-                compliance: vec![0.0; rows * rows],
-                shares: Vec::new(),
-                between: Vec::new(),
-                residual: 0.0,
-            },
-            answers: vec![0.0; 3 * points.len() * rows],
+            shape,
+            elements: wall.elements_behind(displaced),
+            wall,
+            edge_m: body.spacing_m(),
             loads: rows_of(&weights),
             read: rows_of(&points),
-            state: BatchState::new(body),
-            unpacked: ElementField::zeros(body.element_count()),
-            next: 0,
-            is_begun: false,
+            onto: Onto::new(body.lattice(), displaced),
         })
     }
 
-    /// Columns that are ready, and all.
-    pub fn progress(&self) -> [usize; 2] {
-        [self.next, self.ready.rows()]
+    /// How many there are.
+    pub fn batches(&self) -> usize {
+        self.loads.len().div_ceil(LOADS)
     }
 
-    /// Solves for all of them; `goes_on` is asked between slices of work.
+    /// Room for one after the other.
+    pub fn room(&self, body: &BatchModel<f32>) -> BatchRoom {
+        BatchRoom {
+            state: BatchState::new(body),
+            solved: ElementField::zeros(body.element_count()),
+            onto: ElementField::zeros(self.onto.elements()),
+        }
+    }
+
+    /// Solves for one batch; `None` when `goes_on`, which is asked between slices of work, said no.
+    pub fn solve(
+        &self,
+        body: &BatchModel<f32>,
+        batch: usize,
+        room: &mut BatchRoom,
+        goes_on: &mut dyn FnMut() -> bool,
+    ) -> Option<BatchAnswers> {
+        let loads = self.loads.chunks(LOADS).nth(batch).unwrap_or_default();
+        let slices: Vec<&[NodeWeight]> = loads.iter().map(Vec::as_slice).collect();
+        room.state.begin(body, &slices);
+        let residual = loop {
+            if !goes_on() {
+                return None;
+            }
+            for _ in 0..room.state.slices() {
+                room.state.advance(body);
+            }
+            let progress = room.state.progress();
+            if progress.residual <= TOLERANCE || progress.iterations >= MOST_ITERATIONS {
+                break progress.residual;
+            }
+        };
+        let answer = |lane: usize| {
+            let moved = |rows: &[Vec<NodeWeight>]| rows.iter().map(|row| room.state.sample(lane, row)).collect();
+            let (pads, points) = (moved(&self.loads), moved(&self.read));
+            room.state.write(body, lane, &mut room.solved);
+            let mut field = PackedField::zeros(self.onto.elements());
+            field.pack(self.onto.mean(&room.solved, &mut room.onto));
+            Answer { pads, points, field }
+        };
+        Some(BatchAnswers {
+            batch,
+            residual,
+            answers: (0..loads.len()).map(answer).collect(),
+        })
+    }
+
+    /// The probe, from the answers of all batches in any order.
+    pub fn finish(self, mut solved: Vec<BatchAnswers>) -> Result<ReadyProbe, NoWall> {
+        solved.sort_unstable_by_key(|of| of.batch);
+        let residual = solved.iter().map(|of| of.residual).fold(0.0, f64::max);
+        let rows = self.loads.len();
+        let answers: Vec<Answer> = solved.into_iter().flat_map(|of| of.answers).collect();
+        if answers.len() != rows {
+            return Err(NoWall::Stopped);
+        }
+        let pads = |row: usize, column: usize| answers[column].pads[row];
+        let compliance = (0..rows * rows).map(|n| 0.5 * (pads(n / rows, n % rows) + pads(n % rows, n / rows)));
+        let compliance: Vec<f64> = compliance.collect();
+        let points = (0..self.read.len() * rows).map(|n| answers[n % rows].points[n / rows]);
+        let between = Between::of(&points.collect::<Vec<f64>>(), &compliance, rows);
+        Ok(ReadyProbe {
+            shape: self.shape,
+            wall: self.wall,
+            elements: self.elements,
+            solved: SolvedProbe {
+                columns: answers.into_iter().map(|answer| answer.field).collect(),
+                compliance,
+                shares: between.shares,
+                between: between.rows,
+                residual,
+                edge_m: self.edge_m,
+            },
+        })
+    }
+
+    /// Solves for all of them in this thread. `goes_on` is given how many columns are ready, and of how many, between slices of work.
     pub fn prepare(
-        mut self,
+        self,
         body: &BatchModel<f32>,
         goes_on: &mut dyn FnMut([usize; 2]) -> bool,
     ) -> Result<ReadyProbe, NoWall> {
-        while self.next < self.ready.rows() {
-            if !goes_on(self.progress()) {
-                return Err(NoWall::Stopped);
-            }
-            self.slice(body);
-        }
-        let rows = self.ready.rows();
-        for a in 0..rows {
-            for b in 0..a {
-                let mean = 0.5 * (self.ready.at(a, b) + self.ready.at(b, a));
-                self.ready.compliance[a * rows + b] = mean;
-                self.ready.compliance[b * rows + a] = mean;
-            }
-        }
-        let joined = Between::of(&self.answers, &self.ready.compliance, rows);
-        (self.ready.shares, self.ready.between) = (joined.shares, joined.rows);
-        Ok(self.ready)
-    }
-
-    fn slice(&mut self, body: &BatchModel<f32>) {
-        let rows = self.ready.rows();
-        let lanes = LOADS.min(rows - self.next);
-        if !self.is_begun {
-            let loads = &self.loads[self.next..self.next + lanes];
-            let slices: Vec<&[NodeWeight]> = loads.iter().map(Vec::as_slice).collect();
-            self.state.begin(body, &slices);
-            self.is_begun = true;
-        }
-        for _ in 0..TOGETHER * self.state.slices() {
-            self.state.advance(body);
-        }
-        let progress = self.state.progress();
-        if progress.residual > TOLERANCE && progress.iterations < MOST_ITERATIONS {
-            return;
-        }
-        for lane in 0..lanes {
-            let column = self.next + lane;
-            for (values, read) in [
-                (&mut self.ready.compliance, &self.loads),
-                (&mut self.answers, &self.read),
-            ] {
-                for (row, load) in values.chunks_exact_mut(rows).zip(read) {
-                    row[column] = self.state.sample(lane, load);
-                }
-            }
-            self.state.write(body, lane, &mut self.unpacked);
-            let mut column = PackedField::zeros(body.element_count());
-            column.pack(&self.unpacked);
-            self.ready.columns.push(column);
-        }
-        self.ready.residual = self.ready.residual.max(progress.residual);
-        self.next += lanes;
-        self.is_begun = false;
+        let mut room = self.room(body);
+        let rows = self.loads.len();
+        let solved = (0..self.batches()).map(|batch| {
+            let mut goes_on = || goes_on([batch * LOADS, rows]);
+            self.solve(body, batch, &mut room, &mut goes_on).ok_or(NoWall::Stopped)
+        });
+        let solved = solved.collect::<Result<Vec<_>, _>>()?;
+        self.finish(solved)
     }
 }
 

@@ -71,7 +71,11 @@ impl ProbeState {
     /// No contact yet.
     pub fn new(probe: &ReadyProbe) -> Self {
         let (rows, points) = (probe.rows(), probe.wall.points.len());
-        let elements = probe.columns.first().map_or(0, crate::tissue::PackedField::elements);
+        let elements = probe
+            .solved
+            .columns
+            .first()
+            .map_or(0, crate::tissue::PackedField::elements);
         ProbeState {
             pose: None,
             loads_n: vec![0.0; rows],
@@ -181,7 +185,7 @@ pub fn step(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside
 
 /// Adds up what the loads do to the body; where they are others than before, which this does not look for. Does not allocate.
 pub fn displace(probe: &ReadyProbe, state: &mut ProbeState) {
-    state.share.load(&probe.columns, &state.loads_n);
+    state.share.load(&probe.solved.columns, &state.loads_n);
 }
 
 /// The farthest that a point of the probe in the wall moves decides.

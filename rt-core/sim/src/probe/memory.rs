@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct ProbeMemory {
     /// There is one.
     pub is_there: bool,
+    /// Edge of the elements that it was solved for in, m.
+    pub edge_m: f64,
     /// Where the last tick had it.
     pub(super) pose: Option<ProbePose>,
     /// How hard each point of the wall is pressed, N, and where to.

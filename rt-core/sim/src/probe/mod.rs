@@ -30,12 +30,13 @@ mod complementarity;
 mod contact;
 mod memory;
 mod moves;
+mod onto;
 mod response;
 mod shape;
 mod wall;
 
 pub use body::BodyProbe;
-pub use columns::{ProbeQueue, ReadyProbe};
+pub use columns::{BatchAnswers, BatchRoom, ProbeQueue, ReadyProbe, SolvedProbe};
 pub use contact::{ContactReport, ProbeState, displace, step};
 pub use memory::ProbeMemory;
 pub use response::{ProbeResponse, Wrench};

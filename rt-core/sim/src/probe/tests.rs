@@ -23,11 +23,30 @@ pub(super) struct Fixture {
 
 impl Fixture {
     pub fn new(scene: Scene, spacing_m: f64) -> Self {
-        let fem = FemTissue::<f32>::new(&scene).expect("valid");
+        let solved_in = scene.clone();
+        Fixture::solved_in(&solved_in, scene, spacing_m)
+    }
+
+    /// The body of another scene is solved for, of the same tissue in other elements.
+    pub fn solved_in(other: &Scene, scene: Scene, spacing_m: f64) -> Self {
+        let fem = FemTissue::<f32>::new(other).expect("valid");
         let body = BatchModel::new(&fem.model);
+        drop(fem);
         let wall = Wall::of(&scene, spacing_m).expect("a rectum");
-        let queue = ProbeQueue::new(&body, wall, ProbeShape::default()).expect("in the body");
-        let probe = queue.prepare(&body, &mut |_| true).expect("not stopped");
+        let queue = ProbeQueue::new(&body, &scene.body, wall, ProbeShape::default()).expect("in the body");
+        // The later half of the batches by a thread of its own.
+        let half = queue.batches() / 2;
+        let solve = |batches: std::ops::Range<usize>| {
+            let mut room = queue.room(&body);
+            let solved = batches.map(|batch| queue.solve(&body, batch, &mut room, &mut || true));
+            solved.collect::<Option<Vec<_>>>().expect("not stopped")
+        };
+        let solved = std::thread::scope(|scope| {
+            let later = scope.spawn(|| solve(half..queue.batches()));
+            let first = solve(0..half);
+            later.join().expect("solved").into_iter().chain(first).collect()
+        });
+        let probe = queue.finish(solved).expect("all are there");
         Fixture { scene, body, probe }
     }
 
@@ -81,12 +100,19 @@ pub(super) fn small() -> &'static Fixture {
 }
 
 pub(super) fn block(is_hollow: bool) -> Scene {
-    let dims = [18, 16, 14];
+    let scene = block_in([18, 16, 14], 1, is_hollow);
+    scene.for_lines(TissueKind::ChainMail).expect("a model with lines")
+}
+
+/// So many times 4 mm large, in so many cells for each 4 mm.
+fn block_in(size: [usize; 3], times: usize, is_hollow: bool) -> Scene {
+    let dims = size.map(|n| n * times);
     let mut cells = Vec::new();
     for _ in 0..dims[2] {
         for j in 0..dims[1] {
             for i in 0..dims[0] {
-                let from_middle = [i as f64 + 0.5 - 9.0, j as f64 + 0.5 - 5.0];
+                let [i, j] = [i, j].map(|c| (c as f64 + 0.5) / times as f64);
+                let from_middle = [i - size[0] as f64 / 2.0, j - 5.0];
                 let across = (from_middle[0] / 3.5).powi(2) + (from_middle[1] / 2.5).powi(2);
                 cells.push(match across {
                     a if a <= 1.0 && is_hollow => 0,
@@ -110,15 +136,14 @@ pub(super) fn block(is_hollow: bool) -> Scene {
     };
     let labels = Labels {
         dims,
-        spacing_m: 4e-3,
+        spacing_m: 4e-3 / times as f64,
         cells,
         structures: vec![
             structure("gland", 1, Role::Target, Beyond::Fat),
             structure("rectal wall", 2, Role::Spare, Beyond::Free),
         ],
     };
-    let scene = Scene::from_labels("block", &labels).expect("valid");
-    scene.for_lines(TissueKind::ChainMail).expect("a model with lines")
+    Scene::from_labels("block", &labels).expect("valid")
 }
 
 #[test]
@@ -163,4 +188,55 @@ fn pads_cover_the_wall_that_can_be_reached_once() {
         let length: f64 = pad.outward.iter().map(|c| c * c).sum();
         assert!((length - 1.0).abs() < 1e-9);
     }
+}
+
+/// Solved in cells of 2 mm, a body in elements of 4 mm is pressed as the one of 2 mm is: its force, and each element as the cells in it.
+#[test]
+fn a_body_is_displaced_as_the_finer_one_that_was_solved_for() {
+    const PRESSED_M: f64 = 4e-3;
+    const BEYOND_M: f64 = 10e-3;
+    let cells = block_in([14, 12, 10], 2, true);
+    let coarse = cells.clone().for_lines(TissueKind::ChainMail).expect("has lines");
+    let fine = cells.in_cells();
+    assert!(coarse.body.spacing_m == 4e-3 && fine.body.spacing_m == 2e-3);
+    let pressed = |fixture: &Fixture| {
+        let mut state = ProbeState::new(&fixture.probe);
+        let response = fixture.go_in_and_press(&mut state, PRESSED_M, BEYOND_M);
+        displace(&fixture.probe, &mut state);
+        (nalgebra::Vector3::from(response.wrench.force_n()), state.share)
+    };
+    let alone = Fixture::new(fine.clone(), 5e-3);
+    let (force_n, field) = pressed(&alone);
+    let (onto_n, onto_field) = pressed(&Fixture::solved_in(&fine, coarse.clone(), 5e-3));
+    assert!(force_n.norm() > 0.5 && (onto_n - force_n).norm() < 1e-9 * force_n.norm());
+    let onto = onto::Onto::new(&fine.body, &coarse.body);
+    let mut room = crate::tissue::ElementField::zeros(coarse.body.element_count());
+    let mean = onto.mean(&field, &mut room);
+    let largest = mean.0.iter().flatten().fold(0.0_f32, |most, u| most.max(u.abs()));
+    for (a, b) in mean.0.iter().flatten().zip(onto_field.0.iter().flatten()) {
+        assert!((a - b).abs() < 1e-3 * largest, "{a} {b} of {largest}");
+    }
+    // In its own elements it is another press.
+    let (coarse_n, _) = pressed(&Fixture::new(coarse.clone(), 5e-3));
+    assert!(
+        (coarse_n - force_n).norm() > 0.02 * force_n.norm(),
+        "{coarse_n} {force_n}"
+    );
+
+    let (solved, wall) = (alone.probe.solved, alone.probe.wall);
+    let is_taken = |change: &dyn Fn(&mut SolvedProbe)| {
+        let mut other = solved.clone();
+        change(&mut other);
+        ReadyProbe::of_solved(other, &fine.body, wall.clone(), ProbeShape::default()).is_some()
+    };
+    assert!(is_taken(&|_| {}));
+    assert!(!is_taken(&|other| other.compliance[3] = f64::NAN));
+    assert!(!is_taken(&|other| other.between[3] = f32::INFINITY));
+    assert!(!is_taken(&|other| other.columns.truncate(7)));
+    assert!(!is_taken(&|other| other.shares.truncate(7)));
+    assert!(!is_taken(
+        &|other| other.columns[0] = crate::tissue::PackedField::zeros(7)
+    ));
+    let other_body = ReadyProbe::of_solved(solved.clone(), &coarse.body, wall.clone(), ProbeShape::default());
+    assert!(other_body.is_none());
 }

@@ -63,6 +63,9 @@ pub struct Face {
     /// A point in the tissue behind it, scene frame, m.
     pub inside_m: [f64; 3],
     outward: [f64; 3],
+    /// Edge of its cell, m, and along which axis the cell ends in it.
+    edge_m: f64,
+    axis: usize,
 }
 
 /// A place of the smooth wall: the mean of faces around it at rest, and however they move.
@@ -127,6 +130,16 @@ impl Wall {
         })
     }
 
+    /// The element behind the middle of each pad.
+    pub fn elements_behind(&self, lattice: &Lattice) -> Vec<u32> {
+        let behind = |pad: &Pad| {
+            let nearest = |f: &&Face| (0..3).map(|c| (f.place_m[c] - pad.place_m[c]).powi(2)).sum::<f64>();
+            let face = pad.faces.iter().min_by(|a, b| nearest(a).total_cmp(&nearest(b)));
+            face.and_then(|f| lattice.element_at_rest(f.inside_m)).unwrap_or(0)
+        };
+        self.pads.iter().map(behind).collect()
+    }
+
     /// The smooth wall at each of its faces, for a measurement.
     #[cfg(test)]
     pub fn finely(&self, scene: &Scene) -> Vec<Point> {
@@ -166,8 +179,11 @@ impl Point {
 fn mean_weights<'a>(body: &BatchModel<f32>, faces: impl Iterator<Item = (&'a Face, f64)>) -> Option<Vec<(u32, f64)>> {
     let mut all = Vec::new();
     for (face, share) in faces {
-        let nodes = body.trilinear(face.inside_m)?;
-        all.extend(nodes.map(|(node, weight)| (node, share * weight)));
+        let count = face.inside_of(body.spacing_m()).count() as f64;
+        for at in face.inside_of(body.spacing_m()) {
+            let nodes = body.trilinear(at)?;
+            all.extend(nodes.map(|(node, weight)| (node, share / count * weight)));
+        }
     }
     all.sort_by_key(|(node, _)| *node);
     let mut merged: Vec<(u32, f64)> = Vec::new();
@@ -228,6 +244,23 @@ fn face(lattice: &Lattice, element: u32, side: usize) -> Face {
         place_m: along(0.5),
         inside_m: along(0.49),
         outward,
+        edge_m: lattice.spacing_m,
+        axis: side / 2,
+    }
+}
+
+impl Face {
+    /// Its middle; in a body of smaller elements the middle of each of their faces in it, or a load would sink in as a point does.
+    fn inside_of(&self, elements_m: f64) -> impl Iterator<Item = [f64; 3]> {
+        let times = (self.edge_m / elements_m).round().max(1.0) as usize;
+        let (middle_m, axis, edge_m) = (self.inside_m, self.axis, self.edge_m);
+        (0..times * times).map(move |n| {
+            let parts = [n % times, n / times].map(|n| (n as f64 + 0.5) / times as f64 - 0.5);
+            let mut at = middle_m;
+            at[(axis + 1) % 3] += parts[0] * edge_m;
+            at[(axis + 2) % 3] += parts[1] * edge_m;
+            at
+        })
     }
 }
 

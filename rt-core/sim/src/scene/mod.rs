@@ -31,6 +31,8 @@ pub use tissue_kind::TissueKind;
 
 /// Most cells along one axis.
 pub const MAX_CELLS_PER_AXIS: usize = 1024;
+/// Elements that a probe is solved for in at most: a thread takes some hundred megabytes for so many.
+const MOST_CELLS: usize = 1_000_000;
 /// Most elements in a scene.
 pub const MAX_ELEMENTS: usize = 4_000_000;
 /// Smallest and largest edge of an element.
@@ -109,6 +111,11 @@ impl Scene {
     pub fn for_lines(self, tissue: TissueKind) -> Option<Scene> {
         let most = tissue.most_line_elements()?;
         Some(self.with_body(TissueKind::Fem, most))
+    }
+
+    /// The same scene with the finite elements that a probe is worth minutes in: its own cells, or larger ones where those are too many.
+    pub fn in_cells(self) -> Scene {
+        self.with_body(TissueKind::Fem, MOST_CELLS)
     }
 
     /// The lattice of those finite elements, for the tissue of this scene.

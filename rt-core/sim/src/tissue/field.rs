@@ -1,6 +1,7 @@
 //! A displacement of every element, as a model answers a force with.
 
 use crate::simd::{Simd, vectorised};
+use serde::{Deserialize, Serialize};
 
 /// Displacement of every element's centre, along x, y, z: per newton, in metres.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,7 +40,7 @@ impl ElementField {
 
 /// The same in half of the memory, which is what adding up many of them waits for: in steps of 1 / 32,767 of the largest
 /// displacement in it.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PackedField {
     step_m: f32,
     steps: [Vec<i16>; 3],
@@ -79,6 +80,11 @@ impl PackedField {
     /// How many elements it has.
     pub fn elements(&self) -> usize {
         self.steps[0].len()
+    }
+
+    /// As many along each axis, in steps of a finite size.
+    pub fn is_sound(&self) -> bool {
+        self.steps.iter().all(|axis| axis.len() == self.elements()) && self.step_m.is_finite()
     }
 
     /// Bytes of the displacements.

@@ -218,7 +218,7 @@ fn a_force_that_nobody_renews_is_released() {
     let mut device = fake.open();
     assert!(drive(&mut device, &push(), |s| s.is_ok() && feels(&fake, 1.0)));
     assert!(until(LONG, || feels(&fake, 0.0)), "the force loop has stopped");
-    // The force goes out first, the fault is told at the end of the same tick.
+    // The force goes out first, the fault is reported at the end of the same tick.
     assert!(until(LONG, || device.read(1e-3) == Err(DeviceFault::TimedOut)));
     assert!(
         drive(&mut device, &push(), |s| s.is_ok() && feels(&fake, 1.0)),

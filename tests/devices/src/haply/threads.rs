@@ -208,7 +208,7 @@ fn a_force_that_nobody_renews_is_released() {
     let mut device = open(&server);
     assert!(drive(&mut device, &push(), |s| s.is_ok() && feels(&service, 1.0)));
     assert!(until(LONG, || feels(&service, 0.0)), "the force loop has stopped");
-    // The force goes out first, the fault is told at the end of the same tick.
+    // The force goes out first, the fault is reported at the end of the same tick.
     assert!(until(LONG, || device.read(1e-3) == Err(DeviceFault::TimedOut)));
     assert!(
         drive(&mut device, &push(), |s| s.is_ok() && feels(&service, 1.0)),

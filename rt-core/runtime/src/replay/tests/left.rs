@@ -152,7 +152,7 @@ fn a_recording_with_a_needle_that_stays_in_repeats_in_every_bit() {
         let tissue = other.tissue.as_mut().expect("recorded");
         tissue.left.clear();
         let tissue = other.tissue.as_ref().expect("recorded");
-        let lines = solve_again(&other, tissue, &mut |_| {}).expect("solved");
+        let lines = solve_again(&other, tissue, None, &mut |_| {}).expect("solved");
         let found = repeat::tissue(&other, tissue, lines).expect("can be run");
         assert!(found.different > 0 || found.different_positions > 0, "{found:?}");
     }

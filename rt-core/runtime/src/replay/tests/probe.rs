@@ -2,11 +2,14 @@
 
 use super::left::APART_M;
 use super::*;
+use crate::kept_probe::KeptError;
+use crate::lines::NoProbe;
 use crate::rt::outside::OutsideTape;
 use crate::rt::probe_tape::ProbeTape;
+use crate::rt::tissue_tape::TapedOrder;
 use stylet_anatomy::Beyond;
 use stylet_shm_schema::flags;
-use stylet_sim::probe::{ProbePose, ProbeShape};
+use stylet_sim::probe::{BodyProbe, NoWall, ProbePose, ProbeShape};
 use stylet_sim::scene::{Material, Role, Structure, Surroundings};
 
 /// Of the needle above the middle of the block.
@@ -14,12 +17,18 @@ const ABOVE_M: f64 = 8e-3;
 
 /// A gland with a hollow of 24 x 16 mm in rectal wall below it.
 fn hollow() -> SceneSource {
-    let dims = [12, 14, 12];
+    hollow_in(1)
+}
+
+/// In so many cells for each 4 mm.
+fn hollow_in(times: usize) -> SceneSource {
+    let dims = [12, 14, 12].map(|n| n * times);
     let mut cells = Vec::new();
     for _ in 0..dims[2] {
         for j in 0..dims[1] {
             for i in 0..dims[0] {
-                let from_middle = [i as f64 + 0.5 - 6.0, j as f64 + 0.5 - 4.0];
+                let [i, j] = [i, j].map(|c| (c as f64 + 0.5) / times as f64);
+                let from_middle = [i - 6.0, j - 4.0];
                 let across = (from_middle[0] / 3.0).powi(2) + (from_middle[1] / 2.5).powi(2);
                 cells.push(match across {
                     a if a <= 1.0 => 0,
@@ -45,7 +54,7 @@ fn hollow() -> SceneSource {
         "hollow",
         &Labels {
             dims,
-            spacing_m: 4e-3,
+            spacing_m: 4e-3 / times as f64,
             cells,
             structures: vec![
                 structure("gland", 1, Role::Target, Beyond::Fat),
@@ -58,11 +67,13 @@ fn hollow() -> SceneSource {
 impl Recorded {
     /// With a probe in the hollow.
     fn with_probe(kind: TissueKind) -> Self {
-        let mut run = Self::of(hollow(), kind, &ForceParameters::default(), ABOVE_M);
         let body = LineBody::of_source(&hollow(), kind).expect("valid").expect("has lines");
-        let probe = body
-            .prepare_probe(ProbeShape::default(), &mut |_| true)
-            .expect("a rectum");
+        let probe = body.prepare_probe(ProbeShape::default(), &mut |_| true);
+        Self::with(hollow(), kind, probe.expect("a rectum"))
+    }
+
+    fn with(source: SceneSource, kind: TissueKind, probe: BodyProbe) -> Self {
+        let mut run = Self::of(source, kind, &ForceParameters::default(), ABOVE_M);
         let bridge = &mut run.loops.bridge;
         assert!(bridge.outside_rooms.push(OutsideTape::new()).is_ok());
         let order = TissueOrder::Probe {
@@ -161,11 +172,96 @@ fn a_recording_with_a_probe_and_a_needle_that_stays_in_repeats_in_every_bit() {
     }
 }
 
+/// A probe that was solved for in the scene's own cells and kept: the run with it repeats with what was kept, and solved again without.
+#[test]
+fn a_recording_with_a_probe_that_was_kept_repeats_in_every_bit() {
+    let (source, kind, shape) = (hollow_in(2), TissueKind::ChainMail, ProbeShape::default());
+    let folder = std::env::temp_dir().join(format!("stylet-kept-{}", std::process::id()));
+    let body = LineBody::of_source(&source, kind).expect("valid").expect("has lines");
+    assert_eq!(body.probe_edges_m(), [4e-3, 2e-3]);
+    assert!(body.kept_probe(shape, &folder).expect("nothing wrong").is_none());
+    let ready = body.solve_in_cells(shape, 2, &mut |_| true).expect("a rectum");
+    let alone = body.solve_in_cells(shape, 1, &mut |_| true).expect("a rectum");
+    assert!(
+        ready.solved == alone.solved,
+        "the answers do not depend on the number of threads"
+    );
+    let stopped = body.solve_in_cells(shape, 2, &mut |_| false);
+    assert!(matches!(stopped, Err(NoProbe::Wall(NoWall::Stopped))));
+    body.keep_probe(&ready, &folder).expect("written");
+    let kept = body.kept_probe(shape, &folder).expect("sound").expect("kept");
+    assert!(kept.ready().solved == ready.solved);
+
+    let mut run = Recorded::with(source, kind, kept);
+    run.give_line(1);
+    run.press([16e-3, 16e-3], 0.1);
+    run.go(14e-3);
+    run.press([16e-3, 23e-3], 2.0);
+    let flight = through_a_file(&run.flight());
+    assert_eq!(run.heap_calls, 0, "heap calls of the loops");
+    assert_repeats(&flight, true);
+    let tissue = flight.tissue.as_ref().expect("recorded");
+    assert_eq!(tissue.probe_edge_m(), Some(2e-3));
+    let lines = solve_again(&flight, tissue, Some(&folder), &mut |_| {}).expect("kept");
+    assert!(
+        repeat::tissue(&flight, tissue, lines)
+            .expect("can be run")
+            .is_identical()
+    );
+    // Of other elements it is another probe, and of none an error.
+    for (edge_m, is_known) in [(4e-3, true), (3e-3, false)] {
+        let mut other = tissue.clone();
+        other.memory.probe.edge_m = edge_m;
+        for (_, order) in &mut other.orders {
+            if let TapedOrder::Probe { edge_m: of } = order {
+                *of = edge_m;
+            }
+        }
+        let lines = solve_again(&flight, &other, Some(&folder), &mut |_| {});
+        assert_eq!(lines.is_ok(), is_known);
+        if let Ok(lines) = lines {
+            assert!(
+                !repeat::tissue(&flight, &other, lines)
+                    .expect("can be run")
+                    .is_identical()
+            );
+        }
+    }
+
+    // What is not what was written is not used.
+    let path = body.probe_file(&shape, &folder);
+    let bytes = std::fs::read(&path).expect("kept");
+    let stiffer = LineBody::of_stiffened(&hollow_in(2), 2.0, kind)
+        .expect("valid")
+        .expect("has lines");
+    assert_ne!(stiffer.probe_file(&shape, &folder), path);
+    std::fs::write(stiffer.probe_file(&shape, &folder), &bytes).expect("written");
+    assert!(matches!(stiffer.kept_probe(shape, &folder), Err(KeptError::Other(_))));
+    let damaged = |at: usize| {
+        let mut bytes = bytes.clone();
+        bytes[at] ^= 1;
+        bytes
+    };
+    for wrong in [
+        damaged(0),
+        damaged(9),
+        damaged(bytes.len() / 2),
+        damaged(bytes.len() - 1),
+        bytes[..bytes.len() - 1].to_vec(),
+        bytes[..20].to_vec(),
+        Vec::new(),
+    ] {
+        std::fs::write(&path, wrong).expect("written");
+        assert!(matches!(body.kept_probe(shape, &folder), Err(KeptError::Other(_))));
+    }
+    std::fs::remove_dir_all(&folder).expect("removed");
+}
+
 fn assert_repeats(flight: &Flight, is_same: bool) {
     let found = repeat::haptic(flight, flight.haptic.as_ref().expect("recorded")).expect("can be run");
     assert_eq!(found.is_identical(), is_same, "forces: {found:?}");
     let tissue = flight.tissue.as_ref().expect("recorded");
-    let lines = solve_again(flight, tissue, &mut |_| {}).expect("solved");
+    let lines = solve_again(flight, tissue, None, &mut |_| {}).expect("solved");
     let found = repeat::tissue(flight, tissue, lines).expect("can be run");
     assert_eq!(found.is_identical(), is_same, "tissue: {found:?}");
     assert!(found.positions > 0);

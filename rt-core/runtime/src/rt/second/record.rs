@@ -55,6 +55,7 @@ impl SecondLoop {
         s.missed_deadlines += u64::from(missed);
         s.worst_wake_ns = s.worst_wake_ns.max(wake_latency_ns);
         s.tissue_tick = response.tick;
+        s.probe_edge_um = response.edge_um;
         (s.gate_counts, s.gate_interventions) = (gate_counts, interventions);
         (s.energy_j, s.warmth_n) = (memory.gate.passivity().energy_j(), memory.gate.warmth_n());
         s.fault = memory.watchdog.fault() as u32;

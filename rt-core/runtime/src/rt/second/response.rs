@@ -16,6 +16,8 @@ pub struct ProbeResponse {
     pub time_ns: u64,
     /// Tissue ticks made so far.
     pub tick: u64,
+    /// Edge of the elements that the contact was solved for in, um; 0 without a probe in the body.
+    pub edge_um: u32,
     /// What the hand holds touches tissue.
     pub touches: bool,
     /// The step has not converged and the hand would feel it.
@@ -36,6 +38,7 @@ impl Default for ProbeResponse {
         Self {
             time_ns: 0,
             tick: 0,
+            edge_um: 0,
             touches: false,
             unsolved: false,
             tip_in_scene: Vector3::zeros(),

@@ -72,6 +72,7 @@ impl Rig {
                 depth_m
             };
         self.tissue.response.write(ProbeResponse {
+            edge_um: 0,
             time_ns: self.now_ns,
             tick: self.now_ns / (TISSUE_TICKS * TICK_NS),
             touches: depth_m > 0.0,

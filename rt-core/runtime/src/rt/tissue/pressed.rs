@@ -32,7 +32,8 @@ impl TissueLoop {
             return self.free_probe(probe);
         }
         self.drop_probe();
-        self.tape_order(TapedOrder::Probe);
+        let edge_m = probe.ready().solved.edge_m;
+        self.tape_order(TapedOrder::Probe { edge_m });
         self.pressed = Some(probe);
     }
 

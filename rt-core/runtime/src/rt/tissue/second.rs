@@ -68,6 +68,7 @@ impl TissueLoop {
         };
         if let Some(pressed) = &self.pressed {
             let contact = pressed.response();
+            response.edge_um = (1e6 * pressed.ready().solved.edge_m).round() as u32;
             response.touches = contact.contacts > 0;
             response.unsolved = pressed.report().open_m > FELT_M;
             response.wrench = Wrench {

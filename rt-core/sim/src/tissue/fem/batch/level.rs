@@ -142,6 +142,11 @@ impl<T: Real> BatchModel<T> {
         self.corners.len()
     }
 
+    /// The elements.
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
     /// Edge of a cell, m.
     pub fn spacing_m(&self) -> f64 {
         self.spacing_m

@@ -1,0 +1,121 @@
+//! Answers to the probe that took minutes to solve for, kept for later runs: one file for each scene and tissue.
+//!
+//! `MAGIC`, SHA-256 of scene and answers, answers (postcard). Nothing of a file is used before that digest is right, and nothing that is of
+//! another wall or no number.
+
+use sha2::{Digest, Sha256};
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use stylet_sim::probe::{PADS_APART_M, ProbeShape, SolvedProbe};
+use stylet_sim::scene::Scene;
+
+/// Ends in the version of the layout, and of how answers are solved for.
+const MAGIC: [u8; 8] = *b"STYLPRB1";
+const DIGEST: usize = 32;
+/// Finite elements of a scene in its own cells take 110 MB.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// Why a file is not used.
+#[derive(Debug, thiserror::Error)]
+pub enum KeptError {
+    /// It could not be read or written.
+    #[error("{path}: {why}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        why: io::Error,
+    },
+    /// It is not what was written for this scene.
+    #[error("{0}: damaged, or of another scene or version: solve again ('rt-core probe --again'), or remove it")]
+    Other(PathBuf),
+}
+
+/// `$XDG_CACHE_HOME/stylet/probes`, by default under `~/.cache`; nothing for a user without a home.
+pub fn default_folder() -> Option<PathBuf> {
+    let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+    let cache = from("XDG_CACHE_HOME").filter(|p| p.is_absolute());
+    let cache = cache.or_else(|| from("HOME").map(|home| home.join(".cache")));
+    cache.map(|cache| cache.join("stylet/probes"))
+}
+
+/// The file of a scene, whose elements are those that are displaced.
+pub fn path(folder: &Path, scene: &Scene, shape: &ProbeShape) -> PathBuf {
+    let digest = digest_of(scene, shape);
+    let number = digest[..8].iter().map(|byte| format!("{byte:02x}")).collect::<String>();
+    folder.join(format!("{number}.probe"))
+}
+
+/// The answers of that scene; `None` where none are kept.
+pub fn read(path: &Path, scene: &Scene, shape: &ProbeShape) -> Result<Option<SolvedProbe>, KeptError> {
+    let other = || KeptError::Other(path.to_owned());
+    let io = |why| KeptError::Io {
+        path: path.to_owned(),
+        why,
+    };
+    match fs::metadata(path) {
+        Err(why) if why.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(why) => return Err(io(why)),
+        Ok(found) if !found.is_file() || found.len() > MOST_BYTES => return Err(other()),
+        Ok(_) => {}
+    }
+    let bytes = fs::read(path).map_err(io)?;
+    let (magic, rest) = bytes.split_at_checked(MAGIC.len()).ok_or_else(other)?;
+    let (digest, answers) = rest.split_at_checked(DIGEST).ok_or_else(other)?;
+    if magic != MAGIC || digest != joined(scene, shape, answers) {
+        return Err(other());
+    }
+    postcard::from_bytes(answers).map(Some).map_err(|_| other())
+}
+
+/// Keeps them; a reader sees all of the file or nothing of it.
+pub fn write(path: &Path, scene: &Scene, shape: &ProbeShape, solved: &SolvedProbe) -> Result<(), KeptError> {
+    let io = |why| KeptError::Io {
+        path: path.to_owned(),
+        why,
+    };
+    let answers = postcard::to_allocvec(solved).map_err(|why| io(io::Error::other(why)))?;
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder).map_err(io)?;
+    let part = path.with_extension(format!("{}.part", std::process::id()));
+    let written = fs::File::create(&part).and_then(|mut file| {
+        file.write_all(&MAGIC)?;
+        file.write_all(&joined(scene, shape, &answers))?;
+        file.write_all(&answers)?;
+        file.sync_all()?;
+        fs::rename(&part, path)
+    });
+    written.map_err(|why| {
+        let _ = fs::remove_file(&part);
+        io(why)
+    })
+}
+
+fn joined(scene: &Scene, shape: &ProbeShape, answers: &[u8]) -> [u8; DIGEST] {
+    Sha256::new()
+        .chain_update(digest_of(scene, shape))
+        .chain_update(answers)
+        .finalize()
+        .into()
+}
+
+/// Of all that answers follow from.
+fn digest_of(scene: &Scene, shape: &ProbeShape) -> [u8; DIGEST] {
+    let mut digest = Sha256::new()
+        .chain_update(MAGIC)
+        .chain_update(env!("CARGO_PKG_VERSION"))
+        .chain_update(shape.radius_m.to_le_bytes())
+        .chain_update(PADS_APART_M.to_le_bytes())
+        .chain_update(scene.body.spacing_m.to_le_bytes())
+        .chain_update(scene.lattice.spacing_m.to_le_bytes());
+    for element in 0..scene.lattice.element_count() as u32 {
+        for coordinate in scene.lattice.cell(element) {
+            digest.update((coordinate as u32).to_le_bytes());
+        }
+        digest.update([scene.lattice.structure(element)]);
+    }
+    // Names and materials; what cannot be written is in no scene.
+    digest.update(postcard::to_allocvec(&scene.structures).unwrap_or_default());
+    digest.finalize().into()
+}

@@ -1,0 +1,117 @@
+//! `rt-core probe`: what the ultrasound probe presses, solved for in a scene's own cells and kept for later runs.
+
+use clap::Args;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+use stylet_runtime::args::{scenes, tissue_kinds};
+use stylet_runtime::kept_probe::{self, KeptError};
+use stylet_runtime::lines::{LineBody, NoLine, NoProbe};
+use stylet_runtime::replay::file::{Flight, FlightError};
+use stylet_sim::probe::{NoWall, ProbeShape};
+use stylet_sim::scene::{SceneSource, TissueKind};
+
+/// Why nothing was kept.
+#[derive(Debug, thiserror::Error)]
+pub enum ProbeTaskError {
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Flight(#[from] FlightError),
+    /// It has no scene.
+    #[error("{0}: the recording has no tissue, so no scene: take one of a smaller body, or the scene's name (--scene)")]
+    NoScene(PathBuf),
+    /// The scene cannot be used.
+    #[error(transparent)]
+    Body(#[from] NoLine),
+    /// No probe in it.
+    #[error(transparent)]
+    Probe(#[from] NoProbe),
+    /// The file.
+    #[error(transparent)]
+    File(#[from] KeptError),
+    /// Nowhere to keep it.
+    #[error("neither XDG_CACHE_HOME nor HOME is set: say where to keep it (--folder)")]
+    NoFolder,
+}
+
+/// The command.
+#[derive(Args, Debug)]
+pub struct ProbeArgs {
+    /// Built-in scene
+    #[arg(long, default_value = "pelvis", value_parser = scenes())]
+    scene: String,
+    /// The scene of a flight recording (*.flight) in place of a built-in one
+    #[arg(long, value_name = "FILE", conflicts_with = "scene")]
+    flight: Option<PathBuf>,
+    /// Tissue model of the runs [default: that of the recording, or of a run]
+    #[arg(long, value_parser = tissue_kinds())]
+    tissue: Option<TissueKind>,
+    /// Threads that solve, some hundred megabytes each [default: one for each processor]
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Solve again although the answers are there
+    #[arg(long)]
+    again: bool,
+    /// Where to keep them; runs look in the default folder [default: $XDG_CACHE_HOME/stylet/probes or ~/.cache/stylet/probes]
+    #[arg(long, value_name = "DIR")]
+    folder: Option<PathBuf>,
+}
+
+impl ProbeArgs {
+    /// Solves, with a line for each tenth, and keeps the answers.
+    pub fn run(&self, stop: &AtomicBool) -> Result<(), ProbeTaskError> {
+        let folder = self.folder.clone().or_else(kept_probe::default_folder);
+        let folder = folder.ok_or(ProbeTaskError::NoFolder)?;
+        let (source, recorded) = self.source()?;
+        let tissue = self.tissue.or(recorded).unwrap_or_default();
+        let body = LineBody::of_source(&source, tissue)?.ok_or(NoProbe::from(NoWall::NoForces))?;
+        let shape = ProbeShape::default();
+        let file = body.probe_file(&shape, &folder);
+        if !self.again && body.kept_probe(shape, &folder)?.is_some() {
+            println!("{}: solved for before", file.display());
+            return Ok(());
+        }
+        let threads = self.threads.map_or_else(processors, usize::from);
+        let begun = Instant::now();
+        let mut tenths = None;
+        let ready = body.solve_in_cells(shape, threads, &mut |[ready, of]| {
+            let before = tenths.replace(10 * ready / of);
+            if before.is_none() {
+                let [quick_mm, fine_mm] = body.probe_edges_m().map(|edge_m| 1e3 * edge_m);
+                println!(
+                    "in cells of {fine_mm:.2} mm, where a run has elements of {quick_mm:.2} mm; {threads} threads"
+                );
+            } else if before != tenths {
+                let left_s = begun.elapsed().as_secs_f64() * (of - ready) as f64 / ready as f64;
+                println!("{ready} of {of} columns, about {left_s:.0} s left");
+            }
+            // SYNC: set by a signal handler; nothing but the flag is carried.
+            !stop.load(Ordering::Acquire)
+        })?;
+        body.keep_probe(&ready, &folder)?;
+        let [columns, others] = ready.bytes();
+        println!(
+            "{}: {} columns, residual {:.1e} at most, {:.0} MB, {:.0} s",
+            file.display(),
+            ready.rows(),
+            ready.solved.residual,
+            1e-6 * (columns + others) as f64,
+            begun.elapsed().as_secs_f64()
+        );
+        Ok(())
+    }
+
+    /// The scene, and the tissue that was recorded with it.
+    fn source(&self) -> Result<(SceneSource, Option<TissueKind>), ProbeTaskError> {
+        let Some(path) = &self.flight else {
+            return Ok((SceneSource::Builtin(self.scene.clone()), None));
+        };
+        let tissue = Flight::read(path)?.tissue;
+        let tissue = tissue.ok_or_else(|| ProbeTaskError::NoScene(path.clone()))?;
+        Ok((tissue.scene, Some(tissue.tissue)))
+    }
+}
+
+fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
