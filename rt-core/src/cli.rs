@@ -59,7 +59,7 @@ pub enum Task {
     /// Solve for what the ultrasound probe presses in a scene's own cells: once, for minutes; later runs use it
     ///
     /// A run with a second device (--device-2) solves for it within seconds, in the larger elements that needles' lines are solved for in: in
-    /// 'pelvis' 2.7 mm (fem) and 5.5 mm (chainmail), with a press that is 6 and 11 % too strong and moves the gland 6 and 12 % too far. This solves
+    /// 'pelvis' 2.7 mm (fem) and 5.5 mm (chainmail), with a press that is 10 and 15 % too strong and moves the gland 7 and 12 % too far. This solves
     /// in the scene's cells and keeps the answers; later runs of the same scene and tissue begin with them. The window says below the scene
     /// in which elements the probe is solved for.
     Probe(ProbeArgs),

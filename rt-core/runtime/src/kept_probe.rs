@@ -11,9 +11,9 @@ use stylet_sim::probe::{PADS_APART_M, ProbeShape, SolvedProbe};
 use stylet_sim::scene::Scene;
 
 /// Ends in the version of the layout, and of how answers are solved for.
-const MAGIC: [u8; 8] = *b"STYLPRB1";
+const MAGIC: [u8; 8] = *b"STYLPRB2";
 const DIGEST: usize = 32;
-/// Finite elements of a scene in its own cells take 110 MB.
+/// In finite elements of 2.7 mm the answers of `pelvis` take 380 MB.
 const MOST_BYTES: u64 = 1 << 30;
 
 /// Why a file is not used.

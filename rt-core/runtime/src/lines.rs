@@ -123,15 +123,14 @@ impl LineBody {
         let Some(solved) = kept_probe::read(&path, &self.scene, &shape)? else {
             return Ok(None);
         };
-        let ready = Wall::of(&self.scene, PADS_APART_M)
-            .ok()
-            .and_then(|wall| ReadyProbe::of_solved(solved, &self.scene.body, wall, shape));
+        let wall = Wall::of(&self.scene, PADS_APART_M).ok().map(Wall::loaded_at_points);
+        let ready = wall.and_then(|wall| ReadyProbe::of_solved(solved, &self.scene.body, wall, shape));
         ready
             .map(|ready| Some(BodyProbe::new(ready)))
             .ok_or(KeptError::Other(path))
     }
 
-    /// Solves in the scene's own cells for what a probe can press: on so many threads, for minutes. `goes_on` is given how many columns are ready,
+    /// Solves in the scene's own cells for what a probe can press, loaded at the points at which it is touched: on so many threads, for minutes. `goes_on` is given how many columns are ready,
     /// and of how many; the answers do not depend on the number of threads.
     pub fn solve_in_cells(
         &self,
@@ -139,8 +138,8 @@ impl LineBody {
         threads: usize,
         goes_on: &mut dyn FnMut([usize; 2]) -> bool,
     ) -> Result<ReadyProbe, NoProbe> {
-        let wall = Wall::of(&self.scene, PADS_APART_M)?;
-        let rows = 3 * wall.pads.len();
+        let wall = Wall::of(&self.scene, PADS_APART_M)?.loaded_at_points();
+        let rows = 3 * wall.loads();
         let body = FemTissue::<f32>::new(&self.scene.clone().in_cells())
             .map(|fem| BatchModel::new(&fem.model))
             .map_err(|problems| NoLine::World(WorldError(problems.iter().map(ToString::to_string).collect())))?;

@@ -32,7 +32,7 @@ fn probe_solved_in(scene: &SceneHeader, edge_um: u32) -> Option<(String, String)
         let why = if is_coarse {
             format!(
                 "What the probe presses was solved for in larger elements than the scene's cells of {cell_mm:.1} mm: in \"pelvis\" its press is \
-                 6 to 11 % too strong. \"rt-core probe\" solves for it in the cells once, for minutes; the next run uses that."
+                 10 to 15 % too strong. \"rt-core probe\" solves for it in the cells once, for minutes; the next run uses that."
             )
         } else {
             "What the probe presses is solved for in the scene's own cells.".to_owned()

@@ -138,7 +138,7 @@ fn find(
     if edge_mm > 1.01 * fine_mm {
         said.get_or_insert_with(|| {
             format!(
-                "the probe is solved for in elements of {edge_mm:.1} mm: in 'pelvis' its press is 6 to 11 % too strong. {} solves in cells of \
+                "the probe is solved for in elements of {edge_mm:.1} mm: in 'pelvis' its press is 10 to 15 % too strong. {} solves in cells of \
                  {fine_mm:.1} mm once, for minutes, and later runs use that",
                 command_for(source)
             )

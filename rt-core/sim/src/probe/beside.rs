@@ -94,11 +94,10 @@ impl LinesBeside {
     pub fn displace_line(&self, generation: u64, loads_n: &[f64], rows_m: &mut [f64]) -> usize {
         let Some(line) = self.find(generation) else { return 0 };
         for (moved_m, row) in rows_m.iter_mut().zip(line.rows_with(self.pads)) {
-            let along = row
-                .iter()
-                .zip(loads_n)
-                .map(|(m_per_n, load_n)| f64::from(*m_per_n) * load_n);
-            *moved_m = along.sum();
+            let places = row.chunks_exact(3).zip(loads_n.chunks_exact(3));
+            let loaded = places.filter(|(_, loads_n)| loads_n.iter().any(|n| *n != 0.0));
+            let along = loaded.flat_map(|(row, loads_n)| row.iter().zip(loads_n));
+            *moved_m = along.map(|(m_per_n, load_n)| f64::from(*m_per_n) * load_n).sum();
         }
         line.rows.min(rows_m.len())
     }

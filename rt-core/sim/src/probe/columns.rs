@@ -20,7 +20,7 @@ pub struct ReadyProbe {
     pub shape: ProbeShape,
     /// What it can press.
     pub wall: Wall,
-    /// The element behind the middle of each pad.
+    /// The element behind the middle of each place that loads the body.
     pub elements: Vec<u32>,
     /// What was solved for.
     pub solved: SolvedProbe,
@@ -29,11 +29,9 @@ pub struct ReadyProbe {
 /// The answers of a body to a probe: what takes long, and can be kept.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolvedProbe {
-    /// Displacement of the body's elements, m/N; pad after pad, along x, y, z.
+    /// Displacement of the body's elements, m/N; one place that loads it after another, along x, y, z.
     pub columns: Vec<PackedField>,
-    /// Displacement of pads along x, y, z with a newton on each, m/N: row after row, symmetric.
-    pub(super) compliance: Vec<f64>,
-    /// Loads of the pads by a newton on each point along x, y, z: row after row.
+    /// Loads of the pads by a newton on each point along x, y, z: row after row; nothing where the points load the body themselves.
     pub(super) shares: Vec<f32>,
     /// How all points move along x, y, z with a newton on each along each of these, m/N: row after row.
     pub(super) between: Vec<f32>,
@@ -44,15 +42,14 @@ pub struct SolvedProbe {
 }
 
 impl SolvedProbe {
-    /// They are of a wall with so many pads and points in a body of so many elements, and every number is finite.
+    /// They are of that wall in a body of so many elements, and every number is finite.
     fn is_of(&self, wall: &Wall, elements: usize) -> bool {
-        let (rows, points) = (3 * wall.pads.len(), 3 * wall.points.len());
+        let (rows, points) = (3 * wall.loads(), 3 * wall.points.len());
+        let shares = if wall.is_loaded_at_points { 0 } else { points * rows };
         let is_field = |field: &PackedField| field.elements() == elements && field.is_sound();
         self.columns.len() == rows
             && self.columns.iter().all(is_field)
-            && [self.compliance.len(), self.shares.len(), self.between.len()]
-                == [rows * rows, points * rows, points * points]
-            && self.compliance.iter().all(|c| c.is_finite())
+            && [self.shares.len(), self.between.len()] == [shares, points * points]
             && self.shares.iter().chain(&self.between).all(|c| c.is_finite())
             && self.edge_m.is_finite()
     }
@@ -69,14 +66,9 @@ impl ReadyProbe {
         })
     }
 
-    /// Rows of the compliance: three for each pad.
+    /// Three for each place that loads the body.
     pub fn rows(&self) -> usize {
-        3 * self.wall.pads.len()
-    }
-
-    /// How row `a` moves with a newton at row `b`, m/N.
-    pub fn at(&self, a: usize, b: usize) -> f64 {
-        self.solved.compliance.get(a * self.rows() + b).copied().unwrap_or(0.0)
+        3 * self.wall.loads()
     }
 
     /// How all points move along x, y, z, point after point, with a newton on point `n` along x; along y; along z, m/N.
@@ -102,11 +94,11 @@ impl ReadyProbe {
             .chunks_exact(rows.max(1))
     }
 
-    /// Bytes of the columns, and of the compliance.
+    /// Bytes of the columns, and of how points move each other and load pads.
     pub fn bytes(&self) -> [usize; 2] {
         [
             self.solved.columns.iter().map(PackedField::bytes).sum(),
-            8 * self.solved.compliance.len() + size_of_val(&*self.solved.between) + size_of_val(&*self.solved.shares),
+            size_of_val(&*self.solved.between) + size_of_val(&*self.solved.shares),
         ]
     }
 }
@@ -117,7 +109,7 @@ pub struct ProbeQueue {
     wall: Wall,
     elements: Vec<u32>,
     edge_m: f64,
-    /// Loads of each row of the pads, and of the points.
+    /// Loads of each row, and of the points where others load the body.
     loads: Vec<Vec<NodeWeight>>,
     read: Vec<Vec<NodeWeight>>,
     onto: Onto,
@@ -137,9 +129,9 @@ pub struct BatchAnswers {
     answers: Vec<Answer>,
 }
 
-/// How rows of the pads and of the points move, and the body, m/N.
+/// How rows of loads and of the points move, and the body, m/N.
 struct Answer {
-    pads: Vec<f64>,
+    loads: Vec<f64>,
     points: Vec<f64>,
     field: PackedField,
 }
@@ -148,10 +140,10 @@ impl ProbeQueue {
     /// For the wall of a scene in the body that is solved for. What is displaced are the elements of `displaced`, whose edge is as long or some
     /// times as long.
     pub fn new(body: &BatchModel<f32>, displaced: &Lattice, wall: Wall, shape: ProbeShape) -> Result<Self, NoWall> {
-        let weights = wall.pads.iter().map(|pad| pad.weights(body));
-        let weights: Vec<_> = weights.collect::<Option<_>>().ok_or(NoWall::NotInBody)?;
+        let weights = wall.load_weights(body).ok_or(NoWall::NotInBody)?;
         let points = wall.points.iter().map(|point| point.weights(body));
         let points: Vec<_> = points.collect::<Option<_>>().ok_or(NoWall::NotInBody)?;
+        let points = if wall.is_loaded_at_points { Vec::new() } else { points };
         Ok(ProbeQueue {
             shape,
             elements: wall.elements_behind(displaced),
@@ -202,11 +194,11 @@ impl ProbeQueue {
         };
         let answer = |lane: usize| {
             let moved = |rows: &[Vec<NodeWeight>]| rows.iter().map(|row| room.state.sample(lane, row)).collect();
-            let (pads, points) = (moved(&self.loads), moved(&self.read));
+            let (loads, points) = (moved(&self.loads), moved(&self.read));
             room.state.write(body, lane, &mut room.solved);
             let mut field = PackedField::zeros(self.onto.elements());
             field.pack(self.onto.mean(&room.solved, &mut room.onto));
-            Answer { pads, points, field }
+            Answer { loads, points, field }
         };
         Some(BatchAnswers {
             batch,
@@ -224,18 +216,24 @@ impl ProbeQueue {
         if answers.len() != rows {
             return Err(NoWall::Stopped);
         }
-        let pads = |row: usize, column: usize| answers[column].pads[row];
-        let compliance = (0..rows * rows).map(|n| 0.5 * (pads(n / rows, n % rows) + pads(n % rows, n / rows)));
+        let moved = |row: usize, column: usize| answers[column].loads[row];
+        let compliance = (0..rows * rows).map(|n| 0.5 * (moved(n / rows, n % rows) + moved(n % rows, n / rows)));
         let compliance: Vec<f64> = compliance.collect();
-        let points = (0..self.read.len() * rows).map(|n| answers[n % rows].points[n / rows]);
-        let between = Between::of(&points.collect::<Vec<f64>>(), &compliance, rows);
+        let between = if self.wall.is_loaded_at_points {
+            Between {
+                shares: Vec::new(),
+                rows: compliance.iter().map(|moved| *moved as f32).collect(),
+            }
+        } else {
+            let points = (0..self.read.len() * rows).map(|n| answers[n % rows].points[n / rows]);
+            Between::of(&points.collect::<Vec<f64>>(), &compliance, rows)
+        };
         Ok(ReadyProbe {
             shape: self.shape,
             wall: self.wall,
             elements: self.elements,
             solved: SolvedProbe {
                 columns: answers.into_iter().map(|answer| answer.field).collect(),
-                compliance,
                 shares: between.shares,
                 between: between.rows,
                 residual,

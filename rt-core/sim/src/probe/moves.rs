@@ -31,6 +31,14 @@ vectorised! {
 /// How these forces load the pads, which load the body, N.
 pub(super) fn pads(probe: &ReadyProbe, pressed_n: &[f64], pushed: &[[f64; 3]], loads_n: &mut [f64]) {
     loads_n.fill(0.0);
+    if probe.wall.is_loaded_at_points {
+        for (load_n, (force_n, pushed)) in loads_n.chunks_exact_mut(3).zip(pressed_n.iter().zip(pushed)) {
+            if *force_n > 0.0 {
+                load_n.copy_from_slice(&pushed.map(|along| force_n * along));
+            }
+        }
+        return;
+    }
     for (n, (force_n, pushed)) in pressed_n.iter().zip(pushed).enumerate() {
         if *force_n > 0.0 {
             for (shares, along) in probe.shares(n).zip(pushed) {
@@ -47,6 +55,9 @@ pub(super) fn beside(probe: &ReadyProbe, beside_m: &[f64], pads_m: &mut [f64], p
     let is_moved = beside_m.iter().any(|m| *m != 0.0) && beside_m.iter().all(|m| m.is_finite());
     if !is_moved || beside_m.len() != pads_m.len() {
         return points_m.fill([0.0; 3]);
+    }
+    if probe.wall.is_loaded_at_points {
+        return points_m.as_flattened_mut().copy_from_slice(beside_m);
     }
     let simd = Simd::detect();
     let pads = (beside_m.len() / 3) as f64;

@@ -96,8 +96,8 @@ mod tests {
         for (element, (sum, count)) in middles.into_iter().enumerate() {
             assert!(count > 0, "element {element} is empty");
             let wanted = moved(sum.map(|c| c / f64::from(count)));
-            for axis in 0..3 {
-                assert!((mean.0[axis][element] - wanted[axis]).abs() < 1e-7, "element {element}");
+            for (axis, wanted) in mean.0.iter().zip(wanted) {
+                assert!((axis[element] - wanted).abs() < 1e-7, "element {element}");
             }
         }
         let same = Onto::new(&coarse, &coarse);

@@ -29,10 +29,15 @@ impl Fixture {
 
     /// The body of another scene is solved for, of the same tissue in other elements.
     pub fn solved_in(other: &Scene, scene: Scene, spacing_m: f64) -> Self {
+        let wall = Wall::of(&scene, spacing_m).expect("a rectum");
+        Fixture::solved_for(other, scene, wall)
+    }
+
+    /// For that wall.
+    pub fn solved_for(other: &Scene, scene: Scene, wall: Wall) -> Self {
         let fem = FemTissue::<f32>::new(other).expect("valid");
         let body = BatchModel::new(&fem.model);
         drop(fem);
-        let wall = Wall::of(&scene, spacing_m).expect("a rectum");
         let queue = ProbeQueue::new(&body, &scene.body, wall, ProbeShape::default()).expect("in the body");
         // The later half of the batches by a thread of its own.
         let half = queue.batches() / 2;
@@ -230,8 +235,8 @@ fn a_body_is_displaced_as_the_finer_one_that_was_solved_for() {
         ReadyProbe::of_solved(other, &fine.body, wall.clone(), ProbeShape::default()).is_some()
     };
     assert!(is_taken(&|_| {}));
-    assert!(!is_taken(&|other| other.compliance[3] = f64::NAN));
     assert!(!is_taken(&|other| other.between[3] = f32::INFINITY));
+    assert!(!is_taken(&|other| other.shares[3] = f32::NAN));
     assert!(!is_taken(&|other| other.columns.truncate(7)));
     assert!(!is_taken(&|other| other.shares.truncate(7)));
     assert!(!is_taken(
@@ -239,4 +244,18 @@ fn a_body_is_displaced_as_the_finer_one_that_was_solved_for() {
     ));
     let other_body = ReadyProbe::of_solved(solved.clone(), &coarse.body, wall.clone(), ProbeShape::default());
     assert!(other_body.is_none());
+}
+
+/// Points that load the body themselves: beside the contact at the same points solved in full, without pads that are close enough.
+#[test]
+fn points_that_load_the_body_press_as_with_the_contact_solved_in_full() {
+    let scene = block(true);
+    let wall = Wall::of(&scene, 5e-3).expect("a rectum").loaded_at_points();
+    let fixture = Fixture::solved_for(&scene.clone(), scene, wall);
+    let ([_, largest_m, _, worst_m], force_off) =
+        reference::beside_reference(&fixture, &fixture.probe.wall, 5e-3, 10e-3);
+    assert!(
+        force_off < 0.01 && worst_m < 0.01 * largest_m,
+        "{force_off}, {worst_m} of {largest_m}"
+    );
 }

@@ -86,6 +86,8 @@ pub struct Wall {
     pub pads: Vec<Pad>,
     /// Where it touches the probe.
     pub points: Vec<Point>,
+    /// The points load the body themselves: four times as many columns, and nothing between force and body.
+    pub is_loaded_at_points: bool,
 }
 
 impl Wall {
@@ -127,17 +129,48 @@ impl Wall {
         Ok(Wall {
             pads,
             points: points.collect(),
+            is_loaded_at_points: false,
         })
     }
 
-    /// The element behind the middle of each pad.
-    pub fn elements_behind(&self, lattice: &Lattice) -> Vec<u32> {
-        let behind = |pad: &Pad| {
-            let nearest = |f: &&Face| (0..3).map(|c| (f.place_m[c] - pad.place_m[c]).powi(2)).sum::<f64>();
-            let face = pad.faces.iter().min_by(|a, b| nearest(a).total_cmp(&nearest(b)));
+    /// The same wall, loaded at its points.
+    pub fn loaded_at_points(self) -> Self {
+        Wall {
+            is_loaded_at_points: true,
+            ..self
+        }
+    }
+
+    /// How many places of it load the body.
+    pub fn loads(&self) -> usize {
+        if self.is_loaded_at_points {
+            self.points.len()
+        } else {
+            self.pads.len()
+        }
+    }
+
+    /// Nodes and weights of each; `None` where the body has no element there.
+    pub(super) fn load_weights(&self, body: &BatchModel<f32>) -> Option<Vec<Vec<(u32, f64)>>> {
+        if self.is_loaded_at_points {
+            return self.points.iter().map(|point| point.weights(body)).collect();
+        }
+        self.pads.iter().map(|pad| pad.weights(body)).collect()
+    }
+
+    /// The element behind the middle of each.
+    pub(super) fn elements_behind(&self, lattice: &Lattice) -> Vec<u32> {
+        let behind = |place_m: [f64; 3], faces: &mut dyn Iterator<Item = &Face>| {
+            let nearest = |f: &&Face| square_m2(f.place_m, place_m);
+            let face = faces.min_by(|a, b| nearest(a).total_cmp(&nearest(b)));
             face.and_then(|f| lattice.element_at_rest(f.inside_m)).unwrap_or(0)
         };
-        self.pads.iter().map(behind).collect()
+        if self.is_loaded_at_points {
+            let of = |point: &Point| behind(point.place_m, &mut point.faces.iter().map(|(face, _)| face));
+            return self.points.iter().map(of).collect();
+        }
+        let of = |pad: &Pad| behind(pad.place_m, &mut pad.faces.iter());
+        self.pads.iter().map(of).collect()
     }
 
     /// The smooth wall at each of its faces, for a measurement.

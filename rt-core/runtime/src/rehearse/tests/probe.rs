@@ -27,7 +27,10 @@ impl Theatre {
         let stage = Stage::build(&source, tissue, DeviceInfo::phantom_premium_1_5()).expect("built in");
         let begun = Instant::now();
         let body = stage.lines.as_ref().expect("it has lines");
-        let probe = body.prepare_probe(Default::default(), &mut |_| true).expect("a rectum");
+        // What `rt-core probe` has kept in a folder, for a measurement.
+        let kept = std::env::var_os("PROBE_KEPT");
+        let kept = kept.and_then(|folder| body.kept_probe(Default::default(), folder.as_ref()).expect("sound"));
+        let probe = kept.unwrap_or_else(|| body.prepare_probe(Default::default(), &mut |_| true).expect("a rectum"));
         println!(
             "probe for {} ready after {:.1?}, {:?} bytes",
             tissue.name(),
