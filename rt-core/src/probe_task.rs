@@ -71,13 +71,18 @@ impl ProbeArgs {
             println!("{}: solved for before", file.display());
             return Ok(());
         }
+        let [quick_mm, fine_mm] = body.probe_edges_m().map(|edge_m| 1e3 * edge_m);
+        // A recording names the probe by this edge: there would be two of one name.
+        if quick_mm == fine_mm {
+            println!("a run solves in cells of {fine_mm:.2} mm, which are the scene's own: nothing to keep");
+            return Ok(());
+        }
         let threads = self.threads.map_or_else(processors, usize::from);
         let begun = Instant::now();
         let mut tenths = None;
         let ready = body.solve_in_cells(shape, threads, &mut |[ready, of]| {
             let before = tenths.replace(10 * ready / of);
             if before.is_none() {
-                let [quick_mm, fine_mm] = body.probe_edges_m().map(|edge_m| 1e3 * edge_m);
                 println!(
                     "in cells of {fine_mm:.2} mm, where a run has elements of {quick_mm:.2} mm; {threads} threads"
                 );
