@@ -1,7 +1,8 @@
 //! The real window on a core of its own, drawn by the software driver and driven as a person would.
 
+use crate::kept::{assert_like_kept, tolerant, with_fewer_greys};
+use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable, by};
-use egui_kittest::{Harness, SnapshotOptions, image_snapshot_options};
 use host_ui::app::{App, Options};
 use host_ui::view::orientation::Orientation;
 use std::time::{Duration, Instant};
@@ -153,12 +154,13 @@ impl Driven {
 
     /// As [`Driven::compare`], where the plan stands in place of the plots.
     pub fn compare_plan(&mut self, name: &str) {
-        self.draw();
-        let size = self.window.ctx.content_rect().size();
-        let status = egui::Rect::from_min_max([120.0, 0.0].into(), [size.x - 250.0, 33.0].into());
-        self.window.mask(status);
-        let picture = self.drawn();
-        image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant());
+        assert_like_kept(name, &tolerant(), || {
+            self.draw();
+            let size = self.window.ctx.content_rect().size();
+            let status = egui::Rect::from_min_max([120.0, 0.0].into(), [size.x - 250.0, 33.0].into());
+            self.window.mask(status);
+            self.drawn()
+        });
     }
 
     /// What moves is drawn coarser: frames until hand and tissue have come to rest.
@@ -172,17 +174,14 @@ impl Driven {
     /// As [`Driven::compare`] where tissue and seeds have moved, never to the same place twice: the slices are covered too, and
     /// figures may differ by so many pixels.
     pub fn compare_live(&mut self, name: &str, pixels: usize) {
-        self.come_to_rest();
-        let slices =
-            ["Axial slice", "Sagittal slice", "Coronal slice"].map(|label| self.window.get_by_label(label).rect());
-        slices.into_iter().for_each(|rect| self.window.mask(rect));
-        self.cover_figures();
-        let picture = self.drawn();
-        image_snapshot_options(
-            &with_fewer_greys(&picture, 51),
-            name,
-            &tolerant().max_failed_pixels(pixels),
-        );
+        assert_like_kept(name, &tolerant().max_failed_pixels(pixels), || {
+            self.come_to_rest();
+            let slices =
+                ["Axial slice", "Sagittal slice", "Coronal slice"].map(|label| self.window.get_by_label(label).rect());
+            slices.into_iter().for_each(|rect| self.window.mask(rect));
+            self.cover_figures();
+            self.drawn()
+        });
     }
 
     /// Figures at the top, and the plots.
@@ -195,10 +194,11 @@ impl Driven {
 
     /// Compares with the picture that is kept; what lives is covered: figures at the top and the plots.
     pub fn compare(&mut self, name: &str) {
-        self.draw();
-        self.cover_figures();
-        let picture = self.drawn();
-        image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant());
+        assert_like_kept(name, &tolerant(), || {
+            self.draw();
+            self.cover_figures();
+            self.drawn()
+        });
     }
 }
 
@@ -215,24 +215,6 @@ pub fn assert_drawn_by_changes<T>(window: &mut Harness<'static, T>, state: &str)
         .collect();
     let some = &differing[..differing.len().min(12)];
     assert_eq!(differing.len(), 0, "{state}: {some:?}");
-}
-
-/// Another version of the software driver may round a few edges otherwise; a moved or missing widget is thousands of pixels.
-pub fn tolerant() -> SnapshotOptions {
-    SnapshotOptions::new().max_failed_pixels(500)
-}
-
-/// Grain does not compress: with fewer levels of grey a picture is a third as large and looks the same.
-pub fn with_fewer_greys(picture: &image::RgbaImage, step: u16) -> image::RgbaImage {
-    let mut fewer = picture.clone();
-    for pixel in fewer.pixels_mut() {
-        let [r, g, b, _] = pixel.0;
-        if r.max(g).max(b) - r.min(g).min(b) <= 8 {
-            let level = ((u16::from(g) + step / 2) / step * step).min(255) as u8;
-            pixel.0[..3].fill(level);
-        }
-    }
-    fewer
 }
 
 /// Written only by `make picture`.

@@ -1,10 +1,11 @@
 //! An instructor's window beside a trainee's: the same debrief, heard over the link, and what exercises look like in both.
 
-use crate::driven::{Driven, misplaced, tolerant, with_fewer_greys};
+use crate::driven::{Driven, misplaced};
+use crate::kept::{assert_like_kept, tolerant};
 use crate::plan::{SMALL, header, open, plan_through, put};
 use egui::Key;
+use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable, by};
-use egui_kittest::{Harness, image_snapshot_options};
 use host_ui::app::{App, Options};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -155,15 +156,27 @@ fn the_instructor_makes_the_debrief_that_the_trainee_makes() {
     std::fs::remove_dir_all(class).expect("ours");
 }
 
-/// Words that say how long ago something was are never twice the same.
 fn compare(window: &mut Harness<'static, App>, name: &str) {
-    for _ in 0..20 {
-        window.run_steps(1);
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    assert_like_kept(name, &tolerant(), || {
+        for _ in 0..20 {
+            window.run_steps(1);
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        covered(window);
+        let picture = window.render().expect("a picture");
+        picture
+            .save(scratch(&format!("picture-{name}")).join(format!("{name}.png")))
+            .expect("saved");
+        picture
+    });
     let mut problems = misplaced(window);
     // A dialog lies over what is behind it.
     problems.retain(|problem| !problem.contains(" lies over "));
+    assert!(problems.is_empty(), "{name}:\n{}", problems.join("\n"));
+}
+
+/// Words that say how long ago something was are never twice the same.
+fn covered(window: &mut Harness<'static, App>) {
     let cover = |from: [f32; 2], to: [f32; 2]| egui::Rect::from_min_max(from.into(), to.into());
     let mut rects = vec![
         cover([120.0, 0.0], [SMALL[0] - 250.0, 33.0]),
@@ -182,12 +195,6 @@ fn compare(window: &mut Harness<'static, App>, name: &str) {
             .map(|node| node.rect()),
     );
     rects.into_iter().for_each(|rect| window.mask(rect));
-    let picture = window.render().expect("a picture");
-    picture
-        .save(scratch(&format!("picture-{name}")).join(format!("{name}.png")))
-        .expect("saved");
-    image_snapshot_options(&with_fewer_greys(&picture, 51), name, &tolerant());
-    assert!(problems.is_empty(), "{name}:\n{}", problems.join("\n"));
 }
 
 /// In the instructor's window its dialog and the list; in the trainee's what is in force, and its end.

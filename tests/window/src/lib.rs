@@ -9,6 +9,8 @@ mod image;
 #[cfg(test)]
 mod instructor;
 #[cfg(test)]
+mod kept;
+#[cfg(test)]
 mod live;
 #[cfg(test)]
 mod plan;

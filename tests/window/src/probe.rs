@@ -1,8 +1,8 @@
 //! The probe's picture and fluoroscopy on a running core: whose pose it is, what moves it, what is held and what it costs.
 
-use crate::driven::{Driven, assert_drawn_by_changes, keep_for_docs, misplaced, tolerant, with_fewer_greys};
+use crate::driven::{Driven, assert_drawn_by_changes, keep_for_docs, misplaced};
+use crate::kept::{assert_like_kept, tolerant};
 use egui::{Event, Key, Modifiers, Pos2};
-use egui_kittest::image_snapshot_options;
 use egui_kittest::kittest::Queryable;
 use host_ui::app::App;
 use nalgebra::{Quaternion, UnitQuaternion};
@@ -184,7 +184,7 @@ fn the_beam_is_on_while_it_is_asked_for_the_last_image_is_held_and_the_dose_is_c
     );
     // Age and dose may differ; bones that lie elsewhere are thousands of pixels.
     let options = tolerant().max_failed_pixels(2500);
-    image_snapshot_options(&with_fewer_greys(&own.to_image(), 51), "fluoroscopy_held", &options);
+    assert_like_kept("fluoroscopy_held", &options, || own.to_image());
     driven.click("New case");
     wait(&mut driven, 3);
     assert_eq!(pulses(driven.window.state()), 0);

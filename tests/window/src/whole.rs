@@ -1,6 +1,7 @@
 //! The window without a core: it says what to type, and its dialogs open.
 
-use crate::driven::{assert_drawn_by_changes, misplaced, tolerant};
+use crate::driven::{assert_drawn_by_changes, misplaced};
+use crate::kept::tolerant;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use host_ui::app::{App, Options};
