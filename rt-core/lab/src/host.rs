@@ -8,7 +8,9 @@ use std::time::Duration;
 use stylet_runtime::rt::clock;
 use stylet_runtime::rt::timing::PoseTimes;
 use stylet_shm_schema::service::{self, Instance, Publisher, ServiceError, SliceSubscriber, Subscriber};
-use stylet_shm_schema::{Command, Event, EventKind, HandMove, ProbeMove, Request, SnapshotHeader, TickRecord, Vertex};
+use stylet_shm_schema::{
+    Command, Event, EventKind, Fault, HandMove, ProbeMove, Request, SnapshotHeader, TickRecord, Vertex,
+};
 use stylet_sim::scene::Scene;
 
 /// One insertion and one retraction.
@@ -33,7 +35,8 @@ pub struct HostReport {
     pub records: u64,
     /// Ticks without a record among those seen.
     pub records_missing: u64,
-    pub faults: u64,
+    /// Each in words, with whose it was and its time.
+    pub faults: Vec<String>,
     pub insertions: u64,
 }
 
@@ -126,7 +129,7 @@ impl Host {
                 snapshots: 0,
                 records: 0,
                 records_missing: 0,
-                faults: 0,
+                faults: Vec::new(),
                 insertions: 0,
             },
         })
@@ -187,10 +190,14 @@ impl Host {
             }
         }
         while let Some(sample) = self.ports.events.receive() {
-            let is_fault = [EventKind::FaultRaised, EventKind::SecondFaultRaised]
-                .iter()
-                .any(|&kind| sample.kind == kind as u32);
-            self.report.faults += u64::from(is_fault);
+            let whose = match sample.kind {
+                kind if kind == EventKind::FaultRaised as u32 => "needle",
+                kind if kind == EventKind::SecondFaultRaised as u32 => "second device",
+                _ => continue,
+            };
+            let fault = Fault::from_number(sample.code).map_or("unknown", Fault::message);
+            let words = format!("{whose}, tick {}: {fault}", sample.tick);
+            self.report.faults.push(words);
         }
     }
 

@@ -80,7 +80,8 @@ pub struct HostSection {
     pub snapshots: u64,
     pub records: u64,
     pub records_missing: u64,
-    pub faults: u64,
+    /// In words.
+    pub faults: Vec<String>,
 }
 
 #[derive(Clone, Debug, Serialize)]

@@ -291,7 +291,11 @@ fn read(reading: Reading, m: &Measured, period_ns: u64) -> Read {
             Some(m.host.records_missing as f64),
             format!("{} records seen by the host", m.host.records),
         ),
-        Reading::Faults => (Some(m.host.faults as f64), format!("{} insertions", m.host.insertions)),
+        Reading::Faults => {
+            let insertions = format!("{} insertions", m.host.insertions);
+            let evidence = [&[insertions], m.host.faults.as_slice()].concat().join("; ");
+            (Some(m.host.faults.len() as f64), evidence)
+        }
     }
 }
 

@@ -109,7 +109,7 @@ pub fn report(parts: &Parts) -> Report {
             snapshots: host.snapshots,
             records: host.records,
             records_missing: host.records_missing,
-            faults: host.faults,
+            faults: host.faults.clone(),
         },
         stiffness: stiffness(&measured.haptic.due_to_output, period_ns),
         windows: windows(measured),
