@@ -210,7 +210,7 @@ impl Fault {
                 "the force law gave a value that is not a number; reset the parameters, then re-arm"
             }
             Self::TissueStale => "the tissue step is late by more than 100 ms; lower the load on its core, then re-arm",
-            Self::TissueUnsolved => "the tissue constraints could not be met; retract the needle, then re-arm",
+            Self::TissueUnsolved => "the tissue constraints could not be met; draw needle or probe back, then re-arm",
             Self::OverrunStreak => {
                 "the force loop missed 20 deadlines in a row; lower the load on its core, then re-arm"
             }

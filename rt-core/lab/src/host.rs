@@ -5,18 +5,22 @@ use hdrhistogram::Histogram;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use stylet_runtime::device::second_start;
 use stylet_runtime::rt::clock;
 use stylet_runtime::rt::timing::PoseTimes;
 use stylet_shm_schema::service::{self, Instance, Publisher, ServiceError, SliceSubscriber, Subscriber};
 use stylet_shm_schema::{
     Command, Event, EventKind, Fault, HandMove, ProbeMove, Request, SnapshotHeader, TickRecord, Vertex,
 };
+use stylet_sim::probe::{PADS_APART_M, ProbeShape, Wall};
 use stylet_sim::scene::Scene;
 
 /// One insertion and one retraction.
 const CYCLE_NS: u64 = 4_000_000_000;
 /// Mean tip speed of needle insertions (Podder 2006 and the U. Alberta data): 48 mm/s.
 const SPEED_M_PER_S: f64 = 0.048;
+/// The probe's way is longer.
+const SECOND_SPEED_M_PER_S: f64 = 0.1;
 const ACCELERATION_M_PER_S2: f64 = 1.0;
 /// Seeds that the script leaves in the gland; they move with it and cost the tissue tick their share.
 const SEEDS: u64 = 32;
@@ -45,17 +49,31 @@ pub struct HostReport {
 pub struct Script {
     outside_m: [f64; 3],
     inside_m: [f64; 3],
+    /// The tip of the other hand, likewise.
+    second_outside_m: [f64; 3],
+    second_inside_m: [f64; 3],
 }
 
 impl Script {
-    /// Along the axis of the target, from 15 mm before the body to four fifths of the target.
+    /// Along the axis of the target, from 15 mm before the body to four fifths of the target. The other hand brings the probe into the rectum and presses it
+    /// against the target; in a scene without one it moves behind the needle.
     pub fn of(scene: &Scene) -> Self {
         let (lowest, _) = scene.lattice.bounds_m();
         let (lower, upper) = scene.target_bounds_m();
         let at = |z: f64| [(lower[0] + upper[0]) / 2.0, (lower[1] + upper[1]) / 2.0, z];
+        let (outside_m, inside_m) = (at(lowest[2] - 0.015), at(lower[2] + 0.8 * (upper[2] - lower[2])));
+        let behind = |[x, y, z]: [f64; 3]| [x, y - BEHIND_M, z];
+        let pressed = |wall: Wall| {
+            let pose = wall.pose_below_target(scene, &ProbeShape::default(), PRESSED_M, BEYOND_TARGET_M);
+            (second_start(scene).into(), pose.tip_m)
+        };
+        let second = Wall::of(scene, PADS_APART_M).map(pressed);
+        let (second_outside_m, second_inside_m) = second.unwrap_or((behind(outside_m), behind(inside_m)));
         Self {
-            outside_m: at(lowest[2] - 0.015),
-            inside_m: at(lower[2] + 0.8 * (upper[2] - lower[2])),
+            outside_m,
+            inside_m,
+            second_outside_m,
+            second_inside_m,
         }
     }
 }
@@ -93,8 +111,11 @@ pub struct Host {
     report: HostReport,
 }
 
-/// How far behind the needle the other hand moves, m.
+/// How far behind the needle the other hand moves where there is no rectum, m.
 const BEHIND_M: f64 = 0.04;
+/// How far the probe is pressed from where it meets the wall, and how far its tip is beyond the target's middle, m.
+const PRESSED_M: f64 = 5e-3;
+const BEYOND_TARGET_M: f64 = 35e-3;
 
 /// Why the host of the measurement saw nothing.
 #[derive(Debug, thiserror::Error)]
@@ -210,27 +231,26 @@ impl Host {
         self.step += 1;
         if self.step % 2 == 1 {
             self.send(&Request::Engage);
-            self.move_hand(self.script.inside_m);
+            self.move_hands(self.script.inside_m, self.script.second_inside_m);
             self.report.insertions += 1;
         } else {
             if self.step / 2 <= SEEDS {
                 self.send(&Request::DropSeed { strand_pitch_m: None });
             }
-            self.move_hand(self.script.outside_m);
+            self.move_hands(self.script.outside_m, self.script.second_outside_m);
         }
     }
 
-    fn move_hand(&mut self, tip_m: [f64; 3]) {
-        let to = |tip_m| HandMove {
+    fn move_hands(&mut self, tip_m: [f64; 3], second_tip_m: [f64; 3]) {
+        let to = |tip_m, speed_m_per_s| HandMove {
             tip_m,
             direction: [0.0, 0.0, 1.0],
-            speed_m_per_s: SPEED_M_PER_S,
+            speed_m_per_s,
             acceleration_m_per_s2: ACCELERATION_M_PER_S2,
         };
-        self.send(&Request::MoveHand(to(tip_m)));
+        self.send(&Request::MoveHand(to(tip_m, SPEED_M_PER_S)));
         if self.moves_second {
-            let [x, y, z] = tip_m;
-            let hand = to([x, y - BEHIND_M, z]);
+            let hand = to(second_tip_m, SECOND_SPEED_M_PER_S);
             self.send(&Request::MoveSecondHand(ProbeMove { hand, up: None }));
         }
     }
