@@ -263,3 +263,25 @@ impl Host {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Behind it, where the probe was once, its contact cannot be solved and the force goes off.
+    #[test]
+    fn the_probe_of_the_script_lies_in_the_rectum() {
+        let scene = Scene::builtin("pelvis").expect("fits");
+        let (low, high) = scene.target_bounds_m();
+        let script = Script::of(&scene);
+        let is_hollow = |[x, y, _]: [f64; 3]| {
+            let along = (0..=20).map(|n| low[2] + (high[2] - low[2]) * f64::from(n) / 20.0);
+            along
+                .into_iter()
+                .all(|z| scene.lattice.element_at_rest([x, y, z]).is_none())
+        };
+        assert!(is_hollow(script.second_inside_m), "{:?}", script.second_inside_m);
+        let [x, y, z] = script.inside_m;
+        assert!(!is_hollow([x, y - BEHIND_M, z]));
+    }
+}

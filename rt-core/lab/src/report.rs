@@ -80,8 +80,9 @@ pub struct HostSection {
     pub snapshots: u64,
     pub records: u64,
     pub records_missing: u64,
-    /// In words.
-    pub faults: Vec<String>,
+    pub faults: u64,
+    /// Each in words.
+    pub which_faults: Vec<String>,
 }
 
 #[derive(Clone, Debug, Serialize)]

@@ -54,7 +54,7 @@ pub fn host(r: &Report) -> Markup {
         p class="faint" {
             "A thread of normal priority that looks once a millisecond; the bridge sends every two. "
             (num(r.host.snapshots as f64)) " snapshots and " (num(r.host.records as f64)) " records seen, "
-            (r.host.records_missing) " records missing, " (r.host.faults.len()) " faults."
+            (r.host.records_missing) " records missing, " (r.host.faults) " faults" @if r.host.faults > 0 { ": " (r.host.which_faults.join("; ")) } "."
         }
     }
 }
