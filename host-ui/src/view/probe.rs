@@ -1,6 +1,7 @@
 //! What the ultrasound probe sees: both of its planes, with the template's grid over the one across it.
 
 mod picture;
+mod scale;
 mod tools;
 mod turns;
 
@@ -185,7 +186,7 @@ impl ProbeView {
         })
     }
 
-    /// Title and template.
+    /// Title, depths and template.
     fn over(&self, painter: &egui::Painter, picture: &ProbePicture, stand: Stand, scene: &SceneHeader) {
         let (plane, rect) = (picture.plane(), picture.rect());
         if self.knobs.template && plane.view == View::Transverse {
@@ -202,7 +203,9 @@ impl ProbeView {
         let (name, way, turn) = (plane.view.name(), format::length(way_m), turn_rad.to_degrees());
         // No minus before a zero.
         let turn = if turn.abs() < 0.05 { 0.0 } else { turn };
-        let at: Pos2 = free_of_banners(painter.ctx(), rect).left_top() + Vec2::new(9.0, 6.0);
+        let free = free_of_banners(painter.ctx(), rect);
+        scale::draw(painter, picture, free);
+        let at: Pos2 = free.left_top() + Vec2::new(9.0, 6.0);
         let text = format!("{name}\n{whose}  {way}  {turn:.1}°");
         painter.text(at, Align2::LEFT_TOP, text, FontId::proportional(12.5), IMAGE.text);
     }

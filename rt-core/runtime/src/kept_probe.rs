@@ -3,6 +3,7 @@
 //! `MAGIC`, SHA-256 of scene and answers, answers (postcard). Nothing of a file is used before that digest is right, and nothing that is of
 //! another wall or no number.
 
+use crate::pieces;
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::io::{self, Write};
@@ -60,7 +61,7 @@ pub fn read(path: &Path, scene: &Scene, shape: &ProbeShape) -> Result<Option<Sol
         Ok(found) if !found.is_file() || found.len() > MOST_BYTES => return Err(other()),
         Ok(_) => {}
     }
-    let bytes = fs::read(path).map_err(io)?;
+    let bytes = pieces::read(path).map_err(io)?;
     let (magic, rest) = bytes.split_at_checked(MAGIC.len()).ok_or_else(other)?;
     let (digest, answers) = rest.split_at_checked(DIGEST).ok_or_else(other)?;
     if magic != MAGIC || digest != joined(scene, shape, answers) {
@@ -82,7 +83,7 @@ pub fn write(path: &Path, scene: &Scene, shape: &ProbeShape, solved: &SolvedProb
     let written = fs::File::create(&part).and_then(|mut file| {
         file.write_all(&MAGIC)?;
         file.write_all(&joined(scene, shape, &answers))?;
-        file.write_all(&answers)?;
+        pieces::write(&mut file, &answers)?;
         file.sync_all()?;
         fs::rename(&part, path)
     });

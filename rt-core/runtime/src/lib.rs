@@ -7,6 +7,7 @@ pub mod bridge;
 pub mod device;
 pub mod kept_probe;
 pub mod lines;
+mod pieces;
 pub mod process;
 pub mod rehearse;
 pub mod replay;

@@ -1,5 +1,6 @@
 //! A flight recording on disk: magic, SHA-256 of the rest, and the recording itself.
 
+use crate::pieces;
 use crate::rt::haptic_tape::HapticFlight;
 use crate::rt::second::SecondFlight;
 use crate::rt::tissue_tape::TissueFlight;
@@ -17,8 +18,6 @@ const VERSION_AT: usize = MAGIC.len() - 1;
 const DIGEST: usize = 32;
 /// No recording is larger: two bodies of 8 MiB and the ticks.
 const MAX_BYTES: u64 = 256 << 20;
-/// Of a file in one call: what the kernel copies at once keeps its core, 20 MB for 5 ms, and the force loop waits.
-const PIECE: usize = 1 << 16;
 
 /// A flight recording that cannot be written or read; the text names the file.
 #[derive(Debug, thiserror::Error)]
@@ -156,7 +155,7 @@ impl Flight {
         let written = std::fs::File::create(&unfinished).and_then(|mut file| {
             file.write_all(MAGIC)?;
             file.write_all(&Sha256::digest(&body))?;
-            body.chunks(PIECE).try_for_each(|piece| file.write_all(piece))?;
+            pieces::write(&mut file, &body)?;
             file.sync_all()
         });
         if let Err(why) = written {

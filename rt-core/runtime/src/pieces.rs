@@ -1,0 +1,47 @@
+//! Large files beside a force loop, a piece at a time.
+//!
+//! A kernel that does not preempt itself keeps the processor for as long as it copies: 20 MB in one call for 5 ms.
+
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+/// In one call, bytes: some 20 us.
+const PIECE: usize = 1 << 16;
+
+/// All of a file.
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let mut file = File::open(path)?;
+    let mut bytes = Vec::with_capacity(file.metadata()?.len() as usize);
+    let mut piece = vec![0; PIECE];
+    loop {
+        match file.read(&mut piece) {
+            Ok(0) => return Ok(bytes),
+            Ok(n) => bytes.extend_from_slice(&piece[..n]),
+            Err(why) if why.kind() == io::ErrorKind::Interrupted => {}
+            Err(why) => return Err(why),
+        }
+    }
+}
+
+/// As `write_all`.
+pub fn write(file: &mut File, bytes: &[u8]) -> io::Result<()> {
+    bytes.chunks(PIECE).try_for_each(|piece| file.write_all(piece))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_many_pieces_is_read_as_it_was_written() {
+        let path = std::env::temp_dir().join(format!("stylet-pieces-{}", std::process::id()));
+        let bytes: Vec<u8> = (0..3 * PIECE + 7).map(|n| (n % 251) as u8).collect();
+        for part in [&bytes[..], &bytes[..PIECE], &[]] {
+            write(&mut File::create(&path).unwrap(), part).unwrap();
+            assert_eq!(read(&path).unwrap(), part);
+        }
+        std::fs::remove_file(&path).unwrap();
+        assert!(read(&path).is_err());
+    }
+}
