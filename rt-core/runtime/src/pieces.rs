@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_of_many_pieces_is_read_as_it_was_written() {
+    fn a_file_of_many_pieces_comes_back_whole() {
         let path = std::env::temp_dir().join(format!("stylet-pieces-{}", std::process::id()));
         let bytes: Vec<u8> = (0..3 * PIECE + 7).map(|n| (n % 251) as u8).collect();
         for part in [&bytes[..], &bytes[..PIECE], &[]] {
