@@ -39,7 +39,7 @@ pub struct HostReport {
     pub records: u64,
     /// Ticks without a record among those seen.
     pub records_missing: u64,
-    /// Each in words, with whose it was and its time.
+    /// Each in words, with whose it was and its tick.
     pub faults: Vec<String>,
     pub insertions: u64,
 }
@@ -275,10 +275,8 @@ mod tests {
         let (low, high) = scene.target_bounds_m();
         let script = Script::of(&scene);
         let is_hollow = |[x, y, _]: [f64; 3]| {
-            let along = (0..=20).map(|n| low[2] + (high[2] - low[2]) * f64::from(n) / 20.0);
-            along
-                .into_iter()
-                .all(|z| scene.lattice.element_at_rest([x, y, z]).is_none())
+            let mut along = (0..=20).map(|n| low[2] + (high[2] - low[2]) * f64::from(n) / 20.0);
+            along.all(|z| scene.lattice.element_at_rest([x, y, z]).is_none())
         };
         assert!(is_hollow(script.second_inside_m), "{:?}", script.second_inside_m);
         let [x, y, z] = script.inside_m;

@@ -9,8 +9,6 @@ use std::path::{Path, PathBuf};
 
 /// Readable and writable for all, less what the umask takes away, as for any new file.
 const MODE: u32 = 0o666;
-/// In one call: a kernel that does not preempt itself keeps the processor from a force loop for as long as it copies.
-const PIECE: usize = 1 << 16;
 
 /// A file that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -34,9 +32,7 @@ pub struct WriteError {
 /// assert_eq!(std::fs::read(&path).unwrap(), b"x_mm,y_mm,z_mm\n");
 /// ```
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    write_streamed(path, |file| {
-        bytes.chunks(PIECE).try_for_each(|piece| file.write_all(piece))
-    })
+    write_streamed(path, |file| file.write_all(bytes))
 }
 
 /// As [`write_whole`], for content that is too large to hold: `write` gets a buffered file.

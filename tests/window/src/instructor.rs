@@ -162,7 +162,7 @@ fn compare(window: &mut Harness<'static, App>, name: &str) {
             window.run_steps(1);
             std::thread::sleep(Duration::from_millis(20));
         }
-        covered(window);
+        cover_times(window);
         let picture = window.render().expect("a picture");
         picture
             .save(scratch(&format!("picture-{name}")).join(format!("{name}.png")))
@@ -176,7 +176,7 @@ fn compare(window: &mut Harness<'static, App>, name: &str) {
 }
 
 /// Words that say how long ago something was are never twice the same.
-fn covered(window: &mut Harness<'static, App>) {
+fn cover_times(window: &mut Harness<'static, App>) {
     let cover = |from: [f32; 2], to: [f32; 2]| egui::Rect::from_min_max(from.into(), to.into());
     let mut rects = vec![
         cover([120.0, 0.0], [SMALL[0] - 250.0, 33.0]),

@@ -30,8 +30,8 @@ pub(super) fn draw(painter: &egui::Painter, picture: &ProbePicture, free: Rect) 
     let right = picture.rect().right() - ASIDE;
     let color = IMAGE.text.gamma_multiply(0.75);
     for (y, depth_mm) in ticks(picture).filter(|(y, _)| free.y_range().shrink(1.0).contains(*y)) {
-        let long = depth_mm.is_multiple_of(2 * TICK_MM);
-        let left = Pos2::new(right - if long { 8.0 } else { 4.0 }, y);
+        let is_long = depth_mm.is_multiple_of(2 * TICK_MM);
+        let left = Pos2::new(right - if is_long { 8.0 } else { 4.0 }, y);
         let ends = [left, Pos2::new(right, y)];
         // Dark around it, since tissue behind it may be as bright.
         painter.line_segment(ends, Stroke::new(3.0, IMAGE.background.gamma_multiply(0.6)));
