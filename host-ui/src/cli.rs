@@ -26,7 +26,7 @@ use stylet_host::roster::Trainee;
 use stylet_implant::class;
 use stylet_implant::procedure;
 use stylet_manual::ManualArgs;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::{MAX_LEFT_NEEDLES, ParameterChange};
 
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.

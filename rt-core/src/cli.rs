@@ -85,9 +85,6 @@ pub enum Task {
         /// Core on which to do it
         #[arg(long)]
         core: Option<usize>,
-        /// Instance under measurement
-        #[arg(long)]
-        instance: String,
         /// File that the load may write
         #[arg(long)]
         file: PathBuf,

@@ -8,7 +8,6 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_lab::{campaign, credibility, devices, doctor, fleet, latency, load, verify};
-use stylet_shm_schema::service::Instance;
 use stylet_sim::scene::Scene;
 
 fn main() -> ExitCode {
@@ -40,12 +39,7 @@ fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
         Some(Task::Probe(args)) => args.run(&*stop_on_signal()?).map(|()| 0)?,
         Some(Task::Cost { scene }) => cost(scene).map(|()| 0)?,
         Some(Task::TraceKeeper { name }) => stylet_lab::keep_trace_instance(name).map(|()| 0)?,
-        Some(Task::Load {
-            work,
-            core,
-            instance,
-            file,
-        }) => serve_as_load(*work, *core, instance, file).map(|()| 0)?,
+        Some(Task::Load { work, core, file }) => serve_as_load(*work, *core, file).map(|()| 0)?,
     })
 }
 
@@ -62,19 +56,11 @@ fn stop_on_signal() -> Result<Arc<AtomicBool>, Box<dyn Error>> {
     Ok(stop)
 }
 
-fn serve_as_load(
-    work: load::LoadProcess,
-    core: Option<usize>,
-    instance: &str,
-    file: &std::path::Path,
-) -> Result<(), Box<dyn Error>> {
+fn serve_as_load(work: load::LoadProcess, core: Option<usize>, file: &std::path::Path) -> Result<(), Box<dyn Error>> {
     follow_parent();
-    let instance = Instance::new(instance)?;
     let stop = stop_on_signal()?;
     // SYNC: set by a signal handler; nothing but the flag is carried.
-    Ok(load::work(work, core, &instance, file, || {
-        stop.load(Ordering::Acquire)
-    })?)
+    Ok(load::work(work, core, file, || stop.load(Ordering::Acquire))?)
 }
 
 fn cost(scene: &str) -> Result<(), Box<dyn Error>> {
@@ -96,9 +82,7 @@ fn run(args: &RunArgs) -> Result<(), Box<dyn Error>> {
         options.scene,
         if options.no_rt { "NOT real-time" } else { "real-time" }
     );
-    let report = stylet_runtime::process::run(&options, &stop);
-    options.instance.sweep_at_end();
-    let report = report?;
+    let report = stylet_runtime::process::run(&options, &stop)?;
     if let Some(path) = &args.report {
         let json = serde_json::to_string_pretty(&Report::from(&report))? + "\n";
         std::fs::write(path, json).map_err(|e| format!("cannot write {}: {e}", path.display()))?;

@@ -28,7 +28,8 @@ impl Left {
     }
 }
 
-fn now_ns() -> u64 {
+/// `CLOCK_MONOTONIC`, ns.
+pub fn now_ns() -> u64 {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
     // SAFETY: `time` is valid for writes; this clock always exists.
     unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
@@ -37,7 +38,7 @@ fn now_ns() -> u64 {
 
 /// Takes the core from all threads of this program; those that they start from now on stay off it too. Nothing where it is
 /// their only one, or where the system does not let us.
-fn keep_off(core: usize) {
+pub fn keep_off(core: usize) {
     let Ok(tasks) = std::fs::read_dir("/proc/self/task") else {
         return;
     };

@@ -3,15 +3,13 @@
 use crate::Text;
 use crate::check::Invalid;
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 
 /// Members that are listed at most.
 pub const MAX_CLASS: usize = 32;
 
 /// One member that is connected.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.ClassMember")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ClassMember {
     /// Name for people.
     pub name: Text<64>,
@@ -27,8 +25,7 @@ pub struct ClassMember {
 
 /// The class, published five times a second by a relay, beside a core as well as in place of one.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.Class")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Class {
     /// The run of the core, as it is announced here.
     pub session_id: u64,
@@ -68,8 +65,7 @@ pub enum LeaseRequest {
 
 /// A [`LeaseRequest`] as plain old data, from a host to the relay of its machine. It has no reply: [`Class`] shows what came of it.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.LeaseOrder")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct LeaseOrder {
     kind: u64,
     name: Text<64>,

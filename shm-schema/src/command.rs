@@ -1,8 +1,7 @@
 //! The records of a request and of its answer, as they lie in shared memory.
 
-use crate::{Reason, Refusal, Text};
+use crate::{CommandKind, Reason, Refusal, Text};
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 use num_enum::TryFromPrimitive;
 
 /// Values of one command at most: a rehearsal with 128 drops beside as many needles as may stay in fits.
@@ -14,8 +13,7 @@ pub const MARK_BYTES: usize = 96;
 /// A [`crate::Request`] as plain old data, written by a host. Answered by one [`Reply`] with the same `host_id` and
 /// `command_id`. Made and read by [`crate::Request::encode`] and [`crate::Request::decode`] only.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.Command")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Command {
     /// The host that asks.
     pub host_id: u64,
@@ -31,13 +29,25 @@ pub struct Command {
     pub text: Text<MARK_BYTES>,
 }
 
+impl Command {
+    /// It takes force or motion away: it is sent both ways, and no limit holds it up.
+    pub fn is_stop(&self) -> bool {
+        const STOPS: [CommandKind; 4] = [
+            CommandKind::Disengage,
+            CommandKind::StopHand,
+            CommandKind::StopSecondHand,
+            CommandKind::Shutdown,
+        ];
+        STOPS.map(|kind| kind as u32).contains(&self.kind)
+    }
+}
+
 /// Reasons in one reply at most; a refusal with more names the others in its text only.
 pub const MAX_REASONS: usize = 48;
 
 /// The answer to a command or an upload, written by the bridge.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.Reply")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Reply {
     /// The run of the core that answers.
     pub session_id: u64,

@@ -2,13 +2,11 @@
 
 use crate::Text;
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 use num_enum::TryFromPrimitive;
 
 /// One thing that happened, written by the bridge.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.Event")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Event {
     /// The run of the core.
     pub session_id: u64,
@@ -60,6 +58,8 @@ pub enum EventKind {
     ExerciseBegun = 12,
     /// No fault of an instructor's is in force any more.
     ExercisesEnded = 13,
+    /// The process that meets hosts was started anew. `text`: why.
+    BridgeRestarted = 14,
     /// As [`FaultRaised`](Self::FaultRaised), of the second device; the needle's goes on.
     SecondFaultRaised = 20,
     /// The force of the second device was armed again after a fault.

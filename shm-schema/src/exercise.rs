@@ -1,7 +1,6 @@
 //! Faults that an instructor puts in, to see what a trainee does.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 use num_enum::TryFromPrimitive;
 use strum::EnumDiscriminants;
 
@@ -66,8 +65,7 @@ fn length(v: [f64; 3]) -> f64 {
 
 /// Faults in force; all zero for none.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.ExercisesInForce")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ExercisesInForce {
     /// 1 while the device counts as lost.
     pub device_lost: u32,

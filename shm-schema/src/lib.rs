@@ -26,12 +26,15 @@
 
 #![warn(missing_docs)]
 
+use std::time::Duration;
+
 pub mod affinity;
 pub mod check;
 mod class;
 mod command;
 mod event;
 mod exercise;
+mod instance;
 pub mod motion;
 mod params;
 mod plan;
@@ -42,7 +45,6 @@ mod relayed;
 mod request;
 mod scene;
 mod second;
-pub mod service;
 mod session;
 mod snapshot;
 mod state;
@@ -52,6 +54,7 @@ pub use class::{Class, ClassMember, LeaseOrder, LeaseRequest, MAX_CLASS};
 pub use command::{Command, MARK_BYTES, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
 pub use event::{Event, EventKind};
 pub use exercise::{EXERCISE_STIFFNESS_RANGE, Exercise, ExercisesInForce, MOST_MOVED_M};
+pub use instance::{Attendance, Epoch, Instance, InstanceError, Owned};
 pub use params::{
     PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet,
     ParameterSpec, ParametersInForce, folding,
@@ -80,4 +83,13 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 13;
+pub const SCHEMA_VERSION: u32 = 14;
+
+/// Records in one batch at most.
+pub const MAX_BATCH: usize = 32;
+/// A batch that is not full is sent after this time, so that the queue of batches holds a known time.
+pub const BATCH_EVERY: Duration = Duration::from_millis(20);
+/// Batches that a slow host may be behind before the oldest is dropped: 12 s. The memory for all hosts is 40 MB in `/dev/shm`.
+pub const RECORD_BUFFER: usize = 600;
+/// Hosts at once.
+pub const MAX_HOSTS: usize = 6;

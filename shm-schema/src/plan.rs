@@ -2,7 +2,6 @@
 
 use crate::Text;
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 
 /// Seeds planned or placed at most.
 pub const MAX_SEEDS: usize = 128;
@@ -14,8 +13,7 @@ pub const MAX_EARLIER_NEEDLES: usize = 40;
 
 /// One seed of a plan.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.PlannedSeed")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct PlannedSeed {
     /// Position at rest, scene frame, m.
     pub position_m: [f64; 3],
@@ -32,8 +30,7 @@ pub const MOST_PLANNED_NEEDLES: u32 = 1000;
 
 /// What the seeds of a planned needle are, for other hosts that count their dose; the core passes it on. All zero where it is not known.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.Prescribed")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Prescribed {
     /// Which needle of a plan of many it is, counted from 1, and its seeds are dropped in their order; 0 for one by hand.
     pub needle: u32,
@@ -55,8 +52,7 @@ impl Default for Prescribed {
 
 /// The needle's path and the seeds planned along it.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.PlanInForce")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct PlanInForce {
     /// The run of the core.
     pub session_id: u64,

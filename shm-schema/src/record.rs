@@ -1,12 +1,10 @@
 //! One record for every tick of the force loop.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 
 /// Written by the haptic thread into a ring, sent by the bridge in batches.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.TickRecord")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct TickRecord {
     /// The run of the core.
     pub session_id: u64,

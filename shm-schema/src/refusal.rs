@@ -1,7 +1,6 @@
 //! Why a request is refused: reason codes for programs, a text for people.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 use num_enum::TryFromPrimitive;
 
 /// Why a request was refused, by stable number. Where nothing is said of it, the subject is [`Reason::NO_SUBJECT`].
@@ -135,8 +134,7 @@ impl RefusalCode {
 
 /// One reason of a refusal, as a [`crate::Reply`] carries it.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.Reason")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct Reason {
     /// [`RefusalCode`] by number.
     pub code: u32,

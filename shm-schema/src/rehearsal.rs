@@ -2,12 +2,10 @@
 
 use crate::{MAX_SEEDS, SceneId, SeedPose};
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 
 /// The result of one [`crate::Request::Rehearse`].
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.Rehearsal")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Rehearsal {
     /// The run of the core.
     pub session_id: u64,

@@ -2,12 +2,10 @@
 
 use crate::Text;
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 
 /// The relay's line, published by a relay in place of a core, five times a second; beside a core there is none.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.Relayed")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Relayed {
     /// The run of the core, as it is announced here.
     pub session_id: u64,

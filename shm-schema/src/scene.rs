@@ -2,7 +2,6 @@
 
 use crate::Text;
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 use stylet_anatomy::PatientFrame;
 
 /// Scenes that the core can draw without a file; [`crate::Request::LoadBuiltinScene`] takes the place in this list.
@@ -16,8 +15,7 @@ pub const MAX_LABEL_CELLS: usize = 2 << 20;
 
 /// A regular grid over the body at rest, x fastest: node (i, j, k) lies at `origin_m + (i, j, k) spacing_m`.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.GridInfo")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct GridInfo {
     /// Nodes along x, y, z; all zero for no grid.
     pub dims: [u32; 3],
@@ -55,8 +53,7 @@ pub mod role {
 
 /// One structure of the scene that runs.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.StructureInfo")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct StructureInfo {
     /// Label of its cells in the volume, 1 to 255.
     pub label: u32,
@@ -82,8 +79,7 @@ pub struct StructureInfo {
 /// Goes with `3 * vertex_count` words of rest positions (`f32` bits, m), `3 * triangle_count` words of indices, and the cells
 /// of `labels`, four to a word, lowest byte first: 0 where there is no tissue, else one more than the place in `structures`.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.SceneHeader")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct SceneHeader {
     /// The run of the core.
     pub session_id: u64,
@@ -173,8 +169,7 @@ impl SceneHeader {
 
 /// One structure of a volume that a host sends, with its material.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.UploadStructure")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct UploadStructure {
     /// The label of its cells, 1 to 255.
     pub label: u32,
@@ -196,8 +191,7 @@ pub struct UploadStructure {
 
 /// Goes with `dims[0] * dims[1] * dims[2]` cells, x fastest; every cell but 0 is tissue.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.UploadHeader")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct UploadHeader {
     /// The host that sends it.
     pub host_id: u64,

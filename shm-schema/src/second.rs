@@ -1,12 +1,10 @@
 //! The second device, which the other hand holds: its latest state, and one record for every tick of its loop.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 
 /// One tick, as hosts see it. Written by the second device's thread only, on a board that exists in a run with a second device.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.SecondState")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct SecondState {
     /// Ticks since the loop began; 0 means that no tick has run.
     pub tick: u64,
@@ -58,8 +56,7 @@ pub struct SecondState {
 
 /// Written by the second device's thread into a ring, sent by the bridge in batches.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.SecondRecord")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct SecondRecord {
     /// The run of the core.
     pub session_id: u64,

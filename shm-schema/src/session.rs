@@ -2,12 +2,10 @@
 
 use crate::{ExercisesInForce, Text};
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 
 /// Announced five times a second, and to every new host.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.Session")]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Session {
     /// Number of the run; differs from every other run.
     pub session_id: u64,
@@ -58,8 +56,7 @@ impl Session {
 
 /// What one thread asked for and what the kernel says it has.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.ThreadReport")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ThreadReport {
     /// As `sched_getscheduler` reports it: 0 `SCHED_OTHER`, 1 `SCHED_FIFO`.
     pub policy: u32,

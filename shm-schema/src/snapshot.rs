@@ -2,13 +2,11 @@
 
 use crate::{MAX_LEFT_NEEDLES, MAX_SEEDS, SceneId};
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 
 /// Deformed position of one surface vertex, scene frame; behind the surface vertices of a snapshot, the displacement
 /// from rest (m) of one node of the scene's [`crate::GridInfo`].
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.Vertex")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Vertex {
     /// Position of a vertex or displacement of a node, m.
     pub position_m: [f32; 3],
@@ -16,8 +14,7 @@ pub struct Vertex {
 
 /// Where a seed is now.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.SeedPose")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct SeedPose {
     /// Centre of the seed in the body as the scene has it: where the body is moved besides, the seed is
     /// [`SnapshotHeader::body_moved_m`] from there. Scene frame, m.
@@ -33,8 +30,7 @@ pub const MAX_BEND_POINTS: usize = 16;
 
 /// A needle that stays in the tissue.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.LeftNeedlePose")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct LeftNeedlePose {
     /// Its number, by which it is taken up again or drawn out.
     pub number: u64,
@@ -48,8 +44,7 @@ pub struct LeftNeedlePose {
 
 /// Header of the vertices of one tissue tick, written by the tissue thread.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.SnapshotHeader")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct SnapshotHeader {
     /// The run of the core.
     pub session_id: u64,

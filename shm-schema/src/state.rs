@@ -1,13 +1,11 @@
 //! The latest state of the force loop, rewritten each millisecond on a wait-free blackboard.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 use num_enum::TryFromPrimitive;
 
 /// One tick, as the operator's program sees it. Written by the haptic thread only.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.HapticState")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct HapticState {
     /// Ticks since the loop began; 0 means that no tick has run.
     pub tick: u64,

@@ -1,12 +1,10 @@
 //! Text of bounded length that any bytes may claim to be.
 
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 
 /// UTF-8 in a fixed field, padded with zeros.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ZeroCopySend)]
-#[type_name("stylet.Text")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Text<const N: usize> {
     bytes: [u8; N],
 }

@@ -12,8 +12,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 use stylet_host::link::{Link, LinkStatus};
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::Request;
-use stylet_shm_schema::service::Instance;
 pub use stylet_test_kit::{program, scratch, until, witness};
 
 /// An instance name that no other test uses.
@@ -179,7 +179,11 @@ pub fn left_behind(instance: &Instance) -> Vec<String> {
     let prefix = instance.prefix();
     let names = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
     let names = names.map(|e| e.file_name().to_string_lossy().into_owned());
-    names.filter(|n| n.starts_with(prefix.trim_end_matches('_'))).collect()
+    let folder = Some(instance.folder()).filter(|folder| folder.exists());
+    names
+        .filter(|n| n.starts_with(&prefix))
+        .chain(folder.map(|folder| folder.display().to_string()))
+        .collect()
 }
 
 /// Sends one command and waits for its answer: `Ok` with the first tick that knew it, or the reasons against it.

@@ -3,7 +3,7 @@
 use clap::Args;
 use std::path::{Path, PathBuf};
 use stylet_shm_schema::BUILTIN_SCENES;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 
 /// Options of every command that uses a core.
 #[derive(Args, Clone, Debug)]

@@ -5,13 +5,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::{self, Instance, Node, Publisher, StateReader, Subscriber};
+use stylet_ports::{self as service, Node, Publisher, StateReader, Subscriber};
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::{Command, HapticState, Mark, PlanInForce, Relayed, Request, SCHEMA_VERSION, Session, check};
 
 const PASS: Duration = Duration::from_millis(100);
 const CONNECT_EVERY: Duration = Duration::from_secs(1);
 /// Ports of a core that is silent for so long are made anew.
-const SILENT_FOR: Duration = Duration::from_secs(2);
 const ORDERS: usize = 64;
 
 /// A trainee and the core that they sit at.
@@ -124,18 +124,20 @@ struct Ports {
     plan: Subscriber<PlanInForce>,
     relayed: Subscriber<Relayed>,
     commands: Publisher<Command>,
+    stops: Publisher<Command>,
     node: Node,
 }
 
 impl Ports {
     fn new(instance: &Instance) -> Option<Self> {
-        let node = instance.node().ok()?;
+        let node = Node::join(instance).ok()?;
         Some(Self {
             board: None,
             session: service::session::subscriber(&node).ok()?,
             plan: service::plan::subscriber(&node).ok()?,
             relayed: service::relayed::subscriber(&node).ok()?,
             commands: service::commands::publisher(&node).ok()?,
+            stops: service::stops::publisher(&node).ok()?,
             node,
         })
     }
@@ -151,15 +153,11 @@ struct Seat {
 
 impl Seat {
     fn pass(&mut self, instance: &Instance, glances: &Mutex<Vec<Glance>>, number: usize) {
-        let is_silent = |heard: Option<Instant>| heard.is_none_or(|at| at.elapsed() > SILENT_FOR);
-        let heard = lock(glances).get(number).and_then(|glance| glance.heard);
-        let may_try = self
-            .tried
-            .is_none_or(|at| at.elapsed() >= CONNECT_EVERY.max(SILENT_FOR));
-        if is_silent(heard) && may_try {
+        if self.tried.is_none_or(|at| at.elapsed() >= CONNECT_EVERY) {
             self.tried = Some(Instant::now());
-            self.ports = None;
-            self.ports = Ports::new(instance);
+            // Those of an epoch that is over go before others are made.
+            self.ports = self.ports.take().filter(|ports| ports.node.is_current());
+            self.ports = self.ports.take().or_else(|| Ports::new(instance));
         }
         let Some(ports) = &mut self.ports else { return };
         let newest = std::iter::from_fn(|| ports.session.receive())
@@ -206,6 +204,9 @@ impl Seat {
             // No reply is waited for: the list shows what the hand does.
             let command = request.encode(u64::from(std::process::id()) << 32, self.commands);
             if let (Some(ports), Ok(command)) = (&self.ports, command) {
+                if command.is_stop() {
+                    let _ = ports.stops.send(command);
+                }
                 let _ = ports.commands.send(command);
             }
         }

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use stylet_anatomy::PatientFrame;
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkStatus, SceneModel, Snapshot};
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::{HapticState, Phase, StructureInfo, role};
 
 const MM_PER_M: f64 = 1000.0;

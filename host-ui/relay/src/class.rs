@@ -3,7 +3,7 @@
 use crate::control::Order;
 use crate::wire::Who;
 use bytemuck::Zeroable;
-use stylet_shm_schema::service::{self, Node, Publisher, ServiceError, Subscriber};
+use stylet_ports::{self as service, Node, Publisher, ServiceError, Subscriber};
 use stylet_shm_schema::{Class, ClassMember, LeaseOrder, LeaseRequest, MAX_CLASS, Text};
 
 /// The ports; a relay beside a core has them as well as one in place of it.

@@ -6,14 +6,14 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::PathBuf;
 use std::time::Duration;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 
 /// An order's line at most, bytes.
 const LINE: usize = 200;
 const PATIENCE: Duration = Duration::from_secs(2);
 
 fn path(instance: &Instance) -> PathBuf {
-    PathBuf::from(format!("/dev/shm/{}relay.socket", instance.prefix()))
+    instance.folder().join("relay.socket")
 }
 
 /// What the lease can be asked for.
@@ -62,6 +62,7 @@ pub struct Orders {
 impl Orders {
     /// Takes the place of one that was killed.
     pub fn listen(instance: &Instance) -> Result<Self, RelayError> {
+        instance.make_folder().map_err(|e| RelayError(e.to_string()))?;
         let path = path(instance);
         let failed = |e: std::io::Error| RelayError(format!("{}: {e}", path.display()));
         let _ = std::fs::remove_file(&path);

@@ -23,9 +23,9 @@ pub mod wire;
 #[error("{0}")]
 pub struct RelayError(pub String);
 
-impl From<stylet_shm_schema::service::ServiceError> for RelayError {
-    fn from(why: stylet_shm_schema::service::ServiceError) -> Self {
-        Self(why.0)
+impl From<stylet_ports::ServiceError> for RelayError {
+    fn from(why: stylet_ports::ServiceError) -> Self {
+        Self(why.to_string())
     }
 }
 

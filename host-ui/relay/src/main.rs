@@ -11,7 +11,7 @@ use stylet_relay::keys::{Invitation, Lab, Role, Validity, write_invitation};
 use stylet_relay::net::PORT;
 use stylet_relay::serve::{self, End, keeper};
 use stylet_relay::{RelayError, join};
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 
 /// Carries a running Stylet to other machines: a class that watches, an instructor elsewhere, an operator at another screen.
 ///

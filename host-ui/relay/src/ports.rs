@@ -3,8 +3,8 @@
 use crate::class::ClassPorts;
 use std::cell::RefCell;
 use std::collections::VecDeque;
-use stylet_shm_schema::service::{
-    self, Instance, MAX_BATCH, Node, Publisher, ServiceError, SlicePublisher, SliceSubscriber, Subscriber,
+use stylet_ports::{
+    self as service, Meeting, Node, Publisher, ServiceError, SlicePublisher, SliceSubscriber, Subscriber,
 };
 use stylet_shm_schema::*;
 
@@ -25,6 +25,7 @@ pub struct Near {
     /// The scene that runs.
     pub scene: SliceSubscriber<u32, SceneHeader>,
     commands: Publisher<Command>,
+    stops: Publisher<Command>,
     requests: Subscriber<Command>,
     /// Host and number of what was sent from here and has not come back over `requests`.
     sent: RefCell<VecDeque<(u64, u64)>>,
@@ -36,9 +37,8 @@ pub struct Near {
 const SENT_AT_MOST: usize = 1024;
 
 impl Near {
-    /// Ports to the core of `instance`, which may not run yet.
-    pub fn new(instance: &Instance) -> Result<Self, ServiceError> {
-        let node = instance.node()?;
+    /// Ports to the core in whose epoch `node` is.
+    pub fn new(node: Node) -> Result<Self, ServiceError> {
         Ok(Self {
             session: service::session::subscriber(&node)?,
             events: service::events::subscriber(&node)?,
@@ -48,6 +48,7 @@ impl Near {
             rehearsals: service::rehearsals::subscriber(&node)?,
             scene: service::scene::subscriber(&node)?,
             commands: service::commands::publisher(&node)?,
+            stops: service::stops::publisher(&node)?,
             requests: service::commands::subscriber(&node)?,
             sent: RefCell::default(),
             node,
@@ -56,8 +57,11 @@ impl Near {
 
     /// A request to the core.
     pub fn ask(&self, command: Command) -> Result<(), ServiceError> {
+        if command.is_stop() {
+            let _ = self.stops.send(command);
+        }
         let sent = self.commands.send(command);
-        sent.map_err(|e| ServiceError(format!("commands: {e}")))?;
+        sent.map_err(|e| ServiceError::Port(format!("commands: {e}")))?;
         let mut all = self.sent.borrow_mut();
         all.push_back((command.host_id, command.command_id));
         if all.len() > SENT_AT_MOST {
@@ -86,7 +90,7 @@ impl Near {
     ) -> Result<SlicePublisher<u8, UploadHeader>, ServiceError> {
         let port = service::uploads::publisher(&self.node, cells.len())?;
         port.send(header, cells)
-            .map_err(|e| ServiceError(format!("uploads: {e}")))?;
+            .map_err(|e| ServiceError::Port(format!("uploads: {e}")))?;
         Ok(port)
     }
 }
@@ -115,28 +119,31 @@ pub struct Far {
     pub commands: Subscriber<Command>,
     /// Volumes of hosts here.
     pub uploads: SliceSubscriber<u8, UploadHeader>,
-    /// The node of these ports.
-    pub node: Node,
+    /// The place of the core here, with the node of these ports.
+    pub meeting: Meeting,
 }
 
 impl Far {
     /// Ports in place of a core of `instance`; fails where a core or another `join` has them.
     pub fn new(instance: &Instance) -> Result<Self, ServiceError> {
-        let node = instance.node()?;
-        Ok(Self {
-            session: service::session::publisher(&node)?,
-            events: service::events::publisher(&node)?,
-            parameters: service::parameters::publisher(&node)?,
-            plan: service::plan::publisher(&node)?,
-            replies: service::replies::publisher(&node)?,
-            rehearsals: service::rehearsals::publisher(&node)?,
-            relayed: service::relayed::publisher(&node)?,
-            class: ClassPorts::new(&node)?,
-            scene: service::scene::publisher(&node, 1 << 16)?,
-            commands: service::commands::subscriber(&node)?,
-            uploads: service::uploads::subscriber(&node)?,
-            node,
-        })
+        let meeting = Meeting::new(instance)?;
+        let node = &meeting.node;
+        let far = Self {
+            session: service::session::publisher(node)?,
+            events: service::events::publisher(node)?,
+            parameters: service::parameters::publisher(node)?,
+            plan: service::plan::publisher(node)?,
+            replies: service::replies::publisher(node)?,
+            rehearsals: service::rehearsals::publisher(node)?,
+            relayed: service::relayed::publisher(node)?,
+            class: ClassPorts::new(node)?,
+            scene: service::scene::publisher(node, 1 << 16)?,
+            commands: service::commands::subscriber(node)?,
+            uploads: service::uploads::subscriber(node)?,
+            meeting,
+        };
+        far.meeting.open()?;
+        Ok(far)
     }
 
     /// Connects hosts that came and drops those that went.
@@ -155,12 +162,12 @@ impl Far {
 
 /// The port of records of a `join`, with the node that it lives on.
 pub fn far_records(instance: &Instance) -> Result<(SlicePublisher<TickRecord, u64>, Node), ServiceError> {
-    let node = instance.node()?;
+    let node = Node::join(instance)?;
     Ok((service::records::publisher(&node, MAX_BATCH)?, node))
 }
 
 /// The port of snapshots of a `join`, with the node that it lives on.
 pub fn far_snapshots(instance: &Instance) -> Result<(SlicePublisher<Vertex, SnapshotHeader>, Node), ServiceError> {
-    let node = instance.node()?;
+    let node = Node::join(instance)?;
     Ok((service::snapshots::publisher(&node, 1 << 13)?, node))
 }

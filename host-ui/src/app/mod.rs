@@ -40,8 +40,8 @@ use stylet_host::link::{Link, LinkStatus};
 use stylet_host::roster::Trainee;
 use stylet_implant::heard::Heard;
 use stylet_implant::workflow::{NeedleTask, Pace, Placed, Run};
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::affinity::Left;
-use stylet_shm_schema::service::Instance;
 
 const LIVE_FRAME: Duration = Duration::from_millis(16);
 const ABSENT_FRAME: Duration = Duration::from_millis(250);
@@ -207,7 +207,7 @@ impl App {
         let shown = Shown::empty(options.instance.name());
         // A plan that is kept goes with the core. Whoever follows a trainee hears of their plan from the core.
         let planner = match options.trainees.is_empty() {
-            true => Planner::default().keeping_in(PathBuf::from(options.instance.root())),
+            true => Planner::default().keeping_in(options.instance.folder()),
             false => Planner::default(),
         };
         Self {

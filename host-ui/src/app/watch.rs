@@ -130,7 +130,7 @@ impl App {
     }
 
     /// Nothing of one core, or of one recording, is taken for that of another.
-    pub(super) fn change_link(&mut self, make: impl FnOnce(stylet_shm_schema::service::Instance) -> Link) {
+    pub(super) fn change_link(&mut self, make: impl FnOnce(stylet_shm_schema::Instance) -> Link) {
         self.link = make(self.link.instance().clone());
         self.waiting.clear();
         self.parameters.forget();

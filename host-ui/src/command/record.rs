@@ -5,7 +5,7 @@ use clap::Args;
 use std::path::PathBuf;
 use std::time::Duration;
 use stylet_host::record::{self, To};
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 
 #[derive(Args, Debug)]
 pub struct RecordArgs {

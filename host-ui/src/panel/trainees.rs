@@ -229,7 +229,7 @@ mod tests {
     use bytemuck::Zeroable;
     use std::time::Instant;
     use stylet_host::roster::Trainee;
-    use stylet_shm_schema::service::Instance;
+    use stylet_shm_schema::Instance;
     use stylet_shm_schema::{Exercise, HapticState, PlanInForce, Relayed, Session};
 
     fn glance() -> Glance {

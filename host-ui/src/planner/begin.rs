@@ -9,7 +9,7 @@ use stylet_base::job::Job;
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::Needle;
 use stylet_implant::workflow::Pace;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 
 impl Planner {
     /// Whether a job runs.

@@ -19,7 +19,7 @@ use stylet_implant::plan::first::{self, FirstPlan};
 use stylet_implant::plan::optimise::Objectives;
 use stylet_implant::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Needle, compensate, exchange};
 use stylet_implant::workflow::Pace;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 
 /// A second host finds the core within this time.
 const FIND_LIMIT: Duration = Duration::from_secs(10);

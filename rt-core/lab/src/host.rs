@@ -1,19 +1,21 @@
-//! A host inside the measurement, at normal priority: it moves the hand, and records when it sees the tissue respond.
+//! The host of a measurement, at normal priority: it moves the hand, and records when it sees the tissue respond.
+//!
+//! What sees it is a process of its own, as every host is: the force process maps no memory that a host could write.
 
 use crate::sample::histogram;
 use hdrhistogram::Histogram;
+use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use stylet_runtime::bridge;
 use stylet_runtime::device::second_start;
 use stylet_runtime::rt::clock;
 use stylet_runtime::rt::timing::PoseTimes;
-use stylet_shm_schema::service::{self, Instance, Publisher, ServiceError, SliceSubscriber, Subscriber};
-use stylet_shm_schema::{
-    Command, Event, EventKind, Fault, HandMove, ProbeMove, Request, SnapshotHeader, TickRecord, Vertex,
-};
+use stylet_shm_schema::{Event, EventKind, Fault, HandMove, Instance, ProbeMove, Request};
 use stylet_sim::probe::{PADS_APART_M, ProbeShape, Wall};
 use stylet_sim::scene::Scene;
+use stylet_wall::packet::{Kind, SeenRecords, SeenSnapshot, Socket};
 
 /// One insertion and one retraction.
 const CYCLE_NS: u64 = 4_000_000_000;
@@ -25,7 +27,7 @@ const ACCELERATION_M_PER_S2: f64 = 1.0;
 /// Seeds that the script leaves in the gland; they move with it and cost the tissue tick their share.
 const SEEDS: u64 = 32;
 /// How often the host looks; part of what it measures.
-pub const LOOK: Duration = Duration::from_millis(1);
+pub const LOOK: Duration = stylet_wall::packet::LOOK_EVERY;
 /// The core must be seen within this time.
 const PATIENCE_NS: u64 = 15_000_000_000;
 
@@ -78,28 +80,35 @@ impl Script {
     }
 }
 
-struct Ports {
-    snapshots: SliceSubscriber<Vertex, SnapshotHeader>,
-    records: SliceSubscriber<TickRecord, u64>,
-    events: Subscriber<Event>,
-    commands: Publisher<Command>,
+/// The process that looks, and the connection to it; ended when dropped.
+struct Eyes {
+    process: Child,
+    socket: Socket,
 }
 
-impl Ports {
-    fn new(instance: &Instance) -> Result<Self, ServiceError> {
-        let node = instance.node()?;
-        Ok(Self {
-            snapshots: service::snapshots::subscriber(&node)?,
-            records: service::records::subscriber(&node)?,
-            events: service::events::subscriber(&node)?,
-            commands: service::commands::publisher(&node)?,
-        })
+impl Eyes {
+    fn open(instance: &Instance) -> Result<Self, HostError> {
+        let (socket, end) = Socket::pair().map_err(HostError::NotStarted)?;
+        let process = Command::new(bridge::program())
+            .args(["host", instance.name()])
+            .stdin(Stdio::from(end))
+            .stdout(Stdio::null())
+            .spawn()
+            .map_err(HostError::NotStarted)?;
+        Ok(Self { process, socket })
+    }
+}
+
+impl Drop for Eyes {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
     }
 }
 
 /// One host; its thread ends the run after `duration_ns` of measurement.
 pub struct Host {
-    ports: Ports,
+    eyes: Eyes,
     script: Script,
     pose_times: Arc<PoseTimes>,
     sent: u64,
@@ -120,9 +129,12 @@ const BEYOND_TARGET_M: f64 = 35e-3;
 /// Why the host of the measurement saw nothing.
 #[derive(Debug, thiserror::Error)]
 pub enum HostError {
-    /// Shared memory cannot be opened.
-    #[error(transparent)]
-    Service(#[from] ServiceError),
+    /// The process that looks was not started.
+    #[error("stylet-bridge, which looks as a host does, cannot be started: {0}")]
+    NotStarted(std::io::Error),
+    /// It ended by itself.
+    #[error("stylet-bridge, which looks as a host does, ended")]
+    Ended,
     /// No tick within so many seconds.
     #[error("the loops published nothing for {0} s")]
     Silent(u64),
@@ -137,7 +149,7 @@ impl Host {
     ) -> Result<Self, HostError> {
         Ok(Self {
             warm_up_ticks,
-            ports: Ports::new(instance)?,
+            eyes: Eyes::open(instance)?,
             script,
             pose_times,
             sent: 0,
@@ -173,7 +185,7 @@ impl Host {
         // SYNC: set by the run when it fails; nothing but the flag is carried.
         while !stop.load(Ordering::Acquire) && !interrupted() {
             let now_ns = clock::now_ns();
-            self.look(now_ns);
+            self.look()?;
             if first_ns == 0 && self.last_tick >= self.warm_up_ticks {
                 first_ns = now_ns;
             }
@@ -191,35 +203,46 @@ impl Host {
         Ok(self.report)
     }
 
-    fn look(&mut self, now_ns: u64) {
-        while let Some(sample) = self.ports.snapshots.receive() {
-            let header = sample.header();
-            self.report.snapshots += 1;
-            let since = |time_ns: u64| now_ns.saturating_sub(time_ns);
-            self.report.tissue_to_host.saturating_record(since(header.time_ns));
-            if let Some(pose_ns) = self.pose_times.of(header.tissue_tick).filter(|&t| t > 0) {
-                self.report.tip_to_host.saturating_record(since(pose_ns));
+    fn look(&mut self) -> Result<(), HostError> {
+        while let Some(packet) = self.eyes.socket.receive().map_err(|_| HostError::Ended)? {
+            match packet.kind {
+                Kind::SeenSnapshots => packet.values().iter().for_each(|seen| self.take_snapshot(seen)),
+                Kind::SeenRecords => packet.values().iter().for_each(|seen| self.take_records(seen)),
+                Kind::Event => packet.value().iter().for_each(|event| self.take_event(event)),
+                _ => {}
             }
         }
-        while let Some(sample) = self.ports.records.receive() {
-            for record in sample.values() {
-                if self.last_tick > 0 {
-                    self.report.records_missing += record.tick.saturating_sub(self.last_tick + 1);
-                }
-                self.last_tick = record.tick;
-                self.report.records += 1;
-            }
+        Ok(())
+    }
+
+    fn take_snapshot(&mut self, seen: &SeenSnapshot) {
+        self.report.snapshots += 1;
+        let since = |time_ns: u64| seen.seen_ns.saturating_sub(time_ns);
+        self.report.tissue_to_host.saturating_record(since(seen.time_ns));
+        if let Some(pose_ns) = self.pose_times.of(seen.tissue_tick).filter(|&t| t > 0) {
+            self.report.tip_to_host.saturating_record(since(pose_ns));
         }
-        while let Some(sample) = self.ports.events.receive() {
-            let whose = match sample.kind {
-                kind if kind == EventKind::FaultRaised as u32 => "needle",
-                kind if kind == EventKind::SecondFaultRaised as u32 => "second device",
-                _ => continue,
-            };
-            let fault = Fault::from_number(sample.code).map_or("unknown", Fault::message);
-            let words = format!("{whose}, tick {}: {fault}", sample.tick);
-            self.report.faults.push(words);
+    }
+
+    fn take_records(&mut self, seen: &SeenRecords) {
+        if self.last_tick > 0 {
+            self.report.records_missing += seen.first.saturating_sub(self.last_tick + 1);
         }
+        self.report.records_missing += (seen.last + 1 - seen.first).saturating_sub(seen.count);
+        self.last_tick = seen.last;
+        self.report.records += seen.count;
+    }
+
+    fn take_event(&mut self, event: &Event) {
+        let whose = match event.kind {
+            kind if kind == EventKind::FaultRaised as u32 => "needle",
+            kind if kind == EventKind::SecondFaultRaised as u32 => "second device",
+            _ => return,
+        };
+        let fault = Fault::from_number(event.code).map_or("unknown", Fault::message);
+        self.report
+            .faults
+            .push(format!("{whose}, tick {}: {fault}", event.tick));
     }
 
     /// Half a cycle in, half a cycle out; engaging anew each time re-arms after a fault.
@@ -259,7 +282,7 @@ impl Host {
         self.sent += 1;
         if let Ok(command) = request.encode(1, self.sent) {
             // The next cycle sends the commands again.
-            let _ = self.ports.commands.send(command);
+            let _ = self.eyes.socket.send(Kind::Command, bytemuck::bytes_of(&command), None);
         }
     }
 }

@@ -7,9 +7,9 @@ use std::io;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
-use stylet_shm_schema::service::{self, Instance, ServiceError, SliceSubscriber};
-use stylet_shm_schema::{SnapshotHeader, TickRecord, Vertex};
+use stylet_runtime::bridge;
+use stylet_shm_schema::Instance;
+use stylet_wall::packet::Socket;
 
 /// What runs beside the loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
@@ -40,7 +40,8 @@ pub enum LoadProcess {
     Memory,
     /// Writes 4 MiB and syncs them to disk
     Io,
-    /// Copies everything that the core publishes
+    #[value(skip)]
+    /// Copies everything that the core publishes: `stylet-bridge`, which knows shared memory
     Ui,
 }
 
@@ -130,43 +131,63 @@ pub enum LoadError {
         /// What the system reports.
         why: io::Error,
     },
-    /// Shared memory cannot be opened.
-    #[error(transparent)]
-    Service(#[from] ServiceError),
 }
 
 /// The processes of a load; ended when dropped.
-pub(crate) struct Running(Vec<Child>);
+pub(crate) struct Running {
+    processes: Vec<Child>,
+    /// A host ends when this is closed.
+    hosts: Vec<Socket>,
+}
 
 impl Running {
     /// `folder`: where the io load may write.
     pub(crate) fn start(load: Load, instance: &Instance, folder: &Path) -> Result<Self, LoadError> {
         let program = std::env::current_exe().map_err(LoadError::Program)?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let mut running = Self(Vec::new());
+        let mut running = Self {
+            processes: Vec::new(),
+            hosts: Vec::new(),
+        };
         let all = load.work(cores);
         for (index, work) in all.iter().enumerate() {
+            if *work == LoadProcess::Ui {
+                running.start_host(instance).map_err(LoadError::Start)?;
+                continue;
+            }
             let name = work.to_possible_value().expect("no variant is skipped");
             let mut command = Command::new(&program);
             command
-                .args(["load", name.get_name(), "--instance", instance.name(), "--file"])
+                .args(["load", name.get_name(), "--file"])
                 .arg(folder.join(format!("load-{index}.tmp")))
                 .stdin(Stdio::null());
             let before = all[..index].iter().filter(|w| *w == work).count();
             if let Some(core) = work.core(before) {
                 command.arg("--core").arg(core.to_string());
             }
-            running.0.push(command.spawn().map_err(LoadError::Start)?);
+            running.processes.push(command.spawn().map_err(LoadError::Start)?);
         }
         if load == Load::Window {
-            running.0.push(window(&program, instance)?);
+            running.processes.push(window(&program, instance)?);
         }
         Ok(running)
     }
 
+    fn start_host(&mut self, instance: &Instance) -> io::Result<()> {
+        let (socket, end) = Socket::pair()?;
+        let mut command = Command::new(bridge::program());
+        command
+            .args(["load", instance.name()])
+            .stdin(Stdio::from(end))
+            .stdout(Stdio::null());
+        self.processes.push(command.spawn()?);
+        self.hosts.push(socket);
+        Ok(())
+    }
+
     /// Fails if a process of the load has ended before its time: then there was no load.
     pub(crate) fn ended(&mut self) -> Result<(), LoadError> {
-        for child in &mut self.0 {
+        for child in &mut self.processes {
             if let Ok(Some(status)) = child.try_wait() {
                 return Err(LoadError::Ended(status));
             }
@@ -190,12 +211,13 @@ fn window(program: &Path, instance: &Instance) -> Result<Child, LoadError> {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        for child in &mut self.0 {
+        self.hosts.clear();
+        for child in &mut self.processes {
             // SIGTERM lets the child remove its file and leave shared memory.
             // SAFETY: the child is ours and not yet waited for.
             unsafe { libc::kill(child.id() as libc::pid_t, libc::SIGTERM) };
         }
-        for child in &mut self.0 {
+        for child in &mut self.processes {
             let _ = child.wait();
         }
     }
@@ -204,14 +226,8 @@ impl Drop for Running {
 /// The body of one such process, on `core` where one is named; ends when `stopped`.
 ///
 /// # Errors
-/// `file` cannot be written, or the shared memory of `instance` cannot be opened.
-pub fn work(
-    kind: LoadProcess,
-    core: Option<usize>,
-    instance: &Instance,
-    file: &Path,
-    stopped: impl Fn() -> bool,
-) -> Result<(), LoadError> {
+/// `file` cannot be written.
+pub fn work(kind: LoadProcess, core: Option<usize>, file: &Path, stopped: impl Fn() -> bool) -> Result<(), LoadError> {
     if let Some(id) = core {
         // Where it may not, it loads whichever core it gets.
         core_affinity::set_for_current(core_affinity::CoreId { id });
@@ -227,7 +243,7 @@ pub fn work(
             let _ = std::fs::remove_file(file);
             ended?;
         }
-        LoadProcess::Ui => copy_all(instance, stopped)?,
+        LoadProcess::Ui => {}
     }
     Ok(())
 }
@@ -260,61 +276,6 @@ fn write_and_sync(path: &Path, stopped: impl Fn() -> bool) -> std::io::Result<()
         file.seek(SeekFrom::Start(0))?;
         file.write_all(&block)?;
         file.sync_all()?;
-    }
-    Ok(())
-}
-
-type Snapshots = SliceSubscriber<Vertex, SnapshotHeader>;
-type Records = SliceSubscriber<TickRecord, u64>;
-
-fn listen(instance: &Instance) -> Result<(Snapshots, Records), ServiceError> {
-    let node = instance.node()?;
-    Ok((
-        service::snapshots::subscriber(&node)?,
-        service::records::subscriber(&node)?,
-    ))
-}
-
-/// Services appear and disappear while a core starts; after this many tries the cause is another.
-const TRIES: u32 = 200;
-const BETWEEN_TRIES: Duration = Duration::from_millis(25);
-
-/// As many as the largest built-in scene shows.
-const VERTICES: usize = 50_000;
-
-/// A host that never pauses: more load than any window.
-fn copy_all(instance: &Instance, stopped: impl Fn() -> bool) -> Result<(), ServiceError> {
-    let mut tries = 0;
-    let (snapshots, records) = loop {
-        match listen(instance) {
-            Ok(ports) => break ports,
-            Err(_) if stopped() => return Ok(()),
-            Err(why) if tries >= TRIES => return Err(why),
-            Err(_) => {
-                tries += 1;
-                std::thread::sleep(BETWEEN_TRIES);
-            }
-        }
-    };
-    // Until there is a picture, and beside a program that publishes none, it goes over as much memory.
-    let mut vertices = vec![Vertex::default(); VERTICES];
-    let mut kept = Vec::new();
-    while !stopped() {
-        let mut idle = true;
-        while let Some(sample) = snapshots.receive() {
-            vertices.clear();
-            vertices.extend_from_slice(sample.values());
-            idle = false;
-        }
-        while let Some(sample) = records.receive() {
-            kept.clear();
-            kept.extend_from_slice(sample.values());
-            idle = false;
-        }
-        // What a window does with a picture: go over it again and again.
-        for _ in 0..if idle { 1 } else { 16 } {
-            std::hint::black_box(vertices.clone());
-        }
     }
     Ok(())
 }
@@ -355,7 +316,7 @@ mod tests {
             passes.get() > 2
         };
         let instance = Instance::default();
-        work(LoadProcess::Io, None, &instance, &file, stopped).expect("the temporary folder can be written");
+        work(LoadProcess::Io, None, &file, stopped).expect("the temporary folder can be written");
         assert_eq!(seen.get(), 4 << 20);
         assert!(!file.exists());
     }

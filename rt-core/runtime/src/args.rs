@@ -9,7 +9,7 @@ use crate::rt::clock::{HAPTIC_PERIOD_NS, Wait};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use stylet_shm_schema::BUILTIN_SCENES;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 use stylet_sim::scene::TissueKind;
 
 /// Options that a run and a measurement share.

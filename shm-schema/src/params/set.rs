@@ -2,12 +2,10 @@
 
 use super::{PARAMETER_COUNT, PARAMETERS, ParameterId};
 use bytemuck::{Pod, Zeroable};
-use iceoryx2::prelude::ZeroCopySend;
 
 /// One value for every row of [`PARAMETERS`], SI.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.ParameterSet")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct ParameterSet {
     /// By the number of the parameter, SI.
     pub values: [f64; PARAMETER_COUNT],
@@ -35,8 +33,7 @@ impl ParameterSet {
 
 /// The parameters in force, written by the bridge after each change.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("stylet.ParametersInForce")]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct ParametersInForce {
     /// The run of the core.
     pub session_id: u64,

@@ -3,7 +3,7 @@
 use bytemuck::Zeroable;
 use std::process::{Child, Command as Process, Stdio};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::{self, Instance};
+use stylet_ports::{self as service, Node};
 use stylet_shm_schema::*;
 use stylet_tests::hand::{Insertion, assert_undisturbed, missed};
 use stylet_tests::witness::{STALL, Witness, where_the_machine_runs};
@@ -181,7 +181,7 @@ fn stopped_and_starved_hosts_are_not_felt_and_go_on_by_themselves() {
 
 /// Sends as fast as it can for a while; how many were taken in by the queue.
 fn flood(instance: &Instance, time: Duration, mut next: impl FnMut(u64) -> Command) -> u64 {
-    let node = instance.node().expect("same user");
+    let node = Node::join(instance).expect("same user");
     let port = service::commands::publisher(&node).expect("a free place");
     let (begun, mut sent) = (Instant::now(), 0);
     while begun.elapsed() < time {
@@ -249,7 +249,7 @@ fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
         let mut hand = Insertion::begin(&mut core, 0.003);
         let before = hand.link.session().expect("live").refused;
         let parameters = hand.link.parameters().expect("live").generation;
-        let node = core.instance.node().expect("same user");
+        let node = Node::join(&core.instance).expect("same user");
         let port = service::commands::publisher(&node).expect("a free place");
         let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
         let mut random = move || {

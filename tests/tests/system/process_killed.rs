@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 use stylet_tests::{Core, left_behind, program, scratch, until};
 
 /// A campaign under way: its instance is named after its process.

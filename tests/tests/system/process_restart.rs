@@ -3,8 +3,8 @@
 use std::process::{Command, Stdio};
 use std::time::Duration;
 use stylet_host::link::{Link, LinkStatus};
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::Request;
-use stylet_shm_schema::service::Instance;
 use stylet_tests::hand::{Insertion, assert_undisturbed};
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, fresh_instance, left_behind, program, scratch, until};

@@ -5,7 +5,7 @@ use std::process::Command;
 use std::time::Duration;
 use stylet_host::link::Link;
 use stylet_implant::workflow::{Pace, Run, RunStatus, default_plan};
-use stylet_shm_schema::service;
+use stylet_ports as service;
 use stylet_shm_schema::*;
 use stylet_sim::scene::{Role, Scene};
 use stylet_tests::witness::where_the_machine_runs;
@@ -124,7 +124,7 @@ const HOST: u64 = 77;
 
 impl Sender {
     fn new(core: &Core) -> Self {
-        let node = core.instance.node().expect("same user");
+        let node = service::Node::join(&core.instance).expect("same user");
         Self {
             replies: service::replies::subscriber(&node).expect("a free place"),
             node,

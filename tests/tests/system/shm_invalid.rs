@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable, pod_read_unaligned};
 use std::time::Duration;
 use stylet_host::link::{Link, LinkStatus};
-use stylet_shm_schema::service::{self, StateBoard};
+use stylet_ports::{self as service, Meeting, Node, StateWriter};
 use stylet_shm_schema::*;
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Alone, Core, ask, fresh_instance, until};
@@ -36,7 +36,7 @@ fn core_refuses_invalid_records_of_hosts_and_runs_on() {
         let mut core = Core::start();
         let mut link = core.host();
         let before = *link.state().expect("live");
-        let node = core.instance.node().expect("same user");
+        let node = Node::join(&core.instance).expect("same user");
         let commands = service::commands::publisher(&node).expect("a free place");
         let mut sent = 0;
         for mut command in invalid::<Command>() {
@@ -106,19 +106,20 @@ const ROUNDS: usize = 50;
 #[test]
 fn host_drops_invalid_records_of_a_core_and_goes_on() {
     let alone = Alone(fresh_instance());
-    let node = alone.0.node().expect("shared memory");
+    let meeting = Meeting::new(&alone.0).expect("shared memory");
+    let node = &meeting.node;
     let session_id = 7;
-    let board = StateBoard::create(&node, session_id).expect("board");
-    let board = board.writer().expect("writer");
-    let sessions = service::session::publisher(&node).expect("publisher");
-    let events = service::events::publisher(&node).expect("publisher");
-    let parameters = service::parameters::publisher(&node).expect("publisher");
-    let plans = service::plan::publisher(&node).expect("publisher");
-    let replies = service::replies::publisher(&node).expect("publisher");
-    let records = service::records::publisher(&node, 64).expect("publisher");
-    let snapshots = service::snapshots::publisher(&node, 64).expect("publisher");
-    let scenes = service::scene::publisher(&node, 64).expect("publisher");
+    let board = StateWriter::create(node, session_id).expect("board");
+    let sessions = service::session::publisher(node).expect("publisher");
+    let events = service::events::publisher(node).expect("publisher");
+    let parameters = service::parameters::publisher(node).expect("publisher");
+    let plans = service::plan::publisher(node).expect("publisher");
+    let replies = service::replies::publisher(node).expect("publisher");
+    let records = service::records::publisher(node, 64).expect("publisher");
+    let snapshots = service::snapshots::publisher(node, 64).expect("publisher");
+    let scenes = service::scene::publisher(node, 64).expect("publisher");
 
+    meeting.open().expect("shared memory");
     let mut link = Link::new(alone.0.clone());
     let mut good = Session::zeroed();
     (good.session_id, good.schema_version) = (session_id, SCHEMA_VERSION);

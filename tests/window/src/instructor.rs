@@ -11,8 +11,9 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stylet_host::roster::Trainee;
-use stylet_shm_schema::service::Instance;
-use stylet_shm_schema::{Class, ClassMember, Exercise, Relayed, Request, Text, service};
+use stylet_ports as service;
+use stylet_shm_schema::Instance;
+use stylet_shm_schema::{Class, ClassMember, Exercise, Relayed, Request, Text};
 use stylet_tests::{ask, scratch, until};
 
 /// That of whoever follows one trainee, on a core that is live.
@@ -236,7 +237,7 @@ fn exercises_are_shown_to_both_while_they_run_and_after() {
 #[test]
 fn who_is_there_is_a_list_with_a_needle_to_hand_over() {
     let mut driven = Driven::open_plain(SMALL);
-    let node = driven.core.instance.node().expect("a node");
+    let node = service::Node::join(&driven.core.instance).expect("a node");
     let (class, relayed) = (
         service::class::publisher(&node).expect("a port"),
         service::relayed::publisher(&node).expect("a port"),

@@ -5,7 +5,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use host_ui::app::{App, Options};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 use stylet_tests::Alone;
 
 fn until(window: &mut Harness<'_, App>, what: &str, mut holds: impl FnMut(&Harness<'_, App>) -> bool) {

@@ -6,8 +6,8 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use host_ui::app::{App, Options};
 use std::ops::{Deref, DerefMut};
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::PARAMETERS;
-use stylet_shm_schema::service::Instance;
 use stylet_tests::Alone;
 
 /// Closed before its files go.

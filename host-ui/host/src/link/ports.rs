@@ -1,6 +1,6 @@
 //! Every port that a host holds, made together and dropped together.
 
-use stylet_shm_schema::service::{self, Instance, Node, Publisher, ServiceError, SliceSubscriber, Subscriber};
+use stylet_ports::{self as service, Node, Publisher, ServiceError, SliceSubscriber, Subscriber};
 use stylet_shm_schema::*;
 
 // Ports before the node, so that they go first.
@@ -18,12 +18,12 @@ pub struct Ports {
     pub snapshots: SliceSubscriber<Vertex, SnapshotHeader>,
     pub scene: SliceSubscriber<u32, SceneHeader>,
     pub commands: Publisher<Command>,
+    pub stops: Publisher<Command>,
     pub node: Node,
 }
 
 impl Ports {
-    pub fn new(instance: &Instance) -> Result<Self, ServiceError> {
-        let node = instance.node()?;
+    pub fn new(node: Node) -> Result<Self, ServiceError> {
         Ok(Self {
             session: service::session::subscriber(&node)?,
             events: service::events::subscriber(&node)?,
@@ -38,6 +38,7 @@ impl Ports {
             snapshots: service::snapshots::subscriber(&node)?,
             scene: service::scene::subscriber(&node)?,
             commands: service::commands::publisher(&node)?,
+            stops: service::stops::publisher(&node)?,
             node,
         })
     }

@@ -1,6 +1,6 @@
 //! The thread that owns every port of a host: it takes what arrives however slow the host is, and sends what the host asks.
 //!
-//! iceoryx2's ports belong to one thread. The queue of records holds seconds of them (`service::RECORD_BUFFER`), and
+//! iceoryx2's ports belong to one thread. The queue of records holds seconds of them ([`RECORD_BUFFER`]), and
 //! this thread looks every two milliseconds.
 
 use super::inbox::Inbox;
@@ -10,14 +10,14 @@ use super::thread::lock;
 use super::{ABSENT_AFTER, SceneModel, Snapshot};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::{self, Instance, MAX_HOSTS, SlicePublisher, StateReader};
+use stylet_ports::{self as service, Node, ServiceError, SlicePublisher, StateReader};
 use stylet_shm_schema::*;
 
 const CLEAN_EVERY: Duration = Duration::from_secs(1);
 const CLEAN_AFTER: Duration = Duration::from_millis(300);
-/// A new core may have swept the folder of the ports that this host holds.
-const RECONNECT_EVERY: Duration = Duration::from_secs(4);
-const CONNECT_EVERY: Duration = Duration::from_secs(1);
+/// Whether the ports are those of the present epoch.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+const CONNECT_AGAIN_AFTER: Duration = Duration::from_millis(250);
 const OPEN_BOARD_EVERY: Duration = Duration::from_millis(20);
 
 /// What the host asks the core for.
@@ -40,7 +40,10 @@ pub struct Passes {
     asked: mpsc::Receiver<Outgoing>,
     session: Option<Session>,
     tick: u64,
-    connect_tried: Option<Instant>,
+    /// The newest record: what a bridge that was started anew sends again is older.
+    record_tick: u64,
+    looked: Option<Instant>,
+    connect_failed: Option<Instant>,
     board_tried: Option<Instant>,
     pub snapshots_every: Duration,
     snapshot_taken: Option<Instant>,
@@ -62,7 +65,9 @@ impl Passes {
             asked,
             session: None,
             tick: 0,
-            connect_tried: None,
+            record_tick: 0,
+            looked: None,
+            connect_failed: None,
             board_tried: None,
             snapshots_every: Duration::ZERO,
             snapshot_taken: None,
@@ -85,24 +90,35 @@ impl Passes {
         self.connect();
     }
 
+    /// Drops the ports of an epoch that is over, and makes those of the present one.
     fn connect(&mut self) {
         let now = Instant::now();
         let long_ago = |then: Option<Instant>, every| then.is_none_or(|t: Instant| now - t >= every);
-        let deaf = self.beat_moved.is_none_or(|t| now - t > ABSENT_AFTER);
-        if self.ports.is_some() && deaf && long_ago(self.connect_tried, RECONNECT_EVERY) {
-            self.second.close();
-            (self.board, self.upload_port, self.ports) = (None, None, None);
-        }
-        if self.ports.is_some() || !long_ago(self.connect_tried, CONNECT_EVERY) {
+        if !long_ago(self.looked, LOOK_EVERY) {
             return;
         }
-        self.connect_tried = Some(now);
-        let trouble = match Ports::new(&self.instance) {
+        self.looked = Some(now);
+        if self.ports.as_ref().is_some_and(|ports| !ports.node.is_current()) {
+            self.second.close_ports();
+            (self.board, self.board_tried, self.upload_port, self.ports) = (None, None, None, None);
+        }
+        if self.ports.is_some() || !long_ago(self.connect_failed, CONNECT_AGAIN_AFTER) {
+            return;
+        }
+        let node = match self.session {
+            Some(_) => Node::join_again(&self.instance),
+            None => Node::join(&self.instance),
+        };
+        let trouble = match node.and_then(Ports::new) {
             Ok(ports) => {
                 self.ports = Some(ports);
                 None
             }
-            Err(e) => Some(e.0),
+            Err(ServiceError::Absent(_)) => None,
+            Err(why) => {
+                self.connect_failed = Some(now);
+                Some(why.to_string())
+            }
         };
         lock(&self.inbox).pulse.trouble = trouble;
     }
@@ -126,6 +142,10 @@ impl Passes {
 
     fn send_command(&self, command: &Command) -> Result<(), String> {
         let ports = self.ports.as_ref().ok_or("there is no connection to rt-core")?;
+        if command.is_stop() {
+            // Both ways: this one passes every flood, the other comes after what was asked for before.
+            let _ = ports.stops.send(*command);
+        }
         match ports.commands.send(*command) {
             Ok(0) => Err("the core did not accept the command: its queue is full or it has just ended".to_owned()),
             Ok(_) => Ok(()),
@@ -136,7 +156,7 @@ impl Passes {
     fn send_volume(&mut self, header: &UploadHeader, cells: &[u8]) -> Result<(), String> {
         self.upload_port = None;
         let ports = self.ports.as_ref().ok_or("there is no connection to rt-core")?;
-        let port = service::uploads::publisher(&ports.node, cells.len()).map_err(|e| e.0)?;
+        let port = service::uploads::publisher(&ports.node, cells.len()).map_err(|e| e.to_string())?;
         let taken = port.send(header, cells);
         // The core still has to map the port's memory.
         self.upload_port = Some(port);
@@ -160,7 +180,10 @@ impl Passes {
         while let Some(batch) = ports.records.receive() {
             for record in batch.values() {
                 match check::record(record) {
-                    Ok(()) if id == Some(record.session_id) => inbox.put_record(*record),
+                    Ok(()) if id == Some(record.session_id) && record.tick > self.record_tick => {
+                        self.record_tick = record.tick;
+                        inbox.put_record(*record);
+                    }
                     Ok(()) => {}
                     Err(_) => invalid += 1,
                 }
@@ -237,7 +260,7 @@ impl Passes {
             Some(old) if old.started_ns > session.started_ns => return,
             // Everything of an earlier run goes before anything of the new one is opened.
             _ => {
-                (self.board, self.board_tried, self.tick) = (None, None, 0);
+                (self.board, self.board_tried, self.tick, self.record_tick) = (None, None, 0, 0);
                 self.second.close();
                 lock(&self.inbox).begin(session);
             }

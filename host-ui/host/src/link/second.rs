@@ -2,7 +2,7 @@
 
 use super::inbox::Inbox;
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::{self, Node, SliceSubscriber, StateReader};
+use stylet_ports::{self as service, Node, SliceSubscriber, StateReader};
 use stylet_shm_schema::{SecondRecord, SecondState, Session, check};
 
 const OPEN_EVERY: Duration = Duration::from_millis(100);
@@ -13,12 +13,19 @@ pub struct SecondEnds {
     board: Option<StateReader<SecondState>>,
     records: Option<SliceSubscriber<SecondRecord, u64>>,
     tried: Option<Instant>,
+    /// The newest tick: what a bridge that was started anew sends again is older.
+    tick: u64,
 }
 
 impl SecondEnds {
     /// Of another run, or none.
     pub fn close(&mut self) {
         *self = Self::default();
+    }
+
+    /// Of another epoch of the same run.
+    pub fn close_ports(&mut self) {
+        (self.board, self.records, self.tried) = (None, None, None);
     }
 
     /// Opens what the run of `session` has.
@@ -36,12 +43,15 @@ impl SecondEnds {
     }
 
     /// Takes what has arrived; how much of it was invalid.
-    pub fn receive(&self, session_id: u64, inbox: &mut Inbox) -> u64 {
+    pub fn receive(&mut self, session_id: u64, inbox: &mut Inbox) -> u64 {
         let mut invalid = 0;
         while let Some(batch) = self.records.as_ref().and_then(SliceSubscriber::receive) {
             for record in batch.values() {
                 match check::second_record(record) {
-                    Ok(()) if record.session_id == session_id => inbox.put_second_record(*record),
+                    Ok(()) if record.session_id == session_id && record.tick > self.tick => {
+                        self.tick = record.tick;
+                        inbox.put_second_record(*record);
+                    }
                     Ok(()) => {}
                     Err(_) => invalid += 1,
                 }

@@ -3,7 +3,7 @@
 use super::*;
 use bytemuck::Zeroable;
 use std::time::Instant;
-use stylet_shm_schema::service;
+use stylet_ports::{self as service, Meeting, StateWriter};
 
 /// A name that leaves nothing in shared memory; to be dropped last.
 struct Swept(Instance);
@@ -38,17 +38,20 @@ fn until(link: &mut Link, mut holds: impl FnMut(&mut Link) -> bool) -> bool {
     false
 }
 
+/// A core's place, with every service that a host joins.
+fn core(instance: &Instance) -> Meeting {
+    let core = Meeting::new(instance).unwrap();
+    core.open().unwrap();
+    core
+}
+
 /// Has made its ports: what is sent from now on reaches it.
-fn connected(instance: &Instance) -> Link {
-    // Two that create a service at the same moment may both fail.
-    let node = instance.node().unwrap();
-    let sessions = service::session::watch(&node).unwrap();
-    let scene = service::scene::watch(&node).unwrap();
-    let commands = service::commands::watch(&node).unwrap();
-    let mut link = Link::new(instance.clone());
+fn connected(core: &Meeting) -> Link {
+    let sessions = service::session::watch(&core.node).unwrap();
+    let stops = service::stops::watch(&core.node).unwrap();
+    let mut link = Link::new(core.node.epoch().instance().clone());
     assert!(until(&mut link, |_| {
-        let subscribers = [sessions.connected().subscribers, scene.connected().subscribers];
-        subscribers == [1; 2] && commands.connected().publishers == 1
+        sessions.connected().subscribers == 1 && stops.connected().publishers == 1
     }));
     link
 }
@@ -75,14 +78,14 @@ fn no_core_says_what_to_type() {
 #[test]
 fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
     let instance = instance("restart");
-    let mut link = connected(&instance);
+    let mut link = Link::new(instance.0.clone());
     for run in 1..=3_u64 {
-        let node = instance.node().unwrap();
-        let board = service::StateBoard::create(&node, run).unwrap().writer().unwrap();
+        let core = core(&instance);
+        let board = StateWriter::create(&core.node, run).unwrap();
         let mut state = HapticState::zeroed();
         state.tick = 10 * run;
         board.write(&state);
-        let parameters = service::parameters::publisher(&node).unwrap();
+        let parameters = service::parameters::publisher(&core.node).unwrap();
         let in_force = ParametersInForce {
             session_id: run,
             generation: run,
@@ -94,9 +97,13 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
         std::thread::sleep(Duration::from_millis(20));
         link.poll();
         assert!(link.parameters().is_none_or(|p| p.session_id == run - 1));
-        let sessions = service::session::publisher(&node).unwrap();
+        let sessions = service::session::publisher(&core.node).unwrap();
         sessions.send(announce(run, run)).unwrap();
-        let begun = |link: &mut Link| link.session().is_some_and(|s| s.session_id == run) && link.state().is_some();
+        let begun = |link: &mut Link| {
+            sessions.connect();
+            parameters.connect();
+            link.session().is_some_and(|s| s.session_id == run) && link.state().is_some() && link.parameters().is_some()
+        };
         assert!(until(&mut link, begun));
         assert_eq!(link.state().unwrap().tick, 10 * run);
         assert_eq!(link.parameters().unwrap().generation, run);
@@ -104,18 +111,62 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
     }
 }
 
+/// A bridge that fails is started anew, with ports of its own, and sends again what hosts may have missed.
+#[test]
+fn a_host_moves_to_new_ports_of_the_same_run_without_a_gap_or_a_record_twice() {
+    let instance = instance("epoch");
+    let mut link = Link::new(instance.0.clone());
+    let mut ticks = Vec::new();
+    for (from, to) in [(1, 100), (50, 300), (250, 301)] {
+        let core = core(&instance);
+        let sessions = service::session::publisher(&core.node).unwrap();
+        let records = service::records::publisher(&core.node, MAX_BATCH).unwrap();
+        sessions.send(announce(5, from)).unwrap();
+        let send = |tick: u64| {
+            let record = TickRecord {
+                session_id: 5,
+                tick,
+                ..TickRecord::zeroed()
+            };
+            records.send(&5, &[record]).unwrap();
+        };
+        if from > 1 {
+            // Before any host is there.
+            (from..=to).for_each(send);
+        }
+        let connect = || {
+            sessions.connect();
+            records.connect();
+        };
+        assert!(until(&mut link, |link| {
+            connect();
+            link.session().is_some_and(|s| s.time_ns == from)
+        }));
+        if from == 1 {
+            (from..=to).for_each(send);
+        }
+        assert!(until(&mut link, |link| {
+            connect();
+            ticks.extend(link.take_records().iter().map(|r| r.tick));
+            ticks.last() == Some(&to)
+        }));
+    }
+    assert!(ticks.iter().zip(1..).all(|(&tick, n)| tick == n), "{ticks:?}");
+}
+
 #[test]
 fn invalid_messages_are_counted_and_not_used() {
     let instance = instance("invalid");
-    let mut link = connected(&instance);
-    let node = instance.node().unwrap();
-    let sessions = service::session::publisher(&node).unwrap();
+    let core = core(&instance);
+    let mut link = connected(&core);
+    let node = &core.node;
+    let sessions = service::session::publisher(node).unwrap();
     sessions.send(announce(7, 1)).unwrap();
-    let plans = service::plan::publisher(&node).unwrap();
+    let plans = service::plan::publisher(node).unwrap();
     plans
         .send(bytemuck::pod_read_unaligned(&vec![0xff; size_of::<PlanInForce>()]))
         .unwrap();
-    let events = service::events::publisher(&node).unwrap();
+    let events = service::events::publisher(node).unwrap();
     events
         .send(bytemuck::pod_read_unaligned(&vec![0xff; size_of::<Event>()]))
         .unwrap();
@@ -127,12 +178,13 @@ fn invalid_messages_are_counted_and_not_used() {
 #[test]
 fn a_command_and_a_volume_arrive_and_are_answered_once() {
     let instance = instance("answer");
-    let mut link = connected(&instance);
-    let node = instance.node().unwrap();
-    let sessions = service::session::publisher(&node).unwrap();
-    let replies = service::replies::publisher(&node).unwrap();
-    let commands = service::commands::subscriber(&node).unwrap();
-    let uploads = service::uploads::subscriber(&node).unwrap();
+    let core = core(&instance);
+    let mut link = connected(&core);
+    let node = &core.node;
+    let sessions = service::session::publisher(node).unwrap();
+    let replies = service::replies::publisher(node).unwrap();
+    let commands = service::commands::subscriber(node).unwrap();
+    let uploads = service::uploads::subscriber(node).unwrap();
     sessions.send(announce(9, 1)).unwrap();
     assert!(until(&mut link, |link| link.status() == LinkStatus::Live));
 
@@ -182,11 +234,11 @@ fn a_command_and_a_volume_arrive_and_are_answered_once() {
     }
 }
 
-fn sends_records(instance: &Instance, session_id: u64, batches: u64, every: Duration) {
-    let node = instance.node().unwrap();
-    let sessions = service::session::publisher(&node).unwrap();
+fn sends_records(core: &Meeting, session_id: u64, batches: u64, every: Duration) {
+    let node = &core.node;
+    let sessions = service::session::publisher(node).unwrap();
     sessions.send(announce(session_id, 1)).unwrap();
-    let records = service::records::publisher(&node, service::MAX_BATCH).unwrap();
+    let records = service::records::publisher(node, MAX_BATCH).unwrap();
     std::thread::sleep(Duration::from_millis(50));
     for batch in 0..batches {
         if batch % 100 == 0 {
@@ -207,13 +259,14 @@ fn sends_records(instance: &Instance, session_id: u64, batches: u64, every: Dura
 #[test]
 fn a_frame_of_three_seconds_loses_no_record() {
     let instance = instance("slow");
-    let mut link = connected(&instance);
-    let sender = std::thread::spawn({
-        let instance = instance.0.clone();
-        move || sends_records(&instance, 5, 1500, Duration::from_millis(2))
+    let core = core(&instance);
+    let mut link = connected(&core);
+    let sender = std::thread::spawn(move || {
+        sends_records(&core, 5, 1500, Duration::from_millis(2));
+        core
     });
     assert!(until(&mut link, |link| link.session().is_some()));
-    sender.join().unwrap();
+    let _core = sender.join().unwrap();
     let mut ticks = Vec::new();
     until(&mut link, |link| {
         ticks.extend(link.take_records().iter().map(|r| r.tick));
@@ -239,9 +292,10 @@ fn events_that_were_not_seen_are_counted_and_those_before_this_host_are_not() {
 #[test]
 fn a_request_that_cannot_be_sent_is_answered() {
     let instance = instance("unsent");
-    let mut link = connected(&instance);
-    let node = instance.node().unwrap();
-    let sessions = service::session::publisher(&node).unwrap();
+    let core = core(&instance);
+    let mut link = connected(&core);
+    let node = &core.node;
+    let sessions = service::session::publisher(node).unwrap();
     sessions.send(announce(3, 1)).unwrap();
     assert!(until(&mut link, |link| link.status() == LinkStatus::Live));
     // Nobody takes commands.

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
 use std::thread::JoinHandle;
 use std::time::Duration;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 
 const PASS: Duration = Duration::from_millis(2);
 /// What the host may ask for ahead of the thread that sends it.

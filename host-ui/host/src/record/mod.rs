@@ -29,8 +29,8 @@ use std::path::PathBuf;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::Request;
-use stylet_shm_schema::service::Instance;
 use writer::{Item, Totals};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);

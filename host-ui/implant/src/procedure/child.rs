@@ -4,7 +4,7 @@ use super::error::ProcedureError;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 
 const END_LIMIT: Duration = Duration::from_secs(4);
 

@@ -4,7 +4,7 @@ use crate::RelayError;
 use std::fs::File;
 use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::PathBuf;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 
 /// Servers keep records for so long.
 const KEPT_NS: u64 = 60_000_000_000;
@@ -26,7 +26,8 @@ pub(super) struct Last {
 impl Last {
     /// Where the member of `instance` notes it, and what one that was killed has noted less than a minute ago.
     pub fn open(instance: &Instance, now_ns: u64) -> Result<(Self, Option<Next>), RelayError> {
-        let path = PathBuf::from(format!("/dev/shm/{}relay.last", instance.prefix()));
+        let folder = instance.make_folder().map_err(|e| RelayError(e.to_string()))?;
+        let path = folder.join("relay.last");
         let mut options = File::options();
         options.read(true).write(true).create(true).truncate(false).mode(0o600);
         let file = options
@@ -88,6 +89,6 @@ mod tests {
         assert_eq!(before, None, "too short");
         drop((ended, same));
         assert_eq!(Last::open(&instance, now_ns).expect("shared memory").1, None);
-        let _ = std::fs::remove_file(format!("/dev/shm/{}relay.last", instance.prefix()));
+        instance.sweep();
     }
 }

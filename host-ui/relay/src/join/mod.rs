@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 
 /// Messages that may wait for a thread; more are dropped, and records among them asked for again.
 const WAITING: usize = 4096;

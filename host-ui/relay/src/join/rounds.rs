@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::check::{self, Invalid};
-use stylet_shm_schema::service::{StateBoard, StateWriter};
+use stylet_ports::StateWriter;
 use stylet_shm_schema::{
     Event, EventKind, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, ReplyStatus, SCHEMA_VERSION,
     Session, Text,
@@ -173,7 +173,7 @@ impl Rounds {
         self.take_orders();
         if self.cleaned.elapsed() >= CLEAN_EVERY {
             self.cleaned = Instant::now();
-            self.far.node.clean_up();
+            self.far.meeting.node.clean_up();
         }
     }
 
@@ -291,7 +291,7 @@ impl Rounds {
     fn open_board(&mut self, session_id: u64) {
         for _ in 0..3 {
             if let Ok(board) =
-                StateBoard::create(&self.far.node, self.member.run(session_id)).and_then(StateBoard::writer)
+                StateWriter::create(&self.far.meeting.node, self.member.run(session_id))
             {
                 self.board = Some((session_id, board));
                 return;

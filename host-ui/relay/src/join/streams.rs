@@ -10,7 +10,7 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::SlicePublisher;
+use stylet_ports::SlicePublisher;
 use stylet_shm_schema::{TickRecord, check};
 
 /// Without a message they look so often whether the end has come, and what is to be asked for.

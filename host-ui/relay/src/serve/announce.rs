@@ -9,12 +9,12 @@ use crate::wire::{Hello, Kind, Who, encode};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use stylet_ports::Node;
 use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::{Event, ParametersInForce, PlanInForce, Reply, SCHEMA_VERSION, Session, check};
 
-const OPEN_EVERY: Duration = Duration::from_secs(1);
+const OPEN_EVERY: Duration = Duration::from_millis(20);
 /// Ports that have heard no announcement for so long are made anew: another core may have swept their folder.
-const SILENT_PORTS: Duration = Duration::from_secs(4);
 const CLEAN_EVERY: Duration = Duration::from_secs(1);
 const EVENTS_KEPT: usize = 64;
 const REPLIES_KEPT: usize = 32;
@@ -109,11 +109,19 @@ impl Announcements {
 
     fn open(&mut self) {
         let now = Instant::now();
-        let is_due = self.tried.is_none_or(|tried| now - tried >= OPEN_EVERY);
-        if is_due && (self.near.is_none() || now - self.heard >= SILENT_PORTS) {
-            (self.tried, self.heard) = (Some(now), now);
+        if self.tried.is_some_and(|tried| now - tried < OPEN_EVERY) {
+            return;
+        }
+        self.tried = Some(now);
+        if self.near.as_ref().is_some_and(|near| !near.node.is_current()) {
             (self.class, self.near) = (None, None);
-            self.near = Near::new(&self.server.instance).ok();
+        }
+        if self.near.is_none() {
+            let node = match self.session {
+                Some(_) => Node::join_again(&self.server.instance),
+                None => Node::join(&self.server.instance),
+            };
+            self.near = node.and_then(Near::new).ok();
             self.class = self.near.as_ref().and_then(|near| ClassPorts::new(&near.node).ok());
         }
     }

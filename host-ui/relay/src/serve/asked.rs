@@ -171,7 +171,7 @@ fn upload(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>
         let (header, cells) = wire::upload(message.body).map_err(|invalid| invalid.to_string())?;
         rounds.upload = None;
         let near = rounds.announcements.near().ok_or("no core runs there")?;
-        rounds.upload = Some(near.upload(&header, &cells).map_err(|e| e.0)?);
+        rounds.upload = Some(near.upload(&header, &cells).map_err(|e| e.to_string())?);
         Ok(())
     });
     if let Err(why) = passed {

@@ -13,7 +13,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::Request;
-use stylet_shm_schema::service::{self, Instance, ServiceError};
+use stylet_ports::{self as service, Node, ServiceError};
+use stylet_shm_schema::Instance;
 
 /// Exit code of a server that is to be started again at once.
 pub const AGAIN: u8 = 3;
@@ -154,8 +155,8 @@ fn watch(instance: &Instance, from_server: &mut UnixStream, tape: &mut Tape, chi
 fn stop_hand(instance: &Instance, why: &str) {
     println!("the hand is stopped: {why}");
     let send = || -> Result<(), ServiceError> {
-        let node = instance.node()?;
-        let port = service::commands::publisher(&node)?;
+        let node = Node::join(instance)?;
+        let port = service::stops::publisher(&node)?;
         port.connect();
         if let Ok(command) = Request::StopHand.encode(now_ns(), 1) {
             let _ = port.send(command);

@@ -27,7 +27,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use streams::Jobs;
 use stylet_shm_schema::HapticState;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 
 /// Requests that may wait; more are dropped and counted.
 const ASKED: usize = 512;

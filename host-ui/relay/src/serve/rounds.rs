@@ -12,7 +12,7 @@ use crate::{RelayError, now_ns};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::SlicePublisher;
+use stylet_ports::SlicePublisher;
 use stylet_shm_schema::{Request, UploadHeader};
 
 const WHO_EVERY: Duration = Duration::from_millis(200);

@@ -1,14 +1,15 @@
 //! The threads of the streams: state and records as they come, snapshots thinned, and what one member asks for again.
 
 use super::pace::Places;
+use super::tape::Newest;
 use super::watched::Watched;
 use super::{Server, lock};
 use crate::net::{Place, Priority, put, put_newest, put_whole};
 use crate::wire::{self, Kind, Rest, Stamp, Thin, Ticks, encode};
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::{self, Instance, Node, ServiceError, SliceSubscriber, StateReader};
-use stylet_shm_schema::{HapticState, SceneHeader, SnapshotHeader, TickRecord, Vertex};
+use stylet_ports::{self as service, Node, ServiceError, SliceSubscriber, StateReader};
+use stylet_shm_schema::{HapticState, Instance, SceneHeader, SnapshotHeader, TickRecord, Vertex};
 
 /// How often the queue of records is looked at: a batch waits half of it on average.
 const RECORDS_EVERY: Duration = Duration::from_micros(100);
@@ -29,11 +30,11 @@ struct Board {
 impl Board {
     /// The state of the run, once its board is there.
     fn state(&mut self, instance: &Instance, session_id: u64) -> Option<HapticState> {
-        let is_of_it = self.reader.as_ref().is_some_and(|(id, ..)| *id == session_id);
+        let is_of_it = (self.reader.as_ref()).is_some_and(|(id, _, node)| *id == session_id && node.is_current());
         if !is_of_it && self.tried.is_none_or(|tried| tried.elapsed() >= BOARD_EVERY) {
             self.tried = Some(Instant::now());
             let open = || {
-                let node = instance.node()?;
+                let node = Node::join(instance)?;
                 Ok::<_, ServiceError>((session_id, StateReader::open(&node, session_id)?, node))
             };
             self.reader = open().ok();
@@ -46,29 +47,29 @@ impl Board {
 /// Sends each batch of records with the state of the moment, and keeps it for those that miss it.
 pub fn records(server: &Server) {
     let mut watched = Watched::<SliceSubscriber<TickRecord, u64>>::new();
-    let (mut board, mut last) = (Board::default(), Instant::now());
+    let (mut board, mut last, mut newest_record) = (Board::default(), Instant::now(), Newest::default());
     while !server.ends() {
-        let make = || {
-            let node = server.instance.node()?;
-            Ok((service::records::subscriber(&node)?, node))
-        };
+        let make = |node: &Node| service::records::subscriber(node);
         let mut any = false;
-        if let Some(port) = watched.get(make) {
+        if let Some(port) = watched.get(&server.instance, make) {
             while let Some(sample) = port.receive() {
+                let values = newest_record.newer(sample.values());
+                if values.is_empty() {
+                    continue;
+                }
                 any = true;
-                let packed = wire::pack(sample.values());
+                let packed = wire::pack(&values);
                 let kept = server.batch(&packed);
                 let newest = match board.state(&server.instance, *sample.header()) {
                     Some(state) => server.newest(&state, &packed),
                     None => kept.clone(),
                 };
-                lock(&server.kept).keep(sample.values(), kept);
+                lock(&server.kept).keep(&values, kept);
                 put(&server.session, Place::Records, Priority::RealTime, newest);
             }
         }
         let mut pause = RECORDS_EVERY;
         if any {
-            watched.heard();
             pause = (last.elapsed() * 3 / 4).clamp(RECORDS_EVERY, RECORDS_PAUSE);
             last = Instant::now();
         }
@@ -88,13 +89,11 @@ pub fn snapshots(server: &Server) {
     let mut rest = Rest::default();
     while !server.ends() {
         let begun = Instant::now();
-        let make = || {
-            let node = server.instance.node()?;
-            let snapshots = service::snapshots::subscriber(&node)?;
-            Ok(((snapshots, service::scene::subscriber(&node)?), node))
+        let make = |node: &Node| {
+            let snapshots = service::snapshots::subscriber(node)?;
+            Ok((snapshots, service::scene::subscriber(node)?))
         };
-        let mut any = false;
-        if let Some((snapshots, scenes)) = watched.get(make) {
+        if let Some((snapshots, scenes)) = watched.get(&server.instance, make) {
             while let Some(sample) = scenes.receive() {
                 if stylet_shm_schema::check::scene(sample.header(), sample.values()).is_ok() {
                     rest = Rest::of_scene(sample.header(), sample.values());
@@ -105,12 +104,8 @@ pub fn snapshots(server: &Server) {
                 newest = Some(sample);
             }
             if let Some(snapshot) = newest {
-                any = true;
                 send_snapshot(server, &rest, snapshot.header(), snapshot.values());
             }
-        }
-        if any {
-            watched.heard();
         }
         std::thread::sleep(SNAPSHOTS_EVERY.saturating_sub(begun.elapsed()));
     }

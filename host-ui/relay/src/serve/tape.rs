@@ -11,8 +11,8 @@ use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::affinity::Left;
-use stylet_shm_schema::service::{self, Instance, MAX_BATCH, SliceSubscriber, Subscriber};
-use stylet_shm_schema::{Session, TickRecord, check};
+use stylet_ports::{self as service, Node, SliceSubscriber, Subscriber};
+use stylet_shm_schema::{Instance, MAX_BATCH, Session, TickRecord, check};
 
 /// What the server sends to have them.
 pub const ASK: u8 = 2;
@@ -29,6 +29,7 @@ pub struct Tape {
     instance: Instance,
     ports: Watched<Ports>,
     batches: VecDeque<Vec<TickRecord>>,
+    newest: Newest,
     left_core: Left,
 }
 
@@ -39,33 +40,30 @@ impl Tape {
             instance: instance.clone(),
             ports: Watched::new(),
             batches: VecDeque::new(),
+            newest: Newest::default(),
             left_core: Left::default(),
         }
     }
 
     /// Takes what the core has sent; its queue holds 12 s.
     pub fn pass(&mut self) {
-        let instance = &self.instance;
-        let make = || {
-            let node = instance.node()?;
-            let records = service::records::subscriber(&node)?;
-            Ok(((records, service::session::subscriber(&node)?), node))
+        let make = |node: &Node| {
+            let records = service::records::subscriber(node)?;
+            Ok((records, service::session::subscriber(node)?))
         };
-        let Some((records, sessions)) = self.ports.get(make) else {
+        let Some((records, sessions)) = self.ports.get(&self.instance, make) else {
             return;
         };
-        let mut any = false;
         while let Some(session) = sessions.receive() {
             self.left_core.leave(&session);
         }
         while let Some(sample) = records.receive() {
-            any = true;
-            self.batches.push_back(sample.values().to_vec());
+            let batch = self.newest.newer(sample.values());
+            if !batch.is_empty() {
+                self.batches.push_back(batch);
+            }
         }
         self.batches.drain(..self.batches.len().saturating_sub(AT_MOST));
-        if any {
-            self.ports.heard();
-        }
     }
 
     /// To a server that asked; one that does not take them is not waited for.
@@ -78,6 +76,27 @@ impl Tape {
         }
         bytes.extend_from_slice(&0_u32.to_le_bytes());
         let _ = to.write_all(&bytes);
+    }
+}
+
+/// The newest record that came: a bridge that was started anew sends the last 12 s again.
+#[derive(Default)]
+pub(super) struct Newest {
+    session_id: u64,
+    tick: u64,
+}
+
+impl Newest {
+    /// Those of a batch that have not come before.
+    pub(super) fn newer(&mut self, batch: &[TickRecord]) -> Vec<TickRecord> {
+        let mut newer = Vec::with_capacity(batch.len());
+        for record in batch {
+            if record.session_id != self.session_id || record.tick > self.tick {
+                (self.session_id, self.tick) = (record.session_id, record.tick);
+                newer.push(*record);
+            }
+        }
+        newer
     }
 }
 

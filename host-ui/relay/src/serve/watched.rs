@@ -1,16 +1,16 @@
-//! Ports to the core of one thread, made again when they are silent: another core may have swept their folder.
+//! Ports to the core of one thread, made again in each epoch.
 
 use std::time::{Duration, Instant};
-use stylet_shm_schema::service::{Node, ServiceError};
+use stylet_ports::{Node, ServiceError};
+use stylet_shm_schema::Instance;
 
-const SILENT: Duration = Duration::from_secs(4);
-const OPEN_EVERY: Duration = Duration::from_secs(1);
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// Ports, and the node that they live on.
 pub struct Watched<P> {
     ports: Option<(P, Node)>,
-    tried: Option<Instant>,
-    heard: Instant,
+    looked: Option<Instant>,
+    had_any: bool,
 }
 
 impl<P> Watched<P> {
@@ -18,24 +18,35 @@ impl<P> Watched<P> {
     pub fn new() -> Self {
         Self {
             ports: None,
-            tried: None,
-            heard: Instant::now(),
+            looked: None,
+            had_any: false,
         }
-    }
-
-    /// Something came through them.
-    pub fn heard(&mut self) {
-        self.heard = Instant::now();
     }
 
     /// The ports, when there are any.
-    pub fn get(&mut self, make: impl FnOnce() -> Result<(P, Node), ServiceError>) -> Option<&P> {
+    pub fn get(&mut self, instance: &Instance, make: impl FnOnce(&Node) -> Result<P, ServiceError>) -> Option<&P> {
         let now = Instant::now();
-        let is_due = self.tried.is_none_or(|tried| now - tried >= OPEN_EVERY);
-        if is_due && (self.ports.is_none() || now - self.heard >= SILENT) {
-            (self.tried, self.ports, self.heard) = (Some(now), None, now);
-            self.ports = make().ok();
+        if self.looked.is_none_or(|looked| now - looked >= LOOK_EVERY) {
+            self.looked = Some(now);
+            // Those of an epoch that is over go before others are made.
+            self.ports = self.ports.take().filter(|(_, node)| node.is_current());
+            if self.ports.is_none() {
+                self.ports = self.open(instance, make).ok();
+                self.had_any |= self.ports.is_some();
+            }
         }
         self.ports.as_ref().map(|(ports, _)| ports)
+    }
+
+    fn open(
+        &self,
+        instance: &Instance,
+        make: impl FnOnce(&Node) -> Result<P, ServiceError>,
+    ) -> Result<(P, Node), ServiceError> {
+        let node = match self.had_any {
+            true => Node::join_again(instance),
+            false => Node::join(instance),
+        }?;
+        Ok((make(&node)?, node))
     }
 }

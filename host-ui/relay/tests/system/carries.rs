@@ -10,7 +10,7 @@ use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity, write_invitation};
 use stylet_shm_schema::TickRecord;
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 use stylet_test_kit::witness::where_the_machine_runs;
 
 #[test]

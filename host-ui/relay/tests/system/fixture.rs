@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 use stylet_relay::keys::{Invitation, Lab, Role, Validity, write_invitation};
 use stylet_relay::ports::Near;
-use stylet_shm_schema::service::{self, Instance, Node, SliceSubscriber, StateReader};
+use stylet_ports::{self as service, Node, SliceSubscriber, StateReader};
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::{HapticState, PlanInForce, Reply, ReplyStatus, Request, SceneHeader, Session, TickRecord};
 pub use stylet_test_kit::{program, until};
 
@@ -31,7 +32,7 @@ impl Drop for Named {
     fn drop(&mut self) {
         until(Duration::from_secs(2), || {
             self.0.sweep();
-            !Path::new(&self.0.root()).exists()
+            !self.0.folder().exists()
         });
     }
 }
@@ -215,13 +216,13 @@ pub struct Host {
 
 impl Host {
     pub fn new(named: &Named) -> Self {
-        let node = named.0.node().expect("shared memory");
+        let node = Node::join(&named.0).expect("shared memory");
         let records = service::records::subscriber(&node).expect("a port");
         // While another program makes a service it cannot be opened; on a busy machine that takes longer than an attempt does.
-        let mut near = Near::new(&named.0);
+        let mut near = Node::join(&named.0).and_then(Near::new);
         until(Duration::from_secs(5), || {
             if near.is_err() {
-                near = Near::new(&named.0);
+                near = Node::join(&named.0).and_then(Near::new);
             }
             near.is_ok()
         });

@@ -3,7 +3,7 @@
 use crate::fixture::{Host, Keys, Named, Running, core, go, join, still_moving_m, until};
 use std::time::Duration;
 use stylet_relay::keys::{Role, Validity};
-use stylet_shm_schema::service::{self, Node, Publisher, Subscriber};
+use stylet_ports::{self as service, Node, Publisher, Subscriber};
 use stylet_shm_schema::{Class, LeaseOrder, LeaseRequest};
 
 /// A host with the ports by which a window knows the class and asks for the needle.
@@ -17,7 +17,7 @@ struct Window {
 
 impl Window {
     fn new(named: &Named) -> Self {
-        let node = named.0.node().expect("shared memory");
+        let node = Node::join(&named.0).expect("shared memory");
         Self {
             host: Host::new(named),
             class: service::class::subscriber(&node).expect("a port"),

@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity};
 use stylet_relay::now_ns;
 use stylet_relay::wire::{Displacements, MAX_THIN_BYTES, Rest, Thin, decode_snapshot};
-use stylet_shm_schema::service::{self, Instance};
+use stylet_ports::{self as service, Node};
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::{SnapshotHeader, Vertex};
 use stylet_test_kit::witness::where_the_machine_runs;
 
@@ -16,7 +17,7 @@ use stylet_test_kit::witness::where_the_machine_runs;
 type Shown = BTreeMap<u64, (f64, Box<SnapshotHeader>, Vec<Vertex>)>;
 
 fn rest(instance: &Instance) -> Rest {
-    let node = instance.node().expect("shared memory");
+    let node = Node::join(instance).expect("shared memory");
     let port = service::scene::subscriber(&node).expect("a port");
     let mut rest = None;
     until(Duration::from_secs(5), || {
@@ -28,7 +29,7 @@ fn rest(instance: &Instance) -> Rest {
 }
 
 fn shown(instance: &Instance, until: Instant) -> Shown {
-    let node = instance.node().expect("shared memory");
+    let node = Node::join(instance).expect("shared memory");
     let port = service::snapshots::subscriber(&node).expect("a port");
     let mut shown = Shown::new();
     while Instant::now() < until {

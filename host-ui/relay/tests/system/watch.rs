@@ -7,7 +7,9 @@ use std::net::{TcpListener, TcpStream};
 use std::sync::mpsc::{Receiver, Sender};
 use std::time::{Duration, Instant};
 use stylet_relay::now_ns;
-use stylet_shm_schema::service::{self, BATCH_EVERY, Instance};
+use stylet_ports::{self as service, Node};
+use stylet_shm_schema::Instance;
+use stylet_shm_schema::BATCH_EVERY;
 
 /// Of each measurement, s; `STYLET_RELAY_S` makes it longer for a figure.
 pub fn seconds(everyday: f64) -> f64 {
@@ -34,7 +36,7 @@ pub enum Beside {
 pub fn arrivals(instance: &Instance, until: Instant, beside: &Beside) -> BTreeMap<u64, Instant> {
     // So that it is the relay that is measured, not when this thread gets its turn.
     stylet_relay::slice::shorten();
-    let node = instance.node().expect("shared memory");
+    let node = Node::join(instance).expect("shared memory");
     let port = service::records::subscriber(&node).expect("a port");
     let mut seen = BTreeMap::new();
     while Instant::now() < until {
@@ -88,7 +90,7 @@ pub fn socket_ages_ms(until: Instant) -> Vec<f64> {
 
 /// How old each snapshot was when it came, ms, by its tissue tick. Both sides are on this machine, so their clock is one.
 pub fn pictures(instance: &Instance, until: Instant) -> Vec<(u64, f64)> {
-    let node = instance.node().expect("shared memory");
+    let node = Node::join(instance).expect("shared memory");
     let port = service::snapshots::subscriber(&node).expect("a port");
     let mut seen = Vec::new();
     while Instant::now() < until {

@@ -4,7 +4,7 @@ use crate::app::App;
 use bytemuck::Zeroable;
 use std::time::Instant;
 use stylet_host::roster::{Glance, Trainee};
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::{Exercise, Relayed, Session, Text};
 
 /// Every exercise at once, with the longest words.

@@ -18,7 +18,7 @@ use stylet_implant::plan::compensate::edges::Sensitive;
 use stylet_implant::plan::first::{FirstPlan, Measures};
 use stylet_implant::plan::optimise::Figures;
 use stylet_implant::plan::{Hole, ImplantPlan};
-use stylet_shm_schema::service::Instance;
+use stylet_shm_schema::Instance;
 use stylet_shm_schema::{
     HapticState, MAX_STRUCTURES, ParametersInForce, PlanInForce, SceneHeader, SeedPose, Session, StructureInfo, Text,
     flags, role,

@@ -4,84 +4,42 @@ use super::Bridge;
 use super::link::EventDetails;
 use super::parameters::order_from_both;
 use super::requests::{hand_goal, needle_run, plan_in_force};
+use super::wall::Asked;
 use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
 use crate::rt::second::SecondOrder;
 use crate::rt::tissue_tape::LeftTape;
-use stylet_shm_schema::service::MAX_HOSTS;
-use stylet_shm_schema::{CommandKind, EventKind, ParameterChange, PlannedNeedle, Refusal, RefusalCode, Request};
+use stylet_shm_schema::{Command, EventKind, ParameterChange, PlannedNeedle, Refusal, RefusalCode, Request};
 use stylet_sim::active::activate;
 use stylet_sim::line::LeftNeedles;
-
-/// Commands of a host that are looked at in one pass. More are refused, so that a flood reaches neither loop.
-const MAX_OF_A_HOST: u32 = 16;
-/// Refusals for that reason that are answered in one pass, the others are counted: every host has all answers in its queue, and
-/// those to one that floods would drive out those to the others.
-const MAX_ANSWERED: u32 = 4;
-/// Commands taken from the queues in one pass. Queues are read one after the other, so that a host that fills its own faster than
-/// it is read would keep the core from those behind it; a refusal that is counted alone takes less time than a request.
-const MAX_TAKEN: usize = 4096;
-
-/// Commands of one pass.
-#[derive(Default)]
-struct Taken {
-    /// By host.
-    of_host: Vec<(u64, u32)>,
-    answered: u32,
-}
-
-impl Taken {
-    /// Counts a command; false where it is one too many.
-    fn admits(&mut self, host_id: u64) -> bool {
-        if let Some((_, count)) = self.of_host.iter_mut().find(|(id, _)| *id == host_id) {
-            *count += 1;
-            return *count <= MAX_OF_A_HOST;
-        }
-        let has_room = self.of_host.len() < MAX_HOSTS;
-        if has_room {
-            self.of_host.push((host_id, 1));
-        }
-        has_room
-    }
-
-    /// Counts a refusal for that reason; false where it is not answered.
-    fn answers(&mut self) -> bool {
-        self.answered += 1;
-        self.answered <= MAX_ANSWERED
-    }
-}
 
 impl Bridge {
     /// True when a host asked to end.
     pub(super) fn take_commands(&mut self) -> bool {
-        let mut taken = Taken::default();
-        for _ in 0..MAX_TAKEN {
-            let Some(command) = self.link.ports.commands.receive() else {
-                break;
-            };
-            let asker = (command.host_id, command.command_id);
-            // A request that takes the force off is never too much.
-            let is_free = [CommandKind::Disengage, CommandKind::Shutdown].map(|kind| kind as u32);
-            if !taken.admits(command.host_id) && !is_free.contains(&command.kind) {
-                match taken.answers() {
-                    true => self.link.refuse(asker, &RefusalCode::TooManyRequests.into()),
-                    false => self.link.session.refused += 1,
-                }
-                continue;
+        while let Some(asked) = self.link.wall.take_asked() {
+            match asked {
+                Asked::Command(command) if self.take_command(&command) => return true,
+                Asked::Command(_) => {}
+                Asked::Volume(header, cells) => self.take_volume(&header, &cells),
             }
-            match Request::decode(&command) {
-                Ok(Request::Shutdown) => {
-                    self.link.reply(asker, Ok(0));
-                    return true;
-                }
-                Ok(request) => {
-                    let ticket = self.link.ticket(asker);
-                    if let Err(refusal) = self.carry_out(ticket, request) {
-                        self.link.session.refused += 1;
-                        self.link.answer(ticket, Err(&refusal));
-                    }
-                }
-                Err(errors) => self.link.refuse_invalid(asker, &errors.into()),
+        }
+        false
+    }
+
+    fn take_command(&mut self, command: &Command) -> bool {
+        let asker = (command.host_id, command.command_id);
+        match Request::decode(command) {
+            Ok(Request::Shutdown) => {
+                self.link.reply(asker, Ok(0));
+                return true;
             }
+            Ok(request) => {
+                let ticket = self.link.ticket(asker);
+                if let Err(refusal) = self.carry_out(ticket, request) {
+                    self.link.session.refused += 1;
+                    self.link.answer(ticket, Err(&refusal));
+                }
+            }
+            Err(errors) => self.link.refuse_invalid(asker, &errors.into()),
         }
         false
     }
@@ -216,7 +174,7 @@ impl Bridge {
         self.plan.generation = if plan.is_some() { generation } else { 0 };
         self.plan.session_id = self.link.session.session_id;
         self.plan.scene_generation = self.scene.generation();
-        let _ = self.link.ports.plan.send(self.plan);
+        self.link.wall.plan(self.plan);
         self.lines
             .expect_planned(plan.map(|plan| (plan.entry_m, plan.direction)));
     }

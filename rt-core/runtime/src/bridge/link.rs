@@ -1,31 +1,25 @@
 //! The link to the hosts: announcements, events, records, and the answers to their requests.
 
-use super::batches::Batches;
-use super::ports::Ports;
+use super::wall::Wall;
 use crate::rt::clock;
 use crate::rt::exchange::Ticket;
 use std::collections::HashMap;
-use stylet_shm_schema::service::Node;
 use stylet_shm_schema::{Event, EventKind, Refusal, Reply, Session, Text, TickRecord};
 
 const ANNOUNCE_NS: u64 = 200_000_000;
-const CLEAN_UP_NS: u64 = 1_000_000_000;
 
 /// Numbers of a host and of its command.
 pub type Asker = (u64, u64);
 
 /// Everything that hosts hear.
 pub struct Link {
-    node: Node,
-    pub ports: Ports,
+    pub wall: Wall,
     pub session: Session,
     /// Who waits for an answer, behind each ticket.
     waiting: HashMap<Ticket, Asker>,
     tickets: Ticket,
     events: u64,
-    batches: Batches<TickRecord>,
     announced_ns: u64,
-    cleaned_ns: u64,
 }
 
 /// The fields of an event that depend on its kind.
@@ -58,53 +52,59 @@ impl EventDetails<'_> {
 }
 
 impl Link {
-    pub fn new(node: Node, ports: Ports, session: Session) -> Self {
+    pub fn new(wall: Wall, session: Session) -> Self {
         Self {
-            node,
-            ports,
+            wall,
             session,
             waiting: HashMap::new(),
             tickets: 0,
             events: 0,
-            batches: Batches::default(),
             announced_ns: 0,
-            cleaned_ns: 0,
         }
     }
 
-    /// Connects hosts, sends the heartbeat, and frees what hosts that died have left.
+    /// Serves the bridge and sends the heartbeat.
     pub fn announce(&mut self) {
-        self.ports.connect();
+        self.wall.pass();
+        if let Some(why) = self.wall.take_lost() {
+            eprintln!("rt-core: the bridge to the hosts is started anew: {why}");
+            let details = EventDetails {
+                text: &why,
+                ..EventDetails::now()
+            };
+            self.event(EventKind::BridgeRestarted, details);
+        }
         let now_ns = clock::now_ns();
         if now_ns - self.announced_ns >= ANNOUNCE_NS {
             self.announced_ns = now_ns;
             self.session.time_ns = now_ns;
-            let _ = self.ports.session.send(self.session);
+            self.send_session();
         }
-        if now_ns - self.cleaned_ns >= CLEAN_UP_NS {
-            self.cleaned_ns = now_ns;
-            self.node.clean_up();
-        }
+    }
+
+    /// Hosts count requests that the bridge has refused with those that were refused here.
+    fn send_session(&mut self) {
+        let refused = self.session.refused + self.wall.refused();
+        self.wall.session(Session {
+            refused,
+            ..self.session
+        });
     }
 
     /// The newest record of the force loop.
     pub fn newest_record(&self) -> Option<&TickRecord> {
-        self.batches.newest()
+        self.wall.records.newest()
     }
 
     /// Takes what the force loop has made and sends it in batches.
     pub fn send_records(&mut self, records: &mut rtrb::Consumer<TickRecord>) {
-        self.batches.pass(records, &self.ports.records, self.session.session_id);
-    }
-
-    /// Whatever has not been sent yet.
-    pub fn send_batch(&mut self) {
-        self.batches.send(&self.ports.records, self.session.session_id);
+        self.wall.records.take(records);
+        self.wall.send_records(false);
     }
 
     pub fn event(&mut self, kind: EventKind, details: EventDetails<'_>) {
         self.events += 1;
-        let _ = self.ports.events.send(Event {
+        self.wall.event(Event {
             session_id: self.session.session_id,
             sequence: self.events,
             time_ns: details.time_ns,
@@ -136,9 +136,9 @@ impl Link {
         }
     }
 
-    pub fn reply(&self, asker: Asker, result: Result<u64, &Refusal>) {
+    pub fn reply(&mut self, asker: Asker, result: Result<u64, &Refusal>) {
         let reply = Reply::new(self.session.session_id, asker, result);
-        let _ = self.ports.replies.send(reply);
+        self.wall.reply(reply);
     }
 
     /// A refusal before there was a ticket.

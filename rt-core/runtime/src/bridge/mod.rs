@@ -1,9 +1,11 @@
-//! The normal-priority thread that owns every port: hosts connect and disconnect here, and the loops do not notice.
+//! The normal-priority thread of the force process: carries out what hosts ask for, and says what the loops have done.
+//!
+//! It meets no host itself: that is for another process behind a [`wall`].
 
-mod batches;
 mod commands;
 mod exercises;
 mod flight;
+mod journal;
 mod line_archive;
 mod lines;
 mod link;
@@ -11,15 +13,14 @@ mod loader;
 mod notices;
 mod parameters;
 mod picture;
-pub mod ports;
 mod probe;
 mod rehearsals;
 mod requests;
 mod scenes;
 mod second;
-mod snapshots;
 mod supervisor;
 mod upload;
+mod wall;
 
 use crate::replay::file::Flight;
 use crate::rt::wiring::BridgePorts;
@@ -30,22 +31,19 @@ use link::{EventDetails, Link};
 use loader::SceneLoader;
 use notices::LoopRings;
 use parameters::ParameterChanges;
-pub use picture::ScenePicture;
-use ports::Ports;
+pub use picture::{ScenePicture, SnapshotBoard, snapshot_board};
 use probe::ProbePreparer;
 use rehearsals::RehearsalRunner;
 use second::Second;
 pub use second::SecondSetup;
-use snapshots::SnapshotLoans;
-pub use snapshots::SnapshotSize;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::service::Node;
 use stylet_shm_schema::{EventKind, Fault, PlanInForce, Refusal, RefusalCode, Rehearsal, Session};
 use stylet_sim::scene::{SceneSource, TissueKind};
 use supervisor::Supervisor;
+pub use wall::{Boards, BridgeError, Wall, program};
 
 const PASS: Duration = Duration::from_millis(2);
 
@@ -62,6 +60,8 @@ pub struct BridgeSetup {
     pub session: Session,
     /// The first scene, as hosts get it.
     pub picture: ScenePicture,
+    /// Where its snapshots can be read.
+    pub snapshots: SnapshotBoard,
     /// Tissue model of every scene.
     pub tissue: TissueKind,
     /// What the first scene was built from.
@@ -79,17 +79,14 @@ pub struct BridgeSetup {
 /// The scene that runs, as hosts get it.
 struct RunningScene {
     picture: ScenePicture,
-    /// The picture has been sent.
-    sent: bool,
     /// The next scene, from when the tissue loop is asked for it until it runs.
-    next: Option<(ScenePicture, Arc<SceneSource>)>,
+    next: Option<(ScenePicture, Arc<SceneSource>, SnapshotBoard)>,
 }
 
 /// Everything that the bridge thread owns.
 pub struct Bridge {
     link: Link,
     loops: LoopRings,
-    loans: SnapshotLoans,
     flights: FlightKeeper,
     device: DeviceInfo,
     /// Tissue model of every scene of the run.
@@ -110,20 +107,20 @@ pub struct Bridge {
 
 impl Bridge {
     /// Announces parameters and plan; everything else follows in [`run`](Self::run).
-    pub fn new(node: Node, ports: Ports, loops: BridgePorts, setup: BridgeSetup) -> Self {
+    pub fn new(wall: Wall, loops: BridgePorts, setup: BridgeSetup) -> Self {
         let session_id = setup.session.session_id;
         let is_real_time = setup.session.haptic.is_fifo();
         let mut plan: PlanInForce = bytemuck::Zeroable::zeroed();
         plan.session_id = session_id;
         let parameters = ParameterChanges::new(session_id);
-        let link = Link::new(node, ports, setup.session);
-        let _ = link.ports.parameters.send(parameters.in_force);
-        let _ = link.ports.plan.send(plan);
+        let mut link = Link::new(wall, setup.session);
+        link.wall.parameters(parameters.in_force);
+        link.wall.plan(plan);
+        setup.picture.show(&mut link.wall, Some(setup.snapshots));
         let (second, second_tapes) = setup.second.map(|second| Second::new(second, is_real_time)).unzip();
         let tapes = (loops.haptic_tapes, loops.tissue_tapes, second_tapes);
         Self {
             link,
-            loans: SnapshotLoans::new(loops.slots, loops.filled),
             flights: FlightKeeper::new(tapes, setup.flight_folder, setup.flight),
             loops: LoopRings {
                 records: loops.records,
@@ -145,7 +142,6 @@ impl Bridge {
             plan,
             scene: RunningScene {
                 picture: setup.picture,
-                sent: false,
                 next: None,
             },
             loader: SceneLoader::default(),
@@ -164,11 +160,7 @@ impl Bridge {
     /// neither loop must be waited for.
     pub fn run(&mut self, stopped: impl Fn() -> bool) -> Result<(), LoopStopped> {
         while !stopped() && !self.pass()? {
-            std::thread::sleep(PASS);
-        }
-        self.link.send_batch();
-        if let Some(second) = &mut self.second {
-            second.send_batch(self.link.session.session_id);
+            self.link.wall.wait(PASS);
         }
         Ok(())
     }
@@ -183,11 +175,9 @@ impl Bridge {
         self.link.announce();
         let before = self.newest_tick();
         let end = self.take_commands();
-        self.take_uploads();
         self.take_loaded();
         self.take_rehearsed();
         self.take_notices();
-        self.scene.send(&self.link);
         while self.loops.old_worlds.pop().is_ok() {}
         self.link.send_records(&mut self.loops.records);
         let made_a_tick = self.newest_tick() != before;
@@ -196,8 +186,6 @@ impl Bridge {
         let generation = self.scene.generation();
         self.lines.pass(self.link.newest_record(), generation, &mut self.loops);
         self.serve_probe(generation);
-        let (generation, size) = (self.scene.generation(), self.scene.picture.snapshot_size());
-        self.loans.pass(&self.link.ports, generation, size);
         if self.supervisor.pass(made_a_tick) {
             let fault = Fault::LoopStopped;
             self.link.event(
@@ -259,12 +247,13 @@ impl Bridge {
             return;
         };
         if let (Ok(result), Some((host_id, command_id))) = (&ended.outcome, self.link.asker(ended.ticket)) {
-            let _ = self.link.ports.rehearsals.send(Rehearsal {
+            let rehearsal = Rehearsal {
                 session_id: self.link.session.session_id,
                 host_id,
                 command_id,
                 ..**result
-            });
+            };
+            self.link.wall.rehearsal(rehearsal);
         }
         self.link.answer(ended.ticket, ended.outcome.as_ref().map(|_| 0));
     }

@@ -45,7 +45,7 @@ impl Bridge {
                 tick,
             } => {
                 if self.parameters.take_effect(generation, tick) {
-                    let _ = self.link.ports.parameters.send(self.parameters.in_force);
+                    self.link.wall.parameters(self.parameters.in_force);
                 }
                 self.link.answer(ticket, Ok(tick));
             }

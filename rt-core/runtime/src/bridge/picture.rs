@@ -1,9 +1,22 @@
 //! What hosts need to draw a scene and to plan in it.
 
-use super::snapshots::SnapshotSize;
+use super::wall::Wall;
+use std::os::fd::OwnedFd;
 use stylet_anatomy::PatientFrame;
 use stylet_shm_schema::*;
 use stylet_sim::scene::{Role, Scene, Structure, label_grid};
+use stylet_wall::board::Writer;
+use stylet_wall::packet::{BoardSize, sealed};
+
+/// Where the snapshots of a scene can be read.
+pub type SnapshotBoard = (BoardSize, OwnedFd);
+
+/// A board for the snapshots of `scene`: one end for its tissue loop, one for the bridge.
+pub fn snapshot_board(scene: &Scene) -> std::io::Result<(Writer<SnapshotHeader, Vertex>, SnapshotBoard)> {
+    let len = scene.surface.vertex_elements.len() + scene.nodes.elements.len();
+    let (writer, memory) = Writer::new("stylet-snapshots", len)?;
+    Ok((writer, (BoardSize { len: len as u64 }, memory)))
+}
 
 /// Header and words of the scene service.
 pub struct ScenePicture {
@@ -27,11 +40,11 @@ impl ScenePicture {
         self.words.len()
     }
 
-    /// How much each snapshot of the scene holds.
-    pub fn snapshot_size(&self) -> SnapshotSize {
-        SnapshotSize {
-            vertices: self.header.vertex_count as usize,
-            nodes: self.header.nodes.node_count().unwrap_or(0),
+    /// Shows it to hosts, with the board of its snapshots where that is new.
+    pub(super) fn show(&self, wall: &mut Wall, snapshots: Option<SnapshotBoard>) {
+        match sealed("stylet-scene", &self.words) {
+            Ok(words) => wall.scene(self.header, words, snapshots),
+            Err(why) => eprintln!("rt-core: the scene cannot be shown: {why}"),
         }
     }
 

@@ -1,26 +1,21 @@
 //! From a scene that a host asks for to the scene that runs.
 
-use super::link::{Asker, EventDetails, Link};
+use super::link::{Asker, EventDetails};
 use super::loader::{Loaded, Wanted};
-use super::picture::ScenePicture;
+use super::picture::{ScenePicture, snapshot_board};
 use super::{Bridge, RunningScene, upload};
 use crate::rt::exchange::{Ticket, TissueOrder};
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use std::sync::Arc;
 use stylet_anatomy::PatientFrame;
-use stylet_shm_schema::{BUILTIN_SCENES, EventKind, Refusal, RefusalCode, Text};
+use stylet_shm_schema::{BUILTIN_SCENES, EventKind, Refusal, RefusalCode, Text, UploadHeader};
 use stylet_sim::active::activate;
 use stylet_sim::scene::{Scene, SceneSource};
 
 impl RunningScene {
     pub(super) fn generation(&self) -> u64 {
         self.picture.header.generation
-    }
-
-    /// Sends the picture once; tried again at the next pass when there is no room.
-    pub(super) fn send(&mut self, link: &Link) {
-        self.sent = self.sent || link.ports.scene.send(&self.picture.header, &self.picture.words).is_ok();
     }
 }
 
@@ -40,36 +35,31 @@ impl Bridge {
         })
     }
 
-    pub(super) fn take_uploads(&mut self) {
-        while let Some(slice) = self.link.ports.uploads.receive() {
-            let header = *slice.header();
-            let asker: Asker = (header.host_id, header.command_id);
-            let labels = match upload::labels(&header, slice.values()) {
-                Ok(labels) => labels,
-                Err(why) => {
-                    let refusal = Refusal::new(RefusalCode::InvalidVolume, why.to_string());
-                    self.link.refuse_invalid(asker, &refusal);
-                    continue;
-                }
-            };
-            drop(slice);
-            let (ticket, name) = (self.link.ticket(asker), header.name.read());
-            let wanted = Wanted {
-                ticket,
-                name: name.clone(),
-                patient: PatientFrame::of_wire(&header.patient_from_scene),
-            };
-            let loading = self.load(wanted, move || {
-                let source = SceneSource::of_labels(&name, &labels);
-                let scene = Scene::from_labels(&name, &labels).map_err(|problems| {
-                    let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
-                    Refusal::new(RefusalCode::InvalidVolume, lines.join("\n"))
-                })?;
-                Ok((scene, source))
-            });
-            if let Err(refusal) = loading {
-                self.link.answer(ticket, Err(&refusal));
+    pub(super) fn take_volume(&mut self, header: &UploadHeader, cells: &[u8]) {
+        let asker: Asker = (header.host_id, header.command_id);
+        let labels = match upload::labels(header, cells) {
+            Ok(labels) => labels,
+            Err(why) => {
+                let refusal = Refusal::new(RefusalCode::InvalidVolume, why.to_string());
+                return self.link.refuse_invalid(asker, &refusal);
             }
+        };
+        let (ticket, name) = (self.link.ticket(asker), header.name.read());
+        let wanted = Wanted {
+            ticket,
+            name: name.clone(),
+            patient: PatientFrame::of_wire(&header.patient_from_scene),
+        };
+        let loading = self.load(wanted, move || {
+            let source = SceneSource::of_labels(&name, &labels);
+            let scene = Scene::from_labels(&name, &labels).map_err(|problems| {
+                let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
+                Refusal::new(RefusalCode::InvalidVolume, lines.join("\n"))
+            })?;
+            Ok((scene, source))
+        });
+        if let Err(refusal) = loading {
+            self.link.answer(ticket, Err(&refusal));
         }
     }
 
@@ -105,6 +95,9 @@ impl Bridge {
         let mut world = World::new(scene, active.limits, generation)
             .map_err(|why| Refusal::new(RefusalCode::SceneNotBuilt, why.to_string()))?;
         world.migration = active.migration;
+        let (writer, snapshots) = snapshot_board(&world.scene)
+            .map_err(|why| Refusal::new(RefusalCode::SceneNotBuilt, format!("no memory to show it: {why}")))?;
+        world.shown = Some(writer);
         let source = Arc::new(source);
         let order = TissueOrder::World {
             ticket: wanted.ticket,
@@ -115,24 +108,23 @@ impl Bridge {
             let why = "too many requests at once; load the scene again";
             return Err(Refusal::new(RefusalCode::TooManyRequests, why));
         }
-        self.scene.next = Some((picture, source));
+        self.scene.next = Some((picture, source, snapshots));
         Ok(())
     }
 
     /// The tissue loop runs the next scene, from `tick` on.
     pub(super) fn scene_taken_up(&mut self, generation: u64, tick: u64) {
-        if let Some((picture, source)) = self.scene.next.take() {
+        if let Some((picture, source, snapshots)) = self.scene.next.take() {
             self.scene.picture = picture;
             self.lines.change_scene(Arc::clone(&source));
             if let Some(probe) = &mut self.probe {
                 probe.change_scene(Arc::clone(&source));
             }
             self.rehearsals.change_scene(source);
-            self.scene.sent = false;
-            self.scene.send(&self.link);
+            self.scene.picture.show(&mut self.link.wall, Some(snapshots));
             self.plan = bytemuck::Zeroable::zeroed();
             self.plan.session_id = self.link.session.session_id;
-            let _ = self.link.ports.plan.send(self.plan);
+            self.link.wall.plan(self.plan);
         }
         let name = self.scene.picture.header.name.read();
         self.link.event(

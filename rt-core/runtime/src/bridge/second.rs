@@ -1,7 +1,6 @@
 //! The bridge's part for the second device: orders to its loop, records and faults of it to the hosts.
 
 use super::Bridge;
-use super::batches::Batches;
 use super::link::{EventDetails, Link};
 use super::requests::hand_goal;
 use super::supervisor::Supervisor;
@@ -9,7 +8,6 @@ use crate::rt::exchange::{Notice, Ticket};
 use crate::rt::second::{SecondBridgePorts, SecondOrder, gate_of};
 use nalgebra::Vector3;
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::service::SlicePublisher;
 use stylet_shm_schema::{EventKind, Fault, ProbeMove, Refusal, RefusalCode, SecondRecord};
 use stylet_sim::force::GateParameters;
 
@@ -19,8 +17,6 @@ pub struct SecondSetup {
     pub device: DeviceInfo,
     /// The bridge's ends of its rings, less the tapes.
     pub ports: SecondBridgePorts,
-    /// Where its records go.
-    pub records: SlicePublisher<SecondRecord, u64>,
 }
 
 /// Of a run with a second device.
@@ -29,8 +25,6 @@ pub(super) struct Second {
     pub(super) orders: rtrb::Producer<SecondOrder>,
     notices: rtrb::Consumer<Notice>,
     records: rtrb::Consumer<SecondRecord>,
-    port: SlicePublisher<SecondRecord, u64>,
-    batches: Batches<SecondRecord>,
     supervisor: Supervisor,
     /// Its loop stands still, and hosts know it.
     has_stopped: bool,
@@ -39,28 +33,16 @@ pub(super) struct Second {
 impl Second {
     /// Beside its tapes, which go to the keeper of flight recordings.
     pub fn new(setup: SecondSetup, is_real_time: bool) -> (Self, super::flight::SecondTapes) {
-        let SecondSetup { device, ports, records } = setup;
+        let SecondSetup { device, ports } = setup;
         let second = Self {
             device,
             orders: ports.orders,
             notices: ports.notices,
             records: ports.records,
-            port: records,
-            batches: Batches::default(),
             supervisor: Supervisor::new(is_real_time, device.simulated),
             has_stopped: false,
         };
         (second, ports.tapes)
-    }
-
-    /// Connects new hosts.
-    pub fn connect(&self) {
-        self.port.connect();
-    }
-
-    /// What has not been sent yet.
-    pub fn send_batch(&mut self, session_id: u64) {
-        self.batches.send(&self.port, session_id);
     }
 
     /// An order whose loss its loop survives: one that stands still has no room for it, and takes nothing from the needle's.
@@ -81,8 +63,7 @@ impl Second {
 
     /// Records to the hosts, and a word where the loop has stopped. The needle's loop goes on.
     fn pass(&mut self, link: &mut Link) {
-        let session_id = link.session.session_id;
-        let made_a_tick = self.batches.pass(&mut self.records, &self.port, session_id);
+        let made_a_tick = link.wall.second_records.take(&mut self.records);
         let stands_still = self.supervisor.pass(made_a_tick);
         if stands_still && !std::mem::replace(&mut self.has_stopped, stands_still) {
             let fault = Fault::LoopStopped;
@@ -106,7 +87,6 @@ impl Bridge {
             self.take_second_notice(&notice);
         }
         if let Some(second) = &mut self.second {
-            second.connect();
             second.pass(&mut self.link);
         }
     }

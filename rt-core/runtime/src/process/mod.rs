@@ -4,7 +4,7 @@ mod session;
 mod setup;
 mod threads;
 
-use crate::bridge::{Bridge, BridgeSetup};
+use crate::bridge::{Bridge, BridgeError, BridgeSetup};
 use crate::device::{DeviceChoice, DeviceError, Libraries};
 use crate::rt::arm::{Refused, Usage};
 use crate::rt::clock::Wait;
@@ -14,8 +14,7 @@ use setup::Setup;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_shm_schema::service::{Instance, ServiceError};
-use stylet_shm_schema::{Fault, ParameterProblems, ThreadReport};
+use stylet_shm_schema::{Fault, Instance, InstanceError, ParameterProblems, ThreadReport, affinity};
 use stylet_sim::scene::TissueKind;
 use threads::Threads;
 
@@ -128,9 +127,15 @@ pub enum RunError {
     /// The tissue model could not be set up.
     #[error(transparent)]
     World(#[from] WorldError),
-    /// Shared memory could not be used.
+    /// The folder in which hosts find the run cannot be used.
     #[error(transparent)]
-    Service(#[from] ServiceError),
+    Instance(#[from] InstanceError),
+    /// The process that meets hosts did not come up.
+    #[error("the bridge to the hosts: {0}")]
+    Bridge(#[from] BridgeError),
+    /// There is no memory in which the loops show what they do.
+    #[error("no memory to show the run in: {0}")]
+    Board(std::io::Error),
     /// Real time was asked for and not granted.
     #[error("{0}\nOr start with --no-rt to run without real-time scheduling.")]
     NotGranted(#[from] Refused),
@@ -160,24 +165,33 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, RunEr
 
 /// The same run, with a probe in each loop.
 pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool>) -> Result<RunReport, RunError> {
+    options.instance.sweep_dead();
+    let owned = options.instance.own()?;
+    if let Some(core) = options.haptic_core {
+        // What this thread starts from now on stays off the core as well: the bridge, and all work beside the loops.
+        affinity::keep_off(core);
+    }
     let setup = Setup::new(options)?;
-    let shared = setup.open_shared_memory(options)?;
     let kernel = setup::lock_memory(options)?;
     let (session_id, info, second_info) = (setup.session_id, setup.info, setup.second_info);
-    let loops = setup.body.into_loops(options, session_id, &setup.source, probes);
-    let second = loops.second.zip(shared.second);
+    let is_watched = Arc::default();
+    let shown = setup.show(owned, &is_watched)?;
+    let loops = setup
+        .body
+        .into_loops(options, session_id, &setup.source, probes, &is_watched);
+    let second = loops.second.zip(shown.second_state);
     let (second_loop, second_bridge) = second.map(setup::SecondLoops::join).unzip();
-    let threads = Threads::start(options, (loops.haptic, shared.board), loops.tissue, second_loop)?;
+    let threads = Threads::start(options, (loops.haptic, shown.state), loops.tissue, second_loop)?;
     let devices = (&info, second_info.as_ref());
     let session = session::session(options, session_id, devices, &threads, kernel.unlocked.as_deref());
     let mut bridge = Bridge::new(
-        shared.node,
-        shared.ports,
+        shown.wall,
         loops.bridge,
         BridgeSetup {
             device: info,
             session,
             picture: setup.picture,
+            snapshots: setup.snapshots,
             tissue: options.tissue,
             source: setup.source,
             second: second_bridge,

@@ -1,8 +1,7 @@
 //! What a run needs before its threads start: scene, device, shared memory, locked memory, and both loops.
 
 use super::{Options, RunError, SecondOptions};
-use crate::bridge::ports::Ports;
-use crate::bridge::{ScenePicture, SecondSetup};
+use crate::bridge::{Boards, ScenePicture, SecondSetup, SnapshotBoard, Wall, snapshot_board};
 use crate::device;
 use crate::rt::arm::{self, Ask, CoresAwake};
 use crate::rt::clock::{self, TISSUE_PERIOD_NS, TISSUE_PHASE, Wait};
@@ -15,11 +14,13 @@ use crate::rt::tissue_tape::TissueTape;
 use crate::rt::wiring::{BridgePorts, Capacities, Wiring};
 use crate::rt::world::World;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use stylet_hw::{Device, DeviceInfo};
-use stylet_shm_schema::service::{self, Node, SlicePublisher, StateBoard};
-use stylet_shm_schema::{ParameterSet, SecondRecord, SecondState, flags};
+use stylet_shm_schema::{HapticState, Owned, ParameterSet, SecondState, flags};
 use stylet_sim::active::{Active, activate};
 use stylet_sim::scene::{Scene, SceneSource};
+use stylet_wall::board::Writer;
+use stylet_wall::packet::Start;
 
 /// Scene, device and their figures.
 pub(super) struct Setup {
@@ -27,6 +28,7 @@ pub(super) struct Setup {
     pub info: DeviceInfo,
     pub second_info: Option<DeviceInfo>,
     pub picture: ScenePicture,
+    pub snapshots: SnapshotBoard,
     pub source: Arc<SceneSource>,
     pub body: Body,
 }
@@ -56,28 +58,20 @@ pub(super) struct SecondLoops {
 
 impl SecondLoops {
     /// What its thread needs, and what the bridge needs.
-    pub fn join((loops, shared): (Self, SecondShared)) -> ((SecondLoop, StateBoard<SecondState>), SecondSetup) {
+    pub fn join((loops, board): (Self, Writer<SecondState>)) -> ((SecondLoop, Writer<SecondState>), SecondSetup) {
         let setup = SecondSetup {
             device: loops.info,
             ports: loops.bridge,
-            records: shared.records,
         };
-        ((loops.own, shared.board), setup)
+        ((loops.own, board), setup)
     }
 }
 
-/// The second device's place in shared memory.
-pub(super) struct SecondShared {
-    board: StateBoard<SecondState>,
-    records: SlicePublisher<SecondRecord, u64>,
-}
-
-/// The process's place in shared memory.
-pub(super) struct SharedMemory {
-    pub node: Node,
-    pub ports: Ports,
-    pub board: StateBoard,
-    pub second: Option<SecondShared>,
+/// The wall to the hosts, and the boards that the loops write.
+pub(super) struct Shown {
+    pub wall: Wall,
+    pub state: Writer<HapticState>,
+    pub second_state: Option<Writer<SecondState>>,
 }
 
 /// What the kernel granted the whole process.
@@ -112,41 +106,45 @@ impl Setup {
         let info = device.info();
         let active = activate(&ParameterSet::default(), &info)?;
         let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
+        let picture = ScenePicture::first(&scene, session_id);
+        let mut world = Box::new(World::new(scene, active.limits.clone(), 1)?);
+        let (writer, snapshots) = snapshot_board(&world.scene).map_err(RunError::Board)?;
+        world.shown = Some(writer);
         Ok(Self {
             session_id,
             info,
             second_info: second.as_ref().map(|second| second.info()),
-            picture: ScenePicture::first(&scene, session_id),
+            picture,
+            snapshots,
             source: Arc::new(SceneSource::Builtin(options.scene.clone())),
             body: Body {
                 device,
                 second,
-                world: Box::new(World::new(scene, active.limits.clone(), 1)?),
+                world,
                 active,
             },
         })
     }
 
-    pub fn open_shared_memory(&self, options: &Options) -> Result<SharedMemory, RunError> {
-        options.instance.sweep_dead();
-        let node = options.instance.node()?;
-        let (snapshot_len, words) = (self.picture.snapshot_size().total(), self.picture.word_count());
-        let ports = Ports::new(&node, snapshot_len, words)?;
-        let board = StateBoard::create(&node, self.session_id)?;
-        let second = self.second_info.map(|_| self.open_second_memory(&node)).transpose()?;
-        options.instance.secure_room()?;
-        Ok(SharedMemory {
-            node,
-            ports,
-            board,
-            second,
-        })
-    }
-
-    fn open_second_memory(&self, node: &Node) -> Result<SecondShared, RunError> {
-        Ok(SecondShared {
-            board: StateBoard::create(node, self.session_id)?,
-            records: service::second_records::publisher(node, service::MAX_BATCH)?,
+    /// Makes the boards and starts the bridge.
+    pub fn show(&self, owned: Owned, is_watched: &Arc<AtomicBool>) -> Result<Shown, RunError> {
+        let (state, memory) = Writer::new("stylet-state", 0).map_err(RunError::Board)?;
+        let second = self.second_info.map(|_| Writer::new("stylet-second-state", 0));
+        let (second_state, second_memory) = second.transpose().map_err(RunError::Board)?.unzip();
+        let start = Start {
+            session_id: self.session_id,
+            snapshot_len: self.snapshots.0.len,
+            word_count: self.picture.word_count() as u64,
+            has_second: u64::from(self.second_info.is_some()),
+        };
+        let boards = Boards {
+            state: memory,
+            second_state: second_memory,
+        };
+        Ok(Shown {
+            wall: Wall::new(owned, start, boards, Arc::clone(is_watched))?,
+            state,
+            second_state,
         })
     }
 }
@@ -173,6 +171,7 @@ impl Body {
         session_id: u64,
         source: &Arc<SceneSource>,
         probes: Option<Probes>,
+        is_watched: &Arc<AtomicBool>,
     ) -> Loops {
         let info = self.device.info();
         let real_time = if options.no_rt { 0 } else { flags::REAL_TIME };
@@ -184,6 +183,7 @@ impl Body {
         let haptic_tape = Box::new(HapticTape::new(&memory));
         let tissue_tape = Box::new(TissueTape::new(&self.world, Arc::clone(source)));
         let mut wiring = Wiring::new(Capacities::RUN, Some(haptic_tape), Some(tissue_tape));
+        wiring.tissue.is_watched = Arc::clone(is_watched);
         let seconds = |ns: u64| ns as f64 / 1e9;
         let second = self.second.zip(options.second.as_ref()).map(|(device, second)| {
             let info = device.info();

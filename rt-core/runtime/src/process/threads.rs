@@ -10,8 +10,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc;
 use std::thread::JoinHandle;
-use stylet_shm_schema::service::{OnBoard, StateBoard};
-use stylet_shm_schema::{SecondState, ThreadReport};
+use stylet_shm_schema::{HapticState, SecondState, ThreadReport};
+use stylet_wall::board::Writer;
 
 /// A loop's thread, and what the kernel granted it.
 struct Started {
@@ -31,9 +31,9 @@ impl Threads {
     /// Starts and arms all; none runs when one is refused.
     pub fn start(
         options: &Options,
-        (haptic, board): (HapticLoop, StateBoard),
+        (haptic, board): (HapticLoop, Writer<HapticState>),
         tissue: TissueLoop,
-        second: Option<(SecondLoop, StateBoard<SecondState>)>,
+        second: Option<(SecondLoop, Writer<SecondState>)>,
     ) -> Result<Self, RunError> {
         let ask = |priority, core| Ask {
             priority: (!options.no_rt).then_some(priority),
@@ -116,14 +116,14 @@ fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopRe
 
 fn run_with_device<L: DeviceLoop>(
     mut device_loop: L,
-    board: StateBoard<L::State>,
+    mut board: Writer<L::State>,
     armed: &Armed,
     end: &AtomicBool,
 ) -> LoopReport {
-    let publish = publisher(board);
+    let mut publish = |state: &L::State| board.write(|shown, _| *shown = *state);
     publish(device_loop.state());
     let start = Usage::now();
-    let sleeps = device_loop::run(&mut device_loop, armed, end, &publish);
+    let sleeps = device_loop::run(&mut device_loop, armed, end, publish);
     let usage = Usage::now().since(start);
     let counts = device_loop.counts();
     LoopReport {
@@ -133,16 +133,6 @@ fn run_with_device<L: DeviceLoop>(
         worst_wake_ns: counts.worst_wake_ns,
         sleeps,
         usage,
-    }
-}
-
-/// The writer is made in the thread that uses it; making it allocates, so it comes before the loop.
-fn publisher<T: OnBoard>(board: StateBoard<T>) -> impl Fn(&T) {
-    let writer = board.writer().ok();
-    move |state| {
-        if let Some(writer) = &writer {
-            writer.write(state);
-        }
     }
 }
 

@@ -11,8 +11,6 @@ pub struct Capacities {
     pub notices: usize,
     /// Scenes that the tissue loop has replaced.
     pub old_worlds: usize,
-    /// Snapshot slots in each direction.
-    pub snapshots: usize,
 }
 
 impl Capacities {
@@ -22,7 +20,6 @@ impl Capacities {
         orders: 256,
         notices: 1024,
         old_worlds: 8,
-        snapshots: 32,
     };
     /// Loops that are stepped on one thread: whoever steps them empties the rings after each tick.
     pub const STEPPED: Self = Self {
@@ -30,6 +27,5 @@ impl Capacities {
         orders: 16,
         notices: 64,
         old_worlds: 1,
-        snapshots: 1,
     };
 }

@@ -8,7 +8,6 @@ use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_hw::{DeviceFault, HandGoal, Sample};
 use stylet_shm_schema::Fault;
-use stylet_shm_schema::service::OnBoard;
 
 /// The hand is at its goal within this distance, at rest.
 const AT_GOAL_M: f64 = 4e-4;
@@ -28,7 +27,7 @@ pub struct Counts {
 /// A loop that owns a device.
 pub trait DeviceLoop {
     /// What hosts see of it.
-    type State: OnBoard;
+    type State: bytemuck::Pod + Send;
     /// What hosts see of it, after the newest tick.
     fn state(&self) -> &Self::State;
     /// Since the counters were last reset.
@@ -52,7 +51,12 @@ pub trait DeviceLoop {
 }
 
 /// Runs on the ideal grid until `stop`, then ramps the force to zero and ends. Returns how often it slept.
-pub fn run<L: DeviceLoop>(device_loop: &mut L, _armed: &Armed, stop: &AtomicBool, publish: impl Fn(&L::State)) -> u64 {
+pub fn run<L: DeviceLoop>(
+    device_loop: &mut L,
+    _armed: &Armed,
+    stop: &AtomicBool,
+    mut publish: impl FnMut(&L::State),
+) -> u64 {
     let period_ns = (device_loop.period_s() * 1e9).round() as u64;
     let phase_ns = clock::phase_ns(device_loop.phase(), period_ns);
     let mut grid = Grid::at_phase(clock::now_ns(), period_ns, phase_ns);

@@ -1,4 +1,4 @@
-//! What the bridge and the loops hand each other: orders, notices and snapshot slots, through wait-free rings.
+//! What the bridge and the loops hand each other: orders and notices, through wait-free rings.
 
 use crate::rt::probe_tape::ProbeTape;
 use crate::rt::tissue_tape::{LeftTape, TissueTape};
@@ -6,7 +6,7 @@ use crate::rt::world::World;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use stylet_hw::HandGoal;
-use stylet_shm_schema::{Fault, RefusalCode, SnapshotHeader, Vertex};
+use stylet_shm_schema::{Fault, RefusalCode};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::Limits;
 use stylet_sim::line::BodyLine;
@@ -234,32 +234,4 @@ pub enum Notice {
         /// Tick of the loop, from 1.
         tick: u64,
     },
-}
-
-/// Memory that the bridge loaned from shared memory for one snapshot.
-pub struct SnapshotSlot {
-    /// Number under which the slot goes back.
-    pub index: u32,
-    /// Scene that the slot was sized for.
-    pub scene_generation: u64,
-    /// Where the header goes.
-    pub header: *mut SnapshotHeader,
-    /// Where `vertex_count + node_count` vertices go.
-    pub vertices: *mut Vertex,
-    /// Vertices of the surface.
-    pub vertex_count: usize,
-    /// Nodes of the displacement grid, whose displacements follow the vertices.
-    pub node_count: usize,
-}
-
-// SAFETY: the bridge keeps the loan alive and does not touch the memory until the slot comes back through the
-// ring, so exactly one thread uses it at a time.
-unsafe impl Send for SnapshotSlot {}
-
-/// A slot on its way back to the bridge.
-pub struct SnapshotReturn {
-    /// Number of the slot.
-    pub index: u32,
-    /// False when the slot no longer fits the scene.
-    pub filled: bool,
 }

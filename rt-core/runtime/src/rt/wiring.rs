@@ -1,7 +1,7 @@
 //! Every ring and triple buffer between the two loops and the bridge: made here, in one call, and nowhere else.
 
 pub use crate::rt::capacities::Capacities;
-use crate::rt::exchange::{HapticOrder, Notice, SnapshotReturn, SnapshotSlot, TissueOrder};
+use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
 use crate::rt::haptic_tape::HapticTape;
 use crate::rt::line_loads::AllLoads;
 use crate::rt::outside::{Outside, OutsideTape};
@@ -11,6 +11,8 @@ use crate::rt::response::TissueResponse;
 use crate::rt::second::SecondTissuePorts;
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use stylet_shm_schema::TickRecord;
 use stylet_sim::line::{BodyLine, HandLine, LeftNeedles, MAX_LEFT};
 use stylet_sim::probe::BodyProbe;
@@ -72,10 +74,8 @@ pub struct TissuePorts {
     pub old_probes: rtrb::Producer<Box<BodyProbe>>,
     /// Forces on the line, of the force loop.
     pub loads: triple_buffer::Output<AllLoads>,
-    /// Loaned snapshot memory.
-    pub slots: rtrb::Consumer<SnapshotSlot>,
-    /// Loaned memory that goes back to the bridge.
-    pub filled: rtrb::Producer<SnapshotReturn>,
+    /// Somebody takes snapshots; without, none is made.
+    pub is_watched: Arc<AtomicBool>,
     /// Pose and contact of the second device, in a run that has one.
     pub second: Option<SecondTissuePorts>,
     /// Flight recording.
@@ -108,10 +108,6 @@ pub struct BridgePorts {
     pub old_body_lines: rtrb::Consumer<Box<BodyLine>>,
     /// Probes to be freed.
     pub old_probes: rtrb::Consumer<Box<BodyProbe>>,
-    /// Snapshot memory for the tissue loop.
-    pub slots: rtrb::Producer<SnapshotSlot>,
-    /// Snapshot memory that the tissue loop has returned.
-    pub filled: rtrb::Consumer<SnapshotReturn>,
     /// The force loop's tapes.
     pub haptic_tapes: TapePort<HapticTape>,
     /// The tissue loop's tapes.
@@ -152,8 +148,6 @@ impl Wiring {
         let (old_body_line_in, old_body_lines) = rtrb::RingBuffer::new(OLD_LINES);
         let (old_probe_in, old_probes) = rtrb::RingBuffer::new(OLD_PROBES);
         let (loads_in, loads_out) = triple_buffer::triple_buffer(&AllLoads::default());
-        let (slots, slot_out) = rtrb::RingBuffer::new(capacities.snapshots);
-        let (filled_in, filled) = rtrb::RingBuffer::new(capacities.snapshots);
         let (haptic_flight, haptic_tapes) = recorder(haptic_tape);
         let (tissue_flight, tissue_tapes) = recorder(tissue_tape);
         Self {
@@ -181,8 +175,7 @@ impl Wiring {
                 old_lines: old_body_line_in,
                 old_probes: old_probe_in,
                 loads: loads_out,
-                slots: slot_out,
-                filled: filled_in,
+                is_watched: Arc::default(),
                 second: None,
                 flight: tissue_flight,
             },
@@ -199,8 +192,6 @@ impl Wiring {
                 old_hand_lines,
                 old_body_lines,
                 old_probes,
-                slots,
-                filled,
                 haptic_tapes,
                 tissue_tapes,
             },

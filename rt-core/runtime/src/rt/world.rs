@@ -1,10 +1,12 @@
 //! The scene as the tissue loop owns it: built by another thread, swapped in whole.
 
+use stylet_shm_schema::{SnapshotHeader, Vertex};
 use stylet_sim::limits::Limits;
 use stylet_sim::migration::Migration;
 use stylet_sim::needle::LayerKind;
 use stylet_sim::scene::{Scene, TissueKind};
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, MaterialPoint, TissueModel};
+use stylet_wall::board::Writer;
 
 /// Why a tissue model cannot be set up: every problem, one a line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -27,6 +29,8 @@ pub struct World {
     pub migration: Migration,
     /// Tissue near the tip is looked at and opened where it folds. Seeds and forces are the same without, and the tissue loop is faster.
     pub looks_near_tip: bool,
+    /// Where snapshots go, in a run that shows any.
+    pub shown: Option<Writer<SnapshotHeader, Vertex>>,
 }
 
 impl World {
@@ -47,6 +51,7 @@ impl World {
             limits,
             migration: Migration::default(),
             looks_near_tip: true,
+            shown: None,
         })
     }
 

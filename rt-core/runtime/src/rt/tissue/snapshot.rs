@@ -1,10 +1,10 @@
-//! Snapshots of the deformed body, written straight into the shared memory that the bridge has loaned.
+//! Snapshots of the deformed body, written straight into the memory that the bridge reads.
 
 use super::TissueLoop;
 use crate::rt::clock;
-use crate::rt::exchange::{SnapshotReturn, SnapshotSlot};
 use crate::rt::seed;
 use nalgebra::Vector3;
+use std::sync::atomic::Ordering;
 use stylet_shm_schema::{LeftNeedlePose, MAX_BEND_POINTS, MAX_SEEDS, SnapshotHeader, Vertex};
 use stylet_sim::line::MAX_LEFT;
 use stylet_sim::tissue::StepReport;
@@ -60,22 +60,17 @@ impl TissueLoop {
         if !self.is_snapshot_due(&now) {
             return;
         }
-        while let Ok(slot) = self.ports.slots.pop() {
-            let filled = slot.scene_generation == self.world.generation
-                && slot.vertex_count == self.world.scene.surface.vertex_elements.len()
-                && slot.node_count == self.world.scene.nodes.elements.len();
-            if filled {
-                self.fill(&slot, woke_ns, work_ns, report, now.is_displaced);
-            }
-            let _ = self.ports.filled.push(SnapshotReturn {
-                index: slot.index,
-                filled,
-            });
-            if filled {
-                self.shown = now;
-                return;
-            }
+        // SYNC: stored by the bridge's thread; nothing but the flag is carried.
+        if !self.ports.is_watched.load(Ordering::Relaxed) {
+            return;
         }
+        // Taken out for the while, since it is filled from the rest of the world.
+        let Some(mut board) = self.world.shown.take() else {
+            return;
+        };
+        board.write(|header, vertices| self.fill(header, vertices, (woke_ns, work_ns), report, now.is_displaced));
+        self.world.shown = Some(board);
+        self.shown = now;
     }
 
     /// Also where that is no number.
@@ -84,15 +79,19 @@ impl TissueLoop {
         report.max_displacement != 0.0 || body.carried.largest_m(body.lattice.spacing_m) != 0.0
     }
 
-    fn fill(&self, slot: &SnapshotSlot, woke_ns: u64, work_ns: u64, report: &StepReport, is_displaced: bool) {
-        let sent = slot.vertex_count + slot.node_count;
-        // SAFETY: the bridge loaned `vertex_count + node_count` vertices at this address to us alone and keeps them mapped
-        // until the slot is returned; they were zeroed, and Vertex is valid for every bit pattern.
-        let vertices = unsafe { std::slice::from_raw_parts_mut(slot.vertices, sent) };
+    fn fill(
+        &self,
+        header: &mut SnapshotHeader,
+        vertices: &mut [Vertex],
+        (woke_ns, work_ns): (u64, u64),
+        report: &StepReport,
+        is_displaced: bool,
+    ) {
+        let vertex_count = self.world.scene.surface.vertex_elements.len();
         let body = self.world.tissue.deformed();
-        // Both always succeed: a vertex is three f32, and there are at least `vertex_count`.
+        // Both always succeed: a vertex is three f32, and the board was made for this scene.
         if let Ok(positions) = bytemuck::try_cast_slice_mut::<Vertex, [f32; 3]>(vertices)
-            && let Some((surface, inside)) = positions.split_at_mut_checked(slot.vertex_count)
+            && let Some((surface, inside)) = positions.split_at_mut_checked(vertex_count)
         {
             let scene = &self.world.scene;
             if is_displaced {
@@ -107,8 +106,6 @@ impl TissueLoop {
             }
             self.move_with_body(surface, inside);
         }
-        // SAFETY: as above, for the header.
-        let header = unsafe { &mut *slot.header };
         let spacing_m = self.world.scene.body.spacing_m;
         *header = SnapshotHeader {
             session_id: self.session_id,
@@ -125,8 +122,8 @@ impl TissueLoop {
             moved_elements: report.moved,
             held_element: self.held.map_or(u32::MAX, |h| h.element),
             phase: self.pose.phase.code(),
-            vertex_count: slot.vertex_count as u32,
-            node_count: slot.node_count as u32,
+            vertex_count: vertex_count as u32,
+            node_count: self.world.scene.nodes.elements.len() as u32,
             bend_count: 0,
             bend_spacing_m: 0.0,
             bend_m: [[0.0; 3]; MAX_BEND_POINTS],

@@ -1,19 +1,24 @@
 //! What a program holds of a service. Behind each port stands a trait object, so that iceoryx2, which is generic through
 //! and through, is compiled for this crate alone (ADR 19), and so that no other crate can make a port in another way.
 
-use super::Ipc;
-use bytemuck::Zeroable;
+use super::wire::Wire;
+use super::{Ipc, ServiceError, failed};
+use bytemuck::{Pod, TransparentWrapper};
+use iceoryx2::config::Config;
 use iceoryx2::node;
+use iceoryx2::node::NodeBuilder;
 use iceoryx2::port::publisher::PublisherCreateError;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::port::{publisher, subscriber};
-use iceoryx2::prelude::ZeroCopySend;
+use iceoryx2::prelude::{FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level};
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::Service;
 use iceoryx2::service::dynamic_config::publish_subscribe::DynamicConfig;
 use std::cell::{Cell, RefCell};
 use std::fmt::Debug;
+use std::time::Duration;
+use stylet_shm_schema::{Attendance, Epoch, Instance, Owned};
 
 /// Why something could not be sent.
 #[derive(Debug, thiserror::Error)]
@@ -26,8 +31,13 @@ impl SendError {
     }
 }
 
-/// A program's place in shared memory; every port is made on one, and goes before it.
-pub struct Node(Box<dyn InnerNode + Send>);
+/// A program's place in the shared memory of an epoch; every port is made on one, and goes before it.
+pub struct Node {
+    inner: Box<dyn InnerNode + Send>,
+    epoch: Epoch,
+    is_again: bool,
+    _attendance: Option<Attendance>,
+}
 
 trait InnerNode {
     fn inner(&self) -> &node::Node<Ipc>;
@@ -40,18 +50,110 @@ impl InnerNode for node::Node<Ipc> {
 }
 
 impl Node {
-    pub(super) fn new(node: node::Node<Ipc>) -> Self {
-        Self(Box::new(node))
+    /// For a host: in the epoch that the owner of `instance` has announced.
+    pub fn join(instance: &Instance) -> Result<Self, ServiceError> {
+        let epoch = instance.epoch().ok_or_else(|| ServiceError::absent(instance))?;
+        let attendance = instance.attend()?;
+        let mut node = Self::open(epoch)?;
+        node._attendance = Some(attendance);
+        Ok(node)
+    }
+
+    /// The same for a host that was in an earlier epoch of the run: what it may have missed is sent to it again.
+    pub fn join_again(instance: &Instance) -> Result<Self, ServiceError> {
+        Self::join(instance).map(|node| Self { is_again: true, ..node })
+    }
+
+    /// For the program that makes the ports of the core in `epoch`.
+    pub fn open(epoch: Epoch) -> Result<Self, ServiceError> {
+        set_log_level(LogLevel::Fatal);
+        let free = free_bytes();
+        if free < MIN_ROOM_BYTES {
+            return Err(failed("shared memory is full", format!("{free} bytes left")));
+        }
+        let inner = NodeBuilder::new()
+            .config(&config(&epoch)?)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<Ipc>()
+            .map_err(|e| failed("cannot use shared memory", e))?;
+        Ok(Self {
+            inner: Box::new(inner),
+            epoch,
+            is_again: false,
+            _attendance: None,
+        })
     }
 
     pub(super) fn inner(&self) -> &node::Node<Ipc> {
-        self.0.inner()
+        self.inner.inner()
+    }
+
+    pub(super) fn is_again(&self) -> bool {
+        self.is_again
+    }
+
+    /// The epoch that it is in.
+    pub fn epoch(&self) -> &Epoch {
+        &self.epoch
+    }
+
+    /// Whether its epoch is that which hosts join now: if not, everything on it goes nowhere.
+    pub fn is_current(&self) -> bool {
+        self.epoch.instance().epoch().as_ref() == Some(&self.epoch)
     }
 
     /// Frees what programs that died have left.
     pub fn clean_up(&self) {
         // What another program cleans at the same time is left to it.
         let _ = self.inner().try_cleanup_dead_nodes();
+    }
+}
+
+/// The place of the core in an instance, for the program that makes its ports itself: a relay, or a test.
+pub struct Meeting {
+    /// On which the ports are made.
+    pub node: Node,
+    owned: Owned,
+}
+
+impl Meeting {
+    /// Makes this program the owner of `instance`; hosts do not come yet.
+    pub fn new(instance: &Instance) -> Result<Self, ServiceError> {
+        let owned = instance.own()?;
+        let node = Node::open(owned.begin()?)?;
+        Ok(Self { node, owned })
+    }
+
+    /// Lets hosts in, once every port of the core is there.
+    pub fn open(&self) -> Result<(), ServiceError> {
+        self.node.epoch.secure()?;
+        Ok(self.owned.announce(&self.node.epoch)?)
+    }
+}
+
+fn config(epoch: &Epoch) -> Result<Config, ServiceError> {
+    let mut config = Config::default();
+    let root = epoch.root();
+    let root = Path::new(root.as_os_str().as_encoded_bytes()).map_err(|e| failed("root path", e))?;
+    config.global.set_root_path(&root);
+    config.global.prefix = FileName::new(epoch.prefix().as_bytes()).map_err(|e| failed("prefix", e))?;
+    config.global.creation_timeout = Duration::from_millis(20);
+    Ok(config)
+}
+
+/// Less than this, and even the first objects of a program might not fit.
+const MIN_ROOM_BYTES: u64 = 4 << 20;
+
+/// Free memory in `/dev/shm`; all there could be when the kernel does not say.
+fn free_bytes() -> u64 {
+    // SAFETY: an all-zero statvfs is valid.
+    let mut stat: libc::statvfs = unsafe { std::mem::zeroed() };
+    // SAFETY: the path ends in a zero byte and `stat` is valid for writes.
+    let failed = unsafe { libc::statvfs(c"/dev/shm".as_ptr(), &mut stat) };
+    if failed == 0 {
+        stat.f_bavail * stat.f_frsize
+    } else {
+        u64::MAX
     }
 }
 
@@ -79,7 +181,7 @@ trait Sends<T> {
 }
 
 trait Receives<T> {
-    fn receive(&self) -> Option<T>;
+    fn receive(&self) -> Option<(u128, T)>;
 }
 
 trait SendsSlices<T, H> {
@@ -102,9 +204,9 @@ trait Loaned<T, H> {
     fn send(self: Box<Self>) -> Result<usize, SendError>;
 }
 
-impl<T: ZeroCopySend + Debug + Copy + 'static> Sends<T> for publisher::Publisher<Ipc, T, ()> {
+impl<T: Pod + Debug> Sends<T> for publisher::Publisher<Ipc, Wire<T>, ()> {
     fn send(&self, value: T) -> Result<usize, SendError> {
-        self.send_copy(value).map_err(SendError::of)
+        self.send_copy(Wire(value)).map_err(SendError::of)
     }
 
     fn connect(&self) {
@@ -113,25 +215,26 @@ impl<T: ZeroCopySend + Debug + Copy + 'static> Sends<T> for publisher::Publisher
     }
 }
 
-impl<T: ZeroCopySend + Debug + Copy + 'static> Receives<T> for subscriber::Subscriber<Ipc, T, ()> {
-    fn receive(&self) -> Option<T> {
-        self.receive().ok().flatten().map(|sample| *sample)
+impl<T: Pod + Debug> Receives<T> for subscriber::Subscriber<Ipc, Wire<T>, ()> {
+    fn receive(&self) -> Option<(u128, T)> {
+        let sample = self.receive().ok().flatten()?;
+        Some((sample.origin().value(), sample.0))
     }
 }
 
 /// A port whose memory is taken once. A slice that is longer than those before it gets a port of its own, which takes its
 /// place: a port of iceoryx2 0.10 that grows ends the program as soon as more slices are held than it began with.
-struct Growing<T: ZeroCopySend + Debug + 'static, H: ZeroCopySend + Debug + 'static, F> {
-    port: RefCell<publisher::Publisher<Ipc, [T], H>>,
+struct Growing<T: Pod + Debug, H: Pod + Debug, F> {
+    port: RefCell<publisher::Publisher<Ipc, [Wire<T>], Wire<H>>>,
     length: Cell<usize>,
     make: F,
 }
 
 impl<T, H, F> Growing<T, H, F>
 where
-    T: ZeroCopySend + Debug + Copy + Zeroable + 'static,
-    H: ZeroCopySend + Debug + Copy + Default + 'static,
-    F: Fn(usize) -> Result<publisher::Publisher<Ipc, [T], H>, PublisherCreateError>,
+    T: Pod + Debug,
+    H: Pod + Debug + Default,
+    F: Fn(usize) -> Result<publisher::Publisher<Ipc, [Wire<T>], Wire<H>>, PublisherCreateError>,
 {
     fn make_room(&self, length: usize) -> Result<(), SendError> {
         if length > self.length.get() {
@@ -145,22 +248,25 @@ where
 
 impl<T, H, F> SendsSlices<T, H> for Growing<T, H, F>
 where
-    T: ZeroCopySend + Debug + Copy + Zeroable + 'static,
-    H: ZeroCopySend + Debug + Copy + Default + 'static,
-    F: Fn(usize) -> Result<publisher::Publisher<Ipc, [T], H>, PublisherCreateError>,
+    T: Pod + Debug,
+    H: Pod + Debug + Default,
+    F: Fn(usize) -> Result<publisher::Publisher<Ipc, [Wire<T>], Wire<H>>, PublisherCreateError>,
 {
     fn send(&self, header: &H, values: &[T]) -> Result<usize, SendError> {
         self.make_room(values.len())?;
         let port = self.port.borrow();
         let mut sample = port.loan_slice_uninit(values.len()).map_err(SendError::of)?;
-        *sample.user_header_mut() = *header;
-        sample.write_from_slice(values).send().map_err(SendError::of)
+        *sample.user_header_mut() = Wire(*header);
+        sample
+            .write_from_slice(Wire::wrap_slice(values))
+            .send()
+            .map_err(SendError::of)
     }
 
     fn loan(&self, length: usize) -> Option<Loan<T, H>> {
         self.make_room(length).ok()?;
         let slice = self.port.borrow().loan_slice_uninit(length).ok()?;
-        Some(Loan(Box::new(slice.write_from_fn(|_| T::zeroed()))))
+        Some(Loan(Box::new(slice.write_from_fn(|_| Wire(T::zeroed())))))
     }
 
     fn connect(&self) {
@@ -169,38 +275,38 @@ where
     }
 }
 
-impl<T, H> ReceivesSlices<T, H> for subscriber::Subscriber<Ipc, [T], H>
+impl<T, H> ReceivesSlices<T, H> for subscriber::Subscriber<Ipc, [Wire<T>], Wire<H>>
 where
-    T: ZeroCopySend + Debug + 'static,
-    H: ZeroCopySend + Debug + 'static,
+    T: Pod + Debug,
+    H: Pod + Debug,
 {
     fn receive(&self) -> Option<Slice<T, H>> {
         Some(Slice(Box::new(self.receive().ok().flatten()?)))
     }
 }
 
-impl<T, H> Held<T, H> for Sample<Ipc, [T], H>
+impl<T, H> Held<T, H> for Sample<Ipc, [Wire<T>], Wire<H>>
 where
-    T: ZeroCopySend + Debug,
-    H: ZeroCopySend + Debug,
+    T: Pod + Debug,
+    H: Pod + Debug,
 {
     fn header(&self) -> &H {
-        self.user_header()
+        &self.user_header().0
     }
 
     fn values(&self) -> &[T] {
-        self.payload()
+        Wire::peel_slice(self.payload())
     }
 }
 
-impl<T, H> Loaned<T, H> for SampleMut<Ipc, [T], H>
+impl<T, H> Loaned<T, H> for SampleMut<Ipc, [Wire<T>], Wire<H>>
 where
-    T: ZeroCopySend + Debug,
-    H: ZeroCopySend + Debug,
+    T: Pod + Debug,
+    H: Pod + Debug,
 {
     fn parts(&mut self) -> (*mut H, *mut T) {
-        let header: *mut H = self.user_header_mut();
-        (header, self.payload_mut().as_mut_ptr())
+        let header: *mut H = &raw mut self.user_header_mut().0;
+        (header, Wire::peel_slice_mut(self.payload_mut()).as_mut_ptr())
     }
 
     fn send(self: Box<Self>) -> Result<usize, SendError> {
@@ -209,9 +315,9 @@ where
 }
 
 impl<T> Publisher<T> {
-    pub(super) fn new(port: publisher::Publisher<Ipc, T, ()>) -> Self
+    pub(super) fn new(port: publisher::Publisher<Ipc, Wire<T>, ()>) -> Self
     where
-        T: ZeroCopySend + Debug + Copy + 'static,
+        T: Pod + Debug,
     {
         Self(Box::new(port))
     }
@@ -228,28 +334,33 @@ impl<T> Publisher<T> {
 }
 
 impl<T> Subscriber<T> {
-    pub(super) fn new(port: subscriber::Subscriber<Ipc, T, ()>) -> Self
+    pub(super) fn new(port: subscriber::Subscriber<Ipc, Wire<T>, ()>) -> Self
     where
-        T: ZeroCopySend + Debug + Copy + 'static,
+        T: Pod + Debug,
     {
         Self(Box::new(port))
     }
 
     /// The next value; none where there is none, or none can be had.
     pub fn receive(&self) -> Option<T> {
+        self.receive_from().map(|(_, value)| value)
+    }
+
+    /// The same, with the number of the port that sent it, which no program can choose.
+    pub fn receive_from(&self) -> Option<(u128, T)> {
         self.0.receive()
     }
 }
 
 impl<T, H> SlicePublisher<T, H>
 where
-    T: ZeroCopySend + Debug + Copy + Zeroable + 'static,
-    H: ZeroCopySend + Debug + Copy + Default + 'static,
+    T: Pod + Debug,
+    H: Pod + Debug + Default,
 {
     /// `make` makes a port for slices of at most so many values.
     pub(super) fn new(
         length: usize,
-        make: impl Fn(usize) -> Result<publisher::Publisher<Ipc, [T], H>, PublisherCreateError> + 'static,
+        make: impl Fn(usize) -> Result<publisher::Publisher<Ipc, [Wire<T>], Wire<H>>, PublisherCreateError> + 'static,
     ) -> Result<Self, PublisherCreateError> {
         Ok(Self(Box::new(Growing {
             port: RefCell::new(make(length)?),
@@ -277,10 +388,10 @@ impl<T, H> SlicePublisher<T, H> {
 }
 
 impl<T, H> SliceSubscriber<T, H> {
-    pub(super) fn new(port: subscriber::Subscriber<Ipc, [T], H>) -> Self
+    pub(super) fn new(port: subscriber::Subscriber<Ipc, [Wire<T>], Wire<H>>) -> Self
     where
-        T: ZeroCopySend + Debug + 'static,
-        H: ZeroCopySend + Debug + 'static,
+        T: Pod + Debug,
+        H: Pod + Debug,
     {
         Self(Box::new(port))
     }

@@ -2,46 +2,57 @@
 //!
 //! Each service has one way to make its ports. Nobody else makes any: no other crate knows iceoryx2.
 
-use crate::*;
+#![warn(missing_docs)]
+
 use iceoryx2::prelude::{BackpressureStrategy, ServiceName};
 use iceoryx2::service::ipc;
 use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
-use std::time::Duration;
+use stylet_shm_schema::*;
+use wire::Wire;
 
 mod board;
-mod instance;
 mod ports;
-mod sweep;
+mod wire;
 
-pub use board::{OnBoard, StateBoard, StateReader, StateWriter};
-pub use instance::Instance;
+pub use board::{OnBoard, StateReader, StateWriter};
 pub use ports::{
-    Connected, Loan, Node, Publisher, SendError, Slice, SlicePublisher, SliceSubscriber, Subscriber, Watch,
+    Connected, Loan, Meeting, Node, Publisher, SendError, Slice, SlicePublisher, SliceSubscriber, Subscriber, Watch,
 };
 
 /// The form of service that all programs use.
 type Ipc = ipc::Service;
 
-/// Records in one batch at most.
-pub const MAX_BATCH: usize = 32;
-/// A batch that is not full is sent after this time, so that the queue of batches holds a known time.
-pub const BATCH_EVERY: Duration = Duration::from_millis(20);
-/// Batches that a slow host may be behind before the oldest is dropped: 12 s. The memory for all hosts is 35 MB in `/dev/shm`.
-pub const RECORD_BUFFER: usize = 600;
-/// Snapshots that the bridge loans ahead.
-pub const SNAPSHOTS_AHEAD: usize = 4;
-/// Hosts at once.
-pub const MAX_HOSTS: usize = 6;
-
 /// Why shared memory could not be used; the text says what to do.
 #[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct ServiceError(pub String);
+pub enum ServiceError {
+    /// The folder of the instance cannot be used.
+    #[error(transparent)]
+    Instance(#[from] InstanceError),
+    /// No core runs under that name.
+    #[error("no rt-core is running (instance \"{0}\"). Start it in another terminal: rt-core{flag}", flag = flag(.0))]
+    Absent(String),
+    /// A port, or the memory behind it.
+    #[error("{0}")]
+    Port(String),
+}
+
+impl ServiceError {
+    fn absent(instance: &Instance) -> Self {
+        Self::Absent(instance.name().to_owned())
+    }
+}
+
+fn flag(name: &str) -> String {
+    match name == Instance::default().name() {
+        true => String::new(),
+        false => format!(" --instance {name}"),
+    }
+}
 
 fn failed(what: &str, why: impl std::fmt::Debug) -> ServiceError {
-    ServiceError(format!(
-        "{what}: {why:?}. Both programs must run as the same user and come from the same build, and /dev/shm needs room (df -h /dev/shm)"
+    ServiceError::Port(format!(
+        "{what}: {why:?}. Both programs must come from the same build, and /dev/shm needs room (df -h /dev/shm)"
     ))
 }
 
@@ -82,7 +93,7 @@ impl By {
 
 /// Why a port of the core, or of a relay in its place, could not be made.
 fn core_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
-    ServiceError(format!(
+    ServiceError::Port(format!(
         "cannot use shared memory: {service}: {why:?}. Is another rt-core or relay running under this instance name? Choose another with \
          --instance"
     ))
@@ -90,27 +101,28 @@ fn core_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
 
 /// Why a port of a host could not be made.
 fn host_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
-    ServiceError(format!(
+    ServiceError::Port(format!(
         "{service}: {why:?}. At most {MAX_HOSTS} hosts can watch one core; close another window, or check the room in /dev/shm"
     ))
 }
 
+// `history`: how many of the last a host gets that joins; `again`: that joins again, after the ports were made anew beneath it.
 macro_rules! service {
-    ($(#[$doc:meta])* $module:ident: $value:ty, by $who:ident, history $history:expr, buffer $buffer:expr) => {
+    ($(#[$doc:meta])* $module:ident: $value:ty, by $who:ident, history $history:expr, again $again:expr, buffer $buffer:expr) => {
         $(#[$doc])*
         pub mod $module {
             use super::*;
 
             const NAME: &str = stringify!($module);
 
-            fn open(node: &Node) -> Result<PortFactory<Ipc, $value, ()>, ServiceError> {
+            fn open(node: &Node) -> Result<PortFactory<Ipc, Wire<$value>, ()>, ServiceError> {
                 node.inner()
                     .service_builder(&name(NAME)?)
-                    .publish_subscribe::<$value>()
+                    .publish_subscribe::<Wire<$value>>()
                     .max_publishers(By::$who.publishers())
                     .max_subscribers(MAX_HOSTS + 2)
                     .max_nodes(MAX_HOSTS + 4)
-                    .history_size($history)
+                    .history_size($again)
                     .subscriber_max_buffer_size($buffer)
                     .open_or_create()
                     .map_err(|e| failed(NAME, e))
@@ -130,6 +142,7 @@ macro_rules! service {
             pub fn subscriber(node: &Node) -> Result<Subscriber<$value>, ServiceError> {
                 open(node)?
                     .subscriber_builder()
+                    .history_request(if node.is_again() { $again } else { $history })
                     .create()
                     .map(Subscriber::new)
                     .map_err(|e| By::$who.subscriber_failed(NAME, e))
@@ -144,8 +157,8 @@ macro_rules! service {
     };
     (
         $(#[$doc:meta])*
-        $module:ident: [$value:ty] under $header:ty, by $who:ident, history $history:expr, buffer $buffer:expr,
-        loans $loans:expr, kept $kept:expr
+        $module:ident: [$value:ty] under $header:ty, by $who:ident, history $history:expr, again $again:expr,
+        buffer $buffer:expr, loans $loans:expr, kept $kept:expr
     ) => {
         $(#[$doc])*
         pub mod $module {
@@ -153,16 +166,16 @@ macro_rules! service {
 
             const NAME: &str = stringify!($module);
 
-            fn open(node: &Node) -> Result<PortFactory<Ipc, [$value], $header>, ServiceError> {
+            fn open(node: &Node) -> Result<PortFactory<Ipc, [Wire<$value>], Wire<$header>>, ServiceError> {
                 node.inner()
                     .service_builder(&name(NAME)?)
-                    .publish_subscribe::<[$value]>()
-                    .user_header::<$header>()
+                    .publish_subscribe::<[Wire<$value>]>()
+                    .user_header::<Wire<$header>>()
                     // One more, while one takes the place of another.
                     .max_publishers(By::$who.publishers() + 1)
                     .max_subscribers(MAX_HOSTS + 2)
                     .max_nodes(MAX_HOSTS + 4)
-                    .history_size($history)
+                    .history_size($again)
                     .subscriber_max_buffer_size($buffer)
                     .open_or_create()
                     .map_err(|e| failed(NAME, e))
@@ -188,6 +201,7 @@ macro_rules! service {
             pub fn subscriber(node: &Node) -> Result<SliceSubscriber<$value, $header>, ServiceError> {
                 open(node)?
                     .subscriber_builder()
+                    .history_request(if node.is_again() { $again } else { $history })
                     .create()
                     .map(SliceSubscriber::new)
                     .map_err(|e| By::$who.subscriber_failed(NAME, e))
@@ -204,67 +218,73 @@ macro_rules! service {
 
 service!(
     /// Which run this is: [`Session`].
-    session: Session, by Core, history 1, buffer 2);
+    session: Session, by Core, history 1, again 1, buffer 2);
 service!(
     /// What happened: [`Event`].
-    events: Event, by Core, history 64, buffer 512);
+    events: Event, by Core, history 64, again 64, buffer 512);
 service!(
     /// Parameters that took effect: [`ParametersInForce`].
-    parameters: ParametersInForce, by Core, history 1, buffer 2);
+    parameters: ParametersInForce, by Core, history 1, again 1, buffer 2);
 service!(
     /// The plan: [`PlanInForce`].
-    plan: PlanInForce, by Core, history 1, buffer 2);
+    plan: PlanInForce, by Core, history 1, again 1, buffer 2);
 service!(
     /// Requests of hosts: [`Command`].
-    commands: Command, by Hosts, history 0, buffer 64);
+    commands: Command, by Hosts, history 0, again 0, buffer 64);
+service!(
+    /// Requests that take force or motion away, beside the same in `commands`: no flood there keeps them from being read.
+    stops: Command, by Hosts, history 0, again 0, buffer 8);
 service!(
     /// Answers to them: [`Reply`].
-    replies: Reply, by Core, history 0, buffer 128);
+    replies: Reply, by Core, history 0, again 128, buffer 128);
 service!(
     /// Results of rehearsals: [`Rehearsal`].
-    rehearsals: Rehearsal, by Core, history 0, buffer 8);
+    rehearsals: Rehearsal, by Core, history 0, again 8, buffer 8);
 service!(
     /// The line to a core on another machine: [`Relayed`].
-    relayed: Relayed, by Core, history 1, buffer 2);
+    relayed: Relayed, by Core, history 1, again 1, buffer 2);
 service!(
     /// Who is connected over a relay: [`Class`].
-    class: Class, by Core, history 1, buffer 2);
+    class: Class, by Core, history 1, again 1, buffer 2);
 service!(
     /// What hosts ask of the needle's lease: [`LeaseOrder`].
-    lease: LeaseOrder, by Hosts, history 0, buffer 8);
+    lease: LeaseOrder, by Hosts, history 0, again 0, buffer 8);
 service!(
     /// Every tick of the force loop; the header is the run of the core.
-    records: [TickRecord] under u64, by Core, history 0, buffer RECORD_BUFFER, loans 2, kept |all| all);
+    records: [TickRecord] under u64, by Core, history 0, again RECORD_BUFFER, buffer RECORD_BUFFER,
+    loans 2, kept |all| all);
 service!(
     /// Every tick of the second device's loop, in a run that has one; the header is the run of the core.
-    second_records: [SecondRecord] under u64, by Core, history 0, buffer RECORD_BUFFER, loans 2, kept |all| all);
+    second_records: [SecondRecord] under u64, by Core, history 0, again RECORD_BUFFER, buffer RECORD_BUFFER,
+    loans 2, kept |all| all);
 
 // Slices that memory is taken for: iceoryx2 would take enough for every host to hold every slice that it may, hundreds of MB of
 // locked memory for a large scene. Two wait in the queues; beside them stand what is being filled and one for each host that
 // stopped while it read. When all are held, nothing is sent until one returns.
 service!(
     /// The deformed surface and displacements inside.
-    snapshots: [Vertex] under SnapshotHeader, by Core, history 1, buffer 2,
-    loans 2 * SNAPSHOTS_AHEAD, kept |_| 2 * SNAPSHOTS_AHEAD + 2 + MAX_HOSTS);
+    snapshots: [Vertex] under SnapshotHeader, by Core, history 1, again 1, buffer 2,
+    loans 2, kept |_| 4 + MAX_HOSTS);
 service!(
     /// Rest surface, structures and labels; sent again under a new generation when the scene changes.
-    scene: [u32] under SceneHeader, by Core, history 1, buffer 2, loans 2, kept |_| 6);
+    scene: [u32] under SceneHeader, by Core, history 1, again 1, buffer 2, loans 2, kept |_| 6);
 service!(
     /// Volumes that hosts send, each through a port of its own: its memory is as large as the volume, and the core maps all of it.
-    uploads: [u8] under UploadHeader, by Hosts, history 0, buffer 2, loans 2, kept |_| 2);
+    uploads: [u8] under UploadHeader, by Hosts, history 0, again 0, buffer 2, loans 2, kept |_| 2);
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
-    /// Each pass of the bridge sent a batch: the queue held 0.13 s of them, and a recorder that stalled for longer lost ticks.
     /// A port that grew ended the core when a host had stopped while it read: more slices were held than it began with.
     #[test]
     fn slices_that_nobody_returns_are_refused_and_longer_ones_find_room() {
         let instance = Instance::new(&format!("held-{}", std::process::id())).unwrap();
-        let node = instance.node().unwrap();
-        let sends = scene::publisher(&node, 4).unwrap();
-        let takes: Vec<_> = (0..4).map(|_| scene::subscriber(&node).unwrap()).collect();
+        let meeting = Meeting::new(&instance).unwrap();
+        let node = &meeting.node;
+        let sends = scene::publisher(node, 4).unwrap();
+        let takes: Vec<_> = (0..4).map(|_| scene::subscriber(node).unwrap()).collect();
         sends.connect();
         let header = SceneHeader::default();
         let mut held = Vec::new();
@@ -284,17 +304,16 @@ mod tests {
                 assert_eq!(take.receive().unwrap().values(), vec![7; length]);
             }
         }
-        drop((sends, takes, node));
-        instance.sweep();
     }
 
+    /// Each pass of the bridge sent a batch: the queue held 0.13 s of them, and a recorder that stalled for longer lost ticks.
     #[test]
     fn a_host_that_stalls_for_ten_seconds_loses_no_record() {
         let held = BATCH_EVERY * RECORD_BUFFER as u32;
         assert!(held >= Duration::from_secs(10), "{held:?}");
         // Full batches, sent without a pause, hold at least as much at 1 kHz.
         assert!(Duration::from_millis(MAX_BATCH as u64) >= BATCH_EVERY);
-        let bytes = (MAX_HOSTS + 2) * (RECORD_BUFFER + 4) * MAX_BATCH * size_of::<TickRecord>();
-        assert!(bytes < 38_000_000, "{bytes} bytes in /dev/shm");
+        let bytes = ((MAX_HOSTS + 2) * (RECORD_BUFFER + 4) + RECORD_BUFFER) * MAX_BATCH * size_of::<TickRecord>();
+        assert!(bytes < 43_000_000, "{bytes} bytes in /dev/shm");
     }
 }

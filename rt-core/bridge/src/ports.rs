@@ -1,0 +1,234 @@
+//! Every port of the core, and what goes through each.
+
+use std::os::fd::{AsFd, BorrowedFd};
+use stylet_ports::{
+    self as service, Node, Publisher, SendError, ServiceError, SlicePublisher, SliceSubscriber, StateWriter,
+    Subscriber, Watch,
+};
+use stylet_shm_schema::*;
+use stylet_wall::board::Reader;
+use stylet_wall::packet::{Closed, Kind, Packet, Socket, Start, sealed, unsealed};
+
+/// Requests of one port that are handed on in a pass. More are refused, so that a flood reaches neither loop. By port, since a
+/// host may call itself anything.
+const MAX_OF_A_PORT: u32 = 16;
+/// Refusals for that reason that are answered in one pass, the others are counted: every host has all answers in its queue, and
+/// those to one that floods would drive out those to the others.
+const MAX_ANSWERED: u32 = 4;
+/// Requests taken from the queues in one pass. Queues are read one after the other, so that a host that fills its own faster than
+/// it is read would keep the core from those behind it; one that is counted alone takes less time than one that is handed on.
+const MAX_TAKEN: usize = 4096;
+
+/// One port for each service of the core; [`service`] says what each holds.
+pub struct Ports {
+    session_id: u64,
+    session: Publisher<Session>,
+    events: Publisher<Event>,
+    parameters: Publisher<ParametersInForce>,
+    plan: Publisher<PlanInForce>,
+    replies: Publisher<Reply>,
+    rehearsals: Publisher<Rehearsal>,
+    records: SlicePublisher<TickRecord, u64>,
+    snapshots: SlicePublisher<Vertex, SnapshotHeader>,
+    /// What the snapshots of the scene are copied from, and how long each is.
+    shown: Option<(Reader<SnapshotHeader, Vertex>, usize)>,
+    viewers: Watch,
+    scene: SlicePublisher<u32, SceneHeader>,
+    commands: Subscriber<Command>,
+    stops: Subscriber<Command>,
+    uploads: SliceSubscriber<u8, UploadHeader>,
+    /// Taken from a queue when the force process had no room for it.
+    held: Option<Command>,
+    /// Requests that were refused here.
+    pub refused: u64,
+    /// The latest tick.
+    pub state: StateWriter<HapticState>,
+    /// In a run with a second device.
+    pub second: Option<Second>,
+    /// Goes last.
+    pub node: Node,
+}
+
+/// Ports of the second device.
+pub struct Second {
+    /// Its latest tick.
+    pub state: StateWriter<SecondState>,
+    records: SlicePublisher<SecondRecord, u64>,
+}
+
+impl Ports {
+    pub fn new(epoch: &Epoch, start: &Start) -> Result<Self, ServiceError> {
+        let node = Node::open(epoch.clone())?;
+        let (session_id, length, words) = (start.session_id, start.snapshot_len as usize, start.word_count as usize);
+        let second = (start.has_second == 1).then(|| {
+            Ok::<_, ServiceError>(Second {
+                state: StateWriter::create(&node, session_id)?,
+                records: service::second_records::publisher(&node, MAX_BATCH)?,
+            })
+        });
+        Ok(Self {
+            session_id,
+            session: service::session::publisher(&node)?,
+            events: service::events::publisher(&node)?,
+            parameters: service::parameters::publisher(&node)?,
+            plan: service::plan::publisher(&node)?,
+            replies: service::replies::publisher(&node)?,
+            rehearsals: service::rehearsals::publisher(&node)?,
+            records: service::records::publisher(&node, MAX_BATCH)?,
+            snapshots: service::snapshots::publisher(&node, length)?,
+            shown: None,
+            viewers: service::snapshots::watch(&node)?,
+            scene: service::scene::publisher(&node, words)?,
+            commands: service::commands::subscriber(&node)?,
+            stops: service::stops::subscriber(&node)?,
+            uploads: service::uploads::subscriber(&node)?,
+            held: None,
+            refused: 0,
+            state: StateWriter::create(&node, session_id)?,
+            second: second.transpose()?,
+            node,
+        })
+    }
+
+    /// Somebody takes snapshots.
+    pub fn has_viewers(&self) -> bool {
+        self.viewers.connected().subscribers > 0
+    }
+
+    /// Connects new hosts and drops those that have disconnected.
+    pub fn connect(&self) {
+        self.session.connect();
+        self.events.connect();
+        self.parameters.connect();
+        self.plan.connect();
+        self.replies.connect();
+        self.rehearsals.connect();
+        self.records.connect();
+        self.snapshots.connect();
+        self.scene.connect();
+        if let Some(second) = &self.second {
+            second.records.connect();
+        }
+    }
+
+    /// Sends to every host what the force process says.
+    pub fn publish(&self, packet: Packet) {
+        // What finds no room reaches nobody: hosts see a gap in its numbers.
+        let _sent = match packet.kind {
+            Kind::Session => send(&self.session, &packet),
+            Kind::Parameters => send(&self.parameters, &packet),
+            Kind::Plan => send(&self.plan, &packet),
+            Kind::Event => send(&self.events, &packet),
+            Kind::Reply => send(&self.replies, &packet),
+            Kind::Rehearsal => send(&self.rehearsals, &packet),
+            Kind::Records => self.records.send(&self.session_id, &packet.values::<TickRecord>()),
+            Kind::SecondRecords => match &self.second {
+                Some(second) => second.records.send(&self.session_id, &packet.values::<SecondRecord>()),
+                None => Ok(0),
+            },
+            Kind::Scene => match (packet.value::<SceneHeader>(), packet.memory) {
+                (Some(header), Some(memory)) => match unsealed::<u32>(memory, usize::MAX) {
+                    Ok(words) => self.scene.send(&header, &words),
+                    Err(_) => Ok(0),
+                },
+                _ => Ok(0),
+            },
+            _ => Ok(0),
+        };
+    }
+
+    /// Copies snapshots from `memory` from now on.
+    pub fn show_snapshots(&mut self, memory: BorrowedFd, len: usize) {
+        self.shown = Reader::new(memory, len).ok().map(|reader| (reader, len));
+    }
+
+    /// Sends the newest snapshot, copied straight into the memory of hosts.
+    pub fn send_snapshot(&mut self) {
+        let Some((reader, len)) = self.shown.as_mut().filter(|(reader, _)| reader.has_news()) else {
+            return;
+        };
+        let Some(mut loan) = self.snapshots.loan(*len) else {
+            return;
+        };
+        let (header, vertices) = loan.parts();
+        // SAFETY: the loan is ours alone until it is sent, and has room for a header and `len` vertices.
+        if unsafe { reader.take_to(header, vertices, *len) } {
+            let _ = loan.send();
+        }
+    }
+
+    /// Hands the force process what hosts ask for, as far as it has room.
+    pub fn forward(&mut self, socket: &Socket) -> Result<(), Closed> {
+        // Those that take force or motion away come first, through queues of their own, and none is too many.
+        for _ in 0..MAX_TAKEN {
+            match self.held.take().or_else(|| self.stops.receive()) {
+                Some(command) if self.hand_on(socket, command)? => {}
+                Some(_) => return Ok(()),
+                None => break,
+            }
+        }
+        let mut taken = Taken::default();
+        for _ in 0..MAX_TAKEN {
+            let Some((port, command)) = self.commands.receive_from() else {
+                break;
+            };
+            match taken.admits(port) {
+                true if self.hand_on(socket, command)? => {}
+                true => return Ok(()),
+                false => self.refuse(&command, taken.answers()),
+            }
+        }
+        while let Some(slice) = self.uploads.receive() {
+            let header = *slice.header();
+            if let Ok(memory) = sealed("stylet-upload", slice.values()) {
+                socket.send(Kind::Upload, bytemuck::bytes_of(&header), Some(memory.as_fd()))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// False where the force process has no room now; the command is held until it has.
+    fn hand_on(&mut self, socket: &Socket, command: Command) -> Result<bool, Closed> {
+        let sent = socket.send(Kind::Command, bytemuck::bytes_of(&command), None)?;
+        self.held = (!sent).then_some(command);
+        Ok(sent)
+    }
+
+    fn refuse(&mut self, command: &Command, answers: bool) {
+        self.refused += 1;
+        if answers {
+            let asker = (command.host_id, command.command_id);
+            let refusal = RefusalCode::TooManyRequests.into();
+            let _ = self.replies.send(Reply::new(self.session_id, asker, Err(&refusal)));
+        }
+    }
+}
+
+/// Requests of one pass.
+#[derive(Default)]
+struct Taken {
+    of_port: Vec<(u128, u32)>,
+    answered: u32,
+}
+
+impl Taken {
+    /// Counts a request; false where it is one too many of its port.
+    fn admits(&mut self, port: u128) -> bool {
+        if let Some((_, count)) = self.of_port.iter_mut().find(|(of, _)| *of == port) {
+            *count += 1;
+            return *count <= MAX_OF_A_PORT;
+        }
+        self.of_port.push((port, 1));
+        true
+    }
+
+    /// Counts a refusal; false where it is not answered.
+    fn answers(&mut self) -> bool {
+        self.answered += 1;
+        self.answered <= MAX_ANSWERED
+    }
+}
+
+fn send<T: bytemuck::AnyBitPattern>(port: &Publisher<T>, packet: &Packet) -> Result<usize, SendError> {
+    packet.value().map_or(Ok(0), |value| port.send(value))
+}

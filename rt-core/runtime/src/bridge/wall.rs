@@ -1,0 +1,524 @@
+//! The force process's side of the wall: starts the bridge, says to it what hosts hear, and starts it anew where it fails.
+//!
+//! What comes from the bridge is input from outside. What a new bridge needs is kept here: the newest of each state, the last
+//! events and answers, and 12 s of records.
+
+use super::journal::Journal;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use std::collections::VecDeque;
+use std::os::fd::{AsFd, OwnedFd};
+use std::path::PathBuf;
+use std::process::{Child, Command as Process, Stdio};
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use stylet_shm_schema::*;
+use stylet_wall::packet::{Alive, BoardSize, Kind, Packet, Socket, Start, unsealed};
+
+/// Packets of the bridge that are taken in one pass; the others wait in its socket.
+const MOST_PACKETS: usize = 256;
+/// The bridge says that it lives twenty times a second.
+const SILENT_AFTER: Duration = Duration::from_millis(400);
+/// While it makes its ports it says nothing.
+const SILENT_AT_START: Duration = Duration::from_secs(2);
+/// One that a busy machine gives no processor is waited for: another would have none either.
+const SILENT_WITHOUT_PROCESSOR: Duration = Duration::from_secs(5);
+/// Processor time that a bridge may use without a word: one that uses more goes round in circles.
+const MOST_BUSY: Duration = Duration::from_millis(200);
+const FIRST_START: Duration = Duration::from_secs(20);
+const RETRY_EVERY: Duration = Duration::from_millis(200);
+const EVENTS_KEPT: usize = 64;
+const REPLIES_KEPT: usize = 128;
+const REHEARSALS_KEPT: usize = 8;
+/// Largest volume that a host may send, in cells.
+const MOST_CELLS: usize = 64 << 20;
+
+/// Why there is no bridge at the start of a run.
+#[derive(Debug, thiserror::Error)]
+pub enum BridgeError {
+    /// The folder of the instance cannot be used.
+    #[error(transparent)]
+    Instance(#[from] InstanceError),
+    /// The program cannot be started.
+    #[error("cannot start {program}: {why}. It comes with rt-core: build or install both")]
+    Spawn {
+        /// Where it was looked for.
+        program: String,
+        /// What the system reports.
+        why: std::io::Error,
+    },
+    /// It was started and ended.
+    #[error("{0}")]
+    Failed(String),
+}
+
+/// Packets that the bridge has not taken yet.
+#[derive(Default)]
+pub struct Outbox {
+    waiting: VecDeque<(Kind, Vec<u8>, Option<Rc<OwnedFd>>)>,
+    socket: Option<Socket>,
+    /// The other end is closed.
+    is_closed: bool,
+}
+
+impl Outbox {
+    /// Sends, or keeps until there is room; nothing without a bridge, since a new one is told everything.
+    pub fn put(&mut self, kind: Kind, bytes: &[u8], memory: Option<&Rc<OwnedFd>>) {
+        if self.socket.is_some() {
+            self.waiting.push_back((kind, bytes.to_vec(), memory.map(Rc::clone)));
+            self.flush();
+        }
+    }
+
+    /// Something could not be sent yet.
+    pub fn is_waiting(&self) -> bool {
+        !self.waiting.is_empty() || self.socket.is_none()
+    }
+
+    fn flush(&mut self) {
+        let Some(socket) = &self.socket else { return };
+        while let Some((kind, bytes, memory)) = self.waiting.front() {
+            match socket.send(*kind, bytes, memory.as_deref().map(AsFd::as_fd)) {
+                Ok(true) => drop(self.waiting.pop_front()),
+                Ok(false) => return,
+                Err(_) => {
+                    self.is_closed = true;
+                    return;
+                }
+            }
+        }
+    }
+
+    fn receive(&mut self) -> Option<Packet> {
+        let received = self.socket.as_mut()?.receive();
+        self.is_closed |= received.is_err();
+        received.ok().flatten()
+    }
+}
+
+/// The process that runs now.
+struct Running {
+    child: Child,
+    epoch: Epoch,
+    is_ready: bool,
+    heard: Instant,
+    /// Processor time that it had used then.
+    busy: Duration,
+    /// Requests that it has refused.
+    refused: u64,
+}
+
+/// Boards of the loops, for each new bridge.
+pub struct Boards {
+    /// Of the force loop.
+    pub state: OwnedFd,
+    /// Of the second device's loop.
+    pub second_state: Option<OwnedFd>,
+}
+
+/// What each new bridge is told.
+struct Kept {
+    state: Rc<OwnedFd>,
+    second_state: Option<Rc<OwnedFd>>,
+    snapshots: Option<(BoardSize, Rc<OwnedFd>)>,
+    session: Option<Session>,
+    scene: Option<(Box<SceneHeader>, Rc<OwnedFd>)>,
+    parameters: Option<ParametersInForce>,
+    plan: Option<PlanInForce>,
+    events: VecDeque<Event>,
+    replies: VecDeque<Reply>,
+    rehearsals: VecDeque<Box<Rehearsal>>,
+}
+
+/// What hosts ask for.
+pub enum Asked {
+    /// A request as plain data.
+    Command(Box<Command>),
+    /// A volume, and its cells.
+    Volume(Box<UploadHeader>, Vec<u8>),
+}
+
+/// One for a run.
+pub struct Wall {
+    running: Option<Running>,
+    outbox: Outbox,
+    kept: Kept,
+    start: Start,
+    program: PathBuf,
+    /// Records of the force loop.
+    pub records: Journal<TickRecord>,
+    /// Records of the second device's loop.
+    pub second_records: Journal<SecondRecord>,
+    asked: VecDeque<Asked>,
+    /// Somebody takes snapshots: read by the tissue loop.
+    is_watched: Arc<AtomicBool>,
+    /// Requests that bridges of this run have refused by themselves.
+    refused: u64,
+    tried: Instant,
+    /// Why the last bridge is gone, until somebody takes it.
+    lost: Option<String>,
+    /// Killed, and not gone yet.
+    dying: Vec<Child>,
+    /// Goes last: with it go the files of the instance.
+    owned: Owned,
+}
+
+impl Wall {
+    /// Starts the first bridge and waits until its ports are there.
+    pub fn new(owned: Owned, start: Start, boards: Boards, is_watched: Arc<AtomicBool>) -> Result<Self, BridgeError> {
+        let mut wall = Self {
+            running: None,
+            outbox: Outbox::default(),
+            kept: Kept {
+                state: Rc::new(boards.state),
+                second_state: boards.second_state.map(Rc::new),
+                snapshots: None,
+                session: None,
+                scene: None,
+                parameters: None,
+                plan: None,
+                events: VecDeque::with_capacity(EVENTS_KEPT),
+                replies: VecDeque::with_capacity(REPLIES_KEPT),
+                rehearsals: VecDeque::with_capacity(REHEARSALS_KEPT),
+            },
+            start,
+            program: program(),
+            records: Journal::new(Kind::Records),
+            second_records: Journal::new(Kind::SecondRecords),
+            asked: VecDeque::new(),
+            is_watched,
+            refused: 0,
+            tried: Instant::now(),
+            lost: None,
+            dying: Vec::new(),
+            owned,
+        };
+        wall.spawn()?;
+        let begun = Instant::now();
+        while !wall.is_open() {
+            wall.wait(Duration::from_millis(20));
+            wall.pass();
+            if let Some(why) = wall
+                .lost
+                .take()
+                .filter(|_| wall.running.is_none() || begun.elapsed() > FIRST_START)
+            {
+                return Err(BridgeError::Failed(why));
+            }
+        }
+        Ok(wall)
+    }
+
+    /// Hosts can join.
+    pub fn is_open(&self) -> bool {
+        self.running.as_ref().is_some_and(|running| running.is_ready)
+    }
+
+    /// Process number of the bridge.
+    pub fn bridge_pid(&self) -> Option<u32> {
+        self.running.as_ref().map(|running| running.child.id())
+    }
+
+    /// Until the bridge says something, and no longer than that.
+    pub fn wait(&self, longest: Duration) {
+        match &self.outbox.socket {
+            Some(socket) => {
+                let longest = Timespec::try_from(longest).ok();
+                let _ = poll(
+                    &mut [PollFd::from_borrowed_fd(socket.as_fd(), PollFlags::IN)],
+                    longest.as_ref(),
+                );
+            }
+            None => std::thread::sleep(longest),
+        }
+    }
+
+    /// One pass: sends what waits, takes what the bridge says, and looks whether it lives.
+    pub fn pass(&mut self) {
+        self.outbox.flush();
+        self.receive();
+        self.dying.retain_mut(|child| matches!(child.try_wait(), Ok(None)));
+        if let Some(why) = self.trouble() {
+            self.end_bridge();
+            self.lost = Some(why);
+        }
+        if self.running.is_none() && self.tried.elapsed() >= RETRY_EVERY {
+            self.tried = Instant::now();
+            if let Err(why) = self.spawn() {
+                self.lost = Some(why.to_string());
+            }
+        }
+    }
+
+    /// Why the last bridge went, once.
+    pub fn take_lost(&mut self) -> Option<String> {
+        self.lost.take()
+    }
+
+    /// What hosts have asked for, in order.
+    pub fn take_asked(&mut self) -> Option<Asked> {
+        self.asked.pop_front()
+    }
+
+    /// Requests that bridges have refused by themselves.
+    pub fn refused(&self) -> u64 {
+        self.refused + self.running.as_ref().map_or(0, |running| running.refused)
+    }
+
+    /// Sends records that are due; all of them where `at_once`.
+    pub fn send_records(&mut self, at_once: bool) {
+        self.records.send(&mut self.outbox, at_once);
+        self.second_records.send(&mut self.outbox, at_once);
+    }
+
+    /// Says which run this is.
+    pub fn session(&mut self, session: Session) {
+        self.kept.session = Some(session);
+        self.outbox.put(Kind::Session, bytemuck::bytes_of(&session), None);
+    }
+
+    /// Says which parameters are in force.
+    pub fn parameters(&mut self, parameters: ParametersInForce) {
+        self.kept.parameters = Some(parameters);
+        self.outbox.put(Kind::Parameters, bytemuck::bytes_of(&parameters), None);
+    }
+
+    /// Says which plan is in force.
+    pub fn plan(&mut self, plan: PlanInForce) {
+        self.kept.plan = Some(plan);
+        self.outbox.put(Kind::Plan, bytemuck::bytes_of(&plan), None);
+    }
+
+    /// Says what happened.
+    pub fn event(&mut self, event: Event) {
+        keep(&mut self.kept.events, event, EVENTS_KEPT);
+        self.outbox.put(Kind::Event, bytemuck::bytes_of(&event), None);
+    }
+
+    /// Answers a request.
+    pub fn reply(&mut self, reply: Reply) {
+        keep(&mut self.kept.replies, reply, REPLIES_KEPT);
+        self.outbox.put(Kind::Reply, bytemuck::bytes_of(&reply), None);
+    }
+
+    /// Says where seeds would end.
+    pub fn rehearsal(&mut self, rehearsal: Rehearsal) {
+        self.outbox.put(Kind::Rehearsal, bytemuck::bytes_of(&rehearsal), None);
+        keep(&mut self.kept.rehearsals, Box::new(rehearsal), REHEARSALS_KEPT);
+    }
+
+    /// Shows a scene, whose words are in `words`, and the board of its snapshots.
+    pub fn scene(&mut self, header: SceneHeader, words: OwnedFd, snapshots: Option<(BoardSize, OwnedFd)>) {
+        if let Some((size, memory)) = snapshots {
+            self.kept.snapshots = Some((size, Rc::new(memory)));
+        }
+        self.kept.scene = Some((Box::new(header), Rc::new(words)));
+        self.kept.tell_scene(&mut self.outbox);
+    }
+
+    fn spawn(&mut self) -> Result<(), BridgeError> {
+        self.owned.clear();
+        let epoch = self.owned.begin()?;
+        let failed = |why| BridgeError::Spawn {
+            program: self.program.display().to_string(),
+            why,
+        };
+        let (socket, end) = Socket::pair().map_err(failed)?;
+        // No `pre_exec`: then the child is made without a copy of this process's page tables, which would cost its loops page faults.
+        let child = Process::new(&self.program)
+            .arg(epoch.instance().name())
+            .arg(epoch.folder())
+            .arg(epoch.token())
+            .stdin(Stdio::from(end))
+            .stdout(Stdio::null())
+            .spawn()
+            .map_err(failed)?;
+        self.running = Some(Running {
+            child,
+            epoch,
+            is_ready: false,
+            heard: Instant::now(),
+            busy: Duration::ZERO,
+            refused: 0,
+        });
+        self.outbox = Outbox {
+            socket: Some(socket),
+            ..Outbox::default()
+        };
+        self.outbox.put(Kind::Start, bytemuck::bytes_of(&self.start), None);
+        self.kept.tell(&mut self.outbox);
+        self.records.rewind();
+        self.second_records.rewind();
+        Ok(())
+    }
+
+    fn end_bridge(&mut self) {
+        self.refused = self.refused();
+        // SYNC: read by the tissue loop; nothing but the flag is carried.
+        self.is_watched.store(false, Ordering::Relaxed);
+        if let Some(mut running) = self.running.take() {
+            let _ = running.child.kill();
+            self.dying.push(running.child);
+            if running.is_ready {
+                // The next one at once; one that never came up is waited with.
+                self.tried = self.tried.checked_sub(RETRY_EVERY).unwrap_or(self.tried);
+            }
+        }
+        self.outbox = Outbox::default();
+        self.owned.clear();
+    }
+
+    fn receive(&mut self) {
+        while self.asked.len() < MOST_PACKETS {
+            let Some(packet) = self.outbox.receive() else { return };
+            let Some(running) = &mut self.running else { return };
+            match packet.kind {
+                Kind::Ready if !running.is_ready => {
+                    running.is_ready = true;
+                    if let Err(why) = self.owned.announce(&running.epoch) {
+                        self.lost = Some(why.to_string());
+                    }
+                }
+                Kind::Alive => {
+                    if let Some(Alive { has_viewers, refused }) = packet.value() {
+                        (running.heard, running.refused) = (Instant::now(), refused.max(running.refused));
+                        running.busy = processor_time(running.child.id()).map_or(running.busy, |(_, busy)| busy);
+                        // SYNC: read by the tissue loop; nothing but the flag is carried.
+                        self.is_watched.store(has_viewers > 0, Ordering::Relaxed);
+                    }
+                }
+                Kind::Failed => self.lost = Some(Text::<200>::new(&String::from_utf8_lossy(&packet.bytes)).read()),
+                Kind::Command => self.asked.extend(packet.value().map(Box::new).map(Asked::Command)),
+                Kind::Upload => {
+                    let header = packet.value::<UploadHeader>();
+                    let cells = packet.memory.and_then(|memory| unsealed(memory, MOST_CELLS).ok());
+                    let volume = header
+                        .zip(cells)
+                        .map(|(header, cells)| Asked::Volume(Box::new(header), cells));
+                    self.asked.extend(volume);
+                }
+                // What only this side says, or says again.
+                _ => {}
+            }
+        }
+    }
+
+    /// Why the bridge must be started anew.
+    fn trouble(&mut self) -> Option<String> {
+        let running = self.running.as_mut()?;
+        if let Ok(Some(status)) = running.child.try_wait() {
+            return Some(self.lost.take().unwrap_or_else(|| format!("it ended: {status}")));
+        }
+        if self.outbox.is_closed {
+            return Some(self.lost.take().unwrap_or_else(|| "it closed its socket".to_owned()));
+        }
+        let silent = running.heard.elapsed();
+        let patience = if running.is_ready {
+            SILENT_AFTER
+        } else {
+            SILENT_AT_START
+        };
+        if silent < patience {
+            return None;
+        }
+        let is_starved = processor_time(running.child.id())
+            .is_some_and(|(is_runnable, busy)| is_runnable && busy.saturating_sub(running.busy) < MOST_BUSY);
+        let is_waited_for = is_starved && silent < SILENT_WITHOUT_PROCESSOR;
+        (!is_waited_for).then(|| format!("it said nothing for {:.1} s", silent.as_secs_f64()))
+    }
+}
+
+impl Drop for Wall {
+    fn drop(&mut self) {
+        let begun = Instant::now();
+        self.send_records(true);
+        while !self.outbox.waiting.is_empty() && !self.outbox.is_closed && begun.elapsed() < SILENT_AFTER {
+            std::thread::sleep(Duration::from_millis(1));
+            self.outbox.flush();
+            self.send_records(true);
+        }
+        // What was said last is read before the other end sees that this one is closed.
+        self.outbox = Outbox::default();
+        if let Some(mut running) = self.running.take() {
+            let ended = Instant::now();
+            while matches!(running.child.try_wait(), Ok(None)) {
+                if ended.elapsed() > SILENT_AFTER {
+                    let _ = running.child.kill();
+                }
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+    }
+}
+
+impl Kept {
+    fn tell(&self, outbox: &mut Outbox) {
+        outbox.put(Kind::State, &[], Some(&self.state));
+        if let Some(board) = &self.second_state {
+            outbox.put(Kind::SecondState, &[], Some(board));
+        }
+        if let Some(session) = &self.session {
+            outbox.put(Kind::Session, bytemuck::bytes_of(session), None);
+        }
+        self.tell_scene(outbox);
+        if let Some(parameters) = &self.parameters {
+            outbox.put(Kind::Parameters, bytemuck::bytes_of(parameters), None);
+        }
+        if let Some(plan) = &self.plan {
+            outbox.put(Kind::Plan, bytemuck::bytes_of(plan), None);
+        }
+        for event in &self.events {
+            outbox.put(Kind::Event, bytemuck::bytes_of(event), None);
+        }
+        for rehearsal in &self.rehearsals {
+            outbox.put(Kind::Rehearsal, bytemuck::bytes_of(&**rehearsal), None);
+        }
+        for reply in &self.replies {
+            outbox.put(Kind::Reply, bytemuck::bytes_of(reply), None);
+        }
+    }
+
+    fn tell_scene(&self, outbox: &mut Outbox) {
+        if let Some((size, board)) = &self.snapshots {
+            outbox.put(Kind::Snapshots, bytemuck::bytes_of(size), Some(board));
+        }
+        if let Some((header, words)) = &self.scene {
+            outbox.put(Kind::Scene, bytemuck::bytes_of(&**header), Some(words));
+        }
+    }
+}
+
+fn keep<T>(queue: &mut VecDeque<T>, value: T, most: usize) {
+    if queue.len() >= most {
+        queue.pop_front();
+    }
+    queue.push_back(value);
+}
+
+/// The bridge's program, which is installed beside this one; a test's is a folder below.
+pub fn program() -> PathBuf {
+    let own = std::env::current_exe().unwrap_or_default();
+    let places = own
+        .ancestors()
+        .skip(1)
+        .take(2)
+        .map(|folder| folder.join("stylet-bridge"));
+    let mut places = places.collect::<Vec<_>>();
+    let found = places.iter().position(|place| place.is_file());
+    match places.is_empty() {
+        true => PathBuf::from("stylet-bridge"),
+        false => places.swap_remove(found.unwrap_or(0)),
+    }
+}
+
+/// Whether a process wants the processor, and how much of it it has had.
+fn processor_time(pid: u32) -> Option<(bool, Duration)> {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    // Behind the name, which may hold anything: the state, and from the 12th field on the times in hundredths of a second.
+    let mut fields = stat.rsplit_once(')')?.1.split_whitespace();
+    let is_runnable = fields.next()? == "R";
+    let mut ticks = fields.skip(10).take(2).filter_map(|field| field.parse::<u64>().ok());
+    let busy = Duration::from_millis(10 * (ticks.next()? + ticks.next()?));
+    Some((is_runnable, busy))
+}

@@ -1,0 +1,363 @@
+//! Packets between both processes: a kind, plain bytes, and sometimes the descriptor of sealed memory.
+
+use bytemuck::{AnyBitPattern, Pod};
+use rustix::fs::{MemfdFlags, SealFlags};
+use rustix::net::{
+    AddressFamily, RecvAncillaryBuffer, RecvAncillaryMessage, RecvFlags, SendAncillaryBuffer, SendAncillaryMessage,
+    SendFlags, SocketFlags, SocketType, recvmsg, sendmsg, socketpair,
+};
+use std::fs::File;
+use std::io::{self, IoSlice, IoSliceMut, Write};
+use std::mem::MaybeUninit;
+use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::unix::fs::FileExt;
+#[cfg(any(doc, test))]
+use stylet_shm_schema::*;
+
+/// What a packet holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Kind {
+    /// To the bridge: [`Start`] of the run; the first packet.
+    Start = 1,
+    /// To the bridge: [`Session`].
+    Session,
+    /// To the bridge: [`ParametersInForce`].
+    Parameters,
+    /// To the bridge: [`PlanInForce`].
+    Plan,
+    /// To the bridge: [`Event`].
+    Event,
+    /// To the bridge: [`Reply`].
+    Reply,
+    /// To the bridge: [`Rehearsal`].
+    Rehearsal,
+    /// To the bridge: [`TickRecord`]s.
+    Records,
+    /// To the bridge: [`SecondRecord`]s.
+    SecondRecords,
+    /// To the bridge: [`SceneHeader`], with memory that holds its words.
+    Scene,
+    /// To the bridge: a [`BoardSize`], with the board of snapshots.
+    Snapshots,
+    /// To the bridge, with the board of [`HapticState`].
+    State,
+    /// To the bridge, with the board of [`SecondState`].
+    SecondState,
+    /// From the host of a measurement: [`SeenSnapshot`]s.
+    SeenSnapshots,
+    /// From the host of a measurement: [`SeenRecords`].
+    SeenRecords,
+    /// From the bridge: its ports are there.
+    Ready = 101,
+    /// From the bridge: [`Alive`].
+    Alive,
+    /// From the bridge: why it cannot go on, in words.
+    Failed,
+    /// From the bridge: a [`Command`].
+    Command,
+    /// From the bridge: an [`UploadHeader`], with memory that holds its cells.
+    Upload,
+}
+
+impl Kind {
+    const ALL: [Self; 20] = [
+        Self::Start,
+        Self::Session,
+        Self::Parameters,
+        Self::Plan,
+        Self::Event,
+        Self::Reply,
+        Self::Rehearsal,
+        Self::Records,
+        Self::SecondRecords,
+        Self::Scene,
+        Self::Snapshots,
+        Self::State,
+        Self::SecondState,
+        Self::SeenSnapshots,
+        Self::SeenRecords,
+        Self::Ready,
+        Self::Alive,
+        Self::Failed,
+        Self::Command,
+        Self::Upload,
+    ];
+
+    fn of(number: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|&kind| kind as u32 == number)
+    }
+}
+
+/// What a bridge needs before it makes its ports.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Start {
+    /// The run of the core.
+    pub session_id: u64,
+    /// Vertices and nodes of a snapshot of the first scene.
+    pub snapshot_len: u64,
+    /// Words of the first scene.
+    pub word_count: u64,
+    /// 1 in a run with a second device.
+    pub has_second: u64,
+}
+
+/// Which scene a board of snapshots is for.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct BoardSize {
+    /// Vertices and nodes of each snapshot.
+    pub len: u64,
+}
+
+/// The bridge's heartbeat.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Alive {
+    /// Somebody takes snapshots.
+    pub has_viewers: u64,
+    /// Requests that it has refused since it began.
+    pub refused: u64,
+}
+
+/// A snapshot, as the host of a measurement saw it. Times of `CLOCK_MONOTONIC`, ns.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct SeenSnapshot {
+    /// Tick of the tissue loop that made it.
+    pub tissue_tick: u64,
+    /// When that tick woke.
+    pub time_ns: u64,
+    /// When the host saw it.
+    pub seen_ns: u64,
+}
+
+/// Records that the host of a measurement saw at once.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct SeenRecords {
+    /// The first tick.
+    pub first: u64,
+    /// The last tick.
+    pub last: u64,
+    /// How many there were.
+    pub count: u64,
+}
+
+/// The largest packet: a batch of records, or a rehearsal.
+pub const MOST_BYTES: usize = 64 << 10;
+/// Between two looks of the bridge, or of the host of a measurement, at what others have written.
+pub const LOOK_EVERY: std::time::Duration = std::time::Duration::from_millis(1);
+/// How often the bridge says that it lives.
+pub const ALIVE_EVERY: std::time::Duration = std::time::Duration::from_millis(50);
+/// The kind, and four bytes that keep what follows aligned.
+const HEAD: usize = 8;
+
+/// A packet that was received.
+#[derive(Debug)]
+pub struct Packet {
+    /// What it holds.
+    pub kind: Kind,
+    /// The descriptor that came with it.
+    pub memory: Option<OwnedFd>,
+    /// The bytes behind its head.
+    pub bytes: Vec<u8>,
+}
+
+impl Packet {
+    /// The bytes as one value; `None` where they are more or fewer.
+    pub fn value<T: AnyBitPattern>(&self) -> Option<T> {
+        bytemuck::try_pod_read_unaligned(&self.bytes).ok()
+    }
+
+    /// The bytes as values; none where they are not whole ones.
+    pub fn values<T: AnyBitPattern + Pod>(&self) -> Vec<T> {
+        let whole = self.bytes.len().is_multiple_of(size_of::<T>().max(1));
+        let chunks = self.bytes.chunks_exact(size_of::<T>().max(1)).filter(|_| whole);
+        chunks.map(bytemuck::pod_read_unaligned).collect()
+    }
+}
+
+/// One end of a connection; nothing waits on it.
+#[derive(Debug)]
+pub struct Socket {
+    end: OwnedFd,
+    buffer: Vec<u8>,
+}
+
+/// Why nothing was received or sent.
+#[derive(Debug)]
+pub enum Closed {
+    /// The other process has ended.
+    Ended,
+    /// The system refuses.
+    Io(io::Error),
+}
+
+impl Socket {
+    /// Both ends.
+    pub fn pair() -> io::Result<(Self, OwnedFd)> {
+        let flags = SocketFlags::CLOEXEC;
+        let (own, other) = socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, flags, None)?;
+        for end in [&own, &other] {
+            // More than the default, for what a new bridge is sent at once; less is slower, not wrong.
+            let _ = rustix::net::sockopt::set_socket_send_buffer_size(end, 4 << 20);
+        }
+        Ok((Self::of(own), other))
+    }
+
+    /// The end that a process was given.
+    pub fn of(end: OwnedFd) -> Self {
+        Self {
+            end,
+            buffer: vec![0; HEAD + MOST_BYTES],
+        }
+    }
+
+    /// For waiting until there is something to receive.
+    pub fn as_fd(&self) -> BorrowedFd<'_> {
+        self.end.as_fd()
+    }
+
+    /// Sends a packet whole; false where there is no room for it now.
+    pub fn send(&self, kind: Kind, bytes: &[u8], memory: Option<BorrowedFd>) -> Result<bool, Closed> {
+        let mut head = [0; HEAD];
+        head[..4].copy_from_slice(&(kind as u32).to_ne_bytes());
+        let parts = [IoSlice::new(&head), IoSlice::new(bytes)];
+        let mut space = [MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(1))];
+        let mut with = SendAncillaryBuffer::new(&mut space);
+        let passed = memory.as_slice();
+        if !passed.is_empty() {
+            with.push(SendAncillaryMessage::ScmRights(passed));
+        }
+        loop {
+            return match sendmsg(&self.end, &parts, &mut with, SendFlags::DONTWAIT | SendFlags::NOSIGNAL) {
+                Ok(_) => Ok(true),
+                Err(rustix::io::Errno::INTR) => continue,
+                Err(rustix::io::Errno::AGAIN | rustix::io::Errno::NOBUFS) => Ok(false),
+                Err(rustix::io::Errno::PIPE | rustix::io::Errno::CONNRESET) => Err(Closed::Ended),
+                Err(why) => Err(Closed::Io(why.into())),
+            };
+        }
+    }
+
+    /// The next packet that makes sense; `None` where there is none now. Packets of no known kind are dropped.
+    pub fn receive(&mut self) -> Result<Option<Packet>, Closed> {
+        loop {
+            let mut space = [MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(1))];
+            let mut with = RecvAncillaryBuffer::new(&mut space);
+            let flags = RecvFlags::DONTWAIT | RecvFlags::CMSG_CLOEXEC;
+            let received = match recvmsg(&self.end, &mut [IoSliceMut::new(&mut self.buffer)], &mut with, flags) {
+                Ok(received) => received,
+                Err(rustix::io::Errno::INTR) => continue,
+                Err(rustix::io::Errno::AGAIN) => return Ok(None),
+                Err(rustix::io::Errno::CONNRESET) => return Err(Closed::Ended),
+                Err(why) => return Err(Closed::Io(why.into())),
+            };
+            let mut memory = None;
+            for message in with.drain() {
+                if let RecvAncillaryMessage::ScmRights(descriptors) = message {
+                    memory = descriptors.last();
+                }
+            }
+            if received.bytes == 0 {
+                return Err(Closed::Ended);
+            }
+            let bytes = self.buffer.get(..received.bytes).unwrap_or(&[]);
+            if let Some(packet) = parse(bytes, memory) {
+                return Ok(Some(packet));
+            }
+        }
+    }
+}
+
+/// A packet out of any bytes.
+pub fn parse(bytes: &[u8], memory: Option<OwnedFd>) -> Option<Packet> {
+    let (head, bytes) = bytes.split_at_checked(HEAD)?;
+    let kind = Kind::of(u32::from_ne_bytes(*head.first_chunk()?))?;
+    let bytes = bytes.to_vec();
+    Some(Packet { kind, memory, bytes })
+}
+
+/// Memory that holds these values and that nobody can change.
+pub fn sealed<T: Pod>(name: &str, values: &[T]) -> io::Result<OwnedFd> {
+    let memory = rustix::fs::memfd_create(name, MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING)?;
+    let mut file = File::from(memory);
+    file.write_all(bytemuck::cast_slice(values))?;
+    let memory = OwnedFd::from(file);
+    rustix::fs::fcntl_add_seals(
+        &memory,
+        SealFlags::SHRINK | SealFlags::GROW | SealFlags::WRITE | SealFlags::SEAL,
+    )?;
+    Ok(memory)
+}
+
+/// The values of sealed memory, at most `most` of them; an error where anybody could still change it, or where it is no memory.
+pub fn unsealed<T: Pod>(memory: OwnedFd, most: usize) -> io::Result<Vec<T>> {
+    let refuse = || io::Error::from(io::ErrorKind::InvalidData);
+    let is_sealed = rustix::fs::fcntl_get_seals(&memory)?.contains(SealFlags::SHRINK | SealFlags::WRITE);
+    let size = usize::try_from(rustix::fs::fstat(&memory)?.st_size).map_err(|_| refuse())?;
+    let count = size / size_of::<T>().max(1);
+    if !is_sealed || count > most || count * size_of::<T>() != size {
+        return Err(refuse());
+    }
+    let mut values = vec![T::zeroed(); count];
+    File::from(memory).read_exact_at(bytemuck::cast_slice_mut(&mut values), 0)?;
+    Ok(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_packet_arrives_with_its_memory() {
+        let (own, other) = Socket::pair().expect("a socket");
+        let mut other = Socket::of(other);
+        let memory = sealed("test", &[1_u32, 2, 3]).expect("room");
+        assert!(own.send(Kind::Scene, &[7; 5], Some(memory.as_fd())).expect("open"));
+        let packet = other.receive().expect("open").expect("sent");
+        assert_eq!((packet.kind, &packet.bytes[..]), (Kind::Scene, &[7; 5][..]));
+        let values: Vec<u32> = unsealed(packet.memory.expect("came with it"), 3).expect("sealed");
+        assert_eq!(values, [1, 2, 3]);
+        assert!(other.receive().expect("open").is_none());
+        drop(own);
+        assert!(matches!(other.receive(), Err(Closed::Ended)));
+    }
+
+    #[test]
+    fn a_process_that_reads_nothing_is_not_waited_for() {
+        let (own, _other) = Socket::pair().expect("a socket");
+        let mut sent = 0;
+        while own.send(Kind::Records, &[0; 8192], None).expect("open") {
+            sent += 1;
+            assert!(sent < 100_000);
+        }
+        assert!(sent > 1);
+    }
+
+    #[test]
+    fn memory_that_can_change_or_is_none_is_refused() {
+        let loose = rustix::fs::memfd_create("test", MemfdFlags::ALLOW_SEALING).expect("room");
+        assert!(unsealed::<u8>(loose, 10).is_err());
+        assert!(unsealed::<u8>(sealed("test", &[0_u8; 11]).expect("room"), 10).is_err());
+        assert!(unsealed::<u32>(sealed("test", &[0_u8; 11]).expect("room"), 10).is_err());
+        assert!(unsealed::<u8>(File::open("/dev/zero").expect("there").into(), 10).is_err());
+        assert!(unsealed::<u8>(Socket::pair().expect("a socket").1, 10).is_err());
+    }
+
+    /// Every payload of a kind fits into a packet.
+    #[test]
+    fn the_largest_payload_fits() {
+        let sizes = [
+            size_of::<Rehearsal>(),
+            size_of::<PlanInForce>(),
+            size_of::<SceneHeader>(),
+            size_of::<UploadHeader>(),
+            size_of::<Command>(),
+            size_of::<Session>(),
+        ];
+        assert!(sizes.iter().all(|&size| size <= MOST_BYTES), "{sizes:?}");
+    }
+}
