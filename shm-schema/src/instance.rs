@@ -5,6 +5,7 @@
 //! | `lock` | locked by the owner, a core or a relay in its place, for as long as it lives; its process number |
 //! | `hosts` | locked by each host, shared, while it is connected |
 //! | `current` | token of the epoch that hosts join |
+//! | `deaf` | token of an epoch whose shared memory a host cannot use: the owner begins another |
 //! | `<token>/` | management files of iceoryx2 for that epoch |
 //!
 //! An epoch is one life of the process that holds the ports. Its token is random and is part of every name in `/dev/shm`, so nobody
@@ -262,9 +263,18 @@ impl Owned {
             .map_err(failed(&path))
     }
 
+    /// A host has said that it cannot use the shared memory of `epoch`.
+    pub fn hears_complaint(&self, epoch: &Epoch) -> bool {
+        let mut token = String::new();
+        let deaf = open(OpenOptions::new().read(true), &self.folder.join("deaf"));
+        deaf.and_then(|file| file.take(64).read_to_string(&mut token)).is_ok() && token == epoch.token
+    }
+
     /// Removes the files of every epoch. Hosts keep what they have mapped until they see that the epoch is over.
     pub fn clear(&self) {
-        let _ = std::fs::remove_file(self.folder.join("current"));
+        for name in ["current", "deaf"] {
+            let _ = std::fs::remove_file(self.folder.join(name));
+        }
         for entry in entries(&self.folder) {
             let name = entry.file_name();
             let is_token = name.len() == TOKEN_DIGITS && name.to_string_lossy().bytes().all(|b| b.is_ascii_hexdigit());
@@ -329,6 +339,16 @@ impl Epoch {
     /// Begins the name of every shared-memory object of this epoch.
     pub fn prefix(&self) -> String {
         format!("{}{}_", self.instance.prefix(), self.token)
+    }
+
+    /// Says to the owner that this host cannot use the shared memory of this epoch, which some host has damaged.
+    pub fn complain(&self) {
+        let deaf = open(
+            OpenOptions::new().write(true).create(true).truncate(true),
+            &self.folder.join("deaf"),
+        );
+        // One that cannot be written is tried again.
+        let _ = deaf.and_then(|mut file| file.write_all(self.token.as_bytes()));
     }
 
     /// Takes every right to the objects of this epoch from other users, and has the kernel give all memory that they may use:
@@ -489,6 +509,8 @@ mod tests {
         assert_ne!(first, second);
         assert_eq!(instance.0.epoch(), None);
         owned.announce(&first).expect("room");
+        second.complain();
+        assert!(!owned.hears_complaint(&first) && owned.hears_complaint(&second));
         assert_eq!(instance.0.epoch(), Some(first));
         owned.clear();
         assert_eq!(instance.0.epoch(), None);

@@ -30,3 +30,4 @@ mod scene_surfaces;
 mod scenes;
 mod shm_invalid;
 mod volume;
+mod wall;

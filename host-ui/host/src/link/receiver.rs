@@ -17,6 +17,8 @@ const CLEAN_EVERY: Duration = Duration::from_secs(1);
 const CLEAN_AFTER: Duration = Duration::from_millis(300);
 /// Whether the ports are those of the present epoch.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// Ports through which no state or no record has come for so long, while the core says that it lives, are damaged.
+const DEAF_AFTER: Duration = Duration::from_millis(1500);
 const CONNECT_AGAIN_AFTER: Duration = Duration::from_millis(250);
 const OPEN_BOARD_EVERY: Duration = Duration::from_millis(20);
 
@@ -43,6 +45,8 @@ pub struct Passes {
     /// The newest record: what a bridge that was started anew sends again is older.
     record_tick: u64,
     looked: Option<Instant>,
+    /// When state and records were last seen to go on, or the ports were made.
+    heard: [(u64, Instant); 2],
     connect_failed: Option<Instant>,
     board_tried: Option<Instant>,
     pub snapshots_every: Duration,
@@ -67,6 +71,7 @@ impl Passes {
             tick: 0,
             record_tick: 0,
             looked: None,
+            heard: [(0, Instant::now()); 2],
             connect_failed: None,
             board_tried: None,
             snapshots_every: Duration::ZERO,
@@ -102,6 +107,7 @@ impl Passes {
             self.second.close_ports();
             (self.board, self.board_tried, self.upload_port, self.ports) = (None, None, None, None);
         }
+        self.complain(now);
         if self.ports.is_some() || !long_ago(self.connect_failed, CONNECT_AGAIN_AFTER) {
             return;
         }
@@ -112,6 +118,7 @@ impl Passes {
         let trouble = match node.and_then(Ports::new) {
             Ok(ports) => {
                 self.ports = Some(ports);
+                self.heard = [(0, now); 2];
                 None
             }
             Err(ServiceError::Absent(_)) => None,
@@ -121,6 +128,20 @@ impl Passes {
             }
         };
         lock(&self.inbox).pulse.trouble = trouble;
+    }
+
+    /// The owner of the ports cannot see what a host sees: where some of them are damaged, it makes all anew when a host says so.
+    fn complain(&mut self, now: Instant) {
+        let Some(ports) = &self.ports else { return };
+        for (heard, tick) in self.heard.iter_mut().zip([self.tick, self.record_tick]) {
+            if heard.0 != tick {
+                *heard = (tick, now);
+            }
+        }
+        if self.heard.iter().any(|(_, then)| now - *then > DEAF_AFTER) {
+            ports.node.epoch().complain();
+            self.heard = [(0, now); 2];
+        }
     }
 
     fn send(&mut self) {

@@ -26,6 +26,9 @@ const SILENT_AT_START: Duration = Duration::from_secs(2);
 const SILENT_WITHOUT_PROCESSOR: Duration = Duration::from_secs(5);
 /// Processor time that a bridge may use without a word: one that uses more goes round in circles.
 const MOST_BUSY: Duration = Duration::from_millis(200);
+/// How often it is looked whether a host complains, and how long an epoch lasts at least.
+const COMPLAINTS_EVERY: Duration = Duration::from_millis(100);
+const SHORTEST_EPOCH: Duration = Duration::from_secs(2);
 const FIRST_START: Duration = Duration::from_secs(20);
 const RETRY_EVERY: Duration = Duration::from_millis(200);
 const EVENTS_KEPT: usize = 64;
@@ -156,6 +159,8 @@ pub struct Wall {
     /// Requests that bridges of this run have refused by themselves.
     refused: u64,
     tried: Instant,
+    /// When complaints were looked for.
+    looked: Instant,
     /// Why the last bridge is gone, until somebody takes it.
     lost: Option<String>,
     /// Killed, and not gone yet.
@@ -190,6 +195,7 @@ impl Wall {
             is_watched,
             refused: 0,
             tried: Instant::now(),
+            looked: Instant::now(),
             lost: None,
             dying: Vec::new(),
             owned,
@@ -244,7 +250,6 @@ impl Wall {
             self.lost = Some(why);
         }
         if self.running.is_none() && self.tried.elapsed() >= RETRY_EVERY {
-            self.tried = Instant::now();
             if let Err(why) = self.spawn() {
                 self.lost = Some(why.to_string());
             }
@@ -318,6 +323,7 @@ impl Wall {
     }
 
     fn spawn(&mut self) -> Result<(), BridgeError> {
+        self.tried = Instant::now();
         self.owned.clear();
         let epoch = self.owned.begin()?;
         let failed = |why| BridgeError::Spawn {
@@ -412,6 +418,12 @@ impl Wall {
         }
         if self.outbox.is_closed {
             return Some(self.lost.take().unwrap_or_else(|| "it closed its socket".to_owned()));
+        }
+        if self.looked.elapsed() >= COMPLAINTS_EVERY {
+            self.looked = Instant::now();
+            if self.tried.elapsed() >= SHORTEST_EPOCH && self.owned.hears_complaint(&running.epoch) {
+                return Some("a host cannot use the shared memory, which some host has damaged".to_owned());
+            }
         }
         let silent = running.heard.elapsed();
         let patience = if running.is_ready {
