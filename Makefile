@@ -5,7 +5,7 @@ CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: compensation envelope procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: loom wall compensation envelope procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -15,7 +15,7 @@ run: deps-run build ## Build, start rt-core and open the window; without a displ
 
 build: ## Build both programs
 # The workspace chooses the features, as for the tests, or both build every dependency for themselves.
-	$(CARGO) build --release --workspace --bin rt-core --bin host-ui
+	$(CARGO) build --release --workspace --bin rt-core --bin stylet-bridge --bin host-ui
 
 test: deps-test ## Install what the tests need, build everything, run all tests
 # Both commands take the same packages: otherwise features differ and everything is built twice. Tests of what runs in real
@@ -39,7 +39,7 @@ report: ## Measure speed against error of every tissue model; writes benches/run
 	$(CARGO) run --release -p stylet-benches --bin report
 
 causes: ## Inject ten causes of late ticks into measurements, and see which of them the trace names (as root, about a minute)
-	$(CARGO) build --release --workspace --bin rt-core
+	$(CARGO) build --release --workspace --bin rt-core --bin stylet-bridge
 	$(CARGO) test --release -p stylet-tests-lab -- eight_of_ten --ignored --nocapture --test-threads=1
 
 ratios: build ## Measure the force loop beside cyclictest in alternating rounds and print the ratios, RATIOS_SECONDS (30) each (as root, quiet machine)
@@ -55,6 +55,12 @@ igtl-test: deps-test build ## Compare OpenIGTLink with libOpenIGTLink and pyigtl
 	$(CARGO) test --release -p stylet-igtl --lib library -- --ignored --nocapture
 	STYLET_PYIGTL=$(abspath $(BIN))/pyigtl/bin/python STYLET_IGTL_S=10 $(CARGO) test --release -p stylet-tests --test system igtl_python -- --ignored --nocapture --test-threads=1
 	STYLET_IGTL_S=$(or $(IGTL_SECONDS),600) $(CARGO) test --release -p stylet-tests --test system igtl::clients_that_hang -- --nocapture
+
+wall: build ## Damage shared memory of hosts with WALL_SEEDS (50) seeds of each kind, kill and stop the bridge WALL_ROUNDS (100) times (about an hour)
+	STYLET_WILD_SEEDS=$(or $(WALL_SEEDS),50) STYLET_BRIDGE_ROUNDS=$(or $(WALL_ROUNDS),100) $(CARGO) test --release -p stylet-tests --test system wall:: -- --nocapture --test-threads=1
+
+loom: ## Try every order in which the force process and its bridge can meet on a board (some minutes)
+	RUSTFLAGS="--cfg loom" $(CARGO) test --release -p stylet-wall --lib --target-dir $(BIN)/../loom
 
 relay: ## Build the relay, which carries a core to other machines; the other targets neither need nor build it
 	$(RELAY) build --release --bin relay

@@ -12,13 +12,13 @@ use stylet_shm_schema::*;
 use wire::Wire;
 
 mod board;
+mod node;
 mod ports;
 mod wire;
 
 pub use board::{OnBoard, StateReader, StateWriter};
-pub use ports::{
-    Connected, Loan, Meeting, Node, Publisher, SendError, Slice, SlicePublisher, SliceSubscriber, Subscriber, Watch,
-};
+pub use node::{Meeting, Node};
+pub use ports::{Connected, Loan, Publisher, SendError, Slice, SlicePublisher, SliceSubscriber, Subscriber, Watch};
 
 /// The form of service that all programs use.
 type Ipc = ipc::Service;
@@ -32,6 +32,9 @@ pub enum ServiceError {
     /// No core runs under that name.
     #[error("no rt-core is running (instance \"{0}\"). Start it in another terminal: rt-core{flag}", flag = flag(.0))]
     Absent(String),
+    /// As many programs as there may be are connected.
+    #[error("{0}")]
+    Full(String),
     /// A port, or the memory behind it.
     #[error("{0}")]
     Port(String),
@@ -101,7 +104,7 @@ fn core_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
 
 /// Why a port of a host could not be made.
 fn host_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
-    ServiceError::Port(format!(
+    ServiceError::Full(format!(
         "{service}: {why:?}. At most {MAX_HOSTS} hosts can watch one core; close another window, or check the room in /dev/shm"
     ))
 }

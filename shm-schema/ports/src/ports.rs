@@ -1,24 +1,18 @@
 //! What a program holds of a service. Behind each port stands a trait object, so that iceoryx2, which is generic through
 //! and through, is compiled for this crate alone (ADR 19), and so that no other crate can make a port in another way.
 
+use super::Ipc;
 use super::wire::Wire;
-use super::{Ipc, ServiceError, failed};
 use bytemuck::{Pod, TransparentWrapper};
-use iceoryx2::config::Config;
-use iceoryx2::node;
-use iceoryx2::node::NodeBuilder;
 use iceoryx2::port::publisher::PublisherCreateError;
 use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::port::{publisher, subscriber};
-use iceoryx2::prelude::{FileName, LogLevel, Path, SemanticString, SignalHandlingMode, set_log_level};
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::Service;
 use iceoryx2::service::dynamic_config::publish_subscribe::DynamicConfig;
 use std::cell::{Cell, RefCell};
 use std::fmt::Debug;
-use std::time::Duration;
-use stylet_shm_schema::{Attendance, Epoch, Instance, Owned};
 
 /// Why something could not be sent.
 #[derive(Debug, thiserror::Error)]
@@ -28,132 +22,6 @@ pub struct SendError(String);
 impl SendError {
     fn of(why: impl Debug) -> Self {
         Self(format!("{why:?}"))
-    }
-}
-
-/// A program's place in the shared memory of an epoch; every port is made on one, and goes before it.
-pub struct Node {
-    inner: Box<dyn InnerNode + Send>,
-    epoch: Epoch,
-    is_again: bool,
-    _attendance: Option<Attendance>,
-}
-
-trait InnerNode {
-    fn inner(&self) -> &node::Node<Ipc>;
-}
-
-impl InnerNode for node::Node<Ipc> {
-    fn inner(&self) -> &node::Node<Ipc> {
-        self
-    }
-}
-
-impl Node {
-    /// For a host: in the epoch that the owner of `instance` has announced.
-    pub fn join(instance: &Instance) -> Result<Self, ServiceError> {
-        let epoch = instance.epoch().ok_or_else(|| ServiceError::absent(instance))?;
-        let attendance = instance.attend()?;
-        let mut node = Self::open(epoch)?;
-        node._attendance = Some(attendance);
-        Ok(node)
-    }
-
-    /// The same for a host that was in an earlier epoch of the run: what it may have missed is sent to it again.
-    pub fn join_again(instance: &Instance) -> Result<Self, ServiceError> {
-        Self::join(instance).map(|node| Self { is_again: true, ..node })
-    }
-
-    /// For the program that makes the ports of the core in `epoch`.
-    pub fn open(epoch: Epoch) -> Result<Self, ServiceError> {
-        set_log_level(LogLevel::Fatal);
-        let free = free_bytes();
-        if free < MIN_ROOM_BYTES {
-            return Err(failed("shared memory is full", format!("{free} bytes left")));
-        }
-        let inner = NodeBuilder::new()
-            .config(&config(&epoch)?)
-            .signal_handling_mode(SignalHandlingMode::Disabled)
-            .create::<Ipc>()
-            .map_err(|e| failed("cannot use shared memory", e))?;
-        Ok(Self {
-            inner: Box::new(inner),
-            epoch,
-            is_again: false,
-            _attendance: None,
-        })
-    }
-
-    pub(super) fn inner(&self) -> &node::Node<Ipc> {
-        self.inner.inner()
-    }
-
-    pub(super) fn is_again(&self) -> bool {
-        self.is_again
-    }
-
-    /// The epoch that it is in.
-    pub fn epoch(&self) -> &Epoch {
-        &self.epoch
-    }
-
-    /// Whether its epoch is that which hosts join now: if not, everything on it goes nowhere.
-    pub fn is_current(&self) -> bool {
-        self.epoch.instance().epoch().as_ref() == Some(&self.epoch)
-    }
-
-    /// Frees what programs that died have left.
-    pub fn clean_up(&self) {
-        // What another program cleans at the same time is left to it.
-        let _ = self.inner().try_cleanup_dead_nodes();
-    }
-}
-
-/// The place of the core in an instance, for the program that makes its ports itself: a relay, or a test.
-pub struct Meeting {
-    /// On which the ports are made.
-    pub node: Node,
-    owned: Owned,
-}
-
-impl Meeting {
-    /// Makes this program the owner of `instance`; hosts do not come yet.
-    pub fn new(instance: &Instance) -> Result<Self, ServiceError> {
-        let owned = instance.own()?;
-        let node = Node::open(owned.begin()?)?;
-        Ok(Self { node, owned })
-    }
-
-    /// Lets hosts in, once every port of the core is there.
-    pub fn open(&self) -> Result<(), ServiceError> {
-        self.node.epoch.secure()?;
-        Ok(self.owned.announce(&self.node.epoch)?)
-    }
-}
-
-fn config(epoch: &Epoch) -> Result<Config, ServiceError> {
-    let mut config = Config::default();
-    let root = epoch.root();
-    let root = Path::new(root.as_os_str().as_encoded_bytes()).map_err(|e| failed("root path", e))?;
-    config.global.set_root_path(&root);
-    config.global.prefix = FileName::new(epoch.prefix().as_bytes()).map_err(|e| failed("prefix", e))?;
-    config.global.creation_timeout = Duration::from_millis(20);
-    Ok(config)
-}
-
-/// Less than this, and even the first objects of a program might not fit.
-const MIN_ROOM_BYTES: u64 = 4 << 20;
-
-/// Free memory in `/dev/shm`; all there could be when the kernel does not say.
-fn free_bytes() -> u64 {
-    // SAFETY: an all-zero statvfs is valid.
-    let mut stat: libc::statvfs = unsafe { std::mem::zeroed() };
-    // SAFETY: the path ends in a zero byte and `stat` is valid for writes.
-    let failed = unsafe { libc::statvfs(c"/dev/shm".as_ptr(), &mut stat) };
-    if failed == 0 {
-        stat.f_bavail * stat.f_frsize
-    } else {
-        u64::MAX
     }
 }
 

@@ -48,6 +48,8 @@ pub struct Passes {
     /// When state and records were last seen to go on, or the ports were made.
     heard: [(u64, Instant); 2],
     connect_failed: Option<Instant>,
+    /// Since when ports cannot be made although a core is there.
+    failing: Option<Instant>,
     board_tried: Option<Instant>,
     pub snapshots_every: Duration,
     snapshot_taken: Option<Instant>,
@@ -73,6 +75,7 @@ impl Passes {
             looked: None,
             heard: [(0, Instant::now()); 2],
             connect_failed: None,
+            failing: None,
             board_tried: None,
             snapshots_every: Duration::ZERO,
             snapshot_taken: None,
@@ -118,12 +121,23 @@ impl Passes {
         let trouble = match node.and_then(Ports::new) {
             Ok(ports) => {
                 self.ports = Some(ports);
-                self.heard = [(0, now); 2];
+                (self.heard, self.failing) = ([(0, now); 2], None);
                 None
             }
-            Err(ServiceError::Absent(_)) => None,
+            Err(ServiceError::Absent(_)) => {
+                self.failing = None;
+                None
+            }
             Err(why) => {
                 self.connect_failed = Some(now);
+                let is_damaged = matches!(why, ServiceError::Port(_));
+                let since = *self.failing.get_or_insert(now);
+                if is_damaged && now - since > DEAF_AFTER {
+                    self.failing = None;
+                    if let Some(epoch) = self.instance.epoch() {
+                        epoch.complain();
+                    }
+                }
                 Some(why.to_string())
             }
         };

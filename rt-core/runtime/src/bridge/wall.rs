@@ -3,10 +3,18 @@
 //! What comes from the bridge is input from outside. What a new bridge needs is kept here: the newest of each state, the last
 //! events and answers, and 12 s of records.
 
+mod child;
+mod kept;
+mod outbox;
+
 use super::journal::Journal;
+use child::processor_time;
+pub use child::program;
+use kept::{Kept, keep};
+pub use outbox::Outbox;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::collections::VecDeque;
-use std::os::fd::{AsFd, OwnedFd};
+use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 use std::process::{Child, Command as Process, Stdio};
 use std::rc::Rc;
@@ -14,7 +22,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::*;
-use stylet_wall::packet::{Alive, BoardSize, Kind, Packet, Socket, Start, unsealed};
+use stylet_wall::packet::{Alive, BoardSize, Kind, Socket, Start, unsealed};
 
 /// Packets of the bridge that are taken in one pass; the others wait in its socket.
 const MOST_PACKETS: usize = 256;
@@ -56,50 +64,6 @@ pub enum BridgeError {
     Failed(String),
 }
 
-/// Packets that the bridge has not taken yet.
-#[derive(Default)]
-pub struct Outbox {
-    waiting: VecDeque<(Kind, Vec<u8>, Option<Rc<OwnedFd>>)>,
-    socket: Option<Socket>,
-    /// The other end is closed.
-    is_closed: bool,
-}
-
-impl Outbox {
-    /// Sends, or keeps until there is room; nothing without a bridge, since a new one is told everything.
-    pub fn put(&mut self, kind: Kind, bytes: &[u8], memory: Option<&Rc<OwnedFd>>) {
-        if self.socket.is_some() {
-            self.waiting.push_back((kind, bytes.to_vec(), memory.map(Rc::clone)));
-            self.flush();
-        }
-    }
-
-    /// Something could not be sent yet.
-    pub fn is_waiting(&self) -> bool {
-        !self.waiting.is_empty() || self.socket.is_none()
-    }
-
-    fn flush(&mut self) {
-        let Some(socket) = &self.socket else { return };
-        while let Some((kind, bytes, memory)) = self.waiting.front() {
-            match socket.send(*kind, bytes, memory.as_deref().map(AsFd::as_fd)) {
-                Ok(true) => drop(self.waiting.pop_front()),
-                Ok(false) => return,
-                Err(_) => {
-                    self.is_closed = true;
-                    return;
-                }
-            }
-        }
-    }
-
-    fn receive(&mut self) -> Option<Packet> {
-        let received = self.socket.as_mut()?.receive();
-        self.is_closed |= received.is_err();
-        received.ok().flatten()
-    }
-}
-
 /// The process that runs now.
 struct Running {
     child: Child,
@@ -118,20 +82,6 @@ pub struct Boards {
     pub state: OwnedFd,
     /// Of the second device's loop.
     pub second_state: Option<OwnedFd>,
-}
-
-/// What each new bridge is told.
-struct Kept {
-    state: Rc<OwnedFd>,
-    second_state: Option<Rc<OwnedFd>>,
-    snapshots: Option<(BoardSize, Rc<OwnedFd>)>,
-    session: Option<Session>,
-    scene: Option<(Box<SceneHeader>, Rc<OwnedFd>)>,
-    parameters: Option<ParametersInForce>,
-    plan: Option<PlanInForce>,
-    events: VecDeque<Event>,
-    replies: VecDeque<Reply>,
-    rehearsals: VecDeque<Box<Rehearsal>>,
 }
 
 /// What hosts ask for.
@@ -462,75 +412,4 @@ impl Drop for Wall {
             }
         }
     }
-}
-
-impl Kept {
-    fn tell(&self, outbox: &mut Outbox) {
-        outbox.put(Kind::State, &[], Some(&self.state));
-        if let Some(board) = &self.second_state {
-            outbox.put(Kind::SecondState, &[], Some(board));
-        }
-        if let Some(session) = &self.session {
-            outbox.put(Kind::Session, bytemuck::bytes_of(session), None);
-        }
-        self.tell_scene(outbox);
-        if let Some(parameters) = &self.parameters {
-            outbox.put(Kind::Parameters, bytemuck::bytes_of(parameters), None);
-        }
-        if let Some(plan) = &self.plan {
-            outbox.put(Kind::Plan, bytemuck::bytes_of(plan), None);
-        }
-        for event in &self.events {
-            outbox.put(Kind::Event, bytemuck::bytes_of(event), None);
-        }
-        for rehearsal in &self.rehearsals {
-            outbox.put(Kind::Rehearsal, bytemuck::bytes_of(&**rehearsal), None);
-        }
-        for reply in &self.replies {
-            outbox.put(Kind::Reply, bytemuck::bytes_of(reply), None);
-        }
-    }
-
-    fn tell_scene(&self, outbox: &mut Outbox) {
-        if let Some((size, board)) = &self.snapshots {
-            outbox.put(Kind::Snapshots, bytemuck::bytes_of(size), Some(board));
-        }
-        if let Some((header, words)) = &self.scene {
-            outbox.put(Kind::Scene, bytemuck::bytes_of(&**header), Some(words));
-        }
-    }
-}
-
-fn keep<T>(queue: &mut VecDeque<T>, value: T, most: usize) {
-    if queue.len() >= most {
-        queue.pop_front();
-    }
-    queue.push_back(value);
-}
-
-/// The bridge's program, which is installed beside this one; a test's is a folder below.
-pub fn program() -> PathBuf {
-    let own = std::env::current_exe().unwrap_or_default();
-    let places = own
-        .ancestors()
-        .skip(1)
-        .take(2)
-        .map(|folder| folder.join("stylet-bridge"));
-    let mut places = places.collect::<Vec<_>>();
-    let found = places.iter().position(|place| place.is_file());
-    match places.is_empty() {
-        true => PathBuf::from("stylet-bridge"),
-        false => places.swap_remove(found.unwrap_or(0)),
-    }
-}
-
-/// Whether a process wants the processor, and how much of it it has had.
-fn processor_time(pid: u32) -> Option<(bool, Duration)> {
-    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // Behind the name, which may hold anything: the state, and from the 12th field on the times in hundredths of a second.
-    let mut fields = stat.rsplit_once(')')?.1.split_whitespace();
-    let is_runnable = fields.next()? == "R";
-    let mut ticks = fields.skip(10).take(2).filter_map(|field| field.parse::<u64>().ok());
-    let busy = Duration::from_millis(10 * (ticks.next()? + ticks.next()?));
-    Some((is_runnable, busy))
 }

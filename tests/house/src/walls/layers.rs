@@ -11,7 +11,7 @@ const WINDOW: &[&str] = &[
 ];
 /// What computes pictures without a window uses `wgpu`.
 const TOOLKIT: &[&str] = &["egui", "eframe", "egui-wgpu", "winit"];
-/// `shm-schema` alone makes ports (ADR 19).
+/// `shm-schema/ports` alone makes ports (ADR 19).
 const PORTS: &[&str] = &["iceoryx2"];
 const ARGUMENTS: &[&str] = &["clap"];
 const PROGRAM: &[&str] = &["indicatif", "signal-hook"];
@@ -73,7 +73,19 @@ pub const LAYERS: &[Layer] = &[
     Layer {
         folder: "shm-schema",
         may_use: &["shm-schema/anatomy"],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "shm-schema/ports",
+        may_use: &["shm-schema"],
         never: &[WINDOW, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "shm-schema/wall",
+        may_use: &["shm-schema"],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
         not_itself: &[],
     },
     Layer {
@@ -92,8 +104,8 @@ pub const LAYERS: &[Layer] = &[
     Layer {
         folder: "rt-core/sim",
         may_use: &["hw", "rt-core/heap", "shm-schema", "shm-schema/anatomy"],
-        never: &[WINDOW, PROGRAM, DICOM],
-        not_itself: &[PORTS, DEVICES, ARGUMENTS],
+        never: &[WINDOW, PORTS, PROGRAM, DICOM],
+        not_itself: &[DEVICES, ARGUMENTS],
     },
     Layer {
         folder: "rt-core/runtime",
@@ -104,9 +116,11 @@ pub const LAYERS: &[Layer] = &[
             "rt-core/sim",
             "shm-schema",
             "shm-schema/anatomy",
+            "shm-schema/wall",
         ],
-        never: &[WINDOW, PROGRAM, DICOM],
-        not_itself: &[PORTS],
+        // The process that owns the device never speaks to hosts itself.
+        never: &[WINDOW, PORTS, PROGRAM, DICOM],
+        not_itself: &[],
     },
     Layer {
         folder: "rt-core/lab",
@@ -117,10 +131,11 @@ pub const LAYERS: &[Layer] = &[
             "rt-core/sim",
             "shm-schema",
             "shm-schema/anatomy",
+            "shm-schema/wall",
             "shm-schema/write",
         ],
-        never: &[WINDOW, DICOM],
-        not_itself: &[PORTS],
+        never: &[WINDOW, PORTS, DICOM],
+        not_itself: &[],
     },
     Layer {
         folder: "rt-core/study",
@@ -133,8 +148,8 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema",
             "shm-schema/write",
         ],
-        never: &[WINDOW, PROGRAM, DICOM],
-        not_itself: &[PORTS, DEVICES],
+        never: &[WINDOW, PORTS, PROGRAM, DICOM],
+        not_itself: &[DEVICES],
     },
     Layer {
         folder: "rt-core",
@@ -149,7 +164,13 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema/anatomy",
             "shm-schema/manual",
         ],
-        never: &[WINDOW, DICOM],
+        never: &[WINDOW, PORTS, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "rt-core/bridge",
+        may_use: &["shm-schema", "shm-schema/ports", "shm-schema/wall"],
+        never: &[WINDOW, ARGUMENTS, PROGRAM, DEVICES, DICOM],
         not_itself: &[PORTS],
     },
     // The host's side.
@@ -191,6 +212,7 @@ pub const LAYERS: &[Layer] = &[
             "host-ui/surfaces",
             "shm-schema",
             "shm-schema/anatomy",
+            "shm-schema/ports",
         ],
         never: &[WINDOW, DEVICES],
         not_itself: &[PORTS, DICOM],
@@ -230,7 +252,7 @@ pub const LAYERS: &[Layer] = &[
     },
     Layer {
         folder: "host-ui/relay",
-        may_use: &["shm-schema", "shm-schema/manual", "tests/kit"],
+        may_use: &["shm-schema", "shm-schema/manual", "shm-schema/ports", "tests/kit"],
         never: &[WINDOW, DEVICES, DICOM],
         not_itself: &[PORTS],
     },

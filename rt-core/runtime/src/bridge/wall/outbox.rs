@@ -1,0 +1,50 @@
+//! What waits to be said to the bridge.
+
+use std::collections::VecDeque;
+use std::os::fd::{AsFd, OwnedFd};
+use std::rc::Rc;
+use stylet_wall::packet::{Kind, Packet, Socket};
+
+/// Packets that the bridge has not taken yet.
+#[derive(Default)]
+pub struct Outbox {
+    pub(super) waiting: VecDeque<(Kind, Vec<u8>, Option<Rc<OwnedFd>>)>,
+    pub(super) socket: Option<Socket>,
+    /// The other end is closed.
+    pub(super) is_closed: bool,
+}
+
+impl Outbox {
+    /// Sends, or keeps until there is room; nothing without a bridge, since a new one is told everything.
+    pub fn put(&mut self, kind: Kind, bytes: &[u8], memory: Option<&Rc<OwnedFd>>) {
+        if self.socket.is_some() {
+            self.waiting.push_back((kind, bytes.to_vec(), memory.map(Rc::clone)));
+            self.flush();
+        }
+    }
+
+    /// Something could not be sent yet.
+    pub fn is_waiting(&self) -> bool {
+        !self.waiting.is_empty() || self.socket.is_none()
+    }
+
+    pub(super) fn flush(&mut self) {
+        let Some(socket) = &self.socket else { return };
+        while let Some((kind, bytes, memory)) = self.waiting.front() {
+            match socket.send(*kind, bytes, memory.as_deref().map(AsFd::as_fd)) {
+                Ok(true) => drop(self.waiting.pop_front()),
+                Ok(false) => return,
+                Err(_) => {
+                    self.is_closed = true;
+                    return;
+                }
+            }
+        }
+    }
+
+    pub(super) fn receive(&mut self) -> Option<Packet> {
+        let received = self.socket.as_mut()?.receive();
+        self.is_closed |= received.is_err();
+        received.ok().flatten()
+    }
+}
