@@ -94,6 +94,8 @@ impl Drop for Mapped {
 pub struct Writer<H, T = ()> {
     mapped: Mapped,
     values: usize,
+    /// Of the last write.
+    number: u64,
     holds: PhantomData<fn(H, T)>,
 }
 
@@ -116,6 +118,7 @@ impl<H: Pod, T: Pod> Writer<H, T> {
         let writer = Self {
             mapped,
             values,
+            number: 0,
             holds: PhantomData,
         };
         Ok((writer, memory))
@@ -133,10 +136,12 @@ impl<H: Pod, T: Pod> Writer<H, T> {
 
     /// Shows what `fill` leaves in a cell, which holds an earlier write before. Neither waits nor allocates.
     pub fn write(&mut self, fill: impl FnOnce(&mut H, &mut [T])) {
+        self.number += 1;
         let mapped = &self.mapped;
         cells::write(
             mapped.newest(),
             |cell| mapped.number(cell),
+            self.number,
             |cell| {
                 // SAFETY: header and values of the cell lie apart inside the mapping, aligned, valid for every bit pattern; this
                 // process has no other reference to them, and no other process can write them.

@@ -15,10 +15,8 @@ pub fn cell_of(number: u64) -> usize {
     (number % CELLS as u64) as usize
 }
 
-/// Fills the next cell. `newest` and `cell(n)` are the numbers that readers see.
-pub fn write<'a>(newest: &AtomicU64, cell: impl Fn(usize) -> &'a AtomicU64, fill: impl FnOnce(usize)) {
-    // SYNC: this thread alone stores to both.
-    let number = newest.load(Ordering::Relaxed).wrapping_add(1);
+/// Fills the cell of write `number`, one more than the last. `newest` and `cell(n)` are the numbers that readers see.
+pub fn write<'a>(newest: &AtomicU64, cell: impl Fn(usize) -> &'a AtomicU64, number: u64, fill: impl FnOnce(usize)) {
     let at = cell_of(number);
     cell(at).store(2 * number + 1, Ordering::Relaxed);
     // SYNC: pairs with the acquire fence in `read`: a reader that copied any byte of this write sees the odd number.
@@ -78,6 +76,7 @@ mod tests {
                     write(
                         &writer.newest,
                         |n| &writer.numbers[n],
+                        number,
                         |at| {
                             writer.values[at]
                                 .iter()
