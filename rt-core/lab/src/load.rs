@@ -315,7 +315,6 @@ mod tests {
             passes.set(passes.get() + 1);
             passes.get() > 2
         };
-        let instance = Instance::default();
         work(LoadProcess::Io, None, &file, stopped).expect("the temporary folder can be written");
         assert_eq!(seen.get(), 4 << 20);
         assert!(!file.exists());
