@@ -67,7 +67,7 @@ pub use relayed::Relayed;
 pub use request::{
     ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, MARK_BEFORE_RANGE_S, Mark, NeedleAxis,
     NeedleRehearsal, ParameterChange, PlannedNeedle, ProbeMove, RETRACT_RANGE_M, Request, RequestError, RequestErrors,
-    SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M, StabilisingNeedle,
+    SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M, StabilisingNeedle, VALID_RANGE_S,
 };
 pub use scene::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, SceneId, StructureInfo,
@@ -80,4 +80,4 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 13;
+pub const SCHEMA_VERSION: u32 = 14;

@@ -10,7 +10,7 @@ use stylet_runtime::rt::clock;
 use stylet_runtime::rt::timing::PoseTimes;
 use stylet_shm_schema::service::{self, Instance, Publisher, ServiceError, SliceSubscriber, Subscriber};
 use stylet_shm_schema::{
-    Command, Event, EventKind, Fault, HandMove, ProbeMove, Request, SnapshotHeader, TickRecord, Vertex,
+    Command, Event, EventKind, Fault, HandMove, ProbeMove, Request, SnapshotHeader, TickRecord, VALID_RANGE_S, Vertex,
 };
 use stylet_sim::probe::{PADS_APART_M, ProbeShape, Wall};
 use stylet_sim::scene::Scene;
@@ -26,6 +26,8 @@ const ACCELERATION_M_PER_S2: f64 = 1.0;
 const SEEDS: u64 = 32;
 /// How often the host looks; part of what it measures.
 pub const LOOK: Duration = Duration::from_millis(1);
+/// Between two promises that the script still lives.
+const RENEW_NS: u64 = 50_000_000;
 /// The core must be seen within this time.
 const PATIENCE_NS: u64 = 15_000_000_000;
 
@@ -106,6 +108,7 @@ pub struct Host {
     last_tick: u64,
     warm_up_ticks: u64,
     step: u64,
+    renewed_ns: u64,
     /// The other hand moves beside the needle's.
     moves_second: bool,
     report: HostReport,
@@ -143,6 +146,7 @@ impl Host {
             sent: 0,
             last_tick: 0,
             step: 0,
+            renewed_ns: 0,
             moves_second: false,
             report: HostReport {
                 tip_to_host: histogram(),
@@ -182,6 +186,7 @@ impl Host {
             }
             if first_ns > 0 {
                 self.follow_script(now_ns - first_ns);
+                self.keep_moving(now_ns);
                 if now_ns - first_ns >= duration_ns {
                     break;
                 }
@@ -241,6 +246,15 @@ impl Host {
         }
     }
 
+    /// A hand that stops would be another measurement: it promises as much as it may.
+    fn keep_moving(&mut self, now_ns: u64) {
+        if now_ns - self.renewed_ns >= RENEW_NS {
+            self.renewed_ns = now_ns;
+            let [_, valid_s] = VALID_RANGE_S;
+            self.send(&Request::KeepMoving { valid_s });
+        }
+    }
+
     fn move_hands(&mut self, tip_m: [f64; 3], second_tip_m: [f64; 3]) {
         let to = |tip_m, speed_m_per_s| HandMove {
             tip_m,
@@ -248,6 +262,7 @@ impl Host {
             speed_m_per_s,
             acceleration_m_per_s2: ACCELERATION_M_PER_S2,
         };
+        self.renewed_ns = 0;
         self.send(&Request::MoveHand(to(tip_m, SPEED_M_PER_S)));
         if self.moves_second {
             let hand = to(second_tip_m, SECOND_SPEED_M_PER_S);

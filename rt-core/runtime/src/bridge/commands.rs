@@ -4,11 +4,13 @@ use super::Bridge;
 use super::link::EventDetails;
 use super::parameters::order_from_both;
 use super::requests::{hand_goal, needle_run, plan_in_force};
-use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
+use crate::rt::exchange::{HapticOrder, Moved, Ticket, TissueOrder};
 use crate::rt::second::SecondOrder;
 use crate::rt::tissue_tape::LeftTape;
 use stylet_shm_schema::service::MAX_HOSTS;
-use stylet_shm_schema::{CommandKind, EventKind, ParameterChange, PlannedNeedle, Refusal, RefusalCode, Request};
+use stylet_shm_schema::{
+    CommandKind, EventKind, ParameterChange, PlannedNeedle, Refusal, RefusalCode, Request, RequestErrors,
+};
 use stylet_sim::active::activate;
 use stylet_sim::line::LeftNeedles;
 
@@ -20,6 +22,8 @@ const MAX_ANSWERED: u32 = 4;
 /// Commands taken from the queues in one pass. Queues are read one after the other, so that a host that fills its own faster than
 /// it is read would keep the core from those behind it; a refusal that is counted alone takes less time than a request.
 const MAX_TAKEN: usize = 4096;
+/// Places of the force loop's ring that only requests take which end a motion or a force.
+const KEPT_FOR_STOPS: usize = 16;
 
 /// Commands of one pass.
 #[derive(Default)]
@@ -27,7 +31,17 @@ struct Taken {
     /// By host.
     of_host: Vec<(u64, u32)>,
     answered: u32,
+    /// Of [`STOPS`], what was carried out since something was set in motion again: more of it changes nothing.
+    stopped: Vec<CommandKind>,
 }
+
+/// Requests that end a motion, a force or the run are never too much; the same one again is.
+const STOPS: [CommandKind; 4] = [
+    CommandKind::StopHand,
+    CommandKind::StopSecondHand,
+    CommandKind::Disengage,
+    CommandKind::Shutdown,
+];
 
 impl Taken {
     /// Counts a command; false where it is one too many.
@@ -43,6 +57,25 @@ impl Taken {
         has_room
     }
 
+    /// Whether a request is taken: of the valid ones a stop always is, unless the same one is in force already.
+    fn takes(&mut self, host_id: u64, request: Result<&Request, &RequestErrors>) -> bool {
+        let is_within = self.admits(host_id);
+        let Ok(kind) = request.map(Request::kind) else {
+            return is_within;
+        };
+        if STOPS.contains(&kind) {
+            let is_new = !self.stopped.contains(&kind);
+            if is_new {
+                self.stopped.push(kind);
+            }
+            return is_within || is_new;
+        }
+        if is_within {
+            self.stopped.clear();
+        }
+        is_within
+    }
+
     /// Counts a refusal for that reason; false where it is not answered.
     fn answers(&mut self) -> bool {
         self.answered += 1;
@@ -53,22 +86,31 @@ impl Taken {
 impl Bridge {
     /// True when a host asked to end.
     pub(super) fn take_commands(&mut self) -> bool {
+        let ends = self.take_each_command();
+        self.renew_motions();
+        ends
+    }
+
+    fn take_each_command(&mut self) -> bool {
         let mut taken = Taken::default();
         for _ in 0..MAX_TAKEN {
             let Some(command) = self.link.ports.commands.receive() else {
                 break;
             };
             let asker = (command.host_id, command.command_id);
-            // A request that takes the force off is never too much.
-            let is_free = [CommandKind::Disengage, CommandKind::Shutdown].map(|kind| kind as u32);
-            if !taken.admits(command.host_id) && !is_free.contains(&command.kind) {
+            let request = Request::decode(&command);
+            if let Ok(Request::KeepMoving { valid_s }) = request {
+                self.movers.keep(command.host_id, valid_s);
+                continue;
+            }
+            if !taken.takes(command.host_id, request.as_ref()) {
                 match taken.answers() {
                     true => self.link.refuse(asker, &RefusalCode::TooManyRequests.into()),
                     false => self.link.session.refused += 1,
                 }
                 continue;
             }
-            match Request::decode(&command) {
+            match request {
                 Ok(Request::Shutdown) => {
                     self.link.reply(asker, Ok(0));
                     return true;
@@ -97,7 +139,8 @@ impl Bridge {
             }
             Request::MoveHand(hand) => {
                 let goal = hand_goal(&hand);
-                self.order_haptic(HapticOrder::Hand { ticket, goal })
+                let promise = self.first_promise(ticket, Moved::Needle);
+                self.order_haptic(HapticOrder::Hand { ticket, goal, promise })
             }
             Request::ExpectNeedle(axis) => {
                 self.lines.expect_next(axis.entry_m, axis.direction);
@@ -112,11 +155,15 @@ impl Bridge {
                 ticket,
                 number: u64::from(number),
             }),
-            Request::DrawNeedle { number, speed_m_per_s } => self.order_haptic(HapticOrder::DrawNeedle {
-                ticket,
-                number: u64::from(number),
-                speed_m_per_s,
-            }),
+            Request::DrawNeedle { number, speed_m_per_s } => {
+                let promise = self.first_promise(ticket, Moved::DrawnNeedle);
+                self.order_haptic(HapticOrder::DrawNeedle {
+                    ticket,
+                    number: u64::from(number),
+                    speed_m_per_s,
+                    promise,
+                })
+            }
             Request::Mark(mark) => {
                 self.mark(ticket, &mark);
                 Ok(())
@@ -151,7 +198,7 @@ impl Bridge {
                 let taken = self.flights.request(ticket);
                 taken.then_some(()).ok_or(RefusalCode::TooManyRequests.into())
             }
-            Request::Shutdown => Ok(()),
+            Request::Shutdown | Request::KeepMoving { .. } => Ok(()),
         }
     }
 
@@ -168,6 +215,10 @@ impl Bridge {
     }
 
     pub(super) fn order_haptic(&mut self, order: HapticOrder) -> Result<(), Refusal> {
+        let is_stop = matches!(order, HapticOrder::StopHand { .. } | HapticOrder::Disengage { .. });
+        if !is_stop && self.loops.haptic_orders.slots() <= KEPT_FOR_STOPS {
+            return Err(RefusalCode::TooManyRequests.into());
+        }
         let pushed = self.loops.haptic_orders.push(order);
         pushed.map_err(|_| RefusalCode::TooManyRequests.into())
     }
@@ -179,6 +230,9 @@ impl Bridge {
 
     fn order_both(&mut self, orders: (HapticOrder, TissueOrder)) -> Result<(), Refusal> {
         let loops = &mut self.loops;
+        if loops.haptic_orders.slots() <= KEPT_FOR_STOPS {
+            return Err(RefusalCode::TooManyRequests.into());
+        }
         let taken = order_from_both(&mut loops.haptic_orders, &mut loops.tissue_orders, orders);
         taken.then_some(()).ok_or(RefusalCode::TooManyRequests.into())
     }
@@ -239,5 +293,31 @@ impl Bridge {
         self.forget_exercises();
         self.link.event(EventKind::Reset, EventDetails::now());
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `StopHand` counted like any other request, so that a host that floods could not stop its hand.
+    #[test]
+    fn a_stop_is_taken_beyond_the_limit_and_again_only_after_another_request() {
+        let mut taken = Taken::default();
+        let (flood, another) = (1, 2);
+        for count in 1..=2 * MAX_OF_A_HOST {
+            let is_taken = taken.takes(flood, Ok(&Request::UndoSeed));
+            assert_eq!(is_taken, count <= MAX_OF_A_HOST);
+        }
+        for stop in [Request::StopHand, Request::StopSecondHand, Request::Disengage] {
+            assert!(taken.takes(flood, Ok(&stop)), "{stop:?}");
+            assert!(!taken.takes(flood, Ok(&stop)), "{stop:?} is in force already");
+        }
+        assert!(taken.takes(another, Ok(&Request::Engage)));
+        assert!(
+            taken.takes(flood, Ok(&Request::StopHand)),
+            "something was asked for since"
+        );
+        assert!(!taken.takes(flood, Err(&RequestErrors(Vec::new()))), "nothing invalid");
     }
 }
