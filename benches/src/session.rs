@@ -163,7 +163,11 @@ impl Session {
             speed_m_per_s,
             acceleration_m_per_s2: 20.0 * speed_m_per_s.max(0.05),
         };
-        let order = HapticOrder::Hand { ticket: 0, goal };
+        let order = HapticOrder::Hand {
+            ticket: 0,
+            goal,
+            promise: None,
+        };
         let _ = self.loops.bridge.haptic_orders.push(order);
     }
 

@@ -59,7 +59,10 @@ pub enum EventKind {
     /// No fault of an instructor's is in force any more.
     ExercisesEnded = 13,
     /// The process that meets hosts was started anew. `text`: why.
-    BridgeRestarted = 14,
+    BridgeRestarted = 15,
+    /// Whoever ordered a motion fell silent, and the motion was given up. `code`: 0 the needle's hand, 1 the second device's, 2 a
+    /// needle that was drawn out; `text` says so.
+    MotionGivenUp = 14,
     /// As [`FaultRaised`](Self::FaultRaised), of the second device; the needle's goes on.
     SecondFaultRaised = 20,
     /// The force of the second device was armed again after a fault.

@@ -70,7 +70,7 @@ pub use relayed::Relayed;
 pub use request::{
     ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, MARK_BEFORE_RANGE_S, Mark, NeedleAxis,
     NeedleRehearsal, ParameterChange, PlannedNeedle, ProbeMove, RETRACT_RANGE_M, Request, RequestError, RequestErrors,
-    SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M, StabilisingNeedle,
+    SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M, StabilisingNeedle, VALID_RANGE_S,
 };
 pub use scene::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, SceneId, StructureInfo,
@@ -83,7 +83,7 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 14;
+pub const SCHEMA_VERSION: u32 = 15;
 
 /// Records in one batch at most.
 pub const MAX_BATCH: usize = 32;

@@ -123,6 +123,8 @@ pub mod flags {
     /// The hand holds no needle: it has left one in the tissue and is not out yet, or is on the way of one that stays in. It meets
     /// nothing, and feels nothing.
     pub const HAND_EMPTY: u32 = 1 << 11;
+    /// The hand moves for a host, or waits to hear from it again ([`crate::Request::KeepMoving`]).
+    pub const IN_MOTION: u32 = 1 << 12;
 }
 
 /// Phase of needle and tissue (paper eq. 6), by stable number.

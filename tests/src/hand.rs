@@ -23,7 +23,11 @@ impl Insertion {
         ask(&mut link, &Request::Engage).expect("engaged");
         let to = move_request(plan.entry_m, plan.direction, 0.2, 2.0);
         ask(&mut link, &to).expect("moved");
-        std::thread::sleep(Duration::from_millis(800));
+        // A hand goes on while its host polls.
+        until(Duration::from_millis(800), || {
+            link.poll();
+            false
+        });
         let is_ready = until(Duration::from_secs(120), || {
             link.poll();
             link.take_records();

@@ -1,6 +1,6 @@
-//! Ctrl-C and requests to terminate: the first asks for an orderly end, the second ends at once. And the end of output.
+//! Ctrl-C, requests to terminate and a terminal that closes: the first asks for an orderly end, the second ends at once. And the end of output.
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -15,13 +15,14 @@ pub struct Interrupt(Arc<AtomicBool>);
 pub struct InterruptError(std::io::Error);
 
 impl Interrupt {
-    /// An interrupt that SIGINT and SIGTERM set; a second signal ends the program at once.
+    /// An interrupt that SIGINT, SIGTERM and, but under `nohup`, SIGHUP set; a second signal ends the program at once.
     ///
     /// # Errors
     /// Where the handlers cannot be installed.
     pub fn on_signals() -> Result<Self, InterruptError> {
         let interrupt = Self::default();
-        for signal in [SIGINT, SIGTERM] {
+        let of_terminal = (!is_ignored(SIGHUP)).then_some(SIGHUP);
+        for signal in [SIGINT, SIGTERM].into_iter().chain(of_terminal) {
             flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&interrupt.0))
                 .and_then(|_| flag::register(signal, Arc::clone(&interrupt.0)))
                 .map_err(InterruptError)?;
@@ -39,6 +40,14 @@ impl Interrupt {
     pub fn asked(&self) -> bool {
         // SYNC: set by a signal handler or by `ask`; nothing but the flag is carried.
         self.0.load(Ordering::Relaxed)
+    }
+}
+
+fn is_ignored(signal: i32) -> bool {
+    // SAFETY: all zero is a valid value, and the call only writes to it.
+    unsafe {
+        let mut now: libc::sigaction = std::mem::zeroed();
+        libc::sigaction(signal, std::ptr::null(), &raw mut now) == 0 && now.sa_sigaction == libc::SIG_IGN
     }
 }
 

@@ -8,6 +8,7 @@ pub mod format;
 pub mod input;
 pub mod interrupt;
 pub mod job;
+pub mod lines;
 pub mod nuclide;
 pub mod output;
 pub mod progress_bar;

@@ -1,6 +1,7 @@
 //! The only place of the host that uses shared memory: receives what the core publishes, checked, and sends requests.
 
 mod inbox;
+mod motion;
 mod player;
 mod ports;
 mod receive;
@@ -10,6 +11,7 @@ mod second;
 mod thread;
 
 use inbox::{Pulse, RECORDS_KEPT};
+use motion::Motions;
 use receive::Latest;
 use receiver::Outgoing;
 use std::collections::{BTreeMap, VecDeque};
@@ -36,6 +38,8 @@ const SNAPSHOTS_EVERY: Duration = Duration::from_millis(12);
 const EVENTS_KEPT: usize = 256;
 const ANSWERS_KEPT: usize = 256;
 const REHEARSALS_KEPT: usize = 8;
+/// Number of a command whose answer nobody waits for.
+const UNANSWERED: u64 = 0;
 /// Largest volume that the core accepts, in cells.
 pub const MAX_UPLOAD_CELLS: usize = 64 << 20;
 
@@ -59,6 +63,7 @@ pub struct Link {
     second_state: Option<SecondState>,
     second_records: VecDeque<SecondRecord>,
     invalid_dropped: u64,
+    motions: Motions,
 }
 
 /// Two hosts must not take each other's answers.
@@ -115,13 +120,30 @@ impl Link {
             second_state: None,
             second_records: VecDeque::new(),
             invalid_dropped: 0,
+            motions: Motions::default(),
         }
     }
 
-    /// Takes everything that was received since the last call. Never waits. Call it each frame.
+    /// Takes everything that was received since the last call. Never waits. Call it each frame: what this host moves stops when it
+    /// polls no more.
     pub fn poll(&mut self) {
         let inbox = self.receiver.take();
         self.take(inbox);
+        if let Some(valid_s) = self.motions.polled(Instant::now()) {
+            self.promise(valid_s);
+        }
+    }
+
+    /// The longest pause between the last calls of [`Link::poll`].
+    pub fn longest_pause(&self) -> Duration {
+        self.motions.longest_pause()
+    }
+
+    /// Without it the hand brakes: a full queue is no error.
+    fn promise(&self, valid_s: f64) {
+        if let Ok(command) = (Request::KeepMoving { valid_s }).encode(self.host_id, UNANSWERED) {
+            let _sent = self.receiver.send(Outgoing::Command(Box::new(command)));
+        }
     }
 
     /// The instance that this link is for.
@@ -266,7 +288,13 @@ impl Link {
         let id = self.next_id()?;
         let command = request.encode(self.host_id, id);
         let command = command.map_err(|errors| LinkError(errors.to_string()))?;
-        self.ask(id, Outgoing::Command(Box::new(command)))
+        let id = self.ask(id, Outgoing::Command(Box::new(command)))?;
+        let now = Instant::now();
+        if self.motions.sent(request, id, now) {
+            let valid_s = self.motions.renew(now);
+            self.promise(valid_s);
+        }
+        Ok(id)
     }
 
     /// A segmented volume for the core to run instead of the present scene.

@@ -49,7 +49,7 @@ impl Moment {
             EventKind::Mark => (MomentKind::Mark, event.text.read()),
             EventKind::ExerciseBegun => (MomentKind::Exercise, event.text.read()),
             EventKind::ExercisesEnded => (MomentKind::Exercise, "all exercises ended".to_owned()),
-            EventKind::FaultRaised => (MomentKind::Fault, event.text.read()),
+            EventKind::FaultRaised | EventKind::MotionGivenUp => (MomentKind::Fault, event.text.read()),
             _ => return None,
         };
         Some(Self {

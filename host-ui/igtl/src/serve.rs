@@ -9,14 +9,18 @@ use crate::server::{Server, ServerError};
 use std::collections::HashMap;
 use std::net::SocketAddr;
 use std::ops::Range;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_anatomy::PatientFrame;
 use stylet_base::interrupt::Interrupt;
+use stylet_base::lines::Lines;
 use stylet_host::link::{Link, LinkStatus, SceneModel, Snapshot};
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::{HapticState, Phase, StructureInfo, role};
 
 const MM_PER_M: f64 = 1000.0;
+/// What clients send is taken so often at least, however rarely something is sent to them.
+const PASS: Duration = Duration::from_millis(10);
 /// The surface and the words change slowly, and cost Slicer more than the needle.
 const SLOW_EVERY: Duration = Duration::from_millis(500);
 
@@ -51,8 +55,13 @@ pub enum ServeError {
 /// Serves until interrupted; a core that starts later or again is served as well.
 pub fn run(options: &Options) -> Result<(), ServeError> {
     let interrupted = Interrupt::on_signals().map_err(|e| ServeError::Signals(e.to_string()))?;
-    let server = Server::listen(options.listen, |line| println!("{line}"))?;
-    println!("OpenIGTLink on {}; end with Ctrl-C", server.address());
+    // A terminal that is stopped or closed must not hold up the loop that watches for silent clients.
+    let lines = Arc::new(Lines::to_stdout());
+    let log = Arc::clone(&lines);
+    let server = Server::listen(options.listen, move |line| {
+        log.say(line);
+    })?;
+    lines.say(format!("OpenIGTLink on {}; end with Ctrl-C", server.address()));
     let mut link = Link::new(options.instance.clone());
     let every = Duration::from_secs_f64(1.0 / options.rate_hz);
     let mut requests = Requests::new(options.hand.clone(), options.probe.clone());
@@ -62,6 +71,12 @@ pub fn run(options: &Options) -> Result<(), ServeError> {
         link.poll();
         link.take_records();
         requests.pass(&mut link, &server);
+        let now = Instant::now();
+        if now < next {
+            std::thread::sleep((next - now).min(PASS));
+            continue;
+        }
+        next = (next + every).max(now);
         let is_slow = slow.is_none_or(|at| at.elapsed() >= SLOW_EVERY);
         if is_slow {
             slow = Some(Instant::now());
@@ -69,8 +84,6 @@ pub fn run(options: &Options) -> Result<(), ServeError> {
         for (device, body) in devices(&link, is_slow) {
             publish(&server, device, body)?;
         }
-        next = (next + every).max(Instant::now());
-        std::thread::sleep(next.saturating_duration_since(Instant::now()));
     }
     requests.end(&mut link);
     Ok(())

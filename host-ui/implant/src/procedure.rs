@@ -21,6 +21,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_base::format;
 use stylet_base::interrupt::Interrupt;
+use stylet_base::lines::Lines;
 use stylet_base::output::new_folder;
 use stylet_files::{self as files, scene::SceneFile};
 use stylet_host::core_args::{CoreArgs, SceneChoice};
@@ -196,8 +197,8 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
     let mut seen = Seen::of(&scene);
     let outcome = perform(&mut link, &job, pace, &interrupted, &mut seen);
     if outcome.is_err() {
-        // Nobody holds the device any more: the force must go off.
-        let _asked = link.send(&Request::Disengage);
+        // Nobody holds the device any more: the motion stops, and the force goes off.
+        let _asked = [Request::StopHand, Request::Disengage].map(|request| link.send(&request));
     }
     let out = options
         .out
@@ -305,6 +306,8 @@ fn perform(
     let mut run = Run::of_needles(job.tasks.clone(), pace)
         .stabilised(&job.stabilising)
         .with_patience(UNWATCHED);
+    // A terminal that is closed or stopped holds up no needle.
+    let lines = Lines::to_stdout();
     let begun = Instant::now();
     let mut step: Option<(usize, Option<usize>, Step)> = None;
     seen.last_event = link.events().back().map(|e| e.sequence);
@@ -323,7 +326,7 @@ fn perform(
                 Some(number) => format!("stabilising needle {} of {}", number + 1, job.stabilising.len()),
                 None => format!("needle {} of {}", run.needle() + 1, job.tasks.len()),
             };
-            println!("{seconds:7.2} s  {which}, step: {}", run.step().name());
+            lines.say(format!("{seconds:7.2} s  {which}, step: {}", run.step().name()));
         }
         seen.take(link, begun);
         seen.most_left(link);
@@ -335,7 +338,10 @@ fn perform(
             seen.motion.take(run.needle(), scene, snapshot);
         }
         for number in run.lost().iter().skip(seen.lost.len()) {
-            println!("note: seed {} is lost: the tip was outside the tissue", number + 1);
+            lines.say(format!(
+                "note: seed {} is lost: the tip was outside the tissue",
+                number + 1
+            ));
         }
         seen.lost = run.lost().to_vec();
         match status {

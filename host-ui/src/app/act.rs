@@ -287,6 +287,7 @@ fn request_name(request: &Request) -> &'static str {
         Request::SaveFlight => "Flight recording",
         Request::Rehearse(_) => "Rehearsal",
         Request::StopHand => "Stop",
+        Request::KeepMoving { .. } => "Motion",
         Request::MoveSecondHand(_) => "Other hand",
         Request::StopSecondHand => "Stop other hand",
         Request::ExpectNeedle(_) => "Next needle",

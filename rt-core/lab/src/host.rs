@@ -12,7 +12,7 @@ use stylet_runtime::bridge;
 use stylet_runtime::device::second_start;
 use stylet_runtime::rt::clock;
 use stylet_runtime::rt::timing::PoseTimes;
-use stylet_shm_schema::{Event, EventKind, Fault, HandMove, Instance, ProbeMove, Request};
+use stylet_shm_schema::{Event, EventKind, Fault, HandMove, Instance, ProbeMove, Request, VALID_RANGE_S};
 use stylet_sim::probe::{PADS_APART_M, ProbeShape, Wall};
 use stylet_sim::scene::Scene;
 use stylet_wall::packet::{Kind, SeenRecords, SeenSnapshot, Socket};
@@ -28,6 +28,8 @@ const ACCELERATION_M_PER_S2: f64 = 1.0;
 const SEEDS: u64 = 32;
 /// How often the host looks; part of what it measures.
 pub const LOOK: Duration = stylet_wall::packet::LOOK_EVERY;
+/// Between two promises that the script still lives.
+const RENEW_NS: u64 = 50_000_000;
 /// The core must be seen within this time.
 const PATIENCE_NS: u64 = 15_000_000_000;
 
@@ -115,6 +117,7 @@ pub struct Host {
     last_tick: u64,
     warm_up_ticks: u64,
     step: u64,
+    renewed_ns: u64,
     /// The other hand moves beside the needle's.
     moves_second: bool,
     report: HostReport,
@@ -155,6 +158,7 @@ impl Host {
             sent: 0,
             last_tick: 0,
             step: 0,
+            renewed_ns: 0,
             moves_second: false,
             report: HostReport {
                 tip_to_host: histogram(),
@@ -194,6 +198,7 @@ impl Host {
             }
             if first_ns > 0 {
                 self.follow_script(now_ns - first_ns);
+                self.keep_moving(now_ns);
                 if now_ns - first_ns >= duration_ns {
                     break;
                 }
@@ -264,6 +269,15 @@ impl Host {
         }
     }
 
+    /// A hand that stops would be another measurement: it promises as much as it may.
+    fn keep_moving(&mut self, now_ns: u64) {
+        if now_ns - self.renewed_ns >= RENEW_NS {
+            self.renewed_ns = now_ns;
+            let [_, valid_s] = VALID_RANGE_S;
+            self.send(&Request::KeepMoving { valid_s });
+        }
+    }
+
     fn move_hands(&mut self, tip_m: [f64; 3], second_tip_m: [f64; 3]) {
         let to = |tip_m, speed_m_per_s| HandMove {
             tip_m,
@@ -271,6 +285,7 @@ impl Host {
             speed_m_per_s,
             acceleration_m_per_s2: ACCELERATION_M_PER_S2,
         };
+        self.renewed_ns = 0;
         self.send(&Request::MoveHand(to(tip_m, SPEED_M_PER_S)));
         if self.moves_second {
             let hand = to(second_tip_m, SECOND_SPEED_M_PER_S);

@@ -128,7 +128,7 @@ fn takes(kind: CommandKind) -> String {
         }
         CommandKind::MoveHand => "8 values".to_owned(),
         CommandKind::MoveSecondHand => "8 values, and three more where it turns about its axis".to_owned(),
-        CommandKind::LoadBuiltinScene => "one number".to_owned(),
+        CommandKind::LoadBuiltinScene | CommandKind::KeepMoving => "one number".to_owned(),
         CommandKind::DropSeed => "nothing, or the pitch of a strand".to_owned(),
         CommandKind::ExpectNeedle => "entry and direction, three values each".to_owned(),
         CommandKind::TakeNeedle => "the number of a needle".to_owned(),
@@ -177,7 +177,7 @@ fn count_fits(kind: CommandKind, count: usize) -> bool {
         // With or without where it turns to about its axis.
         CommandKind::MoveSecondHand => matches!(count, 8 | 11),
         CommandKind::ExpectNeedle => count == 6,
-        CommandKind::TakeNeedle | CommandKind::Mark => count == 1,
+        CommandKind::TakeNeedle | CommandKind::Mark | CommandKind::KeepMoving => count == 1,
         // Which of them the number says; see `Reader::exercise`.
         CommandKind::BeginExercise => matches!(count, 1 | 2 | 4),
         CommandKind::DrawNeedle => count == 2,
@@ -244,6 +244,7 @@ impl<'a> Reader<'a> {
                 drops_m: self.drops(),
             }),
             CommandKind::StopHand => Request::StopHand,
+            CommandKind::KeepMoving => self.keep_moving(),
             CommandKind::Mark => Request::Mark(self.mark(command)),
             CommandKind::BeginExercise => Request::BeginExercise(self.exercise()),
             CommandKind::EndExercises => Request::EndExercises,

@@ -24,6 +24,9 @@ pub const LEFT_DEPTH_RANGE_M: [f64; 2] = [1e-3, 0.5];
 /// How long before its request a marked moment may lie, s: somebody types the words meanwhile.
 pub const MARK_BEFORE_RANGE_S: [f64; 2] = [0.0, 120.0];
 
+/// Shortest and longest time for which a host can promise to be heard again while what it moves goes on, s.
+pub const VALID_RANGE_S: [f64; 2] = [0.02, 0.3];
+
 /// One request of a host. The numbers are stable: [`CommandKind`] is made from them, and [`Command::kind`] carries them.
 #[derive(Clone, Debug, PartialEq, EnumDiscriminants)]
 #[strum_discriminants(name(CommandKind), derive(TryFromPrimitive))]
@@ -100,6 +103,14 @@ pub enum Request {
     /// Take every fault away that was put in. A reset does so as well.
     #[strum_discriminants(doc = "[`Request::EndExercises`]")]
     EndExercises = 20,
+    /// Keep in motion what this host moves: both hands and needles that are drawn out. A motion whose host is not heard in the time that
+    /// it promised brakes, goes on where the host is heard within 0.3 s, and is given up after that
+    /// ([`crate::EventKind::MotionGivenUp`]). A request that begins a motion promises 20 ms. Not answered where it is valid.
+    #[strum_discriminants(doc = "[`Request::KeepMoving`]")]
+    KeepMoving {
+        /// How long the motion goes on without another one of these, s, within [`VALID_RANGE_S`].
+        valid_s: f64,
+    } = 21,
     /// Set the goal of the simulated hand that holds the second device.
     #[strum_discriminants(doc = "[`Request::MoveSecondHand`]")]
     MoveSecondHand(ProbeMove) = 30,
@@ -274,6 +285,7 @@ impl Request {
             Self::DropSeed { strand_pitch_m } => strand_pitch_m.iter().copied().collect(),
             Self::TakeNeedle(number) => vec![f64::from(*number)],
             Self::DrawNeedle { number, speed_m_per_s } => vec![f64::from(*number), *speed_m_per_s],
+            Self::KeepMoving { valid_s } => vec![*valid_s],
             Self::Mark(mark) => vec![mark.before_s],
             Self::BeginExercise(exercise) => {
                 let number = f64::from(exercise.number());

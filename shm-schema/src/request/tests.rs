@@ -104,6 +104,7 @@ fn all() -> Vec<Request> {
             by_m: [0.006, 0.0, -0.008],
         }),
         Request::EndExercises,
+        Request::KeepMoving { valid_s: 0.02 },
     ]
 }
 
@@ -128,8 +129,8 @@ fn every_request_survives_its_record() {
         numbers.push(command.kind);
     }
     numbers.dedup();
-    // The wire values of schema 5, one of schema 7, three of schema 9, and three of schema 12.
-    assert_eq!(numbers, (1..=20).collect::<Vec<u32>>());
+    // The wire values of schema 5, one of schema 7, three of schema 9, three of schema 12, and one of schema 14.
+    assert_eq!(numbers, (1..=21).collect::<Vec<u32>>());
 }
 
 #[test]

@@ -155,6 +155,7 @@ fn a_list_of_trainees_sees_each_stops_one_hand_and_says_who_is_silent() {
     let seen = |which: usize, is: &dyn Fn(&Glance) -> bool| {
         until(Duration::from_secs(5), || roster.glances().get(which).is_some_and(is))
     };
+    assert!(seen(0, &|g| g.state.is_some()) && seen(1, &|g| g.state.is_some()));
     for link in &mut links {
         let mut request = move_request([0.0, 0.0, -0.2], [0.0, 0.0, 1.0], 0.01, 2.0);
         if let (Request::MoveHand(hand), Some(state)) = (&mut request, link.state()) {
@@ -163,12 +164,15 @@ fn a_list_of_trainees_sees_each_stops_one_hand_and_says_who_is_silent() {
         ask(link, &request).expect("taken");
     }
     let tip_m = |which: usize| roster.glances()[which].state.map(|s| s.tip_in_scene_m);
-    let moves = |which: usize| {
+    // A hand goes on while its host polls.
+    let mut moves = |which: usize| {
         let before = tip_m(which);
-        std::thread::sleep(Duration::from_millis(400));
+        until(Duration::from_millis(400), || {
+            links.iter_mut().for_each(Link::poll);
+            false
+        });
         tip_m(which) != before
     };
-    assert!(seen(0, &|g| g.state.is_some()) && seen(1, &|g| g.state.is_some()));
     assert!(moves(0) && moves(1), "both hands are on their way");
     assert!(roster.stop(1));
     assert!(until(Duration::from_secs(5), || !moves(1)), "the hand goes on");

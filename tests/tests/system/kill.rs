@@ -19,8 +19,10 @@ fn insertion(display: &Display, kill: bool) -> Vec<TickRecord> {
     ask(&mut link, &plan_request(&plan)).expect("planned");
     ask(&mut link, &Request::Engage).expect("engaged");
     ask(&mut link, &move_request(plan.entry_m, plan.direction, 0.2, 2.0)).expect("moved");
-    std::thread::sleep(Duration::from_millis(800));
-    link.poll();
+    until(Duration::from_millis(800), || {
+        link.poll();
+        false
+    });
     link.take_records();
     ask(&mut link, &move_request(plan.seeds_m[0], plan.direction, 0.005, 2.0)).expect("moved");
 

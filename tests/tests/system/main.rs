@@ -14,6 +14,7 @@ mod igtl_python;
 mod insertion;
 mod kill;
 mod lab_latency;
+mod motion_sender;
 mod perturb_cli;
 mod plan_compensation;
 mod plan_optimised;

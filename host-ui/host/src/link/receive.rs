@@ -133,12 +133,19 @@ impl Link {
             self.put_answer(id, Answer::unsent(why));
         }
         self.second_state = inbox.second_state.or(self.second_state);
+        self.latest.events.iter().for_each(|event| self.motions.take(event));
+        let is_moving = |tick: u64, flags: u32| (tick, flags & flags::IN_MOTION != 0);
+        self.motions.seen([
+            self.state.map(|s| is_moving(s.tick, s.flags)),
+            self.second_state.map(|s| is_moving(s.tick, s.flags)),
+        ]);
         join(&mut self.records, inbox.records);
         join(&mut self.second_records, inbox.second_records);
     }
 
     fn begin_session(&mut self, session: Session) {
         self.state = None;
+        self.motions.forget();
         self.answers.clear();
         self.rehearsals.clear();
         self.records.clear();
@@ -168,6 +175,10 @@ impl Link {
     }
 
     fn put_answer(&mut self, command_id: u64, answer: Answer) {
+        if command_id == UNANSWERED {
+            return;
+        }
+        self.motions.answered(command_id, &answer);
         self.answers.insert(command_id, answer);
         if self.answers.len() > ANSWERS_KEPT {
             self.answers.pop_first();

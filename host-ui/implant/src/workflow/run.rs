@@ -10,10 +10,15 @@ use stylet_procedure::{
     Done, HandRequest, NeedleWay, Next, Observed, Pace, Patience, Procedure, Reply, Step, StepFailure, Waiting,
     needle_inside,
 };
-use stylet_shm_schema::{HapticState, NeedleAxis, RefusalCode, Request};
+use stylet_shm_schema::{Event, EventKind, HapticState, NeedleAxis, RefusalCode, Request};
 
 /// A core that is absent for less is waited for: a busy machine may hold it up.
 const ABSENT_LIMIT: Duration = Duration::from_secs(10);
+
+/// What of [`EventKind::MotionGivenUp`] is not the needle's.
+const SECOND_HAND: u32 = 1;
+/// A program that stood still for less, on a busy machine, goes on with its motion; after more, a person has to.
+const GOES_ON_AFTER: Duration = Duration::from_secs(2);
 
 /// How a run ended, or that it has not.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +50,9 @@ pub enum RunFailure {
     /// Another run of the core has begun.
     #[error("rt-core was restarted during the procedure; start the procedure again")]
     Restarted,
+    /// The program was not heard, and the core stopped what it moved.
+    #[error("this program stood still for {0:.1} s, and the core stopped the needle; continue when you are ready")]
+    StoodStill(f64),
     /// A request could not be sent.
     #[error(transparent)]
     Link(#[from] LinkError),
@@ -164,6 +172,8 @@ pub struct Run {
     absent_since: Option<Instant>,
     started: Instant,
     sent: Option<u64>,
+    /// The motion that it asked for, to be ordered again where the core gave it up.
+    motion: Option<Request>,
     /// The tick from which the state shows the request.
     effective_tick: Option<u64>,
 }
@@ -219,6 +229,7 @@ impl Run {
             absent_since: None,
             started: Instant::now(),
             sent: None,
+            motion: None,
             effective_tick: None,
         }
     }
@@ -276,6 +287,7 @@ impl Run {
         if self.sent.is_none() && self.stabilising().is_some() && !shows_left(link) {
             return Ok(Next::Wait);
         }
+        self.order_again(link)?;
         let (now_s, state) = (self.started.elapsed().as_secs_f64(), link.state().copied());
         let reply = state.as_ref().map_or(Reply::Pending, |state| self.reply(link, state));
         let displacement_m = link.snapshot().map(|s| s.header.max_displacement_m);
@@ -305,8 +317,26 @@ impl Run {
         Ok(true)
     }
 
-    fn send(&self, link: &mut Link, request: HandRequest) -> Result<u64, LinkError> {
-        let sent = link.send(&match request {
+    /// What the core gave up while this program stood still for a moment is ordered again.
+    fn order_again(&mut self, link: &mut Link) -> Result<(), RunFailure> {
+        let (Some(motion), Some(from)) = (&self.motion, self.effective_tick) else {
+            return Ok(());
+        };
+        let is_given_up =
+            |e: &Event| e.kind == EventKind::MotionGivenUp as u32 && e.code != SECOND_HAND && e.tick >= from;
+        if !link.events().iter().any(is_given_up) {
+            return Ok(());
+        }
+        let stood_still = link.longest_pause();
+        if stood_still > GOES_ON_AFTER {
+            return Err(RunFailure::StoodStill(stood_still.as_secs_f64()));
+        }
+        (self.sent, self.effective_tick) = (Some(link.send(motion)?), None);
+        Ok(())
+    }
+
+    fn send(&mut self, link: &mut Link, request: HandRequest) -> Result<u64, LinkError> {
+        let asked = match request {
             HandRequest::Reset => Request::Reset,
             HandRequest::PublishPlan { needle } => plan_request(&self.tasks[needle].plan),
             HandRequest::ExpectStabilising { number } => {
@@ -324,7 +354,10 @@ impl Run {
             HandRequest::Engage => Request::Engage,
             HandRequest::MoveHand(goal) => Request::MoveHand(goal),
             HandRequest::DropSeed { strand_pitch_m } => Request::DropSeed { strand_pitch_m },
-        })?;
+        };
+        let sent = link.send(&asked)?;
+        let moves = matches!(asked, Request::MoveHand(_) | Request::DrawNeedle { .. });
+        self.motion = moves.then_some(asked);
         if let HandRequest::PublishPlan { needle } = request
             && let Some(next) = self.tasks.get(needle + 1)
         {
@@ -357,39 +390,4 @@ impl Run {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Two needles with two seeds each, along z.
-    fn tasks() -> Vec<NeedleTask> {
-        let needle = |x: f64| NeedlePlan {
-            entry_m: [x, 0.0, 0.0],
-            direction: [0.0, 0.0, 1.0],
-            seeds_m: vec![[x, 0.0, 0.05], [x, 0.0, 0.04]],
-            prescribed: Default::default(),
-        };
-        [0.0, 0.01].map(needle).map(NeedleTask::as_planned).to_vec()
-    }
-
-    #[test]
-    fn what_is_in_the_tissue_says_where_to_go_on() {
-        let tasks = tasks();
-        let found = |dropped: &[[f64; 3]], tip_m| Placed::find(&tasks, dropped, tip_m, &[]);
-        let none = found(&[], Some([0.0, 0.0, -0.01]));
-        assert!(!none.is_partial());
-        let first = [[0.0, 0.0, 0.0502]];
-        assert_eq!(found(&first, None).next_needle(), 0);
-        let three = [[0.0, 0.0, 0.05], [0.0, 0.0, 0.04], [0.01, 0.0, 0.05]];
-        let rest = found(&three, Some([0.01, 0.0, 0.05]));
-        assert_eq!((rest.is_partial(), rest.next_needle()), (true, 1));
-        assert_eq!([0, 1].map(|n| rest.seeds_of(n)), [2, 1]);
-        // All seeds of the first, and it is still in the tissue.
-        assert_eq!(found(&three[..2], Some([0.0, 0.0, 0.03])).next_needle(), 0);
-        let all = [&three[..], &[[0.01, 0.0, 0.04]]].concat();
-        assert!(!found(&all, Some([0.0, 0.0, -0.01])).is_partial(), "nothing is left");
-        assert!(found(&all, Some([0.01, 0.0, 0.03])).is_partial(), "but to take it out");
-        // A drop that left no seed is not made again.
-        let lost = Placed::find(&tasks, &three[1..], None, &[0]);
-        assert_eq!((lost.next_needle(), lost.done.lost.as_slice()), (1, &[0][..]));
-    }
-}
+mod tests;

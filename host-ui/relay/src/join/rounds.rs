@@ -15,8 +15,8 @@ use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::check::{self, Invalid};
 use stylet_ports::StateWriter;
 use stylet_shm_schema::{
-    Event, EventKind, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, ReplyStatus, SCHEMA_VERSION,
-    Session, Text,
+    CommandKind, Event, EventKind, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, ReplyStatus,
+    SCHEMA_VERSION, Session, Text,
 };
 
 /// Requests of hosts here wait for half of it on average: while they come, as from a hand, and after a while without any.
@@ -219,6 +219,8 @@ impl Rounds {
             self.asked = Instant::now();
             match self.has_server {
                 true => self.member.ask(Kind::Command, &[bytemuck::bytes_of(&command)]),
+                // A motion whose promises do not arrive brakes.
+                false if command.kind == CommandKind::KeepMoving as u32 => {}
                 false => self.refuse((command.host_id, command.command_id)),
             }
         }

@@ -98,8 +98,12 @@ fn answer(rounds: &Rounds, seat: u16, kind: Kind, body: &[u8]) {
     let _ = rounds.jobs.messages.try_send(streams::Message(seat, message));
 }
 
-/// Says so here, and to the host that asked.
+/// Says so here, and to the host that asked; of a promise, of which many come in a second, to nobody.
 fn refuse(rounds: &mut Rounds, seat: u16, message: &Message<'_>, why: &str, is_greeting: bool) {
+    let is_promise = |command: Command| command.kind == CommandKind::KeepMoving as u32;
+    if message.kind == Kind::Command && wire::one::<Command>(message.body).is_ok_and(is_promise) {
+        return;
+    }
     let (what, asker) = match message.kind {
         Kind::Command => match wire::one::<Command>(message.body) {
             Ok(command) => {
@@ -157,6 +161,11 @@ fn command(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_
             Ok((command, right(member.role, request.kind())))
         });
     let passed = checked.and_then(|(command, right)| {
+        // Renewing a motion takes the needle from nobody.
+        let is_promise = command.kind == CommandKind::KeepMoving as u32;
+        if is_promise && rounds.lease.holder() != Holder::Seat(seat) {
+            return Ok(());
+        }
         allowed(rounds, seat, member, right)?;
         let near = rounds.announcements.near().ok_or("no core runs there")?;
         near.ask(command).map_err(|e| e.to_string())

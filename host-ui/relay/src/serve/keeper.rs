@@ -153,7 +153,6 @@ fn watch(instance: &Instance, from_server: &mut UnixStream, tape: &mut Tape, chi
 }
 
 fn stop_hand(instance: &Instance, why: &str) {
-    println!("the hand is stopped: {why}");
     let send = || -> Result<(), ServiceError> {
         let node = Node::join(instance)?;
         let port = service::stops::publisher(&node)?;
@@ -165,7 +164,9 @@ fn stop_hand(instance: &Instance, why: &str) {
         std::thread::sleep(Duration::from_millis(30));
         Ok(())
     };
-    if let Err(why) = send() {
-        println!("the hand could not be stopped: {why}");
-    }
+    // After it was sent, and whatever becomes of the words: an output may be full, or closed.
+    let _said = match send() {
+        Ok(()) => writeln!(std::io::stdout(), "the hand is stopped: {why}"),
+        Err(failed) => writeln!(std::io::stdout(), "the hand could not be stopped ({why}): {failed}"),
+    };
 }

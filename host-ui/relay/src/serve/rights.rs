@@ -35,8 +35,10 @@ pub fn right_to_upload(role: Role) -> Option<Right> {
 }
 
 /// Whether a request of a host beside the core shows that somebody operates there.
+///
+/// A promise shows that a host lives; a window here may give one for a motion that a member has taken over.
 pub fn operates(kind: CommandKind) -> bool {
-    right(Role::Operator, kind) == Some(Right::Lease)
+    kind != CommandKind::KeepMoving && right(Role::Operator, kind) == Some(Right::Lease)
 }
 
 /// A request that a refusal of the relay answers has no code of its own in the core's list.
@@ -73,6 +75,7 @@ mod tests {
             K::LeaveNeedle,
             K::TakeNeedle,
             K::DrawNeedle,
+            K::KeepMoving,
         ] {
             assert_eq!(right(Role::Operator, kind), Some(Right::Lease), "{kind:?}");
             assert_eq!(right(Role::Instructor, kind), None, "{kind:?}");
@@ -85,6 +88,7 @@ mod tests {
                 "an instructor beside the core takes the needle from nobody"
             );
         }
+        assert!(operates(K::MoveHand) && !operates(K::KeepMoving));
         assert_eq!(right(Role::Operator, K::Mark), Some(Right::Role));
         assert_eq!(right(Role::Instructor, K::StopHand), Some(Right::Role));
         assert_eq!(right(Role::Operator, K::StopHand), Some(Right::Role));

@@ -10,6 +10,7 @@ use crate::keys::{Lab, Member, Members, Role};
 use crate::wire::{Present, Who};
 use crate::{RelayError, now_ns};
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_ports::SlicePublisher;
@@ -150,11 +151,12 @@ impl Rounds {
 
     fn stop_hand(&mut self, why: &str) {
         self.stops += 1;
-        println!("the hand is stopped: {why}");
         let command = Request::StopHand.encode(self.host_id, self.stops);
         if let (Some(near), Ok(command)) = (self.announcements.near(), command) {
             let _ = near.ask(command);
         }
+        // Last, and whatever becomes of it: an output may be full, or closed.
+        let _said = writeln!(std::io::stdout(), "the hand is stopped: {why}");
     }
 
     /// Name and role for the log.

@@ -3,7 +3,7 @@
 use crate::fixture::{Host, Keys, Named, core, go, join, still_moving_m, until};
 use std::time::Duration;
 use stylet_relay::keys::{Lab, Role, Validity, write_invitation};
-use stylet_shm_schema::service;
+use stylet_ports as service;
 use stylet_shm_schema::{EventKind, Exercise, Mark, Request};
 
 fn marked() -> Request {

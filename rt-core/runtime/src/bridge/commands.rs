@@ -5,16 +5,25 @@ use super::link::EventDetails;
 use super::parameters::order_from_both;
 use super::requests::{hand_goal, needle_run, plan_in_force};
 use super::wall::Asked;
-use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
+use crate::rt::exchange::{HapticOrder, Moved, Ticket, TissueOrder};
 use crate::rt::second::SecondOrder;
 use crate::rt::tissue_tape::LeftTape;
 use stylet_shm_schema::{Command, EventKind, ParameterChange, PlannedNeedle, Refusal, RefusalCode, Request};
 use stylet_sim::active::activate;
 use stylet_sim::line::LeftNeedles;
 
+/// Places of the force loop's ring that only requests take which end a motion or a force.
+const KEPT_FOR_STOPS: usize = 16;
+
 impl Bridge {
     /// True when a host asked to end.
     pub(super) fn take_commands(&mut self) -> bool {
+        let ends = self.take_each_command();
+        self.renew_motions();
+        ends
+    }
+
+    fn take_each_command(&mut self) -> bool {
         while let Some(asked) = self.link.wall.take_asked() {
             match asked {
                 Asked::Command(command) if self.take_command(&command) => return true,
@@ -28,6 +37,8 @@ impl Bridge {
     fn take_command(&mut self, command: &Command) -> bool {
         let asker = (command.host_id, command.command_id);
         match Request::decode(command) {
+            // Never answered: it is sent many times a second.
+            Ok(Request::KeepMoving { valid_s }) => self.movers.keep(command.host_id, valid_s),
             Ok(Request::Shutdown) => {
                 self.link.reply(asker, Ok(0));
                 return true;
@@ -55,7 +66,8 @@ impl Bridge {
             }
             Request::MoveHand(hand) => {
                 let goal = hand_goal(&hand);
-                self.order_haptic(HapticOrder::Hand { ticket, goal })
+                let promise = self.first_promise(ticket, Moved::Needle);
+                self.order_haptic(HapticOrder::Hand { ticket, goal, promise })
             }
             Request::ExpectNeedle(axis) => {
                 self.lines.expect_next(axis.entry_m, axis.direction);
@@ -70,11 +82,15 @@ impl Bridge {
                 ticket,
                 number: u64::from(number),
             }),
-            Request::DrawNeedle { number, speed_m_per_s } => self.order_haptic(HapticOrder::DrawNeedle {
-                ticket,
-                number: u64::from(number),
-                speed_m_per_s,
-            }),
+            Request::DrawNeedle { number, speed_m_per_s } => {
+                let promise = self.first_promise(ticket, Moved::DrawnNeedle);
+                self.order_haptic(HapticOrder::DrawNeedle {
+                    ticket,
+                    number: u64::from(number),
+                    speed_m_per_s,
+                    promise,
+                })
+            }
             Request::Mark(mark) => {
                 self.mark(ticket, &mark);
                 Ok(())
@@ -109,7 +125,7 @@ impl Bridge {
                 let taken = self.flights.request(ticket);
                 taken.then_some(()).ok_or(RefusalCode::TooManyRequests.into())
             }
-            Request::Shutdown => Ok(()),
+            Request::Shutdown | Request::KeepMoving { .. } => Ok(()),
         }
     }
 
@@ -126,6 +142,10 @@ impl Bridge {
     }
 
     pub(super) fn order_haptic(&mut self, order: HapticOrder) -> Result<(), Refusal> {
+        let is_stop = matches!(order, HapticOrder::StopHand { .. } | HapticOrder::Disengage { .. });
+        if !is_stop && self.loops.haptic_orders.slots() <= KEPT_FOR_STOPS {
+            return Err(RefusalCode::TooManyRequests.into());
+        }
         let pushed = self.loops.haptic_orders.push(order);
         pushed.map_err(|_| RefusalCode::TooManyRequests.into())
     }
@@ -137,6 +157,9 @@ impl Bridge {
 
     fn order_both(&mut self, orders: (HapticOrder, TissueOrder)) -> Result<(), Refusal> {
         let loops = &mut self.loops;
+        if loops.haptic_orders.slots() <= KEPT_FOR_STOPS {
+            return Err(RefusalCode::TooManyRequests.into());
+        }
         let taken = order_from_both(&mut loops.haptic_orders, &mut loops.tissue_orders, orders);
         taken.then_some(()).ok_or(RefusalCode::TooManyRequests.into())
     }
@@ -197,5 +220,31 @@ impl Bridge {
         self.forget_exercises();
         self.link.event(EventKind::Reset, EventDetails::now());
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `StopHand` counted like any other request, so that a host that floods could not stop its hand.
+    #[test]
+    fn a_stop_is_taken_beyond_the_limit_and_again_only_after_another_request() {
+        let mut taken = Taken::default();
+        let (flood, another) = (1, 2);
+        for count in 1..=2 * MAX_OF_A_HOST {
+            let is_taken = taken.takes(flood, Ok(&Request::UndoSeed));
+            assert_eq!(is_taken, count <= MAX_OF_A_HOST);
+        }
+        for stop in [Request::StopHand, Request::StopSecondHand, Request::Disengage] {
+            assert!(taken.takes(flood, Ok(&stop)), "{stop:?}");
+            assert!(!taken.takes(flood, Ok(&stop)), "{stop:?} is in force already");
+        }
+        assert!(taken.takes(another, Ok(&Request::Engage)));
+        assert!(
+            taken.takes(flood, Ok(&Request::StopHand)),
+            "something was asked for since"
+        );
+        assert!(!taken.takes(flood, Err(&RequestErrors(Vec::new()))), "nothing invalid");
     }
 }

@@ -10,6 +10,7 @@ mod line_archive;
 mod lines;
 mod link;
 mod loader;
+mod movers;
 mod notices;
 mod parameters;
 mod picture;
@@ -103,6 +104,7 @@ pub struct Bridge {
     left_rooms: (bool, Option<u64>),
     supervisor: Supervisor,
     second: Option<Second>,
+    movers: movers::Movers,
 }
 
 impl Bridge {
@@ -153,6 +155,7 @@ impl Bridge {
             left_rooms: (false, None),
             supervisor: Supervisor::new(is_real_time, setup.device.simulated),
             second,
+            movers: movers::Movers::default(),
         }
     }
 

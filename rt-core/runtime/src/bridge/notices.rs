@@ -2,7 +2,7 @@
 
 use super::Bridge;
 use super::link::EventDetails;
-use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
+use crate::rt::exchange::{HapticOrder, Moved, Notice, TissueOrder};
 use crate::rt::outside::OutsideTape;
 use crate::rt::world::World;
 use stylet_shm_schema::{EventKind, TickRecord};
@@ -66,7 +66,7 @@ impl Bridge {
     }
 
     /// Notices that are events and nothing else.
-    fn report(&mut self, notice: &Notice) {
+    pub(super) fn report(&mut self, notice: &Notice) {
         let (kind, details) = match *notice {
             Notice::Contact {
                 tick,
@@ -111,6 +111,20 @@ impl Bridge {
                 EventDetails {
                     code: fault as u32,
                     text: fault.message(),
+                    ..EventDetails::at(tick, time_ns)
+                },
+            ),
+            Notice::MotionGivenUp { tick, time_ns, what } => (
+                EventKind::MotionGivenUp,
+                EventDetails {
+                    code: what as u32,
+                    text: match what {
+                        Moved::Needle => "the program that moved the hand fell silent; the hand was stopped",
+                        Moved::SecondHand => {
+                            "the program that moved the second hand fell silent; that hand was stopped"
+                        }
+                        Moved::DrawnNeedle => "the program that drew a needle out fell silent; the needle was stopped",
+                    },
                     ..EventDetails::at(tick, time_ns)
                 },
             ),

@@ -4,7 +4,7 @@ use super::Bridge;
 use super::link::{EventDetails, Link};
 use super::requests::hand_goal;
 use super::supervisor::Supervisor;
-use crate::rt::exchange::{Notice, Ticket};
+use crate::rt::exchange::{Moved, Notice, Ticket};
 use crate::rt::second::{SecondBridgePorts, SecondOrder, gate_of};
 use nalgebra::Vector3;
 use stylet_hw::DeviceInfo;
@@ -110,6 +110,7 @@ impl Bridge {
                 self.link
                     .event(EventKind::SecondRearmed, EventDetails::at(tick, time_ns));
             }
+            Notice::MotionGivenUp { .. } => self.report(notice),
             _ => {}
         }
     }
@@ -127,9 +128,10 @@ impl Bridge {
 
     pub(super) fn move_second_hand(&mut self, ticket: Ticket, probe: &ProbeMove) -> Result<(), Refusal> {
         let goal = hand_goal(&probe.hand);
+        let promise = self.first_promise(ticket, Moved::SecondHand);
         let second = self.second_or_refusal()?;
         second.order_answered(SecondOrder::Up(probe.up.map(Vector3::from)))?;
-        second.order_answered(SecondOrder::Hand { ticket, goal })
+        second.order_answered(SecondOrder::Hand { ticket, goal, promise })
     }
 
     pub(super) fn stop_second_hand(&mut self, ticket: Ticket) -> Result<(), Refusal> {

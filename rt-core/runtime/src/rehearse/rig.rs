@@ -144,11 +144,11 @@ impl Rig {
             speed_m_per_s: hand.speed_m_per_s,
             acceleration_m_per_s2: hand.acceleration_m_per_s2,
         };
-        let _ = self
-            .loops
-            .bridge
-            .haptic_orders
-            .push(HapticOrder::Hand { ticket: 0, goal });
+        let _ = self.loops.bridge.haptic_orders.push(HapticOrder::Hand {
+            ticket: 0,
+            goal,
+            promise: None,
+        });
     }
 
     pub fn drop_seed(&mut self, strand_pitch_m: Option<f64>) {
@@ -177,6 +177,7 @@ impl Rig {
             ticket: 0,
             number,
             speed_m_per_s: 0.05,
+            promise: None,
         };
         let _ = self.loops.bridge.haptic_orders.push(order);
     }

@@ -20,6 +20,7 @@ use stylet_sim::needle::NeedleParameters;
 use stylet_sim::scene::{Labels, SceneSource, TissueKind};
 
 mod left;
+mod motion;
 mod probe;
 
 /// The loops with their tapes, and what the bridge would keep beside them.
@@ -103,7 +104,11 @@ impl Recorded {
             speed_m_per_s: 0.02,
             acceleration_m_per_s2: 1.0,
         };
-        self.haptic(HapticOrder::Hand { ticket: 0, goal });
+        self.haptic(HapticOrder::Hand {
+            ticket: 0,
+            goal,
+            promise: None,
+        });
     }
 
     fn run(&mut self, seconds: f64) {

@@ -1,5 +1,6 @@
 //! What the bridge and the loops hand each other: orders and notices, through wait-free rings.
 
+use crate::rt::motion_lease::Promise;
 use crate::rt::probe_tape::ProbeTape;
 use crate::rt::tissue_tape::{LeftTape, TissueTape};
 use crate::rt::world::World;
@@ -39,6 +40,8 @@ pub enum HapticOrder {
         ticket: Ticket,
         /// Place, direction, speed and acceleration.
         goal: HandGoal,
+        /// Of the host; without one nobody has to renew it.
+        promise: Option<Promise>,
     },
     /// Turn the force on; re-arms after a fault.
     Engage {
@@ -89,7 +92,11 @@ pub enum HapticOrder {
         number: u64,
         /// How fast.
         speed_m_per_s: f64,
+        /// As of a goal.
+        promise: Option<Promise>,
     },
+    /// What this host moves goes on.
+    KeepMoving(Promise),
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
     /// Hold the simulated hand where it is.
@@ -225,6 +232,15 @@ pub enum Notice {
         /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
     },
+    /// Whoever ordered a motion fell silent, and the motion was given up.
+    MotionGivenUp {
+        /// Tick of the loop, from 1.
+        tick: u64,
+        /// `CLOCK_MONOTONIC`, ns.
+        time_ns: u64,
+        /// What moved.
+        what: Moved,
+    },
     /// Another scene runs.
     WorldSwapped {
         /// Number of the request.
@@ -234,4 +250,15 @@ pub enum Notice {
         /// Tick of the loop, from 1.
         tick: u64,
     },
+}
+
+/// What hosts move, by stable number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Moved {
+    /// The hand that holds the needle.
+    Needle = 0,
+    /// That of the second device.
+    SecondHand = 1,
+    /// A needle that stayed in.
+    DrawnNeedle = 2,
 }

@@ -4,6 +4,7 @@ use crate::rt::clock::{self, HAPTIC_PHASE, Wait};
 use crate::rt::device_loop::{self, Counts, DeviceLoop};
 use crate::rt::exchange::Notice;
 use crate::rt::haptic_tape::HapticMemory;
+use crate::rt::motion_lease::Motions;
 use crate::rt::pose::TipPose;
 use crate::rt::put_in::PutIn;
 use crate::rt::response::TissueResponse;
@@ -20,6 +21,7 @@ mod deflection;
 mod flight;
 mod left;
 mod line;
+mod motion;
 mod orders;
 mod put_in;
 mod record;
@@ -36,6 +38,7 @@ pub struct HapticLoop {
     contact: u64,
     pose: TipPose,
     goal: Option<HandGoal>,
+    motions: Motions,
     /// Ready for a needle that goes in where it lies.
     line: Option<Box<HandLine>>,
     /// Number of what the probe does to it, as it was last taken up.
@@ -98,6 +101,7 @@ impl HapticLoop {
             contact: memory.contact,
             pose: memory.pose,
             goal: memory.goal,
+            motions: memory.motions,
             line: None,
             outside: memory.outside,
             on_line: memory.on_line,
@@ -126,6 +130,7 @@ impl HapticLoop {
     pub fn tick(&mut self, due_ns: u64, woke_ns: u64, missed: u32) -> ChainOutput {
         self.checkpoint();
         self.take_orders();
+        self.watch_motions();
         self.take_line();
         self.follow_body();
         self.mark();

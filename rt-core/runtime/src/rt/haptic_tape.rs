@@ -1,6 +1,7 @@
 //! What the haptic loop writes to its flight recording, each tick.
 
 use crate::rt::exchange::HapticOrder;
+use crate::rt::motion_lease::Motions;
 use crate::rt::outside::{LineOutside, OutsideTape};
 use crate::rt::pose::TipPose;
 use crate::rt::put_in::PutIn;
@@ -38,6 +39,8 @@ pub struct HapticMemory {
     pub pose: TipPose,
     /// Goal of the simulated hand.
     pub goal: Option<HandGoal>,
+    /// Leases of what hosts move.
+    pub motions: Motions,
     /// Number of the needle line that the loop has; 0 for none. Its state stands beside the memory.
     pub line: u64,
     /// Number of what the probe does to it, as it was last taken up.
@@ -69,6 +72,7 @@ impl HapticMemory {
             contact: 0,
             pose: TipPose::default(),
             goal: None,
+            motions: Motions::default(),
             line: 0,
             outside: 0,
             on_line: false,

@@ -25,6 +25,7 @@ pub mod haptic_tape;
 pub mod layers_met;
 pub mod left_loads;
 pub mod line_loads;
+pub mod motion_lease;
 pub mod outside;
 pub mod pin;
 pub mod pose;

@@ -1,11 +1,16 @@
-//! Marks and exercises out of a record.
+//! Marks, exercises and promises out of a record.
 
 use super::{Reader, RequestError, whole};
 use crate::exercise::ExerciseNumber;
-use crate::request::{MARK_BEFORE_RANGE_S, Mark};
+use crate::request::{MARK_BEFORE_RANGE_S, Mark, Request, VALID_RANGE_S};
 use crate::{Command, CommandKind, EXERCISE_STIFFNESS_RANGE, Exercise, MOST_MOVED_M};
 
 impl Reader<'_> {
+    pub(super) fn keep_moving(&mut self) -> Request {
+        let valid_s = self.within("time for which the motion goes on, in s,", VALID_RANGE_S);
+        Request::KeepMoving { valid_s }
+    }
+
     pub(super) fn mark(&mut self, command: &Command) -> Mark {
         let before_s = self.within("time before the request, in s,", MARK_BEFORE_RANGE_S);
         let words = command.text.exact().filter(|words| !words.trim().is_empty());

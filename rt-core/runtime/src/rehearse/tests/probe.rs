@@ -219,7 +219,14 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
             speed_m_per_s: 0.1,
             acceleration_m_per_s2: 2.0,
         };
-        for order in [SecondOrder::Engage, SecondOrder::Hand { ticket: 0, goal }] {
+        for order in [
+            SecondOrder::Engage,
+            SecondOrder::Hand {
+                ticket: 0,
+                goal,
+                promise: None,
+            },
+        ] {
             assert!(bridge.orders.push(order).is_ok());
         }
         let mut wrench = stylet_hw::Wrench::zero();

@@ -1,6 +1,7 @@
 //! Needles that stay in, by both loops: left, taken up again, drawn out, and in a recording that repeats in every bit.
 
 use super::*;
+use crate::rt::motion_lease::Promise;
 use stylet_shm_schema::{RefusalCode, flags};
 use stylet_sim::line::LeftNeedles;
 
@@ -129,6 +130,7 @@ fn a_recording_with_a_needle_that_stays_in_repeats_in_every_bit() {
             ticket: 0,
             number: 1,
             speed_m_per_s: 0.02,
+            promise: None,
         });
         run.run(0.3);
         assert_eq!(run.left_count(), 1);
@@ -190,6 +192,7 @@ fn a_needle_is_taken_up_again_where_it_was_left_and_comes_out_by_hand() {
             ticket: 0,
             number: 1,
             speed_m_per_s: 0.02,
+            promise: None,
         });
         run.haptic(HapticOrder::LeaveNeedle { ticket: 0 });
         run.haptic(HapticOrder::LeaveNeedle { ticket: 0 });
@@ -267,4 +270,27 @@ impl Recorded {
     fn line_track(&self) -> Option<stylet_sim::line::Track> {
         self.loops.haptic.line_track()
     }
+}
+
+/// It went on to the end when the host that had asked for it had ended.
+#[test]
+fn a_needle_that_is_drawn_waits_for_its_host() {
+    let mut run = Recorded::with_left(TissueKind::ChainMail);
+    run.leave_first();
+    let promise = Promise::first(7);
+    run.haptic(HapticOrder::DrawNeedle {
+        ticket: 0,
+        number: 1,
+        speed_m_per_s: 0.05,
+        promise: Some(promise),
+    });
+    run.run(0.3);
+    assert_eq!(run.left_count(), 1, "held on its way");
+    for _ in 0..40 {
+        run.haptic(HapticOrder::KeepMoving(promise));
+        run.run(0.01);
+    }
+    assert_eq!(run.left_count(), 0, "drawn out");
+    assert_eq!(run.heap_calls, 0, "heap calls of the loops");
+    assert_identical(&run.flight());
 }

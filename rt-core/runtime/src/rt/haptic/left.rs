@@ -4,6 +4,7 @@ use super::HapticLoop;
 use crate::rt::exchange::{Notice, Ticket};
 use crate::rt::left_loads::LeftLoads;
 use crate::rt::line_loads::LineLoads;
+use crate::rt::motion_lease::Promise;
 use crate::rt::response::TissueResponse;
 use stylet_hw::Sample;
 use stylet_shm_schema::RefusalCode;
@@ -33,6 +34,18 @@ impl Left {
     /// Those that are left, where there are any.
     pub fn any_mut(&mut self) -> Option<&mut LeftNeedles> {
         self.needles.as_deref_mut().filter(|needles| !needles.is_empty())
+    }
+
+    /// Whether one is being drawn out, or held on its way.
+    pub fn is_drawing(&self) -> bool {
+        self.needles.as_ref().is_some_and(|needles| needles.is_drawing())
+    }
+
+    /// Each stays where it is.
+    pub fn end_drawing(&mut self) {
+        if let Some(needles) = self.any_mut() {
+            needles.end_drawing();
+        }
     }
 
     /// What they do to the body.
@@ -131,10 +144,19 @@ impl HapticLoop {
         Ok(())
     }
 
-    pub(super) fn draw_needle(&mut self, ticket: Ticket, generation: u64, speed_m_per_s: f64) {
+    pub(super) fn draw_needle(
+        &mut self,
+        ticket: Ticket,
+        generation: u64,
+        speed_m_per_s: f64,
+        promise: Option<Promise>,
+    ) {
         let needles = self.left.any_mut();
         let notice = match needles.is_some_and(|needles| needles.draw_out(generation, speed_m_per_s)) {
-            true => self.done(ticket),
+            true => {
+                self.begin_drawing(promise);
+                self.done(ticket)
+            }
             false => Notice::Refused {
                 ticket,
                 why: RefusalCode::NoLeftNeedle,

@@ -34,9 +34,8 @@ impl HapticLoop {
                         tick,
                     });
                 }
-                HapticOrder::Hand { ticket, goal } if goal.is_valid() => {
-                    self.device.set_hand_goal(&goal);
-                    self.goal = Some(goal);
+                HapticOrder::Hand { ticket, goal, promise } if goal.is_valid() => {
+                    self.begin_motion(goal, promise);
                     self.notify(Notice::Done { ticket, tick });
                 }
                 HapticOrder::Hand { ticket, .. } => self.notify(Notice::Refused {
@@ -44,8 +43,7 @@ impl HapticLoop {
                     why: RefusalCode::BadGoal,
                 }),
                 HapticOrder::StopHand { ticket } => {
-                    self.device.stop_hand();
-                    self.goal = None;
+                    self.stop_motion();
                     self.notify(Notice::Done { ticket, tick });
                 }
                 HapticOrder::Engage { ticket } => self.engage(ticket, tick),
@@ -59,7 +57,9 @@ impl HapticLoop {
                     ticket,
                     number,
                     speed_m_per_s,
-                } => self.draw_needle(ticket, number, speed_m_per_s),
+                    promise,
+                } => self.draw_needle(ticket, number, speed_m_per_s, promise),
+                HapticOrder::KeepMoving(promise) => self.keep_moving(&promise),
                 HapticOrder::LoseDevice { ticket, lost } => self.lose_device(ticket, lost, tick),
                 HapticOrder::MoveBody { ticket, to_m } => self.move_body(ticket, to_m, tick),
                 HapticOrder::Reset { ticket } => self.reset(ticket, tick),

@@ -3,6 +3,7 @@
 use super::HapticLoop;
 use crate::rt::clock;
 use crate::rt::device_loop::is_at_goal;
+use crate::rt::motion_lease::MotionLease;
 use crate::rt::response::TissueResponse;
 use nalgebra::Vector3;
 use stylet_shm_schema::{TickRecord, flags};
@@ -24,6 +25,7 @@ impl HapticLoop {
             | bit(self.on_line && !self.lacks_beam(), flags::LINE_READY)
             | bit(tissue.least_corner <= 0.0, flags::FOLDED)
             | bit(self.left.is_hand_empty, flags::HAND_EMPTY)
+            | bit(self.motions.hand != MotionLease::Free, flags::IN_MOTION)
     }
 
     pub(super) fn record(

@@ -3,6 +3,7 @@
 //! The other hand's loop has a thread, a rate, a watchdog, a gate and limits of its own, under the contract of every loop here. It
 //! shares nothing with the needle's loop: whatever stops one leaves the other alone.
 
+mod motion;
 mod orders;
 mod ports;
 mod record;
@@ -100,6 +101,7 @@ impl SecondLoop {
             tape.begin_tick(&self.memory);
         }
         self.take_orders();
+        self.watch_motion();
         self.mark();
         let (answer, reading) = self.read();
         self.mark();

@@ -16,9 +16,8 @@ impl SecondLoop {
                     self.memory.gate_parameters = gate;
                     self.memory.state.parameters_generation = generation;
                 }
-                SecondOrder::Hand { ticket, goal } if goal.is_valid() => {
-                    self.device.set_hand_goal(&goal);
-                    self.memory.goal = Some(goal);
+                SecondOrder::Hand { ticket, goal, promise } if goal.is_valid() => {
+                    self.begin_motion(goal, promise);
                     self.notify(Notice::Done { ticket, tick });
                 }
                 SecondOrder::Hand { ticket, .. } => {
@@ -26,14 +25,14 @@ impl SecondLoop {
                     self.notify(Notice::Refused { ticket, why });
                 }
                 SecondOrder::StopHand { ticket } => {
-                    self.device.stop_hand();
-                    self.memory.goal = None;
+                    self.stop_motion();
                     self.notify(Notice::Done { ticket, tick });
                 }
                 SecondOrder::Engage => self.engage(tick),
                 SecondOrder::Disengage => self.memory.gate.release(),
                 SecondOrder::Reset => self.reset(),
-                SecondOrder::Up(up) => self.device.set_hand_up(up),
+                SecondOrder::Up(up) => self.turn_up(up),
+                SecondOrder::KeepMoving(promise) => self.keep_moving(&promise),
                 SecondOrder::HandOverTape => self.ports.flight.hand_over(),
             }
         }

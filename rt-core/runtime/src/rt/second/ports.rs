@@ -4,6 +4,7 @@ use super::response::ProbeResponse;
 use super::tape::SecondTape;
 use crate::rt::capacities::Capacities;
 use crate::rt::exchange::{Notice, Ticket};
+use crate::rt::motion_lease::Promise;
 use crate::rt::recorder::{Recorder, TapePort, recorder};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -51,12 +52,16 @@ pub enum SecondOrder {
         ticket: Ticket,
         /// Place, direction, speed and acceleration.
         goal: HandGoal,
+        /// Of the host; without one nobody has to renew it.
+        promise: Option<Promise>,
     },
     /// Hold the simulated hand where it is.
     StopHand {
         /// Number of the request.
         ticket: Ticket,
     },
+    /// What this host moves goes on.
+    KeepMoving(Promise),
     /// Turn the force on; re-arms after a fault.
     Engage,
     /// Ramp the force out.

@@ -3,6 +3,7 @@
 use super::{ProbeResponse, SecondLoop, SecondOutput};
 use crate::rt::clock;
 use crate::rt::device_loop::is_at_goal;
+use crate::rt::motion_lease::MotionLease;
 use stylet_shm_schema::{SecondRecord, flags};
 
 /// A force that is no number trips the gate; its record is one all the same.
@@ -25,6 +26,7 @@ impl SecondLoop {
             | bit(response.touches, flags::IN_CONTACT)
             | bit(at_goal, flags::AT_GOAL)
             | bit(gate_acted, flags::GATE_ACTED)
+            | bit(memory.motion != MotionLease::Free, flags::IN_MOTION)
     }
 
     pub(super) fn record(

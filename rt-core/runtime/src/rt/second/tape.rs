@@ -2,9 +2,11 @@
 
 use super::ports::SecondOrder;
 use super::response::ProbeResponse;
+use crate::rt::motion_lease::MotionLease;
 use crate::rt::recorder::{FLIGHT_TICKS, Last, Tape, complete_from};
 use crate::rt::taped::pod;
 use crate::rt::watchdog::Watchdog;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use stylet_hw::{DeviceFault, DeviceInfo, HandGoal, Sample};
 use stylet_shm_schema::{SecondRecord, SecondState, flags};
@@ -28,6 +30,10 @@ pub struct SecondMemory {
     pub sample: Option<Sample>,
     /// Goal of the simulated hand.
     pub goal: Option<HandGoal>,
+    /// Where +y of the tool goes with it.
+    pub up: Option<Vector3<f64>>,
+    /// Lease of what a host moves.
+    pub motion: MotionLease,
     /// Watchdog with the fault that it keeps.
     pub watchdog: Watchdog,
     /// State as hosts see it.
@@ -49,6 +55,8 @@ impl SecondMemory {
             estimator: VelocityEstimator::new(info.position_step_m),
             sample: None,
             goal: None,
+            up: None,
+            motion: MotionLease::default(),
             watchdog: Watchdog::default(),
             state,
         }

@@ -5,6 +5,8 @@ use crate::replay;
 use crate::replay::file::{Flight, SecondFigures};
 use crate::rt::breaking::{BreakingDevice, Cause};
 use crate::rt::capacities::Capacities;
+use crate::rt::exchange::Moved;
+use crate::rt::motion_lease::Promise;
 use crate::rt::watchdog::{OVERRUN_STREAK, SILENT_SAMPLES, STALE_TISSUE_NS};
 use nalgebra::SMatrix;
 use std::sync::Arc;
@@ -120,6 +122,7 @@ impl Rig {
 fn to_depth(depth_m: f64) -> SecondOrder {
     SecondOrder::Hand {
         ticket: 2,
+        promise: None,
         goal: HandGoal {
             tip_in_world: Vector3::new(0.0, 0.0, depth_m),
             direction: Vector3::z(),
@@ -260,3 +263,50 @@ const SIMULATED: DeviceInfo = DeviceInfo {
     simulated: true,
     ..DeviceInfo::phantom_premium_1_5()
 };
+
+/// The probe went on and turned on after its host had died.
+#[test]
+fn a_hand_whose_host_falls_silent_is_at_rest_within_5_mm_and_goes_on_when_it_is_heard() {
+    let promise = Promise::first(7);
+    let mut rig = Rig::new();
+    let mut move_on = to_depth(-0.3);
+    if let SecondOrder::Hand { goal, promise: of, .. } = &mut move_on {
+        (goal.speed_m_per_s, goal.acceleration_m_per_s2) = (0.123, 2.0);
+        (goal.direction, *of) = (Vector3::new(0.0, 1.0, 1.0).normalize(), Some(promise));
+    }
+    rig.order(SecondOrder::Up(Some(Vector3::x())));
+    rig.order(move_on);
+    for _ in 0..30 {
+        rig.order(SecondOrder::KeepMoving(promise));
+        rig.run(5);
+    }
+    rig.order(SecondOrder::KeepMoving(promise));
+    let silent = rig.run(300);
+    let way_m = |from: &SecondRecord, to: &SecondRecord| {
+        (Vector3::from(to.tip_in_scene_m) - Vector3::from(from.tip_in_scene_m)).norm()
+    };
+    let (first, last) = (&silent[0], &silent[299]);
+    assert!((1e-3..5e-3).contains(&way_m(first, last)), "{} m", way_m(first, last));
+    assert!(way_m(&silent[150], last) < 1.5e-4, "at rest");
+    assert_eq!(silent[40].world_from_tool, last.world_from_tool, "turns no more");
+    rig.order(SecondOrder::KeepMoving(promise));
+    let on = rig.run(20);
+    assert!(
+        on[19].world_from_tool != last.world_from_tool && way_m(last, &on[19]) > 1e-5,
+        "goes on"
+    );
+    rig.run(500);
+    let given_up = |notice: &&Notice| {
+        matches!(
+            notice,
+            Notice::MotionGivenUp {
+                what: Moved::SecondHand,
+                ..
+            }
+        )
+    };
+    assert_eq!(rig.seen.iter().filter(given_up).count(), 1);
+    rig.order(SecondOrder::KeepMoving(promise));
+    let after = rig.run(100);
+    assert!(way_m(&after[0], &after[99]) < 1.5e-4, "a new goal is needed");
+}

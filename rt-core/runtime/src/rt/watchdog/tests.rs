@@ -17,6 +17,7 @@ use stylet_sim::force::gate::RAMP_OUT_TICKS;
 use stylet_sim::needle::{LayerKind, NeedleParameters};
 
 mod exercises;
+mod motion;
 
 const TICK_NS: u64 = 1_000_000;
 
@@ -117,6 +118,7 @@ impl Rig {
 fn to_depth(depth_m: f64) -> HapticOrder {
     HapticOrder::Hand {
         ticket: 2,
+        promise: None,
         goal: HandGoal {
             tip_in_world: Vector3::new(0.0, 0.0, depth_m),
             direction: Vector3::z(),

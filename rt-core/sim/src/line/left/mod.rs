@@ -7,6 +7,7 @@
 
 mod assemble;
 mod by_sets;
+mod draw;
 mod moved;
 mod needle;
 mod onward;
@@ -41,7 +42,7 @@ pub struct LeftNeedle {
     stations: usize,
     /// Where its tip is along the line in the world.
     held_m: f64,
-    /// How far it has been drawn back since it was left, and how fast it is, m/s.
+    /// How far it has been drawn back since it was left, and how fast it is, m/s; below zero while it is held on its way.
     drawn_m: f64,
     drawing_m_per_s: f64,
 }
@@ -227,13 +228,6 @@ impl LeftNeedles {
         Some(needle.line)
     }
 
-    /// Begins to draw that needle out; at 0 m/s it is held again. False where there is none of that number.
-    pub fn draw_out(&mut self, generation: u64, speed_m_per_s: f64) -> bool {
-        self.is_still = false;
-        let needle = self.needles.iter_mut().find(|n| n.line.generation == generation);
-        needle.map(|n| n.drawing_m_per_s = speed_m_per_s.max(0.0)).is_some()
-    }
-
     /// One that has been drawn out of the tissue, if any.
     pub fn drawn_out(&mut self) -> Option<Box<HandLine>> {
         let is_out = |needle: &LeftNeedle| needle.drawn_m > 0.0 && needle.depth_m() <= 0.0;
@@ -309,23 +303,6 @@ impl LeftNeedles {
     /// Forces of all elements, needle by needle: its shaft's, then its tip's.
     pub fn forces_n(&self) -> &[f64] {
         &self.force_n[..self.count]
-    }
-
-    fn draw(&mut self, dt_s: f64) {
-        let mut is_drawn = false;
-        for needle in self.needles.iter_mut().filter(|needle| needle.drawing_m_per_s > 0.0) {
-            let by_m = needle.drawing_m_per_s * dt_s;
-            needle.drawn_m += by_m;
-            needle.held_m -= by_m;
-            for rest_m in &mut self.rest_m[needle.first..=needle.first + needle.stations] {
-                *rest_m -= by_m;
-            }
-            is_drawn = true;
-        }
-        if is_drawn {
-            self.is_still = false;
-            self.limit();
-        }
     }
 
     /// Friction of each station by how much of it the shaft is in; the tip pushes up to its cutting force.

@@ -1,0 +1,261 @@
+//! Motions that this host ordered, which go on while it says that it lives.
+//!
+//! Tied to the host's own calls of `poll`, not to the thread that receives: that lives on when the host hangs.
+
+use super::Answer;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::{Event, EventKind, Request, VALID_RANGE_S};
+
+/// Polls from which the host's pauses are known.
+const POLLS: usize = 16;
+/// The third longest pause of those is foreseen: a host that is slow each time keeps its motion, and one that is slow once brakes and
+/// goes on.
+const FORESEEN: usize = 2;
+/// A promise is for so many pauses, and is renewed so often while it lasts.
+const PAUSES: f64 = 1.5;
+const RENEWALS: u32 = 3;
+/// No needle lies deeper than this, m.
+const LONGEST_DRAW_M: f64 = 0.5;
+
+/// One motion, from its request on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Ordered {
+    command_id: u64,
+    /// The first tick that knows it; the reply says which.
+    from_tick: Option<u64>,
+    /// When it has ended for certain, where no state shows its end.
+    until: Option<Instant>,
+}
+
+/// What moves by this host's orders, by the numbers of [`EventKind::MotionGivenUp`]: the needle's hand, the second device's, and needles
+/// that are drawn out.
+#[derive(Default)]
+pub struct Motions {
+    ordered: [Option<Ordered>; 3],
+    polled: Option<Instant>,
+    pauses: [Duration; POLLS],
+    next_pause: usize,
+    renewed: Option<Instant>,
+}
+
+impl Motions {
+    /// Takes a request that was sent. True where it begins a motion.
+    pub fn sent(&mut self, request: &Request, command_id: u64, now: Instant) -> bool {
+        let begun = Ordered {
+            command_id,
+            from_tick: None,
+            until: None,
+        };
+        match request {
+            Request::MoveHand(_) => self.ordered[0] = Some(begun),
+            Request::MoveSecondHand(_) => self.ordered[1] = Some(begun),
+            Request::DrawNeedle { speed_m_per_s, .. } => {
+                let lasts = Duration::try_from_secs_f64(LONGEST_DRAW_M / speed_m_per_s).unwrap_or(Duration::MAX);
+                let until = now.checked_add(lasts);
+                self.ordered[2] = Some(Ordered { until, ..begun });
+            }
+            Request::StopHand => {
+                self.ordered[..2].fill(None);
+                return false;
+            }
+            Request::StopSecondHand => {
+                self.ordered[1] = None;
+                return false;
+            }
+            _ => return false,
+        }
+        true
+    }
+
+    /// Takes the core's answer to a request.
+    pub fn answered(&mut self, command_id: u64, answer: &Answer) {
+        for ordered in &mut self.ordered {
+            if let Some(motion) = ordered.as_mut().filter(|motion| motion.command_id == command_id) {
+                motion.from_tick = Some(answer.effective_tick);
+                if !answer.accepted {
+                    *ordered = None;
+                }
+            }
+        }
+    }
+
+    /// Takes what happened: a motion that was given up does not go on.
+    pub fn take(&mut self, event: &Event) {
+        if EventKind::from_number(event.kind) == Some(EventKind::MotionGivenUp)
+            && let Some(ordered) = self.ordered.get_mut(event.code as usize)
+        {
+            ordered.take_if(|motion| motion.from_tick.is_some_and(|tick| event.tick >= tick));
+        }
+    }
+
+    /// Takes the newest states, the needle's and the second device's: tick, and whether the hand is in motion.
+    pub fn seen(&mut self, states: [Option<(u64, bool)>; 2]) {
+        for (ordered, state) in self.ordered.iter_mut().zip(states) {
+            let has_ended = |motion: &mut Ordered| {
+                let knows = |tick: u64| motion.from_tick.is_some_and(|from| tick > from);
+                state.is_some_and(|(tick, is_moving)| !is_moving && knows(tick))
+            };
+            ordered.take_if(has_ended);
+        }
+    }
+
+    /// The longest pause between the host's last polls.
+    pub fn longest_pause(&self) -> Duration {
+        self.pauses.iter().copied().max().unwrap_or_default()
+    }
+
+    /// Another run of the core knows nothing of them.
+    pub fn forget(&mut self) {
+        self.ordered = [None; 3];
+    }
+
+    /// The host polls. What to promise, where it is time for it.
+    pub fn polled(&mut self, now: Instant) -> Option<f64> {
+        if let Some(before) = self.polled.replace(now) {
+            self.pauses[self.next_pause % POLLS] = now - before;
+            self.next_pause += 1;
+        }
+        self.ordered[2].take_if(|motion| motion.until.is_none_or(|until| now >= until));
+        let every = Duration::from_secs_f64(self.valid_s()) / RENEWALS;
+        let is_time = self.renewed.is_none_or(|at| now - at >= every);
+        (is_time && self.ordered.iter().any(Option::is_some)).then(|| self.renew(now))
+    }
+
+    /// A promise now.
+    pub fn renew(&mut self, now: Instant) -> f64 {
+        self.renewed = Some(now);
+        self.valid_s()
+    }
+
+    fn valid_s(&self) -> f64 {
+        let mut pauses = self.pauses;
+        pauses.sort_unstable();
+        let foreseen = pauses[POLLS - 1 - FORESEEN];
+        let [shortest_s, longest_s] = VALID_RANGE_S;
+        (PAUSES * foreseen.as_secs_f64()).clamp(shortest_s, longest_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+    use stylet_shm_schema::HandMove;
+
+    fn move_hand() -> Request {
+        Request::MoveHand(HandMove {
+            tip_m: [0.0; 3],
+            direction: [0.0, 0.0, 1.0],
+            speed_m_per_s: 0.1,
+            acceleration_m_per_s2: 1.0,
+        })
+    }
+
+    fn accepted(effective_tick: u64) -> Answer {
+        Answer {
+            accepted: true,
+            text: String::new(),
+            reasons: Vec::new(),
+            effective_tick,
+        }
+    }
+
+    /// A host that polls with these pauses.
+    struct Host {
+        motions: Motions,
+        now: Instant,
+    }
+
+    impl Host {
+        fn new() -> Self {
+            Self {
+                motions: Motions::default(),
+                now: Instant::now(),
+            }
+        }
+
+        fn moves() -> Self {
+            let mut host = Self::new();
+            assert!(host.motions.sent(&move_hand(), 5, host.now));
+            host
+        }
+
+        /// What it promises, with the number of the poll.
+        fn polls(&mut self, pauses_ms: &[u64]) -> Vec<(usize, f64)> {
+            let mut promises = Vec::new();
+            for (poll, &pause_ms) in pauses_ms.iter().enumerate() {
+                self.now += Duration::from_millis(pause_ms);
+                promises.extend(self.motions.polled(self.now).map(|valid_s| (poll, valid_s)));
+            }
+            promises
+        }
+
+        fn renews(&mut self) -> bool {
+            !self.polls(&[2; 20]).is_empty()
+        }
+    }
+
+    #[test]
+    fn a_host_promises_one_and_a_half_of_its_pauses_and_one_long_one_is_not_foreseen() {
+        for (pause_ms, valid_s, every) in [(2, 0.02, 4), (16, 0.024, 1), (60, 0.09, 1), (900, 0.3, 1)] {
+            let mut host = Host::moves();
+            host.polls(&[pause_ms; 40]);
+            let promised = host.polls(&[&[400], &[pause_ms; 10][..]].concat());
+            let last = &promised[promised.len() - 2..];
+            assert!((last[1].1 - valid_s).abs() < 1e-9, "{pause_ms} ms: {last:?}");
+            assert_eq!(last[1].0 - last[0].0, every, "{pause_ms} ms");
+        }
+    }
+
+    #[test]
+    fn a_motion_is_renewed_until_the_hand_is_there_and_no_longer() {
+        assert!(!Host::new().renews(), "nothing moves");
+        let mut host = Host::moves();
+        host.motions.seen([Some((99, false)), None]);
+        assert!(host.renews(), "that was before it");
+        host.motions.answered(4, &accepted(50));
+        host.motions.answered(5, &accepted(100));
+        for state in [(100, false), (200, true)] {
+            host.motions.seen([Some(state), Some((200, false))]);
+            assert!(host.renews());
+        }
+        host.motions.seen([Some((201, false)), None]);
+        assert!(!host.renews());
+    }
+
+    #[test]
+    fn a_needle_that_is_drawn_out_is_renewed_for_as_long_as_that_can_take() {
+        let mut host = Host::new();
+        let speed_m_per_s = 0.5;
+        let draw = Request::DrawNeedle {
+            number: 1,
+            speed_m_per_s,
+        };
+        assert!(host.motions.sent(&draw, 5, host.now));
+        host.polls(&[10; 90]);
+        assert!(host.renews());
+        host.polls(&[10; 20]);
+        assert!(!host.renews());
+    }
+
+    #[test]
+    fn a_motion_that_was_stopped_refused_or_given_up_is_not_renewed() {
+        let refused = Answer::unsent("full".to_owned());
+        let mut event = Event::zeroed();
+        (event.kind, event.tick) = (EventKind::MotionGivenUp as u32, 300);
+        let ends: [&dyn Fn(&mut Motions); 4] = [
+            &|motions| motions.answered(5, &refused),
+            &|motions| assert!(!motions.sent(&Request::StopHand, 6, Instant::now())),
+            &|motions| {
+                motions.answered(5, &accepted(100));
+                motions.take(&event);
+            },
+            &|motions| motions.forget(),
+        ];
+        for end in ends {
+            let mut host = Host::moves();
+            end(&mut host.motions);
+            assert!(!host.renews());
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Hosts that order motions, and what they promise: at most one renewal for each in a pass, however often it is sent.
+
+use super::Bridge;
+use crate::rt::exchange::{HapticOrder, Moved, Ticket};
+use crate::rt::motion_lease::Promise;
+use crate::rt::second::SecondOrder;
+
+/// Of each of what is [`Moved`].
+#[derive(Default)]
+pub(super) struct Movers {
+    /// Who moves it.
+    hosts: [Option<u64>; 3],
+    /// What was promised in this pass.
+    promises: [Option<Promise>; 3],
+}
+
+impl Movers {
+    /// Takes a promise; one of a host that moves nothing is of no use.
+    pub fn keep(&mut self, host_id: u64, valid_s: f64) {
+        for (promise, mover) in self.promises.iter_mut().zip(self.hosts) {
+            if mover == Some(host_id) {
+                *promise = Some(Promise { host_id, valid_s });
+            }
+        }
+    }
+}
+
+impl Bridge {
+    /// The promise with which a request begins a motion.
+    pub(super) fn first_promise(&mut self, ticket: Ticket, what: Moved) -> Option<Promise> {
+        let (host_id, _) = self.link.asker(ticket)?;
+        self.movers.hosts[what as usize] = Some(host_id);
+        Some(Promise::first(host_id))
+    }
+
+    /// Hands on what was promised in this pass.
+    pub(super) fn renew_motions(&mut self) {
+        let [needle, second, drawn] = std::mem::take(&mut self.movers.promises);
+        // One order renews both motions of the needle's loop.
+        for promise in [needle, drawn.filter(|_| drawn != needle)].into_iter().flatten() {
+            let _ = self.loops.haptic_orders.push(HapticOrder::KeepMoving(promise));
+        }
+        if let Some(promise) = second {
+            self.order_second(SecondOrder::KeepMoving(promise));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_host_that_moves_nothing_renews_nothing() {
+        let mut movers = Movers {
+            hosts: [Some(1), Some(2), None],
+            ..Movers::default()
+        };
+        for (host_id, valid_s) in [(3, 0.3), (2, 0.1), (2, 0.2)] {
+            movers.keep(host_id, valid_s);
+        }
+        let promise = Promise {
+            host_id: 2,
+            valid_s: 0.2,
+        };
+        assert_eq!(movers.promises, [None, Some(promise), None]);
+    }
+}

@@ -1,0 +1,226 @@
+//! The lease of a motion: a goal that a host set is followed while that host says that it still lives.
+//!
+//! Judged in ticks of the loop that moves the hand, so that a bridge that hangs stops the hand as well.
+
+use nalgebra::{UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+use stylet_hw::{Device, HandGoal, Sample};
+
+/// What a request that begins a motion promises.
+const FIRST_VALID_S: f64 = 0.02;
+/// A host that is heard again within this time after the hand began to brake goes on.
+const GRACE_S: f64 = 0.3;
+/// So hard that the mass of the hand, not its path, decides how far it goes on: 1.6 mm from 123 mm/s.
+const BRAKE_M_PER_S2: f64 = 20.0;
+/// Cosine of the angle within which a tool is turned as its goal says: 1.4 mrad.
+const TURNED: f64 = 1.0 - 1e-6;
+
+/// A host's promise to be heard again in time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Promise {
+    /// The host.
+    pub host_id: u64,
+    /// For how long the motion goes on without another promise.
+    pub valid_s: f64,
+}
+
+impl Promise {
+    /// Of a request that begins a motion.
+    pub fn first(host_id: u64) -> Self {
+        Self {
+            host_id,
+            valid_s: FIRST_VALID_S,
+        }
+    }
+}
+
+/// Whether a motion may go on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub enum MotionLease {
+    /// Nothing moves, or nobody has to renew it: rehearsals and steppers have no host.
+    #[default]
+    Free,
+    /// The motion goes on.
+    Valid {
+        /// Whose it is.
+        host_id: u64,
+        /// Without another promise.
+        ticks_left: u32,
+    },
+    /// The hand brakes, or rests.
+    Lapsed {
+        /// Whose it is.
+        host_id: u64,
+        /// Until it is given up.
+        ticks_left: u32,
+    },
+}
+
+/// Leases of the force loop's motions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Motions {
+    /// Of the hand.
+    pub hand: MotionLease,
+    /// Of all needles that are drawn out.
+    pub drawing: MotionLease,
+}
+
+/// What a loop has to do in the tick in which a lease changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lapse {
+    /// Brake, and keep the goal.
+    Brake,
+    /// Forget the goal.
+    GiveUp,
+}
+
+impl MotionLease {
+    /// Of a motion that begins; nobody has to renew it where nobody promised.
+    pub fn begin(promise: Option<Promise>, period_s: f64) -> Self {
+        promise.map_or(Self::Free, |promise| Self::Valid {
+            host_id: promise.host_id,
+            ticks_left: ticks(promise.valid_s, period_s),
+        })
+    }
+
+    /// Takes a promise. True where a motion that had lapsed goes on.
+    pub fn renew(&mut self, promise: &Promise, period_s: f64) -> bool {
+        let was_lapsed = match *self {
+            Self::Valid { host_id, .. } if host_id == promise.host_id => false,
+            Self::Lapsed { host_id, .. } if host_id == promise.host_id => true,
+            _ => return false,
+        };
+        *self = Self::begin(Some(*promise), period_s);
+        was_lapsed
+    }
+
+    /// One tick. A motion that has ended needs no lease.
+    pub fn tick(&mut self, has_ended: bool, period_s: f64) -> Option<Lapse> {
+        if has_ended {
+            *self = Self::Free;
+        }
+        match self {
+            Self::Free => None,
+            Self::Valid { host_id, ticks_left: 0 } => {
+                *self = Self::Lapsed {
+                    host_id: *host_id,
+                    ticks_left: ticks(GRACE_S, period_s),
+                };
+                Some(Lapse::Brake)
+            }
+            Self::Lapsed { ticks_left: 0, .. } => {
+                *self = Self::Free;
+                Some(Lapse::GiveUp)
+            }
+            Self::Valid { ticks_left, .. } | Self::Lapsed { ticks_left, .. } => {
+                *ticks_left -= 1;
+                None
+            }
+        }
+    }
+}
+
+fn ticks(time_s: f64, period_s: f64) -> u32 {
+    (time_s / period_s).round() as u32
+}
+
+/// Brakes a simulated hand at its tip, and ends its turn. The spring of the hand must not draw the tip on: one that pushes against a
+/// membrane is ahead of it.
+pub fn brake(device: &mut dyn Device, goal: &HandGoal, sample: Option<Sample>, velocity_m_per_s: &Vector3<f64>) {
+    let Some(sample) = sample else {
+        return device.stop_hand();
+    };
+    let acceleration_m_per_s2 = goal.acceleration_m_per_s2.max(BRAKE_M_PER_S2);
+    let stopping_s = velocity_m_per_s.norm() / (2.0 * acceleration_m_per_s2);
+    device.set_hand_up(None);
+    device.set_hand_goal(&HandGoal {
+        tip_in_world: sample.tip_in_world + velocity_m_per_s * stopping_s,
+        direction: sample.direction_in_world(),
+        acceleration_m_per_s2,
+        ..*goal
+    });
+}
+
+/// Whether a tool points, and is turned about its axis, as its goal says.
+pub fn is_turned(goal: &HandGoal, up: Option<Vector3<f64>>, world_from_tool: &UnitQuaternion<f64>) -> bool {
+    let is_along = |of_tool: Vector3<f64>, wanted: Vector3<f64>| {
+        let wanted = wanted.try_normalize(1e-9);
+        wanted.is_none_or(|wanted| (world_from_tool * of_tool).dot(&wanted) >= TURNED)
+    };
+    let axis = world_from_tool * Vector3::z();
+    is_along(Vector3::z(), goal.direction) && up.is_none_or(|up| is_along(Vector3::y(), up - axis * up.dot(&axis)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MINE: u64 = 7;
+
+    fn promise(host_id: u64, ticks: u32) -> Promise {
+        let valid_s = f64::from(ticks) * 1e-3;
+        Promise { host_id, valid_s }
+    }
+
+    /// Ticks until it lapses and until it is given up.
+    fn ends(mut lease: MotionLease) -> Vec<(u32, Lapse)> {
+        let lapse = |n: u32| Some((n, lease.tick(false, 1e-3)?));
+        (0..1000).filter_map(lapse).collect()
+    }
+
+    #[test]
+    fn a_motion_lapses_when_its_promise_is_over_and_is_given_up_after_the_grace() {
+        let lease = MotionLease::begin(Some(promise(MINE, 25)), 1e-3);
+        assert_eq!(ends(lease), [(25, Lapse::Brake), (25 + 301, Lapse::GiveUp)]);
+        assert_eq!(ends(MotionLease::begin(None, 1e-3)), [], "a rehearsal has no host");
+    }
+
+    #[test]
+    fn the_promise_of_the_host_that_moves_it_renews_it_and_that_of_another_does_not() {
+        for (host_id, lapses) in [(MINE, 0), (MINE + 1, 1)] {
+            let mut lease = MotionLease::begin(Some(promise(MINE, 25)), 1e-3);
+            let mut seen = Vec::new();
+            for tick in 0..200 {
+                if tick % 20 == 0 {
+                    assert!(!lease.renew(&promise(host_id, 25), 1e-3));
+                }
+                seen.extend(lease.tick(false, 1e-3));
+            }
+            assert_eq!(seen.len(), lapses, "host {host_id}");
+        }
+    }
+
+    #[test]
+    fn a_host_that_is_heard_within_the_grace_goes_on_and_after_it_does_not() {
+        for (silent, goes_on) in [(30, true), (320, true), (330, false)] {
+            let mut lease = MotionLease::begin(Some(promise(MINE, 25)), 1e-3);
+            for _ in 0..silent {
+                lease.tick(false, 1e-3);
+            }
+            assert!(!lease.renew(&promise(MINE + 1, 25), 1e-3));
+            assert_eq!(lease.renew(&promise(MINE, 25), 1e-3), goes_on, "{silent}");
+        }
+    }
+
+    #[test]
+    fn a_motion_that_has_ended_never_lapses() {
+        let mut lease = MotionLease::begin(Some(promise(MINE, 25)), 1e-3);
+        assert_eq!(lease.tick(true, 1e-3), None);
+        assert_eq!(ends(lease), []);
+    }
+
+    #[test]
+    fn a_tool_is_turned_where_its_axis_and_its_side_are() {
+        let goal = HandGoal {
+            tip_in_world: Vector3::zeros(),
+            direction: Vector3::z() * 3.0,
+            speed_m_per_s: 0.1,
+            acceleration_m_per_s2: 1.0,
+        };
+        let tool = UnitQuaternion::identity();
+        let tilted = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.01);
+        assert!(is_turned(&goal, None, &tool) && !is_turned(&goal, None, &tilted));
+        let up = |v: Vector3<f64>| is_turned(&goal, Some(v), &tool);
+        assert!(up(Vector3::new(0.0, 2.0, 5.0)) && up(Vector3::z()) && !up(Vector3::x()));
+    }
+}
