@@ -80,4 +80,4 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 13;
+pub const SCHEMA_VERSION: u32 = 14;
