@@ -30,6 +30,7 @@ pub mod affinity;
 pub mod check;
 mod class;
 mod command;
+mod deadlines;
 mod event;
 mod exercise;
 pub mod motion;
@@ -50,6 +51,7 @@ mod text;
 
 pub use class::{Class, ClassMember, LeaseOrder, LeaseRequest, MAX_CLASS};
 pub use command::{Command, MARK_BYTES, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
+pub use deadlines::DeadlineTotals;
 pub use event::{Event, EventKind};
 pub use exercise::{EXERCISE_STIFFNESS_RANGE, Exercise, ExercisesInForce, MOST_MOVED_M};
 pub use params::{

@@ -1,5 +1,6 @@
 //! The latest state of the force loop, rewritten each millisecond on a wait-free blackboard.
 
+use crate::DeadlineTotals;
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 use num_enum::TryFromPrimitive;
@@ -37,7 +38,7 @@ pub struct HapticState {
     pub force_scale: f64,
     /// Peak force of the device, N.
     pub device_limit_n: f64,
-    /// Deadlines of the force loop that were missed.
+    /// Deadlines of the force loop that were missed since the last reset.
     pub missed_deadlines: u64,
     /// Longest wake-up latency of the force loop since the last reset.
     pub worst_wake_ns: u64,
@@ -45,7 +46,7 @@ pub struct HapticState {
     pub worst_work_ns: u64,
     /// The tissue tick whose answer was used.
     pub tissue_tick: u64,
-    /// Deadlines of the tissue loop that were missed.
+    /// Deadlines of the tissue loop that were missed since the last reset.
     pub tissue_missed_deadlines: u64,
     /// Longest wake-up latency of the tissue loop since the last reset.
     pub tissue_worst_wake_ns: u64,
@@ -83,6 +84,14 @@ pub struct HapticState {
     pub worst_lag_ns: u64,
     /// Largest [`lag_m`](Self::lag_m) since the last reset.
     pub worst_lag_m: f64,
+    /// Totals of the force loop since it began.
+    pub since_start: DeadlineTotals,
+    /// Totals of the force loop since the force was last turned on.
+    pub since_armed: DeadlineTotals,
+    /// Totals of the tissue loop since it began.
+    pub tissue_since_start: DeadlineTotals,
+    /// Totals of the tissue loop since the force was last turned on.
+    pub tissue_since_armed: DeadlineTotals,
     /// [`Phase`] by number.
     pub phase: u32,
     /// [`Fault`] by number.

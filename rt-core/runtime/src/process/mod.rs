@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_shm_schema::service::{Instance, ServiceError};
-use stylet_shm_schema::{Fault, ParameterProblems, ThreadReport};
+use stylet_shm_schema::{DeadlineTotals, Fault, ParameterProblems, ThreadReport};
 use stylet_sim::scene::TissueKind;
 use threads::Threads;
 
@@ -94,10 +94,10 @@ pub struct LoopReport {
     pub thread: ThreadReport,
     /// Ticks made.
     pub ticks: u64,
-    /// Deadlines missed.
-    pub missed: u64,
-    /// Latest wake-up after a deadline, ns.
-    pub worst_wake_ns: u64,
+    /// Deadlines missed and worst wake-up.
+    pub since_start: DeadlineTotals,
+    /// Those since the force was last turned on.
+    pub since_armed: DeadlineTotals,
     /// Sleeps there was reason for: each costs a switch.
     pub sleeps: u64,
     /// Page faults, context switches and heap calls.

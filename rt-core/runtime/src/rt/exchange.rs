@@ -128,6 +128,8 @@ pub enum TissueOrder {
         /// A blank flight recording for it.
         tape: Box<TissueTape>,
     },
+    /// The force was turned on: totals since then begin anew.
+    Armed,
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
     /// Room to record what needles that stay in do to the body.

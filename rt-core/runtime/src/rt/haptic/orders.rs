@@ -2,7 +2,7 @@
 
 use super::HapticLoop;
 use crate::rt::exchange::{HapticOrder, Notice, Ticket};
-use stylet_shm_schema::RefusalCode;
+use stylet_shm_schema::{DeadlineTotals, RefusalCode};
 use stylet_sim::force::chain::ChainParameters;
 
 impl HapticLoop {
@@ -73,6 +73,7 @@ impl HapticLoop {
             let time_ns = self.state.time_ns;
             self.notify(Notice::Rearmed { tick, time_ns });
         }
+        self.state.since_armed = DeadlineTotals::default();
         self.chain.gate.engage();
         self.notify(Notice::Done { ticket, tick });
     }
