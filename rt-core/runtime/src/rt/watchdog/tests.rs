@@ -17,6 +17,7 @@ use stylet_sim::force::gate::RAMP_OUT_TICKS;
 use stylet_sim::needle::{LayerKind, NeedleParameters};
 
 mod exercises;
+mod stale;
 mod totals;
 
 const TICK_NS: u64 = 1_000_000;

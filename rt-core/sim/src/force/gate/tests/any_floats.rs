@@ -112,7 +112,11 @@ impl Bits {
                 force_n: self.vector(size),
                 torque_nm: self.vector(0.5),
             },
-            constant_n: if self.one_in(4) { self.vector(2.0) } else { Vector3::zeros() },
+            constant_n: if self.one_in(4) {
+                self.vector(2.0)
+            } else {
+                Vector3::zeros()
+            },
             stored_j: self.near(0.1),
             motion: Motion {
                 moved_m: self.vector(1e-3),
@@ -146,7 +150,12 @@ fn sequence(seed: u64) -> Result<(), String> {
         let input = bits.input(dt_s, tick < 4);
         let out = step(&parameters, &device, &mut state, &input);
         let (force_n, torque_nm) = (out.wrench.force_n, out.wrench.torque_nm);
-        let fails = |claim: &str| Err(format!("{claim}: seed {seed}, tick {tick}, {before:?} to {:?}", out.wrench));
+        let fails = |claim: &str| {
+            Err(format!(
+                "{claim}: seed {seed}, tick {tick}, {before:?} to {:?}",
+                out.wrench
+            ))
+        };
         let slack = 1.0 + 1e-9;
         if !out.wrench.is_finite() {
             return fails("finite");
