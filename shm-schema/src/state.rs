@@ -223,9 +223,7 @@ impl Fault {
             Self::OverrunStreak => {
                 "the force loop missed 20 deadlines in a row; lower the load on its core, then re-arm"
             }
-            Self::LoopStopped => {
-                "the force loop has stopped; rt-core ended, so that the device is released: start it again"
-            }
+            Self::LoopStopped => "the force loop stood still for too long; lower the load on its core, then re-arm",
             Self::DeviceLost => {
                 "the device is not connected; check power and cable, wait until it is found again, then re-arm"
             }

@@ -43,15 +43,16 @@ use std::sync::Arc;
 use std::time::Duration;
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::service::Node;
-use stylet_shm_schema::{EventKind, Fault, PlanInForce, Refusal, RefusalCode, Rehearsal, Session};
+use stylet_shm_schema::{EventKind, PlanInForce, Refusal, RefusalCode, Rehearsal, Session};
 use stylet_sim::scene::{SceneSource, TissueKind};
+pub(crate) use supervisor::LOOP_ENDED;
 use supervisor::Supervisor;
 
 const PASS: Duration = Duration::from_millis(2);
 
 /// The force loop has stopped by itself.
 #[derive(Debug, thiserror::Error)]
-#[error("{}", Fault::LoopStopped.message())]
+#[error("{}", LOOP_ENDED)]
 pub struct LoopStopped;
 
 /// What a bridge must know of its run.
@@ -173,6 +174,14 @@ impl Bridge {
         Ok(())
     }
 
+    /// After the force loop has stopped: gives the others `limit` to hand over what they recorded, and writes it. The force loop's own
+    /// tape is missing unless it comes back meanwhile.
+    pub fn save_flight_of_stopped(&mut self, limit: Duration) -> Result<PathBuf, SaveError> {
+        let generation = self.scene.generation();
+        self.flights
+            .save_stopped(generation, self.lines.archive(), LOOP_ENDED, limit)
+    }
+
     /// After both loops have ended: writes what they recorded last.
     pub fn save_last_flight(&mut self) -> Result<PathBuf, SaveError> {
         self.flights.save_at_end(self.scene.generation(), self.lines.archive())
@@ -198,18 +207,7 @@ impl Bridge {
         self.serve_probe(generation);
         let (generation, size) = (self.scene.generation(), self.scene.picture.snapshot_size());
         self.loans.pass(&self.link.ports, generation, size);
-        if self.supervisor.pass(made_a_tick) {
-            let fault = Fault::LoopStopped;
-            self.link.event(
-                EventKind::FaultRaised,
-                EventDetails {
-                    code: fault as u32,
-                    text: fault.message(),
-                    ..EventDetails::now()
-                },
-            );
-            return Err(LoopStopped);
-        }
+        self.supervise(made_a_tick)?;
         Ok(end)
     }
 

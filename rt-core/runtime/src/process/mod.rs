@@ -4,7 +4,7 @@ mod session;
 mod setup;
 mod threads;
 
-use crate::bridge::{Bridge, BridgeSetup};
+use crate::bridge::{Bridge, BridgeSetup, LOOP_ENDED};
 use crate::device::{DeviceChoice, DeviceError, Libraries};
 use crate::rt::arm::{Refused, Usage};
 use crate::rt::clock::Wait;
@@ -14,8 +14,9 @@ use setup::Setup;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use stylet_shm_schema::service::{Instance, ServiceError};
-use stylet_shm_schema::{DeadlineTotals, Fault, ParameterProblems, ThreadReport};
+use stylet_shm_schema::{DeadlineTotals, ParameterProblems, ThreadReport};
 use stylet_sim::scene::TissueKind;
 use threads::Threads;
 
@@ -146,12 +147,16 @@ pub enum RunError {
     #[error("the {0} thread ended before it began")]
     EndedEarly(&'static str),
     /// The force loop stopped making ticks.
-    #[error("{}", Fault::LoopStopped.message())]
+    #[error("{LOOP_ENDED}")]
     LoopStopped,
     /// A loop's thread ended before it was asked to.
     #[error("a real-time thread ended by itself")]
     ThreadEnded,
 }
+
+/// The loops that run have this long to hand over what they recorded when the force loop stands still: the device keeps its
+/// last force until the process ends, or until its own watchdog acts.
+const HAND_OVER_LIMIT: Duration = Duration::from_millis(100);
 
 /// Runs until `stop` is set by a signal, or a host asks to end.
 pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, RunError> {
@@ -191,6 +196,10 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     threads.end();
     if served.is_err() {
         // Not joined: a loop that stands still would be waited for in vain.
+        match bridge.save_flight_of_stopped(HAND_OVER_LIMIT) {
+            Ok(path) => eprintln!("rt-core: flight recording {}", path.display()),
+            Err(why) => eprintln!("rt-core: the flight recording was not saved: {why}"),
+        }
         return Err(RunError::LoopStopped);
     }
     let ended = threads.join()?;

@@ -90,6 +90,8 @@ pub enum HapticOrder {
         /// How fast.
         speed_m_per_s: f64,
     },
+    /// The loop made no tick for longer than the supervisor waits: the force stays off until somebody re-arms.
+    StoodStill,
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
     /// Hold the simulated hand where it is.
