@@ -127,6 +127,7 @@ fn watch_core(options: &Options) -> Option<usize> {
 
 /// Runs for `setup.duration_ns` after the first tick that a host saw, or until `interrupted`.
 pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, MeasureError> {
+    process::limits::check().map_err(RunError::from)?;
     let script = Script::of(&Scene::builtin(&setup.options.scene)?);
     let pose_times = Arc::new(PoseTimes::new());
     let options = setup.options;

@@ -20,6 +20,7 @@ mod plan_optimised;
 mod plan_rehearsal;
 mod process_hosts;
 mod process_killed;
+mod process_limits;
 mod process_loops;
 mod process_restart;
 mod recorder_flight;

@@ -1,5 +1,6 @@
 //! Puts the process together: scene and device, shared memory, two armed threads, and the bridge on the calling thread.
 
+pub mod limits;
 mod session;
 mod setup;
 mod threads;
@@ -129,6 +130,9 @@ pub enum RunError {
     /// The tissue model could not be set up.
     #[error(transparent)]
     World(#[from] WorldError),
+    /// A limit of the PC is too low.
+    #[error(transparent)]
+    Limit(#[from] limits::LimitError),
     /// Shared memory could not be used.
     #[error(transparent)]
     Service(#[from] ServiceError),
@@ -165,6 +169,7 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, RunEr
 
 /// The same run, with a probe in each loop.
 pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool>) -> Result<RunReport, RunError> {
+    limits::check()?;
     let setup = Setup::new(options)?;
     let shared = setup.open_shared_memory(options)?;
     let kernel = setup::lock_memory(options)?;
