@@ -161,6 +161,8 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
             .saturating_sub(WATCH_PRIORITY_BELOW_TISSUE)
             .max(1)
     });
+    // On the only core it would take from the bridge and the host what they live on.
+    let priority = priority.filter(|_| watch_core(options) != options.haptic_core);
     let second_core = options.second.as_ref().and_then(|second| second.core);
     let second_core = second_core.filter(|&core| ![options.haptic_core, options.tissue_core].contains(&Some(core)));
     let (core, watched) = (
