@@ -213,6 +213,13 @@ impl Shown {
         Fault::from_number(self.state.map_or(0, |s| s.fault))
     }
 
+    /// The fault of either device that only a person ends; [`Fault::DeviceError`] for one that this program does not know.
+    pub fn stands_fault(&self) -> Option<Fault> {
+        let of_device = |fault: u32| (fault != 0).then(|| Fault::from_number(fault).unwrap_or(Fault::DeviceError));
+        let own = self.state.and_then(|s| of_device(s.fault));
+        own.or_else(|| self.second.and_then(|s| of_device(s.fault)))
+    }
+
     pub fn phase(&self) -> &'static str {
         match self.state.map(|s| Phase::from_number(s.phase)) {
             None => "n/a",

@@ -7,6 +7,7 @@ mod device_procedure;
 mod device_second;
 mod dose_cli;
 mod exercises;
+mod fault_rearm;
 mod force_insertions;
 mod formats;
 mod igtl;

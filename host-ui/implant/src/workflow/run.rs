@@ -10,7 +10,7 @@ use stylet_procedure::{
     Done, HandRequest, NeedleWay, Next, Observed, Pace, Patience, Procedure, Reply, Step, StepFailure, Waiting,
     needle_inside,
 };
-use stylet_shm_schema::{HapticState, NeedleAxis, RefusalCode, Request};
+use stylet_shm_schema::{Fault, HapticState, NeedleAxis, RefusalCode, Request};
 
 /// A core that is absent for less is waited for: a busy machine may hold it up.
 const ABSENT_LIMIT: Duration = Duration::from_secs(10);
@@ -34,6 +34,13 @@ pub struct RunError {
     pub step: Step,
     /// What went wrong.
     pub why: RunFailure,
+}
+
+impl RunError {
+    /// Whether it did not begin since a fault stands.
+    pub fn is_standing_fault(&self) -> bool {
+        matches!(self.why, RunFailure::Procedure(StepFailure::FaultStands(_)))
+    }
 }
 
 /// Why a step could not be completed.
@@ -159,6 +166,8 @@ pub struct Run {
     tasks: Vec<NeedleTask>,
     stabilising: Vec<Stabilising>,
     procedure: Procedure,
+    /// A fault of the second device does not keep it from beginning: somebody asked to re-arm, or there was none.
+    rearms: bool,
     status: RunStatus,
     session_id: Option<u64>,
     absent_since: Option<Instant>,
@@ -202,6 +211,16 @@ impl Run {
         self.procedure.stabilising()
     }
 
+    /// Re-arms after a fault that stands at the beginning, since somebody asked for it.
+    #[must_use]
+    pub fn rearming(self) -> Self {
+        Self {
+            procedure: self.procedure.rearming(),
+            rearms: true,
+            ..self
+        }
+    }
+
     /// How long it waits for what does not arrive; without this, until the operator decides.
     #[must_use]
     pub fn with_patience(self, patience: Patience) -> Self {
@@ -214,6 +233,7 @@ impl Run {
             tasks,
             stabilising: Vec::new(),
             procedure: procedure.with_patience(Patience::Operator),
+            rearms: false,
             status: RunStatus::Working,
             session_id: None,
             absent_since: None,
@@ -275,6 +295,14 @@ impl Run {
         }
         if self.sent.is_none() && self.stabilising().is_some() && !shows_left(link) {
             return Ok(Next::Wait);
+        }
+        // Turning the force on re-arms both devices.
+        let second = link
+            .second_state()
+            .filter(|_| !std::mem::replace(&mut self.rearms, true));
+        if let Some(fault) = second.map(|s| s.fault).filter(|fault| *fault != 0) {
+            let fault = Fault::from_number(fault).unwrap_or(Fault::DeviceError);
+            return Err(StepFailure::FaultStands(fault).into());
         }
         let (now_s, state) = (self.started.elapsed().as_secs_f64(), link.state().copied());
         let reply = state.as_ref().map_or(Reply::Pending, |state| self.reply(link, state));
@@ -357,39 +385,4 @@ impl Run {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Two needles with two seeds each, along z.
-    fn tasks() -> Vec<NeedleTask> {
-        let needle = |x: f64| NeedlePlan {
-            entry_m: [x, 0.0, 0.0],
-            direction: [0.0, 0.0, 1.0],
-            seeds_m: vec![[x, 0.0, 0.05], [x, 0.0, 0.04]],
-            prescribed: Default::default(),
-        };
-        [0.0, 0.01].map(needle).map(NeedleTask::as_planned).to_vec()
-    }
-
-    #[test]
-    fn what_is_in_the_tissue_says_where_to_go_on() {
-        let tasks = tasks();
-        let found = |dropped: &[[f64; 3]], tip_m| Placed::find(&tasks, dropped, tip_m, &[]);
-        let none = found(&[], Some([0.0, 0.0, -0.01]));
-        assert!(!none.is_partial());
-        let first = [[0.0, 0.0, 0.0502]];
-        assert_eq!(found(&first, None).next_needle(), 0);
-        let three = [[0.0, 0.0, 0.05], [0.0, 0.0, 0.04], [0.01, 0.0, 0.05]];
-        let rest = found(&three, Some([0.01, 0.0, 0.05]));
-        assert_eq!((rest.is_partial(), rest.next_needle()), (true, 1));
-        assert_eq!([0, 1].map(|n| rest.seeds_of(n)), [2, 1]);
-        // All seeds of the first, and it is still in the tissue.
-        assert_eq!(found(&three[..2], Some([0.0, 0.0, 0.03])).next_needle(), 0);
-        let all = [&three[..], &[[0.01, 0.0, 0.04]]].concat();
-        assert!(!found(&all, Some([0.0, 0.0, -0.01])).is_partial(), "nothing is left");
-        assert!(found(&all, Some([0.01, 0.0, 0.03])).is_partial(), "but to take it out");
-        // A drop that left no seed is not made again.
-        let lost = Placed::find(&tasks, &three[1..], None, &[0]);
-        assert_eq!((lost.next_needle(), lost.done.lost.as_slice()), (1, &[0][..]));
-    }
-}
+mod tests;
