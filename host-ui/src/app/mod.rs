@@ -114,6 +114,8 @@ pub struct App {
     /// Shown once the scene that it belongs to, by name, is taken.
     image_to_come: Option<(Image, String)>,
     run: Option<Run>,
+    /// The core was absent in the last frame.
+    was_absent: bool,
     /// A run that waits for a person to re-arm.
     asks_rearm: Option<Begin>,
     /// Which needles of the plan the script goes through.
@@ -234,6 +236,7 @@ impl App {
             scene_file: None,
             image_to_come: None,
             run: None,
+            was_absent: true,
             asks_rearm: None,
             run_needles: Vec::new(),
             run_placed: Placed::default(),

@@ -80,6 +80,8 @@ pub struct Shown {
     /// Refusals of requests that the operator has not yet dismissed, and the last reason.
     pub refusals: u64,
     pub last_refusal: String,
+    /// What the core reported last as a fault of this run and nobody re-armed after: why it ended, where it ended.
+    pub last_fault: String,
     /// Gamepads and 3D mice, and whether this window has the focus that they need.
     pub controllers: Latest,
     pub has_focus: bool,
@@ -123,6 +125,7 @@ impl Shown {
             planning: Planning::default(),
             refusals: 0,
             last_refusal: String::new(),
+            last_fault: String::new(),
             controllers: Latest::default(),
             has_focus: true,
             disconnected: None,
@@ -144,6 +147,10 @@ impl Shown {
         let refusals = link.events().iter().rev();
         let last = refusals.clone().find(|e| e.kind == EventKind::InvalidRefused as u32);
         self.last_refusal = last.map_or_else(String::new, |e| e.text.read());
+        let mut newest = link.events().iter().rev().map(|e| (EventKind::from_number(e.kind), e));
+        let of_fault = newest.find(|(kind, _)| matches!(kind, Some(EventKind::FaultRaised | EventKind::Rearmed)));
+        let raised = of_fault.filter(|(kind, _)| *kind == Some(EventKind::FaultRaised));
+        self.last_fault = raised.map_or_else(String::new, |(_, event)| event.text.read());
         self.seeds.clear();
         self.bend.clear();
         self.left.clear();
