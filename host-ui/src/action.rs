@@ -34,6 +34,8 @@ pub enum Action {
     Trainee(TraineeAction),
     Probe(ProbeAction),
     RunAll,
+    /// The answer to the question that a standing fault raises: re-arm and begin, or not.
+    Rearm(bool),
     /// All needles again, from a reset, whatever was done.
     StartOver,
     StopRun,

@@ -104,6 +104,9 @@ enum Task {
         /// Set a parameter before anything else, in the unit that the window shows, such as needle.bending_stiffness=0.016; may be given several times, and stays in force in the core
         #[arg(long = "set", value_name = "KEY=VALUE", value_parser = procedure::parameter)]
         parameters: Vec<ParameterChange>,
+        /// Turn the force on although a fault stands; without it the procedure does not begin, for after a fault only a person re-arms
+        #[arg(long)]
+        rearm: bool,
         /// Seeds along the needle, 1 to 128, where no plan is given
         #[arg(long, default_value_t = 5, conflicts_with = "plan", value_parser = clap::value_parser!(u16).range(1..=128))]
         seeds: u16,
@@ -278,6 +281,7 @@ impl Cli {
                 stabilise,
                 source,
                 parameters,
+                rearm,
                 seeds,
             }) => {
                 if let Some(speed) = insert_speed.filter(|s| !(0.1..=500.0).contains(s)) {
@@ -294,6 +298,7 @@ impl Cli {
                     stabilise: usize::from(stabilise),
                     source,
                     parameters,
+                    rearm,
                 });
                 instance.sweep();
                 Ok(ended?)

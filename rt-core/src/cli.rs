@@ -133,7 +133,7 @@ impl RunArgs {
         let mut options = self.real_time.options(&self.instance)?;
         options.tissue = self.tissue;
         options.device = self.device.clone();
-        options.second = self.second.options()?;
+        self.second.add_to(&mut options)?;
         options.libraries =
             Libraries::or_of_environment(self.libhd.as_deref(), self.libdrd.as_deref(), self.haply_url.as_deref());
         if let Some(folder) = &self.flight_dir {

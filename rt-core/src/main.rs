@@ -8,10 +8,12 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_lab::{campaign, credibility, devices, doctor, fleet, latency, load, verify};
+use stylet_runtime::process::limits;
 use stylet_sim::scene::Scene;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    limits::raise();
     match carry_out(&cli) {
         Ok(code) => ExitCode::from(code),
         Err(why) => {

@@ -21,14 +21,23 @@ struct Loop {
     /// `u32::MAX` for any core.
     core: u32,
     ticks: u64,
+    /// Since the start; no reset clears it.
     missed_deadlines: u64,
-    /// To a tenth.
+    /// Since the start, to a tenth.
     worst_wake_us: f64,
+    /// Since the force was last turned on.
+    missed_deadlines_since_armed: u64,
+    /// Since then, to a tenth.
+    worst_wake_since_armed_us: f64,
     heap_calls: u64,
     minor_faults: i64,
     major_faults: i64,
     voluntary_switches: i64,
     involuntary_switches: i64,
+}
+
+fn tenths_us(ns: u64) -> f64 {
+    (ns as f64 / 1e2).round() / 1e1
 }
 
 impl From<&RunReport> for Report {
@@ -48,8 +57,10 @@ impl From<&LoopReport> for Loop {
             priority: r.thread.priority,
             core: r.thread.core,
             ticks: r.ticks,
-            missed_deadlines: r.missed,
-            worst_wake_us: (r.worst_wake_ns as f64 / 1e2).round() / 1e1,
+            missed_deadlines: r.since_start.missed,
+            worst_wake_us: tenths_us(r.since_start.worst_wake_ns),
+            missed_deadlines_since_armed: r.since_armed.missed,
+            worst_wake_since_armed_us: tenths_us(r.since_armed.worst_wake_ns),
             heap_calls: r.usage.heap_calls,
             minor_faults: r.usage.minor_faults,
             major_faults: r.usage.major_faults,
@@ -67,9 +78,11 @@ mod tests {
     #[test]
     fn the_names_of_the_fields_are_kept() {
         let mut run = RunReport::default();
-        run.haptic.worst_wake_ns = 12_340;
+        run.haptic.since_start.worst_wake_ns = 12_340;
+        run.haptic.since_armed.missed = 3;
         let json = serde_json::to_value(Report::from(&run)).expect("numbers");
         assert_eq!(json["haptic"]["worst_wake_us"], 12.3);
+        assert_eq!(json["haptic"]["missed_deadlines_since_armed"], 3);
         let names: Vec<_> = json["tissue"].as_object().expect("an object").keys().cloned().collect();
         let mut expected = [
             "policy",
@@ -78,6 +91,8 @@ mod tests {
             "ticks",
             "missed_deadlines",
             "worst_wake_us",
+            "missed_deadlines_since_armed",
+            "worst_wake_since_armed_us",
             "heap_calls",
             "minor_faults",
             "major_faults",

@@ -32,6 +32,7 @@ pub mod affinity;
 pub mod check;
 mod class;
 mod command;
+mod deadlines;
 mod event;
 mod exercise;
 mod instance;
@@ -52,6 +53,7 @@ mod text;
 
 pub use class::{Class, ClassMember, LeaseOrder, LeaseRequest, MAX_CLASS};
 pub use command::{Command, MARK_BYTES, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
+pub use deadlines::DeadlineTotals;
 pub use event::{Event, EventKind};
 pub use exercise::{EXERCISE_STIFFNESS_RANGE, Exercise, ExercisesInForce, MOST_MOVED_M};
 pub use instance::{Attendance, Epoch, Instance, InstanceError, Owned};
@@ -83,7 +85,7 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 15;
+pub const SCHEMA_VERSION: u32 = 16;
 
 /// Records in one batch at most.
 pub const MAX_BATCH: usize = 32;

@@ -1,5 +1,6 @@
 //! The second device, which the other hand holds: its latest state, and one record for every tick of its loop.
 
+use crate::DeadlineTotals;
 use bytemuck::{Pod, Zeroable};
 
 /// One tick, as hosts see it. Written by the second device's thread only, on a board that exists in a run with a second device.
@@ -24,7 +25,7 @@ pub struct SecondState {
     pub force_scale: f64,
     /// Peak force of this device, N.
     pub device_limit_n: f64,
-    /// Deadlines of this loop that were missed.
+    /// Deadlines of this loop that were missed since the last reset.
     pub missed_deadlines: u64,
     /// Longest wake-up latency since the last reset.
     pub worst_wake_ns: u64,
@@ -44,6 +45,10 @@ pub struct SecondState {
     pub warmth_n: f64,
     /// [`crate::ParametersInForce::generation`] that the tick ran with.
     pub parameters_generation: u64,
+    /// Totals of this loop since it began.
+    pub since_start: DeadlineTotals,
+    /// Totals of this loop since the force was last turned on.
+    pub since_armed: DeadlineTotals,
     /// [`crate::Fault`] of this device by number. The needle's device has its own.
     pub fault: u32,
     /// Bits of [`crate::flags`]: engaged, waiting, in contact, simulated device, at goal, gate acted, real time.

@@ -1,5 +1,6 @@
 //! The latest state of the force loop, rewritten each millisecond on a wait-free blackboard.
 
+use crate::DeadlineTotals;
 use bytemuck::{Pod, Zeroable};
 use num_enum::TryFromPrimitive;
 
@@ -35,7 +36,7 @@ pub struct HapticState {
     pub force_scale: f64,
     /// Peak force of the device, N.
     pub device_limit_n: f64,
-    /// Deadlines of the force loop that were missed.
+    /// Deadlines of the force loop that were missed since the last reset.
     pub missed_deadlines: u64,
     /// Longest wake-up latency of the force loop since the last reset.
     pub worst_wake_ns: u64,
@@ -43,7 +44,7 @@ pub struct HapticState {
     pub worst_work_ns: u64,
     /// The tissue tick whose answer was used.
     pub tissue_tick: u64,
-    /// Deadlines of the tissue loop that were missed.
+    /// Deadlines of the tissue loop that were missed since the last reset.
     pub tissue_missed_deadlines: u64,
     /// Longest wake-up latency of the tissue loop since the last reset.
     pub tissue_worst_wake_ns: u64,
@@ -81,6 +82,14 @@ pub struct HapticState {
     pub worst_lag_ns: u64,
     /// Largest [`lag_m`](Self::lag_m) since the last reset.
     pub worst_lag_m: f64,
+    /// Totals of the force loop since it began.
+    pub since_start: DeadlineTotals,
+    /// Totals of the force loop since the force was last turned on.
+    pub since_armed: DeadlineTotals,
+    /// Totals of the tissue loop since it began.
+    pub tissue_since_start: DeadlineTotals,
+    /// Totals of the tissue loop since the force was last turned on.
+    pub tissue_since_armed: DeadlineTotals,
     /// [`Phase`] by number.
     pub phase: u32,
     /// [`Fault`] by number.
@@ -214,9 +223,7 @@ impl Fault {
             Self::OverrunStreak => {
                 "the force loop missed 20 deadlines in a row; lower the load on its core, then re-arm"
             }
-            Self::LoopStopped => {
-                "the force loop has stopped; rt-core ended, so that the device is released: start it again"
-            }
+            Self::LoopStopped => "the force loop stood still for too long; lower the load on its core, then re-arm",
             Self::DeviceLost => {
                 "the device is not connected; check power and cable, wait until it is found again, then re-arm"
             }

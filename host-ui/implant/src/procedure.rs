@@ -118,6 +118,8 @@ pub struct Options {
     pub stabilise: usize,
     /// For the score; else the one that the plan names.
     pub source: Option<PathBuf>,
+    /// Turn the force on although a fault stands.
+    pub rearm: bool,
     /// Set before anything else; they stay in force.
     pub parameters: Vec<ParameterChange>,
 }
@@ -195,7 +197,11 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
         job.compensate(&mut link, &pace, &interrupted)?;
     }
     let mut seen = Seen::of(&scene);
-    let outcome = perform(&mut link, &job, pace, &interrupted, &mut seen);
+    let run = Run::of_needles(job.tasks.clone(), pace)
+        .stabilised(&job.stabilising)
+        .with_patience(UNWATCHED);
+    let run = if options.rearm { run.rearming() } else { run };
+    let outcome = perform(&mut link, &job, run, &interrupted, &mut seen);
     if outcome.is_err() {
         // Nobody holds the device any more: the motion stops, and the force goes off.
         let _asked = [Request::StopHand, Request::Disengage].map(|request| link.send(&request));
@@ -299,13 +305,10 @@ fn load(
 fn perform(
     link: &mut Link,
     job: &Job,
-    pace: Pace,
+    mut run: Run,
     interrupted: &Interrupt,
     seen: &mut Seen,
 ) -> Result<(), ProcedureError> {
-    let mut run = Run::of_needles(job.tasks.clone(), pace)
-        .stabilised(&job.stabilising)
-        .with_patience(UNWATCHED);
     // A terminal that is closed or stopped holds up no needle.
     let lines = Lines::to_stdout();
     let begun = Instant::now();
@@ -347,6 +350,7 @@ fn perform(
         match status {
             RunStatus::Working => std::thread::sleep(POLL_EVERY),
             RunStatus::Done => return Ok(()),
+            RunStatus::Failed(why) if why.is_standing_fault() => return Err(ProcedureError::FaultStands(why)),
             RunStatus::Failed(why) => return Err(why.into()),
         }
     }

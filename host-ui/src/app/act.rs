@@ -3,6 +3,7 @@
 use super::drive::{BEFORE_ENTRY_M, Drive, Goal};
 use super::{App, Waiting, refusal};
 use crate::action::Action;
+use crate::panel::rearm::Begin;
 use crate::panel::workflow::{Undo, next_action, undo_action};
 use crate::planner::Edit;
 use crate::settings::ThemeChoice;
@@ -133,8 +134,9 @@ impl App {
                 None => {}
             },
             Action::Plan(action) => self.act_on_plan(action),
-            Action::RunAll => self.run_all(),
-            Action::StartOver => self.start_over(),
+            Action::RunAll => self.begin_run(Begin::WhereItWas),
+            Action::StartOver => self.begin_run(Begin::Anew),
+            Action::Rearm(is_agreed) => self.answer_rearm(is_agreed),
             Action::PlanSeeds => {
                 if let Some(scene) = &self.shown.scene {
                     let plan = self.by_hand(default_plan(scene));

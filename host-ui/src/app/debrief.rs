@@ -50,6 +50,22 @@ impl App {
         self.save_debrief_as(folder);
     }
 
+    /// When the core ends, for whatever reason: what was placed stays shown, and is written with the plan.
+    pub(super) fn keep_of_ended_core(&mut self) {
+        let is_absent = self.shown.is_absent();
+        let was_absent = std::mem::replace(&mut self.was_absent, is_absent);
+        let has_ended = is_absent && !was_absent;
+        let is_own = self.trainees.followed.is_none() && !self.watches();
+        if !has_ended || !is_own || self.shown.seeds.is_empty() {
+            return;
+        }
+        let folder = PathBuf::from(format!("out/core-ended-{}", format::utc_now()));
+        if self.shown.planning.implant.is_some() && std::fs::create_dir_all(&folder).is_ok() {
+            self.planner.export(folder.join("plan.toml"));
+        }
+        self.save_debrief_as(folder);
+    }
+
     pub(super) fn save_debrief_as(&mut self, folder: PathBuf) {
         let delivered = self.delivered();
         self.write_debrief(delivered, folder);

@@ -21,6 +21,7 @@ use crate::loader::Loader;
 use crate::panel::history::History;
 use crate::panel::instructor::InstructorState;
 use crate::panel::parameters::ParametersState;
+use crate::panel::rearm::Begin;
 use crate::panel::workflow::WorkflowState;
 use crate::picture::Pictures;
 use crate::planner::Planner;
@@ -113,6 +114,10 @@ pub struct App {
     /// Shown once the scene that it belongs to, by name, is taken.
     image_to_come: Option<(Image, String)>,
     run: Option<Run>,
+    /// The core was absent in the last frame.
+    was_absent: bool,
+    /// A run that waits for a person to re-arm.
+    asks_rearm: Option<Begin>,
     /// Which needles of the plan the script goes through.
     run_needles: Vec<usize>,
     /// What was in the tissue when the script began or went on.
@@ -231,6 +236,8 @@ impl App {
             scene_file: None,
             image_to_come: None,
             run: None,
+            was_absent: true,
+            asks_rearm: None,
             run_needles: Vec::new(),
             run_placed: Placed::default(),
             run_lost: Default::default(),
@@ -335,6 +342,7 @@ impl eframe::App for App {
         if ctx.input(|i| i.key_pressed(egui::Key::Escape)) {
             (self.help, self.class, self.parameters.open) = (false, false, false);
             self.instructor.close();
+            self.asks_rearm = None;
         }
         for action in actions {
             self.act(action, &ctx);

@@ -3,6 +3,7 @@
 use super::drive::Drive;
 use super::{App, refusal};
 use crate::action::PlanAction;
+use crate::panel::rearm::Begin;
 use crate::panel::workflow::Progress;
 use crate::planner::Message;
 use crate::settings::Layout;
@@ -151,9 +152,32 @@ impl App {
         }
     }
 
+    /// Begins, or asks first where a fault stands: only a person re-arms.
+    pub(super) fn begin_run(&mut self, begin: Begin) {
+        if self.shown.stands_fault().is_some() {
+            self.asks_rearm = Some(begin);
+            return;
+        }
+        match begin {
+            Begin::WhereItWas => self.run_all(),
+            Begin::Anew => self.start_over(),
+        }
+    }
+
+    pub(super) fn answer_rearm(&mut self, is_agreed: bool) {
+        let Some(begin) = self.asks_rearm.take().filter(|_| is_agreed) else {
+            return;
+        };
+        match begin {
+            Begin::WhereItWas => self.run_all(),
+            Begin::Anew => self.start_over(),
+        }
+        self.run = self.run.take().map(Run::rearming);
+    }
+
     /// Goes on with the needles of the plan from where the tissue shows that they are; where there is nothing to go on with, from
     /// the beginning.
-    pub(super) fn run_all(&mut self) {
+    fn run_all(&mut self) {
         let (numbers, tasks): (Vec<usize>, Vec<NeedleTask>) = self.planner.tasks().into_iter().unzip();
         let placed = self.placed(&tasks);
         if self.planner.is_busy() || !placed.is_partial() {
@@ -175,7 +199,7 @@ impl App {
     }
 
     /// All needles of the plan from a reset; without one, one through the middle.
-    pub(super) fn start_over(&mut self) {
+    fn start_over(&mut self) {
         (self.run_placed, self.run_lost) = (Placed::default(), Default::default());
         if self.planner.is_busy() {
             self.shown.note = Some(refusal("Wait for the running task, or cancel it first.".to_owned()));

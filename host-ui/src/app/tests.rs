@@ -5,6 +5,7 @@ pub(crate) mod fixture;
 mod guide;
 mod held;
 mod pictures;
+mod rearm;
 mod text;
 mod update;
 mod whole;

@@ -263,7 +263,7 @@ fn absent(shown: &Shown, why: &str) -> Banner {
     let text = if why.is_empty() {
         format!("Start it in another terminal: rt-core --instance {}", shown.instance)
     } else {
-        sentence(why)
+        format!("{}{}", what_ended(shown), sentence(why))
     };
     Banner {
         level: BannerLevel::Bad,
@@ -271,6 +271,23 @@ fn absent(shown: &Shown, why: &str) -> Banner {
         text,
         remedy: (!shown.reads_recording).then_some(("Watch an example", Action::Watch(WatchAction::Example))),
     }
+}
+
+/// Why the core that was shown ended, as far as it said so, and what is kept of it; nothing before one was shown.
+fn what_ended(shown: &Shown) -> String {
+    if shown.session.is_none() {
+        return String::new();
+    }
+    let fault = match shown.last_fault.as_str() {
+        "" => String::new(),
+        fault => format!("Its last fault: {fault}. "),
+    };
+    let kept = match shown.seeds.len() {
+        0 => String::new(),
+        1 => "The plan and 1 seed stay shown. ".to_owned(),
+        n => format!("The plan and {n} seeds stay shown. "),
+    };
+    fault + &kept
 }
 
 fn not_real_time(shown: &Shown) -> Banner {

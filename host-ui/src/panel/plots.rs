@@ -222,7 +222,12 @@ fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
             .explained("missed deadline");
         // A procedure begins with a reset, but the number of the tick goes on: no share of it.
         ui.label(theme::small("since the last reset"))
-            .on_hover_text(format!("{} ticks since rt-core started", format::count(s.tick)))
+            .on_hover_text(format!(
+                "{} ticks since rt-core started; missed: {} since then, {} since the force was last turned on",
+                format::count(s.tick),
+                format::count(s.since_start.missed),
+                format::count(s.since_armed.missed)
+            ))
             .explained("tick");
     });
     let text = format!(

@@ -80,6 +80,8 @@ pub struct Shown {
     /// Refusals of requests that the operator has not yet dismissed, and the last reason.
     pub refusals: u64,
     pub last_refusal: String,
+    /// What the core reported last as a fault of this run and nobody re-armed after: why it ended, where it ended.
+    pub last_fault: String,
     /// Gamepads and 3D mice, and whether this window has the focus that they need.
     pub controllers: Latest,
     pub has_focus: bool,
@@ -123,6 +125,7 @@ impl Shown {
             planning: Planning::default(),
             refusals: 0,
             last_refusal: String::new(),
+            last_fault: String::new(),
             controllers: Latest::default(),
             has_focus: true,
             disconnected: None,
@@ -144,6 +147,10 @@ impl Shown {
         let refusals = link.events().iter().rev();
         let last = refusals.clone().find(|e| e.kind == EventKind::InvalidRefused as u32);
         self.last_refusal = last.map_or_else(String::new, |e| e.text.read());
+        let mut newest = link.events().iter().rev().map(|e| (EventKind::from_number(e.kind), e));
+        let of_fault = newest.find(|(kind, _)| matches!(kind, Some(EventKind::FaultRaised | EventKind::Rearmed)));
+        let raised = of_fault.filter(|(kind, _)| *kind == Some(EventKind::FaultRaised));
+        self.last_fault = raised.map_or_else(String::new, |(_, event)| event.text.read());
         self.seeds.clear();
         self.bend.clear();
         self.left.clear();
@@ -211,6 +218,13 @@ impl Shown {
     /// `None` for a number that this program does not know, which is a fault too.
     pub fn fault(&self) -> Option<Fault> {
         Fault::from_number(self.state.map_or(0, |s| s.fault))
+    }
+
+    /// The fault of either device that only a person ends; [`Fault::DeviceError`] for one that this program does not know.
+    pub fn stands_fault(&self) -> Option<Fault> {
+        let of_device = |fault: u32| (fault != 0).then(|| Fault::from_number(fault).unwrap_or(Fault::DeviceError));
+        let own = self.state.and_then(|s| of_device(s.fault));
+        own.or_else(|| self.second.and_then(|s| of_device(s.fault)))
     }
 
     pub fn phase(&self) -> &'static str {

@@ -104,7 +104,7 @@ impl LatencyArgs {
         let instance = format!("lab-{}", std::process::id());
         let mut options = self.real_time.options(&instance)?;
         options.haptic_period_ns = measure::period_ns(self.rate);
-        options.second = self.second.options()?;
+        self.second.add_to(&mut options)?;
         options.wait = Wait::at_period(options.haptic_period_ns);
         if let Some(early_us) = self.early_us {
             options.wait.early_ns = early_us * 1_000;

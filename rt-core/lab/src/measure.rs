@@ -127,6 +127,7 @@ fn watch_core(options: &Options) -> Option<usize> {
 
 /// Runs for `setup.duration_ns` after the first tick that a host saw, or until `interrupted`.
 pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, MeasureError> {
+    process::limits::check().map_err(RunError::from)?;
     let script = Script::of(&Scene::builtin(&setup.options.scene)?);
     let pose_times = Arc::new(PoseTimes::new());
     let options = setup.options;
@@ -160,6 +161,8 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
             .saturating_sub(WATCH_PRIORITY_BELOW_TISSUE)
             .max(1)
     });
+    // On the only core it would take from the bridge and the host what they live on.
+    let priority = priority.filter(|_| watch_core(options) != options.haptic_core);
     let second_core = options.second.as_ref().and_then(|second| second.core);
     let second_core = second_core.filter(|&core| ![options.haptic_core, options.tissue_core].contains(&Some(core)));
     let (core, watched) = (

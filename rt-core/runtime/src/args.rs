@@ -1,5 +1,7 @@
 //! Options that a run and a measurement share on the command line, and the settings of a run that they give.
 
+mod priorities;
+
 use crate::device::{DeviceChoice, Libraries};
 use crate::kept_probe;
 use crate::process::{Options, SecondOptions};
@@ -61,8 +63,13 @@ pub struct SecondArgs {
 }
 
 impl SecondArgs {
-    /// What the run does with a second device; nothing where none was named.
-    pub fn options(&self) -> Result<Option<SecondOptions>, OptionsError> {
+    /// Adds the second device to the run, where one was named.
+    pub fn add_to(&self, options: &mut Options) -> Result<(), OptionsError> {
+        options.second = self.options()?;
+        priorities::check(options)
+    }
+
+    fn options(&self) -> Result<Option<SecondOptions>, OptionsError> {
         let Some(device) = self.device_2.clone() else {
             return Ok(None);
         };
@@ -146,8 +153,8 @@ impl RealTimeArgs {
         } else {
             None
         };
-        match instance {
-            Ok(instance) if problems.is_empty() => Ok(Options {
+        let options = match instance {
+            Ok(instance) if problems.is_empty() => Options {
                 instance,
                 scene: self.scene.clone(),
                 no_rt: self.no_rt || refused.is_some(),
@@ -165,9 +172,11 @@ impl RealTimeArgs {
                 device: DeviceChoice::default(),
                 second: None,
                 libraries: Libraries::default(),
-            }),
-            _ => Err(OptionsError(problems)),
-        }
+            },
+            _ => return Err(OptionsError(problems)),
+        };
+        priorities::check(&options)?;
+        Ok(options)
     }
 }
 

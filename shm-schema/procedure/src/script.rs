@@ -76,6 +76,8 @@ pub struct Procedure {
     lost: Vec<usize>,
     /// From here on a fault ends the procedure.
     is_engaged: bool,
+    /// Somebody asked to re-arm where a fault stands at the beginning.
+    rearms: bool,
     patience: Patience,
     waits_for: WaitsFor,
     now_s: f64,
@@ -169,6 +171,7 @@ impl Procedure {
             ahead,
             lost: Vec::new(),
             is_engaged: false,
+            rearms: false,
             patience: Patience::Usual,
             waits_for: WaitsFor::State,
             now_s: 0.0,
@@ -212,6 +215,9 @@ impl Procedure {
         let fault = Fault::from_number(observed.state.fault).unwrap_or(Fault::None);
         if self.is_engaged && fault != Fault::None {
             return Err(StepFailure::ForceOff(fault));
+        }
+        if !self.is_engaged && !self.rearms && fault != Fault::None {
+            return Err(StepFailure::FaultStands(fault));
         }
         if !self.is_sent {
             self.is_sent = true;

@@ -7,10 +7,11 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 use stylet_host::link::Link;
 use stylet_implant::workflow::{NeedlePlan, Pace, Run, RunStatus, Step, default_plan};
-use stylet_shm_schema::{EventKind, Fault, Request, TickRecord, flags};
+use stylet_shm_schema::{Event, EventKind, Fault, Request, TickRecord, flags};
 use stylet_tests::phantom::library;
+use stylet_tests::stopped::{StoppedThread, is_dead};
 use stylet_tests::witness::where_the_machine_runs;
-use stylet_tests::{Core, ask, scratch, until};
+use stylet_tests::{Core, ask, left_behind, scratch, until};
 
 const LONG: Duration = Duration::from_secs(20);
 
@@ -83,6 +84,32 @@ fn goal(run: &Run, plan: &NeedlePlan, seeds_dropped: usize) -> Option<[f64; 3]> 
         Step::Drop => plan.deepest_first().get(seeds_dropped).copied(),
         Step::Retract | Step::Settle => Some(plan.entry_m),
     }
+}
+
+/// Over real motors the core ends, for its end is what releases them; that is when a recording is wanted.
+#[test]
+fn a_force_loop_that_stops_over_a_phantom_ends_the_core_and_leaves_a_recording() {
+    where_the_machine_runs(|| {
+        let mut rig = Rig::start("phantom-stopped", true);
+        let stopped = StoppedThread::stop(rig.core.id(), "haptic");
+        let id = rig.core.id();
+        assert!(
+            until(LONG, || is_dead(id)),
+            "a core whose force loop stands still must end"
+        );
+        drop(stopped);
+        let status = rig.core.ended(LONG).expect("dead");
+        assert_eq!(status.code(), Some(1), "it ends with an error, not by a signal");
+        rig.link.poll();
+        let is_why = |e: &Event| e.code == Fault::LoopStopped as u32 && e.text.read().contains("rt-core ended");
+        assert!(rig.link.events().iter().any(is_why), "{:?}", rig.link.events().back());
+        let flights = rig.core.flights();
+        assert_eq!(flights.len(), 1, "{flights:?}");
+        let (instance, Rig { link, core, .. }) = (rig.core.instance.clone(), rig);
+        drop(link);
+        drop(core);
+        assert_eq!(left_behind(&instance), [""; 0]);
+    });
 }
 
 #[test]

@@ -51,6 +51,9 @@ pub enum ProcedureError {
     /// A step could not be completed.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// A fault stands, and nobody asked to re-arm.
+    #[error("{0}. See to its cause, then re-arm in the window (key E), or give --rearm")]
+    FaultStands(RunError),
     /// The implant cannot be scored.
     #[error(transparent)]
     Score(#[from] ScoreError),

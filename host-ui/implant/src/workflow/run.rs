@@ -10,7 +10,7 @@ use stylet_procedure::{
     Done, HandRequest, NeedleWay, Next, Observed, Pace, Patience, Procedure, Reply, Step, StepFailure, Waiting,
     needle_inside,
 };
-use stylet_shm_schema::{Event, EventKind, HapticState, NeedleAxis, RefusalCode, Request};
+use stylet_shm_schema::{Event, EventKind, Fault, HapticState, NeedleAxis, RefusalCode, Request};
 
 /// A core that is absent for less is waited for: a busy machine may hold it up.
 const ABSENT_LIMIT: Duration = Duration::from_secs(10);
@@ -39,6 +39,13 @@ pub struct RunError {
     pub step: Step,
     /// What went wrong.
     pub why: RunFailure,
+}
+
+impl RunError {
+    /// Whether it did not begin since a fault stands.
+    pub fn is_standing_fault(&self) -> bool {
+        matches!(self.why, RunFailure::Procedure(StepFailure::FaultStands(_)))
+    }
 }
 
 /// Why a step could not be completed.
@@ -167,6 +174,8 @@ pub struct Run {
     tasks: Vec<NeedleTask>,
     stabilising: Vec<Stabilising>,
     procedure: Procedure,
+    /// A fault of the second device does not keep it from beginning: somebody asked to re-arm, or there was none.
+    rearms: bool,
     status: RunStatus,
     session_id: Option<u64>,
     absent_since: Option<Instant>,
@@ -212,6 +221,16 @@ impl Run {
         self.procedure.stabilising()
     }
 
+    /// Re-arms after a fault that stands at the beginning, since somebody asked for it.
+    #[must_use]
+    pub fn rearming(self) -> Self {
+        Self {
+            procedure: self.procedure.rearming(),
+            rearms: true,
+            ..self
+        }
+    }
+
     /// How long it waits for what does not arrive; without this, until the operator decides.
     #[must_use]
     pub fn with_patience(self, patience: Patience) -> Self {
@@ -224,6 +243,7 @@ impl Run {
             tasks,
             stabilising: Vec::new(),
             procedure: procedure.with_patience(Patience::Operator),
+            rearms: false,
             status: RunStatus::Working,
             session_id: None,
             absent_since: None,
@@ -288,6 +308,14 @@ impl Run {
             return Ok(Next::Wait);
         }
         self.order_again(link)?;
+        // Turning the force on re-arms both devices.
+        let second = link
+            .second_state()
+            .filter(|_| !std::mem::replace(&mut self.rearms, true));
+        if let Some(fault) = second.map(|s| s.fault).filter(|fault| *fault != 0) {
+            let fault = Fault::from_number(fault).unwrap_or(Fault::DeviceError);
+            return Err(StepFailure::FaultStands(fault).into());
+        }
         let (now_s, state) = (self.started.elapsed().as_secs_f64(), link.state().copied());
         let reply = state.as_ref().map_or(Reply::Pending, |state| self.reply(link, state));
         let displacement_m = link.snapshot().map(|s| s.header.max_displacement_m);

@@ -21,6 +21,25 @@ fn no_banner_without_a_problem_and_absence_shows_what_to_type() {
     assert!(list[0].text.contains("rt-core --instance lab"), "{}", list[0].text);
 }
 
+/// A core that had ended was absent without a reason, and the seeds that it had placed without a word.
+#[test]
+fn a_core_that_ended_says_why_and_what_is_kept() {
+    let mut shown = live();
+    shown.session = Some(stylet_shm_schema::Session::zeroed());
+    shown.status = LinkStatus::Absent {
+        why: "rt-core has stopped. Start it in another terminal: rt-core".to_owned(),
+    };
+    shown.last_fault = "the force loop has stopped".to_owned();
+    shown.seeds = vec![stylet_shm_schema::SeedPose::zeroed(); 2];
+    let text = &banners(&shown)[0].text;
+    assert!(
+        text.starts_with(
+            "Its last fault: the force loop has stopped. The plan and 2 seeds stay shown. Rt-core has stopped."
+        ),
+        "{text}"
+    );
+}
+
 #[test]
 fn a_force_that_is_off_or_waits_and_a_refusal_each_have_their_banner() {
     let titles = |shown: &Shown| banners(shown).iter().map(|b| b.title).collect::<Vec<_>>();

@@ -105,6 +105,7 @@ impl Bridge {
             }
             Request::Engage => {
                 self.order_second(SecondOrder::Engage);
+                let _ = self.loops.tissue_orders.push(TissueOrder::Armed);
                 self.order_haptic(HapticOrder::Engage { ticket })
             }
             Request::Disengage => {

@@ -227,6 +227,36 @@ impl FlightKeeper {
         }
     }
 
+    /// While the force loop stands still: what the other loops hand over within `limit`, or its own tape if it comes back.
+    pub fn save_stopped(
+        &mut self,
+        scene_generation: u64,
+        lines: &LineArchive,
+        reason: &str,
+        limit: Duration,
+    ) -> Result<PathBuf, SaveError> {
+        let reason = reason.to_owned();
+        let due = Instant::now();
+        let wanted = Wanted {
+            kind: "fault",
+            reason,
+            due,
+            ticket: None,
+        };
+        let mut gathering = Gathering::new(wanted, self.second.is_some());
+        while !gathering.is_whole() && due.elapsed() < limit {
+            std::thread::sleep(Duration::from_millis(2));
+            self.gathering = Some(gathering);
+            self.take_tapes(scene_generation);
+            let Some(taken) = self.gathering.take() else {
+                return Err(SaveError::NothingRecorded);
+            };
+            gathering = taken;
+        }
+        let path = self.next_path("fault");
+        save(&gathering.into_flight(&self.common, lines), &path)
+    }
+
     fn next_path(&mut self, kind: &str) -> PathBuf {
         self.files += 1;
         let now = jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ");

@@ -39,10 +39,11 @@ use second::Second;
 pub use second::SecondSetup;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::{EventKind, Fault, PlanInForce, Refusal, RefusalCode, Rehearsal, Session};
+use stylet_shm_schema::{EventKind, PlanInForce, Refusal, RefusalCode, Rehearsal, Session};
 use stylet_sim::scene::{SceneSource, TissueKind};
+pub(crate) use supervisor::LOOP_ENDED;
 use supervisor::Supervisor;
 pub use wall::{Boards, BridgeError, Wall, program};
 
@@ -50,7 +51,7 @@ const PASS: Duration = Duration::from_millis(2);
 
 /// The force loop has stopped by itself.
 #[derive(Debug, thiserror::Error)]
-#[error("{}", Fault::LoopStopped.message())]
+#[error("{}", LOOP_ENDED)]
 pub struct LoopStopped;
 
 /// What a bridge must know of its run.
@@ -163,9 +164,26 @@ impl Bridge {
     /// neither loop must be waited for.
     pub fn run(&mut self, stopped: impl Fn() -> bool) -> Result<(), LoopStopped> {
         while !stopped() && !self.pass()? {
+            // A request is taken as soon as it comes; a pass is never shorter, since the supervisor counts passes.
+            let begun = Instant::now();
             self.link.wall.wait(PASS);
+            if let Some(rest) = PASS.checked_sub(begun.elapsed()) {
+                self.link.wall.pass();
+                if self.take_commands() {
+                    break;
+                }
+                std::thread::sleep(rest);
+            }
         }
         Ok(())
+    }
+
+    /// After the force loop has stopped: gives the others `limit` to hand over what they recorded, and writes it. The force loop's own
+    /// tape is missing unless it comes back meanwhile.
+    pub fn save_flight_of_stopped(&mut self, limit: Duration) -> Result<PathBuf, SaveError> {
+        let generation = self.scene.generation();
+        self.flights
+            .save_stopped(generation, self.lines.archive(), LOOP_ENDED, limit)
     }
 
     /// After both loops have ended: writes what they recorded last.
@@ -189,18 +207,7 @@ impl Bridge {
         let generation = self.scene.generation();
         self.lines.pass(self.link.newest_record(), generation, &mut self.loops);
         self.serve_probe(generation);
-        if self.supervisor.pass(made_a_tick) {
-            let fault = Fault::LoopStopped;
-            self.link.event(
-                EventKind::FaultRaised,
-                EventDetails {
-                    code: fault as u32,
-                    text: fault.message(),
-                    ..EventDetails::now()
-                },
-            );
-            return Err(LoopStopped);
-        }
+        self.supervise(made_a_tick)?;
         Ok(end)
     }
 

@@ -5,7 +5,7 @@ use super::link::EventDetails;
 use crate::rt::exchange::{HapticOrder, Moved, Notice, TissueOrder};
 use crate::rt::outside::OutsideTape;
 use crate::rt::world::World;
-use stylet_shm_schema::{EventKind, TickRecord};
+use stylet_shm_schema::{EventKind, Fault, TickRecord};
 use stylet_sim::line::{BodyLine, HandLine, LeftNeedles};
 use stylet_sim::probe::BodyProbe;
 
@@ -59,7 +59,10 @@ impl Bridge {
             }
             Notice::Fault { fault, .. } => {
                 self.flights.fault(fault.message());
-                self.report(&notice);
+                // The supervisor has reported that one when it found it.
+                if fault != Fault::LoopStopped {
+                    self.report(&notice);
+                }
             }
             _ => self.report(&notice),
         }

@@ -1,7 +1,13 @@
 //! Detects that the haptic loop itself has stopped: the one fault that the loop cannot detect.
 //!
-//! It runs in the bridge, at normal priority. A loop that stands still leaves its last force on the device; so the
-//! process ends, and the device's own watchdog, or the closing of its port, takes the force away.
+//! It runs in the bridge, at normal priority. A loop that stands still leaves its last force on the device. Over real motors
+//! the process ends, and the device's own watchdog, or the closing of its port, takes the force away. A simulated device has
+//! no motors: the fault is reported, and the run goes on with the force off when the loop comes back.
+
+use super::link::EventDetails;
+use super::{Bridge, LoopStopped};
+use crate::rt::exchange::HapticOrder;
+use stylet_shm_schema::{EventKind, Fault};
 
 /// Passes of the bridge without one tick of the loop; 2 ms and more each.
 ///
@@ -15,6 +21,11 @@ const PATIENCE_PASSES_UNHURRIED: u32 = 1000;
 pub struct Supervisor {
     patience_passes: u32,
     without_tick: u32,
+    is_simulated: bool,
+    /// Hosts know that the loop stands still.
+    is_reported: bool,
+    /// The loop still has to get its order, which had no room for it.
+    owes_order: bool,
 }
 
 impl Supervisor {
@@ -26,6 +37,9 @@ impl Supervisor {
                 false => PATIENCE_PASSES,
             },
             without_tick: 0,
+            is_simulated,
+            is_reported: false,
+            owes_order: false,
         }
     }
 
@@ -34,7 +48,47 @@ impl Supervisor {
         self.without_tick = if made_a_tick { 0 } else { self.without_tick + 1 };
         self.without_tick >= self.patience_passes
     }
+
+    /// One pass; true when it is the first since the last tick that takes the loop for dead.
+    fn finds_stopped(&mut self, made_a_tick: bool) -> bool {
+        let stands_still = self.pass(made_a_tick);
+        let was_reported = std::mem::replace(&mut self.is_reported, stands_still);
+        stands_still && !was_reported
+    }
 }
+
+impl Bridge {
+    /// One pass. An error when the run must end, so that a real device is released.
+    pub(super) fn supervise(&mut self, made_a_tick: bool) -> Result<(), LoopStopped> {
+        if self.supervisor.finds_stopped(made_a_tick) {
+            let text = match self.supervisor.is_simulated {
+                true => Fault::LoopStopped.message(),
+                false => LOOP_ENDED,
+            };
+            self.link.event(
+                EventKind::FaultRaised,
+                EventDetails {
+                    code: Fault::LoopStopped as u32,
+                    text,
+                    ..EventDetails::now()
+                },
+            );
+            if !self.supervisor.is_simulated {
+                return Err(LoopStopped);
+            }
+            eprintln!("rt-core: {text}");
+            self.supervisor.owes_order = true;
+        }
+        if self.supervisor.owes_order && self.order_haptic(HapticOrder::StoodStill).is_ok() {
+            self.supervisor.owes_order = false;
+        }
+        Ok(())
+    }
+}
+
+/// What hosts and the terminal read when the run ends.
+pub(crate) const LOOP_ENDED: &str =
+    "the force loop has stopped; rt-core ended, so that the device is released: start it again";
 
 #[cfg(test)]
 mod tests {
@@ -62,5 +116,15 @@ mod tests {
             assert_eq!(passes(is_real_time, is_simulated), Some(PATIENCE_PASSES));
         }
         assert_eq!(passes(false, true), Some(PATIENCE_PASSES_UNHURRIED));
+    }
+
+    #[test]
+    fn each_standstill_is_reported_once() {
+        let mut supervisor = Supervisor::new(true, true);
+        for _ in 0..2 {
+            let reports = (0..3 * PATIENCE_PASSES).filter(|_| supervisor.finds_stopped(false));
+            assert_eq!(reports.count(), 1);
+            assert!(!supervisor.finds_stopped(true));
+        }
     }
 }

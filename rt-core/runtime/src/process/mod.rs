@@ -1,10 +1,11 @@
 //! Puts the process together: scene and device, shared memory, two armed threads, and the bridge on the calling thread.
 
+pub mod limits;
 mod session;
 mod setup;
 mod threads;
 
-use crate::bridge::{Bridge, BridgeError, BridgeSetup};
+use crate::bridge::{Bridge, BridgeError, BridgeSetup, LOOP_ENDED};
 use crate::device::{DeviceChoice, DeviceError, Libraries};
 use crate::rt::arm::{Refused, Usage};
 use crate::rt::clock::Wait;
@@ -14,7 +15,8 @@ use setup::Setup;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_shm_schema::{Fault, Instance, InstanceError, ParameterProblems, ThreadReport, affinity};
+use std::time::Duration;
+use stylet_shm_schema::{DeadlineTotals, Instance, InstanceError, ParameterProblems, ThreadReport, affinity};
 use stylet_sim::scene::TissueKind;
 use threads::Threads;
 
@@ -93,10 +95,10 @@ pub struct LoopReport {
     pub thread: ThreadReport,
     /// Ticks made.
     pub ticks: u64,
-    /// Deadlines missed.
-    pub missed: u64,
-    /// Latest wake-up after a deadline, ns.
-    pub worst_wake_ns: u64,
+    /// Deadlines missed and worst wake-up.
+    pub since_start: DeadlineTotals,
+    /// Those since the force was last turned on.
+    pub since_armed: DeadlineTotals,
     /// Sleeps there was reason for: each costs a switch.
     pub sleeps: u64,
     /// Page faults, context switches and heap calls.
@@ -127,6 +129,9 @@ pub enum RunError {
     /// The tissue model could not be set up.
     #[error(transparent)]
     World(#[from] WorldError),
+    /// A limit of the PC is too low.
+    #[error(transparent)]
+    Limit(#[from] limits::LimitError),
     /// The folder in which hosts find the run cannot be used.
     #[error(transparent)]
     Instance(#[from] InstanceError),
@@ -151,12 +156,16 @@ pub enum RunError {
     #[error("the {0} thread ended before it began")]
     EndedEarly(&'static str),
     /// The force loop stopped making ticks.
-    #[error("{}", Fault::LoopStopped.message())]
+    #[error("{LOOP_ENDED}")]
     LoopStopped,
     /// A loop's thread ended before it was asked to.
     #[error("a real-time thread ended by itself")]
     ThreadEnded,
 }
+
+/// The loops that run have this long to hand over what they recorded when the force loop stands still: the device keeps its
+/// last force until the process ends, or until its own watchdog acts.
+const HAND_OVER_LIMIT: Duration = Duration::from_millis(100);
 
 /// Runs until `stop` is set by a signal, or a host asks to end.
 pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, RunError> {
@@ -165,6 +174,7 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, RunEr
 
 /// The same run, with a probe in each loop.
 pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool>) -> Result<RunReport, RunError> {
+    limits::check()?;
     options.instance.sweep_dead();
     let owned = options.instance.own()?;
     if let Some(core) = options.haptic_core {
@@ -205,6 +215,10 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     threads.end();
     if served.is_err() {
         // Not joined: a loop that stands still would be waited for in vain.
+        match bridge.save_flight_of_stopped(HAND_OVER_LIMIT) {
+            Ok(path) => eprintln!("rt-core: flight recording {}", path.display()),
+            Err(why) => eprintln!("rt-core: the flight recording was not saved: {why}"),
+        }
         return Err(RunError::LoopStopped);
     }
     let ended = threads.join()?;

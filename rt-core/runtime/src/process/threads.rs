@@ -107,8 +107,8 @@ fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopRe
     LoopReport {
         thread: armed.report,
         ticks: r.tick,
-        missed: r.missed,
-        worst_wake_ns: r.worst_wake_ns,
+        since_start: r.since_start,
+        since_armed: r.since_armed,
         sleeps,
         usage,
     }
@@ -129,8 +129,8 @@ fn run_with_device<L: DeviceLoop>(
     LoopReport {
         thread: armed.report,
         ticks: counts.ticks,
-        missed: counts.missed,
-        worst_wake_ns: counts.worst_wake_ns,
+        since_start: counts.since_start,
+        since_armed: counts.since_armed,
         sleeps,
         usage,
     }

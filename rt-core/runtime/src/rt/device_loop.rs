@@ -7,7 +7,7 @@ use crate::rt::watchdog::device_fault;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_hw::{DeviceFault, HandGoal, Sample};
-use stylet_shm_schema::Fault;
+use stylet_shm_schema::{DeadlineTotals, Fault};
 
 /// The hand is at its goal within this distance, at rest.
 const AT_GOAL_M: f64 = 4e-4;
@@ -18,10 +18,10 @@ const AT_REST_M_PER_S: f64 = 3e-3;
 pub struct Counts {
     /// Ticks made.
     pub ticks: u64,
-    /// Deadlines missed.
-    pub missed: u64,
-    /// Latest wake-up after a deadline, ns.
-    pub worst_wake_ns: u64,
+    /// Since the loop began.
+    pub since_start: DeadlineTotals,
+    /// Since the force was last turned on.
+    pub since_armed: DeadlineTotals,
 }
 
 /// A loop that owns a device.
@@ -30,7 +30,7 @@ pub trait DeviceLoop {
     type State: bytemuck::Pod + Send;
     /// What hosts see of it, after the newest tick.
     fn state(&self) -> &Self::State;
-    /// Since the counters were last reset.
+    /// Since the loop began; a reset does not clear them.
     fn counts(&self) -> Counts;
     /// Time between two ticks, s.
     fn period_s(&self) -> f64;

@@ -97,6 +97,8 @@ pub enum HapticOrder {
     },
     /// What this host moves goes on.
     KeepMoving(Promise),
+    /// The loop made no tick for longer than the supervisor waits: the force stays off until somebody re-arms.
+    StoodStill,
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
     /// Hold the simulated hand where it is.
@@ -135,6 +137,8 @@ pub enum TissueOrder {
         /// A blank flight recording for it.
         tape: Box<TissueTape>,
     },
+    /// The force was turned on: totals since then begin anew.
+    Armed,
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
     /// Room to record what needles that stay in do to the body.

@@ -290,8 +290,8 @@ impl DeviceLoop for HapticLoop {
     fn counts(&self) -> Counts {
         Counts {
             ticks: self.state.tick,
-            missed: self.state.missed_deadlines,
-            worst_wake_ns: self.state.worst_wake_ns,
+            since_start: self.state.since_start,
+            since_armed: self.state.since_armed,
         }
     }
 

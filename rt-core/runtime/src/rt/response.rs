@@ -1,7 +1,9 @@
 //! What the tissue loop hands to the force loop.
 
+use crate::rt::taped::pod;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use stylet_shm_schema::DeadlineTotals;
 use stylet_sim::force::LocalResponse;
 use stylet_sim::force::chain::Touch;
 use stylet_sim::line::MAX_LEFT;
@@ -41,6 +43,12 @@ pub struct TissueResponse {
     pub worst_wake_ns: u64,
     /// Deadlines missed so far.
     pub missed: u64,
+    /// Totals since the loop began; no reset clears them.
+    #[serde(with = "pod")]
+    pub since_start: DeadlineTotals,
+    /// Totals since the force was last turned on.
+    #[serde(with = "pod")]
+    pub since_armed: DeadlineTotals,
     /// Seeds in the tissue.
     pub seed_count: u32,
     /// Generation of the line whose columns the tissue loop has; 0 for none.
@@ -89,6 +97,8 @@ impl Default for TissueResponse {
             worst_work_ns: 0,
             worst_wake_ns: 0,
             missed: 0,
+            since_start: DeadlineTotals::default(),
+            since_armed: DeadlineTotals::default(),
             seed_count: 0,
             line: 0,
             solved_ns: 0,

@@ -18,7 +18,7 @@ use crate::rt::world::World;
 use last_carry::LastCarry;
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_shm_schema::{MAX_SEEDS, SeedPose};
+use stylet_shm_schema::{DeadlineTotals, MAX_SEEDS, SeedPose};
 use stylet_sim::force::LocalResponse;
 use stylet_sim::line::{BodyLine, MAX_LEFT};
 use stylet_sim::probe::{BodyProbe, ProbePose};
@@ -175,16 +175,23 @@ impl TissueLoop {
         while !stop.load(Ordering::Acquire) {
             sleeps += Wait::default().until(grid.due_ns);
             let woke_ns = clock::now_ns();
-            self.response.worst_wake_ns = self.response.worst_wake_ns.max(woke_ns.saturating_sub(grid.due_ns));
+            self.count(missed, woke_ns.saturating_sub(grid.due_ns));
             self.tick(woke_ns);
             if let Some(probe) = &mut self.probe {
                 probe.finish(grid.due_ns, woke_ns, missed);
             }
             missed = grid.advance(clock::now_ns());
-            self.response.missed += u64::from(missed);
         }
         self.hand_over_tape();
         sleeps
+    }
+
+    fn count(&mut self, missed: u32, wake_latency_ns: u64) {
+        let response = &mut self.response;
+        response.missed += u64::from(missed);
+        response.worst_wake_ns = response.worst_wake_ns.max(wake_latency_ns);
+        response.since_start.add(missed, wake_latency_ns);
+        response.since_armed.add(missed, wake_latency_ns);
     }
 
     /// One tick; in the order of the data.
@@ -253,6 +260,7 @@ impl TissueLoop {
                     self.checkpoint();
                 }
                 TissueOrder::LeftRoom(room) => self.left_room = self.left_room.take().or(Some(room)),
+                TissueOrder::Armed => self.response.since_armed = DeadlineTotals::default(),
                 TissueOrder::HandOverTape => self.hand_over_tape(),
                 TissueOrder::Probe {
                     generation,

@@ -26,8 +26,11 @@ enum Mode {
         from: Wrench,
         ticks: u32,
     },
-    /// Asked to engage; the model still asks for too much.
-    Waiting,
+    /// Asked to engage; the model still asks for too much. What is left of a ramp out goes on.
+    Waiting {
+        from: Wrench,
+        ticks: u32,
+    },
     Engaged {
         ticks: u32,
     },
@@ -87,8 +90,8 @@ impl Default for GateState {
 impl GateState {
     /// Ramps the force in as soon as it is small, and forgets the last fault.
     pub fn engage(&mut self) {
-        if !self.engaged() {
-            self.mode = Mode::Waiting;
+        if let Mode::RampOut { from, ticks } = self.mode {
+            self.mode = Mode::Waiting { from, ticks };
         }
         self.fault = None;
     }
@@ -97,7 +100,8 @@ impl GateState {
     pub fn release(&mut self) {
         match self.mode {
             Mode::RampOut { .. } => {}
-            Mode::Waiting | Mode::Engaged { .. } => {
+            Mode::Waiting { from, ticks } => self.mode = Mode::RampOut { from, ticks },
+            Mode::Engaged { .. } => {
                 self.mode = Mode::RampOut {
                     from: self.output,
                     ticks: 0,
@@ -122,7 +126,7 @@ impl GateState {
 
     /// Asked to engage, and the model still asks for too much.
     pub fn waiting(&self) -> bool {
-        matches!(self.mode, Mode::Waiting)
+        matches!(self.mode, Mode::Waiting { .. })
     }
 
     /// Why the force went to zero, until it is engaged again.
@@ -172,8 +176,7 @@ pub fn step(parameters: &GateParameters, device: &DeviceInfo, state: &mut GateSt
             constant_n = input.constant_n * share;
             within_limits(parameters, device, state, input, share)
         }
-        Mode::Waiting => Wrench::zero(),
-        Mode::RampOut { from, ticks } => {
+        Mode::Waiting { from, ticks } | Mode::RampOut { from, ticks } => {
             *ticks = ticks.saturating_add(1).min(ramp_out);
             scaled(from, 1.0 - f64::from(*ticks) / f64::from(ramp_out))
         }
@@ -182,13 +185,12 @@ pub fn step(parameters: &GateParameters, device: &DeviceInfo, state: &mut GateSt
     let (torque_nm, turned) = limited(next.torque_nm, device.peak_torque_nm);
     count(&mut state.counts.device_limited, cut || turned);
     let next = Wrench { force_n, torque_nm };
-    // Settings that are not numbers end here.
-    state.output = if next.is_finite() {
-        next
-    } else {
+    // Settings that are not numbers end here, and the ramp out begins at what the device was given: zero.
+    let is_finite = next.is_finite();
+    state.output = if is_finite { next } else { Wrench::zero() };
+    if !is_finite {
         state.trip(ForceFault::NonFiniteForce);
-        Wrench::zero()
-    };
+    }
     // What is the same everywhere stores what it takes: no motion that ends where it began gets any of it.
     state.passivity.book(&(state.output.force_n - constant_n));
     let dt_s = input.motion.dt_s;

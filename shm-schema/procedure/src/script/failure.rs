@@ -1,6 +1,15 @@
 //! Why a procedure cannot go on.
 
+use super::Procedure;
 use stylet_shm_schema::Fault;
+
+impl Procedure {
+    /// Re-arms after a fault that stands at the beginning; without this it does not begin.
+    #[must_use]
+    pub fn rearming(self) -> Self {
+        Self { rearms: true, ..self }
+    }
+}
 
 /// Why the procedure cannot go on. Times are those that were waited, s.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -11,6 +20,9 @@ pub enum StepFailure {
     /// The force went off after it was turned on.
     #[error("the force is off: {}", .0.message())]
     ForceOff(Fault),
+    /// A fault stood before the force was turned on, and nobody asked to re-arm.
+    #[error("a fault keeps the force off, and only a person re-arms: {}", .0.message())]
+    FaultStands(Fault),
     /// A request was refused.
     #[error("{request} was refused: {why}")]
     Refused {

@@ -212,8 +212,20 @@ fn what_is_not_answered_refused_or_without_effect_ends_the_procedure() {
 }
 
 #[test]
-fn a_fault_ends_the_procedure_only_once_the_force_was_turned_on() {
-    let (mut hand, mut procedure) = (Obedient::new(), Procedure::rehearsal(way(), Pace::default()));
+fn nothing_is_sent_while_a_fault_stands_unless_somebody_asked_to_rearm() {
+    let (mut hand, mut procedure) = (Obedient::new(), Procedure::of_needles(vec![way()], Pace::default()));
+    hand.state.fault = Fault::TissueStale as u32;
+    let failure = hand.step(&mut procedure, &[]).expect_err("a person re-arms");
+    assert_eq!(failure, StepFailure::FaultStands(Fault::TissueStale));
+    assert!(hand.sent.is_empty(), "not even a reset");
+    let mut procedure = Procedure::of_needles(vec![way()], Pace::default()).rearming();
+    assert!(hand.step(&mut procedure, &[]).is_ok() && !hand.sent.is_empty());
+}
+
+#[test]
+fn a_fault_ends_a_procedure_that_may_rearm_only_once_the_force_was_turned_on() {
+    let (mut hand, procedure) = (Obedient::new(), Procedure::rehearsal(way(), Pace::default()));
+    let mut procedure = procedure.rearming();
     hand.state.fault = Fault::DeviceError as u32;
     assert!(hand.step(&mut procedure, &[]).is_ok() && hand.step(&mut procedure, &[]).is_ok());
     assert_eq!(

@@ -1,4 +1,4 @@
-//! Where an implantation that was stopped goes on.
+//! Where a run goes on, by what is in the tissue.
 
 use super::*;
 

@@ -2,7 +2,7 @@
 
 use super::HapticLoop;
 use crate::rt::exchange::{HapticOrder, Notice, Ticket};
-use stylet_shm_schema::RefusalCode;
+use stylet_shm_schema::{DeadlineTotals, Fault, RefusalCode};
 use stylet_sim::force::chain::ChainParameters;
 
 impl HapticLoop {
@@ -63,6 +63,7 @@ impl HapticLoop {
                 HapticOrder::LoseDevice { ticket, lost } => self.lose_device(ticket, lost, tick),
                 HapticOrder::MoveBody { ticket, to_m } => self.move_body(ticket, to_m, tick),
                 HapticOrder::Reset { ticket } => self.reset(ticket, tick),
+                HapticOrder::StoodStill => self.raise(Fault::LoopStopped),
                 HapticOrder::HandOverTape => self.ports.flight.hand_over(),
             }
         }
@@ -73,6 +74,7 @@ impl HapticLoop {
             let time_ns = self.state.time_ns;
             self.notify(Notice::Rearmed { tick, time_ns });
         }
+        self.state.since_armed = DeadlineTotals::default();
         self.chain.gate.engage();
         self.notify(Notice::Done { ticket, tick });
     }

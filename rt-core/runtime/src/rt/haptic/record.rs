@@ -71,6 +71,9 @@ impl HapticLoop {
         s.force_scale = self.parameters.force.gate.force_scale;
         s.missed_deadlines += u64::from(missed);
         s.worst_wake_ns = s.worst_wake_ns.max(wake_latency_ns);
+        s.since_start.add(missed, wake_latency_ns);
+        s.since_armed.add(missed, wake_latency_ns);
+        (s.tissue_since_start, s.tissue_since_armed) = (tissue.since_start, tissue.since_armed);
         s.tissue_tick = tissue.tick;
         s.tissue_missed_deadlines = tissue.missed;
         s.tissue_worst_wake_ns = tissue.worst_wake_ns;

@@ -226,8 +226,8 @@ impl DeviceLoop for SecondLoop {
     fn counts(&self) -> Counts {
         Counts {
             ticks: self.memory.state.tick,
-            missed: self.memory.state.missed_deadlines,
-            worst_wake_ns: self.memory.state.worst_wake_ns,
+            since_start: self.memory.state.since_start,
+            since_armed: self.memory.state.since_armed,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::{SecondLoop, SecondOrder};
 use crate::rt::exchange::Notice;
-use stylet_shm_schema::RefusalCode;
+use stylet_shm_schema::{DeadlineTotals, RefusalCode};
 
 impl SecondLoop {
     pub(super) fn take_orders(&mut self) {
@@ -43,6 +43,7 @@ impl SecondLoop {
             let time_ns = self.memory.state.time_ns;
             self.notify(Notice::Rearmed { tick, time_ns });
         }
+        self.memory.state.since_armed = DeadlineTotals::default();
         self.memory.gate.engage();
     }
 

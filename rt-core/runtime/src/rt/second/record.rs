@@ -56,6 +56,8 @@ impl SecondLoop {
         s.force_scale = memory.gate_parameters.force_scale;
         s.missed_deadlines += u64::from(missed);
         s.worst_wake_ns = s.worst_wake_ns.max(wake_latency_ns);
+        s.since_start.add(missed, wake_latency_ns);
+        s.since_armed.add(missed, wake_latency_ns);
         s.tissue_tick = response.tick;
         s.probe_edge_um = response.edge_um;
         (s.gate_counts, s.gate_interventions) = (gate_counts, interventions);

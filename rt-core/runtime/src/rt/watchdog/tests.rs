@@ -18,6 +18,8 @@ use stylet_sim::needle::{LayerKind, NeedleParameters};
 
 mod exercises;
 mod motion;
+mod stale;
+mod totals;
 
 const TICK_NS: u64 = 1_000_000;
 

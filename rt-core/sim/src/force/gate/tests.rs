@@ -2,6 +2,8 @@
 
 use super::*;
 
+mod any_floats;
+
 const DT_S: f64 = 1e-3;
 
 fn device() -> DeviceInfo {

@@ -1,0 +1,110 @@
+//! Limits of the PC: raised where this process may raise them, named where they are too low for a run.
+
+use std::ffi::CStr;
+
+/// Files of a run at once: 70 with a second device, 11 more for each host.
+const FILES: libc::rlim_t = 192;
+/// Length of the largest object in shared memory: that of a large scene takes up to this.
+const LARGEST_FILE: libc::rlim_t = 256 << 20;
+const SHARED_MEMORY: &CStr = c"/dev/shm";
+
+/// A limit that keeps the run from starting; the text says what to change.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct LimitError(String);
+
+/// Raises the soft limits of this process to the hard ones, and has a write beyond the limit of a file's length fail instead of
+/// ending the program by SIGXFSZ. Files that cannot be written are then named by who writes them.
+pub fn raise() {
+    // SAFETY: SIG_IGN needs no handler.
+    unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_IGN) };
+    for resource in [libc::RLIMIT_NOFILE, libc::RLIMIT_FSIZE] {
+        let mut limit = of(resource);
+        limit.rlim_cur = limit.rlim_max;
+        // SAFETY: `limit` is valid for reads. What is refused stays as it is, and is named by `check`.
+        unsafe { libc::setrlimit(resource, &limit) };
+    }
+}
+
+/// Names the first limit that is too low for a run.
+pub fn check() -> Result<(), LimitError> {
+    enough(of(libc::RLIMIT_NOFILE).rlim_cur, of(libc::RLIMIT_FSIZE).rlim_cur)?;
+    shared_memory(SHARED_MEMORY)
+}
+
+fn of(resource: libc::__rlimit_resource_t) -> libc::rlimit {
+    let mut limit = libc::rlimit {
+        rlim_cur: libc::RLIM_INFINITY,
+        rlim_max: libc::RLIM_INFINITY,
+    };
+    // SAFETY: `limit` is valid for writes.
+    unsafe { libc::getrlimit(resource, &mut limit) };
+    limit
+}
+
+fn enough(files: libc::rlim_t, file_bytes: libc::rlim_t) -> Result<(), LimitError> {
+    if files < FILES {
+        return Err(LimitError(format!(
+            "this process may open {files} files and needs {FILES}: raise the hard limit, ulimit -Hn {FILES} or more (nofile in \
+             /etc/security/limits.d), and start again"
+        )));
+    }
+    if file_bytes < LARGEST_FILE {
+        return Err(LimitError(format!(
+            "files of this process may be {} KiB long, and shared memory needs up to {} KiB: raise the hard limit, ulimit -Hf unlimited \
+             (fsize in /etc/security/limits.d), and start again",
+            file_bytes >> 10,
+            LARGEST_FILE >> 10
+        )));
+    }
+    Ok(())
+}
+
+fn shared_memory(folder: &CStr) -> Result<(), LimitError> {
+    let name = folder.to_string_lossy();
+    // SAFETY: an all-zero statvfs is valid.
+    let mut stat: libc::statvfs = unsafe { std::mem::zeroed() };
+    // SAFETY: the path ends in a zero byte and `stat` is valid for writes.
+    if unsafe { libc::statvfs(folder.as_ptr(), &mut stat) } != 0 {
+        let why = std::io::Error::last_os_error();
+        return Err(LimitError(format!(
+            "there is no shared memory at {name} ({why}): sudo mount -t tmpfs tmpfs {name}"
+        )));
+    }
+    if stat.f_flag & libc::ST_RDONLY != 0 {
+        return Err(LimitError(format!(
+            "shared memory at {name} is read-only: sudo mount -o remount,rw {name}"
+        )));
+    }
+    // SAFETY: the path ends in a zero byte.
+    if unsafe { libc::access(folder.as_ptr(), libc::W_OK | libc::X_OK) } != 0 {
+        return Err(LimitError(format!(
+            "this user may not write to shared memory at {name}: sudo chmod 1777 {name}"
+        )));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_limit_is_named_with_what_is_needed() {
+        let said = |files, bytes| enough(files, bytes).expect_err("too low").to_string();
+        assert!(said(56, libc::RLIM_INFINITY).starts_with("this process may open 56 files and needs 192"));
+        assert!(said(1024, 100 << 10).starts_with("files of this process may be 100 KiB long"));
+        assert!(enough(FILES, LARGEST_FILE).is_ok());
+    }
+
+    #[test]
+    fn shared_memory_that_is_missing_or_read_only_is_named() {
+        let said = |folder| shared_memory(folder).expect_err("of no use").to_string();
+        assert!(said(c"/nowhere/shm").starts_with("there is no shared memory at /nowhere/shm"));
+        // Read-only in every container and to everybody but root; where it is not, there is nothing to see.
+        if let Err(why) = shared_memory(c"/sys") {
+            assert!(why.to_string().contains("/sys"), "{why}");
+        }
+        assert!(shared_memory(SHARED_MEMORY).is_ok());
+    }
+}

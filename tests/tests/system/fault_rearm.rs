@@ -1,0 +1,49 @@
+//! A fault needs a person: a script does not turn the force on again unless that was asked for.
+
+use std::process::Command;
+use std::time::Duration;
+use stylet_shm_schema::{Fault, Request};
+use stylet_tests::stopped::StoppedThread;
+use stylet_tests::witness::where_the_machine_runs;
+use stylet_tests::{Core, ask, program, scratch, until};
+
+const LONG: Duration = Duration::from_secs(30);
+
+#[test]
+fn a_procedure_does_not_begin_while_a_fault_stands_unless_it_may_rearm() {
+    where_the_machine_runs(|| {
+        let mut core = Core::start();
+        let mut link = core.host();
+        ask(&mut link, &Request::Engage).expect("armed");
+        let stopped = StoppedThread::stop(core.id(), "tissue");
+        let fault = Fault::TissueStale as u32;
+        let mut fault_is = |fault: u32| {
+            until(LONG, || {
+                link.poll();
+                link.state().is_some_and(|s| s.fault == fault)
+            })
+        };
+        assert!(fault_is(fault));
+        drop(stopped);
+        let out = scratch(&format!("rearm-{}", core.instance.name()));
+        let procedure = |name: &str| {
+            let mut command = Command::new(program("host-ui"));
+            command.args(["procedure", "--instance", core.instance.name(), "--out"]);
+            command.arg(out.join(name));
+            command
+        };
+        let refused = procedure("refused").output().expect("host-ui starts");
+        let why = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(1), "{why}");
+        assert!(
+            why.contains("only a person re-arms") && why.contains("--rearm"),
+            "{why}"
+        );
+        assert!(fault_is(fault), "it re-armed by itself");
+        let mut allowed = procedure("allowed").arg("--rearm").spawn().expect("host-ui starts");
+        let armed = fault_is(0);
+        allowed.kill().expect("ours");
+        allowed.wait().expect("ours");
+        assert!(armed, "--rearm is the word for it");
+    });
+}
