@@ -53,6 +53,12 @@ pub const LAYERS: &[Layer] = &[
         not_itself: &[],
     },
     Layer {
+        folder: "shm-schema/text",
+        may_use: &[],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
         folder: "shm-schema/write",
         may_use: &[],
         never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
@@ -118,6 +124,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema",
             "shm-schema/anatomy",
             "shm-schema/write",
+            "shm-schema/text",
         ],
         never: &[WINDOW, DICOM],
         not_itself: &[PORTS],
@@ -132,6 +139,7 @@ pub const LAYERS: &[Layer] = &[
             "rt-core/sim",
             "shm-schema",
             "shm-schema/write",
+            "shm-schema/text",
         ],
         never: &[WINDOW, PROGRAM, DICOM],
         not_itself: &[PORTS, DEVICES],
@@ -148,6 +156,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema",
             "shm-schema/anatomy",
             "shm-schema/manual",
+            "shm-schema/text",
         ],
         never: &[WINDOW, DICOM],
         not_itself: &[PORTS],
@@ -155,7 +164,7 @@ pub const LAYERS: &[Layer] = &[
     // The host's side.
     Layer {
         folder: "host-ui/base",
-        may_use: &["shm-schema/anatomy", "shm-schema/write"],
+        may_use: &["shm-schema/anatomy", "shm-schema/write", "shm-schema/text"],
         never: &[WINDOW, PORTS, DEVICES, DICOM],
         not_itself: &[],
     },
