@@ -12,11 +12,12 @@ use stylet_shm_schema::service::Instance;
 use stylet_sim::scene::Scene;
 
 fn main() -> ExitCode {
+    stylet_runtime::environment::cleanse();
     let cli = Cli::parse();
     match carry_out(&cli) {
         Ok(code) => ExitCode::from(code),
         Err(why) => {
-            eprintln!("rt-core: {why}");
+            eprintln!("rt-core: {}", stylet_text::printable(&why.to_string()));
             ExitCode::FAILURE
         }
     }
