@@ -5,7 +5,7 @@ CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: loom wall compensation envelope procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: deny loom wall compensation envelope procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -92,6 +92,9 @@ live-test: build live ## Watch 'host-ui record --live' for LIVE_SECONDS (60) wit
 
 fuzz: ## Fuzz each file reader for FUZZ_SECONDS (600) seconds
 	docs/tools/fuzz
+
+deny: ## Check licences, sources, bans and advisories of what the programs are built from
+	docs/tools/deny --install
 
 relay-fuzz: ## Fuzz what the relay takes from the net for FUZZ_SECONDS (600) seconds
 	docs/tools/fuzz wire

@@ -9,7 +9,7 @@ fn main() -> ExitCode {
     match host_ui::cli::Cli::parse().run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
-            eprintln!("host-ui: {why}");
+            eprintln!("host-ui: {}", stylet_base::format::printable(&why.to_string()));
             ExitCode::FAILURE
         }
     }

@@ -29,7 +29,7 @@ pub use drd::{ForceDimension, ForceDimensionConfig};
 pub use finding::{Finding, Severity};
 pub use haply::{Haply, HaplyConfig};
 pub use libhd::{Phantom, PhantomConfig};
-pub use library::{Driver, LoadError, LoadFailure};
+pub use library::{Driver, LoadError, LoadFailure, has_more_rights_than_user};
 pub use placement::{Axes, Placement};
 pub use replay::ReplayDevice;
 pub use sim::hand::{Effort, Hand};

@@ -33,14 +33,32 @@ pub enum LoadFailure {
     /// The message of the dynamic loader, unaltered.
     #[error("{0}")]
     Loader(String),
+    /// The user named the file, and the program has more rights than the user.
+    #[error(
+        "not loaded: rt-core has more rights than its user (file capabilities), and a library of the user's would have them too"
+    )]
+    NotTrusted,
     /// The library lacks these functions.
     #[error("another version, or another library: it lacks {}", .0.join(", "))]
     Incomplete(Vec<&'static str>),
 }
 
+impl LoadFailure {
+    /// Two ways out.
+    pub(crate) const CURE_OF_NOT_TRUSTED: &str = "install it where the system finds it, then sudo ldconfig; or take the rights from the program: \
+                                                  sudo dpkg-reconfigure stylet-rt-core";
+}
+
 fn attempts(tried: &[(PathBuf, LoadFailure)]) -> String {
     let line = |(name, why): &(PathBuf, LoadFailure)| format!("\n  {}: {why}", name.display());
     tried.iter().map(line).collect()
+}
+
+/// Whether the kernel gave this program more rights than its user has, as `setcap` does (`AT_SECURE`): whatever the user names is then
+/// not loaded, or the user's own code would have these rights.
+pub fn has_more_rights_than_user() -> bool {
+    // SAFETY: getauxval has no preconditions.
+    unsafe { libc::getauxval(libc::AT_SECURE) != 0 }
 }
 
 /// Loads the library at `path`, or the first of the driver's files that can be loaded, and never closes it. `bind` looks up its
@@ -56,6 +74,11 @@ pub fn load<T>(
     };
     let mut tried = Vec::new();
     for name in names {
+        // A name without a slash is looked for where root alone installs: the loader ignores LD_LIBRARY_PATH as well.
+        if has_more_rights_than_user() && name.components().count() > 1 {
+            tried.push((name, LoadFailure::NotTrusted));
+            continue;
+        }
         match load_one(&name, &bind) {
             Ok(functions) => return Ok(functions),
             Err(why) => tried.push((name, why)),

@@ -12,12 +12,13 @@ use stylet_runtime::process::limits;
 use stylet_sim::scene::Scene;
 
 fn main() -> ExitCode {
+    stylet_runtime::environment::cleanse();
     let cli = Cli::parse();
     limits::raise();
     match carry_out(&cli) {
         Ok(code) => ExitCode::from(code),
         Err(why) => {
-            eprintln!("rt-core: {why}");
+            eprintln!("rt-core: {}", stylet_text::printable(&why.to_string()));
             ExitCode::FAILURE
         }
     }

@@ -11,6 +11,7 @@ use stylet_runtime::rt::arm::{self, Ask, Refused};
 use stylet_runtime::rt::haptic_tape::HapticFlight;
 use stylet_runtime::rt::tissue_tape::TissueFlight;
 use stylet_shm_schema::{Fault, flags};
+use stylet_text::printable_line;
 
 /// Why a recording could not be repeated.
 #[derive(Debug, thiserror::Error)]
@@ -40,12 +41,12 @@ impl Replay {
         if flight.version != env!("CARGO_PKG_VERSION") {
             println!(
                 "note: recorded by version {}, repeated by {}: another build may round otherwise",
-                flight.version,
+                printable_line(&flight.version),
                 env!("CARGO_PKG_VERSION")
             );
         }
-        println!("reason   {}", flight.reason);
-        println!("device   {}", flight.device_name);
+        println!("reason   {}", printable_line(&flight.reason.to_string()));
+        println!("device   {}", printable_line(&flight.device_name));
         // Before denormal numbers are off: what prepared the lines had them on.
         let again = flight.tissue.as_ref().map(|recorded| solve_again(&flight, recorded));
         let again = again.transpose()?.unwrap_or_default();
@@ -98,7 +99,7 @@ fn repeat_second(flight: &Flight) -> bool {
     let Some(figures) = &flight.second_device else {
         return true;
     };
-    println!("second   {}", figures.device_name);
+    println!("second   {}", printable_line(&figures.device_name));
     let again = flight.second.as_ref().map(|recorded| {
         let peak_n = recorded
             .ticks

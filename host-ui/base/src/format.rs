@@ -1,5 +1,7 @@
 //! From SI to what a person reads; the only place of the window that converts units.
 
+pub use stylet_text::{cell, printable, printable_line, printable_table};
+
 /// The present time as 20260131T235959Z, for names of files.
 pub fn utc_now() -> String {
     jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ").to_string()
@@ -106,22 +108,6 @@ pub fn signed(value: f64, decimals: usize) -> String {
     } else {
         format!("+{shown}")
     }
-}
-
-/// Characters of a text out of a file that are shown: a file chooses what it makes a message say, and how much.
-const MAX_SHOWN_CHARS: usize = 4000;
-
-/// Text out of a file for a terminal: without control characters but line feeds, and not endless.
-pub fn printable(text: &str) -> String {
-    let mut kept: String = text
-        .chars()
-        .filter(|c| !c.is_control() || *c == '\n')
-        .take(MAX_SHOWN_CHARS)
-        .collect();
-    if text.chars().nth(MAX_SHOWN_CHARS).is_some() {
-        kept.push_str("...");
-    }
-    kept
 }
 
 #[cfg(test)]

@@ -31,7 +31,7 @@ impl Requests {
     /// Takes what clients have sent, and hands on what the core answered.
     pub fn pass(&mut self, link: &mut Link, server: &Server) {
         for received in server.received() {
-            if let Err(refusal) = self.take(link, &received) {
+            if let Err(refusal) = self.take(link, server, &received) {
                 server.refuse(received.from, &received.device, &refusal);
             }
         }
@@ -59,7 +59,7 @@ impl Requests {
         }
     }
 
-    fn take(&mut self, link: &mut Link, received: &Received) -> Result<(), Refusal> {
+    fn take(&mut self, link: &mut Link, server: &Server, received: &Received) -> Result<(), Refusal> {
         let scene = match (link.scene(), link.status()) {
             (Some(scene), LinkStatus::Live) => scene,
             (_, LinkStatus::Absent { why }) => return Err(not_ready(why)),
@@ -73,6 +73,7 @@ impl Requests {
             needle
         };
         if let Some(goal) = hand.take(received, &patient, Instant::now())? {
+            server.has_moved(received.from);
             let sent = link.send(&hand.held().moved(goal));
             let id = sent.map_err(|error| not_ready(error.to_string()))?;
             self.awaited.push_back((id, received.clone()));

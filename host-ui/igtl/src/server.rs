@@ -4,10 +4,12 @@
 //! Each client has two threads. It keeps at most one message of each device that waits, and one transform of each device that it has
 //! sent: a newer one replaces it. So memory is bounded, and whoever is slow sees what is newest.
 
+mod door;
 mod incoming;
 mod outgoing;
 
 use crate::codec::Status;
+use door::{Door, Limits};
 use outgoing::Client;
 use std::collections::BTreeMap;
 use std::io;
@@ -15,10 +17,10 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
+use stylet_base::format::printable_line;
 
 /// How often a thread looks whether the server has ended.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-const CLIENTS_AT_MOST: usize = 16;
 /// Devices whose transforms one client may send.
 const DEVICES_AT_MOST: usize = 16;
 
@@ -100,6 +102,14 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 impl Server {
     /// Listens on the address; port 0 lets the system choose one.
     pub fn listen(address: SocketAddr, log: impl Fn(String) + Send + Sync + 'static) -> Result<Self, ServerError> {
+        Self::listen_within(Limits::default(), address, log)
+    }
+
+    fn listen_within(
+        limits: Limits,
+        address: SocketAddr,
+        log: impl Fn(String) + Send + Sync + 'static,
+    ) -> Result<Self, ServerError> {
         let failed = |source| ServerError::Listen { address, source };
         let listener = TcpListener::bind(address).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
@@ -109,10 +119,11 @@ impl Server {
             address: listener.local_addr().map_err(failed)?,
         };
         let (shared, ended) = (server.shared.clone(), server.ended.clone());
-        let log: Log = Arc::new(log);
+        // Clients choose the words of some lines.
+        let log: Log = Arc::new(move |line| log(printable_line(&line)));
         std::thread::Builder::new()
             .name("igtl-accept".to_owned())
-            .spawn(move || accept(&listener, &shared, &ended, &log))
+            .spawn(move || accept(&listener, Door::new(limits), &shared, &ended, &log))
             .map_err(ServerError::Thread)?;
         Ok(server)
     }
@@ -145,6 +156,13 @@ impl Server {
             .collect()
     }
 
+    /// Notes that a transform of this client moved a hand: no other client takes its place for a while.
+    pub fn has_moved(&self, from: SocketAddr) {
+        if let Some(client) = lock(&self.shared).clients.iter().find(|c| c.address == from) {
+            client.has_moved();
+        }
+    }
+
     /// Answers a client's message with a STATUS, and logs it; the same words to the same client once in a while.
     pub fn refuse(&self, from: SocketAddr, device: &str, refusal: &Refusal) {
         let client = lock(&self.shared).clients.iter().find(|c| c.address == from).cloned();
@@ -160,23 +178,36 @@ impl Drop for Server {
     }
 }
 
-fn accept(listener: &TcpListener, shared: &Arc<Mutex<Shared>>, ended: &Arc<AtomicBool>, log: &Log) {
+fn accept(listener: &TcpListener, mut door: Door, shared: &Arc<Mutex<Shared>>, ended: &Arc<AtomicBool>, log: &Log) {
     while !ended.load(Ordering::Relaxed) {
         let Ok((stream, from)) = listener.accept() else {
             std::thread::sleep(LOOK_EVERY);
             continue;
         };
         let client = Arc::new(Client::new(from, log.clone()));
-        {
+        let admitted = {
             let mut shared = lock(shared);
-            if shared.clients.len() >= CLIENTS_AT_MOST {
-                log(format!(
-                    "{from}: refused, {CLIENTS_AT_MOST} clients are connected already"
-                ));
+            let admitted = door.admit(from, &shared.clients);
+            if let Ok(displaced) = &admitted {
+                shared
+                    .clients
+                    .retain(|c| displaced.as_ref().is_none_or(|d| !Arc::ptr_eq(c, d)));
+                client.put_all(&shared.newest);
+                shared.clients.push(client.clone());
+            }
+            admitted
+        };
+        match admitted {
+            Ok(displaced) => displaced
+                .into_iter()
+                .for_each(|d| d.end("another client has taken its place")),
+            Err(refused) => {
+                door::answer(&stream, &refused.words);
+                if refused.is_said {
+                    log(format!("{from}: refused, {}", refused.words));
+                }
                 continue;
             }
-            client.put_all(&shared.newest);
-            shared.clients.push(client.clone());
         }
         log(format!("{from}: connected"));
         if let Err(error) = start(stream, &client, shared, ended) {

@@ -75,7 +75,7 @@ impl Live {
         find_core(&mut link, &mut core, options, device, &interrupted)?;
         if let Some(volume) = &volume {
             for note in &volume.warnings {
-                println!("note: {note}");
+                println!("note: {}", stylet_base::format::printable_line(note));
             }
             load(&mut link, |link| Ok(link.upload(volume)?), &interrupted)?;
         }
@@ -387,7 +387,11 @@ impl Seen {
             let kind = EventKind::from_number(event.kind);
             self.punctured |= kind == Some(EventKind::Puncture);
             let what = kind.map_or_else(String::new, |k| format!("{k:?}"));
-            println!("{:7.2} s  {what} {}", begun.elapsed().as_secs_f64(), event.text.read());
+            println!(
+                "{:7.2} s  {what} {}",
+                begun.elapsed().as_secs_f64(),
+                stylet_base::format::printable_line(&event.text.read())
+            );
         }
         self.last_event = link.events().back().map(|e| e.sequence).or(self.last_event);
         let snapshot = link.snapshot().filter(|_| !self.punctured);

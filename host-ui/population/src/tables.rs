@@ -4,6 +4,7 @@ use crate::dose::Scored;
 use crate::error::PopulationError;
 use crate::figures::{Distribution, mean_misplacement_mm};
 use std::path::Path;
+use stylet_base::format::cell;
 use stylet_base::write_whole;
 use stylet_insertions::Table;
 
@@ -48,7 +49,13 @@ fn insertions(table: &Table) -> Result<Vec<u8>, PopulationError> {
         "failure",
     ];
     let drawn = table.quantities.iter().map(String::as_str);
-    rows.write_record(fixed.into_iter().chain(drawn).chain(results))?;
+    rows.write_record(
+        fixed
+            .into_iter()
+            .chain(drawn)
+            .chain(results)
+            .map(|name| cell(name).into_owned()),
+    )?;
     for row in &table.rows {
         let m = row.outcome.as_ref().ok();
         let mut record = vec![row.id.clone(), row.scene.clone(), row.plan.clone()];
@@ -69,7 +76,7 @@ fn insertions(table: &Table) -> Result<Vec<u8>, PopulationError> {
             number(mean_misplacement_mm(row)),
             row.outcome.as_ref().err().cloned().unwrap_or_default(),
         ]);
-        rows.write_record(record)?;
+        rows.write_record(record.iter().map(|value| cell(value).into_owned()))?;
     }
     bytes(rows)
 }
@@ -91,7 +98,7 @@ fn implants(scored: &Scored) -> Result<Vec<u8>, PopulationError> {
             i.planned.v100_percent,
             i.delivered.v100_percent,
         ];
-        let record = [i.id.clone(), i.seeds.to_string()].into_iter();
+        let record = [cell(&i.id).into_owned(), i.seeds.to_string()].into_iter();
         rows.write_record(record.chain(figures.map(|f| f.to_string())))?;
     }
     bytes(rows)

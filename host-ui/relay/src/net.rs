@@ -290,7 +290,8 @@ impl Subscriber for Log {
         event.record(&mut text);
         // A peer that is refused tries again at once; the same reason is said once in a while.
         let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
-        let why = reason(&text.0);
+        // A peer may have chosen some of it.
+        let why = reason(&text.0).replace(char::is_control, " ");
         if said
             .as_ref()
             .is_some_and(|(last, at)| *last == why && at.elapsed() < SAY_EVERY)

@@ -39,7 +39,7 @@ impl ClassArgs {
             class::write_table(&class, file).map_err(std::io::Error::other)
         })?;
         for why in &class.left_out {
-            println!("left out: {why}");
+            println!("left out: {}", stylet_base::format::printable_line(why));
         }
         println!(
             "{} trainees, {} procedures",

@@ -125,7 +125,7 @@ impl DicomArgs {
             "made": provenance::made(&inputs)?,
         });
         write::json(&c.out.join("study.json"), &record)?;
-        print!("{}", judge.table(&verdict));
+        print!("{}", stylet_base::format::printable_table(&judge.table(&verdict)));
         for file in &written.files {
             println!("written: {}", file.display());
         }

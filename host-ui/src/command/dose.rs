@@ -109,7 +109,7 @@ impl DoseArgs {
             metrics["dose"] = c.provenance(source, seeds);
             metrics["made"] = made.clone();
             write::json(&c.out.join("metrics.json"), &metrics)?;
-            print!("{}", judge.table(verdict));
+            print!("{}", stylet_base::format::printable_table(&judge.table(verdict)));
         }
         if let Some((structures, target)) = structures {
             let implant = self.implant(&loaded)?;

@@ -169,7 +169,11 @@ impl PerturbArgs {
         result["made"] = provenance::made(&inputs)?;
         write::json(&c.out.join("made.json"), &result["made"])?;
         write::json(&c.out.join("distribution.json"), &result)?;
-        print!("{}{}", write::spread_table(&spreads), write::criteria_table(&kept));
+        print!(
+            "{}{}",
+            stylet_base::format::printable_table(&write::spread_table(&spreads)),
+            stylet_base::format::printable_table(&write::criteria_table(&kept))
+        );
         if trials.len() < how.trials {
             println!("stopped after {} of {} trials", trials.len(), how.trials);
         }

@@ -167,21 +167,21 @@ impl PlanArgs {
                 let wanted = self.compare.map_or(0, |wanted| wanted as usize);
                 let found = found.swap_remove(wanted.min(found.len() - 1));
                 for note in &found.notes {
-                    println!("note: {note}");
+                    println!("note: {}", stylet_base::format::printable_line(note));
                 }
                 found.plan
             }
             Some((path, seeds)) => file::import(path, seeds, &frames, template, &source.model, prescription_gy)?,
         };
         for problem in check::problems(&plan, &anatomy) {
-            println!("note: {problem}");
+            println!("note: {}", stylet_base::format::printable_line(&problem.to_string()));
         }
         self.write(&plan, &frames)?;
         let (figures, broken) = figures(&plan, &anatomy, &kernel)?;
         for criterion in &broken {
-            println!("note: {criterion}");
+            println!("note: {}", stylet_base::format::printable_line(criterion));
         }
-        print!("{figures}");
+        print!("{}", stylet_base::format::printable_table(&figures));
         println!("written: {}", self.out.display());
         Ok(())
     }

@@ -207,7 +207,10 @@ impl PostImplantArgs {
         let rows = sheet::rows(implant, columns);
         write::figures(&out.join("post_implant.csv"), &names, &rows)?;
         write_whole(&out.join("post_implant.html"), sheet::page(implant, columns).as_bytes())?;
-        print!("{}", write::figure_table(&names, &rows));
+        print!(
+            "{}",
+            stylet_base::format::printable_table(&write::figure_table(&names, &rows))
+        );
         println!("written: {}", out.display());
         Ok(())
     }

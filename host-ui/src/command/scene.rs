@@ -73,7 +73,10 @@ fn check_scene_file(file: &Path) -> Result<(), CommandError> {
         .as_ref()
         .map(|plan| file.parent().unwrap_or(Path::new("")).join(plan));
     if let Some(path) = plan.as_ref().filter(|p| files::scene::is_scene(p)) {
-        println!("  plan: {}, read when there is a scene", path.display());
+        println!(
+            "  plan: {}, read when there is a scene",
+            printable(&path.display().to_string())
+        );
     } else if let Some(path) = plan {
         let seeds = read_seeds(
             &path,
@@ -82,16 +85,23 @@ fn check_scene_file(file: &Path) -> Result<(), CommandError> {
                 ..SeedDefaults::default()
             },
         )?;
-        println!("  plan: {} seeds in {}", seeds.len(), path.display());
+        println!(
+            "  plan: {} seeds in {}",
+            seeds.len(),
+            printable(&path.display().to_string())
+        );
     }
     if let Some(named) = &scene.image {
         let path = file.with_file_name(named);
         let image = files::watched(&path, |progress| files::Image::read(&path, progress))?;
         let [x, y, z] = image.dims;
-        println!("  image: {x} x {y} x {z} voxels in {}", path.display());
+        println!(
+            "  image: {x} x {y} x {z} voxels in {}",
+            printable(&path.display().to_string())
+        );
     }
     if let Some(device) = &scene.device {
-        println!("  device: {device}, for an rt-core that host-ui starts");
+        println!("  device: {}, for an rt-core that host-ui starts", printable(device));
     }
     Ok(())
 }

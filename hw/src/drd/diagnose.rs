@@ -8,7 +8,7 @@ use crate::drd::ffi::Api;
 use crate::drd::session::{ConnectionError, Session, sdk_version, version_text};
 use crate::drd::status::{Health, health};
 use crate::finding::{Finding, Severity};
-use crate::library::LoadError;
+use crate::library::{LoadError, LoadFailure};
 use crate::usb;
 
 /// USB vendor of Force Dimension, as in the udev rules that its users publish.
@@ -26,7 +26,13 @@ pub fn diagnose(root: &Path, library: &Result<Api, LoadError>) -> Vec<Finding> {
         }
         Err(LoadError { tried, .. }) => tried
             .iter()
-            .map(|(name, why)| Finding::new(Severity::Problem, format!("{}: {why}", name.display()), INSTALL))
+            .map(|(name, why)| {
+                let cure = match why {
+                    LoadFailure::NotTrusted => LoadFailure::CURE_OF_NOT_TRUSTED,
+                    _ => INSTALL,
+                };
+                Finding::new(Severity::Problem, format!("{}: {why}", name.display()), cure)
+            })
             .collect(),
     };
     let seen = usb::devices_of(root, VENDOR);

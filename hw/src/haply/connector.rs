@@ -9,7 +9,7 @@ use crate::beside::serving;
 use crate::beside::shared::Shared;
 use crate::haply::servo::{Servo, loss};
 use crate::haply::session::{self, ConnectionError, Description, Wanted};
-use crate::haply::socket::{Service, Socket};
+use crate::haply::socket::{NoSocket, Service, Socket};
 use crate::haply::wire::Wire;
 
 /// Between two checks of a running device.
@@ -41,12 +41,15 @@ impl Connect for Connector {
     type Error = ConnectionError;
 
     fn open(&mut self) -> Result<Connection, ConnectionError> {
-        let version = self.service.version();
-        let socket = self.service.connect().map_err(|why| ConnectionError::NoService {
-            address: self.service.to_string(),
-            why: why.to_string(),
+        let socket = self.service.connect().map_err(|why| match why {
+            NoSocket::NotTrusted(why) => ConnectionError::NotTrusted(why.to_string()),
+            why => ConnectionError::NoService {
+                address: self.service.to_string(),
+                why: why.to_string(),
+            },
         })?;
-        Ok(Connection::Open(Box::new(socket), version))
+        // Asked once it is known whose program it is.
+        Ok(Connection::Open(Box::new(socket), self.service.version()))
     }
 
     fn prepare(&mut self, keeper: &mut Keeper, connection: &mut Connection) -> Result<bool, ConnectionError> {

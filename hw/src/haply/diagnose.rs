@@ -3,13 +3,17 @@
 use crate::finding::{Finding, Severity};
 use crate::haply::message::Inverse;
 use crate::haply::session::{self, ConnectionError, is_supported};
-use crate::haply::socket::Service;
+use crate::haply::socket::{NoSocket, Service};
 use crate::haply::wire::Wire;
 
 /// Asks the service which version it is and which devices it has.
 pub fn diagnose(service: &Service) -> Vec<Finding> {
     let mut socket = match service.connect() {
         Ok(socket) => socket,
+        Err(why @ NoSocket::NotTrusted(_)) => {
+            let cure = "end that program and start the service as this user, or with sudo systemctl start haply-inverse-service";
+            return vec![Finding::new(Severity::Problem, why.to_string(), cure)];
+        }
         Err(why) => {
             let what = format!("no Inverse service answers at {service} ({why})");
             let cure = "install Haply Hub and start it, or sudo systemctl start haply-inverse-service, or name it with --haply-url";

@@ -195,7 +195,9 @@ pub fn version(answer: &str) -> Option<String> {
     let field = value
         .get("project_version")
         .or_else(|| value.get("data")?.get("project_version"));
-    field?.as_str().map(|v| v.chars().take(32).collect())
+    field?
+        .as_str()
+        .map(|v| v.chars().filter(|c| !c.is_control()).take(32).collect())
 }
 
 /// Whether the number of a device can stand in a message as it is.

@@ -7,6 +7,8 @@
 //! so that a service that falls behind never has a queue of forces. Only a zero is sent out of turn, as soon as anything is
 //! wrong. A connector of normal priority opens the connection and opens it again after a loss.
 //!
+//! The websocket is neither encrypted nor signed: what answers has to be a program of this user or root on this PC.
+//!
 //! The maker's pages say that a force is applied once and that the device returns to idle when forces stop; they do not say
 //! after how long, nor what a service does whose client dies. Nothing here relies on it.
 //!
@@ -17,6 +19,7 @@ mod device;
 mod diagnose;
 mod message;
 mod model;
+mod owner;
 mod servo;
 mod session;
 mod socket;

@@ -25,6 +25,11 @@ const FROZEN_S: f64 = 0.25;
 const FARTHEST_M: f64 = 1.0;
 /// States that one tick takes.
 const MOST_STATES: u32 = 16;
+/// A state has some kilobytes; what is longer is not read.
+const LONGEST_STATE: usize = 16 * 1024;
+/// Messages that nobody asked for: so many for each tick are borne, and so many more at once.
+const SURPLUS_A_TICK: u32 = 2;
+const MOST_SURPLUS: u32 = 500;
 
 /// Why a connection was lost, by number.
 pub mod loss {
@@ -36,6 +41,8 @@ pub mod loss {
     pub const UNPLUGGED: u32 = 3;
     /// A tick panicked.
     pub const PANIC: u32 = 4;
+    /// The service sends what nobody asked for.
+    pub const FLOOD: u32 = 5;
 
     /// In words, with what to do.
     pub fn text(code: u32) -> &'static str {
@@ -43,6 +50,7 @@ pub mod loss {
             CLOSED => "the service closed the connection; it is opened again automatically",
             SILENT => "the service does not answer: restart it; it is connected again automatically",
             UNPLUGGED => "it is unplugged or switched off; it is connected again automatically",
+            FLOOD => "the service sends more than it is asked for: restart it; it is connected again automatically",
             _ => "an error in rt-core: report it",
         }
     }
@@ -71,6 +79,8 @@ struct Link {
     sent_n: Vector3<f64>,
     /// Messages without an answer.
     owed: u32,
+    /// Messages that were not asked for, less what is borne.
+    surplus: u32,
     /// Ticks since the oldest of them.
     waited: u32,
     /// Position and velocity of the last state.
@@ -115,6 +125,7 @@ impl Servo {
             id: description.id.clone(),
             sent_n: Vector3::zeros(),
             owed: 0,
+            surplus: 0,
             waited: 0,
             last: [Vector3::zeros(); 2],
             still: 0,
@@ -165,6 +176,9 @@ impl Servo {
     /// Takes what has arrived, and waits for what is owed.
     fn take_states(&mut self, shared: &Shared, until: Instant) {
         let mut arrived = core::mem::take(&mut self.arrived);
+        if let Some(link) = &mut self.link {
+            link.surplus = link.surplus.saturating_sub(SURPLUS_A_TICK);
+        }
         for _ in 0..MOST_STATES {
             let Some(link) = &mut self.link else { break };
             // A service that sends more than it owes does not make us read old states.
@@ -173,14 +187,21 @@ impl Servo {
             if received == Ok(false) {
                 break;
             }
+            link.surplus += u32::from(link.owed == 0);
+            let is_flood = link.surplus > MOST_SURPLUS;
             link.owed = link.owed.saturating_sub(1);
             link.waited = 0;
+            if is_flood {
+                self.lose(shared, DeviceFault::Driver, loss::FLOOD);
+                break;
+            }
             match received {
                 Err(WireError::Closed) => {
                     self.lose(shared, DeviceFault::NotConnected, loss::CLOSED);
                     break;
                 }
                 Err(WireError::NoText) => self.fail(shared, DeviceFault::Driver),
+                Ok(_) if arrived.len() > LONGEST_STATE => self.fail(shared, DeviceFault::Driver),
                 Ok(_) => self.take_state(shared, &arrived),
             }
         }

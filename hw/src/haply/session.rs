@@ -62,6 +62,11 @@ pub enum ConnectionError {
         /// What the system says.
         why: String,
     },
+    /// Another user's program, or another machine's.
+    #[error(
+        "{0}: end that program and start the service as this user, or with sudo systemctl start haply-inverse-service"
+    )]
+    NotTrusted(String),
     /// The service speaks another version of the interface.
     #[error("the Inverse service is of version {0}; 3.5 or a newer 3 is needed: update it with Haply Hub")]
     OtherVersion(String),

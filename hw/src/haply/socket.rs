@@ -4,7 +4,7 @@ use core::fmt;
 use core::str::FromStr;
 use core::time::Duration;
 use std::io::{ErrorKind, Read, Write};
-use std::net::{TcpStream, ToSocketAddrs};
+use std::net::{SocketAddr, TcpStream, ToSocketAddrs};
 use std::time::Instant;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -12,6 +12,7 @@ use tungstenite::protocol::WebSocketConfig;
 use tungstenite::{Error, Message, WebSocket};
 
 use crate::haply::message;
+use crate::haply::owner::{self, NotTrusted};
 use crate::haply::wire::{Wire, WireError};
 
 /// For connecting, and for each step of the handshake.
@@ -42,6 +43,9 @@ pub enum NoSocket {
     /// What listens there is no websocket.
     #[error("no websocket: {0}")]
     Handshake(String),
+    /// Another user's program, or another machine's.
+    #[error(transparent)]
+    NotTrusted(#[from] NotTrusted),
 }
 
 impl Default for Service {
@@ -79,12 +83,17 @@ impl FromStr for Service {
 impl Service {
     /// Opens a websocket.
     pub fn connect(&self) -> Result<Socket, NoSocket> {
+        let here = |a: SocketAddr| a.ip().to_canonical().is_loopback();
+        if let Some(other) = self.host_and_port.to_socket_addrs()?.find(|a| !here(*a)) {
+            return Err(NotTrusted::OtherMachine(other.ip()).into());
+        }
         let stream = self.stream(CONNECT_LIMIT)?;
         let config = WebSocketConfig::default()
             .max_message_size(Some(LONGEST_MESSAGE))
             .max_frame_size(Some(LONGEST_MESSAGE));
         let shaken = tungstenite::client::client_with_config(self.to_string(), stream, Some(config));
         let (socket, _) = shaken.map_err(|e| NoSocket::Handshake(e.to_string()))?;
+        owner::check(socket.get_ref())??;
         socket.get_ref().set_nonblocking(true)?;
         Ok(Socket(socket))
     }

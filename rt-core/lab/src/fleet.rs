@@ -11,6 +11,7 @@ use clap::Args;
 use entry::{Entry, Unread};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use stylet_text::printable_line;
 use stylet_write::{WriteError, write_whole};
 
 const PAGE: &str = "fleet.html";
@@ -97,14 +98,14 @@ pub fn run(args: &FleetArgs) -> Result<u8, FleetError> {
         println!(
             "{:<14} {} ({}, latest of {})",
             pc.latest().outcome.words(),
-            pc.name,
+            printable_line(&pc.name),
             page::counted(pc.entries.len(), "report", "reports"),
-            pc.latest().made_at
+            printable_line(&pc.latest().made_at)
         );
     }
     unread
         .iter()
-        .for_each(|u| println!("not counted    {}: {}", u.path, u.why));
+        .for_each(|u| println!("not counted    {}", printable_line(&format!("{}: {}", u.path, u.why))));
     println!("{}", args.out.join(PAGE).display());
     println!("{}", args.out.join(TABLE).display());
     Ok(exit_code(&pcs, &unread))

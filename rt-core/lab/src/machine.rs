@@ -73,7 +73,7 @@ impl Machine {
     }
 
     /// Not one that is made of files.
-    fn is_this(&self) -> bool {
+    pub fn is_this(&self) -> bool {
         self.root == Path::new("/")
     }
 

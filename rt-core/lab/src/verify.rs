@@ -6,6 +6,7 @@ use crate::sign::{self, SignError};
 use clap::Args;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use stylet_text::printable;
 
 /// What to verify.
 #[derive(Args, Clone, Debug)]
@@ -57,11 +58,11 @@ pub fn run(args: &VerifyArgs) -> Result<u8, ReadError> {
         problems.extend(other_program(&report, binary, &sha256(&read(binary)?)));
     }
     for problem in &problems {
-        println!("{problem}");
+        println!("{}", printable(&problem.to_string()));
     }
     if problems.is_empty() {
         println!("{}: unaltered", file.display());
-        notes.iter().for_each(|note| println!("{note}"));
+        notes.iter().for_each(|note| println!("{}", printable(note)));
     }
     Ok(u8::from(!problems.is_empty()))
 }

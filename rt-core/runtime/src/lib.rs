@@ -5,6 +5,7 @@
 pub mod args;
 pub mod bridge;
 pub mod device;
+pub mod environment;
 pub mod kept_probe;
 pub mod lines;
 mod pieces;

@@ -9,6 +9,7 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use stylet_insertions::{Shard, Table, digest};
+use stylet_text::printable;
 
 const HELP: &str = concat!(
     "Each insertion begins with tissue at rest and runs through the two ticks of the live simulator, in its own time. Its random\n\
@@ -55,12 +56,12 @@ impl StudyArgs {
         let ended = run(&study, &order, stop, &Progress::shown())?;
         let file = order.shard.file(&order.folder);
         match ended {
-            Ended::Before(table) => println!("finished before: {}\n{}", file.display(), summary(&table)),
+            Ended::Before(table) => println!("finished before: {}\n{}", file.display(), printable(&summary(&table))),
             Ended::Now { table, kept } => {
                 if kept > 0 {
                     println!("{kept} insertions were kept from an earlier run");
                 }
-                println!("{}\nwritten: {}", summary(&table), file.display());
+                println!("{}\nwritten: {}", printable(&summary(&table)), file.display());
             }
             Ended::Stopped { implants, of } => {
                 eprintln!(

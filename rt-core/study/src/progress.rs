@@ -65,7 +65,7 @@ impl Progress {
             failure.is_some() && state.failed == 1
         });
         if let Some(why) = failure.filter(|_| first && !self.silent) {
-            eprintln!("\nfirst insertion that failed: {why}");
+            eprintln!("\nfirst insertion that failed: {}", stylet_text::printable(why));
         }
     }
 

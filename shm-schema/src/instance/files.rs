@@ -22,7 +22,9 @@ pub(super) fn base() -> PathBuf {
 
 /// Both folders: a core may have been started outside of the session that a window is in.
 pub(super) fn bases() -> impl Iterator<Item = PathBuf> {
-    let session = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|folder| {
+    // A service of the user, and a login without a session manager, do not have the variable.
+    let named = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
+    let session = Some(named.unwrap_or_else(|| PathBuf::from(format!("/run/user/{}", user())))).filter(|folder| {
         let about = std::fs::symlink_metadata(folder);
         folder.is_absolute() && about.is_ok_and(|a| a.is_dir() && a.uid() == user() && a.mode() & 0o077 == 0)
     });

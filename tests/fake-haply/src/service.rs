@@ -47,6 +47,8 @@ pub enum Wrong {
     Long,
     /// Each answer is sent twice.
     Twice,
+    /// Each answer is sent twenty times.
+    Floods,
     /// Somebody has scaled the frame.
     Scaled,
     /// The orientation of the handle is none, in one of three ways.
@@ -201,6 +203,7 @@ impl State {
             Wrong::Silent => vec![],
             Wrong::Binary => vec![Sent::Binary],
             Wrong::Long => vec![Sent::Text(format!("{whole}{}", " ".repeat(1 << 20)))],
+            Wrong::Floods => vec![Sent::Text(whole); 20],
             Wrong::Twice => vec![Sent::Text(whole.clone()), Sent::Text(whole)],
             Wrong::Broken(kind) => {
                 let broken = match kind % 6 {

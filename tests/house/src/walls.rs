@@ -1,4 +1,4 @@
-//! The house rules that no compiler holds: walls between crates and folders, words, layout of tests, sizes.
+//! The house rules that no compiler holds: walls between crates and folders, layout of tests, sizes.
 
 mod circles;
 mod crates;
@@ -7,9 +7,7 @@ mod layers;
 mod lexer;
 mod shape;
 mod tree;
-mod words;
 
-const WORDS: &str = "tests/house/words.toml";
 
 fn assert_none(found: &[String]) {
     assert!(found.is_empty(), "{} found:\n{}", found.len(), found.join("\n"));
@@ -57,39 +55,6 @@ fn the_workspace_takes_nothing_of_the_relay() {
         packages("host-ui/relay/Cargo.lock") > 0,
         "the test looks for the wrong names"
     );
-}
-
-#[test]
-fn no_word_that_went_stands_in_the_tree() {
-    let list = words::list(&tree::manifest(WORDS), "gone");
-    let mut found = Vec::new();
-    for file in searched() {
-        let places = words::places(&list, &file).into_iter();
-        found.extend(
-            places.map(|(word, line)| format!("{}:{line}: {} (instead: {})", file.path, word.text, word.instead)),
-        );
-    }
-    assert_none(&found);
-}
-
-/// Shows where the words stand that still have to go; asserts only that no word is in both lists.
-#[test]
-fn words_that_have_to_go_are_counted() {
-    let table = tree::manifest(WORDS);
-    let pending = words::list(&table, "pending");
-    for (word, files) in words::counts(&pending, &searched()) {
-        println!("{word}: {}", files.values().sum::<usize>());
-        files.iter().for_each(|(path, count)| println!("  {count:>4} {path}"));
-    }
-    assert!(!pending.iter().any(|word| table["gone"].get(&word.text).is_some()));
-}
-
-fn searched() -> Vec<words::Text> {
-    // Without the list itself and the tests of its reader.
-    let files = sources(&[".rs", ".md", ".toml"])
-        .into_iter()
-        .filter(|(path, _)| path != WORDS && path != "tests/house/src/walls/words.rs");
-    files.map(|(path, source)| words::Text::of(&path, &source)).collect()
 }
 
 #[test]

@@ -129,7 +129,31 @@ fn the_unit_of_a_lab_pc_starts_what_is_installed_with_the_limits_that_the_loops_
         "{option} is not in {settings}"
     );
     assert_eq!((keys["LimitRTPRIO"], keys["LimitMEMLOCK"]), ("90", "infinity"));
-    assert!(!unit.contains("PrivateTmp"), "hosts would not find the core");
+    // With any of these in force, loops have no priority, or hosts do not find the core.
+    for lost in [
+        "PrivateTmp=",
+        "RestrictRealtime=",
+        "RemoveIPC=",
+        "PrivateDevices=",
+        "PrivateNetwork=",
+        "PrivateUsers=",
+    ] {
+        assert!(!unit.contains(&format!("\n{lost}")), "{lost}");
+    }
+}
+
+/// The unit had no sandbox: `systemd-analyze` gave it an exposure of 9.0.
+#[test]
+fn the_unit_is_exposed_to_no_more_than_a_real_time_process_must_be() {
+    // Ten times the exposure.
+    let judged = Command::new("systemd-analyze")
+        .args(["security", "--offline=yes", "--no-pager", "--threshold=25"])
+        .arg(repository("rt-core/package/stylet-rt-core@.service"))
+        .output();
+    match judged {
+        Ok(judged) => assert!(judged.status.success(), "{}", String::from_utf8_lossy(&judged.stdout)),
+        Err(why) => println!("skipped: systemd-analyze: {why}"),
+    }
 }
 
 #[test]

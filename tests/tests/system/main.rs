@@ -25,6 +25,7 @@ mod process_killed;
 mod process_limits;
 mod process_loops;
 mod process_restart;
+mod process_rights;
 mod recorder_flight;
 mod recorder_mcap;
 mod rt_contract;

@@ -37,7 +37,10 @@ pub fn export(options: &Export) -> Result<(), RecordError> {
         recording.gaps.gaps().len()
     );
     if let Some(why) = &recording.cut_off {
-        println!("note: the recording was cut off ({why}); what came before is used");
+        println!(
+            "note: the recording was cut off ({}); what came before is used",
+            stylet_base::format::printable_line(why)
+        );
     }
     if let Some(path) = &options.csv {
         write_streamed(path, |file| csv(&recording.ticks, file))?;

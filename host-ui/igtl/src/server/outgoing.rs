@@ -31,6 +31,8 @@ pub struct Client {
     waiting: Mutex<Waiting>,
     arrived: Condvar,
     refused: Mutex<Option<(Refusal, Instant)>>,
+    /// When it came, or last moved a hand.
+    active: Mutex<Instant>,
     log: Log,
 }
 
@@ -41,8 +43,17 @@ impl Client {
             waiting: Mutex::default(),
             arrived: Condvar::new(),
             refused: Mutex::default(),
+            active: Mutex::new(Instant::now()),
             log,
         }
+    }
+
+    pub fn has_moved(&self) {
+        *lock(&self.active) = Instant::now();
+    }
+
+    pub fn active(&self) -> Instant {
+        *lock(&self.active)
     }
 
     pub fn say(&self, line: &str) {

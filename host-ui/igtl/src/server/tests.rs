@@ -130,3 +130,67 @@ fn a_client_keeps_so_many_devices_and_no_more() {
     assert_eq!(refused(&mut client).code, 12, "all was read");
     assert_eq!(server.received().len(), DEVICES_AT_MOST);
 }
+
+/// A client wrote escape sequences to the terminal with the type of a message.
+#[test]
+fn no_line_of_the_log_holds_what_commands_a_terminal() {
+    let (log, lines) = mpsc::channel();
+    let server = Server::listen("127.0.0.1:0".parse().unwrap(), move |line| drop(log.send(line))).unwrap();
+    let mut client = TcpStream::connect(server.address()).unwrap();
+    let mut message = text("Words", "x");
+    message[2..8].copy_from_slice(b"\x1b[2J\x1bc");
+    client.write_all(&message).unwrap();
+    let _ = refused(&mut client);
+    std::thread::sleep(Duration::from_millis(60));
+    // Where a reason quotes the header, the whole of it is the client's.
+    client.write_all(&[0x1b; HEADER_BYTES]).unwrap();
+    let _ = refused(&mut client);
+    assert_eq!(client.read(&mut [0]).unwrap(), 0, "the connection ends");
+    let begun = Instant::now();
+    let mut seen = Vec::new();
+    while !seen.iter().any(|line: &String| line.contains("disconnected")) && begun.elapsed() < Duration::from_secs(10) {
+        seen.extend(lines.try_iter());
+    }
+    assert!(
+        seen.iter()
+            .any(|line| line.contains("[2J") && line.contains("is not taken")),
+        "{seen:?}"
+    );
+    assert!(
+        seen.iter().all(|line| !line.contains(|c: char| c.is_control())),
+        "{seen:?}"
+    );
+}
+
+#[test]
+fn one_that_reads_gives_its_place_to_one_that_comes_and_is_said_why() {
+    let (log, lines) = mpsc::channel();
+    let limits = Limits {
+        of_one_address: 2,
+        place_for: Duration::from_secs(3600),
+        ..Limits::default()
+    };
+    let address = "127.0.0.1:0".parse().unwrap();
+    let server = Server::listen_within(limits, address, move |line| drop(log.send(line))).unwrap();
+    let _both = [0, 1].map(|_| TcpStream::connect(server.address()).unwrap());
+    let mut third = TcpStream::connect(server.address()).unwrap();
+    assert!(
+        refused(&mut third)
+            .text
+            .contains("2 clients of its address are connected")
+    );
+    drop((server, lines));
+
+    let limits = Limits {
+        place_for: Duration::ZERO,
+        ..limits
+    };
+    let server = Server::listen_within(limits, address, |_| ()).unwrap();
+    server.publish("State", text("State", "newest"));
+    let mut first = TcpStream::connect(server.address()).unwrap();
+    assert_eq!(next(&mut first).device, "State");
+    let mut others = [0, 1].map(|_| TcpStream::connect(server.address()).unwrap());
+    assert_eq!(others.each_mut().map(|other| next(other).device), ["State", "State"]);
+    assert_eq!(first.read(&mut [0]).unwrap(), 0, "the connection ends");
+    assert_eq!(server.clients(), 2);
+}

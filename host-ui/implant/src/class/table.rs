@@ -1,6 +1,7 @@
 //! The table of a class: one row for each procedure.
 
 use super::{Class, FIGURES};
+use stylet_base::format::cell;
 
 /// CSV with a head.
 ///
@@ -16,7 +17,7 @@ pub fn write(class: &Class, to: impl std::io::Write) -> Result<(), csv::Error> {
         let figures = FIGURES
             .iter()
             .map(|f| (f.of)(a).map_or_else(String::new, |v| v.to_string()));
-        let names = [a.trainee.clone(), a.session.clone()].into_iter();
+        let names = [&a.trainee, &a.session].map(|name| cell(name).into_owned()).into_iter();
         table.write_record(
             names
                 .chain(figures)

@@ -150,3 +150,21 @@ fn a_folder_without_a_debrief_says_what_one_looks_like_and_names_are_no_paths() 
         assert!(!is_name(name), "{name:?}");
     }
 }
+
+/// A trainee's name is that of a folder; a spreadsheet computed it.
+#[test]
+fn a_name_that_is_a_formula_is_text_in_the_table() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["=1+1", "@SUM(A1)", "-2+3", "+A1", "\t=1", "Ida"] {
+        debrief(folder.path(), name, "20261101T090000Z", 1.0, 144.0);
+    }
+    let class = Class::read(&[folder.path().to_owned()]).expect("read");
+    let mut bytes = Vec::new();
+    write_table(&class, &mut bytes).expect("written");
+    let mut rows = csv::Reader::from_reader(&*bytes);
+    let names = rows.records().map(|row| row.expect("a row")[0].to_owned());
+    assert_eq!(
+        names.collect::<Vec<_>>(),
+        ["'\t=1", "'+A1", "'-2+3", "'=1+1", "'@SUM(A1)", "Ida"]
+    );
+}

@@ -75,8 +75,14 @@ pub fn write(
         updates: Vec::new(),
     })?;
     score::write(&score, made, out)?;
-    print!("planned\n{}", score.judge.table(&score.planned));
-    print!("delivered\n{}", score.judge.table(&score.delivered));
+    print!(
+        "planned\n{}",
+        stylet_base::format::printable_table(&score.judge.table(&score.planned))
+    );
+    print!(
+        "delivered\n{}",
+        stylet_base::format::printable_table(&score.judge.table(&score.delivered))
+    );
     println!("debrief: {}", out.join("debrief.html").display());
     Ok(())
 }

@@ -78,7 +78,11 @@ impl Job {
             )));
         }
         for problem in check::problems(&plan, &Anatomy::of(scene)?) {
-            println!("note: {}: {problem}", path.display());
+            println!(
+                "note: {}: {}",
+                path.display(),
+                stylet_base::format::printable_line(&problem.to_string())
+            );
         }
         let task = |(number, needle): (usize, &Needle)| {
             let drops = (!needle.seeds.is_empty()).then(|| Drops::as_planned(needle))?;

@@ -3,6 +3,7 @@
 use crate::command::CommandError;
 use serde_json::{Value, json};
 use std::path::Path;
+use stylet_base::format::cell;
 use stylet_base::{write_streamed, write_whole};
 use stylet_dose::Dvh;
 use stylet_dose::criterion::Kept;
@@ -19,9 +20,9 @@ pub fn json(path: &Path, value: &Value) -> Result<(), CommandError> {
 fn csv(path: &Path, header: &[String], rows: impl Iterator<Item = Vec<String>>) -> Result<(), CommandError> {
     let table = |file: &mut dyn std::io::Write| -> std::io::Result<()> {
         let mut writer = csv::Writer::from_writer(file);
-        writer.write_record(header)?;
+        writer.write_record(header.iter().map(|name| cell(name).into_owned()))?;
         for row in rows {
-            writer.write_record(&row)?;
+            writer.write_record(row.iter().map(|value| cell(value).into_owned()))?;
         }
         writer.flush()
     };

@@ -56,8 +56,12 @@ pub fn of_library(library: &Result<(), LoadError>) -> Vec<Finding> {
 }
 
 fn library_cure(why: &LoadFailure) -> &'static str {
-    let LoadFailure::Loader(why) = why else {
-        return "another library has this name, or a part of it is missing: install OpenHaptics again";
+    let why = match why {
+        LoadFailure::Loader(why) => why,
+        LoadFailure::NotTrusted => return LoadFailure::CURE_OF_NOT_TRUSTED,
+        LoadFailure::Incomplete(_) => {
+            return "another library has this name, or a part of it is missing: install OpenHaptics again";
+        }
     };
     if why.contains("wrong ELF class") {
         return "this is a library for another processor: install the 64 bit one";

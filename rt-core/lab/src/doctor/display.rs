@@ -5,10 +5,10 @@ use super::tunable::{Tunable, as_kernel_prints};
 use super::{Finding, FindingLevel};
 use crate::machine::{Machine, Process, core_list, cores};
 
-const CHECK: &str = "display";
+pub const CHECK: &str = "display";
 
 /// X servers, compositors and our window, by the names that the kernel keeps.
-const DRAW: [&str; 27] = [
+pub const DRAW: [&str; 27] = [
     "Xorg",
     "X",
     "Xwayland",

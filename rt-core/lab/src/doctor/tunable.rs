@@ -93,6 +93,12 @@ const QUIET: [Quiet; 5] = [
     },
 ];
 
+/// Check and wanted value of a setting that only this file knows.
+pub fn quiet(path: &str) -> Option<(&'static str, &'static str)> {
+    let found = QUIET.iter().find(|q| q.path == path)?;
+    Some((found.check, found.wanted))
+}
+
 /// Findings of the settings that only this file knows.
 pub fn findings(machine: &Machine) -> Vec<Finding> {
     QUIET

@@ -132,7 +132,10 @@ pub fn run(folder: &Path, file: &Path, motion: Option<&str>) -> Result<u8, Exter
     for d in &external.delays {
         println!(
             "{}: {:.1} +- {:.1} us after {} (k = 2)",
-            d.channel, d.mean_us, d.expanded_us, d.from
+            stylet_text::printable_line(&d.channel),
+            d.mean_us,
+            d.expanded_us,
+            d.from
         );
     }
     external.without.iter().for_each(|why| println!("no delay: {why}"));

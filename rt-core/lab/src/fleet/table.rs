@@ -39,14 +39,9 @@ pub fn csv(entries: &[Entry]) -> String {
     all
 }
 
-/// In quotes where it must be. Text that a spreadsheet would compute gets a space before it.
+/// In quotes where it must be.
 fn quoted(cell: &str) -> String {
-    let is_formula = cell.starts_with(['=', '+', '-', '@']) && cell.parse::<f64>().is_err();
-    let cell = if is_formula {
-        format!(" {cell}")
-    } else {
-        cell.to_owned()
-    };
+    let cell = stylet_text::cell(cell).into_owned();
     if cell.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", cell.replace('"', "\"\""))
     } else {
@@ -62,7 +57,7 @@ mod tests {
     fn cells_survive_commas_quotes_and_spreadsheets() {
         assert_eq!(
             ["plain", "a, b", "the \"old\" one", "=1+1", "-5"].map(quoted),
-            ["plain", "\"a, b\"", "\"the \"\"old\"\" one\"", " =1+1", "-5"]
+            ["plain", "\"a, b\"", "\"the \"\"old\"\" one\"", "'=1+1", "-5"]
         );
         assert_eq!(HEAD.split(',').count(), 19);
     }

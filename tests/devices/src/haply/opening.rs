@@ -56,6 +56,11 @@ fn what_cannot_be_used_is_refused_in_words_that_help() {
     assert!(text.contains("another frame"), "{text}");
     let text = why(&|s| s.wrong = Wrong::Hangs);
     assert!(text.contains("does not send a list of devices"), "{text}");
+    let elsewhere = stylet_hw::HaplyConfig {
+        service: "ws://192.0.2.1:9".parse().unwrap(),
+        ..config(&server)
+    };
+    assert!(refused(elsewhere).contains("is not on this PC"));
     let text = why(&|s| s.wrong = Wrong::Broken(2));
     assert!(text.contains("does not send a state"), "{text}");
     let other = Wanted::Id("A14".to_owned());

@@ -180,6 +180,21 @@ fn answers_that_nobody_asked_for_do_not_make_the_pose_old() {
 }
 
 #[test]
+fn a_service_that_floods_is_lost_with_its_force_and_named() {
+    let service = Service::default();
+    let server = Server::start(&service);
+    let (mut device, heard) = open_listening(&server);
+    let named = |text: &str| heard.lock().unwrap().iter().any(|t| t.contains(text));
+    assert!(drive(&mut device, &push(), |s| s.is_ok() && feels(&service, 1.0)));
+    service.state().wrong = Wrong::Floods;
+    assert!(drive(&mut device, &push(), |s| s.is_err()));
+    assert!(until(LONG, || named("sends more than it is asked for")
+        && service.state().force_n == [0.0; 3]));
+    service.state().wrong = Wrong::Nothing;
+    assert!(drive(&mut device, &Wrench::zero(), Result::is_ok));
+}
+
+#[test]
 fn unplugged_and_plugged_in_again_and_another_device_in_its_place_is_refused() {
     let service = Service::default();
     let server = Server::start(&service);

@@ -53,6 +53,12 @@ pub const LAYERS: &[Layer] = &[
         not_itself: &[],
     },
     Layer {
+        folder: "shm-schema/text",
+        may_use: &[],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
         folder: "shm-schema/write",
         may_use: &[],
         never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
@@ -133,6 +139,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema/anatomy",
             "shm-schema/wall",
             "shm-schema/write",
+            "shm-schema/text",
         ],
         never: &[WINDOW, PORTS, DICOM],
         not_itself: &[],
@@ -147,6 +154,7 @@ pub const LAYERS: &[Layer] = &[
             "rt-core/sim",
             "shm-schema",
             "shm-schema/write",
+            "shm-schema/text",
         ],
         never: &[WINDOW, PORTS, PROGRAM, DICOM],
         not_itself: &[DEVICES],
@@ -163,6 +171,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema",
             "shm-schema/anatomy",
             "shm-schema/manual",
+            "shm-schema/text",
         ],
         never: &[WINDOW, PORTS, DICOM],
         not_itself: &[],
@@ -176,7 +185,7 @@ pub const LAYERS: &[Layer] = &[
     // The host's side.
     Layer {
         folder: "host-ui/base",
-        may_use: &["shm-schema/anatomy", "shm-schema/write"],
+        may_use: &["shm-schema/anatomy", "shm-schema/write", "shm-schema/text"],
         never: &[WINDOW, PORTS, DEVICES, DICOM],
         not_itself: &[],
     },

@@ -3,6 +3,7 @@
 use super::*;
 use crate::doctor::mend::file::{Changes, State};
 use crate::doctor::tests::{Fake, expect};
+use std::os::unix::process::CommandExt;
 use std::process::{Child, Command};
 
 /// A machine of three cores whose kernel works like this.
@@ -93,7 +94,12 @@ impl Drop for Idle {
 #[test]
 fn a_process_is_moved_and_moved_back_but_never_another_of_its_number() {
     let here = Machine::this();
-    let idle = Idle(Command::new("sleep").arg("100").spawn().expect("it starts"));
+    let folder = tempfile::tempdir().expect("a folder");
+    // An undo moves only what draws, by its name.
+    let named = folder.path().join("Xvfb");
+    std::os::unix::fs::symlink("/bin/sleep", &named).expect("linked");
+    let mut command = Command::new(&named);
+    let idle = Idle(command.arg0("sleep").arg("100").spawn().expect("it starts"));
     let id = idle.0.id();
     let path = format!("proc/{id}/task/{id}/status");
     let now = here.allowed_cores(&path).expect("shown");

@@ -1,12 +1,17 @@
 //! Settings that were changed, as the file from which they are undone.
 
-use super::MendError;
+use super::{MendError, allowed};
 use crate::doctor::tunable::{self, Tunable};
 use crate::machine::Machine;
 use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt};
 use std::path::Path;
 
 const SCHEMA: &str = "stylet.settings/1";
+/// A PC of 1,000 cores takes a tenth of it.
+const MOST_BYTES: u64 = 4 << 20;
 
 /// How far a change is.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,22 +82,41 @@ impl Changes {
         }
     }
 
-    /// A path that leads out of `/proc` and `/sys` is none that this program wrote.
+    /// Reads a list. One that others can write is none that this program wrote, nor is one that names anything but its settings.
     pub fn read(path: &Path) -> Result<Self, MendError> {
+        Self::open(path, false).map(|(read, _)| read)
+    }
+
+    /// The list and its file, into which the states of an undo go: its name may by then be another's.
+    pub fn open_to_undo(path: &Path) -> Result<(Self, File), MendError> {
+        Self::open(path, true)
+    }
+
+    fn open(path: &Path, is_written: bool) -> Result<(Self, File), MendError> {
         let failed = |why: String| MendError::Undo {
             path: path.to_owned(),
             why,
         };
-        let text = std::fs::read_to_string(path).map_err(|e| failed(e.to_string()))?;
+        let (text, file) = own_text(path, is_written).map_err(|e| failed(e.to_string()))?;
         let read: Self = serde_json::from_str(&text).map_err(|e| failed(format!("not a file of settings: {e}")))?;
         if read.schema != SCHEMA {
             return Err(failed(format!("expected schema {SCHEMA}, found {:?}", read.schema)));
         }
-        let inside = |c: &Change| (c.path.starts_with("proc/") || c.path.starts_with("sys/")) && !c.path.contains("..");
-        match read.changes.iter().find(|c| !inside(c)) {
-            Some(c) => Err(failed(format!("/{} is not a setting of the kernel", c.path))),
-            None => Ok(read),
+        match read.changes.iter().find_map(allowed::refusal) {
+            Some(why) => Err(failed(why)),
+            None => Ok((read, file)),
         }
+    }
+
+    /// Writes the list into its file again.
+    pub fn rewrite(&self, path: &Path, file: &File) -> Result<(), MendError> {
+        let text = self.text();
+        let written = file.write_all_at(text.as_bytes(), 0);
+        let written = written.and_then(|()| file.set_len(text.len() as u64));
+        written.map_err(|e| MendError::Undo {
+            path: path.to_owned(),
+            why: e.to_string(),
+        })
     }
 
     pub fn text(&self) -> String {
@@ -119,6 +143,10 @@ impl Changes {
     pub fn undo(&mut self, machine: &Machine) {
         for change in self.changes.iter_mut().rev() {
             if !matches!(change.state, State::Applied | State::Planned | State::Foreign(_)) {
+                continue;
+            }
+            if let Err(why) = check(machine, change) {
+                change.state = State::Refused(why);
                 continue;
             }
             let now = tunable::value(machine, &change.path).unwrap_or_default();
@@ -166,11 +194,51 @@ impl Changes {
     }
 }
 
+/// Text of a regular file that nobody else could have written, and the file.
+fn own_text(path: &Path, is_written: bool) -> io::Result<(String, File)> {
+    let flags = libc::O_NOFOLLOW | libc::O_NONBLOCK;
+    let file = File::options()
+        .read(true)
+        .write(is_written)
+        .custom_flags(flags)
+        .open(path)?;
+    let about = file.metadata()?;
+    // SAFETY: neither has preconditions.
+    let (user, group) = unsafe { (libc::geteuid(), libc::getegid()) };
+    let by_others = about.mode() & 0o002 != 0 || about.mode() & 0o020 != 0 && about.gid() != group;
+    if !about.is_file() || about.uid() != user || by_others {
+        let why = "not a file that its user alone can write: an undo takes the list that 'rt-core doctor --apply' wrote, \
+                   as the same user";
+        return Err(io::Error::other(why));
+    }
+    let mut text = String::new();
+    (&file).take(MOST_BYTES).read_to_string(&mut text)?;
+    Ok((text, file))
+}
+
+/// Whether a setting may be written.
+fn check(machine: &Machine, change: &Change) -> Result<(), String> {
+    if change.began.is_none() {
+        return allowed::open(machine, &change.path)
+            .map(drop)
+            .map_err(|e| e.to_string());
+    }
+    if change.has_ended(machine) || allowed::is_drawing(machine, &change.path) {
+        return Ok(());
+    }
+    Err("the process does not draw: the doctor does not move it".to_owned())
+}
+
 fn put(machine: &Machine, path: &str, value: &str) -> Result<(), String> {
     if machine.allowed_cores(path).is_some() {
         machine.allow_cores(path, value).map_err(|e| e.to_string())?;
     } else {
-        std::fs::write(machine.path(path), value).map_err(|e| e.to_string())?;
+        let mut file = allowed::open(machine, path).map_err(|e| e.to_string())?;
+        if !machine.is_this() {
+            // A file of the kernel has no length.
+            file.set_len(0).map_err(|e| e.to_string())?;
+        }
+        file.write_all(value.as_bytes()).map_err(|e| e.to_string())?;
     }
     match tunable::value(machine, path) {
         Some(now) if now == value => Ok(()),

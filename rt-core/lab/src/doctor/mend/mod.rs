@@ -1,5 +1,6 @@
 //! `rt-core doctor --apply`: changes the settings that the doctor names, so that each can be undone, and measures before and after.
 
+mod allowed;
 pub(super) mod file;
 mod page;
 #[cfg(test)]
@@ -50,6 +51,8 @@ pub struct DoctorArgs {
     #[arg(long, default_value = "30s", value_parser = duration_ns, value_name = "TIME")]
     measure: u64,
     /// Give every setting its value from before, from the undo.json of --apply
+    ///
+    /// Only settings that --apply makes are undone, from a file that the same user wrote and nobody else can write.
     #[arg(long, value_name = "FILE")]
     undo: Option<PathBuf>,
 }
@@ -105,9 +108,9 @@ pub fn run(args: &DoctorArgs, interrupted: &AtomicBool) -> Result<u8, MendError>
     let core = args.haptic_core.unwrap_or(last);
     let machine = Machine::this();
     if let Some(path) = &args.undo {
-        let mut changes = Changes::read(path)?;
+        let (mut changes, file) = Changes::open_to_undo(path)?;
         changes.undo(&machine);
-        write_whole(path, changes.text().as_bytes())?;
+        changes.rewrite(path, &file)?;
         print!("{}", changes.words());
         return Ok(u8::from(changes.any_refused()));
     }

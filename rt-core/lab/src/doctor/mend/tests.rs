@@ -86,8 +86,9 @@ fn a_file_that_names_anything_but_a_setting_is_refused() {
     let (root, _) = machine("path", FILES);
     let file = root.join("undo.json");
     let with = |path: &str, schema: &str| {
-        let change =
-            format!("{{\"check\":\"a\",\"path\":{path:?},\"before\":\"0\",\"after\":\"1\",\"state\":\"applied\"}}");
+        let change = format!(
+            "{{\"check\":\"statistics\",\"path\":{path:?},\"before\":\"1\",\"after\":\"120\",\"state\":\"applied\"}}"
+        );
         std::fs::write(
             &file,
             format!("{{\"schema\":{schema:?},\"boot\":\"\",\"changes\":[{change}]}}"),
