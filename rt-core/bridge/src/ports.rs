@@ -232,3 +232,20 @@ impl Taken {
 fn send<T: bytemuck::AnyBitPattern>(port: &Publisher<T>, packet: &Packet) -> Result<usize, SendError> {
     packet.value().map_or(Ok(0), |value| port.send(value))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Seven new identities in one pass used to keep another host's stop from being read.
+    #[test]
+    fn a_port_that_floods_is_limited_and_leaves_room_for_others() {
+        let mut taken = Taken::default();
+        for count in 1..=2 * MAX_OF_A_PORT {
+            assert_eq!(taken.admits(1), count <= MAX_OF_A_PORT);
+        }
+        assert!((2..100).all(|port| taken.admits(port)));
+        assert!((0..MAX_ANSWERED).all(|_| taken.answers()));
+        assert!(!taken.answers());
+    }
+}

@@ -223,29 +223,3 @@ impl Bridge {
         Ok(())
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// `StopHand` counted like any other request, so that a host that floods could not stop its hand.
-    #[test]
-    fn a_stop_is_taken_beyond_the_limit_and_again_only_after_another_request() {
-        let mut taken = Taken::default();
-        let (flood, another) = (1, 2);
-        for count in 1..=2 * MAX_OF_A_HOST {
-            let is_taken = taken.takes(flood, Ok(&Request::UndoSeed));
-            assert_eq!(is_taken, count <= MAX_OF_A_HOST);
-        }
-        for stop in [Request::StopHand, Request::StopSecondHand, Request::Disengage] {
-            assert!(taken.takes(flood, Ok(&stop)), "{stop:?}");
-            assert!(!taken.takes(flood, Ok(&stop)), "{stop:?} is in force already");
-        }
-        assert!(taken.takes(another, Ok(&Request::Engage)));
-        assert!(
-            taken.takes(flood, Ok(&Request::StopHand)),
-            "something was asked for since"
-        );
-        assert!(!taken.takes(flood, Err(&RequestErrors(Vec::new()))), "nothing invalid");
-    }
-}
