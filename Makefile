@@ -60,7 +60,7 @@ wall: build ## Damage shared memory of hosts with WALL_SEEDS (50) seeds of each 
 	STYLET_WILD_SEEDS=$(or $(WALL_SEEDS),50) STYLET_BRIDGE_ROUNDS=$(or $(WALL_ROUNDS),100) $(CARGO) test --release -p stylet-tests --test system wall:: -- --nocapture --test-threads=1
 
 loom: ## Try every order in which the force process and its bridge can meet on a board (some minutes)
-	RUSTFLAGS="--cfg loom" $(CARGO) test --release -p stylet-wall --lib --target-dir $(BIN)/../loom
+	cd shm-schema/wall/loom && RUSTFLAGS="--cfg loom" $(CARGO) test --release --target-dir $(abspath $(BIN))/../loom
 
 relay: ## Build the relay, which carries a core to other machines; the other targets neither need nor build it
 	$(RELAY) build --release --bin relay

@@ -95,9 +95,15 @@ fn needed(needs: &Needs, program: &str) -> BTreeSet<Package> {
     found
 }
 
-/// `name version` of each package that `rt-core` needs, one a line.
+/// What the core needs: the force process and its bridge.
+fn core(needs: &Needs) -> BTreeSet<Package> {
+    let programs = ["rt-core", "stylet-bridge"].map(|program| needed(needs, program));
+    programs.into_iter().flatten().collect()
+}
+
+/// `name version` of each package that the core needs, one a line.
 fn dependencies(needs: &Needs) -> String {
-    let all = needed(needs, "rt-core");
+    let all = core(needs);
     all.iter()
         .map(|(name, version)| format!("{name} {version}\n"))
         .collect()
@@ -105,7 +111,7 @@ fn dependencies(needs: &Needs) -> String {
 
 /// `name version programs licence` of each package of others in either program, one a line.
 fn packages(needs: &Needs) -> String {
-    let (core, host) = (needed(needs, "rt-core"), needed(needs, "host-ui"));
+    let (core, host) = (core(needs), needed(needs, "host-ui"));
     let ours = |name: &str| name.starts_with("stylet-") || name == "rt-core" || name == "host-ui";
     let sources = sources();
     let line = |package: &Package| {

@@ -1,6 +1,6 @@
 //! The records of a request and of its answer, as they lie in shared memory.
 
-use crate::{CommandKind, Reason, Refusal, Text};
+use crate::{Reason, Refusal, Text};
 use bytemuck::{Pod, Zeroable};
 use num_enum::TryFromPrimitive;
 
@@ -27,19 +27,6 @@ pub struct Command {
     pub values: [f64; MAX_COMMAND_VALUES],
     /// The words of a request that has some.
     pub text: Text<MARK_BYTES>,
-}
-
-impl Command {
-    /// It takes force or motion away: it is sent both ways, and no limit holds it up.
-    pub fn is_stop(&self) -> bool {
-        const STOPS: [CommandKind; 4] = [
-            CommandKind::Disengage,
-            CommandKind::StopHand,
-            CommandKind::StopSecondHand,
-            CommandKind::Shutdown,
-        ];
-        STOPS.map(|kind| kind as u32).contains(&self.kind)
-    }
 }
 
 /// Reasons in one reply at most; a refusal with more names the others in its text only.

@@ -34,7 +34,7 @@ pub enum InstanceError {
     Name(String),
     /// Another program owns the instance.
     #[error(
-        "rt-core or a relay already runs as instance \"{instance}\" (process {process}). End it, or choose another name with --instance"
+        "another rt-core or a relay runs as instance \"{instance}\" (process {process}). End it, or choose another name with --instance"
     )]
     Owned {
         /// Name of the instance.
@@ -53,6 +53,9 @@ pub enum InstanceError {
     /// Something is in the way that is no folder.
     #[error("{0} is not a folder. Remove it")]
     NoFolder(String),
+    /// There is no memory for the file.
+    #[error("{0}: no space left. /dev/shm needs room (df -h /dev/shm)")]
+    Full(String),
     /// The system refuses.
     #[error("{path}: {why}")]
     Io {

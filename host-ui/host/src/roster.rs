@@ -7,7 +7,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use stylet_ports::{self as service, Node, Publisher, StateReader, Subscriber};
 use stylet_shm_schema::Instance;
-use stylet_shm_schema::{Command, HapticState, Mark, PlanInForce, Relayed, Request, SCHEMA_VERSION, Session, check};
+use stylet_shm_schema::{
+    Command, CommandKind, HapticState, Mark, PlanInForce, Relayed, Request, SCHEMA_VERSION, Session, check,
+};
 
 const PASS: Duration = Duration::from_millis(100);
 const CONNECT_EVERY: Duration = Duration::from_secs(1);
@@ -204,7 +206,7 @@ impl Seat {
             // No reply is waited for: the list shows what the hand does.
             let command = request.encode(u64::from(std::process::id()) << 32, self.commands);
             if let (Some(ports), Ok(command)) = (&self.ports, command) {
-                if command.is_stop() {
+                if CommandKind::is_stop(command.kind) {
                     let _ = ports.stops.send(command);
                 }
                 let _ = ports.commands.send(command);

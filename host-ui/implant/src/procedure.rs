@@ -183,10 +183,9 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
         scene.header.name.read(),
         scene.header.element_count,
         scene.header.spacing_m * 1e3,
-        if scene.header.body_edge > 1 {
-            format!(", solved in elements of {:.2} mm", scene.header.body_spacing_m() * 1e3)
-        } else {
-            String::new()
+        match scene.header.body_edge {
+            0 | 1 => String::new(),
+            _ => format!(", solved in elements of {:.2} mm", scene.header.body_spacing_m() * 1e3),
         }
     );
     parameters::set(&mut link, &options.parameters, &interrupted)?;
@@ -296,9 +295,8 @@ fn load(
     if shown {
         Ok(())
     } else {
-        Err(ProcedureError::NothingReceived(
-            "the core did not show the scene in time",
-        ))
+        let why = "the core did not show the scene in time";
+        Err(ProcedureError::NothingReceived(why))
     }
 }
 

@@ -62,7 +62,7 @@ pub struct Orders {
 impl Orders {
     /// Takes the place of one that was killed.
     pub fn listen(instance: &Instance) -> Result<Self, RelayError> {
-        instance.make_folder().map_err(|e| RelayError(e.to_string()))?;
+        instance.make_folder()?;
         let path = path(instance);
         let failed = |e: std::io::Error| RelayError(format!("{}: {e}", path.display()));
         let _ = std::fs::remove_file(&path);

@@ -23,6 +23,12 @@ pub mod wire;
 #[error("{0}")]
 pub struct RelayError(pub String);
 
+impl From<stylet_shm_schema::InstanceError> for RelayError {
+    fn from(why: stylet_shm_schema::InstanceError) -> Self {
+        Self(why.to_string())
+    }
+}
+
 impl From<stylet_ports::ServiceError> for RelayError {
     fn from(why: stylet_ports::ServiceError) -> Self {
         Self(why.to_string())

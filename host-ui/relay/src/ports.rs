@@ -57,7 +57,7 @@ impl Near {
 
     /// A request to the core.
     pub fn ask(&self, command: Command) -> Result<(), ServiceError> {
-        if command.is_stop() {
+        if CommandKind::is_stop(command.kind) {
             let _ = self.stops.send(command);
         }
         let sent = self.commands.send(command);

@@ -99,5 +99,8 @@ pub(super) fn remove_objects(prefix: &str) {
 
 pub(super) fn failed(path: &Path) -> impl FnOnce(io::Error) -> InstanceError {
     let path = path.display().to_string();
-    |why| InstanceError::Io { path, why }
+    |why| match why.kind() {
+        io::ErrorKind::StorageFull => InstanceError::Full(path),
+        _ => InstanceError::Io { path, why },
+    }
 }

@@ -221,6 +221,14 @@ pub struct StabilisingNeedle {
     pub depth_m: f64,
 }
 
+impl CommandKind {
+    /// A request of that number takes force or motion away: it is sent both ways, and no limit holds it up.
+    pub fn is_stop(number: u32) -> bool {
+        let stops = [Self::Disengage, Self::StopHand, Self::StopSecondHand, Self::Shutdown];
+        stops.map(|kind| kind as u32).contains(&number)
+    }
+}
+
 impl Request {
     /// Kind of the request, without its payload.
     pub fn kind(&self) -> CommandKind {

@@ -11,9 +11,6 @@
 
 #![warn(missing_docs)]
 
-#[cfg(not(loom))]
 pub mod board;
-#[cfg_attr(loom, allow(dead_code))]
 mod cells;
-#[cfg(not(loom))]
 pub mod packet;

@@ -8,7 +8,6 @@ mod lexer;
 mod shape;
 mod tree;
 
-
 fn assert_none(found: &[String]) {
     assert!(found.is_empty(), "{} found:\n{}", found.len(), found.join("\n"));
 }

@@ -177,7 +177,7 @@ impl Passes {
 
     fn send_command(&self, command: &Command) -> Result<(), String> {
         let ports = self.ports.as_ref().ok_or("there is no connection to rt-core")?;
-        if command.is_stop() {
+        if CommandKind::is_stop(command.kind) {
             // Both ways: this one passes every flood, the other comes after what was asked for before.
             let _ = ports.stops.send(*command);
         }

@@ -26,7 +26,7 @@ pub(super) struct Last {
 impl Last {
     /// Where the member of `instance` notes it, and what one that was killed has noted less than a minute ago.
     pub fn open(instance: &Instance, now_ns: u64) -> Result<(Self, Option<Next>), RelayError> {
-        let folder = instance.make_folder().map_err(|e| RelayError(e.to_string()))?;
+        let folder = instance.make_folder()?;
         let path = folder.join("relay.last");
         let mut options = File::options();
         options.read(true).write(true).create(true).truncate(false).mode(0o600);

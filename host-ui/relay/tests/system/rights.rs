@@ -126,7 +126,7 @@ fn an_operator_marks_and_puts_no_fault_in() {
     }
     host.ask(&marked()).expect("allowed");
     let is_mark = |e: &stylet_shm_schema::Event| e.kind == EventKind::Mark as u32 && e.text.read() == "left lobe";
-    let node = Node::join(&far.0).expect("shared memory");
+    let node = service::Node::join(&far.0).expect("shared memory");
     let events = service::events::subscriber(&node).expect("a port");
     let came = until(Duration::from_secs(3), || {
         std::iter::from_fn(|| events.receive()).any(|e| is_mark(&e))

@@ -98,12 +98,16 @@ pub const REQUIREMENTS: &[Requirement] = &[
     },
     Requirement {
         id: "REQ-SAFE-002",
-        what: "A force loop that stops ends the process; a process that was stopped turns the force off.",
+        what: "A force loop that stops over motors ends the process; over none, and after a process was stopped, the force stays off.",
         hazards: &["HAZ-02"],
         tests: &[
             (
+                "tests/tests/system/device_procedure.rs",
+                "a_force_loop_that_stops_over_a_phantom_ends_the_core_and_leaves_a_recording",
+            ),
+            (
                 "tests/tests/system/process_loops.rs",
-                "a_force_loop_that_stops_ends_the_process_and_leaves_nothing",
+                "a_simulated_force_loop_that_stops_is_waited_for_and_keeps_the_force_off",
             ),
             (
                 "tests/tests/system/process_loops.rs",

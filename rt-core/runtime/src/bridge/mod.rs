@@ -5,7 +5,6 @@
 mod commands;
 mod exercises;
 mod flight;
-mod journal;
 mod line_archive;
 mod lines;
 mod link;

@@ -4,12 +4,13 @@
 //! events and answers, and 12 s of records.
 
 mod child;
+mod journal;
 mod kept;
 mod outbox;
 
-use super::journal::Journal;
-use child::processor_time;
 pub use child::program;
+use child::{Running, SILENT_AFTER};
+use journal::Journal;
 use kept::{Kept, keep};
 pub use outbox::Outbox;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -26,14 +27,6 @@ use stylet_wall::packet::{Alive, BoardSize, Kind, Socket, Start, unsealed};
 
 /// Packets of the bridge that are taken in one pass; the others wait in its socket.
 const MOST_PACKETS: usize = 256;
-/// The bridge says that it lives twenty times a second.
-const SILENT_AFTER: Duration = Duration::from_millis(400);
-/// While it makes its ports it says nothing.
-const SILENT_AT_START: Duration = Duration::from_secs(2);
-/// One that a busy machine gives no processor is waited for: another would have none either.
-const SILENT_WITHOUT_PROCESSOR: Duration = Duration::from_secs(5);
-/// Processor time that a bridge may use without a word: one that uses more goes round in circles.
-const MOST_BUSY: Duration = Duration::from_millis(200);
 /// How often it is looked whether a host complains, and how long an epoch lasts at least.
 const COMPLAINTS_EVERY: Duration = Duration::from_millis(100);
 const SHORTEST_EPOCH: Duration = Duration::from_secs(2);
@@ -62,18 +55,6 @@ pub enum BridgeError {
     /// It was started and ended.
     #[error("{0}")]
     Failed(String),
-}
-
-/// The process that runs now.
-struct Running {
-    child: Child,
-    epoch: Epoch,
-    is_ready: bool,
-    heard: Instant,
-    /// Processor time that it had used then.
-    busy: Duration,
-    /// Requests that it has refused.
-    refused: u64,
 }
 
 /// Boards of the loops, for each new bridge.
@@ -290,14 +271,7 @@ impl Wall {
             .stdout(Stdio::null())
             .spawn()
             .map_err(failed)?;
-        self.running = Some(Running {
-            child,
-            epoch,
-            is_ready: false,
-            heard: Instant::now(),
-            busy: Duration::ZERO,
-            refused: 0,
-        });
+        self.running = Some(Running::new(child, epoch));
         self.outbox = Outbox {
             socket: Some(socket),
             ..Outbox::default()
@@ -338,8 +312,7 @@ impl Wall {
                 }
                 Kind::Alive => {
                     if let Some(Alive { has_viewers, refused }) = packet.value() {
-                        (running.heard, running.refused) = (Instant::now(), refused.max(running.refused));
-                        running.busy = processor_time(running.child.id()).map_or(running.busy, |(_, busy)| busy);
+                        running.hear(refused);
                         // SYNC: read by the tissue loop; nothing but the flag is carried.
                         self.is_watched.store(has_viewers > 0, Ordering::Relaxed);
                     }
@@ -375,19 +348,8 @@ impl Wall {
                 return Some("a host cannot use the shared memory, which some host has damaged".to_owned());
             }
         }
-        let silent = running.heard.elapsed();
-        let patience = if running.is_ready {
-            SILENT_AFTER
-        } else {
-            SILENT_AT_START
-        };
-        if silent < patience {
-            return None;
-        }
-        let is_starved = processor_time(running.child.id())
-            .is_some_and(|(is_runnable, busy)| is_runnable && busy.saturating_sub(running.busy) < MOST_BUSY);
-        let is_waited_for = is_starved && silent < SILENT_WITHOUT_PROCESSOR;
-        (!is_waited_for).then(|| format!("it said nothing for {:.1} s", silent.as_secs_f64()))
+        let silent = running.is_silent()?;
+        Some(format!("it said nothing for {:.1} s", silent.as_secs_f64()))
     }
 }
 

@@ -1,7 +1,65 @@
-//! The bridge as a process: where its program is, and what the kernel says of it.
+//! The bridge as a process: where its program is, and whether it lives.
 
 use std::path::PathBuf;
-use std::time::Duration;
+use std::process::Child;
+use std::time::{Duration, Instant};
+use stylet_shm_schema::Epoch;
+
+/// The bridge says that it lives twenty times a second.
+pub const SILENT_AFTER: Duration = Duration::from_millis(400);
+/// While it makes its ports it says nothing.
+const SILENT_AT_START: Duration = Duration::from_secs(2);
+/// One that a busy machine gives no processor is waited for: another would have none either.
+const SILENT_WITHOUT_PROCESSOR: Duration = Duration::from_secs(5);
+/// Processor time that a bridge may use without a word: one that uses more goes round in circles.
+const MOST_BUSY: Duration = Duration::from_millis(200);
+
+/// The process that runs now.
+pub struct Running {
+    pub child: Child,
+    pub epoch: Epoch,
+    pub is_ready: bool,
+    heard: Instant,
+    /// Processor time that it had used then.
+    busy: Duration,
+    /// Requests that it has refused.
+    pub refused: u64,
+}
+
+impl Running {
+    /// Started a moment ago.
+    pub fn new(child: Child, epoch: Epoch) -> Self {
+        Self {
+            child,
+            epoch,
+            is_ready: false,
+            heard: Instant::now(),
+            busy: Duration::ZERO,
+            refused: 0,
+        }
+    }
+
+    /// Takes its word that it lives.
+    pub fn hear(&mut self, refused: u64) {
+        (self.heard, self.refused) = (Instant::now(), refused.max(self.refused));
+        self.busy = processor_time(self.child.id()).map_or(self.busy, |(_, busy)| busy);
+    }
+
+    /// For how long it has said nothing, where that is too long.
+    pub fn is_silent(&self) -> Option<Duration> {
+        let silent = self.heard.elapsed();
+        let patience = match self.is_ready {
+            true => SILENT_AFTER,
+            false => SILENT_AT_START,
+        };
+        let is_starved = || {
+            let time = processor_time(self.child.id());
+            time.is_some_and(|(is_runnable, busy)| is_runnable && busy.saturating_sub(self.busy) < MOST_BUSY)
+        };
+        let is_dead = silent >= patience && (silent >= SILENT_WITHOUT_PROCESSOR || !is_starved());
+        is_dead.then_some(silent)
+    }
+}
 
 /// The bridge's program, which is installed beside this one; a test's is a folder below.
 pub fn program() -> PathBuf {
@@ -20,7 +78,7 @@ pub fn program() -> PathBuf {
 }
 
 /// Whether a process wants the processor, and how much of it it has had.
-pub fn processor_time(pid: u32) -> Option<(bool, Duration)> {
+fn processor_time(pid: u32) -> Option<(bool, Duration)> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
     // Behind the name, which may hold anything: the state, and from the 12th field on the times in hundredths of a second.
     let mut fields = stat.rsplit_once(')')?.1.split_whitespace();

@@ -1,6 +1,6 @@
 //! The last records of a loop, kept for a bridge that is started anew, and sent in batches.
 
-use super::wall::Outbox;
+use super::outbox::Outbox;
 use crate::rt::clock;
 use std::collections::VecDeque;
 use stylet_shm_schema::{BATCH_EVERY, MAX_BATCH, RECORD_BUFFER};
