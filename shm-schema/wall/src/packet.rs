@@ -244,6 +244,7 @@ impl Socket {
 
     /// The next packet that makes sense; `None` where there is none now. Packets of no known kind are dropped.
     pub fn receive(&mut self) -> Result<Option<Packet>, Closed> {
+        let mut was_reset = false;
         loop {
             let mut space = [MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(1))];
             let mut with = RecvAncillaryBuffer::new(&mut space);
@@ -252,6 +253,8 @@ impl Socket {
                 Ok(received) => received,
                 Err(rustix::io::Errno::INTR) => continue,
                 Err(rustix::io::Errno::AGAIN) => return Ok(None),
+                // Said first where the other process ended with packets unread; what it had sent comes after.
+                Err(rustix::io::Errno::CONNRESET) if !std::mem::replace(&mut was_reset, true) => continue,
                 Err(rustix::io::Errno::CONNRESET) => return Err(Closed::Ended),
                 Err(why) => return Err(Closed::Io(why.into())),
             };
@@ -324,6 +327,19 @@ mod tests {
         assert!(other.receive().expect("open").is_none());
         drop(own);
         assert!(matches!(other.receive(), Err(Closed::Ended)));
+    }
+
+    /// The kernel reports the reset before what was sent: why a bridge had failed was lost.
+    #[test]
+    fn what_a_process_said_last_arrives_though_it_read_nothing() {
+        let (mut own, other) = Socket::pair().expect("a socket");
+        let other = Socket::of(other);
+        own.send(Kind::Start, &[0; 32], None).expect("open");
+        other.send(Kind::Failed, b"why", None).expect("open");
+        drop(other);
+        let packet = own.receive().expect("said before the end").expect("said");
+        assert_eq!((packet.kind, &packet.bytes[..]), (Kind::Failed, &b"why"[..]));
+        assert!(matches!(own.receive(), Err(Closed::Ended)));
     }
 
     #[test]
