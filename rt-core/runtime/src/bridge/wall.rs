@@ -180,10 +180,11 @@ impl Wall {
             self.end_bridge();
             self.lost = Some(why);
         }
-        if self.running.is_none() && self.tried.elapsed() >= RETRY_EVERY {
-            if let Err(why) = self.spawn() {
-                self.lost = Some(why.to_string());
-            }
+        if self.running.is_none()
+            && self.tried.elapsed() >= RETRY_EVERY
+            && let Err(why) = self.spawn()
+        {
+            self.lost = Some(why.to_string());
         }
     }
 
@@ -336,11 +337,8 @@ impl Wall {
     /// Why the bridge must be started anew.
     fn trouble(&mut self) -> Option<String> {
         let running = self.running.as_mut()?;
-        if let Ok(Some(status)) = running.child.try_wait() {
-            return Some(self.lost.take().unwrap_or_else(|| format!("it ended: {status}")));
-        }
-        if self.outbox.is_closed {
-            return Some(self.lost.take().unwrap_or_else(|| "it closed its socket".to_owned()));
+        if let Some(why) = running.end(self.outbox.is_closed) {
+            return Some(self.lost.take().unwrap_or(why));
         }
         if self.looked.elapsed() >= COMPLAINTS_EVERY {
             self.looked = Instant::now();

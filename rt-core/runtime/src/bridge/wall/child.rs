@@ -1,5 +1,6 @@
 //! The bridge as a process: where its program is, and whether it lives.
 
+use std::os::unix::process::ExitStatusExt;
 use std::path::PathBuf;
 use std::process::Child;
 use std::time::{Duration, Instant};
@@ -7,6 +8,8 @@ use stylet_shm_schema::Epoch;
 
 /// The bridge says that it lives twenty times a second.
 pub const SILENT_AFTER: Duration = Duration::from_millis(400);
+/// Between the end of its socket and its own.
+const LAST_MOMENT: Duration = Duration::from_millis(50);
 /// While it makes its ports it says nothing.
 const SILENT_AT_START: Duration = Duration::from_secs(2);
 /// One that a busy machine gives no processor is waited for: another would have none either.
@@ -43,6 +46,22 @@ impl Running {
     pub fn hear(&mut self, refused: u64) {
         (self.heard, self.refused) = (Instant::now(), refused.max(self.refused));
         self.busy = processor_time(self.child.id()).map_or(self.busy, |(_, busy)| busy);
+    }
+
+    /// How it has ended, where it has; one that closed its socket is about to.
+    pub fn end(&mut self, has_closed: bool) -> Option<String> {
+        let begun = Instant::now();
+        loop {
+            match self.child.try_wait() {
+                Ok(Some(status)) if status.signal() == Some(libc::SIGBUS) => {
+                    return Some("it found shared memory full: /dev/shm needs room (df -h /dev/shm)".to_owned());
+                }
+                Ok(Some(status)) => return Some(format!("it ended: {status}")),
+                _ if !has_closed => return None,
+                _ if begun.elapsed() > LAST_MOMENT => return Some("it closed its socket".to_owned()),
+                _ => std::thread::sleep(Duration::from_millis(1)),
+            }
+        }
     }
 
     /// For how long it has said nothing, where that is too long.

@@ -42,7 +42,7 @@ fn the_force_is_zero_once_device_or_tissue_is_stale() {
         let (mut watchdog, mut gate) = (Watchdog::default(), GateState::default());
         gate.engage();
         let begins = 3 + next(&mut seed) % 20;
-        let is_device = next(&mut seed) % 2 == 0;
+        let is_device = next(&mut seed).is_multiple_of(2);
         let (after, off_at) = match is_device {
             true => (
                 u64::from(SILENT_SAMPLES),
