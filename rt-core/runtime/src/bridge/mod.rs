@@ -1,6 +1,6 @@
 //! The normal-priority thread of the force process: carries out what hosts ask for, and says what the loops have done.
 //!
-//! It meets no host itself: that is for another process behind a [`wall`].
+//! It meets no host itself: that is for another process behind a [`Wall`].
 
 mod commands;
 mod exercises;
