@@ -14,10 +14,10 @@ use stylet_wall::packet::{Closed, Kind, Packet, Socket, Start, sealed, unsealed}
 const MAX_OF_A_PORT: u32 = 16;
 /// Refusals for that reason that are answered in one pass, the others are counted: every host has all answers in its queue, and
 /// those to one that floods would drive out those to the others.
-const MAX_ANSWERED: u32 = 4;
+const MAX_ANSWERED: u32 = 1;
 /// Requests taken from the queues in one pass. Queues are read one after the other, so that a host that fills its own faster than
 /// it is read would keep the core from those behind it; one that is counted alone takes less time than one that is handed on.
-const MAX_TAKEN: usize = 4096;
+const MAX_TAKEN: usize = 8192;
 
 /// One port for each service of the core; [`service`] says what each holds.
 pub struct Ports {

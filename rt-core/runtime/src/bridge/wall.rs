@@ -136,11 +136,8 @@ impl Wall {
         while !wall.is_open() {
             wall.wait(Duration::from_millis(20));
             wall.pass();
-            if let Some(why) = wall
-                .lost
-                .take()
-                .filter(|_| wall.running.is_none() || begun.elapsed() > FIRST_START)
-            {
+            let is_over = wall.running.is_none() || begun.elapsed() > FIRST_START;
+            if let Some(why) = wall.lost.take_if(|_| is_over) {
                 return Err(BridgeError::Failed(why));
             }
         }
