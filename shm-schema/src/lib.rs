@@ -3,9 +3,9 @@
 //! | service | form | written by | read by | holds |
 //! |---|---|---|---|---|
 //! | `session` | publish-subscribe, newest one kept | bridge | hosts | [`Session`]: which run this is, what the kernel granted |
-//! | `state/<session>` | blackboard, one per run | haptic thread | hosts | [`HapticState`]: the latest tick |
+//! | `state/<session>` | blackboard, one per run | bridge | hosts | [`HapticState`]: the latest tick |
 //! | `records` | slices of [`TickRecord`] | bridge | hosts | every tick of the force loop |
-//! | `second/<session>` | blackboard, in a run with a second device | its thread | hosts | [`SecondState`]: its latest tick |
+//! | `second/<session>` | blackboard, in a run with a second device | bridge | hosts | [`SecondState`]: its latest tick |
 //! | `second_records` | slices of [`SecondRecord`], likewise | bridge | hosts | every tick of the second device's loop |
 //! | `snapshots` | slices of [`Vertex`] under a [`SnapshotHeader`] | tissue thread, sent by the bridge | hosts | the deformed surface, displacements inside, needle and seeds |
 //! | `scene` | words under a [`SceneHeader`], newest one kept | bridge | hosts | rest surface, triangles, structures, labels of the cells |
@@ -13,6 +13,7 @@
 //! | `parameters` | [`ParametersInForce`], newest one kept | bridge | hosts | the parameters that took effect, and when |
 //! | `plan` | [`PlanInForce`], newest one kept | bridge | hosts | planned seeds and needle path |
 //! | `commands` | [`Command`] | hosts | bridge | a [`Request`] as plain data |
+//! | `stops` | [`Command`] that takes force or motion away | hosts | bridge | the same as in `commands`, past every flood |
 //! | `replies` | [`Reply`] | bridge | hosts | accepted, or refused and why |
 //! | `rehearsals` | [`Rehearsal`] | bridge | hosts | where the seeds of a needle would end |
 //! | `relayed` | [`Relayed`], newest one kept | a relay in place of the core | hosts | server, role, round trip, age and losses |

@@ -1,4 +1,4 @@
-//! The deformed gland at 200 Hz, filled straight into memory that the bridge loaned ahead.
+//! The deformed gland, as the tissue thread writes it and the bridge copies it to hosts.
 
 use crate::{MAX_LEFT_NEEDLES, MAX_SEEDS, SceneId};
 use bytemuck::{Pod, Zeroable};

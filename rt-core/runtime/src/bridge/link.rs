@@ -20,6 +20,8 @@ pub struct Link {
     tickets: Ticket,
     events: u64,
     announced_ns: u64,
+    /// Why the bridge was lost last, until another is there.
+    bridge_lost: Option<String>,
 }
 
 /// The fields of an event that depend on its kind.
@@ -60,19 +62,26 @@ impl Link {
             tickets: 0,
             events: 0,
             announced_ns: 0,
+            bridge_lost: None,
         }
     }
 
     /// Serves the bridge and sends the heartbeat.
     pub fn announce(&mut self) {
         self.wall.pass();
-        if let Some(why) = self.wall.take_lost() {
+        // A bridge that fails again and again for one reason is reported once, or it would drive out all other events.
+        let lost = self.wall.take_lost();
+        if let Some(why) = lost.filter(|why| self.bridge_lost.as_ref() != Some(why)) {
+            self.bridge_lost = Some(why.clone());
             eprintln!("rt-core: the bridge to the hosts is started anew: {why}");
             let details = EventDetails {
                 text: &why,
                 ..EventDetails::now()
             };
             self.event(EventKind::BridgeRestarted, details);
+        }
+        if self.wall.is_open() {
+            self.bridge_lost = None;
         }
         let now_ns = clock::now_ns();
         if now_ns - self.announced_ns >= ANNOUNCE_NS {

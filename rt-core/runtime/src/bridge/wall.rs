@@ -149,11 +149,6 @@ impl Wall {
         self.running.as_ref().is_some_and(|running| running.is_ready)
     }
 
-    /// Process number of the bridge.
-    pub fn bridge_pid(&self) -> Option<u32> {
-        self.running.as_ref().map(|running| running.child.id())
-    }
-
     /// Until the bridge says something, and no longer than that.
     pub fn wait(&self, longest: Duration) {
         match &self.outbox.socket {
