@@ -4,8 +4,8 @@ use crate::{Reason, Refusal, Text};
 use bytemuck::{Pod, Zeroable};
 use num_enum::TryFromPrimitive;
 
-/// Values of one command at most: a rehearsal with 128 drops beside as many needles as may stay in fits.
-pub const MAX_COMMAND_VALUES: usize = 432;
+/// Size of the payload of a command, bytes. The longest is a rehearsal with every needle and seed that it may name.
+pub const COMMAND_BYTES: usize = 5760;
 
 /// Bytes of the text of a mark at most.
 pub const MARK_BYTES: usize = 96;
@@ -21,12 +21,10 @@ pub struct Command {
     pub command_id: u64,
     /// [`crate::CommandKind`] by number.
     pub kind: u32,
-    /// How many of `values` count.
-    pub value_count: u32,
-    /// The payload.
-    pub values: [f64; MAX_COMMAND_VALUES],
-    /// The words of a request that has some.
-    pub text: Text<MARK_BYTES>,
+    /// Bytes of `payload` in use.
+    pub length: u32,
+    /// The request, packed by `postcard`.
+    pub payload: [u8; COMMAND_BYTES],
 }
 
 /// Reasons in one reply at most; a refusal with more names the others in its text only.

@@ -1,10 +1,11 @@
 //! Deadlines of a loop that were missed, and its worst wake-up, since a moment that a reset does not move.
 
 use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
 
 /// Totals of one loop since it began, or since the force was last turned on.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable, Serialize, Deserialize)]
 pub struct DeadlineTotals {
     /// Deadlines missed.
     pub missed: u64,

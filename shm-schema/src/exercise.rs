@@ -1,7 +1,7 @@
 //! Faults that an instructor puts in, to see what a trainee does.
 
 use bytemuck::{Pod, Zeroable};
-use num_enum::TryFromPrimitive;
+use serde::{Deserialize, Serialize};
 use strum::EnumDiscriminants;
 
 /// How many times as stiff an exercise may make tissue.
@@ -10,8 +10,8 @@ pub const EXERCISE_STIFFNESS_RANGE: [f64; 2] = [1.0, 5.0];
 pub const MOST_MOVED_M: f64 = 0.01;
 
 /// One fault. The numbers are stable: requests and events carry them.
-#[derive(Clone, Copy, Debug, PartialEq, EnumDiscriminants)]
-#[strum_discriminants(name(ExerciseNumber), vis(pub(crate)), derive(TryFromPrimitive))]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, EnumDiscriminants)]
+#[strum_discriminants(name(ExerciseNumber), vis(pub(crate)))]
 #[repr(u32)]
 pub enum Exercise {
     /// The device counts as disconnected: the force goes off as at a real loss.

@@ -53,7 +53,7 @@ mod state;
 mod text;
 
 pub use class::{Class, ClassMember, LeaseOrder, LeaseRequest, MAX_CLASS};
-pub use command::{Command, MARK_BYTES, MAX_COMMAND_VALUES, MAX_REASONS, Reply, ReplyStatus};
+pub use command::{COMMAND_BYTES, Command, MARK_BYTES, MAX_REASONS, Reply, ReplyStatus};
 pub use deadlines::DeadlineTotals;
 pub use event::{Event, EventKind};
 pub use exercise::{EXERCISE_STIFFNESS_RANGE, Exercise, ExercisesInForce, MOST_MOVED_M};
@@ -86,7 +86,7 @@ pub use state::{Fault, HapticState, Phase, flags};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.
-pub const SCHEMA_VERSION: u32 = 16;
+pub const SCHEMA_VERSION: u32 = 17;
 
 /// Records in one batch at most.
 pub const MAX_BATCH: usize = 32;

@@ -1,7 +1,8 @@
 //! The plan that `rt-core` keeps, whichever hosts are connected.
 
-use crate::Text;
+use crate::{PlannedNeedle, Text};
 use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
 
 /// Seeds planned or placed at most.
 pub const MAX_SEEDS: usize = 128;
@@ -30,7 +31,7 @@ pub const MOST_PLANNED_NEEDLES: u32 = 1000;
 
 /// What the seeds of a planned needle are, for other hosts that count their dose; the core passes it on. All zero where it is not known.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
 pub struct Prescribed {
     /// Which needle of a plan of many it is, counted from 1, and its seeds are dropped in their order; 0 for one by hand.
     pub needle: u32,
@@ -70,4 +71,49 @@ pub struct PlanInForce {
     pub prescribed: Prescribed,
     /// In the order in which the host sent them.
     pub seeds: [PlannedSeed; MAX_SEEDS],
+}
+
+impl PlanInForce {
+    /// Returns the plan that hosts get, without its session and generations; all zero for no plan.
+    pub fn of(plan: Option<&PlannedNeedle>) -> Self {
+        let mut sent = Self::zeroed();
+        let Some(plan) = plan else { return sent };
+        (sent.entry_m, sent.direction, sent.prescribed) = (plan.entry_m, plan.direction, plan.prescribed);
+        for (seed, &position_m) in sent.seeds.iter_mut().zip(&plan.seeds_m) {
+            seed.position_m = position_m;
+        }
+        sent.seed_count = plan.seeds_m.len().min(MAX_SEEDS) as u64;
+        sent
+    }
+
+    /// Returns the planned needle.
+    pub fn needle(&self) -> PlannedNeedle {
+        let seeds = self.seeds.iter().take(self.seed_count as usize);
+        PlannedNeedle {
+            entry_m: self.entry_m,
+            direction: self.direction,
+            seeds_m: seeds.map(|seed| seed.position_m).collect(),
+            prescribed: self.prescribed,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_planned_needle_survives_and_no_plan_is_all_zero() {
+        let needle = PlannedNeedle {
+            entry_m: [0.0, 0.0, -0.01],
+            direction: [0.0, 0.0, 1.0],
+            seeds_m: vec![[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]],
+            prescribed: Prescribed {
+                strength_u: 0.5,
+                ..Default::default()
+            },
+        };
+        assert_eq!(PlanInForce::of(Some(&needle)).needle(), needle);
+        assert_eq!(PlanInForce::of(None), PlanInForce::zeroed());
+    }
 }

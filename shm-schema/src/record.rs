@@ -1,10 +1,11 @@
 //! One record for every tick of the force loop.
 
 use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
 
 /// Written by the haptic thread into a ring, sent by the bridge in batches.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
 pub struct TickRecord {
     /// The run of the core.
     pub session_id: u64,
@@ -41,9 +42,11 @@ pub struct TickRecord {
     /// Quaternion i, j, k, w; with the tip all that the device said.
     pub world_from_tool: [f64; 4],
     /// Tip of the needle less where a rigid one in the same hand would have it, scene frame, m.
+    #[serde(default)]
     pub tip_deflection_m: [f64; 3],
     /// Bits of the buttons that are pressed.
     pub buttons: u32,
     /// [`crate::HapticState::folded_from_m`] in micrometres, rounded up.
+    #[serde(default)]
     pub folded_from_um: u32,
 }

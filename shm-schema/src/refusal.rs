@@ -9,17 +9,15 @@ use num_enum::TryFromPrimitive;
 pub enum RefusalCode {
     /// The number of the command is not known. Subject: that number.
     UnknownCommand = 1,
-    /// The payload has more or fewer values than it must. Subject: how many came.
-    ValueCount = 2,
-    /// A value is not a finite number. Subject: its place in the payload.
-    NotFinite = 3,
-    /// The number of a parameter is not known. Subject: its place in the payload.
-    UnknownParameter = 4,
-    /// A coordinate is too far from the origin. Subject: place of the first coordinate in the payload.
+    /// The payload is no request of that number.
+    Malformed = 2,
+    /// There are too many or too few needles, seeds or changes. Subject: how many came.
+    WrongCount = 3,
+    /// A place is too far from the origin, or no number.
     PlaceTooFar = 5,
-    /// A direction is not a unit vector. Subject: place of its first value in the payload.
+    /// A direction is not a unit vector.
     NotUnitDirection = 6,
-    /// A speed, an acceleration or a distance is outside its limits. Subject: its place in the payload.
+    /// A speed, an acceleration, a distance or a parameter is outside its limits, or no number.
     ValueOutOfLimits = 7,
     /// There is no built-in scene of that number.
     UnknownScene = 8,
@@ -87,9 +85,8 @@ impl RefusalCode {
     pub fn message(self) -> &'static str {
         match self {
             Self::UnknownCommand => "the command is not known; host and core differ",
-            Self::ValueCount => "the command has too many or too few values",
-            Self::NotFinite => "a value is not a finite number",
-            Self::UnknownParameter => "the parameter is not known; host and core differ",
+            Self::Malformed => "the command cannot be read; host and core differ",
+            Self::WrongCount => "there are too many or too few needles, seeds or changes",
             Self::PlaceTooFar => "a place is too far away",
             Self::NotUnitDirection => "a direction is not a unit vector",
             Self::ValueOutOfLimits => "a speed, an acceleration or a distance is outside its limits",

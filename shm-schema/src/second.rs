@@ -2,6 +2,7 @@
 
 use crate::DeadlineTotals;
 use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
 
 /// One tick, as hosts see it. Written by the second device's thread only, on a board that exists in a run with a second device.
 #[repr(C)]
@@ -61,7 +62,7 @@ pub struct SecondState {
 
 /// Written by the second device's thread into a ring, sent by the bridge in batches.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
 pub struct SecondRecord {
     /// The run of the core.
     pub session_id: u64,

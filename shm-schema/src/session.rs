@@ -2,20 +2,25 @@
 
 use crate::{ExercisesInForce, Text};
 use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
 
-/// Announced five times a second, and to every new host.
+/// Announced five times a second, and to every new host. A recording keeps what describes the run.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Session {
     /// Number of the run; differs from every other run.
     pub session_id: u64,
     /// [`crate::SCHEMA_VERSION`] of the core.
     pub schema_version: u32,
     /// Process of the core.
+    #[serde(skip)]
     pub pid: u32,
     /// `CLOCK_MONOTONIC` of this announcement: the heartbeat of the bridge.
+    #[serde(skip)]
     pub time_ns: u64,
     /// `CLOCK_MONOTONIC` at the start of the run.
+    #[serde(skip)]
     pub started_ns: u64,
     /// Period of the force loop.
     pub period_ns: u64,
@@ -32,10 +37,13 @@ pub struct Session {
     /// 1 when `mlockall` succeeded.
     pub memory_locked: u32,
     /// 1 when `--no-rt` was asked for.
+    #[serde(skip)]
     pub no_rt_asked: u32,
     /// Messages from hosts that were refused in this run.
+    #[serde(skip)]
     pub refused: u64,
     /// Faults that an instructor put in.
+    #[serde(skip)]
     pub exercises: ExercisesInForce,
     /// Name of the device.
     pub device: Text<64>,
@@ -44,7 +52,14 @@ pub struct Session {
     /// Version of the core.
     pub version: Text<32>,
     /// What was asked for and not granted, and what to do about it; empty when nothing is missing.
+    #[serde(skip)]
     pub advice: Text<512>,
+}
+
+impl Default for Session {
+    fn default() -> Self {
+        Self::zeroed()
+    }
 }
 
 impl Session {
@@ -56,7 +71,8 @@ impl Session {
 
 /// What one thread asked for and what the kernel says it has.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
+#[serde(default)]
 pub struct ThreadReport {
     /// As `sched_getscheduler` reports it: 0 `SCHED_OTHER`, 1 `SCHED_FIFO`.
     pub policy: u32,

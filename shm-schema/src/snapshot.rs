@@ -2,6 +2,7 @@
 
 use crate::{MAX_LEFT_NEEDLES, MAX_SEEDS, SceneId};
 use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
 
 /// Deformed position of one surface vertex, scene frame; behind the surface vertices of a snapshot, the displacement
 /// from rest (m) of one node of the scene's [`crate::GridInfo`].
@@ -14,7 +15,7 @@ pub struct Vertex {
 
 /// Where a seed is now.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
 pub struct SeedPose {
     /// Centre of the seed in the body as the scene has it: where the body is moved besides, the seed is
     /// [`SnapshotHeader::body_moved_m`] from there. Scene frame, m.
@@ -30,7 +31,8 @@ pub const MAX_BEND_POINTS: usize = 16;
 
 /// A needle that stays in the tissue.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
+#[serde(default)]
 pub struct LeftNeedlePose {
     /// Its number, by which it is taken up again or drawn out.
     pub number: u64,

@@ -3,10 +3,12 @@
 use crate::DeadlineTotals;
 use bytemuck::{Pod, Zeroable};
 use num_enum::TryFromPrimitive;
+use serde::{Deserialize, Serialize};
 
 /// One tick, as the operator's program sees it. Written by the haptic thread only.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
+#[serde(default)]
 pub struct HapticState {
     /// Ticks since the loop began; 0 means that no tick has run.
     pub tick: u64,

@@ -1,12 +1,19 @@
 //! Text of bounded length that any bytes may claim to be.
 
 use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// UTF-8 in a fixed field, padded with zeros.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Text<const N: usize> {
     bytes: [u8; N],
+}
+
+impl<const N: usize> Default for Text<N> {
+    fn default() -> Self {
+        Self { bytes: [0; N] }
+    }
 }
 
 // SAFETY: an array of bytes has no padding and every bit pattern is a value.
@@ -41,6 +48,20 @@ impl<const N: usize> Text<N> {
             .chars()
             .map(|c| if c.is_control() && c != '\n' { '\u{fffd}' } else { c })
             .collect()
+    }
+}
+
+/// As the words that can be read.
+impl<const N: usize> Serialize for Text<N> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.read())
+    }
+}
+
+/// Keeps as much as fits.
+impl<'de, const N: usize> Deserialize<'de> for Text<N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer).map(|words| Self::new(&words))
     }
 }
 

@@ -1,14 +1,16 @@
 //! The table: number, name, unit, limits, default and source of every parameter. A new parameter is one row.
 
 use super::{ParameterGroup, ParameterSpec};
-use num_enum::TryFromPrimitive;
+use num_enum::{IntoPrimitive, TryFromPrimitive};
+use serde::{Deserialize, Serialize};
 
 const RAD: f64 = std::f64::consts::PI / 180.0;
 
 macro_rules! parameters {
     ($( $id:ident $key:literal $label:literal $group:ident $unit:literal $per_si:expr, $min:expr, $max:expr, $default:expr, $source:literal, $help:literal; )*) => {
         /// Number of a parameter; its place in [`PARAMETERS`] and in [`ParameterSet`](crate::ParameterSet).
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive, IntoPrimitive, Serialize, Deserialize)]
+        #[serde(try_from = "u32", into = "u32")]
         #[repr(u32)]
         pub enum ParameterId {
             $( #[doc = concat!("`", $key, "`: ", $help)] $id ),*

@@ -1,12 +1,13 @@
 //! What a host may ask for, typed; [`Request::encode`] and [`Request::decode`] are the only way to and from a [`Command`].
 
-mod decode;
+mod verify;
 
-pub use decode::{RequestError, RequestErrors};
+pub use verify::{RequestError, RequestErrors};
 
-use crate::{BUILTIN_SCENES, Command, Exercise, MAX_SEEDS, ParameterId, Prescribed, Text};
+use crate::{Command, Exercise, ParameterId, Prescribed};
 use bytemuck::Zeroable;
 use num_enum::TryFromPrimitive;
+use serde::{Deserialize, Serialize};
 use strum::EnumDiscriminants;
 
 /// Slowest and fastest speed of the simulated hand, m/s.
@@ -28,7 +29,7 @@ pub const MARK_BEFORE_RANGE_S: [f64; 2] = [0.0, 120.0];
 pub const VALID_RANGE_S: [f64; 2] = [0.02, 0.3];
 
 /// One request of a host. The numbers are stable: [`CommandKind`] is made from them, and [`Command::kind`] carries them.
-#[derive(Clone, Debug, PartialEq, EnumDiscriminants)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, EnumDiscriminants)]
 #[strum_discriminants(name(CommandKind), derive(TryFromPrimitive))]
 #[strum_discriminants(doc = "Kind of a [`Request`] by stable number, as [`Command::kind`] carries it.")]
 #[repr(u32)]
@@ -58,7 +59,7 @@ pub enum Request {
     /// Bring the tissue to rest, remove the seeds, clear peaks and worst cases.
     #[strum_discriminants(doc = "[`Request::Reset`]")]
     Reset = 7,
-    /// Run a built-in scene, by its place in [`BUILTIN_SCENES`].
+    /// Run a built-in scene, by its place in [`crate::BUILTIN_SCENES`].
     #[strum_discriminants(doc = "[`Request::LoadBuiltinScene`]")]
     LoadBuiltinScene(u32) = 8,
     /// Remove the last seed.
@@ -120,7 +121,7 @@ pub enum Request {
 }
 
 /// A moment and what is to be said of it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mark {
     /// 1 to [`crate::MARK_BYTES`] bytes of UTF-8 without control characters.
     pub text: String,
@@ -129,7 +130,7 @@ pub struct Mark {
 }
 
 /// Where a needle goes in, scene frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NeedleAxis {
     /// Where the needle enters, m.
     pub entry_m: [f64; 3],
@@ -138,7 +139,7 @@ pub struct NeedleAxis {
 }
 
 /// New value of one parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterChange {
     /// Which parameter.
     pub id: ParameterId,
@@ -147,20 +148,21 @@ pub struct ParameterChange {
 }
 
 /// A needle and the seeds along it, scene frame.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedNeedle {
     /// Where the needle enters, m.
     pub entry_m: [f64; 3],
     /// Unit vector from the entry into the body.
     pub direction: [f64; 3],
-    /// Positions of at most [`MAX_SEEDS`] seeds, m.
+    /// Positions of at most [`crate::MAX_SEEDS`] seeds, m.
     pub seeds_m: Vec<[f64; 3]>,
     /// What the seeds are.
+    #[serde(default)]
     pub prescribed: Prescribed,
 }
 
 /// Goal of the simulated hand, scene frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HandMove {
     /// Where the tip goes, m.
     pub tip_m: [f64; 3],
@@ -173,7 +175,7 @@ pub struct HandMove {
 }
 
 /// Goal of the simulated hand that holds the ultrasound probe, scene frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProbeMove {
     /// Of its tip.
     pub hand: HandMove,
@@ -183,7 +185,7 @@ pub struct ProbeMove {
 }
 
 /// One needle to rehearse, scene frame.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NeedleRehearsal {
     /// Where the needle enters, m.
     pub entry_m: [f64; 3],
@@ -206,12 +208,12 @@ pub struct NeedleRehearsal {
     /// Needles that went that deep and came out again beside those that stay, in their order, at most [`crate::MAX_EARLIER_NEEDLES`]: each
     /// leaves those that stay, and the tissue that they hold, a little elsewhere. Nothing without needles that stay.
     pub earlier: Vec<StabilisingNeedle>,
-    /// Where the tip leaves each seed, m, in the order of the drops: 1 to [`MAX_SEEDS`].
+    /// Where the tip leaves each seed, m, in the order of the drops: 1 to [`crate::MAX_SEEDS`].
     pub drops_m: Vec<[f64; 3]>,
 }
 
 /// A needle that goes in, leaves no seed, and stays while others come and go; scene frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StabilisingNeedle {
     /// Where the needle enters, m.
     pub entry_m: [f64; 3],
@@ -235,105 +237,28 @@ impl Request {
         self.into()
     }
 
-    /// The record that crosses the process. [`RequestErrors`] when the payload does not fit into it; nothing else is
-    /// verified here, since [`Request::decode`] verifies everything.
+    /// Packs the request into the record that crosses the process. Verifies nothing but that it fits: [`Request::decode`] verifies
+    /// everything.
     pub fn encode(&self, host_id: u64, command_id: u64) -> Result<Command, RequestErrors> {
         let mut command = Command::zeroed();
         (command.host_id, command.command_id, command.kind) = (host_id, command_id, self.kind() as u32);
-        let values = self.values();
-        let Some(place) = command.values.get_mut(..values.len()) else {
-            return Err(RequestError::count(self.kind(), values.len()).into());
-        };
-        place.copy_from_slice(&values);
-        command.value_count = values.len() as u32;
-        if let Self::Mark(mark) = self {
-            command.text = Text::new(&mark.text);
-            if command.text.exact() != Some(&mark.text) {
-                return Err(RequestError::InvalidText.into());
-            }
-        }
-        if let Self::SetPlan(Some(plan)) = self {
-            command.text = Text::new(&plan.prescribed.source.read());
-        }
+        let packed = postcard::to_slice(self, &mut command.payload);
+        command.length = packed.map_err(|_| RequestError::TooLong { kind: self.kind() })?.len() as u32;
         Ok(command)
     }
 
-    fn values(&self) -> Vec<f64> {
-        match self {
-            Self::SetParameters(changes) => changes
-                .iter()
-                .flat_map(|change| [f64::from(change.id as u32), change.value])
-                .collect(),
-            Self::SetPlan(None) => Vec::new(),
-            Self::SetPlan(Some(plan)) => {
-                let of = &plan.prescribed;
-                let numbers = [of.needle, of.last_needle].map(f64::from);
-                let amounts = [of.strength_u, of.dose_gy];
-                joined(&[&plan.entry_m, &plan.direction, &numbers, &amounts], &plan.seeds_m)
-            }
-            Self::MoveHand(hand) => hand_values(hand),
-            Self::MoveSecondHand(probe) => [hand_values(&probe.hand), probe.up.as_slice().concat()].concat(),
-            Self::LoadBuiltinScene(number) => vec![f64::from(*number)],
-            Self::ExpectNeedle(axis) => joined(&[&axis.entry_m, &axis.direction], &[]),
-            Self::Rehearse(run) => {
-                let pace = [
-                    run.insert_m_per_s,
-                    run.retract_m_per_s,
-                    run.approach_m_per_s,
-                    run.acceleration_m_per_s2,
-                    run.retract_to_m,
-                    run.strand_pitch_m.unwrap_or_default(),
-                ];
-                let others = [&run.stabilising, &run.earlier].map(|needles| needle_values(needles));
-                joined(
-                    &[&run.entry_m, &run.direction, &pace, &others[0], &others[1]],
-                    &run.drops_m,
-                )
-            }
-            Self::DropSeed { strand_pitch_m } => strand_pitch_m.iter().copied().collect(),
-            Self::TakeNeedle(number) => vec![f64::from(*number)],
-            Self::DrawNeedle { number, speed_m_per_s } => vec![f64::from(*number), *speed_m_per_s],
-            Self::KeepMoving { valid_s } => vec![*valid_s],
-            Self::Mark(mark) => vec![mark.before_s],
-            Self::BeginExercise(exercise) => {
-                let number = f64::from(exercise.number());
-                match exercise {
-                    Exercise::DeviceLost => vec![number],
-                    Exercise::StiffTissue { factor } => vec![number, *factor],
-                    Exercise::BodyMoved { by_m } => joined(&[&[number], by_m], &[]),
-                }
-            }
-            Self::EndExercises
-            | Self::LeaveNeedle
-            | Self::Engage
-            | Self::Disengage
-            | Self::Reset
-            | Self::UndoSeed
-            | Self::Shutdown
-            | Self::SaveFlight
-            | Self::StopHand
-            | Self::StopSecondHand => Vec::new(),
+    /// Unpacks a record of any bytes and verifies every value. The limits of a parameter are those of
+    /// [`crate::ParameterSet::problems`], which needs the other parameters.
+    pub fn decode(command: &Command) -> Result<Self, RequestErrors> {
+        let number = command.kind;
+        let kind = CommandKind::try_from(number).map_err(|_| RequestError::UnknownCommand(number))?;
+        let payload = command.payload.get(..command.length as usize);
+        let unpacked = payload.and_then(|payload| postcard::take_from_bytes::<Self>(payload).ok());
+        match unpacked {
+            Some((request, [])) if request.kind() == kind => request.verified(),
+            _ => Err(RequestError::Malformed { kind }.into()),
         }
     }
-}
-
-fn hand_values(hand: &HandMove) -> Vec<f64> {
-    let pace = [hand.speed_m_per_s, hand.acceleration_m_per_s2];
-    joined(&[&hand.tip_m, &hand.direction, &pace], &[])
-}
-
-/// How many there are, then entry, direction and depth of each.
-fn needle_values(needles: &[StabilisingNeedle]) -> Vec<f64> {
-    let mut values = vec![needles.len() as f64];
-    for needle in needles {
-        values.extend(needle.entry_m.iter().chain(&needle.direction));
-        values.push(needle.depth_m);
-    }
-    values
-}
-
-fn joined(head: &[&[f64]], places: &[[f64; 3]]) -> Vec<f64> {
-    [&head.concat(), places.as_flattened()].concat()
 }
 
 #[cfg(test)]

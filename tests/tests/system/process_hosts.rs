@@ -263,10 +263,13 @@ fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
             for word in bytemuck::cast_slice_mut::<u8, u64>(bytemuck::bytes_of_mut(&mut command)) {
                 *word = random();
             }
-            // Half of them with a kind and a length that exist, so that the values are what is wrong.
+            // Half of them with a kind that exists, and values that are what is wrong.
             if n % 2 == 0 {
-                (command.kind, command.value_count) = (1 + 2 * (n % 2) as u32, 1 + (n % 7) as u32);
-                command.values[0] = f64::from_bits(random() | 0x7ff0_0000_0000_0000);
+                let value = f64::from_bits(random() | 0x7ff0_0000_0000_0000);
+                let change = ParameterChange { value, ..change };
+                command = Request::SetParameters(vec![change])
+                    .encode(random(), random())
+                    .expect("fits");
             } else {
                 command.kind |= 1 << 31;
             }

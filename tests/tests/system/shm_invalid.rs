@@ -53,8 +53,8 @@ fn core_refuses_invalid_records_of_hosts_and_runs_on() {
         for kind in 1..=9_u32 {
             for bad in [f64::NAN, f64::INFINITY, 1e300, -1e300] {
                 let mut command = Command::zeroed();
-                (command.kind, command.value_count) = (kind, 8);
-                command.values = [bad; MAX_COMMAND_VALUES];
+                (command.kind, command.length) = (kind, 64);
+                bytemuck::cast_slice_mut(&mut command.payload[..64]).fill(bad);
                 commands.send(command).expect("sent");
                 std::thread::sleep(Duration::from_millis(1));
             }

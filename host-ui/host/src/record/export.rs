@@ -1,12 +1,12 @@
 //! What can be made of a recording: a table, and a motion for the core's replay device.
 
 use super::error::RecordError;
-use super::messages::Tick;
 use super::read::read;
 use super::second;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stylet_base::{write_streamed, write_whole};
+use stylet_shm_schema::TickRecord;
 use stylet_shm_schema::motion::{Motion, MotionSample};
 
 /// The period of the force loop's ideal grid.
@@ -84,7 +84,7 @@ fn write_motion(
     Ok(())
 }
 
-fn sample(tick: &Tick) -> MotionSample {
+fn sample(tick: &TickRecord) -> MotionSample {
     MotionSample {
         tip_in_scene_m: tick.tip_in_scene_m,
         world_from_tool: tick.world_from_tool,
@@ -130,10 +130,10 @@ const COLUMNS: [&str; 34] = [
     "session_begins",
 ];
 
-fn csv(ticks: &[Tick], file: &mut impl Write) -> std::io::Result<()> {
+fn csv(ticks: &[TickRecord], file: &mut impl Write) -> std::io::Result<()> {
     let mut table = csv::Writer::from_writer(file);
     table.write_record(COLUMNS)?;
-    let mut before: Option<&Tick> = None;
+    let mut before: Option<&TickRecord> = None;
     for t in ticks {
         let same = before.filter(|b| b.session_id == t.session_id);
         let missing = same.map_or(0, |b| t.tick - b.tick - 1);

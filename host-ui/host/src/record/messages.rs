@@ -3,13 +3,11 @@
 //! JSON and not a binary form: 1 kHz of it costs one core a few per cent, zstd takes most of its size back (figures in
 //! CHANGELOG), and every reader has a parser. Numbers are written so that they read back to the same bits.
 
-use super::scene;
+use super::{scene, setting};
 use crate::link::Snapshot;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use stylet_shm_schema::{
-    Event, EventKind, MAX_BEND_POINTS, MAX_LEFT_NEEDLES, MAX_SEEDS, SnapshotHeader, Text, TickRecord, Vertex,
-};
+use stylet_shm_schema::{Event, EventKind, LeftNeedlePose, SeedPose, SnapshotHeader, Text, Vertex};
 
 /// Where each kind of message goes, and the name and text of its schema.
 pub struct Channel {
@@ -39,90 +37,6 @@ pub const GLAND: Channel = Channel {
     schema: "foxglove.PointCloud",
     text: gland_schema,
 };
-
-/// A [`TickRecord`], field by field.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Tick {
-    pub session_id: u64,
-    pub tick: u64,
-    pub due_ns: u64,
-    pub wake_latency_ns: u64,
-    pub force_written_ns: u64,
-    pub work_ns: u64,
-    pub missed: u32,
-    pub phase: u32,
-    pub fault: u32,
-    pub flags: u32,
-    pub tip_in_scene_m: [f64; 3],
-    pub force_on_hand_n: [f64; 3],
-    pub depth_m: f64,
-    pub speed_m_per_s: f64,
-    pub force_terms_n: [f64; 5],
-    pub tissue_tick: u64,
-    pub world_from_tool: [f64; 4],
-    pub buttons: u32,
-    /// Recordings of an older version have none.
-    #[serde(default)]
-    pub tip_deflection_m: [f64; 3],
-    /// As above.
-    #[serde(default)]
-    pub folded_from_um: u32,
-}
-
-impl Tick {
-    /// As the core sent it.
-    pub fn record(&self) -> TickRecord {
-        TickRecord {
-            session_id: self.session_id,
-            tick: self.tick,
-            due_ns: self.due_ns,
-            wake_latency_ns: self.wake_latency_ns,
-            force_written_ns: self.force_written_ns,
-            work_ns: self.work_ns,
-            missed: self.missed,
-            phase: self.phase,
-            fault: self.fault,
-            flags: self.flags,
-            tip_in_scene_m: self.tip_in_scene_m,
-            force_on_hand_n: self.force_on_hand_n,
-            depth_m: self.depth_m,
-            speed_m_per_s: self.speed_m_per_s,
-            force_terms_n: self.force_terms_n,
-            tissue_tick: self.tissue_tick,
-            world_from_tool: self.world_from_tool,
-            tip_deflection_m: self.tip_deflection_m,
-            buttons: self.buttons,
-            folded_from_um: self.folded_from_um,
-        }
-    }
-}
-
-impl From<&TickRecord> for Tick {
-    fn from(r: &TickRecord) -> Self {
-        Self {
-            session_id: r.session_id,
-            tick: r.tick,
-            due_ns: r.due_ns,
-            wake_latency_ns: r.wake_latency_ns,
-            force_written_ns: r.force_written_ns,
-            work_ns: r.work_ns,
-            missed: r.missed,
-            phase: r.phase,
-            fault: r.fault,
-            flags: r.flags,
-            tip_in_scene_m: r.tip_in_scene_m,
-            force_on_hand_n: r.force_on_hand_n,
-            depth_m: r.depth_m,
-            speed_m_per_s: r.speed_m_per_s,
-            force_terms_n: r.force_terms_n,
-            tissue_tick: r.tissue_tick,
-            world_from_tool: r.world_from_tool,
-            buttons: r.buttons,
-            tip_deflection_m: r.tip_deflection_m,
-            folded_from_um: r.folded_from_um,
-        }
-    }
-}
 
 pub(super) fn vector(length: usize, unit: &str) -> Value {
     json!({ "type": "array", "items": { "type": "number" }, "minItems": length, "maxItems": length, "description": unit })
@@ -173,22 +87,42 @@ fn event_schema() -> Value {
     )
 }
 
+/// An [`Event`] with the name of its kind.
+#[derive(Serialize, Deserialize)]
+struct NamedEvent {
+    session_id: u64,
+    sequence: u64,
+    tick: u64,
+    time_ns: u64,
+    kind: String,
+    code: u32,
+    value: f64,
+    position_m: [f64; 3],
+    text: String,
+}
+
 pub fn event(e: &Event) -> Value {
-    json!({
-        "session_id": e.session_id, "sequence": e.sequence, "tick": e.tick, "time_ns": e.time_ns,
-        "kind": EventKind::from_number(e.kind).map_or_else(String::new, |k| format!("{k:?}")),
-        "code": e.code, "value": e.value, "position_m": e.position_m, "text": e.text.read(),
+    setting::message(&NamedEvent {
+        session_id: e.session_id,
+        sequence: e.sequence,
+        tick: e.tick,
+        time_ns: e.time_ns,
+        kind: EventKind::from_number(e.kind).map_or_else(String::new, |kind| format!("{kind:?}")),
+        code: e.code,
+        value: e.value,
+        position_m: e.position_m,
+        text: e.text.read(),
     })
 }
 
-/// The event of [`event`]; `None` for bytes that are none.
+/// Reads an event; `None` for bytes that are none.
 pub fn event_of(data: &[u8]) -> Option<Event> {
-    let e: EventRead = serde_json::from_slice(data).ok()?;
+    let e: NamedEvent = serde_json::from_slice(data).ok()?;
     let kind = (1..64)
         .filter_map(EventKind::from_number)
         .find(|kind| format!("{kind:?}") == e.kind)?;
     let is_finite = e.value.is_finite() && e.position_m.iter().all(|c| c.is_finite());
-    is_finite.then(|| Event {
+    is_finite.then_some(Event {
         session_id: e.session_id,
         sequence: e.sequence,
         time_ns: e.time_ns,
@@ -199,19 +133,6 @@ pub fn event_of(data: &[u8]) -> Option<Event> {
         position_m: e.position_m,
         text: Text::new(&e.text),
     })
-}
-
-#[derive(Deserialize)]
-struct EventRead {
-    session_id: u64,
-    sequence: u64,
-    tick: u64,
-    time_ns: u64,
-    kind: String,
-    code: u32,
-    value: f64,
-    position_m: [f64; 3],
-    text: String,
 }
 
 fn tissue_schema() -> Value {
@@ -235,30 +156,8 @@ fn tissue_schema() -> Value {
     )
 }
 
-pub fn tissue(snapshot: &Snapshot) -> Value {
-    let h = &snapshot.header;
-    let seeds = h.seeds.iter().take(h.seed_count as usize);
-    let seeds = seeds.map(|s| json!({ "position_m": s.position_m, "axis": s.axis, "dropped_at_m": s.dropped_at_m }));
-    let left = h.left().iter();
-    let left = left.map(|l| json!({ "number": l.number, "tip_m": l.tip_m, "direction": l.direction }));
-    json!({
-        "session_id": h.session_id, "tissue_tick": h.tissue_tick, "time_ns": h.time_ns,
-        "tip_in_scene_m": h.tip_in_scene_m, "needle_direction": h.needle_direction, "held_in_scene_m": h.held_in_scene_m,
-        "bend_m": h.bends_m(), "bend_spacing_m": h.bend_spacing_m, "body_moved_m": h.body_moved_m,
-        "held_element": (h.held_element != u32::MAX).then_some(h.held_element), "phase": h.phase, "residual": h.residual,
-        "max_displacement_m": h.max_displacement_m, "work_ns": h.work_ns, "seeds": seeds.collect::<Vec<_>>(),
-        "needles_left_in": left.collect::<Vec<_>>(),
-    })
-}
-
-#[derive(Deserialize)]
-struct Seed {
-    position_m: [f64; 3],
-    axis: [f64; 3],
-    dropped_at_m: [f64; 3],
-}
-
-#[derive(Deserialize)]
+/// A [`SnapshotHeader`], as far as viewers need it.
+#[derive(Serialize, Deserialize)]
 struct Tissue {
     session_id: u64,
     tissue_tick: u64,
@@ -271,28 +170,41 @@ struct Tissue {
     residual: f64,
     max_displacement_m: f64,
     work_ns: u64,
-    seeds: Vec<Seed>,
-    /// Earlier versions know none.
+    seeds: Vec<SeedPose>,
+    // Recordings of earlier versions lack what follows.
     #[serde(default)]
-    needles_left_in: Vec<LeftIn>,
-    /// Recordings of an older version have none. So of the spacing.
+    needles_left_in: Vec<LeftNeedlePose>,
     #[serde(default)]
     bend_m: Vec<[f64; 3]>,
     #[serde(default)]
     bend_spacing_m: f64,
-    /// As above.
     #[serde(default)]
     body_moved_m: [f64; 3],
 }
 
-#[derive(Deserialize)]
-struct LeftIn {
-    number: u64,
-    tip_m: [f64; 3],
-    direction: [f64; 3],
+pub fn tissue(snapshot: &Snapshot) -> Value {
+    let h = &snapshot.header;
+    setting::message(&Tissue {
+        session_id: h.session_id,
+        tissue_tick: h.tissue_tick,
+        time_ns: h.time_ns,
+        tip_in_scene_m: h.tip_in_scene_m,
+        needle_direction: h.needle_direction,
+        held_in_scene_m: h.held_in_scene_m,
+        held_element: (h.held_element != u32::MAX).then_some(h.held_element),
+        phase: h.phase,
+        residual: h.residual,
+        max_displacement_m: h.max_displacement_m,
+        work_ns: h.work_ns,
+        seeds: h.seeds[..h.seed_count as usize].to_vec(),
+        needles_left_in: h.left().to_vec(),
+        bend_m: h.bends_m().to_vec(),
+        bend_spacing_m: h.bend_spacing_m,
+        body_moved_m: h.body_moved_m,
+    })
 }
 
-/// The header of a snapshot, as far as [`tissue`] keeps it.
+/// Returns the header of a snapshot, as far as [`tissue`] keeps it.
 pub fn tissue_of(data: &[u8]) -> Option<SnapshotHeader> {
     let t: Tissue = serde_json::from_slice(data).ok()?;
     let mut header = SnapshotHeader {
@@ -307,23 +219,21 @@ pub fn tissue_of(data: &[u8]) -> Option<SnapshotHeader> {
         work_ns: t.work_ns,
         held_element: t.held_element.unwrap_or(u32::MAX),
         phase: t.phase,
-        seed_count: t.seeds.len().min(MAX_SEEDS) as u32,
-        left_count: t.needles_left_in.len().min(MAX_LEFT_NEEDLES) as u32,
-        bend_count: t.bend_m.len().min(MAX_BEND_POINTS) as u32,
         bend_spacing_m: t.bend_spacing_m,
         body_moved_m: t.body_moved_m,
         ..SnapshotHeader::default()
     };
-    for (to, from) in header.left.iter_mut().zip(t.needles_left_in) {
-        (to.number, to.tip_m, to.direction) = (from.number, from.tip_m, from.direction);
-    }
-    for (to, from) in header.bend_m.iter_mut().zip(t.bend_m) {
-        *to = from;
-    }
-    for (to, from) in header.seeds.iter_mut().zip(t.seeds) {
-        (to.position_m, to.axis, to.dropped_at_m) = (from.position_m, from.axis, from.dropped_at_m);
-    }
+    header.seed_count = fill(&mut header.seeds, &t.seeds);
+    header.left_count = fill(&mut header.left, &t.needles_left_in);
+    header.bend_count = fill(&mut header.bend_m, &t.bend_m);
     Some(header)
+}
+
+/// Copies what there is room for, and returns how many that are.
+fn fill<T: Copy>(room: &mut [T], from: &[T]) -> u32 {
+    let count = room.len().min(from.len());
+    room[..count].copy_from_slice(&from[..count]);
+    count as u32
 }
 
 #[derive(Deserialize)]

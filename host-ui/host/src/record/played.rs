@@ -1,16 +1,16 @@
 //! A recording read for a window: what the core said, each with its time.
 
 use super::error::{RecordError, ShowError};
-use super::messages::{EVENT, GLAND, TICK, TISSUE, Tick, event_of, gland_of, tissue_of};
+use super::messages::{EVENT, GLAND, TICK, TISSUE, event_of, gland_of, tissue_of};
 use super::scene::{self, FIELD, SCENE};
-use super::second::{SECOND, second_of};
+use super::second::SECOND;
 use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
 use super::stream;
 use crate::link::{Piece, Played, Snapshot};
 use std::path::Path;
 use std::sync::Arc;
 use stylet_base::interrupt::Interrupt;
-use stylet_shm_schema::{Session, SnapshotHeader, check};
+use stylet_shm_schema::{SecondRecord, Session, SnapshotHeader, TickRecord, check};
 
 /// Longer recordings are shown up to here.
 const MOST_BYTES: usize = 1 << 30;
@@ -59,11 +59,10 @@ impl Reader {
                 return Ok(());
             }
             t if t == TICK.topic => {
-                let tick: Tick = serde_json::from_slice(data).map_err(|_| damaged())?;
-                if tick.session_id != session_id {
+                let record: TickRecord = serde_json::from_slice(data).map_err(|_| damaged())?;
+                if record.session_id != session_id {
                     return Err("another run of rt-core begins".to_owned());
                 }
-                let record = tick.record();
                 check::record(&record).map_err(|_| damaged())?;
                 Piece::Tick(Box::new(record))
             }
@@ -73,11 +72,14 @@ impl Reader {
                 None => return Ok(()),
             },
             t if t == SECOND.topic => {
-                let record = second_of(data).filter(|r| r.session_id == session_id && check::second_record(r).is_ok());
+                let record: Option<SecondRecord> = serde_json::from_slice(data).ok();
+                let record = record.filter(|r| r.session_id == session_id && check::second_record(r).is_ok());
                 Piece::Second(Box::new(record.ok_or_else(damaged)?))
             }
             t if t == STATE.topic => {
-                let state = setting::state_of(data).filter(|state| check::state(state).is_ok());
+                let state = serde_json::from_slice(data)
+                    .ok()
+                    .filter(|state| check::state(state).is_ok());
                 Piece::State(Box::new(state.ok_or_else(damaged)?))
             }
             t if t == SCENE.topic => {

@@ -2,16 +2,16 @@
 
 use super::error::RecordError;
 use super::gaps::Gaps;
-use super::messages::{TICK, Tick};
-use super::second::{SECOND, second_of};
+use super::messages::TICK;
+use super::second::SECOND;
 use super::stream;
 use std::path::Path;
-use stylet_shm_schema::SecondRecord;
+use stylet_shm_schema::{SecondRecord, TickRecord};
 
 /// The ticks of a recording, in the order in which they arrived.
 pub struct Recording {
     /// The ticks, without repetitions.
-    pub ticks: Vec<Tick>,
+    pub ticks: Vec<TickRecord>,
     /// Those of the second device.
     pub second: Vec<SecondRecord>,
     /// Which ticks are missing.
@@ -32,13 +32,15 @@ pub fn read(path: &Path) -> Result<Recording, RecordError> {
     };
     let cut_off = stream::each(&bytes, |topic, _, data| {
         if topic == TICK.topic {
-            let tick: Tick = serde_json::from_slice(data).map_err(|e| format!("invalid tick: {e}"))?;
+            let tick: TickRecord = serde_json::from_slice(data).map_err(|e| format!("invalid tick: {e}"))?;
             if recording.gaps.record(tick.session_id, tick.tick) {
                 recording.ticks.push(tick);
             }
         }
         if topic == SECOND.topic {
-            recording.second.extend(second_of(data));
+            recording
+                .second
+                .extend(serde_json::from_slice::<SecondRecord>(data).ok());
         }
         Ok(())
     });

@@ -1,7 +1,6 @@
 //! The second device in a recording: its ticks as messages, and what an export makes of them.
 
 use super::messages::{Channel, object, vector, whole};
-use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::io::Write;
 use stylet_shm_schema::SecondRecord;
@@ -12,41 +11,6 @@ pub const SECOND: Channel = Channel {
     schema: "stylet.SecondTick",
     text: second_schema,
 };
-
-/// A [`SecondRecord`], field by field.
-#[derive(Serialize, Deserialize)]
-#[serde(remote = "SecondRecord")]
-struct Fields {
-    session_id: u64,
-    tick: u64,
-    due_ns: u64,
-    wake_latency_ns: u64,
-    force_written_ns: u64,
-    work_ns: u64,
-    missed: u32,
-    fault: u32,
-    flags: u32,
-    buttons: u32,
-    tip_in_scene_m: [f64; 3],
-    world_from_tool: [f64; 4],
-    force_on_hand_n: [f64; 3],
-    torque_on_hand_nm: [f64; 3],
-    contact_force_n: f64,
-    tissue_tick: u64,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(transparent)]
-struct SecondTick(#[serde(with = "Fields")] SecondRecord);
-
-pub fn second(record: &SecondRecord) -> Vec<u8> {
-    serde_json::to_vec(&SecondTick(*record)).unwrap_or_default()
-}
-
-pub fn second_of(data: &[u8]) -> Option<SecondRecord> {
-    let tick: SecondTick = serde_json::from_slice(data).ok()?;
-    Some(tick.0)
-}
 
 fn second_schema() -> Value {
     object(
@@ -144,9 +108,8 @@ mod tests {
         (record.tick, record.fault, record.flags) = (u64::MAX - 1, 9, 0b101);
         record.tip_in_scene_m = [0.1, 1.0 / 3.0, -2e-17];
         record.force_on_hand_n = [-0.0, f64::MIN_POSITIVE, 8.5];
-        let again = second_of(&second(&record)).expect("a tick");
+        let again: SecondRecord = serde_json::from_slice(&serde_json::to_vec(&record).unwrap()).expect("a tick");
         assert_eq!(bytemuck::bytes_of(&again), bytemuck::bytes_of(&record));
-        assert!(second_of(b"{}").is_none());
         let mut table = Vec::new();
         csv(&[record], &mut table).unwrap();
         let text = String::from_utf8(table).unwrap();

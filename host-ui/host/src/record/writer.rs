@@ -2,9 +2,9 @@
 
 use super::error::RecordError;
 use super::gaps::{Gap, Gaps};
-use super::messages::{self, Channel, EVENT, GLAND, TICK, TISSUE, Tick};
+use super::messages::{self, Channel, EVENT, GLAND, TICK, TISSUE};
 use super::scene::{self, FIELD, SCENE};
-use super::second::{SECOND, second};
+use super::second::SECOND;
 use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
 use crate::link::{SceneModel, Snapshot};
 use mcap::records::{MessageHeader, Metadata};
@@ -226,14 +226,18 @@ impl<W: Write + Seek> Writer<W> {
                 for record in &records {
                     if self.totals.gaps.record(record.session_id, record.tick) {
                         let time_ns = record.due_ns + record.wake_latency_ns;
-                        self.message(0, time_ns, &serde_json::to_vec(&Tick::from(record)).unwrap_or_default())?;
+                        self.message(0, time_ns, &serde_json::to_vec(record).unwrap_or_default())?;
                     }
                 }
             }
             Item::SecondRecords(records) => {
                 for record in &records {
                     if self.totals.second.record(record.session_id, record.tick) {
-                        self.message(10, record.due_ns + record.wake_latency_ns, &second(record))?;
+                        self.message(
+                            10,
+                            record.due_ns + record.wake_latency_ns,
+                            &serde_json::to_vec(record).unwrap_or_default(),
+                        )?;
                     }
                 }
             }
@@ -245,7 +249,7 @@ impl<W: Write + Seek> Writer<W> {
             Item::Scene(model) => self.between(4, &scene::scene(&model))?,
             Item::Plan(plan) => self.between(5, &setting::plan(&plan))?,
             Item::Parameters(parameters) => self.between(6, &setting::parameters(&parameters))?,
-            Item::State(state) => self.message(7, state.time_ns, setting::state(&state).to_string().as_bytes())?,
+            Item::State(state) => self.message(7, state.time_ns, setting::message(&*state).to_string().as_bytes())?,
             Item::Snapshot(snapshot) => {
                 self.totals.snapshots += 1;
                 let time_ns = snapshot.header.time_ns;
@@ -284,7 +288,7 @@ impl<W: Write + Seek> Writer<W> {
 
     fn session(&mut self, session: &Session) -> mcap::McapResult<()> {
         self.newest_ns = self.newest_ns.max(session.time_ns);
-        self.between(9, &setting::session(session))?;
+        self.between(9, &setting::message(session))?;
         let metadata = [
             ("session_id", session.session_id.to_string()),
             ("version", session.version.read()),

@@ -6,9 +6,7 @@ use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkError, LinkStatus};
 use stylet_procedure::{NeedleWay, Pace};
-use stylet_shm_schema::{
-    MAX_COMMAND_VALUES, MAX_EARLIER_NEEDLES, NeedleRehearsal, Reason, RefusalCode, Request, StabilisingNeedle,
-};
+use stylet_shm_schema::{MAX_EARLIER_NEEDLES, NeedleRehearsal, Reason, RefusalCode, Request, StabilisingNeedle};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 /// The largest scene takes a second for a second.
@@ -52,15 +50,6 @@ impl Drops {
         self.along_m.iter().map(|&along| self.at_m(along))
     }
 
-    /// How many needles that were there before a request has room for; they matter beside needles that stay in alone.
-    fn room_for_earlier(&self, stabilising: usize) -> usize {
-        if stabilising == 0 {
-            return 0;
-        }
-        let taken = 15 + 7 * stabilising + 3 * self.along_m.len();
-        (MAX_COMMAND_VALUES.saturating_sub(taken) / 7).min(MAX_EARLIER_NEEDLES)
-    }
-
     /// The needle as one that comes and goes, to its deepest drop.
     pub fn pass(&self) -> StabilisingNeedle {
         StabilisingNeedle {
@@ -88,6 +77,11 @@ impl Drops {
         stabilising: &[StabilisingNeedle],
         earlier: &[StabilisingNeedle],
     ) -> NeedleRehearsal {
+        // Earlier needles matter only to those that stay in; the last ones matter most.
+        let first = match stabilising {
+            [] => earlier.len(),
+            _ => earlier.len().saturating_sub(MAX_EARLIER_NEEDLES),
+        };
         NeedleRehearsal {
             entry_m: self.entry_m,
             direction: self.direction,
@@ -98,8 +92,7 @@ impl Drops {
             retract_to_m: self.retract_to_m,
             strand_pitch_m: self.strand_pitch_m,
             stabilising: stabilising.to_vec(),
-            // The last ones, where a request has no room for all.
-            earlier: earlier[earlier.len().saturating_sub(self.room_for_earlier(stabilising.len()))..].to_vec(),
+            earlier: earlier[first..].to_vec(),
             drops_m: self.drops_m().collect(),
         }
     }

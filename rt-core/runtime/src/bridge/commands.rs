@@ -2,13 +2,15 @@
 
 use super::Bridge;
 use super::link::EventDetails;
-use super::parameters::order_from_both;
-use super::requests::{hand_goal, needle_run, plan_in_force};
+use super::requests::{hand_goal, needle_run};
+use super::second::Second;
 use super::wall::Asked;
-use crate::rt::exchange::{HapticOrder, Moved, Ticket, TissueOrder};
+use crate::rt::exchange::{HapticOrder, Moved, Ticket, TissueOrder, TissueStep};
 use crate::rt::second::SecondOrder;
 use crate::rt::tissue_tape::LeftTape;
-use stylet_shm_schema::{Command, EventKind, ParameterChange, PlannedNeedle, Refusal, RefusalCode, Request};
+use stylet_shm_schema::{
+    Command, EventKind, ParameterChange, PlanInForce, PlannedNeedle, Refusal, RefusalCode, Request,
+};
 use stylet_sim::active::activate;
 use stylet_sim::line::LeftNeedles;
 
@@ -44,7 +46,7 @@ impl Bridge {
                 return true;
             }
             Ok(request) => {
-                let ticket = self.link.ticket(asker);
+                let ticket = self.link.answers.ticket(asker);
                 if let Err(refusal) = self.carry_out(ticket, request) {
                     self.link.session.refused += 1;
                     self.link.answer(ticket, Err(&refusal));
@@ -112,8 +114,8 @@ impl Bridge {
                 self.order_second(SecondOrder::Disengage);
                 self.order_haptic(HapticOrder::Disengage { ticket })
             }
-            Request::DropSeed { strand_pitch_m } => self.order_tissue(TissueOrder::DropSeed { ticket, strand_pitch_m }),
-            Request::UndoSeed => self.order_tissue(TissueOrder::UndoSeed { ticket }),
+            Request::DropSeed { strand_pitch_m } => self.order_tissue(ticket, TissueStep::DropSeed { strand_pitch_m }),
+            Request::UndoSeed => self.order_tissue(ticket, TissueStep::UndoSeed),
             Request::Reset => self.reset(ticket),
             Request::LoadBuiltinScene(number) => {
                 self.refuse_uncounted(ticket, |this| this.load_builtin(ticket, number))
@@ -151,21 +153,37 @@ impl Bridge {
         pushed.map_err(|_| RefusalCode::TooManyRequests.into())
     }
 
-    fn order_tissue(&mut self, order: TissueOrder) -> Result<(), Refusal> {
-        let pushed = self.loops.tissue_orders.push(order);
+    fn order_tissue(&mut self, ticket: Ticket, step: TissueStep) -> Result<(), Refusal> {
+        let pushed = self.loops.tissue_orders.push(TissueOrder::Step(ticket, step));
         pushed.map_err(|_| RefusalCode::TooManyRequests.into())
     }
 
-    fn order_both(&mut self, orders: (HapticOrder, TissueOrder)) -> Result<(), Refusal> {
+    /// Orders a change from every loop, or from none. It is answered once all have carried it out.
+    fn order_all(
+        &mut self,
+        ticket: Ticket,
+        haptic: HapticOrder,
+        step: TissueStep,
+        second: Option<SecondOrder>,
+    ) -> Result<(), Refusal> {
         let loops = &mut self.loops;
-        if loops.haptic_orders.slots() <= KEPT_FOR_STOPS {
+        let has_room = |second: &Second| second.orders.slots() > 0;
+        // The loops only take orders out, so no room is lost after this.
+        let room = loops.haptic_orders.slots() > KEPT_FOR_STOPS
+            && loops.tissue_orders.slots() > 0
+            && self.second.as_ref().is_none_or(has_room);
+        if !room {
             return Err(RefusalCode::TooManyRequests.into());
         }
-        let taken = order_from_both(&mut loops.haptic_orders, &mut loops.tissue_orders, orders);
-        taken.then_some(()).ok_or(RefusalCode::TooManyRequests.into())
+        let answers = self.second.as_ref().is_some_and(|second| second.shared(ticket) != 0);
+        self.link.answers.await_loops(ticket, 2 + usize::from(answers));
+        let _ = loops.haptic_orders.push(haptic);
+        let _ = loops.tissue_orders.push(TissueOrder::Step(ticket, step));
+        second.into_iter().for_each(|order| self.order_second(order));
+        Ok(())
     }
 
-    /// Verified as a whole, then ordered from both loops or from none.
+    /// Verifies the changes as a whole, then orders them from every loop or from none.
     fn change_parameters(&mut self, ticket: Ticket, changes: &[ParameterChange]) -> Result<(), Refusal> {
         let set = self.parameters.with(changes);
         let active = activate(&set, &self.device).map_err(|problems| {
@@ -181,12 +199,13 @@ impl Bridge {
             needle: active.needle,
             force: active.force,
         };
-        self.order_both((haptic, TissueOrder::Limits(active.limits)))?;
-        if let Some(second) = &mut self.second {
-            second.set_gate(generation, &active.force.gate);
-        }
-        // Both rings were emptied lately: there is room for one more.
-        let _ = self.loops.tissue_orders.push(TissueOrder::Migration(active.migration));
+        let step = TissueStep::Parameters {
+            limits: active.limits,
+            migration: active.migration,
+        };
+        let gate = |second: &Second| second.gate_order(ticket, generation, &active.force.gate);
+        let second = self.second.as_ref().map(gate);
+        self.order_all(ticket, haptic, step, second)?;
         self.parameters.ordered(generation, set);
         self.lines.take_bending(bends);
         Ok(())
@@ -194,7 +213,7 @@ impl Bridge {
 
     fn set_plan(&mut self, plan: Option<&PlannedNeedle>) {
         let generation = self.plan.generation + 1;
-        self.plan = plan_in_force(plan);
+        self.plan = PlanInForce::of(plan);
         self.plan.generation = if plan.is_some() { generation } else { 0 };
         self.plan.session_id = self.link.session.session_id;
         self.plan.scene_generation = self.scene.generation();
@@ -215,8 +234,10 @@ impl Bridge {
     }
 
     fn reset(&mut self, ticket: Ticket) -> Result<(), Refusal> {
-        self.order_both((HapticOrder::Reset { ticket }, TissueOrder::Reset))?;
-        self.order_second(SecondOrder::Reset);
+        let second = self.second.as_ref().map(|second| SecondOrder::Reset {
+            ticket: second.shared(ticket),
+        });
+        self.order_all(ticket, HapticOrder::Reset { ticket }, TissueStep::Reset, second)?;
         self.lines.forget_tracks();
         self.forget_exercises();
         self.link.event(EventKind::Reset, EventDetails::now());

@@ -1,23 +1,18 @@
 //! The link to the hosts: announcements, events, records, and the answers to their requests.
 
+use super::answers::{Answers, Asker};
 use super::wall::Wall;
 use crate::rt::clock;
 use crate::rt::exchange::Ticket;
-use std::collections::HashMap;
 use stylet_shm_schema::{Event, EventKind, Refusal, Reply, Session, Text, TickRecord};
 
 const ANNOUNCE_NS: u64 = 200_000_000;
-
-/// Numbers of a host and of its command.
-pub type Asker = (u64, u64);
 
 /// Everything that hosts hear.
 pub struct Link {
     pub wall: Wall,
     pub session: Session,
-    /// Who waits for an answer, behind each ticket.
-    waiting: HashMap<Ticket, Asker>,
-    tickets: Ticket,
+    pub answers: Answers,
     events: u64,
     announced_ns: u64,
     /// Why the bridge was lost last, until another is there.
@@ -58,8 +53,7 @@ impl Link {
         Self {
             wall,
             session,
-            waiting: HashMap::new(),
-            tickets: 0,
+            answers: Answers::default(),
             events: 0,
             announced_ns: 0,
             bridge_lost: None,
@@ -126,22 +120,25 @@ impl Link {
         });
     }
 
-    /// A ticket under which `asker` waits for its answer.
-    pub fn ticket(&mut self, asker: Asker) -> Ticket {
-        self.tickets += 1;
-        self.waiting.insert(self.tickets, asker);
-        self.tickets
-    }
-
-    /// Who waits behind `ticket`.
-    pub fn asker(&self, ticket: Ticket) -> Option<Asker> {
-        self.waiting.get(&ticket).copied()
-    }
-
-    /// `Ok` with the first tick that ran with the change.
+    /// Answers a request: with the first tick of the force loop that ran with the change, or a refusal.
     pub fn answer(&mut self, ticket: Ticket, result: Result<u64, &Refusal>) {
-        if let Some(asker) = self.waiting.remove(&ticket) {
-            self.reply(asker, result);
+        match result {
+            Ok(tick) => {
+                self.answers.holds_from(ticket, tick);
+                self.carried_out(ticket, tick);
+            }
+            Err(_) => {
+                if let Some(asker) = self.answers.refused(ticket) {
+                    self.reply(asker, result);
+                }
+            }
+        }
+    }
+
+    /// Takes word of the tissue loop or the second device's loop that it carried a request out.
+    pub fn carried_out(&mut self, ticket: Ticket, tick: u64) {
+        if let Some((asker, tick)) = self.answers.carried_out(ticket, tick) {
+            self.reply(asker, Ok(tick));
         }
     }
 

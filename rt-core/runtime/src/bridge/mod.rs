@@ -2,6 +2,7 @@
 //!
 //! It meets no host itself: that is for another process behind a [`Wall`].
 
+mod answers;
 mod commands;
 mod exercises;
 mod flight;
@@ -255,7 +256,7 @@ impl Bridge {
         let Some(ended) = self.rehearsals.take(self.scene.generation()) else {
             return;
         };
-        if let (Ok(result), Some((host_id, command_id))) = (&ended.outcome, self.link.asker(ended.ticket)) {
+        if let (Ok(result), Some((host_id, command_id))) = (&ended.outcome, self.link.answers.asker(ended.ticket)) {
             let rehearsal = Rehearsal {
                 session_id: self.link.session.session_id,
                 host_id,

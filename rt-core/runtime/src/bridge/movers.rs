@@ -28,7 +28,7 @@ impl Movers {
 impl Bridge {
     /// The promise with which a request begins a motion.
     pub(super) fn first_promise(&mut self, ticket: Ticket, what: Moved) -> Option<Promise> {
-        let (host_id, _) = self.link.asker(ticket)?;
+        let (host_id, _) = self.link.answers.asker(ticket)?;
         self.movers.hosts[what as usize] = Some(host_id);
         Some(Promise::first(host_id))
     }

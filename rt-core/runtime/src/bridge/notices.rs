@@ -31,7 +31,10 @@ impl Bridge {
             self.take_notice(notice);
         }
         while let Ok(notice) = self.loops.tissue_notices.pop() {
-            self.take_notice(notice);
+            match notice {
+                Notice::Done { ticket, tick } => self.link.carried_out(ticket, tick),
+                _ => self.take_notice(notice),
+            }
         }
     }
 

@@ -1,6 +1,5 @@
 //! Changes of parameters on their way to the loops: each starts from the one before it, and reaches both loops or none.
 
-use crate::rt::exchange::{HapticOrder, TissueOrder};
 use std::collections::BTreeMap;
 use stylet_shm_schema::{ParameterChange, ParameterSet, ParametersInForce};
 
@@ -63,17 +62,6 @@ impl ParameterChanges {
     }
 }
 
-/// Orders something from both loops, or from none where either ring is full: false then.
-pub fn order_from_both(
-    haptic_orders: &mut rtrb::Producer<HapticOrder>,
-    tissue_orders: &mut rtrb::Producer<TissueOrder>,
-    (haptic, tissue): (HapticOrder, TissueOrder),
-) -> bool {
-    // The loops only take orders out, so the room does not shrink.
-    let room = haptic_orders.slots() > 0 && tissue_orders.slots() > 0;
-    room && haptic_orders.push(haptic).is_ok() && tissue_orders.push(tissue).is_ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -99,25 +87,5 @@ mod tests {
         assert_eq!(now.set, second);
         assert_eq!(changes.with(&[]), second);
         assert_eq!(changes.next_generation(), 4);
-    }
-
-    /// The limits of the tissue used to be ordered even when the force loop had no room for its part.
-    #[test]
-    fn a_full_ring_of_one_loop_leaves_the_other_alone() {
-        let both = || (HapticOrder::Reset { ticket: 1 }, TissueOrder::Reset);
-        for full in [0, 1] {
-            let (mut haptic, haptic_out) = rtrb::RingBuffer::new(1);
-            let (mut tissue, tissue_out) = rtrb::RingBuffer::new(1);
-            match full {
-                0 => haptic.push(HapticOrder::HandOverTape).unwrap(),
-                _ => tissue.push(TissueOrder::HandOverTape).ok().unwrap(),
-            }
-            assert!(!order_from_both(&mut haptic, &mut tissue, both()));
-            assert_eq!(haptic_out.slots() + tissue_out.slots(), 1);
-        }
-        let (mut haptic, haptic_out) = rtrb::RingBuffer::new(1);
-        let (mut tissue, tissue_out) = rtrb::RingBuffer::new(1);
-        assert!(order_from_both(&mut haptic, &mut tissue, both()));
-        assert_eq!((haptic_out.slots(), tissue_out.slots()), (1, 1));
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::rehearse::NeedleRun;
 use stylet_hw::HandGoal;
-use stylet_shm_schema::{HandMove, NeedleRehearsal, PlanInForce, PlannedNeedle};
+use stylet_shm_schema::{HandMove, NeedleRehearsal};
 
 pub fn hand_goal(hand: &HandMove) -> HandGoal {
     HandGoal {
@@ -29,38 +29,9 @@ pub fn needle_run(run: &NeedleRehearsal) -> NeedleRun {
     }
 }
 
-/// As hosts get it, without session and generation; all zero for no plan.
-pub fn plan_in_force(plan: Option<&PlannedNeedle>) -> PlanInForce {
-    let mut sent: PlanInForce = bytemuck::Zeroable::zeroed();
-    let Some(plan) = plan else { return sent };
-    (sent.entry_m, sent.direction) = (plan.entry_m, plan.direction);
-    for (seed, &position_m) in sent.seeds.iter_mut().zip(&plan.seeds_m) {
-        seed.position_m = position_m;
-    }
-    sent.seed_count = plan.seeds_m.len().min(sent.seeds.len()) as u64;
-    sent.prescribed = plan.prescribed;
-    sent
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stylet_shm_schema::Prescribed;
-
-    #[test]
-    fn a_plan_keeps_its_seeds_in_order() {
-        let plan = plan_in_force(Some(&PlannedNeedle {
-            entry_m: [0.0, 0.0, -0.01],
-            direction: [0.0, 0.0, 1.0],
-            seeds_m: vec![[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]],
-            prescribed: Prescribed {
-                strength_u: 0.5,
-                ..Default::default()
-            },
-        }));
-        assert_eq!((plan.seed_count, plan.seeds[1].position_m), (2, [0.4, 0.5, 0.6]));
-        assert_eq!((plan.entry_m, plan.prescribed.strength_u), ([0.0, 0.0, -0.01], 0.5));
-    }
 
     #[test]
     fn a_rehearsal_keeps_its_drops_in_order() {

@@ -1,6 +1,7 @@
 //! From a scene that a host asks for to the scene that runs.
 
-use super::link::{Asker, EventDetails};
+use super::answers::Asker;
+use super::link::EventDetails;
 use super::loader::{Loaded, Wanted};
 use super::picture::{ScenePicture, snapshot_board};
 use super::{Bridge, RunningScene, upload};
@@ -44,7 +45,7 @@ impl Bridge {
                 return self.link.refuse_invalid(asker, &refusal);
             }
         };
-        let (ticket, name) = (self.link.ticket(asker), header.name.read());
+        let (ticket, name) = (self.link.answers.ticket(asker), header.name.read());
         let wanted = Wanted {
             ticket,
             name: name.clone(),

@@ -50,10 +50,19 @@ impl Second {
         let _ = self.orders.push(order);
     }
 
-    /// The gate within the limits of this device.
-    pub fn set_gate(&mut self, generation: u64, run: &GateParameters) {
-        let gate = gate_of(run, &self.device);
-        self.order(SecondOrder::Gate { generation, gate });
+    /// Returns the ticket that its loop answers a change under that all loops share. One that stands still answers none: it takes the
+    /// change up before its next tick.
+    pub fn shared(&self, ticket: Ticket) -> Ticket {
+        if self.has_stopped { 0 } else { ticket }
+    }
+
+    /// Returns the order for the gate within the limits of this device.
+    pub fn gate_order(&self, ticket: Ticket, generation: u64, run: &GateParameters) -> SecondOrder {
+        SecondOrder::Gate {
+            ticket: self.shared(ticket),
+            generation,
+            gate: gate_of(run, &self.device),
+        }
     }
 
     fn order_answered(&mut self, order: SecondOrder) -> Result<(), Refusal> {
@@ -93,7 +102,7 @@ impl Bridge {
 
     fn take_second_notice(&mut self, notice: &Notice) {
         match *notice {
-            Notice::Done { ticket, tick } => self.link.answer(ticket, Ok(tick)),
+            Notice::Done { ticket, tick } => self.link.carried_out(ticket, tick),
             Notice::Refused { ticket, why } => self.link.answer(ticket, Err(&why.into())),
             Notice::Fault { tick, time_ns, fault } => {
                 self.flights.fault(&format!("the second device: {}", fault.message()));

@@ -1,7 +1,7 @@
 //! The stepped loops as a rehearsal drives them: a simulated device, orders, and what the loops refuse.
 
 use super::NeedleRun;
-use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
+use crate::rt::exchange::{HapticOrder, Notice, TissueOrder, TissueStep};
 use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::world::World;
 use crate::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
@@ -121,7 +121,11 @@ impl Rig {
     #[cfg(test)]
     pub fn reset(&mut self) {
         let _ = self.loops.bridge.haptic_orders.push(HapticOrder::Reset { ticket: 0 });
-        let _ = self.loops.bridge.tissue_orders.push(TissueOrder::Reset);
+        let _ = self
+            .loops
+            .bridge
+            .tissue_orders
+            .push(TissueOrder::Step(0, TissueStep::Reset));
     }
 
     pub fn leave_needle(&mut self) {
@@ -152,10 +156,8 @@ impl Rig {
     }
 
     pub fn drop_seed(&mut self, strand_pitch_m: Option<f64>) {
-        let _ = self.loops.bridge.tissue_orders.push(TissueOrder::DropSeed {
-            ticket: 0,
-            strand_pitch_m,
-        });
+        let step = TissueStep::DropSeed { strand_pitch_m };
+        let _ = self.loops.bridge.tissue_orders.push(TissueOrder::Step(0, step));
     }
 
     pub fn state(&self) -> &HapticState {

@@ -288,14 +288,7 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
 
 fn order_of(order: &TapedOrder, lines: &mut LinesAgain) -> Result<TissueOrder, RepeatError> {
     Ok(match order {
-        TapedOrder::Limits(limits) => TissueOrder::Limits(limits.clone()),
-        TapedOrder::Migration(migration) => TissueOrder::Migration(*migration),
-        TapedOrder::DropSeed { strand_pitch_m } => TissueOrder::DropSeed {
-            ticket: 0,
-            strand_pitch_m: *strand_pitch_m,
-        },
-        TapedOrder::UndoSeed => TissueOrder::UndoSeed { ticket: 0 },
-        TapedOrder::Reset => TissueOrder::Reset,
+        TapedOrder::Step(step) => TissueOrder::Step(0, step.clone()),
         TapedOrder::Line { generation } => {
             TissueOrder::Line(lines.take(*generation).ok_or(RepeatError::NoLine(*generation))?)
         }

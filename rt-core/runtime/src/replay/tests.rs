@@ -4,7 +4,7 @@ use super::file::{DeviceFigures, Flight};
 use super::lines::{LineProgress, solve_again};
 use super::repeat::{self, RepeatError};
 use crate::lines::LineBody;
-use crate::rt::exchange::{HapticOrder, TissueOrder};
+use crate::rt::exchange::{HapticOrder, TissueOrder, TissueStep};
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
@@ -144,10 +144,7 @@ impl Recorded {
         self.run(0.2);
         self.go(12e-3);
         self.run(1.8);
-        let drop = TissueOrder::DropSeed {
-            ticket: 0,
-            strand_pitch_m: None,
-        };
+        let drop = TissueOrder::Step(0, TissueStep::DropSeed { strand_pitch_m: None });
         self.loops.bridge.tissue_orders.push(drop).expect("room");
         self.go(9e-3);
         self.run(3.0);

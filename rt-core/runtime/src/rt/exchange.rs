@@ -108,26 +108,31 @@ pub enum HapticOrder {
     },
 }
 
-/// Bridge to tissue.
-pub enum TissueOrder {
-    /// Keep these limits from this tick on.
-    Limits(Limits),
-    /// Let seeds migrate like that from this tick on.
-    Migration(Migration),
+/// Orders to the tissue loop that a flight recording repeats as they were.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum TissueStep {
+    /// Use these parameters from this tick on.
+    Parameters {
+        /// Limits of the links.
+        limits: Limits,
+        /// Migration of seeds.
+        migration: Migration,
+    },
     /// Leave a seed at the tip.
     DropSeed {
-        /// Number of the request.
-        ticket: Ticket,
         /// As in the request.
         strand_pitch_m: Option<f64>,
     },
     /// Remove the seed that was dropped last.
-    UndoSeed {
-        /// Number of the request.
-        ticket: Ticket,
-    },
+    UndoSeed,
     /// Return the tissue to rest and remove every seed.
     Reset,
+}
+
+/// Control thread to tissue.
+pub enum TissueOrder {
+    /// Carry out one step; answered under the ticket.
+    Step(Ticket, TissueStep),
     /// Run another scene from this tick on.
     World {
         /// Number of the request.

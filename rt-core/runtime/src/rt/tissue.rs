@@ -3,7 +3,7 @@
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid, Wait};
 use crate::rt::contact::Contact;
-use crate::rt::exchange::{Notice, Ticket, TissueOrder};
+use crate::rt::exchange::{Notice, Ticket, TissueOrder, TissueStep};
 use crate::rt::layers_met::LayersMet;
 use crate::rt::left_loads::LeftLoads;
 use crate::rt::line_loads::LineLoads;
@@ -234,25 +234,9 @@ impl TissueLoop {
     fn take_orders(&mut self) {
         while let Ok(order) = self.ports.orders.pop() {
             match order {
-                TissueOrder::Limits(limits) => {
-                    self.tape_order(TapedOrder::Limits(limits.clone()));
-                    self.world.set_limits(limits);
-                }
-                TissueOrder::Migration(migration) => {
-                    self.tape_order(TapedOrder::Migration(migration));
-                    self.world.migration = migration;
-                }
-                TissueOrder::DropSeed { ticket, strand_pitch_m } => {
-                    self.tape_order(TapedOrder::DropSeed { strand_pitch_m });
-                    self.drop_seed(ticket, strand_pitch_m);
-                }
-                TissueOrder::UndoSeed { ticket } => {
-                    self.tape_order(TapedOrder::UndoSeed);
-                    self.undo_seed(ticket);
-                }
-                TissueOrder::Reset => {
-                    self.tape_order(TapedOrder::Reset);
-                    self.reset();
+                TissueOrder::Step(ticket, step) => {
+                    self.tape_order(TapedOrder::Step(step.clone()));
+                    self.carry_out(ticket, step);
                 }
                 TissueOrder::World { ticket, world, tape } => {
                     self.swap(ticket, world);
@@ -273,6 +257,23 @@ impl TissueLoop {
                     });
                     self.take_line(line);
                 }
+            }
+        }
+    }
+
+    fn carry_out(&mut self, ticket: Ticket, step: TissueStep) {
+        let tick = self.response.tick;
+        match step {
+            TissueStep::Parameters { limits, migration } => {
+                self.world.set_limits(limits);
+                self.world.migration = migration;
+                self.notify(Notice::Done { ticket, tick });
+            }
+            TissueStep::DropSeed { strand_pitch_m } => self.drop_seed(ticket, strand_pitch_m),
+            TissueStep::UndoSeed => self.undo_seed(ticket),
+            TissueStep::Reset => {
+                self.reset();
+                self.notify(Notice::Done { ticket, tick });
             }
         }
     }

@@ -1,6 +1,7 @@
 //! What the tissue loop writes to its flight recording, each tick.
 
 use crate::rt::contact::Contact;
+use crate::rt::exchange::TissueStep;
 use crate::rt::layers_met::LayersMet;
 use crate::rt::left_loads::{LeftLoads, NeedleLoads};
 use crate::rt::line_loads::LineLoads;
@@ -31,25 +32,14 @@ pub const MAX_BODY_BYTES: usize = 8 << 20;
 /// An order to the tissue loop, as far as it can be written down. A new scene begins a new tape instead.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TapedOrder {
-    /// See [`TissueOrder::Limits`](crate::rt::exchange::TissueOrder).
-    Limits(Limits),
-    /// See [`TissueOrder::Migration`](crate::rt::exchange::TissueOrder).
-    Migration(Migration),
-    /// See [`TissueOrder::DropSeed`](crate::rt::exchange::TissueOrder).
-    DropSeed {
-        /// As in the order.
-        strand_pitch_m: Option<f64>,
-    },
-    /// See [`TissueOrder::UndoSeed`](crate::rt::exchange::TissueOrder).
-    UndoSeed,
-    /// See [`TissueOrder::Reset`](crate::rt::exchange::TissueOrder).
-    Reset,
-    /// See [`TissueOrder::Line`](crate::rt::exchange::TissueOrder).
+    /// A step, as it was ordered.
+    Step(TissueStep),
+    /// Another line of the needle.
     Line {
         /// Number of the line.
         generation: u64,
     },
-    /// See [`TissueOrder::Probe`](crate::rt::exchange::TissueOrder).
+    /// Another ultrasound probe.
     Probe {
         /// Edge of the elements that it was solved for in, m.
         edge_m: f64,
@@ -182,7 +172,7 @@ impl TissueTape {
             scene_generation: world.generation,
             scene,
             ticks: Last::new(&blank, room(!not_kept)),
-            orders: Last::new(&(0, TapedOrder::Reset), ORDERS),
+            orders: Last::new(&(0, TapedOrder::Step(TissueStep::Reset)), ORDERS),
             loads: Last::new(&(0, LineLoads::default()), room(!not_kept && tissue.has_lines())),
             left: None,
             probe: None,

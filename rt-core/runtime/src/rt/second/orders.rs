@@ -12,9 +12,14 @@ impl SecondLoop {
                 tape.order(order);
             }
             match order {
-                SecondOrder::Gate { generation, gate } => {
+                SecondOrder::Gate {
+                    ticket,
+                    generation,
+                    gate,
+                } => {
                     self.memory.gate_parameters = gate;
                     self.memory.state.parameters_generation = generation;
+                    self.notify(Notice::Done { ticket, tick });
                 }
                 SecondOrder::Hand { ticket, goal, promise } if goal.is_valid() => {
                     self.begin_motion(goal, promise);
@@ -30,7 +35,10 @@ impl SecondLoop {
                 }
                 SecondOrder::Engage => self.engage(tick),
                 SecondOrder::Disengage => self.memory.gate.release(),
-                SecondOrder::Reset => self.reset(),
+                SecondOrder::Reset { ticket } => {
+                    self.reset();
+                    self.notify(Notice::Done { ticket, tick });
+                }
                 SecondOrder::Up(up) => self.turn_up(up),
                 SecondOrder::KeepMoving(promise) => self.keep_moving(&promise),
                 SecondOrder::HandOverTape => self.ports.flight.hand_over(),

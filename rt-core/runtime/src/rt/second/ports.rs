@@ -41,6 +41,8 @@ impl Default for SecondPose {
 pub enum SecondOrder {
     /// Use these settings of the gate from this tick on.
     Gate {
+        /// Number of the request.
+        ticket: Ticket,
         /// Rises with each change of a run.
         generation: u64,
         /// The settings.
@@ -67,7 +69,10 @@ pub enum SecondOrder {
     /// Ramp the force out.
     Disengage,
     /// Clear peaks and counters.
-    Reset,
+    Reset {
+        /// Number of the request.
+        ticket: Ticket,
+    },
     /// Hand the flight recording over; the loop records anew once it has it back.
     HandOverTape,
     /// Where +y of the tool goes with the next goal; without it the simulated hand does not turn it about its axis.
