@@ -123,8 +123,8 @@ impl Session {
     ) -> Self {
         let mut session = Self::over_link(world, start, hand, force, tissue_every);
         // Both rings are empty.
-        let _ = session.loops.bridge.lines.push(line.hand);
-        let _ = session.loops.bridge.tissue_orders.push(TissueOrder::Line(line.body));
+        let _ = session.loops.control.lines.push(line.hand);
+        let _ = session.loops.control.tissue_orders.push(TissueOrder::Line(line.body));
         session
     }
 
@@ -168,7 +168,7 @@ impl Session {
             goal,
             promise: None,
         };
-        let _ = self.loops.bridge.haptic_orders.push(order);
+        let _ = self.loops.control.haptic_orders.push(order);
     }
 
     /// One tick of the force loop, and one of the tissue loop where it is due.
@@ -184,8 +184,8 @@ impl Session {
     /// The same, faults included.
     pub fn step_in_any_state(&mut self) -> ChainOutput {
         let output = self.loops.step();
-        let bridge = &mut self.loops.bridge;
-        for notices in [&mut bridge.haptic_notices, &mut bridge.tissue_notices] {
+        let control = &mut self.loops.control;
+        for notices in [&mut control.haptic_notices, &mut control.tissue_notices] {
             while notices.pop().is_ok() {}
         }
         output

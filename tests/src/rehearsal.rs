@@ -6,7 +6,7 @@ use stylet_host::link::SceneModel;
 use stylet_hw::DeviceInfo;
 use stylet_implant::plan::rehearse::{Drops, RehearsalError, Rehearser, Rest};
 use stylet_implant::workflow::Pace;
-use stylet_runtime::bridge::ScenePicture;
+use stylet_runtime::control::ScenePicture;
 use stylet_runtime::rehearse::{NeedleRun, RehearseError, Stage};
 use stylet_shm_schema::ParameterSet;
 use stylet_sim::scene::TissueKind;

@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use stylet_runtime::bridge;
+use stylet_runtime::control;
 use stylet_runtime::device::second_start;
 use stylet_runtime::rt::clock;
 use stylet_runtime::rt::timing::PoseTimes;
@@ -92,7 +92,7 @@ struct Eyes {
 impl Eyes {
     fn open(instance: &Instance) -> Result<Self, HostError> {
         let (socket, end) = Socket::pair().map_err(HostError::NotStarted)?;
-        let process = Command::new(bridge::program())
+        let process = Command::new(control::program())
             .args(["host", instance.name()])
             .stdin(Stdio::from(end))
             .stdout(Stdio::null())

@@ -7,7 +7,7 @@ use std::io;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use stylet_runtime::bridge;
+use stylet_runtime::control;
 use stylet_shm_schema::Instance;
 use stylet_wall::packet::Socket;
 
@@ -175,7 +175,7 @@ impl Running {
 
     fn start_host(&mut self, instance: &Instance) -> io::Result<()> {
         let (socket, end) = Socket::pair()?;
-        let mut command = Command::new(bridge::program());
+        let mut command = Command::new(control::program());
         command
             .args(["load", instance.name()])
             .stdin(Stdio::from(end))

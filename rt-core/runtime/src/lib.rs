@@ -1,9 +1,9 @@
-//! The running core: two real-time loops, the bridge that owns every port, flight recordings and rehearsals.
+//! The running core: two real-time loops, the control thread that owns every port, flight recordings and rehearsals.
 
 #![warn(missing_docs)]
 
 pub mod args;
-pub mod bridge;
+pub mod control;
 pub mod device;
 pub mod environment;
 pub mod kept_probe;

@@ -7,7 +7,7 @@ use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::tissue::TissueLoop;
 use crate::rt::tissue_tape::TissueTape;
-use crate::rt::wiring::{BridgePorts, Capacities, Wiring};
+use crate::rt::wiring::{Capacities, ControlPorts, Wiring};
 use crate::rt::world::World;
 use stylet_hw::Device;
 use stylet_sim::force::chain::ChainOutput;
@@ -15,14 +15,14 @@ use stylet_sim::force::chain::ChainOutput;
 /// Ticks of the force loop for each tick of the tissue loop, in a run.
 pub const HAPTIC_TICKS_PER_TISSUE_TICK: u64 = TISSUE_PERIOD_NS / HAPTIC_PERIOD_NS;
 
-/// Two loops without threads, and the bridge's ends of their rings.
+/// Two loops without threads, and the control thread's ends of their rings.
 pub struct SteppedLoops {
     /// The force loop.
     pub haptic: HapticLoop,
     /// The tissue loop.
     pub tissue: TissueLoop,
     /// Orders go in here, notices come out. Records are dropped after each step.
-    pub bridge: BridgePorts,
+    pub control: ControlPorts,
     tissue_period_ns: u64,
     now_ns: u64,
     missed: u32,
@@ -48,13 +48,17 @@ impl SteppedLoops {
         haptic_ticks_per_tissue_tick: u64,
         (haptic_tape, tissue_tape): (Option<Box<HapticTape>>, Option<Box<TissueTape>>),
     ) -> Self {
-        let Wiring { haptic, tissue, bridge } = Wiring::new(Capacities::STEPPED, haptic_tape, tissue_tape);
+        let Wiring {
+            haptic,
+            tissue,
+            control,
+        } = Wiring::new(Capacities::STEPPED, haptic_tape, tissue_tape);
         let tissue_period_ns = haptic_ticks_per_tissue_tick.max(1) * HAPTIC_PERIOD_NS;
         let seconds = |ns: u64| ns as f64 / 1e9;
         Self {
             haptic: HapticLoop::new(0, device, haptic, memory, seconds(HAPTIC_PERIOD_NS)),
             tissue: TissueLoop::new(0, tissue, world, seconds(tissue_period_ns)),
-            bridge,
+            control,
             tissue_period_ns,
             now_ns: 0,
             missed: 0,
@@ -65,7 +69,7 @@ impl SteppedLoops {
     pub fn step(&mut self) -> ChainOutput {
         self.now_ns += HAPTIC_PERIOD_NS;
         let output = self.haptic.tick(self.now_ns, self.now_ns, 0);
-        while self.bridge.records.pop().is_ok() {}
+        while self.control.records.pop().is_ok() {}
         if self.now_ns.is_multiple_of(self.tissue_period_ns) {
             if self.missed == 0 {
                 self.tissue.tick(self.now_ns);

@@ -5,7 +5,7 @@ use stylet_runtime::rt::exchange::HapticOrder;
 use stylet_runtime::rt::haptic::HapticLoop;
 use stylet_runtime::rt::haptic_tape::HapticMemory;
 use stylet_runtime::rt::response::TissueResponse;
-use stylet_runtime::rt::wiring::{BridgePorts, Capacities, TissuePorts, Wiring};
+use stylet_runtime::rt::wiring::{Capacities, ControlPorts, TissuePorts, Wiring};
 use stylet_shm_schema::{Fault, TickRecord};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::needle::{LayerKind, NeedleParameters};
@@ -31,7 +31,7 @@ pub struct Rig<F: Led> {
     haptic: HapticLoop,
     tissue: TissueResponse,
     tissue_ports: TissuePorts,
-    bridge: BridgePorts,
+    control: ControlPorts,
     contacts: u64,
     now_ns: u64,
     hand_m: f64,
@@ -64,7 +64,7 @@ impl<F: Led> Rig<F> {
             haptic: HapticLoop::new(1, device, wiring.haptic, &memory, 1e-3),
             tissue: TissueResponse::default(),
             tissue_ports: wiring.tissue,
-            bridge: wiring.bridge,
+            control: wiring.control,
             contacts: 0,
             now_ns,
             hand_m: OUTSIDE_M,
@@ -85,8 +85,8 @@ impl<F: Led> Rig<F> {
         self.tissue.time_ns = self.now_ns;
         self.tissue_ports.response.write(self.tissue);
         self.haptic.tick(self.now_ns, self.now_ns, 0);
-        while self.bridge.haptic_notices.pop().is_ok() {}
-        let record = self.bridge.records.pop().expect("a record for each tick");
+        while self.control.haptic_notices.pop().is_ok() {}
+        let record = self.control.records.pop().expect("a record for each tick");
         // The membrane is met where the tip passes it, and left where it is well outside.
         let depth_m = record.tip_in_scene_m[2];
         if depth_m > 0.0 && self.tissue.contact == 0 {
@@ -121,8 +121,8 @@ impl<F: Led> Rig<F> {
             if seen.fault() == Fault::None && self.haptic.state.flags & stylet_shm_schema::flags::ENGAGED != 0 {
                 break;
             }
-            if self.bridge.haptic_orders.slots() > 1 {
-                let _ = self.bridge.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
+            if self.control.haptic_orders.slots() > 1 {
+                let _ = self.control.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
             }
         }
         for _ in 0..250 {

@@ -266,7 +266,8 @@ fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
             // Half of them with a kind that exists, and values that are what is wrong.
             if n % 2 == 0 {
                 let value = f64::from_bits(random() | 0x7ff0_0000_0000_0000);
-                let change = ParameterChange { value, ..change };
+                let id = ParameterId::ForceScale;
+                let change = ParameterChange { id, value };
                 command = Request::SetParameters(vec![change])
                     .encode(random(), random())
                     .expect("fits");

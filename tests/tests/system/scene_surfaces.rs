@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::time::Instant;
 use stylet_host::link::SceneModel;
-use stylet_runtime::bridge::ScenePicture;
+use stylet_runtime::control::ScenePicture;
 use stylet_sim::scene::{Labels, Scene};
 use stylet_surfaces::bodies::{Bodies, Segmentation, shown_alone};
 

@@ -1,11 +1,11 @@
-//! Puts the process together: scene and device, shared memory, two armed threads, and the bridge on the calling thread.
+//! Puts the process together: scene and device, shared memory, two armed threads, and the control thread on the calling thread.
 
 pub mod limits;
 mod session;
 mod setup;
 mod threads;
 
-use crate::bridge::{Bridge, BridgeError, BridgeSetup, LOOP_ENDED};
+use crate::control::{BridgeError, Control, ControlSetup, LOOP_ENDED};
 use crate::device::{DeviceChoice, DeviceError, Libraries};
 use crate::rt::arm::{Refused, Usage};
 use crate::rt::clock::Wait;
@@ -190,39 +190,39 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
         .body
         .into_loops(options, session_id, &setup.source, probes, &is_watched);
     let second = loops.second.zip(shown.second_state);
-    let (second_loop, second_bridge) = second.map(setup::SecondLoops::join).unzip();
+    let (second_loop, second_control) = second.map(setup::SecondLoops::join).unzip();
     let threads = Threads::start(options, (loops.haptic, shown.state), loops.tissue, second_loop)?;
     let devices = (&info, second_info.as_ref());
     let session = session::session(options, session_id, devices, &threads, kernel.unlocked.as_deref());
-    let mut bridge = Bridge::new(
+    let mut control = Control::new(
         shown.wall,
-        loops.bridge,
-        BridgeSetup {
+        loops.control,
+        ControlSetup {
             device: info,
             session,
             picture: setup.picture,
             snapshots: setup.snapshots,
             tissue: options.tissue,
             source: setup.source,
-            second: second_bridge,
+            second: second_control,
             flight_folder: options.flight_folder.clone(),
             probe_folder: options.probe_folder.clone(),
             flight: session::flight(options, session_id, devices),
         },
     );
     // SYNC: set by a signal handler; nothing but the flag is carried.
-    let served = bridge.run(|| stop.load(Ordering::Acquire));
+    let served = control.run(|| stop.load(Ordering::Acquire));
     threads.end();
     if served.is_err() {
         // Not joined: a loop that stands still would be waited for in vain.
-        match bridge.save_flight_of_stopped(HAND_OVER_LIMIT) {
+        match control.save_flight_of_stopped(HAND_OVER_LIMIT) {
             Ok(path) => eprintln!("rt-core: flight recording {}", path.display()),
             Err(why) => eprintln!("rt-core: the flight recording was not saved: {why}"),
         }
         return Err(RunError::LoopStopped);
     }
     let ended = threads.join()?;
-    if let Err(why) = bridge.save_last_flight() {
+    if let Err(why) = control.save_last_flight() {
         eprintln!("rt-core: the flight recording was not saved: {why}");
     }
     Ok(RunReport {

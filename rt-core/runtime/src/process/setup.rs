@@ -1,17 +1,17 @@
 //! What a run needs before its threads start: scene, device, shared memory, locked memory, and both loops.
 
 use super::{Options, RunError, SecondOptions};
-use crate::bridge::{Boards, ScenePicture, SecondSetup, SnapshotBoard, Wall, snapshot_board};
+use crate::control::{Boards, ScenePicture, SecondSetup, SnapshotBoard, Wall, snapshot_board};
 use crate::device;
 use crate::rt::arm::{self, Ask, CoresAwake};
 use crate::rt::clock::{self, TISSUE_PERIOD_NS, TISSUE_PHASE, Wait};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
-use crate::rt::second::{self, SecondBridgePorts, SecondLoop, SecondMemory, SecondTape, gate_of};
+use crate::rt::second::{self, SecondControlPorts, SecondLoop, SecondMemory, SecondTape, gate_of};
 use crate::rt::timing::Probes;
 use crate::rt::tissue::TissueLoop;
 use crate::rt::tissue_tape::TissueTape;
-use crate::rt::wiring::{BridgePorts, Capacities, Wiring};
+use crate::rt::wiring::{Capacities, ControlPorts, Wiring};
 use crate::rt::world::World;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -41,27 +41,27 @@ pub(super) struct Body {
     world: Box<World>,
 }
 
-/// Both loops and the bridge's ends of their rings.
+/// Both loops and the control thread's ends of their rings.
 pub(super) struct Loops {
     pub haptic: HapticLoop,
     pub tissue: TissueLoop,
-    pub bridge: BridgePorts,
+    pub control: ControlPorts,
     pub second: Option<SecondLoops>,
 }
 
-/// The second device's loop and the bridge's ends of its rings.
+/// The second device's loop and the control thread's ends of its rings.
 pub(super) struct SecondLoops {
     own: SecondLoop,
     info: DeviceInfo,
-    bridge: SecondBridgePorts,
+    control: SecondControlPorts,
 }
 
 impl SecondLoops {
-    /// What its thread needs, and what the bridge needs.
+    /// What its thread needs, and what the control thread needs.
     pub fn join((loops, board): (Self, Writer<SecondState>)) -> ((SecondLoop, Writer<SecondState>), SecondSetup) {
         let setup = SecondSetup {
             device: loops.info,
-            ports: loops.bridge,
+            ports: loops.control,
         };
         ((loops.own, board), setup)
     }
@@ -126,7 +126,7 @@ impl Setup {
         })
     }
 
-    /// Makes the boards and starts the bridge.
+    /// Makes the boards and starts the control thread.
     pub fn show(&self, owned: Owned, is_watched: &Arc<AtomicBool>) -> Result<Shown, RunError> {
         let (state, memory) = Writer::new("stylet-state", 0).map_err(RunError::Board)?;
         let second = self.second_info.map(|_| Writer::new("stylet-second-state", 0));
@@ -189,11 +189,11 @@ impl Body {
             let info = device.info();
             let memory = SecondMemory::new(&info, gate_of(&self.active.force.gate, &info), !options.no_rt);
             let tape = Box::new(SecondTape::new(&memory));
-            let (ports, tissue, bridge) = second::wire(Capacities::RUN, Some(tape));
+            let (ports, tissue, control) = second::wire(Capacities::RUN, Some(tape));
             wiring.tissue.second = Some(tissue);
             let mut own = SecondLoop::new(session_id, device, ports, &memory, seconds(second.period_ns));
             own.wait = Wait::at_period(second.period_ns);
-            SecondLoops { own, info, bridge }
+            SecondLoops { own, info, control }
         });
         let period_s = seconds(options.haptic_period_ns);
         let mut haptic = HapticLoop::new(session_id, self.device, wiring.haptic, &memory, period_s);
@@ -212,7 +212,7 @@ impl Body {
         Loops {
             haptic,
             tissue,
-            bridge: wiring.bridge,
+            control: wiring.control,
             second,
         }
     }

@@ -19,7 +19,7 @@ struct Started {
     granted: ThreadReport,
 }
 
-/// All threads. The loops have a flag of their own: the bridge must be able to end them when a host asks.
+/// All threads. The loops have a flag of their own: the control thread must be able to end them when a host asks.
 pub(super) struct Threads {
     haptic: Started,
     tissue: Started,

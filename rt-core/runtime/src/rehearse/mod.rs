@@ -2,7 +2,7 @@
 //!
 //! Nothing is modelled anew: the simulated hand and device, `HapticLoop::tick` and `TissueLoop::tick` are those of the live
 //! run, fed with a time that does not wait. Each rehearsal begins with tissue at rest, and the same needle gives the same bytes.
-//! Runs on a thread of normal priority (`bridge/rehearsals.rs`).
+//! Runs on a thread of normal priority (`control/rehearsals.rs`).
 
 mod motion;
 mod rig;
@@ -212,7 +212,7 @@ impl Stage {
             .count();
         self.kept.truncate(same);
         for (number, axis) in wanted.iter().enumerate().skip(same) {
-            // SYNC: set by the bridge when it ends; nothing but the flag is carried.
+            // SYNC: set by the control thread when it ends; nothing but the flag is carried.
             let mut goes_on = || !stop.load(Ordering::Relaxed);
             let others: Vec<_> = self.kept.iter().map(|(.., line)| line.stations.clone()).collect();
             let generation = number as u64 + 1;
@@ -307,7 +307,7 @@ fn perform(
     rig.forget_peaks();
     let mut dropped_after_s = Vec::new();
     while rig.seconds() < LONGEST_S {
-        // SYNC: set by the bridge when it ends; nothing but the flag is carried.
+        // SYNC: set by the control thread when it ends; nothing but the flag is carried.
         if stop.load(Ordering::Relaxed) {
             return Err(RehearseError::Stopped);
         }

@@ -54,7 +54,7 @@ impl Rig {
     pub fn take_lines_of_many(&mut self, mut lines: Vec<ReadyLine>) {
         lines.reverse();
         self.lines = lines;
-        let _ = self.loops.bridge.rooms.push(LeftNeedles::with_room());
+        let _ = self.loops.control.rooms.push(LeftNeedles::with_room());
     }
 
     /// Before the first tick: needles that stay in stand as `record` has them, on those of `lines` that it names.
@@ -88,17 +88,17 @@ impl Rig {
     /// Before the needle begins.
     pub fn take_line(&mut self, line: ReadyLine) {
         // Both rings are empty.
-        let _ = self.loops.bridge.lines.push(line.hand);
-        let _ = self.loops.bridge.tissue_orders.push(TissueOrder::Line(line.body));
+        let _ = self.loops.control.lines.push(line.hand);
+        let _ = self.loops.control.tissue_orders.push(TissueOrder::Line(line.body));
     }
 
     /// One tick of the force loop, and of the tissue loop where one is due: then true.
     pub fn tick(&mut self) -> bool {
         let tissue_tick = self.loops.tissue.response().tick;
         self.loops.step();
-        let bridge = &mut self.loops.bridge;
-        while bridge.old_hand_lines.pop().is_ok() || bridge.old_body_lines.pop().is_ok() {}
-        for notices in [&mut bridge.haptic_notices, &mut bridge.tissue_notices] {
+        let control = &mut self.loops.control;
+        while control.old_hand_lines.pop().is_ok() || control.old_body_lines.pop().is_ok() {}
+        for notices in [&mut control.haptic_notices, &mut control.tissue_notices] {
             while let Ok(notice) = notices.pop() {
                 if let Notice::Refused { why, .. } = notice {
                     self.refusal = Some(why);
@@ -115,15 +115,15 @@ impl Rig {
 
     pub fn engage(&mut self) {
         // Both rings are emptied before the script goes on, and are never full.
-        let _ = self.loops.bridge.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
+        let _ = self.loops.control.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
     }
 
     #[cfg(test)]
     pub fn reset(&mut self) {
-        let _ = self.loops.bridge.haptic_orders.push(HapticOrder::Reset { ticket: 0 });
+        let _ = self.loops.control.haptic_orders.push(HapticOrder::Reset { ticket: 0 });
         let _ = self
             .loops
-            .bridge
+            .control
             .tissue_orders
             .push(TissueOrder::Step(0, TissueStep::Reset));
     }
@@ -131,7 +131,7 @@ impl Rig {
     pub fn leave_needle(&mut self) {
         let _ = self
             .loops
-            .bridge
+            .control
             .haptic_orders
             .push(HapticOrder::LeaveNeedle { ticket: 0 });
     }
@@ -148,7 +148,7 @@ impl Rig {
             speed_m_per_s: hand.speed_m_per_s,
             acceleration_m_per_s2: hand.acceleration_m_per_s2,
         };
-        let _ = self.loops.bridge.haptic_orders.push(HapticOrder::Hand {
+        let _ = self.loops.control.haptic_orders.push(HapticOrder::Hand {
             ticket: 0,
             goal,
             promise: None,
@@ -157,7 +157,7 @@ impl Rig {
 
     pub fn drop_seed(&mut self, strand_pitch_m: Option<f64>) {
         let step = TissueStep::DropSeed { strand_pitch_m };
-        let _ = self.loops.bridge.tissue_orders.push(TissueOrder::Step(0, step));
+        let _ = self.loops.control.tissue_orders.push(TissueOrder::Step(0, step));
     }
 
     pub fn state(&self) -> &HapticState {
@@ -181,7 +181,7 @@ impl Rig {
             speed_m_per_s: 0.05,
             promise: None,
         };
-        let _ = self.loops.bridge.haptic_orders.push(order);
+        let _ = self.loops.control.haptic_orders.push(order);
     }
 
     #[cfg(test)]
@@ -196,7 +196,7 @@ impl Rig {
 
     #[cfg(test)]
     pub fn take_probe(&mut self, probe: Box<stylet_sim::probe::BodyProbe>) {
-        let _ = self.loops.bridge.tissue_orders.push(TissueOrder::Probe {
+        let _ = self.loops.control.tissue_orders.push(TissueOrder::Probe {
             generation: 1,
             room: crate::rt::probe_tape::ProbeTape::new(&probe),
             probe,

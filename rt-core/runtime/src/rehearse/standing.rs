@@ -175,7 +175,7 @@ fn drive(
     mut advance: impl FnMut(&mut Rig) -> Result<bool, RehearseError>,
 ) -> Result<(), RehearseError> {
     while rig.seconds() < LONGEST_S {
-        // SYNC: set by the bridge when it ends; nothing but the flag is carried.
+        // SYNC: set by the control thread when it ends; nothing but the flag is carried.
         if stop.load(Ordering::Relaxed) {
             return Err(RehearseError::Stopped);
         }

@@ -105,7 +105,7 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
     let Wiring {
         haptic: ports,
         mut tissue,
-        mut bridge,
+        mut control,
     } = Wiring::new(capacities(recorded.orders.len()), Some(tape), None);
     let answers = recorded.ticks.iter().map(|e| (e.read, e.write_failed)).collect();
     let device = RecordedDevice::new(flight.device.info(), answers);
@@ -124,19 +124,19 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
     {
         return Err(RepeatError::OtherLeft);
     }
-    let _ = bridge.rooms.push(LeftNeedles::with_room());
+    let _ = control.rooms.push(LeftNeedles::with_room());
     let mut found = Repeated::default();
     let mut orders = recorded.orders.iter().peekable();
     let mut lines = recorded.lines.iter().peekable();
     let mut outside = recorded.outside.iter().peekable();
     for (index, entry) in recorded.ticks.iter().enumerate() {
         while let Some((_, line)) = lines.next_if(|(tick, _)| *tick == index as u64) {
-            let _ = bridge.lines.push(hand_line(flight, *line)?);
+            let _ = control.lines.push(hand_line(flight, *line)?);
         }
         while let Some((_, order)) = orders.next_if(|(tick, _)| *tick == index as u64) {
             // A tape that is handed over changes nothing of what the loop does.
             if !matches!(order, HapticOrder::HandOverTape) {
-                let _ = bridge.haptic_orders.push(*order);
+                let _ = control.haptic_orders.push(*order);
             }
         }
         // Where the probe did nothing to a line, or there was none, the loop is to find none: it would meet what an older tick left.
@@ -150,9 +150,9 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
         tissue.outside.publish();
         tissue.response.write(entry.tissue);
         again.tick(entry.record.due_ns, entry.woke_ns, entry.record.missed);
-        while bridge.haptic_notices.pop().is_ok() {}
-        while bridge.old_hand_lines.pop().is_ok() {}
-        found.count(index, bridge.records.pop().is_ok_and(|record| is_same(&record, entry)));
+        while control.haptic_notices.pop().is_ok() {}
+        while control.old_hand_lines.pop().is_ok() {}
+        found.count(index, control.records.pop().is_ok_and(|record| is_same(&record, entry)));
     }
     Ok(found)
 }
@@ -216,7 +216,7 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
     let Wiring {
         mut haptic,
         tissue: ports,
-        mut bridge,
+        mut control,
     } = Wiring::new(capacities(recorded.orders.len()), None, Some(tape));
     let mut again = TissueLoop::new(flight.session_id, ports, world()?, flight.tissue_period_s);
     let before = match recorded.memory.response.line {
@@ -258,7 +258,7 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
             compare.positions(&again, memory);
         }
         while let Some((_, order)) = orders.next_if(|(tick, _)| *tick == index as u64) {
-            let _ = bridge.tissue_orders.push(order_of(order, &mut lines)?);
+            let _ = control.tissue_orders.push(order_of(order, &mut lines)?);
         }
         while let Some((_, loads)) = loads.next_if(|(tick, _)| *tick == index as u64) {
             all.line = *loads;
@@ -276,8 +276,8 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
         }
         haptic.pose.write(entry.pose);
         again.tick(entry.woke_ns);
-        while bridge.tissue_notices.pop().is_ok() {}
-        while bridge.old_body_lines.pop().is_ok() {}
+        while control.tissue_notices.pop().is_ok() {}
+        while control.old_body_lines.pop().is_ok() {}
         compare
             .found
             .count(index, same_step(&again, entry) && is_pressed_so(&again, pressed));

@@ -12,7 +12,7 @@ pub fn second(flight: &Flight, recorded: &SecondFlight) -> Repeated {
         return found;
     };
     let tape = Box::new(SecondTape::new(&recorded.memory));
-    let (ports, mut tissue, mut bridge) = wire(capacities(recorded.orders.len()), Some(tape));
+    let (ports, mut tissue, mut control) = wire(capacities(recorded.orders.len()), Some(tape));
     let answers = recorded.ticks.iter().map(|e| (e.read, e.write_failed)).collect();
     let device = Box::new(RecordedDevice::new(figures.device.info(), answers));
     let mut again = SecondLoop::new(flight.session_id, device, ports, &recorded.memory, figures.period_s);
@@ -21,13 +21,13 @@ pub fn second(flight: &Flight, recorded: &SecondFlight) -> Repeated {
         while let Some((_, order)) = orders.next_if(|(tick, _)| *tick == index as u64) {
             // A tape that is handed over changes nothing of what the loop does.
             if *order != SecondOrder::HandOverTape {
-                let _ = bridge.orders.push(*order);
+                let _ = control.orders.push(*order);
             }
         }
         tissue.response.write(entry.response);
         again.tick(entry.record.due_ns, entry.woke_ns, entry.record.missed);
-        while bridge.notices.pop().is_ok() {}
-        let record = bridge.records.pop();
+        while control.notices.pop().is_ok() {}
+        let record = control.records.pop();
         found.count(index, record.is_ok_and(|record| is_same(&record, &entry.record)));
     }
     found

@@ -23,7 +23,7 @@ mod left;
 mod motion;
 mod probe;
 
-/// The loops with their tapes, and what the bridge would keep beside them.
+/// The loops with their tapes, and what the control thread would keep beside them.
 struct Recorded {
     loops: SteppedLoops,
     entry_m: Vector3<f64>,
@@ -84,7 +84,7 @@ impl Recorded {
     }
 
     fn haptic(&mut self, order: HapticOrder) {
-        self.loops.bridge.haptic_orders.push(order).expect("room");
+        self.loops.control.haptic_orders.push(order).expect("room");
     }
 
     /// The line under that number, to both loops.
@@ -92,9 +92,9 @@ impl Recorded {
         let (mut hand, mut body) = (self.line.hand.clone(), self.line.body.clone());
         (hand.generation, body.generation) = (generation, generation);
         self.kept.push(hand.source());
-        let bridge = &mut self.loops.bridge;
-        bridge.lines.push(hand).expect("room");
-        bridge.tissue_orders.push(TissueOrder::Line(body)).expect("room");
+        let control = &mut self.loops.control;
+        control.lines.push(hand).expect("room");
+        control.tissue_orders.push(TissueOrder::Line(body)).expect("room");
     }
 
     fn go(&mut self, depth_m: f64) {
@@ -116,9 +116,9 @@ impl Recorded {
             let before = stylet_heap::calls_of_this_thread();
             self.loops.step();
             self.heap_calls += stylet_heap::calls_of_this_thread() - before;
-            let bridge = &mut self.loops.bridge;
-            while bridge.haptic_notices.pop().is_ok() || bridge.tissue_notices.pop().is_ok() {}
-            while bridge.old_hand_lines.pop().is_ok() || bridge.old_body_lines.pop().is_ok() {}
+            let control = &mut self.loops.control;
+            while control.haptic_notices.pop().is_ok() || control.tissue_notices.pop().is_ok() {}
+            while control.old_hand_lines.pop().is_ok() || control.old_body_lines.pop().is_ok() {}
         }
     }
 
@@ -145,7 +145,7 @@ impl Recorded {
         self.go(12e-3);
         self.run(1.8);
         let drop = TissueOrder::Step(0, TissueStep::DropSeed { strand_pitch_m: None });
-        self.loops.bridge.tissue_orders.push(drop).expect("room");
+        self.loops.control.tissue_orders.push(drop).expect("room");
         self.go(9e-3);
         self.run(3.0);
         self.go(-8e-3);
@@ -162,11 +162,11 @@ impl Recorded {
     fn flight(&mut self) -> Flight {
         self.haptic(HapticOrder::HandOverTape);
         let order = TissueOrder::HandOverTape;
-        self.loops.bridge.tissue_orders.push(order).expect("room");
+        self.loops.control.tissue_orders.push(order).expect("room");
         self.run(0.005);
-        let bridge = &mut self.loops.bridge;
-        let haptic = bridge.haptic_tapes.taken.pop().expect("handed over");
-        let tissue = bridge.tissue_tapes.taken.pop().expect("handed over");
+        let control = &mut self.loops.control;
+        let haptic = control.haptic_tapes.taken.pop().expect("handed over");
+        let tissue = control.tissue_tapes.taken.pop().expect("handed over");
         let flight = Flight {
             version: String::new(),
             session_id: 0,
@@ -181,8 +181,8 @@ impl Recorded {
             haptic: haptic.flight(),
             tissue: tissue.flight(),
         };
-        bridge.haptic_tapes.back.push(haptic).expect("room");
-        bridge.tissue_tapes.back.push(tissue).expect("room");
+        control.haptic_tapes.back.push(haptic).expect("room");
+        control.tissue_tapes.back.push(tissue).expect("room");
         flight
     }
 }

@@ -1,4 +1,4 @@
-//! How much each ring between the loops and the bridge holds.
+//! How much each ring between the loops and the control thread holds.
 
 /// Places in each ring, all at least one.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +14,7 @@ pub struct Capacities {
 }
 
 impl Capacities {
-    /// A run: the bridge may be late by four seconds of records.
+    /// A run: the control thread may be late by four seconds of records.
     pub const RUN: Self = Self {
         records: 4096,
         orders: 256,

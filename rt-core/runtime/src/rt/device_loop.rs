@@ -63,7 +63,7 @@ pub fn run<L: DeviceLoop>(
     let (mut missed, mut sleeps) = (0, 0);
     let mut last_ticks = device_loop.ramp_out_ticks() + 1;
     while last_ticks > 0 {
-        // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
+        // SYNC: pairs with the control thread's release store; nothing but the flag is carried.
         if stop.load(Ordering::Acquire) {
             device_loop.release_for_the_end();
             last_ticks -= 1;

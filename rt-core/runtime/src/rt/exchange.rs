@@ -1,4 +1,4 @@
-//! What the bridge and the loops hand each other: orders and notices, through wait-free rings.
+//! What the control thread and the loops hand each other: orders and notices, through wait-free rings.
 
 use crate::rt::motion_lease::Promise;
 use crate::rt::probe_tape::ProbeTape;
@@ -18,7 +18,7 @@ use stylet_sim::probe::BodyProbe;
 /// Number that joins an order to the host's request; 0 when nobody waits for an answer.
 pub type Ticket = u64;
 
-/// Bridge to haptic.
+/// Control thread to haptic.
 // Copied through a ring: a box would be freed in the loop.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -161,7 +161,7 @@ pub enum TissueOrder {
     },
 }
 
-/// Either loop to the bridge: what happened, once each.
+/// Either loop to the control thread: what happened, once each.
 #[derive(Clone, Copy, Debug)]
 pub enum Notice {
     /// An order was carried out.

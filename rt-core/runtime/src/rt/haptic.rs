@@ -162,7 +162,7 @@ impl HapticLoop {
     }
 
     fn notify(&mut self, notice: Notice) {
-        // A full ring means that the bridge has ended: nobody reads notices any more.
+        // A full ring means that the control thread has ended: nobody reads notices any more.
         let _ = self.ports.notices.push(notice);
     }
 

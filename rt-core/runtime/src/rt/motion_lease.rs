@@ -1,6 +1,6 @@
 //! The lease of a motion: a goal that a host set is followed while that host says that it still lives.
 //!
-//! Judged in ticks of the loop that moves the hand, so that a bridge that hangs stops the hand as well.
+//! Judged in ticks of the loop that moves the hand, so that a control thread that hangs stops the hand as well.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 //!
 //! A loop writes to a tape that it owns: no lock, no heap call, no system call. A tape holds the inputs and outputs of
 //! each tick, the orders taken, and now and then a checkpoint of all that one tick leaves to the next. When asked, the
-//! loop hands the whole tape to the bridge through a ring, continues without one, and records again when it returns.
+//! loop hands the whole tape to the control thread through a ring, continues without one, and records again when it returns.
 
 /// Ticks of the haptic loop that a recording reaches back, at least.
 pub const FLIGHT_TICKS: usize = 4000;
@@ -87,7 +87,7 @@ pub fn complete_from<T>(orders: &Last<(u64, T)>) -> u64 {
     orders.get(orders.first()).map_or(0, |(tick, _)| tick + 1)
 }
 
-/// A tape that a loop and the bridge pass to each other.
+/// A tape that a loop and the control thread pass to each other.
 pub trait Tape {
     /// Forgets what it holds. Allocates nothing.
     fn clear(&mut self);
@@ -102,7 +102,7 @@ pub struct Recorder<T> {
     back: rtrb::Consumer<Box<T>>,
 }
 
-/// The bridge's end.
+/// The control thread's end.
 pub struct TapePort<T> {
     /// Tapes that the loop has handed over.
     pub taken: rtrb::Consumer<Box<T>>,
@@ -122,7 +122,7 @@ pub fn recorder<T>(tape: Option<Box<T>>) -> (Recorder<T>, TapePort<T>) {
 
 impl<T: Tape> Recorder<T> {
     /// The tape for the tick that begins now. A returned tape is cleared and begins with a whole tick; one of an earlier
-    /// scene is sent to the bridge again, which returned it before it knew of the present one.
+    /// scene is sent to the control thread again, which returned it before it knew of the present one.
     pub fn begin_tick(&mut self, scene_generation: u64) -> Option<&mut T> {
         if let Ok(mut tape) = self.back.pop() {
             if self.tape.is_none() && tape.is_for(scene_generation) {
@@ -150,7 +150,7 @@ impl<T: Tape> Recorder<T> {
         self.tape = Some(tape);
     }
 
-    /// Sends the tape to the bridge.
+    /// Sends the tape to the control thread.
     pub fn hand_over(&mut self) {
         if let Some(tape) = self.tape.take() {
             self.send(tape);
@@ -215,7 +215,7 @@ mod tests {
         recorder.replace(Box::new(Blank(2, false)));
         port.back.push(port.taken.pop().unwrap()).ok().unwrap();
         assert_eq!(recorder.begin_tick(2).unwrap().0, 2);
-        // It used to stay in the ring as long as the loop had another: 7 MB for each change of the scene that the bridge knew late.
+        // It used to stay in the ring as long as the loop had another: 7 MB for each change of the scene that the control thread knew late.
         assert_eq!(port.taken.pop().expect("out again at once").0, 1);
         recorder.hand_over();
         assert!(recorder.begin_tick(2).is_none());

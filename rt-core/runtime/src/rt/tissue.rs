@@ -171,7 +171,7 @@ impl TissueLoop {
     pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool) -> u64 {
         let mut grid = Grid::at_phase(clock::now_ns(), (self.period_s * 1e9).round() as u64, self.phase_ns);
         let (mut missed, mut sleeps) = (0, 0);
-        // SYNC: pairs with the bridge's release store; nothing but the flag is carried.
+        // SYNC: pairs with the control thread's release store; nothing but the flag is carried.
         while !stop.load(Ordering::Acquire) {
             sleeps += Wait::default().until(grid.due_ns);
             let woke_ns = clock::now_ns();
@@ -279,7 +279,7 @@ impl TissueLoop {
     }
 
     fn notify(&mut self, notice: Notice) {
-        // A full ring means that the bridge has ended: nobody reads notices any more.
+        // A full ring means that the control thread has ended: nobody reads notices any more.
         let _ = self.ports.notices.push(notice);
     }
 

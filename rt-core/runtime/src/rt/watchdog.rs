@@ -2,7 +2,7 @@
 //!
 //! [`RAMP_OUT_TICKS`](stylet_sim::force::gate::RAMP_OUT_TICKS) ticks after the one that raises a fault the force is zero, on a straight ramp. The first
 //! fault is kept until the operator re-arms. A haptic loop that stops altogether cannot watch itself: that is seen
-//! by `bridge/supervisor.rs`.
+//! by `control/supervisor.rs`.
 
 use crate::rt::taped::fault_code;
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Every ring and triple buffer between the two loops and the bridge: made here, in one call, and nowhere else.
+//! Every ring and triple buffer between the two loops and the control thread: made here, in one call, and nowhere else.
 
 pub use crate::rt::capacities::Capacities;
 use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
@@ -17,7 +17,7 @@ use stylet_shm_schema::TickRecord;
 use stylet_sim::line::{BodyLine, HandLine, LeftNeedles, MAX_LEFT};
 use stylet_sim::probe::BodyProbe;
 
-/// Lines on their way in each direction; the bridge frees what has come back before it sends another.
+/// Lines on their way in each direction; the control thread frees what has come back before it sends another.
 const LINES: usize = 2;
 /// Lines on their way back: those that stay in may all come at once.
 const OLD_LINES: usize = LINES + 2 * MAX_LEFT;
@@ -36,15 +36,15 @@ pub struct HapticPorts {
     pub outside: triple_buffer::Output<Outside>,
     /// Room to record it.
     pub outside_rooms: rtrb::Consumer<Box<OutsideTape>>,
-    /// Orders of the bridge.
+    /// Orders of the control thread.
     pub orders: rtrb::Consumer<HapticOrder>,
-    /// What happened, to the bridge.
+    /// What happened, to the control thread.
     pub notices: rtrb::Producer<Notice>,
-    /// One record for each tick, to the bridge.
+    /// One record for each tick, to the control thread.
     pub records: rtrb::Producer<TickRecord>,
     /// Lines that are ready for the needle.
     pub lines: rtrb::Consumer<Box<HandLine>>,
-    /// Replaced ones, to the bridge, which frees them.
+    /// Replaced ones, to the control thread, which frees them.
     pub old_lines: rtrb::Producer<Box<HandLine>>,
     /// Room for needles that stay in.
     pub rooms: rtrb::Consumer<Box<LeftNeedles>>,
@@ -62,15 +62,15 @@ pub struct TissuePorts {
     pub response: triple_buffer::Input<TissueResponse>,
     /// What the probe does to the line, to the force loop.
     pub outside: triple_buffer::Input<Outside>,
-    /// Orders of the bridge.
+    /// Orders of the control thread.
     pub orders: rtrb::Consumer<TissueOrder>,
-    /// What happened, to the bridge.
+    /// What happened, to the control thread.
     pub notices: rtrb::Producer<Notice>,
-    /// Replaced scenes, to the bridge, which frees them.
+    /// Replaced scenes, to the control thread, which frees them.
     pub old_worlds: rtrb::Producer<Box<World>>,
-    /// Replaced columns of a line, to the bridge, which frees them.
+    /// Replaced columns of a line, to the control thread, which frees them.
     pub old_lines: rtrb::Producer<Box<BodyLine>>,
-    /// Probes of replaced scenes, to the bridge, which frees them.
+    /// Probes of replaced scenes, to the control thread, which frees them.
     pub old_probes: rtrb::Producer<Box<BodyProbe>>,
     /// Forces on the line, of the force loop.
     pub loads: triple_buffer::Output<AllLoads>,
@@ -82,8 +82,8 @@ pub struct TissuePorts {
     pub flight: Recorder<TissueTape>,
 }
 
-/// Ends that the bridge owns, or whoever steps the loops in its place.
-pub struct BridgePorts {
+/// Ends that the control thread owns, or whoever steps the loops in its place.
+pub struct ControlPorts {
     /// Records of the force loop.
     pub records: rtrb::Consumer<TickRecord>,
     /// Orders to the force loop.
@@ -120,12 +120,12 @@ pub struct Wiring {
     pub haptic: HapticPorts,
     /// For the tissue loop.
     pub tissue: TissuePorts,
-    /// For the bridge.
-    pub bridge: BridgePorts,
+    /// For the control thread.
+    pub control: ControlPorts,
 }
 
 impl Wiring {
-    /// Joins two loops and a bridge. A loop without a tape is not recorded.
+    /// Joins two loops and a control thread. A loop without a tape is not recorded.
     // SYNC: every ring and triple buffer is single-producer single-consumer; their crates pair release with acquire.
     pub fn new(
         capacities: Capacities,
@@ -179,7 +179,7 @@ impl Wiring {
                 second: None,
                 flight: tissue_flight,
             },
-            bridge: BridgePorts {
+            control: ControlPorts {
                 records,
                 haptic_orders,
                 haptic_notices,

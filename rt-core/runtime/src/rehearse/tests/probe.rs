@@ -194,7 +194,7 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
         ..SimulatedPhantomConfig::default()
     });
     let memory = SecondMemory::new(&info, gate_of(&Default::default(), &info), false);
-    let (ports, tissue_ports, mut bridge) = wire(Capacities::STEPPED, None);
+    let (ports, tissue_ports, mut control) = wire(Capacities::STEPPED, None);
     let mut wiring = Wiring::new(Capacities::STEPPED, None, None);
     wiring.tissue.second = Some(tissue_ports);
     let world = theatre.stage.world.take().expect("a body");
@@ -209,7 +209,7 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
             probe,
             room,
         };
-        assert!(wiring.bridge.tissue_orders.push(order).is_ok());
+        assert!(wiring.control.tissue_orders.push(order).is_ok());
     }
     let mut now_ns = 1_000_000_000;
     let mut go = |to: ProbePose, ticks: usize| {
@@ -227,16 +227,16 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
                 promise: None,
             },
         ] {
-            assert!(bridge.orders.push(order).is_ok());
+            assert!(control.orders.push(order).is_ok());
         }
         let mut wrench = stylet_hw::Wrench::zero();
         for n in 0..ticks {
             now_ns += 1_000_000;
             wrench = second.tick(now_ns, now_ns, 0).wrench;
-            while bridge.records.pop().is_ok() || bridge.notices.pop().is_ok() {}
+            while control.records.pop().is_ok() || control.notices.pop().is_ok() {}
             if n % 5 == 4 {
                 tissue.tick(now_ns);
-                while wiring.bridge.tissue_notices.pop().is_ok() {}
+                while wiring.control.tissue_notices.pop().is_ok() {}
             }
         }
         let gland = theatre.stage.target.mean_m(tissue.body());

@@ -29,10 +29,10 @@ impl Recorded {
                 ..ForceParameters::default()
             },
         });
-        let bridge = &mut self.loops.bridge;
-        assert!(bridge.rooms.push(LeftNeedles::with_room()).is_ok());
+        let control = &mut self.loops.control;
+        assert!(control.rooms.push(LeftNeedles::with_room()).is_ok());
         let room = TissueOrder::LeftRoom(crate::rt::tissue_tape::LeftTape::new());
-        assert!(bridge.tissue_orders.push(room).is_ok());
+        assert!(control.tissue_orders.push(room).is_ok());
     }
 
     /// A line beside the first one, which knows it.
@@ -52,10 +52,10 @@ impl Recorded {
 
     pub(super) fn give(&mut self, line: &ReadyLine) {
         self.kept.push(line.hand.source());
-        let bridge = &mut self.loops.bridge;
-        bridge.lines.push(line.hand.clone()).expect("room");
+        let control = &mut self.loops.control;
+        control.lines.push(line.hand.clone()).expect("room");
         let order = TissueOrder::Line(line.body.clone());
-        bridge.tissue_orders.push(order).expect("room");
+        control.tissue_orders.push(order).expect("room");
     }
 
     /// The hand on the axis that far beside the first needle's.
@@ -79,14 +79,14 @@ impl Recorded {
         let mut refused = Vec::new();
         for _ in 0..(1e3 * seconds) as u64 {
             self.loops.step();
-            let bridge = &mut self.loops.bridge;
-            while let Ok(notice) = bridge.haptic_notices.pop() {
+            let control = &mut self.loops.control;
+            while let Ok(notice) = control.haptic_notices.pop() {
                 if let crate::rt::exchange::Notice::Refused { why, .. } = notice {
                     refused.push(why);
                 }
             }
-            while bridge.tissue_notices.pop().is_ok() {}
-            while bridge.old_hand_lines.pop().is_ok() || bridge.old_body_lines.pop().is_ok() {}
+            while control.tissue_notices.pop().is_ok() {}
+            while control.old_hand_lines.pop().is_ok() || control.old_body_lines.pop().is_ok() {}
         }
         refused
     }
@@ -174,7 +174,7 @@ fn a_needle_is_taken_up_again_where_it_was_left_and_comes_out_by_hand() {
         for _ in 0..1600 {
             let output = run.loops.step();
             assert!(output.wrench.force_n.norm() < 1e-9 && !run.has(flags::IN_CONTACT));
-            while run.loops.bridge.haptic_notices.pop().is_ok() || run.loops.bridge.tissue_notices.pop().is_ok() {}
+            while run.loops.control.haptic_notices.pop().is_ok() || run.loops.control.tissue_notices.pop().is_ok() {}
         }
         // ChainMail recovers where its tip held it; finite elements stay as they are.
         let now = run.loops.tissue.displacement_m();
@@ -208,7 +208,7 @@ fn a_needle_is_taken_up_again_where_it_was_left_and_comes_out_by_hand() {
         let mut most_n = 0.0_f64;
         for _ in 0..3500 {
             most_n = most_n.max(run.loops.step().wrench.force_n.norm());
-            while run.loops.bridge.haptic_notices.pop().is_ok() || run.loops.bridge.tissue_notices.pop().is_ok() {}
+            while run.loops.control.haptic_notices.pop().is_ok() || run.loops.control.tissue_notices.pop().is_ok() {}
         }
         println!(
             "{kind:?}: held {:.3} mm, drawn out by hand with up to {most_n:.3} N",
@@ -247,7 +247,7 @@ fn a_track_is_met_again_after_another_needle() {
     run.run(1.5);
     run.go_beside(APART_M, -8e-3);
     run.run(1.2);
-    // The bridge gives what it has of earlier needles to each line.
+    // The control thread gives what it has of earlier needles to each line.
     let mut again = run.beside(kind, 3, 0.4e-3);
     again.hand.open_track(&track);
     run.go_beside(0.4e-3, -8e-3);

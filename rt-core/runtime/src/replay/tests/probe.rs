@@ -74,14 +74,14 @@ impl Recorded {
 
     fn with(source: SceneSource, kind: TissueKind, probe: BodyProbe) -> Self {
         let mut run = Self::of(source, kind, &ForceParameters::default(), ABOVE_M);
-        let bridge = &mut run.loops.bridge;
-        assert!(bridge.outside_rooms.push(OutsideTape::new()).is_ok());
+        let control = &mut run.loops.control;
+        assert!(control.outside_rooms.push(OutsideTape::new()).is_ok());
         let order = TissueOrder::Probe {
             generation: 1,
             room: ProbeTape::new(&probe),
             probe: Box::new(probe),
         };
-        assert!(bridge.tissue_orders.push(order).is_ok());
+        assert!(control.tissue_orders.push(order).is_ok());
         run
     }
 

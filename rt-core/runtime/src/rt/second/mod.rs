@@ -10,7 +10,7 @@ mod record;
 mod response;
 mod tape;
 
-pub use ports::{SecondBridgePorts, SecondOrder, SecondPorts, SecondPose, SecondTissuePorts, wire};
+pub use ports::{SecondControlPorts, SecondOrder, SecondPorts, SecondPose, SecondTissuePorts, wire};
 pub use response::{Felt, ProbeResponse};
 pub use tape::{SecondEntry, SecondFlight, SecondMemory, SecondTape};
 
@@ -133,7 +133,7 @@ impl SecondLoop {
     }
 
     fn notify(&mut self, notice: Notice) {
-        // A full ring means that the bridge has ended: nobody reads notices any more.
+        // A full ring means that the control thread has ended: nobody reads notices any more.
         let _ = self.ports.notices.push(notice);
     }
 

@@ -36,7 +36,7 @@ impl Default for SecondPose {
     }
 }
 
-/// Bridge to the second device's loop.
+/// Control thread to the second device's loop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SecondOrder {
     /// Use these settings of the gate from this tick on.
@@ -85,11 +85,11 @@ pub struct SecondPorts {
     pub pose: triple_buffer::Input<SecondPose>,
     /// Newest response of the tissue loop.
     pub response: triple_buffer::Output<ProbeResponse>,
-    /// Orders of the bridge.
+    /// Orders of the control thread.
     pub orders: rtrb::Consumer<SecondOrder>,
-    /// What happened, to the bridge.
+    /// What happened, to the control thread.
     pub notices: rtrb::Producer<Notice>,
-    /// One record for each tick, to the bridge.
+    /// One record for each tick, to the control thread.
     pub records: rtrb::Producer<SecondRecord>,
     /// Flight recording.
     pub flight: Recorder<SecondTape>,
@@ -103,8 +103,8 @@ pub struct SecondTissuePorts {
     pub response: triple_buffer::Input<ProbeResponse>,
 }
 
-/// Ends that the bridge owns.
-pub struct SecondBridgePorts {
+/// Ends that the control thread owns.
+pub struct SecondControlPorts {
     /// Orders to the loop.
     pub orders: rtrb::Producer<SecondOrder>,
     /// What the loop reports.
@@ -115,12 +115,12 @@ pub struct SecondBridgePorts {
     pub tapes: TapePort<SecondTape>,
 }
 
-/// Joins the loop with the tissue loop and the bridge. A loop without a tape is not recorded.
+/// Joins the loop with the tissue loop and the control thread. A loop without a tape is not recorded.
 // SYNC: every ring and triple buffer is single-producer single-consumer; their crates pair release with acquire.
 pub fn wire(
     capacities: Capacities,
     tape: Option<Box<SecondTape>>,
-) -> (SecondPorts, SecondTissuePorts, SecondBridgePorts) {
+) -> (SecondPorts, SecondTissuePorts, SecondControlPorts) {
     let (pose_in, pose) = triple_buffer::triple_buffer(&SecondPose::default());
     let (response_in, response) = triple_buffer::triple_buffer(&ProbeResponse::default());
     let (record_in, records) = rtrb::RingBuffer::new(capacities.records);
@@ -139,11 +139,11 @@ pub fn wire(
         pose,
         response: response_in,
     };
-    let bridge = SecondBridgePorts {
+    let control = SecondControlPorts {
         orders,
         notices,
         records,
         tapes,
     };
-    (own, tissue, bridge)
+    (own, tissue, control)
 }

@@ -26,7 +26,7 @@ struct Rig {
     second: SecondLoop,
     cause: Arc<AtomicU32>,
     tissue: SecondTissuePorts,
-    bridge: SecondBridgePorts,
+    control: SecondControlPorts,
     now_ns: u64,
     seen: Vec<Notice>,
 }
@@ -37,12 +37,12 @@ impl Rig {
         let gate = gate_of(&GateParameters::default(), &device.info());
         let memory = SecondMemory::new(&device.info(), gate, false);
         let tape = Box::new(SecondTape::new(&memory));
-        let (ports, tissue, bridge) = wire(Capacities::STEPPED, Some(tape));
+        let (ports, tissue, control) = wire(Capacities::STEPPED, Some(tape));
         let mut rig = Self {
             second: SecondLoop::new(1, Box::new(device), ports, &memory, 1e-3),
             cause,
             tissue,
-            bridge,
+            control,
             now_ns: 1_000_000_000,
             seen: Vec::new(),
         };
@@ -59,7 +59,7 @@ impl Rig {
     }
 
     fn order(&mut self, order: SecondOrder) {
-        self.bridge.orders.push(order).expect("room");
+        self.control.orders.push(order).expect("room");
     }
 
     fn answer(&mut self) {
@@ -93,10 +93,10 @@ impl Rig {
         }
         let late = u32::from(self.has(Cause::Late));
         self.second.tick(self.now_ns, self.now_ns, late);
-        while let Ok(notice) = self.bridge.notices.pop() {
+        while let Ok(notice) = self.control.notices.pop() {
             self.seen.push(notice);
         }
-        self.bridge.records.pop().expect("a record for each tick")
+        self.control.records.pop().expect("a record for each tick")
     }
 
     fn run(&mut self, ticks: usize) -> Vec<SecondRecord> {
@@ -209,7 +209,7 @@ fn a_recorded_flight_repeats_bit_by_bit() {
     rig.press();
     rig.order(SecondOrder::HandOverTape);
     rig.run(2);
-    let flight = rig.bridge.tapes.taken.pop().expect("handed over").flight();
+    let flight = rig.control.tapes.taken.pop().expect("handed over").flight();
     let recorded = flight.expect("ticks");
     let info = rig.second.info;
     let file = Flight {
@@ -247,7 +247,7 @@ fn a_tick_makes_no_heap_call() {
         rig.now_ns += TICK_NS;
         rig.answer();
         rig.second.tick(rig.now_ns, rig.now_ns, 0);
-        while rig.bridge.records.pop().is_ok() {}
+        while rig.control.records.pop().is_ok() {}
     }
     assert_eq!(stylet_heap::calls_of_this_thread() - before, 0);
 }

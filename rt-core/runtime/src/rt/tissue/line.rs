@@ -12,7 +12,7 @@ impl TissueLoop {
     /// Takes up the columns of a new line; the old ones go back to be freed.
     pub(super) fn take_line(&mut self, line: Box<BodyLine>) {
         if self.in_by_line {
-            // The force loop keeps the line that it is on; the bridge sends another when it sees that this one is not in use.
+            // The force loop keeps the line that it is on; the control thread sends another when it sees that this one is not in use.
             self.free(line);
             return;
         }
@@ -37,7 +37,7 @@ impl TissueLoop {
         }
     }
 
-    /// By the bridge: freeing has no place in a tick. The bridge empties the ring before it sends another line.
+    /// By the control thread: freeing has no place in a tick. The control thread empties the ring before it sends another line.
     pub(super) fn free(&mut self, line: Box<BodyLine>) {
         if let Err(rtrb::PushError::Full(line)) = self.ports.old_lines.push(line) {
             std::mem::forget(line);

@@ -37,7 +37,7 @@ impl TissueLoop {
         self.pressed = Some(probe);
     }
 
-    /// It was solved for in a body that is replaced. By the bridge: freeing has no place in a tick.
+    /// It was solved for in a body that is replaced. By the control thread: freeing has no place in a tick.
     pub(super) fn drop_probe(&mut self) {
         if let Some(old) = self.pressed.take() {
             self.last_carry.forget();

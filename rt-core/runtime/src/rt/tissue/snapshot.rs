@@ -1,4 +1,4 @@
-//! Snapshots of the deformed body, written straight into the memory that the bridge reads.
+//! Snapshots of the deformed body, written straight into the memory that the control thread reads.
 
 use super::TissueLoop;
 use crate::rt::clock;
@@ -60,7 +60,7 @@ impl TissueLoop {
         if !self.is_snapshot_due(&now) {
             return;
         }
-        // SYNC: stored by the bridge's thread; nothing but the flag is carried.
+        // SYNC: stored by the control thread; nothing but the flag is carried.
         if !self.ports.is_watched.load(Ordering::Relaxed) {
             return;
         }

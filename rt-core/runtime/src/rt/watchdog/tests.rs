@@ -6,7 +6,7 @@ use crate::rt::exchange::{HapticOrder, Notice};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::response::TissueResponse;
-use crate::rt::wiring::{BridgePorts, Capacities, TissuePorts, Wiring};
+use crate::rt::wiring::{Capacities, ControlPorts, TissuePorts, Wiring};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -30,7 +30,7 @@ struct Rig {
     now_ns: u64,
     tissue: TissueResponse,
     tissue_ports: TissuePorts,
-    bridge: BridgePorts,
+    control: ControlPorts,
     seen: Vec<Notice>,
     contacts: u64,
 }
@@ -51,7 +51,7 @@ impl Rig {
             now_ns: 1_000_000_000,
             tissue: TissueResponse::default(),
             tissue_ports: wiring.tissue,
-            bridge: wiring.bridge,
+            control: wiring.control,
             seen: Vec::new(),
             contacts: 0,
         }
@@ -75,7 +75,7 @@ impl Rig {
     }
 
     fn order(&mut self, order: HapticOrder) {
-        self.bridge.haptic_orders.push(order).expect("room");
+        self.control.haptic_orders.push(order).expect("room");
     }
 
     fn tick(&mut self) -> TickRecord {
@@ -86,10 +86,10 @@ impl Rig {
         self.tissue_ports.response.write(self.tissue);
         let late = u32::from(self.cause.load(Ordering::Relaxed) == Cause::Late as u32);
         self.haptic.tick(self.now_ns, self.now_ns, late);
-        while let Ok(notice) = self.bridge.haptic_notices.pop() {
+        while let Ok(notice) = self.control.haptic_notices.pop() {
             self.seen.push(notice);
         }
-        let record = self.bridge.records.pop().expect("a record for each tick");
+        let record = self.control.records.pop().expect("a record for each tick");
         // The membrane is met where the tip passes it, and left where it is well outside.
         let depth_m = record.tip_in_scene_m[2];
         if depth_m > 0.0 && self.tissue.contact == 0 {

@@ -1,6 +1,6 @@
 //! Hosts that order motions, and what they promise: at most one renewal for each in a pass, however often it is sent.
 
-use super::Bridge;
+use super::Control;
 use crate::rt::exchange::{HapticOrder, Moved, Ticket};
 use crate::rt::motion_lease::Promise;
 use crate::rt::second::SecondOrder;
@@ -25,7 +25,7 @@ impl Movers {
     }
 }
 
-impl Bridge {
+impl Control {
     /// The promise with which a request begins a motion.
     pub(super) fn first_promise(&mut self, ticket: Ticket, what: Moved) -> Option<Promise> {
         let (host_id, _) = self.link.answers.asker(ticket)?;

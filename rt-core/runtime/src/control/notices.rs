@@ -1,6 +1,6 @@
 //! What the loops report, as answers and events for hosts.
 
-use super::Bridge;
+use super::Control;
 use super::link::EventDetails;
 use crate::rt::exchange::{HapticOrder, Moved, Notice, TissueOrder};
 use crate::rt::outside::OutsideTape;
@@ -25,7 +25,7 @@ pub(super) struct LoopRings {
     pub old_probes: rtrb::Consumer<Box<BodyProbe>>,
 }
 
-impl Bridge {
+impl Control {
     pub(super) fn take_notices(&mut self) {
         while let Ok(notice) = self.loops.haptic_notices.pop() {
             self.take_notice(notice);

@@ -1,12 +1,12 @@
 //! Marks, and faults that an instructor puts in, from the request to the event that everybody sees.
 
-use super::Bridge;
+use super::Control;
 use super::link::EventDetails;
 use crate::rt::clock;
 use crate::rt::exchange::{HapticOrder, Ticket};
 use stylet_shm_schema::{EventKind, Exercise, ExercisesInForce, Mark, Refusal, RefusalCode};
 
-impl Bridge {
+impl Control {
     pub(super) fn mark(&mut self, ticket: Ticket, mark: &Mark) {
         let before_ns = (mark.before_s * 1e9) as u64;
         // Whoever marks has seen the loop's own state, which is newer than the records of the last pass.

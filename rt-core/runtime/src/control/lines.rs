@@ -46,7 +46,7 @@ struct LineTask {
     stop: Arc<AtomicBool>,
 }
 
-/// The bridge's side of lines.
+/// The control thread's side of lines.
 pub struct LinePreparer {
     source: Arc<SceneSource>,
     /// Body of the scene that runs; `None` until the first line in it, and while one is under way.

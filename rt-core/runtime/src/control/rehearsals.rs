@@ -27,7 +27,7 @@ pub struct Ended {
     pub outcome: Result<Box<Rehearsal>, Refusal>,
 }
 
-/// The bridge's side of rehearsals.
+/// The control thread's side of rehearsals.
 pub struct RehearsalRunner {
     source: Arc<SceneSource>,
     tissue: TissueKind,

@@ -11,7 +11,7 @@ use stylet_wall::packet::{BoardSize, sealed};
 /// Where the snapshots of a scene can be read.
 pub type SnapshotBoard = (BoardSize, OwnedFd);
 
-/// A board for the snapshots of `scene`: one end for its tissue loop, one for the bridge.
+/// A board for the snapshots of `scene`: one end for its tissue loop, one for the control thread.
 pub fn snapshot_board(scene: &Scene) -> std::io::Result<(Writer<SnapshotHeader, Vertex>, SnapshotBoard)> {
     let len = scene.surface.vertex_elements.len() + scene.nodes.elements.len();
     let (writer, memory) = Writer::new("stylet-snapshots", len)?;

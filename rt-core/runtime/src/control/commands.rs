@@ -1,6 +1,6 @@
 //! Requests of hosts, carried out: an order for a loop, or work beside it.
 
-use super::Bridge;
+use super::Control;
 use super::link::EventDetails;
 use super::requests::{hand_goal, needle_run};
 use super::second::Second;
@@ -17,7 +17,7 @@ use stylet_sim::line::LeftNeedles;
 /// Places of the force loop's ring that only requests take which end a motion or a force.
 const KEPT_FOR_STOPS: usize = 16;
 
-impl Bridge {
+impl Control {
     /// True when a host asked to end.
     pub(super) fn take_commands(&mut self) -> bool {
         let ends = self.take_each_command();

@@ -24,7 +24,7 @@ struct Task {
     stop: Arc<AtomicBool>,
 }
 
-/// The bridge's side of the probe.
+/// The control thread's side of the probe.
 pub struct ProbePreparer {
     source: Arc<SceneSource>,
     tissue: TissueKind,

@@ -7,20 +7,24 @@ use stylet_sim::scene::Labels;
 
 /// Rings as in a run; nothing ticks at their other ends.
 fn rings() -> (LoopRings, HapticPorts, TissuePorts) {
-    let Wiring { haptic, tissue, bridge } = Wiring::new(Capacities::RUN, None, None);
+    let Wiring {
+        haptic,
+        tissue,
+        control,
+    } = Wiring::new(Capacities::RUN, None, None);
     let rings = LoopRings {
-        records: bridge.records,
-        haptic_orders: bridge.haptic_orders,
-        haptic_notices: bridge.haptic_notices,
-        tissue_orders: bridge.tissue_orders,
-        tissue_notices: bridge.tissue_notices,
-        old_worlds: bridge.old_worlds,
-        lines: bridge.lines,
-        rooms: bridge.rooms,
-        old_hand_lines: bridge.old_hand_lines,
-        old_body_lines: bridge.old_body_lines,
-        outside_rooms: bridge.outside_rooms,
-        old_probes: bridge.old_probes,
+        records: control.records,
+        haptic_orders: control.haptic_orders,
+        haptic_notices: control.haptic_notices,
+        tissue_orders: control.tissue_orders,
+        tissue_notices: control.tissue_notices,
+        old_worlds: control.old_worlds,
+        lines: control.lines,
+        rooms: control.rooms,
+        old_hand_lines: control.old_hand_lines,
+        old_body_lines: control.old_body_lines,
+        outside_rooms: control.outside_rooms,
+        old_probes: control.old_probes,
     };
     (rings, haptic, tissue)
 }

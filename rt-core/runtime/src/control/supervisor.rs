@@ -1,15 +1,15 @@
 //! Detects that the haptic loop itself has stopped: the one fault that the loop cannot detect.
 //!
-//! It runs in the bridge, at normal priority. A loop that stands still leaves its last force on the device. Over real motors
+//! It runs in the control thread, at normal priority. A loop that stands still leaves its last force on the device. Over real motors
 //! the process ends, and the device's own watchdog, or the closing of its port, takes the force away. A simulated device has
 //! no motors: the fault is reported, and the run goes on with the force off when the loop comes back.
 
 use super::link::EventDetails;
-use super::{Bridge, LoopStopped};
+use super::{Control, LoopStopped};
 use crate::rt::exchange::HapticOrder;
 use stylet_shm_schema::{EventKind, Fault};
 
-/// Passes of the bridge without one tick of the loop; 2 ms and more each.
+/// Passes of the control thread without one tick of the loop; 2 ms and more each.
 ///
 /// Passes, not time: while the whole process is stopped, neither advances.
 const PATIENCE_PASSES: u32 = 125;
@@ -17,7 +17,7 @@ const PATIENCE_PASSES: u32 = 125;
 /// is late there is not dead.
 const PATIENCE_PASSES_UNHURRIED: u32 = 1000;
 
-/// One for a bridge.
+/// One for a control thread.
 pub struct Supervisor {
     patience_passes: u32,
     without_tick: u32,
@@ -57,7 +57,7 @@ impl Supervisor {
     }
 }
 
-impl Bridge {
+impl Control {
     /// One pass. An error when the run must end, so that a real device is released.
     pub(super) fn supervise(&mut self, made_a_tick: bool) -> Result<(), LoopStopped> {
         if self.supervisor.finds_stopped(made_a_tick) {

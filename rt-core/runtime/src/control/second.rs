@@ -1,22 +1,22 @@
-//! The bridge's part for the second device: orders to its loop, records and faults of it to the hosts.
+//! The control thread's part for the second device: orders to its loop, records and faults of it to the hosts.
 
-use super::Bridge;
+use super::Control;
 use super::link::{EventDetails, Link};
 use super::requests::hand_goal;
 use super::supervisor::Supervisor;
 use crate::rt::exchange::{Moved, Notice, Ticket};
-use crate::rt::second::{SecondBridgePorts, SecondOrder, gate_of};
+use crate::rt::second::{SecondControlPorts, SecondOrder, gate_of};
 use nalgebra::Vector3;
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{EventKind, Fault, ProbeMove, Refusal, RefusalCode, SecondRecord};
 use stylet_sim::force::GateParameters;
 
-/// What a bridge must know of the second device.
+/// What a control thread must know of the second device.
 pub struct SecondSetup {
     /// Its figures.
     pub device: DeviceInfo,
-    /// The bridge's ends of its rings, less the tapes.
-    pub ports: SecondBridgePorts,
+    /// The control thread's ends of its rings, less the tapes.
+    pub ports: SecondControlPorts,
 }
 
 /// Of a run with a second device.
@@ -89,7 +89,7 @@ impl Second {
     }
 }
 
-impl Bridge {
+impl Control {
     /// Records, notices and the state of the second device's loop.
     pub(super) fn pass_second(&mut self) {
         while let Some(Ok(notice)) = self.second.as_mut().map(|second| second.notices.pop()) {

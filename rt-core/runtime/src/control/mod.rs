@@ -24,7 +24,7 @@ mod upload;
 mod wall;
 
 use crate::replay::file::Flight;
-use crate::rt::wiring::BridgePorts;
+use crate::rt::wiring::ControlPorts;
 pub use flight::SaveError;
 use flight::{FlightKeeper, Orders};
 use lines::LinePreparer;
@@ -54,8 +54,8 @@ const PASS: Duration = Duration::from_millis(2);
 #[error("{}", LOOP_ENDED)]
 pub struct LoopStopped;
 
-/// What a bridge must know of its run.
-pub struct BridgeSetup {
+/// What a control thread must know of its run.
+pub struct ControlSetup {
     /// The haptic device.
     pub device: DeviceInfo,
     /// What hosts learn about the run.
@@ -85,8 +85,8 @@ struct RunningScene {
     next: Option<(ScenePicture, Arc<SceneSource>, SnapshotBoard)>,
 }
 
-/// Everything that the bridge thread owns.
-pub struct Bridge {
+/// Everything that the control thread owns.
+pub struct Control {
     link: Link,
     loops: LoopRings,
     flights: FlightKeeper,
@@ -108,9 +108,9 @@ pub struct Bridge {
     movers: movers::Movers,
 }
 
-impl Bridge {
+impl Control {
     /// Announces parameters and plan; everything else follows in [`run`](Self::run).
-    pub fn new(wall: Wall, loops: BridgePorts, setup: BridgeSetup) -> Self {
+    pub fn new(wall: Wall, loops: ControlPorts, setup: ControlSetup) -> Self {
         let session_id = setup.session.session_id;
         let is_real_time = setup.session.haptic.is_fifo();
         let mut plan: PlanInForce = bytemuck::Zeroable::zeroed();

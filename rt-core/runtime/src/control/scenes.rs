@@ -4,7 +4,7 @@ use super::answers::Asker;
 use super::link::EventDetails;
 use super::loader::{Loaded, Wanted};
 use super::picture::{ScenePicture, snapshot_board};
-use super::{Bridge, RunningScene, upload};
+use super::{Control, RunningScene, upload};
 use crate::rt::exchange::{Ticket, TissueOrder};
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
@@ -20,7 +20,7 @@ impl RunningScene {
     }
 }
 
-impl Bridge {
+impl Control {
     pub(super) fn load_builtin(&mut self, ticket: Ticket, number: u32) -> Result<(), Refusal> {
         let name = *BUILTIN_SCENES.get(number as usize).ok_or(RefusalCode::UnknownScene)?;
         let wanted = Wanted {

@@ -30,7 +30,7 @@ pub struct EventDetails<'a> {
 }
 
 impl EventDetails<'_> {
-    /// Nothing but the time; seen by the bridge.
+    /// Nothing but the time; seen by the control thread.
     pub fn now() -> Self {
         Self::at(0, clock::now_ns())
     }
@@ -60,7 +60,7 @@ impl Link {
         }
     }
 
-    /// Serves the bridge and sends the heartbeat.
+    /// Serves the control thread and sends the heartbeat.
     pub fn announce(&mut self) {
         self.wall.pass();
         // A bridge that fails again and again for one reason is reported once, or it would drive out all other events.

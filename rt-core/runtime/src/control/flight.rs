@@ -79,7 +79,7 @@ pub struct Orders<'a> {
     pub second: Option<&'a mut rtrb::Producer<SecondOrder>>,
 }
 
-/// Everything that the bridge needs for flight recordings.
+/// Everything that the control thread needs for flight recordings.
 pub struct FlightKeeper {
     haptic: TapePort<HapticTape>,
     tissue: TapePort<TissueTape>,
@@ -143,7 +143,7 @@ impl FlightKeeper {
         room
     }
 
-    /// One pass of the bridge; returns what was written since the last.
+    /// One pass of the control thread; returns what was written since the last.
     pub fn pass(&mut self, scene_generation: u64, orders: Orders<'_>, lines: &LineArchive) -> Option<Saved> {
         self.take_tapes(scene_generation);
         if let Some(gathering) = self
@@ -200,7 +200,7 @@ impl FlightKeeper {
             .name("flight-writer".to_owned())
             .spawn(move || {
                 let result = save(&flight, &path);
-                // Nobody waits for it once the bridge has ended.
+                // Nobody waits for it once the control thread has ended.
                 let _ = sender.send(Saved { ticket, result });
             });
         if let Err(why) = spawned {
