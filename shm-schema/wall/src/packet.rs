@@ -15,7 +15,7 @@ use std::os::unix::fs::FileExt;
 use stylet_shm_schema::*;
 
 /// What a packet holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, num_enum::TryFromPrimitive)]
 #[repr(u32)]
 pub enum Kind {
     /// To the bridge: [`Start`] of the run; the first packet.
@@ -58,35 +58,6 @@ pub enum Kind {
     Command,
     /// From the bridge: an [`UploadHeader`], with memory that holds its cells.
     Upload,
-}
-
-impl Kind {
-    const ALL: [Self; 20] = [
-        Self::Start,
-        Self::Session,
-        Self::Parameters,
-        Self::Plan,
-        Self::Event,
-        Self::Reply,
-        Self::Rehearsal,
-        Self::Records,
-        Self::SecondRecords,
-        Self::Scene,
-        Self::Snapshots,
-        Self::State,
-        Self::SecondState,
-        Self::SeenSnapshots,
-        Self::SeenRecords,
-        Self::Ready,
-        Self::Alive,
-        Self::Failed,
-        Self::Command,
-        Self::Upload,
-    ];
-
-    fn of(number: u32) -> Option<Self> {
-        Self::ALL.into_iter().find(|&kind| kind as u32 == number)
-    }
 }
 
 /// What a bridge needs before it makes its ports.
@@ -278,7 +249,7 @@ impl Socket {
 /// A packet out of any bytes.
 pub fn parse(bytes: &[u8], memory: Option<OwnedFd>) -> Option<Packet> {
     let (head, bytes) = bytes.split_at_checked(HEAD)?;
-    let kind = Kind::of(u32::from_ne_bytes(*head.first_chunk()?))?;
+    let kind = Kind::try_from(u32::from_ne_bytes(*head.first_chunk()?)).ok()?;
     let bytes = bytes.to_vec();
     Some(Packet { kind, memory, bytes })
 }
