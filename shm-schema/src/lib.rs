@@ -58,13 +58,10 @@ pub use deadlines::DeadlineTotals;
 pub use event::{Event, EventKind};
 pub use exercise::{EXERCISE_STIFFNESS_RANGE, Exercise, ExercisesInForce, MOST_MOVED_M};
 pub use instance::{Attendance, Epoch, Instance, InstanceError, Owned};
-pub use params::{
-    PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet,
-    ParameterSpec, ParametersInForce, folding,
-};
+pub use params::ParametersInForce;
 pub use plan::{
-    MAX_EARLIER_NEEDLES, MAX_LEFT_NEEDLES, MAX_SEEDS, MOST_PLANNED_NEEDLES, PRESCRIPTION_RANGE_GY, PlanInForce,
-    PlannedSeed, Prescribed, SEED_STRENGTH_RANGE_U, SOURCE_BYTES,
+    MAX_EARLIER_NEEDLES, MAX_SEEDS, MOST_PLANNED_NEEDLES, PRESCRIPTION_RANGE_GY, PlanInForce, PlannedSeed, Prescribed,
+    SEED_STRENGTH_RANGE_U, SOURCE_BYTES,
 };
 pub use record::TickRecord;
 pub use refusal::{Reason, Refusal, RefusalCode};
@@ -75,14 +72,15 @@ pub use request::{
     NeedleRehearsal, ParameterChange, PlannedNeedle, ProbeMove, RETRACT_RANGE_M, Request, RequestError, RequestErrors,
     SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M, StabilisingNeedle, VALID_RANGE_S,
 };
-pub use scene::{
-    BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_NODES, MAX_STRUCTURES, SceneHeader, SceneId, StructureInfo,
-    UploadHeader, UploadStructure, role,
-};
+pub use scene::{SceneHeader, SceneId, StructureInfo, UploadHeader, UploadStructure, role};
 pub use second::{SecondRecord, SecondState};
 pub use session::{Session, ThreadReport};
 pub use snapshot::{LeftNeedlePose, MAX_BEND_POINTS, SeedPose, SnapshotHeader, Vertex};
 pub use state::{Fault, HapticState, Phase, flags};
+pub use stylet_settings::{
+    BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_LEFT_NEEDLES, MAX_NODES, MAX_STRUCTURES, PARAMETER_COUNT,
+    PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet, ParameterSpec, folding,
+};
 pub use text::Text;
 
 /// Both programs must agree on this; it is part of every service name.

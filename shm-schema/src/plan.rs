@@ -7,8 +7,6 @@ use serde::{Deserialize, Serialize};
 /// Seeds planned or placed at most.
 pub const MAX_SEEDS: usize = 128;
 
-/// Needles that may stay in the tissue while another moves, at most.
-pub const MAX_LEFT_NEEDLES: usize = 4;
 /// Needles, at most, that a rehearsal beside those that stay in may name as having been there before.
 pub const MAX_EARLIER_NEEDLES: usize = 40;
 

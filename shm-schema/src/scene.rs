@@ -1,43 +1,8 @@
 //! The scene both ways: what runs (core to host) and a volume of the user's own (host to core).
 
-use crate::Text;
+use crate::{GridInfo, MAX_STRUCTURES, Text};
 use bytemuck::{Pod, Zeroable};
 use stylet_anatomy::PatientFrame;
-
-/// Scenes that the core can draw without a file; [`crate::Request::LoadBuiltinScene`] takes the place in this list.
-pub const BUILTIN_SCENES: [&str; 3] = ["paper", "pelvis", "full"];
-
-/// Nodes of the displacement grid at most: what a tissue tick may spend on it.
-pub const MAX_NODES: usize = 8192;
-
-/// Cells of the label grid at most.
-pub const MAX_LABEL_CELLS: usize = 2 << 20;
-
-/// A regular grid over the body at rest, x fastest: node (i, j, k) lies at `origin_m + (i, j, k) spacing_m`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct GridInfo {
-    /// Nodes along x, y, z; all zero for no grid.
-    pub dims: [u32; 3],
-    /// Zero.
-    pub reserved: u32,
-    /// Place of node (0, 0, 0), scene frame, m.
-    pub origin_m: [f64; 3],
-    /// Distance between neighbouring nodes, m.
-    pub spacing_m: f64,
-}
-
-impl GridInfo {
-    /// Nodes in all; `None` when there are absurdly many.
-    pub fn node_count(&self) -> Option<usize> {
-        let [x, y, z] = self.dims.map(u64::from);
-        let nodes = x.checked_mul(y)?.checked_mul(z)?;
-        (nodes <= 64_000_000).then_some(nodes as usize)
-    }
-}
-
-/// Structures in a scene at most.
-pub const MAX_STRUCTURES: usize = 255;
 
 /// What a structure is, as bits of [`StructureInfo::role`] and [`UploadStructure::role`].
 pub mod role {

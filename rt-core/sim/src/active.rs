@@ -5,8 +5,8 @@ use crate::limits::{Limits, TissueParameters};
 use crate::line::{NeedleBending, PronyTerm};
 use crate::migration::Migration;
 use crate::needle::{Layer, Layers, NeedleParameters};
-use stylet_hw::DeviceInfo;
-use stylet_shm_schema::{ParameterId, ParameterProblem, ParameterProblems, ParameterSet};
+use stylet_device::DeviceInfo;
+use stylet_settings::{ParameterId, ParameterProblem, ParameterProblems, ParameterSet};
 
 /// Everything that a change of parameters brings to both threads.
 #[derive(Clone, Debug)]
@@ -150,7 +150,7 @@ fn layers(set: &ParameterSet) -> Layers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stylet_shm_schema::PARAMETERS;
+    use stylet_settings::PARAMETERS;
 
     fn device() -> DeviceInfo {
         DeviceInfo::phantom_premium_1_5()

@@ -1,7 +1,7 @@
 //! What the tissue may do: the paper's limits as settings, validated, and as the loop uses them.
 
 use serde::{Deserialize, Serialize};
-pub use stylet_shm_schema::folding;
+pub use stylet_settings::folding;
 
 mod validate;
 

@@ -150,7 +150,7 @@ fn rows(page: &str) -> impl Iterator<Item = Vec<&str>> {
 fn notation_leads_to_names_that_the_named_files_hold() {
     let tree = Tree::of_workspace();
     let keys = tree
-        .ending_in("params/table.rs")
+        .ending_in("settings/src/table.rs")
         .map(|file| tree.text(file))
         .collect::<String>();
     let page = tree.text("docs/notation.md");

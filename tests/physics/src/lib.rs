@@ -3,6 +3,8 @@
 #[cfg(test)]
 mod as_it_runs;
 #[cfg(test)]
+mod chain;
+#[cfg(test)]
 mod coupled;
 #[cfg(test)]
 mod envelope;

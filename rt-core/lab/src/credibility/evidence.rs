@@ -51,7 +51,7 @@ pub const CATEGORIES: &[Category] = &[
         name: "Model calibration evidence",
         there: &[(
             "every parameter with unit, limits and its source in the literature",
-            "shm-schema/src/params/table.rs",
+            "shm-schema/settings/src/table.rs",
         )],
         missing: "Parameters come from publications. None was fitted to measurements of this project.",
     },

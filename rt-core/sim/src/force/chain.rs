@@ -1,7 +1,7 @@
 //! From one sample to one wrench: velocity → layers and eq. 6 → force law → gate. All of it plain data.
 
 use nalgebra::Vector3;
-use stylet_hw::{DeviceInfo, Sample, Wrench};
+use stylet_device::{DeviceInfo, Sample, Wrench};
 
 use super::coupling::{self, TissueForce};
 use super::friction::FrictionState;
@@ -245,6 +245,3 @@ fn guard(
 fn soften(friction: &mut FrictionState, by: f64, stiffness_n_per_m: f64) {
     friction.soften(by, SOFTEST_STICK_N_PER_M / stiffness_n_per_m.max(1.0));
 }
-
-#[cfg(test)]
-mod tests;

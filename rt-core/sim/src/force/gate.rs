@@ -8,7 +8,7 @@
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use stylet_hw::{DeviceInfo, Wrench};
+use stylet_device::{DeviceInfo, Wrench};
 
 use super::passivity::{self, Motion, PassivityState};
 use super::thermal::Warmth;

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use stylet_hw::DeviceInfo;
+use stylet_device::DeviceInfo;
 
 use super::gate::GateParameters;
 use crate::line::{NeedleBending, PronyTerm};
@@ -78,7 +78,7 @@ impl Default for ForceParameters {
 
 impl ForceParameters {
     /// Every setting that cannot be used on any device, or `Ok`. What a device cannot hold is refused before:
-    /// [`stylet_shm_schema::ParameterSet::problems_on`].
+    /// [`stylet_settings::ParameterSet::problems_on`].
     pub fn validate(&self) -> Result<(), Vec<Problem>> {
         let mut problems = Problems::default();
         problems.extend(self.layers.validate());

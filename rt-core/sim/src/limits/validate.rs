@@ -2,7 +2,7 @@
 
 use super::{Limits, TissueParameters, folding};
 use crate::settings::{Problem, Problems};
-use stylet_shm_schema::ParameterId;
+use stylet_settings::ParameterId;
 
 impl TissueParameters {
     /// The limits as the loop uses them.

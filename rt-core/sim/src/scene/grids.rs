@@ -1,7 +1,7 @@
 //! Two coarse grids over a body at rest: labels of its cells, and nodes at which hosts get its displacements.
 
 use super::Lattice;
-use stylet_shm_schema::{GridInfo, MAX_LABEL_CELLS, MAX_NODES};
+use stylet_settings::{GridInfo, MAX_LABEL_CELLS, MAX_NODES};
 
 /// Nodes at which displacements are published, each with the element that stands for it.
 #[derive(Clone, Debug)]
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn every_node_stands_for_the_nearest_element_and_bounds_hold() {
-        for name in stylet_shm_schema::BUILTIN_SCENES {
+        for name in stylet_settings::BUILTIN_SCENES {
             let lattice = Scene::builtin(name).expect("built in").lattice;
             let grid = NodeGrid::of(&lattice);
             let count = grid.info.node_count().expect("sane");
@@ -188,7 +188,7 @@ mod tests {
     #[test]
     #[ignore = "a measurement"]
     fn time_to_write_displacements() {
-        for name in stylet_shm_schema::BUILTIN_SCENES {
+        for name in stylet_settings::BUILTIN_SCENES {
             let scene = Scene::builtin(name).expect("built in");
             let limits = TissueParameters::default().validate().expect("defaults");
             let mut tissue = ChainMailTissue::new(&scene, limits);

@@ -25,7 +25,7 @@ pub use lattice::{Extent, Lattice};
 pub use problem::{SceneError, SceneProblem};
 pub use source::SceneSource;
 pub use structure::{Material, Role, Structure, Surroundings};
-pub use stylet_shm_schema::MAX_STRUCTURES;
+pub use stylet_settings::MAX_STRUCTURES;
 pub use surface::{Surface, SurfacePart, surface_elements};
 pub use tissue_kind::TissueKind;
 
@@ -71,7 +71,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A scene that needs no file, one of [`stylet_shm_schema::BUILTIN_SCENES`].
+    /// A scene that needs no file, one of [`stylet_settings::BUILTIN_SCENES`].
     pub fn builtin(name: &str) -> Result<Scene, SceneError> {
         let labels = builtin::labels(name).ok_or_else(|| SceneError::Unknown(name.to_owned()))?;
         labels

@@ -1,7 +1,7 @@
 //! What can be wrong with a scene, said with the value, the limit and what to do.
 
 use super::{MAX_CELLS_PER_AXIS, MAX_ELEMENTS, MAX_STRUCTURES, SPACING_RANGE_M};
-use stylet_shm_schema::BUILTIN_SCENES;
+use stylet_settings::BUILTIN_SCENES;
 
 const MIB: u64 = 1 << 20;
 

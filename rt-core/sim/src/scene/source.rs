@@ -112,7 +112,7 @@ mod tests {
 
     #[test]
     fn a_stiffer_scene_differs_in_its_moduli_alone() {
-        for name in stylet_shm_schema::BUILTIN_SCENES {
+        for name in stylet_settings::BUILTIN_SCENES {
             let source = SceneSource::Builtin(name.to_owned());
             let (soft, stiff) = (source.build().unwrap(), source.stiffened(2.5).unwrap().build().unwrap());
             assert_eq!(soft.lattice.structures(), stiff.lattice.structures());

@@ -41,8 +41,14 @@ pub const LAYERS: &[Layer] = &[
     },
     // Below both sides.
     Layer {
-        folder: "hw",
+        folder: "hw/device",
         may_use: &[],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
+        folder: "hw",
+        may_use: &["hw/device"],
         never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DICOM],
         not_itself: &[],
     },
@@ -77,8 +83,14 @@ pub const LAYERS: &[Layer] = &[
         not_itself: &[],
     },
     Layer {
+        folder: "shm-schema/settings",
+        may_use: &[],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
         folder: "shm-schema",
-        may_use: &["shm-schema/anatomy"],
+        may_use: &["shm-schema/anatomy", "shm-schema/settings"],
         never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
         not_itself: &[],
     },
@@ -109,9 +121,9 @@ pub const LAYERS: &[Layer] = &[
     },
     Layer {
         folder: "rt-core/sim",
-        may_use: &["hw", "rt-core/heap", "shm-schema", "shm-schema/anatomy"],
-        never: &[WINDOW, PORTS, PROGRAM, DICOM],
-        not_itself: &[DEVICES, ARGUMENTS],
+        may_use: &["hw/device", "rt-core/heap", "shm-schema/anatomy", "shm-schema/settings"],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
     },
     Layer {
         folder: "rt-core/runtime",

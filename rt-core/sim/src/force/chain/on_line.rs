@@ -8,7 +8,7 @@ use crate::line::beam::BeamOutput;
 use crate::line::{HandLine, LayerForces, LeftNeedles, LineOutput};
 use crate::needle::{LayerKind, Phase};
 use nalgebra::Vector3;
-use stylet_hw::{DeviceInfo, Sample};
+use stylet_device::{DeviceInfo, Sample};
 
 impl ChainParameters {
     /// What layers resist with on a line.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use stylet_hw::{DeviceInfo, Wrench};
+use stylet_device::{DeviceInfo, Wrench};
 
 use crate::force::chatter::ChatterState;
 use crate::force::coupling::{CouplingState, LocalResponse};

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::needle::{LayerKind, Layers};
-use stylet_hw::DeviceInfo;
-use stylet_shm_schema::ParameterSet;
+use stylet_device::DeviceInfo;
+use stylet_settings::ParameterSet;
 
 /// In the gland alone.
 fn input(depth_m: f64, punctured: bool, phase: Phase) -> ForceInput {

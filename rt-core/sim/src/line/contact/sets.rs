@@ -10,7 +10,7 @@ use super::super::rows::Rows;
 use super::Spring;
 use crate::simd::{LANES, Vector, in_vectors};
 use gradients::{Of, add, answer, hold, places, product};
-use stylet_shm_schema::MAX_LEFT_NEEDLES;
+use stylet_settings::MAX_LEFT_NEEDLES;
 
 mod gradients;
 

@@ -22,7 +22,7 @@ use super::rows::Rows;
 use super::state::LineOutput;
 use crate::simd::{LANES, Simd};
 pub use record::LeftRecord;
-use stylet_shm_schema::MAX_LEFT_NEEDLES;
+use stylet_settings::MAX_LEFT_NEEDLES;
 
 /// Needles that stay in at most.
 pub const MAX_LEFT: usize = MAX_LEFT_NEEDLES;

@@ -57,7 +57,7 @@ mod times {
     #[test]
     #[ignore = "a measurement"]
     fn time_to_cut() {
-        for name in stylet_shm_schema::BUILTIN_SCENES {
+        for name in stylet_settings::BUILTIN_SCENES {
             for _ in 0..3 {
                 let start = Instant::now();
                 let labels = super::labels(name).expect("known").expect("valid");

@@ -1,9 +1,10 @@
 //! The whole chain at 1 kHz, device to device: an operator inserts, holds and retracts a needle.
 
+use nalgebra::Vector3;
 use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
-
-use super::*;
-use crate::force::{ForceParameters, LocalResponse};
+use stylet_sim::force::chain::step;
+use stylet_sim::force::{ChainParameters, ChainState, ForceParameters, LocalResponse, Touch};
+use stylet_sim::needle::{LayerKind, NeedleParameters, Phase};
 
 const DT_S: f64 = 1e-3;
 

@@ -1,11 +1,47 @@
-//! The contract between the force loop and a haptic device.
+//! The contract between a force loop and a haptic device.
+//!
+//! A back end implements [`Device`]; `stylet_hw::conformance` checks its obligations.
+//!
+//! ```
+//! use nalgebra::{UnitQuaternion, Vector3};
+//! use stylet_device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
+//!
+//! /// A device that nobody moves.
+//! struct Still(u64);
+//!
+//! impl Device for Still {
+//!     fn info(&self) -> DeviceInfo {
+//!         DeviceInfo::phantom_premium_1_5()
+//!     }
+//!
+//!     fn read(&mut self, _dt_s: f64) -> Result<Sample, DeviceFault> {
+//!         self.0 += 1;
+//!         Ok(Sample {
+//!             tip_in_world: Vector3::zeros(),
+//!             world_from_tool: UnitQuaternion::identity(),
+//!             buttons: 0,
+//!             sequence: self.0,
+//!         })
+//!     }
+//!
+//!     fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
+//!         wrench.is_finite().then_some(()).ok_or(DeviceFault::NonFiniteWrench)
+//!     }
+//! }
+//!
+//! let mut device = Still(0);
+//! assert!(device.read(1e-3).unwrap().is_finite());
+//! assert_eq!(device.write(&Wrench::zero()), Ok(()));
+//! ```
+
+#![warn(missing_docs)]
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// A haptic device of six degrees of freedom, called once a tick from the force loop.
 ///
-/// Obligations of every back end, checked by [`conformance`](crate::conformance):
+/// Obligations of every back end, checked by `stylet_hw::conformance`:
 ///
 /// - after construction nothing allocates, locks, logs or panics, whatever the arguments are;
 /// - [`read`](Device::read) returns within a quarter of a millisecond. A device that has nothing new
@@ -16,14 +52,6 @@ use serde::{Deserialize, Serialize};
 /// - a wrench past what the device can give keeps its direction and loses magnitude;
 /// - the wrench holds until the next `write`, and a dropped device leaves zero force. A real device also
 ///   sets a wrench to zero that was not renewed for a tenth of a second.
-///
-/// ```
-/// use stylet_hw::{Device, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
-/// let mut device = SimulatedPhantom::new(SimulatedPhantomConfig::default());
-/// let sample = device.read(1e-3).unwrap();
-/// device.write(&Wrench::zero()).unwrap();
-/// assert!(sample.is_finite() && device.info().simulated);
-/// ```
 pub trait Device: Send {
     /// Name and limits of the device. Constant for the life of the device.
     fn info(&self) -> DeviceInfo;
@@ -193,7 +221,7 @@ impl HandGoal {
 }
 
 /// Why a device could not read or write. The numbers are stable, because they appear in records.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error, num_enum::TryFromPrimitive)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[repr(u32)]
 pub enum DeviceFault {
     /// No device is connected.
@@ -226,8 +254,25 @@ pub enum DeviceFault {
 }
 
 impl DeviceFault {
-    /// Its stable number; `DeviceFault::try_from` is the inverse.
+    const ALL: [Self; 9] = [
+        Self::NotConnected,
+        Self::TimedOut,
+        Self::NonFiniteSample,
+        Self::NonFiniteWrench,
+        Self::InvalidPeriod,
+        Self::NotCalibrated,
+        Self::Overheated,
+        Self::SafetyStop,
+        Self::Driver,
+    ];
+
+    /// Returns its stable number.
     pub const fn code(self) -> u32 {
         self as u32
+    }
+
+    /// Returns the fault of a stable number, or `None` for a number that no fault has.
+    pub fn from_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|fault| fault.code() == code)
     }
 }

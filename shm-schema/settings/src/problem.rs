@@ -1,7 +1,6 @@
 //! What makes a set of parameters invalid: one function for the core and for the window.
 
 use super::{PARAMETERS, ParameterId, ParameterSet};
-use crate::{Reason, Refusal, RefusalCode};
 use ParameterId as P;
 
 /// What is wrong with a set of parameters; each names the parameters that are involved.
@@ -45,7 +44,7 @@ pub enum ParameterProblem {
 
 /// Every problem of one set; at least one.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{}", crate::refusal::lines(.0))]
+#[error("{}", lines(.0))]
 pub struct ParameterProblems(pub Vec<ParameterProblem>);
 
 const SHEARS: [P; 2] = [P::ShearHorizontal, P::ShearVertical];
@@ -63,16 +62,6 @@ impl ParameterProblem {
             Self::CellsFold { .. } => &SHEARS,
             Self::TooStiff { parameters, .. } => parameters,
             Self::Unusable(_) => &[],
-        }
-    }
-
-    /// Reason code of a reply.
-    pub fn code(&self) -> RefusalCode {
-        match self {
-            Self::OutOfLimits { .. } => RefusalCode::ParameterOutOfLimits,
-            Self::CellsFold { .. } => RefusalCode::CellsFold,
-            Self::TooStiff { .. } => RefusalCode::TooStiff,
-            Self::Unusable(_) => RefusalCode::ParametersUnusable,
         }
     }
 }
@@ -161,30 +150,7 @@ fn keys(parameters: &[ParameterId]) -> String {
     keys.join(", ")
 }
 
-impl From<ParameterProblems> for Refusal {
-    fn from(problems: ParameterProblems) -> Self {
-        let reasons = problems.0.iter().flat_map(|problem| {
-            let code = problem.code();
-            let subjects = problem.parameters().iter().map(|&id| id as u32);
-            let none = problem.parameters().is_empty().then_some(Reason::NO_SUBJECT);
-            subjects.chain(none).map(move |subject| Reason::new(code, subject))
-        });
-        Self {
-            reasons: reasons.collect(),
-            text: problems.to_string(),
-        }
-    }
-}
-
-impl Reason {
-    /// The parameter that it is about.
-    pub fn parameter(&self) -> Option<ParameterId> {
-        let of_parameter = [
-            RefusalCode::ParameterOutOfLimits,
-            RefusalCode::CellsFold,
-            RefusalCode::TooStiff,
-        ];
-        let code = self.code().filter(|code| of_parameter.contains(code));
-        code.and_then(|_| ParameterId::try_from(self.subject).ok())
-    }
+fn lines(problems: &[ParameterProblem]) -> String {
+    let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
+    lines.join("\n")
 }

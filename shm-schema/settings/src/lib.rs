@@ -1,11 +1,26 @@
-//! Every parameter of tissue, needle and force: the table, the sets of values, and what makes a set invalid.
+//! Settings of a run that simulation and hosts share: every parameter of tissue, needle and force with its validation, the
+//! built-in scenes by name, and the sizes that a scene may have.
+//!
+//! ```
+//! use stylet_settings::{ParameterId, ParameterSet};
+//!
+//! let mut set = ParameterSet::default();
+//! set.set(ParameterId::PunctureDepth, 1.0);
+//! let problems = set.problems();
+//! assert_eq!(problems[0].parameters(), [ParameterId::PunctureDepth]);
+//! println!("{}", problems[0]);
+//! ```
+
+#![warn(missing_docs)]
 
 mod problem;
+mod scene;
 mod set;
 mod table;
 
 pub use problem::{ParameterProblem, ParameterProblems, folding};
-pub use set::{ParameterSet, ParametersInForce};
+pub use scene::{BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_LEFT_NEEDLES, MAX_NODES, MAX_STRUCTURES};
+pub use set::ParameterSet;
 pub use table::{PARAMETER_COUNT, PARAMETERS, ParameterId};
 
 /// Part of the dialog that a parameter stands in.
@@ -67,7 +82,12 @@ pub struct ParameterSpec {
 }
 
 impl ParameterId {
-    /// Its row of the table.
+    /// Returns the parameter of a number, or `None` for a number that no parameter has.
+    pub fn from_number(number: u32) -> Option<Self> {
+        PARAMETERS.get(number as usize).map(|spec| spec.id)
+    }
+
+    /// Returns its row of the table.
     pub fn spec(self) -> &'static ParameterSpec {
         &PARAMETERS[self as usize]
     }
