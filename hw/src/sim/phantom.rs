@@ -65,7 +65,6 @@ pub struct SimulatedPhantom {
     up: Option<Vector3<f64>>,
     wrench: Wrench,
     work_j: f64,
-    buttons: u32,
     sequence: u64,
 }
 
@@ -83,7 +82,6 @@ impl SimulatedPhantom {
             up: None,
             wrench: Wrench::zero(),
             work_j: 0.0,
-            buttons: 0,
             sequence: 0,
         }
     }
@@ -124,11 +122,6 @@ impl SimulatedPhantom {
     pub fn set_hand(&mut self, hand: Hand) {
         self.config.hand = hand;
         self.push_n = Vector3::zeros();
-    }
-
-    /// Sets the buttons of the following samples, one bit each.
-    pub fn set_buttons(&mut self, buttons: u32) {
-        self.buttons = buttons;
     }
 
     fn moving_mass_kg(&self) -> f64 {
@@ -175,7 +168,7 @@ impl SimulatedPhantom {
         Sample {
             tip_in_world: quantise(&self.tip_in_world, self.config.info.position_step_m),
             world_from_tool: self.world_from_tool,
-            buttons: self.buttons,
+            buttons: 0,
             sequence: self.sequence,
         }
     }

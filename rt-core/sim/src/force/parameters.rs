@@ -2,7 +2,6 @@
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use stylet_device::DeviceInfo;
 
 use super::gate::GateParameters;
 use crate::line::{NeedleBending, PronyTerm};
@@ -132,10 +131,5 @@ impl ForceParameters {
         }
         problems.extend(self.gate.validate());
         problems.finish()
-    }
-
-    /// The largest force scale with which `device` gives every membrane its full force.
-    pub fn fitting_scale(&self, device: &DeviceInfo) -> f64 {
-        device.peak_force_n / (self.layers.largest_puncture_force_n() * self.membrane_gain).max(1e-9)
     }
 }

@@ -44,16 +44,6 @@ impl VelocityEstimator {
         &self.velocity_m_per_s
     }
 
-    /// How old the last estimate is, on each axis: the velocity of the middle of its window.
-    pub fn delay_s(&self) -> Vector3<f64> {
-        self.window_s / 2.0
-    }
-
-    /// Largest error of the last estimate that rounding explains, on each axis; infinite before the second sample.
-    pub fn noise_m_per_s(&self) -> Vector3<f64> {
-        self.window_s.map(|window_s| self.step_m / window_s)
-    }
-
     /// Forgets every sample.
     pub fn reset(&mut self) {
         self.filled = 0;
@@ -207,7 +197,8 @@ mod tests {
         for i in 0..5000 {
             let t = f64::from(i) * 1e-3;
             let v = estimator.update(&rounded(0.15 / omega * (omega * t).sin()), 1e-3).x;
-            let (delay, noise) = (estimator.delay_s().x, estimator.noise_m_per_s().x);
+            let window_s = estimator.window_s.x;
+            let (delay, noise) = (window_s / 2.0, STEP_M / window_s);
             if i <= WINDOW as i32 {
                 continue;
             }
@@ -295,7 +286,7 @@ mod tests {
                 let given = estimator.update(&Vector3::new(x, 0.0, -x), dt_s);
                 let (slope, window_s) = by_brute_force(&samples, dt_s);
                 assert_eq!(given.x.to_bits(), slope.to_bits(), "path {path}");
-                assert_eq!(2.0 * estimator.delay_s().x, window_s);
+                assert_eq!(estimator.window_s.x, window_s);
             }
         }
     }

@@ -137,13 +137,6 @@ impl Compliance {
     pub fn at(&self, i: usize, j: usize) -> f64 {
         self.rows.row(i).get(j).copied().unwrap_or(f64::NAN)
     }
-
-    /// Smallest eigenvalue over largest, of the shaft's part.
-    pub fn conditioning(&self) -> f64 {
-        let matrix = nalgebra::DMatrix::from_fn(self.stations, self.stations, |i, j| self.at(i, j));
-        let eigenvalues = matrix.symmetric_eigenvalues();
-        eigenvalues.min() / eigenvalues.max()
-    }
 }
 
 /// Half of each pair: what columns that are not quite solved leave.

@@ -237,11 +237,6 @@ impl HandLine {
         self.state.outside.set(rows_m, ticks);
     }
 
-    /// Something displaces it so.
-    pub fn is_displaced_from_outside(&self) -> bool {
-        self.state.outside.is_on()
-    }
-
     /// What the state is.
     pub fn state(&self) -> &LineState {
         &self.state

@@ -152,11 +152,6 @@ impl LineState {
         &self.shaft_n
     }
 
-    /// Places in the tissue that stick to the shaft, along the line, m.
-    pub fn anchors_m(&self) -> &[f64] {
-        &self.anchor_m
-    }
-
     /// Elastic energy of the tissue, in joules.
     pub fn stored_j(&self, model: &LineModel) -> f64 {
         let m = model.compliance.stations;

@@ -84,15 +84,6 @@ impl Layer {
     pub fn has_membrane(&self) -> bool {
         self.puncture_depth_m > 0.0
     }
-
-    /// Stiffness of the membrane before it gives way; 0 without one.
-    pub fn membrane_stiffness_n_per_m(&self) -> f64 {
-        if self.has_membrane() {
-            self.puncture_force_n / self.puncture_depth_m
-        } else {
-            0.0
-        }
-    }
 }
 
 /// Every kind, in order of [`LayerKind`].

@@ -83,18 +83,6 @@ impl Phase {
     pub const fn code(self) -> u32 {
         self as u32
     }
-
-    /// The phase of a number in records.
-    pub const fn from_code(code: u32) -> Option<Self> {
-        match code {
-            0 => Some(Self::Outside),
-            1 => Some(Self::Contraction),
-            2 => Some(Self::Penetration),
-            3 => Some(Self::Retraction),
-            4 => Some(Self::Hold),
-            _ => None,
-        }
-    }
 }
 
 /// One tick of the needle, as its tip sees it.

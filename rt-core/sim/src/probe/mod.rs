@@ -2,7 +2,7 @@
 //!
 //! *Before the probe moves*: [`ProbeQueue`] solves for the body's answer to a force on each [`Pad`] of the rectum's wall, in slices.
 //! *At the rate of the tissue*: [`step`] finds the forces between probe and pads, none of which pulls, and how the body is displaced by
-//! them. *At the rate of the hand*: [`ProbeResponse::wrench_at`] goes on from the last answer with its stiffness.
+//! them. [`ProbeResponse::stiffness`] extrapolates the answer to the rate of the hand.
 //!
 //! The contact has no friction: the probe lies in gel. Measurements are in `docs/adr/0021-probe.md`.
 //!

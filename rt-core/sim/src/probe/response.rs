@@ -1,4 +1,4 @@
-//! What the hand that holds the probe feels, between two ticks of the tissue as well.
+//! The force of the tissue on the probe, and its stiffness between two ticks of the tissue.
 
 use super::shape::ProbePose;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,7 @@ impl Wrench {
     }
 }
 
-/// The answer of the tissue to a pose, and how it goes on beside it.
+/// Answer of the tissue to a pose, with the stiffness to extrapolate it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProbeResponse {
     /// The pose that was answered.
@@ -42,19 +42,6 @@ impl ProbeResponse {
             stiffness: [[0.0; 6]; 6],
             contacts: 0,
         }
-    }
-
-    /// The wrench at a pose close to that of the answer. The force does not turn round: a probe that is lifted faster than
-    /// the next answer comes feels nothing, not a pull.
-    pub fn wrench_at(&self, pose: &ProbePose) -> Wrench {
-        let motion = self.pose.motion_to(pose);
-        let mut wrench = self.wrench;
-        for (value, row) in wrench.0.iter_mut().zip(&self.stiffness) {
-            *value += row.iter().zip(motion).map(|(k, m)| k * m).sum::<f64>();
-        }
-        let along: f64 = (0..3).map(|c| wrench.0[c] * self.wrench.0[c]).sum();
-        // What is no number does not press either.
-        if along > 0.0 { wrench } else { Wrench::default() }
     }
 }
 

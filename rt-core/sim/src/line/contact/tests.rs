@@ -104,7 +104,7 @@ fn one_station_sticks_slips_and_takes_the_area_of_its_loop() {
             }
             (before, last_m) = (now, tip_m);
             // Stick, as steep as the tissue is, or slip.
-            let stuck_n = (tip_m - state.anchors_m()[0]) / own;
+            let stuck_n = (tip_m - state.anchor_m[0]) / own;
             assert!((now.shaft_n - stuck_n).abs() < 1e-6 && now.shaft_n.abs() <= limit_n);
         }
     }

@@ -91,7 +91,8 @@ impl ChainMail {
         links + self.rows.bytes() + self.segments.bytes() + parts + planes
     }
 
-    /// Runs the portable kernels, whatever the processor has: they give the same bytes.
+    /// Runs the portable kernels, whatever the processor has.
+    #[cfg(test)]
     pub fn without_vectors(mut self) -> Self {
         self.vectors = false;
         self

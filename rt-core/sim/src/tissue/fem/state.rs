@@ -44,7 +44,8 @@ impl<T: Real> FemState<T> {
         [0, 1, 2].map(|a| rest[a] + model.lattice.spacing_m * u[a])
     }
 
-    /// Displacement of the node at `corner`, counted in cells from the scene's origin, in metres; `None` where there is no node.
+    /// Returns the displacement of the node at `corner`, counted in cells from the scene's origin, in metres; `None` without a node.
+    #[cfg(test)]
     pub fn node_displacement_m(&self, model: &FemModel<T>, corner: [usize; 3]) -> Option<[f64; 3]> {
         let grid = &model.levels[0].grid;
         let mut place = [0; 3];
