@@ -1,7 +1,11 @@
 //! What is installed: man pages and completions of both programs, and what the Debian packages hold.
 
 #[cfg(test)]
+mod commands;
+#[cfg(test)]
 mod contents;
+#[cfg(test)]
+mod help;
 #[cfg(test)]
 mod pages;
 

@@ -1,37 +1,9 @@
 //! Every subcommand and option that a program lists in its help has its entry on a page and in the completions.
 
+use crate::help::helps;
 use crate::{PROGRAMS, manual};
 use std::path::Path;
 use std::process::Command;
-use stylet_test_kit::program;
-
-/// A command and all below it, each as its words with the text of its help.
-fn helps(words: Vec<String>) -> Vec<(Vec<String>, String)> {
-    let shown = Command::new(program(&words[0]))
-        .args(&words[1..])
-        .arg("--help")
-        .output()
-        .expect("it starts");
-    let help = String::from_utf8(shown.stdout).expect("UTF-8");
-    let below = subcommands(&help);
-    let mut all = vec![(words.clone(), help)];
-    for name in below {
-        all.extend(helps([words.clone(), vec![name]].concat()));
-    }
-    all
-}
-
-/// Names in the list of commands.
-fn subcommands(help: &str) -> Vec<String> {
-    let list = help.lines().skip_while(|line| *line != "Commands:").skip(1);
-    let list = list.take_while(|line| !line.is_empty());
-    let names = list.filter_map(|line| line.strip_prefix("  ")?.split(' ').next());
-    // `help` has no page: the pages are the help.
-    names
-        .filter(|name| !name.is_empty() && *name != "help")
-        .map(str::to_owned)
-        .collect()
-}
 
 /// Long options with an entry of their own.
 fn options(help: &str) -> Vec<String> {
@@ -61,10 +33,11 @@ fn every_subcommand_and_option_is_on_its_page_and_completed() {
         ]
         .map(|script| read(&folder.join(script)));
         let fish = read(&folder.join(format!("fish/vendor_completions.d/{name}.fish")));
-        for (words, help) in helps(vec![name.to_owned()]) {
+        for help in helps(vec![name.to_owned()]) {
             pages += 1;
+            let words = &help.words;
             let page = read(&folder.join(format!("man/man1/{}.1", words.join("-"))));
-            for option in options(&help) {
+            for option in options(&help.text) {
                 checked += 1;
                 let on_page = option.replace('-', "\\-");
                 assert!(page.contains(&on_page), "{words:?}: {option} is not on its page");
@@ -74,7 +47,7 @@ fn every_subcommand_and_option_is_on_its_page_and_completed() {
                 );
                 assert!(fish.contains(&format!("-l {}", &option[2..])), "{words:?} {option}");
             }
-            for below in subcommands(&help) {
+            for (below, _) in help.subcommands() {
                 assert!(page.contains(&below.replace('-', "\\-")), "{words:?}: {below}");
             }
         }

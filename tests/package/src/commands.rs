@@ -1,0 +1,77 @@
+//! `docs/commands.md`: the commands and options of both programs, as their help lists them.
+
+use crate::PROGRAMS;
+use crate::help::{Help, helps};
+use std::fmt::Write as _;
+use stylet_test_kit::repository;
+
+const HEAD: &str = "\
+# Commands
+
+The test that checks this page also writes it, from the help of both programs:
+`UPDATE_DOCS=1 cargo test --release -p stylet-tests-package commands`. `COMMAND --help` explains each option.
+The packages install man pages and completions for bash, zsh and fish; `rt-core manual` and `host-ui manual` write them.
+[A class over the network](network.md) lists the commands of `relay`.
+";
+
+/// Returns the page: for each program a table of its commands, and the options of a run.
+fn page() -> String {
+    let mut page = HEAD.to_owned();
+    for name in PROGRAMS {
+        let helps = helps(vec![name.to_owned()]);
+        let program = &helps[0];
+        let about = program.text.lines().next().unwrap_or_default();
+        let _ = write!(
+            page,
+            "\n## {name}\n\n{about}\n\n| command | what it does |\n|---|---|\n"
+        );
+        for (words, does) in helps.iter().flat_map(commands) {
+            let _ = writeln!(page, "| `{words}` | {} |", cell(&does));
+        }
+        let _ = write!(
+            page,
+            "\nOptions of a run, `{name} -h`:\n\n```\n{}\n```\n",
+            options(name)
+        );
+    }
+    page
+}
+
+/// Returns each command that a help lists, as it is typed, with its line.
+fn commands(help: &Help) -> Vec<(String, String)> {
+    let listed = help.subcommands().into_iter();
+    listed
+        .map(|(name, does)| (format!("{} {name}", help.words.join(" ")), does))
+        .collect()
+}
+
+/// Returns the options of the short help.
+fn options(program: &str) -> String {
+    let help = Help::short(program);
+    let lines = help.text.lines().skip_while(|line| *line != "Options:").skip(1);
+    lines
+        .map(str::trim_end)
+        .collect::<Vec<_>>()
+        .join("\n")
+        .trim_end()
+        .to_owned()
+}
+
+/// Returns text as it may stand in a cell of a table.
+fn cell(text: &str) -> String {
+    text.replace('|', "\\|")
+}
+
+#[test]
+fn the_page_of_commands_says_what_the_programs_say() {
+    let (path, now) = (repository("docs/commands.md"), page());
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        std::fs::write(&path, &now).expect("the page can be written");
+    }
+    let kept = std::fs::read_to_string(&path).unwrap_or_default();
+    let differs = kept.lines().zip(now.lines()).find(|(kept, now)| kept != now);
+    assert!(
+        kept == now,
+        "docs/commands.md is not what the programs say: run the command at its head; {differs:?}"
+    );
+}
