@@ -3,6 +3,15 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+/// Pages outside `docs` whose names and links are checked too.
+const ROOT_PAGES: [&str; 5] = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "SECURITY.md",
+    "scenes/README.md",
+];
+
 /// Every file below the root of the workspace, as a path relative to it with `/` between the parts.
 struct Tree {
     root: PathBuf,
@@ -48,11 +57,20 @@ impl Tree {
 
     /// Pages that the tests in this file check.
     fn pages(&self) -> impl Iterator<Item = &str> {
-        let checked = |file: &&str| {
-            file.ends_with(".md")
-                && (file.starts_with("docs/") || ["README.md", "ARCHITECTURE.md", "scenes/README.md"].contains(file))
-        };
+        let checked = |file: &&str| file.ends_with(".md") && (file.starts_with("docs/") || ROOT_PAGES.contains(file));
         self.files.iter().map(String::as_str).filter(checked)
+    }
+
+    /// Names of all test functions.
+    fn tests(&self) -> BTreeSet<String> {
+        let mut found = BTreeSet::new();
+        for file in self.files.iter().filter(|file| file.ends_with(".rs")) {
+            let source = without_comments(&self.text(file));
+            let after = source.split("#[test]").skip(1);
+            let names = after.filter_map(|rest| words(rest.split_once("fn ")?.1).next());
+            found.extend(names.map(str::to_owned));
+        }
+        found
     }
 
     /// Words of all source files but this one, without comments: a name in a comment alone does not exist.
@@ -198,6 +216,24 @@ fn every_code_name_on_a_page_occurs_in_the_sources() {
     }
     assert!(checked > 50, "only {checked} names found");
     assert!(wrong.is_empty(), "no source has:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn every_invariant_names_a_test_that_exists() {
+    let tree = Tree::of_workspace();
+    let tests = tree.tests();
+    let page = tree.text("docs/invariants.md");
+    let (mut wrong, mut checked) = (Vec::new(), 0);
+    for row in rows(&page).filter(|row| row.last() != Some(&"test")) {
+        checked += 1;
+        let spans = code_spans(row.last().copied().unwrap_or_default());
+        let named: Vec<&&str> = spans.iter().filter(|span| is_code_name(span)).collect();
+        if named.is_empty() || named.iter().any(|name| !tests.contains(**name)) {
+            wrong.push(row.join(" | "));
+        }
+    }
+    assert!(checked > 50, "the tables of docs/invariants.md were not found");
+    assert!(wrong.is_empty(), "without an existing test:\n{}", wrong.join("\n"));
 }
 
 #[test]
