@@ -1,8 +1,8 @@
 //! Finite elements as they run: one cycle a tick, a patch of 4 mm, work ahead, and lines in bodies that are hard to solve.
 
+use crate::patch::{PATCH_M, PERIOD_S, PatchTick, STRAIGHT, Way, converged, insertion};
 use crate::rows::{Row, keep};
 use stylet_anatomy::{Beyond, Surroundings};
-use stylet_benches::patch::{PATCH_M, PERIOD_S, PatchTick, STRAIGHT, Way, converged, insertion};
 use stylet_benches::twin::{Twin, TwinSettings, default_forces};
 use stylet_runtime::lines::LineBody;
 use stylet_sim::line::{HandLine, StationSettings};

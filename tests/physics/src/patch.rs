@@ -9,8 +9,6 @@ use stylet_sim::tissue::{Carried, Deformed, element_ahead};
 pub const PERIOD_S: f64 = 5e-3;
 /// As the loop holds with finite elements.
 pub const PATCH_M: f64 = 4e-3;
-/// A centimetre of fat of 3 kPa around the gland.
-pub const FOUNDATION_PA_PER_M: f64 = 3e5;
 /// As patients' needles go on average; 123 and 280 mm/s are the mean maximum and the maximum.
 pub const STRAIGHT: Way = Way {
     direction: [0.0, 0.0, 1.0],
