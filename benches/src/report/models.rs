@@ -1,6 +1,5 @@
 //! The models that are compared, each under the settings that it is compared with.
 
-use stylet_benches::solvers::{OnePass, PassKind};
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
@@ -17,8 +16,6 @@ pub struct Fitted {
 /// Models that differ only in a setting belong to one family; the picture draws a family in one colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Family {
-    Queue,
-    OnePass,
     Sweeps,
     Relaxed,
     Fem,
@@ -26,19 +23,10 @@ pub enum Family {
 }
 
 impl Family {
-    pub const ALL: [Family; 6] = [
-        Family::Queue,
-        Family::OnePass,
-        Family::Sweeps,
-        Family::Relaxed,
-        Family::Fem,
-        Family::FemDouble,
-    ];
+    pub const ALL: [Family; 4] = [Family::Sweeps, Family::Relaxed, Family::Fem, Family::FemDouble];
 
     pub fn name(self) -> &'static str {
         match self {
-            Family::Queue => "ChainMail, queue, one pass",
-            Family::OnePass => "ChainMail, sweeps, one pass",
             Family::Sweeps => "ChainMail, solved",
             Family::Relaxed => "ChainMail, relaxed",
             Family::Fem => "FEM, f32",
@@ -73,14 +61,10 @@ pub fn chainmail(scene: &Scene, parameters: &TissueParameters) -> ChainMailTissu
 }
 
 pub fn entries(scene: &Scene, fitted: &Fitted) -> Vec<Entry> {
-    let limits = fitted.limits.validate().expect("fitted settings are valid");
     let mut entries = Vec::new();
     let mut add = |family, setting: String, model: Box<dyn TissueModel>| {
         entries.push(Entry { family, setting, model });
     };
-    let pass = |kind| Box::new(OnePass::new(scene, &limits, kind));
-    add(Family::Queue, "fitted limits".to_owned(), pass(PassKind::Queue));
-    add(Family::OnePass, "fitted limits".to_owned(), pass(PassKind::Sweep));
     let paper = TissueParameters::default();
     for (name, parameters) in [("paper's limits", &paper), ("fitted limits", &fitted.limits)] {
         add(Family::Sweeps, name.to_owned(), Box::new(chainmail(scene, parameters)));

@@ -118,7 +118,7 @@ fn choices(text: &mut String, found: &Findings) -> std::fmt::Result {
             point.rms_percent
         )?;
     }
-    text.push_str("- **The queue** and **one pass** are for comparison: they leave limits violated.\n\n");
+    text.push('\n');
     if let (Some(relaxed), Some(fem)) = (
         fastest_within(Family::Relaxed, ASKED_PERCENT).or(best(Family::Relaxed)),
         fastest_within(Family::Fem, 1.0),

@@ -112,8 +112,8 @@ pub fn causes(text: &mut String, causes: &[Cause]) -> std::fmt::Result {
 
 pub fn passes(text: &mut String, rows: &[Passes]) -> std::fmt::Result {
     text.push_str(
-        "## One pass over everything\n\nAn element in the middle is pulled so far that every element moves. The plain queue and the plain sweep \
-         are the textbook's (`benches/src/solvers`); they leave limits violated, ours goes on until none is violated by more than 1e-3 elements. Least of \
+        "## One pass over everything\n\nAn element in the middle is pulled so far that every element moves. The plain queue \
+         is the textbook's (`benches/src/solvers`); it leaves limits violated, ours goes on until none is violated by more than 1e-3 elements. Least of \
          interleaved rounds.\n\n",
     );
     text.push_str("| scene | elements | solver | passes | time, us | ns an element and pass | violation left, elements |\n|---|---|---|---|---|---|---|\n");

@@ -1,7 +1,7 @@
 //! What the textbook's single pass costs beside a step of ours, on a body in which everything moves.
 
 use std::time::Instant;
-use stylet_benches::solvers::{Body, PlainQueue, PlainSweep};
+use stylet_benches::solvers::{Body, PlainQueue};
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
 use stylet_sim::tissue::{ChainMail, Held, TissueState, step};
@@ -51,14 +51,13 @@ fn on(name: &'static str, rounds: usize) -> Vec<Passes> {
         patch_m: 0.0,
     };
     let at = way.map(|c| c as f32);
-    let (mut queue, sweep) = (PlainQueue::new(lattice), PlainSweep::new(lattice));
-    let mut bodies = [Body::at_rest(&scene, &limits), Body::at_rest(&scene, &limits)];
+    let (mut queue, mut body) = (PlainQueue::new(lattice), Body::at_rest(&scene, &limits));
     let model = ChainMail::new(&scene, limits);
     let at_rest = TissueState::at_rest(&model);
     let mut state = TissueState::at_rest(&model);
-    let (mut least, mut passes) = ([f64::INFINITY; 3], 1);
+    let (mut least, mut passes) = ([f64::INFINITY; 2], 1);
     for _ in 0..rounds {
-        bodies.iter_mut().for_each(Body::return_to_rest);
+        body.return_to_rest();
         state.copy_from(&at_rest);
         let mut time = |n: usize, run: &mut dyn FnMut()| {
             let begun = Instant::now();
@@ -66,17 +65,15 @@ fn on(name: &'static str, rounds: usize) -> Vec<Passes> {
             least[n] = least[n].min(begun.elapsed().as_secs_f64() * 1e6);
         };
         time(0, &mut || {
-            let moved = queue.run(&mut bodies[0], element, at);
+            let moved = queue.run(&mut body, element, at);
             assert_eq!(moved as usize, lattice.element_count(), "a pass over everything");
         });
-        time(1, &mut || sweep.run(&mut bodies[1], element, at));
-        time(2, &mut || passes = step(&model, &mut state, Some(far), 5e-3).passes);
+        time(1, &mut || passes = step(&model, &mut state, Some(far), 5e-3).passes);
     }
     let left = stylet_sim::tissue::largest_violation(&model, &state);
     let rows = [
-        ("plain queue, one pass", 1, least[0], bodies[0].largest_violation()),
-        ("plain sweep, one pass", 1, least[1], bodies[1].largest_violation()),
-        ("ours, to the residual", passes, least[2], left),
+        ("plain queue, one pass", 1, least[0], body.largest_violation()),
+        ("ours, to the residual", passes, least[1], left),
     ];
     rows.map(|(solver, passes, us, violation)| Passes {
         scene: name,

@@ -19,8 +19,6 @@ const FONT: &str = "sans-serif";
 /// Okabe and Ito's colours, which the colour-blind can distinguish; each with a shape of its own.
 fn colour(family: Family) -> RGBColor {
     match family {
-        Family::Queue => RGBColor(90, 90, 90),
-        Family::OnePass => RGBColor(230, 159, 0),
         Family::Sweeps => RGBColor(0, 114, 178),
         Family::Relaxed => RGBColor(0, 158, 115),
         Family::Fem => RGBColor(213, 94, 0),
@@ -40,8 +38,6 @@ where
     let polygon =
         |corners: &[(i32, i32)]| Polygon::new(corners.iter().map(|(a, b)| (x + a, y + b)).collect::<Vec<_>>(), style);
     match family {
-        Family::Queue => area.draw(&polygon(&[(0, -6), (6, 5), (-6, 5)]))?,
-        Family::OnePass => area.draw(&polygon(&[(0, 6), (6, -5), (-6, -5)]))?,
         Family::Sweeps => area.draw(&Circle::new((x, y), 5, style))?,
         Family::Relaxed => area.draw(&Rectangle::new([(x - 5, y - 5), (x + 5, y + 5)], style))?,
         Family::Fem => area.draw(&polygon(&[(0, -7), (7, 0), (0, 7), (-7, 0)]))?,

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use stylet_sim::limits::{Limits, LinkLimits};
 use stylet_sim::scene::{Lattice, Scene};
-use stylet_sim::tissue::{Carried, Deformed};
 
 /// Where every element is, and how far its links may go.
 pub struct Body {
@@ -13,8 +12,6 @@ pub struct Body {
     pub u: [Vec<f32>; 3],
     /// Limits of the links along x, y, z.
     pub limits: [LinkLimits; 3],
-    /// No element is farther from rest along any axis, in elements.
-    pub(super) farthest: f32,
 }
 
 impl Body {
@@ -29,34 +26,18 @@ impl Body {
             lattice: scene.lattice.clone(),
             u: std::array::from_fn(|_| vec![0.0; scene.lattice.element_count()]),
             limits: *limits.links(),
-            farthest: 0.0,
         }
     }
 
     /// Every element to its place at rest.
     pub fn return_to_rest(&mut self) {
         self.u.iter_mut().for_each(|c| c.fill(0.0));
-        self.farthest = 0.0;
     }
 
     /// Puts an element `at` elements from rest.
     pub fn put(&mut self, element: u32, at: [f32; 3]) {
         for (component, value) in self.u.iter_mut().zip(at) {
             component[element as usize] = value;
-            self.farthest = self.farthest.max(value.abs());
-        }
-    }
-
-    /// The body as everything else reads it.
-    pub fn deformed(&self) -> Deformed<'_> {
-        let stretch: f32 = self.limits.iter().map(|l| l.high).sum();
-        Deformed {
-            lattice: &self.lattice,
-            u: self.u.each_ref().map(Vec::as_slice),
-            scale: 1.0,
-            carried: Carried::Not,
-            // A link brings its outer end nearer to the inner one's displacement, so nothing passes what was put.
-            reach: 1.0 + stretch + 2.0 * self.farthest,
         }
     }
 
