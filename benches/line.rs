@@ -1,6 +1,6 @@
 //! The needle's line: what its columns cost beside how exact they are, and a tick of its stations beside sweeps alone.
 //!
-//! `cargo bench -p stylet-benches --bench line`; after `--` the names of what to measure: `columns`, `pelvis`, `ticks`, `folds`.
+//! `cargo bench -p stylet-benches --bench line`; after `--` the names of what to measure: `columns`, `pelvis`, `ticks`.
 
 use std::time::Instant;
 
@@ -11,7 +11,7 @@ use stylet_sim::line::{
 use stylet_sim::scene::{Scene, TissueKind};
 use stylet_sim::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight, Progress};
 use stylet_sim::tissue::fem::{FemModel, FemSettings, Integration, Material};
-use stylet_sim::tissue::{ElementField, FemTissue, TissueModel, least_corner};
+use stylet_sim::tissue::{ElementField, FemTissue};
 
 /// As patients' tissue is nearly incompressible; a centimetre of fat around it.
 const GLAND: Material = Material {
@@ -35,9 +35,6 @@ fn main() {
     if is_wanted("pelvis") {
         let (model, stations) = pelvis();
         columns("pelvis", &model, &stations);
-    }
-    if is_wanted("folds") {
-        folds();
     }
     if is_wanted("ticks") {
         ticks("40 stations, made up", &made_up(40));
@@ -168,54 +165,6 @@ fn columns(name: &str, model: &BatchModel<f32>, stations: &Stations) {
         assert!(
             tolerance > TOLERANCE || off / largest < 2e-3,
             "a wrong answer has no time"
-        );
-    }
-}
-
-/// What a look for folded cells costs beside the tick that it follows, and from which displacement of the tip on there are some.
-fn folds() {
-    let scene = Scene::builtin("paper").expect("built in").with_tissue(TissueKind::Fem);
-    let mut tissue = FemTissue::<f32>::new(&scene).expect("valid");
-    let model = BatchModel::new(&tissue.model);
-    let (low, high) = scene.lattice.bounds_m();
-    let start = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2] - 10e-3];
-    let line = Line::into_body(&scene.lattice, start, [0.0, 0.0, 1.0]).expect("meets the gland");
-    let stations = Stations::along(
-        &model,
-        line,
-        StationSettings::of_lattice(model.spacing_m()),
-        MAX_STATIONS,
-    );
-    let m = stations.count();
-    let mut queue = ColumnQueue::new(&model, &stations, false, TOLERANCE);
-    queue.prepare_all(&model);
-    let columns = queue.into_fields();
-    println!("folds: paper as it ships, a load on the tip's patch alone, {m} stations");
-    for at in [0, m / 4, m / 2] {
-        let place_m = line.point_m((at as f64 + 0.5) * stations.settings.spacing_m, [0.0; 2]);
-        let element = scene.body.element_at_rest(place_m).expect("in the gland");
-        let mut loads = vec![0.0; 2 * m];
-        let (mut displaced_us, mut looked_us) = (f64::INFINITY, f64::INFINITY);
-        let mut from = None;
-        for tenth in 1..=60 {
-            loads[m + at] = 0.1 * f64::from(tenth);
-            let start = Instant::now();
-            tissue.displace(&columns, &loads, [0.0; 3]).expect("adds columns up");
-            displaced_us = (start.elapsed().as_secs_f64() * 1e6).min(displaced_us);
-            let body = tissue.deformed();
-            let start = Instant::now();
-            let least = least_corner(&body, element);
-            looked_us = (start.elapsed().as_secs_f64() * 1e6).min(looked_us);
-            let moved = body.displacement(element).iter().map(|u| u * u).sum::<f64>().sqrt();
-            if least <= 0.0 && from.is_none() {
-                from = Some((loads[m + at], 1e3 * moved * model.spacing_m()));
-            }
-        }
-        println!(
-            "  station {at:2}: look {looked_us:.1} us, tick of one column {displaced_us:.1} us; folded from {}",
-            from.map_or("no load up to 6 N on".to_owned(), |(n, mm)| format!(
-                "{n:.1} N, {mm:.1} mm on"
-            ))
         );
     }
 }
