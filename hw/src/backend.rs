@@ -15,7 +15,7 @@ pub enum BackendKind {
     Haply,
 }
 
-/// What may follow the name, behind a colon.
+/// Argument that may follow the name, behind a colon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Argument {
     /// Nothing.
@@ -29,17 +29,17 @@ pub enum Argument {
 /// One row of the table.
 #[derive(Debug, Clone, Copy)]
 pub struct Backend {
-    /// Which back end this is.
+    /// Kind of device that the name selects.
     pub kind: BackendKind,
-    /// The name that is written. Stable: it stands in scene files.
+    /// Name in command lines and scene files. Stable, because scene files contain it.
     pub name: &'static str,
     /// Older names, accepted on reading.
     pub aliases: &'static [&'static str],
-    /// What may follow the name.
+    /// Argument that may follow the name.
     pub argument: Argument,
     /// One line for help texts.
     pub help: &'static str,
-    /// Nobody has tried it on the device itself, only on a fake of its driver.
+    /// True if the back end has run only against a fake of its driver, never on the device.
     pub untried: bool,
 }
 
@@ -92,7 +92,7 @@ pub const BACKENDS: &[Backend] = &[
 #[error("\"{0}\" is not a device; give {forms}", forms = forms())]
 pub struct UnknownBackend(pub String);
 
-/// The back end that `text` names, and the argument behind the colon.
+/// Returns the back end that `text` names, and the argument behind the colon.
 ///
 /// ```
 /// use stylet_hw::backend::{BackendKind, parse};
@@ -116,27 +116,27 @@ pub fn parse(text: &str) -> Result<(BackendKind, Option<&str>), UnknownBackend> 
         .ok_or_else(|| UnknownBackend(text.to_owned()))
 }
 
-/// Every accepted form, for messages.
+/// Returns every accepted form, for messages.
 pub fn forms() -> String {
     let mut forms: Vec<_> = BACKENDS.iter().flat_map(forms_of).collect();
     let last = forms.pop().unwrap_or_default();
     format!("{} or {last}", forms.join(", "))
 }
 
-/// The forms of every back end with their help, one per line.
+/// Returns the forms of every back end with their help, one per line.
 pub fn help() -> String {
     let line = |b: &Backend| format!("{}: {}{}", forms_of(b).join(" or "), b.help, b.untried_text());
     BACKENDS.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
 impl Backend {
-    /// What help texts add where nobody has tried the back end on the device; else nothing.
+    /// Returns the remark of help texts on a back end that is untried on the device; else nothing.
     pub fn untried_text(&self) -> &'static str {
         if self.untried { " (not tried on the device)" } else { "" }
     }
 }
 
-/// Every accepted form of one back end.
+/// Returns every accepted form of one back end.
 pub fn forms_of(b: &Backend) -> Vec<String> {
     match b.argument {
         Argument::None => vec![b.name.to_owned()],
@@ -150,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_aliases_are_unique_and_each_is_read_back() {
+    fn names_and_aliases_are_unique_and_parse() {
         let mut names: Vec<_> = BACKENDS
             .iter()
             .flat_map(|b| b.aliases.iter().chain([&b.name]))
@@ -166,9 +166,9 @@ mod tests {
         }
     }
 
-    /// Scene files said `sim` where the force loop's process accepted only `simulated`.
+    /// Guards older scene files, which say `sim` where the force process accepted only `simulated`.
     #[test]
-    fn the_device_of_older_scene_files_is_the_simulated_one() {
+    fn sim_in_older_scene_files_means_simulated() {
         assert_eq!(parse("sim"), Ok((BackendKind::Simulated, None)));
         assert_eq!(parse("simulated"), Ok((BackendKind::Simulated, None)));
     }
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn other_texts_are_refused_with_every_accepted_form() {
+    fn unknown_names_are_refused_with_every_accepted_form() {
         for wrong in [
             "",
             ":",

@@ -2,18 +2,19 @@
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-/// Counts of an encoder whose step is `step`; half a step rounds away from zero. Saturates, and returns zero for a value
-/// that is not a number or a step that is not positive.
+/// Returns the counts of an encoder of this `step`, rounding half a step away from zero. Saturates.
+/// Returns zero if `value` is not a number or `step` is not positive.
 pub fn counts_from_si(value: f64, step: f64) -> i64 {
     if step > 0.0 { (value / step).round() as i64 } else { 0 }
 }
 
-/// The value in the middle of the encoder step `counts`.
+/// Returns the value in the middle of the encoder step `counts`.
 pub fn si_from_counts(counts: i64, step: f64) -> f64 {
     counts as f64 * step
 }
 
-/// The nearest position that encoders of `step_m` resolve; the position itself when the step is zero.
+/// Returns the nearest position that encoders of `step_m` resolve; the position itself when the
+/// step is zero.
 pub fn quantise(position_m: &Vector3<f64>, step_m: f64) -> Vector3<f64> {
     if step_m > 0.0 {
         position_m.map(|x| si_from_counts(counts_from_si(x, step_m), step_m))
@@ -22,18 +23,18 @@ pub fn quantise(position_m: &Vector3<f64>, step_m: f64) -> Vector3<f64> {
     }
 }
 
-/// Metres from a driver's millimetres.
+/// Converts a driver's millimetres to metres.
 pub fn metres_from_millimetres(position_mm: &Vector3<f64>) -> Vector3<f64> {
     position_mm * 1e-3
 }
 
-/// A driver's millinewton metres from newton metres.
+/// Converts newton metres to a driver's millinewton metres.
 pub fn millinewton_metres_from_newton_metres(torque_nm: &Vector3<f64>) -> Vector3<f64> {
     torque_nm * 1e3
 }
 
-/// Position (m) and orientation from a driver's homogeneous transform: column-major, in millimetres.
-/// `None` if it is not finite or its upper block is not close to a rotation.
+/// Returns position (m) and orientation of a driver's homogeneous transform: column-major, in
+/// millimetres. `None` if it is not finite or its upper block is not close to a rotation.
 pub fn pose_from_column_major_mm(transform: &[f64; 16]) -> Option<(Vector3<f64>, UnitQuaternion<f64>)> {
     let &[xx, xy, xz, _, yx, yy, yz, _, zx, zy, zz, _, px, py, pz, _] = transform;
     let rotation = Matrix3::new(xx, yx, zx, xy, yy, zy, xz, yz, zz);
@@ -43,7 +44,7 @@ pub fn pose_from_column_major_mm(transform: &[f64; 16]) -> Option<(Vector3<f64>,
     finite.then_some((tip, orientation))
 }
 
-/// Orientation from a driver's matrix; `None` if it is not close to a rotation.
+/// Returns the orientation of a driver's matrix; `None` if it is not close to a rotation.
 pub fn orientation_from_matrix(rotation: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     let defect = (rotation.transpose() * rotation - Matrix3::identity()).norm();
     // Numbers that are not finite fail the first comparison.

@@ -1,6 +1,6 @@
-//! One line about a device: what was found, how much it matters, and what to do.
+//! One finding about a device: observation, severity and remedy.
 
-/// How much a finding matters.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// Nothing to do.
@@ -16,11 +16,11 @@ pub enum Severity {
 /// Result of one check.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
-    /// How much it matters.
+    /// Severity of the finding.
     pub severity: Severity,
-    /// What was found.
+    /// Observation.
     pub what: String,
-    /// What to do, with the command to type; empty when there is nothing to do.
+    /// Remedy, with the command to type; empty when there is nothing to do.
     pub cure: String,
 }
 

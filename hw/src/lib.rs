@@ -1,15 +1,15 @@
 //! Haptic devices: the [`Device`] trait and its back ends.
 //!
-//! Encoder counts, driver units and calibration stand only here: everything that leaves this crate is in SI units and in
-//! the world frame.
+//! Encoder counts, driver units and calibration are confined to this crate: everything that leaves
+//! it is in SI units and in the world frame.
 
 #![warn(missing_docs)]
 
 pub mod backend;
-mod beside;
 pub mod conformance;
 pub mod convert;
 pub mod drd;
+mod driver_thread;
 mod finding;
 pub mod haply;
 pub mod libhd;
@@ -20,10 +20,17 @@ pub mod sim;
 mod usb;
 
 pub use backend::BackendKind;
+<<<<<<< HEAD
 pub use beside::arm::{Arm, ArmError};
 pub use beside::keeper::Report;
 pub use beside::served::{Described, Readings, Served};
+=======
+pub use device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
+>>>>>>> c3509727 (Say what each part of the devices crate holds in plain English)
 pub use drd::{ForceDimension, ForceDimensionConfig};
+pub use driver_thread::arm::{Arm, ArmError};
+pub use driver_thread::keeper::Report;
+pub use driver_thread::served::{Described, Readings, Served};
 pub use finding::{Finding, Severity};
 pub use haply::{Haply, HaplyConfig};
 pub use libhd::{Phantom, PhantomConfig};

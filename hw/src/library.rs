@@ -1,7 +1,7 @@
-//! Drivers of makers, loaded at run time and never closed.
+//! Makers' drivers, loaded at run time and never closed.
 //!
-//! A machine without a device needs no driver. A library stays loaded until the process ends: drivers fail when they are
-//! loaded a second time after they were closed.
+//! A machine without a device needs no driver. A library stays loaded until the process ends:
+//! drivers fail when they are loaded a second time after they were closed.
 
 use core::ffi::{CStr, c_char};
 use std::path::{Path, PathBuf};
@@ -13,21 +13,21 @@ use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LAZY};
 pub struct Driver {
     /// Its name for people.
     pub name: &'static str,
-    /// Names under which it is installed, in the order in which they are tried.
+    /// Names under which it is installed, in the order of trial.
     pub files: &'static [&'static str],
 }
 
-/// Why no library could be loaded: each name that was tried, with the reason.
+/// Reason why no library could be loaded: each name that was tried, with its failure.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{driver} cannot be loaded{}", attempts(tried))]
 pub struct LoadError {
     /// Name of the driver for people.
     pub driver: &'static str,
-    /// Each name that was tried, with the reason.
+    /// Each name that was tried, with its failure.
     pub tried: Vec<(PathBuf, LoadFailure)>,
 }
 
-/// Why one library could not be loaded.
+/// Reason why one library could not be loaded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LoadFailure {
     /// The message of the dynamic loader, unaltered.
@@ -44,7 +44,7 @@ pub enum LoadFailure {
 }
 
 impl LoadFailure {
-    /// Two ways out.
+    /// Both remedies for an untrusted library.
     pub(crate) const CURE_OF_NOT_TRUSTED: &str = "install it where the system finds it, then sudo ldconfig; or take the rights from the program: \
                                                   sudo dpkg-reconfigure stylet-rt-core";
 }
@@ -54,8 +54,9 @@ fn attempts(tried: &[(PathBuf, LoadFailure)]) -> String {
     tried.iter().map(line).collect()
 }
 
-/// Whether the kernel gave this program more rights than its user has, as `setcap` does (`AT_SECURE`): whatever the user names is then
-/// not loaded, or the user's own code would have these rights.
+/// Returns whether the kernel gave this program more rights than its user has, as `setcap` does
+/// (`AT_SECURE`). Such a program must not load a library that the user names, or the user's own
+/// code would gain these rights.
 pub fn has_more_rights_than_user() -> bool {
     // SAFETY: getauxval has no preconditions.
     unsafe { libc::getauxval(libc::AT_SECURE) != 0 }
@@ -74,7 +75,8 @@ pub fn load<T>(
     };
     let mut tried = Vec::new();
     for name in names {
-        // A name without a slash is looked for where root alone installs: the loader ignores LD_LIBRARY_PATH as well.
+        // A name without a slash resolves only to folders that root writes: the loader ignores
+        // LD_LIBRARY_PATH as well.
         if has_more_rights_than_user() && name.components().count() > 1 {
             tried.push((name, LoadFailure::NotTrusted));
             continue;
@@ -97,7 +99,7 @@ fn load_one<T>(name: &Path, bind: impl Fn(&Library) -> Result<T, Vec<&'static st
     functions
 }
 
-/// The message of the dynamic loader.
+/// Returns the message of the dynamic loader.
 fn message(error: &libloading::Error) -> String {
     match error {
         libloading::Error::DlOpen { desc } => format!("{desc:?}").trim_matches('"').to_owned(),
@@ -105,7 +107,7 @@ fn message(error: &libloading::Error) -> String {
     }
 }
 
-/// A driver's string; "unknown" for none.
+/// Returns a driver's string; "unknown" for none.
 ///
 /// # Safety
 ///
@@ -118,7 +120,8 @@ pub unsafe fn text(pointer: *const c_char) -> String {
     unsafe { CStr::from_ptr(pointer) }.to_string_lossy().into_owned()
 }
 
-/// The table of a library's functions: `Api`, their names and signatures. A library that lacks a required one is refused.
+/// Defines `Api`, the table of a library's functions with names and signatures. A library that
+/// lacks a required one is refused.
 macro_rules! functions {
     (
         required { $(fn $name:ident($($argument:ty),*) $(-> $result:ty)?;)* }
@@ -152,7 +155,7 @@ macro_rules! functions {
                 $crate::library::load(&DRIVER, path, Self::from_library)
             }
 
-            /// All functions, or every name that the library lacks.
+            /// Returns all functions, or every name that the library lacks.
             fn from_library(library: &libloading::os::unix::Library) -> Result<Self, Vec<&'static str>> {
                 let missing: Vec<_> = FUNCTIONS.iter().copied().filter(|name| {
                     // SAFETY: only the presence of the symbol is checked; it is not used.

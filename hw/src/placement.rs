@@ -4,13 +4,15 @@ use core::f64::consts::FRAC_1_SQRT_2;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// How a maker lays the axes of a device and of its handle.
+/// Convention of a maker for the axes of a device and of its handle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axes {
-    /// From the device's frame to the world, for an operator who sits before the perineum of a patient on the back: world z
-    /// (superior) points away from the operator, world y (anterior) up, world x (the patient's right) to the operator's left.
+    /// Rotation from the device's frame to the world, for an operator who sits before the perineum
+    /// of a patient on the back. World z (superior) points away from the operator, world y
+    /// (anterior) up, world x (the patient's right) to the operator's left.
     world_from_device: Quaternion<f64>,
-    /// From the tool's frame, whose z is the needle towards its tip, to the frame of the handle.
+    /// Rotation from the tool's frame, whose z is the needle towards its tip, to the frame of the
+    /// handle.
     handle_from_tool: Quaternion<f64>,
 }
 
@@ -26,8 +28,9 @@ impl Axes {
         world_from_device: Quaternion::new(0.5, -0.5, 0.5, 0.5),
         handle_from_tool: Quaternion::new(0.5, 0.5, -0.5, -0.5),
     };
-    /// Haply: x to the operator's right, y forward, z up (docs.haply.co, "Basis Permutation"). Which way a VerseGrip points in its
-    /// own frame was not found; here its orientation counts from how it was held at the start, which is straight ahead.
+    /// Haply: x to the operator's right, y forward, z up (docs.haply.co, "Basis Permutation"). The
+    /// direction of a VerseGrip in its own frame is unpublished. Its orientation counts from the
+    /// first one, which is assumed to be straight ahead.
     pub const HAPLY: Self = Self {
         world_from_device: Quaternion::new(0.0, 0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2),
         handle_from_tool: Quaternion::new(0.0, 0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2),
@@ -46,7 +49,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// A device between the operator and the patient; see [`Axes`].
+    /// Creates a placement between the operator and the patient; see [`Axes`].
     pub fn facing_patient(axes: Axes, origin_in_world: Vector3<f64>) -> Self {
         Self {
             origin_in_world,
@@ -55,7 +58,7 @@ impl Placement {
         }
     }
 
-    /// Tip (m) and tool in the world, of a tip and a handle in the device's frame.
+    /// Returns tip (m) and tool in the world, from a tip and a handle in the device's frame.
     pub fn pose(
         &self,
         tip_in_device: &Vector3<f64>,
@@ -76,7 +79,7 @@ impl Placement {
 mod tests {
     use super::*;
 
-    /// Tip of a device in which right, up and away are these vectors, moved by 1, 2 and 3 along them; and its needle at rest.
+    /// Returns the tip after moves of 1, 2 and 3 along right, up and away, and the needle at rest.
     fn moved(axes: Axes, [right, up, away]: [Vector3<f64>; 3]) -> (Vector3<f64>, Vector3<f64>) {
         let placement = Placement::facing_patient(axes, Vector3::zeros());
         let (tip, tool) = placement.pose(&(right + up * 2.0 + away * 3.0), &UnitQuaternion::identity());
@@ -85,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn right_is_minus_x_up_is_y_away_is_z_and_a_handle_at_rest_points_away() {
+    fn right_is_minus_x_up_is_y_and_away_is_z() {
         let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
         let makers = [
             (Axes::OPEN_HAPTICS, [x, y, -z]),

@@ -2,7 +2,8 @@
 
 use crate::device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
 
-/// Plays its samples once, at their recorded rate, then repeats the last one like a silent device.
+/// Device that plays its samples once, at their recorded rate, then repeats the last one like a
+/// silent device.
 #[derive(Debug, Clone)]
 pub struct ReplayDevice {
     info: DeviceInfo,
@@ -67,7 +68,7 @@ impl Device for ReplayDevice {
     }
 
     fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault> {
-        // Nobody holds the device, so the force has no effect.
+        // No hand holds the device, so the force has no effect.
         if wrench.is_finite() {
             Ok(())
         } else {

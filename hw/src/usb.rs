@@ -6,15 +6,16 @@ use std::path::Path;
 /// A device on USB.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsbDevice {
-    /// The kernel's name of its place, `1-2`.
+    /// Kernel's name of its place, such as `1-2`.
     pub place: String,
-    /// Its name by itself, or empty.
+    /// Product name, or empty.
     pub product: String,
-    /// File through which a driver speaks with it, below `/`.
+    /// File through which a driver accesses it, below `/`.
     pub file: String,
 }
 
-/// Devices whose vendor has this number in hexadecimal, as the kernel writes it. `root` is `/`, or a folder that stands for it.
+/// Returns the devices whose vendor has this number in hexadecimal, as the kernel writes it. `root`
+/// is `/`, or a folder that replaces it.
 pub fn devices_of(root: &Path, vendor: &str) -> Vec<UsbDevice> {
     let folder = root.join("sys/bus/usb/devices");
     let entries = fs::read_dir(&folder).into_iter().flatten().flatten();

@@ -53,21 +53,23 @@ use serde::{Deserialize, Serialize};
 /// - the wrench holds until the next `write`, and a dropped device leaves zero force. A real device also
 ///   sets a wrench to zero that was not renewed for a tenth of a second.
 pub trait Device: Send {
-    /// Name and limits of the device. Constant for the life of the device.
+    /// Returns name and limits of the device, constant for its life.
     fn info(&self) -> DeviceInfo;
 
-    /// The newest pose. `dt_s` is the time since the last call; a simulated device advances by it, a real
-    /// one ignores it.
+    /// Returns the newest pose. `dt_s` is the time since the last call; a simulated device advances
+    /// by it, a real one ignores it.
     fn read(&mut self, dt_s: f64) -> Result<Sample, DeviceFault>;
 
-    /// The wrench that the device exerts on the operator, in the world frame, until the next call.
+    /// Sets the wrench that the device exerts on the operator, in the world frame, until the next
+    /// call.
     fn write(&mut self, wrench: &Wrench) -> Result<(), DeviceFault>;
 
     /// Sets the goal to which a simulated hand moves the tip. A device held by a real hand ignores it.
     fn set_hand_goal(&mut self, _goal: &HandGoal) {}
 
-    /// Where +y of the tool goes from now on, as far as that is square to the direction of the goal; without it a simulated hand does
-    /// not turn the tool about its axis. A device held by a real hand ignores it.
+    /// Sets the direction of the tool's +y, projected perpendicular to the goal's direction.
+    /// Without it a simulated hand does not turn the tool about its axis. A device held by a real
+    /// hand ignores it.
     fn set_hand_up(&mut self, _up: Option<Vector3<f64>>) {}
 
     /// Stops a simulated hand with the acceleration of its last goal. A device held by a real hand ignores it.
@@ -89,12 +91,12 @@ pub struct DeviceInfo {
     pub max_stiffness_n_per_m: f64,
     /// Smallest change of position that the encoders resolve, at the nominal pose.
     pub position_step_m: f64,
-    /// No real hand holds the device.
+    /// True if no real hand holds the device.
     pub simulated: bool,
 }
 
 impl DeviceInfo {
-    /// Phantom Premium 1.5 with six degrees of freedom: figures of its data sheet.
+    /// Returns the data sheet figures of the Phantom Premium 1.5 with six degrees of freedom.
     pub const fn phantom_premium_1_5() -> Self {
         Self {
             name: "Phantom Premium 1.5 6DOF",
@@ -113,21 +115,22 @@ impl DeviceInfo {
 pub struct Sample {
     /// Position of the tip, m.
     pub tip_in_world: Vector3<f64>,
-    /// The needle lies along +z of the tool frame, pointing out of the handle towards the tip.
+    /// Orientation of the tool; the needle lies along its +z, which points out of the handle
+    /// towards the tip.
     pub world_from_tool: UnitQuaternion<f64>,
     /// One bit per button, bit 0 for the first.
     pub buttons: u32,
-    /// Grows with each new reading: the same number twice means a repeated sample.
+    /// Number of the reading; a repeated number marks a repeated sample.
     pub sequence: u64,
 }
 
 impl Sample {
-    /// Whether position and orientation are finite.
+    /// Returns whether position and orientation are finite.
     pub fn is_finite(&self) -> bool {
         self.tip_in_world.iter().all(|x| x.is_finite()) && self.world_from_tool.coords.iter().all(|x| x.is_finite())
     }
 
-    /// Unit vector along the needle, towards its tip.
+    /// Returns the unit vector along the needle, towards its tip.
     pub fn direction_in_world(&self) -> Vector3<f64> {
         self.world_from_tool * Vector3::z()
     }
@@ -143,7 +146,7 @@ pub struct Wrench {
 }
 
 impl Wrench {
-    /// No force and no torque.
+    /// Returns zero force and torque.
     pub fn zero() -> Self {
         Self {
             force_n: Vector3::zeros(),
@@ -151,7 +154,7 @@ impl Wrench {
         }
     }
 
-    /// A force without torque.
+    /// Creates a force without torque.
     pub fn from_force(force_n: Vector3<f64>) -> Self {
         Self {
             force_n,
@@ -159,7 +162,7 @@ impl Wrench {
         }
     }
 
-    /// The same directions, with force and torque limited to the peaks of the device.
+    /// Returns the same directions, with force and torque limited to the peaks of the device.
     pub fn within(&self, info: &DeviceInfo) -> Self {
         Self {
             force_n: saturated(&self.force_n, info.peak_force_n),
@@ -167,7 +170,7 @@ impl Wrench {
         }
     }
 
-    /// Whether force and torque are finite.
+    /// Returns whether force and torque are finite.
     pub fn is_finite(&self) -> bool {
         self.force_n.iter().chain(self.torque_nm.iter()).all(|x| x.is_finite())
     }
@@ -179,7 +182,8 @@ impl Default for Wrench {
     }
 }
 
-/// The same direction, with the length limited to `limit`. Finite even if the square of the length is not.
+/// Returns the same direction, with the length limited to `limit`. Finite even if the square of the
+/// length is not.
 fn saturated(v: &Vector3<f64>, limit: f64) -> Vector3<f64> {
     let largest = v.amax();
     if largest <= 0.0 {
@@ -197,7 +201,7 @@ fn saturated(v: &Vector3<f64>, limit: f64) -> Vector3<f64> {
 /// Goal of the simulated hand, and its limits on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct HandGoal {
-    /// Where the tip should be, m.
+    /// Goal of the tip, m.
     pub tip_in_world: Vector3<f64>,
     /// Needle axis towards the tip, of any length but zero.
     pub direction: Vector3<f64>,
@@ -208,7 +212,8 @@ pub struct HandGoal {
 }
 
 impl HandGoal {
-    /// Whether all values are finite, the direction is longer than 1e-9, and speed and acceleration are above zero.
+    /// Returns whether all values are finite, the direction is longer than 1e-9, and speed and
+    /// acceleration are above zero.
     pub fn is_valid(&self) -> bool {
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
         let positive = |x: f64| x.is_finite() && x > 0.0;
@@ -220,8 +225,9 @@ impl HandGoal {
     }
 }
 
-/// Why a device could not read or write. The numbers are stable, because they appear in records.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+/// Reason why a device could not read or write. The numbers are stable, because they appear in
+/// records.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error, num_enum::TryFromPrimitive)]
 #[repr(u32)]
 pub enum DeviceFault {
     /// No device is connected.
@@ -254,25 +260,8 @@ pub enum DeviceFault {
 }
 
 impl DeviceFault {
-    const ALL: [Self; 9] = [
-        Self::NotConnected,
-        Self::TimedOut,
-        Self::NonFiniteSample,
-        Self::NonFiniteWrench,
-        Self::InvalidPeriod,
-        Self::NotCalibrated,
-        Self::Overheated,
-        Self::SafetyStop,
-        Self::Driver,
-    ];
-
-    /// Returns its stable number.
+    /// Returns the stable number; `DeviceFault::try_from` is the inverse.
     pub const fn code(self) -> u32 {
         self as u32
-    }
-
-    /// Returns the fault of a stable number, or `None` for a number that no fault has.
-    pub fn from_code(code: u32) -> Option<Self> {
-        Self::ALL.into_iter().find(|fault| fault.code() == code)
     }
 }

@@ -5,37 +5,37 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Instant;
 
-use crate::beside::keeper::{self, Connect};
-use crate::beside::serving;
-use crate::beside::shared::Shared;
 use crate::device::{DeviceFault, DeviceInfo};
 use crate::drd::ffi::Api;
 use crate::drd::servo::Servo;
 use crate::drd::session::{ConnectionError, Description, Session};
 use crate::drd::status::{Health, health};
+use crate::driver_thread::keeper::{self, Connect};
+use crate::driver_thread::serving;
+use crate::driver_thread::shared::Shared;
 
-/// Between two checks of a running device.
+/// Time between two checks of a running device.
 const CHECK_EVERY: Duration = Duration::from_millis(20);
-/// A servo loop that does not tick for this long waits in a call of the SDK.
+/// Silence after which a servo loop counts as waiting in a call of the SDK.
 const SILENT_FOR: Duration = Duration::from_millis(250);
 const CALIBRATION_EVERY: Duration = Duration::from_millis(50);
-/// A servo thread that has not ended after this time waits in a call of the SDK.
+/// Time after which a servo thread that has not ended counts as waiting in a call of the SDK.
 const RELEASE_LIMIT: Duration = Duration::from_millis(50);
 
-/// What a device can do about a driver that hangs.
+/// Remark on a device whose driver may hang, without a watchdog.
 const WITHOUT_WATCHDOG: &str =
     "the device has no watchdog that this SDK can arm: a driver that hangs leaves its last force";
 const HANGS: &str = "the driver does not return from a call: the watchdog of the device drops the force";
 const NEEDS_CALIBRATION: &str = "the device is not calibrated: calibrate it as its manual says; rt-core waits";
 
-/// Owns the connection; see the module.
+/// Owner of the connection; see the module.
 pub struct Connector {
     api: Api,
     number: u8,
     shared: Arc<Shared>,
-    /// `None` while the servo thread has it.
+    /// Servo state; `None` while the servo thread owns it.
     servo: Option<Servo>,
-    /// The limits that the force loop uses, fixed by the first connection.
+    /// Limits that the force loop uses, fixed by the first connection.
     info: Option<DeviceInfo>,
 }
 
@@ -102,8 +102,8 @@ impl Connect for Connector {
         None
     }
 
-    /// Ends the servo thread, which leaves zero force, and closes the device. While the servo thread hangs in a call no other call
-    /// is made, and nothing can be closed.
+    /// Ends the servo thread, which leaves zero force, and closes the device. If the servo thread
+    /// hangs in a call, no other call is made and the device stays open.
     fn release(&mut self, keeper: &mut Keeper, running: Running) {
         self.shared.request_release();
         if let Some(servo) = running.servo {
@@ -139,7 +139,7 @@ impl Connector {
         }
     }
 
-    /// Waits until the device is calibrated; false when the thread is to end.
+    /// Waits until the device is calibrated; returns false when the thread must end.
     fn calibrate(
         &self,
         keeper: &mut Keeper,
@@ -161,7 +161,8 @@ impl Connector {
         Ok(false)
     }
 
-    /// Starts the servo thread and waits for its first sample; returns what it was granted.
+    /// Starts the servo thread and waits for its first sample; returns the rights that it was
+    /// granted.
     fn start(&mut self, running: &mut Running, info: &DeviceInfo) -> Result<String, ConnectionError> {
         let mut servo = self.servo.take().ok_or(ConnectionError::NoServo)?;
         servo.begin(running.session.id, info.peak_torque_nm > 0.0);

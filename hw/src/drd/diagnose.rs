@@ -1,4 +1,4 @@
-//! What of a Force Dimension device is there, and what is missing; tried without a force.
+//! Checks of library, USB and device for Force Dimension, without a force.
 
 use std::fs::File;
 use std::path::Path;
@@ -11,11 +11,12 @@ use crate::finding::{Finding, Severity};
 use crate::library::{LoadError, LoadFailure};
 use crate::usb;
 
-/// USB vendor of Force Dimension, as in the udev rules that its users publish.
+/// USB vendor of Force Dimension, as in published udev rules.
 const VENDOR: &str = "1451";
 const INSTALL: &str = "install the vendor's SDK and run sudo ldconfig, or name the file with --libdrd";
 
-/// Library and USB, without a call to the device. `root` is `/`, or a folder that stands for it.
+/// Checks library and USB without a call to the device. `root` is `/`, or a folder that replaces
+/// it.
 pub fn diagnose(root: &Path, library: &Result<Api, LoadError>) -> Vec<Finding> {
     let mut findings = match library {
         Ok(api) => {
@@ -59,14 +60,15 @@ pub fn diagnose(root: &Path, library: &Result<Api, LoadError>) -> Vec<Finding> {
     findings
 }
 
-/// How many devices the SDK counts.
+/// Returns the number of devices that the SDK counts.
 pub fn device_count(api: &Api) -> u8 {
     // SAFETY: no preconditions.
     let count = unsafe { (api.dhdGetDeviceCount)() };
     u8::try_from(count.max(0)).unwrap_or(u8::MAX)
 }
 
-/// Opens the device, asks what it is and how it is, and closes it. Its forces stay off. Do not call it while `rt-core` uses it.
+/// Opens the device, queries model and state, and closes it. Its forces stay off. Must not run
+/// while `rt-core` uses the device.
 pub fn of_device(api: &Api, number: u8) -> Vec<Finding> {
     let session = match Session::open(api, number) {
         Ok(session) => session,

@@ -1,9 +1,9 @@
-//! The SDK's errors: number, name, and what each means for the force.
+//! The SDK's errors: number, name, and consequence for the force.
 
-use crate::beside::errors::{find, pause, reconnect};
 use crate::device::DeviceFault;
+use crate::driver_thread::errors::{find, pause, reconnect};
 
-pub use crate::beside::errors::{KnownError, Response};
+pub use crate::driver_thread::errors::{KnownError, Response};
 
 /// A call failed, and the SDK gives no other number.
 pub const ERROR: u32 = 1;
@@ -36,12 +36,12 @@ pub const KNOWN: &[KnownError] = &[
     pause(22, "DHD_ERROR_NO_REGULATION", DeviceFault::Driver),
 ];
 
-/// The entry of `code`; an unknown number pauses the force as a driver's error.
+/// Returns the entry of `code`; an unknown number pauses the force as a driver's error.
 pub fn known(code: u32) -> KnownError {
     find(KNOWN, code)
 }
 
-/// What the operator can do about the error.
+/// Returns the remedy for the error, as an instruction to the operator.
 pub fn cure(code: u32) -> &'static str {
     match code {
         2 | 7 => "check power and USB cable of the device; it is reconnected automatically",

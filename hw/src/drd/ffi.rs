@@ -1,11 +1,13 @@
-//! The C interface of `libdrd.so` and `libdhd.so`, as the Force Dimension SDK 3.7 to 3.17 has it, loaded at run time.
+//! The C interface of `libdrd.so` and `libdhd.so`, Force Dimension SDK 3.7 to 3.17, loaded at run
+//! time.
 //!
-//! Types and numbers are facts of the vendor's interface (`dhdc.h` of SDK 3.17.5, in github chai3d/chai3d at 7c76b1f; of 3.7.0 in
-//! CHAI3D 3.2). Both libraries have all `dhd` functions; `libdrd.so` adds regulation, which Stylet does not use: nothing here moves
-//! a device by itself.
+//! Types and numbers are facts of the vendor's interface (`dhdc.h` of SDK 3.17.5, in github
+//! chai3d/chai3d at 7c76b1f; of 3.7.0 in CHAI3D 3.2). Both libraries have all `dhd` functions;
+//! `libdrd.so` adds regulation, which Stylet does not use: nothing here moves a device by itself.
 //!
-//! The interface grows: what came late, or what only some devices need, may be missing. The status array grew from 16 to 17
-//! numbers, so [`STATUS_ROOM`] has more than any known version writes.
+//! The interface grows, so recent functions and functions for some devices only may be missing. The
+//! status array grew from 16 to 17 numbers, so [`STATUS_ROOM`] has more than any known version
+//! writes.
 
 #![allow(non_snake_case)]
 
@@ -13,14 +15,14 @@ use core::ffi::{c_char, c_double, c_int, c_uchar, c_uint, c_ushort};
 
 use crate::library::{Driver, functions};
 
-/// Number of a device: the order in which the system lists them.
+/// Number of a device, in the order of the system's list.
 pub type Id = c_char;
 
-/// A call did what it says.
+/// Answer of a call that succeeded.
 pub const GOOD: c_int = 0;
-/// The pose is the one of the last call: the calls came too fast for the SDK.
+/// Answer for a repeated pose: the calls came too fast for the SDK.
 pub const TIMEGUARD: c_int = 1;
-/// The motors cannot give all of the force.
+/// Answer when the motors cannot render the full force.
 pub const MOTOR_SATURATED: c_int = 2;
 
 /// Room for the status array.
@@ -38,25 +40,25 @@ pub mod status {
     pub const FORCE: usize = 5;
     /// The controller has an error.
     pub const ERROR: usize = 9;
-    /// Why forces were last turned off, a number of [`off_cause`](super::off_cause).
+    /// Reason for the last loss of forces, a number of [`off_cause`](super::off_cause).
     pub const FORCE_OFF_CAUSE: usize = 14;
 }
 
-/// Why forces were turned off.
+/// Reasons for forces that were turned off.
 pub mod off_cause {
-    /// They were not.
+    /// No reason: they were not turned off.
     pub const NONE: i32 = 0;
-    /// By the button of the device.
+    /// Button of the device.
     pub const BUTTON: i32 = 1;
-    /// The handle moved too fast.
+    /// Excess speed of the handle.
     pub const VELOCITY: i32 = 2;
-    /// The watchdog of the device.
+    /// Watchdog of the device.
     pub const WATCHDOG: i32 = 3;
-    /// By a program.
+    /// Request of a program.
     pub const SOFTWARE: i32 = 4;
-    /// The cable.
+    /// Loss of the cable.
     pub const USB: i32 = 5;
-    /// Nobody held the handle.
+    /// Release of the handle.
     pub const DEADMAN: i32 = 6;
 }
 

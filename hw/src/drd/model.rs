@@ -4,8 +4,9 @@ use core::ffi::c_int;
 
 use crate::device::DeviceInfo;
 
-/// Types, forces, torques and stiffness as CHAI3D 3.3 uses them. No continuous force was found in public text: half of the
-/// peak is our own choice. Nor was the encoders' step: it is taken as 10 um, and as 1/400 inch for the Falcon.
+/// Types, forces, torques and stiffness as in CHAI3D 3.3. Public text gives no continuous force, so
+/// half of the peak is our choice. It gives no encoder step either: 10 um is assumed, and 1/400
+/// inch for the Falcon.
 const MODELS: &[(&[c_int], DeviceInfo)] = &[
     (&[33], model("Force Dimension omega.3", 12.0, 0.0, 5000.0)),
     (&[34, 36], model("Force Dimension omega.6", 12.0, 0.0, 5000.0)),
@@ -34,7 +35,8 @@ const fn model(name: &'static str, peak_n: f64, peak_torque_nm: f64, stiffness_n
     }
 }
 
-/// Figures of the type that the SDK reports; `None` for an unknown one. Without an active wrist there are no torques.
+/// Returns the figures of the type that the SDK reports; `None` for an unknown one. Without an
+/// active wrist there are no torques.
 pub fn figures(system_type: c_int, active_wrist: bool) -> Option<DeviceInfo> {
     let (_, info) = MODELS.iter().find(|(types, _)| types.contains(&system_type))?;
     let peak_torque_nm = if active_wrist { info.peak_torque_nm } else { 0.0 };
@@ -44,7 +46,7 @@ pub fn figures(system_type: c_int, active_wrist: bool) -> Option<DeviceInfo> {
     })
 }
 
-/// Names of all known models, for messages.
+/// Returns the names of all known models, for messages.
 pub fn known_models() -> String {
     MODELS.iter().map(|(_, m)| m.name).collect::<Vec<_>>().join(", ")
 }
@@ -54,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_type_has_one_model_and_a_wrist_without_motors_no_torque() {
+    fn a_wrist_without_motors_has_no_torque() {
         let types: Vec<_> = MODELS.iter().flat_map(|(types, _)| types.iter()).collect();
         for (i, kind) in types.iter().enumerate() {
             assert!(!types[i + 1..].contains(kind), "{kind}");

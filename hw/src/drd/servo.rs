@@ -1,34 +1,36 @@
-//! One tick of the servo thread: the newest force goes out, the pose comes in, the state of the device is checked.
+//! One tick of the servo thread: write the newest force, read the pose, check the device.
 //!
-//! Every call may block for a while, which is why no other thread makes them. Once the thread is armed it allocates, locks and
-//! logs nothing. The force goes out in every tick, also when it is zero, because that renews the device's watchdog.
+//! Every call may block for a while, so no other thread makes them. Once armed, the thread does not
+//! allocate, lock or log. It writes the force in every tick, zero included, because that renews the
+//! device's watchdog.
 
 use core::ffi::c_int;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::beside::arm::{Arm, ArmError};
-use crate::beside::ends::ServoEnd;
-use crate::beside::hold::Hold;
-use crate::beside::serving::{self, Serve};
-use crate::beside::shared::Shared;
 use crate::convert::orientation_from_matrix;
 use crate::device::{DeviceFault, Sample, Wrench};
 use crate::drd::errors::{self, Response};
 use crate::drd::ffi::{Api, Id, MOTOR_SATURATED, STATUS_ROOM, TIMEGUARD};
 use crate::drd::session::last_error;
 use crate::drd::status::{Health, health};
+use crate::driver_thread::arm::{Arm, ArmError};
+use crate::driver_thread::ends::ServoEnd;
+use crate::driver_thread::hold::Hold;
+use crate::driver_thread::serving::{self, Serve};
+use crate::driver_thread::shared::Shared;
 use crate::placement::Placement;
 
-/// Between two checks of the device's state.
+/// Ticks between two checks of the device's state.
 pub const TICKS_BETWEEN_CHECKS: u64 = 10;
-/// Forces that went off are turned on again at one check of this many.
+/// Number of checks between two attempts to turn forces on again.
 const CHECKS_BEFORE_ON: u32 = 25;
-/// A device that gets forces more rarely than this is frozen: its SDK only says that it sends them.
+/// Lowest rate at which forces must reach the device; below it the device is frozen, whatever the
+/// SDK returns.
 const LOWEST_RATE_KHZ: f64 = 0.1;
-/// The SDK has had time to find its rate.
+/// Time that the SDK needs to measure its rate.
 const RATE_KNOWN_AFTER_S: u64 = 2;
-/// No device of this maker reaches so far from its origin.
+/// Farthest reach of any device of this maker from its origin.
 const FARTHEST_M: f64 = 1.0;
 
 /// Ports and settings of a servo tick, and its state.
@@ -65,7 +67,8 @@ impl Servo {
         }
     }
 
-    /// Serves the device `id` from the next tick on. After an earlier connection the force stays off until all was quiet.
+    /// Serves the device `id` from the next tick on. After an earlier connection the force stays
+    /// off until no fault has occurred for a while.
     pub fn begin(&mut self, id: Id, torques: bool) {
         if self.ticks > 0 {
             self.hold.pause(DeviceFault::NotConnected);
@@ -74,7 +77,7 @@ impl Servo {
         (self.ticks, self.checks_off) = (0, 0);
     }
 
-    /// One servo tick; in the order of the data.
+    /// Runs one servo tick, in the order of the data.
     pub fn tick(&mut self, shared: &Shared) {
         shared.count_tick();
         let wrench = self.hold.wrench(self.end.commands.read(), self.servo_hz);
@@ -85,7 +88,7 @@ impl Servo {
             self.check_rate();
         }
         self.ticks += 1;
-        // What this tick found takes its force back at once.
+        // A fault found in this tick withdraws the force at once.
         if self.hold.fault().is_some() && wrench != Wrench::zero() {
             self.send(&Wrench::zero());
         }
@@ -148,7 +151,7 @@ impl Servo {
 
     fn check_state(&mut self, shared: &Shared) {
         let mut numbers = [0; STATUS_ROOM];
-        // SAFETY: there is room for more numbers than any version writes.
+        // SAFETY: the array has room for more numbers than any version writes.
         let answer = unsafe { (self.api.dhdGetStatus)(numbers.as_mut_ptr(), self.id) };
         if answer < 0 {
             self.note_answer(shared, answer);
@@ -164,7 +167,8 @@ impl Servo {
             Health::Off { fault, by_program } => {
                 self.hold.pause(fault);
                 self.checks_off += 1;
-                // A device that does not take the zero has an older force, which comes back when forces are turned on.
+                // A device that refuses the zero holds an older force, which would return when
+                // forces are turned on.
                 let due = by_program && self.checks_off.is_multiple_of(CHECKS_BEFORE_ON);
                 if due && self.send(&Wrench::zero()) >= 0 {
                     // SAFETY: the number is the SDK's own.
@@ -186,7 +190,7 @@ impl Servo {
         }
     }
 
-    /// Notes the error behind a call that failed.
+    /// Records the error behind a call that failed.
     fn note_answer(&mut self, shared: &Shared, answer: c_int) {
         if answer >= 0 {
             return;

@@ -3,28 +3,28 @@
 use core::ffi::{c_int, c_uchar};
 use core::fmt;
 
-use crate::beside::arm::ArmError;
-use crate::beside::served::Described;
 use crate::device::DeviceInfo;
 use crate::drd::errors;
 use crate::drd::ffi::{Api, Id, STATUS_ROOM};
 use crate::drd::model;
 use crate::drd::status::Status;
+use crate::driver_thread::arm::ArmError;
+use crate::driver_thread::served::Described;
 use crate::library::text;
 
-/// The device drops a force by itself that is not renewed for this number of times 125 us.
+/// Watchdog period, in units of 125 us, after which the device drops a force that is not renewed.
 const WATCHDOG_UNITS: c_uchar = 160;
 const WATCHDOG_UNIT_S: f64 = 125e-6;
 
-/// Why there is no connection; the text says what to do.
+/// Reason why there is no connection; the text says what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ConnectionError {
     /// The device with this number does not open.
     #[error("device {number} of {count} does not open: {error} ({code}): {cure}", error = errors::known(*code).name, cure = errors::cure(*code))]
     NoDevice {
-        /// The number that was asked for, from 0.
+        /// Requested number, from 0.
         number: u8,
-        /// How many devices the SDK counts.
+        /// Number of devices that the SDK counts.
         count: i32,
         /// The SDK's error.
         code: u32,
@@ -67,7 +67,7 @@ pub struct Description {
     pub serial: Option<u16>,
     /// Version of the SDK, where it has one.
     pub sdk: Option<[i32; 4]>,
-    /// After how long the device drops a force by itself, once that is armed.
+    /// Time after which the device drops a stale force by itself, once its watchdog is armed.
     pub watchdog_s: Option<f64>,
 }
 
@@ -92,12 +92,12 @@ impl fmt::Display for Description {
     }
 }
 
-/// A version as the vendor writes it.
+/// Formats a version as the vendor writes it.
 pub fn version_text([major, minor, release, revision]: [i32; 4]) -> String {
     format!("{major}.{minor}.{release}-{revision}")
 }
 
-/// Version of the SDK, where it can say.
+/// Returns the version of the SDK, if it reports one.
 pub fn sdk_version(api: &Api) -> Option<[i32; 4]> {
     let [mut major, mut minor, mut release, mut revision] = [0; 4];
     let get = api.dhdGetSDKVersion?;
@@ -128,7 +128,7 @@ impl Session {
         }
     }
 
-    /// Model, versions and limits.
+    /// Queries model, versions and limits.
     pub fn describe(&self) -> Result<Description, ConnectionError> {
         // SAFETY: the number is the SDK's own.
         let system_type = unsafe { (self.api.dhdGetSystemType)(self.id) };
@@ -158,7 +158,7 @@ impl Session {
         (unsafe { get(&mut serial, self.id) } >= 0).then_some(serial)
     }
 
-    /// State of the device.
+    /// Queries the state of the device.
     pub fn status(&self) -> Result<Status, ConnectionError> {
         let mut numbers = [0; STATUS_ROOM];
         // SAFETY: there is room for more numbers than any version writes.
@@ -167,10 +167,12 @@ impl Session {
         Ok(numbers)
     }
 
-    /// Arms the device's own watchdog and limits; returns after how long it drops a force that is not renewed, if it can.
+    /// Arms the device's watchdog and limits. Returns the time after which it drops a stale force,
+    /// if it has a watchdog.
     pub fn guard(&self, info: &DeviceInfo) -> Option<f64> {
         let (api, id) = (&self.api, self.id);
-        // SAFETY: no preconditions but the SDK's own number. What a version or a device lacks is refused without effect.
+        // SAFETY: no preconditions but the SDK's own number. Calls that a version or a device lacks
+        // are refused without effect.
         unsafe {
             if let Some(enable) = api.dhdEnableExpertMode {
                 enable();
@@ -195,9 +197,9 @@ impl Session {
         }
     }
 
-    /// Turns forces on, with none: a device that does not take the zero may have an older force.
+    /// Turns forces on, at zero: a device that refuses the zero may hold an older force.
     pub fn turn_on(&self) -> Result<(), ConnectionError> {
-        // Forces are off: whether a device takes a zero then is not known.
+        // Forces are off, and it is unknown whether a device accepts a zero in that state.
         self.zero();
         // SAFETY: the number is the SDK's own.
         let answer = unsafe { (self.api.dhdEnableForce)(1, self.id) };
@@ -215,7 +217,8 @@ impl Session {
         unsafe { (self.api.dhdSetForceAndTorqueAndGripperForce)(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, self.id) }
     }
 
-    /// Zero force, forces off, closed. Every call is made, whatever the ones before it return.
+    /// Writes zero force, turns forces off and closes the device. Makes every call, whatever the
+    /// earlier ones return.
     pub fn close(self) {
         self.zero();
         // SAFETY: the number is the SDK's own, used for the last time.
@@ -240,7 +243,7 @@ impl Session {
     }
 }
 
-/// The SDK's number of the last error of this thread, after a call that failed.
+/// Returns the SDK's number of the last error of this thread, after a call that failed.
 pub fn last_error(api: &Api) -> u32 {
     // SAFETY: no preconditions.
     let code = unsafe { (api.dhdErrorGetLast)() };

@@ -1,32 +1,33 @@
-//! What the status of the device means for the force.
+//! Interpretation of the device's status for the force.
 
 use core::ffi::c_int;
 
 use crate::device::DeviceFault;
 use crate::drd::ffi::{STATUS_ROOM, off_cause, status};
 
-/// The status array as the SDK fills it; what a shorter version leaves is zero.
+/// Status array as the SDK fills it; numbers that a shorter version omits are zero.
 pub type Status = [c_int; STATUS_ROOM];
 
-/// What a status means for the force.
+/// Consequence of a status for the force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Health {
-    /// Nothing speaks against a force.
+    /// Ready for a force.
     Good,
-    /// No force; the connection holds.
+    /// Force off; the connection holds.
     Pause(DeviceFault),
-    /// The device has turned its forces off. A program may turn them on again, or only the operator.
+    /// Forces turned off by the device.
     Off {
-        /// Why.
+        /// Reason.
         fault: DeviceFault,
-        /// A program may turn them on again.
+        /// True if a program may turn them on again; otherwise only the operator may.
         by_program: bool,
     },
     /// The connection is lost.
     Lost(DeviceFault),
 }
 
-/// `force_on` says whether forces were turned on. A number that is neither 0 nor 1 counts as the worse of both.
+/// Interprets a status. `force_on` says whether forces were turned on. A number that is neither 0
+/// nor 1 counts as the worse of both.
 pub fn health(numbers: &Status, force_on: bool) -> Health {
     let on = |place: usize| numbers[place] == 1;
     if !on(status::CONNECTED) || !on(status::POWER) {
@@ -49,7 +50,7 @@ fn off(cause: c_int) -> Health {
         off_cause::WATCHDOG => off(DeviceFault::TimedOut, true),
         off_cause::VELOCITY => off(DeviceFault::SafetyStop, true),
         off_cause::NONE | off_cause::SOFTWARE => off(DeviceFault::Driver, true),
-        // The operator's own stop, and what no known version has.
+        // The operator's own stop, and causes that no known version has.
         _ => off(DeviceFault::SafetyStop, false),
     }
 }
@@ -67,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn each_number_that_speaks_against_a_force_is_heard() {
+    fn every_adverse_status_turns_the_force_off() {
         assert_eq!(health(&good(), true), Health::Good);
         let with = |place: usize, number: c_int| {
             let mut numbers = good();
@@ -90,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn the_operator_s_own_stop_is_left_to_the_operator() {
+    fn only_the_operator_ends_the_operator_s_stop() {
         let mut numbers = good();
         numbers[status::FORCE] = 0;
         for (cause, by_program) in [

@@ -1,7 +1,5 @@
-//! A Force Dimension device without threads; see [`stepped`](crate::beside::stepped).
+//! A Force Dimension device without threads; see [`stepped`](crate::driver_thread::stepped).
 
-use crate::beside::shared::Shared;
-use crate::beside::stepped::{self, Step};
 use crate::device::DeviceInfo;
 use crate::drd::connector::same_model;
 use crate::drd::device::{ForceDimensionConfig, OpenError};
@@ -9,11 +7,13 @@ use crate::drd::ffi::Api;
 use crate::drd::servo::Servo;
 use crate::drd::session::{ConnectionError, Description, Session};
 use crate::drd::status::{Health, health};
+use crate::driver_thread::shared::Shared;
+use crate::driver_thread::stepped::{self, Step};
 
 /// A Force Dimension device on the caller's thread and without a clock.
 pub type Stepped = stepped::Stepped<Steps>;
 
-/// Its servo loop and its connection.
+/// Servo loop and connection of a stepped device.
 pub struct Steps {
     api: Api,
     number: u8,
@@ -24,7 +24,8 @@ pub struct Steps {
 }
 
 impl Stepped {
-    /// Opens the device. `runs` says before each tick whether the servo thread would run in it, or wait in a call of the SDK.
+    /// Opens the device. Before each tick, `runs` says whether the servo thread would run in it,
+    /// instead of waiting in a call of the SDK.
     pub fn open(
         api: Api,
         config: &ForceDimensionConfig,

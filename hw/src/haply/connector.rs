@@ -4,29 +4,29 @@ use core::time::Duration;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-use crate::beside::keeper::{self, Connect};
-use crate::beside::serving;
-use crate::beside::shared::Shared;
+use crate::driver_thread::keeper::{self, Connect};
+use crate::driver_thread::serving;
+use crate::driver_thread::shared::Shared;
 use crate::haply::servo::{Servo, loss};
 use crate::haply::session::{self, ConnectionError, Description, Wanted};
 use crate::haply::socket::{NoSocket, Service, Socket};
 use crate::haply::wire::Wire;
 
-/// Between two checks of a running device.
+/// Time between two checks of a running device.
 const CHECK_EVERY: Duration = Duration::from_millis(20);
 
-/// Owns the connection; see the module.
+/// Owner of the connection; see the module.
 pub struct Connector {
     service: Service,
     wanted: Wanted,
     shared: Arc<Shared>,
-    /// `None` while the servo thread has it.
+    /// Servo state; `None` while the servo thread owns it.
     servo: Option<Servo>,
-    /// The device of the first connection, whose limits the force loop uses.
+    /// Device of the first connection, whose limits the force loop uses.
     known: Option<Description>,
 }
 
-/// A connection, before and while a thread serves it.
+/// Connection, before and while a thread serves it.
 pub enum Connection {
     Open(Box<Socket>, Option<String>),
     Served(JoinHandle<Servo>),
@@ -48,7 +48,7 @@ impl Connect for Connector {
                 why: why.to_string(),
             },
         })?;
-        // Asked once it is known whose program it is.
+        // The version is queried only once the owner of the service is known.
         Ok(Connection::Open(Box::new(socket), self.service.version()))
     }
 
@@ -90,14 +90,15 @@ impl Connect for Connector {
         None
     }
 
-    /// Ends the servo thread, which leaves zero force and closes the connection. None of its calls blocks.
+    /// Ends the servo thread, which leaves zero force, and closes the connection. None of its calls
+    /// blocks.
     fn release(&mut self, _keeper: &mut Keeper, connection: Connection) {
         self.shared.request_release();
         match connection {
             Connection::Open(mut socket, _) => socket.close(),
             Connection::Served(thread) => {
                 self.servo = thread.join().ok();
-                // A thread that could not be armed has not closed it.
+                // A thread that could not be armed has not closed the connection.
                 if let Some(servo) = &mut self.servo {
                     servo.end_connection();
                 }

@@ -1,21 +1,21 @@
 //! An Inverse3, opened.
 
-use crate::beside::arm::Arm;
-use crate::beside::keeper::Report;
-use crate::beside::open;
-use crate::beside::served::Served;
+use crate::driver_thread::arm::Arm;
+use crate::driver_thread::keeper::Report;
+use crate::driver_thread::open;
+use crate::driver_thread::served::Served;
 use crate::haply::connector::Connector;
 use crate::haply::servo::Servo;
 use crate::haply::session::{ConnectionError, Description, Wanted};
 use crate::haply::socket::Service;
 use crate::placement::Placement;
 
-/// Which device to open, and its place in the world.
+/// Device to open, and its place in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HaplyConfig {
     /// The Inverse service.
     pub service: Service,
-    /// Which of its devices.
+    /// Device to take from the service's list.
     pub wanted: Wanted,
     /// Place of the device in the world.
     pub placement: Placement,
@@ -23,15 +23,16 @@ pub struct HaplyConfig {
     pub servo_hz: u32,
 }
 
-/// Why a device could not be opened; the text says what to do.
+/// Reason why a device could not be opened; the text says what to do.
 pub type OpenError = open::OpenError<ConnectionError>;
 
 /// An Inverse3; see the module [`haply`](crate::haply). Dropping it leaves zero force and a closed connection.
 pub type Haply = Served<Description>;
 
 impl Haply {
-    /// Connects to the service and finds the device. `arm` runs once in each servo thread, before its first tick; `report`
-    /// receives messages for the operator, from a thread of normal priority.
+    /// Connects to the service and finds the device. `arm` runs once in each servo thread, before
+    /// its first tick. `report` receives messages for the operator, from a thread of normal
+    /// priority.
     pub fn open(config: HaplyConfig, arm: Arm, report: Report) -> Result<Self, OpenError> {
         Self::start("haply", report, |shared, end| {
             let servo = Servo::new(config.placement, arm, end, config.servo_hz);

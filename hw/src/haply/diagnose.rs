@@ -1,4 +1,5 @@
-//! What of an Inverse3 is there, and what is missing; the service is asked for its list and nothing is sent to a device.
+//! Checks of service and device for an Inverse3. The service is asked for its list; the device
+//! receives nothing.
 
 use crate::finding::{Finding, Severity};
 use crate::haply::message::Inverse;
@@ -6,7 +7,7 @@ use crate::haply::session::{self, ConnectionError, is_supported};
 use crate::haply::socket::{NoSocket, Service};
 use crate::haply::wire::Wire;
 
-/// Asks the service which version it is and which devices it has.
+/// Asks the service for its version and its devices.
 pub fn diagnose(service: &Service) -> Vec<Finding> {
     let mut socket = match service.connect() {
         Ok(socket) => socket,

@@ -1,6 +1,7 @@
-//! Messages of service 3.5 in JSON: what is read of them, and what is sent.
+//! Messages of service 3.5 in JSON, read and written.
 //!
-//! Fields and units: docs.haply.co, "WebSocket Protocol" and "Control Commands" of 3.5, and the maker's crate `haply` 1.3.1.
+//! Fields and units: docs.haply.co, "WebSocket Protocol" and "Control Commands" of 3.5, and the
+//! maker's crate `haply` 1.3.1.
 
 use core::fmt::Write;
 use std::borrow::Cow;
@@ -35,7 +36,7 @@ pub struct Inverse<'a> {
     pub status: Status,
 }
 
-/// What a device is and how its frame lies.
+/// Type and frame of a device.
 #[derive(Deserialize)]
 pub struct Config<'a> {
     #[serde(borrow, rename = "type")]
@@ -53,7 +54,7 @@ pub struct Versions {
     pub minor_version: Option<u32>,
 }
 
-/// Which axes a session uses.
+/// Axes that a session uses.
 #[derive(Deserialize)]
 pub struct Basis<'a> {
     #[serde(borrow)]
@@ -67,7 +68,7 @@ pub struct Scaled {
     scale: Option<Xyz>,
 }
 
-/// Where a device is.
+/// Position and velocity of a device.
 #[derive(Deserialize, Default)]
 pub struct State {
     pub cursor_position: Option<Xyz>,
@@ -75,7 +76,7 @@ pub struct State {
     pub transform: Option<Scaled>,
 }
 
-/// What speaks against a force; what a service leaves out speaks against none.
+/// Conditions that forbid a force; a field that the service omits forbids none.
 #[derive(Deserialize, Default, Clone, Copy)]
 pub struct Status {
     pub calibrated: Option<bool>,
@@ -93,7 +94,7 @@ pub struct Grip<'a> {
     pub state: GripState,
 }
 
-/// Where a handle points.
+/// Orientation of a handle.
 #[derive(Deserialize, Default)]
 pub struct GripState {
     pub orientation: Option<Wxyz>,
@@ -110,7 +111,7 @@ struct Buttons {
     c: bool,
 }
 
-/// A vector; a number that is missing is none.
+/// Vector; a missing number reads as NaN.
 #[derive(Deserialize, Clone, Copy)]
 pub struct Xyz {
     x: Option<f64>,
@@ -128,17 +129,17 @@ pub struct Wxyz {
 }
 
 impl<'a> Frame<'a> {
-    /// The frame that `text` holds, unless it is none.
+    /// Parses the frame in `text`; `None` if it is not one.
     pub fn of(text: &'a str) -> Option<Self> {
         serde_json::from_str(text).ok()
     }
 
-    /// The device with this number.
+    /// Returns the device with this number.
     pub fn device(&self, id: &str) -> Option<&Inverse<'a>> {
         self.inverse3.iter().find(|d| d.device_id == id)
     }
 
-    /// The first handle, wireless ones before those on a cable.
+    /// Returns the first handle; wireless handles precede those on a cable.
     pub fn grip(&self) -> Option<&Grip<'a>> {
         let wireless = self.wireless_verse_grip.iter().chain(&self.custom_verse_grip);
         wireless.chain(&self.verse_grip).next()
@@ -146,14 +147,14 @@ impl<'a> Frame<'a> {
 }
 
 impl Xyz {
-    /// With no number for each that is missing.
+    /// Returns the vector, with NaN for each missing number.
     pub fn vector(&self) -> Vector3<f64> {
         Vector3::new(self.x, self.y, self.z).map(|x| x.unwrap_or(f64::NAN))
     }
 }
 
 impl Wxyz {
-    /// The rotation, unless it is none.
+    /// Returns the rotation, if it is one.
     pub fn rotation(&self) -> Option<UnitQuaternion<f64>> {
         let parts = Quaternion::new(self.w?, self.x?, self.y?, self.z?);
         let is_rotation = parts.norm().is_finite() && (parts.norm() - 1.0).abs() < 0.01;
@@ -162,13 +163,13 @@ impl Wxyz {
 }
 
 impl Scaled {
-    /// Whether lengths in this frame are those of the device.
+    /// Returns whether lengths in this frame are those of the device.
     pub fn keeps_lengths(&self) -> bool {
         self.scale
             .is_none_or(|s| (s.vector() - Vector3::repeat(1.0)).amax() < 1e-6)
     }
 
-    /// Whether it leaves a frame as it is, wherever its origin is.
+    /// Returns whether the transform keeps the axes, wherever its origin is.
     pub fn keeps_axes(&self) -> bool {
         let turned = |r: &Wxyz| r.rotation().is_none_or(|r| r.angle() > 1e-3);
         self.keeps_lengths() && !self.rotation.as_ref().is_some_and(turned)
@@ -176,7 +177,7 @@ impl Scaled {
 }
 
 impl GripState {
-    /// One bit per button.
+    /// Returns one bit per button.
     pub fn buttons(&self) -> u32 {
         let b = self.buttons.as_ref();
         let bits = [
@@ -188,7 +189,7 @@ impl GripState {
     }
 }
 
-/// Version in the answer to `GET /version`, with or without the envelope of 3.5.
+/// Returns the version in the answer to `GET /version`, with or without the envelope of 3.5.
 pub fn version(answer: &str) -> Option<String> {
     let (_, json) = answer.split_at(answer.find('{')?);
     let value: serde_json::Value = serde_json::Deserializer::from_str(json).into_iter().next()?.ok()?;
@@ -200,12 +201,12 @@ pub fn version(answer: &str) -> Option<String> {
         .map(|v| v.chars().filter(|c| !c.is_control()).take(32).collect())
 }
 
-/// Whether the number of a device can stand in a message as it is.
+/// Returns whether the number of a device can stand in a message without quoting.
 pub fn is_plain(id: &str) -> bool {
     (1..=64).contains(&id.len()) && id.bytes().all(|b| b.is_ascii_alphanumeric() || b"-_".contains(&b))
 }
 
-/// The first message: who we are, axes and origin, the whole state as an answer, and no force.
+/// Returns the first message: name of the program, axes and origin, full-state answers, zero force.
 pub fn hello(id: &str) -> String {
     format!(
         "{{\"session\":{{\"force_render_full_state\":{{}},\"configure\":{{\"profile\":{{\"name\":\"stylet\",\
@@ -215,7 +216,7 @@ pub fn hello(id: &str) -> String {
     )
 }
 
-/// Arm forward, origin in the centre of the workspace.
+/// Preset with the arm forward and the origin in the centre of the workspace.
 const PRESET: &str = "arm_front_centered";
 
 /// Writes the message that sets a force, N, into `out`.
@@ -251,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn a_number_that_is_missing_is_none_and_no_rotation_is_refused() {
+    fn missing_numbers_and_invalid_rotations_are_refused() {
         let text = r#"{"session_id": 7, "inverse3": [{"device_id": "A", "state": {"cursor_position": {"x": 1, "y": null}}}],
             "verse_grip": [{"device_id": "G", "state": {"orientation": {"w": 2, "x": 0, "y": 0, "z": 0}, "button": true}}]}"#;
         let frame = Frame::of(text).expect("a frame");
@@ -276,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn a_version_is_found_in_both_forms_of_the_answer() {
+    fn both_forms_of_the_version_answer_are_read() {
         let bare = "HTTP/1.1 200 OK\r\n\r\n{\"project_version\": \"3.5.0.0\"}";
         let wrapped = "HTTP/1.1 200 OK\r\n\r\n{\"ok\": true, \"data\": {\"project_version\": \"3.5.1\"}}tail";
         assert_eq!(version(bare).as_deref(), Some("3.5.0.0"));

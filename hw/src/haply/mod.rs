@@ -1,18 +1,23 @@
-//! An Inverse3 of Haply through the maker's Inverse service 3.5: a websocket, JSON, one state for each message.
+//! An Inverse3 of Haply through the maker's Inverse service 3.5: a websocket, JSON, one state for
+//! each message.
 //!
-//! Not tried on a device: only against a fake service of the tests.
+//! Tested only against a fake service, not on a device.
 //!
-//! A servo thread beside the force loop, armed by us, sends the newest force and reads the state that answers it; the delay
-//! that follows is that of [`libhd`](crate::libhd). The exchange is in lock-step: no force is sent while an answer is owed,
-//! so that a service that falls behind never has a queue of forces. Only a zero is sent out of turn, as soon as anything is
-//! wrong. A connector of normal priority opens the connection and opens it again after a loss.
+//! An armed servo thread of ours, outside the force loop, sends the newest force and reads the
+//! state that answers it; for the resulting delay see [`libhd`](crate::libhd). The exchange is in
+//! lock-step: no force is sent while an answer is outstanding, so a slow service never queues
+//! forces. Only a zero is sent out of turn, as soon as a fault appears. A connector of normal
+//! priority opens the connection and reopens it after a loss.
 //!
-//! The websocket is neither encrypted nor signed: what answers has to be a program of this user or root on this PC.
+//! The websocket is neither encrypted nor signed, so the peer must be a program of this user or
+//! root on this PC.
 //!
-//! The maker's pages say that a force is applied once and that the device returns to idle when forces stop; they do not say
-//! after how long, nor what a service does whose client dies. Nothing here relies on it.
+//! The maker's pages say that a force is applied once and that the device returns to idle when
+//! forces stop. They do not say after how long, or what a service does when its client dies.
+//! Nothing here relies on it.
 //!
-//! The servo thread allocates, as the library does for each message; the force loop does not wait for it.
+//! The servo thread allocates, because the library does for each message; the force loop does not
+//! wait for it.
 
 mod connector;
 mod device;

@@ -2,10 +2,11 @@
 
 use crate::device::DeviceInfo;
 
-/// No force, stiffness or encoder step of an Inverse3 was found in public text. The peak is the safety limit that Isaac Lab
-/// (`isaaclab.devices.haply`, `limit_force`) gives to the same device through the same service; half of it for any time and
-/// the step of 10 um are our own choice, as is the stiffness: that of the Phantom for which the scenes are made. With less, the
-/// core refuses them.
+/// Limits by type. No force, stiffness or encoder step of an Inverse3 was found in public text. The
+/// peak is the safety limit that Isaac Lab (`isaaclab.devices.haply`, `limit_force`) gives to the
+/// same device through the same service. The continuous force, half of it, and the step of 10 um
+/// are our choice. So is the stiffness, that of the Phantom for which the scenes are made: with
+/// less, the core refuses them.
 const MODELS: &[(&str, DeviceInfo)] = &[
     ("inverse3", model("Haply Inverse3")),
     ("inverse3x", model("Haply Inverse3x")),
@@ -23,12 +24,12 @@ const fn model(name: &'static str) -> DeviceInfo {
     }
 }
 
-/// Figures of the type that the service reports; `None` for an unknown one.
+/// Returns the figures of the type that the service reports; `None` for an unknown one.
 pub fn figures(kind: &str) -> Option<DeviceInfo> {
     MODELS.iter().find(|(known, _)| *known == kind).map(|(_, info)| *info)
 }
 
-/// Names of all known types, for messages.
+/// Returns the names of all known types, for messages.
 pub fn known_types() -> String {
     MODELS.iter().map(|(kind, _)| *kind).collect::<Vec<_>>().join(", ")
 }

@@ -1,13 +1,14 @@
-//! Whose program answers at the service's port: anybody on this PC can take a port first.
+//! Owner of the program that answers at the service's port, because anybody on this PC can take a
+//! port first.
 
 use std::io;
 use std::net::{IpAddr, Ipv6Addr, SocketAddr, TcpStream};
 
-/// The state of an open connection in `/proc/net/tcp`.
+/// State of an open connection in `/proc/net/tcp`.
 const ESTABLISHED: &str = "01";
 const ROOT: u32 = 0;
 
-/// Why the program at the other end is not trusted.
+/// Reason why the program at the other end is not trusted.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotTrusted {
     /// Another user runs it.
@@ -15,7 +16,7 @@ pub enum NotTrusted {
         "the program that answers belongs to user {0}, not to this user or root: another user has taken the port of the service"
     )]
     OtherUser(u32),
-    /// It is on another machine, where nobody can say whose it is.
+    /// The program is on another machine, where its owner cannot be known.
     #[error("{0} is not on this PC: the service is neither encrypted nor signed, and is taken from this PC alone")]
     OtherMachine(IpAddr),
     /// The kernel does not show the connection.
@@ -23,8 +24,8 @@ pub enum NotTrusted {
     NotShown,
 }
 
-/// Refuses a service of another user or another machine. Call it once something has arrived: before the other side has accepted the
-/// connection, the kernel calls it root's.
+/// Refuses a service of another user or another machine. Must be called after the first bytes
+/// arrived: until the other side accepts the connection, the kernel attributes it to root.
 pub fn check(stream: &TcpStream) -> io::Result<Result<(), NotTrusted>> {
     let (here, there) = (stream.local_addr()?, stream.peer_addr()?);
     if !there.ip().to_canonical().is_loopback() {
@@ -40,7 +41,7 @@ pub fn check(stream: &TcpStream) -> io::Result<Result<(), NotTrusted>> {
     })
 }
 
-/// User of the socket at `local` that is connected with `remote`.
+/// Returns the user of the socket at `local` that is connected with `remote`.
 fn owner(table: &str, local: SocketAddr, remote: SocketAddr) -> Option<u32> {
     let both = |local: String, remote: String| {
         table.lines().find_map(|line| {
@@ -52,7 +53,7 @@ fn owner(table: &str, local: SocketAddr, remote: SocketAddr) -> Option<u32> {
     both(plain(local), plain(remote)).or_else(|| both(mapped(local), mapped(remote)))
 }
 
-/// An address as the kernel prints it: words in the order of this machine's bytes.
+/// Returns an address as the kernel prints it: words in the byte order of this machine.
 fn plain(address: SocketAddr) -> String {
     match address.ip() {
         IpAddr::V4(v4) => format!("{:08X}:{:04X}", u32::from_ne_bytes(v4.octets()), address.port()),
@@ -60,7 +61,7 @@ fn plain(address: SocketAddr) -> String {
     }
 }
 
-/// As [`plain`], of a socket that takes both kinds of addresses.
+/// Like [`plain`], for a socket that takes both kinds of addresses.
 fn mapped(address: SocketAddr) -> String {
     match address.ip() {
         IpAddr::V4(v4) => in_words(v4.to_ipv6_mapped(), address.port()),
@@ -91,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_of_this_user_is_trusted_however_it_listens() {
+    fn a_program_of_this_user_is_trusted() {
         for listen in ["127.0.0.1:0", "0.0.0.0:0", "[::]:0"] {
             let Ok(listener) = TcpListener::bind(listen) else {
                 println!("skipped: {listen}");
@@ -104,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn the_user_is_that_of_the_other_end() {
+    fn the_owner_is_that_of_the_peer() {
         let table = "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode\n\
              0: 0100007F:2711 00000000:0000 0A 00000000:00000000 00:00000000 00000000     0        0 1 1 0 100 0 0 10 0\n\
              1: 0100007F:D431 0100007F:2711 01 00000000:00000000 00:00000000 00000000     0        0 2 1 0 20 4 30 10 -1\n\
@@ -114,7 +115,7 @@ mod tests {
         assert_eq!(owner(table, address(0x2711), address(0xd432)), None);
     }
 
-    /// The port of the service was taken by whoever came first.
+    /// Guards against a port that another program took first.
     #[test]
     fn a_program_of_another_user_is_refused() {
         // SAFETY: none has preconditions; the child only accepts, waits and ends.

@@ -1,50 +1,51 @@
-//! One tick of the servo thread: the newest force goes out, the state that answers it comes in.
+//! One tick of the servo thread: send the newest force, read the state that answers it.
 
 use std::time::Instant;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::beside::arm::{Arm, ArmError};
-use crate::beside::ends::ServoEnd;
-use crate::beside::hold::Hold;
-use crate::beside::serving::{self, Serve};
-use crate::beside::shared::Shared;
 use crate::device::{DeviceFault, Sample};
+use crate::driver_thread::arm::{Arm, ArmError};
+use crate::driver_thread::ends::ServoEnd;
+use crate::driver_thread::hold::Hold;
+use crate::driver_thread::serving::{self, Serve};
+use crate::driver_thread::shared::Shared;
 use crate::haply::message::{self, Frame, Grip, Inverse};
 use crate::haply::session::Description;
 use crate::haply::wire::{Wire, WireError};
 use crate::placement::Placement;
 
-/// An answer that is owed for this long is late: the force goes to zero without waiting for it.
+/// Age at which an outstanding answer is late: the force goes to zero at once.
 const LATE_S: f64 = 0.02;
-/// A service that owes an answer for this long is lost.
+/// Age of an outstanding answer at which the service counts as lost.
 const SILENT_S: f64 = 0.25;
-/// A device that is pushed for this long and does not move by one bit is frozen: its service repeats an old state.
+/// Time for which a loaded device may not move by a single bit; after it the service counts as
+/// repeating an old state.
 const FROZEN_S: f64 = 0.25;
-/// No device of this maker reaches so far from the centre of its workspace.
+/// Farthest reach of any device of this maker from the centre of its workspace.
 const FARTHEST_M: f64 = 1.0;
-/// States that one tick takes.
+/// Most states read in one tick.
 const MOST_STATES: u32 = 16;
-/// A state has some kilobytes; what is longer is not read.
+/// Longest state that is read; a normal one has some kilobytes.
 const LONGEST_STATE: usize = 16 * 1024;
-/// Messages that nobody asked for: so many for each tick are borne, and so many more at once.
+/// Unsolicited messages tolerated per tick; the burst limit is larger.
 const SURPLUS_A_TICK: u32 = 2;
 const MOST_SURPLUS: u32 = 500;
 
-/// Why a connection was lost, by number.
+/// Reasons for a lost connection, by number.
 pub mod loss {
     /// The service closed it.
     pub const CLOSED: u32 = 1;
-    /// The service owes an answer.
+    /// The service does not answer.
     pub const SILENT: u32 = 2;
-    /// The device is not among those of the service.
+    /// The device is missing from the service's list.
     pub const UNPLUGGED: u32 = 3;
     /// A tick panicked.
     pub const PANIC: u32 = 4;
-    /// The service sends what nobody asked for.
+    /// The service sends unsolicited messages.
     pub const FLOOD: u32 = 5;
 
-    /// In words, with what to do.
+    /// Returns the reason in words, with the remedy.
     pub fn text(code: u32) -> &'static str {
         match code {
             CLOSED => "the service closed the connection; it is opened again automatically",
@@ -79,17 +80,18 @@ struct Link {
     sent_n: Vector3<f64>,
     /// Messages without an answer.
     owed: u32,
-    /// Messages that were not asked for, less what is borne.
+    /// Unsolicited messages beyond the tolerated rate.
     surplus: u32,
-    /// Ticks since the oldest of them.
+    /// Ticks since the oldest unanswered message.
     waited: u32,
     /// Position and velocity of the last state.
     last: [Vector3<f64>; 2],
-    /// Ticks for which they have been the same under a force.
+    /// Ticks for which they have not changed under a force.
     still: u32,
 }
 
-/// Orientation of the handle since the device was first opened, when it was taken to point straight ahead.
+/// Orientation of the handle relative to the first opening of the device, when it is assumed to
+/// point straight ahead.
 #[derive(Default)]
 struct Turned {
     straight: Option<UnitQuaternion<f64>>,
@@ -114,7 +116,8 @@ impl Servo {
         }
     }
 
-    /// Serves this device from the next tick on. After an earlier connection the force stays off until all was quiet.
+    /// Serves this device from the next tick on. After an earlier connection the force stays off
+    /// until no fault has occurred for a while.
     pub fn begin(&mut self, wire: Box<dyn Wire>, description: &Description) {
         if self.served {
             self.hold.pause(DeviceFault::NotConnected);
@@ -132,7 +135,7 @@ impl Servo {
         });
     }
 
-    /// One servo tick, until `until`; in the order of the data.
+    /// Runs one servo tick, until `until`, in the order of the data.
     pub fn tick(&mut self, shared: &Shared, until: Instant) {
         shared.count_tick();
         let wrench = self.hold.wrench(self.end.commands.read(), self.servo_hz);
@@ -143,14 +146,14 @@ impl Servo {
         }
         self.take_states(shared, until);
         self.check_silence(shared);
-        // What this tick found takes its force back at once.
+        // A fault found in this tick withdraws the force at once.
         if self.hold.fault().is_some() && self.has_force() {
             self.send(shared, Vector3::zeros());
         }
         shared.fault.set(self.hold.end_tick(self.servo_hz));
     }
 
-    /// Zero force, and closes the connection.
+    /// Writes zero force and closes the connection.
     pub fn end_connection(&mut self) {
         if let Some(mut link) = self.link.take() {
             message::force(&mut self.out, &link.id, [0.0; 3]);
@@ -173,7 +176,7 @@ impl Servo {
         }
     }
 
-    /// Takes what has arrived, and waits for what is owed.
+    /// Reads the states that have arrived, and waits for outstanding answers.
     fn take_states(&mut self, shared: &Shared, until: Instant) {
         let mut arrived = core::mem::take(&mut self.arrived);
         if let Some(link) = &mut self.link {
@@ -181,7 +184,7 @@ impl Servo {
         }
         for _ in 0..MOST_STATES {
             let Some(link) = &mut self.link else { break };
-            // A service that sends more than it owes does not make us read old states.
+            // Unsolicited messages must not make us read old states.
             let limit = if link.owed == 0 { Instant::now() } else { until };
             let received = link.wire.receive(limit, &mut arrived);
             if received == Ok(false) {
@@ -253,7 +256,8 @@ impl Servo {
         })
     }
 
-    /// A service that repeats an old state answers as a good one does: only a hand that is pushed and moves by nothing reveals it.
+    /// Detects a service that repeats an old state: only a loaded hand that does not move at all
+    /// reveals it.
     fn check_motion(&mut self, state: [Vector3<f64>; 2]) -> Result<(), DeviceFault> {
         let is_pushed = self.has_force();
         let Some(link) = &mut self.link else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! The first messages of a connection: which device it is, whether its limits and its frame are known.
+//! The first messages of a connection: identify the device, check its limits and its frame.
 
 use core::fmt;
 use core::time::Duration;
@@ -6,32 +6,33 @@ use std::convert::Infallible;
 use std::str::FromStr;
 use std::time::Instant;
 
-use crate::beside::arm::ArmError;
-use crate::beside::served::Described;
 use crate::device::DeviceInfo;
+use crate::driver_thread::arm::ArmError;
+use crate::driver_thread::served::Described;
 use crate::haply::message::{self, Frame, Inverse};
 use crate::haply::model;
 use crate::haply::wire::{Wire, WireError};
 
-/// A service has this long for its list of devices, and for its answer to the first message.
+/// Time limit of the service for its list of devices, and for its answer to the first message.
 const ANSWER_LIMIT: Duration = Duration::from_secs(2);
 
-/// Which of the service's devices to use.
+/// Choice among the service's devices.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Wanted {
     /// The first one.
     #[default]
     First,
-    /// The one at this place of the service's list, from 0.
+    /// Device at this place of the service's list, from 0.
     Number(usize),
-    /// The one that the service calls so.
+    /// Device with this name in the service.
     Id(String),
 }
 
 impl FromStr for Wanted {
     type Err = Infallible;
 
-    /// One or two digits are a place in the list, anything else is what the service calls a device.
+    /// Reads one or two digits as a place in the list, anything else as the service's name of a
+    /// device.
     fn from_str(text: &str) -> Result<Self, Infallible> {
         let number = (text.len() < 3).then(|| text.parse().ok()).flatten();
         Ok(number.map_or_else(|| Self::Id(text.to_owned()), Self::Number))
@@ -48,7 +49,7 @@ impl fmt::Display for Wanted {
     }
 }
 
-/// Why there is no connection; the text says what to do.
+/// Reason why there is no connection; the text says what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ConnectionError {
     /// Nothing answers at the address.
@@ -57,9 +58,9 @@ pub enum ConnectionError {
          with --haply-url"
     )]
     NoService {
-        /// Where it was looked for.
+        /// Address that was tried.
         address: String,
-        /// What the system says.
+        /// Message of the system.
         why: String,
     },
     /// Another user's program, or another machine's.
@@ -70,27 +71,27 @@ pub enum ConnectionError {
     /// The service speaks another version of the interface.
     #[error("the Inverse service is of version {0}; 3.5 or a newer 3 is needed: update it with Haply Hub")]
     OtherVersion(String),
-    /// What answers at the address does not speak as the service does.
+    /// The program at the address does not follow the service's protocol.
     #[error("what answers there does not send {0}: another program, or another version of the Inverse service")]
     OtherProgram(&'static str),
     /// The connection ended in its first messages.
     #[error("{0}: it is connected again automatically")]
     Wire(#[from] WireError),
-    /// The device that is asked for is not there.
+    /// The requested device is missing.
     #[error(
         "the service has {wanted}, only {}: plug it in and switch it on; rt-core devices lists what is there",
         listed(found)
     )]
     NoDevice {
-        /// What was asked for.
+        /// Requested device.
         wanted: Wanted,
-        /// What is there.
+        /// Devices in the service.
         found: Vec<String>,
     },
     /// No limits are known for this type.
     #[error("the device {id} is a \"{kind}\", of which no limits are known; known are: {known}", known = model::known_types())]
     WrongModel {
-        /// What the service calls it.
+        /// Name in the service.
         id: String,
         /// Its type.
         kind: String,
@@ -103,10 +104,10 @@ pub enum ConnectionError {
     OtherDevice {
         /// The device of the first connection.
         was: String,
-        /// What is there now.
+        /// Device that answers now.
         is: String,
     },
-    /// The service did not take the axes that were asked for.
+    /// The service refused the requested axes.
     #[error("the service gives positions in another frame ({0}): a force would point elsewhere; restart the service")]
     OtherAxes(String),
     /// The servo thread was not granted the rights that it needs.
@@ -130,13 +131,13 @@ fn listed(found: &[String]) -> String {
 pub struct Description {
     /// Limits.
     pub info: DeviceInfo,
-    /// What the service calls the device.
+    /// Name in the service.
     pub id: String,
-    /// Its firmware, where the service says it.
+    /// Firmware, if the service reports it.
     pub firmware: Option<(u32, u32)>,
-    /// Version of the service, where it says one.
+    /// Version of the service, if it reports one.
     pub service: Option<String>,
-    /// Number of a handle that gives the orientation; without one the needle is held straight.
+    /// Number of the handle that gives the orientation; without one the needle is held straight.
     pub grip: Option<String>,
 }
 
@@ -161,14 +162,14 @@ impl fmt::Display for Description {
     }
 }
 
-/// Whether the interface of this version is the one that is spoken here.
+/// Returns whether this version of the interface is supported.
 pub fn is_supported(version: &str) -> bool {
     let mut parts = version.split('.').map(|part| part.parse::<u32>().ok());
     matches!((parts.next().flatten(), parts.next().flatten()), (Some(3), Some(minor)) if minor >= 5)
 }
 
-/// The first messages: finds the device, sets the axes, and makes sure of them. After an earlier connection, `known`, it has to
-/// be the same device.
+/// Exchanges the first messages: finds the device, sets the axes and verifies them. After an
+/// earlier connection, `known`, the device must be the same.
 pub fn open(
     wire: &mut dyn Wire,
     wanted: &Wanted,
@@ -193,7 +194,7 @@ pub fn open(
     Ok(description)
 }
 
-/// The next frame.
+/// Receives the next frame.
 pub fn next<'a>(wire: &mut dyn Wire, text: &'a mut String, what: &'static str) -> Result<Frame<'a>, ConnectionError> {
     if !wire.receive(Instant::now() + ANSWER_LIMIT, text)? {
         return Err(ConnectionError::OtherProgram(what));
@@ -226,13 +227,14 @@ fn same<'f, 'a>(list: &'f Frame<'a>, known: &Description) -> Result<&'f Inverse<
     })
 }
 
-/// What the service calls its devices, as it can be printed.
+/// Returns the service's names of its devices, ready to print.
 fn ids(list: &Frame<'_>) -> Vec<String> {
     let printable = |id: &str| id.chars().take(64).flat_map(char::escape_default).collect();
     list.inverse3.iter().take(16).map(|d| printable(&d.device_id)).collect()
 }
 
-/// What the service says of the device, without a question; refuses one whose limits are not known.
+/// Returns the service's description of the device without a query; refuses a device of unknown
+/// limits.
 pub fn describe(device: &Inverse<'_>, known: Option<&Description>) -> Result<Description, ConnectionError> {
     let config = device.config.as_ref();
     let kind = config.and_then(|c| c.kind.as_deref()).unwrap_or("unknown");
@@ -258,7 +260,7 @@ pub fn describe(device: &Inverse<'_>, known: Option<&Description>) -> Result<Des
     })
 }
 
-/// Refuses a frame that is not the one that was asked for; what the service leaves out is taken as asked for.
+/// Refuses a frame other than the requested one; a field that the service omits counts as granted.
 fn axes(answer: &Frame<'_>, id: &str) -> Result<(), ConnectionError> {
     let device = answer.device(id).ok_or(ConnectionError::OtherProgram("a state"))?;
     let config = device.config.as_ref();
@@ -280,7 +282,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_place_in_the_list_has_one_or_two_digits_and_versions_from_3_5_on_are_spoken() {
+    fn short_numbers_are_list_places_and_versions_from_3_5_are_supported() {
         assert_eq!("1".parse(), Ok(Wanted::Number(1)));
         assert_eq!("12".parse(), Ok(Wanted::Number(12)));
         assert_eq!("0490".parse(), Ok(Wanted::Id("0490".to_owned())));

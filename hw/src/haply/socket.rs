@@ -1,4 +1,4 @@
-//! The service's websocket, and the version that it gives over HTTP on the same port.
+//! The service's websocket, and the version that the service gives over HTTP on the same port.
 
 use core::fmt;
 use core::str::FromStr;
@@ -15,12 +15,12 @@ use crate::haply::message;
 use crate::haply::owner::{self, NotTrusted};
 use crate::haply::wire::{Wire, WireError};
 
-/// For connecting, and for each step of the handshake.
+/// Time limit for connecting, and for each step of the handshake.
 const CONNECT_LIMIT: Duration = Duration::from_secs(2);
-/// A list of a few devices has some kilobytes.
+/// Longest message that is read; a list of a few devices has some kilobytes.
 const LONGEST_MESSAGE: usize = 256 * 1024;
 const LONGEST_VERSION: u64 = 16 * 1024;
-/// Messages without a text that one call looks at.
+/// Most messages without text that one call reads.
 const MOST_OTHERS: u32 = 16;
 
 /// Address of an Inverse service.
@@ -29,18 +29,18 @@ pub struct Service {
     host_and_port: String,
 }
 
-/// A text that is no address of a service.
+/// Text that is not an address of a service.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{0}\" is no address of an Inverse service; give ws://HOST:PORT, as in ws://localhost:10001")]
 pub struct BadAddress(String);
 
-/// Why no websocket opens.
+/// Reason why no websocket opens.
 #[derive(Debug, thiserror::Error)]
 pub enum NoSocket {
     /// Nothing listens there.
     #[error("{0}")]
     Connection(#[from] std::io::Error),
-    /// What listens there is no websocket.
+    /// The program that listens is not a websocket server.
     #[error("no websocket: {0}")]
     Handshake(String),
     /// Another user's program, or another machine's.
@@ -98,7 +98,7 @@ impl Service {
         Ok(Socket(socket))
     }
 
-    /// Version of the service, where it says one.
+    /// Returns the version of the service, if it reports one.
     pub fn version(&self) -> Option<String> {
         let mut stream = self.stream(CONNECT_LIMIT / 4).ok()?;
         let host = &self.host_and_port;
@@ -108,7 +108,7 @@ impl Service {
         )
         .ok()?;
         let mut answer = Vec::new();
-        // What has arrived counts, whether or not the connection ends in time.
+        // Whatever has arrived counts, even if the connection does not end in time.
         let _ = stream.take(LONGEST_VERSION).read_to_end(&mut answer);
         message::version(&String::from_utf8_lossy(&answer))
     }
@@ -135,7 +135,7 @@ pub struct Socket(WebSocket<TcpStream>);
 
 impl Wire for Socket {
     fn send(&mut self, text: &str) -> Result<(), WireError> {
-        // A service that reads so little that a few forces fill the socket has as good as closed it.
+        // A service that reads so little that a few forces fill the socket is as good as closed.
         self.0.send(Message::text(text)).map_err(|_| WireError::Closed)
     }
 
@@ -170,7 +170,7 @@ impl Wire for Socket {
 }
 
 impl Socket {
-    /// Waits until something can be read; false if that is not so before `until`.
+    /// Waits until data can be read; returns false if there is none before `until`.
     fn is_readable(&self, until: Instant) -> bool {
         let left = until.saturating_duration_since(Instant::now());
         let timeout = Timespec {
@@ -187,7 +187,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_address_has_a_scheme_a_host_and_a_port_and_nothing_else() {
+    fn an_address_is_scheme_host_and_port_only() {
         for good in ["ws://localhost:10001", "ws://127.0.0.1:9/", "ws://[::1]:10001"] {
             assert_eq!(good.parse::<Service>().unwrap().to_string(), good.trim_end_matches('/'));
         }

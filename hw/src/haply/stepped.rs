@@ -1,9 +1,9 @@
-//! An Inverse3 without threads; see [`stepped`](crate::beside::stepped).
+//! An Inverse3 without threads; see [`stepped`](crate::driver_thread::stepped).
 
 use std::time::Instant;
 
-use crate::beside::shared::Shared;
-use crate::beside::stepped::{self, Step};
+use crate::driver_thread::shared::Shared;
+use crate::driver_thread::stepped::{self, Step};
 use crate::haply::servo::Servo;
 use crate::haply::session::{self, ConnectionError, Description, Wanted};
 use crate::haply::wire::Wire;
@@ -12,10 +12,10 @@ use crate::placement::Placement;
 /// An Inverse3 on the caller's thread and without a clock.
 pub type Stepped = stepped::Stepped<Steps>;
 
-/// Opens a connection to a service, with the service's version; `None` where none answers.
+/// Opener of a connection to a service, with its version; `None` if none answers.
 pub type Opener = Box<dyn FnMut() -> Option<(Box<dyn Wire>, Option<String>)> + Send>;
 
-/// Its servo loop and its connection.
+/// Servo loop and connection of a stepped device.
 pub struct Steps {
     opener: Opener,
     known: Option<Description>,

@@ -5,7 +5,7 @@ use core::ffi::c_int;
 use crate::libhd::ffi::{Api, Handle, calibration, parameter, style};
 use crate::libhd::session::{ConnectionError, last_error};
 
-/// Where calibration stands.
+/// State of the calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Calibration {
     /// The device is calibrated.
@@ -23,9 +23,9 @@ const NEUTRAL: &str = "The device is not calibrated. Hold the arm in its neutral
 const MOVE: &str =
     "The device is not calibrated. Move the arm slowly through its whole range until this message disappears.";
 
-/// Checks the calibration, and updates it if that is possible now. The scheduler must not run.
+/// Checks the calibration, and updates it if that is possible now. The scheduler must be stopped.
 ///
-/// A reset of the encoders takes the present pose as the neutral one, so it waits for the button.
+/// Resetting the encoders makes the present pose the neutral one, so it waits for the button.
 pub fn step(api: &Api, handle: Handle) -> Result<Calibration, ConnectionError> {
     // SAFETY: no preconditions.
     let state = unsafe { (api.hdCheckCalibration)() };
@@ -51,7 +51,8 @@ pub fn step(api: &Api, handle: Handle) -> Result<Calibration, ConnectionError> {
     }))
 }
 
-/// The inkwell is the most reliable style; a device that reports none is reset, as the Premium is.
+/// Returns the calibration style: the inkwell as the most reliable one, or an encoder reset for a
+/// device that reports none, as the Premium does.
 fn chosen_style(api: &Api) -> u32 {
     let mut styles: c_int = 0;
     // SAFETY: one number, as the interface states.

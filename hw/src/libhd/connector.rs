@@ -5,8 +5,8 @@ use std::sync::PoisonError;
 use std::thread;
 use std::time::Instant;
 
-use crate::beside::keeper::{self, Connect};
 use crate::device::{DeviceFault, DeviceInfo};
+use crate::driver_thread::keeper::{self, Connect};
 use crate::libhd::calibrate::{self, Calibration};
 use crate::libhd::device::PhantomConfig;
 use crate::libhd::exchange::Served;
@@ -14,9 +14,9 @@ use crate::libhd::ffi::Api;
 use crate::libhd::servo::Servo;
 use crate::libhd::session::{ConnectionError, Description, Session};
 
-/// Between two checks of a running device.
+/// Time between two checks of a running device.
 const CHECK_EVERY: Duration = Duration::from_millis(20);
-/// A servo loop that does not call for this long is stopped and restarted.
+/// Silence after which a servo loop is stopped and restarted.
 const SILENT_FOR: Duration = Duration::from_millis(250);
 const CALIBRATION_EVERY: Duration = Duration::from_millis(50);
 const FIRST_CALL_LIMIT: Duration = Duration::from_secs(2);
@@ -24,12 +24,12 @@ const FIRST_SAMPLE_LIMIT: Duration = Duration::from_millis(100);
 /// Longest wait for the callback to write zero before the scheduler stops.
 const RELEASE_LIMIT: Duration = Duration::from_millis(50);
 
-/// Owns the connection; see the module.
+/// Owner of the connection; see the module.
 pub struct Connector {
     api: Api,
     servo: &'static Servo,
     config: PhantomConfig,
-    /// The limits that the force loop uses, fixed by the first connection.
+    /// Limits that the force loop uses, fixed by the first connection.
     info: Option<DeviceInfo>,
 }
 
@@ -122,7 +122,7 @@ impl Connector {
         }
     }
 
-    /// Waits until the device is calibrated; false when the thread is to end.
+    /// Waits until the device is calibrated; returns false when the thread must end.
     fn calibrate(
         &mut self,
         keeper: &mut Keeper,
@@ -144,7 +144,8 @@ impl Connector {
         Ok(false)
     }
 
-    /// Starts the servo loop and waits for its first callback; returns what its thread was granted.
+    /// Starts the servo loop and waits for its first callback; returns the rights that its thread
+    /// was granted.
     fn start(&self, session: &mut Session) -> Result<String, ConnectionError> {
         let shared = &self.servo.shared;
         let armed = || self.servo.armed.lock().unwrap_or_else(PoisonError::into_inner).take();
@@ -169,7 +170,8 @@ impl Connector {
         Err(ConnectionError::NoCallback)
     }
 
-    /// The first callback has begun: waits for its sample, so that whoever opened the device finds one, unless there is a fault.
+    /// Waits for the sample of the first callback, so that the opener finds one, unless there is a
+    /// fault.
     fn wait_for_sample(&self) {
         let start = Instant::now();
         while self.servo.shared.fault.get().is_some() && start.elapsed() < FIRST_SAMPLE_LIMIT {

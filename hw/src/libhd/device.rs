@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use crate::beside::arm::Arm;
-use crate::beside::ends::{self, ForceLoopEnd};
-use crate::beside::keeper::{self, KeeperThread, Report};
-use crate::beside::open;
 use crate::device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
+use crate::driver_thread::arm::Arm;
+use crate::driver_thread::ends::{self, ForceLoopEnd};
+use crate::driver_thread::keeper::{self, KeeperThread, Report};
+use crate::driver_thread::open;
 use crate::libhd::connector::Connector;
 use crate::libhd::exchange::Readings;
 use crate::libhd::ffi::Api;
@@ -14,21 +14,21 @@ use crate::libhd::servo::{Inner, Servo, State};
 use crate::libhd::session::{ConnectionError, Description};
 use crate::placement::Placement;
 
-/// Which device to open, and its place in the world.
+/// Device to open, and its place in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhantomConfig {
     /// The driver's library; `None` tries its usual names.
     pub library: Option<PathBuf>,
-    /// The device's name in the driver's set-up; `None` takes the default one.
+    /// Name of the device in the driver's set-up; `None` takes the default one.
     pub name: Option<String>,
     /// Place of the device in the world.
     pub placement: Placement,
-    /// Rate of the driver's servo loop, Hz: 500, 1000 or 2000 on a parallel port. The module's documentation explains the
-    /// delay that follows from it.
+    /// Rate of the driver's servo loop, Hz: 500, 1000 or 2000 on a parallel port. The module's
+    /// documentation explains the delay that it causes.
     pub servo_hz: u32,
 }
 
-/// Why a Phantom could not be opened; the text says what to do.
+/// Reason why a Phantom could not be opened; the text says what to do.
 pub type OpenError = open::OpenError<ConnectionError>;
 
 /// A Phantom; see the module [`libhd`](crate::libhd). Dropping it leaves zero force and a disabled device.
@@ -40,17 +40,18 @@ pub struct Phantom {
 }
 
 impl Phantom {
-    /// Loads the driver and finds the device. `arm` runs once in each servo thread, before its first tick is served;
-    /// `report` receives messages for the operator, from a thread of normal priority.
+    /// Loads the driver and finds the device. `arm` runs once in each servo thread, before its
+    /// first tick is served. `report` receives messages for the operator, from a thread of normal
+    /// priority.
     ///
-    /// A device that is not calibrated is opened: it reads [`DeviceFault::NotCalibrated`] until the operator has followed
-    /// the reported instruction.
+    /// A device that is not calibrated is opened too: it reads [`DeviceFault::NotCalibrated`] until
+    /// the operator has followed the reported instruction.
     pub fn open(config: PhantomConfig, arm: Arm, report: Report) -> Result<Self, OpenError> {
         let api = Api::load(config.library.as_deref())?;
         Self::open_with(api, config, arm, report)
     }
 
-    /// As [`open`](Self::open), with a library that is already loaded.
+    /// Like [`open`](Self::open), with a library that is already loaded.
     pub fn open_with(api: Api, config: PhantomConfig, arm: Arm, report: Report) -> Result<Self, OpenError> {
         let (end, servo_end) = ends::pair();
         // Never freed, see `Servo`.
@@ -77,7 +78,7 @@ impl Phantom {
         &self.description
     }
 
-    /// State of the driver beside the pose.
+    /// Returns the state of the driver, without the pose.
     pub fn readings(&self) -> Readings {
         self.servo.shared.readings()
     }

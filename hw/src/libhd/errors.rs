@@ -1,9 +1,9 @@
-//! The driver's errors: number, name, and what each means for the force.
+//! The driver's errors: number, name, and consequence for the force.
 
-use crate::beside::errors::{find, pause, reconnect};
 use crate::device::DeviceFault;
+use crate::driver_thread::errors::{find, pause, reconnect};
 
-pub use crate::beside::errors::{KnownError, Response};
+pub use crate::driver_thread::errors::{KnownError, Response};
 
 /// No error.
 pub const SUCCESS: u32 = 0;
@@ -39,12 +39,12 @@ pub const KNOWN: &[KnownError] = &[
     reconnect(0x0600, "HD_INVALID_LICENSE", DeviceFault::Driver),
 ];
 
-/// The entry of `code`; an unknown number pauses the force as a driver's error.
+/// Returns the entry of `code`; an unknown number pauses the force as a driver's error.
 pub fn known(code: u32) -> KnownError {
     find(KNOWN, code)
 }
 
-/// What the operator can do about the error.
+/// Returns the remedy for the error, as an instruction to the operator.
 pub fn cure(code: u32) -> &'static str {
     match code {
         0x0200 => "let the motors cool for some minutes; lower the force scale",

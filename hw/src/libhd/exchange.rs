@@ -1,33 +1,36 @@
 //! State that the servo thread, the force loop and the connector thread share without waiting.
 //!
-//! All atomics of the back end and their orderings stand here, except the flag that guards a servo thread's entry
-//! ([`servo`](super::servo)) and what all back ends share ([`beside`](crate::beside)).
+//! This file holds all atomics of the back end and their orderings, with two exceptions: the entry
+//! flag of a servo thread ([`servo`](super::servo)) and the parts common to all back ends
+//! ([`driver_thread`](crate::driver_thread)).
 
 use core::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
-use crate::beside::ends::FaultCell;
-use crate::beside::loss::Errors;
 use crate::device::DeviceFault;
+use crate::driver_thread::ends::FaultCell;
+use crate::driver_thread::loss::Errors;
 use crate::libhd::ffi::{Handle, INVALID_HANDLE};
 
-/// The device that a callback serves.
+/// Device that a callback serves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Served {
     pub handle: Handle,
-    /// The device has motors in its gimbal.
+    /// True if the device has motors in its gimbal.
     pub torques: bool,
 }
 
-/// Each field has one writer, which its comment names, unless it says otherwise.
+/// State shared by three threads. Each field has one writer, named in its comment, unless the
+/// comment says otherwise.
 #[derive(Debug)]
 pub struct Shared {
-    /// Connector: the device that callbacks serve, published by `release`.
+    /// Connector: device that callbacks serve, published by `release`.
     handle: AtomicU32,
-    /// Connector: as `handle`.
+    /// Connector: like `handle`.
     torques: AtomicBool,
-    /// Connector: every callback writes zero force.
+    /// Connector: order to every callback to write zero force.
     release: AtomicBool,
-    /// The connector sets it before a scheduler starts; the first callback clears it and arms its thread.
+    /// Order to the first callback to arm its thread; set by the connector before a scheduler
+    /// starts, cleared by that callback.
     arm: AtomicBool,
     /// Servo: callbacks so far.
     calls: AtomicU64,
@@ -37,7 +40,7 @@ pub struct Shared {
     pub fault: FaultCell,
     /// Servo, and the connector when the servo loop is silent.
     pub errors: Errors,
-    /// Servo: `f64` bits, as the two that follow.
+    /// Servo: `f64` bits, like the next two.
     temperature: AtomicU64,
     speed: AtomicU64,
     worst_callback: AtomicU64,
@@ -61,14 +64,14 @@ impl Default for Shared {
     }
 }
 
-/// State of the driver beside the pose.
+/// State of the driver, without the pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Readings {
     /// Servo callbacks so far.
     pub calls: u64,
     /// Present fault.
     pub fault: Option<DeviceFault>,
-    /// The driver's last error by number, 0 for none.
+    /// Last error of the driver by number; 0 for none.
     pub error: u32,
     /// Number of errors that the driver reported so far.
     pub errors: u64,
@@ -99,15 +102,15 @@ impl Shared {
         self.release.store(true, Ordering::Relaxed);
     }
 
-    /// Number of callbacks that wrote zero force because of `release` or `lost`.
+    /// Returns the number of callbacks that wrote zero force because of `release` or `lost`.
     pub fn released(&self) -> u64 {
         // SYNC: acquire pairs with the release in `count_released`: the driver has the zero of every counted callback.
         self.released.load(Ordering::Acquire)
     }
 
-    /// Number of callbacks that have begun.
+    /// Returns the number of callbacks that have begun.
     pub fn calls(&self) -> u64 {
-        // SYNC: relaxed; only a change of the number is looked for. Its partner is `count_call`.
+        // SYNC: relaxed; readers only look for a change. Its partner is `count_call`.
         self.calls.load(Ordering::Relaxed)
     }
 }
@@ -120,7 +123,7 @@ impl Shared {
         self.calls.fetch_add(1, Ordering::Relaxed)
     }
 
-    /// The device to serve, or `None` when this callback has to write zero.
+    /// Returns the device to serve, or `None` when this callback must write zero.
     pub fn served(&self) -> Option<Served> {
         // SYNC: acquire pairs with the release store in `serve`; it comes before every other load of this function and
         // before `take_arm`.
@@ -128,7 +131,7 @@ impl Shared {
         (!release && !self.errors.is_lost()).then(|| self.last_served())
     }
 
-    /// The device that was served last, whether it is released or not.
+    /// Returns the device that was served last, released or not.
     pub fn last_served(&self) -> Served {
         // SYNC: relaxed; `served` has acquired them, and a callback that only writes zero may see the device before.
         Served {
@@ -137,7 +140,7 @@ impl Shared {
         }
     }
 
-    /// True once after each `serve`.
+    /// Returns true once after each `serve`.
     pub fn take_arm(&self) -> bool {
         // SYNC: relaxed; a callback that saw `release` cleared (acquire in `served`) sees this flag set.
         self.arm.swap(false, Ordering::Relaxed)
@@ -149,19 +152,19 @@ impl Shared {
         self.released.fetch_add(1, Ordering::Release);
     }
 
-    /// Notes the temperature of the warmest motor, 0 to 1.
+    /// Records the temperature of the warmest motor, 0 to 1.
     pub fn note_temperature(&self, share: f64) {
         // SYNC: relaxed; one value for display. Its partner is `readings`.
         self.temperature.store(share.to_bits(), Ordering::Relaxed);
     }
 
-    /// Notes the driver's estimate of the speed.
+    /// Records the driver's estimate of the speed.
     pub fn note_speed_m_per_s(&self, speed: f64) {
         // SYNC: relaxed; one value for display. Its partner is `readings`.
         self.speed.store(speed.to_bits(), Ordering::Relaxed);
     }
 
-    /// Notes when a callback ended, counted from the start of its servo tick.
+    /// Records when a callback ended, counted from the start of its servo tick.
     pub fn note_callback_s(&self, time_s: f64) {
         if time_s > 0.0 {
             // The bits of positive numbers are in the order of the numbers.
@@ -173,9 +176,9 @@ impl Shared {
 
 /// Calls of more than one thread.
 impl Shared {
-    /// Everything for display. The values may stem from different ticks.
+    /// Returns everything for display. The values may come from different ticks.
     pub fn readings(&self) -> Readings {
-        // SYNC: relaxed; every value stands for itself. The partners are the `note_` functions.
+        // SYNC: relaxed; every value stands alone. The partners are the `note_` functions.
         let number = |bits: &AtomicU64| f64::from_bits(bits.load(Ordering::Relaxed));
         Readings {
             calls: self.calls(),

@@ -1,7 +1,7 @@
-//! The C interface of `libHD.so`, as OpenHaptics 3.00 to 3.30 have it, loaded at run time.
+//! The C interface of `libHD.so`, OpenHaptics 3.00 to 3.30, loaded at run time.
 //!
-//! Types, numbers and the 36 functions are facts of the vendor's interface (HDAPI reference; names checked against the
-//! symbols of `libHD.so.3.0.0`).
+//! Types, numbers and the 36 functions are facts of the vendor's interface (HDAPI reference; names
+//! checked against the symbols of `libHD.so.3.0.0`).
 
 #![allow(non_snake_case)]
 
@@ -11,7 +11,7 @@ use crate::library::{Driver, functions};
 
 /// Handle of a device; [`INVALID_HANDLE`] for none.
 pub type Handle = u32;
-/// A number of [`parameter`], [`capability`], [`calibration`] or [`style`].
+/// Value of [`parameter`], [`capability`], [`calibration`] or [`style`].
 pub type Enum = u32;
 /// The scheduler's handle of a callback.
 pub type Schedule = c_ulong;
@@ -87,7 +87,7 @@ pub mod capability {
     pub const FORCE_RAMPING: u32 = 0x4002;
     /// The driver turns forces off that exceed the limit of the software.
     pub const SOFTWARE_FORCE_LIMIT: u32 = 0x4003;
-    /// All that a session enables, in this order.
+    /// Capabilities that a session enables, in this order.
     pub const AT_START: [u32; 4] = [FORCE_OUTPUT, MAX_FORCE_CLAMPING, FORCE_RAMPING, SOFTWARE_FORCE_LIMIT];
 }
 
@@ -101,7 +101,7 @@ pub mod calibration {
     pub const NEEDS_MANUAL_INPUT: u32 = 0x5002;
 }
 
-/// How a device is calibrated, a bit each.
+/// Calibration styles of a device, a bit each.
 pub mod style {
     /// The present pose becomes the neutral one.
     pub const ENCODER_RESET: u32 = 1;

@@ -1,12 +1,14 @@
-//! Torques of the gimbal joints that make a torque in space.
+//! Torques of the gimbal joints that produce a torque in space.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Torques of the gimbal joints (turn, lift, roll; N m) that add up to `torque_nm` in the device's frame.
+/// Returns the torques of the gimbal joints (turn, lift, roll; N m) that add up to `torque_nm` in
+/// the device's frame.
 ///
-/// Each joint gives the part of the torque that lies along its axis, so that the power at the joints equals the power in space.
-/// The joints turn about -y, -x and -z of the frames they carry, as the driver counts their angles: right, down and
-/// clockwise are positive. That torques have the sign of the angles is inferred, not stated by the vendor.
+/// Each joint gives the part of the torque that lies along its axis, so that the power at the
+/// joints equals the power in space. The joints turn about -y, -x and -z of the frames they carry,
+/// as the driver counts their angles: right, down and clockwise are positive. The sign of the
+/// torques follows the angles by inference; the vendor does not state it.
 pub fn gimbal_torque_nm(
     torque_nm: &Vector3<f64>,
     device_from_stylus: &UnitQuaternion<f64>,
@@ -20,7 +22,7 @@ pub fn gimbal_torque_nm(
     [turn.dot(torque_nm), lift.dot(torque_nm), roll.dot(torque_nm)]
 }
 
-/// The same direction, with no joint over its limit.
+/// Returns the same direction, with no joint over its limit.
 pub fn within_joint_limits(torque_nm: [f64; 3], limits_nm: &[f64; 3]) -> [f64; 3] {
     let excess = torque_nm
         .iter()
@@ -38,7 +40,7 @@ mod tests {
         UnitQuaternion::from_scaled_axis(axis * angle)
     }
 
-    /// Forward kinematics of the gimbal on a forearm of any orientation.
+    /// Returns the forward kinematics of the gimbal on a forearm of any orientation.
     fn stylus(forearm: &UnitQuaternion<f64>, [turn, lift, roll]: [f64; 3]) -> UnitQuaternion<f64> {
         forearm * axis_turn(-Vector3::y(), turn) * axis_turn(-Vector3::x(), lift) * axis_turn(-Vector3::z(), roll)
     }

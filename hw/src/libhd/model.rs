@@ -2,8 +2,8 @@
 
 use crate::device::DeviceInfo;
 
-/// Forces, stiffness and torque as CHAI3D 3.3 uses them, continuous force and position step from the vendor's data
-/// sheets. A smaller force that the driver reports replaces the figure here.
+/// Forces, stiffness and torque as in CHAI3D 3.3; continuous force and position step from the
+/// vendor's data sheets. A smaller force that the driver reports replaces the figure here.
 const MODELS: &[DeviceInfo] = &[
     DeviceInfo::phantom_premium_1_5(),
     DeviceInfo {
@@ -39,7 +39,8 @@ const fn small(name: &'static str, peak_n: f64, continuous_n: f64, stiffness_n_p
 /// Largest torque of each gimbal joint, N m: turn, lift, roll (the vendor's example for torques).
 pub const GIMBAL_TORQUE_LIMITS_NM: [f64; 3] = [0.188, 0.188, 0.048];
 
-/// Figures of the model that the driver names, in upper or lower case; `None` for an unknown model.
+/// Returns the figures of the model that the driver names, in upper or lower case; `None` for an
+/// unknown model.
 pub fn figures(model: &str) -> Option<DeviceInfo> {
     MODELS
         .iter()
@@ -47,12 +48,12 @@ pub fn figures(model: &str) -> Option<DeviceInfo> {
         .copied()
 }
 
-/// Names of all known models, for messages.
+/// Returns the names of all known models, for messages.
 pub fn known_models() -> String {
     MODELS.iter().map(|m| m.name).collect::<Vec<_>>().join(", ")
 }
 
-/// The smaller of figure and report; a report that is not a positive number is ignored.
+/// Returns the smaller of figure and report; a report that is not a positive number is ignored.
 pub fn with_reported(mut info: DeviceInfo, peak_n: f64, continuous_n: f64, output_dof: i32) -> DeviceInfo {
     let smaller = |figure: f64, reported: f64| if reported > 0.0 { figure.min(reported) } else { figure };
     info.peak_force_n = smaller(info.peak_force_n, peak_n);
@@ -68,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_driver_s_name_finds_the_model_and_never_a_longer_one() {
+    fn a_model_is_found_by_its_exact_name() {
         assert_eq!(figures("PHANTOM Premium 1.5 6DOF").unwrap().peak_torque_nm, 0.188);
         assert_eq!(figures("PHANTOM Premium 1.5").unwrap().peak_torque_nm, 0.0);
         assert!(figures("PHANTOM Premium").is_none());

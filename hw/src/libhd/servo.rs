@@ -1,7 +1,8 @@
-//! The callback that the driver runs each servo tick: reads the pose, writes the force, drains the errors.
+//! The callback that the driver runs each servo tick: reads the pose, writes the force, drains the
+//! errors.
 //!
-//! It runs in a thread that the driver makes. It allocates, locks and logs nothing once that thread is armed, and never
-//! unwinds into the driver.
+//! It runs in a thread that the driver makes. Once that thread is armed, it does not allocate, lock
+//! or log, and it never unwinds into the driver.
 
 use core::cell::UnsafeCell;
 use core::ffi::c_void;
@@ -10,11 +11,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use nalgebra::Vector3;
 
-use crate::beside::arm::{Arm, ArmError};
-use crate::beside::ends::ServoEnd;
-use crate::beside::hold::Hold;
 use crate::convert::{metres_from_millimetres, millinewton_metres_from_newton_metres, pose_from_column_major_mm};
 use crate::device::{DeviceFault, Sample, Wrench};
+use crate::driver_thread::arm::{Arm, ArmError};
+use crate::driver_thread::ends::ServoEnd;
+use crate::driver_thread::hold::Hold;
 use crate::libhd::errors::{self, Response};
 use crate::libhd::exchange::{Served, Shared};
 use crate::libhd::ffi::{Api, CALLBACK_CONTINUE, CALLBACK_DONE, parameter};
@@ -22,15 +23,16 @@ use crate::libhd::frame::{gimbal_torque_nm, within_joint_limits};
 use crate::libhd::model::GIMBAL_TORQUE_LIMITS_NM;
 use crate::placement::Placement;
 
-/// Motors at this share of their temperature limit turn the force off, until they are below `COOL`.
+/// Share of the motors' temperature limit at which the force turns off, until they are below
+/// `COOL`.
 const HOT: f64 = 0.95;
 const COOL: f64 = 0.80;
 const TICKS_BETWEEN_TEMPERATURES: u64 = 100;
-/// More errors than this in one tick are left for the next.
+/// Most errors read in one tick; the others wait for the next.
 const MAX_ERRORS_PER_TICK: usize = 16;
 
-/// The callback and all that it owns. Lives until the process ends, because a driver may call once more after it was
-/// stopped.
+/// Callback and its state. Lives until the process ends, because a driver may call once more after
+/// it was stopped.
 pub struct Servo {
     pub shared: Shared,
     /// Result of arming the newest servo thread, until the connector takes it.
@@ -52,7 +54,7 @@ pub struct Inner {
     pub state: State,
 }
 
-/// What one servo tick leaves for the next.
+/// State carried from one servo tick to the next.
 #[derive(Default)]
 pub struct State {
     sequence: u64,
@@ -70,7 +72,7 @@ impl Servo {
         }
     }
 
-    /// Callback for the scheduler; its context is a `&'static Servo`.
+    /// Serves one tick of the scheduler; its context is a `&'static Servo`.
     ///
     /// # Safety
     ///
@@ -99,11 +101,12 @@ impl Servo {
 }
 
 impl Inner {
-    /// One servo tick; in the order of the data.
+    /// Runs one servo tick, in the order of the data.
     fn tick(&mut self, servo: &Servo) {
         let shared = &servo.shared;
         let calls = shared.count_call();
-        // Asked before `take_arm`, so that only an armed thread serves, and again after arming, which takes its time.
+        // Checked before `take_arm`, so that only an armed thread serves, and again after arming,
+        // which takes time.
         let may_serve = shared.served().is_some();
         if shared.take_arm() {
             self.begin(servo);
@@ -128,7 +131,7 @@ impl Inner {
         shared.note_callback_s(unsafe { (self.api.hdGetSchedulerTimeStamp)() });
     }
 
-    /// The first tick of a servo thread.
+    /// Begins the first tick of a servo thread.
     fn begin(&mut self, servo: &Servo) {
         self.state = State {
             sequence: self.state.sequence,
@@ -226,7 +229,7 @@ impl Inner {
         }
     }
 
-    /// Errors of a released device report nothing new.
+    /// Discards the errors of a released device.
     fn discard_errors(&self) {
         for _ in 0..MAX_ERRORS_PER_TICK {
             // SAFETY: no preconditions.
@@ -243,7 +246,7 @@ impl Inner {
         shared.errors.set_lost();
     }
 
-    /// Zero force and torque, whatever the state of the device.
+    /// Writes zero force and torque, whatever the state of the device.
     fn write_zero(&self, shared: &Shared) {
         let served = shared.last_served();
         let zero = [0.0; 3];

@@ -4,8 +4,8 @@ use core::ffi::{CStr, c_int};
 use core::fmt;
 use std::ffi::CString;
 
-use crate::beside::arm::ArmError;
 use crate::device::DeviceInfo;
+use crate::driver_thread::arm::ArmError;
 use crate::libhd::errors;
 use crate::libhd::ffi::{
     Api, Callback, Enum, Handle, INVALID_HANDLE, PRIORITY_MAX, Schedule, WAIT_CHECK_STATUS, capability, parameter,
@@ -13,10 +13,11 @@ use crate::libhd::ffi::{
 use crate::libhd::model;
 use crate::library::text;
 
-/// Names that the driver's old and new set-up programs give the first device; no name at all fails on some systems.
+/// Names that the driver's old and new set-up programs give the first device; omitting the name
+/// fails on some systems.
 const DEVICE_NAMES: &[&CStr] = &[c"Default PHANToM", c"Default Device"];
 
-/// Why there is no connection; the text says what to do.
+/// Reason why there is no connection; the text says what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ConnectionError {
     /// No name could be initialised; each with the driver's error code.
@@ -131,7 +132,7 @@ impl Session {
         Err(ConnectionError::NoDevice(tried))
     }
 
-    /// Model, versions and limits.
+    /// Queries model, versions and limits.
     pub fn describe(&self) -> Result<Description, ConnectionError> {
         let model = self.string(parameter::MODEL);
         self.check("hdGetString")?;
@@ -157,8 +158,8 @@ impl Session {
         Ok(description)
     }
 
-    /// Forces on, limits on, callback scheduled at `rate_hz`, scheduler started from the calling thread, whose policy
-    /// and cores the driver's thread inherits.
+    /// Turns forces and limits on, schedules the callback at `rate_hz` and starts the scheduler.
+    /// The driver's thread inherits policy and cores from the calling thread.
     ///
     /// # Safety
     ///
@@ -191,14 +192,14 @@ impl Session {
         self.check("hdStartScheduler")
     }
 
-    /// Whether the driver still runs the callback.
+    /// Returns whether the driver still runs the callback.
     pub fn is_scheduled(&self) -> bool {
         // SAFETY: the schedule is the driver's own; the status check does not wait.
         self.schedule
             .is_some_and(|s| unsafe { (self.api.hdWaitForCompletion)(s, WAIT_CHECK_STATUS) } != 0)
     }
 
-    /// Whether the scheduler was started.
+    /// Returns whether the scheduler was started.
     pub fn is_running(&self) -> bool {
         self.started
     }

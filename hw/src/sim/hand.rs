@@ -14,12 +14,12 @@ pub struct Hand {
     pub damping_n_s_per_m: f64,
     /// Passive stiffness.
     pub stiffness_n_per_m: f64,
-    /// `None`: the hand is passive and yields to the force.
+    /// Effort of the operator. Without it, the hand is passive and yields to the force.
     pub effort: Option<Effort>,
 }
 
-/// How an operator responds to a needle that lags behind: braces the arm, and pushes harder until the needle follows.
-/// Not passive; for scripted insertions, not for tests of stability.
+/// Response of an operator to a needle that lags behind: braces the arm, and pushes harder until
+/// the needle follows. Not passive; for scripted insertions, not for tests of stability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
     /// Growth of the push per second and metre of lag.
@@ -35,7 +35,7 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// An operator who inserts a needle carefully.
+    /// Creates an operator who inserts a needle carefully.
     pub const fn steady() -> Self {
         Self {
             gain_n_per_m_s: 6000.0,
@@ -48,7 +48,7 @@ impl Effort {
 }
 
 impl Hand {
-    /// A yielding hand in the middle of the envelope.
+    /// Creates a yielding hand in the middle of the envelope.
     pub const fn passive() -> Self {
         Self {
             mass_kg: 0.5,
@@ -58,7 +58,7 @@ impl Hand {
         }
     }
 
-    /// The same hand, with an operator who pushes until the needle reaches its goal.
+    /// Returns the same hand, with an operator who pushes until the needle reaches its goal.
     pub const fn steady() -> Self {
         Self {
             effort: Some(Effort::steady()),
@@ -66,7 +66,7 @@ impl Hand {
         }
     }
 
-    /// Nobody holds the device.
+    /// Creates a device that nobody holds.
     pub const fn absent() -> Self {
         Self {
             mass_kg: 0.0,
@@ -76,17 +76,17 @@ impl Hand {
         }
     }
 
-    /// Stiffness of the hand with bracing.
+    /// Returns the stiffness of the hand with bracing.
     pub fn total_stiffness_n_per_m(&self) -> f64 {
         self.stiffness_n_per_m + self.effort.map_or(0.0, |e| e.bracing_stiffness_n_per_m)
     }
 
-    /// Damping of the hand with bracing.
+    /// Returns the damping of the hand with bracing.
     pub fn total_damping_n_s_per_m(&self) -> f64 {
         self.damping_n_s_per_m + self.effort.map_or(0.0, |e| e.bracing_damping_n_s_per_m)
     }
 
-    /// The push after `dt_s` more of `lag_m` (path minus tip).
+    /// Returns the push after `dt_s` more of `lag_m` (path minus tip).
     pub fn push_n(&self, push_n: &Vector3<f64>, lag_m: &Vector3<f64>, dt_s: f64) -> Vector3<f64> {
         let Some(effort) = self.effort else {
             return Vector3::zeros();

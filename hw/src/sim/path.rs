@@ -15,7 +15,7 @@ pub struct HandPath {
 }
 
 impl HandPath {
-    /// At rest at `start_m`, with the needle along `direction`.
+    /// Creates a path at rest at `start_m`, with the needle along `direction`.
     pub fn at(start_m: Vector3<f64>, direction: Vector3<f64>) -> Self {
         Self {
             position_m: start_m,
@@ -29,7 +29,7 @@ impl HandPath {
         }
     }
 
-    /// Takes a new goal; an invalid one is ignored and returns `false`.
+    /// Takes a new goal; returns `false` and ignores an invalid one.
     pub fn set_goal(&mut self, goal: &HandGoal) -> bool {
         let valid = goal.is_valid();
         if valid {
@@ -44,22 +44,22 @@ impl HandPath {
         self.goal.tip_in_world = self.position_m + self.velocity_m_per_s * stopping_s;
     }
 
-    /// Present position of the equilibrium.
+    /// Returns the present position of the equilibrium.
     pub fn position_m(&self) -> &Vector3<f64> {
         &self.position_m
     }
 
-    /// Present velocity of the equilibrium.
+    /// Returns the present velocity of the equilibrium.
     pub fn velocity_m_per_s(&self) -> &Vector3<f64> {
         &self.velocity_m_per_s
     }
 
-    /// The present goal.
+    /// Returns the present goal.
     pub fn goal(&self) -> &HandGoal {
         &self.goal
     }
 
-    /// Whether the path is at rest at its goal.
+    /// Returns whether the path is at rest at its goal.
     pub fn arrived(&self) -> bool {
         self.velocity_m_per_s == Vector3::zeros() && self.position_m == self.goal.tip_in_world
     }
@@ -91,8 +91,8 @@ impl HandPath {
         self.position_m += self.velocity_m_per_s * dt_s;
     }
 
-    /// The fastest speed from which steps of `speed_step` still stop at the goal: the solution of
-    /// `v^2 / 2a + v dt / 2 = distance`, for the discrete motion. The last step may
+    /// Returns the fastest speed from which steps of `speed_step` still stop at the goal: the
+    /// solution of `v^2 / 2a + v dt / 2 = distance`, for the discrete motion. The last step may
     /// overshoot the goal by a small part of `a dt^2`; the next one is at the goal.
     fn approach_speed(&self, distance: f64, speed_step: f64, dt_s: f64) -> f64 {
         let stopping = speed_step * ((0.25 + 2.0 * distance / (speed_step * dt_s)).sqrt() - 0.5);
@@ -103,9 +103,9 @@ impl HandPath {
 /// One stop of a script.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Waypoint {
-    /// Where to go.
+    /// Goal of the hand.
     pub goal: HandGoal,
-    /// How long to stay after arriving.
+    /// Time to stay after arriving.
     pub dwell_s: f64,
     /// Longest time for this stop, dwell included; the script continues after it in any case.
     pub timeout_s: f64,
@@ -123,7 +123,7 @@ pub struct ScriptedPath {
 }
 
 impl ScriptedPath {
-    /// A script at its first waypoint. `step` allocates nothing.
+    /// Creates a script at its first waypoint. `step` allocates nothing.
     pub fn new(waypoints: Vec<Waypoint>, arrival_tolerance_m: f64) -> Self {
         Self {
             waypoints,
@@ -156,12 +156,13 @@ impl ScriptedPath {
         None
     }
 
-    /// Index of the present waypoint, or the number of waypoints when the script has ended.
+    /// Returns the index of the present waypoint, or the number of waypoints when the script has
+    /// ended.
     pub fn index(&self) -> usize {
         self.index
     }
 
-    /// Whether the script has ended.
+    /// Returns whether the script has ended.
     pub fn finished(&self) -> bool {
         self.index >= self.waypoints.len()
     }

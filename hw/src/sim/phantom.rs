@@ -61,7 +61,7 @@ pub struct SimulatedPhantom {
     velocity_m_per_s: Vector3<f64>,
     push_n: Vector3<f64>,
     world_from_tool: UnitQuaternion<f64>,
-    /// Where +y of the tool goes, where the hand turns it about its axis.
+    /// Direction of the tool's +y, if the hand controls the roll.
     up: Option<Vector3<f64>>,
     wrench: Wrench,
     work_j: f64,
@@ -69,7 +69,7 @@ pub struct SimulatedPhantom {
 }
 
 impl SimulatedPhantom {
-    /// At rest at the start.
+    /// Creates a device at rest at the start.
     pub fn new(config: SimulatedPhantomConfig) -> Self {
         let direction = unit_or_z(&config.start_direction);
         Self {
@@ -86,32 +86,32 @@ impl SimulatedPhantom {
         }
     }
 
-    /// Position of the tip before the encoders quantise it.
+    /// Returns the position of the tip before the encoders quantise it.
     pub fn true_tip_in_world(&self) -> &Vector3<f64> {
         &self.tip_in_world
     }
 
-    /// Velocity of the tip.
+    /// Returns the velocity of the tip.
     pub fn true_velocity_m_per_s(&self) -> &Vector3<f64> {
         &self.velocity_m_per_s
     }
 
-    /// Path of the hand.
+    /// Returns the path of the hand.
     pub fn path(&self) -> &HandPath {
         &self.path
     }
 
-    /// The wrench that acts, limited by the amplifiers.
+    /// Returns the wrench that acts, limited by the amplifiers.
     pub fn applied_wrench(&self) -> &Wrench {
         &self.wrench
     }
 
-    /// Work that the applied force has done on device and hand since the start.
+    /// Returns the work that the applied force has done on device and hand since the start.
     pub fn work_j(&self) -> f64 {
         self.work_j
     }
 
-    /// Kinetic energy of device and hand, and the energy in the spring of the hand.
+    /// Returns the kinetic energy of device and hand, plus the energy in the spring of the hand.
     pub fn energy_j(&self) -> f64 {
         let lag_m = self.path.position_m() - self.tip_in_world;
         0.5 * self.moving_mass_kg() * self.velocity_m_per_s.norm_squared()
@@ -128,8 +128,8 @@ impl SimulatedPhantom {
         (self.config.apparent_mass_kg + self.config.hand.mass_kg).max(1e-3)
     }
 
-    /// One step, implicit in spring, damper and friction: `(m + h b + h^2 k) v' = p` without friction, and
-    /// friction reduces the impulse `p`, at most to zero. Stable at any stiffness.
+    /// Advances by one step, implicit in spring, damper and friction. Without friction `(m + h b +
+    /// h^2 k) v' = p`; friction reduces the impulse `p`, at most to zero. Stable at any stiffness.
     fn advance(&mut self, h: f64) {
         self.path.step(h);
         let hand = &self.config.hand;
@@ -234,7 +234,7 @@ fn unit_or_z(v: &Vector3<f64>) -> Vector3<f64> {
     v.try_normalize(1e-9).unwrap_or_else(Vector3::z)
 }
 
-/// The tool along `aim`, its +y as near to `up` as it can be; `None` where both are parallel.
+/// Returns the tool along `aim`, its +y as near to `up` as it can be; `None` where both are parallel.
 fn upright(aim: &Vector3<f64>, up: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
     let up = (up - aim * up.dot(aim)).try_normalize(1e-6)?;
     let axes = Matrix3::from_columns(&[up.cross(aim), up, *aim]);
@@ -243,7 +243,7 @@ fn upright(aim: &Vector3<f64>, up: &Vector3<f64>) -> Option<UnitQuaternion<f64>>
     )))
 }
 
-/// The rotation, or as much of it as is within `limit_rad`.
+/// Returns the rotation, or as much of it as is within `limit_rad`.
 fn part_of(rotation: &UnitQuaternion<f64>, limit_rad: f64) -> UnitQuaternion<f64> {
     let turn = rotation.scaled_axis();
     let angle = turn.norm();
@@ -251,7 +251,7 @@ fn part_of(rotation: &UnitQuaternion<f64>, limit_rad: f64) -> UnitQuaternion<f64
     UnitQuaternion::from_scaled_axis(turn * share)
 }
 
-/// The rotation that takes `from` towards `to` (unit vectors) by at most `limit_rad`.
+/// Returns the rotation that takes `from` towards `to` (unit vectors) by at most `limit_rad`.
 fn turn(from: &Vector3<f64>, to: &Vector3<f64>, limit_rad: f64) -> UnitQuaternion<f64> {
     let normal = from.cross(to);
     let angle = normal.norm().atan2(from.dot(to));

@@ -17,7 +17,7 @@ fn goal(x: f64, y: f64, z: f64) -> HandGoal {
 }
 
 #[test]
-fn from_rest_the_path_is_straight_trapezoidal_and_ends_at_the_goal() {
+fn a_path_from_rest_is_straight_and_trapezoidal() {
     let mut path = HandPath::at(Vector3::zeros(), Vector3::z());
     let target = goal(0.03, -0.04, 0.05);
     path.set_goal(&target);
@@ -44,7 +44,7 @@ fn from_rest_the_path_is_straight_trapezoidal_and_ends_at_the_goal() {
 }
 
 #[test]
-fn a_new_goal_at_any_time_never_makes_the_velocity_jump() {
+fn a_new_goal_never_makes_the_velocity_jump() {
     let mut path = HandPath::at(Vector3::zeros(), Vector3::z());
     let mut before = Vector3::zeros();
     for tick in 0..100_000u32 {
@@ -102,7 +102,8 @@ fn the_tool_turns_to_the_needle_axis() {
     }
 }
 
-/// Steady resistance that opposes motion towards +z, with a membrane that is punctured at 8 mm.
+/// Returns a steady resistance that opposes motion towards +z, with a membrane that is punctured at
+/// 8 mm.
 fn tissue(depth_m: f64, punctured: &mut bool, held_at_m: &mut f64) -> f64 {
     if depth_m <= 0.0 {
         return 0.0;
@@ -121,7 +122,7 @@ fn tissue(depth_m: f64, punctured: &mut bool, held_at_m: &mut f64) -> f64 {
 }
 
 #[test]
-fn a_steady_operator_reaches_the_goal_and_does_not_lunge_at_puncture() {
+fn a_steady_operator_does_not_lunge_at_puncture() {
     let mut device = SimulatedPhantom::new(SimulatedPhantomConfig::default());
     device.set_hand_goal(&HandGoal {
         speed_m_per_s: 0.02,
@@ -144,7 +145,7 @@ fn a_steady_operator_reaches_the_goal_and_does_not_lunge_at_puncture() {
 }
 
 #[test]
-fn a_passive_hand_yields_as_its_spring_says() {
+fn a_passive_hand_yields_like_its_spring() {
     let mut device = SimulatedPhantom::new(SimulatedPhantomConfig {
         hand: Hand::passive(),
         coulomb_friction_n: 0.0,
@@ -157,9 +158,10 @@ fn a_passive_hand_yields_as_its_spring_says() {
     assert!((device.true_tip_in_world().x - 8.5 / 300.0).abs() < 1e-6);
 }
 
-/// The acceleration limits the deceleration; the last step of the discrete motion may overshoot by a part of `a dt^2`.
+/// Checks that the acceleration limits the deceleration. The last step of the discrete motion may
+/// overshoot by a part of `a dt^2`.
 #[test]
-fn a_path_that_is_stopped_continues_by_its_stopping_distance_and_never_reverses() {
+fn a_stopped_path_never_reverses() {
     for (speed, acceleration, after_ticks) in [(0.05, 1.0, 300), (0.28, 2.0, 100), (0.05, 1.0, 20), (0.05, 1.0, 0)] {
         let mut path = HandPath::at(Vector3::zeros(), Vector3::z());
         path.set_goal(&HandGoal {
@@ -227,7 +229,7 @@ fn a_script_visits_its_waypoints_in_order_and_ends() {
     assert_eq!(goals, [0.01, 0.03, 0.0]);
     assert!(script.finished());
 
-    // A goal that cannot be reached is given up.
+    // A goal that cannot be reached is abandoned.
     let mut script = ScriptedPath::new(vec![stop(1.0)], 3e-4);
     let ticks = (0..10_000)
         .take_while(|_| {
@@ -238,9 +240,9 @@ fn a_script_visits_its_waypoints_in_order_and_ends() {
     assert!((ticks as f64 * DT_S - 5.0).abs() < 0.01);
 }
 
-/// The tool lies along +z of its own frame, and its +y goes where the hand was asked to turn it.
+/// Checks the roll: the tool lies along +z of its own frame, and its +y follows the hand's request.
 #[test]
-fn a_hand_turns_what_it_holds_about_its_axis_only_when_it_is_asked_to() {
+fn a_hand_rolls_the_tool_only_on_request() {
     let mut device = SimulatedPhantom::new(SimulatedPhantomConfig::default());
     let aim = Vector3::new(0.0, 0.6, 0.8);
     device.set_hand_goal(&HandGoal {
@@ -264,11 +266,11 @@ fn a_hand_turns_what_it_holds_about_its_axis_only_when_it_is_asked_to() {
         (straight * Vector3::y() - Vector3::new(0.0, 0.8, -0.6)).norm() < 1e-9,
         "no roll"
     );
-    // Half square to the axis: what is along it does not count.
+    // Only the part perpendicular to the axis counts.
     device.set_hand_up(Some(Vector3::x() + aim));
     let turned = after(&mut device, 2000);
     assert!((turned * Vector3::z() - aim).norm() < 1e-9 && (turned * Vector3::y() - Vector3::x()).norm() < 1e-9);
-    // Along the axis there is no roll, and what is no number is none.
+    // A vector along the axis defines no roll, and neither does NaN.
     for up in [aim, Vector3::repeat(f64::NAN)] {
         device.set_hand_up(Some(up));
         assert!(after(&mut device, 2000).angle_to(&turned) < 1e-9);

@@ -1,4 +1,4 @@
-//! The simulated Phantom against closed forms: what a mass, a spring, dry friction and an amplifier do.
+//! The simulated Phantom against closed forms of mass, spring, dry friction and amplifier.
 
 use nalgebra::Vector3;
 use stylet_hw::{
@@ -52,7 +52,7 @@ fn a_step_of_force_gives_the_response_of_mass_spring_and_damper() {
 }
 
 #[test]
-fn a_free_device_accelerates_by_what_friction_leaves() {
+fn friction_reduces_the_acceleration_of_a_free_device() {
     let mut device = SimulatedPhantom::new(config(Hand::absent()));
     push(&mut device, Vector3::y());
     for _ in 0..100 {
@@ -63,7 +63,7 @@ fn a_free_device_accelerates_by_what_friction_leaves() {
 }
 
 #[test]
-fn below_its_friction_the_device_sticks_exactly_and_a_slide_stops_in_finite_time() {
+fn friction_holds_the_device_and_stops_a_slide_in_finite_time() {
     let mut device = SimulatedPhantom::new(config(Hand::absent()));
     for tick in 0..10_000 {
         let angle = f64::from(tick);
@@ -139,7 +139,7 @@ fn a_hand_with_no_goal_gives_no_energy() {
 }
 
 #[test]
-fn every_corner_of_the_envelope_of_hands_is_stable_against_a_sampled_wall() {
+fn every_hand_is_stable_against_a_sampled_wall() {
     for mass_kg in [0.1, 1.0] {
         for damping_n_s_per_m in [2.0, 20.0] {
             for stiffness_n_per_m in [50.0, 1000.0] {
@@ -185,7 +185,7 @@ fn the_tip_does_not_leave_its_workspace() {
 }
 
 #[test]
-fn strange_periods_are_refused_or_cut_short() {
+fn invalid_periods_are_refused_or_shortened() {
     let mut device = SimulatedPhantom::new(config(Hand::passive()));
     for bad in [f64::NAN, -1e-3, f64::INFINITY] {
         assert_eq!(device.read(bad), Err(DeviceFault::InvalidPeriod));
@@ -232,7 +232,7 @@ fn a_bad_link_delays_loses_and_repeats_as_asked() {
 }
 
 #[test]
-fn the_work_of_a_force_is_the_energy_that_device_and_hand_gain() {
+fn the_work_of_a_force_equals_the_energy_gained() {
     let hand = Hand {
         damping_n_s_per_m: 0.0,
         ..Hand::passive()

@@ -29,7 +29,7 @@ fn a_recorded_hand_meets_the_contract() {
 }
 
 #[test]
-fn every_sample_is_played_once_bit_identical_and_the_last_one_repeats() {
+fn every_sample_is_played_once_and_the_last_one_repeats() {
     let samples = recorded(300);
     let mut device = played(samples.clone());
     let mut last = 0;

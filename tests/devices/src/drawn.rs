@@ -1,4 +1,4 @@
-//! Faults of a device, drawn at random, one after another, while the needle presses into a membrane.
+//! Device faults drawn at random, one after another, while the needle presses into a membrane.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -9,30 +9,32 @@ use stylet_sim::force::gate::GateParameters;
 
 use crate::rig::{Led, Rig};
 
-/// What goes wrong with a fake device.
+/// Fault of a fake device.
 pub trait Drawn: Copy + Debug {
     /// The fake.
     type Fake: Led;
-    /// Any of them.
+    /// Draws one of the faults.
     fn draw(random: &mut ChaCha8Rng) -> Self;
-    /// It begins.
+    /// Begins the fault.
     fn begin(self, fake: &Self::Fake);
-    /// What changes while it lasts.
+    /// Advances the fault while it lasts.
     fn go_on(self, tick: usize, fake: &Self::Fake);
-    /// It ends.
+    /// Ends the fault.
     fn end(self, fake: &Self::Fake);
-    /// The names that the screen may give it, and the ticks until the motors are without force, at most.
+    /// Returns the names that the screen may show, and the most ticks until the motors are without
+    /// force.
     fn bound(self) -> (Vec<Fault>, usize);
-    /// Ticks for which it stays, at least until it is named.
+    /// Returns the ticks for which it lasts, at least until it is named.
     fn lasts(self) -> usize;
 }
 
-/// A number below `count`.
+/// Draws a number below `count`.
 pub fn below(random: &mut ChaCha8Rng, count: usize) -> usize {
     (random.next_u64() % count as u64) as usize
 }
 
-/// Ticks until the motors were without force and until the fault was named, at most, for one kind of fault.
+/// Longest delay for one kind of fault, in ticks: until the motors were without force, and until
+/// the fault was named.
 #[derive(Default)]
 struct Worst {
     count: usize,

@@ -1,11 +1,11 @@
-//! A device with threads, driven as the force loop does it.
+//! A device with threads, driven as by the force loop.
 
 use std::time::{Duration, Instant};
 use stylet_hw::{Device, DeviceFault, Sample, Wrench};
 
 pub const LONG: Duration = Duration::from_secs(10);
 
-/// Waits for `ready`; false when it has not come true in time.
+/// Waits for `ready`; returns false if it does not come true in time.
 pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
     let begun = Instant::now();
     while begun.elapsed() < limit {
@@ -17,7 +17,7 @@ pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
     false
 }
 
-/// Drives `device` every millisecond until `ready`; false when it has not come true in time.
+/// Drives `device` every millisecond until `ready`; returns false if it does not come true in time.
 pub fn drive(
     device: &mut impl Device,
     wrench: &Wrench,

@@ -11,18 +11,18 @@ use stylet_sim::force::ForceParameters;
 use stylet_sim::needle::{LayerKind, NeedleParameters};
 
 const TICK_NS: u64 = 1_000_000;
-/// Where the hand waits, and how deep it presses.
+/// Depth at which the hand waits; the pressing depth follows.
 const OUTSIDE_M: f64 = -0.005;
 const PRESSED_M: f64 = 0.006;
 const SPEED_M_PER_TICK: f64 = 4e-5;
 
 /// A fake device that a test leads.
 pub trait Led {
-    /// What the fake does by time is at this time.
+    /// Sets the time of the fake.
     fn at(&self, now_ns: u64);
-    /// The hand holds the tip at this depth along world z.
+    /// Holds the tip at this depth along world z.
     fn hold(&self, depth_m: f64);
-    /// Force of the device's motors, N.
+    /// Returns the force of the device's motors, N.
     fn motors_n(&self) -> f64;
 }
 
@@ -37,7 +37,7 @@ pub struct Rig<F: Led> {
     hand_m: f64,
 }
 
-/// What one tick ended with.
+/// Result of one tick.
 pub struct Seen {
     pub record: TickRecord,
     /// Force of the device's motors, N.
@@ -51,7 +51,7 @@ impl Seen {
 }
 
 impl<F: Led> Rig<F> {
-    /// Over the device that `open` gives for this fake.
+    /// Creates a rig over the device that `open` gives for this fake.
     pub fn over(fake: F, open: impl FnOnce(&F) -> Box<dyn Device>) -> Self {
         let now_ns = 1_000_000_000;
         fake.at(now_ns);
@@ -73,7 +73,7 @@ impl<F: Led> Rig<F> {
         rig
     }
 
-    /// The hand holds the tip at this depth.
+    /// Holds the tip at this depth.
     fn hold(&mut self, depth_m: f64) {
         self.hand_m = depth_m;
         self.fake.hold(depth_m);
@@ -85,9 +85,15 @@ impl<F: Led> Rig<F> {
         self.tissue.time_ns = self.now_ns;
         self.tissue_ports.response.write(self.tissue);
         self.haptic.tick(self.now_ns, self.now_ns, 0);
+<<<<<<< HEAD
         while self.control.haptic_notices.pop().is_ok() {}
         let record = self.control.records.pop().expect("a record for each tick");
         // The membrane is met where the tip passes it, and left where it is well outside.
+=======
+        while self.bridge.haptic_notices.pop().is_ok() {}
+        let record = self.bridge.records.pop().expect("a record for each tick");
+        // The membrane is in contact once the tip passes it, until the tip is well outside.
+>>>>>>> c3509727 (Say what each part of the devices crate holds in plain English)
         let depth_m = record.tip_in_scene_m[2];
         if depth_m > 0.0 && self.tissue.contact == 0 {
             self.contacts += 1;
@@ -113,7 +119,8 @@ impl<F: Led> Rig<F> {
         }
     }
 
-    /// Draws back, arms again, and presses until the membrane resists. False where the force did not come back.
+    /// Draws back, arms again, and presses until the membrane resists. Returns false if the force
+    /// did not return.
     pub fn press(&mut self) -> bool {
         self.move_to(OUTSIDE_M);
         for _ in 0..3000 {

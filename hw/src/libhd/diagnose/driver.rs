@@ -1,4 +1,5 @@
-//! Library, licence and configuration of the vendor's software, and the device as they report it.
+//! Checks of library, licence and configuration of the vendor's software, and of the device through
+//! them.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +12,7 @@ use crate::libhd::ffi::Api;
 use crate::libhd::session::{ConnectionError, Session};
 use crate::library::{LoadError, LoadFailure};
 
-/// Libraries that `libHD.so` needs: a part of the name, and how to install it.
+/// Libraries that `libHD.so` needs: part of the name, and how to install it.
 const NEEDED: &[(&str, &str)] = &[
     (
         "libPHANToMIO",
@@ -73,7 +74,7 @@ fn library_cure(why: &LoadFailure) -> &'static str {
     found.map_or("install what the message names, then sudo ldconfig", |(_, cure)| cure)
 }
 
-/// Folder in which the Touch drivers keep the paired devices; a Premium needs none of it.
+/// Checks the folder of the Touch drivers for paired devices; a Premium needs none.
 pub fn of_configuration(root: &Path, here: &Surroundings) -> Vec<Finding> {
     let inside = |path: &Path| root.join(path.strip_prefix("/").unwrap_or(path));
     let touch_driver = ["usr/lib", "usr/lib64", "lib"]
@@ -111,7 +112,8 @@ pub fn of_configuration(root: &Path, here: &Surroundings) -> Vec<Finding> {
     }]
 }
 
-/// Checks the device itself: initialises it and releases it again. Do not call it while `rt-core` uses the device.
+/// Checks the device itself: initialises it and releases it again. Must not run while `rt-core`
+/// uses the device.
 pub fn of_device(api: &Api, name: Option<&str>) -> Vec<Finding> {
     let session = match Session::open(api, name) {
         Ok(session) => session,

@@ -1,6 +1,7 @@
-//! Why a Phantom is not found, and what to do about each reason.
+//! Reasons why a Phantom is not found, each with its remedy.
 //!
-//! Reads files through a root folder and takes everything else as an argument, so that a test can fake all of it.
+//! Reads files through a root folder and takes everything else as an argument, so that a test can
+//! fake all of it.
 
 mod driver;
 mod port;
@@ -15,7 +16,7 @@ use crate::library::LoadError;
 
 pub use driver::of_device;
 
-/// The user and the result of loading the library; everything else is in files.
+/// User, and result of loading the library; everything else is in files.
 #[derive(Clone, Debug)]
 pub struct Surroundings {
     /// Effective user.
@@ -26,12 +27,12 @@ pub struct Surroundings {
     pub home: Option<PathBuf>,
     /// The variable `GTDD_HOME` of the Touch drivers.
     pub gtdd_home: Option<PathBuf>,
-    /// Why `libHD.so` cannot be loaded, if it cannot.
+    /// Result of loading `libHD.so`.
     pub library: Result<(), LoadError>,
 }
 
 impl Surroundings {
-    /// Surroundings of this process. Also returns the library, for [`of_device`].
+    /// Returns the surroundings of this process, and the library for [`of_device`].
     pub fn of_this_process(library: Option<&Path>) -> (Self, Option<Api>) {
         let loaded = Api::load(library);
         let here = Self {
@@ -55,7 +56,7 @@ fn groups() -> Vec<u32> {
         .collect()
 }
 
-/// Every check that needs no device. `root` is `/`, or a folder that stands for it.
+/// Runs every check that needs no device. `root` is `/`, or a folder that replaces it.
 pub fn diagnose(root: &Path, surroundings: &Surroundings) -> Vec<Finding> {
     let mut findings = driver::of_library(&surroundings.library);
     findings.extend(port::of_parallel_port(root, surroundings));

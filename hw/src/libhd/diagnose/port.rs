@@ -1,4 +1,4 @@
-//! Ports and links: parallel port of the Premium, FireWire and USB of the others.
+//! Checks of ports and links: parallel port of the Premium, FireWire and USB of the others.
 
 use std::fs;
 use std::os::unix::fs::MetadataExt;
@@ -12,7 +12,7 @@ const LINKS: [(&str, &str); 2] = [
     ("dev/phnepp_modes", "/proc/sys/dev/parport/parport0/modes"),
 ];
 
-/// Parallel port of a Premium: the findings are in the order in which to cure them.
+/// Checks the parallel port of a Premium; the findings are in the order in which to fix them.
 pub fn of_parallel_port(root: &Path, here: &Surroundings) -> Vec<Finding> {
     let Ok(modes) = fs::read_to_string(root.join("proc/sys/dev/parport/parport0/modes")) else {
         return vec![Finding::new(
@@ -74,7 +74,7 @@ fn linked(root: &Path, link: &str, target: &str) -> Finding {
     }
 }
 
-/// A device file that this user must be able to read and write.
+/// Checks a device file that this user must be able to read and write.
 fn device_file(root: &Path, path: &str, module: &str, here: &Surroundings) -> Finding {
     let Ok(found) = fs::metadata(root.join(path)) else {
         return Finding::new(
@@ -119,7 +119,7 @@ fn group_name(root: &Path, number: u32) -> String {
     found.unwrap_or_else(|| number.to_string())
 }
 
-/// FireWire (Omni, Desktop) and USB (Touch): no finding where there are none.
+/// Checks FireWire (Omni, Desktop) and USB (Touch); returns no finding where there are none.
 pub fn of_other_ports(root: &Path, here: &Surroundings) -> Vec<Finding> {
     let mut names: Vec<PathBuf> = fs::read_dir(root.join("dev"))
         .map(|entries| entries.flatten().map(|e| PathBuf::from(e.file_name())).collect())

@@ -16,7 +16,7 @@ struct Faked {
 }
 
 impl Faked {
-    /// A PC with everything that a Premium needs.
+    /// Creates a PC with everything that a Premium needs.
     fn fit() -> Self {
         let faked = Self {
             root: tempfile::tempdir().unwrap(),
@@ -66,7 +66,7 @@ impl Faked {
         diagnose(self.root.path(), &self.here)
     }
 
-    /// The one finding worse than good that contains `word`.
+    /// Expects one finding worse than good that contains `word`.
     #[track_caller]
     fn bad(&self, severity: Severity, word: &str, cure: &str) {
         let all = self.findings();
@@ -92,7 +92,7 @@ fn load_error(why: &str) -> LoadError {
 }
 
 #[test]
-fn a_pc_that_is_fit_has_nothing_to_cure() {
+fn a_complete_pc_has_no_findings() {
     for finding in Faked::fit().findings() {
         assert_eq!(
             (finding.severity, finding.cure.as_str()),
@@ -104,7 +104,7 @@ fn a_pc_that_is_fit_has_nothing_to_cure() {
 }
 
 #[test]
-fn the_port_s_mode_must_be_epp_alone() {
+fn the_port_mode_must_be_plain_epp() {
     let faked = Faked::fit();
     faked.write(MODES, "PCSPP,TRISTATE,EPP,ECP\n");
     faked.bad(Severity::Warning, "mixed mode", "not ECP+EPP");
@@ -133,7 +133,7 @@ fn a_printer_driver_on_the_port_is_named() {
 }
 
 #[test]
-fn links_that_are_missing_or_wrong_are_named_with_the_command() {
+fn missing_and_wrong_links_are_reported_with_the_command() {
     let faked = Faked::fit();
     faked.remove("dev/phnepp");
     faked.bad(
@@ -151,7 +151,7 @@ fn links_that_are_missing_or_wrong_are_named_with_the_command() {
 }
 
 #[test]
-fn a_port_that_this_user_may_not_use_names_its_group() {
+fn a_port_without_access_names_its_group() {
     let mut faked = Faked::fit();
     let group = fs::metadata(faked.path("dev/parport0")).unwrap().gid();
     faked.write("etc/group", &format!("other:x:{}:\nlp:x:{group}:\n", group + 1));
@@ -169,7 +169,7 @@ fn a_port_that_this_user_may_not_use_names_its_group() {
 }
 
 #[test]
-fn usb_and_firewire_ports_are_checked_where_there_are_any() {
+fn usb_and_firewire_ports_are_checked_if_present() {
     let mut faked = Faked::fit();
     for name in ["raw1394", "fw0", "ttyACM0"] {
         faked.write(&format!("dev/{name}"), "");
@@ -182,7 +182,7 @@ fn usb_and_firewire_ports_are_checked_where_there_are_any() {
 }
 
 #[test]
-fn each_missing_library_is_named_with_its_cure() {
+fn each_missing_library_is_named_with_its_remedy() {
     let missing = |name: &str| format!("{name}: cannot open shared object file: No such file or directory");
     for (why, cure) in [
         (missing("libHD.so"), "install OpenHaptics"),
@@ -237,7 +237,7 @@ fn the_touch_driver_needs_its_folder_and_a_paired_device() {
 }
 
 #[test]
-fn a_missing_library_is_reported_in_the_words_of_the_loader() {
+fn a_missing_library_is_reported_with_the_loader_s_message() {
     let (here, api) = Surroundings::of_this_process(Some(Path::new("/nonexistent/libHD.so")));
     assert!(api.is_none());
     let text = here.library.unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! Every function of the interface: its name, its types, and a call through the fake.
+//! Every function of the interface: name, types, and a call through the fake.
 
 use fake_drd::table::{COUNT, ERRORS, FUNCTIONS, STATUS, Source};
 use std::sync::atomic::Ordering::Relaxed;
@@ -11,7 +11,7 @@ use stylet_hw::{DeviceFault, Severity};
 use super::fake::{Fake, api, config, library, library_without};
 use crate::driven::drive;
 
-/// The type in Rust that a C type has on 64 bit Linux.
+/// Returns the Rust type that a C type has on 64-bit Linux.
 fn in_rust(c: &str) -> &str {
     match c {
         "char" => "Id",
@@ -30,7 +30,7 @@ fn in_rust(c: &str) -> &str {
     }
 }
 
-/// The signature in Rust of a declaration in C, without spaces.
+/// Returns the Rust signature of a C declaration, without spaces.
 fn signature(c: &str) -> String {
     let (result, arguments) = c.split_once(" (").expect("result and arguments");
     let arguments = arguments.trim_end_matches(')').split(", ").filter(|a| !a.is_empty());
@@ -43,7 +43,7 @@ fn signature(c: &str) -> String {
 }
 
 #[test]
-fn every_function_has_the_name_and_the_types_that_are_published() {
+fn every_function_has_its_published_name_and_types() {
     assert_eq!(SIGNATURES.len(), COUNT);
     for ((name, types), published) in SIGNATURES.iter().zip(FUNCTIONS) {
         println!("{:38} {:?}: {}", published.name, published.source, published.c);
@@ -100,7 +100,7 @@ fn every_function_is_called_by_a_device_that_opens_serves_and_closes() {
 }
 
 #[test]
-fn a_library_that_lacks_what_is_needed_is_refused_with_the_names() {
+fn a_library_without_required_functions_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let lacks = ["dhdSetForceAndTorqueAndGripperForce", "dhdGetStatus"];
     let other = library_without(&lacks, folder.path());
@@ -117,7 +117,7 @@ fn a_library_that_lacks_what_is_needed_is_refused_with_the_names() {
 }
 
 #[test]
-fn a_library_without_a_watchdog_serves_and_says_what_that_means() {
+fn a_library_without_a_watchdog_serves_with_a_warning() {
     let _fake = Fake::new();
     let folder = tempfile::tempdir().expect("a folder");
     let lacks: Vec<_> = FUNCTIONS.iter().filter(|f| !f.required).map(|f| f.name).collect();
@@ -138,7 +138,7 @@ fn a_library_without_a_watchdog_serves_and_says_what_that_means() {
 }
 
 #[test]
-fn a_longer_status_than_any_known_one_writes_into_nothing_else() {
+fn a_long_status_does_not_overrun_its_array() {
     let fake = Fake::new();
     for count in [16, 17, 20, ffi::STATUS_ROOM as u32] {
         fake.control.status_count.store(count, Relaxed);
@@ -148,7 +148,7 @@ fn a_longer_status_than_any_known_one_writes_into_nothing_else() {
 }
 
 #[test]
-fn every_error_of_the_interface_turns_the_force_off_and_the_device_comes_back() {
+fn the_device_recovers_from_every_error_of_the_interface() {
     let fake = Fake::new();
     let mut device = fake.open();
     let push = stylet_hw::Wrench::from_force(nalgebra::Vector3::y());
@@ -174,7 +174,7 @@ fn every_error_of_the_interface_turns_the_force_off_and_the_device_comes_back() 
 }
 
 #[test]
-fn what_is_missing_is_said_in_words_that_help() {
+fn missing_parts_are_reported_with_a_remedy() {
     let fake = Fake::new();
     let open = || match fake_open() {
         Err(OpenError::Connection(why)) => why.to_string(),

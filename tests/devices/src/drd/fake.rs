@@ -1,4 +1,4 @@
-//! A Force Dimension device that is not there: the fake library, found and commanded.
+//! The fake Force Dimension library, found and commanded.
 
 use fake_drd::{Block, Control};
 use nalgebra::Vector3;
@@ -7,12 +7,13 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use stylet_hw::drd::{Api, ForceDimension, ForceDimensionConfig};
 use stylet_hw::{Axes, Placement};
 
-/// The built library.
+/// Returns the built library.
 pub fn library() -> PathBuf {
     fake_control::library("libfake_drd.so")
 }
 
-/// A copy of the library in which each of these functions has another name, as in another version.
+/// Returns a copy of the library in which each of these functions has another name, as in another
+/// version.
 pub fn library_without(functions: &[&str], folder: &Path) -> PathBuf {
     let mut bytes = std::fs::read(library()).expect("the fake can be read");
     for function in functions {
@@ -30,14 +31,14 @@ pub fn library_without(functions: &[&str], folder: &Path) -> PathBuf {
     path
 }
 
-/// The fake of this process: one at a time.
+/// Fake of this process: one at a time.
 pub struct Fake {
     pub control: &'static Control,
     _alone: MutexGuard<'static, ()>,
 }
 
 impl Fake {
-    /// Healthy, with nothing counted.
+    /// Creates a healthy fake with all counters at zero.
     pub fn new() -> Self {
         static ALONE: Mutex<()> = Mutex::new(());
         let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -50,7 +51,7 @@ impl Fake {
         Self { control, _alone: alone }
     }
 
-    /// With threads; what it reports is printed.
+    /// Opens a device with threads; its reports are printed.
     pub fn open(&self) -> ForceDimension {
         let arm = Box::new(|| Ok("not armed".to_owned()));
         ForceDimension::open(config(), arm, Box::new(|text| println!("reported: {text}"))).expect("a healthy device")
@@ -61,7 +62,7 @@ pub fn api() -> Api {
     Api::load(Some(&library())).expect("the fake has every function")
 }
 
-/// The fake at the world's origin.
+/// Returns the settings of the fake at the world's origin.
 pub fn config() -> ForceDimensionConfig {
     ForceDimensionConfig {
         library: Some(library()),

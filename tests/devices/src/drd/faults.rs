@@ -1,4 +1,4 @@
-//! Faults drawn at random, one after another: no newton of surprise, and each is named.
+//! Random faults, one after another: none raises the force, and each is named.
 
 use fake_drd::control::put;
 use fake_drd::table::ERRORS;
@@ -17,31 +17,32 @@ use super::fake::{Fake, api, config};
 use crate::drawn::{Drawn, below, campaign};
 use crate::rig::{Led, Rig};
 
-/// The device drops a force that is not renewed for this long.
+/// Ticks after which the device drops a force that is not renewed.
 const WATCHDOG_TICKS: usize = 20;
-/// The state of the device is checked so often.
+/// Ticks between two checks of the device's state.
 const CHECK_TICKS: usize = 10;
 
-/// What goes wrong.
+/// Faults of the device.
 #[derive(Clone, Copy, Debug)]
 enum Wrong {
     /// Calls of a function fail with an error of the interface.
     Fails(&'static str, u32),
-    /// As many calls of it, and no more.
+    /// As many calls of a function fail, and no more.
     FailsTimes(&'static str, u32, u32),
-    /// The cable is unplugged; where it comes back, another program may have the device, or it may be another device.
+    /// The cable is unplugged. When it returns, another program may have the device, or another
+    /// device may answer.
     Unplugged { in_use: bool, other: bool },
-    /// A number of the status array is this.
+    /// A number of the status array has this value.
     Status(usize, i32),
     /// The firmware turns forces off, and they may stay off.
     TurnsOff { cause: u32, stays: bool },
-    /// The pose is no number, no rotation, or far away.
+    /// The pose is not finite, not a rotation, or too far away.
     BadPose(u32),
-    /// The SDK says yes, and does nothing.
+    /// The SDK reports success and does nothing.
     Frozen,
-    /// A call does not return for so many ticks.
+    /// A call does not return for this number of ticks.
     Hangs(usize),
-    /// Every pose is the one before.
+    /// Every pose repeats the one before.
     OldPose,
 }
 
@@ -137,7 +138,7 @@ impl Drawn for Wrong {
             cell.store(0, Relaxed);
         }
         control.system_type.store(0, Relaxed);
-        // The operator's own hand turns on again what it turned off.
+        // The operator turns on again what the operator's own button turned off.
         control.force_mode.store(1, Relaxed);
     }
 
@@ -174,7 +175,7 @@ impl Drawn for Wrong {
         }
     }
 
-    /// The SDK's rate is known after two seconds.
+    /// Returns the duration; the SDK's rate is known after two seconds.
     fn lasts(self) -> usize {
         if matches!(self, Self::Frozen) { 2500 } else { 800 }
     }
@@ -208,11 +209,11 @@ fn faults(seed: u64, count: usize) {
 }
 
 #[test]
-fn after_a_fault_drawn_at_random_the_force_is_zero_in_time_and_the_fault_is_named() {
+fn a_random_fault_zeroes_the_force_in_time_and_is_named() {
     faults(1, 60);
 }
 
-/// `cargo test --release -p stylet-tests-devices -- --ignored --nocapture thousand`
+/// Run with `cargo test --release -p stylet-tests-devices -- --ignored --nocapture thousand`.
 #[test]
 #[ignore = "a thousand of them: half a minute"]
 fn a_thousand_faults_drawn_at_random() {

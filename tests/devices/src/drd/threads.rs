@@ -1,4 +1,4 @@
-//! The device with its threads: what the force loop sees, what the motors get, and how it ends.
+//! The device with its threads: poses for the force loop, forces for the motors, and the end.
 
 use fake_drd::Block;
 use fake_drd::control::{get, put};
@@ -18,7 +18,7 @@ fn push() -> Wrench {
     Wrench::from_force(Vector3::y())
 }
 
-/// With the messages that it has reported so far.
+/// Opens a device; returns it with the messages that it has reported so far.
 fn open_listening() -> (ForceDimension, Arc<Mutex<Vec<String>>>) {
     let heard = Arc::new(Mutex::new(Vec::new()));
     let ear = Arc::clone(&heard);
@@ -27,7 +27,7 @@ fn open_listening() -> (ForceDimension, Arc<Mutex<Vec<String>>>) {
     (device.expect("a device"), heard)
 }
 
-/// World +y is up, which this maker calls z.
+/// Returns whether the motors push up with this force. World +y is up, which this maker calls z.
 fn feels(fake: &Fake, up_n: f64) -> bool {
     (fake.control.commanded_n()[2] - up_n).abs() < 1e-9
 }
@@ -112,7 +112,7 @@ fn the_watchdog_of_the_device_is_armed_before_its_forces_are_on() {
 }
 
 #[test]
-fn a_call_that_hangs_is_named_and_the_device_drops_its_force_by_itself() {
+fn a_hanging_call_is_named_and_the_device_drops_its_force() {
     let fake = Fake::new();
     let (mut device, heard) = open_listening();
     assert!(drive(&mut device, &push(), |s| s.is_ok() && feels(&fake, 1.0)));
@@ -130,7 +130,7 @@ fn a_call_that_hangs_is_named_and_the_device_drops_its_force_by_itself() {
     assert_eq!(
         fake.control.calls_of("dhdClose"),
         closes,
-        "no other call beside the one that hangs"
+        "no call but the one that hangs"
     );
     fake.control.hang.store(0, Relaxed);
     assert!(
@@ -149,7 +149,7 @@ fn a_device_that_hangs_for_ever_can_be_dropped() {
     assert!(drive(&mut device, &push(), Result::is_err));
     drop(device);
     fake.control.hang.store(0, Relaxed);
-    // The abandoned thread comes back, leaves zero force and ends; nobody closes its device.
+    // The abandoned thread returns, leaves zero force and ends; nobody closes its device.
     assert!(until(LONG, || fake.control.commanded_n() == [0.0; 3]));
     let ticks = fake.control.calls_of("dhdSetForceAndTorqueAndGripperForce");
     std::thread::sleep(Duration::from_millis(50));
@@ -157,7 +157,7 @@ fn a_device_that_hangs_for_ever_can_be_dropped() {
 }
 
 #[test]
-fn unplugged_and_plugged_in_again_without_loading_the_library_anew() {
+fn a_replugged_device_needs_no_reload_of_the_library() {
     let fake = Fake::new();
     let (mut device, heard) = open_listening();
     assert!(drive(&mut device, &push(), |s| s.is_ok() && feels(&fake, 1.0)));
@@ -183,7 +183,7 @@ fn unplugged_and_plugged_in_again_without_loading_the_library_anew() {
 }
 
 #[test]
-fn another_model_that_comes_back_is_refused_since_limits_were_set_for_the_first() {
+fn another_model_is_refused_after_a_reconnection() {
     let fake = Fake::new();
     let (mut device, heard) = open_listening();
     assert!(drive(&mut device, &push(), Result::is_ok));
@@ -213,7 +213,7 @@ fn a_device_that_is_not_calibrated_waits_for_the_operator() {
 }
 
 #[test]
-fn a_force_that_nobody_renews_is_released() {
+fn a_stale_force_is_released() {
     let fake = Fake::new();
     let mut device = fake.open();
     assert!(drive(&mut device, &push(), |s| s.is_ok() && feels(&fake, 1.0)));
@@ -227,7 +227,7 @@ fn a_force_that_nobody_renews_is_released() {
 }
 
 #[test]
-fn a_dropped_device_has_zero_force_and_is_stopped_and_closed_in_this_order() {
+fn a_dropped_device_is_zeroed_stopped_and_closed_in_order() {
     let fake = Fake::new();
     let mut device = fake.open();
     let strong = Wrench::from_force(Vector3::y() * 8.0);
@@ -262,7 +262,7 @@ fn a_servo_thread_that_could_not_be_armed_exerts_no_force() {
     }));
 }
 
-/// Heap calls of the servo thread, counted where it asks for the buttons.
+/// Most heap calls of the servo thread, counted in its query for the buttons.
 static MOST: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
 static ASKED: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);
 static LAST: std::sync::atomic::AtomicU64 = std::sync::atomic::AtomicU64::new(0);

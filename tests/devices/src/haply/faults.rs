@@ -1,4 +1,4 @@
-//! Faults drawn at random, one after another: no newton of surprise, and each is named.
+//! Random faults, one after another: none raises the force, and each is named.
 
 use fake_haply::{IDLE_AFTER_MS, Service, Wrong};
 use nalgebra::Vector3;
@@ -12,18 +12,18 @@ use stylet_shm_schema::Fault as Named;
 use crate::drawn::{Drawn, below, campaign};
 use crate::rig::{Led, Rig};
 
-/// An answer is late after so many ticks.
+/// Ticks after which an answer is late.
 const LATE_TICKS: usize = 20;
-/// A service that does not answer for so many is lost.
+/// Ticks after which a service that does not answer is lost.
 const LOST_TICKS: usize = 250;
-/// A device that is pushed and does not move is frozen after so many.
+/// Ticks after which a loaded device that does not move is frozen.
 const FROZEN_TICKS: usize = 250;
 
-/// What goes wrong, and what becomes of it while it lasts.
+/// Fault of the service, and its further course.
 #[derive(Clone, Copy)]
 struct Fault {
     wrong: Wrong,
-    /// A service that hangs goes on after so many ticks; one whose device is plugged in again differs in one of five ways.
+    /// Ticks until a service that hangs continues, or variant of a device that is plugged in again.
     then: usize,
 }
 
@@ -89,7 +89,8 @@ impl Drawn for Fault {
 
     fn bound(self) -> (Vec<Named>, usize) {
         match self.wrong {
-            // What the service does with the zero that it does not read is its own: it drops a force that is not renewed.
+            // The service decides about a zero that it does not read: it drops a force that is not
+            // renewed.
             Wrong::Hangs => (
                 vec![Named::DeviceSilent, Named::DeviceError],
                 IDLE_AFTER_MS as usize + 1,
@@ -144,12 +145,12 @@ fn faults(seed: u64, count: usize) {
 }
 
 #[test]
-fn after_a_fault_drawn_at_random_the_force_is_zero_in_time_and_the_fault_is_named() {
+fn a_random_fault_zeroes_the_force_in_time_and_is_named() {
     const { assert!(LATE_TICKS == SILENT_SAMPLES as usize) };
     faults(1, 120);
 }
 
-/// `cargo test --release -p stylet-tests-devices -- --ignored --nocapture thousand`
+/// Run with `cargo test --release -p stylet-tests-devices -- --ignored --nocapture thousand`.
 #[test]
 #[ignore = "a thousand of them: a minute"]
 fn a_thousand_faults_drawn_at_random() {

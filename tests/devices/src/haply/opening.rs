@@ -1,4 +1,4 @@
-//! What is opened and what is refused, and what `rt-core devices` says of it.
+//! Devices that open, devices that are refused, and the report of `rt-core devices`.
 
 use fake_haply::{Server, Service, Wrong};
 use stylet_hw::Severity;
@@ -9,7 +9,7 @@ use crate::driven::{LONG, drive, until};
 use stylet_hw::{Device, Wrench};
 
 #[test]
-fn the_first_message_sets_axes_and_origin_and_later_ones_are_forces_alone() {
+fn only_the_first_message_sets_axes_and_origin() {
     let service = Service::default();
     let server = Server::start(&service);
     let mut device = open(&server);
@@ -29,7 +29,7 @@ fn the_first_message_sets_axes_and_origin_and_later_ones_are_forces_alone() {
 }
 
 #[test]
-fn what_cannot_be_used_is_refused_in_words_that_help() {
+fn unusable_devices_are_refused_with_a_remedy() {
     let service = Service::default();
     let server = Server::start(&service);
     let why = |set: &dyn Fn(&mut fake_haply::State)| {
@@ -80,7 +80,7 @@ fn what_cannot_be_used_is_refused_in_words_that_help() {
 }
 
 #[test]
-fn the_list_of_devices_names_service_version_device_and_cure_and_sends_nothing() {
+fn listing_devices_sends_nothing() {
     let service = Service::default();
     let server = Server::start(&service);
     let listed = || diagnose(&config(&server).service);
@@ -109,7 +109,7 @@ fn the_list_of_devices_names_service_version_device_and_cure_and_sends_nothing()
 }
 
 #[test]
-fn a_service_of_an_unknown_version_is_used_and_said_to_be_so() {
+fn a_service_of_an_unknown_version_is_used_with_a_note() {
     let service = Service::default();
     service.state().version = None;
     let server = Server::start(&service);

@@ -1,4 +1,4 @@
-//! The device with its threads: what the force loop sees, what the service gets, and how it ends.
+//! The device with its threads: poses for the force loop, messages for the service, and the end.
 
 use fake_haply::{Server, Service, Wrong};
 use nalgebra::Vector3;
@@ -20,7 +20,7 @@ pub fn open(server: &Server) -> Haply {
     open_listening(server).0
 }
 
-/// With the messages that it has reported so far.
+/// Opens a device; returns it with the messages that it has reported so far.
 fn open_listening(server: &Server) -> (Haply, Arc<Mutex<Vec<String>>>) {
     let heard = Arc::new(Mutex::new(Vec::new()));
     let ear = Arc::clone(&heard);
@@ -29,7 +29,7 @@ fn open_listening(server: &Server) -> (Haply, Arc<Mutex<Vec<String>>>) {
     (device.expect("a device"), heard)
 }
 
-/// In words why it does not open.
+/// Returns the reason why the device does not open, in words.
 pub fn refused(config: HaplyConfig) -> String {
     let opened = Haply::open(config, Box::new(|| Ok(String::new())), Box::new(|_| ()));
     opened.map(drop).expect_err("refused").to_string()
@@ -39,7 +39,7 @@ fn push() -> Wrench {
     Wrench::from_force(Vector3::y())
 }
 
-/// World +y is up, which this maker calls z.
+/// Returns whether the device pushes up with this force. World +y is up, which this maker calls z.
 fn feels(service: &Service, up_n: f64) -> bool {
     (service.state().force_n[2] - up_n).abs() < 1e-9
 }
@@ -61,7 +61,7 @@ fn the_device_meets_the_contract() {
 }
 
 #[test]
-fn pose_and_force_change_frames_as_stated_and_a_torque_goes_nowhere() {
+fn pose_and_force_change_frames_and_torque_is_dropped() {
     let service = Service::default();
     let server = Server::start(&service);
     let mut device = open(&server);
@@ -83,7 +83,7 @@ fn pose_and_force_change_frames_as_stated_and_a_torque_goes_nowhere() {
 }
 
 #[test]
-fn a_grip_turns_the_needle_from_where_it_was_held_at_the_start_and_its_last_orientation_holds() {
+fn a_grip_turns_the_needle_relative_to_its_first_orientation() {
     let service = Service::default();
     let half = 0.5_f64.sqrt();
     service.state().grip = Some([half, 0.0, 0.0, half]);
@@ -108,7 +108,7 @@ fn a_grip_turns_the_needle_from_where_it_was_held_at_the_start_and_its_last_orie
 }
 
 #[test]
-fn a_service_that_does_not_answer_is_named_gets_a_zero_and_is_connected_again() {
+fn a_silent_service_gets_a_zero_and_is_reconnected() {
     let service = Service::default();
     let server = Server::start(&service);
     let (mut device, heard) = open_listening(&server);
@@ -127,7 +127,7 @@ fn a_service_that_does_not_answer_is_named_gets_a_zero_and_is_connected_again() 
 }
 
 #[test]
-fn no_fault_of_the_service_ends_the_threads_or_is_taken_for_a_state() {
+fn no_fault_of_the_service_ends_the_threads() {
     let service = Service::default();
     let server = Server::start(&service);
     let mut device = open(&server);
@@ -160,7 +160,7 @@ fn no_fault_of_the_service_ends_the_threads_or_is_taken_for_a_state() {
 }
 
 #[test]
-fn answers_that_nobody_asked_for_do_not_make_the_pose_old() {
+fn unsolicited_answers_do_not_delay_the_pose() {
     let service = Service::default();
     let server = Server::start(&service);
     let mut device = open(&server);
@@ -180,7 +180,7 @@ fn answers_that_nobody_asked_for_do_not_make_the_pose_old() {
 }
 
 #[test]
-fn a_service_that_floods_is_lost_with_its_force_and_named() {
+fn a_flooding_service_is_disconnected_and_named() {
     let service = Service::default();
     let server = Server::start(&service);
     let (mut device, heard) = open_listening(&server);
@@ -195,7 +195,7 @@ fn a_service_that_floods_is_lost_with_its_force_and_named() {
 }
 
 #[test]
-fn unplugged_and_plugged_in_again_and_another_device_in_its_place_is_refused() {
+fn another_device_is_refused_after_replugging() {
     let service = Service::default();
     let server = Server::start(&service);
     let (mut device, heard) = open_listening(&server);
@@ -217,7 +217,7 @@ fn unplugged_and_plugged_in_again_and_another_device_in_its_place_is_refused() {
 }
 
 #[test]
-fn a_force_that_nobody_renews_is_released() {
+fn a_stale_force_is_released() {
     let service = Service::default();
     let server = Server::start(&service);
     let mut device = open(&server);

@@ -6,28 +6,28 @@ use std::sync::{Arc, mpsc};
 use std::thread::{self, JoinHandle};
 use std::time::Instant;
 
-use crate::beside::arm::ArmError;
-use crate::beside::shared::Shared;
+use crate::driver_thread::arm::ArmError;
+use crate::driver_thread::shared::Shared;
 
 const ARMED_LIMIT: Duration = Duration::from_secs(2);
 const FIRST_SAMPLE_LIMIT: Duration = Duration::from_millis(100);
 
-/// What a servo thread runs.
+/// Loop that a servo thread runs.
 pub trait Serve: Send + 'static {
-    /// Arms the calling thread; returns what it was granted.
+    /// Arms the calling thread; returns the rights that it was granted.
     fn arm(&self) -> Result<String, ArmError>;
-    /// Ticks until the keeper or a lost connection ends it, and leaves zero force.
+    /// Runs ticks until the keeper or a lost connection ends it, and leaves zero force.
     fn run(&mut self, shared: &Shared);
 }
 
-/// A servo thread, and what it was granted; it serves only if it was armed.
+/// Servo thread and the rights that it was granted. It serves only if it was armed.
 pub struct Started<S> {
     pub thread: JoinHandle<S>,
-    /// `None` where the thread gave no answer.
+    /// Result of arming; `None` if the thread never answered.
     pub granted: Option<Result<String, ArmError>>,
 }
 
-/// Starts the servo thread and waits for its first sample. `None` where no thread starts.
+/// Starts the servo thread and waits for its first sample. Returns `None` if no thread starts.
 pub fn start<S: Serve>(name: &str, mut servo: S, shared: &Arc<Shared>) -> Option<Started<S>> {
     shared.serve();
     let in_thread = Arc::clone(shared);
@@ -59,7 +59,7 @@ pub fn at_rate(shared: &Shared, servo_hz: u32, mut tick: impl FnMut(Instant)) ->
         while shared.serves() {
             due += period;
             tick(due);
-            // A late tick is not made up for.
+            // Skip missed ticks instead of catching up.
             due = due.max(Instant::now());
             thread::sleep(due.saturating_duration_since(Instant::now()));
         }

@@ -6,42 +6,43 @@ use core::time::Duration;
 use std::sync::{Arc, mpsc};
 use std::thread::{self, Thread};
 
-/// Takes a message for the operator.
+/// Receiver of messages for the operator.
 pub type Report = Box<dyn Fn(&str) + Send>;
 
-/// Between two attempts to connect.
+/// Time between two attempts to connect.
 const RETRY_EVERY: Duration = Duration::from_millis(500);
 /// Longest wait for the thread to end; a driver that hangs is abandoned.
 const END_LIMIT: Duration = Duration::from_secs(3);
 
-/// What the keeper of one kind of device does. Each call may block.
+/// Work of the keeper for one kind of device. Each call may block.
 pub trait Connect: Sized + Send + 'static {
     /// One connection, from opening to closing.
     type Session;
-    /// What is known of a connected device.
+    /// Properties of a connected device.
     type Description: Send + 'static;
-    /// Why there is no connection.
+    /// Reason why there is no connection.
     type Error: Display + Send + 'static;
 
     /// Opens a connection.
     fn open(&mut self) -> Result<Self::Session, Self::Error>;
-    /// Makes the connection serve, and calls [`Keeper::opened`]; false when the thread is to end.
+    /// Starts serving and calls [`Keeper::opened`]; returns false when the thread must end.
     fn prepare(&mut self, keeper: &mut Keeper<Self>, session: &mut Self::Session) -> Result<bool, Self::Error>;
-    /// Returns when the device is lost, with the reason, or when the thread is to end.
+    /// Waits until the device is lost, and returns the reason; also returns when the thread must
+    /// end.
     fn watch(&mut self, keeper: &mut Keeper<Self>, session: &Self::Session) -> Option<String>;
     /// Leaves zero force and closes the connection.
     fn release(&mut self, keeper: &mut Keeper<Self>, session: Self::Session);
-    /// No device is connected.
+    /// Publishes that no device is connected.
     fn not_connected(&self);
 }
 
-/// Takes the first result: a description, or why there is no connection.
+/// Sender of the first result: a description, or the reason why there is no connection.
 type First<C> = mpsc::Sender<Result<<C as Connect>::Description, <C as Connect>::Error>>;
 
-/// Gets the first result.
+/// Receiver of the first result.
 pub type Opened<C> = mpsc::Receiver<Result<<C as Connect>::Description, <C as Connect>::Error>>;
 
-/// What every keeper has.
+/// State common to all keepers.
 pub struct Keeper<C: Connect> {
     stop: Arc<AtomicBool>,
     report: Report,
@@ -106,7 +107,7 @@ impl<C: Connect> Keeper<C> {
         }
     }
 
-    /// `None` when the thread is to end.
+    /// Connects; returns `None` when the thread must end.
     fn connect(&mut self, connect: &mut C) -> Result<Option<C::Session>, C::Error> {
         let mut session = connect.open()?;
         let prepared = connect.prepare(self, &mut session);
@@ -117,13 +118,13 @@ impl<C: Connect> Keeper<C> {
         prepared.map(|_| None)
     }
 
-    /// Whether the thread is to end.
+    /// Returns whether the thread must end.
     pub fn stopped(&self) -> bool {
         // SYNC: relaxed; the flag carries nothing with it. Its partner is the store in `drop`.
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Reports a message that is not the last one again.
+    /// Reports a message unless it repeats the last one.
     pub fn report(&mut self, message: &str) {
         if self.last_message != message {
             (self.report)(message);
@@ -131,7 +132,8 @@ impl<C: Connect> Keeper<C> {
         }
     }
 
-    /// The device can be used, or waits for the operator: whoever opened it goes on.
+    /// Announces that the device is usable or waits for the operator, and releases the caller that
+    /// opened it.
     pub fn opened(&mut self, description: C::Description) {
         if let Some(first) = self.first.take() {
             let _ = first.send(Ok(description));

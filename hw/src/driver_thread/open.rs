@@ -5,10 +5,10 @@ use std::sync::mpsc::Receiver;
 
 use crate::library::LoadError;
 
-/// A driver has this long to find its device.
+/// Time limit for a driver to find its device.
 const OPEN_LIMIT: Duration = Duration::from_secs(15);
 
-/// Why a device could not be opened; the text says what to do.
+/// Reason why a device could not be opened; the text says what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum OpenError<E: core::error::Error + 'static> {
     /// The driver's library cannot be loaded.
@@ -22,7 +22,7 @@ pub enum OpenError<E: core::error::Error + 'static> {
     NoAnswer,
 }
 
-/// The result of the first attempt.
+/// Waits for the result of the first attempt.
 pub fn first<D, E: core::error::Error + 'static>(opened: &Receiver<Result<D, E>>) -> Result<D, OpenError<E>> {
     match opened.recv_timeout(OPEN_LIMIT) {
         Ok(description) => description.map_err(OpenError::Connection),

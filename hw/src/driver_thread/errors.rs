@@ -1,13 +1,13 @@
-//! An error of a driver: number, name, and what it means for the force.
+//! A driver's error: number, name, and consequence for the force.
 
 use crate::device::DeviceFault;
 
-/// How the servo loop responds to an error.
+/// Response of the servo loop to an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Response {
-    /// Turn the force off until the error has not returned for a while; the connection holds.
+    /// Turns the force off until the error has been absent for a while; keeps the connection.
     Pause,
-    /// The connection is lost: stop, disable, initialise again.
+    /// Stops, disables and initialises again: the connection is lost.
     Reconnect,
 }
 
@@ -20,11 +20,11 @@ pub struct KnownError {
     pub name: &'static str,
     /// The fault that the force loop sees.
     pub fault: DeviceFault,
-    /// How the servo loop responds.
+    /// Response of the servo loop.
     pub response: Response,
 }
 
-/// An error after which the connection holds.
+/// Creates an error that keeps the connection.
 pub const fn pause(code: u32, name: &'static str, fault: DeviceFault) -> KnownError {
     let response = Response::Pause;
     KnownError {
@@ -35,7 +35,7 @@ pub const fn pause(code: u32, name: &'static str, fault: DeviceFault) -> KnownEr
     }
 }
 
-/// An error after which the connection is lost.
+/// Creates an error that ends the connection.
 pub const fn reconnect(code: u32, name: &'static str, fault: DeviceFault) -> KnownError {
     let response = Response::Reconnect;
     KnownError {
@@ -46,7 +46,7 @@ pub const fn reconnect(code: u32, name: &'static str, fault: DeviceFault) -> Kno
     }
 }
 
-/// The entry of `code`; an unknown number pauses the force as a driver's error.
+/// Returns the entry of `code`; an unknown number pauses the force as a driver's error.
 pub fn find(known: &[KnownError], code: u32) -> KnownError {
     let found = known.iter().find(|k| k.code == code);
     found

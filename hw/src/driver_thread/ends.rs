@@ -1,10 +1,11 @@
-//! Samples and wrenches between the force loop and a servo thread: the newest of each, without waiting; and the present fault.
+//! Wait-free exchange of the newest sample and wrench between force loop and servo thread, with the
+//! present fault.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use crate::device::{DeviceFault, DeviceInfo, Sample, Wrench};
 
-/// The newest wrench, and how many have been written.
+/// Newest wrench, and the number of wrenches written so far.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Command {
     pub wrench: Wrench,
@@ -24,7 +25,7 @@ pub struct ServoEnd {
     pub commands: triple_buffer::Output<Command>,
 }
 
-/// Both ends of a new exchange, without a sample and with zero force.
+/// Creates both ends of a new exchange, without a sample and with zero force.
 pub fn pair() -> (ForceLoopEnd, ServoEnd) {
     let (sample_in, sample_out) = triple_buffer::triple_buffer(&None);
     let (command_in, command_out) = triple_buffer::triple_buffer(&Command::default());
@@ -41,7 +42,7 @@ pub fn pair() -> (ForceLoopEnd, ServoEnd) {
 }
 
 impl ForceLoopEnd {
-    /// The newest sample, unless there is a fault.
+    /// Returns the newest sample, or the present fault.
     pub fn read(&mut self, fault: Option<DeviceFault>) -> Result<Sample, DeviceFault> {
         match fault {
             Some(fault) => Err(fault),
@@ -49,8 +50,8 @@ impl ForceLoopEnd {
         }
     }
 
-    /// Passes `wrench` on, within the limits of the device. While there is a fault, which `read` reports, the servo thread exerts
-    /// no force.
+    /// Passes `wrench` on, within the limits of the device. While `read` reports a fault, the servo
+    /// thread exerts no force.
     pub fn write(&mut self, info: &DeviceInfo, wrench: &Wrench) -> Result<(), DeviceFault> {
         let finite = wrench.is_finite();
         self.number += 1;
@@ -66,7 +67,7 @@ impl ForceLoopEnd {
     }
 }
 
-/// The present fault, written by the servo thread, or by the keeper while no servo thread runs.
+/// Present fault, written by the servo thread, or by the keeper while no servo thread runs.
 #[derive(Debug)]
 pub struct FaultCell(AtomicU32);
 
@@ -77,12 +78,12 @@ impl Default for FaultCell {
 }
 
 impl FaultCell {
-    /// The present fault.
+    /// Returns the present fault.
     pub fn get(&self) -> Option<DeviceFault> {
         // SYNC: acquire pairs with the release in `set`: without a fault, the sample taken before is visible.
         match self.0.load(Ordering::Acquire) {
             0 => None,
-            code => Some(DeviceFault::from_code(code).unwrap_or(DeviceFault::Driver)),
+            code => Some(DeviceFault::try_from(code).unwrap_or(DeviceFault::Driver)),
         }
     }
 
@@ -98,16 +99,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_fault_survives_the_way_through_its_number() {
+    fn every_fault_survives_the_round_trip_through_its_number() {
         let cell = FaultCell::default();
         assert_eq!(cell.get(), Some(DeviceFault::NotConnected));
         for code in 1..=9 {
-            let fault = DeviceFault::from_code(code).expect("numbers 1 to 9 are faults");
+            let fault = DeviceFault::try_from(code).expect("numbers 1 to 9 are faults");
             cell.set(Some(fault));
             assert_eq!(cell.get(), Some(fault));
         }
         cell.set(None);
         assert_eq!(cell.get(), None);
-        assert!(DeviceFault::from_code(0).is_none() && DeviceFault::from_code(10).is_none());
+        assert!(DeviceFault::try_from(0).is_err() && DeviceFault::try_from(10).is_err());
     }
 }

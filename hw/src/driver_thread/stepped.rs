@@ -1,30 +1,31 @@
 //! A device on the caller's thread and without a clock: each reading is a tick of the servo loop.
 //!
-//! For tests and measurements of what a back end does after a fault, which then does not depend on the machine. The ticks,
-//! the connection and its errors are those of the device with threads.
+//! Tests and measurements of faults use it, so that results do not depend on the machine. Ticks,
+//! connection and errors are those of the device with threads.
 
-use crate::beside::ends::{self, ForceLoopEnd, ServoEnd};
-use crate::beside::shared::Shared;
 use crate::device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
+use crate::driver_thread::ends::{self, ForceLoopEnd, ServoEnd};
+use crate::driver_thread::shared::Shared;
 
 /// Ticks between two attempts to connect.
 const TICKS_BETWEEN_ATTEMPTS: u32 = 500;
 
-/// A servo loop and its connection.
+/// Servo loop and its connection.
 pub trait Step: Send {
-    /// Connects again; whether it did.
+    /// Reconnects; returns whether it succeeded.
     fn connect(&mut self, shared: &Shared) -> bool;
     /// Leaves zero force and closes the connection, if there is one.
     fn close(&mut self);
-    /// One servo tick.
+    /// Runs one servo tick.
     fn tick(&mut self, shared: &Shared);
-    /// Whether the servo thread would run in this tick, or wait in a call of its driver.
+    /// Returns whether the servo thread would run in this tick, instead of waiting in a driver
+    /// call.
     fn runs(&mut self) -> bool {
         true
     }
 }
 
-/// See the module.
+/// Device that advances by one servo tick per reading.
 pub struct Stepped<S: Step> {
     info: DeviceInfo,
     step: S,
@@ -35,7 +36,7 @@ pub struct Stepped<S: Step> {
 }
 
 impl<S: Step> Stepped<S> {
-    /// Over the servo loop that `open` connects for the first time.
+    /// Creates a stepped device over the servo loop that `open` connects for the first time.
     pub(crate) fn over<E>(open: impl FnOnce(ServoEnd, &Shared) -> Result<(S, DeviceInfo), E>) -> Result<Self, E> {
         let (end, servo_end) = ends::pair();
         let shared = Shared::default();

@@ -5,13 +5,13 @@ use core::fmt;
 /// Arms the calling thread; returns a description of what the kernel granted.
 pub type Arm = Box<dyn Fn() -> Result<String, ArmError> + Send + Sync>;
 
-/// Why a thread could not be armed.
+/// Reason why a thread could not be armed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ArmError(String);
 
 impl ArmError {
-    /// With the reason, in words for the operator.
+    /// Creates an error with the reason, in words for the operator.
     pub fn new(reason: impl fmt::Display) -> Self {
         Self(reason.to_string())
     }

@@ -1,14 +1,15 @@
-//! When a servo thread exerts no force: on a fault, for a while after it, and when nobody renews the wrench.
+//! Conditions under which a servo thread exerts no force: a fault, a pause after it, or a stale
+//! wrench.
 
-use crate::beside::ends::Command;
 use crate::device::{DeviceFault, Wrench};
+use crate::driver_thread::ends::Command;
 
-/// A force that nobody renews for this long becomes zero: its writer has stopped.
+/// Age at which a wrench that is not renewed becomes zero, because its writer has stopped.
 const DEAD_TIME_S: f64 = 0.1;
-/// After a fault the force stays off until there was none for this long.
+/// Time without a fault before the force returns.
 const QUIET_TIME_S: f64 = 0.5;
 
-/// What one servo tick leaves for the next about faults and the newest wrench.
+/// Faults and age of the newest wrench, carried from one servo tick to the next.
 #[derive(Debug, Default)]
 pub struct Hold {
     fault: Option<DeviceFault>,
@@ -20,25 +21,26 @@ pub struct Hold {
 }
 
 impl Hold {
-    /// Turns the force off. The first fault stays the reported one until there was none for `QUIET_TIME_S`.
+    /// Turns the force off. Keeps reporting the first fault until none has occurred for
+    /// `QUIET_TIME_S`.
     pub fn pause(&mut self, fault: DeviceFault) {
         self.fault.get_or_insert(fault);
         self.quiet = 0;
     }
 
-    /// As [`pause`](Self::pause) for a lost connection, which replaces any other fault: without a connection the pose is invalid
-    /// as well.
+    /// Like [`pause`](Self::pause), for a lost connection. Replaces any other fault, because the
+    /// pose is invalid as well.
     pub fn lose(&mut self, fault: DeviceFault) {
         self.fault = Some(fault);
         self.quiet = 0;
     }
 
-    /// The present fault.
+    /// Returns the present fault.
     pub fn fault(&self) -> Option<DeviceFault> {
         self.fault
     }
 
-    /// The newest wrench; zero when it is not renewed or there is a fault.
+    /// Returns the newest wrench; zero during a fault or when the wrench is stale.
     pub fn wrench(&mut self, command: &Command, servo_hz: u32) -> Wrench {
         let renewed = command.number != self.command_number;
         self.command_number = command.number;
@@ -53,7 +55,8 @@ impl Hold {
         }
     }
 
-    /// The end of a tick: clears a fault that has not returned for `QUIET_TIME_S`. Returns what is left.
+    /// Ends a tick: clears a fault that has been absent for `QUIET_TIME_S`. Returns the remaining
+    /// fault.
     pub fn end_tick(&mut self, servo_hz: u32) -> Option<DeviceFault> {
         self.quiet = self.quiet.saturating_add(1);
         if lasts(self.quiet, QUIET_TIME_S, servo_hz) {
@@ -80,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrench_that_nobody_renews_becomes_zero_after_a_tenth_of_a_second_and_a_zero_one_is_no_fault() {
+    fn a_stale_wrench_becomes_zero_after_a_tenth_of_a_second() {
         let mut hold = Hold::default();
         for _ in 0..100 {
             assert_ne!(hold.wrench(&push(1), HZ), Wrench::zero());
@@ -95,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_fault_is_kept_for_half_a_second_after_the_last_and_a_lost_connection_replaces_it() {
+    fn the_first_fault_holds_until_half_a_second_passes_without_one() {
         let mut hold = Hold::default();
         hold.pause(DeviceFault::Overheated);
         hold.pause(DeviceFault::Driver);

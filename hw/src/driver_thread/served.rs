@@ -1,35 +1,36 @@
-//! A device behind a servo thread, as the force loop uses it: wait-free ends.
+//! A device behind a servo thread, as the force loop sees it: two wait-free ends.
 
 use std::sync::Arc;
 
-use crate::beside::ends::{self, ForceLoopEnd, ServoEnd};
-use crate::beside::keeper::{self, Connect, KeeperThread, Report};
-use crate::beside::open::{self, OpenError};
-use crate::beside::shared::Shared;
 use crate::device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
+use crate::driver_thread::ends::{self, ForceLoopEnd, ServoEnd};
+use crate::driver_thread::keeper::{self, Connect, KeeperThread, Report};
+use crate::driver_thread::open::{self, OpenError};
+use crate::driver_thread::shared::Shared;
 
-/// What is known of a connected device.
+/// Description of a connected device.
 pub trait Described: Send + 'static {
     /// Limits of the device.
     fn info(&self) -> DeviceInfo;
 }
 
-/// State of the driver beside the pose.
+/// State of the driver, without the pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Readings {
     /// Servo ticks so far.
     pub ticks: u64,
     /// Present fault.
     pub fault: Option<DeviceFault>,
-    /// The driver's last error by number, 0 for none.
+    /// Last error of the driver by number; 0 for none.
     pub error: u32,
     /// Number of errors so far.
     pub errors: u64,
-    /// Ticks in which the motors could not give all of the force, where the driver says so.
+    /// Ticks in which the motors could not render the full force, where the driver reports it.
     pub saturated: u64,
 }
 
-/// A device that a servo thread serves and a keeper connects. Dropping it leaves zero force and a closed connection.
+/// Device that a servo thread serves and a keeper connects. Dropping it leaves zero force and a
+/// closed connection.
 pub struct Served<D> {
     description: D,
     shared: Arc<Shared>,
@@ -38,7 +39,8 @@ pub struct Served<D> {
 }
 
 impl<D: Described> Served<D> {
-    /// Starts the keeper that `connector` makes, called `name`, and waits for its first result.
+    /// Starts the keeper that `connector` makes, under the given name, and waits for its first
+    /// result.
     pub(crate) fn start<C>(
         name: &str,
         report: Report,
@@ -66,7 +68,7 @@ impl<D: Described> Served<D> {
         &self.description
     }
 
-    /// State of the driver beside the pose.
+    /// Returns the state of the driver, without the pose.
     pub fn readings(&self) -> Readings {
         let shared = &self.shared;
         Readings {
