@@ -1,14 +1,16 @@
-//! One axis of a device: from counts to the share of the greatest speed.
+//! Conversion of one device axis from counts to a share of the maximum speed.
 
 use evdev::AbsInfo;
 
-/// The core refuses a hand that is slower.
+/// Slowest speed of a hand that the core accepts.
 pub const SLOWEST_M_PER_S: f64 = 1e-4;
-/// Many drivers give no dead zone (`flat`), or one that a worn stick does not keep to: it is at least this share of the way.
+/// Smallest dead zone, as a share of the range. Many drivers report none (`flat`), or one that a
+/// worn stick exceeds.
 const LEAST_DEAD: f64 = 0.08;
-/// A larger dead zone is a driver's mistake.
+/// Largest dead zone; a larger one is a driver's mistake.
 const MOST_DEAD: f64 = 0.5;
-/// Full deflection of a 3D mouse in counts, where its driver reports relative axes, which have no range.
+/// Full deflection of a 3D mouse in counts, for drivers that report relative axes, which have no
+/// range.
 const RELATIVE_FULL: f64 = 350.0;
 
 /// Range and dead zone in counts.
@@ -16,12 +18,12 @@ const RELATIVE_FULL: f64 = 350.0;
 pub struct Axis {
     middle: f64,
     half: f64,
-    /// Share of `half`.
+    /// Dead zone as a share of `half`.
     dead: f64,
 }
 
 impl Axis {
-    /// `None` for a range that is empty.
+    /// Creates an absolute axis; `None` for an empty range.
     pub fn absolute(info: &AbsInfo) -> Option<Self> {
         let (low, high) = (f64::from(info.minimum()), f64::from(info.maximum()));
         let half = (high - low) / 2.0;
@@ -32,7 +34,8 @@ impl Axis {
         })
     }
 
-    /// An axis without a range: full speed at the counts that such a device reports at most.
+    /// Creates an axis without a range; full speed is at the largest counts that such a device
+    /// reports.
     pub fn relative() -> Self {
         Self {
             middle: 0.0,
@@ -41,12 +44,13 @@ impl Axis {
         }
     }
 
-    /// Counts in the middle of the range, where a driver reports nothing else.
+    /// Returns the counts in the middle of the range, the value of an axis at rest.
     pub fn at_rest(&self) -> i32 {
         self.middle.round() as i32
     }
 
-    /// -1 to 1: 0 in the dead zone, from its edge on with the square of the way, so that small speeds have most of it.
+    /// Returns the share of the speed, -1 to 1. It is 0 in the dead zone, then grows with the
+    /// square of the deflection, so that small speeds are easy to hold.
     pub fn share(&self, counts: i32) -> f64 {
         let way = (f64::from(counts) - self.middle) / self.half;
         let beyond = ((way.abs() - self.dead) / (1.0 - self.dead)).clamp(0.0, 1.0);
@@ -70,7 +74,8 @@ mod tests {
         }
         let just_outside = stick.share(8400);
         assert!(just_outside > 0.0 && just_outside < 1e-3, "{just_outside}");
-        // A quarter is dead: half of what is left is at 5/8 of the way, and gives a quarter of the speed.
+        // A quarter is dead: half of the rest ends at 5/8 of the range, and gives a quarter of the
+        // speed.
         assert!((stick.share(20480) - 0.25).abs() < 1e-3);
         assert!((stick.share(-20480) + 0.25).abs() < 1e-3);
     }

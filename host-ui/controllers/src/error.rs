@@ -1,15 +1,15 @@
-//! Why a device cannot be read, with what to do about it.
+//! Reasons why a device cannot be read, each with a remedy.
 
 use super::found::Found;
 use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 
-/// A device that is plugged in and cannot be read.
+/// Error of a device that is plugged in and cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// This user has no right to read it.
     #[error(
-        "{name} ({}) may not be read. Run: sudo usermod -aG input $USER and log in again, or add a udev rule (docs/controllers.md).",
+        "{name} ({}) cannot be read. Run: sudo usermod -aG input $USER and log in again, or add a udev rule (docs/controllers.md).",
         .path.display()
     )]
     NoPermission {
@@ -18,7 +18,7 @@ pub enum OpenError {
         /// Its device node.
         path: PathBuf,
     },
-    /// It is no event device, or it failed.
+    /// It is not an event device, or it failed.
     #[error("{name} ({}) cannot be read: {source}. Unplug it and plug it in again.", .path.display())]
     Unreadable {
         /// Name of the device.
@@ -40,7 +40,7 @@ impl OpenError {
     }
 }
 
-/// Every device that cannot be read.
+/// Error of all devices that cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.iter().map(OpenError::to_string).collect::<Vec<_>>().join("\n"))]
 pub struct ListError(pub Vec<OpenError>);

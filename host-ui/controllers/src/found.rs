@@ -3,10 +3,10 @@
 use super::kind::{Abilities, Bits, Kind};
 use std::path::{Path, PathBuf};
 
-/// A longer name is not shown whole.
+/// Longest name that is shown whole.
 const LONGEST_NAME: usize = 60;
 
-/// Where the kernel shows devices, and where they are opened.
+/// Folders in which the kernel lists devices and opens them.
 #[derive(Clone, Debug)]
 pub struct Places {
     /// Folder in which sysfs lists input devices.
@@ -24,18 +24,18 @@ impl Default for Places {
     }
 }
 
-/// A device that can hold the needle.
+/// Device that can hold the needle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Found {
     /// Its device node.
     pub path: PathBuf,
-    /// Its name, for people.
+    /// Display name.
     pub name: String,
-    /// What it is.
+    /// Kind of the device.
     pub kind: Kind,
 }
 
-/// In the order in which they were plugged in.
+/// Returns the devices in the order in which they were plugged in.
 pub fn find(places: &Places) -> Vec<Found> {
     let Ok(entries) = std::fs::read_dir(&places.class) else {
         return Vec::new();
@@ -62,7 +62,7 @@ fn look(places: &Places, event: &str) -> Option<Found> {
         properties: Bits::read(&text("properties")),
         vendor,
     })?;
-    // A device may call itself anything.
+    // A device may report any name.
     let name: String = text("name")
         .trim()
         .chars()
@@ -76,7 +76,8 @@ fn look(places: &Places, event: &str) -> Option<Found> {
     })
 }
 
-/// Empty where it cannot be read: the device may go at any moment.
+/// Reads a file; returns an empty text if it cannot be read, because a device may disappear at any
+/// moment.
 fn read(device: &Path, name: &str) -> String {
     std::fs::read(device.join(name)).map_or_else(|_| String::new(), |b| String::from_utf8_lossy(&b).into_owned())
 }
@@ -85,7 +86,7 @@ fn read(device: &Path, name: &str) -> String {
 pub mod tests {
     use super::*;
 
-    /// A device as sysfs shows it, below `class`.
+    /// Writes a device as sysfs shows it, below `class`.
     pub fn lay_down(class: &Path, event: &str, name: &str, files: [&str; 4]) {
         let device = class.join(event).join("device");
         std::fs::create_dir_all(device.join("capabilities")).unwrap();

@@ -1,4 +1,5 @@
-//! All devices together: which are plugged in, which may not be read, and which one controls the needle.
+//! All devices together: those plugged in, those that cannot be read, and the one that controls the
+//! needle.
 
 use super::error::OpenError;
 use super::found::Found;
@@ -9,14 +10,15 @@ use std::io::{self, ErrorKind};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// A node appears before its rights are set: a device is reported only after it could not be opened this often.
+/// Failed attempts to open a device before it is reported, because its node appears before its
+/// rights are set.
 const REPORTED_AFTER: u32 = 2;
 
-/// Where devices are found: the system, or a test.
+/// Source of devices: the system, or a test.
 pub trait DeviceSource {
     /// An open device.
     type Device: OpenDevice;
-    /// The devices that are plugged in now.
+    /// Returns the devices that are plugged in now.
     fn list(&mut self) -> Vec<Found>;
     /// Opens one of them.
     fn open(&mut self, found: &Found) -> io::Result<Self::Device>;
@@ -24,39 +26,39 @@ pub trait DeviceSource {
     fn wait(&mut self, opened: &[&Self::Device], at_most: Duration);
 }
 
-/// An open device. Neither call may block.
+/// Open device. Neither call may block.
 pub trait OpenDevice {
-    /// Appends new events; `WouldBlock` where there are none.
+    /// Appends new events; returns `WouldBlock` if there are none.
     fn fetch(&mut self, into: &mut Vec<InputEvent>) -> io::Result<()>;
-    /// All of its axes and keys now.
+    /// Returns the present state of its axes and keys.
     fn state(&self) -> io::Result<DeviceState>;
 }
 
-/// A device, as the window shows it.
+/// Device as the window shows it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Device {
-    /// Its name, for people.
+    /// Display name.
     pub name: String,
-    /// What it is.
+    /// Kind of the device.
     pub kind: Kind,
-    /// The stick or the cap must be at rest once before the needle follows it.
+    /// True once the stick or the cap has been at rest; only then does the needle follow it.
     pub was_released: bool,
 }
 
-/// What the window needs to know, as of the last reading.
+/// State of the last reading, for the window.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Latest {
-    /// The device that controls the needle: the one that was moved last.
+    /// Device that controls the needle: the one that was moved last.
     pub holder: Option<Device>,
-    /// Speed that it asks for.
+    /// Speed that this device requests.
     pub wish: Wish,
-    /// In a run with two hands: the device that controls the probe.
+    /// Device that controls the probe, in a run with two hands.
     pub probe_holder: Option<Device>,
-    /// Speed that it asks for.
+    /// Speed that this device requests.
     pub probe: ProbeWish,
-    /// How often each of [`Button::ALL`] was pressed since the start.
+    /// Number of presses of each of [`Button::ALL`] since the start.
     pub presses: [u32; Button::ALL.len()],
-    /// Devices that are there and cannot be read, each with the reason and what to do.
+    /// Devices that cannot be read, each with the reason and the remedy.
     pub denied: Vec<String>,
     /// Name of the device that was unplugged last.
     pub disconnected: String,
@@ -70,7 +72,7 @@ struct Held<O> {
     state: State,
 }
 
-/// Devices that are there, and what they asked for.
+/// Connected devices and their requests.
 pub struct DeviceHub<G: DeviceSource> {
     source: G,
     held: Vec<Held<G::Device>>,
@@ -82,7 +84,7 @@ pub struct DeviceHub<G: DeviceSource> {
 }
 
 impl<G: DeviceSource> DeviceHub<G> {
-    /// A hub without devices.
+    /// Creates a hub without devices.
     pub fn new(source: G) -> Self {
         Self {
             source,
@@ -95,7 +97,8 @@ impl<G: DeviceSource> DeviceHub<G> {
         }
     }
 
-    /// With two hands the device that controls the needle keeps it, and another one controls the probe.
+    /// Enables two hands: the device that controls the needle keeps it, and another one controls
+    /// the probe.
     pub fn use_two_hands(&mut self, two_hands: bool) {
         self.two_hands = two_hands;
     }
@@ -155,12 +158,13 @@ impl<G: DeviceSource> DeviceHub<G> {
         }
     }
 
-    /// Reads all devices at this time (s, of any clock that does not jump); a device that fails counts as unplugged.
+    /// Reads all devices at this time (s, of any monotonic clock); a device that fails counts as
+    /// unplugged.
     pub fn read(&mut self, now_s: f64) -> &Latest {
         let mut failed = Vec::new();
         for held in &mut self.held {
             self.events.clear();
-            // A thumb on the probe drops no seed.
+            // The thumb on the probe's device must not drop a seed.
             let stops_only = self.two_hands && Some(&held.found.path) != self.holder.as_ref();
             let presses = &mut self.latest.presses;
             let count = |button: Button| {
@@ -181,7 +185,7 @@ impl<G: DeviceSource> DeviceHub<G> {
         &self.latest
     }
 
-    /// One device at a time: another takes over only while the needle is at rest.
+    /// Chooses one device: another takes over only while the needle is at rest.
     fn choose(&mut self, now_s: f64) {
         let wish = |h: &Held<G::Device>| h.state.wish(now_s);
         let holds = |h: &&Held<G::Device>| Some(&h.found.path) == self.holder.as_ref();
@@ -206,7 +210,7 @@ impl<G: DeviceSource> DeviceHub<G> {
         self.holder = path;
     }
 
-    /// Waits until a device has events, at most for this time.
+    /// Waits until a device has events, up to a limit.
     pub fn wait(&mut self, at_most: Duration) {
         let opened: Vec<&G::Device> = self.held.iter().map(|h| &h.opened).collect();
         self.source.wait(&opened, at_most);

@@ -1,9 +1,9 @@
-//! The kind of a device, from the abilities that the kernel reports, and what its buttons do.
+//! Kind of a device, from the abilities that the kernel reports, and the functions of its buttons.
 
 use evdev::{AbsoluteAxisCode, KeyCode, PropType, RelativeAxisCode};
 use stylet_base::format;
 
-/// A device that can control the needle.
+/// Kind of a device that can control the needle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A gamepad with a stick.
@@ -12,7 +12,7 @@ pub enum Kind {
     Mouse3d,
 }
 
-/// What a button asks for when it is pressed.
+/// Function of a button.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Button {
     /// Drops a seed.
@@ -26,29 +26,29 @@ pub enum Button {
 }
 
 impl Button {
-    /// All of them, in the order of [`Latest::presses`](crate::Latest::presses).
+    /// All functions, in the order of [`Latest::presses`](crate::Latest::presses).
     pub const ALL: [Self; 4] = [Self::Drop, Self::Undo, Self::Stop, Self::Engage];
 }
 
-/// A bitmap of the kernel, as sysfs writes it: words in hexadecimal, the most significant first.
+/// Bitmap of the kernel, as sysfs writes it: words in hexadecimal, the most significant first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bits(Vec<u64>);
 
 impl Bits {
-    /// Nothing where the text is not a bitmap.
+    /// Reads a bitmap; a text that is not one gives an empty bitmap.
     pub fn read(text: &str) -> Self {
         let words = text.split_whitespace().rev();
         Self(words.map_while(|w| u64::from_str_radix(w, 16).ok()).collect())
     }
 
-    /// Whether the bit is set.
+    /// Returns whether the bit is set.
     pub fn has(&self, bit: u16) -> bool {
         let word = self.0.get(usize::from(bit) / 64).copied().unwrap_or(0);
         word >> (bit % 64) & 1 == 1
     }
 }
 
-/// What a device can report.
+/// Abilities of a device.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Abilities {
     /// Keys and buttons.
@@ -57,7 +57,7 @@ pub struct Abilities {
     pub absolute: Bits,
     /// Relative axes.
     pub relative: Bits,
-    /// Properties, as accelerometer.
+    /// Properties, such as accelerometer.
     pub properties: Bits,
     /// USB number of the vendor.
     pub vendor: u16,
@@ -82,10 +82,10 @@ const SIX_RELATIVE: [RelativeAxisCode; 6] = [
 ];
 
 impl Kind {
-    /// The kind of a device with these abilities; `None` for any other device.
+    /// Returns the kind of a device with these abilities; `None` for any other device.
     pub fn of(can: &Abilities) -> Option<Self> {
         let key = |key: KeyCode| can.keys.has(key.0);
-        // The motion sensor of a gamepad is a device of its own with six axes.
+        // The motion sensor of a gamepad appears as a separate device with six axes.
         if can.properties.has(PropType::ACCELEROMETER.0) {
             return None;
         }
@@ -95,12 +95,12 @@ impl Kind {
         }
         let six =
             SIX_ABSOLUTE.iter().all(|a| can.absolute.has(a.0)) || SIX_RELATIVE.iter().all(|a| can.relative.has(a.0));
-        // Joysticks and wheels have six axes too, but not the buttons of a 3D mouse.
+        // Joysticks and wheels have six axes too, but lack the buttons of a 3D mouse.
         let is_cap = can.vendor == VENDOR_3DCONNEXION || key(KeyCode::BTN_0);
         (six && is_cap && !key(KeyCode::BTN_TRIGGER)).then_some(Self::Mouse3d)
     }
 
-    /// Its name, for people.
+    /// Returns the display name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gamepad => "gamepad",
@@ -108,7 +108,8 @@ impl Kind {
         }
     }
 
-    /// What a key asks for, by its place: drivers name the upper and the left one differently.
+    /// Returns the function of a key by its place: drivers name the upper and the left one
+    /// differently.
     pub fn button(self, key: KeyCode) -> Option<Button> {
         match (self, key) {
             (Self::Gamepad, KeyCode::BTN_SOUTH) | (Self::Mouse3d, KeyCode::BTN_0) => Some(Button::Drop),
@@ -119,17 +120,17 @@ impl Kind {
         }
     }
 
-    /// Whether the key does anything.
+    /// Returns whether the key has a function.
     pub fn has_use_for(self, key: KeyCode) -> bool {
         self.button(key).is_some() || self.slows(key)
     }
 
-    /// Whether the key slows the needle while it is held.
+    /// Returns whether the key slows the needle while it is held.
     pub fn slows(self, key: KeyCode) -> bool {
         self == Self::Gamepad && [KeyCode::BTN_TL, KeyCode::BTN_TR].contains(&key)
     }
 
-    /// Its axes in a few words, for a line of the window.
+    /// Returns a short description of its axes, for a line of the window.
     pub fn axes(self) -> &'static str {
         match self {
             Self::Gamepad => "left stick: forwards in, backwards out",
@@ -137,7 +138,7 @@ impl Kind {
         }
     }
 
-    /// Every axis and button, for the help page and the manual.
+    /// Returns every axis and button, for the help page and the manual.
     pub fn uses(self) -> Vec<(&'static str, String)> {
         let along = format::speed(super::ALONG_M_PER_S);
         let across = format::speed(super::ACROSS_M_PER_S);
@@ -165,7 +166,7 @@ impl Kind {
 mod tests {
     use super::*;
 
-    /// As `/sys/class/input/eventN/device` shows them; on a machine of 64 bits.
+    /// Returns abilities as `/sys/class/input/eventN/device` shows them on a 64-bit machine.
     fn sysfs(keys: &str, absolute: &str, relative: &str, properties: &str, vendor: u16) -> Abilities {
         Abilities {
             keys: Bits::read(keys),

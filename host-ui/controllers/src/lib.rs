@@ -1,7 +1,8 @@
-//! Gamepads and 3D mice that hold the needle: found, read and understood on a thread of their own.
+//! Gamepads and 3D mice that hold the needle: found, read and interpreted on a thread of their own.
 //!
-//! Events go one way: `found` (which devices there are) → `state` (events to a [`Wish`]) → `hub` (which device holds
-//! the needle) → `reader` (the thread) → the window, which asks the core to move the hand as it does for the mouse.
+//! Events go one way: `found` (list of devices) → `state` (events to a [`Wish`]) → `hub` (choice of
+//! the device that holds the needle) → `reader` (the thread) → the window, which asks the core to
+//! move the hand as it does for the mouse.
 
 #![warn(missing_docs)]
 
@@ -23,11 +24,11 @@ pub use list::list;
 pub use reader::{Controllers, System};
 pub use state::{DeviceState, ProbeWish, Wish};
 
-/// Speed of the tip along the needle with the stick or the cap as far as it goes; that of the keys.
+/// Speed of the tip along the needle at full deflection; equal to that of the keys.
 pub const ALONG_M_PER_S: f64 = 0.04;
-/// The same across the template: a hole in half a second.
+/// Speed of the tip across the template at full deflection: a hole in half a second.
 pub const ACROSS_M_PER_S: f64 = 0.01;
-/// Of the probe about its axis: 40 degrees in a second.
+/// Speed of the probe about its axis: 40 degrees in a second.
 pub const TURN_RAD_PER_S: f64 = 0.7;
-/// What the shoulder buttons and Shift leave of it.
+/// Share of the speed that remains with the shoulder buttons or Shift.
 pub const SLOW: f64 = 0.25;

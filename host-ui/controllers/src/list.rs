@@ -1,11 +1,11 @@
-//! `host-ui controllers`: each device, whether it can be read, and what it does.
+//! The command `host-ui controllers`: each device, its access and its functions.
 
 use super::error::{ListError, OpenError};
 use super::found::{Found, Places, find};
 use super::kind::Kind;
 use super::{DeviceSource, OpenDevice, System};
 
-/// Prints the devices; `Err` where one cannot be read, with what to do about it.
+/// Prints the devices; returns `Err` with the remedy if one cannot be read.
 pub fn list() -> Result<(), ListError> {
     let found = find(&Places::default());
     if found.is_empty() {

@@ -1,4 +1,5 @@
-//! The thread that reads the devices, of normal priority, and the window's end of it, which never waits.
+//! The thread that reads the devices, of normal priority, and the window's end of it, which never
+//! waits.
 
 use super::found::{Found, Places, find};
 use super::hub::{DeviceHub, DeviceSource, Latest, OpenDevice};
@@ -18,17 +19,17 @@ use triple_buffer::{Input, Output, triple_buffer};
 
 /// Period of the search for devices that were plugged in or unplugged.
 const LOOK_EVERY: Duration = Duration::from_millis(1500);
-/// A device is read no more often, whatever it sends.
+/// Shortest time between two readings of a device, however much it sends.
 const READ_EVERY: Duration = Duration::from_millis(4);
-/// While the needle is moved the thread publishes at least this often.
+/// Longest time between two publications while the needle moves.
 const MOVING_EVERY: Duration = Duration::from_millis(20);
-/// A wish that is older than this is no longer one: the thread stands still.
+/// Age at which a wish expires, because the thread has stopped.
 const WISH_LASTS: Duration = Duration::from_millis(250);
 
-/// The devices of this machine.
+/// Devices of this machine.
 #[derive(Default)]
 pub struct System {
-    /// Folders in which it looks.
+    /// Folders of the search.
     pub places: Places,
 }
 
@@ -57,7 +58,7 @@ impl DeviceSource for System {
         let ms = at_most.as_millis().min(10_000) as libc::c_int;
         // SAFETY: `polled` is valid for reads and writes of its length, and the devices stay open meanwhile.
         unsafe { libc::poll(polled.as_mut_ptr(), polled.len() as libc::nfds_t, ms) };
-        // Whatever woke it, all devices are read next; an unplugged one fails there.
+        // Whatever woke the thread, it reads all devices next; an unplugged one fails there.
     }
 }
 
@@ -75,18 +76,18 @@ impl OpenDevice for RawDevice {
     }
 }
 
-/// The window's end of the thread.
+/// Window's end of the thread.
 pub struct Controllers {
     latest: Output<(Instant, Latest)>,
     thread: Option<JoinHandle<()>>,
-    /// The thread ends when this is dropped.
+    /// Channel whose end stops the thread.
     open: Option<Sender<()>>,
     counted: [u32; Button::ALL.len()],
     two_hands: Arc<AtomicBool>,
 }
 
 impl Controllers {
-    /// Begins to look for devices.
+    /// Starts the search for devices.
     pub fn start<G: DeviceSource + Send + 'static>(source: G) -> Self
     where
         G::Device: Send,
@@ -107,13 +108,13 @@ impl Controllers {
         }
     }
 
-    /// Whether a second device moves the probe.
+    /// Sets whether a second device moves the probe.
     pub fn use_two_hands(&self, two_hands: bool) {
         // SYNC: no other memory depends on it; the thread sees it within its next reading.
         self.two_hands.store(two_hands, Ordering::Relaxed);
     }
 
-    /// No device holds the needle, whatever is plugged in.
+    /// Creates an end without a thread: no device ever holds the needle.
     pub fn none() -> Self {
         Self {
             latest: triple_buffer(&(Instant::now(), Latest::default())).1,
@@ -124,7 +125,7 @@ impl Controllers {
         }
     }
 
-    /// What is known now, and the buttons that were pressed since the last call. Never waits.
+    /// Returns the latest state, and the buttons pressed since the last call. Never waits.
     pub fn take(&mut self) -> (Latest, Vec<Button>) {
         let (at, latest) = self.latest.read();
         let mut latest = latest.clone();

@@ -1,4 +1,4 @@
-//! The state of one device from its events, and the speed that it asks for. Needs no device.
+//! The state of one device from its events, and the speed that it requests. Needs no device.
 
 use super::axis::Axis;
 use super::kind::{Button, Kind};
@@ -7,10 +7,11 @@ use evdev::{
     AbsInfo, AbsoluteAxisCode, AttributeSet, EventSummary, InputEvent, KeyCode, RelativeAxisCode, SynchronizationCode,
 };
 
-/// A driver with relative axes sends no zero when the cap is released: an axis without events for so long is at rest.
+/// Silence after which a relative axis is at rest, because its driver sends no zero when the cap is
+/// released.
 const RELATIVE_SILENCE_S: f64 = 0.1;
 
-/// How fast the hand wants the tip to go.
+/// Requested speed of the tip.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wish {
     /// Along the needle, positive inwards.
@@ -20,13 +21,13 @@ pub struct Wish {
 }
 
 impl Wish {
-    /// The needle stays where it is.
+    /// Request to stay in place.
     pub const REST: Self = Self {
         along_m_per_s: 0.0,
         across_m_per_s: [0.0; 2],
     };
 
-    /// The same direction at a share of the speed.
+    /// Returns the same direction at a share of the speed.
     pub fn slower(self, by: f64) -> Self {
         Self {
             along_m_per_s: self.along_m_per_s * by,
@@ -35,7 +36,7 @@ impl Wish {
     }
 }
 
-/// How the hand wants the ultrasound probe to go.
+/// Requested speed of the ultrasound probe.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ProbeWish {
     /// Along its axis, positive into the patient.
@@ -45,7 +46,7 @@ pub struct ProbeWish {
 }
 
 impl ProbeWish {
-    /// The same direction at a share of the speed.
+    /// Returns the same direction at a share of the speed.
     pub fn slower(self, by: f64) -> Self {
         Self {
             along_m_per_s: self.along_m_per_s * by,
@@ -54,7 +55,7 @@ impl ProbeWish {
     }
 }
 
-/// All that the kernel knows of a device at one moment.
+/// Kernel's whole state of a device at one moment.
 #[derive(Debug, Default)]
 pub struct DeviceState {
     /// Absolute axes with their range and position.
@@ -63,21 +64,22 @@ pub struct DeviceState {
     pub keys: AttributeSet<KeyCode>,
 }
 
-/// What an event was.
+/// Result of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Taken {
     Nothing,
     Pressed(Button),
-    /// Events are missing: the whole state must be read.
+    /// Events were lost: the whole state must be read.
     Lost,
 }
 
-/// X to the right, Y towards the operator, Z down, as drivers of sticks and of 3D mice have it.
+/// State of the axes: X to the right, Y towards the operator, Z down, as in drivers of sticks and
+/// 3D mice.
 pub struct State {
     kind: Kind,
     axes: [Option<Axis>; 3],
     counts: [i32; 3],
-    /// When a relative axis last spoke; `None` for an absolute one.
+    /// Time of the last event of a relative axis; `None` for an absolute one.
     spoke_s: [Option<f64>; 3],
     keys: AttributeSet<KeyCode>,
     is_losing: bool,
@@ -85,7 +87,8 @@ pub struct State {
 }
 
 impl State {
-    /// A device that was just opened. What is held now was not pressed for this program, and must first be released.
+    /// Creates a device that was just opened. Keys and sticks held now were not meant for this
+    /// program, and must first be released.
     pub fn new(kind: Kind, whole: &DeviceState) -> Self {
         let mut state = Self {
             kind,
@@ -106,7 +109,8 @@ impl State {
         state
     }
 
-    /// Whether the stick or the cap has been at rest since the device was plugged in, or since it was stopped.
+    /// Returns whether the stick or the cap has been at rest since the device was plugged in or
+    /// stopped.
     pub fn was_released(&self) -> bool {
         self.was_released
     }
@@ -115,7 +119,8 @@ impl State {
         if let EventSummary::Synchronization(_, code, _) = event.destructure() {
             return self.take_sync(code);
         }
-        // Between the loss and the next report nothing belongs together (kernel: event-codes.txt, SYN_DROPPED).
+        // Events between the loss and the next report are inconsistent (kernel: event-codes.txt,
+        // SYN_DROPPED).
         if self.is_losing {
             return Taken::Nothing;
         }
@@ -124,7 +129,7 @@ impl State {
             EventSummary::RelativeAxis(_, axis, counts) if axis.0 <= RelativeAxisCode::REL_Z.0 => {
                 self.set(usize::from(axis.0), counts, Some(now_s));
             }
-            // A set of keys panics at a number that it has no place for.
+            // A set of keys panics at a number outside its range.
             EventSummary::Key(_, key, _) if !self.kind.has_use_for(key) => {}
             EventSummary::Key(_, key, 1) if !self.keys.contains(key) => {
                 self.keys.insert(key);
@@ -148,11 +153,11 @@ impl State {
         Taken::Nothing
     }
 
-    /// After a loss. Buttons that are down now and were not before were pressed in between.
+    /// Takes the whole state after a loss. Buttons that are newly down were pressed in between.
     pub fn resync(&mut self, whole: &DeviceState) -> Vec<Button> {
         let before = std::mem::replace(&mut self.keys, AttributeSet::new());
         self.take_whole(whole);
-        // Of relative axes the kernel keeps no state.
+        // The kernel keeps no state of relative axes.
         for (counts, spoke_s) in self.counts.iter_mut().zip(&mut self.spoke_s) {
             if spoke_s.take().is_some() {
                 *counts = 0;
@@ -162,7 +167,7 @@ impl State {
         new.into_iter().filter_map(|key| self.pressed(key)).collect()
     }
 
-    /// What the hand on the device wants at this time.
+    /// Returns the speed that the device requests at this time.
     pub fn wish(&self, now_s: f64) -> Wish {
         if !self.was_released {
             return Wish::REST;
@@ -178,7 +183,7 @@ impl State {
                 along_m_per_s: speed(-back, ALONG_M_PER_S),
                 ..Wish::REST
             },
-            // A hand that presses also slides a little: only the direction that is meant counts.
+            // A hand that presses also slides a little: only the dominant direction counts.
             Kind::Mouse3d if down.abs() >= right.hypot(back) => Wish {
                 along_m_per_s: speed(down, ALONG_M_PER_S),
                 ..Wish::REST
@@ -190,7 +195,7 @@ impl State {
         }
     }
 
-    /// What the hand on the device wants of the probe at this time: in, out and a turn.
+    /// Returns the speed that the device requests of the probe at this time: in, out and a turn.
     pub fn probe_wish(&self, now_s: f64) -> ProbeWish {
         if !self.was_released {
             return ProbeWish::default();
@@ -240,12 +245,14 @@ impl State {
         Some(button)
     }
 
-    /// To be called without events too: relative axes rest by being silent.
+    /// Notes an axis at rest. Must also be called without events, because relative axes rest by
+    /// being silent.
     pub fn note_rest(&mut self, now_s: f64) {
         self.was_released |= (0..3).all(|axis| self.ignores(axis) || self.share(axis, now_s) == 0.0);
     }
 
-    /// The second stick and the triggers of a gamepad rest where they like.
+    /// Returns whether an axis is ignored: the second stick and the triggers of a gamepad have any
+    /// rest position.
     fn ignores(&self, axis: usize) -> bool {
         self.kind == Kind::Gamepad && axis > usize::from(AbsoluteAxisCode::ABS_Y.0)
     }

@@ -1,4 +1,4 @@
-//! Two gamepads that are not there: who holds what, what is unplugged, what may not be read.
+//! Two fake gamepads: control, unplugging and missing rights.
 
 use super::*;
 use evdev::{AbsInfo, AbsoluteAxisCode, AttributeSet, EventType, KeyCode};
@@ -8,7 +8,7 @@ use std::rc::Rc;
 
 type Queue = Rc<RefCell<VecDeque<io::Result<InputEvent>>>>;
 
-/// Two gamepads at most, with the events that they are to send.
+/// Two gamepads at most, with the events that they will send.
 #[derive(Clone, Default)]
 struct Table {
     there: Rc<RefCell<Vec<&'static str>>>,
@@ -71,7 +71,7 @@ impl Table {
         queue.push_back(Ok(InputEvent::new(EventType::SYNCHRONIZATION.0, 0, 0)));
     }
 
-    /// Away from the operator by so many of 100.
+    /// Pushes the stick away from the operator, in percent.
     fn pushes(&self, pad: usize, by: i32) {
         self.sends(pad, EventType::ABSOLUTE, AbsoluteAxisCode::ABS_Y.0, -by);
     }
@@ -102,7 +102,7 @@ fn a_device_that_fails_while_it_is_read_is_unplugged_at_once() {
     let (table, mut hub) = Table::with(&["a"]);
     table.pushes(0, 100);
     assert!(hub.read(0.0).wish != Wish::REST);
-    // ENODEV, what the kernel says of a device that was pulled out.
+    // ENODEV, the kernel's answer for a device that was pulled out.
     table.queues[0]
         .borrow_mut()
         .push_back(Err(io::Error::from_raw_os_error(19)));
@@ -183,7 +183,7 @@ fn lost_events_have_the_state_read_again() {
     table.pushes(0, 100);
     hub.read(0.0);
     table.sends(0, EventType::SYNCHRONIZATION, 3, 0);
-    // The stick of the device is in the middle.
+    // The device's stick is in the middle.
     assert_eq!(hub.read(0.0).wish, Wish::REST);
 }
 

@@ -1,4 +1,4 @@
-//! Events of devices, and the speed that follows from them.
+//! Device events, and the speed that follows from them.
 
 use super::*;
 use evdev::EventType;
@@ -13,7 +13,7 @@ fn report() -> InputEvent {
     event(EventType::SYNCHRONIZATION, SynchronizationCode::SYN_REPORT.0, 0)
 }
 
-/// Events in one report, then what they were; `None` for those that were nothing.
+/// Feeds the events of one report; returns the result of each, without those that had none.
 fn feed(state: &mut State, now_s: f64, events: &[(EventType, u16, i32)]) -> Vec<Taken> {
     let events = events.iter().map(|(kind, code, value)| event(*kind, *code, *value));
     let taken = events.chain([report()]).map(|e| state.take(e, now_s));
@@ -155,7 +155,7 @@ fn a_relative_cap_that_falls_silent_is_at_rest() {
         &[(EventType::RELATIVE, RelativeAxisCode::REL_RZ.0, 350)],
     );
     assert_eq!(state.wish(2.0), Wish::REST);
-    // Stopped while pressed: silence is letting go.
+    // Stopped while pressed: silence counts as release.
     feed(&mut state, 3.0, &press);
     feed(&mut state, 3.0, &[(EventType::KEY, KeyCode::BTN_1.0, 1)]);
     assert!(!state.was_released());
