@@ -1,4 +1,5 @@
-//! What the operator asks for, as plain data: pictures, panels and keys return it, the window carries it out.
+//! Requests of the operator as plain data: pictures, panels and keys return them, the window
+//! executes them.
 
 use crate::dialog::Purpose;
 use crate::planner::Edit;
@@ -8,12 +9,12 @@ use stylet_implant::intraoperative::SeedsFrom;
 use stylet_implant::plan::{Hole, Row};
 use stylet_shm_schema::{LeaseRequest, Request};
 
-/// What the operator asked for. The window carries it out after all panels are drawn.
+/// Request of the operator. The window executes it after all panels are drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Sends a request without a payload.
     Send(Request),
-    /// Joined to the one before it where the needle is loaded with a strand.
+    /// Drops a seed, joined to the previous one if the needle is loaded with a strand.
     DropSeed,
     PlanSeeds,
     PlaceNeedle,
@@ -21,9 +22,9 @@ pub enum Action {
     Retract,
     /// Depth along the path from the entry, m.
     MoveTo(f64),
-    /// A hand on the needle: depth along the path, m. Carried out once a frame at most.
+    /// Drives the needle by hand to a depth along the path, m. Executed at most once a frame.
     DriveTo(f64),
-    /// The main action of the present step.
+    /// Runs the main action of the present step.
     Next,
     /// Undoes the last step, where that is possible.
     Undo,
@@ -34,13 +35,13 @@ pub enum Action {
     Trainee(TraineeAction),
     Probe(ProbeAction),
     RunAll,
-    /// The answer to the question that a standing fault raises: re-arm and begin, or not.
+    /// Answers the question that a standing fault raises: re-arm and begin, or not.
     Rearm(bool),
-    /// All needles again, from a reset, whatever was done.
+    /// Inserts all needles again, from a reset.
     StartOver,
     StopRun,
     LoadScene(PathBuf),
-    /// Loads an image of the patient of the present scene for the slices.
+    /// Loads an image of the present scene's patient for the slices.
     LoadImage(PathBuf),
     CancelLoad,
     /// Opens a dialog for a file.
@@ -48,7 +49,7 @@ pub enum Action {
     /// Loads the scene of this index in [`stylet_shm_schema::BUILTIN_SCENES`].
     LoadBuiltinScene(usize),
     OpenParameters,
-    /// Shows who is connected over a relay, or no longer.
+    /// Shows or hides the list of hosts connected over a relay.
     ToggleClass,
     /// Asks the relay for the needle, or hands it over.
     Lease(LeaseRequest),
@@ -68,21 +69,22 @@ pub enum Action {
     SavePicture,
     /// Saves the debrief as files.
     SaveDebrief,
-    /// The refusals shown so far were read.
+    /// Marks the refusals shown so far as read.
     DismissRefusals,
-    /// The message that a device was unplugged was read.
+    /// Marks the message about an unplugged device as read.
     DismissDisconnected,
 }
 
-/// What is asked of the simulated hand that holds the ultrasound probe: ways along its axis (m), turns about it (rad).
+/// Request to the simulated hand that holds the ultrasound probe: moves along its axis (m), turns
+/// about it (rad).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ProbeAction {
-    /// By the stepper, whether its brake is on or off.
+    /// Moves by the stepper, with its brake on or off.
     Step {
         way_m: f64,
         turn_rad: f64,
     },
-    /// By hand, which the brake does not allow.
+    /// Moves by hand, which the brake prevents.
     Drag {
         way_m: f64,
         turn_rad: f64,
@@ -90,41 +92,41 @@ pub enum ProbeAction {
     ToggleBrake,
 }
 
-/// What an instructor asks for of a trainee, by the place in the list.
+/// Instructor's request for a trainee, by the place in the list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TraineeAction {
-    /// The window shows this one.
+    /// Shows this trainee in the window.
     Follow(usize),
-    /// Stops that hand.
+    /// Stops this trainee's hand.
     Stop(usize),
-    /// Writes the debrief of this one, from what the window has heard.
+    /// Writes the debrief of this trainee, from the data that the window received.
     Debrief(usize),
     /// Stops every hand.
     StopAll,
 }
 
-/// What the operator asks for of a recording.
+/// Request of the operator for a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum WatchAction {
     /// Shows the recorded insertion that comes with the program.
     Example,
     /// Shows a recording made by `host-ui record`.
     File(PathBuf),
-    /// Holds it, or lets it go on.
+    /// Pauses or resumes it.
     Hold(bool),
-    /// Shows it again from its beginning.
+    /// Plays it again from its beginning.
     Again,
-    /// Goes back to the core.
+    /// Returns to the core.
     Close,
 }
 
-/// What the operator asks for in a plan of many needles; needles are counted from 0.
+/// Request of the operator in a plan of many needles; needles are counted from 0.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlanAction {
     /// Begins an empty plan.
     Begin,
     Automatic,
-    /// Takes a proposal of the automatic plan, by its place among them.
+    /// Takes a proposal of the automatic plan, by its index.
     Choose(usize),
     Discard,
     Add(Hole),
@@ -138,25 +140,25 @@ pub enum PlanAction {
     Cancel,
     Import(PathBuf),
     Export(PathBuf),
-    /// Structure set, plan and dose as DICOM, into a new folder.
+    /// Exports structure set, plan and dose as DICOM into a new folder.
     ExportStudy,
-    /// The next needle with seeds becomes the one to insert.
+    /// Selects the next needle with seeds for insertion.
     NextNeedle,
     /// Moves the slices to this depth from the template's face, m.
     LookAt(f64),
-    /// Changes what is drawn on the live picture.
+    /// Changes the drawing on the live picture.
     Draw(Edit),
-    /// Which seeds the dose of a moment is of.
+    /// Chooses the seeds whose present dose is shown.
     SeedsFrom(SeedsFrom),
-    /// Plans the needles that are left anew.
+    /// Replans the remaining needles.
     Update,
-    /// Takes the update that waits, or leaves the plan as it is.
+    /// Accepts the pending update, or rejects it.
     Decide(bool),
-    /// The plan before the last update again.
+    /// Restores the plan before the last update.
     WithdrawUpdate,
 }
 
-/// A place that the three-dimensional picture is looked at from.
+/// Viewpoint of the three-dimensional picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Viewpoint {
     Oblique,

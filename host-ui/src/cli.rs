@@ -31,19 +31,21 @@ use stylet_shm_schema::{MAX_LEFT_NEEDLES, ParameterChange};
 
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
 ///
-/// Start `rt-core` first, then `host-ui` for the window. `host-ui procedure` implants the seeds of the default plan
-/// without a window and writes what happened. In the window keys, mouse, a gamepad or a 3D mouse hold the needle: F1
-/// lists what they do, `host-ui controllers` those that are plugged in.
+/// Start `rt-core` first, then `host-ui` for the window. `host-ui procedure` implants the seeds of
+/// the default plan without a window and writes the results. In the window, keys, mouse, a gamepad
+/// or a 3D mouse hold the needle: F1 lists their functions, `host-ui controllers` lists the
+/// connected ones.
 #[derive(Parser, Debug)]
 #[command(name = "host-ui", version, args_conflicts_with_subcommands = true)]
 pub struct Cli {
     #[command(flatten)]
     window: CoreArgs,
-    /// Image for the slices instead of simulated ultrasound, of the patient of --scene FILE: a DICOM series (its folder, or one of its
-    /// files), NIfTI-1, NRRD, MetaImage
+    /// Image for the slices instead of simulated ultrasound, of the patient of --scene FILE: a
+    /// DICOM series (its folder, or one of its files), NIfTI-1, NRRD, MetaImage
     #[arg(long, value_name = "FILE", requires = "scene")]
     image: Option<PathBuf>,
-    /// Show a recording made by 'host-ui record' in place of a running rt-core; nothing in it can be moved
+    /// Show a recording made by 'host-ui record' instead of a running rt-core; nothing in it can be
+    /// moved
     #[arg(long, value_name = "FILE.mcap", conflicts_with = "scene")]
     watch: Option<PathBuf>,
     /// Ignore gamepads and 3D mice: only keys and mouse move the needle
@@ -52,20 +54,22 @@ pub struct Cli {
     /// Draw frames without a pause, for measurements
     #[arg(long)]
     without_pause: bool,
-    /// Print each second how many frames were drawn and what they cost
+    /// Print each second how many frames were drawn and their cost
     #[arg(long)]
     count_frames: bool,
-    /// Show a square in the lower right corner that turns from dark to light or back when the tip has moved by 0.5 mm, for a photodiode
+    /// Show a square in the lower right corner that switches between dark and light when the tip
+    /// has moved by 0.5 mm, for a photodiode
     #[arg(long)]
     patch: bool,
-    /// Show a trainee in a list, with the instance of their rt-core or of a 'relay join'; may be given several times, and the first is
-    /// followed
+    /// Show a trainee in a list, with the instance of their rt-core or of a 'relay join'; may be
+    /// given several times; the window follows the first
     #[arg(long = "trainee", value_name = "NAME=INSTANCE", value_parser = trainee)]
     trainees: Vec<Trainee>,
     /// Write a debrief into DIR/NAME/DATE at the end of each procedure, for 'host-ui class'
     #[arg(long, value_name = "DIR")]
     class: Option<PathBuf>,
-    /// Who sits at this window, for --class [default: the instance; of a list, whoever is followed]
+    /// Name of the operator at this window, for --class [default: the instance; with a list, the
+    /// followed trainee]
     #[arg(long, value_name = "NAME", requires = "class", value_parser = name)]
     name: Option<String>,
     #[command(subcommand)]
@@ -74,9 +78,11 @@ pub struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Task {
-    /// List the connected gamepads and 3D mice, whether they can be read, and what their axes and buttons do
+    /// List the connected gamepads and 3D mice, their access rights, and the functions of their
+    /// axes and buttons
     Controllers,
-    /// Plan, place the needles, insert, drop the seeds while retracting; write result.json, force.csv and, of a plan, a debrief
+    /// Plan, place the needles, insert, drop the seeds while retracting; write result.json,
+    /// force.csv and, for a plan, a debrief
     Procedure {
         #[command(flatten)]
         common: CoreArgs,
@@ -89,34 +95,40 @@ enum Task {
         /// Speed of insertion in mm/s [default: that of the scene file, or 50]
         #[arg(long, value_name = "MM/S")]
         insert_speed: Option<f64>,
-        /// Plan of many needles (TOML), as 'host-ui plan' writes it [default: that of the scene file, or one needle through the middle]
+        /// Plan of many needles (TOML) from 'host-ui plan' [default: that of the scene file, or one
+        /// needle through the middle]
         #[arg(long, value_name = "FILE")]
         plan: Option<PathBuf>,
-        /// Rehearse every needle first, and drop each seed so that it rests on plan
+        /// Rehearse every needle first, and shift the drops so that each seed comes to rest on plan
         #[arg(long)]
         compensate: bool,
-        /// Put this many stabilising needles in first, 0 to 4; they leave no seed, hold the gland while the others come and go, and are drawn out at the end
+        /// Insert this many stabilising needles first, 0 to 4; they leave no seed, hold the gland
+        /// during the implant, and are withdrawn at the end
         #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=MAX_LEFT_NEEDLES as i64))]
         stabilise: u8,
         /// Source file for the score [default: the source that the plan names, 6711 or 200]
         #[arg(long, value_name = "FILE")]
         source: Option<PathBuf>,
-        /// Set a parameter before anything else, in the unit that the window shows, such as needle.bending_stiffness=0.016; may be given several times, and stays in force in the core
+        /// Set a parameter before anything else, in the window's unit, such as
+        /// needle.bending_stiffness=0.016; may be given several times, and stays in force in the
+        /// core
         #[arg(long = "set", value_name = "KEY=VALUE", value_parser = procedure::parameter)]
         parameters: Vec<ParameterChange>,
-        /// Turn the force on although a fault stands; without it the procedure does not begin, for after a fault only a person re-arms
+        /// Turn the force on although a fault stands; without this the procedure does not begin,
+        /// because only a person re-arms after a fault
         #[arg(long)]
         rearm: bool,
-        /// Seeds along the needle, 1 to 128, where no plan is given
+        /// Seeds along the needle, 1 to 128, if no plan is given
         #[arg(long, default_value_t = 5, conflicts_with = "plan", value_parser = clap::value_parser!(u16).range(1..=128))]
         seeds: u16,
     },
-    /// Record every tick of the force loop and the tissue's snapshots in an MCAP file, and count what is missing
+    /// Record every tick of the force loop and the tissue's snapshots in an MCAP file, and count
+    /// losses
     Record(RecordArgs),
-    /// Serve needle, seeds, gland and state to 3D Slicer over OpenIGTLink, until interrupted; anyone who reaches the
-    /// address can watch, for the protocol has no passwords
+    /// Serve needle, seeds, gland and state to 3D Slicer over OpenIGTLink, until interrupted;
+    /// anyone who reaches the address can watch, because the protocol has no passwords
     Igtl {
-        /// Name that rt-core was started under
+        /// Name under which rt-core was started
         #[arg(long, default_value = "main", value_parser = Instance::new)]
         instance: Instance,
         /// Address and port to listen on
@@ -132,7 +144,7 @@ enum Task {
         /// Let transforms of this name, such as ProbeToScene, move the simulated hand with the ultrasound probe (rt-core --device-2)
         #[arg(long, value_name = "NAME")]
         probe: Option<String>,
-        /// As fast as this at most, both hands, 0.1 to 1000 mm/s
+        /// Maximum speed of both hands, 0.1 to 1000 mm/s
         #[arg(long, default_value_t = 100.0, value_name = "MM/S")]
         hand_speed: f64,
     },
@@ -140,34 +152,36 @@ enum Task {
     Export(ExportArgs),
     /// Let rt-core write its flight recording: the last seconds of both loops, for 'rt-core replay'
     Flight {
-        /// Name that rt-core was started under
+        /// Name under which rt-core was started
         #[arg(long, default_value = "main", value_parser = Instance::new)]
         instance: Instance,
     },
     /// Segmented volumes and scene files
     #[command(subcommand)]
     Scene(SceneTask),
-    /// Label volumes, seed plans and doses from one format to another, DICOM among them
+    /// Convert label volumes, seed plans and doses between formats, DICOM among them
     Convert(ConvertArgs),
-    /// Structure set, plan and dose of one study as DICOM files that name each other
+    /// Write structure set, plan and dose of one study as DICOM files that name each other
     Dicom(Box<DicomArgs>),
-    /// Make a plan for the scene that runs: needles through the template, seeds, their strength; or from a table of seeds
+    /// Make a plan for the running scene: needles through the template, seeds, their strength; or
+    /// from a table of seeds
     Plan(PlanArgs),
-    /// The ultrasound of a probe, or a radiograph of a C-arm, of the scene that runs, as PNG
+    /// Write the ultrasound of a probe, or a radiograph of a C-arm, of the running scene, as PNG
     Picture(PictureArgs),
-    /// Dose of seeds (TG-43U1) at points, in structures, or on a grid
+    /// Compute the dose of seeds (TG-43U1) at points, in structures, or on a grid
     Dose(DoseArgs),
-    /// Find the implanted seeds in a CT volume; seeds that touch are split
+    /// Find the implanted seeds in a CT volume, including seeds that touch
     FindSeeds(FindSeedsArgs),
-    /// The implant as planned, delivered, on day 0 and on day 30: dose, sectors, indices and effect side by side
+    /// Compare the implant as planned, delivered, on day 0 and on day 30: dose, sectors, indices
+    /// and effect
     PostImplant(Box<PostImplantArgs>),
-    /// Difference of two doses, each an RT Dose or a dose_grid.csv
+    /// Compute the difference of two doses, each an RT Dose or a dose_grid.csv
     Compare(CompareArgs),
-    /// Dose of a plan under random seed errors
+    /// Compute the dose of a plan under random seed errors
     Perturb(PerturbArgs),
-    /// Distributions and dose of the insertions that `rt-core study` simulated, beside published values
+    /// Compare distributions and dose of the insertions of 'rt-core study' with published values
     Study(StudyArgs),
-    /// Trainees of a class beside each other, and what each has learned: a page and a table
+    /// Compare the trainees of a class and their progress: a page and a table
     Class(ClassArgs),
     /// Write the man pages and shell completions of this program
     Manual(ManualArgs),
@@ -180,17 +194,18 @@ enum SceneTask {
     Check {
         /// NIfTI-1, NRRD (also Slicer's .seg.nrrd), MetaImage, DICOM RT Structure Set, or a scene file (.toml)
         file: PathBuf,
-        /// Which label is the gland [default: all but 0]
+        /// Label of the gland [default: all but 0]
         #[arg(long, value_name = "N")]
         label: Option<u8>,
     },
 }
 
 impl Cli {
-    /// Carries out the command.
+    /// Executes the command.
     ///
     /// # Errors
-    /// The text for the terminal: what failed and what to do.
+    ///
+    /// The text for the terminal: the failure and its remedy.
     pub fn run(self) -> Result<(), CommandError> {
         if self.task.is_some() {
             interrupt::end_with_reader();

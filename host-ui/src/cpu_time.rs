@@ -1,6 +1,6 @@
-//! Processor time: the cost of a frame, whatever else the machine does.
+//! Processor time: the cost of a frame, independent of the machine's load.
 
-/// Processor time of this thread so far, ns; 0 where the system does not report it.
+/// Returns the processor time of this thread so far, ns; 0 if the system does not report it.
 pub fn thread_ns() -> u64 {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
     // SAFETY: `time` is valid for writes.

@@ -1,36 +1,37 @@
-//! Native dialogs for files, through the desktop's portal, on a thread of its own: a frame never waits for one.
+//! Native file dialogs, through the desktop's portal, on a thread of their own: a frame never waits
+//! for one.
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use stylet_base::job::{Job, JobUpdate};
 
-/// Nobody closes a dialog faster than this: it never opened.
+/// Shortest time in which a person can close a dialog; a faster end means that it never opened.
 const OPENS_WITHIN: Duration = Duration::from_millis(400);
 
-/// What a file is chosen for.
+/// Purpose of a dialog.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// A segmentation or a scene file.
     Scene,
     /// An image of the patient of the scene.
     Image,
-    /// A recording to look at.
+    /// A recording to play.
     Recording,
     /// A plan to read.
     ImportPlan,
-    /// A plan to write, with all that it holds.
+    /// A plan to write, complete.
     SavePlan,
-    /// Its seeds as a table.
+    /// The plan's seeds as a table.
     SaveTable,
-    /// Its seeds as a DICOM RT Plan.
+    /// The plan's seeds as a DICOM RT Plan.
     SaveRtPlan,
 }
 
 impl Purpose {
-    /// The ways to save a plan.
+    /// Purposes that save a plan.
     pub const SAVES: [Self; 3] = [Self::SavePlan, Self::SaveTable, Self::SaveRtPlan];
 
-    /// What the dialog, and the entry of the menu that opens it, are called.
+    /// Returns the title of the dialog, and of the menu entry that opens it.
     pub fn title(self) -> &'static str {
         match self {
             Self::Scene => "Open a scene",
@@ -47,7 +48,7 @@ impl Purpose {
         Self::SAVES.contains(&self)
     }
 
-    /// Names of the formats, each with its endings.
+    /// Returns the names of the formats, each with its file extensions.
     fn formats(self) -> &'static [(&'static str, &'static [&'static str])] {
         match self {
             Self::Scene => &[
@@ -70,7 +71,7 @@ impl Purpose {
     }
 }
 
-/// How a dialog ended.
+/// Result of a dialog.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Picked {
     /// With a file.
@@ -81,10 +82,10 @@ pub enum Picked {
     Failed(DialogError),
 }
 
-/// No dialog could be opened.
+/// Error of a dialog that could not be opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DialogError {
-    /// Neither a session bus nor zenity is there.
+    /// Neither a session bus nor zenity is present.
     #[error(
         "this desktop has no file dialog (no session bus with a portal, no zenity): type the path into the field instead"
     )]
@@ -94,7 +95,7 @@ pub enum DialogError {
         "the desktop's file dialog did not open (is xdg-desktop-portal installed?): type the path into the field instead"
     )]
     NotOpened,
-    /// Its thread ended without an outcome.
+    /// Its thread ended without a result.
     #[error("the file dialog ended without an answer: type the path into the field instead")]
     Ended,
 }
@@ -106,20 +107,20 @@ pub struct Dialogs {
 }
 
 impl Dialogs {
-    /// Opens a dialog in the folder of a file that is known, unless one is open.
+    /// Opens a dialog in the folder of a known file, unless one is open.
     pub fn begin(&mut self, purpose: Purpose, beside: &str) {
         if self.open.is_some() {
             return;
         }
         let folder = Path::new(beside.trim()).parent().map(Path::to_owned);
         let job = Job::begin("file dialog", move |answer, _| {
-            // The window may be closed by now; then nobody reads the answer.
+            // The window may have closed, so nobody reads the answer.
             let _ = answer.send(pick(purpose, folder));
         });
         self.open = Some((purpose, job));
     }
 
-    /// Each outcome once.
+    /// Returns each result once.
     pub fn poll(&mut self) -> Option<(Purpose, Picked)> {
         let (purpose, job) = self.open.as_ref()?;
         let (purpose, picked) = match job.poll() {
@@ -156,7 +157,7 @@ fn pick(purpose: Purpose, folder: Option<PathBuf>) -> Picked {
     }
 }
 
-/// A session bus that could have a portal, or zenity.
+/// Returns whether a dialog is possible: a session bus that may have a portal, or zenity.
 fn is_possible(variable: impl Fn(&str) -> Option<PathBuf>) -> bool {
     let has_bus = variable("DBUS_SESSION_BUS_ADDRESS").is_some_and(|address| !address.as_os_str().is_empty())
         || variable("XDG_RUNTIME_DIR").is_some_and(|folder| folder.join("bus").exists());
@@ -167,7 +168,7 @@ fn is_possible(variable: impl Fn(&str) -> Option<PathBuf>) -> bool {
     has_bus || (has_display && std::env::split_paths(&paths).any(|folder| folder.join("zenity").exists()))
 }
 
-/// A plan's format goes by its ending.
+/// Adds the extension that selects a plan's format.
 fn with_ending(purpose: Purpose, path: PathBuf) -> PathBuf {
     let ending = match purpose {
         Purpose::SavePlan => "toml",

@@ -1,10 +1,10 @@
-//! Keys: which there are, and what is held or pressed in this frame.
+//! Keys: their list, and those held or pressed in this frame.
 
 use crate::action::{Action, ProbeAction, TraineeAction, Viewpoint};
 use egui::{Key, Modifiers};
 use stylet_shm_schema::Request;
 
-/// Every key, for the overlay and the manual.
+/// Every key with its function, for the overlay and the manual.
 pub const KEYS: [(&str, &str); 26] = [
     ("W  or  Up", "advance the needle along its path while held"),
     (
@@ -55,20 +55,21 @@ pub const KEYS: [(&str, &str); 26] = [
     ("Wheel in a slice", "through the slices; with Ctrl zooms"),
 ];
 
-/// What the keys ask for in one frame.
+/// Requests of the keys in one frame.
 #[derive(Debug, Default, PartialEq)]
 pub struct Keys {
     /// Actions of the keys that were pressed.
     pub actions: Vec<Action>,
     /// Metres per second along the path, positive inwards; 0 when no key is held.
     pub drive_m_per_s: f64,
-    /// Speed of the other hand, scene frame; 0 when no key is held.
+    /// Speed of the second hand in the scene frame; 0 when no key is held.
     pub second_m_per_s: [f64; 3],
 }
 
 const DRIVE_M_PER_S: f64 = 0.04;
 
-/// Nothing while a widget has the focus: typing a path must not drop a seed.
+/// Reads the keys; returns nothing while a widget has the focus, because typing a path must not
+/// drop a seed.
 pub fn read(ctx: &egui::Context) -> Keys {
     let mut keys = Keys::default();
     if ctx.input_mut(|i| i.consume_key(Modifiers::NONE, Key::F1)) {
@@ -80,7 +81,7 @@ pub fn read(ctx: &egui::Context) -> Keys {
             keys.actions.push(Action::Trainee(TraineeAction::Follow(number)));
         }
     }
-    // These two are for whatever is edited but words.
+    // These two apply to everything but text fields.
     if !ctx.text_edit_focused() {
         ctx.input(|i| {
             if fresh_press(i, Modifiers::CTRL | Modifiers::SHIFT, Key::Z) {
@@ -126,7 +127,7 @@ pub fn read(ctx: &egui::Context) -> Keys {
         }
         let held = |a, b| f64::from(u8::from(i.key_down(a) || i.key_down(b)));
         let slow = if i.modifiers.shift { 0.25 } else { 1.0 };
-        // Who releases Alt before the rest has not begun to move the needle.
+        // Releasing Alt before the other key must not begin to move the needle.
         let is_held = [Key::W, Key::S, Key::ArrowUp, Key::ArrowDown]
             .iter()
             .any(|key| i.key_down(*key));

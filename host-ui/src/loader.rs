@@ -1,23 +1,24 @@
-//! Reads scenes and images on a thread of its own, so that a large or broken file never holds up a frame.
+//! Reads scenes and images on a thread of its own, so that a large or broken file never delays a
+//! frame.
 
 use std::path::{Path, PathBuf};
 use stylet_base::job::{Job, JobUpdate};
 use stylet_files::{self as files, FileError, Image, LabelVolume, Progress, scene};
 
-/// What was read from a file.
+/// Result of reading a file.
 pub enum Loaded {
-    /// A scene, and the image that its scene file names.
+    /// Scene, and the image that its scene file names.
     Scene(Box<LabelVolume>, Option<Image>),
     Image(Image),
 }
 
-/// A file that could not be read.
+/// Error of a file that could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// The file was refused, with the reason.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The thread ended without an outcome.
+    /// The thread ended without a result.
     #[error("{}: the reader ended before the file was read", .0.display())]
     Ended(PathBuf),
 }
@@ -37,7 +38,7 @@ pub struct Loader {
 }
 
 impl Loader {
-    /// Begins to read a scene. `image` replaces the image that a scene file names.
+    /// Starts to read a scene. `image` replaces the image that a scene file names.
     pub fn begin_scene(&mut self, path: &Path, label: Option<u8>, image: Option<PathBuf>) {
         self.begin(path, move |path, progress| scene_of(path, label, image, progress));
     }
@@ -55,14 +56,14 @@ impl Loader {
         let (owned, reported) = (path.to_owned(), progress.clone());
         let job = Job::begin("file reader", move |answer, interrupt| {
             let outcome = read(&owned, &reported.ended_by(interrupt.clone()));
-            // The window may be closed by now; then nobody reads the answer.
+            // The window may have closed, so nobody reads the answer.
             let _ = answer.send(outcome.map_err(LoadError::from));
         });
         let path = path.to_owned();
         self.reading = Some(Reading { path, progress, job });
     }
 
-    /// File and stage of the reading, and the share of the stage that is done.
+    /// Returns file and stage of the reading, and the completed share of the stage.
     pub fn at(&self) -> Option<(String, f32)> {
         let reading = self.reading.as_ref()?;
         let (stage, share) = reading.progress.at();
@@ -77,7 +78,7 @@ impl Loader {
         self.reading = None;
     }
 
-    /// Reports each outcome once; a reader that ended without one is an error too.
+    /// Reports each result once; a reader that ended without one is an error too.
     pub fn poll(&mut self) -> Option<Outcome> {
         let reading = self.reading.as_ref()?;
         let outcome = match reading.job.poll() {

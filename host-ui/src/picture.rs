@@ -1,4 +1,4 @@
-//! The window as a PNG file, written beside the frames.
+//! The window as a PNG file, written in the background.
 
 use eframe::icon_data::IconDataExt;
 use egui::{ColorImage, IconData};
@@ -8,10 +8,10 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{SystemTime, UNIX_EPOCH};
 use stylet_base::{WriteError, write_whole};
 
-/// Under the folder that the program was started in.
+/// Folder for pictures, below the folder in which the program was started.
 const FOLDER: &str = "out/pictures";
 
-/// A picture that could not be saved.
+/// Error of a picture that could not be saved.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
     /// No thread could be started to write it.
@@ -28,7 +28,7 @@ pub enum PictureError {
     Write(#[from] WriteError),
 }
 
-/// The file of a picture, or why there is none.
+/// File of a picture, or the reason why there is none.
 type Saved = Result<PathBuf, PictureError>;
 
 /// Pictures that are being written.
@@ -45,14 +45,14 @@ impl Default for Pictures {
 }
 
 impl Pictures {
-    /// Asks for the next frame; it is written by a thread of its own.
+    /// Requests the next frame, which a thread of its own writes.
     pub fn request(&self, ctx: &egui::Context) {
         let done = self.done.clone();
         ctx.request_screenshot(move |image| {
             let writer = std::thread::Builder::new().name("picture".to_owned());
             let failed = done.clone();
             let spawned = writer.spawn(move || {
-                // The window may be closed by now; then nobody reads the answer.
+                // The window may have closed, so nobody reads the answer.
                 let _ = done.send(save(&image, Path::new(FOLDER)));
             });
             if let Err(e) = spawned {
@@ -61,13 +61,13 @@ impl Pictures {
         });
     }
 
-    /// Each picture once.
+    /// Returns each picture once.
     pub fn poll(&self) -> Option<Saved> {
         self.saved.try_recv().ok()
     }
 }
 
-/// The bytes of a PNG file; four bytes for each pixel.
+/// Returns the bytes of a PNG file; four bytes for each pixel.
 pub fn png_of(rgba: Vec<u8>, [width, height]: [u32; 2]) -> Result<Vec<u8>, PictureError> {
     let icon = IconData { rgba, width, height };
     icon.to_png_bytes().map_err(PictureError::Encode)

@@ -1,24 +1,24 @@
-//! Files that were opened last, as the settings keep them, and which of them are missing.
+//! Recent files, as the settings keep them, and which of them are missing.
 
 use crate::dialog::Purpose;
 use serde::{Deserialize, Serialize};
 use stylet_base::job::{Job, JobUpdate};
 
-/// So many are kept.
+/// Number of files that are kept.
 pub const MOST: usize = 10;
 const LONGEST: usize = 4096;
 
-/// A file that was opened.
+/// Recent file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Recent {
-    /// Where it lies.
+    /// Path of the file.
     pub path: String,
-    /// It was opened as an image, and not as a scene.
+    /// True if it was opened as an image, not as a scene.
     pub is_image: bool,
 }
 
 impl Recent {
-    /// What it was opened for.
+    /// Returns the purpose for which it was opened.
     pub fn purpose(&self) -> Purpose {
         if self.is_image { Purpose::Image } else { Purpose::Scene }
     }
@@ -32,14 +32,15 @@ pub fn remember(list: &mut Vec<Recent>, path: String, is_image: bool) {
     list.truncate(MOST);
 }
 
-/// What a settings file holds may be anything.
+/// Removes invalid entries, because a settings file may contain anything.
 pub fn checked(mut list: Vec<Recent>) -> Vec<Recent> {
     list.retain(|one| !one.path.is_empty() && one.path.len() <= LONGEST);
     list.truncate(MOST);
     list
 }
 
-/// Looks for the files on a thread of its own: they may lie on a share that does not answer.
+/// Search for missing files, on a thread of its own, because they may lie on a share that does not
+/// answer.
 #[derive(Default)]
 pub struct Missing {
     looking: Option<Job<Vec<Recent>>>,
@@ -47,17 +48,17 @@ pub struct Missing {
 }
 
 impl Missing {
-    /// Looks again.
+    /// Starts a new search.
     pub fn look(&mut self, list: &[Recent]) {
         let list = list.to_vec();
         self.looking = Some(Job::begin("recent files", move |answer, _| {
             let missing = list.into_iter().filter(|one| !std::path::Path::new(&one.path).exists());
-            // The window may be closed by now; then nobody reads the answer.
+            // The window may have closed, so nobody reads the answer.
             let _ = answer.send(missing.collect());
         }));
     }
 
-    /// Whether a file is missing, as far as is known.
+    /// Returns whether a file is missing, as far as known.
     pub fn has(&mut self, one: &Recent) -> bool {
         if let Some(JobUpdate::Message(found)) = self.looking.as_ref().map(Job::poll) {
             (self.found, self.looking) = (found, None);

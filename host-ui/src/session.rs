@@ -1,12 +1,13 @@
-//! What a desktop's session sets and libraries complain about on the terminal where there is none, as in `ssh` or `su`.
+//! Environment variables that a desktop session sets, and whose absence, as in `ssh` or `su`, makes
+//! libraries write to the terminal.
 
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
 const RUNTIME_FOLDER: &str = "XDG_RUNTIME_DIR";
 
-/// Names the folder for the user's sockets where no session did. Libraries look for sockets of the desktop there; without
-/// the name, graphics drivers write an error to the terminal each time.
+/// Sets the folder for the user's sockets if no session did. Libraries look for the desktop's
+/// sockets there; without it, graphics drivers write an error to the terminal each time.
 pub fn name_runtime_folder() {
     if let Some(folder) = missing_runtime_folder(std::env::var_os(RUNTIME_FOLDER).as_deref()) {
         // SAFETY: `main` calls this before any other thread starts.
@@ -14,7 +15,8 @@ pub fn name_runtime_folder() {
     }
 }
 
-/// Where sessions put the folder, unless `named` is one. It need not exist: nothing is made in it.
+/// Returns the folder that sessions use, unless `named` is one. It need not exist, because nothing
+/// is created in it.
 fn missing_runtime_folder(named: Option<&OsStr>) -> Option<OsString> {
     let is_named = named.is_some_and(|folder| Path::new(folder).is_absolute());
     // SAFETY: no preconditions.

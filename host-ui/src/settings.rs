@@ -1,13 +1,13 @@
-//! What a person set in the window and finds again the next time it opens.
+//! Settings of the window that persist between starts.
 
 use crate::recent::{self, Recent};
 use serde::{Deserialize, Serialize};
 
-/// Under which the settings are kept.
+/// Key under which the settings are stored.
 const KEY: &str = "stylet.settings";
-/// Smallest and largest scale of words and widgets.
+/// Smallest and largest scale of text and widgets.
 pub const SCALES: [f32; 2] = [0.8, 2.0];
-/// Air kerma strength of a seed that can be set (U).
+/// Range of the air kerma strength of a seed (U).
 pub const STRENGTHS_U: [f64; 2] = [0.05, 5.0];
 const LONGEST_FILE_NAME: usize = 4096;
 
@@ -18,7 +18,7 @@ pub enum ThemeChoice {
     Light,
 }
 
-/// What stands in the middle of the window.
+/// Content of the middle of the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Layout {
     /// The three slices and the three-dimensional picture.
@@ -26,9 +26,9 @@ pub enum Layout {
     Quad,
     Solid,
     Slices,
-    /// What the ultrasound probe sees.
+    /// Both planes of the ultrasound probe.
     Probe,
-    /// The screen of a C-arm, beside the probe's.
+    /// Screen of a C-arm, next to the probe's.
     Fluoroscopy,
 }
 
@@ -62,9 +62,9 @@ pub struct Settings {
     pub theme: ThemeChoice,
     pub scale: f32,
     pub layout: Layout,
-    /// The volume that was loaded last.
+    /// Volume that was loaded last.
     pub last_file: String,
-    /// Files that were opened, the last one first.
+    /// Recent files, the newest first.
     pub recent: Vec<Recent>,
     /// Air kerma strength of each seed (U).
     pub seed_strength_u: f64,
@@ -84,7 +84,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The defaults where nothing was kept or it cannot be used.
+    /// Returns the stored settings, or the defaults if there are none or they are unusable.
     pub fn read(storage: Option<&dyn eframe::Storage>) -> Self {
         let kept: Option<Self> = storage.and_then(|s| eframe::get_value(s, KEY));
         kept.unwrap_or_default().checked()
@@ -94,7 +94,7 @@ impl Settings {
         eframe::set_value(storage, KEY, self);
     }
 
-    /// The file is not trusted: anyone may have edited it.
+    /// Corrects invalid values, because anyone may have edited the file.
     fn checked(mut self) -> Self {
         let default = Self::default();
         if !self.scale.is_finite() {

@@ -1,6 +1,7 @@
 //! Colours, sizes and spacings as tokens; nothing else in the window names a colour.
 //!
-//! Hues come from the Okabe-Ito set, whose colours stay distinct with any common colour blindness; no meaning rests on hue alone.
+//! Hues come from the Okabe-Ito set, whose colours stay distinct with any common colour blindness;
+//! no meaning rests on hue alone.
 
 mod tokens;
 
@@ -12,7 +13,7 @@ pub const RIGHT_WIDTH: f32 = 330.0;
 pub const GAP: f32 = 6.0;
 pub const PADDING: i8 = 8;
 
-/// The tokens of the theme that is shown.
+/// Returns the tokens of the theme that is shown.
 pub fn of(ui: &egui::Ui) -> &'static Tokens {
     tokens(ui.visuals().dark_mode)
 }
@@ -21,7 +22,7 @@ pub fn tokens(dark: bool) -> &'static Tokens {
     if dark { &DARK } else { &LIGHT }
 }
 
-/// Both themes, once, at start; which of them is shown is a setting.
+/// Installs both themes at start; a setting selects the one shown.
 pub fn apply(ctx: &egui::Context) {
     for (theme, tokens) in [(Theme::Dark, &DARK), (Theme::Light, &LIGHT)] {
         ctx.style_mut_of(theme, |style| {
@@ -71,7 +72,7 @@ fn visuals(theme: Theme, t: &Tokens) -> Visuals {
     v
 }
 
-/// A box that groups what belongs together.
+/// Returns a frame around widgets that belong together.
 pub fn card(ui: &egui::Ui) -> egui::Frame {
     egui::Frame::new()
         .fill(of(ui).card)
@@ -97,7 +98,7 @@ pub fn small(text: impl Into<String>) -> RichText {
     RichText::new(text).weak().small()
 }
 
-/// As the shader takes it: gamma-encoded, 0 to 1.
+/// Returns the colour for the shader: gamma-encoded, 0 to 1.
 pub fn rgba(color: egui::Color32, alpha: f32) -> [f32; 4] {
     let [r, g, b, _] = color.to_array();
     [f32::from(r) / 255.0, f32::from(g) / 255.0, f32::from(b) / 255.0, alpha]

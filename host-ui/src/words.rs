@@ -1,11 +1,13 @@
-//! What the words of physics and of the clinic mean, on hover: the tables of `docs/words.md`, which goes into the program.
+//! Meanings of terms of physics and of the clinic, shown on hover: the tables of `docs/words.md`,
+//! compiled into the program.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 const PAGE: &str = include_str!("../../docs/words.md");
 
-/// Row by row: words that share a meaning are separated by commas. Lower case is another word: D is a dose, d a distance.
+/// Meanings by term. Terms that share a row are separated by commas. Case matters: D is a dose, d a
+/// distance.
 static MEANINGS: LazyLock<BTreeMap<&str, &str>> = LazyLock::new(|| {
     let rows = PAGE.lines().filter_map(|line| {
         let (words, meaning) = line.strip_prefix("| ")?.strip_suffix(" |")?.split_once(" | ")?;
@@ -16,14 +18,14 @@ static MEANINGS: LazyLock<BTreeMap<&str, &str>> = LazyLock::new(|| {
         .collect()
 });
 
-/// What a word means; `None` where the page has no row for it.
+/// Returns the meaning of a term; `None` if the page has no row for it.
 pub fn meaning(word: &str) -> Option<&'static str> {
     MEANINGS.get(word).copied()
 }
 
-/// Something in the window that a word of the page stands for.
+/// Widget that names a term of the page.
 pub trait Explained {
-    /// Shows the word and its meaning on hover.
+    /// Shows the meaning of the term on hover.
     fn explained(self, word: &str) -> Self;
 }
 
@@ -54,7 +56,7 @@ mod tests {
         }
     }
 
-    /// The window asks for a word by its name: one that the page does not have would show nothing.
+    /// Guards against a term that the page lacks, which would show nothing.
     #[test]
     fn every_word_that_the_window_explains_has_its_row_on_the_page() {
         let mut files = Vec::new();

@@ -1,4 +1,4 @@
-//! Carries out what the operator asked for, after all panels are drawn.
+//! Executes the operator's requests, after all panels are drawn.
 
 use super::drive::{BEFORE_ENTRY_M, Drive, Goal};
 use super::{App, Waiting, refusal};
@@ -15,11 +15,11 @@ use stylet_shm_schema::{
     PARAMETERS, ParameterChange, ParameterProblems, ParameterSet, PlannedNeedle, Refusal, Request,
 };
 
-/// A hand on the tip may pull it this far ahead.
+/// Farthest goal ahead of the tip for a hand that pulls it.
 const PULLED_M: f64 = 0.02;
-/// A goal nearer than this to the last one is the same.
+/// Distance below which two goals count as the same.
 const SAME_GOAL_M: f64 = 0.1e-3;
-/// Requests that wait for their answer at once; the answer of an older one is not shown.
+/// Most requests that wait for their answer at once; the answer of an older one is not shown.
 const WAITING_AT_MOST: usize = 64;
 
 impl App {
@@ -43,7 +43,8 @@ impl App {
         self.send("Built-in scene", &Request::LoadBuiltinScene(number as u32));
     }
 
-    /// Sends the hand to a depth along the planned path, or along the line beside it where the needle is.
+    /// Sends the hand to a depth along the planned path, or along the parallel line on which the
+    /// needle is.
     fn move_to(&mut self, what: &'static str, depth_m: f64, speed_m_per_s: f64) {
         let beside_m = self.drive.beside_m();
         self.move_hand(
@@ -109,16 +110,16 @@ impl App {
             _ if self.watches() => {
                 self.shown.note = Some(refusal("This is a recording: close it to move the needle.".to_owned()));
             }
-            // Whoever instructs does so while a script or a trainee moves the needle.
+            // Instructors may mark and inject while a script or a trainee moves the needle.
             Action::Send(request @ (Request::Mark(_) | Request::BeginExercise(_) | Request::EndExercises)) => {
                 self.send(request_name(&request), &request);
             }
-            // The other hand is nobody's but the operator's.
+            // The script does not use the other hand, so the operator keeps it.
             Action::Probe(action) => self.act_on_probe(action),
-            // While the script runs the needle is its own.
+            // While the script runs, it owns the needle.
             _ if self.run.is_some() && action != Action::Send(Request::Disengage) => {}
             Action::Next => {
-                // An action that is carried out names what it does itself.
+                // An executed action reports its own name.
                 if let Some(action) = next_action(&self.shown) {
                     self.act(action, ctx);
                 }
@@ -145,7 +146,7 @@ impl App {
             }
             Action::LoadBuiltinScene(number) => self.load_builtin(number),
             Action::PlaceNeedle => {
-                // In the tissue the needle keeps its line: aside it would tear.
+                // In the tissue the needle keeps its line, because a sideways move would tear it.
                 if !self.shown.has_punctured() {
                     self.drive.keep_to_path();
                 }
@@ -166,7 +167,7 @@ impl App {
         }
     }
 
-    /// An empty list of seeds: there is no plan any more.
+    /// Sends an empty list of seeds: the plan is withdrawn.
     fn withdraw_plan(&mut self) {
         if let Some(plan) = &self.shown.plan {
             let withdrawn = PlannedNeedle {
@@ -180,7 +181,8 @@ impl App {
         }
     }
 
-    /// Cancels the reading of a file. One that is being sent is left to the core, and its answer is ignored.
+    /// Cancels the reading of a file. A file that is already being sent is left to the core, and
+    /// its answer is ignored.
     fn cancel_load(&mut self) {
         self.loader.cancel();
         self.uploading = None;
@@ -188,7 +190,7 @@ impl App {
         self.shown.load = LoadState::Idle;
     }
 
-    /// A hand on the tip: at most one goal a frame, and none that is the same.
+    /// Pulls the tip by hand: at most one goal a frame, and no goal twice.
     fn pull(&mut self) {
         let Some(wanted) = self.pulled_to_m.take() else {
             self.pulled_goal_m = None;
@@ -205,7 +207,7 @@ impl App {
         }
     }
 
-    /// The needle stays where it is; the force stays as it is.
+    /// Stops the script. The needle stays where it is, and the force stays on or off.
     pub(super) fn stop_run(&mut self) {
         self.end_run();
         self.shown.running = false;
@@ -215,8 +217,8 @@ impl App {
         self.send("Stop", &Request::StopHand);
     }
 
-    /// Held keys, a stick or a cap move the goal along the path; letting go stops it there. Without them a hand
-    /// may pull the tip.
+    /// Moves the goal along the path while keys, stick or cap are held; releasing stops it there.
+    /// Otherwise a hand may pull the tip.
     pub(super) fn drive(&mut self, wish: Wish, frame_s: f64) {
         if self.run.is_some() || self.watches() || !self.shown.is_live() {
             self.drive.forget();
@@ -263,7 +265,7 @@ impl App {
     }
 }
 
-/// By the rules that the core goes by, but for the stiffness that its device can hold.
+/// Applies changes by the rules of the core, except for the stiffness limit of its device.
 fn changed(mut set: ParameterSet, changes: &[ParameterChange]) -> Result<ParameterSet, ParameterProblems> {
     for change in changes {
         set.set(change.id, change.value);

@@ -1,4 +1,4 @@
-//! The debrief as files: the same page as `host-ui procedure` writes, from the data of the window.
+//! The debrief as files: the page of `host-ui procedure`, from the data of the window.
 
 use super::{App, refusal};
 use crate::planner;
@@ -18,12 +18,12 @@ use stylet_implant::provenance;
 use stylet_implant::score::{self, Implant, Motion, Score, SeedPair};
 use stylet_shm_schema::{Prescribed, SeedPose, TickRecord};
 
-/// The folder of what was written, or why it could not be.
+/// Folder that was written, or the reason why it could not be.
 pub(super) type Saved = Result<PathBuf, Failure>;
-/// Whatever was wrong, to be shown as text.
+/// Any error, shown as text.
 pub(super) type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// Everything that a debrief is made of, as it was when it was asked for.
+/// Data of a debrief, as of the request for it.
 pub(super) struct Delivered {
     scene: Arc<SceneModel>,
     title: String,
@@ -35,12 +35,13 @@ pub(super) struct Delivered {
     records: Vec<TickRecord>,
     moments: Vec<Moment>,
     updates: Vec<Reviewed>,
-    /// The plan as its file would be; `None` for one needle by hand, and for a plan that was only heard of.
+    /// Plan as its file would be; `None` for one needle by hand, and for a plan received from
+    /// another window.
     plan: Option<ImplantPlan>,
 }
 
 impl App {
-    /// Begins to write the files; [`App::take_debrief`] reports when they are written.
+    /// Starts writing the files; [`App::take_debrief`] reports when they are written.
     pub(super) fn save_debrief(&mut self) {
         if let Some(number) = self.trainees.followed {
             return self.debrief_trainee(number);
@@ -50,7 +51,8 @@ impl App {
         self.save_debrief_as(folder);
     }
 
-    /// When the core ends, for whatever reason: what was placed stays shown, and is written with the plan.
+    /// Keeps the result when the core ends for any reason: the placed seeds stay shown and are
+    /// written with the plan.
     pub(super) fn keep_of_ended_core(&mut self) {
         let is_absent = self.shown.is_absent();
         let was_absent = std::mem::replace(&mut self.was_absent, is_absent);
@@ -71,7 +73,7 @@ impl App {
         self.write_debrief(delivered, folder);
     }
 
-    /// One at a time.
+    /// Writes one debrief at a time.
     pub(super) fn write_debrief(&mut self, delivered: Result<Delivered, Failure>, folder: PathBuf) {
         if self.debrief.is_some() {
             self.shown.note = Some(refusal("A debrief is being written: try again in a moment.".to_owned()));
@@ -80,7 +82,7 @@ impl App {
         match delivered {
             Ok(delivered) => {
                 self.debrief = Some(Job::begin("debrief", move |messages, _| {
-                    // The window may be closed by now; then nobody reads the answer.
+                    // The window may have closed, so nobody reads the answer.
                     let _ = messages.send(write(&delivered, folder));
                 }));
             }
@@ -143,7 +145,7 @@ impl App {
         })
     }
 
-    /// A planned seed, as if it lay on plan, and the one that was dropped for it.
+    /// Returns a planned seed, as if it lay on plan, and the seed that was dropped for it.
     fn pair(&self, implant: &planner::Implant, needle: usize, row: &SeedError) -> Option<(SeedPair, Option<SeedPose>)> {
         let shown = &self.shown;
         let of = implant.plan.needles.get(needle)?;
@@ -165,7 +167,7 @@ impl App {
     }
 }
 
-/// Where none is named, the usual one and its prescription.
+/// Returns source and prescription; a plan without them gets the usual ones.
 fn source_of(model: &str, prescription_gy: f64) -> Result<(Source, f64), Failure> {
     if model.is_empty() {
         return Ok(exchange::usual()?);
@@ -175,7 +177,8 @@ fn source_of(model: &str, prescription_gy: f64) -> Result<(Source, f64), Failure
 }
 
 impl Delivered {
-    /// Of a procedure that another window planned and drove; `planned`: what its seeds are, where its plan does not say.
+    /// Builds the debrief of a procedure that another window planned and drove. `planned` gives the
+    /// seeds if its plan does not.
     pub(super) fn of_heard(
         link: &Link,
         heard: &Heard,
@@ -207,7 +210,8 @@ impl Delivered {
         })
     }
 
-    /// The scene by its labels, the plan by the text of its file, and the source by its model.
+    /// Returns the provenance: scene by its labels, plan by the text of its file, source by its
+    /// model.
     fn made(&self) -> Result<serde_json::Value, Failure> {
         let plan = match &self.plan {
             Some(plan) => file::to_text(plan, &self.scene.header.patient())?,

@@ -1,51 +1,53 @@
-//! Goals for the simulated hand, from the speed that keys, stick or cap ask for.
+//! Goals for the simulated hand, from the speed that keys, stick or cap request.
 
 use crate::shown::TipOnPath;
 use std::time::Duration;
 use stylet_controllers::{SLOWEST_M_PER_S, Wish};
 
-/// A tip that is held back lags behind the hand that drives it by no more than this.
+/// Largest lead of the hand over a tip that is held back.
 const LEAD_M: f64 = 0.004;
-/// The hand goes on without another goal for so many times the longest of the last frames: frames that are slow one after the
-/// other do not stop the needle, a window that hangs does. Nobody can know earlier, since keys are read once a frame.
+/// Time for which the hand continues without another goal, in multiples of the longest recent
+/// frame. Slow frames do not stop the needle, a window that hangs does. Keys are read once a frame,
+/// so an earlier detection is impossible.
 const HOLD_FRAMES: f64 = 1.5;
-/// At least for so long, however fast the frames are, and at most for so long, however slow.
+/// Bounds of that time, for fast and for slow frames.
 const HOLD_S: [f64; 2] = [0.1, 0.5];
-/// So many frames of this drive count.
+/// Number of recent frames of this drive that count.
 const FRAMES: usize = 8;
-/// Stands for the frames before a drive, which may be rare because nothing changed.
+/// Assumed time of the frames before a drive, which may be rare because nothing changed.
 const FIRST_FRAME_S: f64 = 0.16;
-/// The needle may be drawn back so far before the entry.
+/// Distance before the entry to which the needle may be drawn back.
 pub const BEFORE_ENTRY_M: f64 = 0.02;
-/// Goals are sent no more often, whatever the frame rate.
+/// Shortest time between two goals, at any frame rate.
 const GOALS_EVERY: Duration = Duration::from_millis(10);
-/// The needle goes across the template only with its tip before this depth.
+/// Depth of the tip before which the needle may move across the template.
 const OUTSIDE_M: f64 = 1e-3;
 
-/// For the simulated hand.
+/// Goal of the simulated hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal {
     pub depth_m: f64,
-    /// Beside the planned path.
+    /// Offset from the planned path.
     pub beside_m: [f64; 2],
     pub speed_m_per_s: f64,
 }
 
-/// A needle that is being driven.
+/// Needle that is being driven.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drive {
-    /// Depth at which the hand is now, while it is driven.
+    /// Present depth of the hand, while it is driven.
     at_m: Option<f64>,
-    /// The line beside the planned path that every goal of the window is on, so that a needle in the tissue is not pulled aside;
-    /// `None` until this window has chosen one or found a needle in the tissue.
+    /// Offset of the line on which all goals of the window lie, so that a needle in the tissue is
+    /// not pulled aside. `None` until this window has chosen a line or found a needle in the
+    /// tissue.
     beside_m: Option<[f64; 2]>,
     unsent_s: f64,
-    /// For how long the hand goes on after the last goal.
+    /// Time for which the hand continues after the last goal.
     hold_s: f64,
     frames: RecentFrames,
 }
 
-/// How long the last frames took, while the needle was driven.
+/// Durations of the last frames, while the needle was driven.
 #[derive(Clone, Debug, PartialEq)]
 struct RecentFrames {
     took_s: [f64; FRAMES],
@@ -78,34 +80,35 @@ impl Drive {
         self.at_m.is_some()
     }
 
-    /// Nobody drives any more, and nothing is to be sent.
+    /// Forgets the drive without sending anything.
     pub fn forget(&mut self) {
         self.at_m = None;
     }
 
-    /// The line beside the planned path that the needle is on.
+    /// Returns the offset of the needle's line from the planned path.
     pub fn beside_m(&self) -> [f64; 2] {
         self.beside_m.unwrap_or_default()
     }
 
-    /// From now on the needle is on the planned path.
+    /// Puts the needle back on the planned path.
     pub fn keep_to_path(&mut self) {
         self.beside_m = Some([0.0; 2]);
     }
 
-    /// A needle that another window left in the tissue stays on its line.
+    /// Takes over the line of a needle that another window left in the tissue.
     pub fn find(&mut self, tip: &TipOnPath) {
         if self.beside_m.is_none() && !is_outside(tip) {
             self.beside_m = Some(tip.beside_m);
         }
     }
 
-    /// Whether the wish is one that is followed here: across only outside.
+    /// Returns whether the wish can be followed: across only while the tip is outside.
     pub fn follows(wish: &Wish, tip: &TipOnPath) -> bool {
         wish.along_m_per_s != 0.0 || (wish.across_m_per_s != [0.0; 2] && is_outside(tip))
     }
 
-    /// The next goal, where it is time for one. The wish must be one that is followed, and `frame_s` the time since the last frame.
+    /// Returns the next goal when one is due. The wish must be one that can be followed; `frame_s`
+    /// is the time since the last frame.
     pub fn step(&mut self, wish: &Wish, tip: &TipOnPath, frame_s: f64) -> Option<Goal> {
         let frame_s = frame_s.clamp(0.0, HOLD_S[1]);
         self.unsent_s += frame_s;
@@ -117,7 +120,8 @@ impl Drive {
         if self.is_on() && self.unsent_s < GOALS_EVERY.as_secs_f64() {
             return None;
         }
-        // The hand was at rest until now, or went on as it was asked to, for so long at most.
+        // The hand was at rest until now, or moved as requested, but for no longer than its hold
+        // time.
         let went_s = if self.is_on() {
             self.unsent_s.min(self.hold_s)
         } else {
@@ -153,7 +157,8 @@ impl Drive {
         })
     }
 
-    /// Whether the keys or the device were released just now, so that the core must stop the needle itself: the tip known here is delayed.
+    /// Returns whether keys or device were just released, so that the core must stop the needle:
+    /// the tip known here is delayed.
     pub fn stop(&mut self, tip: &TipOnPath) -> bool {
         let was_on = self.at_m.take().is_some();
         if was_on && is_outside(tip) {
@@ -193,13 +198,14 @@ mod tests {
         }
     }
 
-    /// A hand that goes to its goal with the speed that it was given, as the core's does.
+    /// Moves a hand to its goal at the given speed, as the core does.
     fn goes(tip: &mut TipOnPath, goal: &Goal, time_s: f64) {
         let step_m = goal.speed_m_per_s * time_s;
         tip.depth_m += (goal.depth_m - tip.depth_m).clamp(-step_m, step_m);
     }
 
-    /// A frame of more than 100 ms stopped the needle, and frames that were slow one after the other drove it at a part of its speed.
+    /// Guards against two faults: a frame of more than 100 ms stopped the needle, and a sequence of
+    /// slow frames slowed it.
     #[test]
     fn the_needle_goes_as_fast_as_it_is_wished_whatever_the_frames_and_goals_are_bounded() {
         for frame_s in [0.001, 0.004, 0.016, 0.040, 0.111, 0.200, 0.240] {
@@ -223,7 +229,8 @@ mod tests {
         }
     }
 
-    /// The hand went on for 0.5 s, 20 mm at the speed of the keys, however fast the frames had been.
+    /// Guards against a hand that continued for 0.5 s, 20 mm at the speed of the keys, however fast
+    /// the frames had been.
     #[test]
     fn a_window_that_hangs_stops_the_needle_after_a_tenth_of_a_second_or_one_and_a_half_frames() {
         for (frame_s, goes_on_s) in [
@@ -247,7 +254,8 @@ mod tests {
         }
     }
 
-    /// One slow frame among fast ones: the needle waits for the window, and goes on from where it is.
+    /// Checks one slow frame among fast ones: the needle waits for the window, and continues from
+    /// where it is.
     #[test]
     fn a_frame_that_nobody_foresaw_holds_the_needle_until_the_window_is_back() {
         let (mut drive, mut tip) = (Drive::default(), OUTSIDE);
@@ -273,7 +281,8 @@ mod tests {
         }
     }
 
-    /// A window that was opened while the needle was beside its path drew it aside in the tissue.
+    /// Guards against a window that was opened while the needle was off its path and drew it aside
+    /// in the tissue.
     #[test]
     fn a_needle_that_another_window_left_in_the_tissue_stays_on_its_line() {
         let tip = TipOnPath {
@@ -293,7 +302,7 @@ mod tests {
             ..tip
         });
         assert_eq!(drive.beside_m(), tip.beside_m);
-        // Outside it may come to the path.
+        // Outside it may return to the path.
         let mut drive = Drive::default();
         drive.find(&TipOnPath {
             depth_m: 0.0,

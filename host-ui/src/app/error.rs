@@ -1,8 +1,8 @@
-//! Why a window could not be opened.
+//! Reasons why a window could not be opened.
 
 use stylet_base::format;
 
-/// The display that the environment names, for people.
+/// Returns the environment's display, for messages.
 pub(super) fn shown_on() -> String {
     let named = ["WAYLAND_DISPLAY", "DISPLAY"]
         .iter()
@@ -15,18 +15,18 @@ pub(super) fn shown_on() -> String {
     }
 }
 
-/// The window could not be opened.
+/// Reason why the window could not be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum WindowError {
     /// There is no display, or it does not answer.
     #[error("no display answers ({0}). Start it in a desktop, or use `host-ui procedure`, which needs no window")]
     Display(String),
-    /// Nothing can draw.
+    /// No graphics driver can draw.
     #[error(
         "no graphics driver can draw the window ({0}). Install mesa-vulkan-drivers, or use `host-ui procedure`, which needs no window"
     )]
     Driver(String),
-    /// Everything else, as the library has it.
+    /// Any other error, as the library reports it.
     #[error("the window cannot be opened: {0}. `host-ui procedure` needs no window")]
     Other(String),
 }

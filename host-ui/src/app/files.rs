@@ -14,7 +14,7 @@ impl App {
         self.dialogs.begin(purpose, beside);
     }
 
-    /// What is done with the file of a dialog that was closed.
+    /// Returns the action for the file of a dialog that was closed.
     pub(super) fn picked_file(&mut self) -> Option<Action> {
         let (purpose, picked) = self.dialogs.poll()?;
         let path = match picked {
@@ -44,7 +44,8 @@ impl App {
         })
     }
 
-    /// A folder is an image series; while the plan's step is open, a file that is no volume is a plan.
+    /// Returns the action for a dropped file. A folder is an image series; while the plan's step is
+    /// open, a file that is not a volume is a plan.
     pub(super) fn dropped_file(&self, ctx: &egui::Context) -> Option<Action> {
         let path = ctx.input(|i| {
             i.raw

@@ -1,4 +1,4 @@
-//! How many frames a second the window draws, and what they cost on average.
+//! Frame rate of the window, and mean cost of a frame.
 
 use crate::shown::FrameCost;
 use std::time::{Duration, Instant};
@@ -15,7 +15,7 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    /// An interval that begins now.
+    /// Creates an interval that begins now.
     pub fn new(now: Instant) -> Self {
         Self {
             since: now,
@@ -25,7 +25,8 @@ impl Frames {
         }
     }
 
-    /// Counts a frame; at the end of an interval its rate (Hz), and the mean cost of a frame.
+    /// Counts a frame; at the end of an interval returns its rate (Hz) and the mean cost of a
+    /// frame.
     pub fn count(&mut self, now: Instant, cost: &FrameCost) -> Option<(f64, FrameCost)> {
         self.count += 1;
         self.cpu_us += cost.cpu_us;

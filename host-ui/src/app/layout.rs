@@ -1,4 +1,4 @@
-//! Where each part of the window stands. Nothing that comes and goes moves anything else.
+//! Layout of the window. Parts that appear and disappear do not move anything else.
 
 use super::{App, patch};
 use crate::action::Action;
@@ -12,10 +12,10 @@ use crate::panel::{banners, class, help, plots, status};
 use crate::theme;
 use egui::{CentralPanel, Frame, Margin, Panel, Rect, ScrollArea};
 
-/// Pictures narrower than this have no use; then they and the right panel share one place.
+/// Smallest useful width of the pictures; below it they share one place with the right panel.
 const LEAST_PICTURES: f32 = 420.0;
 
-/// What stands in the middle of a narrow window.
+/// Content of the middle of a narrow window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Narrow {
     #[default]
@@ -73,7 +73,8 @@ impl App {
         actions
     }
 
-    /// The run above and the force below stay where they are; the steps between them scroll.
+    /// Draws the left panel: the run above and the force below stay in place; the steps between
+    /// them scroll.
     fn left_ui(&mut self, ui: &mut egui::Ui, actions: &mut Vec<Action>) {
         let left = Panel::left("workflow").exact_size(theme::LEFT_WIDTH).resizable(false);
         left.frame(theme::side_panel(ui)).show(ui, |ui| {
@@ -87,7 +88,8 @@ impl App {
         });
     }
 
-    /// What is drawn on the live picture, or needles while a plan is edited, otherwise the instruments.
+    /// Draws the right panel: drawing tools on the live picture, needles while a plan is edited,
+    /// otherwise the instruments.
     fn right_ui(&mut self, ui: &mut egui::Ui, actions: &mut Vec<Action>) {
         let height = ui.available_height();
         if self.draws() {
@@ -103,7 +105,7 @@ impl App {
             });
             return;
         }
-        // The debrief looks back on all of it, not on the last seconds.
+        // The debrief covers the whole insertion, not only the last seconds.
         let whole = self.workflow.is_open(Progress::Debrief).then_some(self.heard.trace());
         ScrollArea::vertical().show(ui, |ui| {
             plots::plots_ui(ui, &self.shown, &self.history, self.heard.moments(), whole, height)

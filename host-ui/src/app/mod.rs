@@ -1,4 +1,4 @@
-//! The window: takes new data, draws the panels, carries out what they ask for. A frame never waits.
+//! The window: takes new data, draws the panels, executes their requests. A frame never waits.
 
 mod act;
 mod debrief;
@@ -52,44 +52,44 @@ pub use error::WindowError;
 /// Options of the window.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Name that rt-core was started under.
+    /// Name under which rt-core was started.
     pub instance: Instance,
     /// Scene to read and send as soon as a core is found.
     pub scene: Option<SceneChoice>,
-    /// Which label of the file is the gland; all of them when none is given.
+    /// Label of the gland in the file; all labels if none is given.
     pub label: Option<u8>,
-    /// Image for the slices, of the patient of the scene file.
+    /// Image for the slices, of the scene file's patient.
     pub image: Option<PathBuf>,
-    /// Recording that is shown in place of a core.
+    /// Recording that is shown instead of a core.
     pub watch: Option<PathBuf>,
-    /// Whether gamepads and 3D mice may hold the needle.
+    /// Permission for gamepads and 3D mice to hold the needle.
     pub controllers: bool,
-    /// Limits the frame rate to what the eye needs; without it frames follow at once.
+    /// Frame rate limited to what the eye needs; otherwise frames follow at once.
     pub pause: bool,
-    /// Prints each second how many frames were drawn and what they cost.
+    /// Report of frame rate and cost, printed each second.
     pub count_frames: bool,
-    /// Shows a patch that changes when the tip moves.
+    /// Patch that changes when the tip moves.
     pub patch: bool,
-    /// Trainees of a list; the first is followed.
+    /// Trainees of a list; the window follows the first.
     pub trainees: Vec<Trainee>,
     /// Folder for the debriefs of a class.
     pub class: Option<PathBuf>,
-    /// Who sits here.
+    /// Name of the operator at this window.
     pub name: String,
 }
 
-/// A command that has not been answered yet.
+/// Command without an answer so far.
 struct Waiting {
     id: u64,
     what: &'static str,
     since: Instant,
 }
 
-/// The window.
+/// Window of the program.
 pub struct App {
     link: Link,
     label: Option<u8>,
-    /// From the command line, until it is read.
+    /// Scene from the command line, until it is read.
     first_scene: Option<SceneChoice>,
     first_image: Option<PathBuf>,
     shown: Shown,
@@ -97,32 +97,32 @@ pub struct App {
     dose: DoseWorker,
     pictures: Pictures,
     settings: Settings,
-    /// As they were when they were last brought into force.
+    /// Settings when they were last applied.
     applied: Option<Settings>,
     history: History,
-    /// The procedure as any host hears it.
+    /// Procedure as any host receives it.
     heard: Heard,
     debrief: Option<Job<debrief::Saved>>,
     summed_up: Instant,
     loader: Loader,
     dialogs: Dialogs,
     uploading: Option<(u64, String)>,
-    /// The file that is read or sent as the next scene, and that of the present one where the window sent it.
-    /// Each with the name of its scene.
+    /// File that is being read or sent as the next scene, and file of the present scene if this
+    /// window sent it, each with its scene's name.
     scene_to_come: Option<(PathBuf, String)>,
     scene_file: Option<(PathBuf, String)>,
-    /// Shown once the scene that it belongs to, by name, is taken.
+    /// Image to show once the scene of this name is loaded.
     image_to_come: Option<(Image, String)>,
     run: Option<Run>,
-    /// The core was absent in the last frame.
+    /// True if the core was absent in the last frame.
     was_absent: bool,
-    /// A run that waits for a person to re-arm.
+    /// Run that waits for a person to re-arm.
     asks_rearm: Option<Begin>,
-    /// Which needles of the plan the script goes through.
+    /// Needles of the plan that the script inserts.
     run_needles: Vec<usize>,
-    /// What was in the tissue when the script began or went on.
+    /// Needles and seeds in the tissue when the script began or continued.
     run_placed: Placed,
-    /// Needles of a script that was stopped, and its drops that left no seed.
+    /// Needles of a stopped script, and its drops that left no seed.
     run_lost: (Vec<NeedleTask>, Vec<usize>),
     placed_found: Instant,
     planner: Planner,
@@ -134,16 +134,16 @@ pub struct App {
     count_frames: bool,
     patch: Option<patch::Patch>,
     frames: frames::Frames,
-    /// The core that was left to the force loop.
+    /// Processor core that this program leaves to the force loop.
     left_core: Left,
     drive: drive::Drive,
     second_drive: second::SecondDrive,
     /// Buttons of gamepads and 3D mice since the last frame.
     pressed: Vec<Action>,
-    /// Where a hand on the tip has drawn it in this frame, and where it was last sent to.
+    /// Place to which a hand has pulled the tip in this frame, and the last one that was sent.
     pulled_to_m: Option<f64>,
     pulled_goal_m: Option<f64>,
-    /// The run of the core, and how many of its refusals were dismissed.
+    /// Run of the core, and number of its refusals that were dismissed.
     dismissed: (u64, u64),
     workflow: WorkflowState,
     parameters: ParametersState,
@@ -151,14 +151,15 @@ pub struct App {
     class: bool,
     instructor: InstructorState,
     trainees: trainees::Trainees,
-    /// What stands in the middle where there is no room for the right panel.
+    /// Content of the middle if there is no room for the right panel.
     narrow: layout::Narrow,
 }
 
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// Where there is no display or no graphics driver.
+///
+/// Without a display or a graphics driver.
 pub fn run(options: Options) -> Result<(), WindowError> {
     let mut native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
@@ -182,27 +183,27 @@ pub fn run(options: Options) -> Result<(), WindowError> {
 }
 
 impl App {
-    /// What the window knows of the core.
+    /// Returns the state of the link to the core.
     pub fn link(&self) -> &Link {
         &self.link
     }
 
-    /// The plan of many needles.
+    /// Returns the plan of many needles.
     pub fn planner(&self) -> &Planner {
         &self.planner
     }
 
-    /// The pictures in the middle, and where they cut.
+    /// Returns the pictures in the middle, and their cut planes.
     pub fn middle(&self) -> &Middle {
         &self.middle
     }
 
-    /// What the last frame cost.
+    /// Returns the cost of the last frame.
     pub fn cost(&self) -> FrameCost {
         self.shown.cost
     }
 
-    /// The window with these options, before its first frame.
+    /// Creates the window with these options, before its first frame.
     pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
         theme::apply(&cc.egui_ctx);
         if let Some(state) = &cc.wgpu_render_state {
@@ -210,7 +211,8 @@ impl App {
         }
         let settings = Settings::read(cc.storage);
         let shown = Shown::empty(options.instance.name());
-        // A plan that is kept goes with the core. Whoever follows a trainee hears of their plan from the core.
+        // A kept plan belongs to this window's core. A window that follows a trainee receives the
+        // trainee's plan from the core.
         let planner = match options.trainees.is_empty() {
             true => Planner::default().keeping_in(options.instance.folder()),
             false => Planner::default(),
@@ -273,12 +275,12 @@ impl App {
         }
     }
 
-    /// Whether only what changed in the window is drawn again in a frame.
+    /// Sets whether a frame redraws only the changed parts of the window.
     pub fn draw_changes_only(ctx: &egui::Context, only: bool) {
         ctx.with_plugin(|redraw: &mut Redraw| redraw.switch(only));
     }
 
-    /// Draws all of the last frame at once, whatever has changed in it.
+    /// Redraws all of the last frame at once.
     pub fn draw_all_again(ctx: &egui::Context) {
         ctx.with_plugin(|redraw: &mut Redraw| redraw.again(ctx));
     }
@@ -288,7 +290,7 @@ impl App {
         self.controllers = controllers;
     }
 
-    /// What was set since the last frame, here or by the keys for larger and smaller words.
+    /// Applies the settings that changed since the last frame, here or by the keys for text size.
     fn apply_settings(&mut self, ctx: &egui::Context) {
         if self.applied.as_ref() != Some(&self.settings) {
             self.settings.apply(ctx);
@@ -298,7 +300,8 @@ impl App {
         }
     }
 
-    /// Keys take precedence over a stick or a cap, which moves nothing while another window has the focus.
+    /// Returns the requested speed. Keys take precedence over a stick or a cap, which has no effect
+    /// while another window has the focus.
     fn wish(&self, ctx: &egui::Context, keys_m_per_s: f64) -> Wish {
         if keys_m_per_s != 0.0 {
             return Wish {
@@ -315,7 +318,7 @@ impl App {
 }
 
 impl App {
-    /// Of a second gamepad.
+    /// Returns the requested speed of the probe, from a second gamepad.
     fn probe_wish(&self, ctx: &egui::Context) -> ProbeWish {
         match (self.shown.has_focus, ctx.input(|i| i.modifiers.shift)) {
             (false, _) => ProbeWish::default(),
@@ -348,7 +351,8 @@ impl eframe::App for App {
             self.act(action, &ctx);
         }
         let wish = self.wish(&ctx, keys.drive_m_per_s);
-        // Not `stable_dt`, which is that of a fast frame whenever a frame was asked for later than at once.
+        // `stable_dt` is unsuitable: it assumes a fast frame whenever a frame was requested with a
+        // delay.
         let frame_s = f64::from(ctx.input(|i| i.unstable_dt));
         self.drive(wish, frame_s);
         self.drive_second(keys.second_m_per_s, self.probe_wish(&ctx), frame_s);
@@ -356,7 +360,7 @@ impl eframe::App for App {
         let asked = self.middle.driver();
         let driver_ns = asked.cpu_ns - driver.cpu_ns;
         let all_ns = cpu_time::thread_ns().saturating_sub(begun_ns);
-        // That of the frame before: this one is drawn when all of it is known.
+        // The redraw plan of the previous frame: the present one is drawn once it is complete.
         let redraw = ctx
             .with_plugin(|redraw: &mut Redraw| redraw.take_cost())
             .unwrap_or_default();

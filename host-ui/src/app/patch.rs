@@ -1,14 +1,15 @@
-//! A patch in a corner of the window that changes when the tip moves, for a photodiode: from motion to photon.
+//! A patch in a corner of the window that changes when the tip moves, for a photodiode: from motion
+//! to photon.
 
 use egui::{Color32, Context, Id, LayerId, Order, Rect, Vec2};
 use nalgebra::{Point3, distance};
 
 /// Side of the square; a photodiode with its holder covers it.
 const SIDE: f32 = 64.0;
-/// The tip has moved once it is so far from where it was at the last change: more than a hand at rest trembles.
+/// Distance between two changes of the patch: more than the tremor of a hand at rest.
 const STEP_M: f64 = 0.5e-3;
 
-/// Dark or light, and where the tip was when it became so.
+/// Brightness, and tip position at its last change.
 #[derive(Debug, Default)]
 pub(super) struct Patch {
     is_light: bool,
@@ -16,7 +17,7 @@ pub(super) struct Patch {
 }
 
 impl Patch {
-    /// Takes the tip of the frame, `None` without a core; true while the patch is light.
+    /// Takes the tip of the frame, `None` without a core; returns true while the patch is light.
     pub(super) fn take(&mut self, tip_in_scene_m: Option<[f64; 3]>) -> bool {
         if let Some(tip) = tip_in_scene_m.map(Point3::from) {
             match self.changed_at_m {
@@ -32,7 +33,7 @@ impl Patch {
     }
 }
 
-/// Draws it over everything else, in the lower right corner, where nothing can be pressed.
+/// Draws the patch over everything else, in the lower right corner, away from all buttons.
 pub(super) fn patch_ui(ctx: &Context, is_light: bool) {
     let window = ctx.content_rect();
     let corner = window.max - Vec2::splat(SIDE);
@@ -55,7 +56,7 @@ mod tests {
         }
         let seen: Vec<bool> = [0.6, 0.7, 1.0, 1.2, 5.0, 5.0].map(|z_mm| patch.take(at(z_mm))).to_vec();
         assert_eq!(seen, [true, true, true, false, true, true]);
-        // Without a core it keeps its colour.
+        // Without a core the patch keeps its colour.
         assert!(patch.take(None));
     }
 }

@@ -1,4 +1,4 @@
-//! Carries out what the operator asked for in a plan of many needles.
+//! Executes the operator's requests in a plan of many needles.
 
 use super::drive::Drive;
 use super::{App, refusal};
@@ -16,16 +16,16 @@ use stylet_implant::plan::exchange;
 use stylet_implant::workflow::{NeedlePlan, NeedleTask, Placed, Run, default_plan, plan_request};
 use stylet_shm_schema::{Prescribed, Text};
 
-/// Looking for what is in the tissue compares every planned drop with every seed.
+/// Period of the search for placed seeds, which compares every planned drop with every seed.
 const FIND_PLACED_EVERY: Duration = Duration::from_millis(300);
 
 impl App {
-    /// Undo is for the plan while it is edited.
+    /// Returns whether undo acts on the plan, which it does while the plan is edited.
     pub(super) fn edits_plan(&self) -> bool {
         self.shown.planning.implant.is_some() && self.workflow.is_open(Progress::Plan)
     }
 
-    /// Whether clicks on the live picture draw.
+    /// Returns whether clicks on the live picture draw.
     pub(super) fn draws(&self) -> bool {
         self.settings.layout == Layout::Probe && self.middle.view.tool.is_some()
     }
@@ -99,13 +99,13 @@ impl App {
         };
         let Some(task) = self.planner.task(number) else { return };
         let mut plan = task.plan;
-        // Compensation may go in a little beside the hole.
+        // Compensation may shift the entry a little from the hole.
         plan.entry_m = task.drops.entry_m;
         self.planner.begin_needle(number, self.shown.seeds.len());
         self.send("Next needle", &plan_request(&plan));
     }
 
-    /// The axial slice shows what the template does.
+    /// Moves the axial slice to the plane that the template shows.
     fn look_at(&mut self, depth_m: f64) {
         let Some(outlines) = &self.shown.planning.outlines else {
             return;
@@ -117,16 +117,16 @@ impl App {
         view.cursor_m += inwards * (depth_m - off_m);
     }
 
-    /// What of the plan is in the tissue.
+    /// Returns the part of the plan that is in the tissue.
     fn placed(&self, tasks: &[NeedleTask]) -> Placed {
         let dropped_at_m: Vec<[f64; 3]> = self.shown.seeds.iter().map(|seed| seed.dropped_at_m).collect();
-        // Of another plan the numbers are others.
+        // Another plan numbers its needles differently.
         let (of, lost) = &self.run_lost;
         let lost = if of == tasks { &lost[..] } else { &[] };
         Placed::find(tasks, &dropped_at_m, self.shown.tip_m(), lost)
     }
 
-    /// Whether the script can go on, looked at now and then while it rests.
+    /// Updates whether the script can continue, checked now and then while it rests.
     pub(super) fn find_placed(&mut self) {
         if self.run.is_some() || self.shown.seeds.is_empty() {
             self.shown.continues_at = None;
@@ -135,14 +135,14 @@ impl App {
             let (numbers, tasks): (Vec<usize>, Vec<NeedleTask>) = self.planner.tasks().into_iter().unzip();
             let placed = self.placed(&tasks);
             self.shown.continues_at = placed.is_partial().then(|| (placed.next_needle(), tasks.len()));
-            // A window that was opened anew knows of no needle.
+            // A reopened window knows of no needle.
             if placed.is_partial() && self.planner.progress().begun() == 0 {
                 self.mark_placed(&numbers, &placed);
             }
         }
     }
 
-    /// The needles before the next are done.
+    /// Marks the needles before the next one as done.
     fn mark_placed(&mut self, numbers: &[usize], placed: &Placed) {
         let mut before = 0;
         for (at, &number) in numbers.iter().enumerate().take(placed.next_needle()) {
@@ -152,7 +152,7 @@ impl App {
         }
     }
 
-    /// Begins, or asks first where a fault stands: only a person re-arms.
+    /// Begins a run, or asks first if a fault stands: only a person re-arms.
     pub(super) fn begin_run(&mut self, begin: Begin) {
         if self.shown.stands_fault().is_some() {
             self.asks_rearm = Some(begin);
@@ -175,8 +175,7 @@ impl App {
         self.run = self.run.take().map(Run::rearming);
     }
 
-    /// Goes on with the needles of the plan from where the tissue shows that they are; where there is nothing to go on with, from
-    /// the beginning.
+    /// Continues the plan from the state of the tissue, or begins it if nothing is placed.
     fn run_all(&mut self) {
         let (numbers, tasks): (Vec<usize>, Vec<NeedleTask>) = self.planner.tasks().into_iter().unzip();
         let placed = self.placed(&tasks);
@@ -190,7 +189,7 @@ impl App {
         self.drive = Drive::default();
     }
 
-    /// The script rests; what it knows of drops without a seed is kept for going on.
+    /// Ends the script; its drops without a seed are kept for a later continuation.
     pub(super) fn end_run(&mut self) {
         if let Some(run) = self.run.take() {
             self.run_lost = (run.tasks().to_vec(), run.lost().to_vec());
@@ -198,7 +197,8 @@ impl App {
         (self.shown.run_waits, self.placed_found) = (None, Instant::now());
     }
 
-    /// All needles of the plan from a reset; without one, one through the middle.
+    /// Starts over: all needles of the plan from a reset, or one needle through the middle without
+    /// a plan.
     fn start_over(&mut self) {
         (self.run_placed, self.run_lost) = (Placed::default(), Default::default());
         if self.planner.is_busy() {
@@ -219,7 +219,7 @@ impl App {
         }
     }
 
-    /// With seeds as the settings have them.
+    /// Returns a needle by hand with the seeds of the settings.
     pub(super) fn by_hand(&self, plan: NeedlePlan) -> NeedlePlan {
         let Ok((source, dose_gy)) = exchange::usual() else {
             return plan;
@@ -233,7 +233,7 @@ impl App {
         NeedlePlan { prescribed, ..plan }
     }
 
-    /// The plan's progress goes with the script's.
+    /// Advances the plan's progress with the script.
     pub(super) fn follow_run(&mut self, at: usize, is_done: bool) {
         let Some(&number) = self.run_needles.get(at) else {
             return;
@@ -242,7 +242,7 @@ impl App {
         if progress.begun() != number + 1 {
             let begins = at == 0 && self.run_placed == Placed::default();
             let seeds = if begins { 0 } else { self.shown.seeds.len() };
-            // Those that it had when the script went on with it are its own.
+            // Seeds that were placed before the script continued belong to this needle.
             let seeds = seeds.saturating_sub(self.run_placed.seeds_of(at));
             self.planner.begin_needle(number, seeds);
         }

@@ -1,5 +1,4 @@
-//! Goals for the simulated hand that holds the probe: from the speed that keys and a gamepad ask for, from the pointer, from the
-//! stepper.
+//! Goals for the simulated hand that holds the probe, from keys, gamepad, pointer and stepper.
 
 use super::{App, refusal};
 use crate::action::ProbeAction;
@@ -9,21 +8,22 @@ use stylet_controllers::{ProbeWish, SLOWEST_M_PER_S};
 use stylet_imaging::ultrasound::{Pose, Probe};
 use stylet_shm_schema::{HandMove, ProbeMove, Request};
 
-/// A hand that is held back lags behind by no more than this.
+/// Largest lead over a hand that is held back.
 const LEAD_M: f64 = 0.004;
 const LEAD_RAD: f64 = 0.2;
-/// The hand goes on without another goal for so long: a window that hangs stops it.
+/// Time for which the hand continues without another goal, so that a window that hangs stops it.
 const HOLD_S: f64 = 0.15;
-/// Goals are sent no more often, whatever the frame rate.
+/// Shortest time between two goals, at any frame rate.
 const GOALS_EVERY: Duration = Duration::from_millis(10);
 const ACCELERATION_M_PER_S2: f64 = 2.0;
-/// Of the stepper, and of a hand on the picture.
+/// Speed of the stepper, and of a hand on the picture.
 const STEP_M_PER_S: f64 = 0.05;
-/// A probe that is farther from where the stepper was set to, and so long after that, was moved by another.
+/// Distance from the stepper's setting beyond which another host has moved the probe, and the time
+/// for which it must last.
 const MOVED_M: f64 = 2e-3;
 const MOVED_AFTER: Duration = Duration::from_secs(3);
 
-/// The other hand while it is driven, and the stepper.
+/// Second hand while it is driven, and the stepper.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SecondDrive {
     at: Option<Pose>,
@@ -32,7 +32,7 @@ pub struct SecondDrive {
     is_locked: bool,
 }
 
-/// How fast the probe is to go, scene frame, and to turn about its axis.
+/// Requested speed of the probe in the scene frame, and of its turn about its axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Speed {
     pub m_per_s: Vector3<f64>,
@@ -50,7 +50,7 @@ impl Speed {
 }
 
 impl SecondDrive {
-    /// The next goal, where it is time for one.
+    /// Returns the next goal when one is due.
     pub fn step(&mut self, wish: &Speed, now: &Pose, frame_s: f64) -> Option<Pose> {
         self.unsent_s += frame_s.clamp(0.0, HOLD_S);
         if self.at.is_some() && self.unsent_s < GOALS_EVERY.as_secs_f64() {
@@ -71,12 +71,12 @@ impl SecondDrive {
         Some(wish.went(&at, HOLD_S))
     }
 
-    /// Whether the keys were released just now, so that the core must stop the hand itself.
+    /// Returns whether the keys were just released, so that the core must stop the hand.
     pub fn stop(&mut self) -> bool {
         self.at.take().is_some()
     }
 
-    /// Where the stepper was set to, unless another has moved the probe since.
+    /// Returns the stepper's setting, unless another host has moved the probe since.
     fn goal(&mut self, now: &Pose) -> Option<Pose> {
         let is_off = |goal: &Pose| (goal.middle_m - now.middle_m).norm() > MOVED_M;
         self.stepper
@@ -86,7 +86,8 @@ impl SecondDrive {
 }
 
 impl App {
-    /// What is shown of the stepper. Nothing over a real hand, or without one.
+    /// Takes the stepper's state for display. Shows nothing without a second hand, or if a real
+    /// hand holds it.
     pub(super) fn take_stepper(&mut self) {
         let held = self.shown.probe_pose().filter(|_| self.shown.is_second_simulated());
         match held {
@@ -99,7 +100,7 @@ impl App {
         }
     }
 
-    /// Held keys and a second gamepad move the other hand; letting go stops it.
+    /// Moves the second hand by held keys and a second gamepad; releasing them stops it.
     pub(super) fn drive_second(&mut self, keys_m_per_s: [f64; 3], gamepad: ProbeWish, frame_s: f64) {
         let now = self.shown.probe_pose().filter(|_| self.shown.is_second_simulated());
         let Some(now) = now.filter(|_| !self.watches()) else {

@@ -1,4 +1,5 @@
-//! Takes what is new since the last frame: records, answers, files that were read, the script's next action.
+//! Takes the data that arrived since the last frame: records, answers, loaded files, the script's
+//! next action.
 
 use super::drive::Drive;
 use super::{App, refusal};
@@ -17,11 +18,11 @@ use stylet_implant::workflow::RunStatus;
 use stylet_shm_schema::{Prescribed, Request};
 
 const SUM_UP_EVERY: Duration = Duration::from_millis(500);
-/// A request that waits for its answer for longer is shown.
+/// Time after which a request without an answer is shown.
 const ANSWER_WITHIN: Duration = Duration::from_secs(3);
 
 impl App {
-    /// Takes all that is new since the last frame.
+    /// Takes all data that arrived since the last frame.
     pub(super) fn take(&mut self) {
         self.take_recording();
         self.link.poll();
@@ -37,7 +38,7 @@ impl App {
         let records = self.link.take_records();
         self.history.take(&records, direction);
         self.workflow.guide.felt.take(&records);
-        // Its state says all that the window shows of it.
+        // The window shows only the state of the second hand, not its records.
         let _second = self.link.take_second_records();
         self.heard.take(&self.link, &records);
         self.shown.heard = self.heard.planned(self.settings.seed_strength_u);
@@ -60,7 +61,7 @@ impl App {
         self.middle.take(&self.shown, self.link.scene(), self.link.snapshot());
     }
 
-    /// The force loop has its core to itself.
+    /// Leaves the force loop's processor core to it.
     fn leave_core(&mut self) {
         if self.watches() {
             return;
@@ -70,7 +71,8 @@ impl App {
         }
     }
 
-    /// Of the plan while it is edited or nothing lies in the tissue; else of the seeds as they lie.
+    /// Returns the dose request: the plan while it is edited or nothing is placed, else the seeds
+    /// at their actual positions.
     fn dose_request(&self) -> DoseRequest {
         let implant = self.shown.planning.implant.as_ref();
         match implant.filter(|_| self.edits_plan() || self.shown.seeds.is_empty()) {
@@ -79,7 +81,8 @@ impl App {
         }
     }
 
-    /// What the seeds are: of the plan of this window, or of that which was heard of, or of the settings.
+    /// Returns the prescription of the seeds: from this window's plan, else from a received plan,
+    /// else from the settings.
     pub(super) fn planned_as(&self) -> Prescribed {
         let implant = self.shown.planning.implant.as_ref();
         let first = implant.and_then(|i| i.plan.needles.iter().position(|n| !n.seeds.is_empty()));
@@ -89,7 +92,7 @@ impl App {
         own.unwrap_or_else(|| {
             let mut heard = self.heard.prescribed().unwrap_or_default();
             let is_others = self.trainees.followed.is_some() || self.watches();
-            // One by hand here is of the seeds that are set here, as soon as they are.
+            // A needle by hand uses the seeds of the settings at once.
             if heard.strength_u == 0.0 || heard.needle == 0 && !is_others {
                 heard.strength_u = self.settings.seed_strength_u;
             }
@@ -107,13 +110,13 @@ impl App {
         } else if before.holder.is_none() && now.holder.is_some() {
             self.shown.disconnected = None;
         }
-        // What is pressed while another window has the focus is meant for that window.
+        // Buttons pressed while another window has the focus are meant for that window.
         if self.shown.has_focus {
             self.pressed.extend(pressed.into_iter().map(asked_by));
         }
     }
 
-    /// Refusals of this run of the core that were not dismissed.
+    /// Counts the refusals of this run of the core that were not dismissed.
     fn count_refusals(&mut self) {
         let Some(session) = &self.shown.session else { return };
         if self.dismissed.0 != session.session_id {
@@ -154,7 +157,7 @@ impl App {
         let (link, note) = (&mut self.link, &mut self.shown.note);
         self.waiting.retain(|w| match link.reply(w.id) {
             Some(answer) if answer.accepted => {
-                // An old refusal is no longer true once something was accepted.
+                // An old refusal is obsolete once a request was accepted.
                 *note = None;
                 false
             }
@@ -233,7 +236,7 @@ impl App {
         }
     }
 
-    /// Of the patient of the present scene, if it can be.
+    /// Takes an image of the present scene's patient.
     fn take_image(&mut self, image: Image) {
         let Some(scene) = &self.shown.scene else {
             self.shown.load = LoadState::Refused(format!(
@@ -319,7 +322,7 @@ fn asked_by(button: Button) -> Action {
     }
 }
 
-/// As it is found from any folder.
+/// Returns the path in absolute form.
 fn absolute(path: &Path) -> String {
     std::path::absolute(path)
         .unwrap_or_else(|_| path.to_owned())

@@ -1,4 +1,5 @@
-//! The whole window without a core and without a graphics device: what is clipped, what overlaps, what moves.
+//! The whole window without a core and without a graphics device: clipped, overlapping and moving
+//! parts.
 
 mod class;
 pub(crate) mod fixture;

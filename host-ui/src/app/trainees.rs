@@ -1,4 +1,5 @@
-//! Several trainees in one window: which is followed, what is heard of each, and debriefs into the folder of a class.
+//! Several trainees in one window: the followed one, the state of each, and debriefs into the
+//! folder of a class.
 
 use super::debrief::Delivered;
 use super::{App, refusal};
@@ -16,24 +17,25 @@ use stylet_implant::class;
 use stylet_implant::heard::Heard;
 use stylet_shm_schema::{Mark, Request, flags};
 
-/// Seeds still move with the tissue for so long after the needle is out.
+/// Time for which seeds still move with the tissue after the needle is out.
 const RESTS_AFTER: Duration = Duration::from_secs(3);
-/// Of whoever is not followed nothing is drawn: the picture of the tissue says only where the seeds lie.
+/// Period of snapshots of a trainee who is not followed: they only locate the seeds, and nothing is
+/// drawn.
 const SEEDS_EVERY: Duration = Duration::from_millis(250);
 
-/// When the procedure of somebody is done: once, and only if this window has seen it begin.
+/// End of a procedure, reported once, and only if this window has seen its beginning.
 #[derive(Default)]
 struct Ending {
-    /// Every planned seed is in, and the needle is out, since then.
+    /// Time since which every planned seed is in, and the needle is out.
     done: Option<Instant>,
-    /// It was seen while seeds of its plan were missing, and its debrief is not written yet.
+    /// True from the first sight of an incomplete plan until its debrief is written.
     is_begun: bool,
 }
 
 impl Ending {
-    /// Whether a debrief is due now.
+    /// Returns whether a debrief is due now.
     fn take(&mut self, is_whole: bool, is_in_tissue: bool) -> bool {
-        // What was done before this window was there is not its own.
+        // A procedure that was complete before this window opened does not count.
         self.is_begun |= !is_whole;
         if !is_whole || is_in_tissue {
             self.done = None;
@@ -44,14 +46,14 @@ impl Ending {
     }
 }
 
-/// One trainee, as this window hears them.
+/// State of one trainee in this window.
 struct Seat {
     link: Link,
     heard: Heard,
     ending: Ending,
 }
 
-/// The list of a window, and where its debriefs go.
+/// List of a window's trainees, and destination of their debriefs.
 pub(super) struct Trainees {
     roster: Option<Roster>,
     all: Vec<Trainee>,
@@ -59,13 +61,13 @@ pub(super) struct Trainees {
     pub(super) followed: Option<usize>,
     /// Folder of the class.
     class: Option<PathBuf>,
-    /// Who sits here, where there is no list.
+    /// Name of the operator here, if there is no list.
     name: String,
-    /// The implant of this window itself.
+    /// End of this window's own implant.
     ending: Ending,
-    /// In the order of the list.
+    /// Trainees in the order of the list.
     seats: Vec<Seat>,
-    /// Whose debriefs are to be written.
+    /// Trainees whose debriefs are to be written.
     due: VecDeque<usize>,
 }
 
@@ -84,7 +86,7 @@ impl Trainees {
         }
     }
 
-    /// Where the debrief of whoever is shown goes.
+    /// Returns the folder for the debrief of the trainee shown.
     pub(super) fn folder(&self) -> Option<PathBuf> {
         let followed = self.followed.and_then(|number| self.all.get(number));
         self.folder_of(followed.map_or(&self.name, |trainee| &trainee.name))
@@ -104,7 +106,7 @@ impl Seat {
         }
     }
 
-    /// Whether a debrief is due.
+    /// Returns whether a debrief is due.
     fn take(&mut self) -> bool {
         self.link.poll();
         let records = self.link.take_records();
@@ -112,7 +114,7 @@ impl Seat {
         self.heard.take(&self.link, &records);
         let in_tissue = flags::IN_CONTACT | flags::PUNCTURED;
         let state = self.link.state().filter(|_| self.link.status() == LinkStatus::Live);
-        // A core that is silent ends nothing.
+        // A silent core ends nothing.
         state.is_some_and(|s| {
             let is_whole = self.heard.is_whole();
             self.heard.prescribed().is_some() && self.ending.take(is_whole, s.flags & in_tissue != 0)
@@ -141,7 +143,8 @@ impl App {
         }
     }
 
-    /// Once each implant: every planned seed was dropped, and the needle is out.
+    /// Writes a debrief once for each implant: every planned seed was dropped, and the needle is
+    /// out.
     fn write_when_done(&mut self) {
         let rows = all_errors(&self.shown);
         if rows.is_empty() || !self.shown.is_live() {
@@ -155,7 +158,7 @@ impl App {
         }
     }
 
-    /// From what this window has heard of them, into the folder of the class or one of its own.
+    /// Writes a debrief from this window's data, into the folder of the class or a new one.
     pub(super) fn debrief_trainee(&mut self, number: usize) {
         let list = &self.trainees;
         let (Some(seat), Some(trainee)) = (list.seats.get(number), list.all.get(number)) else {
@@ -180,7 +183,7 @@ impl App {
         }
     }
 
-    /// Nothing of one trainee's is taken for another's.
+    /// Follows another trainee, discarding everything that belongs to the previous one.
     fn follow(&mut self, number: usize) {
         let Some(trainee) = self.trainees.all.get(number).cloned() else {
             return;

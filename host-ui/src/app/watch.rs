@@ -1,4 +1,5 @@
-//! A recording in the window, in place of a core: everything is as it was, and nothing can be moved.
+//! A recording in the window instead of a core: everything is shown as it was, and nothing can be
+//! moved.
 
 use super::{App, refusal};
 use crate::action::WatchAction;
@@ -10,13 +11,13 @@ use stylet_base::job::{Job, JobUpdate};
 use stylet_host::link::{Link, Played};
 use stylet_host::record::{self, RecordError, ShowError};
 
-/// One needle through the gland of `paper`, recorded by `make example`.
+/// Insertion of one needle through the gland of `paper`, recorded by `make example`.
 pub(super) const EXAMPLE: &[u8] = include_bytes!("../../example/insertion.mcap");
 
-/// The text of an error follows the name of the file.
+/// Reading of a recording; the text of an error follows the name of the file.
 type Read = Job<Result<Played, WatchError>>;
 
-/// Why a recording is not shown.
+/// Reason why a recording is not shown.
 #[derive(Debug, thiserror::Error)]
 enum WatchError {
     #[error(transparent)]
@@ -27,17 +28,17 @@ enum WatchError {
     Ended,
 }
 
-/// The recording that is read or shown.
+/// Recording that is being read or shown.
 #[derive(Default)]
 pub(super) struct Recording {
     reading: Option<(String, Read)>,
     name: String,
-    /// That of the core, for when the recording is closed.
+    /// Planner of the core, kept until the recording is closed.
     planner: Option<Planner>,
 }
 
 impl Recording {
-    /// One that is read as soon as the window opens.
+    /// Creates a state whose file is read as soon as the window opens.
     pub(super) fn beginning_with(file: Option<PathBuf>) -> Self {
         let mut recording = Self::default();
         if let Some(path) = file {
@@ -52,7 +53,7 @@ impl Recording {
             .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         let path = path.to_owned();
         let job = Job::begin("recording", move |answer, interrupt| {
-            // The window may be closed by now; then nobody reads the answer. So below.
+            // The window may have closed, so nobody reads the answer. The same holds below.
             let _ = answer.send(record::played(&path, interrupt).map_err(WatchError::from));
         });
         self.reading = Some((name, job));
@@ -67,7 +68,7 @@ impl Recording {
 }
 
 impl App {
-    /// Whether a recording is shown in place of a core.
+    /// Returns whether a recording is shown instead of a core.
     pub(super) fn watches(&self) -> bool {
         self.link.playback().is_some()
     }
@@ -77,7 +78,7 @@ impl App {
             WatchAction::Example | WatchAction::File(_) if self.run.is_some() => {
                 self.shown.note = Some(refusal("Stop the needles first, then look at a recording.".to_owned()));
             }
-            // Its keys would not reach the core any more.
+            // Its keys would no longer reach the core.
             WatchAction::Example | WatchAction::File(_) if self.shown.is_engaged() && !self.watches() => {
                 let why = "Turn the force off first (key D), then look at a recording.";
                 self.shown.note = Some(refusal(why.to_owned()));
@@ -90,7 +91,7 @@ impl App {
         }
     }
 
-    /// What is shown of the recording, once it is read.
+    /// Takes the state of the recording, once it is read.
     pub(super) fn take_recording(&mut self) {
         let Some((name, job)) = &self.recording.reading else {
             return self.show_recording();
@@ -129,7 +130,7 @@ impl App {
         }
     }
 
-    /// Nothing of one core, or of one recording, is taken for that of another.
+    /// Changes the link and discards everything that belongs to the previous core or recording.
     pub(super) fn change_link(&mut self, make: impl FnOnce(stylet_shm_schema::Instance) -> Link) {
         self.link = make(self.link.instance().clone());
         self.waiting.clear();

@@ -1,4 +1,4 @@
-//! `host-ui class`: trainees of a class beside each other, and what each has learned.
+//! The command `host-ui class`: comparison of trainees, and of each one's progress.
 
 use super::CommandError;
 use clap::Args;
@@ -29,7 +29,7 @@ pub struct ClassArgs {
 }
 
 impl ClassArgs {
-    /// Carries out the command.
+    /// Executes the command.
     pub fn run(self) -> Result<(), CommandError> {
         let class = Class::read(&self.folders)?;
         new_folder(&self.out)?;

@@ -1,4 +1,4 @@
-//! `host-ui compare`: what two doses differ by.
+//! The command `host-ui compare`: differences between two doses.
 
 use super::CommandError;
 use clap::Args;
@@ -8,7 +8,7 @@ use stylet_dose::gamma::{self, Agreement, Criterion};
 use stylet_implant::provenance;
 use stylet_implant::readers::{DoseFile, read_any_dose};
 
-/// Doses below this share of the highest are left out of relative differences.
+/// Share of the highest dose below which doses are left out of relative differences.
 const USUAL_THRESHOLD_PERCENT: f64 = 10.0;
 
 const HELP: &str = "\
@@ -27,20 +27,21 @@ Examples:
 #[derive(Args, Debug)]
 #[command(after_long_help = HELP)]
 pub struct CompareArgs {
-    /// Dose that is compared
+    /// Dose to compare
     dose: PathBuf,
-    /// Dose that it is compared with
+    /// Dose to compare it with
     with: PathBuf,
-    /// Only voxels count where the first dose is at least this share of --of-gy
+    /// Count only voxels where the first dose is at least this share of --of-gy
     #[arg(long, value_name = "PERCENT", default_value_t = USUAL_THRESHOLD_PERCENT)]
     threshold: f64,
-    /// Dose that shares are of, as the prescription [default: the highest of the first dose]
+    /// Dose to which the shares refer, such as the prescription [default: the highest of the first
+    /// dose]
     #[arg(long, value_name = "GY")]
     of_gy: Option<f64>,
-    /// Gamma index too: allowed dose difference and distance, such as 3,2
+    /// Compute the gamma index too: allowed dose difference and distance, such as 3,2
     #[arg(long, value_name = "PERCENT,MM", value_delimiter = ',')]
     gamma: Option<Vec<f64>>,
-    /// Percents of the gamma index are of the dose at each voxel
+    /// Take the percents of the gamma index from the dose at each voxel
     #[arg(long, requires = "gamma")]
     local: bool,
     /// File for the figures
@@ -48,7 +49,7 @@ pub struct CompareArgs {
     json: Option<PathBuf>,
 }
 
-/// Differences second minus first, in Gy.
+/// Differences, second dose minus first, in Gy.
 struct Difference {
     compared: usize,
     outside: usize,
@@ -59,7 +60,7 @@ struct Difference {
 }
 
 impl CompareArgs {
-    /// Carries out the command.
+    /// Executes the command.
     pub fn run(self) -> Result<(), CommandError> {
         if !(0.0..=1000.0).contains(&self.threshold) {
             return Err(format!("--threshold {}: give 0 to 1000 percent", self.threshold).into());

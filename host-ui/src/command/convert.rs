@@ -1,4 +1,5 @@
-//! `host-ui convert`: label volumes, seed plans and doses from one format to another, by the names of the two files.
+//! The command `host-ui convert`: conversion of label volumes, seed plans and doses, by the names
+//! of the two files.
 
 use super::CommandError;
 use super::dicom::plan_seed;
@@ -52,19 +53,20 @@ pub struct ConvertArgs {
     from: PathBuf,
     /// File to write; its name decides the format
     to: PathBuf,
-    /// Source of the seeds (TOML), for a plan out of CSV; a plan out of .toml has to be of its isotope
+    /// Source of the seeds (TOML), for a plan from CSV; must have the isotope of a plan from .toml
     #[arg(long, value_name = "FILE")]
     source: Option<PathBuf>,
     /// Strength in U of seeds whose CSV gives none
     #[arg(long, value_name = "U")]
     strength_u: Option<f64>,
-    /// What a column of the table of seeds is: NAME=HEADER with its unit, as in x_mm=-Lateral:cm; may be given again
+    /// Meaning of a column in the table of seeds: NAME=HEADER with its unit, as in
+    /// x_mm=-Lateral:cm; may be given several times
     #[arg(long = "column", value_name = "NAME=HEADER[:UNIT]")]
     columns: Vec<Mapped>,
-    /// RT Plan that a dose belongs to
+    /// RT Plan to which a dose belongs
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// DICOM file whose patient, study and frame of reference are taken, instead of those of the file that is read
+    /// DICOM file that provides patient, study and frame of reference, instead of the input file
     #[arg(long, value_name = "FILE")]
     like: Option<PathBuf>,
 }
@@ -108,7 +110,7 @@ impl ConvertArgs {
             return self.structures_again();
         }
         let voxels = files::watched(&self.from, |progress| files::read_voxels(&self.from, progress))?;
-        // Contours may overlap; in a volume one label has the voxel.
+        // Contours may overlap, but a voxel has one label.
         let lost = voxels.overlap.iter().filter(|_| !to_dicom);
         for note in voxels.frame.warning.iter().chain(lost) {
             seeds::report(&self.from, std::slice::from_ref(note));
@@ -130,7 +132,7 @@ impl ConvertArgs {
         self.written()
     }
 
-    /// A structure set contour by contour, on the images beside it.
+    /// Writes a structure set again, contour by contour, on the images in its folder.
     fn structures_again(&self) -> Result<(), CommandError> {
         let refused = |why| FileError::of(&self.from, why);
         let content = files::watched(&self.from, |progress| bytes::whole(&self.from, progress)).map_err(refused)?;
@@ -171,7 +173,7 @@ impl ConvertArgs {
         self.written()
     }
 
-    /// That of --like, or else that of the file that is read, or a new one.
+    /// Returns the identity of --like, else that of the input file, else a new one.
     fn identity(&self, of_file: Option<Identity>) -> Result<Identity, CommandError> {
         let Some(like) = &self.like else {
             return Ok(of_file.unwrap_or_default());
@@ -223,7 +225,7 @@ impl ConvertArgs {
             let [x, y, z] = seed.position_m.map(|v| v * 1e3);
             let axis = seed.axis.map_or(",,".to_owned(), |[a, b, c]| format!("{a},{b},{c}"));
             let needle = seed.needle.map_or_else(String::new, |n| n.to_string());
-            // The only characters that would end the field.
+            // These characters would end the field.
             let hole = seed.hole.replace([',', '"', '\n', '\r'], " ");
             let day = seed.strength_on.map_or_else(String::new, |day| day.to_string());
             let day = if is_dated { day + "," } else { day };
@@ -316,7 +318,7 @@ impl ConvertArgs {
     }
 }
 
-/// SOP class of a DICOM file; `None` for any other.
+/// Returns the SOP class of a DICOM file; `None` for any other.
 fn dicom_class(path: &Path) -> Result<Option<String>, CommandError> {
     let refused = |why| FileError::of(path, why);
     if !bytes::start(path, 160).is_some_and(|start| dicom::is_dicom(&start)) {
@@ -326,7 +328,7 @@ fn dicom_class(path: &Path) -> Result<Option<String>, CommandError> {
     Ok(Some(dicom::read(&content).map_err(refused)?.sop_class))
 }
 
-/// Scene files end in .toml as well.
+/// Returns whether the file is a plan; scene files end in .toml as well.
 fn is_plan_file(path: &Path) -> bool {
     has_ending(path, "toml") && input::read_text(path, MAX_PLAN_BYTES).is_ok_and(|text| text.contains("\"stylet plan,"))
 }
@@ -354,7 +356,7 @@ fn first_line(path: &Path) -> Result<String, CommandError> {
     Ok(String::from_utf8_lossy(line).to_ascii_lowercase())
 }
 
-/// In double precision, so that nothing is lost.
+/// Writes the dose in double precision, without loss.
 fn dose_nrrd(grid: &DoseFile) -> Vec<u8> {
     let [x, y, z] = grid.origin_m.map(|v| v * 1e3);
     let [a, b, c] = grid.spacing_m.map(|v| v * 1e3);

@@ -1,4 +1,4 @@
-//! `host-ui dicom`: structure set, plan and dose of one study as DICOM, linked to each other.
+//! The command `host-ui dicom`: structure set, plan and dose of one study as linked DICOM files.
 
 use super::CommandError;
 use super::dose::common::{Common, Loaded, within};
@@ -21,7 +21,7 @@ use stylet_implant::plan::seeds;
 use stylet_implant::provenance;
 use stylet_implant::readers::SeedRow;
 
-/// The grid reaches this far beyond the outermost structure.
+/// Margin of the grid around the outermost structure.
 const GRID_MARGIN_M: f64 = 0.005;
 
 const HELP: &str = "\
@@ -53,10 +53,10 @@ pub struct DicomArgs {
     /// Structures: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
     #[arg(long, value_name = "FILE")]
     structures: PathBuf,
-    /// Folder with the image series that the structures are drawn on [default: that of the structure set]
+    /// Folder with the image series of the contours [default: that of the structure set]
     #[arg(long, value_name = "DIR")]
     images: Option<PathBuf>,
-    /// DICOM file whose patient, study and frame of reference are taken
+    /// DICOM file that provides patient, study and frame of reference
     #[arg(long, value_name = "FILE")]
     like: Option<PathBuf>,
     /// Side of the voxels of the dose
@@ -65,7 +65,7 @@ pub struct DicomArgs {
 }
 
 impl DicomArgs {
-    /// Carries out the command.
+    /// Executes the command.
     pub fn run(self) -> Result<(), CommandError> {
         let c = &self.common;
         within("--spacing-mm", self.spacing_mm, 0.05, 100.0)?;
@@ -81,7 +81,7 @@ impl DicomArgs {
         let covered = bounds_m(&drawn.structures);
         let dose = grid(&loaded.seeds, &loaded.kernel, self.spacing_mm * 1e-3, covered)?;
         let number = |name: &str| drawn.structures.iter().position(|s| s.name == name).map(|n| n + 1);
-        // Structures may have one name: the first histogram of it is that of the first.
+        // Structures may share a name: the first histogram with it belongs to the first of them.
         let mut left: Vec<(usize, &str)> = (1..).zip(drawn.structures.iter().map(|s| s.name.as_str())).collect();
         let mut histograms: Vec<(usize, &Dvh)> = Vec::new();
         for (name, dvh) in judge.names().zip(&verdict.dvhs) {
@@ -132,7 +132,7 @@ impl DicomArgs {
         Ok(())
     }
 
-    /// The structures as they are drawn, with the images under them.
+    /// Returns the structures as contours, with their images.
     fn drawn(&self) -> Result<Drawn, CommandError> {
         let path = &self.structures;
         let refused = |why| FileError::of(path, why);
@@ -166,7 +166,7 @@ impl DicomArgs {
         })
     }
 
-    /// That of the first file that has one; all others must agree with it.
+    /// Returns the identity of the first file that has one; all others must agree with it.
     fn identity(&self, drawn: &Drawn, loaded: &Loaded) -> Result<Identity, CommandError> {
         let mut all: Vec<(PathBuf, Identity)> = Vec::new();
         if let Some(like) = &self.like {
@@ -206,14 +206,14 @@ impl DicomArgs {
     }
 }
 
-/// Structures with what they belong to.
+/// Structures with their images and identity.
 struct Drawn {
     structures: Vec<Outlined>,
     identity: Option<Identity>,
     images: Vec<Slice>,
 }
 
-/// The images of a folder, which must be of one series.
+/// Returns the images of a folder, which must be of one series.
 fn one_series(folder: &Path) -> Result<Vec<Slice>, CommandError> {
     let slices = images::all_in(folder).map_err(|why| FileError::of(folder, why))?;
     let Some(first) = slices.first() else {
@@ -230,7 +230,7 @@ fn one_series(folder: &Path) -> Result<Vec<Slice>, CommandError> {
     Ok(slices)
 }
 
-/// Around every corner of a contour.
+/// Returns the box around every corner of a contour.
 fn bounds_m(structures: &[Outlined]) -> Option<([f64; 3], [f64; 3])> {
     let corners: Vec<[f64; 3]> = structures
         .iter()
@@ -262,7 +262,7 @@ fn plan(loaded: &Loaded, identity: &Identity, prescription_gy: f64) -> SeedPlan 
     }
 }
 
-/// A seed with its needle and hole, as a plan has it.
+/// Returns a seed with its needle and hole, in the form of a plan.
 pub fn plan_seed(row: SeedRow) -> PlanSeed {
     PlanSeed {
         needle: row.needle,

@@ -1,4 +1,4 @@
-//! `host-ui dose`.
+//! The command `host-ui dose`.
 
 use super::CommandError;
 use clap::Args;
@@ -18,7 +18,7 @@ pub mod common;
 pub mod write;
 
 pub const POINTS_FOR_DOSE: usize = 300_000;
-/// The grid reaches this far beyond the outermost seeds.
+/// Margin of the grid around the outermost seeds.
 const GRID_MARGIN_M: f64 = 0.02;
 
 const DOSE_HELP: &str = "\
@@ -51,7 +51,7 @@ pub struct DoseArgs {
     /// Seeds: CSV, a plan of host-ui (.toml), or a DICOM RT Plan; see --help
     #[arg(long, value_name = "FILE")]
     seeds: PathBuf,
-    /// Points to take the dose at (CSV: x_mm,y_mm,z_mm)
+    /// Points for the dose (CSV: x_mm,y_mm,z_mm)
     #[arg(long, value_name = "FILE")]
     points: Option<PathBuf>,
     /// Structures: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
@@ -151,13 +151,14 @@ impl DoseArgs {
     }
 }
 
-/// Name of a file, without its folder.
+/// Returns the name of a file, without its folder.
 pub fn file_name(path: &Path) -> String {
     path.file_name()
         .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
-/// Dose on a grid around the seeds, and around a box (m) where one is given; with progress.
+/// Computes the dose on a grid around the seeds, and around a box (m) if one is given; with
+/// progress.
 pub fn grid(
     seeds: &[Seed],
     kernel: &DoseKernel,

@@ -1,4 +1,4 @@
-//! `host-ui find-seeds`: the seeds in a CT volume, as a table.
+//! The command `host-ui find-seeds`: seeds in a CT volume, as a table.
 
 use super::CommandError;
 use super::dose::common::within;
@@ -13,9 +13,9 @@ use stylet_files::{bytes, dicom, watched};
 use stylet_implant::finder::{self, Found, Search};
 use stylet_implant::provenance;
 
-/// Seeds at least are one, and no implant has more.
+/// Largest number of seeds in an implant.
 const MOST_SEEDS: u64 = 400;
-/// Number of bytes that distinguish a DICOM file from others.
+/// Number of bytes that identify a DICOM file.
 const START_BYTES: u64 = 160;
 
 const HELP: &str = "\
@@ -37,10 +37,10 @@ Example:
 pub struct FindSeedsArgs {
     /// CT of the implant: a DICOM series (its folder, or one of its files), NIfTI-1, NRRD, MetaImage
     ct: PathBuf,
-    /// Number of seeds that were implanted, less those that were lost
+    /// Number of implanted seeds, less those that were lost
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     count: Option<u64>,
-    /// Voxels of this value or more belong to seeds [default: from the data, and reported]
+    /// Smallest value of the voxels of seeds [default: from the data, and reported]
     #[arg(long, value_name = "HU", allow_negative_numbers = true)]
     threshold: Option<f64>,
     /// Length of a seed
@@ -49,7 +49,7 @@ pub struct FindSeedsArgs {
     /// Diameter of a seed
     #[arg(long, value_name = "MM", default_value_t = 0.8)]
     diameter_mm: f64,
-    /// Count every component as one seed, to see what splitting gains
+    /// Count every component as one seed, to measure the gain of splitting
     #[arg(long)]
     no_split: bool,
     /// Folder for the results
@@ -58,7 +58,7 @@ pub struct FindSeedsArgs {
 }
 
 impl FindSeedsArgs {
-    /// Carries out the command.
+    /// Executes the command.
     pub fn run(self) -> Result<(), CommandError> {
         within("--length-mm", self.length_mm, 1.0, 10.0)?;
         within("--diameter-mm", self.diameter_mm, 0.2, 3.0)?;
@@ -124,7 +124,7 @@ impl FindSeedsArgs {
             .iter()
             .map(|d| json!({ "at_mm": mm(d.place_m), "signal_seeds": d.signal, "counted": d.counted, "why": d.why }));
         let mut inputs: Vec<(&str, &Path)> = vec![("ct", &self.ct)];
-        // A file of a series stands for all files beside it.
+        // One file of a series selects all files in its folder.
         let is_slice = bytes::start(&self.ct, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
         inputs.extend(self.ct.parent().filter(|_| is_slice).map(|folder| ("series", folder)));
         Ok(json!({

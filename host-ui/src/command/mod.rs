@@ -1,6 +1,6 @@
-//! Tasks of the command line that open no window.
+//! Commands that open no window.
 
-/// An error of a command, whatever its type: it is printed for the person at the terminal.
+/// Error of a command, of any type, printed on the terminal.
 pub type CommandError = Box<dyn std::error::Error>;
 
 pub mod class;

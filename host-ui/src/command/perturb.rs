@@ -1,4 +1,4 @@
-//! `host-ui perturb`.
+//! The command `host-ui perturb`.
 
 use super::CommandError;
 use super::dose::common::{Common, Loaded, errors_of, within};
@@ -58,7 +58,7 @@ pub struct PerturbArgs {
     /// Standard deviation of a seed's error along each axis
     #[arg(long, value_name = "MM", default_value_t = 4.0)]
     sigma_mm: f64,
-    /// Standard deviation of its error along the needle, instead of --sigma-mm, which then counts across it
+    /// Standard deviation of its error along the needle; --sigma-mm then applies across it
     #[arg(long, value_name = "MM")]
     sigma_along_mm: Option<f64>,
     /// Correlation of the errors of two seeds of one needle, 0 to 1
@@ -67,10 +67,11 @@ pub struct PerturbArgs {
     /// Shift of all seeds in every trial
     #[arg(long, value_name = "X,Y,Z", value_parser = Shift::parse, allow_hyphen_values = true)]
     shift_mm: Option<Shift>,
-    /// Standard deviation along each axis of a shift that all seeds of a trial have in common
+    /// Standard deviation, along each axis, of a shift common to all seeds of a trial
     #[arg(long, value_name = "MM", default_value_t = 0.0)]
     shift_sigma_mm: f64,
-    /// Take shift, deviations and correlation from the seeds of a study of rt-core instead: its folder
+    /// Take shift, deviations and correlation from the seeds of a study of rt-core instead: its
+    /// folder
     #[arg(long, value_name = "DIR", conflicts_with_all = ["sigma_mm", "sigma_along_mm", "strand_correlation", "shift_mm"])]
     errors_of: Option<PathBuf>,
     /// Probability that a seed is lost, 0 to 1
@@ -82,7 +83,8 @@ pub struct PerturbArgs {
     /// Time in which half of the swelling is lost
     #[arg(long, value_name = "DAYS", requires = "edema")]
     edema_half_life: Option<f64>,
-    /// One more criterion: "D90>=130.5" of the target (Gy), "Urethra V150<=10" (percent); may be given again
+    /// Additional criterion: "D90>=130.5" of the target (Gy), "Urethra V150<=10" (percent); may be
+    /// given several times
     #[arg(long = "criterion", value_name = "CRITERION")]
     criteria: Vec<String>,
     /// Number of trials, each with its own random errors
@@ -93,7 +95,7 @@ pub struct PerturbArgs {
     seed: u64,
 }
 
-/// Three lengths in mm, as they are typed.
+/// Three lengths in mm, as typed.
 #[derive(Clone, Copy, Debug)]
 struct Shift([f64; 3]);
 
@@ -222,7 +224,8 @@ impl PerturbArgs {
         Ok(Some(Edema::of_days(percent / 100.0, days)))
     }
 
-    /// The needle of each seed, counted from 0, where it matters; what the file lacks for the errors asked for is refused.
+    /// Returns the needle of each seed, counted from 0, if the errors depend on it; refuses a file
+    /// without the data they need.
     fn strands(&self, loaded: &Loaded, errors: &Errors) -> Result<Vec<usize>, CommandError> {
         let (file, all) = (self.plan.display(), loaded.rows.len());
         let without_axis = loaded.seeds.iter().filter(|s| s.axis.is_none()).count();

@@ -1,4 +1,5 @@
-//! `host-ui picture`: what a probe or a C-arm sees of the scene of a running core, as a PNG file.
+//! The command `host-ui picture`: image of a probe or a C-arm in the scene of a running core, as a
+//! PNG file.
 
 use super::CommandError;
 use super::dose::common::within;
@@ -18,7 +19,7 @@ use stylet_implant::plan::{Hole, Template};
 use stylet_implant::procedure::{Connect, Live};
 use stylet_surfaces::field::Field;
 
-/// A core sends one at least every 30 ms.
+/// Longest wait for a snapshot; a core sends one at least every 30 ms.
 const SNAPSHOT_WITHIN: Duration = Duration::from_secs(3);
 
 const HELP: &str = "\
@@ -41,7 +42,7 @@ pub struct PictureArgs {
     /// Start this rt-core when none is running, and end it afterwards
     #[arg(long, value_name = "PATH")]
     core: Option<PathBuf>,
-    /// Which picture
+    /// Picture to write
     #[arg(long, value_enum)]
     view: Wanted,
     /// File to write
@@ -50,19 +51,19 @@ pub struct PictureArgs {
     /// Width and height in pixels
     #[arg(long, default_value_t = 768, value_name = "N", value_parser = clap::value_parser!(u32).range(64..=2048))]
     pixels: u32,
-    /// Move the probe this far into the patient, -100 to 100 mm
+    /// Move the probe by this into the patient, -100 to 100 mm
     #[arg(long, default_value_t = 0.0, value_name = "MM", allow_negative_numbers = true)]
     way: f64,
     /// Turn the probe about its axis, -180 to 180 degrees
     #[arg(long, default_value_t = 0.0, value_name = "DEG", allow_negative_numbers = true)]
     turn: f64,
-    /// How deep ultrasound looks, 20 to 120 mm
+    /// Depth of the ultrasound image, 20 to 120 mm
     #[arg(long, default_value_t = 60.0, value_name = "MM")]
     depth: f64,
     /// Gain of ultrasound, -60 to 60 dB
     #[arg(long, default_value_t = 0.0, value_name = "DB", allow_negative_numbers = true)]
     gain: f64,
-    /// Draw the holes of the template over the transverse picture
+    /// Draw the holes of the template on the transverse picture
     #[arg(long)]
     template: bool,
     /// Orbital angle of the C-arm, -180 to 180 degrees
@@ -73,14 +74,14 @@ pub struct PictureArgs {
     cranial: f64,
 }
 
-/// Which picture is wanted.
+/// Requested picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Wanted {
     /// Ultrasound across the probe
     Transverse,
     /// Ultrasound along the probe
     Sagittal,
-    /// A radiograph of a C-arm
+    /// Radiograph of a C-arm
     Fluoroscopy,
 }
 
@@ -163,7 +164,7 @@ impl PictureArgs {
     }
 }
 
-/// The tissue and the metal of the first snapshot that arrives.
+/// Returns the tissue and the metal of the first snapshot that arrives.
 fn now(live: &mut Live, scene: &SceneModel) -> Result<(Field, Metal), CommandError> {
     let start = Instant::now();
     while live.link.snapshot().is_none() {
@@ -181,7 +182,7 @@ fn now(live: &mut Live, scene: &SceneModel) -> Result<(Field, Metal), CommandErr
     Ok((field.unwrap_or_else(|| Field::rest(nodes)), shown.metal()))
 }
 
-/// A dot of the template on the screen.
+/// Draws a dot of the template.
 fn dot(pixels: &mut [[u8; 4]], side: u32, at: Vector2<f64>) {
     const COLOR: [u8; 4] = [150, 230, 150, 255];
     for (x, y) in [(0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)] {

@@ -1,4 +1,4 @@
-//! `host-ui plan`: a plan file for the scene of a running core.
+//! The command `host-ui plan`: a plan file for the scene of a running core.
 
 use super::CommandError;
 use super::dose::common::{errors_of, within};
@@ -54,25 +54,26 @@ pub struct PlanArgs {
     /// Start this rt-core when none is running, and end it afterwards
     #[arg(long, value_name = "PATH")]
     core: Option<PathBuf>,
-    /// Source file (TOML) as those in sources/
+    /// Source file (TOML), like those in sources/
     #[arg(long, value_name = "FILE")]
     source: PathBuf,
     /// Prescribed dose in Gy [default: that of the seeds' plan, or else of the source file]
     #[arg(long, value_name = "GY")]
     prescription_gy: Option<f64>,
-    /// Seeds to take instead (CSV, a plan .toml, or a DICOM RT Plan)
+    /// Seeds to use instead (CSV, a plan .toml, or a DICOM RT Plan)
     #[arg(long, value_name = "FILE")]
     seeds: Option<PathBuf>,
     /// Strength in U of seeds whose table gives none
     #[arg(long, value_name = "U", requires = "seeds")]
     strength_u: Option<f64>,
-    /// What a column of the table of seeds is: NAME=HEADER with its unit, as in x_mm=-Lateral:cm; may be given again
+    /// Meaning of a column in the table of seeds: NAME=HEADER with its unit, as in
+    /// x_mm=-Lateral:cm; may be given several times
     #[arg(long = "column", value_name = "NAME=HEADER[:UNIT]", requires = "seeds")]
     columns: Vec<Mapped>,
     /// Day of the implant (2026-10-31), to which strengths with a reference date decay
     #[arg(long, value_name = "DATE", requires = "seeds")]
     implant_date: Option<Date>,
-    /// Which D90 should be at least 90 % of the prescription when seeds miss their places
+    /// D90 that must be at least 90 % of the prescription when seeds are misplaced
     #[arg(long, value_enum, default_value_t = Robust::P5, conflicts_with = "seeds")]
     robust: Robust,
     /// Standard deviation of a seed's error along each axis, for --robust
@@ -81,30 +82,31 @@ pub struct PlanArgs {
     /// Take the errors of seeds from a study of rt-core instead: its folder
     #[arg(long, value_name = "DIR", conflicts_with_all = ["seeds", "misplacement_mm"])]
     errors_of: Option<PathBuf>,
-    /// Needles at most
+    /// Maximum number of needles
     #[arg(long, value_name = "N", default_value_t = 25, conflicts_with = "seeds", value_parser = clap::value_parser!(u8).range(1..=60))]
     needles: u8,
-    /// Search for three plans, robust, with fewer needles and cooler, compare them, and write this one
+    /// Search for three plans, robust, with fewer needles and with lower V150, compare them, and
+    /// write this one
     #[arg(long, value_enum, conflicts_with = "seeds")]
     compare: Option<Wanted>,
     /// Plan file to write (TOML)
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Table of the seeds to write as well
+    /// Table of the seeds to write in addition
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 }
 
-/// Which D90 a search aims at.
+/// Aim of a search, as a D90.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Robust {
-    /// That of the plan alone
+    /// The D90 of the plan alone
     Planned,
-    /// The mean of 300 trials
+    /// The mean D90 of 300 trials
     Expected,
-    /// The one that 90 % of the trials reach
+    /// The D90 that 90 % of the trials reach
     P10,
-    /// The one that 95 % of the trials reach
+    /// The D90 that 95 % of the trials reach
     P5,
 }
 
@@ -119,10 +121,10 @@ impl Robust {
     }
 }
 
-/// Which of several plans is written.
+/// Choice among several plans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Wanted {
-    /// The one that keeps its coverage
+    /// The most robust one
     Robust,
     /// The one with the fewest needles
     FewerNeedles,
@@ -186,7 +188,7 @@ impl PlanArgs {
         Ok(())
     }
 
-    /// What the search aims at.
+    /// Returns the objectives of the search.
     fn objectives(
         &self,
         source: &Source,
@@ -204,7 +206,7 @@ impl PlanArgs {
         Ok(objectives)
     }
 
-    /// The seeds to take, compared with the source, and the prescription.
+    /// Returns the seeds of the file, compared with the source, and the prescription.
     fn seeds(&self, source: &Source) -> Result<SeedsAndPrescription<'_>, CommandError> {
         let Some(path) = self.seeds.as_deref() else {
             return Ok((None, self.prescription_gy.or(source.prescription_gy)));
@@ -227,7 +229,7 @@ impl PlanArgs {
         inputs.extend(self.asked.file().map(|file| ("--scene", file)));
         inputs.extend(self.errors_of.as_deref().map(|folder| ("--errors-of", folder)));
         let made = serde_json::to_string(&provenance::made(&inputs)?)?;
-        // One line, as JSON has no line feeds of its own.
+        // One line, because JSON has no line feeds of its own.
         let text = format!("# made: {made}\n{}", file::to_text(plan, frames)?);
         write_whole(&self.out, text.as_bytes())?;
         let Some(csv) = &self.csv else { return Ok(()) };
@@ -236,7 +238,7 @@ impl PlanArgs {
     }
 }
 
-/// Proposals, one a line.
+/// Returns the proposals, one a line.
 fn comparison(found: &[FirstPlan]) -> String {
     let mut text = format!(
         "{:14} {:>6} {:>6} {:>6} {:>7} {:>5} {:>8} {:>10} {:>8} {:>7}\n",
@@ -261,10 +263,10 @@ fn comparison(found: &[FirstPlan]) -> String {
     text
 }
 
-/// The file with its seeds, where one was given, and the dose in gray.
+/// File with its seeds, if one was given, and the dose in gray.
 type SeedsAndPrescription<'a> = (Option<(&'a Path, SeedFile)>, Option<f64>);
 
-/// The measures as a table, and the limits that they do not keep.
+/// Returns the measures as a table, and the limits that they violate.
 fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result<(String, Vec<String>), CommandError> {
     let seeds = plan.seeds();
     let strengths = seeds.iter().map(|s| s.strength_u);
@@ -279,7 +281,7 @@ fn figures(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result
         POINTS,
     )?;
     let verdict = judge.judge(kernel, &seeds);
-    // The target is the first one.
+    // The first structure is the target.
     let named = judge.names().zip(&verdict.dvhs).enumerate();
     let of_structure = |(n, (name, dvh)): (usize, (&str, &Dvh))| {
         let figures = DoseStructure::of(name, n == 0).map(|s| s.figures(dvh, plan.prescription_gy));

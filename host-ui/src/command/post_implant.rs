@@ -1,4 +1,5 @@
-//! `host-ui post-implant`: an implant as planned, as delivered, on day 0 and on day 30, side by side.
+//! The command `host-ui post-implant`: comparison of an implant as planned, as delivered, on day 0
+//! and on day 30.
 
 use super::CommandError;
 use super::dose::common::{Common, Loaded, within};
@@ -41,7 +42,7 @@ pub struct PostImplantArgs {
     /// Structures of the plan: NIfTI-1, NRRD, MetaImage or a DICOM RT Structure Set
     #[arg(long, value_name = "FILE")]
     structures: PathBuf,
-    /// Seeds as they were delivered, in the frame of the plan
+    /// Delivered seeds, in the frame of the plan
     #[arg(long, value_name = "FILE")]
     delivered: Option<PathBuf>,
     /// Seeds found on the day of the implant
@@ -50,7 +51,7 @@ pub struct PostImplantArgs {
     /// Structures of that day, in the frame of its seeds
     #[arg(long, value_name = "FILE", requires = "day0")]
     day0_structures: Option<PathBuf>,
-    /// Seeds found about a month after
+    /// Seeds found about a month later
     #[arg(long, value_name = "FILE")]
     day30: Option<PathBuf>,
     /// Structures of that day, in the frame of its seeds
@@ -67,7 +68,7 @@ pub struct PostImplantArgs {
     edema_half_life: Option<f64>,
 }
 
-/// Seeds and structures of the plan, which other states are compared with.
+/// Seeds and structures of the plan, the reference of the other states.
 struct Planned {
     places_m: Vec<[f64; 3]>,
     structures: Vec<Structure>,
@@ -75,7 +76,7 @@ struct Planned {
 }
 
 impl PostImplantArgs {
-    /// Carries out the command.
+    /// Executes the command.
     pub fn run(self) -> Result<(), CommandError> {
         let c = &self.common;
         within("--imaged-after", self.imaged_after, 0.0, 400.0)?;
@@ -100,7 +101,7 @@ impl PostImplantArgs {
             structures,
             target,
         };
-        // Long after any edema: planned and delivered are in the gland as it was imaged before.
+        // Long after any edema: planned and delivered seeds are in the gland as imaged before.
         let settled_s = f64::INFINITY;
         let mut states = vec![planned.state("planned", &self.planned, settled_s, loaded.seeds.clone(), None)];
         if let Some(file) = &self.delivered {
@@ -141,7 +142,8 @@ impl PostImplantArgs {
         Ok(Some(Edema::of_days(percent / 100.0, days)))
     }
 
-    /// Seeds of a day after the implant: in structures of their own, or fitted to the plan.
+    /// Reads the seeds of a day after the implant: in structures of their own, or fitted to the
+    /// plan.
     fn later(
         &self,
         planned: &Planned,
@@ -217,7 +219,7 @@ impl PostImplantArgs {
 }
 
 impl Planned {
-    /// Seeds in the structures of the plan.
+    /// Evaluates seeds in the structures of the plan.
     fn state(&self, name: &str, file: &Path, seen_s: f64, seeds: Vec<Seed>, fit: Option<RigidFit>) -> State {
         State {
             name: name.to_owned(),

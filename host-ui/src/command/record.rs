@@ -1,4 +1,4 @@
-//! `record`: a session into a file, or to viewers while it runs.
+//! The command `record`: a session to a file, or to viewers while it runs.
 
 use super::CommandError;
 use clap::Args;
@@ -9,19 +9,21 @@ use stylet_shm_schema::Instance;
 
 #[derive(Args, Debug)]
 pub struct RecordArgs {
-    /// Name that rt-core was started under
+    /// Name under which rt-core was started
     #[arg(long, default_value = "main", value_parser = Instance::new)]
     instance: Instance,
     /// File to write
     #[arg(long, value_name = "FILE.mcap", required_unless_present = "live")]
     out: Option<PathBuf>,
-    /// Serve the messages of a recording to Foxglove's app instead, on this address and port [default: 127.0.0.1:8765]; needs 'make live'
+    /// Serve the messages of a recording to Foxglove's app instead, on this address and port
+    /// [default: 127.0.0.1:8765]; needs 'make live'
     #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765", conflicts_with = "out")]
     live: Option<String>,
     /// Seconds to record [default: until interrupted or until rt-core ends]
     #[arg(long, value_name = "S")]
     duration: Option<f64>,
-    /// Snapshots of the gland per second, 0 to 60; the core sends 67 while the needle moves, 33 while it rests, and 17 where nothing displaces the gland
+    /// Snapshots of the gland per second, 0 to 60; the core sends 67 while the needle moves, 33
+    /// while it rests, and 17 while the gland is undisturbed
     #[arg(long, default_value_t = 20.0, value_name = "HZ")]
     snapshot_rate: f64,
 }

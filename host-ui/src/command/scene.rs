@@ -1,4 +1,4 @@
-//! `host-ui scene check`: what a volume or a scene file would give.
+//! The command `host-ui scene check`: the result of loading a volume or a scene file.
 
 use super::CommandError;
 use std::path::Path;
@@ -6,7 +6,7 @@ use stylet_base::format::printable;
 use stylet_files as files;
 use stylet_implant::readers::{SeedDefaults, read_seeds};
 
-/// Scene files, explained.
+/// Explanation of scene files.
 pub const HELP: &str = concat!(
     "A scene file is TOML. All fields but [volume] may be omitted; omitted fields are inferred from the name of the structure:\n\n",
     include_str!("../../../scenes/example.toml"),
@@ -65,7 +65,7 @@ pub fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Prints what a scene file holds besides its volume; its plan is read.
+/// Prints the content of a scene file except its volume; reads its plan.
 fn check_scene_file(file: &Path) -> Result<(), CommandError> {
     let scene = files::scene::read(file)?;
     let plan = scene

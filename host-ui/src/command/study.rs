@@ -1,4 +1,4 @@
-//! `host-ui study`: a page and tables of a population of insertions.
+//! The command `host-ui study`: a page and tables of a population of insertions.
 
 use super::CommandError;
 use super::dose::write;
@@ -28,7 +28,7 @@ Example:
 #[derive(Args, Debug)]
 #[command(after_long_help = HELP)]
 pub struct StudyArgs {
-    /// Folder that `rt-core study` wrote to
+    /// Folder written by 'rt-core study'
     folder: PathBuf,
     /// Folder for the page and the tables [default: page, in that folder]
     #[arg(long, value_name = "DIR")]
@@ -36,7 +36,7 @@ pub struct StudyArgs {
 }
 
 impl StudyArgs {
-    /// Carries out the command.
+    /// Executes the command.
     pub fn run(self) -> Result<(), CommandError> {
         let out = self.out.unwrap_or_else(|| self.folder.join("page"));
         let read = population::load(&self.folder)?;

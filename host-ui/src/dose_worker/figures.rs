@@ -1,20 +1,21 @@
-//! Figures of merit of a dose: measures of the structures with their limits, and the histogram of the target.
+//! Figures of merit of a dose: measures of the structures with their limits, and the histogram of
+//! the target.
 
 use stylet_dose::criteria::{DoseStructure, Figure};
 use stylet_dose::{DoseKernel, DosePoints, Dvh, Seed};
 use stylet_host::link::SceneModel;
 use stylet_shm_schema::{SceneHeader, StructureInfo, role};
 
-/// Cells of one structure that its histogram is made of, at most.
+/// Most cells of one structure in its histogram.
 const MOST_POINTS: usize = 60_000;
 
-/// What each structure is evaluated as, in the order of the labels.
+/// Returns the evaluated structure of each label.
 fn evaluated(scene: &SceneHeader) -> Vec<Option<DoseStructure>> {
     let of = |structure: &StructureInfo| DoseStructure::of(&structure.name.read(), structure.role & role::TARGET != 0);
     scene.structures().iter().map(of).collect()
 }
 
-/// Histograms of the target, then of the other evaluated structures that the scene has.
+/// Computes the histograms of the target, then of the other evaluated structures of the scene.
 pub(super) fn dvhs(scene: &SceneModel, kernel: &DoseKernel, seeds: &[Seed]) -> Vec<(DoseStructure, Dvh)> {
     let header = &scene.header;
     let all = [DoseStructure::Target, DoseStructure::Urethra, DoseStructure::Rectum];
@@ -38,7 +39,8 @@ pub(super) fn dvhs(scene: &SceneModel, kernel: &DoseKernel, seeds: &[Seed]) -> V
         .collect()
 }
 
-/// Middles of cells at rest, scene frame; an even selection where there are more than [`MOST_POINTS`].
+/// Returns centres of cells at rest, in the scene frame; an even selection if there are more than
+/// [`MOST_POINTS`].
 fn cell_centres(scene: &SceneModel, is_in: impl Fn(u8) -> bool) -> Vec<[f64; 3]> {
     let grid = &scene.header.labels;
     let [nx, ny, _] = grid.dims.map(|d| d as usize);

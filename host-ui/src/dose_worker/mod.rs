@@ -1,4 +1,4 @@
-//! Dose of the seeds that lie in the tissue or are planned, computed on a thread of its own whenever they have changed.
+//! Dose of the placed or planned seeds, computed on a thread of its own whenever they change.
 
 mod figures;
 
@@ -14,36 +14,36 @@ use stylet_implant::plan::exchange::USUAL_SOURCE;
 use stylet_shm_schema::{Prescribed, SceneId, SeedPose};
 use stylet_surfaces::mesh::{self, SurfaceVertex};
 
-/// Doses that are drawn, as shares of the prescription.
+/// Drawn dose levels, as shares of the prescription.
 pub const LEVELS: [f64; 4] = [0.5, 1.0, 1.5, 2.0];
-/// Sources without a prescription of their own are drawn against this (I-125, AAPM TG-137).
+/// Prescription assumed for sources without one (I-125, AAPM TG-137).
 const USUAL_PRESCRIPTION_GY: f64 = 145.0;
-/// A seed that has moved less has, for the eye, the same dose as before.
+/// Movement of a seed below which its dose looks the same.
 const SAME_PLACE_M: f64 = 0.2e-3;
-/// The grid reaches this far beyond the box of the target.
+/// Margin of the grid around the box of the target.
 const MARGIN_M: f64 = 0.012;
-/// Distance of the voxels that isodose surfaces are made from.
+/// Voxel spacing for isodose surfaces.
 const SPACING_M: f64 = 1.5e-3;
 
-/// An isodose surface.
+/// Isodose surface.
 #[derive(Clone, Debug, Default)]
 pub struct IsodoseShell {
-    /// Which of [`LEVELS`].
+    /// Index into [`LEVELS`].
     pub level: usize,
-    /// Vertices, in the body as the scene has it.
+    /// Vertices, in the frame of the scene's body.
     pub points_m: Vec<[f32; 3]>,
-    /// Three places in `points_m` each.
+    /// Triangles, as indices into `points_m`.
     pub triangles: Vec<[u32; 3]>,
-    /// Vertices for the graphics card, made here because that takes longer than a frame has.
+    /// Vertices for the graphics card, made here because that takes longer than a frame.
     pub vertices: Vec<SurfaceVertex>,
     /// Indices for the graphics card.
     pub indices: Vec<u32>,
 }
 
-/// Which seeds a dose is of.
+/// Seeds of a dose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DoseOf {
-    /// Seeds that lie in the tissue.
+    /// Seeds in the tissue.
     Tissue,
     /// Seeds of the plan.
     Plan,
@@ -52,21 +52,21 @@ pub enum DoseOf {
 /// Seeds whose dose is requested.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DoseRequest {
-    /// Which seeds they are.
+    /// Choice of seeds.
     pub of: DoseOf,
     /// Model of their source.
     pub source: String,
-    /// Prescribed dose; without one that of the source.
+    /// Prescribed dose; without one, that of the source.
     pub prescription_gy: Option<f64>,
-    /// How far an exercise has moved the body, m.
+    /// Displacement of the body by an exercise, m.
     pub body_moved_m: [f64; 3],
-    /// Place, axis and strength of each, in the body as the scene has it.
+    /// Place, axis and strength of each seed, in the frame of the scene's body.
     pub seeds: Vec<Seed>,
 }
 
 impl DoseRequest {
-    /// Request for seeds as they lie: of the source, strength and prescription of what they were planned as, or of the usual source
-    /// where that is not known.
+    /// Creates a request for placed seeds, with the planned source, strength and prescription, or
+    /// the usual source if unknown.
     pub fn in_tissue(poses: &[SeedPose], planned: &Prescribed) -> Self {
         let source = planned.source.read();
         Self {
@@ -82,7 +82,8 @@ impl DoseRequest {
         }
     }
 
-    /// Request for the seeds of a plan: they stay where the template is, whichever way the body was moved.
+    /// Creates a request for the seeds of a plan. They follow the template, however the body was
+    /// moved.
     pub fn of_plan(plan: &ImplantPlan, seeds: &[Seed], body_moved_m: [f64; 3]) -> Self {
         let in_body = |seed: &Seed| Seed {
             position_m: [0, 1, 2].map(|a| seed.position_m[a] - body_moved_m[a]),
@@ -106,19 +107,19 @@ impl DoseRequest {
 /// Dose of one set of seeds.
 #[derive(Clone, Debug)]
 pub struct DoseResult {
-    /// Rises with every result.
+    /// Number that grows with every result.
     pub number: u64,
-    /// Which seeds it is of.
+    /// Choice of seeds.
     pub of: DoseOf,
     /// Number of seeds.
     pub seeds: usize,
-    /// How far the body was moved then, m.
+    /// Displacement of the body at the time, m.
     pub body_moved_m: [f64; 3],
     /// Nuclide and model.
     pub source: String,
-    /// Dose that the levels are shares of.
+    /// Dose to which the levels refer.
     pub prescription_gy: f64,
-    /// One for each of [`LEVELS`]; none where the target has no extent.
+    /// Shells, one for each of [`LEVELS`]; none if the target has no extent.
     pub shells: Vec<IsodoseShell>,
     /// Measures of the structures, with their limits.
     pub figures: Vec<Figure>,
@@ -133,7 +134,8 @@ struct DoseTask {
 }
 
 impl DoseResult {
-    /// From the body as the scene has it to where this dose is drawn, m. Seeds in the tissue go with the body, those of a plan do not.
+    /// Returns the offset from the scene's body to the place where this dose is drawn, m. Placed
+    /// seeds follow the body, planned seeds do not.
     pub fn shift_m(&self, body_moved_m: [f64; 3]) -> [f64; 3] {
         match self.of {
             DoseOf::Tissue => body_moved_m,
@@ -142,21 +144,22 @@ impl DoseResult {
     }
 }
 
-/// The thread that computes doses: one set of seeds at a time, then the newest that was requested meanwhile.
+/// Thread that computes doses: one set of seeds at a time, then the newest request.
 pub struct DoseWorker {
     tasks: Sender<DoseTask>,
     results: Receiver<DoseResult>,
     computing: bool,
-    /// Session, generation of the scene, and what was requested last.
+    /// Session, generation of the scene, and the last request.
     requested: Option<(SceneId, DoseRequest)>,
     number: u64,
     latest: Option<Arc<DoseResult>>,
-    /// The thread has ended.
+    /// True once the thread has ended.
     lost: bool,
 }
 
 impl DoseWorker {
-    /// Starts the thread. Where that fails there is no dose, and [`DoseWorker::trouble`] says so.
+    /// Starts the thread. If that fails there is no dose, and [`DoseWorker::trouble`] gives the
+    /// reason.
     pub fn new() -> Self {
         let (tasks, work) = channel();
         let (done, results) = channel();
@@ -174,34 +177,35 @@ impl DoseWorker {
         }
     }
 
-    /// The newest result, while it still holds for what was requested last.
+    /// Returns the newest result, while it answers the last request.
     pub fn latest(&self) -> Option<&Arc<DoseResult>> {
         self.latest.as_ref()
     }
 
-    /// Whether a dose is being computed.
+    /// Returns whether a dose is being computed.
     #[cfg(test)]
     fn is_computing(&self) -> bool {
         self.computing
     }
 
-    /// Why there is no dose, where that is so.
+    /// Returns the reason why there is no dose, if there is none.
     pub fn trouble(&self) -> Option<&'static str> {
         self.lost.then_some("the dose is not computed: its thread has ended")
     }
 
-    /// Takes a result that is ready, and requests a new one where seeds were added, removed or moved. Never waits.
+    /// Takes a finished result, and requests a new one if seeds were added, removed or moved. Never
+    /// waits.
     pub fn take(&mut self, scene: Option<&Arc<SceneModel>>, request: &DoseRequest) {
         match self.results.try_recv() {
             Ok(result) => {
                 self.computing = false;
-                // A dose of seeds that were all removed meanwhile no longer holds.
+                // If all its seeds have been removed since, a dose is obsolete.
                 self.latest = (result.seeds > 0 && !request.seeds.is_empty()).then(|| Arc::new(result));
             }
             Err(TryRecvError::Empty) => {}
             Err(TryRecvError::Disconnected) => self.lost = true,
         }
-        // The dose of the plan says nothing of the seeds in the tissue.
+        // The dose of the plan does not describe the seeds in the tissue.
         self.latest = self.latest.take().filter(|result| result.of == request.of);
         let Some(scene) = scene else { return };
         if request.seeds.is_empty() {
@@ -254,7 +258,7 @@ fn compute_all(work: &Receiver<DoseTask>, done: &Sender<DoseResult>) {
     while let Ok(task) = work.recv() {
         let model = &task.request.source;
         if known.as_ref().is_none_or(|(name, _, _)| name != model) {
-            // The usual one is part of the program; a test reads it.
+            // The usual source is part of the program; a test reads it.
             let Some(source) = Source::known(model).or_else(|| Source::known(USUAL_SOURCE)) else {
                 return;
             };
@@ -276,7 +280,7 @@ fn compute(task: &DoseTask, source: &Source, kernel: &DoseKernel) -> DoseResult 
     let low = header.target_lower_m.map(|c| c - MARGIN_M);
     let high = header.target_upper_m.map(|c| c + MARGIN_M);
     let mut shells = Vec::new();
-    // A box without extent has no shells; the figures do not need it.
+    // A box without extent has no shells, but it has figures.
     if let Ok(mut grid) = DoseGrid::covering(low, high, SPACING_M) {
         grid.add(kernel, seeds);
         shells.extend((0..LEVELS.len()).map(|level| shell(&grid, level, prescription_gy)));

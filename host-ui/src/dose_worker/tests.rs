@@ -1,4 +1,4 @@
-//! The dose that is computed in the background, against the formula.
+//! The dose computed in the background, against the formula.
 
 use super::*;
 use bytemuck::Zeroable;
@@ -55,7 +55,8 @@ fn the_shell_of_a_seed_lies_where_the_formula_gives_that_dose() {
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let shell = &picture.shells[0];
     assert!(!shell.points_m.is_empty());
-    // No farther from the formula's surface than a voxel: one voxel nearer to the seed there is more, one farther less.
+    // At most a voxel from the formula's surface: one voxel nearer to the seed the dose is higher,
+    // one farther it is lower.
     let level_gy = 0.5 * 145.0;
     for p in &shell.points_m {
         let out: Vec<f64> = (0..3).map(|a| f64::from(p[a]) - poses[0].position_m[a]).collect();

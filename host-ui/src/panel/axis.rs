@@ -1,14 +1,14 @@
-//! Plots that are only looked at: their axes, the marks on them, and their words.
+//! Plots without interaction: axes, marks and labels.
 
 use egui::Rangef;
 use egui_plot::{AxisHints, GridInput, GridMark, Plot};
 
-/// Between two values on an axis that goes up, points, so that each can be read.
+/// Distance between two values on a vertical axis, in points, so that each is legible.
 const BETWEEN_VALUES: f32 = 20.0;
-/// Lines of the grid nearer than the first are not seen, as far as the second are drawn in full.
+/// Spacing of grid lines: invisible below the first, drawn in full at the second.
 const LINES: Rangef = Rangef { min: 8.0, max: 300.0 };
 
-/// A plot without interaction, so that a plot that moves is not dragged by accident.
+/// Returns a plot without interaction, so that a plot that moves is not dragged by accident.
 pub fn plot(name: &str, height: f32) -> Plot<'static> {
     Plot::new(name.to_owned())
         .height(height)
@@ -26,7 +26,7 @@ pub fn plot(name: &str, height: f32) -> Plot<'static> {
         .set_margin_fraction(egui::vec2(0.0, 0.08))
 }
 
-/// Marks at multiples of 1, 2 or 5 times a power of ten, at least so far apart.
+/// Returns marks at multiples of 1, 2 or 5 times a power of ten, with at least this spacing.
 pub fn grid([from, to]: [f64; 2], at_least: f64) -> Vec<GridMark> {
     if !(at_least > 0.0 && at_least.is_finite() && to >= from && (to - from) / at_least < 100.0) {
         return Vec::new();
@@ -43,23 +43,23 @@ pub fn grid([from, to]: [f64; 2], at_least: f64) -> Vec<GridMark> {
     (first..=last).map(mark).collect()
 }
 
-/// Of an axis that goes up.
+/// Returns the marks of a vertical axis.
 pub fn upwards(input: GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
-    // The step that is offered is as wide as the nearest lines that are seen.
+    // The offered step is as wide as the nearest visible lines.
     grid(
         [low, high],
         input.base_step_size * f64::from(BETWEEN_VALUES / LINES.min),
     )
 }
 
-/// With as many decimals as the grid needs.
+/// Formats a mark with as many decimals as the grid needs.
 pub fn number(mark: GridMark) -> String {
     let decimals = (-mark.step_size.log10() - 1e-9).ceil().max(0.0) as usize;
     format!("{:.decimals$}", mark.value)
 }
 
-/// From `first` on, evenly.
+/// Returns evenly spaced marks from `first` on.
 pub fn marks(first: f64, step: f64, count: usize) -> Vec<GridMark> {
     (0..=count)
         .map(|i| GridMark {

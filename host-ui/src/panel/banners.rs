@@ -1,4 +1,4 @@
-//! The banners under the bar: what is wrong with the core, the force and the controllers, and what to do.
+//! The banners under the bar: problems of core, force and controllers, with their remedies.
 
 use super::class;
 use crate::action::{Action, WatchAction};
@@ -32,11 +32,11 @@ pub struct Banner {
     pub level: BannerLevel,
     pub title: &'static str,
     pub text: String,
-    /// The one thing to do about it, where a click can do it.
+    /// Remedy, if a click can apply one.
     pub remedy: Option<(&'static str, Action)>,
 }
 
-/// Worst first. Without a core there is no banner about its force.
+/// Returns the banners, worst first. Without a core there is no banner about its force.
 pub fn banners(shown: &Shown) -> Vec<Banner> {
     let mut list = match &shown.watched {
         Some(watched) => vec![of_recording(watched)],
@@ -46,7 +46,7 @@ pub fn banners(shown: &Shown) -> Vec<Banner> {
     list
 }
 
-/// In place of whatever was wrong with the core that was recorded.
+/// Returns the banner of a recording, which replaces the problems of the recorded core.
 fn of_recording(watched: &Watched) -> Banner {
     Banner {
         level: BannerLevel::Info,
@@ -59,7 +59,7 @@ fn of_recording(watched: &Watched) -> Banner {
     }
 }
 
-/// Devices that were unplugged, and devices that may not be read.
+/// Returns banners for devices that were unplugged or cannot be read.
 fn of_controllers(shown: &Shown) -> Vec<Banner> {
     let banner = |title, text, remedy| Banner {
         level: BannerLevel::Warn,
@@ -124,7 +124,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
     list
 }
 
-/// What is wrong with the second device; the needle's has its own banner.
+/// Returns the banner of the second device; the needle's device has its own.
 fn of_second(shown: &Shown) -> Option<Banner> {
     let Some(SecondHand::Faulty(fault)) = shown.second_hand() else {
         return None;
@@ -146,7 +146,7 @@ fn of_second(shown: &Shown) -> Option<Banner> {
     })
 }
 
-/// Whom the window shows, over which relay, how old that is and what was lost.
+/// Returns the banner of a relay: the trainee shown, the delay and the losses.
 fn of_line(line: &Relayed) -> Banner {
     let age_s = line.snapshot_age_ns as f64 * 1e-9;
     let (server, name) = (line.server.read(), line.name.read());
@@ -198,7 +198,7 @@ fn force_is_off(shown: &Shown) -> Option<Banner> {
     })
 }
 
-/// What an instructor put in, by name: a trainee must not look for a fault of the machine.
+/// Names the faults that an instructor injected, so that a trainee does not suspect the machine.
 fn exercises(shown: &Shown) -> Vec<Banner> {
     let in_force = shown.session.map(|s| s.exercises).unwrap_or_default();
     let banner = |exercise: Exercise| Banner {
@@ -210,7 +210,8 @@ fn exercises(shown: &Shown) -> Vec<Banner> {
     in_force.all().map(banner).collect()
 }
 
-/// While the needle is in tissue that was not prepared for it: force and places are then worth less, and may come late.
+/// Warns while the needle is in tissue that was not prepared for it: force and positions are less
+/// accurate, and may be late.
 fn without_line(shown: &Shown) -> Option<Banner> {
     let is_missing = shown.needle_line() == Some(NeedleLine::Missing);
     is_missing.then(|| Banner {
@@ -231,7 +232,7 @@ fn without_line(shown: &Shown) -> Option<Banner> {
     })
 }
 
-/// While it is; results keep from which displacement on it was.
+/// Warns while the tissue is folded; results record from which displacement on it was.
 fn folded(shown: &Shown) -> Option<Banner> {
     let folded_from_m = shown.folded_from_m().filter(|_| shown.is_folded());
     folded_from_m.map(|folded_from_m| Banner {
@@ -246,7 +247,7 @@ fn folded(shown: &Shown) -> Option<Banner> {
     })
 }
 
-/// Until they are dismissed: the refused request may be that of another host.
+/// Returns the refusals until they are dismissed: the refused request may be another host's.
 fn refused(shown: &Shown) -> Option<Banner> {
     (shown.refusals > 0).then(|| Banner {
         level: BannerLevel::Info,
@@ -273,7 +274,8 @@ fn absent(shown: &Shown, why: &str) -> Banner {
     }
 }
 
-/// Why the core that was shown ended, as far as it said so, and what is kept of it; nothing before one was shown.
+/// Explains why the last core ended, as far as it reported, and what is kept. Empty before one was
+/// shown.
 fn what_ended(shown: &Shown) -> String {
     if shown.session.is_none() {
         return String::new();
@@ -321,12 +323,13 @@ fn capital(text: &str) -> String {
     first.unwrap_or_default() + chars.as_str()
 }
 
-/// Over so much of the pictures at most.
+/// Largest share of the pictures under banners.
 const SHARE: f32 = 0.6;
-/// Narrower than this the text stands under the title.
+/// Width below which the text stands under the title.
 const NARROW: f32 = 560.0;
 
-/// Over the upper edge of the pictures, so that nothing moves when a banner comes or goes.
+/// Draws the banners over the upper edge of the pictures, so that nothing moves when one appears or
+/// disappears.
 pub fn banners_ui(ctx: &egui::Context, pictures: Rect, list: &[Banner]) -> Option<Action> {
     if list.is_empty() {
         return None;
@@ -339,14 +342,14 @@ pub fn banners_ui(ctx: &egui::Context, pictures: Rect, list: &[Banner]) -> Optio
     let shown = area.show(ctx, |ui| {
         ui.set_max_width(pictures.width());
         let most = SHARE * pictures.height();
-        // It would scroll from 64 points on.
+        // It would scroll beyond 64 points.
         let scroll = egui::ScrollArea::vertical().max_height(most).min_scrolled_height(most);
-        // Between two banners the pictures would be seen.
+        // The pictures must not show between two banners.
         let backed = egui::Frame::new().fill(theme::of(ui).panel);
         let inner = backed.show(ui, |ui| {
             scroll.show(ui, |ui| {
                 ui.spacing_mut().item_spacing.y = 1.0;
-                // The last one that was clicked.
+                // The last clicked one wins.
                 list.iter().filter_map(|banner| banner_ui(ui, banner)).last()
             })
         });

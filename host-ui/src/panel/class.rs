@@ -1,4 +1,4 @@
-//! Who is connected over a relay, who operates, and how the needle changes hands.
+//! Hosts connected over a relay: the operator, and the transfer of the needle.
 
 use crate::action::Action;
 use crate::panel::banners::{Banner, BannerLevel};
@@ -7,29 +7,29 @@ use crate::theme;
 use egui::RichText;
 use stylet_shm_schema::{Class, ClassMember, LeaseRequest};
 
-/// The word of the certificates of those who may hold the needle.
+/// Role in the certificates of those who may hold the needle.
 const OPERATOR: &str = "operator";
 const WIDTH: f32 = 480.0;
 const NAME_WIDTH: f32 = 190.0;
-/// A member is heard five times a second.
+/// Silence after which a member counts as lost; members report five times a second.
 const SILENT_NS: u64 = 1_000_000_000;
 const TITLE_AND_EDGES: f32 = 70.0;
 
-/// What whoever sits here may do with the needle.
+/// Rights of this window's user to the needle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Hand {
-    /// Another role.
+    /// Another role, without rights.
     None,
     /// May ask for it.
     Free,
-    /// Has it.
+    /// Holds it.
     Held,
 }
 
 fn hand(shown: &Shown, class: &Class) -> Hand {
     let (may, has) = match &shown.relayed {
         Some(line) => (line.role.read() == OPERATOR, line.operates != 0),
-        // Whoever sits beside the core decides who operates.
+        // The user at the core's machine decides who operates.
         None => (class.is_beside_core != 0, class.local_operates != 0),
     };
     match (may, has) {
@@ -39,7 +39,8 @@ fn hand(shown: &Shown, class: &Class) -> Hand {
     }
 }
 
-/// Beside the core, who is there; wherever the needle is, who asks for it.
+/// Returns banners: connected hosts, at the core's machine; requests for the needle, wherever it
+/// is.
 pub fn banners(shown: &Shown) -> Vec<Banner> {
     let Some(class) = shown.class.as_ref().filter(|class| class.count > 0) else {
         return Vec::new();
@@ -84,7 +85,7 @@ fn operates(shown: &Shown, class: &Class) -> String {
     }
 }
 
-/// The list, while the operator wants to see it.
+/// Draws the list of members while it is open.
 pub fn class_ui(ctx: &egui::Context, shown: &Shown, open: &mut bool) -> Option<Action> {
     let window = egui::Window::new("Who is there")
         .open(open)
@@ -131,7 +132,7 @@ fn list_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
     if !asked.is_empty() {
         ui.label(format!("{asked} asks to operate."));
     }
-    // Over a relay only who has the needle gives it.
+    // Over a relay only the holder of the needle can hand it over.
     let gives = hand == Hand::Held || (hand == Hand::Free && shown.relayed.is_none());
     ui.add_space(4.0);
     let rows = egui::Grid::new("members")
@@ -155,7 +156,7 @@ fn list_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
     action
 }
 
-/// One row; under the name the button that hands the needle over.
+/// Draws one row; the button that hands the needle over stands under the name.
 fn member_ui(ui: &mut egui::Ui, member: &ClassMember, may_have_it: bool) -> Option<Action> {
     let (name, role) = (member.name.read(), member.role.read());
     let (role_words, color) = match role.is_empty() {
@@ -186,7 +187,7 @@ fn member_ui(ui: &mut egui::Ui, member: &ClassMember, may_have_it: bool) -> Opti
     gives.inner.then_some(Action::Lease(LeaseRequest::Give(name)))
 }
 
-/// Short times to a tenth, long ones in seconds.
+/// Formats short times to a tenth, long ones in seconds.
 fn milliseconds(ns: u64) -> String {
     let ms = ns as f64 * 1e-6;
     match ms {

@@ -1,8 +1,9 @@
-//! A field for the path of a file: while nobody types in it, it shows the end of the path, and the whole on hover.
+//! A field for a file's path: it shows the end of the path unless it has the focus, and the whole
+//! path on hover.
 
 use egui::{Response, TextEdit, TextStyle};
 
-/// Three dots, and the margins of the field.
+/// Width of the three dots and the margins of the field.
 const BESIDE: f32 = 24.0;
 
 pub fn path_ui(ui: &mut egui::Ui, name: &str, path: &mut String, hint: &str, width: f32) -> Response {
@@ -25,7 +26,7 @@ pub fn path_ui(ui: &mut egui::Ui, name: &str, path: &mut String, hint: &str, wid
     response.on_hover_text(path.as_str())
 }
 
-/// The end of a path that is too long for the room.
+/// Returns the end of a path that does not fit the room.
 fn end_of(ui: &egui::Ui, path: &str, room: f32) -> Option<String> {
     let font = TextStyle::Body.resolve(ui.style());
     let whole = ui.painter().layout_no_wrap(path.to_owned(), font, egui::Color32::WHITE);

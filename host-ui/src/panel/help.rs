@@ -1,16 +1,16 @@
-//! The overlay that lists every key, and what gamepads and 3D mice do.
+//! The overlay that lists every key, and the functions of gamepads and 3D mice.
 
 use crate::shown::Shown;
 use crate::{keyboard, theme};
 use stylet_controllers::Kind;
 
-/// Around what is listed, in points.
+/// Height around the list, in points.
 const TITLE_AND_EDGES: f32 = 70.0;
-/// Narrower than this, controllers stand under the keys.
+/// Width below which controllers stand under the keys.
 const TWO_COLUMNS: f32 = 1100.0;
-/// Longer words go on in another line.
+/// Width beyond which text wraps.
 const LONGEST: f32 = 440.0;
-/// What the keys and the edges take.
+/// Width of keys and edges.
 const BESIDE_WORDS: f32 = 290.0;
 
 pub fn help_ui(ctx: &egui::Context, shown: &Shown, open: &mut bool) {
@@ -83,7 +83,7 @@ fn rows_ui<S: Into<String>>(ui: &mut egui::Ui, id: &str, rows: impl IntoIterator
         ui.spacing_mut().interact_size.y = 18.0;
         for (what, does) in rows {
             ui.label(theme::strong(what));
-            // Beside each other both columns are as wide as their words.
+            // Side by side, both columns are as wide as their text.
             let words = egui::Label::new(does.into());
             ui.add(if is_wide { words.extend() } else { words.wrap() });
             ui.end_row();

@@ -1,4 +1,5 @@
-//! How often the force loop woke up how late, and worked how long: both axes logarithmic, because one late tick in a minute must be seen.
+//! Histograms of wake-up latency and work of the force loop. Both axes are logarithmic, so that one
+//! late tick in a minute is visible.
 
 use super::axis::{marks, plot};
 use super::history::{BINS, Timing, bin_low_us};
@@ -9,7 +10,7 @@ use stylet_base::format;
 
 /// Height of a bar of one tick.
 const ONE_TICK: f64 = 0.4;
-/// Powers of ten over it that fit.
+/// Number of powers of ten that fit above it.
 const DECADES: f64 = 4.8;
 
 pub fn histogram_ui(ui: &mut egui::Ui, timing: &Timing) {
@@ -35,7 +36,7 @@ pub fn histogram_ui(ui: &mut egui::Ui, timing: &Timing) {
         .x_grid_spacer(|_| marks(0.0, 5.0, 5))
         .y_grid_spacer(|_| marks(ONE_TICK, 2.0, 2))
         .x_axis_formatter(|mark: GridMark, _: &_| {
-            // On the edge a label would be cut off.
+            // At the edge a label would be cut off.
             if mark.value < BINS as f64 {
                 decade(bin_low_us(mark.value.max(0.0) as usize))
             } else {
@@ -67,7 +68,7 @@ fn bars(counts: &[u32; BINS], beside: f64) -> Vec<Bar> {
     counts.map(bar).collect()
 }
 
-/// What a bin stands for.
+/// Describes a bin.
 fn bin_text(timing: &Timing, bin: usize) -> String {
     let us = |bin: usize| format::microseconds(Some(bin_low_us(bin)));
     let range = match bin {
@@ -104,7 +105,7 @@ mod tests {
         assert!(bin_text(&timing, BINS - 1).starts_with("63.1 ms and more"));
     }
 
-    /// A bar of as many ticks as a mark stands for reaches that mark.
+    /// Checks that a bar reaches the mark of its number of ticks.
     #[test]
     fn bars_end_where_the_axis_says() {
         let mut counts = [0; BINS];

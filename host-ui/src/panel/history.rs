@@ -7,19 +7,19 @@ use stylet_base::format;
 use stylet_base::seen::{Seen, TickOrder};
 use stylet_shm_schema::TickRecord;
 
-/// Seconds that the plots show.
+/// Time span of the plots, in seconds.
 pub const WINDOW_S: f64 = 10.0;
 const WINDOW_NS: u64 = WINDOW_S as u64 * 1_000_000_000;
-/// Ticks of this time are one place of a plot: 250 in its width.
+/// Time of one place of a plot: 250 of them fill its width.
 const SLOT_NS: u64 = WINDOW_NS / 250;
-/// Ticks that percentiles are taken over: one minute at 1 kHz, so that p99.9 has samples beyond it.
+/// Number of ticks in percentiles: one minute at 1 kHz, so that p99.9 has samples beyond it.
 const KEPT_TICKS: u64 = 60_000;
-/// A percentile with fewer samples beyond it is a guess and is not shown.
+/// Fewest samples beyond a percentile; with fewer it would be a guess and is not shown.
 const SAMPLES_BEYOND: f64 = 10.0;
-/// Digits of a percentile that hold.
+/// Significant digits of a percentile.
 const DIGITS: u8 = 3;
 
-/// What is plotted over time.
+/// Plotted quantity.
 #[derive(Clone, Copy, Debug)]
 pub enum Quantity {
     ResistanceN,
@@ -27,7 +27,7 @@ pub enum Quantity {
     WakeUs,
 }
 
-/// Of one quantity, in microseconds, to three digits.
+/// Percentiles of one quantity, in microseconds, to three digits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Percentiles {
     pub p50: Option<f64>,
@@ -38,7 +38,7 @@ pub struct Percentiles {
 
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
-    /// Of the ticks of the last minute.
+    /// Share of the ticks of the last minute that were seen.
     pub seen: Seen,
     pub wake: Percentiles,
     pub work: Percentiles,
@@ -49,12 +49,12 @@ pub struct Timing {
 
 pub struct History {
     curves: Envelope<3>,
-    /// Number of the tick, and its wake latency and work, ns, cut off at four seconds.
+    /// Number of each tick, with its wake latency and work, ns, saturated at four seconds.
     timings: VecDeque<(u64, [u32; 2])>,
     counts: [LastMinute; 2],
     session: u64,
     order: TickOrder,
-    /// The first tick of the session that was seen, and the last.
+    /// First and last tick of the session that were seen.
     ticks: Option<[u64; 2]>,
     pub missed: u64,
     pub timing: Timing,
@@ -76,7 +76,8 @@ impl Default for History {
 }
 
 impl History {
-    /// `direction` is the needle's, because records carry the force as a vector only.
+    /// Takes records. `direction` is the needle's, because records carry the force as a vector
+    /// only.
     pub fn take(&mut self, records: &[TickRecord], direction: [f64; 3]) {
         for r in records {
             if r.session_id != self.session {
@@ -106,7 +107,7 @@ impl History {
         }
     }
 
-    /// The minute is one of ticks, seen or not.
+    /// Removes ticks older than a minute of ticks, whether seen or not.
     fn expire(&mut self, newest: u64) {
         while let Some(&(tick, timing)) = self.timings.front()
             && tick + KEPT_TICKS <= newest
@@ -118,7 +119,7 @@ impl History {
         }
     }
 
-    /// How many of the ticks of the last minute were seen.
+    /// Returns how many of the ticks of the last minute were seen.
     fn seen(&self) -> Seen {
         let seen = self.timings.len() as u64;
         let ran = self.ticks.map_or(0, |[first, last]| (last - first + 1).min(KEPT_TICKS));
@@ -128,7 +129,8 @@ impl History {
         }
     }
 
-    /// Percentiles, of tens of thousands of counts; words that change in each frame cannot be read either.
+    /// Computes percentiles over tens of thousands of counts. Called rarely, because text that
+    /// changes in each frame is illegible.
     pub fn sum_up(&mut self) {
         let [wake, work] = self.counts.each_mut().map(LastMinute::percentiles);
         let [wake_histogram, work_histogram] = self.counts.each_ref().map(|c| c.bins);
@@ -141,8 +143,7 @@ impl History {
         };
     }
 
-    /// Smallest and largest over seconds before the newest tick, in pieces: between two of them nothing was seen.
-    /// When it was, s before the newest tick; `None` where that is not plotted.
+    /// Returns the age of a time before the newest tick, s; `None` if it is not plotted.
     pub fn before_s(&self, time_ns: u64) -> Option<f64> {
         let newest_ns = self.curves.newest_ns()?;
         let before_s = format::seconds(newest_ns.saturating_sub(time_ns));
@@ -162,9 +163,9 @@ impl History {
     }
 }
 
-/// How often each time was among the ticks that are kept.
+/// Histogram of the ticks that are kept.
 struct LastMinute {
-    /// Still with what is in `expired`, which is subtracted all at once.
+    /// Counts that still include those in `expired`, which are subtracted all at once.
     all: Histogram<u32>,
     expired: Histogram<u32>,
     bins: [u32; BINS],
@@ -199,7 +200,7 @@ impl LastMinute {
         let us = |ns: u64| format::us(ns.min(u64::from(u32::MAX)));
         let at = |share: f64| {
             let beyond = all.len() as f64 * (1.0 - share);
-            // A hair below, because 1 - 0.999 is not exact.
+            // Slightly lowered, because 1 - 0.999 is not exact.
             (beyond >= SAMPLES_BEYOND - 1e-6).then(|| us(all.value_at_quantile(share)))
         };
         Percentiles {
@@ -211,7 +212,7 @@ impl LastMinute {
     }
 }
 
-/// Bins from 1 us up, five for each decade; the last takes all above.
+/// Number of bins from 1 us up, five for each decade; the last one has no upper limit.
 pub const BINS: usize = 25;
 
 pub fn bin_low_us(bin: usize) -> f64 {
@@ -270,7 +271,7 @@ mod tests {
         assert_eq!(history.timing.seen.seen, 10_000);
     }
 
-    /// Against all of the last minute, sorted and counted.
+    /// Compares with a sort of the whole last minute.
     #[test]
     fn percentiles_and_histogram_are_those_of_what_is_kept() {
         let mut history = History::default();
@@ -325,7 +326,7 @@ mod tests {
         assert_eq!(history.curve(Quantity::DepthMm).concat().len(), 1);
     }
 
-    /// The last 60 000 records counted as the last minute however many ticks had run between them, and nothing said so.
+    /// Guards against a last minute of 60 000 records, however many ticks had run between them.
     #[test]
     fn the_last_minute_is_one_of_ticks_and_says_how_many_of_them_were_seen() {
         let mut history = History::default();
@@ -339,7 +340,7 @@ mod tests {
         assert!(seen.seen.abs_diff(KEPT_TICKS / 2) <= 64, "{}", seen.words());
         let counted: u32 = history.timing.wake_histogram.iter().sum();
         assert_eq!(u64::from(counted), seen.seen);
-        // Of the last ten seconds no piece of a curve crosses a loss.
+        // In the last ten seconds no piece of a curve crosses a loss.
         let longest = history.curve(Quantity::WakeUs).iter().map(Vec::len).max();
         assert!(longest.is_some_and(|n| n <= 3), "{longest:?}");
     }

@@ -1,4 +1,4 @@
-//! The instructor's dialog: marks, and faults that are put in as exercises.
+//! The instructor's dialog: marks, and faults injected as exercises.
 
 use crate::action::Action;
 use crate::shown::Shown;
@@ -11,17 +11,17 @@ use stylet_shm_schema::{
     EXERCISE_STIFFNESS_RANGE, Exercise, MARK_BEFORE_RANGE_S, MARK_BYTES, MOST_MOVED_M, Mark, Request, Text,
 };
 
-/// So many of the last moments are listed.
+/// Number of moments in the list.
 const LISTED: usize = 5;
 const WIDTH: f32 = 420.0;
 const TITLE_AND_EDGES: f32 = 70.0;
 
 pub struct InstructorState {
     open: bool,
-    /// The dialog was opened in this frame: the words come first.
+    /// True in the frame in which the dialog opens: the text field takes the focus.
     is_new: bool,
     words: String,
-    /// When the words were begun: the moment is that one.
+    /// Time at which the text was begun; the mark gets this time.
     since: Option<Instant>,
     factor: f64,
     moved_mm: [f64; 3],
@@ -41,7 +41,7 @@ impl Default for InstructorState {
 }
 
 impl InstructorState {
-    /// Opened, its moment is now.
+    /// Opens or closes the dialog; opening sets the time of a mark.
     pub fn toggle(&mut self) {
         self.open = !self.open;
         (self.is_new, self.since) = (self.open, self.open.then(Instant::now));
@@ -51,7 +51,7 @@ impl InstructorState {
         self.open = false;
     }
 
-    /// The words of the field, of the moment at which they were begun.
+    /// Returns the mark with the text of the field and the time at which it was begun.
     fn mark(&mut self) -> Request {
         let ago_s = self.since.take().map_or(0.0, |since| since.elapsed().as_secs_f64());
         let words = std::mem::take(&mut self.words);
@@ -140,7 +140,7 @@ fn exercises_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut InstructorState) -
     ui.horizontal(|ui| {
         let by_m = state.moved_mm.map(|mm| mm * 1e-3);
         begin(ui, "Move the gland", Exercise::BodyMoved { by_m });
-        // So that no three of them are too far together.
+        // Limits each axis, so that no three of them exceed the total.
         let most_mm = MOST_MOVED_M * 1e3 / 3.0_f64.sqrt();
         for (mm, axis) in state.moved_mm.iter_mut().zip(["x ", "y ", "z "]) {
             let drag = DragValue::new(mm).range(-most_mm..=most_mm).speed(0.1);

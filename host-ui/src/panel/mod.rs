@@ -1,4 +1,4 @@
-//! Panels: each a pure function of prepared data that draws and returns what the operator asked for.
+//! Panels: each a pure function of prepared data that draws and returns the operator's requests.
 
 mod axis;
 pub mod banners;

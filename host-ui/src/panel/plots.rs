@@ -1,4 +1,5 @@
-//! The right panel: force and depth of the last seconds, or force and speed of the whole procedure, and the timing of the loop.
+//! The right panel: force and depth of the last seconds, or force and speed of the whole procedure,
+//! and the timing of the loop.
 
 use super::histogram::histogram_ui;
 use super::history::{History, Percentiles, Quantity, WINDOW_S};
@@ -13,15 +14,16 @@ use stylet_base::seen::Seen;
 use stylet_host::moments::{Moment, MomentKind, Moments};
 use stylet_implant::score::Trace;
 
-/// What stands between and under the three plots over time.
+/// Height of the parts between and under the three plots over time.
 const BESIDE_PLOTS: f32 = 492.0;
 const PLOT_HEIGHTS: [f32; 2] = [48.0, 150.0];
-/// A line on ticks that were not seen.
+/// Height of a line on unseen ticks.
 const SEEN_LINE: f32 = 20.0;
-/// That of the second device.
+/// Height of the line of the second device.
 const SECOND_LINE: f32 = 16.0;
 
-/// The plots share what of `height` the rest leaves. With `whole` they look back on all of the procedure.
+/// Draws the plots, which share the free part of `height`. With `whole` they cover the whole
+/// procedure.
 pub fn plots_ui(
     ui: &mut egui::Ui,
     shown: &Shown,
@@ -86,7 +88,7 @@ pub fn plots_ui(
     setup::setup_ui(ui, shown);
 }
 
-/// Those that a plot shows, where it has them.
+/// Returns the marks inside the range of a plot.
 fn marks(ui: &egui::Ui, moments: &Moments, at_s: impl Fn(u64) -> Option<f64>) -> Vec<(f64, Color32, String)> {
     let tokens = theme::of(ui);
     let color = |kind: MomentKind| match kind {
@@ -104,7 +106,7 @@ fn marks(ui: &egui::Ui, moments: &Moments, at_s: impl Fn(u64) -> Option<f64>) ->
     moments.all().filter_map(shown).collect()
 }
 
-/// From the first contact with tissue on.
+/// Draws the procedure from the first contact with tissue on.
 fn whole_ui(ui: &mut egui::Ui, trace: &Trace, moments: &Moments, height: f32) {
     let began_ns = trace.began_ns().unwrap_or(u64::MAX);
     let marks = marks(ui, moments, |time_ns| {
@@ -135,7 +137,7 @@ fn whole_ui(ui: &mut egui::Ui, trace: &Trace, moments: &Moments, height: f32) {
     seen_ui(ui, "peaks and curves", motion.seen);
 }
 
-/// Beside figures that are not of every tick.
+/// Draws a remark if figures do not cover every tick.
 fn seen_ui(ui: &mut egui::Ui, of: &str, seen: Seen) {
     if seen.is_all() {
         return;
@@ -149,7 +151,7 @@ fn seen_ui(ui: &mut egui::Ui, of: &str, seen: Seen) {
     );
 }
 
-/// What the membrane does before it gives way, which a mouse cannot let one feel.
+/// Draws the tension of the membrane before it gives way, which a mouse cannot render.
 fn tension_ui(ui: &mut egui::Ui, shown: &Shown) {
     let tokens = theme::of(ui);
     let tension = shown.membrane_tension();
@@ -220,7 +222,7 @@ fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
         let text = format!("missed deadlines {}", format::count(s.missed_deadlines));
         ui.label(RichText::new(text).color(color).strong())
             .explained("missed deadline");
-        // A procedure begins with a reset, but the number of the tick goes on: no share of it.
+        // A procedure begins with a reset, but tick numbers continue, so no share is shown.
         ui.label(theme::small("since the last reset"))
             .on_hover_text(format!(
                 "{} ticks since rt-core started; missed: {} since then, {} since the force was last turned on",

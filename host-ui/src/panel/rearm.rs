@@ -1,20 +1,21 @@
-//! Asks before a run that would re-arm: after a fault only a person turns the force on again.
+//! The question before a run that would re-arm: after a fault only a person turns the force on
+//! again.
 
 use crate::action::Action;
 use crate::shown::Shown;
 use egui::{Key, Modal, Modifiers};
 use stylet_shm_schema::Fault;
 
-/// Where the run that waits would begin.
+/// Starting point of the waiting run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Begin {
-    /// With what is missing in the tissue.
+    /// The remaining drops in the tissue.
     WhereItWas,
-    /// From a reset.
+    /// A reset.
     Anew,
 }
 
-/// The question while a run waits; Y and N answer it as well, and Esc takes it back.
+/// Draws the question while a run waits; Y and N answer it too, and Esc cancels it.
 pub fn rearm_ui(ctx: &egui::Context, shown: &Shown, asks: Option<Begin>) -> Option<Action> {
     asks?;
     let fault = shown.stands_fault().unwrap_or(Fault::None);

@@ -1,4 +1,5 @@
-//! The plan brought up to date on the live picture: what is drawn, the dose before and after, and the decision.
+//! The update of the plan on the live picture: the drawing, the dose before and after, and the
+//! decision.
 
 use crate::action::{Action, PlanAction};
 use crate::panel::workflow::job::job_ui;
@@ -11,7 +12,7 @@ use stylet_base::format;
 use stylet_implant::intraoperative::{PLANES, Proposed, SeedsFrom};
 use stylet_implant::plan::optimise::{Figures, Measure};
 
-/// Draws the panel; `at_m` is where the transverse plane is along the axis of the probe.
+/// Draws the panel; `at_m` is the place of the transverse plane along the axis of the probe.
 pub fn review_ui(ui: &mut egui::Ui, shown: &Shown, tool: &mut Option<Tool>, at_m: Option<f64>) -> Vec<Action> {
     let mut actions = Vec::new();
     let review = &shown.planning.review;
@@ -197,7 +198,7 @@ fn dose_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     }
 }
 
-/// How much of the dose of the plan carried on is rehearsed; nothing where no needle is left.
+/// Returns the rehearsed share of the continued plan's dose; nothing if no needle is left.
 fn rehearsed(implant: &Implant, begun: usize) -> Option<String> {
     let left = || implant.plan.needles.iter().zip(&implant.rest_errors_m).skip(begun);
     let with_seeds = || left().filter(|(needle, _)| !needle.seeds.is_empty());
@@ -218,7 +219,7 @@ fn rehearsed(implant: &Implant, begun: usize) -> Option<String> {
     }
 }
 
-/// In the colour of a warning where it does not keep its limit.
+/// Draws a value, in the warning colour if it violates its limit.
 fn value_ui(ui: &mut egui::Ui, figures: Option<&Figures>, name: &str) {
     let measure = figures.and_then(|figures| figures.measures().find(|m| m.name() == name));
     let Some(measure) = measure else {
@@ -234,7 +235,7 @@ fn value_ui(ui: &mut egui::Ui, figures: Option<&Figures>, name: &str) {
     };
 }
 
-/// Why the plan cannot be updated.
+/// Returns the reason why the plan cannot be updated.
 fn missing(shown: &Shown) -> Option<String> {
     let planning = &shown.planning;
     let planes = planning.review.drawn.contour.outlines().len();

@@ -1,4 +1,4 @@
-//! What the loop got from the kernel, the state of the link, and the cost of a frame.
+//! Settings granted by the kernel, state of the link, and cost of a frame.
 
 use crate::shown::{SecondHand, Shown};
 use crate::theme;
@@ -7,12 +7,12 @@ use stylet_base::format;
 use stylet_host::link::LinkStatus;
 use stylet_shm_schema::ThreadReport;
 
-/// What there is room for beside the reason why it does not hold the needle.
+/// Length of a controller's name that leaves room for the reason why it does not hold the needle.
 const LONGEST_CONTROLLER: usize = 24;
 
 pub fn setup_ui(ui: &mut egui::Ui, shown: &Shown) {
     ui.separator();
-    // Lines of words need less room than widgets.
+    // Lines of text need less room than widgets.
     ui.spacing_mut().interact_size.y = 14.0;
     egui::Grid::new("set-up")
         .num_columns(2)
@@ -72,7 +72,7 @@ fn link(shown: &Shown) -> (String, bool) {
     (text, fine && dropped == 0)
 }
 
-/// Which device holds the needle, and why it does not where that is so.
+/// Returns the device that holds the needle, and the reason if it does not.
 fn controller(shown: &Shown) -> (String, bool) {
     let Some(device) = &shown.controllers.holder else {
         return match shown.controllers.denied.is_empty() {

@@ -10,7 +10,8 @@ use stylet_base::format;
 use stylet_host::link::LinkStatus;
 use stylet_shm_schema::ParameterId;
 
-/// Narrower than this the bar takes two rows, or three. How many depends on the width alone, so that nothing moves.
+/// Width below which the bar takes two or three rows. The number depends on the width alone, so
+/// that nothing moves.
 const ONE_ROW: f32 = 1240.0;
 const TWO_ROWS: f32 = 780.0;
 
@@ -54,7 +55,7 @@ pub fn status_ui(ui: &mut egui::Ui, shown: &Shown, settings: &mut Settings) -> O
     action
 }
 
-/// Right to left.
+/// Draws the buttons from right to left.
 fn buttons_ui(ui: &mut egui::Ui, settings: &mut Settings) -> Option<Action> {
     let mut action = None;
     if ui.button("Help").on_hover_text("Key F1").clicked() {
@@ -139,7 +140,7 @@ fn link_ui(ui: &mut egui::Ui, shown: &Shown) {
     second_ui(ui, shown);
 }
 
-/// The other hand, in a run with a second device.
+/// Draws the state of the second hand, in a run with a second device.
 fn second_ui(ui: &mut egui::Ui, shown: &Shown) {
     let tokens = theme::of(ui);
     let color = match shown.second_hand() {
@@ -154,7 +155,7 @@ fn second_ui(ui: &mut egui::Ui, shown: &Shown) {
     }
 }
 
-/// With finite elements: whether the tissue is prepared for the needle where it is.
+/// Draws whether the tissue is prepared for the needle at its place, with finite elements.
 fn line_ui(ui: &mut egui::Ui, shown: &Shown) {
     let tokens = theme::of(ui);
     let (word, color, hint) = match shown.needle_line() {
@@ -205,7 +206,7 @@ fn figures_ui(ui: &mut egui::Ui, shown: &Shown) {
     );
 }
 
-/// Fixed width, so that the bar does not jump as figures change.
+/// Draws a figure with a fixed width, so that the bar does not jump.
 fn figure(ui: &mut egui::Ui, name: &str, value: &str, width: f32) {
     ui.label(theme::small(name)).explained(name);
     let height = ui.spacing().interact_size.y;
@@ -215,7 +216,7 @@ fn figure(ui: &mut egui::Ui, name: &str, value: &str, width: f32) {
     });
 }
 
-/// Right to left: the scale, the bar, its name.
+/// Draws scale, bar and name of the force, from right to left.
 fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
     let scale = shown
         .state
@@ -255,7 +256,7 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
         egui::WidgetInfo::labeled(egui::accesskit::Role::ProgressIndicator, true, format!("Force {label}"))
     });
     response.on_hover_text(format!("Peak since the last reset: {}", format::force(peak)));
-    // Beside the bar: no colour of words can be read on both of its parts.
+    // Outside the bar: no text colour is legible on both of its parts.
     let size = Vec2::new(106.0, ui.spacing().interact_size.y);
     ui.allocate_ui_with_layout(size, Layout::right_to_left(Align::Center), |ui| {
         ui.set_min_width(size.x);

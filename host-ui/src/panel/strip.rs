@@ -1,29 +1,30 @@
-//! A plot over time: smallest and largest as a band, and the value under the pointer.
+//! A plot over time: minimum and maximum as a band, and the value under the pointer.
 
 use super::axis::{grid, number, plot, upwards};
 use egui::Color32;
 use egui_plot::{FilledArea, GridMark, Line, PlotPoints, VLine};
 use stylet_base::format;
 
-/// Of the axis of time: half of what a point between two gaps covers, and how near to a piece a pointer means it.
+/// Share of the time axis: half the width of an isolated point, and the distance at which a pointer
+/// selects a piece.
 const LONE_SHARE: f64 = 0.001;
 const BESIDE_SHARE: f64 = 0.005;
 
 pub struct Strip<'a> {
     pub name: &'a str,
-    /// Unit and decimals of a value that is pointed at.
+    /// Unit and decimals of the value under the pointer.
     pub unit: (&'a str, usize),
     pub color: Color32,
     pub height: f32,
     /// The ends of the axis of time.
     pub seconds: [f64; 2],
-    /// The axis that goes up shows at least these.
+    /// Smallest range of the vertical axis.
     pub least: [f64; 2],
-    /// Time, smallest and largest, in pieces: between two of them nothing is known.
+    /// Time, minimum and maximum, in pieces; the data has gaps between them.
     pub pieces: &'a [Vec<[f64; 3]>],
     /// Moments on the axis of time, each with its colour and words.
     pub marks: &'a [(f64, Color32, String)],
-    /// From nothing up to the largest, where only that counts.
+    /// True for a plot from zero to the maximum, if only that counts.
     pub worst_only: bool,
 }
 
@@ -40,7 +41,7 @@ impl Strip<'_> {
             .include_y(self.least[1])
             .x_grid_spacer(move |_| grid([from_s, to_s], length_s / 5.0))
             .x_axis_formatter(move |mark: GridMark, _: &_| {
-                // On the edge a label would be cut off.
+                // At the edge a label would be cut off.
                 if to_s - mark.value < 0.04 * length_s {
                     String::new()
                 } else {
@@ -57,7 +58,7 @@ impl Strip<'_> {
                     let lows = if self.worst_only { vec![0.0; xs.len()] } else { lows };
                     let band = FilledArea::new(self.name, &xs, &lows, &highs).fill_color(self.color);
                     plot.add(band.allow_hover(false));
-                    // Where both are the same a band has no width.
+                    // A band whose limits are equal has no width.
                     if !self.worst_only {
                         let middle = piece.iter().map(|[x, low, high]| [*x, 0.5 * (low + high)]);
                         let line = Line::new(self.name, PlotPoints::from_iter(middle)).color(self.color);
@@ -72,7 +73,7 @@ impl Strip<'_> {
         }
     }
 
-    /// The value that is nearest in time.
+    /// Returns the value that is nearest in time.
     fn value_at(&self, seconds: f64) -> Option<String> {
         let beside_s = (self.seconds[1] - self.seconds[0]) * BESIDE_SHARE;
         let marked = self.marks.iter().find(|(at_s, ..)| (at_s - seconds).abs() <= beside_s);
@@ -98,7 +99,7 @@ impl Strip<'_> {
         })
     }
 
-    /// Between two pieces, and not just beside one of them.
+    /// Returns whether a time lies between two pieces, and not close to one of them.
     fn is_in_gap(&self, seconds: f64) -> bool {
         let [from_s, to_s] = self.seconds;
         let beside_s = (to_s - from_s) * BESIDE_SHARE;
@@ -110,7 +111,7 @@ impl Strip<'_> {
     }
 }
 
-/// A single point has no width to be seen by.
+/// Widens a single point, which would be invisible.
 fn widened(piece: &[[f64; 3]], half_s: f64) -> Vec<[f64; 3]> {
     match piece {
         &[[x, low, high]] => vec![[x - half_s, low, high], [x + half_s, low, high]],

@@ -1,4 +1,4 @@
-//! The list of trainees: how each is, one click to follow one, one to stop a hand.
+//! The list of trainees: the state of each, a click to follow one, a click to stop a hand.
 
 use crate::action::{Action, TraineeAction};
 use crate::theme;
@@ -8,20 +8,20 @@ use stylet_base::format;
 use stylet_host::roster::Glance;
 use stylet_shm_schema::{Fault, flags};
 
-/// A core that was not heard for longer is said to be silent.
+/// Silence after which a core is called silent.
 const SILENT_AFTER: Duration = Duration::from_millis(1500);
-/// Of name and state, where there is room and where there is little.
+/// Widths of name and state, with much room and with little.
 const WIDTHS: [f32; 2] = [130.0, 210.0];
 const NARROW_WIDTHS: [f32; 2] = [100.0, 140.0];
 const TITLE_AND_EDGES: f32 = 110.0;
-/// Of the whole list with wide columns, and its distance from what is beside it.
+/// Width of the whole list with wide columns, and its distance from its neighbours.
 const LIST_WIDTH: f32 = 720.0;
 const MARGIN: f32 = 24.0;
 const NARROW_MARGIN: f32 = 8.0;
-/// Keys follow so many of them: F2 to F9.
+/// Number of trainees with a key: F2 to F9.
 pub const KEYS: usize = 8;
 
-/// How urgent a line of the list is.
+/// Urgency of a line in the list.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Level {
     Good,
@@ -29,7 +29,7 @@ enum Level {
     Bad,
 }
 
-/// What is said of one: of the needle, and of the force.
+/// Text on one trainee: on the needle, and on the force.
 #[derive(Debug, PartialEq)]
 struct Line {
     level: Level,
@@ -123,7 +123,7 @@ fn short(fault: Fault) -> &'static str {
     }
 }
 
-/// `followed`: the one that the window shows.
+/// Draws the list. `followed` is the trainee that the window shows.
 pub fn trainees_ui(ctx: &egui::Context, glances: &[Glance], followed: Option<usize>) -> Option<Action> {
     if glances.is_empty() {
         return None;
@@ -214,7 +214,7 @@ fn row_ui(
     name.clicked().then_some(TraineeAction::Follow(number))
 }
 
-/// As wide as its words, and no wider: longer ones are wrapped.
+/// Draws a column as wide as its text, which wraps beyond a limit.
 fn column(ui: &mut egui::Ui, most: f32, widget: impl egui::Widget) -> egui::Response {
     let shown = ui.vertical(|ui| {
         ui.set_max_width(most);

@@ -1,4 +1,4 @@
-//! Background jobs as they are asked for: each is refused while another runs.
+//! Requests for background jobs; each is refused while another runs.
 
 use super::jobs::{self, JobMessage, JobProgress};
 use super::outlines::AnatomyOutlines;
@@ -12,7 +12,7 @@ use stylet_implant::workflow::Pace;
 use stylet_shm_schema::Instance;
 
 impl Planner {
-    /// Whether a job runs.
+    /// Returns whether a job runs.
     pub fn is_busy(&self) -> bool {
         self.job.is_some()
     }
@@ -44,7 +44,7 @@ impl Planner {
         }
     }
 
-    /// Begins a search for a first plan.
+    /// Starts a search for a first plan.
     pub fn automatic(&mut self) {
         self.begin_job(jobs::FIRST_PLAN, |_, outlines| Ok(jobs::automatic(outlines)));
     }
@@ -64,26 +64,27 @@ impl Planner {
         }
     }
 
-    /// Begins to fit the strength of the seeds to the dose of the target.
+    /// Starts to fit the strength of the seeds to the dose of the target.
     pub fn fit_strength(&mut self) {
         self.begin_job("Fitting the strength", |planner, outlines| {
             Ok(jobs::strength(outlines, Arc::new(planner.planned()?.clone())))
         });
     }
 
-    /// Begins to read a plan from a file.
+    /// Starts to read a plan from a file.
     pub fn import(&mut self, path: PathBuf, scene: Arc<SceneModel>) {
         self.begin_job("Reading the plan", |_, _| Ok(jobs::import(path, scene)));
     }
 
-    /// Begins to write the plan to a file.
+    /// Starts to write the plan to a file.
     pub fn export(&mut self, path: PathBuf) {
         self.begin_job("Writing the plan", |planner, outlines| {
             Ok(jobs::export(path, Arc::new(planner.planned()?.clone()), outlines))
         });
     }
 
-    /// Begins to write structure set, plan and dose; patient and frame are those of `like` where it is a DICOM file.
+    /// Starts to write structure set, plan and dose. Patient and frame come from `like` if it is a
+    /// DICOM file.
     pub fn export_study(&mut self, folder: PathBuf, scene: Arc<SceneModel>, like: Option<PathBuf>) {
         self.begin_job(jobs::STUDY, |planner, outlines| {
             let plan = Arc::new(planner.planned()?.clone());

@@ -1,13 +1,13 @@
-//! Changes of the plan, each one step to undo, and what may not be changed.
+//! Changes of the plan, each one step to undo, and the limits on them.
 
 use super::{Failure, Message, NeedleProgress, Planner};
 use std::time::{Duration, Instant};
 use stylet_implant::plan::{History, Hole, ImplantPlan, Row, exchange};
 use stylet_shm_schema::MAX_SEEDS;
 
-/// Changes of one needle that follow each other faster are one step to undo.
+/// Time within which changes of one needle count as one step to undo.
 const ONE_STEP: Duration = Duration::from_millis(800);
-/// Strength of the seeds of a plan that has none yet.
+/// Strength of the seeds of a new plan.
 const STRENGTH_U: f64 = 0.5;
 
 impl Planner {
@@ -32,11 +32,11 @@ impl Planner {
         }
     }
 
-    /// Discards the plan; one needle is left.
+    /// Discards the plan; one needle remains.
     pub fn discard(&mut self) {
         (self.history, self.job, self.problems, self.proposals) = (None, None, None, None);
         if let (Some(folder), Some(outlines)) = (&self.kept_in, &self.outlines) {
-            // Mostly there is none.
+            // Usually there is no file.
             let _removed = std::fs::remove_file(super::kept::path_of(folder, outlines.scene));
         }
         self.compensated.clear();
@@ -120,7 +120,7 @@ impl Planner {
         self.change();
     }
 
-    /// The plan, if it keeps the inserted needles and the core can hold it.
+    /// Returns the plan if it keeps the inserted needles and fits the core.
     pub(super) fn can_be(&self, plan: ImplantPlan) -> Result<ImplantPlan, Failure> {
         if plan.seed_count() > MAX_SEEDS {
             let count = plan.seed_count();
@@ -141,7 +141,7 @@ impl Planner {
         Ok(())
     }
 
-    /// The plan or its anatomy has changed.
+    /// Marks plan or anatomy as changed.
     pub(super) fn change(&mut self) {
         self.revision += 1;
         let plan = self.history.as_ref().map(History::now);

@@ -21,26 +21,26 @@ use stylet_implant::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Nee
 use stylet_implant::workflow::Pace;
 use stylet_shm_schema::Instance;
 
-/// A second host finds the core within this time.
+/// Time within which a second host finds the core.
 const FIND_LIMIT: Duration = Duration::from_secs(10);
 const POLL_EVERY: Duration = Duration::from_millis(5);
 pub(super) const FIRST_PLAN: &str = "Looking for a first plan";
 pub(super) const STUDY: &str = "Writing the DICOM study";
 
-/// What a job does, for people.
+/// Progress of a job, for display.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JobProgress {
-    /// Its name.
+    /// Name of the job.
     pub what: String,
-    /// 0 to 1, where that is known.
+    /// Completed share, 0 to 1, if known.
     pub share: Option<f32>,
 }
 
-/// What a job sends.
+/// Message from a job.
 pub(super) enum JobMessage {
     Progress(JobProgress),
     Plan(Result<ImplantPlan, Failure>),
-    /// Plans to choose from, with what there is to know about them.
+    /// Proposed plans, with remarks on each.
     First(Vec<FirstPlan>),
     Compensated(Box<(Needle, Compensation)>),
     Update(Result<Box<Proposed>, Failure>),
@@ -75,7 +75,7 @@ pub(super) fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
                 report,
             )?)
         };
-        // The window may be closed by now; then nobody reads the answer.
+        // The window may have closed, so nobody reads the answer.
         let _ = messages.send(match plan() {
             Ok(found) => JobMessage::First(found),
             Err(why) => JobMessage::Plan(Err(why)),
@@ -83,7 +83,7 @@ pub(super) fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
     })
 }
 
-/// The strength with which the plan covers the target as a first plan does.
+/// Returns the strength with which the plan covers the target like a first plan.
 pub(super) fn strength(outlines: Arc<AnatomyOutlines>, plan: Arc<ImplantPlan>) -> Job<JobMessage> {
     Job::begin("strength", move |messages, _| {
         let scaled = || -> Result<ImplantPlan, Failure> {
@@ -113,7 +113,7 @@ pub(super) fn export(path: PathBuf, plan: Arc<ImplantPlan>, outlines: Arc<Anatom
     })
 }
 
-/// Structure set, plan and dose of one study.
+/// Writes structure set, plan and dose of one study.
 pub(super) fn study(
     folder: PathBuf,
     plan: Arc<ImplantPlan>,
@@ -142,7 +142,7 @@ pub(super) fn study(
     })
 }
 
-/// Compensates one needle after the other, through a link of its own: the window keeps its own.
+/// Compensates one needle after the other, through a separate link: the window keeps its own.
 pub(super) fn compensation(instance: Instance, needles: Vec<Needle>, pace: Pace) -> Job<JobMessage> {
     Job::begin("compensation", move |messages, interrupt| {
         let end = all(instance, &needles, &pace, messages, interrupt);

@@ -1,5 +1,5 @@
-//! The plan that needles are inserted by, kept beside the core's shared memory: a window that was closed or killed finds it
-//! again while that run of the core lasts, and it goes with the core.
+//! A copy of the plan being inserted, next to the core's shared memory. A window that was closed or
+//! killed finds it again during the same run of the core, and it is deleted with the core.
 
 use super::{Message, Planner};
 use serde::{Deserialize, Serialize};
@@ -10,31 +10,31 @@ use stylet_base::{input, write_whole};
 use stylet_implant::plan::{Compensation, ImplantPlan, Needle, file};
 use stylet_shm_schema::SceneId;
 
-/// More is no plan of ours.
+/// Largest size of a file; a larger one is not a plan of ours.
 const MOST_BYTES: u64 = 4 << 20;
 
-/// A plan, and what its needles were compensated by.
+/// Plan, and the compensation of its needles.
 pub struct Kept {
     /// The plan.
     pub plan: ImplantPlan,
-    /// Of the needles that were rehearsed.
+    /// Rehearsed needles with their compensation.
     pub compensated: Vec<(Needle, Compensation)>,
 }
 
 #[derive(Serialize, Deserialize)]
 struct Stored {
     plan: String,
-    /// With the number of the needle.
+    /// Compensation by number of the needle.
     compensated: Vec<(usize, Compensation)>,
 }
 
-/// The file for a scene of a run of the core.
+/// Returns the file for a scene of a run of the core.
 pub fn path_of(folder: &Path, scene: SceneId) -> PathBuf {
     folder.join(format!("plan-{:016x}-{}.json", scene.session_id, scene.generation))
 }
 
 impl Kept {
-    /// Writes it. What cannot be written is not found again, and nothing else is lost by that.
+    /// Writes the copy. If that fails, the plan is only not found again; nothing else is lost.
     pub fn write(&self, path: &Path, frames: &PatientFrame) {
         let Ok(plan) = file::to_text(&self.plan, frames) else {
             return;
@@ -51,7 +51,7 @@ impl Kept {
         }
     }
 
-    /// Reads it, if it is there and whole.
+    /// Reads the copy, if it is complete.
     pub fn read(path: &Path, frames: &PatientFrame) -> Option<Self> {
         let stored: Stored = serde_json::from_slice(&input::read(path, MOST_BYTES).ok()?).ok()?;
         let plan = file::from_text(&stored.plan, frames).ok()?;
@@ -62,7 +62,7 @@ impl Kept {
 }
 
 impl Planner {
-    /// The plan is kept in this folder while needles are inserted, and looked for there.
+    /// Sets the folder in which plans are kept and looked for while needles are inserted.
     #[must_use]
     pub fn keeping_in(self, folder: PathBuf) -> Self {
         Self {
@@ -71,7 +71,7 @@ impl Planner {
         }
     }
 
-    /// A plan that another window of this run of the core has begun to insert.
+    /// Takes a plan that another window of this run of the core has begun to insert.
     pub(super) fn take_kept(&mut self) {
         let (Some(folder), Some(outlines)) = (&self.kept_in, &self.outlines) else {
             return;
@@ -95,7 +95,7 @@ impl Planner {
         }
     }
 
-    /// Keeps the plan for another window, on a thread of its own.
+    /// Writes the plan for another window, on a thread of its own.
     pub(super) fn keep(&self) {
         if let (Some(folder), Some(outlines), Some(plan)) = (&self.kept_in, &self.outlines, self.plan()) {
             let (path, frames) = (path_of(folder, outlines.scene), outlines.frames);
@@ -103,7 +103,7 @@ impl Planner {
                 plan: plan.clone(),
                 compensated: self.compensated.clone(),
             };
-            // It ends by itself; what it has written is looked for by another window.
+            // The thread ends by itself; another window looks for its file.
             let _writes = std::thread::Builder::new()
                 .name("keep plan".to_owned())
                 .spawn(move || kept.write(&path, &frames));

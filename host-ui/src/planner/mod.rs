@@ -1,6 +1,8 @@
-//! The plan that is edited in the window: its history, its problems, the background jobs for it, and the progress of its needles.
+//! The plan that is edited in the window: its history, its problems, its background jobs, and the
+//! progress of its needles.
 //!
-//! Each frame hands over new data and takes what is shown; nothing here takes longer than a copy of the plan.
+//! Each frame passes new data in and takes the state for display; nothing here takes longer than a
+//! copy of the plan.
 
 mod begin;
 mod edit;
@@ -33,72 +35,72 @@ use stylet_implant::plan::{Compensation, Drops, History, ImplantPlan, Needle, Te
 use stylet_implant::workflow::NeedleTask;
 use stylet_shm_schema::SceneId;
 
-/// Whatever was wrong, to be shown as text.
+/// Any error, shown as text.
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 type Checked = Job<Vec<Problem>>;
-/// Session and generation of the scene and the template, with the work for them.
+/// Session and generation of the scene, the template, and the job that computes their outlines.
 type OutlinesJob = (SceneId, Template, Job<Result<AnatomyOutlines, Failure>>);
 
-/// A message for the operator.
+/// Message for the operator.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Message {
-    /// Something was done.
+    /// Success.
     Done(String),
-    /// Something was refused or failed, with the reason.
+    /// Refusal or failure, with the reason.
     Refused(String),
 }
 
-/// The plan of many needles and the background jobs for it.
+/// Plan of many needles and its background jobs.
 #[derive(Default)]
 pub struct Planner {
     outlines: Option<Arc<AnatomyOutlines>>,
     outlining: Option<OutlinesJob>,
-    /// Scene and template that no outlines could be made of.
+    /// Scene and template whose outlines could not be computed.
     failed: Option<(SceneId, Template)>,
-    /// The scene that the plan is for: its name and box.
+    /// Scene of the plan: its name and box.
     of_scene: Option<(String, [f64; 3])>,
     history: Option<History<ImplantPlan>>,
-    /// Rises with each change of what is shown.
+    /// Number that grows with each visible change.
     revision: u64,
     problems: Option<Arc<Vec<Problem>>>,
     checking: Option<(u64, Checked)>,
     checked: u64,
     job: Option<(Job<JobMessage>, JobProgress)>,
-    /// Where the plan is kept for another window; nowhere when not given.
+    /// Folder in which the plan is kept for another window; none if not given.
     kept_in: Option<PathBuf>,
-    /// The scene that a kept plan was looked for, and the look.
+    /// Scene for which a kept plan was looked for, and the search.
     looked: Option<(SceneId, Job<Kept>)>,
-    /// With the needles as they were when they were rehearsed.
+    /// Needles at their rehearsal, with their compensation.
     compensated: Vec<(Needle, Compensation)>,
-    /// Of the last automatic plan.
+    /// Proposals of the last automatic plan.
     proposals: Option<Arc<Vec<FirstPlan>>>,
     progress: NeedleProgress,
     review: Review,
-    /// The needle whose seeds were changed last, and when.
+    /// Needle whose seeds were changed last, and the time.
     drawn: Option<(usize, Instant)>,
     implant: Option<Arc<Implant>>,
     shown_revision: u64,
-    /// A message for the operator, reported once.
+    /// Message for the operator, reported once.
     message: Option<Message>,
 }
 
 impl Planner {
-    /// The plan, where there is one.
+    /// Returns the plan, where there is one.
     pub fn plan(&self) -> Option<&ImplantPlan> {
         self.history.as_ref().map(History::now)
     }
 
-    /// Progress of its needles.
+    /// Returns the progress of its needles.
     pub fn progress(&self) -> &NeedleProgress {
         &self.progress
     }
 
-    /// A message for the operator, reported once.
+    /// Returns a message for the operator, reported once.
     pub fn take_message(&mut self) -> Option<Message> {
         self.message.take()
     }
 
-    /// What a frame shows of it.
+    /// Returns the state that a frame shows.
     pub fn planning(&self) -> Planning {
         Planning {
             outlines: self.outlines.clone(),
@@ -110,7 +112,7 @@ impl Planner {
         }
     }
 
-    /// Takes what is new since the last frame.
+    /// Takes the data that arrived since the last frame.
     pub fn take(&mut self, scene: Option<&Arc<SceneModel>>, seeds: usize) {
         let Some(scene) = scene else { return };
         self.take_scene(scene);
@@ -225,7 +227,7 @@ impl Planner {
     fn take_job(&mut self) {
         let Some((job, progress)) = &mut self.job else { return };
         let mut news = job.poll();
-        // Of several messages on the progress the last one counts.
+        // Of several messages about progress only the last counts.
         while let JobUpdate::Message(JobMessage::Progress(now)) = news {
             *progress = now;
             news = job.poll();
@@ -267,7 +269,7 @@ impl Planner {
         }
     }
 
-    /// What is shown of it has changed.
+    /// Publishes a visible change.
     fn refresh(&mut self) {
         self.shown_revision = 0;
     }
@@ -279,7 +281,7 @@ impl Planner {
         }
     }
 
-    /// Path and drops of a needle.
+    /// Returns path and drops of a needle.
     pub fn task(&self, number: usize) -> Option<NeedleTask> {
         let plan = self.plan()?;
         let needle = plan.needles.get(number)?;
@@ -288,12 +290,12 @@ impl Planner {
         NeedleTask::of(plan, number, drops)
     }
 
-    /// The next needle that has seeds.
+    /// Returns the next needle that has seeds.
     pub fn next_needle(&self) -> Option<usize> {
         self.planning().next_needle()
     }
 
-    /// All needles with seeds, each with its number.
+    /// Returns all needles with seeds, each with its number.
     pub fn tasks(&self) -> Vec<(usize, NeedleTask)> {
         let needles = self.plan().map_or(&[][..], |p| &p.needles[..]).iter().enumerate();
         let loaded = needles.filter(|(_, n)| !n.seeds.is_empty());
@@ -302,7 +304,7 @@ impl Planner {
             .collect()
     }
 
-    /// A needle is inserted now, with so many seeds in the tissue.
+    /// Marks a needle as being inserted, with this number of seeds in the tissue.
     pub fn begin_needle(&mut self, number: usize, seeds: usize) {
         self.keep();
         let mut progress = self.progress.clone();
@@ -310,33 +312,33 @@ impl Planner {
         self.set_progress(progress);
     }
 
-    /// The inserted needle is done, with so many seeds in the tissue.
+    /// Marks the inserted needle as done, with this number of seeds in the tissue.
     pub fn finish_needle(&mut self, seeds: usize) {
         let mut progress = self.progress.clone();
         progress.finish(seeds);
         self.set_progress(progress);
     }
 
-    /// Counts the inserted needle as planned again.
+    /// Marks the inserted needle as planned again.
     pub fn step_back(&mut self) {
         let mut progress = self.progress.clone();
         progress.step_back();
         self.set_progress(progress);
     }
 
-    /// Begins the implantation again: no needle is inserted.
+    /// Restarts the implantation: no needle is inserted.
     pub fn restart(&mut self) {
         self.review.restart();
         self.count_none();
     }
 
-    /// Counts no needle as inserted, in an implantation that goes on: its updates are kept.
+    /// Marks no needle as inserted, in an implantation that continues: its updates are kept.
     pub fn count_none(&mut self) {
         self.set_progress(NeedleProgress::default());
     }
 }
 
-/// What there is to know about an automatic plan.
+/// Returns a message with the remarks on an automatic plan.
 fn plan_message(notes: &[String]) -> Option<Message> {
     (!notes.is_empty()).then(|| Message::Done(format!("Automatic plan: {}.", notes.join("; "))))
 }

@@ -1,8 +1,8 @@
-//! Progress of the needles: which are done, and which seeds belong to which.
+//! Progress of the needles: those done, and the seeds of each.
 
 use std::ops::Range;
 
-/// How far one needle is.
+/// Progress of one needle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NeedleState {
     /// Not inserted yet.
@@ -14,7 +14,7 @@ pub enum NeedleState {
 }
 
 impl NeedleState {
-    /// Its name, for people.
+    /// Returns its display name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Planned => "planned",
@@ -27,35 +27,36 @@ impl NeedleState {
 /// Progress of the needles, which are inserted one after the other in the order of the plan.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct NeedleProgress {
-    /// For each needle that has begun, the number of seeds in the tissue before it.
+    /// Number of seeds in the tissue before each needle that has begun.
     first_seed: Vec<usize>,
     is_done: bool,
-    /// In the tissue when the last needle that is done was finished.
+    /// Number of seeds in the tissue when the last finished needle was done.
     seeds_when_done: usize,
 }
 
 impl NeedleProgress {
-    /// Number of needles that were inserted, those that are done included.
+    /// Returns the number of needles that were inserted, those that are done included.
     pub fn begun(&self) -> usize {
         self.first_seed.len()
     }
 
-    /// Whether all needles that have begun are done.
+    /// Returns whether all needles that have begun are done.
     pub fn is_done(&self) -> bool {
         self.begun() > 0 && self.is_done
     }
 
-    /// Whether they are, with so many seeds in the tissue: one that was taken back is to be dropped again.
+    /// Returns whether they are, with this number of seeds in the tissue: a seed that was undone
+    /// must be dropped again.
     pub fn is_done_with(&self, seeds: usize) -> bool {
         self.is_done() && seeds >= self.seeds_when_done
     }
 
-    /// Number of needles that are done.
+    /// Returns the number of needles that are done.
     pub fn done(&self) -> usize {
         self.begun() - usize::from(self.begun() > 0 && !self.is_done)
     }
 
-    /// State of one needle.
+    /// Returns the state of one needle.
     pub fn state(&self, needle: usize) -> NeedleState {
         if needle < self.done() {
             NeedleState::Done
@@ -66,35 +67,37 @@ impl NeedleProgress {
         }
     }
 
-    /// This needle is inserted now, with so many seeds in the tissue; needles that were skipped have no seeds.
+    /// Marks this needle as being inserted, with this number of seeds in the tissue; skipped
+    /// needles have no seeds.
     pub fn begin(&mut self, needle: usize, seeds: usize) {
         self.first_seed.resize(needle + 1, seeds);
         self.first_seed[needle] = seeds;
         self.is_done = false;
     }
 
-    /// The inserted needle is done, with so many seeds in the tissue.
+    /// Marks the inserted needle as done, with this number of seeds in the tissue.
     pub fn finish(&mut self, seeds: usize) {
         if !self.is_done {
             (self.is_done, self.seeds_when_done) = (true, seeds);
         }
     }
 
-    /// The inserted needle is withdrawn from the plan again.
+    /// Removes the inserted needle from the progress.
     pub fn step_back(&mut self) {
         if let Some(seeds) = self.first_seed.pop() {
             (self.is_done, self.seeds_when_done) = (true, seeds);
         }
     }
 
-    /// Seeds of a needle, as a range of all seeds in the order in which they were dropped.
+    /// Returns the seeds of a needle, as a range of all seeds in the order of dropping.
     pub fn seeds_of(&self, needle: usize, seeds: usize) -> Range<usize> {
         let from = self.first_seed.get(needle).copied().unwrap_or(seeds).min(seeds);
         let to = self.first_seed.get(needle + 1).copied().unwrap_or(seeds).min(seeds);
         from..to.max(from)
     }
 
-    /// Seeds of the inserted needle, as [`Self::seeds_of`]; all where none is inserted.
+    /// Returns the seeds of the inserted needle, like [`Self::seeds_of`]; all seeds if none is
+    /// inserted.
     pub fn own_seeds(&self, seeds: usize) -> Range<usize> {
         match self.begun() {
             0 => 0..seeds,
@@ -102,7 +105,7 @@ impl NeedleProgress {
         }
     }
 
-    /// Whether seeds of earlier needles were removed, so that the implantation begins again.
+    /// Returns whether seeds of earlier needles were removed, so that the implantation restarts.
     pub fn is_undone(&self, seeds: usize) -> bool {
         self.first_seed.last().is_some_and(|&first| seeds < first)
     }
@@ -122,7 +125,7 @@ mod tests {
         progress.finish(4);
         assert_eq!((progress.state(0), progress.done()), (NeedleState::Done, 1));
         assert!(progress.is_done_with(4) && !progress.is_done_with(3));
-        // The second has no seeds and is skipped.
+        // The second needle has no seeds and is skipped.
         progress.begin(2, 4);
         assert_eq!(progress.own_seeds(6), 4..6);
         assert_eq!([0, 1, 2].map(|n| progress.seeds_of(n, 6)), [0..4, 4..4, 4..6]);

@@ -1,4 +1,4 @@
-//! Outlines of the scene's anatomy behind the holes of a template, made once per scene.
+//! Outlines of the scene's anatomy behind the holes of a template, computed once per scene.
 
 use super::Failure;
 use nalgebra::Vector3;
@@ -9,15 +9,15 @@ use stylet_implant::plan::{Anatomy, HOLES, Hole, Template};
 use stylet_shm_schema::SceneId;
 use stylet_surfaces::mesh::cut;
 
-/// From one layer of outlines to the next.
+/// Distance between layers of outlines.
 const LAYER_M: f64 = 1e-3;
-/// Seeds stay so far inside the ends of the target.
+/// Distance of seeds from the ends of the target.
 const INSET_M: f64 = 2e-3;
 
-/// A line in the template's plane, counted in holes from A1.
+/// Line in the template's plane, counted in holes from A1.
 pub type Outline = Vec<[f32; 2]>;
 
-/// What a plane parallel to the template cuts.
+/// Cut of the anatomy in a plane parallel to the template.
 #[derive(Default)]
 pub struct Layer {
     /// Outlines of the target.
@@ -26,7 +26,7 @@ pub struct Layer {
     pub spared: Vec<Outline>,
 }
 
-/// The anatomy of a scene, cut in layers parallel to a template.
+/// Anatomy of a scene, cut in layers parallel to a template.
 pub struct AnatomyOutlines {
     /// The scene.
     pub scene: SceneId,
@@ -34,7 +34,7 @@ pub struct AnatomyOutlines {
     pub template: Template,
     /// Surfaces of target and spared structures.
     pub anatomy: Anatomy,
-    /// Between scene and patient.
+    /// Transform between scene and patient.
     pub frames: PatientFrame,
     /// Distances from the template's face to the near and the far end of the target, m.
     pub depths_m: [f64; 2],
@@ -83,20 +83,21 @@ impl AnatomyOutlines {
         }
     }
 
-    /// The outlines nearest to a depth from the template's face.
+    /// Returns the outlines nearest to a depth from the template's face.
     pub fn layer(&self, depth_m: f64) -> &Layer {
         let number = ((depth_m - self.depths_m[0]) / LAYER_M).round().max(0.0) as usize;
         &self.layers[number.min(self.layers.len() - 1)]
     }
 
-    /// Near and far depth of seeds of a needle through the hole, from the template's face, m; `None` where it misses the target.
+    /// Returns the near and far depth of seeds in a needle through the hole, from the template's
+    /// face, m; `None` if it misses the target.
     pub fn piece_m(&self, hole: Hole) -> Option<[f64; 2]> {
         let number = usize::from(hole.row()) * usize::from(HOLES) + usize::from(hole.column());
         *self.pieces_m.get(number)?
     }
 }
 
-/// The nearest and the farthest corner of the body's box, as depths.
+/// Returns the nearest and the farthest corner of the body's box, as depths.
 fn ends_m(template: &Template, body: &Body) -> [f64; 2] {
     let (low, high) = body.bounds_m();
     let depths = (0..8).map(|corner| {
@@ -131,7 +132,7 @@ mod tests {
     use super::*;
     use stylet_implant::plan::anatomy::ball;
 
-    /// Half axes of the gland; its middle lies before G7, 70 mm from the template.
+    /// Half axes of the gland; its centre is behind G7, 70 mm from the template.
     const HALF_M: [f64; 3] = [0.024, 0.018, 0.02];
 
     fn outlines() -> AnatomyOutlines {

@@ -1,4 +1,4 @@
-//! The plan as a frame shows it, made once per change.
+//! The plan in the form that a frame shows, made once per change.
 
 use super::jobs::JobProgress;
 use super::needles::{NeedleProgress, NeedleState};
@@ -11,75 +11,78 @@ use stylet_implant::plan::compensate::edges::Sensitive;
 use stylet_implant::plan::first::FirstPlan;
 use stylet_implant::plan::{Compensation, History, ImplantPlan, Needle};
 
-/// Everything about plans of many needles that a frame shows.
+/// State of plans of many needles that a frame shows.
 #[derive(Clone, Default)]
 pub struct Planning {
-    /// `None` until the scene's anatomy is known.
+    /// Outlines; `None` until the scene's anatomy is known.
     pub outlines: Option<Arc<AnatomyOutlines>>,
-    /// `None` without a plan of many needles.
+    /// Plan; `None` without a plan of many needles.
     pub implant: Option<Arc<Implant>>,
-    /// The background job for it, if one runs.
+    /// Background job for it, if one runs.
     pub job: Option<JobProgress>,
     /// Progress of its needles.
     pub progress: NeedleProgress,
     /// Plans of the last search, to choose from.
     pub proposals: Option<Arc<Vec<FirstPlan>>>,
-    /// What is drawn on the live picture, and the update of the plan by it.
+    /// Drawing on the live picture, and the update of the plan based on it.
     pub review: ReviewShown,
 }
 
 impl Planning {
-    /// The next needle that has seeds.
+    /// Returns the next needle that has seeds.
     pub fn next_needle(&self) -> Option<usize> {
         let needles = self.implant.as_ref()?.plan.needles.iter().enumerate();
         let mut left = needles.skip(self.progress.begun()).filter(|(_, n)| !n.seeds.is_empty());
         left.next().map(|(number, _)| number)
     }
 
-    /// Whether there is a plan and none of its needles was inserted.
+    /// Returns whether there is a plan and none of its needles was inserted.
     pub fn waits(&self) -> bool {
         self.implant.is_some() && self.progress.begun() == 0
     }
 
-    /// From middle to middle of two seeds of the needle at work, m, where it is loaded with a strand.
+    /// Returns the distance between two seeds of the present needle, centre to centre, m, if it is
+    /// loaded with a strand.
     pub fn strand_pitch_m(&self) -> Option<f64> {
         self.at_work().and_then(|(_, needle)| needle.loading.pitch_m())
     }
 
-    /// The inserted needle, or the last one that was.
+    /// Returns the inserted needle, or the last one that was.
     pub fn at_work(&self) -> Option<(usize, &Needle)> {
         let number = self.progress.begun().checked_sub(1)?;
         Some((number, self.implant.as_ref()?.plan.needles.get(number)?))
     }
 
-    /// Depth of its tip when each seed leaves it, deepest first, m; empty where no needle of a plan is inserted.
+    /// Returns the depths of its tip at which the seeds leave it, deepest first, m; empty if no
+    /// needle of a plan is inserted.
     pub fn drops_m(&self) -> &[f64] {
         let drops = self.at_work().and_then(|(n, _)| self.implant.as_ref()?.drops_m.get(n));
         drops.map_or(&[], |d| d)
     }
 }
 
-/// A plan as it is shown.
+/// Plan as it is shown.
 pub struct Implant {
-    /// Rises with every change.
+    /// Number that grows with every change.
     pub revision: u64,
     /// The plan.
     pub plan: ImplantPlan,
     /// All its seeds.
     pub seeds: Vec<Seed>,
-    /// `None` until the plan was checked; while it is checked again, those of the plan before.
+    /// Problems of the plan; `None` until it was checked. During a new check, those of the previous
+    /// plan.
     pub problems: Option<Arc<Vec<Problem>>>,
-    /// One for each needle.
+    /// State of each needle.
     pub states: Vec<NeedleState>,
-    /// Mean distance of the seeds of each needle from plan at rest, where that was rehearsed, m.
+    /// Mean distance of each needle's seeds from plan at rest, if it was rehearsed, m.
     pub rest_errors_m: Vec<Option<f64>>,
-    /// Seeds of each needle that are on an edge, where it was rehearsed.
+    /// Seeds of each needle that are close to an edge, if it was rehearsed.
     pub sensitive: Vec<Vec<Sensitive>>,
     /// Depths of the drops of each needle, by rehearsal or as planned, m.
     pub drops_m: Vec<Vec<f64>>,
-    /// Whether a change can be undone.
+    /// True if a change can be undone.
     pub can_undo: bool,
-    /// Whether a change can be redone.
+    /// True if a change can be redone.
     pub can_redo: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What may be changed of a plan that is being carried out.
+//! Changes of a plan during its execution.
 
 use super::*;
 use stylet_implant::plan::{Hole, Row};
@@ -8,7 +8,7 @@ fn hole(name: &str) -> Hole {
     name.parse().expect("a hole")
 }
 
-/// Two needles of two seeds each, 80 and 70 mm deep.
+/// Creates two needles of two seeds each, 80 and 70 mm deep.
 pub(crate) fn planned() -> ImplantPlan {
     let template = Template {
         middle_m: [0.05, 0.05, -0.01],
@@ -36,7 +36,7 @@ pub(crate) fn planner() -> Planner {
     planner
 }
 
-/// As after a frame.
+/// Returns the planning state after a frame.
 pub(crate) fn planning(planner: &mut Planner) -> Planning {
     planner.show();
     planner.planning()

@@ -1,27 +1,28 @@
-//! Where two frames of the window differ.
+//! Differences between two frames of the window.
 
 use egui::epaint::{ClippedShape, Shape};
 use egui::{Pos2, Rect, Vec2};
 
-/// Smoothed edges and rounding to pixels reach so far beyond a shape, in points.
+/// Reach of smoothed edges and pixel rounding beyond a shape, in points.
 const EDGE: f32 = 3.0;
-/// Shapes that were added or removed together, at most, before all that follows counts as changed until the next equal pair.
+/// Most shapes added or removed together; beyond it, everything up to the next equal pair counts as
+/// changed.
 const REACH: usize = 12;
-/// Each rectangle costs one pass over the shapes.
+/// Most rectangles, because each costs one pass over the shapes.
 const MOST: usize = 24;
 
-/// A shape, and where it can be seen.
+/// Shape, and the area in which it is visible.
 #[derive(Clone, Debug)]
 pub(super) struct Drawn {
     pub shape: ClippedShape,
-    /// In points; empty where nothing can be seen.
+    /// Visible area in points; may be empty.
     pub rect: Rect,
-    /// A finished picture: nothing below it is seen.
+    /// True for a finished picture, which hides everything below it.
     is_picture: bool,
 }
 
 impl Drawn {
-    /// In a window of this size.
+    /// Creates a shape in a window of this size.
     pub(super) fn new(shape: ClippedShape, window: Rect) -> Self {
         let own = shape.transform_after_tessellation * shape.shape.visual_bounding_rect();
         let is_picture = matches!(shape.shape, Shape::Callback(_));
@@ -34,20 +35,22 @@ impl Drawn {
         }
     }
 
-    /// As if it were seen in all of this rectangle.
+    /// Makes the shape visible in all of this rectangle.
     pub(super) fn everywhere(self, rect: Rect) -> Self {
         Self { rect, ..self }
     }
 
-    /// Whether it hides all that is below it in this rectangle, which lies on whole pixels.
+    /// Returns whether it hides everything below it in this rectangle, which is aligned to whole
+    /// pixels.
     pub(super) fn hides_below(&self, rect: Rect) -> bool {
         self.is_picture && self.rect.contains_rect(rect)
     }
 }
 
-/// Rectangles, in points and on whole pixels, outside which both frames look the same. They do not overlap by much.
+/// Returns rectangles, in points and on whole pixels, outside which both frames look the same.
+/// Their overlap is small.
 ///
-/// Equal shapes are paired in the order they are painted in, so that what is not paired covers every difference.
+/// Equal shapes are paired in painting order, so that the unpaired ones cover every difference.
 pub(super) fn damage(before: &[Drawn], now: &[Drawn], pixels_per_point: f32) -> Vec<Rect> {
     let (mut pictures, mut others) = (Vec::new(), Vec::new());
     let (mut old, mut new) = (0, 0);
@@ -61,7 +64,7 @@ pub(super) fn damage(before: &[Drawn], now: &[Drawn], pixels_per_point: f32) -> 
         old = before.len().min(old + removed + 1);
         new = now.len().min(new + added + 1);
     }
-    // A picture is kept apart, so that nothing below it need be drawn.
+    // A picture gets its own rectangle, so that nothing below it needs drawing.
     let mut rects: Vec<Rect> = Vec::new();
     for picture in pictures {
         if !rects.iter().any(|r| r.contains_rect(picture)) {
@@ -78,10 +81,11 @@ pub(super) fn damage(before: &[Drawn], now: &[Drawn], pixels_per_point: f32) -> 
     rects
 }
 
-/// How many shapes stand before the first equal pair in each of both; all of them where there is none.
+/// Returns the number of shapes before the first equal pair in each of both; all of them if there
+/// is none.
 fn next_pair(before: &[Drawn], now: &[Drawn]) -> (usize, usize) {
     for skipped in 0..=before.len().max(now.len()) {
-        // The same number on both sides first: most often a shape was replaced.
+        // Try equal numbers first, because most often a shape was replaced.
         if let (Some(a), Some(b)) = (before.get(skipped), now.get(skipped))
             && a.shape == b.shape
         {
@@ -109,7 +113,7 @@ fn on_pixels(rect: Rect, pixels_per_point: f32) -> Rect {
     Rect::from_min_max(low.to_pos2(), high.to_pos2())
 }
 
-/// Joins rectangles where drawing their union costs no more than drawing both.
+/// Joins rectangles whose union costs no more to draw than both.
 fn add(rects: &mut Vec<Rect>, rect: Rect) {
     if !rect.is_positive() {
         return;
@@ -130,12 +134,12 @@ fn add(rects: &mut Vec<Rect>, rect: Rect) {
     }
 }
 
-/// What the union has more than both, in square points.
+/// Returns the area of the union beyond both rectangles, in square points.
 fn extra_area(a: Rect, b: Rect) -> f32 {
     a.union(b).area() - a.area() - b.area()
 }
 
-/// The whole window, in points.
+/// Returns the whole window, in points.
 pub(super) fn window(size: [u32; 2], pixels_per_point: f32) -> Rect {
     let [width, height] = size.map(|side| side as f32 / pixels_per_point);
     Rect::from_min_size(Pos2::ZERO, Vec2::new(width, height))
@@ -154,7 +158,7 @@ mod tests {
         Drawn::new(ClippedShape::new(WINDOW, shape), WINDOW)
     }
 
-    /// Colour of the shape on top at each point, with its edge.
+    /// Returns the topmost shape at each point, by colour with its edge.
     fn picture(shapes: &[Drawn]) -> Vec<usize> {
         let mut points = vec![usize::MAX; 400 * 300];
         for drawn in shapes {

@@ -1,8 +1,8 @@
-//! Draws again only what differs from the frame before.
+//! Redraws only the parts of the window that differ from the previous frame.
 //!
-//! The toolkit draws all of the window in each frame. Where a driver without a graphics card does that on the processor, it
-//! took most of a frame, for words that had not changed. Here the window is a texture that is kept, only what changed is drawn
-//! into it, and the toolkit is left with one picture.
+//! The toolkit draws all of the window in each frame. A driver without a graphics card does that on
+//! the processor, which took most of a frame for unchanged text. Here the window is a texture that
+//! is kept: only the changes are drawn into it, and the toolkit draws one picture.
 
 mod damage;
 
@@ -16,7 +16,7 @@ use egui::epaint::textures::TexturesDelta;
 use egui::epaint::{ClippedPrimitive, ClippedShape, Shape};
 use egui::{Color32, Context, FullOutput, Rect, TextureId};
 
-/// Takes the shapes of a frame and leaves one that shows them.
+/// Renderer that replaces the shapes of a frame by one that shows them.
 pub(crate) struct Redraw {
     is_on: bool,
     state: RenderState,
@@ -26,15 +26,15 @@ pub(crate) struct Redraw {
     driver: DriverCost,
 }
 
-/// Processor time.
+/// Processor time of redrawing.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct RedrawCost {
-    /// To find what changed and to turn it into triangles.
+    /// Time to find the changes and to triangulate them.
     pub own_ns: u64,
     pub driver_ns: u64,
 }
 
-/// The window as it was last drawn.
+/// Window as it was last drawn.
 struct Kept {
     size: [u32; 2],
     pixels_per_point: f32,
@@ -45,7 +45,7 @@ struct Kept {
 }
 
 impl Redraw {
-    /// For the window of this graphics device.
+    /// Creates a renderer for the window of this graphics device.
     pub(crate) fn new(state: RenderState) -> Self {
         Self {
             is_on: true,
@@ -57,12 +57,12 @@ impl Redraw {
         }
     }
 
-    /// What it cost since this was last asked for.
+    /// Returns the cost since the last call.
     pub(crate) fn take_cost(&mut self) -> RedrawCost {
         std::mem::take(&mut self.cost)
     }
 
-    /// Leaves the window to the toolkit where it is off.
+    /// Switches the renderer; when off, the toolkit draws the window.
     pub(crate) fn switch(&mut self, on: bool) {
         (self.is_on, self.kept) = (on, None);
     }
@@ -75,7 +75,8 @@ impl Redraw {
         }
     }
 
-    /// What is drawn from textures that change at one place keeps its place; a texture that is replaced may move everything.
+    /// Takes changed textures. An update inside a texture keeps the layout; a replaced texture may
+    /// move everything.
     fn take_textures(&mut self, textures: &mut TexturesDelta) {
         let mut renderer = self.state.renderer.write();
         for (id, changes) in textures.set.drain() {
@@ -116,7 +117,7 @@ impl Redraw {
             background,
             pasted: self.paste.of(&texture),
             texture,
-            // Is in no frame, so that all of the window differs.
+            // A shape that is in no frame, so that all of the window differs.
             shapes: vec![Drawn::new(nothing, whole).everywhere(whole)],
         }
     }
@@ -127,7 +128,7 @@ impl Redraw {
         for rect in damaged {
             let hidden = kept.shapes.iter().rposition(|drawn| drawn.hides_below(*rect));
             if hidden.is_none() {
-                // Larger than what is seen of it: its own edge is smooth.
+                // Larger than the visible area, because its own edge is smoothed.
                 let background = Shape::rect_filled(rect.expand(4.0), 0.0, kept.background);
                 shapes.push(ClippedShape::new(*rect, background));
             }

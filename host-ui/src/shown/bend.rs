@@ -3,7 +3,7 @@
 use super::Shown;
 use stylet_shm_schema::{MAX_BEND_POINTS, SnapshotHeader};
 
-/// Places of the shaft off where a rigid needle would have them, from the tip back to the hand.
+/// Offsets of the shaft from a rigid needle, from the tip back to the hand.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Bend {
     bends_m: Vec<[f64; 3]>,
@@ -26,7 +26,8 @@ impl Bend {
         }
     }
 
-    /// Places along the needle from the tip to `length_m` behind it, scene frame; two where it does not bend.
+    /// Returns places along the needle from the tip to `length_m` behind it, scene frame; two if it
+    /// does not bend.
     pub fn points_m(&self, tip_m: [f64; 3], direction: [f64; 3], length_m: f64) -> Vec<[f64; 3]> {
         let at = |back_m: f64, bend_m: [f64; 3]| [0, 1, 2].map(|a| tip_m[a] - back_m * direction[a] + bend_m[a]);
         if self.bends_m.len() < 2 {
@@ -52,7 +53,8 @@ impl Bend {
 }
 
 impl Shown {
-    /// Places along the needle from the tip to `length_m` behind it, scene frame; two where it does not bend.
+    /// Returns places along the needle from the tip to `length_m` behind it, scene frame; two if it
+    /// does not bend.
     pub fn needle_points_m(&self, length_m: f64) -> Option<Vec<[f64; 3]>> {
         let state = self.state.filter(|s| s.tick > 0)?;
         Some(
@@ -61,7 +63,8 @@ impl Shown {
         )
     }
 
-    /// How old the tissue's answer is to a needle in tissue without a line, in s, and how far the tip has come since, m.
+    /// Returns age (s) and travel of the tip (m) since the tissue's last answer, for a needle in
+    /// tissue without a line.
     pub fn lag(&self) -> Option<(f64, f64)> {
         let state = self.state.filter(|s| s.lag_ns > 0)?;
         Some((state.lag_ns as f64 * 1e-9, state.lag_m))

@@ -1,9 +1,9 @@
-//! Whether the needle has its line.
+//! State of the needle's line.
 
 use super::Shown;
 use stylet_shm_schema::flags;
 
-/// Whether the tissue is prepared for the needle where it is.
+/// Preparation of the tissue for the needle at its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NeedleLine {
     Ready,
@@ -14,7 +14,8 @@ pub enum NeedleLine {
 }
 
 impl Shown {
-    /// `None` where the tissue needs no lines, and while the hand holds no needle.
+    /// Returns the state of the line; `None` if the tissue needs none, and while the hand holds no
+    /// needle.
     pub fn needle_line(&self) -> Option<NeedleLine> {
         let needs_one = self.has_flag(flags::LINE_NEEDED) && !self.has_flag(flags::HAND_EMPTY);
         needs_one.then(|| {

@@ -1,14 +1,14 @@
-//! Seeds and needles as pictures of the body take them.
+//! Seeds and needles for pictures of the body.
 
 use super::Shown;
 use nalgebra::Vector3;
 use stylet_imaging::{Metal, Needle, Seed};
 
-/// So much of a needle is drawn, m.
+/// Drawn length of a needle, m.
 const NEEDLE_M: f64 = 0.15;
 
 impl Shown {
-    /// All metal as it lies now.
+    /// Returns all metal as it lies now.
     pub fn metal(&self) -> Metal {
         let seeds = self.seeds.iter().map(|seed| Seed {
             middle_m: self.drawn_at_m(seed).into(),
@@ -32,7 +32,8 @@ mod tests {
     use super::*;
     use stylet_shm_schema::SeedPose;
 
-    /// They stayed in the picture where the scene has the body, and the tissue around them moved.
+    /// Guards against seeds that stayed at the scene's place of the body while the tissue around
+    /// them moved.
     #[test]
     fn seeds_are_seen_in_the_body_where_an_exercise_has_moved_it() {
         let mut shown = Shown::empty("lab");

@@ -1,4 +1,4 @@
-//! What one frame shows, taken from the link once, so that no panel touches shared memory.
+//! Data of one frame, taken from the link once, so that no panel touches shared memory.
 
 mod bend;
 mod line;
@@ -26,7 +26,7 @@ use stylet_shm_schema::{
     SceneHeader, SecondState, SeedPose, Session, flags,
 };
 
-/// Past the deepest seed the needle may go this far, and the path is drawn this far.
+/// Length of the path beyond the deepest seed, for the needle and for drawing.
 pub const PAST_LAST_SEED_M: f64 = 0.01;
 
 #[derive(Clone)]
@@ -34,58 +34,59 @@ pub struct Shown {
     pub instance: String,
     pub status: LinkStatus,
     pub session: Option<Session>,
-    /// The line to the core, where that runs on another machine.
+    /// Line to the core, if that runs on another machine.
     pub relayed: Option<Relayed>,
-    /// Who is connected over a relay of this machine.
+    /// Hosts connected over a relay of this machine.
     pub class: Option<Class>,
     pub state: Option<HapticState>,
-    /// Of the second device.
+    /// State of the second device.
     pub second: Option<SecondState>,
     pub stepper: Stepper,
     pub scene: Option<SceneHeader>,
-    /// Only a plan with at least one seed.
+    /// Plan in force, if it has at least one seed.
     pub plan: Option<PlanInForce>,
     pub parameters: Option<ParametersInForce>,
     pub seeds: Vec<SeedPose>,
-    /// What they were planned as, by what was heard of the plans in force.
+    /// Planned seeds, from the plans in force that were received.
     pub heard: Vec<HeardSeed>,
-    /// How far an exercise has moved the body, and with it the seeds, from where the scene has it.
+    /// Displacement of the body, and of its seeds, by an exercise.
     pub body_moved_m: [f64; 3],
-    /// Of the needle in the last snapshot.
+    /// Bend of the needle in the last snapshot.
     pub bend: Bend,
     /// Needles that stay in while another moves.
     pub left: Vec<LeftNeedlePose>,
     pub snapshot_residual: Option<f64>,
     pub invalid_dropped: u64,
-    /// Step of the scripted procedure while it runs or after it ran.
+    /// Step of the scripted procedure during and after its run.
     pub running: bool,
     pub run_step: Option<Step>,
-    /// Which of how many needles the script is at, counted from 0; `None` for one needle.
+    /// Needle of the script and number of needles, counted from 0; `None` for one needle.
     pub run_needle: Option<(usize, usize)>,
-    /// What the script waits for, and for how long.
+    /// Condition for which the script waits, and for how long.
     pub run_waits: Option<Waiting>,
-    /// Which needle of how many the script would go on with, counted from 0; `None` where it begins.
+    /// Needle with which the script would continue, and number of needles, counted from 0; `None`
+    /// if it would begin.
     pub continues_at: Option<(usize, usize)>,
-    /// The last answer that the operator should read.
+    /// Last answer for the operator.
     pub note: Option<Note>,
     pub load: LoadState,
-    /// The recording that is shown in place of a core, and whether one is being read.
+    /// Recording shown instead of a core, and whether one is being read.
     pub watched: Option<Watched>,
     pub reads_recording: bool,
-    /// Of the seeds as they lie now, or of those of the plan.
+    /// Dose of the placed seeds, or of the plan.
     pub dose: Option<Arc<DoseResult>>,
-    /// Why the dose is not known, where that is so.
+    /// Reason why the dose is unknown.
     pub dose_trouble: Option<&'static str>,
     pub planning: Planning,
-    /// Refusals of requests that the operator has not yet dismissed, and the last reason.
+    /// Number of refused requests that the operator has not dismissed, and the last reason.
     pub refusals: u64,
     pub last_refusal: String,
-    /// What the core reported last as a fault of this run and nobody re-armed after: why it ended, where it ended.
+    /// Last fault of this run that nobody re-armed after; if the core ended, its reason.
     pub last_fault: String,
     /// Gamepads and 3D mice, and whether this window has the focus that they need.
     pub controllers: Latest,
     pub has_focus: bool,
-    /// The device that was unplugged, until the message is dismissed or a device is plugged in.
+    /// Device that was unplugged, until the message is dismissed or a device is plugged in.
     pub disconnected: Option<String>,
     pub cost: FrameCost,
 }
@@ -165,7 +166,7 @@ impl Shown {
         }
     }
 
-    /// Where a seed is drawn: in the body where that is now.
+    /// Returns the drawn place of a seed, which follows the body.
     pub fn drawn_at_m(&self, seed: &SeedPose) -> [f64; 3] {
         [0, 1, 2].map(|a| seed.position_m[a] + self.body_moved_m[a])
     }
@@ -178,7 +179,7 @@ impl Shown {
         matches!(self.status, LinkStatus::Absent { .. })
     }
 
-    /// Whether the newest tick has a bit of [`flags`].
+    /// Returns whether the newest tick has a bit of [`flags`].
     pub fn has_flag(&self, flag: u32) -> bool {
         self.state.is_some_and(|s| s.flags & flag != 0)
     }
@@ -187,17 +188,18 @@ impl Shown {
         self.has_flag(flags::ENGAGED)
     }
 
-    /// Engaged, but the force would begin with a jump.
+    /// Returns whether the force is engaged but waits, because it would begin with a jump.
     pub fn is_waiting(&self) -> bool {
         self.has_flag(flags::WAITING)
     }
 
-    /// How far the tissue at the tip was displaced when its linear answer folded, m; `None` while it has not since the needle went in.
+    /// Returns the displacement of the tissue at the tip at which its linear answer folded, m;
+    /// `None` if it has not since the needle went in.
     pub fn folded_from_m(&self) -> Option<f64> {
         self.state.map(|s| s.folded_from_m).filter(|m| *m > 0.0)
     }
 
-    /// The tissue at the tip is folded now.
+    /// Returns whether the tissue at the tip is folded now.
     pub fn is_folded(&self) -> bool {
         self.has_flag(flags::FOLDED)
     }
@@ -210,17 +212,19 @@ impl Shown {
         self.has_flag(flags::PUNCTURED)
     }
 
-    /// The tip touches tissue, or is behind a membrane.
+    /// Returns whether the tip touches tissue, or is behind a membrane.
     pub fn is_in_tissue(&self) -> bool {
         self.has_punctured() || self.has_flag(flags::IN_CONTACT)
     }
 
-    /// `None` for a number that this program does not know, which is a fault too.
+    /// Returns the fault; `None` for a number that this program does not know, which is a fault
+    /// too.
     pub fn fault(&self) -> Option<Fault> {
         Fault::from_number(self.state.map_or(0, |s| s.fault))
     }
 
-    /// The fault of either device that only a person ends; [`Fault::DeviceError`] for one that this program does not know.
+    /// Returns the fault of either device that only a person ends; [`Fault::DeviceError`] for one
+    /// that this program does not know.
     pub fn stands_fault(&self) -> Option<Fault> {
         let of_device = |fault: u32| (fault != 0).then(|| Fault::from_number(fault).unwrap_or(Fault::DeviceError));
         let own = self.state.and_then(|s| of_device(s.fault));
@@ -246,30 +250,30 @@ impl Shown {
         })
     }
 
-    /// Depth of the tip along the planned path, from the entry.
+    /// Returns the depth of the tip along the planned path, from the entry.
     pub fn path_depth_m(&self) -> Option<f64> {
         let (plan, tip) = (self.plan.as_ref()?, self.tip_m()?);
         Some(along(plan, tip))
     }
 
-    /// How deep along the planned path a place is.
+    /// Returns the depth of a place along the planned path.
     pub fn depth_of_m(&self, place_m: [f64; 3]) -> Option<f64> {
         Some(along(self.plan.as_ref()?, place_m))
     }
 
-    /// Seeds of the needle at work, in the order in which they were dropped.
+    /// Returns the seeds of the present needle, in the order of dropping.
     pub fn own_seeds(&self) -> &[SeedPose] {
         let own = self.planning.progress.own_seeds(self.seeds.len());
         &self.seeds[own]
     }
 
-    /// How deep the tip is when the planned seed leaves it; compensation may have moved that.
+    /// Returns the depth of the tip when the planned seed leaves it, with compensation.
     fn drop_depth_m(&self, plan: &PlanInForce, number: usize) -> f64 {
         let planned_m = || along(plan, self.planned()[number].position_m);
         self.planning.drops_m().get(number).copied().unwrap_or_else(planned_m)
     }
 
-    /// How far the needle may go along the path.
+    /// Returns how far the needle may go along the path.
     pub fn path_length_m(&self) -> Option<f64> {
         let plan = self.plan.as_ref()?;
         let deepest = (0..self.planned().len())
@@ -278,12 +282,13 @@ impl Shown {
         Some((deepest + PAST_LAST_SEED_M).min(0.3))
     }
 
-    /// Depth of the deepest planned seed.
+    /// Returns the depth of the deepest planned seed.
     pub fn deepest_seed_m(&self) -> Option<f64> {
         Some(self.path_length_m()? - PAST_LAST_SEED_M)
     }
 
-    /// Depth of the deepest planned seed that no seed was dropped for; `None` when all are.
+    /// Returns the depth of the deepest planned seed without a dropped one; `None` if there is
+    /// none.
     pub fn next_seed_m(&self) -> Option<f64> {
         let plan = self.plan.as_ref()?;
         let rows = own_errors(self);
@@ -293,7 +298,8 @@ impl Shown {
             .max_by(f64::total_cmp)
     }
 
-    /// Depth of the membrane in front of the tip as a share of the depth at which it is punctured; `None` where there is none.
+    /// Returns the depression of the membrane in front of the tip, as a share of its puncture
+    /// depth; `None` without a membrane.
     pub fn membrane_tension(&self) -> Option<f64> {
         let is_pressed = |s: &&HapticState| s.flags & flags::IN_CONTACT != 0 && s.flags & flags::PUNCTURED == 0;
         let state = self.state.as_ref().filter(is_pressed)?;
@@ -305,7 +311,8 @@ impl Shown {
         Some([0, 1, 2].map(|i| plan.entry_m[i] + plan.direction[i] * depth_m))
     }
 
-    /// A place at a depth along the planned path and beside it: to the right and up, as seen from the perineum.
+    /// Returns the place at a depth along the planned path and an offset to the right and up, as
+    /// seen from the perineum.
     pub fn beside_path_m(&self, depth_m: f64, beside_m: [f64; 2]) -> Option<[f64; 3]> {
         let on_path = self.on_path_m(depth_m)?;
         let Some((_, axes)) = self.across() else {
@@ -314,7 +321,7 @@ impl Shown {
         Some([0, 1, 2].map(|a| on_path[a] + axes[0][a] * beside_m[0] + axes[1][a] * beside_m[1]))
     }
 
-    /// The template, and its columns and rows made square to the planned path.
+    /// Returns the template, and its columns and rows projected perpendicular to the planned path.
     fn across(&self) -> Option<(Template, [Vector3<f64>; 2])> {
         let template = Template::before(self.scene.as_ref()?);
         let direction = Vector3::from(self.plan.as_ref()?.direction);
@@ -347,13 +354,13 @@ impl Shown {
         self.on_path_m(self.path_length_m()?)
     }
 
-    /// How far the tip is beside the planned path.
+    /// Returns the distance of the tip from the planned path.
     pub fn off_path_m(&self) -> Option<f64> {
         let (tip, foot) = (self.tip_m()?, self.on_path_m(self.path_depth_m()?)?);
         Some([0, 1, 2].map(|i| (tip[i] - foot[i]).powi(2)).iter().sum::<f64>().sqrt())
     }
 
-    /// Force that resists the insertion: against the needle's direction.
+    /// Returns the force that resists the insertion, against the needle's direction.
     pub fn resistance_n(&self) -> Option<f64> {
         let s = self.state.as_ref()?;
         Some(-dot(s.force_on_hand_n, s.needle_direction))
@@ -373,7 +380,8 @@ mod tests {
     use super::*;
     use bytemuck::Zeroable;
 
-    /// The depth of the gland's membrane was taken for every membrane: skin of 12 mm seemed punctured at 8 mm.
+    /// Guards against the puncture depth of the gland for every membrane: skin of 12 mm seemed
+    /// punctured at 8 mm.
     #[test]
     fn the_tension_is_that_of_the_membrane_in_front_of_the_tip() {
         let mut shown = Shown::empty("lab");

@@ -1,10 +1,10 @@
-//! What of the state a frame shows, in parts of its own.
+//! Parts of the state that a frame shows.
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum LoadState {
     #[default]
     Idle,
-    /// What, and the share of it that is done.
+    /// Stage of the reading, and its completed share.
     Reading(String, f32),
     Sending(String),
     Loaded(String),
@@ -17,31 +17,31 @@ impl LoadState {
     }
 }
 
-/// Where the tip is against the planned path.
+/// Position of the tip relative to the planned path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TipOnPath {
-    /// From the entry along the path, and how far the path goes.
+    /// Depth from the entry along the path, and length of the path.
     pub depth_m: f64,
     pub length_m: f64,
-    /// Beside the path: to the right and up, as seen from the perineum.
+    /// Offset from the path: to the right and up, as seen from the perineum.
     pub beside_m: [f64; 2],
-    /// How far beside the path there are holes.
+    /// Range of the holes around the path.
     pub room_m: [[f64; 2]; 2],
-    /// The tip touches nothing.
+    /// True if the tip touches nothing.
     pub is_free: bool,
 }
 
-/// What the last frame cost this program.
+/// Cost of the last frame for this program.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameCost {
     /// Processor time without the driver's.
     pub cpu_us: f64,
-    /// Of the graphics library and its driver for the pictures in the middle.
+    /// Processor time of the graphics library and its driver, for the pictures in the middle.
     pub driver_us: f64,
     pub uploaded_bytes: u64,
 }
 
-/// A recording in place of a core.
+/// Recording that replaces a core.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Watched {
     pub name: String,

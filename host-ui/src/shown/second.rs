@@ -1,43 +1,44 @@
-//! The other hand, as the window shows it: only in a run with a second device.
+//! The second hand, in a run with a second device.
 
 use super::Shown;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use stylet_imaging::ultrasound::{Pose, Probe};
 use stylet_shm_schema::{Fault, flags};
 
-/// Its loop writes its state each tick; one so much older than the needle's says that it stands still.
+/// Delay behind the needle's state at which the second loop counts as stopped; it writes its state
+/// each tick.
 const STANDS_STILL_NS: u64 = 250_000_000;
 
-/// How the second device is.
+/// State of the second device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SecondHand {
-    /// The run has one and nothing is known of it yet.
+    /// Unknown, because no data has arrived yet.
     Unknown,
-    /// Its force is off because of a fault; `None` for one that this program does not know.
+    /// Force off because of a fault; `None` for one that this program does not know.
     Faulty(Option<Fault>),
-    /// Its force is off.
+    /// Force off.
     Off,
-    /// Its force is on.
+    /// Force on.
     On,
 }
 
-/// The stepper that drives the simulated hand with the probe.
+/// Stepper that drives the simulated hand with the probe.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stepper {
-    /// Where it was last set to, until a hand moves the probe.
+    /// Last setting, until a hand moves the probe.
     pub goal: Option<Pose>,
-    /// Its brake is on: no hand moves the probe.
+    /// True if its brake is on, so that no hand moves the probe.
     pub is_locked: bool,
 }
 
 impl Shown {
-    /// Nothing in a run without a second device.
+    /// Returns the state of the second hand; `None` in a run without a second device.
     pub fn second_hand(&self) -> Option<SecondHand> {
         self.session.filter(|session| session.has_second())?;
         let Some(second) = &self.second else {
             return Some(SecondHand::Unknown);
         };
-        // A recording has states of the needle's hand now and then, and every tick of this one.
+        // A recording has every tick of this hand, but only some states of the needle's.
         let is_late = self.watched.is_none()
             && self
                 .state
@@ -50,43 +51,44 @@ impl Shown {
         })
     }
 
-    /// Tip of what the other hand holds, m.
+    /// Returns the tip of the tool in the second hand, m.
     pub fn second_tip_m(&self) -> Option<[f64; 3]> {
         self.second
             .filter(|second| second.tick > 0)
             .map(|second| second.tip_in_scene_m)
     }
 
-    /// From the frame of what the other hand holds, which lies along +z of it.
+    /// Returns the rotation from the frame of the second hand's tool, which lies along its +z.
     fn scene_from_second(&self) -> Option<UnitQuaternion<f64>> {
         let [i, j, k, w] = self.second.filter(|second| second.tick > 0)?.world_from_tool;
         UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 1e-6)
     }
 
-    /// Unit vector along what the other hand holds, towards its tip.
+    /// Returns the unit vector along the second hand's tool, towards its tip.
     pub fn second_axis(&self) -> Option<[f64; 3]> {
         Some((self.scene_from_second()? * Vector3::z()).into())
     }
 
-    /// The ultrasound probe as the other hand holds it; nothing in a run without a second device, and before its first tick.
+    /// Returns the pose of the ultrasound probe in the second hand; `None` without a second device,
+    /// and before its first tick.
     pub fn probe_pose(&self) -> Option<Pose> {
         let (tip, turn) = (self.second_tip_m()?, self.scene_from_second()?);
         Some(Pose::of_tool(tip.into(), &turn, &Probe::default()))
     }
 
-    /// Whether the core moves the other hand when it is asked to: a simulated one of a run that goes on.
+    /// Returns whether the core moves the second hand on request: a simulated one, in a live run.
     pub fn is_second_simulated(&self) -> bool {
         let is_simulated = self.second.is_some_and(|s| s.flags & flags::SIMULATED_DEVICE != 0);
         is_simulated && self.is_live() && self.watched.is_none()
     }
 
-    /// Its tip, and where it ends towards the hand when it is so long.
+    /// Returns the tip of the tool, and its end towards the hand at this length.
     pub fn second_tool_m(&self, length_m: f64) -> Option<[[f64; 3]; 2]> {
         let (tip, axis) = (self.second_tip_m()?, self.second_axis()?);
         Some([tip, [0, 1, 2].map(|a| tip[a] - axis[a] * length_m)])
     }
 
-    /// Name, place, force and deadlines, for whoever points at its badge.
+    /// Returns name, place, force and deadlines, for the tooltip of its badge.
     pub fn second_words(&self) -> Option<String> {
         let (session, second) = (self.session.as_ref()?, self.second.as_ref()?);
         let force_n = second.force_on_hand_n.iter().map(|f| f * f).sum::<f64>().sqrt();

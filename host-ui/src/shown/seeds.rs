@@ -1,30 +1,30 @@
-//! Distance of each seed at rest from the place that it was planned for.
+//! Distance of each seed at rest from its planned place.
 
 use super::Shown;
 use stylet_implant::pairing::{self, SeedOffset};
 use stylet_shm_schema::{PlannedSeed, SeedPose};
 
-/// Where a placed seed lies, seen from the planned one it was dropped for.
+/// Error of a placed seed relative to the planned one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeedError {
     /// Index in the plan.
     pub planned: usize,
     /// Index in the order of dropping; `None` while it is missing.
     pub placed: Option<usize>,
-    /// Positive in the direction of insertion.
+    /// Distance along the needle, positive in the direction of insertion.
     pub along_m: f64,
     pub across_m: f64,
 }
 
-/// One row for each planned seed, paired with the nearest drop.
+/// Returns one row for each planned seed, paired with the nearest drop.
 pub fn seed_errors(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64; 3]) -> Vec<SeedError> {
     let planned_m: Vec<_> = planned.iter().map(|p| p.position_m).collect();
     let dropped_at_m: Vec<_> = placed.iter().map(|p| p.dropped_at_m).collect();
     rows(planned, placed, direction, pairing::nearest(&planned_m, &dropped_at_m))
 }
 
-/// Errors of the inserted needle. Seeds of a plan of many needles are dropped in its order, which identifies them where compensation drops
-/// one at the place of another.
+/// Returns the errors of the inserted needle. Seeds of a plan of many needles are dropped in its
+/// order, which identifies them even if compensation drops one at the place of another.
 pub fn own_errors(shown: &Shown) -> Vec<SeedError> {
     let Some(plan) = &shown.plan else { return Vec::new() };
     if shown.planning.at_work().is_none() && plan.prescribed.needle > 0 {
@@ -40,7 +40,7 @@ pub fn own_errors(shown: &Shown) -> Vec<SeedError> {
     in_order(shown.planned(), shown.own_seeds(), plan.direction)
 }
 
-/// Errors of all needles that have begun, each with the number of its needle.
+/// Returns the errors of all needles that have begun, each with the number of its needle.
 pub fn all_errors(shown: &Shown) -> Vec<(usize, SeedError)> {
     let Some(implant) = &shown.planning.implant else {
         if shown.plan.is_some_and(|plan| plan.prescribed.needle > 0) {
@@ -61,7 +61,7 @@ pub fn all_errors(shown: &Shown) -> Vec<(usize, SeedError)> {
         .collect()
 }
 
-/// Errors of a plan of many needles that another window inserts, each with the number of its needle.
+/// Returns the errors of a plan that another window inserts, each with the number of its needle.
 fn heard_rows(shown: &Shown) -> impl Iterator<Item = (usize, SeedError)> {
     let mut before = (0, 0);
     shown.heard.iter().map(move |seed| {
@@ -84,7 +84,7 @@ fn heard_rows(shown: &Shown) -> impl Iterator<Item = (usize, SeedError)> {
     })
 }
 
-/// Seeds in the order of the drops; planned seeds that are still missing come last.
+/// Returns seeds in the order of the drops; planned seeds that are still missing come last.
 fn in_order(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64; 3]) -> Vec<SeedError> {
     let pairs = pairing::in_order(planned.len(), &[], placed.len());
     rows(planned, placed, direction, pairs)

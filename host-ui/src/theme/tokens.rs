@@ -1,8 +1,8 @@
-//! The two sets of colours, what each is for, and what a person must be able to read on what.
+//! The two sets of colours, their purposes, and the contrasts that they must keep.
 
 use egui::Color32;
 
-/// What a colour is for; the same names in both themes.
+/// Colours by purpose; the same names in both themes.
 #[derive(Debug)]
 pub struct Tokens {
     pub dark: bool,
@@ -21,12 +21,12 @@ pub struct Tokens {
     pub bad: Color32,
     /// Text on [`Tokens::good`], [`Tokens::warn`], [`Tokens::bad`] and [`Tokens::accent`].
     pub on_signal: Color32,
-    /// Lines and words of plots.
+    /// Lines and labels of plots.
     pub force: Color32,
     pub depth: Color32,
     pub wake: Color32,
     pub work: Color32,
-    /// In the three-dimensional picture.
+    /// Colours of the three-dimensional picture.
     pub gland: Color32,
     pub body: Color32,
     pub spared: Color32,
@@ -115,10 +115,10 @@ pub const LIGHT: Tokens = Tokens {
     measure: Color32::from_rgb(146, 52, 104),
 };
 
-/// What is drawn over an ultrasound picture, which is dark in both themes.
+/// Colours of drawings over an ultrasound picture, which is dark in both themes.
 #[derive(Debug)]
 pub struct ImageTokens {
-    /// Around the picture, and behind words on it.
+    /// Colour around the picture, and behind text on it.
     pub background: Color32,
     pub text: Color32,
     pub crosshair: Color32,
@@ -128,12 +128,13 @@ pub struct ImageTokens {
     pub bone: Color32,
     pub seed_placed: Color32,
     pub seed_planned: Color32,
-    /// Half, whole, one and a half and double the prescription; each with dashes of its own as well.
+    /// Colours at half, whole, one and a half and double the prescription; each has its own dashes
+    /// as well.
     pub isodose: [Color32; 4],
     pub measure: Color32,
-    /// The sign that a beam is on.
+    /// Sign that a beam is on.
     pub beam: Color32,
-    /// What the operator draws.
+    /// Drawing of the operator.
     pub drawn: Color32,
 }
 
@@ -162,7 +163,7 @@ pub const IMAGE: ImageTokens = ImageTokens {
 mod tests {
     use super::*;
 
-    /// Relative luminance, WCAG 2.2.
+    /// Returns the relative luminance (WCAG 2.2).
     fn luminance(color: Color32) -> f64 {
         let [r, g, b, _] = color.to_array().map(|byte| {
             let v = f64::from(byte) / 255.0;
@@ -205,7 +206,7 @@ mod tests {
             for signal in [t.good, t.warn, t.bad, t.accent] {
                 assert!(contrast(t.on_signal, signal) >= 4.5, "on {signal:?}");
             }
-            // What is drawn needs 3:1.
+            // Drawings need 3:1.
             for mark in [t.entry, t.path, t.seed_planned, t.needle_tip, t.measure] {
                 let c = contrast(mark, t.background);
                 assert!(c >= 3.0, "{mark:?} on the background of the picture: {c:.2}");

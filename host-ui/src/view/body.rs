@@ -1,26 +1,27 @@
-//! Where the drawn surfaces of the scene are now: computed once a frame, for all pictures.
+//! Present positions of the scene's drawn surfaces, computed once a frame for all pictures.
 
 use std::sync::Arc;
 use stylet_host::link::{SceneModel, Snapshot};
 use stylet_shm_schema::SceneId;
 use stylet_surfaces::bodies::Bodies;
 
-/// The surfaces of the scene that is shown, as the last snapshot has them.
+/// Surfaces of the scene at the last snapshot.
 #[derive(Default)]
 pub struct ShownBody {
     model: Option<Arc<SceneModel>>,
     scene: Option<SceneId>,
-    /// Surfaces that a thread makes, or has made.
+    /// Scene whose surfaces a thread makes, or has made.
     making: Option<SceneId>,
     snapshot: Option<(u64, u64)>,
-    /// Of the elements at the surface of the lattice.
+    /// Positions of the elements at the surface of the lattice.
     elements_m: Vec<[f32; 3]>,
     positions_m: Vec<[f32; 3]>,
     moved: u64,
 }
 
 impl ShownBody {
-    /// Takes what is new since the last frame. A new scene is shown once a thread has made its surfaces.
+    /// Takes the data that arrived since the last frame. A new scene is shown once a thread has
+    /// made its surfaces.
     pub fn take(&mut self, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
         let Some(model) = model else { return };
         let Some(bodies) = model.bodies_made() else {
@@ -40,7 +41,7 @@ impl ShownBody {
             return;
         }
         self.snapshot = Some(key);
-        // Tissue at rest is sent 200 times a second too.
+        // Tissue at rest is also sent 200 times a second.
         if self.elements_m != snapshot.positions_m {
             self.elements_m.clone_from(&snapshot.positions_m);
             bodies.deformed(&model.rest_m, &self.elements_m, &mut self.positions_m);
@@ -61,27 +62,27 @@ impl ShownBody {
             })
             .is_err()
         {
-            // Without a thread a frame has to wait.
+            // Without a thread a frame must wait.
             model.bodies();
         }
     }
 
-    /// The scene that is shown; nothing before the first one.
+    /// Returns the scene that is shown; `None` before the first one.
     pub fn model(&self) -> Option<&Arc<SceneModel>> {
         self.model.as_ref()
     }
 
-    /// The surfaces at rest; nothing before the first scene.
+    /// Returns the surfaces at rest; `None` before the first scene.
     pub fn bodies(&self) -> Option<&Bodies> {
         self.model.as_ref().map(|model| model.bodies())
     }
 
-    /// Where their vertices are now.
+    /// Returns the present positions of their vertices.
     pub fn positions_m(&self) -> &[[f32; 3]] {
         &self.positions_m
     }
 
-    /// Rises whenever they move.
+    /// Returns a number that grows whenever they move.
     pub fn moved(&self) -> u64 {
         self.moved
     }

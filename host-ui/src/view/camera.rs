@@ -1,14 +1,15 @@
-//! An orbiting camera: where the eye is, and how a point of the scene lands on the picture.
+//! An orbiting camera: position of the eye, and projection of scene points onto the picture.
 
 use nalgebra::{Matrix4, Perspective3, Point3, Vector3, Vector4};
 
 const FIELD_OF_VIEW_RAD: f32 = 0.55;
 const NEAREST_M: f32 = 0.01;
 const FARTHEST_M: f32 = 5.0;
-/// Short of the pole, where "up" has no meaning.
+/// Largest pitch, short of the pole, where "up" is undefined.
 const STEEPEST_RAD: f32 = 1.5;
 
-/// `yaw` turns about +y, `pitch` lifts the eye; at zero the eye looks along +x and +z points right.
+/// Orbiting camera. `yaw` turns about +y, `pitch` lifts the eye; at zero the eye looks along +x and
+/// +z points right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     pub target_m: [f32; 3],
@@ -24,7 +25,7 @@ impl Default for Camera {
 }
 
 impl Camera {
-    /// The view to begin with: the whole of a body of this radius, needle from the left.
+    /// Creates the initial view: a whole body of this radius, needle from the left.
     pub fn looking_at(target_m: [f32; 3], radius_m: f32) -> Self {
         Self {
             target_m,
@@ -34,7 +35,7 @@ impl Camera {
         }
     }
 
-    /// The same distance, looking along `forward` (scene frame).
+    /// Turns the view along `forward` (scene frame), at the same distance.
     pub fn look_along(&mut self, forward: Vector3<f32>) {
         let Some(f) = forward.try_normalize(1e-6) else { return };
         self.pitch_rad = (-f.y).asin().clamp(-STEEPEST_RAD, STEEPEST_RAD);
@@ -43,7 +44,8 @@ impl Camera {
         }
     }
 
-    /// From the eye through a place on the picture (0 to 1 from the upper left); a unit vector.
+    /// Returns the ray from the eye through a place on the picture (0 to 1 from the upper left), a
+    /// unit vector.
     pub fn ray(&self, aspect: f32, [x, y]: [f32; 2]) -> Vector3<f32> {
         let (right, up) = self.right_and_up();
         let half = (0.5 * FIELD_OF_VIEW_RAD).tan();
@@ -56,7 +58,8 @@ impl Camera {
         self.pitch_rad = (self.pitch_rad + turn_rad[1]).clamp(-STEEPEST_RAD, STEEPEST_RAD);
     }
 
-    /// `shift` is in heights of the picture, so that what lies at the target follows the pointer.
+    /// Moves the target. `shift` is in heights of the picture, so that the target follows the
+    /// pointer.
     pub fn pan(&mut self, shift: [f32; 2]) {
         let per_height = self.height_at_target_m();
         let (right, up) = self.right_and_up();
@@ -69,7 +72,7 @@ impl Camera {
         self.distance_m = (self.distance_m / factor).clamp(NEAREST_M, FARTHEST_M);
     }
 
-    /// Height of the picture in m at the distance of the target.
+    /// Returns the height of the picture in m at the distance of the target.
     pub fn height_at_target_m(&self) -> f32 {
         2.0 * self.distance_m * (0.5 * FIELD_OF_VIEW_RAD).tan()
     }
@@ -90,7 +93,7 @@ impl Camera {
         (right, right.cross(&forward))
     }
 
-    /// Depth 0 to 1, as wgpu has it.
+    /// Returns the projection, with depth 0 to 1 as in wgpu.
     pub fn clip_from_scene(&self, aspect: f32) -> Matrix4<f32> {
         let near = self.distance_m * 0.05;
         let far = self.distance_m * 8.0 + 1.0;
@@ -107,7 +110,7 @@ impl Camera {
         half_depth * gl * view
     }
 
-    /// Place on the picture, 0 to 1 from the upper left; `None` behind the eye.
+    /// Returns the place on the picture, 0 to 1 from the upper left; `None` behind the eye.
     pub fn project(&self, aspect: f32, point_m: [f32; 3]) -> Option<[f32; 2]> {
         let [x, y, z] = point_m;
         let clip = self.clip_from_scene(aspect) * Vector4::new(x, y, z, 1.0);

@@ -1,4 +1,4 @@
-//! What marks there are in the three-dimensional picture, of the plan and of what moves.
+//! Marks of the three-dimensional picture, of the plan and of moving parts.
 
 use super::marks::{Marks, NEEDLE_LENGTH_M};
 use super::scene3d::Look;
@@ -7,12 +7,13 @@ use crate::shown::Shown;
 use crate::theme::Tokens;
 use nalgebra::Vector3;
 
-/// Behind the entry, where the template is held.
+/// Distance of the template before the entry.
 const TEMPLATE_BEFORE_M: f32 = 0.01;
-/// As much of what the other hand holds is drawn.
+/// Drawn length of the second hand's tool.
 const SECOND_LENGTH_M: f64 = 0.12;
 
-/// What changes with the scene and the plan only. Gives the corner where the axes are drawn.
+/// Collects marks that change only with the scene and the plan. Returns the corner of the drawn
+/// axes.
 pub fn collect_fixed(marks: &mut Marks, shown: &Shown, look: Look, tokens: &'static Tokens) -> Option<[f32; 3]> {
     marks.begin(tokens);
     let corner = shown
@@ -46,7 +47,8 @@ pub fn collect_fixed(marks: &mut Marks, shown: &Shown, look: Look, tokens: &'sta
     corner
 }
 
-/// Places along the needle without its hub, which trembles with the hand far more than what is in tissue, and those of the other hand.
+/// Returns places along the needle and the second hand's tool. Omits the hub, which trembles far
+/// more than the part in tissue.
 pub fn moving_points(shown: &Shown) -> Vec<[f64; 3]> {
     let mut points_m = shown.needle_points_m(NEEDLE_LENGTH_M).unwrap_or_default();
     points_m.pop();

@@ -1,4 +1,5 @@
-//! What the operator draws on the picture of the probe: clicks on the edge of the gland and marks of seeds.
+//! The operator's drawing on the picture of the probe: clicks on the edge of the gland and marks of
+//! seeds.
 
 use super::probe::ProbePicture;
 use super::state::Tool;
@@ -10,28 +11,29 @@ use nalgebra::{Vector2, Vector3};
 use stylet_imaging::ultrasound::View;
 use stylet_implant::intraoperative::{Outline, Transverse};
 
-/// A click within so many points of one that is there means that one.
+/// Distance within which a click selects an existing one, in points.
 const NEAR: f32 = 9.0;
-/// Half the thickness of the slab whose marks are drawn, m: half a seed and a little.
+/// Half the thickness of the slab whose marks are drawn, m: slightly more than half a seed.
 const SLAB_M: f64 = 2.5e-3;
 
-/// What is being dragged.
+/// Part of the drawing that is being dragged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Held {
     Click { at_m: f64, number: usize },
     Mark(usize),
 }
 
-/// What is dragged in one picture from one frame to the next.
+/// Drag in one picture, from one frame to the next.
 #[derive(Default)]
 pub(super) struct Drawing {
     held: Option<Held>,
-    /// It was taken hold of and has not been moved yet.
+    /// True at the start of a drag, before any motion.
     is_first: bool,
 }
 
 impl Drawing {
-    /// Draws what is there over a picture; with a tool clicks add, drags move, and the right button or Del remove.
+    /// Draws the drawing over a picture. With a tool, clicks add, drags move, and the right button
+    /// or Del remove.
     pub(super) fn draw_ui(
         &mut self,
         ui: &mut egui::Ui,
@@ -104,13 +106,13 @@ fn removed(held: Held) -> Edit {
     }
 }
 
-/// One picture with what is drawn over it.
+/// Picture with the drawing over it.
 struct Over<'a> {
     painter: Painter,
     picture: &'a ProbePicture,
     review: &'a ReviewShown,
     frame: Transverse,
-    /// Where the transverse plane is along the axis, m.
+    /// Place of the transverse plane along the axis, m.
     at_m: f64,
 }
 
@@ -119,7 +121,7 @@ impl Over<'_> {
         self.picture.at(self.frame.place_m(Vector2::new(right, up), self.at_m))
     }
 
-    /// Marks near the plane, with their numbers.
+    /// Returns the marks near the plane, with their numbers.
     fn marks_here(&self) -> impl Iterator<Item = (usize, Pos2)> + '_ {
         let marks = self.review.drawn.marks_m.iter().enumerate();
         let here = marks.map(|(n, place_m)| (n, Vector3::from(*place_m)));
@@ -133,7 +135,7 @@ impl Over<'_> {
         points.iter().enumerate().map(|(n, point)| (n, self.on_screen(*point)))
     }
 
-    /// What a place of the window means: the nearest click or mark within reach.
+    /// Returns the nearest click or mark within reach of a place of the window.
     fn near(&self, tool: Tool, at: Pos2) -> Option<Held> {
         let nearest = |all: &mut dyn Iterator<Item = (usize, Pos2)>| {
             let near = all.map(|(n, place)| (n, place.distance(at)));
@@ -153,7 +155,7 @@ impl Over<'_> {
         }
     }
 
-    /// A place of the window in its transverse plane.
+    /// Returns a place of the window in its transverse plane.
     fn in_plane(&self, at: Pos2) -> Option<[f64; 2]> {
         let place_m = self.picture.place_m(at)?;
         Some(self.frame.in_plane_m(place_m).0.into())
@@ -185,7 +187,7 @@ impl Over<'_> {
         })
     }
 
-    /// Whole where it goes through clicks of this plane, dashed where it is proposed.
+    /// Draws the outline: solid if it goes through clicks of this plane, dashed if it is proposed.
     fn outline(&self) {
         let Some((outline, is_own)) = self.review.outline_at(self.at_m) else {
             return;
@@ -221,7 +223,7 @@ impl Over<'_> {
         }
     }
 
-    /// A ring with a cross in it; a mark of no seed has no cross.
+    /// Draws a ring with a cross in it; a mark without a seed has no cross.
     fn marks(&self, near: Option<Held>) {
         let without_seed = &self.review.marks.without_seed;
         for (n, at) in self.marks_here() {

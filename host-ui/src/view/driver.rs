@@ -1,8 +1,9 @@
-//! Cost of this program's own pictures in the graphics library and its driver: bytes and processor time.
+//! Cost of this program's own pictures in the graphics library and its driver: bytes and processor
+//! time.
 
 use crate::cpu_time::thread_ns;
 
-/// Since the window opened.
+/// Cost since the window opened.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DriverCost {
     pub uploaded_bytes: u64,
@@ -10,7 +11,7 @@ pub struct DriverCost {
 }
 
 impl DriverCost {
-    /// Does what the driver is asked for.
+    /// Runs calls of the driver and measures them.
     pub fn time<T>(&mut self, calls: impl FnOnce() -> T) -> T {
         let begun_ns = thread_ns();
         let result = calls();
@@ -18,7 +19,7 @@ impl DriverCost {
         result
     }
 
-    /// As [`DriverCost::time`], for calls that return the number of bytes they sent.
+    /// Like [`DriverCost::time`], for calls that return the number of bytes they sent.
     pub fn send(&mut self, calls: impl FnOnce() -> u64) {
         self.uploaded_bytes += self.time(calls);
     }

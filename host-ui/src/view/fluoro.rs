@@ -1,4 +1,4 @@
-//! Fluoroscopy: a C-arm that turns, its beam while it is asked for, the last picture held, and what was spent.
+//! Fluoroscopy: a C-arm that turns, its beam on request, the last image held, and the dose spent.
 //!
 //! A pulse is computed on a thread of its own, so that no frame waits for it.
 
@@ -23,20 +23,20 @@ use stylet_imaging::{Body, Gpu};
 use stylet_shm_schema::{SceneHeader, SceneId};
 use stylet_surfaces::field::Field;
 
-/// Pixels of a picture along an edge.
+/// Side of a picture in pixels.
 const SIDE: u32 = 512;
-/// How far the arm turns, degrees.
+/// Range of the arm, degrees.
 const ORBITAL_DEG: f64 = 100.0;
 const CRANIAL_DEG: f64 = 40.0;
-/// A drag of so many points turns the arm by a degree.
+/// Length of a drag that turns the arm by a degree, in points.
 const POINTS_PER_DEG: f64 = 3.0;
-/// A frame looks for a picture again after so long.
+/// Time after which a frame looks for a picture again.
 const LOOK_AGAIN: Duration = Duration::from_millis(10);
 
-/// What stands for a patient: a run of the core and its scene.
+/// Patient: a run of the core and its scene.
 type Case = (u64, SceneId);
 
-/// A pulse that was computed: the tube comes back with it.
+/// Computed pulse, with the tube that it returns.
 type Pulse = (Fluoroscope, CArm, Vec<u8>);
 
 /// Tube, arm and screen.
@@ -47,12 +47,12 @@ pub(super) struct FluoroView {
     held: Option<Held>,
     pub dose: DoseCounter,
     angles: Angles,
-    /// Its switch stays where it is put; a key counts while it is held.
+    /// State of the latching switch; a key counts while it is held.
     is_switched_on: bool,
     is_key_held: bool,
 }
 
-/// How the arm stands, degrees.
+/// Angles of the arm, degrees.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Angles {
     orbital: f64,
@@ -66,7 +66,7 @@ impl Angles {
     }
 }
 
-/// Where pictures are shown.
+/// Graphics resources of the screen.
 struct Screen {
     gpu: Gpu,
     paste: Paste,
@@ -77,16 +77,16 @@ enum Tube {
     AtWork(Job<Pulse>),
 }
 
-/// The last picture.
+/// Last picture.
 struct Held {
     pasted: Pasted,
     arm: CArm,
-    /// When its pulse began.
+    /// Time at which its pulse began.
     at: Instant,
 }
 
 impl FluoroView {
-    /// Without a graphics device that computes there are no pictures.
+    /// Creates the view. Without a graphics device that computes there are no pictures.
     pub fn new(state: Option<RenderState>) -> Self {
         let screen = state.and_then(|state| {
             let gpu = Gpu {
@@ -114,12 +114,12 @@ impl FluoroView {
         self.is_switched_on || self.is_key_held
     }
 
-    /// What the layout that was left behind does not keep on.
+    /// Releases the key's beam when the layout is left.
     pub fn release(&mut self) {
         (self.is_switched_on, self.is_key_held) = (false, false);
     }
 
-    /// Another patient: nothing was spent, and no picture is held.
+    /// Begins another patient: no dose spent, and no picture held.
     pub fn begin_case(&mut self) {
         self.held = None;
         self.dose = DoseCounter::default();
@@ -199,7 +199,7 @@ impl FluoroView {
         };
         self.tube = Some(Tube::AtWork(Job::begin("fluoroscopy", move |sender, _| {
             let greys = tube.shoot(&arm, &exposure, &body, &field, &metal).greys();
-            // Nobody waits for a picture of a window that was closed.
+            // The window may have closed, so nobody waits for the picture.
             let _ = sender.send((tube, arm, greys));
         })));
         self.dose.count(&exposure, &arm);
@@ -261,7 +261,7 @@ impl Screen {
     }
 }
 
-/// Beside the corner of a rectangle.
+/// Returns a point at an offset from the corner of a rectangle.
 fn inside(corner: Pos2, by: [f32; 2]) -> Pos2 {
     corner + Vec2::from(by)
 }

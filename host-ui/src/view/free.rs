@@ -1,13 +1,14 @@
-//! Where words of a picture may stand: banners lie over the upper ones, for as long as what they say is so.
+//! Places for text on a picture, below the banners that lie over its upper part.
 
 use egui::{Context, Id, LayerId, Order, Rect};
 
-/// Of all banners.
+/// Area of all banners.
 pub(crate) const BANNERS: &str = "banners";
-/// Words below banners keep so far from what stands half way down a picture, points.
+/// Distance of text below banners from text half way down a picture, points.
 const APART: f32 = 34.0;
 
-/// The part of a picture below the banners of the last frame; all of it where they leave too little for words.
+/// Returns the part of a picture below the banners of the last frame; all of it if they leave too
+/// little for text.
 pub(crate) fn free_of_banners(ctx: &Context, rect: Rect) -> Rect {
     let id = Id::unique(BANNERS);
     let bottom = ctx.memory(|memory| {

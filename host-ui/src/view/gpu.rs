@@ -1,6 +1,7 @@
 //! The offscreen picture: textures, pipelines and buffers on the graphics card.
 //!
-//! The picture is drawn into a texture of its own and shown as an image, so that a window and a test see the same pixels.
+//! The picture is drawn into a texture of its own and shown as an image, so that a window and a
+//! test see the same pixels.
 
 mod growing;
 mod pipelines;
@@ -28,14 +29,14 @@ struct Material {
     bind: wgpu::BindGroup,
 }
 
-/// One closed surface: its indices, all and fewer, and what it looks like.
+/// Closed surface: its indices, all and fewer, and its look.
 struct Layer {
     fine: Range<u32>,
     coarse: Range<u32>,
     material: Material,
 }
 
-/// A surface of one dose.
+/// Surface of one dose.
 struct Shell {
     vertices: Growing,
     indices: Growing,
@@ -46,10 +47,10 @@ pub struct Gpu {
     state: RenderState,
     layout: wgpu::BindGroupLayout,
     pipelines: Pipelines,
-    /// For `coarse`.
+    /// Pipelines for `coarse`.
     coarse_pipelines: Pipelines,
     paste: Paste,
-    /// The body's surface, then those inside it.
+    /// Surface of the body, then those inside it.
     surfaces: Vec<Layer>,
     ghost: Material,
     /// Marks that change with the plan, then those that change with every tick.
@@ -59,7 +60,8 @@ pub struct Gpu {
     ghost_vertices: Growing,
     indices: Growing,
     shells: Vec<Shell>,
-    /// Without a graphics card what moves is drawn with a quarter of the pixels, and with fewer triangles.
+    /// True with a graphics card; without one, moving pictures have a quarter of the pixels and
+    /// fewer triangles.
     has_card: bool,
     fine: Option<Targets>,
     coarse: Option<Targets>,
@@ -106,7 +108,7 @@ impl Gpu {
         }
     }
 
-    /// The indices of each surface, the body's first.
+    /// Sets the indices of each surface, the body's first.
     pub fn set_scene(&mut self, rest: &[SurfaceVertex], surfaces: &[Vec<u32>]) {
         self.driver.send(|| self.ghost_vertices.write(&self.state, rest));
         let mut indices: Vec<u32> = Vec::new();
@@ -136,7 +138,7 @@ impl Gpu {
         self.driver.send(|| self.surface_vertices.write(&self.state, vertices));
     }
 
-    /// Of the same surface, what has moved.
+    /// Moves vertices of the same surface.
     pub fn move_surface(&mut self, vertices: &[SurfaceVertex], runs: Vec<Range<usize>>) {
         for run in runs {
             self.driver
@@ -144,7 +146,7 @@ impl Gpu {
         }
     }
 
-    /// Vertices and indices of each isodose surface.
+    /// Sets vertices and indices of each isodose surface.
     pub fn set_shells(&mut self, shells: &[IsodoseShell]) {
         let device = &self.state.device;
         while self.shells.len() < shells.len() {
@@ -162,14 +164,14 @@ impl Gpu {
         }
     }
 
-    /// `which` is 0 for marks of the plan, 1 for those of the tick.
+    /// Sets marks: `which` is 0 for those of the plan, 1 for those of the tick.
     pub fn set_marks(&mut self, which: usize, marks: &Marks) {
         self.driver
             .send(|| self.solids[which].write(&self.state, &marks.triangles));
         self.driver.send(|| self.lines[which].write(&self.state, &marks.lines));
     }
 
-    /// Sizes in pixels. True when the picture is new and has to be drawn.
+    /// Sets the size in pixels. Returns true if the picture is new and must be drawn.
     pub fn resize(&mut self, size: [u32; 2]) -> bool {
         let size = size.map(|side| side.clamp(1, LARGEST_SIDE));
         if self.fine.as_ref().is_some_and(|t| t.size == size) {
@@ -183,20 +185,21 @@ impl Gpu {
         true
     }
 
-    /// What was drawn last.
+    /// Returns the picture that was drawn last.
     pub fn picture(&self) -> Option<Pasted> {
         let shown = if self.shows_coarse { &self.coarse } else { &self.fine };
         shown.as_ref().map(|t| t.pasted.clone())
     }
 
-    /// Whether what was drawn last has fewer pixels than its place.
+    /// Returns whether the last drawn picture has fewer pixels than its place.
     pub fn shows_coarse(&self) -> bool {
         self.shows_coarse
     }
 
-    /// Opaque first, then the rest shape, then the body's far side, what is in the body, and the body's near side.
-    /// `looks` has one uniform for each surface, `shells` one for each isodose surface; those that are not there are not drawn.
-    /// The background, and whether the picture will be another one in the next frame.
+    /// Draws the picture: opaque parts, the rest shape, the body's far side, its inner parts, its
+    /// near side. `looks` has one uniform for each surface, `shells` one for each isodose surface;
+    /// missing ones are not drawn. Returns the background, and whether the picture will change in
+    /// the next frame.
     pub fn draw(
         &mut self,
         looks: &[SceneUniform],
@@ -223,7 +226,7 @@ impl Gpu {
         *drawn = Some(targets);
     }
 
-    /// Returns the bytes that it sent.
+    /// Sends the picture; returns the number of bytes.
     fn send_picture(
         &self,
         targets: &Targets,
@@ -237,7 +240,7 @@ impl Gpu {
         for (shell, look) in self.shells.iter().zip(shells) {
             queue.write_buffer(&shell.material.uniform, 0, bytemuck::bytes_of(look));
         }
-        // Marks take the light and the eye from it.
+        // Marks use its light and eye.
         if let Some(ghost) = ghost.or(looks.first()) {
             queue.write_buffer(&self.ghost.uniform, 0, bytemuck::bytes_of(ghost));
         }
@@ -281,7 +284,7 @@ impl Gpu {
         ((looks.len() + shells.len() + 1) * size_of::<SceneUniform>()) as u64
     }
 
-    /// The highest dose is innermost and is drawn first.
+    /// Draws the shells; the highest dose is innermost and comes first.
     fn draw_shells(&self, pass: &mut wgpu::RenderPass<'_>, pipelines: &Pipelines, count: usize) {
         for shell in self.shells.iter().take(count).rev().filter(|s| s.indices.len > 0) {
             for pipeline in [&pipelines.surface_back, &pipelines.surface_front] {
@@ -302,7 +305,7 @@ impl Gpu {
         material: &Material,
         indices: &Range<u32>,
     ) {
-        // The indices were made for the rest shape; fewer vertices than that are not drawn.
+        // The indices belong to the rest shape; a buffer with fewer vertices is not drawn.
         let drawable = indices.end <= self.indices.len && vertices.len > 0 && vertices.len >= self.ghost_vertices.len;
         if !drawable || indices.is_empty() {
             return;

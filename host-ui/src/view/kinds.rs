@@ -1,4 +1,4 @@
-//! What the surfaces of a scene are of, and how each is drawn.
+//! Kinds of surfaces in a scene, and the look of each.
 
 use crate::theme::Tokens;
 use egui::Color32;
@@ -7,10 +7,10 @@ use stylet_shm_schema::{SceneHeader, role};
 use stylet_surfaces::bodies::{Bodies, shown_alone};
 use stylet_surfaces::mesh;
 
-/// What a surface is of.
+/// Kind of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// The body around the others.
+    /// Body around the others.
     Body,
     Gland,
     Spared,
@@ -27,7 +27,8 @@ impl Kind {
         }
     }
 
-    /// Of the opacity that a person set: what lies around the gland must not hide it.
+    /// Returns its share of the opacity that a person set: structures around the gland must not
+    /// hide it.
     pub fn share(self) -> f32 {
         match self {
             Self::Body => 0.16,
@@ -38,7 +39,7 @@ impl Kind {
     }
 }
 
-/// What each surface is of, the body's first. A body without others in it is the gland.
+/// Returns the kind of each surface, the body's first. A body without others in it is the gland.
 pub fn kinds(scene: Option<&SceneHeader>) -> impl Iterator<Item = Kind> {
     let alone = scene.map_or_else(Vec::new, shown_alone);
     let body = if alone.is_empty() { Kind::Gland } else { Kind::Body };
@@ -52,7 +53,7 @@ pub fn kinds(scene: Option<&SceneHeader>) -> impl Iterator<Item = Kind> {
     std::iter::once(body).chain(inner)
 }
 
-/// The indices of each surface, in the order of [`kinds`].
+/// Returns the indices of each surface, in the order of [`kinds`].
 pub fn surfaces(bodies: &Bodies) -> Vec<Vec<u32>> {
     let triangles = |part: &Range<usize>| bodies.triangles.get(part.clone()).unwrap_or(&[]);
     let count = bodies.rest_m.len();

@@ -1,4 +1,4 @@
-//! Words over the three-dimensional picture: axes, landmarks, the bar that gives the scale, what each shape means.
+//! Text over the three-dimensional picture: axes, landmarks, the scale bar, and the legend.
 
 use super::camera::Camera;
 use super::kinds::{Kind, kinds};
@@ -10,15 +10,15 @@ use crate::theme::{IMAGE, Tokens};
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Stroke, Vec2};
 use stylet_base::format;
 
-/// Height of a row of the legend, and the share of the picture that all of them may take.
+/// Height of a row of the legend, and the share of the picture that all rows may take.
 const ROW: f32 = 16.0;
 const MOST_SHARE: f32 = 0.4;
-/// Height of a word (points).
+/// Height of a label (points).
 const WORD: f32 = 12.0;
-/// How much of the picture the legend covers where it stands.
+/// Opacity of the legend's background.
 const BACKING: f32 = 0.85;
 
-/// A shape and what it means.
+/// Shape and its meaning.
 pub struct Row {
     name: String,
     color: Color32,
@@ -52,7 +52,7 @@ impl Legend<'_> {
             .text(place, anchor, text, FontId::proportional(WORD), color);
     }
 
-    /// Axes and entry, with no word where the legend is: the axes lie in the same corner.
+    /// Labels axes and entry, but not under the legend: the axes lie in the same corner.
     pub fn landmarks(&self, corner_m: Option<[f32; 3]>, view: &ViewState, rows: &[Row]) {
         let legend = self.place_of(rows);
         let word = |place: Pos2, anchor: Align2, text: &str, color: Color32| {
@@ -113,13 +113,15 @@ impl Legend<'_> {
         self.word(middle, Align2::CENTER_BOTTOM, &text, self.tokens.path);
     }
 
-    /// Needles, seeds and the grid go through the same corners as the words.
+    /// Fills the background, because needles, seeds and the grid cross the same corners as the
+    /// text.
     fn fill_backing(&self, rect: Rect) {
         let backing = self.tokens.background.gamma_multiply(BACKING);
         self.painter.rect_filled(rect, 3.0, backing);
     }
 
-    /// What is drawn, from above downwards; nothing in a small picture, where it would lie over what it explains.
+    /// Returns the drawn shapes, from the top down; none in a small picture, where the legend would
+    /// hide them.
     pub fn listed(&self, look: Look, dose: Option<&DoseResult>) -> Vec<Row> {
         let mut rows = Vec::new();
         let mut list = |name: &str, color, filled| {
@@ -162,7 +164,7 @@ impl Legend<'_> {
         rows
     }
 
-    /// Where the rows stand, with a margin.
+    /// Returns the place of the rows, with a margin.
     fn place_of(&self, rows: &[Row]) -> Rect {
         if rows.is_empty() {
             return Rect::NOTHING;
@@ -173,7 +175,7 @@ impl Legend<'_> {
         Rect::from_min_max(corner - Vec2::new(0.0, size.y), corner + Vec2::new(size.x, 0.0))
     }
 
-    /// A filled dot is a surface, a ring a mark that is only planned.
+    /// Draws the rows. A filled dot is a surface, a ring a mark that is only planned.
     pub fn rows(&self, rows: &[Row]) {
         if rows.is_empty() {
             return;
@@ -205,8 +207,9 @@ mod tests {
     use egui::Shape;
     use stylet_shm_schema::PlanInForce;
 
-    /// "z" of the axes stood under "body", and "entry" under "gland", in the picture of a small window. No test saw it: without a
-    /// graphics device there is no picture, and no words over it.
+    /// Guards against labels under the legend in a small window: "z" of the axes stood under
+    /// "body", "entry" under "gland". No test saw it, because without a graphics device there is no
+    /// picture and no label.
     #[test]
     fn no_word_of_the_picture_lies_over_its_legend_however_it_is_turned() {
         let mut shown = Shown::empty("lab");

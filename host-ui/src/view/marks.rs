@@ -9,12 +9,12 @@ type V = Vector3<f32>;
 
 pub const SEED_LENGTH_M: f32 = 4.5e-3;
 pub const SEED_RADIUS_M: f32 = 0.4e-3;
-/// 18 gauge.
+/// Radius of an 18 gauge needle.
 const NEEDLE_RADIUS_M: f32 = 0.635e-3;
-/// As much of it is drawn.
+/// Drawn length of the needle.
 pub const NEEDLE_LENGTH_M: f64 = 0.12;
 const BEVEL_M: f32 = 2.5e-3;
-/// Thinner than an ultrasound probe, so that what is behind it is seen.
+/// Radius of the second hand's tool, thinner than an ultrasound probe, so that it hides little.
 const SECOND_RADIUS_M: f32 = 3e-3;
 const RING_RADIUS_M: f32 = 1.6e-3;
 const RING_THICKNESS_M: f32 = 0.16e-3;
@@ -26,7 +26,7 @@ const CAP_RINGS: usize = 4;
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct MarkVertex {
     pub place_m: [f32; 3],
-    /// Zero for lines, which are not lit.
+    /// Normal; zero for lines, which are not lit.
     pub normal: [f32; 3],
     pub color: [u8; 4],
 }
@@ -52,7 +52,7 @@ fn single(v: [f64; 3]) -> V {
     V::new(v[0] as f32, v[1] as f32, v[2] as f32)
 }
 
-/// A unit vector, also of a vector without direction.
+/// Returns the unit vector; z for a vector without direction.
 fn unit_or_z(v: V) -> V {
     v.try_normalize(1e-6).unwrap_or_else(V::z)
 }
@@ -64,14 +64,14 @@ fn frame_about(axis: V) -> (V, V) {
 }
 
 impl Marks {
-    /// Empty, for a picture in these colours.
+    /// Clears the marks, for a picture in these colours.
     pub fn begin(&mut self, tokens: &'static Tokens) {
         self.tokens = tokens;
         self.triangles.clear();
         self.lines.clear();
     }
 
-    /// Through these places, from the tip back; at least two.
+    /// Adds the needle through these places, from the tip back; at least two.
     pub fn needle(&mut self, points_m: &[[f64; 3]]) {
         let [tip, next, ..] = points_m else { return };
         let (tip, next) = (single(*tip), single(*next));
@@ -86,14 +86,14 @@ impl Marks {
             front = place;
         }
         let hub = front;
-        // The hub, so that a person sees which end is held.
+        // The hub shows which end is held.
         let grip = hub - axis * 0.012;
         self.cone(grip, hub, [2.6e-3, 2.0e-3], self.tokens.path);
         self.cone(grip - axis * 1e-4, grip, [0.0, 2.6e-3], self.tokens.path);
         self.cone(hub, hub + axis * 1e-4, [2.0e-3, 0.0], self.tokens.path);
     }
 
-    /// What the other hand holds, from its tip to the hand: a plain rod, whatever it is.
+    /// Adds the tool of the second hand, from its tip to the hand, as a plain rod.
     pub fn second_tool(&mut self, tip_m: [f64; 3], end_m: [f64; 3]) {
         let (tip, end) = (single(tip_m), single(end_m));
         let color = self.tokens.path;
@@ -110,7 +110,7 @@ impl Marks {
         self.cap(center - half, -axis, radius, self.tokens.seed_placed);
     }
 
-    /// Three rings, a wire sphere: nothing like the capsule of a placed seed.
+    /// Adds a planned seed as three rings, a wire sphere, unlike the capsule of a placed seed.
     pub fn planned_seed(&mut self, center_m: [f64; 3], direction: [f64; 3]) {
         let (center, axis) = (single(center_m), unit_or_z(single(direction)));
         let (u, v) = frame_about(axis);
@@ -119,7 +119,7 @@ impl Marks {
         }
     }
 
-    /// Seeds of needles that are not at work: the same wire sphere in thin lines, since there may be a hundred.
+    /// Adds seeds of other needles as wire spheres in thin lines, because there may be a hundred.
     pub fn planned_seeds_thin(&mut self, centers_m: impl Iterator<Item = [f64; 3]>, direction: [f64; 3]) {
         const STEPS: usize = 10;
         let axis = unit_or_z(single(direction));
@@ -139,7 +139,7 @@ impl Marks {
         }
     }
 
-    /// Where a needle that is not at work goes.
+    /// Adds the path of another needle.
     pub fn path_thin(&mut self, from_m: [f64; 3], to_m: [f64; 3]) {
         self.line(single(from_m), single(to_m), self.tokens.path);
     }
@@ -156,7 +156,7 @@ impl Marks {
         }
     }
 
-    /// A flat ring and a cross about the place where the needle goes in.
+    /// Adds a flat ring and a cross about the entry.
     pub fn entry(&mut self, place_m: [f64; 3], direction: [f64; 3]) {
         let (center, axis) = (single(place_m), unit_or_z(single(direction)));
         let (u, v) = frame_about(axis);
@@ -171,14 +171,14 @@ impl Marks {
         }
     }
 
-    /// What the hand feels, from the tip, 4 mm for each newton.
+    /// Adds the force on the hand, from the tip, 4 mm per newton.
     pub fn force(&mut self, tip_m: [f64; 3], force_n: [f64; 3]) {
         const M_PER_N: f32 = 4e-3;
         const LEAST_N: f32 = 0.05;
         const HEAD_M: f32 = 3e-3;
         let (tip, force) = (single(tip_m), single(force_n));
         let size = force.norm();
-        // A force that is not a number is not drawn either.
+        // NaN is not drawn either.
         if !(LEAST_N..).contains(&size) {
             return;
         }
@@ -189,7 +189,7 @@ impl Marks {
         self.cone(end - axis * 1e-4, end, [0.0, 1.3e-3], self.tokens.force);
     }
 
-    /// 13 by 13 holes 5 mm apart about the needle's path, `before_m` before the entry.
+    /// Adds 13 by 13 holes 5 mm apart about the needle's path, `before_m` before the entry.
     pub fn template(&mut self, entry_m: [f64; 3], direction: [f64; 3], before_m: f32) {
         const HOLES: i32 = 6;
         const PITCH_M: f32 = 5e-3;
@@ -212,7 +212,7 @@ impl Marks {
         }
     }
 
-    /// A line between two places, or a ring about one.
+    /// Adds a line between two places, or a ring about one.
     pub fn measured(&mut self, points: &[V]) {
         for point in points {
             self.ring(*point, V::x(), V::y(), 0.8e-3, self.tokens.measure);
@@ -222,7 +222,8 @@ impl Marks {
         }
     }
 
-    /// Lines each 10 mm under the body, and the three axes from a far corner, which is returned.
+    /// Adds lines each 10 mm under the body, and the three axes from a far corner, which is
+    /// returned.
     pub fn grid_and_axes(&mut self, lower_m: [f64; 3], upper_m: [f64; 3]) -> [f32; 3] {
         const STEP_M: f32 = 0.01;
         let (lower, upper) = (single(lower_m), single(upper_m));
@@ -267,7 +268,7 @@ impl Marks {
         }
     }
 
-    /// The side of a cone, a cylinder when both radii are the same; open at both ends.
+    /// Adds the side of a cone, a cylinder if both radii are equal; open at both ends.
     fn cone(&mut self, from: V, to: V, radii: [f32; 2], color: Color32) {
         let axis = unit_or_z(to - from);
         let (u, v) = frame_about(axis);

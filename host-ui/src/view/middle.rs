@@ -1,4 +1,4 @@
-//! What stands in the middle of the window: the three-dimensional picture, the slices, and the tools over them.
+//! The middle of the window: the three-dimensional picture, the slices, and the tools over them.
 
 use super::body::ShownBody;
 use super::draw::Drawing;
@@ -23,28 +23,28 @@ use stylet_host::link::{SceneModel, Snapshot};
 use stylet_imaging::fluoroscopy::DoseCounter;
 use stylet_imaging::ultrasound::View;
 
-/// Between two pictures.
+/// Gap between two pictures.
 const GAP: f32 = 2.0;
-/// Of the height, for the screen of the C-arm.
+/// Share of the height for the screen of the C-arm.
 const FLUORO_SHARE: f32 = 0.6;
 
-/// The three-dimensional picture and the slices.
+/// Three-dimensional picture and slices.
 pub struct Middle {
-    /// The three-dimensional picture.
+    /// Three-dimensional picture.
     pub(crate) solid: Scene3d,
     slices: Slices,
     probe: ProbeView,
-    /// One for each plane of the probe.
+    /// Drawing in each plane of the probe.
     drawings: [Drawing; 2],
     fluoro: FluoroView,
     body: ShownBody,
-    /// What all pictures share.
+    /// State common to all pictures.
     pub(crate) view: ViewState,
-    /// Under the tools, in the last frame.
+    /// Top of the pictures, under the tools, in the last frame.
     pictures_top: f32,
 }
 
-/// Where each picture stands.
+/// Places of the pictures.
 struct Places {
     solid: Option<Rect>,
     slices: Vec<(Orientation, Rect)>,
@@ -53,7 +53,7 @@ struct Places {
 }
 
 impl Middle {
-    /// Pictures on this graphics device; without one they are empty.
+    /// Creates pictures on this graphics device; without one they are empty.
     pub(crate) fn new(state: Option<RenderState>) -> Self {
         Self {
             solid: Scene3d::new(state.clone()),
@@ -67,17 +67,17 @@ impl Middle {
         }
     }
 
-    /// Where the pictures begin.
+    /// Returns the top of the pictures.
     pub(crate) fn pictures_top(&self) -> f32 {
         self.pictures_top
     }
 
-    /// Bytes sent to the graphics card since the window opened.
+    /// Returns the number of bytes sent to the graphics card since the window opened.
     pub(crate) fn driver(&self) -> DriverCost {
         self.solid.driver().plus(self.slices.driver())
     }
 
-    /// Takes what is new since the last frame.
+    /// Takes the data that arrived since the last frame.
     pub(crate) fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
         self.body.take(model, snapshot);
         self.solid.take(shown, &self.body);
@@ -90,28 +90,29 @@ impl Middle {
         }
     }
 
-    /// The plane that a slice at this place of the window shows.
+    /// Returns the plane that a slice at this place of the window shows.
     pub fn plane(&self, orientation: Orientation, rect: Rect) -> Plane {
         self.slices.plane(orientation, &self.view, rect)
     }
 
-    /// A picture of the probe as it stood in the window in the last frame; `None` where the layout has none.
+    /// Returns a picture of the probe as it stood in the window in the last frame; `None` if the
+    /// layout has none.
     pub fn probe_picture(&self, view: View) -> Option<&ProbePicture> {
         self.probe.picture(view)
     }
 
-    /// Where the transverse plane of the probe is along its axis, m.
+    /// Returns the place of the transverse plane along the probe's axis, m.
     pub(crate) fn transverse_at_m(&self, shown: &Shown) -> Option<f64> {
         let (frame, picture) = (shown.planning.review.frame?, self.probe.picture(View::Transverse)?);
         Some(frame.in_plane_m(picture.plane().pose.middle_m).1)
     }
 
-    /// What fluoroscopy has cost this patient.
+    /// Returns the dose that fluoroscopy has cost this patient.
     pub fn spent(&self) -> DoseCounter {
         self.fluoro.dose
     }
 
-    /// Shows an image in the slices, of the patient of the scene of this name.
+    /// Shows an image in the slices, of the patient of the scene with this name.
     pub(crate) fn show_image(&mut self, image: Image, scene: &str) -> Result<(), ImageError> {
         self.view.image = true;
         self.slices.show_image(image, scene)
@@ -147,7 +148,8 @@ impl Middle {
         self.pictures_top = rect.top();
         let places = places(rect, layout);
         if layout != Layout::Solid {
-            // Only what is seen between the pictures: each layer of a pixel costs as much as the last on a driver in software.
+            // Only the visible gaps between the pictures: for a software driver each layer of a
+            // pixel costs as much as the last.
             let whole = Rect::from_center_size(meet(rect, layout), egui::Vec2::splat(GAP));
             for strip in [
                 Rect::from_x_y_ranges(rect.x_range(), whole.y_range()),
@@ -271,7 +273,8 @@ impl Middle {
     }
 }
 
-/// A needle far outside would take the slices to where nothing is.
+/// Returns whether the tip is near the body; a needle far outside would take the slices to empty
+/// space.
 fn is_near_body(shown: &Shown, tip_m: &[f64; 3]) -> bool {
     const NEAR_M: f64 = 0.002;
     shown
@@ -280,7 +283,7 @@ fn is_near_body(shown: &Shown, tip_m: &[f64; 3]) -> bool {
         .is_some_and(|s| (0..3).all(|a| (s.lower_m[a] - NEAR_M..=s.upper_m[a] + NEAR_M).contains(&tip_m[a])))
 }
 
-/// Where the pictures of a layout meet.
+/// Returns the point where the pictures of a layout meet.
 fn meet(rect: Rect, layout: Layout) -> Pos2 {
     match layout {
         Layout::Fluoroscopy => Pos2::new(rect.center().x, (rect.top() + FLUORO_SHARE * rect.height()).round()),

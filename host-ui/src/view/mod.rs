@@ -1,4 +1,5 @@
-//! What is drawn of the body: the deforming gland, the needle and the seeds, in three dimensions and in slices.
+//! Pictures of the body: the deforming gland, the needle and the seeds, in three dimensions and in
+//! slices.
 
 mod body;
 mod camera;

@@ -1,9 +1,9 @@
-//! The directions of the patient, in which bodies are cut and looked at.
+//! The directions of the patient, for slices and views.
 
 use nalgebra::{Matrix3, Vector3};
 use stylet_shm_schema::SceneHeader;
 
-/// The three ways to cut a body.
+/// Orientation of a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Orientation {
     /// Across the body.
@@ -15,10 +15,10 @@ pub enum Orientation {
 }
 
 impl Orientation {
-    /// All of them.
+    /// All orientations.
     pub const ALL: [Self; 3] = [Self::Axial, Self::Sagittal, Self::Coronal];
 
-    /// Its name, for people.
+    /// Returns the display name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Axial => "Axial",
@@ -27,8 +27,8 @@ impl Orientation {
         }
     }
 
-    /// To the right and up on the screen, in patient axes (right, anterior, superior). Axial and coronal are seen as by
-    /// one who faces the patient: the patient's right is on the left.
+    /// Returns the directions to the right and up on the screen, in patient axes (right, anterior,
+    /// superior). Axial and coronal face the patient: the patient's right is on the left.
     pub(super) fn axes(self) -> [Vector3<f64>; 2] {
         let (right, anterior, superior) = (Vector3::x(), Vector3::y(), Vector3::z());
         match self {
@@ -38,7 +38,7 @@ impl Orientation {
         }
     }
 
-    /// Letters of what lies left, right, above and below.
+    /// Returns the letters of left, right, top and bottom.
     pub fn letters(self) -> [&'static str; 4] {
         match self {
             Self::Axial => ["R", "L", "A", "P"],
@@ -48,7 +48,8 @@ impl Orientation {
     }
 }
 
-/// Scene from patient directions; the scene's own axes where the transform is no rotation.
+/// Returns the rotation from patient directions to the scene; the scene's own axes if the transform
+/// is not a rotation.
 pub fn scene_from_patient(scene: &SceneHeader) -> Matrix3<f64> {
     scene.patient().rotation().transpose()
 }

@@ -1,29 +1,29 @@
 //! Puts a finished picture into the window, pixel for pixel.
 //!
-//! As an image of the toolkit it would go through the shader of its widgets, which a driver without a graphics card runs in
-//! full for each pixel: that took longer than drawing the picture.
+//! An image of the toolkit would go through the shader of its widgets. A driver without a graphics
+//! card runs that in full for each pixel, which took longer than drawing the picture.
 
 use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, RenderState};
 use eframe::wgpu;
 use egui::epaint::PaintCallback;
 use egui::{PaintCallbackInfo, Painter, Rect, Shape};
 
-/// How pictures are put into the window.
+/// Pipelines that put pictures into the window.
 pub struct Paste {
     device: wgpu::Device,
     layout: wgpu::BindGroupLayout,
     between: wgpu::Sampler,
-    /// Pixel for pixel.
+    /// Pipeline pixel for pixel.
     exact: wgpu::RenderPipeline,
-    /// For a picture with fewer pixels than its place.
+    /// Pipeline for a picture with fewer pixels than its place.
     enlarging: wgpu::RenderPipeline,
 }
 
-/// A picture that can be put into the window.
+/// Picture that can be put into the window.
 #[derive(Clone)]
 pub struct Pasted {
     draw: Draw,
-    /// Its identity says whether the picture is the one of the frame before.
+    /// Paint callback, whose identity tells whether the picture is that of the previous frame.
     callback: PaintCallback,
 }
 
@@ -34,12 +34,12 @@ struct Draw {
 }
 
 impl Paste {
-    /// For textures that hold what the screen shall show, in red, green and blue.
+    /// Creates pipelines for textures with the screen's red, green and blue.
     pub fn new(state: &RenderState) -> Self {
         Self::converting(state, state.target_format.is_srgb())
     }
 
-    /// For textures of the window's own format.
+    /// Creates pipelines for textures of the window's own format.
     pub fn as_window(state: &RenderState) -> Self {
         Self::converting(state, false)
     }
@@ -76,12 +76,12 @@ impl Paste {
         }
     }
 
-    /// The picture in this texture.
+    /// Returns the picture in this texture.
     pub fn of(&self, texture: &wgpu::TextureView) -> Pasted {
         self.by(&self.exact, texture)
     }
 
-    /// The picture in this texture, which has fewer pixels than the picture will have.
+    /// Returns the picture in this texture, which has fewer pixels than its place.
     pub fn enlarged(&self, texture: &wgpu::TextureView) -> Pasted {
         self.by(&self.enlarging, texture)
     }
@@ -113,19 +113,19 @@ impl Paste {
 }
 
 impl Pasted {
-    /// To be called when the texture holds another picture.
+    /// Marks the texture as changed.
     pub fn renew(&mut self) {
         self.callback = Callback::new_paint_callback(Rect::NOTHING, self.draw.clone());
     }
 
-    /// The picture at this place of the window.
+    /// Returns the picture at this place of the window.
     pub fn shape(&self, rect: Rect) -> Shape {
         let mut callback = self.callback.clone();
         callback.rect = rect;
         callback.into()
     }
 
-    /// Over what was painted there before.
+    /// Paints the picture over earlier shapes.
     pub fn paint(&self, painter: &Painter, rect: Rect) {
         painter.add(self.shape(rect));
     }

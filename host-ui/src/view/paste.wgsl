@@ -1,8 +1,8 @@
 // A finished picture, pixel for pixel.
 
-// The window's texture takes light, not what the screen gets.
+// The window's texture takes linear light, not screen values.
 override TAKES_LIGHT: bool;
-// Of a picture with fewer pixels than its place.
+// For a picture with fewer pixels than its place.
 override ENLARGES: bool;
 
 @group(0) @binding(0) var picture: texture_2d<f32>;

@@ -1,9 +1,10 @@
-//! Which place of a surface the pointer is on.
+//! The place of a surface under the pointer.
 
 use nalgebra::Vector3;
 use stylet_surfaces::mesh::SurfaceVertex;
 
-/// The nearest place where a ray meets a triangle, from in front or from behind (Möller and Trumbore).
+/// Returns the nearest place where a ray meets a triangle, from in front or from behind (Möller and
+/// Trumbore).
 pub fn pick(
     vertices: &[SurfaceVertex],
     triangles: &[[u32; 3]],
@@ -18,12 +19,13 @@ pub fn pick(
     Some(eye_m + ray * nearest)
 }
 
-/// How far along the ray it meets the triangle.
+/// Returns the distance along the ray to the triangle.
 fn way(a: Vector3<f32>, b: Vector3<f32>, c: Vector3<f32>, eye_m: Vector3<f32>, ray: Vector3<f32>) -> Option<f32> {
     let (ab, ac) = (b - a, c - a);
     let p = ray.cross(&ac);
     let volume = ab.dot(&p);
-    // Areas of triangles are of the order of a square millimetre, and a ray along one meets it nowhere.
+    // Areas of triangles are of the order of a square millimetre, and a ray in a triangle's plane
+    // misses it.
     if volume.abs() < 1e-14 {
         return None;
     }

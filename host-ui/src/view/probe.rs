@@ -1,4 +1,5 @@
-//! What the ultrasound probe sees: both of its planes, with the template's grid over the one across it.
+//! The pictures of the ultrasound probe: both of its planes, with the template's grid over the
+//! transverse one.
 
 mod picture;
 mod scale;
@@ -25,22 +26,22 @@ use stylet_surfaces::field::Field;
 use tools::Knobs;
 use turns::Turns;
 
-/// Pixels of the longer side.
+/// Largest size of the longer side, in pixels.
 const LARGEST_SIDE: f32 = 1024.0;
-/// A drag of so many points moves the probe by 1 mm, or turns it by 1 degree.
+/// Length of a drag that moves the probe by 1 mm, or turns it by 1 degree.
 const POINTS_PER_MM: f64 = 4.0;
 const POINTS_PER_DEG: f64 = 3.0;
 
-/// What one frame has of the scene.
+/// Scene data of one frame.
 pub(super) type Seen<'a> = (&'a Shown, &'a ShownBody, &'a Field);
 
-/// The picture of one plane, and what it was drawn of.
+/// Picture of one plane, and its inputs.
 struct Pane {
     scanner: Scanner,
     scene: Option<SceneId>,
     drawn: Option<(Plane, Settings, Metal, Field)>,
     pasted: Option<Pasted>,
-    /// As it stands in the window.
+    /// Picture as it stands in the window.
     shown: Option<ProbePicture>,
 }
 
@@ -52,16 +53,16 @@ pub(super) struct ProbeView {
     turns: Turns,
 }
 
-/// Whose pose a picture has.
+/// Pose of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stand {
     pub pose: Pose,
-    /// In the hand that holds the second device, else on the window's own stepper.
+    /// True in the hand that holds the second device, false on the window's own stepper.
     pub is_in_hand: bool,
 }
 
 impl ProbeView {
-    /// Without a graphics device that computes there are no pictures.
+    /// Creates the view. Without a graphics device that computes there are no pictures.
     pub fn new(state: Option<RenderState>) -> Self {
         let gpu = state.as_ref().map(|state| Gpu {
             device: state.device.clone(),
@@ -87,19 +88,21 @@ impl ProbeView {
         }
     }
 
-    /// The picture of a plane as it stood in the window in the last frame; `None` where it was not shown.
+    /// Returns the picture of a plane as it stood in the window in the last frame; `None` if it was
+    /// not shown.
     pub fn picture(&self, view: View) -> Option<&ProbePicture> {
         self.panes.get(view as usize)?.shown.as_ref()
     }
 
-    /// Of a frame that is over.
+    /// Forgets the pictures of the last frame.
     pub fn forget_pictures(&mut self) {
         for pane in &mut self.panes {
             pane.shown = None;
         }
     }
 
-    /// Where the probe stands: in the hand that holds the second device, or on the stepper where there is none.
+    /// Returns the pose of the probe: in the hand that holds the second device, or on the stepper
+    /// without one.
     pub fn stand(&self, shown: &Shown, scene: &SceneHeader) -> Stand {
         let on_stepper = || self.knobs.stepper(&Pose::of_scene(scene));
         let in_hand = shown.probe_pose();
@@ -109,7 +112,7 @@ impl ProbeView {
         }
     }
 
-    /// Draws one plane; what the pointer asks for.
+    /// Draws one plane; returns the requests of the pointer.
     pub fn picture_ui(&mut self, ui: &mut egui::Ui, rect: Rect, view: View, seen: Seen<'_>) -> Option<Action> {
         let (shown, body, field) = seen;
         let response = ui.interact(rect, ui.scope_id().with(view.name()), Sense::click_and_drag());
@@ -153,7 +156,7 @@ impl ProbeView {
                 return action;
             }
             if is_old {
-                // The other plane's turn; this one's is next.
+                // It is the other plane's turn; this one is next.
                 painter.rect_filled(rect, 0.0, IMAGE.background);
                 return action;
             }
@@ -166,14 +169,15 @@ impl ProbeView {
         action
     }
 
-    /// Along the picture's height the probe goes in and out, along its width it turns.
+    /// Converts a drag: along the picture's height the probe goes in and out, along its width it
+    /// turns.
     fn dragged(&mut self, response: &egui::Response, view: View, shown: &Shown) -> Option<Action> {
         if !response.dragged() {
             return None;
         }
         let by = response.drag_delta();
         let (across, up) = (f64::from(by.x), f64::from(-by.y));
-        // In the sagittal picture the way into the patient is to the right.
+        // In the sagittal picture the direction into the patient is to the right.
         let (way_mm, turn_deg) = match view {
             View::Transverse => (up / POINTS_PER_MM, across / POINTS_PER_DEG),
             View::Sagittal => (across / POINTS_PER_MM, up / POINTS_PER_DEG),
@@ -186,7 +190,7 @@ impl ProbeView {
         })
     }
 
-    /// Title, depths and template.
+    /// Draws title, depths and template.
     fn over(&self, painter: &egui::Painter, picture: &ProbePicture, stand: Stand, scene: &SceneHeader) {
         let (plane, rect) = (picture.plane(), picture.rect());
         if self.knobs.template && plane.view == View::Transverse {
@@ -201,7 +205,7 @@ impl ProbeView {
         let (way_m, turn_rad) = stand.pose.way_and_turn(&Pose::of_scene(scene));
         let whose = if stand.is_in_hand { "Hand 2" } else { "Stepper" };
         let (name, way, turn) = (plane.view.name(), format::length(way_m), turn_rad.to_degrees());
-        // No minus before a zero.
+        // Avoid a minus before a zero.
         let turn = if turn.abs() < 0.05 { 0.0 } else { turn };
         let free = free_of_banners(painter.ctx(), rect);
         scale::draw(painter, picture, free);
@@ -212,7 +216,8 @@ impl ProbeView {
 }
 
 impl Pane {
-    /// Computes the picture where it is not that of what is wanted: whether it did, and whether it is old now.
+    /// Computes the picture if its inputs have changed. Returns whether it did, and whether the
+    /// picture is out of date.
     fn bring_up_to_date(
         &mut self,
         model: &stylet_host::link::SceneModel,
@@ -249,7 +254,7 @@ impl Pane {
     }
 }
 
-/// Pixels of a picture at this place; a large one has fewer and is enlarged.
+/// Returns the pixels of a picture at this place; a large one has fewer and is enlarged.
 fn pixels(rect: Rect, per_point: f32) -> [u32; 2] {
     let size = rect.size() * per_point;
     let share = (LARGEST_SIDE / size.max_elem().max(1.0)).min(1.0);

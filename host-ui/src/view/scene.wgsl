@@ -8,7 +8,7 @@ struct Scene {
     surface: vec4<f32>,
     // x: strength of the rim, y: how much the facing part fades.
     look: vec4<f32>,
-    // Normal and offset of the section; what lies in front of it is cut away.
+    // Normal and offset of the section; the part in front of it is cut away.
     section: vec4<f32>,
 }
 

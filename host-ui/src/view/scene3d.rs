@@ -1,4 +1,4 @@
-//! The three-dimensional picture: what it shows, and how the pointer turns it.
+//! The three-dimensional picture: its content, and its rotation by the pointer.
 
 use super::body::ShownBody;
 use super::camera::Camera;
@@ -25,20 +25,20 @@ use stylet_shm_schema::SceneId;
 use stylet_surfaces::mesh::Surface;
 
 const TURN_PER_POINT_RAD: f32 = 0.008;
-/// The needle's own view is from so far behind the tip.
+/// Distance of the needle's own view behind the tip.
 const NEEDLE_VIEW_M: f32 = 0.06;
-/// A picture wider than this has room for words about doses.
+/// Width beyond which a picture has room for dose labels.
 const ALONE: f32 = 500.0;
-/// Less is not seen, so that a force and a tip at rest leave the picture as it is.
+/// Smallest visible change, so that a force and a tip at rest leave the picture as it is.
 const SEEN_M: f64 = 2e-5;
 const SEEN_N: f64 = 0.02;
 /// Opacity of isodose surfaces.
 const SHELL: f32 = 0.30;
 
-/// What a person set; the same settings and the same data give the same picture.
+/// Settings of a person; the same settings and the same data give the same picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
-    /// 0 opaque, 1 not to be seen.
+    /// Transparency: 0 opaque, 1 invisible.
     pub transparency: f32,
     pub rest_shape: bool,
     pub force: bool,
@@ -56,11 +56,11 @@ impl Default for Look {
     }
 }
 
-/// Everything a picture depends on: drawn again only when one of them changed, places and the force by what can be seen.
+/// Inputs of a picture: it is drawn again only when one of them changed visibly.
 struct Key {
     what: What,
     tip: [f64; 3],
-    /// Places along the needle and of the other hand, as [`moving_points`] has them.
+    /// Places along the needle and the second hand's tool, from [`moving_points`].
     needle: Vec<[f64; 3]>,
     force: [f64; 3],
     seeds: Vec<[f64; 3]>,
@@ -86,7 +86,7 @@ struct What {
     view: ViewState,
     scene: SceneId,
     changes: u64,
-    /// Of the needle at work, and of the plan of all.
+    /// Revisions of the present needle, and of the plan.
     plan: (u64, u64, usize),
     dose: u64,
     dark: bool,
@@ -99,20 +99,20 @@ pub struct Scene3d {
     gpu: Option<Gpu>,
     pub camera: Camera,
     pub look: Look,
-    /// Scene of the surface that the card has.
+    /// Scene of the surface on the card.
     uploaded_scene: Option<SceneId>,
     surface: Surface,
-    /// Of the body as the card has it.
+    /// Number of the body's motion on the card.
     moved: u64,
-    /// How often what the card has was changed.
+    /// Number of changes on the card.
     changes: u64,
-    /// The dose that the card has.
+    /// Dose on the card.
     shells: u64,
     drawn: Option<Key>,
-    /// What the marks of the plan were made for.
+    /// Inputs of the plan's marks.
     fixed: Option<PlanMarksKey>,
     marks: Marks,
-    /// Where the axes are drawn.
+    /// Place of the axes.
     corner_m: Option<[f32; 3]>,
 }
 
@@ -218,7 +218,7 @@ impl Scene3d {
                     tokens,
                     shown,
                 };
-                // Beside the slices, these show the levels already.
+                // Next to the slices, these show the levels already.
                 let alone = dose.filter(|_| rect.width() > ALONE);
                 let rows = legend.listed(self.look, alone.map(|d| &**d));
                 legend.landmarks(self.corner_m, view, &rows);

@@ -1,13 +1,13 @@
-//! What all pictures in the middle share: where they cut, what is measured, what is shown.
+//! State common to all pictures in the middle: cut planes, measurements, visibility.
 
 use super::orientation::Orientation;
 use nalgebra::Vector3;
 
-/// A distance between two places, taken by two clicks.
+/// Distance between two places, set by two clicks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measure {
     pub active: bool,
-    /// None, one or two, scene frame.
+    /// None, one or two places, scene frame.
     points_m: Vec<Vector3<f64>>,
 }
 
@@ -17,7 +17,7 @@ impl Measure {
         self.points_m.clear();
     }
 
-    /// A third place begins a new distance.
+    /// Takes a place; a third one begins a new distance.
     pub fn take(&mut self, point_m: Vector3<f64>) {
         if self.points_m.len() >= 2 {
             self.points_m.clear();
@@ -37,12 +37,12 @@ impl Measure {
     }
 }
 
-/// What clicks on the picture of the probe draw.
+/// Tool for clicks on the picture of the probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tool {
-    /// The edge of the gland.
+    /// Edge of the gland.
     Contour,
-    /// Seeds where they are seen.
+    /// Seeds that are visible.
     Seeds,
 }
 
@@ -59,17 +59,17 @@ impl Tool {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct ViewState {
-    /// Where the three slices meet, scene frame.
+    /// Common point of the three slices, scene frame.
     pub cursor_m: Vector3<f64>,
-    /// The slices go through the tip of the needle.
+    /// True if the slices go through the tip of the needle.
     pub follow_tip: bool,
     pub measure: Measure,
-    /// What is drawn on the picture of the probe.
+    /// Tool on the picture of the probe.
     pub tool: Option<Tool>,
-    /// Half of the body is cut away at this slice.
+    /// Slice in front of which the body is cut away.
     pub section: Option<Orientation>,
     pub isodose: bool,
-    /// The slices show the image that was loaded, where there is one.
+    /// True if the slices show the loaded image, if there is one.
     pub image: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What the shader of the three-dimensional picture is given.
+//! Uniforms of the three-dimensional picture's shader.
 
 use super::camera::Camera;
 use super::orientation::{Orientation, scene_from_patient};
@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 
 const LIGHT: [f32; 4] = [-0.48, 0.78, -0.40, 0.0];
 
-/// As `Scene` in `scene.wgsl`.
+/// Same layout as `Scene` in `scene.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct SceneUniform {
@@ -20,11 +20,12 @@ pub struct SceneUniform {
     pub light: [f32; 4],
     pub surface: [f32; 4],
     pub look: [f32; 4],
-    /// Normal and offset of the plane in front of which surfaces are cut away; a normal of zero cuts nothing.
+    /// Normal and offset of the plane in front of which surfaces are cut away; a normal of zero
+    /// cuts nothing.
     pub section: [f32; 4],
 }
 
-/// The plane through the cursor whose near side is cut away.
+/// Returns the plane through the cursor whose near side is cut away.
 pub fn section(camera: &Camera, view: &ViewState, shown: &Shown) -> [f32; 4] {
     let (Some(orientation), Some(scene)) = (view.section, &shown.scene) else {
         return [0.0; 4];
@@ -44,7 +45,7 @@ pub fn section(camera: &Camera, view: &ViewState, shown: &Shown) -> [f32; 4] {
     [normal.x, normal.y, normal.z, normal.dot(&cursor)]
 }
 
-/// Without colours.
+/// Returns a uniform without colours.
 pub fn uniform(camera: &Camera, aspect: f32) -> SceneUniform {
     let eye = camera.eye_m();
     let length = LIGHT.iter().map(|c| c * c).sum::<f32>().sqrt();
@@ -58,7 +59,7 @@ pub fn uniform(camera: &Camera, aspect: f32) -> SceneUniform {
     }
 }
 
-/// Of what stands so far from where its vertices are, m.
+/// Returns the uniform of a surface that is displaced from its vertices, m.
 pub fn shifted(of: SceneUniform, by_m: [f64; 3]) -> SceneUniform {
     let by = by_m.map(|c| c as f32);
     let mut shifted = of;
@@ -72,7 +73,7 @@ pub fn shifted(of: SceneUniform, by_m: [f64; 3]) -> SceneUniform {
     shifted
 }
 
-/// Of one surface.
+/// Returns the uniform of one surface.
 pub fn tint(whole: SceneUniform, color: Color32, opacity: f32, section: [f32; 4]) -> SceneUniform {
     SceneUniform {
         surface: theme::rgba(color, opacity),
@@ -86,7 +87,7 @@ pub fn tint(whole: SceneUniform, color: Color32, opacity: f32, section: [f32; 4]
 mod tests {
     use super::*;
 
-    /// Where a place is on the screen, and how far before the section.
+    /// Returns the place on the screen, and the distance before the section.
     fn seen(of: &SceneUniform, at: [f32; 3]) -> [f32; 5] {
         let at = [at[0], at[1], at[2], 1.0];
         let clip: [f32; 4] = std::array::from_fn(|row| (0..4).map(|a| of.clip_from_scene[a][row] * at[a]).sum());

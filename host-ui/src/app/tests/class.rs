@@ -1,4 +1,5 @@
-//! A class with the longest names and words: who is there, what an instructor has put in, and the list of trainees.
+//! A class with the longest names and texts: connected hosts, injected faults, and the list of
+//! trainees.
 
 use crate::app::App;
 use bytemuck::Zeroable;
@@ -7,7 +8,7 @@ use stylet_host::roster::{Glance, Trainee};
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::{Exercise, Relayed, Session, Text};
 
-/// Every exercise at once, with the longest words.
+/// Shows every exercise at once, with the longest texts.
 pub fn put_in(app: &mut App) {
     let mut session = app.shown.session.unwrap_or_else(Session::zeroed);
     let by_m = [-0.0057, -0.0057, -0.0057];
@@ -22,7 +23,7 @@ pub fn put_in(app: &mut App) {
     app.shown.body_moved_m = by_m;
 }
 
-/// Eight, one of each kind of line at least.
+/// Shows eight trainees, at least one for each kind of line.
 pub fn trainees(app: &mut App) {
     let name = |n: usize| format!("{n}. Maximiliane Wolfeschlegelsteinhausenbergerdorff of group 2")[..60].to_owned();
     let glance = |n: usize| Glance {
@@ -40,7 +41,7 @@ pub fn trainees(app: &mut App) {
     app.trainees.followed = Some(3);
 }
 
-/// To another machine, with the longest names that it takes.
+/// Returns a line to another machine, with the longest possible names.
 pub fn line_to_a_core(is_heard: bool) -> Relayed {
     Relayed {
         is_heard: u32::from(is_heard),
@@ -56,7 +57,7 @@ pub fn line_to_a_core(is_heard: bool) -> Relayed {
     }
 }
 
-/// As many as it lists, with the longest names.
+/// Returns a full class, with the longest names.
 pub fn whole_class() -> stylet_shm_schema::Class {
     let line = line_to_a_core(true);
     let mut class = stylet_shm_schema::Class {
@@ -67,7 +68,7 @@ pub fn whole_class() -> stylet_shm_schema::Class {
         ..Zeroable::zeroed()
     };
     for (i, member) in class.members.iter_mut().enumerate() {
-        // Each differs, so that one row that scrolls is not taken for another.
+        // The names differ, so that rows that scroll cannot be confused.
         let name = format!("{}. {}", i + 1, line.name.read());
         (member.name, member.role) = (Text::new(&name), Text::new("operator"));
         (member.round_trip_ns, member.silent_ns) = (1_234_000_000, 1_999_000_000);

@@ -1,4 +1,4 @@
-//! The window drawn into nothing, in states that are made by hand.
+//! The window drawn without a display, in states that are made by hand.
 
 use super::text::Painted;
 use crate::app::{App, Options};
@@ -24,10 +24,11 @@ use stylet_shm_schema::{
     flags, role,
 };
 
-/// Those of a window without a core, under a name of its own: windows of other tests come and go beside it.
+/// Returns options of a window without a core, under a unique name, because other tests open
+/// windows too.
 pub fn options() -> Options {
     static WINDOWS: AtomicU64 = AtomicU64::new(0);
-    // No other memory depends on the number.
+    // SYNC: relaxed; no other memory depends on the number.
     let number = WINDOWS.fetch_add(1, Ordering::Relaxed);
     Options {
         instance: Instance::new(&format!("ui-drawn-{}-{number}", std::process::id())).expect("a valid name"),
@@ -45,7 +46,7 @@ pub fn options() -> Options {
     }
 }
 
-/// The window, and the time that its frames believe in.
+/// Window with its own time.
 pub struct Drawn {
     pub app: App,
     pub ctx: egui::Context,
@@ -55,7 +56,7 @@ pub struct Drawn {
     _swept: Swept,
 }
 
-/// Removes what a window leaves in shared memory, after the window itself.
+/// Instance whose shared memory is removed after the window.
 struct Swept(Instance);
 
 impl Drop for Swept {
@@ -65,7 +66,7 @@ impl Drop for Swept {
 }
 
 impl Drawn {
-    /// So many pixels, with text so much larger.
+    /// Creates a window of this size in pixels, with text of this scale.
     pub fn new(pixels: [f32; 2], scale: f32) -> Self {
         let ctx = egui::Context::default();
         ctx.enable_accesskit();
@@ -111,7 +112,7 @@ impl Drawn {
         painted
     }
 
-    /// As it looks once it has settled.
+    /// Draws the window until it has settled.
     pub fn frame(&mut self) -> Painted {
         let mut before = self.pass(vec![Event::PointerMoved(Pos2::new(-9.0, -9.0))]);
         for _ in 0..10 {
@@ -124,7 +125,7 @@ impl Drawn {
         before
     }
 
-    /// After the wheel was turned with the pointer here.
+    /// Draws after the wheel was turned with the pointer here.
     pub fn scrolled(&mut self, place: Pos2, points: Vec2) -> Painted {
         self.pass(vec![Event::PointerMoved(place)]);
         self.pass(vec![Event::MouseWheel {
@@ -138,7 +139,7 @@ impl Drawn {
         self.pass(Vec::new())
     }
 
-    /// Where a widget of this name is.
+    /// Returns the place of the widget with this name.
     pub fn place(&mut self, name: &str) -> Rect {
         self.frame()
             .place(name)
@@ -146,12 +147,12 @@ impl Drawn {
     }
 }
 
-/// As long as a name in the schema can be.
+/// Longest name that the schema allows.
 pub const LONG_NAME: &str = "Prostata_Zielvolumen_mit_Samenblasen_und_Sicherheitssaum_PTV_3mm";
 pub const LONG_PATH: &str = "/srv/klinik/strahlentherapie/brachytherapie/patienten/2026/studie-11/segmentierung-der-\
                              prostata-und-risikoorgane-mit-katheter-und-samenblasen.seg.nrrd";
 
-/// A live core with the scene, and nothing planned.
+/// Returns a live core with the scene, and nothing planned.
 pub fn live() -> Shown {
     let mut shown = Shown::empty("lab");
     shown.status = LinkStatus::Live;
@@ -186,7 +187,7 @@ pub fn live() -> Shown {
     shown
 }
 
-/// With the five seeds of one needle, its tip at a depth, `placed` of them in the tissue.
+/// Returns a needle with five seeds, its tip at a depth, `placed` of them in the tissue.
 pub fn one_needle(depth_m: f64, placed: usize) -> Shown {
     let mut shown = live();
     let mut plan = PlanInForce::zeroed();
@@ -211,7 +212,7 @@ pub fn one_needle(depth_m: f64, placed: usize) -> Shown {
     shown
 }
 
-/// Two needles of `planned` and as many beside them as make `count`.
+/// Returns two needles of `planned`, filled up to `count` with others.
 fn needles(count: usize) -> ImplantPlan {
     let mut plan = planned();
     for hole in Hole::all() {
@@ -226,7 +227,7 @@ fn needles(count: usize) -> ImplantPlan {
     plan
 }
 
-/// A plan of many needles, `begun` of them inserted.
+/// Returns a plan of many needles, `begun` of them inserted.
 pub fn many_needles(count: usize, begun: usize) -> Shown {
     let mut shown = live();
     let plan = needles(count);
@@ -265,7 +266,7 @@ pub fn many_needles(count: usize, begun: usize) -> Shown {
     shown
 }
 
-/// Three proposals, the second of which is this plan.
+/// Returns three proposals, the second of which is this plan.
 pub fn proposals(plan: &ImplantPlan) -> Arc<Vec<FirstPlan>> {
     let proposal = |(name, v150, robust, strength_u): (&'static str, f64, f64, Option<f64>)| FirstPlan {
         name,

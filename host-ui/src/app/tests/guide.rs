@@ -1,4 +1,4 @@
-//! The guide against the state machine of the procedure, and its figures against the state that they are of.
+//! The guide against the state machine of the procedure, and its figures against their state.
 
 use super::fixture::{live, one_needle};
 use crate::panel::workflow::{Felt, lesson};
@@ -24,7 +24,7 @@ fn the_guide_says_what_the_state_machine_says_comes_next() {
     ] {
         let mut shown = shown;
         if let Some(state) = &mut shown.state {
-            // Needs no line, and its speed is that of a needle at rest.
+            // No line is needed, and the speed is that of a needle at rest.
             state.flags &= !flags::LINE_NEEDED;
             state.speed_m_per_s = 0.0;
         }
@@ -33,7 +33,8 @@ fn the_guide_says_what_the_state_machine_says_comes_next() {
     }
 }
 
-/// Who followed the guide with the keys never turned the force on, and read that the membrane gave way at 0.00 N.
+/// Guards against a guide that never turned the force on for keys, so that a membrane gave way at
+/// 0.00 N.
 #[test]
 fn the_force_is_turned_on_before_the_needle_moves() {
     let mut shown = one_needle(-0.05, 0);
@@ -89,7 +90,7 @@ fn the_debrief_has_the_figures_of_the_seeds_and_of_the_membrane() {
         assert!(notes.contains(word), "{word:?} is not in {notes}");
     }
     assert!(notes.contains("Most of it is the tissue"));
-    // The next insertion begins anew.
+    // The next insertion starts from zero.
     felt.take(&[tick(1e-3, 0.0, flags::IN_CONTACT)]);
     assert!(felt.punctures().is_empty());
 }

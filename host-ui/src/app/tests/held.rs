@@ -1,4 +1,4 @@
-//! What does not move when something comes or goes.
+//! Parts that stay in place while others appear or disappear.
 
 use super::fixture::{Drawn, live, many_needles, one_needle};
 use crate::shown::{Note, Shown};
@@ -11,7 +11,8 @@ fn places(shown: Shown, names: &[&str]) -> Vec<Rect> {
     names.iter().map(|name| drawn.place(name)).collect()
 }
 
-/// Everything went down by 34 points as a banner came: the second click fell on something else.
+/// Guards against a banner that moved everything down by 34 points, so that the second click hit
+/// another button.
 #[test]
 fn a_banner_moves_nothing() {
     let names = ["Insert", "Engage force", "Follow tip", "Membrane tension", "Parameters"];
@@ -24,7 +25,7 @@ fn a_banner_moves_nothing() {
     assert_eq!(places(shown, &names), without);
 }
 
-/// The buttons for the force stood under the last answer.
+/// Guards against buttons for the force that moved below the last answer.
 #[test]
 fn a_note_moves_nothing() {
     let names = ["Plan five seeds", "Engage force", "Disengage", "Reset"];
@@ -35,7 +36,7 @@ fn a_note_moves_nothing() {
     assert_eq!(places(shown, &names), without);
 }
 
-/// The steps went down by a line while needles ran, and came up again after it.
+/// Guards against steps that moved by a line while needles ran.
 #[test]
 fn a_run_of_needles_moves_no_step() {
     let names = ["1  Choose the scene", "7  Debrief", "Engage force"];

@@ -1,6 +1,7 @@
-//! Pictures of every state of the window in all its sizes, to be looked at:
+//! Pictures of every state of the window in all its sizes, for inspection:
 //!
-//! `cargo test --release -p host-ui --lib pictures -- --ignored`, with `STYLET_PICTURES=1280x720` for those whose name contains that.
+//! `cargo test --release -p host-ui --lib pictures -- --ignored`, with `STYLET_PICTURES=1280x720`
+//! for those whose name contains that.
 
 use super::fixture::options;
 use super::whole::{STATES, State};
@@ -16,14 +17,14 @@ use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Piece, SceneModel, Snapshot};
 use stylet_host::record::played_of;
 
-/// Pixels of the window: the smallest that it can be, and those of usual screens.
+/// Sizes of the window in pixels: the smallest possible, and those of common screens.
 const SIZES: [[u32; 2]; 5] = [[960, 600], [1280, 720], [1366, 768], [1920, 1080], [3840, 2160]];
 const SCALES: [f32; 3] = [1.0, 1.5, 2.0];
 /// Width of a picture on the sheet of all states.
 const ON_SHEET: u32 = 480;
 const SHEET_COLUMNS: u32 = 6;
 
-/// The window in a state, with tissue in its pictures.
+/// Window in a state, with tissue in its pictures.
 struct Posed {
     app: App,
     tissue: (Arc<SceneModel>, Box<Snapshot>),
@@ -38,7 +39,7 @@ impl eframe::App for Posed {
     }
 }
 
-/// Scene and last tissue of the example.
+/// Returns scene and last tissue of the example.
 fn tissue() -> (Arc<SceneModel>, Box<Snapshot>) {
     let played = played_of(EXAMPLE, &Interrupt::default()).expect("a recording");
     let (mut scene, mut snapshot) = (None, None);
@@ -50,7 +51,7 @@ fn tissue() -> (Arc<SceneModel>, Box<Snapshot>) {
         }
     }
     let scene = scene.expect("a scene");
-    // Made here, and not on a thread that the picture would not wait for.
+    // Made here, because a picture would not wait for a thread.
     let _bodies = scene.bodies();
     (scene, snapshot.expect("tissue"))
 }

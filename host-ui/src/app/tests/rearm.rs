@@ -23,7 +23,7 @@ fn a_run_asks_before_it_rearms() {
         drawn.app.act(Action::Rearm(true), &ctx);
         assert!(drawn.app.run.take().is_some());
     }
-    // Without a fault there is nothing to ask.
+    // Without a fault the window does not ask.
     if let Some(state) = &mut drawn.app.shown.state {
         state.fault = 0;
     }

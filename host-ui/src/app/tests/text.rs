@@ -1,4 +1,4 @@
-//! Finds text that is clipped or lies over other text, from what was painted, whatever the window shows.
+//! Finds text that is clipped or overlaps other text, from the painted shapes of any state.
 
 use super::fixture::Drawn;
 use egui::accesskit::{NodeId, Role};
@@ -6,14 +6,15 @@ use egui::epaint::ClippedShape;
 use egui::{LayerId, Pos2, Rect, Shape, Vec2};
 use std::collections::HashMap;
 
-/// Text may stick out by this much, in points.
+/// Overhang that text may have, in points.
 const SLACK: f32 = 1.0;
-/// Neighbours may share this much, in points.
+/// Overlap that neighbours may have, in points.
 const SHARED: f32 = 1.5;
-/// Turns of the wheel, in points: to the end of what is under the pointer, on with what is around it, and back.
+/// Turns of the wheel, in points: to the end of the area under the pointer, on with its parent, and
+/// back.
 const WHEEL: [f32; 3] = [-400.0, -400.0, 900.0];
 
-/// Text that was painted, or a widget with a name, which may have been clipped away whole.
+/// Painted text, or a named widget, which may be clipped away whole.
 #[derive(Clone, Debug)]
 struct Piece {
     name: String,
@@ -37,13 +38,13 @@ impl Piece {
     }
 }
 
-/// What one frame painted.
+/// Shapes that one frame painted.
 pub struct Painted {
     pieces: Vec<Piece>,
 }
 
 impl Painted {
-    /// Within the frame, once everything is drawn.
+    /// Collects the shapes within the frame, once everything is drawn.
     pub fn of(ctx: &egui::Context) -> Self {
         let mut layers: Vec<LayerId> = ctx.memory(|m| m.layer_ids().collect());
         layers.push(LayerId::background());
@@ -62,7 +63,7 @@ impl Painted {
         Self { pieces }
     }
 
-    /// Names, and which of them are fields for text, are known after the frame.
+    /// Adds names, and which of them are text fields; both are known after the frame.
     pub fn name_widgets(&mut self, ctx: &egui::Context, nodes: &[(NodeId, egui::accesskit::Node)]) {
         let names: HashMap<u64, &egui::accesskit::Node> = nodes.iter().map(|(id, node)| (id.0, node)).collect();
         let mut fields = Vec::new();
@@ -88,24 +89,24 @@ impl Painted {
                 }
             }
         });
-        // A field shows a part of what is typed, which the keys go through.
+        // A text field shows only a part of its text; the keys move through it.
         self.pieces
             .retain(|piece| !piece.is_painted || !fields.iter().any(|field| field.contains(piece.seen().center())));
     }
 
-    /// Where the widget of this name is.
+    /// Returns the place of the widget with this name.
     pub fn place(&self, name: &str) -> Option<Rect> {
         let named = self.pieces.iter().find(|p| !p.is_painted && p.name == name);
         named.map(|piece| piece.rect)
     }
 
-    /// Nothing is elsewhere.
+    /// Returns whether everything is in the same place.
     pub fn is_as(&self, other: &Self) -> bool {
         let pairs = self.pieces.iter().zip(&other.pieces);
         self.pieces.len() == other.pieces.len() && pairs.into_iter().all(|(a, b)| a.rect == b.rect && a.clip == b.clip)
     }
 
-    /// Of the piece along the way of the wheel; the other way it stays where it is.
+    /// Returns the place of the piece along the wheel's direction; across it the piece stays.
     fn place_of(&self, piece: &Piece, sideways: bool) -> Option<f32> {
         let along = |at: Pos2| if sideways { [at.x, at.y] } else { [at.y, at.x] };
         let [_, was_across] = along(piece.rect.min);
@@ -133,7 +134,8 @@ fn texts(shape: &Shape, clip: Rect, layer: LayerId, pieces: &mut Vec<Piece>) {
     }
 }
 
-/// Every text that is cut off where nothing scrolls to it, and every pair in one layer that overlaps.
+/// Returns every text that is cut off and cannot be scrolled into view, and every pair in one layer
+/// that overlaps.
 pub fn misplaced(drawn: &mut Drawn) -> Vec<String> {
     let painted = drawn.frame();
     let mut problems = overlaps(&painted);
@@ -166,7 +168,7 @@ fn overlaps(painted: &Painted) -> Vec<String> {
     problems
 }
 
-/// Those of the pieces that no turn of the wheel moves.
+/// Returns those of the pieces that no turn of the wheel moves.
 fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece>, sideways: bool) -> Vec<&'a Piece> {
     let mut tried: Vec<Pos2> = Vec::new();
     let pieces = left.clone();
@@ -175,19 +177,19 @@ fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece
         let (rect, clip) = (piece.rect, piece.clip);
         let place = match seen.is_positive() {
             true => seen.center(),
-            // Nothing of it is seen: just within the edge that it is beyond.
+            // The piece is wholly hidden: use a point just inside the edge behind which it lies.
             false if rect.top() >= clip.bottom() => Pos2::new(rect.center().x, clip.bottom() - 4.0),
             false => Pos2::new(rect.center().x, clip.top() + 4.0),
         };
         if !left.iter().any(|other| std::ptr::eq(*other, piece)) {
             continue;
         }
-        // Under a window that was opened over it; by itself it is tried in another state, and what lies over it here.
+        // Another window covers it here; this window is tested in a state of its own.
         if drawn.ctx.layer_id_at(place).is_some_and(|layer| layer != piece.layer) {
             left.retain(|other| other.layer != piece.layer || !near_clip(other, piece));
             continue;
         }
-        // Once in each column and stretch of it.
+        // One turn for each column and stretch of it.
         let near = |other: &Pos2| (other.x - place.x).abs() < 150.0 && (other.y - place.y).abs() < 60.0;
         if tried.iter().any(near) {
             continue;
@@ -204,7 +206,7 @@ fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece
             );
             let has_moved = |piece: &Piece| {
                 let (was, is) = (before.place_of(piece, sideways), after.place_of(piece, sideways));
-                // What scrolled out of the picture is not painted any more.
+                // A piece that scrolled out of the picture is no longer painted.
                 was.zip(is).is_none_or(|(was, is)| (was - is).abs() > 1.0)
             };
             left.retain(|other| !has_moved(other));

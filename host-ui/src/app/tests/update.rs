@@ -1,4 +1,4 @@
-//! A plan that is updated on the live picture, made by hand.
+//! States of a plan that is updated on the live picture, made by hand.
 
 use super::fixture::many_needles;
 use crate::app::App;
@@ -10,7 +10,7 @@ use stylet_implant::intraoperative::{Contour, Doses, Marks, Proposed, Reviewed, 
 use stylet_implant::plan::optimise::Figures;
 use stylet_shm_schema::SeedPose;
 
-/// Every measure far beyond its limit.
+/// Returns figures far beyond their limits.
 fn figures() -> Figures {
     Figures {
         v100: 45.6,
@@ -23,7 +23,7 @@ fn figures() -> Figures {
     }
 }
 
-/// Twelve of 24 needles in, five planes contoured, with this tool.
+/// Shows 12 of 24 needles inserted and five planes contoured, with this tool.
 pub fn drawing(app: &mut App, tool: Tool) {
     app.shown = many_needles(24, 12);
     (app.settings.layout, app.middle.view.tool) = (Layout::Probe, Some(tool));
@@ -55,7 +55,7 @@ pub fn drawing(app: &mut App, tool: Tool) {
     review.can_withdraw = true;
 }
 
-/// While the needles that are left are planned anew.
+/// Shows the search for a new plan of the remaining needles.
 pub fn searching(app: &mut App) {
     drawing(app, Tool::Contour);
     app.shown.planning.job = Some(JobProgress {
@@ -64,7 +64,7 @@ pub fn searching(app: &mut App) {
     });
 }
 
-/// An update that waits for a decision.
+/// Shows an update that waits for a decision.
 pub fn deciding(app: &mut App) {
     drawing(app, Tool::Contour);
     let Some(implant) = app.shown.planning.implant.clone() else {

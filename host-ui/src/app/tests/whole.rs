@@ -1,4 +1,4 @@
-//! Every state of the window in all its sizes, with the longest words that there are.
+//! Every state of the window in all its sizes, with the longest possible texts.
 
 use super::class::{line_to_a_core, put_in, trainees, whole_class};
 use super::fixture::{Drawn, LONG_PATH, dose, live, many_needles, one_needle, proposals};
@@ -207,7 +207,7 @@ pub const STATES: &[State] = &[
     }),
 ];
 
-/// In place of a core.
+/// Shows a recording instead of a core.
 fn recorded(app: &mut App, shown: Shown, has_ended: bool) {
     app.shown = shown;
     app.shown.running = true;
@@ -220,7 +220,7 @@ fn recorded(app: &mut App, shown: Shown, has_ended: bool) {
     });
 }
 
-/// With the guide open, after a membrane gave way.
+/// Shows the guide, after a membrane gave way.
 fn guided(app: &mut App, shown: Shown) {
     app.shown = shown;
     app.workflow.guide.open = true;
@@ -240,12 +240,12 @@ fn running(shown: &mut Shown, waits: Option<Waiting>) {
     shown.run_waits = waits;
 }
 
-/// As many needles as may stay in.
+/// Leaves as many needles in the tissue as are allowed.
 fn stay_in(shown: &mut Shown) {
     shown.left = vec![LeftNeedlePose::zeroed(); MAX_LEFT_NEEDLES];
 }
 
-/// A needle in tissue that was not prepared for it.
+/// Returns a needle in tissue that was not prepared for it.
 fn without_line(more: u32) -> Shown {
     let mut shown = one_needle(0.03, 2);
     if let Some(state) = &mut shown.state {
@@ -280,7 +280,8 @@ fn every_banner(shown: &mut Shown) {
     )];
 }
 
-/// "Stop" and every "done" were cut off while many needles ran, at every size; nothing looked for it.
+/// Asserts that nothing is clipped. Guards against "Stop" and "done" buttons that were cut off
+/// while many needles ran.
 fn assert_in_place(pixels: [f32; 2], scales: &[f32]) {
     let mut problems = Vec::new();
     for scale in scales {
@@ -303,7 +304,7 @@ fn assert_in_place(pixels: [f32; 2], scales: &[f32]) {
     );
 }
 
-/// The smallest window.
+/// Tests the smallest window.
 #[test]
 fn no_text_is_cut_off_or_lies_over_another_at_960_x_600() {
     assert_in_place([960.0, 600.0], &[1.0, 1.5]);
@@ -314,25 +315,25 @@ fn no_text_is_cut_off_or_lies_over_another_at_1280_x_720() {
     assert_in_place([1280.0, 720.0], &[1.0, 1.5, 2.0]);
 }
 
-/// Larger scales leave it as few points as 1280 x 720.
+/// Tests one scale; larger ones leave as few points as 1280 x 720.
 #[test]
 fn no_text_is_cut_off_or_lies_over_another_at_1366_x_768() {
     assert_in_place([1366.0, 768.0], &[1.0]);
 }
 
-/// 150 % are as many points as 1280 x 720.
+/// Tests scales whose points include those of 1280 x 720, at 150 %.
 #[test]
 fn no_text_is_cut_off_or_lies_over_another_at_1920_x_1080() {
     assert_in_place([1920.0, 1080.0], &[1.0, 2.0]);
 }
 
-/// 200 % are as many points as 1920 x 1080.
+/// Tests scales whose points include those of 1920 x 1080, at 200 %.
 #[test]
 fn no_text_is_cut_off_or_lies_over_another_at_3840_x_2160() {
     assert_in_place([3840.0, 2160.0], &[1.0, 1.5]);
 }
 
-/// Steps that are opened by hand.
+/// Tests steps that are opened by hand.
 #[test]
 fn no_text_is_cut_off_in_a_step_that_was_opened_by_hand() {
     let mut problems = Vec::new();

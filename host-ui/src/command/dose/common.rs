@@ -1,4 +1,4 @@
-//! What `dose`, `perturb` and `dicom` have in common: source, seeds, times and structures.
+//! Common parts of `dose`, `perturb` and `dicom`: source, seeds, times and structures.
 
 use crate::command::CommandError;
 use clap::Args;
@@ -23,19 +23,22 @@ use stylet_population as population;
 /// Options of all commands that compute dose.
 #[derive(Args, Debug)]
 pub struct Common {
-    /// Source file (TOML) as those in sources/
+    /// Source file (TOML), like those in sources/
     #[arg(long, value_name = "FILE")]
     pub source: PathBuf,
     /// Strength in U of seeds whose file gives none
     #[arg(long, value_name = "U")]
     strength_u: Option<f64>,
-    /// What a column of the table of seeds is: NAME=HEADER with its unit, as in x_mm=-Lateral:cm; may be given again
+    /// Meaning of a column in the table of seeds: NAME=HEADER with its unit, as in
+    /// x_mm=-Lateral:cm; may be given several times
     #[arg(long = "column", value_name = "NAME=HEADER[:UNIT]")]
     columns: Vec<Mapped>,
-    /// The strengths were measured this many days before the implant, and have decayed since
+    /// Days between the measurement of the strengths and the implant, during which the seeds
+    /// decayed
     #[arg(long, value_name = "DAYS", default_value_t = 0.0)]
     measured_days_before: f64,
-    /// Day of the implant (2026-10-31), to which strengths with a reference date decay, as those of an RT Plan have it
+    /// Day of the implant (2026-10-31), to which strengths with a reference date decay, such as
+    /// those of an RT Plan
     #[arg(long, value_name = "DATE", conflicts_with = "measured_days_before")]
     pub implant_date: Option<Date>,
     /// Count dose from this day after the implant
@@ -47,13 +50,15 @@ pub struct Common {
     /// Prescribed dose in Gy [default: that of the plan, or else of the source file]
     #[arg(long, value_name = "GY")]
     prescription_gy: Option<f64>,
-    /// What a label is called: 1=Prostate; may be given again
+    /// Name of a label: 1=Prostate; may be given several times
     #[arg(long = "name", value_name = "LABEL=NAME")]
     names: Vec<String>,
-    /// Structure that the prescription is for [default: the one named PTV, CTV, prostate, gland, ..., or the lowest label]
+    /// Structure of the prescription [default: the one named PTV, CTV, prostate, gland, ..., or the
+    /// lowest label]
     #[arg(long, value_name = "NAME")]
     pub target: Option<String>,
-    /// One more metric of every structure: D90, D2cc, V150, V145Gy, Dmean, Dmax, Dmin; may be given again
+    /// Additional metric of every structure: D90, D2cc, V150, V145Gy, Dmean, Dmax, Dmin; may be
+    /// given several times
     #[arg(long = "metric", value_name = "METRIC")]
     metrics: Vec<String>,
     /// Folder for the results
@@ -61,25 +66,26 @@ pub struct Common {
     pub out: PathBuf,
 }
 
-/// What dose is computed from.
+/// Input of a dose computation.
 pub struct Loaded {
-    /// The model of seed.
+    /// Model of the seeds.
     pub source: Source,
-    /// Dose of a seed of 1 U over the time asked for.
+    /// Dose of a seed of 1 U over the requested time.
     pub kernel: DoseKernel,
-    /// The seeds, with their strength at the implant.
+    /// Seeds, with their strength at the implant.
     pub seeds: Vec<Seed>,
-    /// The seeds with needle, hole and the strength of the file.
+    /// Seeds with needle, hole and the strength of the file.
     pub rows: Vec<SeedRow>,
-    /// What a plan says of its seeds.
+    /// Declarations of a plan about its seeds.
     pub declared: Option<Declared>,
-    /// Patient, study and frame of reference, where the file of the seeds names them.
+    /// Patient, study and frame of reference, if the file of the seeds names them.
     pub identity: Option<Identity>,
     prescription_gy: Option<f64>,
 }
 
 impl Common {
-    /// Source, dose of a seed of 1 U over the time asked for, and seeds with their strength at the implant.
+    /// Loads source, dose of a seed of 1 U over the requested time, and seeds with their strength
+    /// at the implant.
     pub fn load(&self, path: &Path) -> Result<Loaded, CommandError> {
         within("--measured-days-before", self.measured_days_before, 0.0, 1e6)?;
         within("--from-days", self.from_days, 0.0, 1e6)?;
@@ -165,7 +171,7 @@ impl Common {
         self.judge_of(structures, loaded, &[], most_points)
     }
 
-    /// Structures, ready to be judged with the metrics that were asked for and `more`.
+    /// Prepares structures for evaluation with the requested metrics and `more`.
     pub fn judge_of(
         &self,
         structures: Vec<Structure>,
@@ -194,12 +200,12 @@ impl Common {
         Ok(metrics.collect::<Result<Vec<_>, _>>()?)
     }
 
-    /// Whether dose is that of the whole life of the seeds.
+    /// Returns whether the dose covers the whole life of the seeds.
     pub fn is_for_ever(&self) -> bool {
         self.from_days == 0.0 && self.to_days.is_none()
     }
 
-    /// Day to which the strengths refer, in words.
+    /// Returns the reference day of the strengths, in words.
     pub fn calibrated(&self, loaded: &Loaded) -> String {
         let mut days: Vec<Date> = loaded.rows.iter().filter_map(|row| row.strength_on).collect();
         days.sort_unstable();
@@ -222,7 +228,7 @@ impl Common {
         }
     }
 
-    /// The structures of a file and which of them is the target; seeds outside of it are reported.
+    /// Returns the structures of a file and the index of the target; reports seeds outside of it.
     pub fn structures(
         &self,
         file: &Path,
@@ -230,7 +236,7 @@ impl Common {
         most_points: usize,
     ) -> Result<(Vec<Structure>, usize), CommandError> {
         let given = self.label_names()?;
-        // A long file is not read for a wrong option.
+        // Check the options before reading a long file.
         self.extra_metrics()?;
         let structures = match contours::structures(file, most_points)? {
             Some((_, _)) if !given.is_empty() => {
@@ -265,7 +271,7 @@ impl Common {
         if let Some(warning) = &voxels.frame.warning {
             seeds::report(file, std::slice::from_ref(warning));
         }
-        // The names in the file count where none are given.
+        // Names in the file count if none are given.
         let mut names = voxels.names.clone();
         names.extend(given);
         Ok(labels::structures(&voxels, &names, most_points))
@@ -302,7 +308,7 @@ impl Common {
     }
 }
 
-/// How the seeds of a study of rt-core missed their places, in the patient's frame; it is printed as well.
+/// Returns and prints the placement errors of a study of rt-core, in the patient's frame.
 pub fn errors_of(folder: &Path) -> Result<Errors, CommandError> {
     let read = population::load(folder)?;
     let errors = population::misplacement(&read.table)

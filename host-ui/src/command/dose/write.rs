@@ -1,4 +1,4 @@
-//! Results as CSV, JSON and tables; the unit of each column stands in its header.
+//! Results as CSV, JSON and tables; the header of each column gives its unit.
 
 use crate::command::CommandError;
 use serde_json::{Value, json};
@@ -41,7 +41,8 @@ pub fn doses(path: &Path, points_m: impl Iterator<Item = [f64; 3]>, dose_gy: &[f
     csv(path, &owned(&["x_mm", "y_mm", "z_mm", "dose_gy"]), rows)
 }
 
-/// Seeds of a CT, in the columns that `host-ui dose --seeds` reads; the last three say how sure each is.
+/// Writes the seeds of a CT in the columns that `host-ui dose --seeds` reads; the last three give
+/// the certainty of each.
 pub fn found_seeds(path: &Path, seeds: &[FoundSeed]) -> Result<(), CommandError> {
     let header = [PLACE.as_slice(), &AXIS, &FOUND].concat();
     let rows = seeds.iter().map(|s| {
@@ -57,7 +58,8 @@ pub fn found_seeds(path: &Path, seeds: &[FoundSeed]) -> Result<(), CommandError>
     csv(path, &owned(&header), rows)
 }
 
-/// Differential and cumulative, up to the highest dose but not beyond ten times the prescription.
+/// Writes differential and cumulative histograms, up to the highest dose but not beyond ten times
+/// the prescription.
 pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64, bin_gy: f64) -> Result<(), CommandError> {
     let header = owned(&[
         "structure",
@@ -89,7 +91,7 @@ pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64, bin_gy: f
     csv(path, &header, rows)
 }
 
-/// Figures of several states, one line each; a field says why there is no figure.
+/// Writes the figures of several states, one line each; a field without a figure gives the reason.
 pub fn figures(path: &Path, columns: &[&str], rows: &[Row]) -> Result<(), CommandError> {
     let header = [owned(&["group", "figure", "unit"]), owned(columns)].concat();
     let rows = rows.iter().map(|row| {
@@ -100,7 +102,7 @@ pub fn figures(path: &Path, columns: &[&str], rows: &[Row]) -> Result<(), Comman
     csv(path, &header, rows)
 }
 
-/// The same for people.
+/// Returns the figures as a table for the terminal.
 pub fn figure_table(columns: &[&str], rows: &[Row]) -> String {
     let mut text = format!("{:44}", "");
     columns.iter().for_each(|name| text += &format!(" {name:>16}"));
@@ -116,7 +118,7 @@ pub fn figure_table(columns: &[&str], rows: &[Row]) -> String {
     text + "\n"
 }
 
-/// An empty field is a measure that is not defined in that trial.
+/// Writes the trials; an empty field is a measure that is undefined in that trial.
 pub fn trials(
     path: &Path,
     measures: &[(String, Option<f64>)],
@@ -193,7 +195,7 @@ pub fn spread_table(spreads: &[Spread]) -> String {
     text
 }
 
-/// Share of the trials that meet each criterion, with its 95 % interval.
+/// Writes the share of the trials that meet each criterion, with its 95 % interval.
 pub fn criteria(path: &Path, kept: &[Kept]) -> Result<(), CommandError> {
     let header = owned(&["criterion", "met", "trials", "percent", "percent_low", "percent_high"]);
     let rows = kept.iter().map(|k| {

@@ -1,4 +1,4 @@
-//! Which banner stands over the pictures, and what it says.
+//! The banners over the pictures, and their texts.
 
 use super::*;
 use crate::panel::workflow::scene::solved_in;
@@ -21,7 +21,7 @@ fn no_banner_without_a_problem_and_absence_shows_what_to_type() {
     assert!(list[0].text.contains("rt-core --instance lab"), "{}", list[0].text);
 }
 
-/// A core that had ended was absent without a reason, and the seeds that it had placed without a word.
+/// Guards against a core that ended without a reason, and placed seeds without a message.
 #[test]
 fn a_core_that_ended_says_why_and_what_is_kept() {
     let mut shown = live();
@@ -120,7 +120,7 @@ fn folded_tissue_has_a_banner_while_it_is_folded_that_says_from_where_on() {
     if let Some(state) = &mut shown.state {
         state.folded_from_m = 7.93e-3;
     }
-    // Where it was: a membrane that gave way has eased it.
+    // At the place of a membrane that gave way.
     assert!(banners(&shown).is_empty());
     if let Some(state) = &mut shown.state {
         state.flags |= stylet_shm_schema::flags::FOLDED;
@@ -130,7 +130,7 @@ fn folded_tissue_has_a_banner_while_it_is_folded_that_says_from_where_on() {
     assert!(list[0].text.contains("folded from 7.9 mm"), "{}", list[0].text);
 }
 
-/// A row of docs/stability.md that says no says what warns of it: it is looked for in what the window shows then.
+/// Checks that each row of docs/stability.md that says no names a warning which the window shows.
 #[test]
 fn what_the_page_of_stability_says_no_to_is_warned_of_while_it_is_so() {
     let page = include_str!("../../../../docs/stability.md");
@@ -151,7 +151,7 @@ fn what_the_page_of_stability_says_no_to_is_warned_of_while_it_is_so() {
         let mut shown = live();
         let state = shown.state.as_mut().expect("live");
         let wanted = match number {
-            // Cells beside the tip fold.
+            // Cells near the tip fold.
             3 | 5 | 14 => {
                 (state.flags, state.folded_from_m) = (state.flags | flags::FOLDED, 4e-3);
                 "Tissue folded: "
@@ -166,7 +166,7 @@ fn what_the_page_of_stability_says_no_to_is_warned_of_while_it_is_so() {
                 state.flags |= flags::LINE_NEEDED | flags::IN_CONTACT;
                 "No line: "
             }
-            // Of the scene, as long as it is there, and not a banner.
+            // This one belongs to the scene, as long as it is loaded, and is not a banner.
             35 => {
                 let mut scene = stylet_shm_schema::SceneHeader::zeroed();
                 (scene.spacing_m, scene.body_edge) = (1.364e-3, 1);
@@ -243,7 +243,7 @@ fn a_second_device_that_is_lost_or_stands_still_has_a_banner_of_its_own() {
         "{list:?}"
     );
     assert_eq!(list[0].remedy.as_ref().map(|r| r.0), Some("Re-arm both"));
-    // The needle's own device has nothing wrong.
+    // The needle's own device is healthy.
     second.fault = 0;
     shown.second = Some(second);
     if let Some(state) = &mut shown.state {
@@ -254,12 +254,13 @@ fn a_second_device_that_is_lost_or_stands_still_has_a_banner_of_its_own() {
         list.len() == 1 && list[0].text.contains("stands still") && list[0].remedy.is_none(),
         "{list:?}"
     );
-    // A run without one says nothing of it.
+    // A run without a second device has no such banner.
     shown.session = None;
     assert!(banners(&shown).is_empty());
 }
 
-/// Which picture it is stays legible under banners; in a picture that they all but cover words stay where they were, for there is no room.
+/// Checks that the title of a picture stays legible under banners. If they all but cover the
+/// picture, titles stay in place.
 #[test]
 fn words_of_a_picture_stand_below_banners() {
     use crate::view::free::free_of_banners;

@@ -10,7 +10,7 @@ fn live() -> Shown {
     shown
 }
 
-/// Of an operator who has the needle, another who asks for it, and an instructor.
+/// Creates a class of an operator who holds the needle, another who asks for it, and an instructor.
 fn class() -> Class {
     let mut class = Class {
         count: 3,
@@ -42,7 +42,7 @@ fn sits(name: &str, role: &str, operates: u32) -> Shown {
     shown
 }
 
-/// The buttons of the list.
+/// Returns the buttons of the list.
 fn buttons(shown: &Shown) -> Vec<String> {
     let harness = egui_kittest::Harness::new_ui(|ui| {
         list_ui(ui, shown);

@@ -10,7 +10,7 @@ use stylet_base::format;
 use stylet_host::link::Answer;
 use stylet_shm_schema::{PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterSpec};
 
-/// What stands under a row.
+/// Note under a row.
 #[derive(Clone, Debug, Default, PartialEq)]
 enum RowNote {
     #[default]
@@ -19,15 +19,15 @@ enum RowNote {
     Refused(&'static str),
 }
 
-/// One change at a time is on its way; what is edited meanwhile waits and goes with the next.
+/// State of the dialog. One change at a time is under way; edits made meanwhile go with the next.
 pub struct ParametersState {
     pub open: bool,
     search: String,
     preset_path: String,
-    /// Edited and not yet in force, SI.
+    /// Edited values that are not yet in force, SI.
     drafts: [Option<f64>; PARAMETER_COUNT],
     in_flight: Option<(u64, Vec<(usize, f64)>)>,
-    /// Edited since the last request went out.
+    /// True if values were edited since the last request.
     unsent: bool,
     notes: [RowNote; PARAMETER_COUNT],
     foot: Option<(bool, String)>,
@@ -49,7 +49,7 @@ impl Default for ParametersState {
 }
 
 impl ParametersState {
-    /// Pairs for `SetParameters`, when there is something to send and nothing is on its way.
+    /// Returns pairs for `SetParameters`, if there are edits and no request is under way.
     pub fn request(&self) -> Option<Vec<(usize, f64)>> {
         if !self.unsent || self.in_flight.is_some() {
             return None;
@@ -78,14 +78,15 @@ impl ParametersState {
         self.in_flight.as_ref().map(|(id, _)| *id)
     }
 
-    /// A refusal names the parameters that are involved; the reasons in full stand at the foot.
+    /// Takes an answer. A refusal marks the parameters involved; the full reasons stand at the
+    /// foot.
     pub fn answered(&mut self, answer: &Answer) {
         if let Some((_, pairs)) = self.in_flight.take() {
             self.note(pairs, answer);
         }
     }
 
-    /// Not sent, since the core would refuse it.
+    /// Takes changes that were not sent because the core would refuse them.
     pub fn refused(&mut self, pairs: Vec<(usize, f64)>, answer: &Answer) {
         self.unsent = false;
         self.note(pairs, answer);
@@ -113,14 +114,14 @@ impl ParametersState {
         });
     }
 
-    /// The core went away: what was on its way is lost.
+    /// Forgets the request under way, because the core is gone.
     pub fn forget(&mut self) {
         self.in_flight = None;
         self.drafts = [None; PARAMETER_COUNT];
         self.unsent = false;
     }
 
-    /// Writes what is in force to the file that is named.
+    /// Writes the values in force to the named file.
     fn save_preset(&mut self, shown: &Shown) {
         let set = shown.parameters.map(|p| p.set).unwrap_or_default();
         self.foot = Some(match preset::save(Path::new(self.preset_path.trim()), &set) {
@@ -129,7 +130,7 @@ impl ParametersState {
         });
     }
 
-    /// Takes every value of a file, or none and shows everything that is wrong with it.
+    /// Takes every value of a file, or none and shows every error.
     fn load_preset(&mut self) {
         match preset::load(Path::new(self.preset_path.trim())) {
             Ok(values) => values.into_iter().for_each(|(index, value)| self.edit(index, value)),
@@ -201,7 +202,7 @@ fn search_ui(ui: &mut egui::Ui, state: &mut ParametersState) {
     });
 }
 
-/// Places in the table whose words hold every word that is searched for.
+/// Returns the places in the table whose text contains every word of the search.
 fn found(search: &str) -> Vec<usize> {
     let wanted = search.to_lowercase();
     let has = |spec: &ParameterSpec| {
@@ -237,7 +238,7 @@ fn group_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, (grou
     ui.add_space(4.0);
 }
 
-/// Text in a column of the same width in every group, so that the groups line up.
+/// Draws text in a column of the same width in every group, so that the groups align.
 fn column(ui: &mut egui::Ui, width: f32, text: RichText) -> egui::Response {
     ui.horizontal(|ui| {
         ui.set_min_width(width);
@@ -351,7 +352,7 @@ fn foot_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState) {
     }
 }
 
-/// As few digits as needed.
+/// Formats a value with as few digits as needed.
 fn plain(value: f64) -> String {
     let text = format!("{value:.4}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

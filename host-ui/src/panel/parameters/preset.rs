@@ -1,4 +1,4 @@
-//! Parameters as a file (TOML) in the units that a person reads.
+//! Parameters as a file (TOML), in display units.
 
 use std::fmt::Write;
 use std::io;
@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use stylet_base::{WriteError, write_whole};
 use stylet_shm_schema::{PARAMETERS, ParameterSet};
 
-/// A larger file is no preset.
+/// Largest size of a preset.
 const MAX_BYTES: u64 = 64 << 10;
 
-/// A preset that could not be saved or loaded.
+/// Error of a preset that could not be saved or loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum PresetError {
     /// The file could not be written.
@@ -23,7 +23,7 @@ pub enum PresetError {
         /// What the system reported.
         source: io::Error,
     },
-    /// A folder or a device, which might never end.
+    /// A folder or a device, which may be endless.
     #[error("{}: it is not a regular file", .0.display())]
     NotAFile(PathBuf),
     /// Far larger than any preset.
@@ -34,7 +34,7 @@ pub enum PresetError {
         /// Its size.
         bytes: u64,
     },
-    /// What is wrong with its content, one problem a line.
+    /// Its content is invalid, with one problem a line.
     #[error("{}: {problems}", .path.display())]
     Invalid {
         /// The file.
@@ -49,7 +49,7 @@ pub fn save(path: &Path, set: &ParameterSet) -> Result<(), PresetError> {
     Ok(write_whole(path, text(set).as_bytes())?)
 }
 
-/// Place in the table and SI value of each parameter in the file.
+/// Returns place in the table and SI value of each parameter in the file.
 pub fn load(path: &Path) -> Result<Vec<(usize, f64)>, PresetError> {
     let path_buf = || path.to_owned();
     let unread = |source| PresetError::Read {
@@ -78,7 +78,7 @@ fn text(set: &ParameterSet) -> String {
     let mut text = "# Parameters of Stylet, in the units behind the values.\n".to_owned();
     for spec in &PARAMETERS {
         let value = set.get(spec.id) * spec.display_per_si;
-        // Twelve digits: what a change of units leaves behind them is rounding.
+        // Twelve digits: a conversion of units leaves only rounding behind them.
         let rounded: f64 = format!("{value:.11e}").parse().unwrap_or(value);
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{} = {rounded:?} # {}", spec.key, spec.unit);
@@ -86,7 +86,7 @@ fn text(set: &ParameterSet) -> String {
     text
 }
 
-/// Every problem, one a line.
+/// Reads a preset; returns every problem, one a line.
 fn read(text: &str) -> Result<Vec<(usize, f64)>, String> {
     let table: toml::Table = text.parse().map_err(|e| format!("it is not TOML: {e}"))?;
     let (mut values, mut problems) = (Vec::new(), Vec::new());

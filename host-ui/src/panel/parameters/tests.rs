@@ -58,7 +58,7 @@ fn a_refusal_stands_at_its_row_and_the_draft_is_cleared() {
     assert_eq!(state.drafts[6], None);
 }
 
-/// The reason was searched for by the key, and `force.cutting` is a part of `force.cutting_gain`.
+/// Guards against a search for reasons by key: `force.cutting` is a part of `force.cutting_gain`.
 #[test]
 fn a_refusal_of_the_cutting_gain_is_not_one_of_the_cutting_force() {
     let mut state = ParametersState::default();

@@ -1,4 +1,4 @@
-//! The debrief: the error of each seed, the dose against its limits, the histogram of the target.
+//! The debrief: the error of each seed, the dose with its limits, the histogram of the target.
 
 use crate::action::Action;
 use crate::dose_worker::{DoseOf, DoseResult, Figure, Limit};
@@ -10,7 +10,7 @@ use egui::RichText;
 use egui_plot::{Line, PlotPoints, VLine};
 use stylet_base::format;
 
-/// Rows of the table of seeds at once; the rest is scrolled to.
+/// Height of the visible rows of the seed table; the others scroll.
 const TABLE_HEIGHT: f32 = 150.0;
 
 pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
@@ -26,7 +26,7 @@ pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     }
 }
 
-/// One line for each update of the plan: how near its contour was to the true gland.
+/// Draws one line for each update of the plan: the distance of its contour from the true gland.
 fn updates_ui(ui: &mut egui::Ui, shown: &Shown) {
     for update in &shown.planning.review.reviewed {
         let what = if update.accepted { "updated" } else { "kept" };
@@ -39,7 +39,7 @@ fn updates_ui(ui: &mut egui::Ui, shown: &Shown) {
     }
 }
 
-/// Figures and histogram, so high, of the seeds that lie in the tissue or are planned.
+/// Draws figures and histogram of the placed or planned seeds, in this height.
 pub fn dose_ui(ui: &mut egui::Ui, shown: &Shown, height: f32, otherwise: &str) {
     let Some(dose) = &shown.dose else {
         ui.label(theme::small(shown.dose_trouble.unwrap_or(otherwise)));
@@ -80,7 +80,7 @@ fn figure_ui(ui: &mut egui::Ui, figure: &Figure) {
         ui.label("");
         return ui.end_row();
     };
-    // The word repeats what the colour shows.
+    // The word repeats the meaning of the colour.
     let (word, color) = match (limit.is_met(figure.value), limit) {
         (true, _) => ("met".to_owned(), tokens.good),
         (false, Limit::AtLeast(value)) => (format!("below {value:.0}"), tokens.bad),
@@ -113,7 +113,7 @@ fn dvh_ui(ui: &mut egui::Ui, dose: &DoseResult, height: f32) {
         });
 }
 
-/// What the figures are of, while an exercise has moved the body.
+/// Explains to which body the figures apply, while an exercise has moved it.
 fn moved_words(dose: &DoseResult, body_moved_m: [f64; 3]) -> Option<String> {
     let moved_mm = body_moved_m.iter().map(|c| c * c).sum::<f64>().sqrt() * 1e3;
     let words = match dose.of {
@@ -123,7 +123,7 @@ fn moved_words(dose: &DoseResult, body_moved_m: [f64; 3]) -> Option<String> {
     (moved_mm > 0.05).then(|| format!("The gland has moved by {moved_mm:.1} mm, {words}."))
 }
 
-/// Nothing until the first seed is placed.
+/// Draws the seeds; nothing until the first one is placed.
 pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     if shown.seeds.is_empty() || rows.is_empty() {
         return;
@@ -161,7 +161,7 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
         });
 }
 
-/// Nothing while no seed of the list is placed.
+/// Formats mean and largest error; `None` while no seed of the list is placed.
 fn mean_and_worst(errors_m: &[f64]) -> Option<String> {
     let worst = errors_m.iter().copied().reduce(f64::max)?;
     let mean = errors_m.iter().sum::<f64>() / errors_m.len() as f64;
@@ -172,7 +172,7 @@ fn total_m(row: &SeedError) -> f64 {
     row.along_m.hypot(row.across_m)
 }
 
-/// With the number of its needle where there are many.
+/// Draws one seed, with the number of its needle if there are many.
 fn seed_row_ui(ui: &mut egui::Ui, needle: Option<usize>, row: &SeedError) {
     let number = row.planned + 1;
     ui.label(needle.map_or_else(|| number.to_string(), |n| format!("{}.{number}", n + 1)));

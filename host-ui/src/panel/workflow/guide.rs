@@ -1,6 +1,7 @@
-//! A guide through the first insertion: what to do, what to watch, and why the seeds missed.
+//! A guide through the first insertion: instructions, observations, and the reasons why seeds
+//! missed.
 //!
-//! What comes next is what the state machine of the procedure says; only the words are here.
+//! The state machine of the procedure decides the next step; this module holds only the texts.
 
 mod felt;
 mod lesson;
@@ -11,16 +12,17 @@ use egui::Stroke;
 pub use felt::Felt;
 pub use lesson::lesson;
 
-/// Whether the guide is open, and what the needle met so far.
+/// State of the guide: open or not, and the membranes that the needle has met.
 #[derive(Default)]
 pub struct Guide {
-    /// Shown above the steps.
+    /// True while it is shown above the steps.
     pub open: bool,
-    /// The membranes of the last insertion.
+    /// Membranes of the last insertion.
     pub felt: Felt,
 }
 
-/// Above the steps, in the panel that scrolls: it covers nothing and can be left at any time.
+/// Draws the guide above the steps, in the panel that scrolls: it covers nothing and can be closed
+/// at any time.
 pub fn guide_ui(ui: &mut egui::Ui, shown: &Shown, guide: &mut Guide) {
     if !guide.open {
         return;
@@ -45,7 +47,7 @@ pub fn guide_ui(ui: &mut egui::Ui, shown: &Shown, guide: &mut Guide) {
 }
 
 impl Guide {
-    /// Opens and closes it.
+    /// Draws the button that opens and closes it.
     pub fn toggle_ui(&mut self, ui: &mut egui::Ui) {
         let hint = "Through the first insertion: what to do, what to watch, and why the seeds missed";
         ui.toggle_value(&mut self.open, "Guide").on_hover_text(hint);

@@ -1,8 +1,8 @@
-//! Work on a thread of its own: what it is, how far it is where that is known, and its end at a click.
+//! Work on a thread of its own: its name, its progress if known, and a button to cancel it.
 
 use crate::theme;
 
-/// Whether it is to be cancelled.
+/// Draws a job; returns whether it was cancelled.
 pub fn job_ui(ui: &mut egui::Ui, what: &str, share: Option<f32>) -> bool {
     let cancel = |ui: &mut egui::Ui| ui.button("Cancel").clicked();
     let Some(share) = share else {

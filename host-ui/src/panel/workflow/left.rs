@@ -1,4 +1,4 @@
-//! Needles that stay in: leaving the one at work, taking one up again, drawing one out.
+//! Needles that stay in: leaving the present one, resuming one, withdrawing one.
 
 use crate::action::Action;
 use crate::shown::Shown;
@@ -7,7 +7,7 @@ use egui::Button;
 use stylet_procedure::Pace;
 use stylet_shm_schema::{HandMove, LeftNeedlePose, MAX_LEFT_NEEDLES, Request, flags};
 
-/// The button beside the other buttons of a needle that is in.
+/// Draws the button that leaves the present needle in, next to its other buttons.
 pub(super) fn leave_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     let is_in = shown.has_flag(flags::IN_CONTACT) && shown.has_flag(flags::LINE_READY);
     let may = shown.is_live() && !shown.running && is_in && shown.left.len() < MAX_LEFT_NEEDLES;
@@ -19,7 +19,7 @@ pub(super) fn leave_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Actio
     }
 }
 
-/// A row for each needle that stays in.
+/// Draws a row for each needle that stays in.
 pub(super) fn left_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     let may = shown.is_live() && !shown.running;
     if !shown.left.is_empty() {
@@ -60,12 +60,12 @@ pub(super) fn left_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action
     }
 }
 
-/// As requests name it.
+/// Returns the number of a needle for requests.
 fn of(left: &LeftNeedlePose) -> Option<u32> {
     u32::try_from(left.number).ok()
 }
 
-/// The hand is at its tip, as near as the core asks for.
+/// Returns whether the hand is at its tip, within the core's tolerance.
 fn is_at(shown: &Shown, left: &LeftNeedlePose) -> bool {
     const WITHIN_M: f64 = 2e-3;
     shown.tip_m().is_some_and(|tip| {
@@ -74,7 +74,7 @@ fn is_at(shown: &Shown, left: &LeftNeedlePose) -> bool {
     })
 }
 
-/// The hand is not on its way.
+/// Returns whether the hand is at rest next to it, not on its way.
 fn is_beside(shown: &Shown, left: &LeftNeedlePose) -> bool {
     const WITHIN_M: f64 = 0.8e-3;
     let Some(tip_m) = shown.tip_m() else { return true };

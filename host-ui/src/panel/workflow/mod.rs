@@ -1,4 +1,5 @@
-//! The left panel: the steps of the procedure, one of them open, with its main action and what is missing.
+//! The left panel: the steps of the procedure, one of them open, with its main action and its
+//! preconditions.
 
 mod debrief;
 mod guide;
@@ -24,22 +25,22 @@ pub use run::{SCRIPTED_STEPS, run_ui};
 use stylet_base::format;
 use stylet_shm_schema::Request;
 
-/// What the panel keeps between frames: what a person is typing, and which step was opened by hand.
+/// State that the panel keeps between frames: text being typed, and the step opened by hand.
 #[derive(Default)]
 pub struct WorkflowState {
     pub scene_path: String,
     pub plan: PlanState,
-    /// Files that were opened last, as the settings have them, and which of them are missing.
+    /// Recent files from the settings, and which of them are missing.
     pub recent: Vec<Recent>,
     missing: Missing,
-    /// Through the first insertion.
+    /// Guide through the first insertion.
     pub guide: Guide,
     opened: Option<Progress>,
     was: Option<Progress>,
 }
 
 impl WorkflowState {
-    /// Offers the file that was loaded last.
+    /// Creates a state that offers the file loaded last.
     pub fn with_file(path: &str) -> Self {
         Self {
             scene_path: path.to_owned(),
@@ -47,7 +48,7 @@ impl WorkflowState {
         }
     }
 
-    /// In the last frame.
+    /// Returns whether the step was open in the last frame.
     pub fn is_open(&self, step: Progress) -> bool {
         self.opened.or(self.was) == Some(step)
     }
@@ -57,7 +58,8 @@ impl WorkflowState {
         self.opened = Some(step);
     }
 
-    /// The step that is open: the present one, until another is opened by hand and the procedure goes on.
+    /// Returns the open step: the present one, unless another was opened by hand since the
+    /// procedure advanced.
     fn open(&mut self, now: Progress) -> Progress {
         if self.was != Some(now) {
             (self.was, self.opened) = (Some(now), None);
@@ -81,7 +83,7 @@ pub fn workflow_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState) 
     actions
 }
 
-/// Lines of the last answer, and what its buttons take.
+/// Lines of the last answer, and of its buttons.
 const NOTE_LINES: [usize; 2] = [1, 3];
 const SHORT: f32 = 420.0;
 
@@ -89,13 +91,13 @@ fn note_lines(ui: &egui::Ui) -> usize {
     NOTE_LINES[usize::from(ui.ctx().content_rect().height() >= SHORT)]
 }
 
-/// Room of [`foot_ui`], whatever it shows.
+/// Returns the height of [`foot_ui`], independent of its content.
 pub fn foot_height(ui: &egui::Ui) -> f32 {
     let line = ui.text_style_height(&TextStyle::Small) + 1.0;
     ui.spacing().interact_size.y + 2.0 * theme::GAP + note_lines(ui) as f32 * line
 }
 
-/// The force, and the last answer that the operator should read, under the steps.
+/// Draws the force, and the last answer for the operator, under the steps.
 pub fn foot_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     ui.add_space(theme::GAP);
     force_ui(ui, shown, actions);
@@ -105,7 +107,7 @@ pub fn foot_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     let font = TextStyle::Small.resolve(ui.style());
     let mut job = LayoutJob::simple(note.text.clone(), font, color, ui.available_width());
     (job.wrap.max_rows, job.wrap.break_anywhere) = (note_lines(ui), false);
-    // Cut off with three dots it shows the whole on hover.
+    // A label cut off with three dots shows the whole text on hover.
     ui.add(egui::Label::new(job).wrap());
 }
 
@@ -116,7 +118,8 @@ fn hinted(response: egui::Response, blocked: Option<String>) -> egui::Response {
     }
 }
 
-/// One line: the step's number in a dot that shows its progress, its name, and the progress in a word.
+/// Draws one line: the step's number in a dot that shows its progress, its name, and the progress
+/// in a word.
 fn head_ui(ui: &mut egui::Ui, (step, now): (Progress, Progress), shown: &Shown) -> egui::Response {
     let tokens = theme::of(ui);
     let size = Vec2::new(ui.available_width(), 24.0);
@@ -159,7 +162,7 @@ fn head_ui(ui: &mut egui::Ui, (step, now): (Progress, Progress), shown: &Shown) 
     response
 }
 
-/// The step that is open.
+/// Draws the open step.
 fn step_ui(
     ui: &mut egui::Ui,
     (step, now): (Progress, Progress),
@@ -176,7 +179,7 @@ fn step_ui(
         let blocked = missing(shown, step);
         match &blocked {
             Some(why) => drop(ui.label(RichText::new(format!("Missing: {why}.")).color(tokens.warn))),
-            // Details stand below.
+            // Details follow below.
             None if step == Progress::Plan && shown.planning.implant.is_some() => {}
             None if step == Progress::Debrief => {}
             None => drop(ui.label(theme::weak(what(step, shown)))),
@@ -191,7 +194,7 @@ fn step_ui(
             Progress::Retract => retract_ui(ui, shown, actions),
             Progress::Debrief => debrief::debrief_ui(ui, shown, actions),
         }
-        // Steps with a needle in have the rows beside its buttons.
+        // Steps with a needle in have these rows next to its buttons.
         if matches!(step, Progress::Plan | Progress::Place | Progress::Debrief) {
             left::left_ui(ui, shown, actions);
         }
@@ -216,7 +219,7 @@ fn what(step: Progress, shown: &Shown) -> String {
     }
 }
 
-/// The button of the main action of a step.
+/// Draws the button of a step's main action.
 fn main_button(ui: &mut egui::Ui, (name, action): (&str, Action), ready: bool, actions: &mut Vec<Action>) {
     if ui
         .add_enabled(ready, Button::new(name))
@@ -249,7 +252,7 @@ fn insert_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Ac
             .suffix(" mm")
             .fixed_decimals(1);
         let response = ui.add_enabled(ready, slider).labelled_by(label.id);
-        // The slider rounds what it is given and calls that a change; only a hand on it may move the needle.
+        // The slider rounds its value and reports a change; only the user may move the needle.
         let by_hand = response.dragged() || response.has_focus();
         if by_hand && (goal_mm - at_mm).abs() > 0.06 {
             actions.push(Action::MoveTo(format::metres(goal_mm)));
@@ -279,7 +282,7 @@ fn drop_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Acti
     debrief::seeds_ui(ui, shown, &own_rows(shown));
 }
 
-/// Of the needle at work.
+/// Returns the seeds of the present needle.
 fn own_rows(shown: &Shown) -> Vec<(usize, SeedError)> {
     let needle = shown.planning.at_work().map_or(0, |(number, _)| number);
     own_errors(shown).into_iter().map(|row| (needle, row)).collect()

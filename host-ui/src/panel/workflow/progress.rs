@@ -1,4 +1,4 @@
-//! How far the operator is, what each step lacks, and the one thing to do next.
+//! Progress of the operator, missing preconditions of each step, and the next action.
 
 use crate::action::{Action, PlanAction};
 use crate::shown::Shown;
@@ -6,7 +6,7 @@ use stylet_base::format;
 use stylet_procedure::tolerance::PLACED_WITHIN_M;
 use stylet_procedure::{AtHand, Operation, Step};
 
-/// A step of the procedure.
+/// Step of the procedure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Progress {
     Scene,
@@ -46,7 +46,8 @@ impl Progress {
     }
 }
 
-/// From the state of the core alone, so that it survives a restart of this program.
+/// Returns the present step from the core's state alone, so that it survives a restart of this
+/// program.
 pub fn progress(shown: &Shown) -> Progress {
     if shown.scene.is_none() {
         return Progress::Scene;
@@ -54,7 +55,7 @@ pub fn progress(shown: &Shown) -> Progress {
     if shown.planning.waits() {
         return Progress::Plan;
     }
-    // The last needle of a plan is done as well where it has lost a seed.
+    // The last needle of a plan is done even if it has lost a seed.
     if shown.planning.progress.is_done_with(shown.seeds.len()) && shown.planning.next_needle().is_none() {
         return Progress::Debrief;
     }
@@ -69,10 +70,10 @@ pub fn progress(shown: &Shown) -> Progress {
     }
 }
 
-/// The needle at work; `None` without a plan or a tip.
+/// Returns the present needle; `None` without a plan or a tip.
 pub fn needle_at_hand(shown: &Shown) -> Option<AtHand> {
     let (depth_m, beside_m) = (shown.path_depth_m()?, shown.off_path_m()?);
-    // Before the hole of another needle the tip may be deeper along this one's path than its entry.
+    // At the hole of another needle the tip may be deeper along this one's path than its entry.
     let is_elsewhere = beside_m > PLACED_WITHIN_M && !shown.is_in_tissue();
     Some(AtHand {
         depth_m: if is_elsewhere { depth_m.min(0.0) } else { depth_m },
@@ -84,31 +85,32 @@ pub fn needle_at_hand(shown: &Shown) -> Option<AtHand> {
     })
 }
 
-/// The needle of a plan that is to be inserted now: the first one, or the one after a needle whose seeds are all dropped.
+/// Returns the needle of a plan to insert now: the first one, or the one after a needle whose seeds
+/// are all dropped.
 pub fn next_needle(shown: &Shown) -> Option<usize> {
     let next = shown.planning.next_needle()?;
     let is_free = shown.planning.waits() || is_needle_done(shown);
     is_free.then_some(next)
 }
 
-/// No needle of a plan was inserted yet, so that another plan may replace it.
+/// Returns whether no needle of a plan was inserted yet, so that another plan may replace it.
 pub fn is_before_needles(shown: &Shown) -> bool {
     shown.planning.progress.begun() == 0
 }
 
-/// All its seeds are dropped and its tip is outside.
+/// Returns whether all its seeds are dropped and its tip is outside.
 pub fn is_needle_done(shown: &Shown) -> bool {
     let is_out = needle_at_hand(shown).is_some_and(|needle| needle.is_outside());
-    // A needle that was withdrawn leaves no path, and those before it are done.
+    // A withdrawn needle leaves no path, and those before it are done.
     shown.planning.progress.is_done() || (shown.planning.at_work().is_some() && shown.next_seed_m().is_none() && is_out)
 }
 
-/// The needle at work is outside, whatever it has dropped.
+/// Returns whether the present needle is outside, with any number of seeds left.
 pub fn can_leave_needle(shown: &Shown) -> bool {
     shown.planning.next_needle().is_some() && needle_at_hand(shown).is_none_or(|needle| needle.is_outside())
 }
 
-/// What is missing before `step` can be done; `None` when nothing is.
+/// Returns the missing precondition of `step`; `None` if there is none.
 pub fn missing(shown: &Shown, step: Progress) -> Option<String> {
     if !shown.is_live() {
         return Some("rt-core must run".to_owned());
@@ -138,7 +140,7 @@ pub fn missing(shown: &Shown, step: Progress) -> Option<String> {
     }
 }
 
-/// What the key for it does; `None` where something is missing or nothing is left.
+/// Returns the main action of the step; `None` if a precondition is missing or nothing is left.
 pub fn next_action(shown: &Shown) -> Option<Action> {
     let step = progress(shown);
     if missing(shown, step).is_some() {
@@ -169,12 +171,13 @@ pub fn next_action(shown: &Shown) -> Option<Action> {
     }
 }
 
-/// Whether the next seed may be dropped where the tip is.
+/// Returns whether the next seed may be dropped at the tip's place.
 pub fn is_at_next_seed(shown: &Shown) -> bool {
     needle_at_hand(shown).is_some_and(|needle| needle.is_at_next_drop())
 }
 
-/// What Ctrl+Z undoes: the last seed, or else the plan while the needle is outside.
+/// Returns the action of Ctrl+Z: it undoes the last seed, or else the plan while the needle is
+/// outside.
 pub fn undo_action(shown: &Shown) -> Option<Undo> {
     if !shown.is_live() {
         None
@@ -200,7 +203,7 @@ mod tests {
     use stylet_host::link::LinkStatus;
     use stylet_shm_schema::{HapticState, PlanInForce, SceneHeader, SeedPose, flags};
 
-    /// Seeds at 30 and 20 mm along z; the tip at a depth.
+    /// Returns a state with seeds at 30 and 20 mm along z, and the tip at a depth.
     fn shown(depth_m: f64, dropped_m: &[f64]) -> Shown {
         let mut shown = Shown::empty("lab");
         shown.status = LinkStatus::Live;

@@ -1,4 +1,4 @@
-//! The row above the steps: the scripted hand, how far it is, and its end.
+//! The row above the steps: the scripted hand, its progress, and its end.
 
 use super::{Guide, Progress, hinted, missing};
 use crate::action::{Action, WatchAction};
@@ -7,15 +7,15 @@ use crate::theme;
 use egui::{Align, Button, Layout};
 use stylet_implant::workflow::Step;
 
-/// What the script does of a plan of one needle, by the numbers in the panel.
+/// Steps that the script takes for a plan of one needle, by their numbers in the panel.
 pub const SCRIPTED_STEPS: &str = "steps 2 to 6";
-/// The button that runs the script, and with the line under it.
+/// Heights of the button that runs the script, alone and with the line under it.
 const RUN_BUTTON: f32 = 28.0;
 const RUN_HEIGHT: f32 = RUN_BUTTON + theme::GAP + 24.0;
-/// Waiting for longer is shown.
+/// Waiting time beyond which the reason is shown.
 const SHOW_WAITING_S: f64 = 2.0;
 
-/// Always as high, running or not.
+/// Draws the row, always with the same height.
 pub fn run_ui(ui: &mut egui::Ui, shown: &Shown, guide: &mut Guide, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.heading("Procedure");
@@ -55,7 +55,7 @@ fn running_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
             }
         });
     });
-    // On a line of its own: as long as it is, it may not make the panel wider.
+    // On a line of its own, because a long text must not widen the panel.
     let text = match waits(shown) {
         Some(waits) => format!("{step}: {waits}"),
         None => step.to_owned(),
@@ -63,7 +63,7 @@ fn running_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     ui.add(egui::Label::new(theme::weak(text)).truncate());
 }
 
-/// A recording: how far it is, and its end.
+/// Draws a recording: its progress, and its end.
 fn watched_ui(ui: &mut egui::Ui, watched: &Watched, actions: &mut Vec<Action>) {
     let mut asked = |action| actions.push(Action::Watch(action));
     ui.horizontal(|ui| {
@@ -99,7 +99,7 @@ fn begin_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         actions.push(Action::RunAll);
     }
     if shown.continues_at.is_none() {
-        // The whole sentence, which has no room here, is the button's help.
+        // The full sentence has no room here and is the button's tooltip.
         ui.add(egui::Label::new(theme::small("By a scripted hand")).truncate());
         return;
     }
@@ -110,7 +110,7 @@ fn begin_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     }
 }
 
-/// What the script waits for, once that takes longer than usual.
+/// Returns the reason why the script waits, once that takes longer than usual.
 pub(super) fn waits(shown: &Shown) -> Option<String> {
     let waiting = shown.run_waits.filter(|waiting| waiting.for_s >= SHOW_WAITING_S)?;
     Some(format!("waiting for {}, {:.0} s", waiting.waits_for, waiting.for_s))
@@ -136,7 +136,7 @@ fn run_help(shown: &Shown) -> &'static str {
     }
 }
 
-/// Needles of the plan of many; 0 where the script plans the only one.
+/// Returns the number of needles of the plan; 0 if the script plans the only one.
 fn needle_count(shown: &Shown) -> usize {
     shown.planning.implant.as_ref().map_or(0, |i| i.plan.needles.len())
 }

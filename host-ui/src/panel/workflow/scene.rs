@@ -15,15 +15,15 @@ use stylet_base::format;
 use stylet_shm_schema::{BUILTIN_SCENES, MAX_LABEL_CELLS, SceneHeader, role};
 use stylet_surfaces::bodies::has_every_label;
 
-/// The button beside the field.
+/// Width of the button next to the field.
 const OPEN_WIDTH: f32 = 78.0;
 
-/// What stands under a scene whose tissue is solved in elements larger than its own.
+/// Returns the remark on a scene whose tissue is solved in elements larger than its own.
 pub fn solved_in(scene: &SceneHeader) -> Option<String> {
     (scene.body_edge > 1).then(|| format!("Tissue solved in elements of {:.1} mm", scene.body_spacing_m() * 1e3))
 }
 
-/// What stands there of the probe of the other hand, and its explanation.
+/// Returns the remark on the second hand's probe, and its explanation.
 fn probe_solved_in(scene: &SceneHeader, edge_um: u32) -> Option<(String, String)> {
     let (edge_mm, cell_mm) = (f64::from(edge_um) * 1e-3, 1e3 * scene.spacing_m);
     (edge_um > 0).then(|| {
@@ -152,7 +152,7 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
     }
 }
 
-/// Dialogs, and the files that were opened last.
+/// Draws the dialogs, and the recent files.
 fn open_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bool, actions: &mut Vec<Action>) {
     ui.add_enabled_ui(free, |ui| {
         let menu = ui.menu_button("Open…", |ui| {

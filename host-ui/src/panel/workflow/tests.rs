@@ -1,4 +1,4 @@
-//! Which needle of a plan is next, and what the script does.
+//! The next needle of a plan, and the steps of the script.
 
 use super::run::{run_name, waits};
 use super::{Progress, SCRIPTED_STEPS, is_needle_done, next_action, progress, run_ui};
@@ -12,7 +12,8 @@ use stylet_host::link::LinkStatus;
 use stylet_procedure::{Step, Waiting, WaitsFor};
 use stylet_shm_schema::{HapticState, PlanInForce, SceneHeader, SeedPose, flags};
 
-/// The needle at work in force, its tip at a depth, seeds dropped so far along their needles.
+/// Returns the present needle, its tip at a depth, and the seeds dropped so far along their
+/// needles.
 fn shown(planner: &mut Planner, depth_m: f64, dropped_m: &[f64]) -> Shown {
     let mut shown = Shown::empty("lab");
     shown.status = LinkStatus::Live;
@@ -63,7 +64,7 @@ fn the_next_needle_is_the_thing_to_do_once_one_is_outside_and_its_seeds_are_drop
     assert_eq!((progress(&out), next_action(&out)), (Progress::Place, next));
     planner.finish_needle(2);
     planner.begin_needle(1, 2);
-    // Those of the first needle are not its own.
+    // The seeds of the first needle do not count here.
     let second = shown(&mut planner, 0.0, &[0.08, 0.07]);
     assert!(!is_needle_done(&second));
     assert_eq!(next_action(&second), Some(Action::Insert));
@@ -72,7 +73,8 @@ fn the_next_needle_is_the_thing_to_do_once_one_is_outside_and_its_seeds_are_drop
     assert_eq!((progress(&last), next_action(&last)), (Progress::Debrief, None));
 }
 
-/// A window that was opened while the tip stood before the next hole said "Take the needle out".
+/// Guards against a window that was opened while the tip stood before the next hole and asked to
+/// withdraw the needle.
 #[test]
 fn a_tip_before_another_hole_is_outside_however_deep_it_is_along_the_path_before() {
     let mut planner = planner();
@@ -83,12 +85,12 @@ fn a_tip_before_another_hole_is_outside_however_deep_it_is_along_the_path_before
     *tip_m = [tip_m[0] + 5e-3, tip_m[1], tip_m[2]];
     assert!(is_needle_done(&elsewhere));
     assert_eq!(progress(&elsewhere), Progress::Place);
-    // In tissue beside its path it still has to come out.
+    // In tissue off its path it must still be withdrawn.
     elsewhere.state.as_mut().expect("a state").flags |= flags::IN_CONTACT;
     assert_eq!(progress(&elsewhere), Progress::Retract);
 }
 
-/// The button said "all four steps" over a list of seven.
+/// Guards against a button that said "all four steps" over a list of seven.
 #[test]
 fn the_button_names_the_steps_of_the_panel_that_the_script_does() {
     let [first, last] = [Progress::Plan, Progress::Retract].map(Progress::number);
@@ -98,7 +100,8 @@ fn the_button_names_the_steps_of_the_panel_that_the_script_does() {
     assert_eq!(run_name(&shown(&mut planner, 0.0, &[])), "Run all 2 needles");
 }
 
-/// The row said the needle and the step on one line, made the panel wider than it was, and "Stop" was cut off.
+/// Guards against a row that put needle and step on one line, so that the panel widened and "Stop"
+/// was cut off.
 #[test]
 fn the_button_says_where_it_goes_on_and_the_row_what_is_waited_for() {
     let mut shown = Shown::empty("lab");
@@ -115,7 +118,7 @@ fn the_button_says_where_it_goes_on_and_the_row_what_is_waited_for() {
     assert_eq!(waits(&shown).as_deref(), Some("waiting for a reply to DropSeed, 12 s"));
 }
 
-/// At the end of many needles, in the longest step.
+/// Tests the end of many needles, in the longest step.
 #[test]
 fn the_row_of_a_run_stays_inside_its_panel() {
     let mut shown = Shown::empty("lab");

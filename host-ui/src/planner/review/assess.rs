@@ -1,4 +1,4 @@
-//! A moment of the procedure, and what is computed of it on threads of their own.
+//! The assessment of a moment of the procedure, on threads of its own.
 
 use super::super::Failure;
 use super::super::needles::{NeedleProgress, NeedleState};
@@ -15,12 +15,12 @@ use stylet_implant::intraoperative::{
 use stylet_implant::plan::{Anatomy, Compensation, ImplantPlan, Needle};
 use stylet_surfaces::field::Field;
 
-/// Plan, seeds and drawing as they were.
+/// Plan, seeds and drawing at one time.
 #[derive(Clone)]
 pub(super) struct Moment {
     plan: ImplantPlan,
     begun: usize,
-    /// As they lie.
+    /// Seeds at their actual positions.
     lying: Vec<Seed>,
     to_drop: Vec<Seed>,
     rehearsed: Vec<(Needle, Compensation)>,
@@ -30,7 +30,7 @@ pub(super) struct Moment {
     seeds_from: SeedsFrom,
 }
 
-/// What is known of a moment.
+/// Assessment of a moment.
 pub(super) struct Assessed {
     pub doses: Doses,
     pub marks: Marks,
@@ -38,7 +38,7 @@ pub(super) struct Assessed {
 }
 
 impl Moment {
-    /// `None` where no seed lies in the tissue.
+    /// Creates a moment; `None` if no seed is in the tissue.
     pub fn of(
         plan: &ImplantPlan,
         (progress, rehearsed): (&NeedleProgress, &[(Needle, Compensation)]),
@@ -55,7 +55,7 @@ impl Moment {
             let strength_u = |n: usize| needle.seeds.get(n).or(needle.seeds.first()).map(|s| s.strength_u);
             lying.extend(own.iter().enumerate().filter_map(|(n, pose)| {
                 Some(Seed {
-                    // Seeds are in the body where the scene has it.
+                    // Seeds in the frame of the scene's body.
                     position_m: [0, 1, 2].map(|a| pose.position_m[a] + header.body_moved_m[a]),
                     axis: Some(pose.axis),
                     strength_u: strength_u(n)?,
@@ -82,7 +82,7 @@ impl Moment {
         })
     }
 
-    /// Whether the same would be found.
+    /// Returns whether the assessment would be the same.
     pub fn is_as(&self, other: &Self) -> bool {
         let near = |a: &[Seed], b: &[Seed]| {
             a.len() == b.len() && a.iter().zip(b).all(|(a, b)| is_near(a.position_m, b.position_m))
@@ -101,7 +101,8 @@ impl Moment {
         Marks::of(&lying_m, &self.drawn.marks_m)
     }
 
-    /// Those that the dose is of. A mark of no seed has no direction; a seed without a mark does not count among the marked.
+    /// Returns the seeds of the dose. A mark without a seed has no direction; a seed without a mark
+    /// is left out.
     fn seeds(&self, marks: &Marks) -> Vec<Seed> {
         if self.seeds_from == SeedsFrom::Tissue {
             return self.lying.clone();
@@ -118,7 +119,8 @@ impl Moment {
         self.drawn.marks_m.iter().enumerate().map(of_mark).collect()
     }
 
-    /// The contoured gland, and what is spared as the tissue has moved it; the true gland of the moment beside it.
+    /// Returns the contoured gland, the spared structures as displaced by the tissue, and the true
+    /// gland of the moment.
     fn anatomy(&self, rest: &Anatomy, scene: &SceneModel, snapshot: &Snapshot) -> Result<[Anatomy; 2], Failure> {
         let field = Field::of(scene.header.nodes, &snapshot.displacements_m).ok_or("the tissue is not known")?;
         let to_m = |p: [f64; 3]| {
@@ -137,7 +139,7 @@ impl Moment {
         Source::known(model).ok_or_else(|| format!("source {model} is not known").into())
     }
 
-    /// Dose of what lies there, now and with the plan carried on.
+    /// Computes the dose of the placed seeds, now and with the plan continued.
     pub fn assess(&self, rest: &Anatomy, scene: &SceneModel, snapshot: &Snapshot) -> Result<Assessed, Failure> {
         let source = self.source()?;
         let kernel = DoseKernel::new(&source, Interval::ALL);
@@ -169,7 +171,7 @@ impl Moment {
         }
     }
 
-    /// The needles that are left, planned anew.
+    /// Replans the remaining needles.
     pub fn update(
         &self,
         rest: &Anatomy,
@@ -204,5 +206,5 @@ impl Moment {
     }
 }
 
-/// Fine enough for a tenth of a cubic centimetre.
+/// Pitch that gives volumes to a tenth of a cubic centimetre.
 const VOLUME_PITCH_M: f64 = 1.5e-3;

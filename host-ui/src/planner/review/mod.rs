@@ -1,4 +1,4 @@
-//! What the operator sees on the live picture while needles go in, and the plan brought up to date by it.
+//! The drawing on the live picture while needles go in, and the update of the plan based on it.
 
 mod assess;
 
@@ -16,28 +16,29 @@ use stylet_implant::intraoperative::{
 use stylet_implant::plan::History;
 use stylet_shm_schema::SceneId;
 
-/// A mark is taken hold of within this distance, m.
+/// Distance within which a click selects a mark, m.
 const SAME_PLACE_M: f64 = 0.2e-3;
 pub(super) const UPDATE: &str = "Planning the needles that are left";
 
-/// What was clicked on the picture.
+/// Drawing on the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drawn {
-    /// The edge of the gland.
+    /// Edge of the gland.
     pub contour: Contour,
-    /// Seeds where they are seen, scene frame, m.
+    /// Visible positions of seeds, scene frame, m.
     pub marks_m: Vec<[f64; 3]>,
 }
 
-/// A change of what is drawn. Places in a plane are to the right and up, m; a plane is where it is along the axis of the probe, m.
+/// Change of the drawing. Positions in a plane are to the right and up, m; a plane is given by its
+/// place along the axis of the probe, m.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Edit {
-    /// One more click in the plane.
+    /// Adds a click in the plane.
     Add {
         at_m: f64,
         point_m: [f64; 2],
     },
-    /// A click that is being dragged; `is_first` where it was taken hold of.
+    /// Moves a click that is being dragged; `is_first` at the start of the drag.
     Move {
         at_m: f64,
         number: usize,
@@ -49,13 +50,13 @@ pub enum Edit {
         at_m: f64,
         number: usize,
     },
-    /// Takes the proposed outline of a plane over as clicks.
+    /// Converts the proposed outline of a plane into clicks.
     TakeOver {
         at_m: f64,
     },
     /// Marks a seed, scene frame, m.
     Mark([f64; 3]),
-    /// A mark that is being dragged.
+    /// Moves a mark that is being dragged.
     MoveMark {
         number: usize,
         to_m: [f64; 3],
@@ -63,16 +64,16 @@ pub enum Edit {
     },
     /// Removes a mark.
     RemoveMark(usize),
-    /// Begins anew.
+    /// Clears the drawing.
     Clear,
     Undo,
     Redo,
 }
 
-/// Points that a proposed outline is taken over as.
+/// Number of clicks that replace a proposed outline.
 const TAKEN_OVER: usize = 8;
 
-/// The state of it, for one scene.
+/// State of the review, for one scene.
 #[derive(Default)]
 pub(super) struct Review {
     scene: Option<SceneId>,
@@ -80,7 +81,7 @@ pub(super) struct Review {
     history: History<Drawn>,
     solid: Option<Arc<Solid>>,
     seeds_from: SeedsFrom,
-    /// What was assessed last, and what is being assessed.
+    /// Last assessment, and the one in progress.
     assessed: Option<(Moment, Arc<Assessed>)>,
     assessing: Option<(Moment, Job<Result<Assessed, String>>)>,
     trouble: Option<(Moment, String)>,
@@ -88,37 +89,38 @@ pub(super) struct Review {
     reviewed: Vec<Reviewed>,
 }
 
-/// What a frame shows of it.
+/// State of the review that a frame shows.
 #[derive(Clone, Default)]
 pub struct ReviewShown {
-    /// The planes across the probe; `None` before a scene.
+    /// Planes across the probe; `None` before a scene.
     pub frame: Option<Transverse>,
-    /// What is drawn.
+    /// Drawing of the operator.
     pub drawn: Drawn,
-    /// The contoured gland; `None` while it has too few planes.
+    /// Contoured gland; `None` while it has too few planes.
     pub solid: Option<Arc<Solid>>,
-    /// Which seeds the dose is of.
+    /// Choice of the seeds for the dose.
     pub seeds_from: SeedsFrom,
-    /// Dose of what lies there, as it was assessed last, and the marks by their seeds.
+    /// Dose of the placed seeds at the last assessment, and the marks by their seeds.
     pub doses: Option<Doses>,
     /// Volume of the contoured gland, m³.
     pub volume_m3: Option<f64>,
     /// Marks by their seeds.
     pub marks: Marks,
-    /// Whether something is being assessed.
+    /// True while an assessment runs.
     pub is_assessing: bool,
-    /// Why nothing can be assessed.
+    /// Reason why nothing can be assessed.
     pub trouble: Option<String>,
-    /// The update that waits for a decision.
+    /// Update that waits for a decision.
     pub update: Option<Arc<Proposed>>,
-    /// Whether the last update was taken and can be taken back.
+    /// True if the last update was accepted and can be withdrawn.
     pub can_withdraw: bool,
-    /// Updates so far, taken or not.
+    /// Updates so far, accepted or not.
     pub reviewed: Vec<Reviewed>,
 }
 
 impl ReviewShown {
-    /// The outline in a plane, and whether it goes through clicks of that plane; else it is proposed by the others.
+    /// Returns the outline in a plane, and whether it goes through clicks of that plane; otherwise
+    /// the other planes propose it.
     pub fn outline_at(&self, at_m: f64) -> Option<(Outline, bool)> {
         let clicks = self.drawn.contour.at(at_m);
         if let Some(own) = clicks.and_then(|clicks| Outline::through(&clicks.points_m)) {
@@ -197,7 +199,7 @@ impl Review {
         self.redraw();
     }
 
-    /// Another implantation begins; what is drawn stays.
+    /// Begins another implantation; the drawing stays.
     pub(super) fn restart(&mut self) {
         self.reviewed.clear();
         self.proposed = None;
@@ -217,22 +219,23 @@ impl Review {
 }
 
 impl Planner {
-    /// Changes what is drawn on the picture.
+    /// Changes the drawing on the picture.
     pub fn draw(&mut self, edit: Edit) {
         self.review.edit(edit);
     }
 
-    /// Chooses which seeds the dose of a moment is of.
+    /// Chooses the seeds for the dose of a moment.
     pub fn set_seeds_from(&mut self, seeds_from: SeedsFrom) {
         (self.review.seeds_from, self.review.proposed) = (seeds_from, None);
     }
 
-    /// Updates of the plan in this scene.
+    /// Returns the updates of the plan in this scene.
     pub fn reviewed(&self) -> &[Reviewed] {
         &self.review.reviewed
     }
 
-    /// Takes what is new since the last frame; assesses what is drawn where that, the plan or the seeds have changed.
+    /// Takes the data that arrived since the last frame; assesses the drawing if it, the plan or
+    /// the seeds have changed.
     pub fn take_review(&mut self, scene: &Arc<SceneModel>, snapshot: &Snapshot) {
         if self.review.scene != Some(scene.header.id()) {
             let pose = Pose::of_scene(&scene.header);
@@ -283,7 +286,7 @@ impl Planner {
         self.review.assessing = None;
     }
 
-    /// What there is to assess; `None` without a plan, a seed or a contoured gland.
+    /// Returns the moment to assess; `None` without a plan, a seed or a contoured gland.
     fn moment(&self, snapshot: &Snapshot) -> Option<Moment> {
         let review = &self.review;
         let (plan, solid, frame) = (self.plan()?, review.solid.clone()?, review.frame?);
@@ -296,7 +299,7 @@ impl Planner {
         )
     }
 
-    /// Begins to plan the needles that are left beside what lies in the tissue now.
+    /// Starts to replan the remaining needles around the seeds in the tissue.
     pub fn update(&mut self, scene: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
         let (Some(scene), Some(snapshot)) = (scene, snapshot) else {
             return;
@@ -325,7 +328,7 @@ impl Planner {
     }
 
     pub(super) fn take_update(&mut self, found: Proposed) {
-        // Needles may have been inserted meanwhile.
+        // Needles may have been inserted since.
         if found.update.begun != self.progress.begun() {
             let why = "A needle went in while the others were planned; update the plan again.";
             self.message = Some(Message::Refused(why.to_owned()));
@@ -334,7 +337,7 @@ impl Planner {
         self.review.proposed = Some(Arc::new(found));
     }
 
-    /// Takes the update that waits, or leaves the plan as it is; either is kept for the debrief.
+    /// Accepts the pending update or rejects it; either is recorded for the debrief.
     pub fn decide(&mut self, accept: bool) {
         let Some(proposed) = self.review.proposed.take() else {
             return;
@@ -355,7 +358,7 @@ impl Planner {
         });
     }
 
-    /// Takes back the last update: the plan before it.
+    /// Withdraws the last update and restores the plan before it.
     pub fn withdraw_update(&mut self) {
         if self.can_withdraw() {
             self.undo();

@@ -1,4 +1,5 @@
-//! What is drawn can be taken back step by step, and an update is taken only while it fits the needles that are in.
+//! The drawing can be undone step by step, and an update is accepted only while it fits the
+//! inserted needles.
 
 use super::*;
 use crate::planner::tests::{planned, planner};
@@ -55,7 +56,7 @@ fn each_click_is_a_step_and_a_drag_is_one() {
     assert_eq!(points(&planner), 2 + TAKEN_OVER);
 }
 
-/// The second needle loses a seed.
+/// Creates an update in which the second needle loses a seed.
 fn proposed(begun: usize) -> Proposed {
     let doses = Doses {
         now: Figures::default(),
@@ -110,7 +111,7 @@ fn an_update_is_taken_as_one_step_and_either_decision_is_kept() {
     assert!(planner.reviewed().is_empty(), "of another implantation");
 }
 
-/// It would take back a needle that is in.
+/// Guards against an update that would undo an inserted needle.
 #[test]
 fn an_update_for_fewer_needles_than_are_in_is_refused() {
     let mut planner = planner();
@@ -120,7 +121,7 @@ fn an_update_for_fewer_needles_than_are_in_is_refused() {
     planner.take_update(proposed(1));
     assert!(planner.planning().review.update.is_none());
     assert!(matches!(planner.take_message(), Some(Message::Refused(_))));
-    // A click makes an update that waits one of another contour.
+    // A click makes a pending update one of another contour.
     planner.take_update(proposed(2));
     planner.draw(Edit::Mark([0.0; 3]));
     assert!(planner.planning().review.update.is_none());

@@ -3,11 +3,11 @@
 use super::{CRANIAL_DEG, FluoroView, ORBITAL_DEG};
 use egui::{Key, Modifiers};
 
-/// Of the keys, degrees.
+/// Step of the keys, degrees.
 const STEP_DEG: f64 = 5.0;
 
 impl FluoroView {
-    /// Switch, angles, and another patient.
+    /// Draws the switch, the angles, and the button for another patient.
     pub fn tools_ui(&mut self, ui: &mut egui::Ui) {
         let beam = ui.toggle_value(&mut self.is_switched_on, "X-ray");
         beam.on_hover_text("Key X while held: 8 pulses a second; afterwards the last image is held");

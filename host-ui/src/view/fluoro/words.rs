@@ -1,4 +1,4 @@
-//! What stands over a picture of the C-arm: how it was taken, how old it is, and what was spent.
+//! Text over a picture of the C-arm: its technique, its age, and the dose spent.
 
 use super::{FluoroView, inside};
 use crate::theme::IMAGE;
@@ -7,9 +7,9 @@ use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Vec2};
 use stylet_imaging::fluoroscopy::{CArm, DoseCounter};
 
 const SIZE: f32 = 12.5;
-/// How much of the picture words cover: it is white beside the body.
+/// Opacity of the background of text, because the picture is white outside the body.
 const BACKING: f32 = 0.8;
-/// From farther to the side than this the patient's sides are not those of the picture.
+/// Largest angle to the side at which the patient's sides are those of the picture.
 const SIDES_DEG: f64 = 60.0;
 
 impl FluoroView {
@@ -83,7 +83,7 @@ fn age(seconds: u64) -> String {
     }
 }
 
-/// One mGy is 1e-3 Gy, one Gy cm² 1e-4 Gy m².
+/// Formats the dose spent; one mGy is 1e-3 Gy, one Gy cm² 1e-4 Gy m².
 fn spent(dose: &DoseCounter) -> String {
     format!(
         "beam {:.1} s\n{} pulses\nair kerma {:.2} mGy\nKAP {:.3} Gy cm²",

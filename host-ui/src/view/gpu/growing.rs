@@ -1,4 +1,4 @@
-//! Buffers on the graphics card that grow with what is drawn.
+//! Buffers on the graphics card that grow with their content.
 
 use bytemuck::Pod;
 use eframe::egui_wgpu::RenderState;
@@ -6,11 +6,11 @@ use eframe::wgpu;
 use std::mem::size_of;
 use std::ops::Range;
 
-/// A buffer that grows by doubling and is otherwise reused.
+/// Buffer that grows by doubling and is otherwise reused.
 pub struct Growing {
     pub buffer: wgpu::Buffer,
     usage: wgpu::BufferUsages,
-    /// Elements that count, not bytes.
+    /// Number of valid elements, not bytes.
     pub len: u32,
 }
 
@@ -23,12 +23,12 @@ impl Growing {
         }
     }
 
-    /// Gives the number of bytes sent.
+    /// Writes the elements; returns the number of bytes sent.
     pub fn write<T: Pod>(&mut self, state: &RenderState, items: &[T]) -> u64 {
         let bytes: &[u8] = bytemuck::cast_slice(items);
         let size = bytes.len() as u64;
         if size > state.device.limits().max_buffer_size {
-            // A scene that does not fit is not drawn; the rest of the window goes on.
+            // A scene that does not fit is not drawn; the rest of the window continues.
             self.len = 0;
             return 0;
         }
@@ -42,7 +42,7 @@ impl Growing {
         size
     }
 
-    /// Only some of as many elements as were written last.
+    /// Writes some elements into a buffer that has as many as were written last.
     pub fn write_run<T: Pod>(&mut self, state: &RenderState, items: &[T], run: Range<usize>) -> u64 {
         let part = items.get(run.clone()).unwrap_or_default();
         if items.len() != self.len as usize || part.is_empty() {

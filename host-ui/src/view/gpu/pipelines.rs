@@ -1,4 +1,4 @@
-//! How marks and surfaces are drawn: shaders, blending and depth.
+//! Pipelines of marks and surfaces: shaders, blending and depth.
 
 use super::super::marks::MarkVertex;
 use super::targets::{COLOR, DEPTH};
@@ -14,7 +14,7 @@ pub struct Pipelines {
     pub surface_front: wgpu::RenderPipeline,
 }
 
-/// For pictures with so many samples in a pixel.
+/// Creates pipelines for pictures with this number of samples per pixel.
 pub fn pipelines(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, samples: u32) -> Pipelines {
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("stylet scene"),
@@ -61,7 +61,7 @@ pub fn pipelines(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, samples:
     }
 }
 
-/// In what the four pipelines differ.
+/// Differences between the four pipelines.
 #[derive(Clone, Copy)]
 struct Kind<'a> {
     stage: &'static str,

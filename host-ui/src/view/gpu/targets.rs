@@ -4,19 +4,19 @@ use crate::view::paste::Pasted;
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 
-/// What egui takes for an image that is already gamma-encoded.
+/// Format that egui accepts for an image that is already gamma-encoded.
 pub const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Samples of a pixel of a picture that stays.
+/// Samples per pixel of a picture that stays.
 pub const FINE: u32 = 4;
-/// Of one that is replaced at once.
+/// Samples per pixel of a picture that is replaced at once.
 pub const ONE_SAMPLE: u32 = 1;
 
-/// Where a picture is drawn.
+/// Textures that receive a picture.
 pub struct Targets {
     pub size: [u32; 2],
     picture: wgpu::TextureView,
-    /// Of a picture with several samples.
+    /// Texture of a picture with several samples.
     samples: Option<wgpu::TextureView>,
     depth: wgpu::TextureView,
     pub pasted: Pasted,

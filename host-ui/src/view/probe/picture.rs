@@ -1,13 +1,14 @@
-//! What a picture of the probe shows, for whatever is drawn or clicked over it.
+//! Coordinates of a picture of the probe, for drawings and clicks over it.
 
 use egui::{Pos2, Rect, Vec2};
 use nalgebra::{Vector2, Vector3};
 use stylet_imaging::ultrasound::{Plane, View};
 
-/// One picture of the probe as it stands in the window: from places of the window to places of the scene and back.
+/// Picture of the probe in the window, which maps places of the window to places of the scene and
+/// back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbePicture {
-    /// Of the picture that is seen, not of one that is yet to be computed.
+    /// Plane of the visible picture, not of one that is still being computed.
     plane: Plane,
     rect: Rect,
     is_live: bool,
@@ -18,28 +19,29 @@ impl ProbePicture {
         Self { plane, rect, is_live }
     }
 
-    /// Which of the probe's two planes it is.
+    /// Returns which of the probe's two planes it is.
     pub fn view(&self) -> View {
         self.plane.view
     }
 
-    /// The plane, scene frame.
+    /// Returns the plane, scene frame.
     pub fn plane(&self) -> &Plane {
         &self.plane
     }
 
-    /// Where the picture stands, points of the window.
+    /// Returns the place of the picture, points of the window.
     pub fn rect(&self) -> Rect {
         self.rect
     }
 
-    /// Whether it shows the probe, the tissue and the metal as they are in this frame; else it is that of a frame before.
+    /// Returns whether it shows probe, tissue and metal of this frame; otherwise it is from an
+    /// earlier one.
     pub fn is_live(&self) -> bool {
         self.is_live
     }
 
-    /// The place in the plane under a place of the window, scene frame, m; `None` beside the picture and outside of what its beams
-    /// reach.
+    /// Returns the place in the plane under a place of the window, scene frame, m; `None` outside
+    /// the picture and beyond its beams.
     pub fn place_m(&self, at: Pos2) -> Option<Vector3<f64>> {
         let off = at - self.rect.min;
         let per_point = self.pixels_per_point();
@@ -48,18 +50,19 @@ impl ProbePicture {
         (self.rect.contains(at) && self.sees(place_m)).then_some(place_m)
     }
 
-    /// Where a place of the scene, dropped onto the plane, stands in the window; it may be beside the picture.
+    /// Returns the place of a scene point, projected onto the plane, in the window; it may be
+    /// outside the picture.
     pub fn at(&self, place_m: Vector3<f64>) -> Pos2 {
         let (pixel, per_point) = (self.plane.pixel_of(place_m), self.pixels_per_point());
         self.rect.min + Vec2::new((pixel.x / per_point.x) as f32, (pixel.y / per_point.y) as f32)
     }
 
-    /// How far a place of the scene is from the plane, m: positive along the plane's normal.
+    /// Returns the distance of a scene point from the plane, m: positive along the plane's normal.
     pub fn beside_m(&self, place_m: Vector3<f64>) -> f64 {
         self.plane.in_beams(place_m).beside_m
     }
 
-    /// Whether the beams reach a place of the scene, dropped onto the plane.
+    /// Returns whether the beams reach a scene point, projected onto the plane.
     pub fn sees(&self, place_m: Vector3<f64>) -> bool {
         let at = self.plane.in_beams(place_m);
         (0.0..=self.plane.depth_m).contains(&at.depth_m) && at.across.abs() <= self.plane.probe.half(self.plane.view)

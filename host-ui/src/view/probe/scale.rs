@@ -4,12 +4,12 @@ use super::picture::ProbePicture;
 use crate::theme::IMAGE;
 use egui::{Align2, FontId, Pos2, Rect, Stroke, Vec2};
 
-/// Between two ticks, mm; every second one is long, every fourth has its number.
+/// Distance between ticks, mm; every second one is long, every fourth has its number.
 const TICK_MM: u32 = 5;
-/// From the edge of the picture, points.
+/// Distance from the edge of the picture, points.
 const ASIDE: f32 = 6.0;
 
-/// Height in the window and depth (mm) of each tick.
+/// Returns height in the window and depth (mm) of each tick.
 fn ticks(picture: &ProbePicture) -> impl Iterator<Item = (f32, u32)> {
     let (plane, count) = (
         *picture.plane(),
@@ -25,7 +25,7 @@ fn ticks(picture: &ProbePicture) -> impl Iterator<Item = (f32, u32)> {
     })
 }
 
-/// Draws it within `free`, the part of the picture that nothing lies over.
+/// Draws the scale within `free`, the uncovered part of the picture.
 pub(super) fn draw(painter: &egui::Painter, picture: &ProbePicture, free: Rect) {
     let right = picture.rect().right() - ASIDE;
     let color = IMAGE.text.gamma_multiply(0.75);
@@ -33,7 +33,7 @@ pub(super) fn draw(painter: &egui::Painter, picture: &ProbePicture, free: Rect) 
         let is_long = depth_mm.is_multiple_of(2 * TICK_MM);
         let left = Pos2::new(right - if is_long { 8.0 } else { 4.0 }, y);
         let ends = [left, Pos2::new(right, y)];
-        // Dark around it, since tissue behind it may be as bright.
+        // A dark outline, because tissue behind it may be as bright.
         painter.line_segment(ends, Stroke::new(3.0, IMAGE.background.gamma_multiply(0.6)));
         painter.line_segment(ends, Stroke::new(1.0, color));
         // A number at the end of the picture would leave it.

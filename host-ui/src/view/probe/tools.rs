@@ -1,4 +1,4 @@
-//! The stepper of the probe, and the knobs of the machine.
+//! The stepper of the probe, and the knobs of the ultrasound machine.
 
 use super::ProbeView;
 use crate::action::{Action, ProbeAction};
@@ -9,16 +9,16 @@ use stylet_imaging::ultrasound::Pose;
 /// Steps of the stepper, mm and degrees.
 const STEP_MM: f64 = 5.0;
 const STEP_DEG: f64 = 5.0;
-/// Half the way of the stepper, mm, and how far it turns to either side, degrees.
+/// Half the travel of the stepper, mm, and its turn to either side, degrees.
 const WAY_MM: f64 = 60.0;
 const TURN_DEG: f64 = 90.0;
 
-/// Way and turn of a probe that no hand holds, and the knobs of the machine.
+/// Insertion and turn of a probe that no hand holds, and the knobs of the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Knobs {
-    /// Into the patient from the middle of the target, mm.
+    /// Insertion into the patient from the middle of the target, mm.
     way_mm: f64,
-    /// About its axis, degrees.
+    /// Turn about its axis, degrees.
     turn_deg: f64,
     pub depth_mm: f64,
     pub gain_db: f64,
@@ -42,7 +42,8 @@ impl Knobs {
         base.moved(self.way_mm * 1e-3, self.turn_deg.to_radians())
     }
 
-    /// Moves the window's own stepper; true where the run has a probe in a hand and the core must move that.
+    /// Moves the window's own stepper; returns true if the run has a probe in a hand, which the
+    /// core must move.
     pub fn step(&mut self, shown: &Shown, way_mm: f64, turn_deg: f64) -> bool {
         let is_in_hand = shown.probe_pose().is_some();
         if !is_in_hand {
@@ -54,7 +55,7 @@ impl Knobs {
 }
 
 impl ProbeView {
-    /// Stepper and knobs; what they ask of the hand that holds the probe.
+    /// Draws stepper and knobs; returns their requests to the hand that holds the probe.
     pub fn tools_ui(&mut self, ui: &mut egui::Ui, shown: &Shown) -> Vec<Action> {
         let mut actions = self.stepper_ui(ui, shown);
         let knobs = &mut self.knobs;
@@ -70,7 +71,7 @@ impl ProbeView {
 
     fn stepper_ui(&mut self, ui: &mut egui::Ui, shown: &Shown) -> Vec<Action> {
         let mut actions = Vec::new();
-        // Where the hand was sent to, or is; a hand at a real device goes where it will.
+        // The goal of the hand, or its place; a real device's hand goes where it will.
         let in_hand = shown.scene.as_ref().zip(shown.stepper.goal.or(shown.probe_pose()));
         let (way_m, turn_rad) = in_hand.map_or(
             (self.knobs.way_mm * 1e-3, self.knobs.turn_deg.to_radians()),
@@ -123,13 +124,13 @@ impl ProbeView {
     }
 }
 
-/// Name, least and most, unit and hint of a number that is dragged.
+/// Name, limits, unit and tooltip of a number that is dragged.
 struct Knob(&'static str, [f64; 2], &'static str, &'static str);
 
 impl Knob {
     fn ui(self, ui: &mut egui::Ui, value: &mut f64, is_enabled: bool) {
         let Self(name, [least, most], unit, hint) = self;
-        // A hand may hold the probe beyond the stepper.
+        // A hand may hold the probe beyond the stepper's range.
         let range = least.min(*value)..=most.max(*value);
         let drag = egui::DragValue::new(value)
             .range(range)
@@ -137,7 +138,7 @@ impl Knob {
             .fixed_decimals(1)
             .prefix(format!("{name} "))
             .suffix(unit);
-        // In one widget, so that no line ends between name and value.
+        // In one widget, so that no line break separates name and value.
         ui.add_enabled(is_enabled, drag).on_hover_text(hint);
     }
 }

@@ -1,18 +1,18 @@
-//! Whose picture is computed in which frame: one in each, so that no frame waits for both, and by turns, so that neither plane waits for one that is
-//! never done.
+//! Turns of the planes: one picture is computed in each frame, so that no frame waits for both. The
+//! planes alternate, so that neither waits for one that is never done.
 
 use stylet_imaging::ultrasound::View;
 
-/// Frames are numbered by their passes.
+/// State of the turns; frames are numbered by their passes.
 #[derive(Debug, Default)]
 pub(super) struct Turns {
     last: Option<(View, u64)>,
-    /// When each plane waited last.
+    /// Pass in which each plane waited last.
     waited: [Option<u64>; 2],
 }
 
 impl Turns {
-    /// Whether the picture of this plane may be computed now.
+    /// Returns whether the picture of this plane may be computed now.
     pub fn is_on(&self, view: View, pass: u64) -> bool {
         let Some((last, when)) = self.last else { return true };
         let other_waits = self
@@ -23,13 +23,13 @@ impl Turns {
         when != pass && !(last == view && other_waits)
     }
 
-    /// It was.
+    /// Records that the picture of this plane was computed.
     pub fn took(&mut self, view: View, pass: u64) {
         self.last = Some((view, pass));
         self.waited[view as usize] = None;
     }
 
-    /// It is old and was not.
+    /// Records that the picture of this plane is out of date.
     pub fn waits(&mut self, view: View, pass: u64) {
         self.waited[view as usize] = Some(pass);
     }
@@ -39,7 +39,8 @@ impl Turns {
 mod tests {
     use super::*;
 
-    /// How often each plane is computed in so many frames, where the planes `shown` are never done.
+    /// Returns how often each plane is computed in this number of frames, if the planes `shown` are
+    /// never done.
     fn computed(frames: u64, shown: impl Fn(u64) -> Vec<View>) -> [usize; 2] {
         let (mut turns, mut count) = (Turns::default(), [0; 2]);
         for pass in 1..=frames {

@@ -1,4 +1,5 @@
-//! The slices on the graphics card: three small volumes, an image where there is one, and a texture for each slice.
+//! The slices on the graphics card: three small volumes, an image if there is one, and a texture
+//! for each slice.
 
 mod pipeline;
 mod texture;
@@ -23,10 +24,11 @@ use texture::{extent, volume, write};
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const GREY: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 const LARGEST_SIDE: u32 = 2048;
-/// Side of a cell of the picture at whose corners the material point is found. Displacements come every 8 mm (ADR 9), which is more pixels.
+/// Side of a picture cell at whose corners the material point is found. Displacements come every 8
+/// mm (ADR 9), which is more pixels.
 const CELL_PIXELS: u32 = 16;
 
-/// As `Slice` in `slice.wgsl`.
+/// Same layout as `Slice` in `slice.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 struct SliceUniform {
@@ -41,7 +43,7 @@ struct SliceUniform {
     image: [[f32; 4]; 3],
 }
 
-/// An image that cannot be shown in the slices.
+/// Error of an image that cannot be shown in the slices.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The window runs without a graphics device.
@@ -59,7 +61,7 @@ pub enum ImageError {
     },
 }
 
-/// What belongs to one scene.
+/// Resources of one scene.
 struct Body {
     brightness: wgpu::TextureView,
     nodes: wgpu::Texture,
@@ -71,7 +73,7 @@ struct Body {
     patient: PatientFrame,
 }
 
-/// Without its greys, which are on the card.
+/// Image without its greys, which are on the card.
 struct OnCard {
     image: Image,
     view: wgpu::TextureView,
@@ -101,13 +103,13 @@ pub struct SliceGpu {
     clamped: wgpu::Sampler,
     repeated: wgpu::Sampler,
     image: Option<OnCard>,
-    /// In its place where there is none.
+    /// Placeholder without an image.
     no_image: wgpu::TextureView,
     body: Option<Body>,
     panes: Vec<Pane>,
-    /// Textures of panes whose scene went, to be used again.
+    /// Textures of panes of earlier scenes, for reuse.
     targets: Vec<Option<Target>>,
-    /// Rises with each new content of the volumes.
+    /// Number that grows with each new content of the volumes.
     content: u64,
     texels: Vec<[u16; 4]>,
     pub driver: DriverCost,
@@ -188,7 +190,7 @@ impl SliceGpu {
         self.set_field(&Field::rest(nodes_info));
     }
 
-    /// Drops what they are bound to; their textures are used again.
+    /// Drops bindings to the volumes; textures are reused.
     fn drop_panes(&mut self) {
         self.targets = self.panes.drain(..).map(|pane| pane.target).collect();
         self.content += 1;
@@ -230,7 +232,7 @@ impl SliceGpu {
         self.content += 1;
     }
 
-    /// The picture of a plane, drawn if anything in it has changed; `None` without a scene.
+    /// Returns the picture of a plane, drawn if anything in it has changed; `None` without a scene.
     pub fn picture(&mut self, number: usize, plane: &Plane, pixels_per_point: f32, with_image: bool) -> Option<Pasted> {
         let body = self.body.as_ref()?;
         let image = self.image.as_ref().filter(|_| with_image).map(|on_card| &on_card.image);

@@ -1,4 +1,5 @@
-//! Three orthogonal slices through the deformed body that look like ultrasound, and what is drawn over them.
+//! Three orthogonal slices through the deformed body that look like ultrasound, with their
+//! overlays.
 
 mod gpu;
 mod overlay;
@@ -29,22 +30,22 @@ use stylet_shm_schema::{SceneHeader, SceneId, Text};
 use stylet_surfaces::bodies::Bodies;
 use stylet_surfaces::field::Field;
 
-/// Of the target, this much is seen at first.
+/// Initial view, in multiples of the target.
 const MARGIN: f64 = 1.45;
 const ZOOMS: [f64; 2] = [0.2, 12.0];
-/// A lower picture does not say why it is empty.
+/// Height below which a picture does not give the reason why it is empty.
 pub const ROOM_FOR_REASON: f32 = 170.0;
-/// The tip is taken hold of within this many points.
+/// Distance from the tip within which a drag pulls the needle, in points.
 const HANDLE: f32 = 16.0;
 const M_PER_SCROLLED_POINT: f64 = 0.05e-3;
 
-/// A surface whose cut is drawn, and in which colour.
+/// Surface whose cut is drawn, and its colour.
 struct Contour {
     color: Color32,
     triangles: Vec<[u32; 3]>,
 }
 
-/// The three slices.
+/// Three slices.
 pub(super) struct Slices {
     gpu: Option<SliceGpu>,
     scene: Option<SceneId>,
@@ -53,21 +54,21 @@ pub(super) struct Slices {
     model: Option<Arc<SceneModel>>,
     contours: Vec<Contour>,
     field: Field,
-    /// In the middle of all pictures, and how much of it is seen.
+    /// Centre of all pictures, and their scale.
     middle_m: Vector3<f64>,
     extent_m: f64,
     zoom: f64,
     lines: [Lines; 3],
-    /// Its name, and that of the scene that it belongs to.
+    /// Name of the image, and of the scene that it belongs to.
     image: Option<(String, Text<64>)>,
-    /// The frame in which a new dose was cut last.
+    /// Frame in which a new dose was cut last.
     dose_cut_in: u64,
-    /// The pointer holds the needle.
+    /// True while the pointer holds the needle.
     holds_needle: bool,
 }
 
 impl Slices {
-    /// Slices on this graphics device; without one they show no tissue.
+    /// Creates slices on this graphics device; without one they show no tissue.
     pub fn new(state: Option<RenderState>) -> Self {
         Self {
             gpu: state.map(SliceGpu::new),
@@ -87,12 +88,12 @@ impl Slices {
         }
     }
 
-    /// Cost of the pictures since the window opened.
+    /// Returns the cost of the pictures since the window opened.
     pub fn driver(&self) -> DriverCost {
         self.gpu.as_ref().map_or_else(DriverCost::default, |gpu| gpu.driver)
     }
 
-    /// Takes what is new since the last frame.
+    /// Takes the data that arrived since the last frame.
     pub fn take(&mut self, body: &ShownBody, snapshot: Option<&Snapshot>, view: &mut ViewState) {
         let (Some(model), Some(bodies)) = (body.model(), body.bodies()) else {
             return;
@@ -153,17 +154,17 @@ impl Slices {
         Ok(())
     }
 
-    /// The displacements of the tissue in the last snapshot.
+    /// Returns the displacements of the tissue in the last snapshot.
     pub fn field(&self) -> &Field {
         &self.field
     }
 
-    /// Name of the image that was loaded.
+    /// Returns the name of the image that was loaded.
     pub fn image_name(&self) -> Option<&str> {
         self.image.as_ref().map(|(name, _)| name.as_str())
     }
 
-    /// Back to the whole of the target.
+    /// Shows the whole target again.
     pub fn reset_view(&mut self, shown: &Shown) {
         self.zoom = 1.0;
         if let Some(scene) = &shown.scene {
@@ -171,7 +172,7 @@ impl Slices {
         }
     }
 
-    /// The plane that a picture of this size shows.
+    /// Returns the plane that a picture of this size shows.
     pub fn plane(&self, orientation: Orientation, view: &ViewState, rect: Rect) -> Plane {
         let m_per_point = self.extent_m / self.zoom / f64::from(rect.width().min(rect.height()).max(20.0));
         let mut plane = Plane::new(orientation, &self.scene_from_patient, self.middle_m, m_per_point, rect);
@@ -179,7 +180,7 @@ impl Slices {
         plane
     }
 
-    /// Draws one slice and returns what the pointer asks for.
+    /// Draws one slice; returns the requests of the pointer.
     pub fn slice_ui(
         &mut self,
         ui: &mut egui::Ui,
@@ -250,7 +251,7 @@ impl Slices {
         action
     }
 
-    /// Name of what lies at a place now; empty outside.
+    /// Returns the name of the tissue at a place now; empty outside.
     fn tissue_at(&self, place_m: Vector3<f64>) -> String {
         let Some(model) = &self.model else { return String::new() };
         let (grid, rest_m) = (&model.header.labels, self.field.rest_of_m(place_m));
@@ -266,7 +267,7 @@ impl Slices {
         structure.map_or_else(String::new, |s| s.name.read())
     }
 
-    /// The wheel goes through the slices; with Ctrl it goes nearer.
+    /// Handles the wheel: it scrolls through the slices, and zooms with Ctrl.
     fn scroll(&mut self, ui: &egui::Ui, orientation: Orientation, view: &mut ViewState, rect: Rect) {
         let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
         if pinch != 1.0 {
@@ -317,7 +318,8 @@ fn is_on_tip(plane: &Plane, shown: &Shown, place: Pos2) -> bool {
     along(plan.direction) && plane.on_screen(tip.into()).distance(place) < HANDLE
 }
 
-/// What is looked at in a scene: its targets, what is spared and what is fixed; the whole body where it is one.
+/// Returns the contours of a scene: its targets, spared and fixed structures; the whole body if it
+/// has only one.
 fn contours(header: &SceneHeader, bodies: &Bodies) -> Vec<Contour> {
     let all = kinds(Some(header)).zip(&bodies.parts);
     let looked_at = all.filter(|(kind, _)| *kind != Kind::Body);

@@ -1,4 +1,4 @@
-//! What is drawn over a slice: contours, isodose lines, needle, seeds, planned places, letters and scale.
+//! Overlays of a slice: contours, isodose lines, needle, seeds, planned places, letters and scale.
 
 use super::Contour;
 use super::plane::Plane;
@@ -15,27 +15,28 @@ use std::sync::Arc;
 use stylet_base::format;
 use stylet_surfaces::mesh::cut;
 
-/// What lies nearer to the plane than this is in it.
+/// Distance from the plane within which a point is in it.
 const IN_PLANE_M: f64 = 1.5e-3;
-/// Half a seed; farther from the plane it is not cut.
+/// Half a seed: distance beyond which the plane does not cut it.
 const SEED_HALF_M: f64 = 2.25e-3;
 const NEEDLE_M: f64 = 0.12;
-/// Drawn and blank points of an isodose line; one that is never blank is solid.
+/// Drawn and blank points of an isodose line; a line without blanks is solid.
 const DASHES: [[f32; 2]; 4] = [[2.0, 3.0], [1.0, 0.0], [8.0, 3.0], [3.0, 2.0]];
 
-/// Lines of one slice, cut again only when the plane or what it cuts has changed.
+/// Lines of one slice, cut again only when the plane or the surfaces have changed.
 #[derive(Default)]
 pub struct Lines {
     /// Plane and surface of the contours; plane and dose of the isodose lines.
     body: Option<([f64; 4], u64)>,
     dose: Option<([f64; 4], u64)>,
     contours: Vec<(Color32, cut::Line)>,
-    /// By level, in the body as the scene has it.
+    /// Isodose lines by level, in the frame of the scene's body.
     isodoses: Vec<(usize, cut::Line)>,
 }
 
 impl Lines {
-    /// `shift_m`: from the body as the scene has it to where the dose is drawn. A new dose is cut where `may_cut_dose`, else in a later frame; gives whether it was cut.
+    /// Cuts the lines again if needed. `shift_m` leads from the scene's body to the drawn dose. A
+    /// new dose is cut if `may_cut_dose`, else in a later frame; returns whether it was cut.
     pub fn update(
         &mut self,
         plane: &Plane,
@@ -76,18 +77,18 @@ impl Lines {
     }
 }
 
-/// In the middle of a picture, in as many lines as it takes.
+/// Writes text in the middle of a picture, in as many lines as it takes.
 pub fn words(painter: &Painter, rect: Rect, text: &str, color: Color32) {
     let font = FontId::proportional(12.5);
     let mut job = LayoutJob::simple(text.to_owned(), font, color, rect.width() - 48.0);
     job.halign = Align::Center;
     let galley = painter.layout_job(job);
-    // Its places are counted from the middle.
+    // Its positions count from the middle.
     let at = rect.center() - Vec2::new(0.0, galley.size().y / 2.0);
     painter.galley(at, galley, color);
 }
 
-/// Smaller pictures have no room for every word.
+/// Size below which a picture has no room for every label.
 const ROOM_FOR_LEGEND: f32 = 170.0;
 const ROOM_FOR_UPPER_LETTER: f32 = 270.0;
 const ROOM_FOR_LETTERS: f32 = 80.0;
@@ -101,7 +102,7 @@ pub struct Overlay<'a> {
 }
 
 impl Overlay<'_> {
-    /// `shift_m`: from the body as the scene has it to where the dose is.
+    /// Draws the overlay. `shift_m` leads from the scene's body to the dose.
     pub fn draw(&self, lines: &Lines, with_dose: bool, shift_m: [f64; 3]) {
         for (color, line) in &lines.contours {
             let stroke = Stroke::new(1.3, color.gamma_multiply(0.9));
@@ -139,7 +140,7 @@ impl Overlay<'_> {
         }
     }
 
-    /// Where the other two slices are, open in the middle so that nothing is hidden.
+    /// Draws the other two slices as lines, open in the middle so that they hide nothing.
     fn crosshair(&self) {
         let (at, rect) = (self.plane.on_screen(self.view.cursor_m), self.plane.rect);
         let stroke = Stroke::new(1.0, IMAGE.crosshair.gamma_multiply(0.5));
@@ -154,13 +155,13 @@ impl Overlay<'_> {
             .vline(at.x, (at.y + OPEN).min(rect.bottom())..=rect.bottom(), stroke);
     }
 
-    /// Rings: nothing like the bars of placed seeds.
+    /// Draws planned seeds as rings, unlike the bars of placed seeds.
     fn planned(&self) {
         let radius = (1.6e-3 / self.plane.m_per_point).max(4.0) as f32;
         let of_needle = self.shown.planned().iter().map(|s| s.position_m);
         let implant = self.shown.planning.implant.as_ref();
         let of_all = implant.iter().flat_map(|i| &i.seeds).map(|s| s.position_m);
-        // The needle at work is one of the plan's.
+        // The present needle is one of the plan's.
         let places = of_needle.filter(|_| implant.is_none()).chain(of_all);
         for place in places.map(Vector3::from) {
             if self.plane.distance_m(place).abs() < SEED_HALF_M {
@@ -187,7 +188,7 @@ impl Overlay<'_> {
         }
     }
 
-    /// The one that moves over those that stay in.
+    /// Draws the moving needle over those that stay in.
     fn needles(&self) {
         for left in &self.shown.left {
             let (tip, direction) = (Vector3::from(left.tip_m), Vector3::from(left.direction));
@@ -199,7 +200,8 @@ impl Overlay<'_> {
         }
     }
 
-    /// The part in the plane as a line; where the needle only goes through, a dot; a ring about a tip in the plane.
+    /// Draws a needle: its part in the plane as a line, a dot if it crosses the plane, a ring about
+    /// a tip in the plane.
     fn needle(&self, points: &[Vector3<f64>]) {
         let width = (1.27e-3 / self.plane.m_per_point).clamp(2.0, 8.0) as f32;
         let pieces: Vec<[Pos2; 2]> = points
@@ -232,12 +234,13 @@ impl Overlay<'_> {
         }
     }
 
-    /// The part of a piece of needle that lies in the plane, on the screen.
+    /// Returns the part of a piece of needle that lies in the plane, on the screen.
     fn in_plane(&self, front: Vector3<f64>, end: Vector3<f64>) -> Option<[Pos2; 2]> {
         let length_m = (front - end).norm();
         let direction = (front - end).try_normalize(1e-9)?;
         let (at_front, per_m) = (self.plane.distance_m(front), -direction.dot(&self.plane.normal()));
-        // Ways back from the front at which the shaft is a given distance in front of the plane.
+        // Distances back from the front at which the shaft is a given distance in front of the
+        // plane.
         let back = |distance: f64| ((distance - at_front) / per_m).clamp(0.0, length_m);
         let (near, far) = if per_m.abs() < 1e-6 {
             let is_in = at_front.abs() < IN_PLANE_M;
@@ -269,7 +272,7 @@ impl Overlay<'_> {
         }
     }
 
-    /// Words on a dark background, so that they can be read on any tissue.
+    /// Writes text on a dark background, legible on any tissue.
     fn word(&self, at: Pos2, anchor: Align2, text: &str, size: f32, color: Color32) -> Rect {
         let galley = self
             .painter
@@ -282,7 +285,7 @@ impl Overlay<'_> {
         rect
     }
 
-    /// What banners leave of the picture.
+    /// Returns the part of the picture without banners.
     fn free(&self) -> Rect {
         free_of_banners(self.painter.ctx(), self.plane.rect)
     }
@@ -310,7 +313,7 @@ impl Overlay<'_> {
         );
     }
 
-    /// Where the slice is, in the patient.
+    /// Returns the place of the slice in the patient.
     fn place(&self) -> String {
         let Some(scene) = &self.shown.scene else {
             return String::new();
@@ -324,7 +327,7 @@ impl Overlay<'_> {
         format!("{letter} {}", format::length(in_patient))
     }
 
-    /// Under the title: what the pointer is on.
+    /// Writes the tissue under the pointer below the title.
     pub fn tissue(&self, name: &str) {
         if !name.is_empty() {
             let at = self.free().left_top() + Vec2::new(9.0, 24.0);

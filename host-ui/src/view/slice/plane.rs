@@ -1,13 +1,14 @@
-//! A plane through the body in the patient's directions, and where its points lie on the screen.
+//! A plane through the body in the patient's directions, and the mapping of its points to the
+//! screen.
 
 use crate::view::orientation::Orientation;
 use egui::{Pos2, Rect, Vec2};
 use nalgebra::{Matrix3, Vector3};
 
-/// The plane of one picture: its middle, two unit vectors, and how large a point of the screen is.
+/// Plane of one picture: its centre, two unit vectors, and the size of a point of the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// Middle of the picture, scene frame.
+    /// Centre of the picture, scene frame.
     pub middle_m: Vector3<f64>,
     /// Unit vector to the right of the picture.
     pub right: Vector3<f64>,
@@ -15,12 +16,12 @@ pub struct Plane {
     pub up: Vector3<f64>,
     /// Length of a point of the screen.
     pub m_per_point: f64,
-    /// Where the picture is in the window.
+    /// Place of the picture in the window.
     pub rect: Rect,
 }
 
 impl Plane {
-    /// The plane of this orientation through a middle (scene frame).
+    /// Returns the plane of this orientation through a centre (scene frame).
     pub fn new(
         orientation: Orientation,
         scene_from_patient: &Matrix3<f64>,
@@ -38,24 +39,24 @@ impl Plane {
         }
     }
 
-    /// Unit vector towards the eye.
+    /// Returns the unit vector towards the eye.
     pub fn normal(&self) -> Vector3<f64> {
         self.right.cross(&self.up)
     }
 
-    /// Distance of a point from the plane, positive in front of it.
+    /// Returns the distance of a point from the plane, positive in front of it.
     pub fn distance_m(&self, point: Vector3<f64>) -> f64 {
         (point - self.middle_m).dot(&self.normal())
     }
 
-    /// Where a point of the scene, dropped onto the plane, lies on the screen.
+    /// Returns the place on the screen of a scene point, projected onto the plane.
     pub fn on_screen(&self, point: Vector3<f64>) -> Pos2 {
         let from_middle = (point - self.middle_m) / self.m_per_point;
         let (x, y) = (from_middle.dot(&self.right), from_middle.dot(&self.up));
         self.rect.center() + Vec2::new(x as f32, -y as f32)
     }
 
-    /// Place in the scene under a place on the screen.
+    /// Returns the place in the scene under a place on the screen.
     pub fn in_scene(&self, place: Pos2) -> Vector3<f64> {
         let from_middle = place - self.rect.center();
         let (x, y) = (f64::from(from_middle.x), f64::from(-from_middle.y));

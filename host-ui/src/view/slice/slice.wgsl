@@ -1,16 +1,19 @@
-// One slice: for each place the material point that lies there now, and its grey in an image, or its brightness and grain as ultrasound.
-// The material point is found at the corners of small cells of the picture: displacements vary over millimetres.
+// One slice: for each place the material point that lies there now, and its grey in an image, or
+// its brightness and grain as ultrasound. The material point is found at the corners of small cells
+// of the picture, because displacements vary over millimetres.
 
-// How often the fixed point is applied at most, and what it need not be followed for (m).
+// Most iterations of the fixed point, and the residual at which they end (m).
 override STEPS: i32;
 override SEEN_M: f32;
 
 struct Slice {
-    // Middle of the picture, and the ways to its right and upper edge (m); beside the first the largest amplitude of grain, beside the last the largest level.
+    // Centre of the picture, and the vectors to its right and upper edge (m). The first also holds
+    // the largest amplitude of grain, the last the largest level.
     middle_m: vec4<f32>,
     right_m: vec4<f32>,
     up_m: vec4<f32>,
-    // Corner and size of the brightness volume and of the grid of displacements (m); beside the first the cells of the picture.
+    // Corner and size of the brightness volume and of the grid of displacements (m). The first also
+    // holds the cells of the picture.
     volume_corner_m: vec4<f32>,
     volume_size_m: vec4<f32>,
     nodes_corner_m: vec4<f32>,
@@ -48,7 +51,7 @@ fn brightness_at(rest_m: vec3<f32>) -> f32 {
     return textureSampleLevel(brightness, clamped, at, 0.0).x;
 }
 
-// Black where the image does not reach.
+// Black outside the image.
 fn image_at(rest_m: vec3<f32>) -> f32 {
     let place = vec4(rest_m, 1.0);
     let at = vec3(dot(slice.image_x, place), dot(slice.image_y, place), dot(slice.image_z, place));
@@ -70,7 +73,8 @@ fn slice_vertex(@builtin(vertex_index) index: u32) -> Out {
 
 fn rest_of(place_m: vec3<f32>) -> vec3<f32> {
     var rest_m = place_m;
-    // No uniform decides how often: Mesa's software driver would compile the shader anew for each of its values, and keep them all.
+    // The count is not a uniform: Mesa's software driver would compile the shader again for each of
+    // its values, and keep them all.
     for (var step = 0; step < STEPS; step++) {
         let next_m = place_m - displacement_m(rest_m);
         let moved_m = abs(next_m - rest_m);
@@ -82,7 +86,7 @@ fn rest_of(place_m: vec3<f32>) -> vec3<f32> {
     return rest_m;
 }
 
-// Two shaders: a driver without a graphics card takes both sides of each condition.
+// Two shaders, because a driver without a graphics card runs both sides of each condition.
 @fragment
 fn image_fragment(in: Out) -> @location(0) vec4<f32> {
     let grey = image_at(in.rest_m);
@@ -95,7 +99,7 @@ fn slice_fragment(in: Out) -> @location(0) vec4<f32> {
     let here = brightness_at(rest_m);
     let cell = vec3(dot(slice.grain_x.xyz, rest_m), dot(slice.grain_y.xyz, rest_m), dot(slice.grain_z.xyz, rest_m));
     let amplitude = textureSampleLevel(grain, repeated, cell, 0.0).x * slice.middle_m.w;
-    // What a scanner shows: the logarithm of what comes back.
+    // A scanner shows the logarithm of the echo.
     let level = here * slice.up_m.w * (1.0 + 0.34 * log(amplitude + 0.09));
     let value = clamp(level, 0.0, 1.0);
     return vec4(value * 0.97, value * 0.985, value, 1.0);

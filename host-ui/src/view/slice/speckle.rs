@@ -1,4 +1,5 @@
-//! What the simulated ultrasound of the slices is made of: the brightness of each cell, and the grain that belongs to its material.
+//! The simulated ultrasound of the slices: brightness of each cell, and the grain that moves with
+//! its material.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
@@ -8,20 +9,23 @@ use stylet_shm_schema::SceneHeader;
 
 /// Side of the cube of grain, which repeats.
 pub const GRAINS: usize = 64;
-/// The amplitude that the brightest texel stands for; the mean is 1.
+/// Amplitude of the brightest texel; the mean is 1.
 pub const LARGEST_AMPLITUDE: f32 = 4.0;
-/// Edges of a texel of grain along patient right, anterior and superior: finer along the beam, which starts in the
-/// rectum, as ultrasound resolves.
+/// Edges of a texel of grain along patient right, anterior and superior: finer along the beam,
+/// which starts in the rectum, as ultrasound resolves.
 pub const GRAIN_M: [f32; 3] = [0.42e-3, 0.24e-3, 0.42e-3];
 
-/// Cells of nothing around the labels. The outermost must not shine for an edge within the labels, which fill their grid from
-/// face to face: the graphics card goes on with the outermost cell as far as the picture reaches.
+/// Returns the number of empty cells around the labels, which fill their grid from face to face.
+/// The graphics card repeats the outermost cell to the edge of the picture, so it must not shine
+/// for an edge within the labels.
 pub fn border_cells(spacing_m: f64) -> usize {
-    // Labels finer than any image would need more; a number from shared memory must not ask for all of the card.
+    // Labels finer than any image would need more; a number from shared memory must not request all
+    // of the card.
     (REACH_M / spacing_m).ceil().min(64.0) as usize + 1
 }
 
-/// Brightness of every cell of a scene's labels, with a border of nothing around them, as bytes; and its size.
+/// Returns the brightness of every cell of a scene's labels, with an empty border, as bytes; and
+/// its size.
 pub fn brightness_volume(scene: &SceneHeader, labels: &[u8]) -> ([usize; 3], Vec<u8>) {
     let byte = |value: f32| (value * 255.0).round() as u8;
     let mut of_label = [byte(OUTSIDE); 256];
@@ -42,13 +46,15 @@ pub fn brightness_volume(scene: &SceneHeader, labels: &[u8]) -> ([usize; 3], Vec
     (dims, volume)
 }
 
-/// The level that the brightest texel with edges stands for.
+/// Level of the brightest texel with edges.
 pub const LARGEST_LEVEL: f32 = 1.55;
-/// Where tissue meets other tissue along the beam it shines: by this share of their difference, over this distance to both sides.
+/// Strength of the echo where tissue meets other tissue along the beam, as a share of their
+/// difference, and its distance to both sides.
 const SHINE: f32 = 0.55;
 const REACH_M: f64 = 0.8e-3;
 
-/// A volume of brightness with the edges that the beam meets; `beam` is its direction, a unit vector in the scene.
+/// Returns a volume of brightness with the edges that the beam meets; `beam` is its direction, a
+/// unit vector in the scene.
 pub fn with_edges(volume: &[u8], dims: [usize; 3], spacing_m: f64, beam: [f64; 3]) -> Vec<u8> {
     let reach = beam.map(|c| c * REACH_M / spacing_m);
     let level = |n: usize| {
@@ -61,7 +67,7 @@ pub fn with_edges(volume: &[u8], dims: [usize; 3], spacing_m: f64, beam: [f64; 3
         .collect()
 }
 
-/// Between the middles of cells, as the graphics card does; outside the nearest.
+/// Interpolates between centres of cells, like the graphics card; outside, takes the nearest.
 fn interpolated(volume: &[u8], dims: [usize; 3], place: [f64; 3]) -> f32 {
     let inside = [0, 1, 2].map(|a| place[a].clamp(0.0, (dims[a] - 1) as f64));
     let low = inside.map(|c| c as usize);
@@ -81,7 +87,8 @@ fn interpolated(volume: &[u8], dims: [usize; 3], place: [f64; 3]) -> f32 {
     sum
 }
 
-/// Amplitudes of fully developed speckle (Rayleigh), each correlated with its neighbours, mean 1; the same every time.
+/// Returns amplitudes of fully developed speckle (Rayleigh), each correlated with its neighbours,
+/// mean 1; always the same.
 pub fn grain() -> Vec<u8> {
     let mut random = ChaCha8Rng::seed_from_u64(0x5712);
     let [real, imaginary] = [(); 2].map(|()| {
@@ -96,7 +103,7 @@ pub fn grain() -> Vec<u8> {
     amplitudes.iter().map(byte).collect()
 }
 
-/// A quarter, a half, a quarter along one axis of the cube, which goes round.
+/// Blurs the cube along one axis by a quarter, a half, a quarter, periodically.
 fn blur(cube: &mut [f32], axis: usize) {
     let step = GRAINS.pow(axis as u32);
     let old = cube.to_vec();
@@ -132,7 +139,8 @@ mod tests {
         assert!(step(0, GRAINS - 1) < 2.0 * step(10, 11), "the seam is no edge");
     }
 
-    /// A step from 51 to 204 along y: the cells beside it shine by 0.55 of the difference where the beam goes along y.
+    /// Checks a step from 51 to 204 along y: its neighbours shine by 0.55 of the difference if the
+    /// beam goes along y.
     #[test]
     fn tissue_shines_where_the_beam_meets_other_tissue() {
         let dims = [3, 6, 2];
@@ -166,8 +174,8 @@ mod tests {
         assert_eq!((at(3, 2, 2), at(2, 2, 3), at(3, 2, 3)), (outside, 5, 77));
     }
 
-    /// A gland touches the faces of its grid. The cell beside it shone, was the last of the volume, and went on as a bright band
-    /// to the edge of the picture.
+    /// Guards against a bright band: a gland that touches the faces of its grid made the last cell
+    /// of the volume shine, and the card repeated it to the edge of the picture.
     #[test]
     fn the_faces_of_the_volume_are_dark_however_the_beam_goes() {
         let mut scene = SceneHeader::zeroed();

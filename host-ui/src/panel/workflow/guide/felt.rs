@@ -1,13 +1,13 @@
-//! The membranes that a needle met, from the records of the ticks.
+//! The membranes that a needle met, from the tick records.
 
 use stylet_shm_schema::{TickRecord, flags};
 
-/// A membrane that gave way.
+/// Membrane that gave way.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Puncture {
-    /// How far the tip pressed it in before, m.
+    /// Distance by which the tip pressed it in before, m.
     pub pressed_m: f64,
-    /// Largest force on the hand meanwhile, N.
+    /// Largest force on the hand during that time, N.
     pub force_n: f64,
 }
 
@@ -20,7 +20,7 @@ pub struct Felt {
     session: u64,
 }
 
-/// More membranes than any way through a body has.
+/// Most membranes on a path, more than any body has.
 const MOST: usize = 16;
 
 impl Felt {
@@ -49,7 +49,7 @@ impl Felt {
         }
     }
 
-    /// Those of the last insertion, the outermost first.
+    /// Returns the punctures of the last insertion, the outermost first.
     pub fn punctures(&self) -> &[Puncture] {
         &self.punctures
     }

@@ -1,4 +1,4 @@
-//! The words of the guide for what comes next.
+//! The texts of the guide for the next step.
 
 use super::felt::{Felt, Puncture};
 use crate::panel::workflow::progress::{Progress, needle_at_hand, progress};
@@ -6,18 +6,18 @@ use crate::shown::{NeedleLine, SeedError, Shown, all_errors};
 use stylet_base::format;
 use stylet_procedure::{AtHand, Operation};
 
-/// What to do, and what to watch meanwhile.
+/// Instruction, and observations during it.
 #[derive(Debug, Default, PartialEq)]
 pub struct Lesson {
-    /// What to do.
+    /// Instruction.
     pub what: String,
-    /// What to watch, or what happened.
+    /// Observations, during the step or after it.
     pub notes: Vec<String>,
 }
 
-/// What is shown as no force.
+/// Force below which zero is shown.
 const LEAST_N: f64 = 5e-3;
-/// Seeds that have a line of their own.
+/// Number of seeds with a line of their own.
 const SEEDS: usize = 6;
 
 fn of(what: impl Into<String>, notes: &[&str]) -> Lesson {
@@ -27,11 +27,11 @@ fn of(what: impl Into<String>, notes: &[&str]) -> Lesson {
     }
 }
 
-/// What comes next, by the state of the core.
+/// Returns the next lesson, by the state of the core.
 pub fn lesson(shown: &Shown, felt: &Felt) -> Lesson {
     let lesson = next_lesson(shown, felt);
     match &shown.watched {
-        // What is said to whoever moves a needle is what happens here.
+        // A recording is described, not instructed.
         Some(_) if progress(shown) != Progress::Debrief => Lesson {
             what: format!(
                 "A recorded insertion: look on. Whoever moves the needle reads here: \u{201c}{}\u{201d}",
@@ -188,7 +188,7 @@ fn depths(shown: &Shown) -> Vec<Depths> {
     all_errors(shown).into_iter().filter_map(of_seed).collect()
 }
 
-/// Why the seeds missed, in figures of this insertion.
+/// Explains why the seeds missed, in figures of this insertion.
 fn debrief(shown: &Shown, felt: &Felt) -> Lesson {
     let seeds = depths(shown);
     if seeds.is_empty() {

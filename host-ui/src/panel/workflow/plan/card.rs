@@ -1,4 +1,4 @@
-//! The step of the plan: make one, compensate it, save it, and its dose.
+//! The step of the plan: create, compensate and save it, and show its dose.
 
 use super::super::{WorkflowState, debrief, hinted, main_button, progress, undo_action};
 use super::summary;
@@ -22,7 +22,7 @@ pub fn plan_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, read
         None => begin_ui(ui, shown, (ready, free), actions),
         Some(implant) => implant_ui(ui, shown, implant, free, actions),
     }
-    // What cannot be done meanwhile makes room for how far it is.
+    // Blocked actions make room for the progress of the job.
     match &shown.planning.job {
         Some(work) => {
             if job_ui(ui, &work.what, work.share) {
@@ -36,7 +36,7 @@ pub fn plan_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, read
     }
 }
 
-/// One needle, or many.
+/// Draws the choice between one needle and many.
 fn begin_ui(ui: &mut egui::Ui, shown: &Shown, (ready, free): (bool, bool), actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         main_button(ui, ("Plan five seeds", Action::PlanSeeds), ready, actions);
@@ -162,10 +162,10 @@ fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut V
     });
 }
 
-/// Buttons beside the field of the plan's file.
+/// Width of the buttons next to the field of the plan's file.
 const BESIDE_FIELD: f32 = 170.0;
 
-/// By name of the format.
+/// Draws the dialogs by name of the format.
 fn dialogs_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     let menu = ui.menu_button("…", |ui| {
         let import = [(Purpose::ImportPlan, progress::is_before_needles(shown))];
@@ -209,7 +209,7 @@ fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bo
     }
 }
 
-/// Structure set, plan and dose at once.
+/// Draws the export of structure set, plan and dose.
 fn study_ui(ui: &mut egui::Ui, free: bool, actions: &mut Vec<Action>) {
     let response = ui.add_enabled(free, Button::new("Save as DICOM study"));
     let hint = "Structure set, plan and dose that name each other, into a new folder; patient and frame are those of the scene's \

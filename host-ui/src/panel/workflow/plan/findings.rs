@@ -1,4 +1,4 @@
-//! Problems of the plan, and limits that its dose does not keep, in words; a click shows the needle.
+//! Problems of the plan, and limits that its dose violates, in words; a click shows the needle.
 
 use super::{PlanState, name_of};
 use crate::dose_worker::{DoseOf, DoseResult, Figure};
@@ -44,7 +44,7 @@ pub fn findings_ui(ui: &mut egui::Ui, dose: Option<&DoseResult>, implant: &Impla
         });
 }
 
-/// Criteria that the dose of the plan does not meet; `None` for a dose of other seeds.
+/// Returns the criteria that the dose of the plan fails; `None` for a dose of other seeds.
 fn broken(dose: &DoseResult, implant: &Implant) -> Option<Vec<String>> {
     let is_of_plan = dose.of == DoseOf::Plan && dose.seeds == implant.seeds.len();
     is_of_plan.then(|| dose.figures.iter().filter_map(Figure::broken).collect())
@@ -72,7 +72,7 @@ fn finding_ui(ui: &mut egui::Ui, implant: &Implant, problem: &Problem, state: &m
     ui.painter().galley(rect.min, galley, tokens.text);
 }
 
-/// "Needle 3, E5, seed 2: it lies outside the gland".
+/// Returns a text such as "Needle 3, E5, seed 2: it lies outside the gland".
 fn words(implant: &Implant, problem: &Problem) -> String {
     let Some(number) = problem.needle else {
         return problem.what.clone();

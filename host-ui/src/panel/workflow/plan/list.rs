@@ -1,4 +1,4 @@
-//! All needles in the order in which they go in.
+//! All needles in the order of insertion.
 
 use super::template::needle_mark;
 use super::{PlanState, name_of};
@@ -9,11 +9,11 @@ use stylet_base::format;
 use stylet_implant::plan::Loading;
 
 const ROW: f32 = 19.0;
-/// At least so many rows can be seen at once.
+/// Fewest visible rows.
 const LEAST_ROWS: f32 = 4.0;
-/// Left for the findings under it, where there are any and where there are none.
+/// Height for the findings below, with and without any.
 const BELOW: [f32; 2] = [104.0, 40.0];
-/// Left edges: number, hole, seeds, loading, depth, state.
+/// Left edges of the columns: number, hole, seeds, loading, depth, state.
 const COLUMNS: [f32; 6] = [22.0, 50.0, 84.0, 122.0, 174.0, 246.0];
 
 pub fn list_ui(ui: &mut egui::Ui, implant: &Implant, state: &mut PlanState) {
@@ -56,7 +56,7 @@ fn row_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, is_chosen: bool, 
         state.listed = Some(number);
         ui.scroll_to_rect_animation(rect, None, egui::style::ScrollAnimation::none());
     }
-    // A row that is mostly cut off is none.
+    // Skip a row that is mostly cut off.
     if ui.clip_rect().expand(0.5).intersect(rect).height() < ROW - 1.0 {
         return;
     }

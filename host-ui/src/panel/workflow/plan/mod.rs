@@ -1,4 +1,4 @@
-//! The plan: in the step what is done with it as a whole; at the right, instead of the instruments, its needles.
+//! The plan: whole-plan actions in the step; its needles at the right, in place of the instruments.
 
 mod card;
 mod findings;
@@ -16,16 +16,16 @@ pub(super) use card::plan_ui;
 use egui::Button;
 use stylet_implant::plan::{Hole, ImplantPlan};
 
-/// What a person is looking at.
+/// Selection of the user in the plan.
 pub struct PlanState {
-    /// Of a plan file.
+    /// Path of a plan file.
     pub path: String,
     pub(super) hole: Hole,
-    /// A needle that goes through no hole.
+    /// Selected needle, if it goes through no hole.
     by_hand: Option<usize>,
-    /// Of the outlines, from the template's face; `None` until it is set.
+    /// Depth of the outlines, from the template's face; `None` until it is set.
     depth_m: Option<f64>,
-    /// The needle that the list was last moved to.
+    /// Needle to which the list was scrolled last.
     listed: Option<usize>,
 }
 
@@ -42,7 +42,7 @@ impl Default for PlanState {
 }
 
 impl PlanState {
-    /// The needle that is looked at.
+    /// Returns the selected needle.
     fn needle(&self, plan: &ImplantPlan) -> Option<usize> {
         let by_hand = self
             .by_hand
@@ -62,10 +62,10 @@ impl PlanState {
     }
 }
 
-/// Where there is less, the panel as a whole scrolls.
+/// Height below which the panel as a whole scrolls.
 const LEAST_HEIGHT: f32 = 620.0;
 
-/// The right panel while a plan of many needles is edited.
+/// Draws the right panel while a plan of many needles is edited.
 pub fn editor_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut PlanState, height: f32) -> Vec<Action> {
     let mut actions = Vec::new();
     ui.set_max_height(height.max(LEAST_HEIGHT));
@@ -78,7 +78,7 @@ pub fn editor_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut PlanState, height
         template::template_ui(ui, shown, implant, state, &mut actions);
         needle::needle_ui(ui, shown, implant, state, &mut actions);
     });
-    // Looked through at any time, also while the script runs.
+    // Available at any time, also while the script runs.
     ui.separator();
     list::list_ui(ui, implant, state);
     ui.separator();
@@ -109,7 +109,7 @@ fn head_ui(ui: &mut egui::Ui, implant: &Implant, actions: &mut Vec<Action>) {
     });
 }
 
-/// "24 needles, 98 seeds of 0.43 U".
+/// Returns a text such as "24 needles, 98 seeds of 0.43 U".
 fn summary(implant: &Implant) -> String {
     let plan = &implant.plan;
     let strengths = || implant.seeds.iter().map(|s| s.strength_u);
@@ -127,13 +127,13 @@ fn summary(implant: &Implant) -> String {
     format!("{needles} needle{plural}, {} seeds{strength}", implant.seeds.len())
 }
 
-/// "E5", or the number of one that is held by hand.
+/// Returns the hole, such as "E5", or the number of a needle held by hand.
 fn name_of(plan: &ImplantPlan, number: usize) -> String {
     let hole = plan.needles.get(number).and_then(|n| n.hole);
     hole.map_or_else(|| format!("needle {}", number + 1), |h| h.to_string())
 }
 
-/// Where in the implantation: "Needle 3 of 24, through E5".
+/// Returns the position in the procedure, such as "Needle 3 of 24, through E5".
 pub(super) fn at_work(shown: &Shown) -> Option<String> {
     let implant = shown.planning.implant.as_ref()?;
     let number = progress::next_needle(shown).or_else(|| Some(shown.planning.at_work()?.0))?;
@@ -142,7 +142,7 @@ pub(super) fn at_work(shown: &Shown) -> Option<String> {
     Some(format!("Needle {} of {count}, {name}.", number + 1))
 }
 
-/// The button for the needle after this one, where a person may leave this one.
+/// Draws the button for the next needle, if a person may leave the present one.
 pub(super) fn next_needle_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     if shown.planning.next_needle().is_none() || shown.planning.waits() {
         return;

@@ -1,4 +1,4 @@
-//! The needle of the chosen hole: its seeds, and where it goes.
+//! The needle of the chosen hole: its seeds, and its path.
 
 use super::template::move_needle;
 use super::{PlanState, name_of};

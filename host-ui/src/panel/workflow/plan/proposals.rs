@@ -1,4 +1,4 @@
-//! Proposals of the automatic plan to choose from, with what each keeps when seeds miss their places against what it costs.
+//! Proposals of the automatic plan, with their robustness against misplaced seeds and its cost.
 
 use crate::action::{Action, PlanAction};
 use crate::panel::axis::{marks, plot};
@@ -10,15 +10,15 @@ use stylet_implant::plan::first::{FirstPlan, Measures};
 
 /// Height of the picture.
 const HEIGHT: f32 = 72.0;
-/// Limit of the hot part of the target, percent.
+/// Limit of V150 of the target, percent.
 const MOST_V150: f64 = 60.0;
-/// Share of trials that should keep their D90, percent.
+/// Share of trials that should meet their D90, percent.
 const TRIALS_KEPT: f64 = 95.0;
-/// What the picture shows at least.
+/// Smallest range of the picture.
 const SHOWN_V150: [f64; 2] = [20.0, 64.0];
 const SHOWN_KEPT: [f64; 2] = [40.0, 104.0];
 
-/// A button for each proposal, the picture, and the figures of the one that is the plan now.
+/// Draws a button for each proposal, the picture, and the figures of the current plan.
 pub fn proposals_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut Vec<Action>) {
     let Some(proposals) = shown.planning.proposals.as_ref().filter(|all| all.len() > 1) else {
         return;
@@ -42,7 +42,7 @@ pub fn proposals_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut 
     super::weak_line(ui, text);
 }
 
-/// Share of the trials that keep their D90 over V150: better is up and to the left.
+/// Draws the share of trials that meet their D90 over V150: better is up and to the left.
 fn picture_ui(ui: &mut egui::Ui, proposals: &[FirstPlan], chosen: Option<usize>) {
     let tokens = theme::of(ui);
     ui.horizontal(|ui| {
@@ -91,7 +91,7 @@ fn hint(proposal: &FirstPlan) -> String {
     format!("{}\n{}", proposal.why, words(proposal))
 }
 
-/// "25 needles, V150 42 %, 96 % keep D90": so many of the trials.
+/// Returns a text such as "25 needles, V150 42 %, 96 % keep D90", a share of the trials.
 fn words(proposal: &FirstPlan) -> String {
     let needles = proposal.plan.needles.len();
     let Some(Measures { figures, robust, .. }) = &proposal.measures else {

@@ -12,11 +12,11 @@ use egui::{
 use stylet_base::format;
 use stylet_implant::plan::{HOLES, Hole, Loading};
 
-/// For letters under the holes and numbers beside them.
+/// Room for letters under the holes and numbers at their side.
 const LETTERS: f32 = 16.0;
-/// From hole to hole, in points.
+/// Distance between holes, in points.
 const PITCHES: [f32; 2] = [16.0, 22.0];
-/// What stands under the template takes so much.
+/// Height of the parts below the template.
 const BELOW: f32 = 400.0;
 const NEEDLE: f32 = 5.5;
 
@@ -71,7 +71,7 @@ pub fn template_ui(
     depth_ui(ui, shown, state, actions);
 }
 
-/// Hole, depth, seeds, in words.
+/// Returns hole, depth and seeds, in words.
 fn hole_text(implant: &Implant, hole: Hole) -> String {
     let number = implant.plan.needles.iter().position(|n| n.hole == Some(hole));
     let Some(number) = number else {
@@ -91,7 +91,8 @@ fn hole_text(implant: &Implant, hole: Hole) -> String {
     )
 }
 
-/// Arrows go from hole to hole, with Shift they move the needle; Enter adds one, Delete removes it.
+/// Handles keys: arrows select a hole, with Shift they move the needle; Enter adds one, Delete
+/// removes it.
 fn steer(ui: &egui::Ui, response: &Response, implant: &Implant, state: &mut PlanState, actions: &mut Vec<Action>) {
     if !response.has_focus() || !ui.is_enabled() {
         return;
@@ -133,7 +134,7 @@ fn steer(ui: &egui::Ui, response: &Response, implant: &Implant, state: &mut Plan
     }
 }
 
-/// To a hole that is free.
+/// Moves a needle to a free hole.
 pub fn move_needle(implant: &Implant, number: usize, to: Hole, state: &mut PlanState, actions: &mut Vec<Action>) {
     let is_free = implant.plan.needles.iter().all(|n| n.hole != Some(to));
     if is_free && implant.states[number] == NeedleState::Planned {
@@ -142,7 +143,8 @@ pub fn move_needle(implant: &Implant, number: usize, to: Hole, state: &mut PlanS
     }
 }
 
-/// Each hole can be clicked and has a name; the keys reach them through the template as a whole.
+/// Draws the holes. Each can be clicked and has a name; the keys reach them through the template as
+/// a whole.
 fn holes_ui(
     ui: &egui::Ui,
     template: &Response,
@@ -168,7 +170,7 @@ fn holes_ui(
     hovered
 }
 
-/// Which plane the outlines are cut in; the axial slice goes there too.
+/// Draws the choice of the outlines' plane, which the axial slice follows.
 fn depth_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut PlanState, actions: &mut Vec<Action>) {
     let (Some(outlines), Some(depth_m)) = (&shown.planning.outlines, &mut state.depth_m) else {
         return;
@@ -189,7 +191,7 @@ fn depth_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut PlanState, actions: &m
     });
 }
 
-/// Where the holes are on the screen.
+/// Positions of the holes on the screen.
 struct Board {
     rect: Rect,
     pitch: f32,
@@ -280,7 +282,7 @@ impl Look<'_> {
     }
 }
 
-/// Planned: an open ring; inserted: a triangle; done: a full square.
+/// Draws the mark of a needle. Planned: an open ring; inserted: a triangle; done: a full square.
 pub fn needle_mark(painter: &Painter, at: Pos2, state: NeedleState, tokens: &Tokens) {
     let stroke = Stroke::new(2.0, tokens.seed_planned);
     match state {

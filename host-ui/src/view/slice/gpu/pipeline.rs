@@ -1,10 +1,10 @@
-//! How a slice is drawn: its bindings and its shader.
+//! Bindings and shader of a slice.
 
 use super::COLOR;
 use eframe::wgpu;
 use stylet_surfaces::field::{SEEN_M, STEPS};
 
-/// Uniform, four volumes and two samplers.
+/// Creates the layout: uniform, four volumes and two samplers.
 pub fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     let volume = wgpu::BindingType::Texture {
         sample_type: wgpu::TextureSampleType::Float { filterable: true },
@@ -33,7 +33,7 @@ pub fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     })
 }
 
-/// Of what the fragment shader of this name shows.
+/// Creates the pipeline of the fragment shader with this name.
 pub fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, shader: &str) -> wgpu::RenderPipeline {
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("stylet slice"),

@@ -24,7 +24,7 @@ pub fn volume(state: &RenderState, format: wgpu::TextureFormat, dims: [u32; 3]) 
     })
 }
 
-/// Returns the bytes that it sent.
+/// Writes a volume; returns the number of bytes sent.
 pub fn write(state: &RenderState, texture: &wgpu::Texture, bytes: &[u8], bytes_per_texel: u32) -> u64 {
     let size = texture.size();
     let layout = wgpu::TexelCopyBufferLayout {
