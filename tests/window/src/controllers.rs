@@ -1,4 +1,5 @@
-//! Gamepad and 3D mouse in the window on a running core: what they move, and that letting go or unplugging stops it.
+//! Gamepad and 3D mouse in the window on a running core: what they move, and that releasing or
+//! unplugging them stops it.
 
 use crate::driven::{Driven, is_at_rest, misplaced};
 use crate::plugged::Table;
@@ -36,7 +37,8 @@ fn wait(driven: &mut Driven, frames: usize) {
     }
 }
 
-/// A hand that outran slow frames rests at its last goal too, so the window must have seen first that it was released.
+/// Waits for rest. A hand that outran slow frames rests at its last goal too, so the window must
+/// have seen the release first.
 fn rest(driven: &mut Driven) {
     wait(driven, 20);
     driven.until("rest", is_at_rest);
@@ -109,7 +111,7 @@ fn a_cap_moves_the_needle_across_outside_only_and_it_keeps_its_line_in_the_tissu
     });
     cap.axis(AbsoluteAxisCode::ABS_Z, 0.0);
     rest(&mut driven);
-    // Inside: sliding does nothing, and the keys keep to the line.
+    // Inside tissue: sliding does nothing, and the keys keep to the line.
     cap.axis(AbsoluteAxisCode::ABS_X, -1.0);
     assert_stays(&mut driven, "slid inside");
     cap.axis(AbsoluteAxisCode::ABS_X, 0.0);
@@ -121,7 +123,7 @@ fn a_cap_moves_the_needle_across_outside_only_and_it_keeps_its_line_in_the_tissu
     rest(&mut driven);
     let rests = tip(driven.window.state())[2];
     assert!(
-        // What the hand's spring gives as it comes to rest.
+        // The hand's spring yields this much as it comes to rest.
         rests > released - 0.2e-3,
         "released at {released} m, it went back to {rests} m"
     );

@@ -1,4 +1,4 @@
-//! The real window on a core of its own, drawn by the software driver and driven as a person would.
+//! The real window on a core of its own, drawn by the software driver and driven like by a person.
 
 use crate::kept::{assert_like_kept, tolerant, with_fewer_greys};
 use egui_kittest::Harness;
@@ -24,7 +24,7 @@ impl Driven {
         Self::on(Core::start(), size)
     }
 
-    /// On a machine of any rights the same: the core does not ask for real time.
+    /// Opens a core without real time, so that the machine's rights do not matter.
     pub fn open_plain(size: [f32; 2]) -> Self {
         Self::on(Core::start_with(&["--no-rt"]), size)
     }
@@ -36,7 +36,7 @@ impl Driven {
         driven
     }
 
-    /// Closes the window as a kill would, and opens another.
+    /// Closes the window like a kill, and opens another.
     pub fn reopen(&mut self, size: [f32; 2]) {
         self.window = Self::window(&self.core, size);
         self.until_live();
@@ -66,7 +66,8 @@ impl Driven {
         window
     }
 
-    /// Some steps, the last ones drawn as the window that ships draws them. What moved last is drawn in full by then.
+    /// Runs some steps, the last ones drawn like in the shipped window. By then, parts that moved
+    /// are drawn in full.
     fn draw(&mut self) {
         for _ in 0..20 {
             self.window.run_steps(1);
@@ -76,7 +77,7 @@ impl Driven {
         self.window.run_steps(3);
     }
 
-    /// What was drawn, with what was covered since.
+    /// Returns the last picture, with covered areas blanked.
     fn drawn(&mut self) -> image::RgbaImage {
         let picture = self.window.render().expect("a picture");
         App::draw_changes_only(&self.window.ctx, false);
@@ -89,7 +90,7 @@ impl Driven {
         });
     }
 
-    /// Draws frames until the window knows what is waited for.
+    /// Draws frames until the window reaches the expected state.
     pub fn until(&mut self, what: &str, ready: impl Fn(&App) -> bool) {
         let start = Instant::now();
         while !ready(self.window.state()) {
@@ -120,7 +121,7 @@ impl Driven {
         self.window.run_steps(2);
     }
 
-    /// A hand takes the tip in the sagittal slice and draws it on.
+    /// Pulls the tip in the sagittal slice by hand.
     pub fn pull_tip(&mut self, ahead_m: f64) {
         let at = |driven: &Self, ahead_m: f64| {
             let app = driven.window.state();
@@ -152,7 +153,7 @@ impl Driven {
         picture
     }
 
-    /// As [`Driven::compare`], where the plan stands in place of the plots.
+    /// Like [`Driven::compare`], while the plan is shown in place of the plots.
     pub fn compare_plan(&mut self, name: &str) {
         assert_like_kept(name, &tolerant(), || {
             self.draw();
@@ -163,7 +164,7 @@ impl Driven {
         });
     }
 
-    /// What moves is drawn coarser: frames until hand and tissue have come to rest.
+    /// Draws frames until hand and tissue are at rest, because moving parts are drawn coarser.
     pub fn come_to_rest(&mut self) {
         for _ in 0..10 {
             self.draw();
@@ -171,8 +172,8 @@ impl Driven {
         }
     }
 
-    /// As [`Driven::compare`] where tissue and seeds have moved, never to the same place twice: the slices are covered too, and
-    /// figures may differ by so many pixels.
+    /// Like [`Driven::compare`], after tissue and seeds have moved, which never repeats exactly:
+    /// the slices are covered too, and figures may differ by this number of pixels.
     pub fn compare_live(&mut self, name: &str, pixels: usize) {
         assert_like_kept(name, &tolerant().max_failed_pixels(pixels), || {
             self.come_to_rest();
@@ -184,7 +185,7 @@ impl Driven {
         });
     }
 
-    /// Figures at the top, and the plots.
+    /// Covers the figures at the top, and the plots.
     fn cover_figures(&mut self) {
         let size = self.window.ctx.content_rect().size();
         let cover = |from: [f32; 2], to: [f32; 2]| egui::Rect::from_min_max(from.into(), to.into());
@@ -192,7 +193,7 @@ impl Driven {
         self.window.mask(cover([size.x - 330.0, 40.0], [size.x, size.y]));
     }
 
-    /// Compares with the picture that is kept; what lives is covered: figures at the top and the plots.
+    /// Compares with the kept picture; live parts are covered: figures at the top and the plots.
     pub fn compare(&mut self, name: &str) {
         assert_like_kept(name, &tolerant(), || {
             self.draw();
@@ -202,7 +203,8 @@ impl Driven {
     }
 }
 
-/// Draws the last frame at once, and compares it with what its changes made of the frames before.
+/// Draws the last frame at once, and compares it with the result of its changes to the previous
+/// frames.
 pub fn assert_drawn_by_changes<T>(window: &mut Harness<'static, T>, state: &str) {
     let by_changes = window.render().expect("a picture");
     App::draw_all_again(&window.ctx);
@@ -217,7 +219,7 @@ pub fn assert_drawn_by_changes<T>(window: &mut Harness<'static, T>, state: &str)
     assert_eq!(differing.len(), 0, "{state}: {some:?}");
 }
 
-/// Written only by `make picture`.
+/// Saves a picture for the documentation; called only by `make picture`.
 pub fn keep_for_docs(picture: &image::RgbaImage, name: &str) {
     if std::env::var_os("UPDATE_SNAPSHOTS").is_none() {
         return;
@@ -233,7 +235,7 @@ pub fn keep_for_docs(picture: &image::RgbaImage, name: &str) {
     rgb.write_with_encoder(encoder).expect("a PNG");
 }
 
-/// Words and widgets that lie outside the window, and pairs that lie over each other.
+/// Returns text and widgets outside the window, and pairs that overlap.
 pub fn misplaced(window: &Harness<'_, App>) -> Vec<String> {
     use egui::accesskit::Role;
     let screen = window.ctx.content_rect();

@@ -1,4 +1,5 @@
-//! Greys of an image in the slices of the real window: where they lie, that they move with the tissue, and when they go.
+//! Greys of an image in the slices of the real window: their place, their motion with the tissue,
+//! and their end.
 
 use crate::driven::{Driven, misplaced};
 use egui_kittest::kittest::{NodeT, Queryable, by};
@@ -13,20 +14,21 @@ use stylet_tests::scratch;
 
 const DIMS: [usize; 3] = [90, 100, 110];
 const SPACING_MM: f64 = 0.8;
-/// Of the waves of grey along each axis of the scene.
+/// Wavelength of the grey waves along each axis of the scene.
 const WAVE_M: [f64; 3] = [0.024, 0.031, 0.012];
-/// Between voxels a wave is taken as straight, 1.4 greys at a crest along z; where it is steep, 33 greys a millimetre, the shader
-/// finds the material point to a fifth of one.
+/// Tolerance of a grey. Linear interpolation between voxels costs 1.4 greys at a crest along z. The
+/// steepest slope is 33 greys a millimetre, and the shader finds the material point to a fifth of
+/// one.
 const GREY_OFF: f64 = 8.0;
 const MOVED_M: f64 = 1e-3;
 
-/// Waves that have no edge anywhere, 0 to 4000 or so.
+/// Returns waves without an edge, 0 to about 4000.
 fn value(scene_m: [f64; 3]) -> f64 {
     let wave = |a: usize| (std::f64::consts::TAU * scene_m[a] / WAVE_M[a]).sin();
     2000.0 + 600.0 * wave(0) + 500.0 * wave(1) + 900.0 * wave(2)
 }
 
-/// A volume that lies obliquely in the patient, `shift_m` beside the middle of the target.
+/// Writes a volume that lies obliquely in the patient, `shift_m` from the middle of the target.
 fn write_image(driven: &Driven, path: &Path, shift_m: f64) {
     let header = driven.window.state().link().scene().expect("live").header;
     let m = header.patient_from_scene;
@@ -91,11 +93,12 @@ fn wait_for(driven: &mut Driven, words: &str) {
     }
 }
 
-/// Of the places in a slice, or of those whose tissue has moved.
+/// Agreement of places in a slice, or of those whose tissue has moved.
 #[derive(Debug, Default)]
 struct Agreement {
     places: usize,
-    /// Their grey is that of the tissue that lies there now, and of what lay there at rest.
+    /// Number of places whose grey is that of the tissue there now, and of the tissue there at
+    /// rest.
     now: usize,
     at_rest: usize,
 }
@@ -106,7 +109,7 @@ impl Agreement {
     }
 }
 
-/// All places, and those where tissue has come from more than `MOVED_M` away.
+/// Returns all places, and those where tissue has come from more than `MOVED_M` away.
 fn agreement(driven: &mut Driven, image: &Image) -> [Agreement; 2] {
     driven.window.run_steps(3);
     let picture = driven.window.render().expect("a picture");
@@ -122,7 +125,7 @@ fn agreement(driven: &mut Driven, image: &Image) -> [Agreement; 2] {
         for x in (rect.left() as u32 + 20..rect.right() as u32 - 20).step_by(2) {
             let place = plane.in_scene(egui::pos2(x as f32 + 0.5, y as f32 + 0.5));
             let [r, g, b, _] = picture.get_pixel(x, y).0;
-            // What is drawn over it has colours; ultrasound is tinted a little.
+            // Overlays have colours; ultrasound is tinted a little.
             if r.max(g).max(b) - r.min(g).min(b) > 8 {
                 continue;
             }
@@ -209,7 +212,7 @@ fn an_image_of_elsewhere_and_a_file_that_is_none_are_refused_with_words() {
     assert!(driven.window.query_by_label("Image").is_none());
 }
 
-/// A hundred million voxels of nothing take a second or two to unpack.
+/// Tests a hundred million empty voxels, which take a second or two to unpack.
 #[test]
 fn a_long_load_reports_its_share_and_ends_when_it_is_cancelled() {
     let mut driven = Driven::open_plain([1280.0, 800.0]);

@@ -1,4 +1,5 @@
-//! An instructor's window beside a trainee's: the same debrief, heard over the link, and what exercises look like in both.
+//! An instructor's window and a trainee's: the same debrief, received over the link, and the
+//! display of exercises in both.
 
 use crate::driven::{Driven, misplaced};
 use crate::kept::{assert_like_kept, tolerant};
@@ -16,7 +17,7 @@ use stylet_shm_schema::Instance;
 use stylet_shm_schema::{Class, ClassMember, Exercise, Relayed, Request, Text};
 use stylet_tests::{ask, scratch, until};
 
-/// That of whoever follows one trainee, on a core that is live.
+/// Opens the window of an instructor who follows one trainee, on a live core.
 fn instructor(instance: &Instance, class: Option<PathBuf>) -> Harness<'static, App> {
     let options = Options {
         instance: instance.clone(),
@@ -56,7 +57,7 @@ fn step_until(window: &mut Harness<'static, App>, what: &str, holds: impl Fn(&Ha
     }
 }
 
-/// The folder that the window says it has written.
+/// Returns the folder that the window reports as written.
 fn saved(window: &mut Harness<'static, App>) -> PathBuf {
     let words = |window: &Harness<'static, App>| {
         let node = window.query_by_label_contains("Debrief saved as")?;
@@ -74,7 +75,7 @@ fn score(folder: &Path) -> Value {
     serde_json::from_slice(&bytes).expect("JSON")
 }
 
-/// Where a figure differs by more than `off` of it, and what is there in one alone.
+/// Returns the figures that differ by more than `off`, and entries that only one has.
 fn differing(place: &str, one: &Value, other: &Value, off: f64) -> Vec<String> {
     match (one, other) {
         (Value::Number(a), Value::Number(b)) => {
@@ -102,7 +103,8 @@ fn differing(place: &str, one: &Value, other: &Value, off: f64) -> Vec<String> {
     }
 }
 
-/// The instructor's window had the debrief of the last needle alone, with a strength of its own.
+/// Guards against a debrief of the last needle alone, with a strength of its own, in the
+/// instructor's window.
 #[test]
 fn the_instructor_makes_the_debrief_that_the_trainee_makes() {
     let mut driven = open(SMALL);
@@ -123,7 +125,7 @@ fn the_instructor_makes_the_debrief_that_the_trainee_makes() {
         other.run_steps(1);
         std::thread::sleep(Duration::from_millis(5));
     }
-    // It comes by itself once the seeds rest, and again for whoever asks.
+    // It is written automatically once the seeds rest, and again on request.
     let by_itself = saved(&mut other);
     assert_eq!(by_itself.parent(), Some(class.join("Otto").as_path()));
     for _ in 0..60 {
@@ -145,10 +147,10 @@ fn the_instructor_makes_the_debrief_that_the_trainee_makes() {
     assert_eq!(heard["seeds"][2]["hole"], "H7");
     for value in [&mut own_score, &mut heard] {
         let all = value.as_object_mut().expect("figures");
-        // What it was made from, and for whom; the procedure ends a moment later for whoever asks later.
+        // Its inputs and its reader differ; the procedure ends a moment later for a later request.
         all.retain(|key, _| !["title", "made"].contains(&key.as_str()));
     }
-    // Seeds creep on between the two: by 8 um in a second, where millimetres came of another needle's strength.
+    // Seeds creep between the two: 8 um in a second. Another needle's strength gave millimetres.
     let found = differing("score", &own_score, &heard, 2e-2);
     assert!(found.is_empty(), "{}", found.join("\n"));
     let first = score(&by_itself);
@@ -171,12 +173,12 @@ fn compare(window: &mut Harness<'static, App>, name: &str) {
         picture
     });
     let mut problems = misplaced(window);
-    // A dialog lies over what is behind it.
+    // A dialog lies over the widgets behind it.
     problems.retain(|problem| !problem.contains(" lies over "));
     assert!(problems.is_empty(), "{name}:\n{}", problems.join("\n"));
 }
 
-/// Words that say how long ago something was are never twice the same.
+/// Covers the texts that say how long ago something was, because they never repeat.
 fn cover_times(window: &mut Harness<'static, App>) {
     let cover = |from: [f32; 2], to: [f32; 2]| egui::Rect::from_min_max(from.into(), to.into());
     let mut rects = vec![
@@ -198,7 +200,7 @@ fn cover_times(window: &mut Harness<'static, App>) {
     rects.into_iter().for_each(|rect| window.mask(rect));
 }
 
-/// In the instructor's window its dialog and the list; in the trainee's what is in force, and its end.
+/// Checks the instructor's dialog and list, the trainee's banner, and its end.
 #[test]
 fn exercises_are_shown_to_both_while_they_run_and_after() {
     let mut driven = Driven::open_plain(SMALL);
@@ -206,7 +208,7 @@ fn exercises_are_shown_to_both_while_they_run_and_after() {
     let mut other = instructor(&driven.core.instance, None);
     let mut host = driven.core.host();
     for exercise in [Exercise::DeviceLost, Exercise::StiffTissue { factor: 2.0 }] {
-        // In tissue of the paper the second is refused; the first says enough of the list.
+        // In tissue of the paper the second is refused; the first is enough for the list.
         let _taken = ask(&mut host, &Request::BeginExercise(exercise));
     }
     let by_m = [0.004, 0.0, 0.003];
@@ -233,7 +235,7 @@ fn exercises_are_shown_to_both_while_they_run_and_after() {
     drop((host, other));
 }
 
-/// The relay is a package of its own: what it publishes is published here.
+/// Checks the list of hosts; the relay is a package of its own, so its state is published here.
 #[test]
 fn who_is_there_is_a_list_with_a_needle_to_hand_over() {
     let mut driven = Driven::open_plain(SMALL);

@@ -1,16 +1,17 @@
-//! A window beside the picture of it that is kept.
+//! A window compared with its kept picture.
 
 use egui_kittest::{SnapshotError, SnapshotOptions, try_image_snapshot_options};
 use image::RgbaImage;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// What moves is drawn coarser, and a busy machine comes late to the picture at rest.
+/// Patience, because moving parts are drawn coarser, and a busy machine reaches the picture at rest
+/// late.
 const PATIENCE: Duration = Duration::from_secs(6);
-/// Pixels.
+/// Tile size in pixels.
 const TILE: u32 = 40;
 
-/// Looks until it sees the picture that is kept, and says where it differs if it never does.
+/// Looks until the window equals the kept picture; otherwise reports the differing tiles.
 pub fn assert_like_kept(name: &str, options: &SnapshotOptions, mut look: impl FnMut() -> RgbaImage) {
     let begun = Instant::now();
     loop {
@@ -25,7 +26,7 @@ pub fn assert_like_kept(name: &str, options: &SnapshotOptions, mut look: impl Fn
     }
 }
 
-/// The tiles with most pixels that differ, for whoever has this output alone.
+/// Returns the tiles with the most differing pixels, for a reader who has only this output.
 fn where_differing(name: &str, seen: &RgbaImage) -> Option<String> {
     let place = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/snapshots/{name}.png"));
     let kept = image::open(place).ok()?.to_rgba8();
@@ -46,12 +47,14 @@ fn where_differing(name: &str, seen: &RgbaImage) -> Option<String> {
     ))
 }
 
-/// Another version of the software driver may round a few edges otherwise; a moved or missing widget is thousands of pixels.
+/// Returns a tolerance for another version of the software driver, which may round a few edges
+/// differently. A moved or missing widget differs by thousands of pixels.
 pub fn tolerant() -> SnapshotOptions {
     SnapshotOptions::new().max_failed_pixels(500)
 }
 
-/// Grain does not compress: with fewer levels of grey a picture is a third as large and looks the same.
+/// Reduces the levels of grey, because grain does not compress: the picture is a third as large and
+/// looks the same.
 pub fn with_fewer_greys(picture: &RgbaImage, step: u16) -> RgbaImage {
     let mut fewer = picture.clone();
     for pixel in fewer.pixels_mut() {

@@ -1,4 +1,4 @@
-//! The window by its labels, its kept pictures, and what is clipped or overlaps.
+//! The window by its labels and its kept pictures, and clipped or overlapping parts.
 
 #[cfg(test)]
 mod controllers;

@@ -1,6 +1,6 @@
 //! The real window on a running core, driven by label through the steps.
 //!
-//! The picture that it draws is the README's; `make picture` keeps it.
+//! Its picture is the README's; `make picture` keeps it.
 
 use crate::driven::{Driven, keep_for_docs};
 use egui_kittest::Harness;
@@ -89,8 +89,9 @@ fn a_window_that_comes_moves_nothing_by_itself() {
         .with_size([1280.0, 800.0])
         .wgpu()
         .build_eframe(|cc| App::new(cc, options));
-    // Begun only now: a window that is held up while another is made on its thread lets its hand stop.
-    // A tip between two marks of the depth slider once made a new window pull it to the nearest mark.
+    // The plan begins only now: a window that waits while another is made on its thread lets its
+    // hand stop. A tip between two marks of the depth slider once made a new window pull it to the
+    // nearest mark.
     driven.click("Insert");
     driven.until("contact", |app| phase(app) != Phase::Outside as u32);
     let start = tip(driven.window.state());
@@ -129,7 +130,8 @@ fn keys_drive_the_needle_and_letting_go_stops_it() {
     );
 }
 
-/// Vertices of the surface are sent in full, displacements inside on a coarse grid: both must say the same of a vertex.
+/// Checks that surface vertices, sent in full, agree with the displacements inside, sent on a
+/// coarse grid.
 fn assert_inside_moves_as_the_surface_does(app: &App) {
     let (scene, snapshot) = (app.link().scene().expect("live"), app.link().snapshot().expect("live"));
     let field = Field::of(scene.header.nodes, &snapshot.displacements_m).expect("the snapshot is the scene's");
@@ -146,12 +148,14 @@ fn assert_inside_moves_as_the_surface_does(app: &App) {
     let worst_m = errors_m.iter().copied().fold(0.0, f64::max);
     let moved_m = snapshot.header.max_displacement_m;
     println!("moved {moved_m:.4} m; grid against surface: rms {rms_m:.6} m, worst {worst_m:.6} m");
-    // A link stretches by three quarters at most, and a vertex is no farther from a node than the grid is wide.
+    // A link stretches by three quarters at most, and a vertex is no farther from a node than the
+    // spacing of the grid.
     assert!(worst_m < 0.75 * field.info.spacing_m, "{worst_m} m");
     assert!(rms_m < 0.1 * moved_m, "{rms_m} m of {moved_m} m");
 }
 
-/// Beside the shaft, behind the tip, lay tissue at rest: now the dent is there, and the picture is as dark as outside.
+/// Guards against tissue at rest next to the shaft: the picture must show the dent, as dark as
+/// outside.
 fn assert_slice_shows_the_dent(driven: &Driven, before: &image::RgbaImage, during: &image::RgbaImage) {
     let app = driven.window.state();
     let rect = driven.window.get_by_label("Sagittal slice").rect();

@@ -1,4 +1,5 @@
-//! A plan of many needles in the window: edited by label and by key, kept in files, stepped through needle by needle.
+//! A plan of many needles in the window: edited by label and by key, saved in files, stepped
+//! through needle by needle.
 
 use crate::driven::{Driven, is_at_rest, keep_for_docs, misplaced};
 use egui::{Key, Modifiers};
@@ -34,7 +35,7 @@ pub fn header(driven: &Driven) -> SceneHeader {
     driven.window.state().link().scene().expect("live").header
 }
 
-/// Needles through holes, `count` seeds each, about the middle of the target.
+/// Returns needles through holes, `count` seeds each, about the middle of the target.
 pub fn plan_through(scene: &SceneHeader, holes: &[&str], count: usize) -> ImplantPlan {
     let template = Template::before(scene);
     let (source, prescription_gy) = exchange::usual().expect("known");
@@ -122,7 +123,7 @@ fn needles_are_added_moved_and_taken_away_and_each_step_can_be_taken_back() {
     assert!(!plan(&driven).needles[0].seeds.is_empty());
     until_checked(&mut driven);
     assert!(problems_of_needles(&driven).is_empty());
-    // One needle cannot cover the target, and that is a problem of the plan.
+    // One needle cannot cover the target, which is a problem of the plan.
     wait_long_for_label(&mut driven, "target V100 is");
     assert!(driven.window.query_by_label("The plan has no problems.").is_none());
     // Two to the patient's left, one up.
@@ -153,7 +154,7 @@ fn needles_are_added_moved_and_taken_away_and_each_step_can_be_taken_back() {
         .key_press_modifiers(Modifiers::CTRL | Modifiers::SHIFT, Key::Z);
     driven.window.run_steps(2);
     assert_eq!(plan(&driven), one, "put back");
-    // A hole outside the target says so and adds nothing.
+    // A hole outside the target reports it and adds nothing.
     driven.click("A1: no needle");
     driven.press(Key::Enter);
     driven.window.get_by_label_contains("would miss the target");
@@ -204,7 +205,7 @@ fn a_plan_goes_to_a_file_and_comes_back_and_a_wrong_file_is_reported_in_one_mess
     assert_eq!(plan(&driven), before);
 }
 
-/// By the one key for the next thing to do, from the first needle to the last.
+/// Inserts all needles with only the key for the next action.
 #[test]
 fn needles_go_in_one_after_the_other_by_one_key() {
     let mut driven = open(SMALL);
@@ -242,7 +243,8 @@ fn needles_go_in_one_after_the_other_by_one_key() {
     assert_eq!([0, 1].map(|n| progress.seeds_of(n, 4)), [0..2, 2..4]);
 }
 
-/// A script that was stopped took the seeds away and began at its first needle; so did one in a window that was opened again.
+/// Guards against a stopped script, or one in a reopened window, that removed the seeds and
+/// restarted at its first needle.
 #[test]
 fn a_script_that_was_stopped_goes_on_in_this_window_and_in_the_next() {
     let mut driven = open(SMALL);
@@ -256,7 +258,7 @@ fn a_script_that_was_stopped_goes_on_in_this_window_and_in_the_next() {
     driven.click("Continue at needle 1 of 2");
     wait_long(&mut driven, "the third seed", |app| seeds(app) == 3);
     driven.window.get_by_label("Needle 2 of 2");
-    // Another window finds the plan of the first, and looks at what is in the tissue.
+    // Another window finds the plan of the first, and inspects the tissue.
     driven.reopen(SMALL);
     driven.until("the plan", |app| {
         app.planner().plan().is_some_and(|plan| plan.needles.len() == 2)
@@ -286,7 +288,7 @@ fn a_script_that_was_stopped_goes_on_in_this_window_and_in_the_next() {
     assert_eq!([0, 1].map(|n| progress.seeds_of(n, 4)), [0..2, 2..4]);
 }
 
-/// As [`Driven::until`], for what takes minutes on a busy machine.
+/// Like [`Driven::until`], for steps that take minutes on a busy machine.
 fn wait_long(driven: &mut Driven, what: &str, ready: impl Fn(&App) -> bool) {
     let start = Instant::now();
     while !ready(driven.window.state()) {
@@ -305,7 +307,7 @@ fn wait_long_for_label(driven: &mut Driven, words: &str) {
     }
 }
 
-/// What the checks of needles and seeds found.
+/// Returns the problems that the checks of needles and seeds found.
 fn problems_of_needles(driven: &Driven) -> Vec<String> {
     let implant = driven.window.state().planner().planning().implant;
     let found = implant.and_then(|i| i.problems.clone()).unwrap_or_default();
@@ -323,7 +325,7 @@ fn an_automatic_plan_covers_the_target_and_nothing_is_wrong_with_its_needles() {
     assert!(planned.needles.iter().all(|n| n.hole.is_some() && !n.seeds.is_empty()));
     let prescription = format!("{} seeds of I-125 6711, 145 Gy", planned.seed_count());
     wait_long_for_label(&mut driven, &prescription);
-    // A limit that the dose does not keep stood beside "The plan has no problems.".
+    // Guards against a violated dose limit next to "The plan has no problems.".
     let broken = [" %, above", " Gy, above", " %, below", " Gy, below"];
     let is_broken = broken
         .iter()
@@ -331,7 +333,7 @@ fn an_automatic_plan_covers_the_target_and_nothing_is_wrong_with_its_needles() {
     let is_praised = driven.window.query_by_label("The plan has no problems.").is_some();
     assert_ne!(is_broken, is_praised);
     keep_for_docs(&driven.picture("plan-automatic"), "plan");
-    // D90 and V100 reach what they should.
+    // D90 and V100 meet their limits.
     assert!(driven.window.query_all_by_label("met").count() >= 2);
     let problems = misplaced(&driven.window);
     assert!(problems.is_empty(), "{}", problems.join("\n"));
@@ -357,7 +359,7 @@ fn compensation_reports_how_far_it_is_and_can_be_ended() {
     driven.picture("plan-compensated-in-part");
     let task = driven.window.state().planner().task(0).expect("a needle");
     assert_ne!(task.drops.along_m[0], planned.needles[0].depth_m, "the drop was moved");
-    // An edit of the needle makes what was rehearsed for it void.
+    // An edit of the needle invalidates its rehearsal.
     driven.window.get_by_label_contains("F7: needle 1,").click();
     driven.window.run_steps(2);
     driven.click("anterior");
@@ -365,7 +367,7 @@ fn compensation_reports_how_far_it_is_and_can_be_ended() {
     assert_eq!(task.drops.along_m[0], planned.needles[0].depth_m);
 }
 
-/// About the middle, and one at the edge, where seeds lie outside the target.
+/// Returns holes about the middle, and one at the edge, where seeds lie outside the target.
 fn twenty() -> Vec<String> {
     let columns = ["D", "E", "F", "G", "H", "I", "J", "L"];
     let rows: [(u8, &[usize]); 5] = [
@@ -414,7 +416,7 @@ fn a_plan_of_twenty_needles_is_in_place_and_as_it_was() {
     }
 }
 
-/// `cargo test --release -p stylet-tests-window plan -- --ignored --nocapture`
+/// Run with `cargo test --release -p stylet-tests-window plan -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn cost_of_a_frame_with_a_hundred_seeds() {
@@ -442,14 +444,14 @@ fn cost_of_a_frame_with_a_hundred_seeds() {
         12,
     );
     let chosen = format!("{chosen}: needle 6");
-    // The template as a whole says its hole too, before the hole does.
+    // The template as a whole reports its hole too, before the hole does.
     let holes = driven.window.get_all_by_label_contains(&chosen);
     holes.last().expect("the hole").click();
     driven.window.run_steps(3);
     pressed(&mut driven, "edits in a row, no isodose", keys, Modifiers::SHIFT, 12);
 }
 
-/// Frames in which one key or the other is pressed.
+/// Measures frames in which one key or the other is pressed.
 fn pressed(driven: &mut Driven, what: &str, keys: [Key; 2], modifiers: Modifiers, pause_ms: u64) {
     let (mut with, mut after) = (Vec::new(), Vec::new());
     for number in 0..40 {

@@ -1,4 +1,4 @@
-//! Gamepads and 3D mice that are not there: what they say is written by the test, in events of the kernel.
+//! Fake gamepads and 3D mice: the test writes their kernel events.
 
 use evdev::{AbsInfo, AbsoluteAxisCode, AttributeSet, EventType, InputEvent, KeyCode};
 use std::collections::VecDeque;
@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use stylet_controllers::{DeviceSource, DeviceState, Found, Kind, OpenDevice};
 
-/// `ENODEV`: what the kernel says of a device that was pulled out.
+/// `ENODEV`, the kernel's answer for a device that was pulled out.
 const NO_SUCH_DEVICE: i32 = 19;
 
-/// One device at most; clones are the same table.
+/// One device at most; clones share the same table.
 #[derive(Clone, Default)]
 pub struct Table {
     there: Arc<Mutex<Option<Kind>>>,
@@ -34,7 +34,7 @@ impl Table {
         self.queue.lock().unwrap().push_back(Err(unplugged));
     }
 
-    /// To a share of its way, -1 to 1.
+    /// Moves an axis to a share of its range, -1 to 1.
     pub fn axis(&self, axis: AbsoluteAxisCode, share: f64) {
         self.says(EventType::ABSOLUTE, axis.0, (share * 350.0) as i32);
     }

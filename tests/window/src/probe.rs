@@ -1,4 +1,4 @@
-//! The probe's picture and fluoroscopy on a running core: whose pose it is, what moves it, what is held and what it costs.
+//! The probe's picture and fluoroscopy on a running core: pose, motion, held image and cost.
 
 use crate::driven::{Driven, assert_drawn_by_changes, keep_for_docs, misplaced};
 use crate::kept::{assert_like_kept, tolerant};
@@ -24,7 +24,7 @@ fn off(a: &Pose, b: &Pose) -> f64 {
     (a.middle_m - b.middle_m).norm() + 0.1 * ((a.up - b.up).norm() + (a.axis - b.axis).norm())
 }
 
-/// Of the picture that is seen.
+/// Returns the pose of the visible picture.
 fn seen(app: &App) -> Option<Pose> {
     app.middle().probe_picture(View::Transverse).map(|p| p.plane().pose)
 }
@@ -43,7 +43,7 @@ fn wait(driven: &mut Driven, frames: usize) {
     }
 }
 
-/// Until the hand rests at a pose, and the picture is that.
+/// Waits until the hand rests at a pose, and the picture shows it.
 fn until_at(driven: &mut Driven, what: &str, goal: Pose) {
     driven.until(what, |app| in_hand(app).is_some_and(|pose| off(&pose, &goal) < 1e-3));
     wait(driven, 30);
@@ -59,7 +59,7 @@ fn the_picture_is_of_the_probe_in_the_hand_which_stepper_and_pointer_move_until_
     wait(&mut driven, 10);
     let start = in_hand(driven.window.state()).expect("a hand");
     until_at(&mut driven, "the start", start);
-    // It begins outside, and goes in by steps of the stepper.
+    // It begins outside, and moves in by steps of the stepper.
     let mut goal = start;
     for _ in 0..28 {
         driven.press(Key::PageUp);
@@ -98,7 +98,7 @@ fn the_picture_is_of_the_probe_in_the_hand_which_stepper_and_pointer_move_until_
     until_at(&mut driven, "a step back", goal);
     driven.press(Key::B);
     hold_alt_w(&driven, true);
-    // A machine that is busy moves it late.
+    // A busy machine moves it late.
     let is_farther =
         |app: &App| in_hand(app).is_some_and(|pose| (pose.middle_m - goal.middle_m).dot(&goal.axis) > 3e-3);
     driven.until("the hand to move it", is_farther);
@@ -106,7 +106,7 @@ fn the_picture_is_of_the_probe_in_the_hand_which_stepper_and_pointer_move_until_
     wait(&mut driven, 2);
 }
 
-/// Both keys stay down; the harness would release Alt in the same frame.
+/// Holds both keys; the harness would release Alt in the same frame.
 fn hold_alt_w(driven: &Driven, pressed: bool) {
     let alt = |held| Event::ModifiersChanged(if held { Modifiers::ALT } else { Modifiers::NONE });
     let w = Event::Key {
@@ -120,7 +120,8 @@ fn hold_alt_w(driven: &Driven, pressed: bool) {
     events.into_iter().for_each(|event| driven.window.event(event));
 }
 
-/// Marks of the seeds stayed where the scene has the body, and the rest of the picture moved.
+/// Guards against marks of seeds that stayed at the scene's place of the body while the rest of the
+/// picture moved.
 #[test]
 fn a_patient_who_moves_is_seen_by_a_probe_that_does_not() {
     let mut driven = open("Probe", &[]);
@@ -182,7 +183,7 @@ fn the_beam_is_on_while_it_is_asked_for_the_last_image_is_held_and_the_dose_is_c
         rect.width() as u32,
         rect.height() as u32,
     );
-    // Age and dose may differ; bones that lie elsewhere are thousands of pixels.
+    // Age and dose may differ; displaced bones are thousands of pixels.
     let options = tolerant().max_failed_pixels(2500);
     assert_like_kept("fluoroscopy_held", &options, || own.to_image());
     driven.click("New case");

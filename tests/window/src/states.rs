@@ -1,4 +1,5 @@
-//! The main states of the window in both themes and sizes: nothing clipped, nothing overlapping, and as it was.
+//! The main states of the window in both themes and sizes: nothing clipped, nothing overlapping,
+//! and equal to the kept pictures.
 
 use crate::driven::{Driven, assert_drawn_by_changes, is_at_rest, keep_for_docs, misplaced};
 use egui::Key;
@@ -10,9 +11,10 @@ use stylet_tests::Core;
 
 const SMALL: [f32; 2] = [1280.0, 800.0];
 const LARGE: [f32; 2] = [1920.0, 1080.0];
-/// Of a depth that differs by a tenth of a millimetre.
+/// Tolerated pixels for a depth that differs by a tenth of a millimetre.
 const INSERTING_PIXELS: usize = 800;
-/// Of figures in the table and the histogram, and of seeds that rest elsewhere by less than a millimetre.
+/// Tolerated pixels for figures in the table and the histogram, and for seeds that rest less than a
+/// millimetre away.
 const DEBRIEF_PIXELS: usize = 4_000;
 
 fn seeds(app: &App) -> u32 {
@@ -25,7 +27,7 @@ fn assert_in_place(driven: &mut Driven, state: &str) {
     assert!(problems.is_empty(), "{state}:\n{}", problems.join("\n"));
 }
 
-/// By the one key for the next thing to do.
+/// Runs the procedure with only the key for the next action.
 fn procedure_by_enter(driven: &mut Driven) {
     let start = Instant::now();
     while driven.window.query_by_label("Seed error, mm").is_none() || seeds(driven.window.state()) < 5 {
@@ -85,7 +87,7 @@ fn planned_state_is_in_place_and_as_it_was() {
     }
 }
 
-/// The membrane is pressed in and gives way a little farther on.
+/// Checks an insertion, in which the membrane is pressed in and gives way a little farther on.
 #[test]
 fn insertion_is_in_place_and_as_it_was() {
     for (size, theme) in [(SMALL, "dark_small"), (LARGE, "light_large")] {
@@ -170,7 +172,7 @@ fn the_whole_procedure_by_one_key_ends_in_a_debrief() {
     driven.until("no plan", |app| app.link().plan().is_some_and(|p| p.seed_count == 0));
 }
 
-/// As a page and as figures; the same seeds as in the table.
+/// Checks the saved page and figures; they have the same seeds as the table.
 fn debrief_is_saved(driven: &mut Driven) {
     driven.click("Save the debrief");
     let start = Instant::now();
@@ -227,7 +229,7 @@ fn words_can_be_made_larger_and_stay_in_place() {
     driven.picture("larger");
 }
 
-/// `cargo test --release -p stylet-tests-window states -- --ignored --nocapture`
+/// Run with `cargo test --release -p stylet-tests-window states -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn cost_of_a_frame() {

@@ -1,4 +1,4 @@
-//! What the window writes to the terminal that it was started from.
+//! Output of the window on the terminal that started it.
 
 use std::io::Read;
 use std::process::{Child, Command, Stdio};
@@ -23,8 +23,8 @@ fn written(window: &mut Child) -> String {
     text
 }
 
-/// In a shell without a session of a desktop the graphics driver wrote "error: XDG_RUNTIME_DIR is invalid or not set in the
-/// environment." four times, and the window then opened all the same.
+/// Guards against four lines "error: XDG_RUNTIME_DIR is invalid or not set in the environment."
+/// from the graphics driver, in a shell without a desktop session.
 #[test]
 fn a_window_outside_of_a_session_writes_no_errors_of_a_library() {
     let alone = Alone(fresh_instance());
@@ -33,7 +33,7 @@ fn a_window_outside_of_a_session_writes_no_errors_of_a_library() {
     let maps = format!("/proc/{}/maps", window.id());
     let drives = || std::fs::read_to_string(&maps).is_ok_and(|maps| maps.contains("libvulkan_"));
     assert!(until(Duration::from_secs(60), drives), "no graphics driver was loaded");
-    // The driver is asked for its devices, and draws.
+    // The driver lists its devices, and draws.
     std::thread::sleep(Duration::from_secs(5));
     assert!(matches!(window.try_wait(), Ok(None)), "it is open");
     window.kill().expect("ours");
@@ -42,7 +42,8 @@ fn a_window_outside_of_a_session_writes_no_errors_of_a_library() {
     assert_eq!(written, "");
 }
 
-/// The message named a source file of the library and a folder of the machine that had built it.
+/// Guards against a message with a source file of the library and a folder of the machine that had
+/// built it.
 #[test]
 fn without_a_display_the_reason_is_in_our_words() {
     let alone = Alone(fresh_instance());

@@ -1,4 +1,5 @@
-//! The plan brought up to date on the live picture of the probe: the whole procedure in the window, by label.
+//! An update of the plan on the live picture of the probe: the whole procedure in the window, by
+//! label.
 
 mod drawing;
 
@@ -14,12 +15,12 @@ use stylet_tests::scratch;
 
 const SIZE: [f32; 2] = [1280.0, 800.0];
 const PATH: &str = "Plan file: .toml, .csv or .dcm";
-/// Strong seeds: few needles are left to plan and to insert.
+/// Strength of the seeds, high, so that few needles remain to plan and to insert.
 const STRENGTH_U: f64 = 1.6;
-/// Needles that go in before the update.
+/// Number of needles inserted before the update.
 const BEFORE: usize = 2;
 
-/// Needles through holes, three seeds each, about the middle of the target.
+/// Returns needles through holes, three seeds each, about the middle of the target.
 fn planned(scene: &SceneHeader) -> ImplantPlan {
     let template = Template::before(scene);
     let (source, prescription_gy) = exchange::usual().expect("known");
@@ -74,7 +75,7 @@ fn import(driven: &mut Driven, plan: &ImplantPlan) {
     driven.window.run_steps(3);
 }
 
-/// As [`Driven::until`], for what takes minutes on a busy machine.
+/// Like [`Driven::until`], for steps that take minutes on a busy machine.
 fn wait_long(driven: &mut Driven, what: &str, ready: impl Fn(&App) -> bool) {
     let start = Instant::now();
     while !ready(driven.window.state()) {
@@ -98,7 +99,7 @@ fn by_enter_until(driven: &mut Driven, done: usize) {
     }
 }
 
-/// `make procedure-test`
+/// Run with `make procedure-test`.
 #[test]
 #[ignore = "a whole procedure, two and a half minutes"]
 fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
@@ -123,7 +124,7 @@ fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
         .window
         .get_by_label_contains(&format!("{} points in 5 planes", 5 * CLICKS));
     edits(&mut driven);
-    // Between two planes that were clicked there is a dashed proposal, which can be taken over.
+    // Between two clicked planes there is a dashed proposal, which can be converted into clicks.
     let review = driven.window.state().planner().planning().review;
     let own = review.drawn.contour.planes()[1].at_m;
     assert!(review.outline_at(own).is_some_and(|(_, is_own)| is_own));
@@ -183,7 +184,7 @@ fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
     let after = plan(&driven);
     assert_eq!(after.needles[..BEFORE], before.needles[..BEFORE], "what is in stays");
     assert_eq!(after, update.update.plan);
-    // Seeds rest where they are planned once each needle is rehearsed.
+    // Seeds rest at their planned places once each needle is rehearsed.
     driven.click("Compensate");
     wait_long(&mut driven, "the rehearsals", |app| !app.planner().is_busy());
     let left = after.needles.len() - BEFORE;
@@ -223,7 +224,8 @@ fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
     println!("{:.1} s: all {needles} needles are in", begun.elapsed().as_secs_f64());
     let planned = after.seed_count();
     wait_long(&mut driven, "the seeds in the picture", |app| {
-        // The contour reaches beyond the gland, which is all the tissue there is: the core takes no seed there.
+        // The contour extends beyond the gland, which is all the tissue there is: the core accepts
+        // no seed there.
         app.link()
             .snapshot()
             .is_some_and(|s| (planned - 2..=planned).contains(&(s.header.seed_count as usize)))
@@ -239,7 +241,7 @@ fn debrief_says_so(driven: &mut Driven) {
         driven.window.run_steps(1);
         std::thread::sleep(Duration::from_millis(10));
     }
-    // A table of many seeds and the updates above it may leave the button outside of the panel.
+    // A long table of seeds and the updates above it may push the button out of the panel.
     driven.window.get_by_label("Save the debrief").scroll_to_me();
     driven.window.run_steps(3);
     driven.picture("update-debrief");
@@ -283,7 +285,7 @@ fn debrief_says_so(driven: &mut Driven) {
         "in the true gland D90 {planned:.1} % as planned, {delivered:.1} % delivered; {} seeds {mean_mm:.2} mm off",
         updated.len()
     );
-    // Without the rehearsals seeds lay 6.1 mm off in the mean, and 60.7 % was delivered.
+    // Without the rehearsals seeds were 6.1 mm off on average, and 60.7 % was delivered.
     assert!(mean_mm < 0.5 && (planned - delivered).abs() < 5.0, "{updated:?}");
     let update = &score["updates"][0];
     assert_eq!((&update["accepted"], &update["marked"]), (&true.into(), &6.into()));

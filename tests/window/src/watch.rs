@@ -1,4 +1,5 @@
-//! A recording in the window: the example opens with one click where no core runs, and can be closed again.
+//! A recording in the window: the example opens with one click if no core runs, and can be closed
+//! again.
 
 use crate::driven::misplaced;
 use egui_kittest::Harness;
@@ -47,7 +48,7 @@ fn the_example_opens_with_one_click_without_a_core_and_shows_an_insertion() {
     until(&mut window, "the first seed", |window| seeds(window) == 1);
     assert!(window.query_by_label("rt-core is absent").is_none());
     assert_eq!(misplaced(&window), Vec::<String>::new());
-    // It holds still, and keys move nothing.
+    // It is paused, and keys move nothing.
     window.get_by_label("Hold").click();
     window.run_steps(3);
     let depth = |window: &Harness<'_, App>| window.state().link().state().map(|s| s.tip_in_scene_m);

@@ -1,4 +1,4 @@
-//! The window without a core: it says what to type, and its dialogs open.
+//! The window without a core: it names the command to type, and its dialogs open.
 
 use crate::driven::{assert_drawn_by_changes, misplaced};
 use crate::kept::tolerant;
@@ -10,7 +10,7 @@ use stylet_shm_schema::Instance;
 use stylet_shm_schema::PARAMETERS;
 use stylet_tests::Alone;
 
-/// Closed before its files go.
+/// Window that closes before its files are deleted.
 struct Window {
     harness: Harness<'static, App>,
     _alone: Alone,
@@ -59,7 +59,7 @@ fn window_of(instance: &str, size: [f32; 2]) -> Window {
     }
 }
 
-/// The window asks for frames for ever, so `run` would never end.
+/// Steps the window a few times; it requests frames forever, so `run` would never end.
 fn settle(window: &mut Harness<'_, App>) {
     window.run_steps(5);
 }
@@ -92,7 +92,7 @@ fn nothing_is_misplaced_without_a_core_in_any_theme_or_size() {
     }
 }
 
-/// Only what changed is drawn again; drawn anew, the whole window has to look the same.
+/// Checks that redrawing only the changes gives the same window as drawing all of it.
 #[test]
 fn a_window_drawn_by_its_changes_is_the_window_drawn_at_once() {
     let mut window = window("ui-window-redraw");

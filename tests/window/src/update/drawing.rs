@@ -1,4 +1,4 @@
-//! What the operator draws on the live picture, by clicks, drags and keys.
+//! The operator's drawing on the live picture, by clicks, drags and keys.
 
 use crate::driven::Driven;
 use egui::{Key, Modifiers, Pos2};
@@ -6,7 +6,7 @@ use host_ui::view::probe::ProbePicture;
 use nalgebra::Vector3;
 use stylet_imaging::ultrasound::View;
 
-/// Clicks in a plane.
+/// Number of clicks in a plane.
 pub(super) const CLICKS: usize = 6;
 
 fn transverse(driven: &Driven) -> ProbePicture {
@@ -18,7 +18,7 @@ fn transverse(driven: &Driven) -> ProbePicture {
         .expect("a picture")
 }
 
-/// A step of the stepper, and the picture from there.
+/// Takes a step of the stepper, and waits for the picture from there.
 fn step(driven: &mut Driven, key: Key) {
     driven.press(key);
     driven.until("the picture", |app| {
@@ -41,7 +41,7 @@ fn points(driven: &Driven) -> usize {
     driven.window.state().planner().planning().review.drawn.contour.points()
 }
 
-/// Where the edge of the gland is in the transverse plane, seen from the gland's middle.
+/// Returns the edge of the gland in the transverse plane, around the gland's middle.
 fn edge(driven: &Driven) -> Vec<Pos2> {
     let picture = transverse(driven);
     let outlines = driven.window.state().planner().planning().outlines.expect("known");
@@ -75,7 +75,7 @@ pub(super) fn contour(driven: &mut Driven) {
     }
 }
 
-/// A drag, the right button, Del and Ctrl+Z, each on a point of the plane that is shown.
+/// Tests a drag, the right button, Del and Ctrl+Z, each on a point of the visible plane.
 pub(super) fn edits(driven: &mut Driven) {
     let drawn = |driven: &Driven| driven.window.state().planner().planning().review.drawn;
     let before = drawn(driven);
@@ -118,7 +118,7 @@ pub(super) fn edits(driven: &mut Driven) {
     assert_eq!(drawn(driven), before);
 }
 
-/// Marks every seed in the transverse plane nearest to it, each once.
+/// Marks every seed in the transverse plane nearest to it, once.
 pub(super) fn mark(driven: &mut Driven) {
     for _ in 0..8 {
         step(driven, Key::PageDown);
