@@ -1,8 +1,9 @@
-//! Smallest and largest of quantities over time, in slots of one width: what a plot that is narrower than its samples can show.
+//! Minimum and maximum of quantities over time, in slots of equal width, for plots narrower than
+//! their samples.
 
 use std::collections::VecDeque;
 
-/// The smallest and the largest of one quantity about a time.
+/// Minimum and maximum of one quantity about a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Band {
     /// Middle of the slot, ns.
@@ -11,11 +12,11 @@ pub struct Band {
     pub low: f32,
     /// Largest value in the slot.
     pub high: f32,
-    /// Whether it goes on from the band before it: nothing is missing between them.
+    /// True if the band continues the one before it, without a gap.
     pub joined: bool,
 }
 
-/// Smallest and largest.
+/// Minimum and maximum.
 type Extremes = [f32; 2];
 
 #[derive(Clone, Copy, Debug)]
@@ -25,7 +26,8 @@ struct Slot<const N: usize> {
     joined: bool,
 }
 
-/// Envelope of `N` quantities that are sampled together. The slots lie on the grid of time itself, so that a line that moves on keeps its shape.
+/// Envelope of `N` quantities that are sampled together. Slots are aligned to absolute time, so
+/// that a scrolling line keeps its shape.
 #[derive(Clone, Debug)]
 pub struct Envelope<const N: usize> {
     slot_ns: u64,
@@ -35,7 +37,7 @@ pub struct Envelope<const N: usize> {
 }
 
 impl<const N: usize> Envelope<N> {
-    /// An empty envelope with slots of this width.
+    /// Creates an empty envelope with slots of this width.
     pub fn new(slot_ns: u64) -> Self {
         Self {
             slot_ns: slot_ns.max(1),
@@ -45,12 +47,12 @@ impl<const N: usize> Envelope<N> {
         }
     }
 
-    /// The next sample does not follow the last one: nobody measured what was between.
+    /// Marks a gap before the next sample.
     pub fn gap(&mut self) {
         self.after_gap = true;
     }
 
-    /// Adds a sample. Times must rise; a sample with an older one is counted to the newest slot.
+    /// Adds a sample. Times must rise; a sample with an older one counts to the newest slot.
     pub fn add(&mut self, time_ns: u64, values: [f32; N]) {
         self.newest_ns = self.newest_ns.max(Some(time_ns));
         let (number, extremes) = (time_ns / self.slot_ns, values.map(|v| [v, v]));
@@ -91,17 +93,17 @@ impl<const N: usize> Envelope<N> {
         }
     }
 
-    /// Whether nothing was added, or all of it was dropped.
+    /// Returns whether nothing was added, or all of it was dropped.
     pub fn is_empty(&self) -> bool {
         self.slots.is_empty()
     }
 
-    /// Time of the newest sample, ns.
+    /// Returns the time of the newest sample, ns.
     pub fn newest_ns(&self) -> Option<u64> {
         self.newest_ns
     }
 
-    /// Bands of one quantity, one for each slot, at its middle.
+    /// Returns the bands of one quantity, one for each slot, at its middle.
     pub fn bands(&self, quantity: usize) -> impl Iterator<Item = Band> {
         let newest_ns = self.newest_ns.unwrap_or(0);
         self.slots.iter().map(move |slot| {
@@ -119,7 +121,7 @@ impl<const N: usize> Envelope<N> {
         })
     }
 
-    /// Bands of one quantity, cut where something is missing between two of them.
+    /// Returns the bands of one quantity, cut at gaps.
     pub fn pieces(&self, quantity: usize) -> Vec<Vec<Band>> {
         let mut pieces: Vec<Vec<Band>> = Vec::new();
         for band in self.bands(quantity) {
@@ -145,14 +147,14 @@ mod tests {
 
     const MS: u64 = 1_000_000;
 
-    /// Two quantities at 1 kHz that never repeat.
+    /// Returns two quantities at 1 kHz that never repeat.
     fn sample(tick: u64) -> (u64, [f32; 2]) {
         let angle = tick as f64 * 0.37;
         let values = [angle.sin(), (angle * 1.7).cos() * angle];
         (tick * MS + 500, values.map(|v| v as f32))
     }
 
-    /// Against the extremes of each slot among all samples, before and after it was widened.
+    /// Compares with the extremes of each slot among all samples, before and after widening.
     #[test]
     fn each_slot_keeps_its_extremes() {
         let mut envelope = Envelope::new(40 * MS);
@@ -179,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_forgotten_is_removed_and_time_that_goes_back_does_no_harm() {
+    fn forgotten_slots_are_removed() {
         let mut envelope = Envelope::new(40 * MS);
         (0..1_000).map(sample).for_each(|(t, v)| envelope.add(t, v));
         envelope.forget_before(400 * MS);
@@ -195,9 +197,10 @@ mod tests {
         assert!(envelope.is_empty());
     }
 
-    /// A line was drawn from the last sample before a loss to the first after it: a ramp that nobody measured.
+    /// Guards against a line from the last sample before a loss to the first after it: a ramp that
+    /// nobody measured.
     #[test]
-    fn what_was_not_measured_cuts_the_curve() {
+    fn gaps_cut_the_curve() {
         let mut envelope = Envelope::new(40 * MS);
         let add = |envelope: &mut Envelope<2>, ticks: std::ops::Range<u64>| {
             ticks.map(sample).for_each(|(t, v)| envelope.add(t, v));

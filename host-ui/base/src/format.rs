@@ -1,13 +1,13 @@
-//! From SI to what a person reads; the only place of the window that converts units.
+//! Conversion from SI to display units, the only place of the window that converts units.
 
 pub use stylet_text::{cell, printable, printable_line, printable_table};
 
-/// The present time as 20260131T235959Z, for names of files.
+/// Returns the present time as 20260131T235959Z, for file names.
 pub fn utc_now() -> String {
     jiff::Timestamp::now().strftime("%Y%m%dT%H%M%SZ").to_string()
 }
 
-/// A time as [`utc_now`] writes it, as a person here reads it; `None` for any other text.
+/// Converts a time from [`utc_now`] to local time for display; `None` for any other text.
 pub fn local_time(utc: &str) -> Option<String> {
     time_in(utc, jiff::tz::TimeZone::system())
 }
@@ -18,52 +18,52 @@ fn time_in(utc: &str, zone: jiff::tz::TimeZone) -> Option<String> {
     Some(there.strftime("%-d %b %Y, %H:%M").to_string())
 }
 
-/// Millimetres from metres.
+/// Converts metres to millimetres.
 pub fn mm(metres: f64) -> f64 {
     metres * 1e3
 }
 
-/// Metres from millimetres that a person typed or dragged.
+/// Converts millimetres that a person typed or dragged to metres.
 pub fn metres(mm: f64) -> f64 {
     mm * 1e-3
 }
 
-/// Microseconds from nanoseconds.
+/// Converts nanoseconds to microseconds.
 pub fn us(ns: u64) -> f64 {
     ns as f64 * 1e-3
 }
 
-/// Seconds from nanoseconds.
+/// Converts nanoseconds to seconds.
 pub fn seconds(ns: u64) -> f64 {
     ns as f64 * 1e-9
 }
 
-/// Length with its unit, to 0.1 mm.
+/// Formats a length with its unit, to 0.1 mm.
 pub fn length(metres: f64) -> String {
     format!("{} mm", decimal(mm(metres), 1))
 }
 
-/// With its sign, to be read as an error.
+/// Formats a signed length, as an error.
 pub fn signed_mm(metres: f64) -> String {
     signed(mm(metres), 2)
 }
 
-/// Speed with its unit, to 0.1 mm/s.
+/// Formats a speed with its unit, to 0.1 mm/s.
 pub fn speed(metres_per_second: f64) -> String {
     format!("{} mm/s", decimal(mm(metres_per_second), 1))
 }
 
-/// Force with its unit, to 0.01 N.
+/// Formats a force with its unit, to 0.01 N.
 pub fn force(newton: f64) -> String {
     format!("{} N", decimal(newton, 2))
 }
 
-/// Volume with its unit, to 0.1 cc.
+/// Formats a volume with its unit, to 0.1 cc.
 pub fn volume(cubic_metres: f64) -> String {
     format!("{:.1} cc", cubic_metres * 1e6)
 }
 
-/// `n/a` where there is no value.
+/// Formats a time in microseconds; `n/a` without a value.
 pub fn microseconds(value: Option<f64>) -> String {
     match value {
         None => "n/a".to_owned(),
@@ -72,7 +72,7 @@ pub fn microseconds(value: Option<f64>) -> String {
     }
 }
 
-/// Rate of a loop with its unit, from its period; `n/a` for a period of 0.
+/// Formats the rate of a loop with its unit, from its period; `n/a` for a period of 0.
 pub fn rate(period_ns: u64) -> String {
     match period_ns {
         0 => "n/a".to_owned(),
@@ -80,7 +80,7 @@ pub fn rate(period_ns: u64) -> String {
     }
 }
 
-/// Counts with a thin grouping, so that a tick of eight digits can be read.
+/// Formats a count with thin spaces between groups, so that eight digits are legible.
 pub fn count(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::with_capacity(digits.len() + digits.len() / 3);
@@ -93,13 +93,13 @@ pub fn count(n: u64) -> String {
     out
 }
 
-/// Without "-0.0", which makes a figure at rest flicker.
+/// Formats a number without "-0.0", which would make a figure at rest flicker.
 pub fn decimal(value: f64, decimals: usize) -> String {
     let is_zero = value.abs() < 0.5 * 10.0_f64.powi(-(decimals as i32));
     format!("{:.decimals$}", if is_zero { 0.0 } else { value })
 }
 
-/// With its sign, unless it is zero as shown.
+/// Formats a number with its sign, unless it is zero as shown.
 pub fn signed(value: f64, decimals: usize) -> String {
     let shown = decimal(value, decimals);
     let is_zero = shown.bytes().all(|b| matches!(b, b'0' | b'.'));
@@ -115,7 +115,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_time_is_read_where_the_reader_is() {
+    fn times_are_shown_in_local_time() {
         let east = jiff::tz::TimeZone::fixed(jiff::tz::offset(2));
         assert_eq!(
             time_in("20261101T230512Z", east.clone()).as_deref(),
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_read_as_a_person_writes_them() {
+    fn figures_are_formatted_for_people() {
         assert_eq!(length(0.0123), "12.3 mm");
         assert_eq!(length(-1e-9), "0.0 mm");
         assert_eq!(signed_mm(-0.00125), "-1.25");

@@ -5,13 +5,13 @@ use std::io::{Error, Read};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 
-/// Why a file cannot be read; the texts follow the name of the file.
+/// Reason why a file cannot be read; the texts follow the name of the file.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
     /// No such file, or no right to open it.
     #[error("it cannot be opened ({0}); check the path")]
     Open(Error),
-    /// A folder, a pipe or a device: reading it might never end.
+    /// A folder, a pipe or a device: reading it may never end.
     #[error("it is not a file; give the path of a file")]
     NotRegular,
     /// The file was opened, but reading failed.
@@ -23,12 +23,13 @@ pub enum InputError {
         /// The limit.
         most_bytes: u64,
     },
-    /// The file holds other bytes than UTF-8.
+    /// The file is not UTF-8.
     #[error("it is not text (UTF-8)")]
     NotText,
 }
 
-/// A regular file and its size in bytes. A pipe that nobody writes to is refused and not waited for.
+/// Returns a regular file and its size in bytes. Refuses a pipe at once, even if nobody writes to
+/// it.
 pub fn open(path: &Path) -> Result<(File, u64), InputError> {
     let file = OpenOptions::new()
         .read(true)
@@ -42,7 +43,7 @@ pub fn open(path: &Path) -> Result<(File, u64), InputError> {
     Ok((file, about.len()))
 }
 
-/// All of a regular file that has at most `most_bytes`.
+/// Returns the content of a regular file that has at most `most_bytes`.
 pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>, InputError> {
     let (file, size) = open(path)?;
     if size > most_bytes {
@@ -59,7 +60,7 @@ pub fn read(path: &Path, most_bytes: u64) -> Result<Vec<u8>, InputError> {
     Ok(bytes)
 }
 
-/// As [`read`], for a file that must be UTF-8.
+/// Like [`read`], for a file that must be UTF-8.
 pub fn read_text(path: &Path, most_bytes: u64) -> Result<String, InputError> {
     String::from_utf8(read(path, most_bytes)?).map_err(|_| InputError::NotText)
 }
@@ -68,7 +69,8 @@ pub fn read_text(path: &Path, most_bytes: u64) -> Result<String, InputError> {
 mod tests {
     use super::*;
 
-    /// `--seeds /dev/zero` read until the memory ended, and a pipe was waited for without an end.
+    /// Guards against reading `/dev/zero` until memory ran out, and against waiting for a pipe
+    /// forever.
     #[test]
     fn devices_pipes_and_folders_are_refused_at_once() {
         let folder = tempfile::tempdir().unwrap();

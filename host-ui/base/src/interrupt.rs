@@ -1,24 +1,27 @@
-//! Ctrl-C, requests to terminate and a terminal that closes: the first asks for an orderly end, the second ends at once. And the end of output.
+//! Ctrl-C, termination requests and a closing terminal: the first asks for an orderly end, the
+//! second ends at once. Also the end of output.
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A request to end, which long work checks now and then.
+/// Request to end, which long work checks now and then.
 #[derive(Clone, Debug, Default)]
 pub struct Interrupt(Arc<AtomicBool>);
 
-/// Ctrl-C cannot be caught.
+/// Error of a Ctrl-C handler that cannot be installed.
 #[derive(Debug, thiserror::Error)]
 #[error("Ctrl-C cannot be caught ({0})")]
 pub struct InterruptError(std::io::Error);
 
 impl Interrupt {
-    /// An interrupt that SIGINT, SIGTERM and, but under `nohup`, SIGHUP set; a second signal ends the program at once.
+    /// Creates an interrupt that SIGINT, SIGTERM and, except under `nohup`, SIGHUP set; a second
+    /// signal ends the program at once.
     ///
     /// # Errors
-    /// Where the handlers cannot be installed.
+    ///
+    /// If the handlers cannot be installed.
     pub fn on_signals() -> Result<Self, InterruptError> {
         let interrupt = Self::default();
         let of_terminal = (!is_ignored(SIGHUP)).then_some(SIGHUP);
@@ -30,15 +33,15 @@ impl Interrupt {
         Ok(interrupt)
     }
 
-    /// Requests an end, as a signal would.
+    /// Requests an end, like a signal.
     pub fn ask(&self) {
-        // SYNC: read by `asked`; nothing but the flag is carried.
+        // SYNC: read by `asked`; only the flag is carried.
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the work is to end.
+    /// Returns whether the work must end.
     pub fn asked(&self) -> bool {
-        // SYNC: set by a signal handler or by `ask`; nothing but the flag is carried.
+        // SYNC: set by a signal handler or by `ask`; only the flag is carried.
         self.0.load(Ordering::Relaxed)
     }
 }
@@ -51,8 +54,9 @@ fn is_ignored(signal: i32) -> bool {
     }
 }
 
-/// Lets a command whose output nobody reads any more end silently, as `head` expects; by default Rust panics.
+/// Lets a command end silently once nobody reads its output, as `head` expects; by default Rust
+/// panics.
 pub fn end_with_reader() {
-    // SAFETY: the default action of a signal is no code of ours, and no thread has been started that could mind.
+    // SAFETY: the default action runs no code of ours, and no other thread has started.
     unsafe { libc::signal(libc::SIGPIPE, libc::SIG_DFL) };
 }

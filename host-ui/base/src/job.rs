@@ -1,19 +1,19 @@
-//! Work on a thread of its own that reports what it finds as it goes and can be asked to end.
+//! Work on a separate thread that reports its results as they arrive and can be cancelled.
 
 use crate::interrupt::Interrupt;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
-/// Work on a thread of its own. Dropping it asks the thread to end.
+/// Job on a separate thread. Dropping it asks the thread to end.
 pub struct Job<T> {
     messages: Receiver<T>,
     interrupt: Interrupt,
 }
 
-/// What a job reports when it is polled.
+/// Report of a job when it is polled.
 pub enum JobUpdate<T> {
     /// Nothing new; its thread is still at work.
     Pending,
-    /// The next message, in the order in which they were sent.
+    /// Next message, in the order of sending.
     Message(T),
     /// Its thread has ended.
     Ended,
@@ -33,7 +33,7 @@ impl<T: Send + 'static> Job<T> {
         Self { messages, interrupt }
     }
 
-    /// The next message, if there is one. Never waits.
+    /// Returns the next message, if there is one. Never waits.
     pub fn poll(&self) -> JobUpdate<T> {
         match self.messages.try_recv() {
             Ok(message) => JobUpdate::Message(message),
@@ -43,7 +43,7 @@ impl<T: Send + 'static> Job<T> {
     }
 }
 
-/// Nobody reads its messages any more.
+/// Asks the thread to end, because nobody reads its messages any more.
 impl<T> Drop for Job<T> {
     fn drop(&mut self) {
         self.interrupt.ask();

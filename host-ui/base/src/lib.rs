@@ -1,5 +1,5 @@
-//! What every part of the host program uses: units for people, long work that can be interrupted, files that are written
-//! whole, curves in slots of time, ticks that were seen, spellings of nuclides.
+//! Common parts of the host program: display units, long work that can be interrupted, whole-file
+//! writes, curves in time slots, counts of seen ticks, spellings of nuclides.
 
 #![warn(missing_docs)]
 

@@ -1,24 +1,25 @@
-//! Lines for people from a loop that must not wait: a thread writes them, and what does not fit is dropped.
+//! Lines printed from a loop that must not wait: a thread writes them, and lines beyond the queue
+//! are dropped.
 
 use std::io::Write;
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Lines that wait to be written.
+/// Number of lines in the queue.
 const WAITING: usize = 256;
-/// The end of a program waits so long for the last ones.
+/// Time for the last lines at the end of a program.
 const LAST_LINES: Duration = Duration::from_millis(200);
 const LOOK_EVERY: Duration = Duration::from_millis(2);
 
-/// Where lines go.
+/// Queue of lines.
 pub struct Lines {
     lines: Option<SyncSender<String>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Lines {
-    /// To standard output. Without a thread nothing is written.
+    /// Creates a queue to standard output. Without a thread nothing is written.
     pub fn to_stdout() -> Self {
         Self::to(std::io::stdout())
     }
@@ -27,7 +28,7 @@ impl Lines {
         let (lines, waiting) = sync_channel::<String>(WAITING);
         let write = move || {
             for line in waiting {
-                // A terminal that is closed ends nothing.
+                // A closed terminal must not end the program.
                 let _written = writeln!(out, "{line}").and_then(|()| out.flush());
             }
         };
@@ -38,7 +39,7 @@ impl Lines {
         }
     }
 
-    /// Never waits. False where the line was dropped.
+    /// Queues a line without waiting; returns false if it was dropped.
     pub fn say(&self, line: String) -> bool {
         let sent = |lines: &SyncSender<String>| lines.try_send(line).is_ok();
         self.lines.as_ref().is_some_and(sent)
@@ -49,7 +50,7 @@ impl Drop for Lines {
     fn drop(&mut self) {
         self.lines = None;
         let begun = Instant::now();
-        // An output that takes nothing is left to itself.
+        // An output that is blocked is abandoned.
         while self.thread.as_ref().is_some_and(|thread| !thread.is_finished()) && begun.elapsed() < LAST_LINES {
             std::thread::sleep(LOOK_EVERY);
         }
@@ -61,7 +62,7 @@ mod tests {
     use super::*;
     use std::sync::{Arc, Mutex, mpsc};
 
-    /// Takes what it is given, once it is released.
+    /// Output that accepts data only once it is released.
     struct Pipe {
         full: Option<mpsc::Receiver<()>>,
         taken: Arc<Mutex<Vec<u8>>>,
@@ -94,9 +95,9 @@ mod tests {
         assert_eq!(*taken.lock().expect("held briefly"), b"line 1\nline 2\nline 3\n");
     }
 
-    /// With a full pipe the loop that printed stood still, and the hand went on for 47 mm.
+    /// Guards against a full pipe: the loop that printed stood still, and the hand moved 47 mm.
     #[test]
-    fn an_output_that_takes_nothing_holds_up_nobody() {
+    fn a_blocked_output_delays_nothing() {
         let (release, full) = mpsc::channel();
         let full = Some(full);
         let lines = Lines::to(Pipe {

@@ -1,13 +1,13 @@
-//! Nuclides by the many ways in which files write them: I-125, 125I, Iodine 125.
+//! Nuclides in the spellings that files use: I-125, 125I, Iodine 125.
 
-/// An isotope: chemical symbol in lower case, and mass number.
+/// Isotope: chemical symbol in lower case, and mass number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Nuclide {
     symbol: String,
     mass: u16,
 }
 
-/// What people write instead of the symbol.
+/// Names that are written instead of the symbol.
 const NAMES: [(&str, &str); 10] = [
     ("iodine", "i"),
     ("iod", "i"),
@@ -20,11 +20,12 @@ const NAMES: [(&str, &str); 10] = [
     ("cobalt", "co"),
     ("ytterbium", "yb"),
 ];
-/// Nuclides that are left in the patient for good.
+/// Nuclides of permanent implants.
 const PERMANENT: [(&str, u16); 4] = [("i", 125), ("pd", 103), ("cs", 131), ("au", 198)];
 
 impl Nuclide {
-    /// From letters and one number, in any order and with anything between them; `None` for anything else.
+    /// Reads letters and one number, in any order and with anything between them; `None` for
+    /// anything else.
     ///
     /// ```
     /// use stylet_base::nuclide::Nuclide;
@@ -45,7 +46,7 @@ impl Nuclide {
         })
     }
 
-    /// Whether seeds of it are implanted for good; other nuclides are taken out again.
+    /// Returns whether its seeds are permanent; sources of other nuclides are removed again.
     pub fn is_of_permanent_seeds(&self) -> bool {
         PERMANENT.contains(&(self.symbol.as_str(), self.mass))
     }

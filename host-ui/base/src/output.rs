@@ -1,14 +1,14 @@
-//! Folders for results: new or empty ones, so that results of two runs never lie in one.
+//! Folders for results: new or empty ones, so that results of two runs never mix.
 
 use std::io::Error;
 use std::path::{Path, PathBuf};
 
-/// Why results cannot be written into a folder.
+/// Reason why results cannot be written into a folder.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    /// It holds files of before.
+    /// It contains earlier files.
     #[error(
-        "{} holds {count} files already, and results are not added to others; choose another folder, or delete it",
+        "{} already contains {count} files, and results are not mixed; choose another folder, or delete it",
         .folder.display()
     )]
     NotEmpty {
@@ -17,7 +17,7 @@ pub enum OutputError {
         /// Files and folders in it.
         count: usize,
     },
-    /// It cannot be made or looked into.
+    /// It cannot be created or listed.
     #[error("{} cannot be created ({why}); choose another folder", .folder.display())]
     Create {
         /// The folder.
@@ -27,7 +27,7 @@ pub enum OutputError {
     },
 }
 
-/// Makes a folder for results, with those above it; one that is there must be empty.
+/// Creates a folder for results, with its parents; an existing one must be empty.
 pub fn new_folder(folder: &Path) -> Result<(), OutputError> {
     let create = |why| OutputError::Create {
         folder: folder.to_owned(),
@@ -48,9 +48,9 @@ pub fn new_folder(folder: &Path) -> Result<(), OutputError> {
 mod tests {
     use super::*;
 
-    /// Results went into a folder beside those of an earlier run, and nobody could see which belonged together.
+    /// Guards against results next to those of an earlier run, which nobody could tell apart.
     #[test]
-    fn a_folder_with_files_is_refused_and_an_empty_one_is_taken() {
+    fn only_an_empty_folder_is_accepted() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("a/b");
         new_folder(&out).unwrap();

@@ -1,4 +1,5 @@
-//! How far long work is: a bar in a terminal, and a line every few seconds where the output is a file.
+//! Progress of long work: a bar in a terminal, and a line every few seconds if the output is a
+//! file.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -6,10 +7,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// A line is written so often where there is no terminal.
+/// Time between lines without a terminal.
 const EVERY: Duration = Duration::from_secs(3);
 
-/// `of` of what `what` names, in the plural.
+/// Creates a bar for `of` items, named by `what` in the plural.
 pub fn progress_bar(of: u64, what: &str) -> ProgressBar {
     let template = format!("{{bar:40}} {{pos}}/{{len}} {what}, {{eta}} left");
     let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
@@ -22,12 +23,12 @@ pub struct LongTask {
     done: AtomicU64,
     of: u64,
     what: String,
-    /// When the last line was written; `None` in a terminal, which has the bar.
+    /// Time of the last line; `None` in a terminal, which has the bar.
     last: Option<Mutex<Instant>>,
 }
 
 impl LongTask {
-    /// `of` of what `what` names, in the plural.
+    /// Creates a task of `of` items, named by `what` in the plural.
     pub fn new(of: u64, what: &str) -> Self {
         Self {
             bar: progress_bar(of, what),
@@ -38,7 +39,7 @@ impl LongTask {
         }
     }
 
-    /// So many more are done.
+    /// Counts more finished items.
     pub fn advance(&self, by: u64) {
         // SYNC: a count alone, nothing else is published with it.
         let done = self.done.fetch_add(by, Ordering::Relaxed) + by;
@@ -49,9 +50,9 @@ impl LongTask {
         }
     }
 
-    /// The line for a file, where it is time for one.
+    /// Returns the line for a file, when one is due.
     fn line(&self, done: u64) -> Option<String> {
-        // Whoever finds it taken leaves the line to the other.
+        // If another thread holds the lock, it writes the line.
         let mut last = self.last.as_ref()?.try_lock().ok()?;
         if last.elapsed() < EVERY {
             return None;
@@ -67,14 +68,15 @@ impl Drop for LongTask {
     }
 }
 
-/// How far one piece of work is whose parts have no number: a bar in a terminal, else a line every few seconds.
+/// Progress of one piece of work without countable parts: a bar in a terminal, else a line every
+/// few seconds.
 pub struct ShareBar {
     bar: ProgressBar,
     last: Option<Instant>,
 }
 
 impl ShareBar {
-    /// Shows nothing until the first call of [`ShareBar::show`].
+    /// Creates a bar that shows nothing until the first call of [`ShareBar::show`].
     pub fn new() -> Self {
         let style = ProgressStyle::with_template("{bar:40} {percent:>3} %  {msg}");
         Self {
@@ -83,7 +85,7 @@ impl ShareBar {
         }
     }
 
-    /// `share` of `what` is done, 0 to 1.
+    /// Shows `share` of `what`, 0 to 1.
     pub fn show(&mut self, what: &str, share: f32) {
         match (self.line(what, share), self.last) {
             (Some(line), _) => eprintln!("{line}"),
@@ -95,7 +97,7 @@ impl ShareBar {
         }
     }
 
-    /// The line for a file, where it is time for one.
+    /// Returns the line for a file, when one is due.
     fn line(&mut self, what: &str, share: f32) -> Option<String> {
         let last = self.last.as_mut().filter(|last| last.elapsed() >= EVERY)?;
         *last = Instant::now();
@@ -120,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_share_is_reported_every_few_seconds_where_there_is_no_terminal() {
+    fn without_a_terminal_a_share_is_reported_periodically() {
         let mut bar = ShareBar::new();
         bar.last = Instant::now().checked_sub(2 * EVERY);
         assert_eq!(
@@ -130,7 +132,7 @@ mod tests {
         assert_eq!(bar.line("reading a.nrrd", 0.41), None, "the next one is not due");
     }
 
-    /// The dose of 5,000 seeds took 35 s without a word where the output was a file.
+    /// Guards against silence: the dose of 5,000 seeds took 35 s without output to a file.
     #[test]
     fn long_work_reports_every_few_seconds_where_there_is_no_terminal() {
         let begun = Instant::now().checked_sub(2 * EVERY);

@@ -1,28 +1,28 @@
-//! How many of the ticks that ran were seen: ticks are numbered, so what is missing shows in the numbers.
+//! Counts of seen ticks: ticks are numbered, so gaps in the numbers are losses.
 
 use crate::format;
 
-/// Ticks that were seen, and ticks between them that ran and were not.
+/// Number of seen ticks, and of ticks between them that ran unseen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Seen {
     /// Ticks whose record was seen.
     pub seen: u64,
-    /// Ticks that ran and whose record was not seen. Deadlines that the core missed are no ticks.
+    /// Ticks that ran and whose record was not seen. Deadlines that the core missed are not ticks.
     pub unseen: u64,
 }
 
 impl Seen {
-    /// Whether no tick is missing.
+    /// Returns whether no tick is missing.
     pub fn is_all(self) -> bool {
         self.unseen == 0
     }
 
-    /// Ticks that ran.
+    /// Returns the number of ticks that ran.
     pub fn ran(self) -> u64 {
         self.seen + self.unseen
     }
 
-    /// For people, beside a figure that is of the ticks seen.
+    /// Formats the counts, for display next to a figure of the seen ticks.
     ///
     /// ```
     /// let seen = stylet_base::seen::Seen { seen: 28_930, unseen: 31_070 };
@@ -37,7 +37,7 @@ impl Seen {
     }
 }
 
-/// The numbers of the ticks of one run of the core after another.
+/// Sequence of tick numbers over successive runs of the core.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TickOrder {
     /// Run and tick that would follow without a gap.
@@ -45,7 +45,8 @@ pub struct TickOrder {
 }
 
 impl TickOrder {
-    /// Takes the next tick; how many ran before it that were not taken. Another run of the core begins without a gap.
+    /// Takes the next tick; returns how many ran unseen before it. Another run of the core begins
+    /// without a gap.
     pub fn missing_before(&mut self, session_id: u64, tick: u64) -> u64 {
         let next = self.next.filter(|(session, _)| *session == session_id);
         let missing = next.map_or(0, |(_, next)| tick.saturating_sub(next));
@@ -60,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn gaps_in_the_numbers_are_counted_and_another_run_or_an_old_tick_is_none() {
+    fn only_gaps_within_a_run_are_counted() {
         let mut order = TickOrder::default();
         let missing = [(1, 5), (1, 6), (1, 10), (1, 7), (1, 11), (2, 900), (2, 902)];
         let missing = missing.map(|(session, tick)| order.missing_before(session, tick));
