@@ -20,13 +20,6 @@ pub mod sim;
 mod usb;
 
 pub use backend::BackendKind;
-<<<<<<< HEAD
-pub use beside::arm::{Arm, ArmError};
-pub use beside::keeper::Report;
-pub use beside::served::{Described, Readings, Served};
-=======
-pub use device::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};
->>>>>>> c3509727 (Say what each part of the devices crate holds in plain English)
 pub use drd::{ForceDimension, ForceDimensionConfig};
 pub use driver_thread::arm::{Arm, ArmError};
 pub use driver_thread::keeper::Report;

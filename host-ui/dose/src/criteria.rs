@@ -1,25 +1,26 @@
-//! What the dose of a permanent implant should keep: limits of the measures, after the ABS and AAPM TG-137 guidance for I-125
-//! at 145 Gy.
+//! Criteria for the dose of a permanent implant: limits of the measures, after the ABS and AAPM
+//! TG-137 guidance for I-125 at 145 Gy.
 
 use super::Dvh;
 use super::metric::Metric;
 use stylet_anatomy::Organ;
 
-/// One measure of one structure, ready to be shown.
+/// Measure of one structure, for display.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// Name of the structure, for people.
+    /// Name of the structure, for display.
     pub structure: String,
-    /// What is measured.
+    /// Measure.
     pub metric: Metric,
     /// Its value in Gy, or in percent of the structure.
     pub value: f64,
-    /// Its limit, where there is one.
+    /// Its limit, if it has one.
     pub limit: Option<Limit>,
 }
 
 impl Figure {
-    /// The limit that the value does not keep, in words; `None` where it keeps it or has none.
+    /// Returns the limit that the value violates, in words; `None` if it meets its limit or has
+    /// none.
     pub fn broken(&self) -> Option<String> {
         let limit = self.limit.filter(|limit| !limit.is_met(self.value))?;
         let unit = match self.metric.unit() {
@@ -49,7 +50,7 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// Whether a value keeps the limit.
+    /// Returns whether a value meets the limit.
     pub fn is_met(self, value: f64) -> bool {
         match self {
             Self::AtLeast(limit) => value >= limit,
@@ -58,7 +59,7 @@ impl Limit {
     }
 }
 
-/// A structure whose dose is evaluated.
+/// Structure whose dose is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DoseStructure {
     /// The target.
@@ -70,7 +71,7 @@ pub enum DoseStructure {
 }
 
 impl DoseStructure {
-    /// By its role, or by a word in its name; `None` for one that has no limits.
+    /// Classifies a structure by its role, or by a word in its name; `None` for one without limits.
     pub fn of(name: &str, is_target: bool) -> Option<Self> {
         if is_target {
             Some(Self::Target)
@@ -89,7 +90,7 @@ impl DoseStructure {
         }
     }
 
-    /// Measures of the structure, with the limits of those that have one.
+    /// Returns the measures of the structure, with their limits.
     pub(crate) fn metrics(self, prescription_gy: f64) -> Vec<(Metric, Option<Limit>)> {
         let dose = |share: f64| Metric::DoseToShare(share);
         let volume = |share: f64| Metric::VolumeAtShare(share);
@@ -107,13 +108,13 @@ impl DoseStructure {
         }
     }
 
-    /// The measures of the structure that its histogram allows.
+    /// Returns the measures of the structure that its histogram allows.
     pub fn figures(self, dvh: &Dvh, prescription_gy: f64) -> Vec<Figure> {
         let figure = |(metric, limit): (Metric, Option<Limit>)| {
             Some(Figure {
                 structure: self.name().to_owned(),
                 metric,
-                // A structure smaller than the volume asked for has no such figure.
+                // A structure smaller than the requested volume has no such figure.
                 value: metric.of(dvh, prescription_gy).main()?,
                 limit,
             })
@@ -126,9 +127,10 @@ impl DoseStructure {
 mod tests {
     use super::*;
 
-    /// V150 and D10 of the urethra above their limits stood beside "nothing is wrong with the plan".
+    /// Guards against V150 and D10 of the urethra above their limits next to "nothing is wrong with
+    /// the plan".
     #[test]
-    fn a_measure_beyond_its_limit_says_so_and_one_at_its_limit_does_not() {
+    fn only_a_measure_beyond_its_limit_is_reported() {
         let urethra = DoseStructure::of("prostatic urethra", false).unwrap();
         let dvh = Dvh::new(&[291.0; 10], &[1e-7; 10]).unwrap();
         let broken: Vec<String> = urethra.figures(&dvh, 145.0).iter().filter_map(Figure::broken).collect();

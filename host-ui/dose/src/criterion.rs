@@ -4,19 +4,19 @@ use super::criteria::{DoseStructure, Limit};
 use super::error::DoseError;
 use super::metric::Metric;
 
-/// A limit of one measure, by the name that [`crate::report::Judge::values`] gives it.
+/// Limit of one measure, by its name in [`crate::report::Judge::values`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Criterion {
     /// Name and unit of the measure.
     pub measure: String,
-    /// In the unit of the measure, Gy or percent of the structure.
+    /// Limit in the unit of the measure, Gy or percent of the structure.
     pub limit: Limit,
 }
 
-/// How many trials met a criterion.
+/// Number of trials that met a criterion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kept {
-    /// What they should meet.
+    /// Criterion to meet.
     pub criterion: Criterion,
     /// Trials that met it.
     pub met: usize,
@@ -25,7 +25,8 @@ pub struct Kept {
 }
 
 impl Criterion {
-    /// The limits of a structure that the project's page has (ABS, AAPM TG-137); none for one without a role.
+    /// Returns the limits of a structure from the project's page (ABS, AAPM TG-137); none for one
+    /// without a role.
     pub fn of_structure(name: &str, is_target: bool, prescription_gy: f64) -> Vec<Self> {
         let Some(structure) = DoseStructure::of(name, is_target) else {
             return Vec::new();
@@ -43,19 +44,19 @@ impl Criterion {
         }
     }
 
-    /// Reads `Prostate D90>=130.5` or, for the target, `V150<=60`: doses in Gy, volumes in percent. The metric is returned to be
-    /// computed.
+    /// Reads `Prostate D90>=130.5` or, for the target, `V150<=60`: doses in Gy, volumes in percent.
+    /// Also returns the metric, which must be computed.
     pub fn parse(text: &str, names: &[&str], target: usize) -> Result<(Self, Metric), DoseError> {
         let wrong = |why: &str| {
             DoseError::Metric(format!(
-                "\"{text}\" is no criterion: {why}; write [STRUCTURE ]METRIC>=VALUE or <=, as in \"D90>=130.5\" (Gy) or \"Urethra V150<=10\" (percent)"
+                "\"{text}\" is not a criterion: {why}; write [STRUCTURE ]METRIC>=VALUE or <=, as in \"D90>=130.5\" (Gy) or \"Urethra V150<=10\" (percent)"
             ))
         };
         let at_least = text.split_once(">=").map(|(left, value)| (left, value, true));
         let (left, value, is_least) = at_least
             .or_else(|| text.split_once("<=").map(|(left, value)| (left, value, false)))
             .ok_or_else(|| wrong("it has neither >= nor <="))?;
-        let value: f64 = value.trim().parse().map_err(|_| wrong("its value is no number"))?;
+        let value: f64 = value.trim().parse().map_err(|_| wrong("its value is not a number"))?;
         if !value.is_finite() {
             return Err(wrong("its value is not finite"));
         }
@@ -79,7 +80,7 @@ impl Criterion {
         Ok((Self::new(name, metric, limit), metric))
     }
 
-    /// How many trials meet it; `None` where `measures` has no such measure.
+    /// Returns how many trials meet it; `None` where `measures` has no such measure.
     pub fn kept(&self, measures: &[(String, Option<f64>)], trials: &[(usize, Vec<Option<f64>>)]) -> Option<Kept> {
         let column = measures.iter().position(|(name, _)| *name == self.measure)?;
         let values = || trials.iter().filter_map(|(_, row)| row[column]);
@@ -101,7 +102,8 @@ impl std::fmt::Display for Criterion {
 }
 
 impl Kept {
-    /// Share of the trials with its 95 % interval (Wilson, J. Am. Stat. Assoc. 22, 209, 1927); `None` without a trial.
+    /// Returns the share of the trials with its 95 % interval (Wilson, J. Am. Stat. Assoc. 22, 209,
+    /// 1927); `None` without a trial.
     pub fn share(&self) -> Option<[f64; 3]> {
         let (z, n) = (1.959_963_985_f64, self.of as f64);
         let p = self.met as f64 / n;
@@ -123,7 +125,8 @@ impl Kept {
 mod tests {
     use super::*;
 
-    /// The ends of Wilson's interval are where a score test is just significant: (p - q)² = z² q (1 - q) / n.
+    /// Checks Wilson's interval: its ends are where a score test is just significant, (p - q)² = z²
+    /// q (1 - q) / n.
     #[test]
     fn the_interval_of_a_share_ends_where_the_score_test_does() {
         for (met, of) in [(0, 10), (3, 10), (95, 100), (1000, 1000)] {

@@ -1,22 +1,23 @@
-//! Tables as TG-43 prints them, read between and beyond their entries.
+//! Tables as TG-43 prints them, with interpolation and extrapolation.
 
 /// Values over rising arguments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// Places, rising.
+    /// Arguments, rising.
     pub at: Vec<f64>,
-    /// Values at these places.
+    /// Values at these arguments.
     pub values: Vec<f64>,
 }
 
 impl Curve {
-    /// Linear between the entries, the end value beyond them.
+    /// Interpolates linearly between the entries; holds the end values beyond them.
     pub fn held(&self, x: f64) -> f64 {
         let (i, share) = place(&self.at, x);
         self.blend(i, share.clamp(0.0, 1.0))
     }
 
-    /// Linear between the entries, the first value before them, the line through the last two after them.
+    /// Interpolates linearly between the entries. Holds the first value before them, and continues
+    /// the line through the last two after them.
     pub fn extended(&self, x: f64) -> f64 {
         let (i, share) = place(&self.at, x);
         self.blend(i, share.max(0.0))
@@ -33,16 +34,16 @@ impl Curve {
 /// A table over two rising arguments, rows by the first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Places of the rows, rising.
+    /// Arguments of the rows, rising.
     pub rows_at: Vec<f64>,
-    /// Places of the columns, rising.
+    /// Arguments of the columns, rising.
     pub columns_at: Vec<f64>,
-    /// Row by row.
+    /// Values, row by row.
     pub values: Vec<f64>,
 }
 
 impl Table {
-    /// Bilinear inside, the edge beyond.
+    /// Interpolates bilinearly inside; holds the edge beyond.
     pub fn held(&self, row: f64, column: f64) -> f64 {
         let (i, down) = place(&self.rows_at, row);
         let (j, along) = place(&self.columns_at, column);
@@ -56,7 +57,7 @@ impl Table {
     }
 }
 
-/// The interval that `x` belongs to, and how far along it lies; below 0 or above 1 outside the table.
+/// Returns the interval of `x`, and the position in it; below 0 or above 1 outside the table.
 fn place(at: &[f64], x: f64) -> (usize, f64) {
     if at.len() < 2 {
         return (0, 0.0);

@@ -1,24 +1,24 @@
-//! From strength at one time to dose over another.
+//! Conversion from strength at one time to dose over an interval.
 
 const SECONDS_PER_DAY: f64 = 86_400.0;
 
-/// When dose is counted, from the time to which the strength refers.
+/// Interval over which dose is counted, from the reference time of the strength.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// Begin after the implant, in s.
     pub from_s: f64,
-    /// Infinite for all that a permanent seed ever gives.
+    /// End after the implant, in s; infinite for the whole life of a permanent seed.
     pub to_s: f64,
 }
 
 impl Interval {
-    /// From the implant on, for ever.
+    /// Interval from the implant on, without an end.
     pub const ALL: Self = Self {
         from_s: 0.0,
         to_s: f64::INFINITY,
     };
 
-    /// From one day after the implant to another.
+    /// Creates an interval from one day after the implant to another.
     pub fn days(from: f64, to: f64) -> Self {
         Self {
             from_s: from * SECONDS_PER_DAY,
@@ -26,7 +26,8 @@ impl Interval {
         }
     }
 
-    /// Time at the reference rate that gives the same dose (s): the integral of the decay.
+    /// Returns the time at the reference rate that gives the same dose (s): the integral of the
+    /// decay.
     pub fn equivalent_s(self, half_life_s: f64) -> f64 {
         let rate_per_s = std::f64::consts::LN_2 / half_life_s;
         let left = |t: f64| (-rate_per_s * t).exp();
@@ -34,17 +35,17 @@ impl Interval {
     }
 }
 
-/// Share of the strength that is left.
+/// Returns the remaining share of the strength.
 pub fn left_after(elapsed_s: f64, half_life_s: f64) -> f64 {
     (-elapsed_s / half_life_s).exp2()
 }
 
-/// Seconds from days.
+/// Converts days to seconds.
 pub fn days_to_s(days: f64) -> f64 {
     days * SECONDS_PER_DAY
 }
 
-/// Days from seconds.
+/// Converts seconds to days.
 pub fn s_to_days(s: f64) -> f64 {
     s / days_to_s(1.0)
 }

@@ -1,10 +1,11 @@
-//! Dose-volume histogram: how much of a structure gets how much.
+//! Dose-volume histogram: the volume of a structure over its dose.
 
 use rayon::prelude::*;
 
-/// Doses of a structure, highest first, with the volume that has got at least as much.
+/// Doses of a structure, highest first, with the volume at each dose or more.
 ///
-/// Each point's volume counts half above and half below its own dose; between points the volume is linear in the dose.
+/// Each point's volume counts half above and half below its own dose; between points the volume is
+/// linear in the dose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dvh {
     dose_gy: Vec<f64>,
@@ -14,7 +15,7 @@ pub struct Dvh {
     mean_gy: f64,
 }
 
-/// One line of a differential histogram.
+/// Line of a differential histogram.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bin {
     /// Lower edge of the bin, in Gy.
@@ -28,7 +29,7 @@ pub struct Bin {
 }
 
 impl Dvh {
-    /// From the dose of each point and the volume that it stands for; `None` without points.
+    /// Creates a histogram from the dose and the volume of each point; `None` without points.
     pub fn new(dose_gy: &[f64], volumes_m3: &[f64]) -> Option<Self> {
         let mut pairs: Vec<(f64, f64)> = dose_gy.iter().copied().zip(volumes_m3.iter().copied()).collect();
         pairs.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(b.1.total_cmp(&a.1)));
@@ -47,27 +48,27 @@ impl Dvh {
         })
     }
 
-    /// Volume of the structure, in m³.
+    /// Returns the volume of the structure, in m³.
     pub fn volume_m3(&self) -> f64 {
         self.volume_m3
     }
 
-    /// Mean dose, in Gy.
+    /// Returns the mean dose, in Gy.
     pub fn mean_gy(&self) -> f64 {
         self.mean_gy
     }
 
-    /// Highest dose, in Gy.
+    /// Returns the highest dose, in Gy.
     pub fn highest_gy(&self) -> f64 {
         self.dose_gy[0]
     }
 
-    /// Lowest dose, in Gy.
+    /// Returns the lowest dose, in Gy.
     pub fn lowest_gy(&self) -> f64 {
         self.dose_gy[self.dose_gy.len() - 1]
     }
 
-    /// Volume with at least this dose (m³).
+    /// Returns the volume with at least this dose (m³).
     pub fn at_least_m3(&self, dose_gy: f64) -> f64 {
         let below = self.dose_gy.partition_point(|&d| d >= dose_gy);
         match below {
@@ -81,7 +82,8 @@ impl Dvh {
         }
     }
 
-    /// The highest dose that this much volume gets at least (Gy); `None` when the structure is smaller.
+    /// Returns the highest dose that at least this volume receives (Gy); `None` if the structure is
+    /// smaller.
     pub fn dose_of_gy(&self, volume_m3: f64) -> Option<f64> {
         // A part in 10^9 is rounding.
         if !(0.0..=self.volume_m3 * (1.0 + 1e-9)).contains(&volume_m3) {
@@ -99,7 +101,7 @@ impl Dvh {
         })
     }
 
-    /// Differential and cumulative histogram from 0 to `to_gy` or above.
+    /// Returns the differential and cumulative histogram from 0 to `to_gy` or above.
     pub fn bins(&self, width_gy: f64, to_gy: f64) -> Vec<Bin> {
         let count = (to_gy / width_gy).ceil() as usize;
         let edge = |i: usize| i as f64 * width_gy;

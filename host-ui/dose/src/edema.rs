@@ -1,9 +1,11 @@
-//! Dose in a gland that swells at the implant and shrinks again, with the seeds that move with it.
+//! Dose in a gland that swells at the implant and shrinks again, together with its seeds.
 //!
-//! The volume is `V(t) = V_end (1 + M exp(-λ_e t))` from the implant on, and every distance in it grows with the cube root (Chen, Yue,
-//! Wang, Roberts, Peschel, Nath, Int. J. Radiat. Oncol. 47, 1405, 2000; AAPM TG-137, 2009). The dose to a piece of tissue is the
-//! integral of its dose rate in the geometry of each moment. With `u = exp(-λ t)` it is the mean over u of the dose that the
-//! geometry of that moment would give for ever: a sum of doses at a few moments (Gauss and Legendre in the root of u).
+//! The volume is `V(t) = V_end (1 + M exp(-λ_e t))` from the implant on, and every distance in it
+//! grows with the cube root (Chen, Yue, Wang, Roberts, Peschel, Nath, Int. J. Radiat. Oncol. 47,
+//! 1405, 2000; AAPM TG-137, 2009). The dose to a piece of tissue is the integral of its dose rate
+//! in the geometry of each moment. With `u = exp(-λ t)` it is the mean over u of the total dose in
+//! the geometry of that moment: a sum of doses at a few moments (Gauss and Legendre in the root of
+//! u).
 
 use super::decay::{days_to_s, s_to_days};
 use super::kernel::DoseKernel;
@@ -23,9 +25,9 @@ const NODES: [[f64; 2]; 6] = [
 /// Swelling of a gland at the implant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edema {
-    /// Volume gained at the implant, as a share of the volume in the end: 0.5 for half as much again.
+    /// Volume gained at the implant, as a share of the final volume: 0.5 for half as much again.
     pub magnitude: f64,
-    /// Time in which half of what was gained is lost, in s.
+    /// Time in which half of the gain is lost, in s.
     pub half_life_s: f64,
 }
 
@@ -39,7 +41,8 @@ pub struct Swelling {
 }
 
 impl Swelling {
-    /// Dose of seeds at points, both as in the gland without edema (Gy); `kernel` is for all time.
+    /// Computes the dose of seeds at points, both as in the gland without edema (Gy); `kernel` is
+    /// for all time.
     pub fn dose_gy(self, kernel: &DoseKernel, seeds: &[Seed], points: &DosePoints) -> Vec<f64> {
         self.edema
             .dose_at_gy(kernel, self.half_life_s, f64::INFINITY, seeds, points)
@@ -47,7 +50,7 @@ impl Swelling {
 }
 
 impl Edema {
-    /// From a half-life in days.
+    /// Creates an edema from a half-life in days.
     pub fn of_days(magnitude: f64, half_life_days: f64) -> Self {
         Self {
             magnitude,
@@ -55,12 +58,13 @@ impl Edema {
         }
     }
 
-    /// Distances some time after the implant, as a share of those in the end.
+    /// Returns the stretch of distances some time after the implant, relative to the final ones.
     pub fn stretch(self, after_s: f64) -> f64 {
         (1.0 + self.magnitude * (-after_s / self.half_life_s).exp2()).cbrt()
     }
 
-    /// Moments, in half-lives of the source turned into s, with the share of the whole dose that the geometry of each has.
+    /// Returns moments, in half-lives of the source turned into s, each with the share of the whole
+    /// dose that its geometry gives.
     fn moments(half_life_s: f64) -> impl Iterator<Item = (f64, f64)> {
         let both = NODES.into_iter().flat_map(|[x, weight]| [(x, weight), (-x, weight)]);
         both.map(move |(x, weight)| {
@@ -70,7 +74,8 @@ impl Edema {
         })
     }
 
-    /// Dose of seeds at points (Gy) for ever, both as they lie `seen_s` after the implant; `kernel` is for all time.
+    /// Computes the total dose of seeds at points (Gy), both at their positions `seen_s` after the
+    /// implant; `kernel` is for all time.
     pub fn dose_gy(
         self,
         kernel: &DoseKernel,
@@ -82,7 +87,7 @@ impl Edema {
         self.dose_at_gy(kernel, half_life_s, seen_s, seeds, &DosePoints::new(points_m))
     }
 
-    /// As [`Edema::dose_gy`], at points that are ready.
+    /// Like [`Edema::dose_gy`], at prepared points.
     pub fn dose_at_gy(
         self,
         kernel: &DoseKernel,
@@ -106,8 +111,8 @@ impl Edema {
         dose_gy
     }
 
-    /// What two volumes of one gland on two days say of its swelling at the implant, for a given half-life; `None` where the later one
-    /// is not the smaller.
+    /// Estimates the swelling at the implant from two volumes of one gland on two days, for a given
+    /// half-life; `None` unless the later one is smaller.
     pub fn of_volumes(volumes_m3: [f64; 2], seen_s: [f64; 2], half_life_s: f64) -> Option<Self> {
         let [early, late] = seen_s.map(|t| (-t / half_life_s).exp2());
         let ratio = volumes_m3[0] / volumes_m3[1];
@@ -133,7 +138,7 @@ mod tests {
     use crate::Source;
     use crate::decay::Interval;
 
-    /// A point that radiates as 1/r² alone.
+    /// Source that radiates as a point, as 1/r² alone.
     const PLAIN: &str = "[source]\nmodel = \"plain\"\nnuclide = \"I-125\"\nhalf_life_days = 59.4\ndose_rate_constant = 1.0\n\
         active_length_cm = 0.0\nr0_cm = 1.0\ntheta0_deg = 90.0\n[radial]\nr_cm = [0.1, 1.0, 20.0]\ng_point = [1.0, 1.0, 1.0]\n\
         [anisotropy_1d]\nr_cm = [0.5, 5.0]\nphi_an = [1.0, 1.0]\n";
@@ -151,7 +156,8 @@ mod tests {
         (moving, DosePoints::new(&POINTS_M).of_seeds_gy(&kernel, &seeds))
     }
 
-    /// Dose over that of the geometry in the end: the sum over n of C(-2/3, n) Mⁿ / (1 + n T/Tₑ), which converges for M < 1.
+    /// Returns the dose relative to that of the final geometry: the sum over n of C(-2/3, n) Mⁿ /
+    /// (1 + n T/Tₑ), which converges for M < 1.
     fn series(magnitude: f64, ratio: f64) -> f64 {
         let (mut sum, mut term) = (0.0, 1.0);
         for n in 0..400 {
@@ -169,14 +175,14 @@ mod tests {
         }
     }
 
-    /// Closed forms for a seed and a point that radiate as 1/r². Where the half-lives are the same the ratio is
-    /// 3 ((1 + M)^(1/3) - 1) / M.
+    /// Compares with closed forms for a seed and a point that radiate as 1/r². For equal half-lives
+    /// the ratio is 3 ((1 + M)^(1/3) - 1) / M.
     #[test]
-    fn a_swelling_gland_gets_what_the_closed_form_says() {
+    fn the_dose_of_a_swelling_gland_matches_the_closed_form() {
         for (magnitude, days) in [(0.5, 59.4), (0.5, 9.3), (0.8, 25.0), (0.3, 4.0), (0.95, 200.0)] {
             let edema = Edema::of_days(magnitude, days);
             let (moving, seen) = doses(edema, 0.0);
-            // What was seen on the first day is stretched: in the end the dose is larger.
+            // The geometry of the first day is stretched: in the final one the dose is larger.
             let in_end = edema.stretch(0.0).powi(2);
             let expected = series(magnitude, 59.4 / days);
             if days == 59.4 {
@@ -192,7 +198,7 @@ mod tests {
         }
     }
 
-    /// The same implant, seen on day 0 and on day 30: one dose.
+    /// Checks the same implant, seen on day 0 and on day 30: one dose.
     #[test]
     fn two_volumes_show_the_magnitude() {
         let edema = Edema::of_days(0.4, 9.3);

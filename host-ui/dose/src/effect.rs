@@ -11,7 +11,7 @@ use std::f64::consts::LN_2;
 const S_PER_HOUR: f64 = 3600.0;
 const S_PER_DAY: f64 = 86_400.0;
 
-/// What a tissue answers with.
+/// Radiobiological response of a tissue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Response {
     /// Name of the tissue.
@@ -24,7 +24,7 @@ pub struct Response {
     pub repair_s: f64,
     /// Time in which the number of clonogens doubles, in s; `None` for a tissue that does not grow.
     pub doubling_s: Option<f64>,
-    /// Where the figures are from.
+    /// Origin of the figures.
     pub source: &'static str,
 }
 
@@ -48,7 +48,7 @@ impl Response {
         source: "GEC-ESTRO (Pötter et al. 2006)",
     };
 
-    /// The parameters in words, with their source.
+    /// Returns the parameters in words, with their source.
     pub fn words(&self) -> String {
         let growth = self.doubling_s.map_or_else(
             || "no growth".to_owned(),
@@ -63,12 +63,13 @@ impl Response {
         )
     }
 
-    /// BED in Gy of a permanent implant that gives `dose_gy` in all; 0 where growth outweighs it from the beginning.
+    /// Returns the BED in Gy of a permanent implant with a total dose of `dose_gy`; 0 if growth
+    /// outweighs it from the beginning.
     pub fn bed_gy(&self, dose_gy: f64, half_life_s: f64) -> f64 {
         let decay = LN_2 / half_life_s;
         let repair = LN_2 / self.repair_s;
         let first_rate = dose_gy * decay;
-        // Without growth every bit of dose counts.
+        // Without growth all of the dose counts.
         let (until_s, growth_gy) = match self.doubling_s {
             None => (f64::INFINITY, 0.0),
             Some(doubling_s) => {
@@ -87,7 +88,7 @@ impl Response {
         dose_gy * given * relative - growth_gy
     }
 
-    /// Dose in fractions of 2 Gy with the same BED, in Gy.
+    /// Returns the dose in fractions of 2 Gy with the same BED, in Gy.
     pub fn eqd2_gy(&self, bed_gy: f64) -> f64 {
         bed_gy / (1.0 + 2.0 / self.alpha_beta_gy)
     }
@@ -97,14 +98,14 @@ impl Response {
 mod tests {
     use super::*;
 
-    /// The integral itself, in small steps: dose, repair of each pair of moments, growth.
+    /// Integrates in small steps: dose, repair of each pair of moments, growth.
     fn by_steps(response: &Response, dose_gy: f64, half_life_s: f64, steps: usize) -> f64 {
         let (decay, repair) = (LN_2 / half_life_s, LN_2 / response.repair_s);
         let until_s = response.doubling_s.map_or(30.0 / decay, |d| {
             (response.alpha_per_gy * dose_gy * decay * d / LN_2).ln() / decay
         });
         let step_s = until_s / steps as f64;
-        // Damage that is not repaired, solved exactly within a step of constant rate.
+        // Unrepaired damage, solved exactly within a step of constant rate.
         let (mut unrepaired, mut linear, mut square) = (0.0, 0.0, 0.0);
         for n in 0..steps {
             let rate = dose_gy * decay * (-decay * (n as f64 + 0.5) * step_s).exp();
@@ -134,7 +135,8 @@ mod tests {
         }
     }
 
-    /// TG-137 has about 110 Gy for 145 Gy of I-125; a dose that growth outweighs has no effect.
+    /// Compares with TG-137: about 110 Gy for 145 Gy of I-125. A dose that growth outweighs has no
+    /// effect.
     #[test]
     fn the_usual_prescription_has_the_published_effect() {
         let bed = Response::PROSTATE.bed_gy(145.0, 59.4 * S_PER_DAY);

@@ -1,16 +1,16 @@
-//! What dose cannot be computed from.
+//! Reasons why a dose cannot be computed.
 
 use std::path::PathBuf;
 use stylet_base::WriteError;
 use stylet_base::format::printable;
 
-/// Why dose cannot be computed; the texts say what was found and what to do.
+/// Reason why a dose cannot be computed; the texts say what was found and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum DoseError {
     /// A triangle mesh that encloses no volume.
     #[error("{0}")]
     Mesh(&'static str),
-    /// A grid with voxels of no size, or with too many of them.
+    /// A grid with voxels of zero size, or with too many of them.
     #[error("{0}")]
     Grid(String),
     /// The name of a metric that does not exist.
@@ -19,15 +19,15 @@ pub enum DoseError {
     /// Structures without the target.
     #[error("{0}")]
     Target(String),
-    /// Everything that is wrong in the text of a source.
+    /// All errors in the text of a source.
     #[error("{0}")]
     Source(String),
-    /// A source file that cannot be read or is wrong.
+    /// A source file that cannot be read or is invalid.
     #[error("{}: {}", .path.display(), printable(.why))]
     SourceFile {
         /// The file.
         path: PathBuf,
-        /// What is wrong in it.
+        /// Errors in the file.
         why: String,
     },
     /// A picture that cannot be drawn.
@@ -35,7 +35,7 @@ pub enum DoseError {
     Picture {
         /// The file.
         path: PathBuf,
-        /// What the drawing library reported.
+        /// Message of the drawing library.
         why: String,
     },
     /// A file that cannot be written.

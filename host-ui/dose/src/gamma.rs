@@ -1,40 +1,42 @@
-//! Gamma index of two doses (Low et al., Med. Phys. 25, 656, 1998): the nearest that a dose comes to another in place and dose at once.
+//! Gamma index of two doses (Low et al., Med. Phys. 25, 656, 1998): smallest combined difference in
+//! place and dose.
 
 use rayon::prelude::*;
 
-/// Beyond this gamma nothing is searched; the value says "2 or more".
+/// Largest gamma of the search; it means "2 or more".
 pub const HIGHEST: f64 = 2.0;
-/// Steps of the search within one distance to agreement (Wendling et al., Med. Phys. 34, 1647, 2007, ask for ten).
+/// Steps of the search within one distance to agreement (Wendling et al., Med. Phys. 34, 1647,
+/// 2007, require ten).
 const STEPS: i32 = 10;
-/// Times that a step is halved around the best place.
+/// Number of halvings of the step around the best place.
 const HALVINGS: usize = 3;
 
-/// When two doses agree.
+/// Criterion for the agreement of two doses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Criterion {
     /// Dose difference, as a share: 0.03.
     pub dose_share: f64,
-    /// What the share is of, in Gy, for all places; `None`: the dose at each place (local).
+    /// Reference of the share, in Gy, for all places; `None` for the dose at each place (local).
     pub of_gy: Option<f64>,
     /// Distance to agreement, in m.
     pub distance_m: f64,
 }
 
-/// Share of the places that agree, and how far the others are off.
+/// Share of the places that agree, and gamma of all.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Agreement {
     /// Places that were compared.
     pub compared: usize,
-    /// Those with gamma of at most 1.
+    /// Places with gamma of at most 1.
     pub passed: usize,
-    /// Mean gamma, those of [`HIGHEST`] and more as that.
+    /// Mean gamma; values of [`HIGHEST`] and more count as that.
     pub mean: f64,
-    /// Largest gamma; [`HIGHEST`] for all that is more.
+    /// Largest gamma; [`HIGHEST`] for larger ones.
     pub highest: f64,
 }
 
 impl Agreement {
-    /// Of some gammas; `None` without any.
+    /// Summarises gammas; `None` without any.
     pub fn of(gammas: &[f64]) -> Option<Self> {
         let compared = gammas.len();
         (compared > 0).then(|| Self {
@@ -47,9 +49,11 @@ impl Agreement {
 }
 
 impl Criterion {
-    /// Gamma at each of some places with their dose (Gy) against another dose, `None` outside of it.
+    /// Returns gamma at some places with their dose (Gy) against another dose, `None` outside of
+    /// it.
     ///
-    /// Shells around the place are searched from the inside: one whose distance alone exceeds what was found ends the search.
+    /// Shells around the place are searched from the inside. A shell whose distance alone exceeds
+    /// the best gamma ends the search.
     pub fn gammas(
         &self,
         places: &[([f64; 3], f64)],
@@ -73,7 +77,8 @@ impl Criterion {
                     (least, best) = (square, Some(*offset));
                 }
             }
-            // Steep doses pass between two steps: half of a step, a quarter and so on around the best.
+            // Steep doses fall between two steps: refine by half of a step, a quarter and so on
+            // around the best.
             let mut step_m = self.distance_m / f64::from(STEPS);
             for _ in 0..HALVINGS {
                 step_m /= 2.0;
@@ -92,7 +97,8 @@ impl Criterion {
         places.par_iter().map(gamma).collect()
     }
 
-    /// Steps in space (m), nearest first, with the square of their length in distances to agreement.
+    /// Returns steps in space (m), nearest first, with the square of their length in distances to
+    /// agreement.
     fn offsets(&self) -> Vec<([f64; 3], f64)> {
         let reach = (HIGHEST * f64::from(STEPS)) as i32;
         let step_m = self.distance_m / f64::from(STEPS);
@@ -138,9 +144,9 @@ mod tests {
         distance_m: 3e-3,
     };
 
-    /// Gamma of a constant offset is the offset over what is allowed, everywhere.
+    /// Compares with a constant offset, whose gamma is the offset over the tolerance, everywhere.
     #[test]
-    fn an_offset_gives_its_share_of_what_is_allowed() {
+    fn the_gamma_of_an_offset_is_its_share_of_the_tolerance() {
         for gamma in gammas(GLOBAL, |_| 80.0, |_| Some(82.4)) {
             assert!((gamma.unwrap() - 0.8).abs() < 1e-9);
         }
@@ -151,7 +157,8 @@ mod tests {
         assert_eq!(gammas(GLOBAL, |_| 80.0, |_| None), [None; 4]);
     }
 
-    /// A gradient of g per m shifted by s: gamma is g s / sqrt(allowed² + (g d)²), the distance of a point from a line.
+    /// Compares with a gradient of g per m shifted by s: gamma is g s / sqrt(allowed² + (g d)²),
+    /// the distance of a point from a line.
     #[test]
     fn a_shifted_gradient_gives_the_distance_from_a_line() {
         for (gradient, shift_m) in [(2000.0, 2e-3), (800.0, 4e-3), (5000.0, 1e-3)] {
@@ -164,7 +171,7 @@ mod tests {
         }
     }
 
-    /// Every place of a finer lattice, without an early end.
+    /// Compares with every place of a finer lattice, without an early end.
     #[test]
     fn the_search_that_ends_early_finds_what_all_steps_find() {
         const SIDE: i32 = 81;
@@ -180,7 +187,7 @@ mod tests {
                     least = least.min(distance.hypot((gy - field(*place)) / 3.0));
                 }
             }
-            // The search ends between the places of this lattice, at an eighth of a step of its own.
+            // The search ends between the places of this lattice, at an eighth of its own step.
             assert!(
                 (least - 0.02..least + 0.01).contains(&found.unwrap()),
                 "{found:?} {least}"

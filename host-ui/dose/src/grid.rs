@@ -1,14 +1,15 @@
-//! Dose on a regular grid, kept up to date seed by seed.
+//! Dose on a regular grid, updated seed by seed.
 
 use super::error::DoseError;
 use super::kernel::{BLOCK, Block, DoseKernel, Placed};
 use super::seed::Seed;
 use rayon::prelude::*;
 
-/// A grid with more voxels is refused (2 GiB).
+/// Largest number of voxels (2 GiB).
 const MAX_VOXELS: usize = 1 << 28;
 
-/// Voxel (i, j, k) has its centre at `origin_m + (i, j, k) spacing_m`; x runs fastest.
+/// Dose on a grid. Voxel (i, j, k) has its centre at `origin_m + (i, j, k) spacing_m`; x runs
+/// fastest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DoseGrid {
     origin_m: [f64; 3],
@@ -18,7 +19,8 @@ pub struct DoseGrid {
 }
 
 impl DoseGrid {
-    /// A grid without dose; an error for voxels without a size or for too many of them.
+    /// Creates a grid without dose; returns an error for voxels of zero size or for too many of
+    /// them.
     pub fn new(origin_m: [f64; 3], spacing_m: [f64; 3], dims: [usize; 3]) -> Result<Self, DoseError> {
         let voxels = dims.iter().try_fold(1_usize, |n, &d| n.checked_mul(d));
         if !origin_m.iter().chain(&spacing_m).all(|v| v.is_finite()) || spacing_m.iter().any(|&h| h <= 0.0) {
@@ -40,28 +42,28 @@ impl DoseGrid {
         }
     }
 
-    /// Covers a box with cubes.
+    /// Creates a grid of cubes that covers a box.
     pub fn covering(low_m: [f64; 3], high_m: [f64; 3], spacing_m: f64) -> Result<Self, DoseError> {
         let dims = [0, 1, 2].map(|a| ((high_m[a] - low_m[a]) / spacing_m - 1e-9).ceil().max(0.0) as usize + 1);
         Self::new(low_m, [spacing_m; 3], dims)
     }
 
-    /// Voxels along x, y, z.
+    /// Returns the number of voxels along x, y, z.
     pub fn dims(&self) -> [usize; 3] {
         self.dims
     }
 
-    /// Sides of a voxel, in m.
+    /// Returns the sides of a voxel, in m.
     pub fn spacing_m(&self) -> [f64; 3] {
         self.spacing_m
     }
 
-    /// Voxel by voxel, x fastest.
+    /// Returns the dose voxel by voxel, x fastest.
     pub fn dose_gy(&self) -> &[f64] {
         &self.dose_gy
     }
 
-    /// Sets each voxel to a given field (Gy), as another program may have computed it.
+    /// Sets each voxel to a given field (Gy), for example that of another program.
     pub fn fill(&mut self, field_gy: impl Fn([f64; 3]) -> f64 + Sync) {
         let (origin, spacing, dims) = (self.origin_m, self.spacing_m, self.dims);
         self.dose_gy
@@ -75,7 +77,7 @@ impl DoseGrid {
             });
     }
 
-    /// Centre of a voxel, in m.
+    /// Returns the centre of a voxel, in m.
     pub fn centre_m(&self, [i, j, k]: [usize; 3]) -> [f64; 3] {
         let at = [i as f64, j as f64, k as f64];
         [0, 1, 2].map(|a| self.origin_m[a] + at[a] * self.spacing_m[a])
@@ -86,7 +88,7 @@ impl DoseGrid {
         self.change(kernel, seeds, 1.0, &|_| ());
     }
 
-    /// As [`DoseGrid::add`]; `done` is called with the number of voxels done since, from any thread.
+    /// Like [`DoseGrid::add`]; calls `done` with the number of voxels done since, from any thread.
     pub fn add_reporting(&mut self, kernel: &DoseKernel, seeds: &[Seed], done: &(dyn Fn(u64) + Sync)) {
         self.change(kernel, seeds, 1.0, done);
     }
@@ -127,11 +129,13 @@ impl DoseGrid {
         });
     }
 
-    /// Cubic between the centres of voxels (Lagrange, four along each axis); outside the outermost centres their dose.
+    /// Interpolates between the centres of voxels by cubics (Lagrange, four along each axis);
+    /// outside the outermost centres holds their dose.
     ///
-    /// Straight lines would cut the tops off: 0.2 % of a volume at voxels of 1 mm. Beside a peak that the grid cannot follow a cubic
-    /// swings, so the dose stays near those of the eight voxels around: above them by an eighth of the range of all that are read,
-    /// as a parabola may, and below them by a tenth of the lowest.
+    /// Linear interpolation would cut the peaks: 0.2 % of a volume at voxels of 1 mm. Next to a
+    /// peak that the grid cannot resolve a cubic overshoots, so the dose stays near those of the
+    /// eight voxels around. It exceeds them by at most an eighth of the range of all values read,
+    /// as a parabola may, and falls below the lowest by at most a tenth of it.
     pub fn at_gy(&self, point_m: [f64; 3]) -> f64 {
         let [x, y, z] = [0, 1, 2].map(|a| Taps::new((point_m[a] - self.origin_m[a]) / self.spacing_m[a], self.dims[a]));
         let [nx, ny, _] = self.dims;
@@ -183,12 +187,12 @@ impl Range {
     }
 }
 
-/// The voxels along one axis that a place is read from.
+/// Voxels along one axis from which a place is interpolated.
 struct Taps {
     first: usize,
     count: usize,
     weights: [f64; 4],
-    /// Which of them lies before the place.
+    /// Index of the last voxel before the place.
     before: usize,
 }
 

@@ -1,24 +1,26 @@
-//! Isodose surfaces: triangles around all that gets a dose.
+//! Isodose surfaces: triangles around the region above a dose.
 
 use super::DoseGrid;
 use fast_surface_nets::ndshape::{RuntimeShape, Shape};
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
 use rayon::prelude::*;
 
-/// A surface in the frame of the grid (m), normals outwards by the order of the corners.
+/// Surface in the frame of the grid (m), normals outwards by the order of the corners.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Isodose {
     /// Corners, in m.
     pub points_m: Vec<[f64; 3]>,
-    /// Three corners each, by their place in `points_m`.
+    /// Triangles, as indices into `points_m`.
     pub triangles: Vec<[usize; 3]>,
 }
 
-/// The surface on which the dose is `level_gy`; closed along the faces of the grid where the dose there is higher.
+/// Returns the surface on which the dose is `level_gy`; closed along the faces of the grid where
+/// the dose there is higher.
 ///
-/// Naive surface nets on the logarithm of the dose, which is nearly linear between voxels where the dose itself is not.
+/// Uses naive surface nets on the logarithm of the dose, which is nearly linear between voxels,
+/// unlike the dose itself.
 pub fn isodose(grid: &DoseGrid, level_gy: f64) -> Isodose {
-    // Nothing around the grid, so that the surface closes; the crate makes no faces in the last layer.
+    // An empty border, so that the surface closes; the crate makes no faces in the last layer.
     let dims = grid.dims().map(|d| d as u32 + 3);
     let shape = RuntimeShape::<u32, 3>::new(dims);
     let mut field = vec![NOTHING; shape.usize()];
@@ -47,7 +49,8 @@ pub fn isodose(grid: &DoseGrid, level_gy: f64) -> Isodose {
     }
 }
 
-/// A net's points lie within the surface where it is curved; Newton's method puts them onto it.
+/// Moves a point of the net onto the surface by Newton's method; on a curved surface such points
+/// lie inside.
 fn onto_surface(grid: &DoseGrid, level_gy: f64, start_m: [f64; 3]) -> [f64; 3] {
     let spacing = grid.spacing_m();
     let (low, high) = (grid.centre_m([0; 3]), grid.centre_m(grid.dims().map(|d| d - 1)));
@@ -79,8 +82,8 @@ fn onto_surface(grid: &DoseGrid, level_gy: f64, start_m: [f64; 3]) -> [f64; 3] {
 }
 
 const NEWTON_STEPS: usize = 2;
-/// Voxels to either side from which the slope is taken.
+/// Distance in voxels for the difference quotient of the slope.
 const PROBE: f64 = 0.25;
 
-/// Logarithm of the level over the dose where there is no dose.
+/// Logarithm of the level over the dose at zero dose.
 const NOTHING: f32 = 50.0;

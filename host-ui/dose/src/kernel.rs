@@ -1,8 +1,10 @@
-//! Dose of seeds at many points: TG-43 once into a table over distance and angle, then four entries of it for each point.
+//! Dose of seeds at many points: TG-43 tabulated once over distance and angle, then four entries of
+//! the table for each point.
 //!
-//! The table holds dose times r², which varies slowly. Nearer than 2.2 half lengths of the capsule or ten of its radii, and farther
-//! than 0.15 m, the formulae themselves are used. What a seed gives to a point is rounded to 2^-30 Gy; sums of such numbers are
-//! exact, so that the order of seeds does not matter and a seed that is taken away leaves no trace.
+//! The table holds dose times r², which varies slowly. Nearer than 2.2 half lengths of the capsule
+//! or ten of its radii, and farther than 0.15 m, the formulae themselves are used. The dose of one
+//! seed at a point is rounded to 2^-30 Gy. Sums of such numbers are exact, so the order of seeds
+//! does not matter and a removed seed leaves no trace.
 
 use super::Seed;
 use super::decay::Interval;
@@ -14,9 +16,10 @@ use table::Table;
 mod lanes;
 mod table;
 
-/// Points that are worked on together; they stay in the first cache.
+/// Number of points processed together; they stay in the first cache.
 pub const BLOCK: usize = 64;
-/// Beyond this many half lengths of the capsule the field times r² is nearly a straight line between two rows.
+/// Number of half lengths of the capsule beyond which the field times r² is nearly linear between
+/// two rows.
 const NEAR_HALF_LENGTHS: f64 = 2.2;
 
 /// Dose of a seed of 1 U over an interval.
@@ -28,25 +31,25 @@ pub struct DoseKernel {
     two_d: Table,
 }
 
-/// A seed in the frame of the points it is added to.
+/// Seed in the frame of the points it is added to.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed {
     line: Line,
     formalism: Formalism,
 }
 
-/// Coordinates of up to [`BLOCK`] points (m), from the place that seeds are placed about.
+/// Coordinates of up to [`BLOCK`] points (m), relative to the anchor of the seeds.
 pub struct Block {
-    /// Places along x, in m.
+    /// Coordinates along x, in m.
     pub x_m: [f32; BLOCK],
-    /// Places along y, in m.
+    /// Coordinates along y, in m.
     pub y_m: [f32; BLOCK],
-    /// Places along z, in m.
+    /// Coordinates along z, in m.
     pub z_m: [f32; BLOCK],
 }
 
 impl Block {
-    /// Points that all lie at the origin.
+    /// Block whose points all lie at the origin.
     pub const ORIGIN: Self = Self {
         x_m: [0.0; BLOCK],
         y_m: [0.0; BLOCK],
@@ -55,7 +58,7 @@ impl Block {
 }
 
 impl DoseKernel {
-    /// The kernel of a source over an interval of time.
+    /// Returns the kernel of a source over an interval of time.
     pub fn new(source: &Source, interval: Interval) -> Self {
         let tables = source.tables.clone();
         let equivalent_s = interval.equivalent_s(source.half_life_s);
@@ -74,12 +77,13 @@ impl DoseKernel {
         }
     }
 
-    /// Dose of 1 U by the formulae, for a point beside and along the axis.
+    /// Computes the dose of 1 U by the formulae, for a point across and along the axis.
     pub fn exact_gy(&self, formalism: Formalism, across_m: f64, along_m: f64) -> f64 {
         self.tables.rate_gy_per_s(formalism, across_m, along_m) * self.equivalent_s
     }
 
-    /// Dose of a seed at a point by the formulae (Gy): the straightforward loop that everything else is measured against.
+    /// Computes the dose of a seed at a point by the formulae (Gy): the plain loop that is the
+    /// reference for everything else.
     pub fn exact_at_gy(&self, seed: &Seed, point_m: [f64; 3]) -> f64 {
         let d = [0, 1, 2].map(|a| point_m[a] - seed.position_m[a]);
         let (formalism, axis) = match seed.axis {
@@ -91,7 +95,7 @@ impl DoseKernel {
         self.exact_gy(formalism, (square - along * along).max(0.0).sqrt(), along) * seed.strength_u
     }
 
-    /// A seed as [`DoseKernel::add`] takes it, for points given from `anchor_m`.
+    /// Returns a seed in the form of [`DoseKernel::add`], for points relative to `anchor_m`.
     pub fn place(seed: &Seed, anchor_m: [f64; 3]) -> Placed {
         Placed {
             line: Line {
@@ -107,7 +111,7 @@ impl DoseKernel {
         }
     }
 
-    /// Adds the dose of seeds to at most [`BLOCK`] points; `sign` is 1, or -1 to take the seeds away.
+    /// Adds the dose of seeds to at most [`BLOCK`] points; `sign` is 1, or -1 to remove the seeds.
     pub fn add(&self, seeds: &[Placed], points: &Block, sign: f64, dose_gy: &mut [f64]) {
         let mut sum_gy = [0.0; BLOCK];
         let mut gy = [0.0; BLOCK];
@@ -137,7 +141,8 @@ impl DoseKernel {
         for (i, gy) in gy.iter_mut().enumerate() {
             let d = [points.x_m[i] - p[0], points.y_m[i] - p[1], points.z_m[i] - p[2]].map(f64::from);
             let square: f64 = d.iter().map(|d| d * d).sum();
-            // Rounding may put a point on the other side here than in `doses`; both ways are right there.
+            // Rounding may put a point on the other side here than in `doses`; both results are
+            // valid there.
             if (nearest..farthest).contains(&square) {
                 continue;
             }

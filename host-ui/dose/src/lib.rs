@@ -27,8 +27,9 @@
 //!
 //! `cargo run --release -p stylet-dose --example dose_of_an_implant` prints the figures of a whole implant.
 //!
-//! Lengths in m, time in s, dose in Gy, air kerma strength in U (1 U = 1 µGy m² h⁻¹); one frame for seeds, structures and
-//! grids, whichever the caller chooses. Water everywhere and no shielding of one seed by another, as TG-43 has it.
+//! Lengths in m, time in s, dose in Gy, air kerma strength in U (1 U = 1 µGy m² h⁻¹); one frame for
+//! seeds, structures and grids, chosen by the caller. Water everywhere and no shielding of one seed
+//! by another, as in TG-43.
 #![warn(missing_docs)]
 
 pub mod criteria;

@@ -13,7 +13,8 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// The mesh must be closed: each edge of a triangle belongs to one other triangle too, which runs along it the other way.
+    /// Creates a region. The mesh must be closed: each edge of a triangle belongs to exactly one
+    /// other triangle, in the opposite direction.
     pub fn new(points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Self, DoseError> {
         check_closed(points_m, triangles)?;
         let (low_m, high_m) = bounds(points_m);
@@ -65,9 +66,10 @@ impl Region for Mesh {
     }
 }
 
-/// Whether the ray from the point towards +x goes through the triangle.
+/// Returns whether the ray from the point towards +x goes through the triangle.
 fn is_before(p: [f64; 3], [a, b, c]: &[[f64; 3]; 3]) -> bool {
-    // Twice the area on the y-z plane that the point spans with an edge; edges shared by two triangles give the same number.
+    // Twice the area on the y-z plane that the point spans with an edge; edges common to two
+    // triangles give the same number.
     let span = |u: &[f64; 3], v: &[f64; 3]| (u[1] - p[1]) * (v[2] - p[2]) - (u[2] - p[2]) * (v[1] - p[1]);
     let (wa, wb, wc) = (span(b, c), span(c, a), span(a, b));
     let all = wa + wb + wc;
@@ -78,7 +80,7 @@ fn is_before(p: [f64; 3], [a, b, c]: &[[f64; 3]; 3]) -> bool {
 fn check_closed(points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<(), DoseError> {
     if triangles.is_empty() || triangles.iter().flatten().any(|&i| i >= points_m.len()) {
         return Err(DoseError::Mesh(
-            "the mesh has no triangles, or a triangle with a corner that is not there",
+            "the mesh has no triangles, or a triangle with a missing corner",
         ));
     }
     if points_m.iter().flatten().any(|v| !v.is_finite()) {

@@ -1,11 +1,11 @@
-//! Measures of a DVH by the names that clinics use: D90, D2cc, V150, V20Gy, Dmean.
+//! Measures of a DVH by their clinical names: D90, D2cc, V150, V20Gy, Dmean.
 
 use super::Dvh;
 use super::error::DoseError;
 
 const M3_PER_CC: f64 = 1e-6;
 
-/// What is asked of a DVH.
+/// Measure of a DVH.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Metric {
     /// Dose to the hottest share of the volume: D90.
@@ -30,7 +30,7 @@ pub enum Metric {
     Lowest,
 }
 
-/// A measure, in the units that people read.
+/// Value of a measure, in display units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
     /// A dose.
@@ -47,7 +47,7 @@ pub enum Value {
         /// In percent of the structure.
         percent: f64,
     },
-    /// The structure is smaller than the volume asked for.
+    /// The structure is smaller than the requested volume.
     TooSmall {
         /// Volume of the structure, in cm³.
         cc: f64,
@@ -55,7 +55,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// In Gy, or in percent of the structure: what a distribution is made of.
+    /// Returns the value in Gy, or in percent of the structure, for statistics.
     pub fn main(self) -> Option<f64> {
         match self {
             Self::Dose { gy, .. } => Some(gy),
@@ -77,7 +77,7 @@ impl Metric {
         }
         let wrong = || {
             DoseError::Metric(format!(
-                "\"{name}\" is no metric; write D90 (or D90%), D2cc, V150 (or V150%), V145Gy, Dmean, Dmax or Dmin"
+                "\"{name}\" is not a metric; write D90 (or D90%), D2cc, V150 (or V150%), V145Gy, Dmean, Dmax or Dmin"
             ))
         };
         let number_before = |unit: &str| -> Option<f64> {
@@ -100,7 +100,7 @@ impl Metric {
         }
     }
 
-    /// The value in a histogram; `prescription_gy` in Gy.
+    /// Returns the value in a histogram; `prescription_gy` in Gy.
     pub fn of(self, dvh: &Dvh, prescription_gy: f64) -> Value {
         let dose = |gy: f64| Value::Dose {
             gy,
@@ -129,7 +129,7 @@ impl Metric {
         }
     }
 
-    /// Whether its value is a dose (Gy) or a volume (percent).
+    /// Returns the unit of its value: dose (Gy) or volume (percent).
     pub fn unit(self) -> &'static str {
         match self {
             Self::VolumeAtShare(_) | Self::VolumeAtDose { .. } => "percent",
@@ -140,7 +140,7 @@ impl Metric {
 
 impl std::fmt::Display for Metric {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // Shares come from percents: no digits beyond those that were typed.
+        // Shares come from percents: drop digits beyond those that were typed.
         let percent = |share: f64| (share * 1e8).round() / 1e6;
         match self {
             Self::DoseToShare(share) => write!(f, "D{}", percent(*share)),

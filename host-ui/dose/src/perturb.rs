@@ -1,4 +1,4 @@
-//! What seeds that miss their places do: many plans with seeds moved at random, and how their measures spread.
+//! Robustness of a plan: many trials with seeds moved at random, and the spread of their measures.
 
 mod errors;
 mod spread;
@@ -13,29 +13,30 @@ use super::seed::Seed;
 use rayon::prelude::*;
 use stylet_base::interrupt::Interrupt;
 
-/// How seeds are moved.
+/// Random displacement of seeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Perturbation {
-    /// What happens to the seeds.
+    /// Errors of the seeds.
     pub errors: Errors,
     /// Number of trials.
     pub trials: usize,
-    /// The same number gives the same trials, on any number of threads.
+    /// Seed of the random numbers: equal seeds give equal trials, on any number of threads.
     pub random_seed: u64,
 }
 
-/// The plan that trials start from.
+/// Plan before its perturbation.
 #[derive(Clone, Copy, Debug)]
 pub struct Planned<'a> {
-    /// The seeds where they should be.
+    /// Seeds at their planned places.
     pub seeds: &'a [Seed],
-    /// The strand of each seed; empty where each seed is alone.
+    /// Strand of each seed; empty if each seed is single.
     pub strands: &'a [usize],
-    /// The swelling of the gland, with which the seeds move.
+    /// Swelling of the gland, with which the seeds move.
     pub swelling: Option<Swelling>,
 }
 
-/// Values of every trial that was done, by its number; `stop` ends the work early, `done` is called after each trial.
+/// Returns the values of every finished trial, by its number. `stop` ends the work early; `done` is
+/// called after each trial.
 pub fn trials(
     judge: &Judge,
     kernel: &DoseKernel,
@@ -58,7 +59,8 @@ pub fn trials(
         .collect()
 }
 
-/// The seeds of one trial; each trial has streams of random numbers of its own. `strands` as in [`Planned`].
+/// Returns the seeds of one trial, which has its own streams of random numbers. `strands` as in
+/// [`Planned`].
 pub fn moved(plan: &[Seed], strands: &[usize], how: Perturbation, trial: usize) -> Vec<Seed> {
     how.errors.apply(plan, strands, how.random_seed, trial)
 }

@@ -6,7 +6,7 @@ use plotters::prelude::*;
 use std::path::Path;
 
 const SIZE: (u32, u32) = (900, 560);
-/// Okabe-Ito, without its yellow, which white swallows.
+/// Colours of Okabe-Ito, without its yellow, which is invisible on white.
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -18,7 +18,7 @@ const COLOURS: [RGBColor; 7] = [
 ];
 const STEPS: usize = 400;
 
-/// Cumulative histograms up to three times the prescription, which is marked.
+/// Draws cumulative histograms up to three times the prescription, which is marked.
 pub fn dvh(path: &Path, curves: &[(&str, &Dvh)], prescription_gy: f64) -> Result<(), DoseError> {
     let most_gy = 3.0 * prescription_gy;
     let lines: Vec<(String, Vec<(f64, f64)>)> = curves

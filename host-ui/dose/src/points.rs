@@ -1,20 +1,20 @@
-//! Dose at points that lie anywhere.
+//! Dose at arbitrary points.
 
 use super::kernel::{BLOCK, Block, DoseKernel, Placed};
 use super::seed::Seed;
 use rayon::prelude::*;
 
-/// Points with the dose they have got so far.
+/// Points with their accumulated dose.
 #[derive(Clone, Debug)]
 pub struct DosePoints {
     blocks: Vec<[[f32; BLOCK]; 3]>,
-    /// The middle of the points, from which single precision is fine enough.
+    /// Middle of the points, from which single precision is fine enough.
     anchor_m: [f64; 3],
     dose_gy: Vec<f64>,
 }
 
 impl DosePoints {
-    /// Points without dose; places in m.
+    /// Creates points without dose; places in m.
     pub fn new(points_m: &[[f64; 3]]) -> Self {
         let count = points_m.len().max(1) as f64;
         let anchor_m = [0, 1, 2].map(|a| points_m.iter().map(|p| p[a]).sum::<f64>() / count);
@@ -29,7 +29,7 @@ impl DosePoints {
         }
     }
 
-    /// In the order of the points.
+    /// Returns the dose in the order of the points.
     pub fn dose_gy(&self) -> &[f64] {
         &self.dose_gy
     }
@@ -67,12 +67,13 @@ impl DosePoints {
             });
     }
 
-    /// Dose of these seeds alone.
+    /// Computes the dose of these seeds alone.
     pub fn of_seeds_gy(&self, kernel: &DoseKernel, seeds: &[Seed]) -> Vec<f64> {
         self.of_seeds_reporting(kernel, seeds, &|_| ())
     }
 
-    /// As [`DosePoints::of_seeds_gy`]; `done` is called with the number of points done since, from any thread.
+    /// Like [`DosePoints::of_seeds_gy`]; calls `done` with the number of points done since, from
+    /// any thread.
     pub fn of_seeds_reporting(&self, kernel: &DoseKernel, seeds: &[Seed], done: &(dyn Fn(u64) + Sync)) -> Vec<f64> {
         let placed = self.place(seeds);
         let mut dose_gy = vec![0.0; self.dose_gy.len()];
@@ -80,7 +81,8 @@ impl DosePoints {
         dose_gy
     }
 
-    /// Dose of seeds alone once every distance, among the points and to the seeds, is `by` times as long.
+    /// Computes the dose of seeds alone after every distance, among the points and to the seeds, is
+    /// multiplied by `by`.
     pub fn of_seeds_stretched_gy(&self, kernel: &DoseKernel, seeds: &[Seed], by: f64) -> Vec<f64> {
         let stretched = Self {
             blocks: self

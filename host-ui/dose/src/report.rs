@@ -1,4 +1,4 @@
-//! What a plan is judged by: the measures of each structure, homogeneity and conformity of the target.
+//! Evaluation of a plan: measures of each structure, homogeneity and conformity of the target.
 
 use super::Dvh;
 use super::criterion::Criterion;
@@ -12,10 +12,10 @@ use super::structure::{Structure, bounds};
 use serde_json::{Value as Json, json};
 use stylet_anatomy::{Organ, target_among};
 
-/// Room around seeds and target in which the volume at the prescription is looked for.
+/// Margin around seeds and target in which the volume at the prescription is searched.
 const MARGIN_M: f64 = 0.03;
 
-/// Structures, ready to be judged under any set of seeds.
+/// Structures, prepared for evaluation under any set of seeds.
 pub struct Judge {
     structures: Vec<Judged>,
     target: usize,
@@ -30,7 +30,7 @@ struct Judged {
     volumes_m3: Vec<f64>,
 }
 
-/// A box around everything: only there can a dose as high as the prescription be.
+/// Box around the whole region where the dose may reach the prescription.
 struct Around {
     points: DosePoints,
     point_m3: f64,
@@ -38,28 +38,31 @@ struct Around {
     outermost: Vec<usize>,
 }
 
-/// How well the dose fits the target.
+/// Quality of the dose distribution around the target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Dose homogeneity index (V100 - V150) / V100 of the target (Wu, Ulin, Sternick, Med. Phys. 15, 104, 1988); `None` at V100 = 0.
+    /// Dose homogeneity index (V100 - V150) / V100 of the target (Wu, Ulin, Sternick, Med. Phys.
+    /// 15, 104, 1988); `None` at V100 = 0.
     pub homogeneity: Option<f64>,
-    /// COIN (Baltas et al., Int. J. Radiat. Oncol. 40, 515, 1998), product of the share of the target at the prescription
-    /// and the target's share of all that is; `None` where that volume leaves the box.
+    /// COIN (Baltas et al., Int. J. Radiat. Oncol. 40, 515, 1998). It is the share of the target at
+    /// the prescription, times the target's share of the whole volume at it; `None` if that volume
+    /// leaves the box.
     pub conformity: Option<f64>,
-    /// All that gets the prescription (m³).
+    /// Whole volume at the prescription (m³).
     pub at_prescription_m3: Option<f64>,
 }
 
-/// Everything known under one set of seeds.
+/// Result of one set of seeds.
 pub struct Verdict {
     /// One histogram for each structure.
     pub dvhs: Vec<Dvh>,
-    /// How well the dose fits the target.
+    /// Quality of the dose distribution around the target.
     pub fit: Fit,
 }
 
 impl Judge {
-    /// `target` by name, or the structure that is called like one, or the first; `extra` metrics are asked of every structure.
+    /// Creates a judge. The target is `target` by name, or the structure named like one, or the
+    /// first; `extra` metrics apply to every structure.
     pub fn new(
         structures: Vec<Structure>,
         target: Option<&str>,
@@ -96,7 +99,8 @@ impl Judge {
         self.judge_reporting(kernel, seeds, &|_| ())
     }
 
-    /// As [`Judge::judge`], in a gland that swells at the implant where a swelling is given; `kernel` is then for all time.
+    /// Like [`Judge::judge`], in a gland that swells at the implant if a swelling is given;
+    /// `kernel` is then for all time.
     pub fn judge_swollen(&self, kernel: &DoseKernel, seeds: &[Seed], swelling: Option<Swelling>) -> Verdict {
         match swelling {
             Some(swelling) => self.judge_by(&|points| swelling.dose_gy(kernel, seeds, points)),
@@ -104,13 +108,13 @@ impl Judge {
         }
     }
 
-    /// Points that the dose is computed at.
+    /// Returns the number of points at which the dose is computed.
     pub fn points(&self) -> u64 {
         let in_structures = self.structures.iter().map(|s| s.volumes_m3.len());
         (in_structures.sum::<usize>() + self.around.points.dose_gy().len()) as u64
     }
 
-    /// As [`Judge::judge`]; `done` is called with the number of points done since, from any thread.
+    /// Like [`Judge::judge`]; calls `done` with the number of points done since, from any thread.
     pub fn judge_reporting(&self, kernel: &DoseKernel, seeds: &[Seed], done: &(dyn Fn(u64) + Sync)) -> Verdict {
         self.judge_by(&|points| points.of_seeds_reporting(kernel, seeds, done))
     }
@@ -137,7 +141,7 @@ impl Judge {
         Fit {
             homogeneity: (v100 > 0.0).then(|| (v100 - v150) / v100),
             conformity: at_prescription_m3.map(|all| {
-                // The two volumes come from different points, which may leave a share just above 1.
+                // The two volumes come from different points, so the share may slightly exceed 1.
                 let share = if all > 0.0 { (v100 / all).min(1.0) } else { 0.0 };
                 v100 / target.volume_m3() * share
             }),
@@ -145,7 +149,7 @@ impl Judge {
         }
     }
 
-    /// Name, unit and value of every measure, in an order that does not depend on the seeds.
+    /// Returns name, unit and value of every measure, in an order independent of the seeds.
     pub fn values(&self, verdict: &Verdict) -> Vec<(String, Option<f64>)> {
         let mut all = Vec::new();
         for (s, dvh) in self.structures.iter().zip(&verdict.dvhs) {
@@ -162,23 +166,23 @@ impl Judge {
         all
     }
 
-    /// Names of the structures, in the order of the histograms.
+    /// Returns the names of the structures, in the order of the histograms.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.structures.iter().map(|s| s.name.as_str())
     }
 
-    /// What is asked of the structures with a role by [`Criterion::of_structure`].
+    /// Returns the criteria of [`Criterion::of_structure`] for the structures with a role.
     pub fn criteria(&self) -> Vec<Criterion> {
         let of = |(i, s): (usize, &Judged)| Criterion::of_structure(&s.name, i == self.target, self.prescription_gy);
         self.structures.iter().enumerate().flat_map(of).collect()
     }
 
-    /// Name of the structure that the prescription is for.
+    /// Returns the name of the target.
     pub fn target_name(&self) -> &str {
         &self.structures[self.target].name
     }
 
-    /// The measures as JSON; doses in Gy, volumes in cm³.
+    /// Returns the measures as JSON; doses in Gy, volumes in cm³.
     pub fn to_json(&self, verdict: &Verdict) -> Json {
         let structures: Vec<Json> = self
             .structures
@@ -208,7 +212,7 @@ impl Judge {
         })
     }
 
-    /// The measures as a table for people.
+    /// Returns the measures as a table for display.
     pub fn table(&self, verdict: &Verdict) -> String {
         let mut text = String::new();
         for (s, dvh) in self.structures.iter().zip(&verdict.dvhs) {
@@ -249,7 +253,7 @@ impl Around {
     }
 }
 
-/// The structure that the prescription is for: by name, or the one that is called like a target, or the first.
+/// Returns the index of the target: by name, or the structure named like a target, or the first.
 pub fn choose_target(names: &[&str], wanted: Option<&str>) -> Result<usize, DoseError> {
     if let Some(wanted) = wanted {
         return names
@@ -266,7 +270,8 @@ pub fn choose_target(names: &[&str], wanted: Option<&str>) -> Result<usize, Dose
     Ok(target_among(names).unwrap_or(0))
 }
 
-/// What is usually reported of a structure of that name (AAPM TG-137, GEC-ESTRO), then what was asked for.
+/// Returns the usual measures of a structure of that name (AAPM TG-137, GEC-ESTRO), then the
+/// requested ones.
 fn metrics(name: &str, is_target: bool, extra: &[Metric]) -> Vec<Metric> {
     use Metric::{DoseToShare, DoseToVolume, Mean, VolumeAtShare};
     let (cc2, cc01) = (DoseToVolume { m3: 2e-6 }, DoseToVolume { m3: 0.1e-6 });

@@ -1,11 +1,11 @@
-//! A seed as dose sees it.
+//! A seed for dose computation.
 
-/// Where a seed lies, how it points, how strong it is.
+/// Place, direction and strength of a seed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seed {
-    /// Place of its middle, in m.
+    /// Place of its centre, in m.
     pub position_m: [f64; 3],
-    /// Unit vector; `None` when the direction is not known, which means the 1D formalism.
+    /// Direction as a unit vector; `None` if it is unknown, which selects the 1D formalism.
     pub axis: Option<[f64; 3]>,
     /// Air kerma strength at the reference time.
     pub strength_u: f64,

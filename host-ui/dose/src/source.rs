@@ -15,10 +15,10 @@ pub const MBQ_PER_MCI: f64 = 37.0;
 const M_PER_CM: f64 = 0.01;
 /// 1 cGy/h in Gy/s.
 const GY_PER_S_PER_CGY_PER_H: f64 = 0.01 / 3600.0;
-/// A file larger than this is no source.
+/// Largest size of a source file.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// A model of seed.
+/// Model of a seed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Source {
     /// Name of the model.
@@ -31,7 +31,7 @@ pub struct Source {
     pub tables: Tables,
     /// Air kerma strength for an apparent activity of 1 mCi.
     pub strength_per_activity_u_per_mci: Option<f64>,
-    /// What is usually prescribed.
+    /// Usual prescription.
     pub prescription_gy: Option<f64>,
 }
 
@@ -42,17 +42,17 @@ const KNOWN: [&str; 2] = [
 ];
 
 impl Source {
-    /// One of those that come with the program, by its model.
+    /// Returns a source of the program, by its model.
     pub fn known(model: &str) -> Option<Self> {
         Self::all_known().find(|source| source.model == model)
     }
 
-    /// All that come with the program.
+    /// Returns all sources of the program.
     pub fn all_known() -> impl Iterator<Item = Self> {
         KNOWN.iter().filter_map(|text| Self::parse(text).ok())
     }
 
-    /// Reads and checks a file; the error names the file and lists all that is wrong in it.
+    /// Reads and checks a file; the error names the file and lists every problem in it.
     pub fn read(path: &Path) -> Result<Self, DoseError> {
         let refused = |why: String| DoseError::SourceFile {
             path: path.to_owned(),
@@ -62,7 +62,7 @@ impl Source {
         Self::parse(&text).map_err(|why| refused(why.to_string()))
     }
 
-    /// As [`Source::read`], from the text of the file.
+    /// Like [`Source::read`], from the text of the file.
     pub fn parse(text: &str) -> Result<Self, DoseError> {
         let table: toml::Table = text
             .parse()
@@ -72,7 +72,8 @@ impl Source {
         reader.finish().map(|()| source)
     }
 
-    /// Total dose of 1 U at 1 cm beside the middle of the source, for ever (Gy).
+    /// Returns the total dose of 1 U at 1 cm from the middle of the source, perpendicular to its
+    /// axis (Gy).
     pub fn reference_dose_gy_per_u(&self) -> f64 {
         let rate = self.tables.rate_gy_per_s(super::tg43::Formalism::TwoD, M_PER_CM, 0.0);
         rate * super::decay::Interval::ALL.equivalent_s(self.half_life_s)
@@ -88,7 +89,7 @@ fn build(r: &mut Reader) -> Source {
     r.fixed("source", "r0_cm", 1.0);
     r.fixed("source", "theta0_deg", 90.0);
     let radii_cm = r.rising("radial", "r_cm", 1e-3, 100.0);
-    // A line source needs g_L and a point source g_P: the geometry function that was divided out differs.
+    // A line source needs g_L and a point source g_P, because their geometry functions differ.
     let (used, other) = if length_cm > 0.0 {
         ("g_line", "g_point")
     } else {
@@ -121,7 +122,8 @@ fn build(r: &mut Reader) -> Source {
     }
 }
 
-/// Without its size: the smallest radius for which there are data, around the active line and beyond its ends.
+/// Reads the capsule. Without its size, uses the smallest radius with data, around the active line
+/// and beyond its ends.
 fn capsule(r: &mut Reader, active_cm: f64, smallest_radius_cm: Option<f64>) -> Capsule {
     let length = r.optional("source", "physical_length_cm", 1e-3, 10.0);
     let diameter = r.optional("source", "physical_diameter_cm", 1e-3, 10.0);
@@ -177,7 +179,7 @@ fn in_m(cm: &[f64]) -> Vec<f64> {
     cm.iter().map(|r| r * M_PER_CM).collect()
 }
 
-/// `None` when the two do not fit, which the reader has reported already.
+/// Creates a curve; `None` if the two do not fit, which the reader has reported already.
 fn curve(radii_cm: &[f64], values: Vec<f64>) -> Option<Curve> {
     (!values.is_empty() && values.len() == radii_cm.len()).then(|| Curve {
         at: in_m(radii_cm),

@@ -1,30 +1,33 @@
-//! A structure as points that each stand for a little volume, so that edges are counted by what lies inside.
+//! A structure as points that each represent a small volume, so that edges count with their inner
+//! part.
 //!
-//! Points are scattered within their cells: on a regular lattice whole layers would pass a dose level at once.
+//! Points are scattered within their cells: on a regular lattice whole layers would cross a dose
+//! level at once.
 
 use rayon::prelude::*;
 
-/// A body in space.
+/// Body in space.
 pub trait Region: Sync {
-    /// Lower and upper corner of a box around it (m).
+    /// Returns the lower and upper corner of a box around it (m).
     fn bounds_m(&self) -> ([f64; 3], [f64; 3]);
-    /// Whether a place lies inside.
+    /// Returns whether a place lies inside.
     fn contains(&self, point_m: [f64; 3]) -> bool;
 }
 
-/// Points with the volume that each stands for.
+/// Points with the volume that each represents.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Structure {
     /// Name of the structure.
     pub name: String,
     /// Points, in m.
     pub points_m: Vec<[f64; 3]>,
-    /// Volume that each point stands for, in m³.
+    /// Volume of each point, in m³.
     pub volumes_m3: Vec<f64>,
 }
 
 impl Structure {
-    /// One point for each cell of side `pitch_m` that the body touches, its volume from eight probes of the cell.
+    /// Creates one point for each cell of side `pitch_m` that the body touches, with a volume from
+    /// eight samples of the cell.
     pub fn of_region(name: &str, region: &dyn Region, pitch_m: f64) -> Self {
         let (low, high) = region.bounds_m();
         let cells = cells(low, high, pitch_m);
@@ -48,7 +51,7 @@ impl Structure {
         }
     }
 
-    /// A whole box, one point to a cell.
+    /// Creates a whole box, one point to a cell.
     pub fn of_box(name: &str, low_m: [f64; 3], high_m: [f64; 3], pitch_m: f64) -> Self {
         let cells = cells(low_m, high_m, pitch_m);
         let sides = [0, 1, 2].map(|a| (high_m[a] - low_m[a]) / cells[a] as f64);
@@ -69,18 +72,18 @@ impl Structure {
         }
     }
 
-    /// Volume of the structure, in m³.
+    /// Returns the volume of the structure, in m³.
     pub fn volume_m3(&self) -> f64 {
         self.volumes_m3.iter().sum()
     }
 
-    /// Lower and upper corner of a box around the points (m).
+    /// Returns the lower and upper corner of a box around the points (m).
     pub fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
         bounds(&self.points_m)
     }
 }
 
-/// Lower and upper corner of a box around points.
+/// Returns the lower and upper corner of a box around points.
 pub fn bounds(points_m: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     points_m
         .iter()
@@ -100,7 +103,7 @@ fn corner(low: [f64; 3], at: [usize; 3], pitch: f64) -> [f64; 3] {
     [0, 1, 2].map(|a| low[a] + at[a] as f64 * pitch)
 }
 
-/// One of the probes that are inside, whichever, stands for all of them.
+/// Returns one of the samples that are inside, at random, to represent all of them.
 fn probe(region: &dyn Region, corner: [f64; 3], pitch: f64, random: &mut Scatter) -> Option<([f64; 3], f64)> {
     let mut inside = [[0.0; 3]; 8];
     let mut count = 0;
@@ -121,7 +124,7 @@ fn probe(region: &dyn Region, corner: [f64; 3], pitch: f64, random: &mut Scatter
 pub struct Scatter(u64);
 
 impl Scatter {
-    /// The numbers of one cell, always the same.
+    /// Returns the numbers of one cell, always the same.
     pub fn of_cell(at: [usize; 3]) -> Self {
         let mut seed = Self(0);
         for index in at {
@@ -138,12 +141,12 @@ impl Scatter {
         z ^ (z >> 31)
     }
 
-    /// The next number, from 0 to 1.
+    /// Returns the next number, from 0 to 1.
     pub fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// The next three numbers, from 0 to 1.
+    /// Returns the next three numbers, from 0 to 1.
     pub fn point(&mut self) -> [f64; 3] {
         [self.unit(), self.unit(), self.unit()]
     }

@@ -1,17 +1,18 @@
 //! The TG-43U1 formulae for one source (Rivard et al., Med. Phys. 31, 633, 2004; eq. 1, 4, 11).
 //!
-//! `D = S_K Λ G_L(r,θ)/G_L(r0,θ0) g_L(r) F(r,θ)` with an axis, `D = S_K Λ G_L(r,θ0)/G_L(r0,θ0) g_L(r) φ_an(r)` without.
-//! Between the entries of a table ln g is linear in r, φ_an linear in r, F bilinear in r and θ. Beyond them: g keeps its
-//! first value inwards and goes on along the line through its last two entries in ln g outwards; φ_an and F keep
-//! their end values (Rivard et al., Med. Phys. 34, 2187, 2007).
-//! Inside the capsule there is no tissue: the dose there is that of the nearest point on the capsule's surface.
+//! `D = S_K Λ G_L(r,θ)/G_L(r0,θ0) g_L(r) F(r,θ)` with an axis, `D = S_K Λ G_L(r,θ0)/G_L(r0,θ0)
+//! g_L(r) φ_an(r)` without. Between the entries of a table ln g is linear in r, φ_an linear in r, F
+//! bilinear in r and θ. Beyond them, g keeps its first value inwards and continues the line through
+//! its last two entries in ln g outwards; φ_an and F keep their end values (Rivard et al., Med.
+//! Phys. 34, 2187, 2007). Inside the capsule there is no tissue: the dose there is that of the
+//! nearest point on the capsule's surface.
 
 use super::curve::{Curve, Table};
 
 /// r0 of TG-43.
 const REFERENCE_RADIUS_M: f64 = 0.01;
 
-/// What is known of the direction of a seed.
+/// Formalism, by what is known of the direction of a seed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Formalism {
     /// Averaged over all directions: φ_an(r).
@@ -29,12 +30,12 @@ pub struct Capsule {
     pub half_length_m: f64,
 }
 
-/// What TG-43 tabulates; distances in m, angles in degrees.
+/// Tables of TG-43; distances in m, angles in degrees.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tables {
     /// Λ in Gy/s for 1 U.
     pub dose_rate_constant_gy_per_s: f64,
-    /// 0 for a point source.
+    /// Active length; 0 for a point source.
     pub active_length_m: f64,
     /// Outer size; no dose is computed inside.
     pub capsule: Capsule,
@@ -42,14 +43,15 @@ pub struct Tables {
     pub ln_radial: Curve,
     /// Anisotropy factor over the distance.
     pub anisotropy_1d: Option<Curve>,
-    /// 0 to 90 deg (symmetric) or 0 to 180 deg.
+    /// Anisotropy function, 0 to 90 deg (symmetric) or 0 to 180 deg.
     pub anisotropy_2d: Option<Table>,
 }
 
 impl Tables {
-    /// Dose rate (Gy/s) of 1 U at a point `across_m` beside the axis and `along_m` from the middle of the source.
+    /// Returns the dose rate (Gy/s) of 1 U at a point `across_m` from the axis and `along_m` from
+    /// the middle of the source.
     ///
-    /// Without the table that the formalism needs its factor is 1.
+    /// The factor of a missing table is 1.
     pub fn rate_gy_per_s(&self, formalism: Formalism, across_m: f64, along_m: f64) -> f64 {
         let (across, along) = self.capsule.outside(across_m.abs(), along_m);
         let r = across.hypot(along);
@@ -70,7 +72,7 @@ impl Tables {
             * anisotropy
     }
 
-    /// G_L in 1/m²: `β / (L across)`, with β the angle under which the active line is seen.
+    /// Returns G_L in 1/m²: `β / (L across)`, with β the angle under which the active line is seen.
     fn geometry(&self, across_m: f64, along_m: f64) -> f64 {
         let length = self.active_length_m;
         let square = across_m * across_m + along_m * along_m - length * length / 4.0;
@@ -84,7 +86,7 @@ impl Tables {
 }
 
 impl Capsule {
-    /// The point itself, or the nearest one on the surface when it lies inside.
+    /// Returns the point itself, or the nearest one on the surface if it lies inside.
     fn outside(&self, across_m: f64, along_m: f64) -> (f64, f64) {
         let to_side = self.radius_m - across_m;
         let to_end = self.half_length_m - along_m.abs();

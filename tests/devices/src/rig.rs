@@ -85,15 +85,9 @@ impl<F: Led> Rig<F> {
         self.tissue.time_ns = self.now_ns;
         self.tissue_ports.response.write(self.tissue);
         self.haptic.tick(self.now_ns, self.now_ns, 0);
-<<<<<<< HEAD
         while self.control.haptic_notices.pop().is_ok() {}
         let record = self.control.records.pop().expect("a record for each tick");
-        // The membrane is met where the tip passes it, and left where it is well outside.
-=======
-        while self.bridge.haptic_notices.pop().is_ok() {}
-        let record = self.bridge.records.pop().expect("a record for each tick");
         // The membrane is in contact once the tip passes it, until the tip is well outside.
->>>>>>> c3509727 (Say what each part of the devices crate holds in plain English)
         let depth_m = record.tip_in_scene_m[2];
         if depth_m > 0.0 && self.tissue.contact == 0 {
             self.contacts += 1;

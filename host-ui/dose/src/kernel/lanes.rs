@@ -1,12 +1,12 @@
-//! The inner loops of the kernel, compiled for each width of vector unit and chosen when the program runs.
+//! The inner loops of the kernel, compiled for each width of vector unit and selected at run time.
 //!
-//! No product and sum are fused, so every machine gives the same bits.
+//! Products and sums are not fused, so every machine gives the same bits.
 
 use super::table::{CM2_PER_M2, Table};
 use super::{BLOCK, Block};
 use multiversion::multiversion;
 
-/// One seed, from the same place as the points.
+/// One seed, relative to the same place as the points.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     pub position_m: [f32; 3],
@@ -14,14 +14,17 @@ pub struct Line {
     pub strength_u: f32,
 }
 
-/// Adding and taking away 3 * 2^-8 rounds a number below 2^-8 to 2^-30, its own last place, and larger ones to a multiple of that.
+/// Constant that rounds: adding and subtracting 3 * 2^-8 rounds a number below 2^-8 to 2^-30, its
+/// own last place, and larger ones to a multiple of that.
 const ROUNDER_GY: f32 = 3.0 / 256.0;
-/// Added to a number above 0.5, this leaves its whole part in the last bits; the share that remains is 1 where it might be 0.
+/// Constant that extracts the whole part: added to a number above 0.5, it leaves that part in the
+/// last bits. The remaining share is 1 where it might be 0.
 const WHOLE: f32 = TWO_TO_23 - 0.5;
 const TWO_TO_23: f32 = 8_388_608.0;
 const MANTISSA: u32 = 0x007f_ffff;
 
-/// Dose of a seed at the points of a block (Gy); whether some of them lie outside the table and have got a wrong one.
+/// Computes the dose of a seed at the points of a block (Gy). Returns whether some of them lie
+/// outside the table, whose values are then wrong.
 #[multiversion(targets(
     "x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl",
     "x86_64+avx2",
@@ -42,7 +45,7 @@ pub fn doses(table: &Table, seed: &Line, points: &Block, gy: &mut [f32; BLOCK]) 
         let (x, y, z) = (points.x_m[i] - p[0], points.y_m[i] - p[1], points.z_m[i] - p[2]);
         let square = x * x + y * y + z * z;
         let along = x * axis[0] + y * axis[1] + z * axis[2];
-        // Not from r² and `along`, which leave no digits near the axis.
+        // Not from r² and `along`, which would lose all digits near the axis.
         let (cx, cy, cz) = (
             y * axis[2] - z * axis[1],
             z * axis[0] - x * axis[2],
@@ -71,8 +74,9 @@ pub fn doses(table: &Table, seed: &Line, points: &Block, gy: &mut [f32; BLOCK]) 
     }
     for i in 0..BLOCK {
         let first = cell[i] as usize;
-        // SAFETY: `key` lies in a row before the last and `column` before the last one, whatever numbers they were made of, so the
-        // cell and its neighbours to the right, below and below to the right are entries, whose number is checked above.
+        // SAFETY: `key` lies in a row before the last and `column` before the last one, for any
+        // input. So the cell and its neighbours to the right, below and below to the right are
+        // entries, whose number is checked above.
         let pair = |at: usize| unsafe { entries.as_ptr().add(at).cast::<u64>().read_unaligned() };
         let [left, right] = halves(pair(first));
         let near = left + along_row[i] * (right - left);
@@ -96,13 +100,13 @@ pub fn add_rounded(gy: &[f32; BLOCK], sum_gy: &mut [f64; BLOCK]) {
     }
 }
 
-/// Two entries that were loaded as one number.
+/// Splits two entries that were loaded as one number.
 #[inline(always)]
 fn halves(pair: u64) -> [f32; 2] {
     bytemuck::cast(pair)
 }
 
-/// As one instruction, unlike `f32::max`; the second where the first is not a number.
+/// Returns the larger number as one instruction, unlike `f32::max`; the second if the first is NaN.
 #[inline(always)]
 fn higher(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
@@ -113,7 +117,8 @@ fn lower(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
-/// Angle (rad, 0 to a quarter turn) from its cosine and sine: acos(c) / sqrt(1 - c²) as a polynomial, wrong by 2.4e-6 rad at most.
+/// Returns the angle (rad, 0 to a quarter turn) from its cosine and sine: acos(c) / sqrt(1 - c²) as
+/// a polynomial, with an error of 2.4e-6 rad at most.
 #[inline(always)]
 fn angle(cosine: f32, sine: f32) -> f32 {
     const TERMS: [f32; 7] = [

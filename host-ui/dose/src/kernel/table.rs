@@ -1,44 +1,46 @@
-//! Dose times r² over distance and angle.
+//! Table of dose times r² over distance and angle.
 //!
-//! Columns go by the angle in even steps, rows by r² in cm². A row stands at each square whose binary form ends early, at 64 or 256
-//! of them to a doubling: the first bits of a square are its row, and the others its share of the way to the next one, without a
-//! root. The squares of 0.5, 0.75, 1, 1.5, 2 ... 5, 6, 7 cm, where TG-43 tables bend, are among them.
+//! Columns go by the angle in even steps, rows by r² in cm². A row stands at each square whose
+//! binary form ends early, at 64 or 256 of them to a doubling. The first bits of a square give its
+//! row, and the others its share of the way to the next one, without a root. The squares of 0.5,
+//! 0.75, 1, 1.5, 2 ... 5, 6, 7 cm, where TG-43 tables bend, are among them.
 
 use crate::tg43::{Formalism, Tables};
 use rayon::prelude::*;
 
 pub const CM2_PER_M2: f32 = 1e4;
-/// Farther than this the formulae are used.
+/// Distance beyond which the formulae are used.
 const FARTHEST_M: f64 = 0.15;
 const MANTISSA_BITS: u32 = 23;
-/// First bits after the point that make a row; without an angle there is room for more of them.
+/// Number of leading fraction bits that select a row; without an angle there is room for more.
 const ROW_BITS: [u32; 2] = [8, 6];
-/// Steps of the angle; the first that all angles of a source's table are whole multiples of is taken.
+/// Candidate steps of the angle; the first that divides all angles of a source's table is used.
 const STEPS_DEG: [f64; 2] = [2.5, 1.0];
 
-/// What the inner loops read.
+/// Data for the inner loops.
 #[derive(Clone, Debug)]
 pub struct Table {
     /// Dose of 1 U times r² (Gy m²), row by row.
     entries: Vec<f32>,
     pub columns: usize,
     pub columns_per_rad: f32,
-    /// The column of half a turn, where the ends of the seed differ; else columns end at a quarter.
+    /// Column of half a turn, if the ends of the seed differ; otherwise columns end at a quarter.
     pub half_turn: Option<f32>,
     /// Bits of the first row's square and of the last one's (cm²).
     pub first_key: u32,
     pub last_key: u32,
-    /// Bits of a square that are no part of its row.
+    /// Number of bits of a square that are not part of its row.
     pub share_bits: u32,
 }
 
 impl Table {
-    /// From the first row beyond `near_m`; `exact_gy` has the dose of 1 U at a point beside and along the axis (m).
+    /// Creates a table from the first row beyond `near_m`; `exact_gy` gives the dose of 1 U at a
+    /// point across and along the axis (m).
     pub fn new(tables: &Tables, formalism: Formalism, near_m: f64, exact_gy: impl Fn(f64, f64) -> f64 + Sync) -> Self {
         let knots_deg = tables.anisotropy_2d.as_ref().map_or(&[][..], |f| &f.columns_at);
         let [one_d_bits, two_d_bits] = ROW_BITS;
         let (step_deg, row_bits) = match formalism {
-            // Two columns that are alike.
+            // Two equal columns.
             Formalism::OneD => (90.0, one_d_bits),
             Formalism::TwoD => (step_deg(knots_deg), two_d_bits),
         };
@@ -66,18 +68,18 @@ impl Table {
         }
     }
 
-    /// As many for each row as there are columns, at least two rows of at least two.
+    /// Returns the entries, at least two rows of at least two columns.
     pub fn entries(&self) -> &[f32] {
         &self.entries
     }
 
-    /// Squares of the distances (m²) from and below which the table is used.
+    /// Returns the squares of the distances (m²) between which the table is used.
     pub fn squares_m2(&self) -> [f64; 2] {
         [self.first_key, self.last_key].map(square_m2)
     }
 }
 
-/// From the bits of a square in cm².
+/// Returns the square for its bits, in cm².
 fn square_m2(key: u32) -> f64 {
     f64::from(f32::from_bits(key)) / f64::from(CM2_PER_M2)
 }
@@ -94,7 +96,7 @@ mod tests {
     use crate::Source;
 
     #[test]
-    fn the_radii_and_angles_at_which_our_sources_bend_are_rows_and_columns() {
+    fn tabulated_radii_and_angles_are_rows_and_columns() {
         for model in ["6711", "200"] {
             let tables = Source::known(model).expect("comes with the program").tables;
             let (f, near_m) = (tables.anisotropy_2d.as_ref().expect("has F"), 5e-3);

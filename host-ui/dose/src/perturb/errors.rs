@@ -1,4 +1,4 @@
-//! What happens to the seeds of an implant: errors of each seed, of a strand, of the whole implant, and loss.
+//! Errors of the seeds of an implant: of each seed, of a strand, of the whole implant, and loss.
 
 use crate::seed::Seed;
 use rand_chacha::ChaCha8Rng;
@@ -10,20 +10,21 @@ use rand_distr::{Distribution, StandardNormal, StandardUniform};
 pub struct Errors {
     /// Standard deviation of each seed along each of the three axes.
     pub sigma_m: f64,
-    /// Standard deviation along the axis of the seed, where it differs from `sigma_m`, which then counts across the axis. A seed
-    /// without an axis has `sigma_m` in every direction.
+    /// Standard deviation along the axis of the seed, if it differs from `sigma_m`, which then
+    /// applies across the axis. A seed without an axis has `sigma_m` in every direction.
     pub along_m: Option<f64>,
     /// Correlation of the errors of two seeds of one strand, 0 to 1.
     pub within_strand: f64,
     /// Shift of all seeds in every trial.
     pub shift_m: [f64; 3],
-    /// Standard deviation along each axis of a shift that all seeds of a trial have in common.
+    /// Standard deviation, along each axis, of a shift common to all seeds of a trial.
     pub shift_sigma_m: f64,
-    /// Probability that a seed is lost, each by itself.
+    /// Probability that a seed is lost, independently of the others.
     pub loss: f64,
 }
 
-/// Streams of random numbers of one trial: what one error draws does not depend on whether another is asked for.
+/// Streams of random numbers of one trial. The numbers of one error do not depend on whether
+/// another is requested.
 #[derive(Clone, Copy)]
 enum Stream {
     Seed,
@@ -33,7 +34,7 @@ enum Stream {
 }
 
 impl Errors {
-    /// Independent errors along each axis alone.
+    /// Creates independent errors along each axis.
     pub const fn of_sigma(sigma_m: f64) -> Self {
         Self {
             sigma_m,
@@ -76,7 +77,7 @@ impl Errors {
         plan.iter().enumerate().filter_map(place).collect()
     }
 
-    /// Normal numbers of deviation 1 to an error, which may be longer or shorter along the axis.
+    /// Scales normal numbers of deviation 1 to an error, with its own deviation along the axis.
     fn scaled(&self, normal: [f64; 3], axis: Option<[f64; 3]>) -> [f64; 3] {
         let error_m = normal.map(|n| self.sigma_m * n);
         let (Some(along_m), Some(axis)) = (self.along_m, axis) else {

@@ -1,28 +1,28 @@
-//! How measures spread over trials: mean with its interval, deviation, percentiles.
+//! Spread of measures over trials: mean with its interval, deviation, percentiles.
 
 /// One measure over all trials, in its unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spread {
     /// Name and unit of the measure.
     pub name: String,
-    /// Of the plan as it is.
+    /// Value of the unperturbed plan.
     pub planned: Option<f64>,
-    /// `None` where the measure is defined in no trial.
+    /// Mean; `None` if the measure is defined in no trial.
     pub mean: Option<f64>,
     /// Standard deviation of a sample; `None` for fewer than two trials.
     pub deviation: Option<f64>,
     /// Ends of the 95 % interval of the mean (Student's t); `None` for fewer than two trials.
     pub interval: Option<[f64; 2]>,
-    /// The 5th, 25th, 50th, 75th and 95th percentile; `None` where the measure is defined in no trial.
+    /// The 5th, 25th, 50th, 75th and 95th percentile; `None` if the measure is defined in no trial.
     pub percentiles: Option<[f64; 5]>,
-    /// Trials in which the measure is defined; the figures above are of these.
+    /// Trials in which the measure is defined; the figures above are from these.
     pub defined: usize,
 }
 
 /// The percentiles of a [`Spread`].
 pub const PERCENTILES: [f64; 5] = [5.0, 25.0, 50.0, 75.0, 95.0];
 
-/// Mean, deviation and percentiles of each measure.
+/// Computes mean, deviation and percentiles of each measure.
 pub fn spreads(planned: &[(String, Option<f64>)], trials: &[(usize, Vec<Option<f64>>)]) -> Vec<Spread> {
     planned
         .iter()
@@ -49,7 +49,8 @@ pub fn spreads(planned: &[(String, Option<f64>)], trials: &[(usize, Vec<Option<f
         .collect()
 }
 
-/// Linear between the sorted values (Hyndman and Fan's type 7), of which there is at least one.
+/// Interpolates between the sorted values (Hyndman and Fan's type 7), of which there is at least
+/// one.
 fn percentile(sorted: &[f64], percent: f64) -> f64 {
     let last = sorted.len() - 1;
     let at = percent / 100.0 * last as f64;
@@ -58,7 +59,8 @@ fn percentile(sorted: &[f64], percent: f64) -> f64 {
     sorted[low] + (at - low as f64) * (sorted[high] - sorted[low])
 }
 
-/// The 97.5th percentile of Student's t, which bounds 95 % on two sides; `freedom` is at least 1.
+/// Returns the 97.5th percentile of Student's t, which bounds 95 % on two sides; `freedom` is at
+/// least 1.
 fn t_95(freedom: usize) -> f64 {
     const FEW: [f64; 10] = [
         12.7062, 4.3027, 3.1824, 2.7764, 2.5706, 2.4469, 2.3646, 2.3060, 2.2622, 2.2281,
@@ -79,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn percentiles_lie_between_the_values_as_numpy_puts_them() {
+    fn percentiles_match_numpy() {
         let values = [1.0, 2.0, 4.0, 8.0];
         assert_eq!(percentile(&values, 50.0), 3.0);
         assert_eq!(percentile(&values, 0.0), 1.0);
@@ -96,7 +98,7 @@ mod tests {
         assert!(spread.deviation.is_some_and(|d| (d - 2.0_f64.sqrt()).abs() < 1e-12));
     }
 
-    /// One trial printed NaN.
+    /// Guards against NaN from one trial.
     #[test]
     fn one_trial_has_no_deviation_and_none_has_no_mean() {
         let planned = [("a".to_owned(), Some(1.0))];
@@ -107,8 +109,8 @@ mod tests {
         assert_eq!((none.mean, none.deviation, none.percentiles), (None, None, None));
     }
 
-    /// The share of Student's density between -t and t by Simpson's rule; the density is normalised by the same rule over the angle,
-    /// `x = sqrt(n) tan(a)`, in which it is `cos(a)^(n - 1)`.
+    /// Integrates Student's density between -t and t by Simpson's rule. The density is normalised
+    /// by the same rule over the angle, `x = sqrt(n) tan(a)`, in which it is `cos(a)^(n - 1)`.
     #[test]
     fn the_interval_of_the_mean_holds_95_percent_of_students_density() {
         let simpson = |n: usize, to: f64| {

@@ -1,4 +1,4 @@
-//! Values out of a TOML table; all problems are reported together.
+//! Values from a TOML table; all problems are reported together.
 
 use crate::error::DoseError;
 use toml::{Table, Value};
@@ -26,7 +26,7 @@ const KNOWN: [(&str, &[&str]); 4] = [
     ("anisotropy_2d", &["r_cm", "theta_deg", "F"]),
 ];
 const MAX_ENTRIES: usize = 1000;
-/// How far g(1 cm) and F(90 deg), 1 by definition, may be rounded.
+/// Rounding allowed for g(1 cm) and F(90 deg), 1 by definition.
 const ROUNDING: f64 = 0.005;
 
 pub struct Reader<'a> {
@@ -52,7 +52,7 @@ impl<'a> Reader<'a> {
         Self { root, problems }
     }
 
-    /// One message with all problems.
+    /// Returns one message with all problems.
     pub fn finish(self) -> Result<(), DoseError> {
         match self.problems.as_slice() {
             [] => Ok(()),
@@ -90,7 +90,7 @@ impl<'a> Reader<'a> {
         String::new()
     }
 
-    /// 1 when the value is bad, so that the rest can still be checked.
+    /// Reads a number; returns 1 for an invalid one, so that the rest can still be checked.
     pub fn number(&mut self, table: &str, key: &str, least: f64, most: f64) -> f64 {
         if !self.has(table, key) {
             self.problem(format!("[{table}] {key} is missing"));
@@ -139,7 +139,7 @@ impl<'a> Reader<'a> {
             .collect()
     }
 
-    /// Each entry above the one before it.
+    /// Reads a list in which each entry exceeds the one before it.
     pub fn rising(&mut self, table: &str, key: &str, least: f64, most: f64) -> Vec<f64> {
         let name = format!("[{table}] {key}");
         let list = self.list(&name, self.value(table, key), least, most);
@@ -149,7 +149,7 @@ impl<'a> Reader<'a> {
         list
     }
 
-    /// As many entries as there are radii.
+    /// Reads a list with one entry for each radius.
     pub fn column(&mut self, table: &str, key: &str, entries: usize, least: f64, most: f64) -> Vec<f64> {
         let name = format!("[{table}] {key}");
         let list = self.list(&name, self.value(table, key), least, most);
@@ -159,7 +159,7 @@ impl<'a> Reader<'a> {
         list
     }
 
-    /// Row by row.
+    /// Reads a matrix row by row.
     pub fn matrix(&mut self, table: &str, key: &str, rows: usize, columns: usize, least: f64, most: f64) -> Vec<f64> {
         let name = format!("[{table}] {key}");
         let Some(Value::Array(items)) = self.value(table, key) else {

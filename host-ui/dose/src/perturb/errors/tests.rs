@@ -29,7 +29,7 @@ fn sigma(values: &[f64]) -> f64 {
 }
 
 #[test]
-fn moves_have_the_deviation_asked_for_along_each_axis_and_keep_the_rest() {
+fn moves_have_the_requested_deviation_along_each_axis() {
     let off = offsets(Errors::of_sigma(4e-3), 20_000, &[], 3);
     for a in 0..3 {
         let along: Vec<f64> = off.iter().map(|o| o[a]).collect();
@@ -46,7 +46,7 @@ fn moves_have_the_deviation_asked_for_along_each_axis_and_keep_the_rest() {
 }
 
 #[test]
-fn the_error_along_the_needle_has_its_own_deviation_and_that_across_keeps_its_own() {
+fn errors_along_and_across_have_separate_deviations() {
     let errors = Errors {
         along_m: Some(6e-3),
         ..Errors::of_sigma(2e-3)
@@ -59,9 +59,10 @@ fn the_error_along_the_needle_has_its_own_deviation_and_that_across_keeps_its_ow
     }
 }
 
-/// Full correlation is one draw for each strand; half of it is a correlation of 0.5 at an unaltered deviation.
+/// Checks full correlation, which is one draw for each strand, and half, which is a correlation of
+/// 0.5 at an unchanged deviation.
 #[test]
-fn seeds_of_one_strand_move_together_as_far_as_they_are_correlated() {
+fn seeds_of_one_strand_share_their_correlated_errors() {
     let of = |within_strand: f64| Errors {
         within_strand,
         ..Errors::of_sigma(4e-3)
@@ -82,7 +83,8 @@ fn seeds_of_one_strand_move_together_as_far_as_they_are_correlated() {
     assert!((sigma(&all) / 4e-3 - 1.0).abs() < 0.02, "{}", sigma(&all));
 }
 
-/// A shift without any other error gives the dose that the plan has at points shifted the other way.
+/// Checks a shift without any other error: it gives the dose of the plan at points shifted the
+/// other way.
 #[test]
 fn a_pure_shift_gives_the_dose_of_shifted_seeds() {
     let source = Source::read(std::path::Path::new("../../sources/i125_6711.toml")).unwrap();
@@ -109,7 +111,7 @@ fn a_pure_shift_gives_the_dose_of_shifted_seeds() {
 }
 
 #[test]
-fn a_random_shift_is_one_draw_for_a_trial() {
+fn a_random_shift_is_drawn_once_per_trial() {
     let errors = Errors {
         shift_sigma_m: 3e-3,
         ..Errors::of_sigma(0.0)
@@ -125,7 +127,7 @@ fn a_random_shift_is_one_draw_for_a_trial() {
     assert!((sigma(&all) / 3e-3 - 1.0).abs() < 4.0 / 154.0, "{}", sigma(&all));
 }
 
-/// Seeds that are left in a trial are binomial: mean n (1 - p), variance n p (1 - p).
+/// Checks that the number of remaining seeds is binomial: mean n (1 - p), variance n p (1 - p).
 #[test]
 fn lost_seeds_are_binomial_and_do_not_move_the_others() {
     let (count, p, trials) = (100_usize, 0.05, 4000_usize);
