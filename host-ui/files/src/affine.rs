@@ -1,14 +1,14 @@
-//! The orientation that a NIfTI header gives.
+//! The orientation in a NIfTI header.
 
 use super::frame::VoxelFrame;
 use crate::error::ContentError;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use nifti::NiftiHeader;
 
-/// Orientations nearer than this at every corner are one.
+/// Distance at every corner below which two orientations count as one.
 const SAME_MM: f64 = 0.1;
 
-/// Where the voxels lie, by the sform, or else the qform.
+/// Returns the frame of the voxels, from the sform, or else the qform.
 pub fn voxel_frame(h: &NiftiHeader) -> Result<VoxelFrame, ContentError> {
     let (unit_m, unknown_unit) = match h.xyzt_units & 7 {
         1 => (1.0, false),
@@ -28,13 +28,13 @@ pub fn voxel_frame(h: &NiftiHeader) -> Result<VoxelFrame, ContentError> {
     let mut frame = VoxelFrame::new(columns * unit_m, origin * unit_m, source)?;
     if source == "pixdim" {
         frame.warning = Some(
-            "the file says nothing of the patient's orientation (sform and qform are 0); +x, +y, +z are taken as right, anterior, superior"
+            "the file does not give the patient's orientation (sform and qform are 0); +x, +y, +z are taken as right, anterior, superior"
                 .to_owned(),
         );
     } else if unknown_unit {
         frame.warning = Some("the file names no unit of length; mm is assumed".to_owned());
     }
-    // NaN compares false, and is no reason to refuse what the sform says.
+    // NaN compares false, and is no reason to reject the sform.
     if let Some(mm) = differs_mm.filter(|mm| *mm > SAME_MM) {
         let note = format!(
             "its sform and its qform differ, by {mm:.2} mm at a corner of the volume; the sform counts. Is it the one of this patient?"
@@ -44,7 +44,8 @@ pub fn voxel_frame(h: &NiftiHeader) -> Result<VoxelFrame, ContentError> {
     Ok(frame)
 }
 
-/// How far the two orientations of a file put a corner of its volume apart, in its unit; `None` where it has only one.
+/// Returns the distance between the corners of a volume in its two orientations, in its unit;
+/// `None` if it has only one.
 fn differs_m(h: &NiftiHeader) -> Option<f64> {
     if h.sform_code <= 0 || h.qform_code <= 0 {
         return None;

@@ -1,4 +1,4 @@
-//! The bytes of files: regular ones only, bounded, with progress; and whole files written at once.
+//! The bytes of files: regular files only, bounded, with progress; and whole files written at once.
 
 use super::element::short;
 use super::error::ContentError;
@@ -7,18 +7,18 @@ use std::io::Read;
 use std::path::{Component, Path};
 use stylet_base::input::{self, InputError};
 
-/// Larger than any segmentation of a pelvis.
+/// Largest size of a file, more than any segmentation of a pelvis.
 const MAX_FILE_BYTES: u64 = 1 << 30;
-/// Read between two reports of progress.
+/// Number of bytes read between two reports of progress.
 const PART_BYTES: u64 = 1 << 23;
 
-/// The last part of a path, for people.
+/// Returns the last part of a path, for display.
 pub fn file_name(path: &Path) -> String {
     path.file_name()
         .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
-/// All of a regular file that is neither empty nor larger than 1 GiB.
+/// Reads a regular file that is neither empty nor larger than 1 GiB.
 pub fn whole(path: &Path, progress: &Progress) -> Result<Vec<u8>, ContentError> {
     let (file, size) = input::open(path)?;
     if size == 0 {
@@ -41,7 +41,7 @@ pub fn whole(path: &Path, progress: &Progress) -> Result<Vec<u8>, ContentError> 
     Ok(bytes)
 }
 
-/// The first bytes of a regular file, at most `count`; `None` for anything else.
+/// Returns the first bytes of a regular file, at most `count`; `None` for anything else.
 pub fn start(path: &Path, count: u64) -> Option<Vec<u8>> {
     let (file, _) = input::open(path).ok()?;
     let mut bytes = Vec::new();
@@ -49,7 +49,8 @@ pub fn start(path: &Path, count: u64) -> Option<Vec<u8>> {
     Some(bytes)
 }
 
-/// The data that a header names; a header from elsewhere must not reach outside of its folder.
+/// Reads the data file that a header names; a header from elsewhere must not reach outside of its
+/// folder.
 pub fn beside(header: &Path, name: &str, progress: &Progress) -> Result<Vec<u8>, ContentError> {
     let mut parts = Path::new(name).components();
     let inside = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));

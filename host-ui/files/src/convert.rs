@@ -1,4 +1,4 @@
-//! Label volumes from one format to another, by the name of the file to be written.
+//! Conversion of label volumes, by the name of the output file.
 
 use super::bytes::file_name;
 use super::error::{ContentError, FileError};
@@ -6,7 +6,7 @@ use super::volume::Voxels;
 use super::{metaimage, nifti, nrrd};
 use std::path::Path;
 
-/// Ways to write a label volume.
+/// Writer of a label volume.
 type Writer = fn(&Voxels) -> Result<Vec<u8>, ContentError>;
 
 fn writer(path: &Path) -> Option<Writer> {
@@ -23,12 +23,12 @@ fn writer(path: &Path) -> Option<Writer> {
     }
 }
 
-/// Whether a label volume can be written under that name.
+/// Returns whether a label volume can be written under that name.
 pub fn can_hold_labels(path: &Path) -> bool {
     writer(path).is_some()
 }
 
-/// Writes a label volume in the format that the file's name says.
+/// Writes a label volume in the format that the file's name selects.
 pub fn write_labels(v: &Voxels, path: &Path) -> Result<(), FileError> {
     let refused = |why: ContentError| FileError::of(path, why);
     let writer =

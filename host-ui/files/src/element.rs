@@ -1,19 +1,19 @@
-//! The numbers in a volume's data, as labels or greys; only as much is held as the data really give.
+//! The numbers in a volume's data, as labels or greys; memory grows only with the actual data.
 
 use super::progress::{Progress, Stage};
 use crate::error::ContentError;
 use std::io::Read;
 
-/// A volume with more voxels is not a prostate.
+/// Most voxels of a volume; a larger one is not a prostate.
 pub const MAX_VOXELS: u64 = 1 << 28;
-/// 512 x 512 x 512: the greys of an image are kept for as long as it is shown.
+/// Most voxels of an image, 512 x 512 x 512: its greys are kept while it is shown.
 pub const MAX_IMAGE_VOXELS: usize = 1 << 27;
-/// Nothing that deflate makes is larger than this many times what it was made from.
+/// Largest compression ratio of deflate.
 pub const MAX_DEFLATE_RATIO: u64 = 1032;
-/// Read at a time; a whole number of elements of any type.
+/// Bytes read at a time; a whole number of elements of any type.
 const CHUNK_BYTES: usize = 1 << 16;
 
-/// What one voxel is stored as.
+/// Storage type of a voxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
     /// Unsigned, 8 bits.
@@ -48,7 +48,7 @@ pub enum Endian {
 }
 
 impl Element {
-    /// Bytes of one element.
+    /// Returns the bytes of one element.
     pub fn bytes(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
@@ -84,7 +84,7 @@ impl Element {
     }
 }
 
-/// How many voxels a header claims, when that is plausible at all.
+/// Returns how many voxels a header claims, if that is plausible at all.
 pub fn voxel_count(dims: &[u64]) -> Result<usize, ContentError> {
     let size = || dims.iter().map(u64::to_string).collect::<Vec<_>>().join(" x ");
     if dims.contains(&0) {
@@ -102,7 +102,8 @@ pub fn voxel_count(dims: &[u64]) -> Result<usize, ContentError> {
     }
 }
 
-/// Whether data of so many bytes can hold what the header claims, before anything of that size is made.
+/// Returns whether data of this many bytes can hold the volume that the header claims, before it is
+/// allocated.
 pub fn must_hold(needed: u64, have: u64, packed: bool) -> Result<(), ContentError> {
     let most = if packed {
         have.saturating_mul(MAX_DEFLATE_RATIO)
@@ -113,11 +114,11 @@ pub fn must_hold(needed: u64, have: u64, packed: bool) -> Result<(), ContentErro
         return Ok(());
     }
     Err(ContentError::Invalid(format!(
-        "it is cut off or its header is wrong: the header asks for {needed} bytes and the {have} bytes there are cannot hold them; copy or export it again"
+        "it is truncated or its header is wrong: the header requires {needed} bytes and the {have} bytes present cannot hold them; copy or export it again"
     )))
 }
 
-/// What a reader makes of each number, and to whom it reports its progress.
+/// Conversion of each number, and receiver of progress.
 #[derive(Clone, Copy, Debug)]
 pub struct Sink<'a, V> {
     made_of: fn(f64) -> Result<V, ContentError>,
@@ -148,7 +149,7 @@ impl<'a> Sink<'a, f32> {
 }
 
 impl<'a> Sink<'a, f64> {
-    /// Takes numbers of an image as they are.
+    /// Takes numbers of an image unchanged.
     pub fn exact(progress: &'a Progress) -> Self {
         Self {
             made_of: Ok,
@@ -159,7 +160,7 @@ impl<'a> Sink<'a, f64> {
 }
 
 impl<V> Sink<'_, V> {
-    /// Empty; grows with what is really there.
+    /// Returns an empty list that grows with the actual data.
     fn values(&self, count: usize) -> Result<Vec<V>, ContentError> {
         if count > self.most {
             return Err(ContentError::Invalid(format!(
@@ -171,7 +172,7 @@ impl<V> Sink<'_, V> {
     }
 }
 
-/// Exactly `count` values, each the stored number times `slope` plus `intercept`.
+/// Reads exactly `count` values, each the stored number times `slope` plus `intercept`.
 pub fn read_values<V>(
     mut from: impl Read,
     element: Element,
@@ -195,7 +196,7 @@ pub fn read_values<V>(
     Ok(values)
 }
 
-/// As [`read_values`], from numbers written out.
+/// Like [`read_values`], from numbers in text form.
 pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, ContentError> {
     let text = std::str::from_utf8(text).map_err(|_| "its numbers are not text".to_owned())?;
     let words = text
@@ -205,12 +206,12 @@ pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<V
     for word in words {
         if values.len() == count {
             return Err(ContentError::Invalid(format!(
-                "it holds more than the {count} values of its size; export it again"
+                "it contains more than the {count} values of its size; export it again"
             )));
         }
         let value: f64 = word
             .parse()
-            .map_err(|_| format!("it holds \"{}\" where a number must be", short(word)))?;
+            .map_err(|_| format!("it contains \"{}\" in place of a number", short(word)))?;
         if values.len() % CHUNK_BYTES == 0 {
             sink.progress.report(Stage::Voxels, values.len(), count)?;
         }
@@ -225,18 +226,18 @@ pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<V
     )))
 }
 
-/// A label from a number; an error unless it is a whole number from 0 to 255.
+/// Converts a number to a label; returns an error unless it is a whole number from 0 to 255.
 pub fn label_of(value: f64) -> Result<u8, ContentError> {
     let whole = value.round();
     if (value - whole).abs() < 1e-3 && (0.0..=255.0).contains(&whole) {
         return Ok(whole as u8);
     }
     Err(ContentError::Invalid(format!(
-        "it holds the value {value}; a segmentation holds whole numbers 0 to 255. Is this the image instead of its labels?"
+        "it contains the value {value}; a segmentation has whole numbers 0 to 255. Is this the image instead of its labels?"
     )))
 }
 
-/// Enough of a foreign text to recognise it.
+/// Shortens a foreign text, keeping enough to recognise it.
 pub fn short(text: &str) -> String {
     let mut start: String = text.chars().take(40).filter(|c| !c.is_control()).collect();
     if start.len() < text.len() {

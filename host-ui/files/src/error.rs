@@ -1,10 +1,11 @@
-//! Why a file was refused: what was found, what was expected, what to do.
+//! Reasons why a file was refused: what was found, what was expected, what to do.
 
 use std::path::{Path, PathBuf};
 use stylet_base::format::printable;
 use stylet_base::input::InputError;
 
-/// Why the content of a file was refused or could not be made; the texts follow the name of the file.
+/// Reason why the content of a file was refused or could not be created; the texts follow the name
+/// of the file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ContentError {
     /// The user ended the work.
@@ -25,7 +26,7 @@ pub enum ContentError {
     /// The file cannot be written.
     #[error("it cannot be written ({0}); check the folder and the space on the disk")]
     Unwritable(String),
-    /// The content is not what it must be.
+    /// The content is invalid.
     #[error("{0}")]
     Invalid(String),
 }
@@ -49,7 +50,7 @@ impl From<&str> for ContentError {
 }
 
 impl ContentError {
-    /// The same error, which says in what part of the file it is.
+    /// Returns the same error, with the part of the file it is in.
     pub(crate) fn within(self, part: impl std::fmt::Display) -> Self {
         match self {
             Self::Invalid(why) => Self::Invalid(format!("{part}: {why}")),
@@ -57,7 +58,7 @@ impl ContentError {
         }
     }
 
-    /// One error from the problems that were collected.
+    /// Combines the collected problems into one error.
     pub(crate) fn all(problems: Vec<String>) -> Result<(), Self> {
         match problems.as_slice() {
             [] => Ok(()),
@@ -71,19 +72,19 @@ impl ContentError {
     }
 }
 
-/// A file that was refused or could not be written, with its path.
+/// Error of a file that was refused or could not be written, with its path.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}: {}", .path.display(), printable(&.why.to_string()))]
 pub struct FileError {
     /// The file.
     pub path: PathBuf,
-    /// Why it was refused.
+    /// Reason of the refusal.
     #[source]
     pub why: ContentError,
 }
 
 impl FileError {
-    /// The error of one file.
+    /// Returns the error of one file.
     pub fn of(path: &Path, why: impl Into<ContentError>) -> Self {
         Self {
             path: path.to_owned(),
@@ -96,7 +97,8 @@ impl FileError {
 mod tests {
     use super::*;
 
-    /// A field of 50 MB gave a message of 50 MB, and escape sequences went to the terminal.
+    /// Guards against a message of 50 MB from a field of 50 MB, and against escape sequences on the
+    /// terminal.
     #[test]
     fn messages_are_bounded_and_hold_no_escape_sequence() {
         let long = format!("\u{1b}[31mred\u{9b}2J {}", "x".repeat(50_000_000));

@@ -1,31 +1,32 @@
-//! Where the voxels of a file lie in the patient (RAS, m), whatever the format.
+//! The place of a file's voxels in the patient (RAS, m), for any format.
 
 use crate::error::ContentError;
 use nalgebra::{Matrix3, Vector3};
 
-/// Axes whose cosine is larger are sheared.
+/// Largest cosine between two axes; beyond it they are sheared.
 const SHEAR: f64 = 1e-3;
 
-/// `patient = directions * (spacing_m .* index) + origin_m`, index at voxel centres.
+/// Frame of voxels: `patient = directions * (spacing_m .* index) + origin_m`, index at voxel
+/// centres.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoxelFrame {
-    /// Orthonormal; mirrored when its determinant is negative.
+    /// Directions, orthonormal; mirrored if the determinant is negative.
     pub directions: Matrix3<f64>,
     /// Distance between voxels along each axis, in m.
     pub spacing_m: [f64; 3],
-    /// Middle of the first voxel, in m.
+    /// Centre of the first voxel, in m.
     pub origin_m: Vector3<f64>,
-    /// What the user should know about how the frame was found.
+    /// Remark for the user on the origin of the frame.
     pub warning: Option<String>,
 }
 
 impl VoxelFrame {
-    /// From the steps between voxels along each axis, one a column, and the middle of the first voxel (RAS, m); `source` is what the
-    /// file calls them.
+    /// Creates a frame from the steps between voxels along each axis, one a column, and the centre
+    /// of the first voxel (RAS, m); `source` is the file's term for them.
     pub fn new(columns_m: Matrix3<f64>, origin_m: Vector3<f64>, source: &str) -> Result<Self, ContentError> {
         if !columns_m.iter().chain(origin_m.iter()).all(|v| v.is_finite()) {
             return Err(ContentError::Invalid(format!(
-                "its {source} holds a value that is not a number; write the file again with a valid orientation"
+                "its {source} contains a value that is not a number; write the file again with a valid orientation"
             )));
         }
         let spacing_m: [f64; 3] = [0, 1, 2].map(|a| columns_m.column(a).norm());
@@ -61,7 +62,7 @@ impl VoxelFrame {
         })
     }
 
-    /// The middle of a voxel, which need not be a whole one (RAS, m).
+    /// Returns the centre of a voxel of any fractional index (RAS, m).
     pub fn place_m(&self, index: [f64; 3]) -> Vector3<f64> {
         let along = Vector3::from([0, 1, 2].map(|a| index[a] * self.spacing_m[a]));
         self.directions * along + self.origin_m
@@ -73,13 +74,14 @@ impl VoxelFrame {
         [0, 1, 2].map(|a| along[a] / self.spacing_m[a])
     }
 
-    /// The step from voxel to voxel along each axis, one a column (RAS, m).
+    /// Returns the step from voxel to voxel along each axis, one a column (RAS, m).
     pub fn columns_m(&self) -> Matrix3<f64> {
         self.directions * Matrix3::from_diagonal(&Vector3::from(self.spacing_m))
     }
 }
 
-/// Single precision and rounded text leave the columns a little off.
+/// Returns the nearest orthonormal matrix; single precision and rounded text leave the columns
+/// slightly off.
 fn nearest_orthonormal(m: Matrix3<f64>) -> Matrix3<f64> {
     let svd = m.svd(true, true);
     match (svd.u, svd.v_t) {

@@ -1,4 +1,4 @@
-//! The image that a segmentation was drawn on, or another of the same patient: greys for the slices.
+//! The image under a segmentation, or another of the same patient: greys for the slices.
 
 use super::bytes::{beside, file_name, whole};
 use super::dicom::series;
@@ -12,9 +12,9 @@ use nalgebra::Vector3;
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
 
-/// Shares of the voxels that are shown black and white: a few bright ones do not darken the rest.
+/// Percentiles shown as black and white, so that a few bright voxels do not darken the rest.
 const BLACK_WHITE: [f64; 2] = [0.005, 0.995];
-/// Voxels that the range of greys is taken from.
+/// Number of voxels sampled for the range of greys.
 const SAMPLED: usize = 1 << 20;
 
 /// Greys on the voxels of a file, x fastest.
@@ -22,18 +22,18 @@ const SAMPLED: usize = 1 << 20;
 pub struct Image {
     /// Name of the file.
     pub name: String,
-    /// Voxels along each axis.
+    /// Number of voxels along each axis.
     pub dims: [usize; 3],
     /// One grey for each voxel, 0 black to 255 white.
     pub greys: Vec<u8>,
-    /// Values that are shown black and white.
+    /// Values shown as black and white.
     pub range: [f32; 2],
-    /// Where the voxels lie in the patient.
+    /// Place of the voxels in the patient.
     pub frame: VoxelFrame,
 }
 
 impl Image {
-    /// Reads an image of any format, or the series of DICOM in a folder; the error names the file.
+    /// Reads an image of any format, or the DICOM series in a folder; the error names the file.
     pub fn read(path: &Path, progress: &Progress) -> Result<Self, FileError> {
         let values = read_values(path, progress)?;
         Self::of(values, file_name(path)).map_err(|why| FileError::of(path, why))
@@ -51,7 +51,8 @@ impl Image {
         })
     }
 
-    /// Rows that take a place in the scene (m) and 1 to the place in the voxels, 0 to 1 from face to face along each axis.
+    /// Returns rows that map a place in the scene (m) and 1 to the place in the voxels, 0 to 1 from
+    /// face to face along each axis.
     pub fn texture_from_scene(&self, patient: &PatientFrame) -> [[f64; 4]; 3] {
         let turn = patient.rotation();
         let origin = patient.translation_m() - self.frame.origin_m;
@@ -68,7 +69,8 @@ impl Image {
         })
     }
 
-    /// Whether the middle of the gland (scene, m) lies in the image; the error says how far outside it is.
+    /// Returns whether the centre of the gland (scene, m) lies in the image; the error gives its
+    /// distance from it.
     pub fn covers(&self, patient: &PatientFrame, middle_m: [f64; 3]) -> Result<(), ContentError> {
         let beside_m = self.distance_m(patient, middle_m);
         if beside_m == 0.0 {
@@ -80,7 +82,7 @@ impl Image {
         )))
     }
 
-    /// How far a place in the scene lies outside of the image (m); 0 inside.
+    /// Returns the distance of a place in the scene from the image (m); 0 inside.
     fn distance_m(&self, patient: &PatientFrame, place_m: [f64; 3]) -> f64 {
         let rows = self.texture_from_scene(patient);
         let beyond = Vector3::from([0, 1, 2].map(|a| {
@@ -91,8 +93,8 @@ impl Image {
     }
 }
 
-/// The values of an image as they are in the file, or in the DICOM series of a folder, such as Hounsfield units; the error names the
-/// file.
+/// Reads the values of an image unchanged, from a file or a folder's DICOM series, such as
+/// Hounsfield units; the error names the file.
 pub fn read_values(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, FileError> {
     if path.is_dir() {
         return series::read(path, progress);
@@ -107,14 +109,14 @@ pub fn read_values(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>,
         Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink),
         Some(Format::Dicom) => return series::read(path, progress),
         None => Err(
-            "it is none of the formats that images are read from: a DICOM series (its folder, or a file of it), NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd)"
+            "its format is not supported for images; supported are a DICOM series (its folder, or a file of it), NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd)"
                 .into(),
         ),
     };
     values.map_err(refused)
 }
 
-/// Values to be shown black and white; what is no number counts for nothing.
+/// Returns the values for black and white; ignores NaN.
 fn range(values: &[f32]) -> Result<[f32; 2], ContentError> {
     let every = values.len().div_ceil(SAMPLED).max(1);
     let mut some: Vec<f32> = values
@@ -136,7 +138,7 @@ fn range(values: &[f32]) -> Result<[f32; 2], ContentError> {
         }
     }
     Err(ContentError::Invalid(
-        "all its voxels hold the same value, so there is nothing to see".to_owned(),
+        "all its voxels have the same value, so there is nothing to show".to_owned(),
     ))
 }
 
@@ -159,9 +161,9 @@ mod tests {
         Image::of(VoxelValues { dims, values, frame }, "test".to_owned()).unwrap()
     }
 
-    /// Against the frame of the file itself, voxel by voxel.
+    /// Compares with the frame of the file, voxel by voxel.
     #[test]
-    fn the_middle_of_each_voxel_is_found_from_the_scene() {
+    fn voxel_centres_are_found_from_the_scene() {
         let image = image([7, 5, 4], |at| at[0] as f32);
         let (s, c) = (-1.1_f64).sin_cos();
         let turn = Matrix3::new(1.0, 0.0, 0.0, 0.0, c, -s, 0.0, s, c);
@@ -187,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn greys_span_what_most_voxels_hold_and_no_number_is_black() {
+    fn greys_span_most_voxels_and_nan_is_black() {
         let ramp = image([100, 10, 10], |at| match at {
             [0, 0, 0] => 1e9,
             [1, 0, 0] => f32::NAN,
@@ -201,7 +203,7 @@ mod tests {
         );
         let middle = ramp.greys[150];
         assert!((126..=130).contains(&middle), "{middle}");
-        // One bright voxel of a thousand is all there is to see.
+        // One bright voxel of a thousand is the only content.
         let mask = image([10, 10, 10], |at| f32::from(at == [4, 4, 4]));
         assert_eq!(mask.greys.iter().filter(|&&g| g == 255).count(), 1);
     }
@@ -218,7 +220,7 @@ mod tests {
                 Image::of(voxels, String::new())
                     .unwrap_err()
                     .to_string()
-                    .contains("nothing to see")
+                    .contains("nothing to show")
             );
         }
     }

@@ -1,4 +1,5 @@
-//! Files that a user brings: label volumes of any format as the same voxels. Every value of a header is checked before it is used.
+//! Files of a user: label volumes of any format as the same voxels. Every value of a header is
+//! checked before it is used.
 #![warn(missing_docs)]
 
 mod affine;
@@ -30,5 +31,5 @@ pub use progress::{Progress, Stage};
 pub use volume::{LabelVolume, Tissue, VoxelValues, Voxels};
 pub use watched::watched;
 
-/// Reads the file that a header names as that of its data.
+/// Reader of the data file that a header names.
 pub type Beside<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, ContentError>;

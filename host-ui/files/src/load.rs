@@ -1,4 +1,4 @@
-//! A label volume out of any file that names one: the volume itself, or a scene file.
+//! A label volume from any file that names one: the volume itself, or a scene file.
 
 use super::bytes::file_name;
 use super::error::FileError;
@@ -8,8 +8,8 @@ use super::scene;
 use super::volume::LabelVolume;
 use std::path::Path;
 
-/// The tissue of a label volume: its structures where it names them, otherwise every label but 0, or only `label`.
-/// A scene file says itself what is what.
+/// Returns the tissue of a label volume: its named structures, or else every label but 0, or only
+/// `label`. A scene file defines its own structures.
 pub fn read(path: &Path, label: Option<u8>, progress: &Progress) -> Result<LabelVolume, FileError> {
     if scene::is_scene(path) {
         if label.is_some() {

@@ -1,4 +1,4 @@
-//! The voxels of a MetaImage file (.mha, .mhd with its data beside it).
+//! The voxels of a MetaImage file (.mha, .mhd with its data file).
 
 mod header;
 pub mod write;
@@ -14,7 +14,7 @@ use header::Header;
 use nalgebra::{Matrix3, Vector3};
 use stylet_anatomy::ras_from_lps;
 
-/// What the first line of such a file may be.
+/// Possible first keys of such a file.
 const FIRST: [&str; 8] = [
     "ObjectType",
     "NDims",
@@ -26,7 +26,7 @@ const FIRST: [&str; 8] = [
     "BinaryData",
 ];
 
-/// Whether the bytes begin as a MetaImage header does.
+/// Returns whether the bytes begin like a MetaImage header.
 pub fn is_metaimage(bytes: &[u8]) -> bool {
     let line = bytes.split(|&b| b == b'\n').next().unwrap_or_default();
     let Ok(line) = std::str::from_utf8(line) else {
@@ -35,7 +35,7 @@ pub fn is_metaimage(bytes: &[u8]) -> bool {
     line.split_once('=').is_some_and(|(key, _)| FIRST.contains(&key.trim()))
 }
 
-/// The whole file; `beside` reads the data of a detached header.
+/// Reads the whole file; `beside` reads the data of a detached header.
 pub fn read<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<VoxelValues<V>, ContentError> {
     let (header, rest) = Header::parse(bytes)?;
     let frame = frame(&header)?;
@@ -73,7 +73,7 @@ fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<
         return Ok(values);
     }
     let data = match h.header_bytes {
-        // The data are the end of the file, whatever is before them.
+        // The data are the end of the file, after any header.
         -1 => &data[data.len().saturating_sub(size as usize)..],
         n => data.get(n as usize..).unwrap_or_default(),
     };
@@ -87,7 +87,7 @@ fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<
     read_values(data, h.element, h.endian, count, [1.0, 0.0], sink)
 }
 
-/// RAS, m; the file is in LPS, mm.
+/// Returns the frame in RAS, m; the file is in LPS, mm.
 fn frame(h: &Header) -> Result<VoxelFrame, ContentError> {
     let lettered = h.letters.as_deref().and_then(axes_of_letters);
     let mut warning = None;
@@ -104,7 +104,7 @@ fn frame(h: &Header) -> Result<VoxelFrame, ContentError> {
         (None, Some(lettered)) => lettered,
         (None, None) => {
             warning = Some(
-                "the file says nothing of the patient's orientation; its axes are taken as left, posterior, superior"
+                "the file does not give the patient's orientation; its axes are taken as left, posterior, superior"
                     .to_owned(),
             );
             Matrix3::identity()
@@ -128,7 +128,8 @@ fn frame(h: &Header) -> Result<VoxelFrame, ContentError> {
     Ok(frame)
 }
 
-/// The letters say where each axis comes from: RAI is left, posterior, superior.
+/// Returns the axes by letters, which name the origin of each: RAI points left, posterior,
+/// superior.
 fn axes_of_letters(letters: &str) -> Option<Matrix3<f64>> {
     let mut axes = Matrix3::zeros();
     let mut seen = [false; 3];
@@ -150,7 +151,7 @@ fn axes_of_letters(letters: &str) -> Option<Matrix3<f64>> {
     (seen == [true; 3]).then_some(axes)
 }
 
-/// Whether each axis goes mainly where the letters say.
+/// Returns whether the main direction of each axis agrees with the letters.
 fn same_octants(lettered: &Matrix3<f64>, directions: &Matrix3<f64>) -> bool {
     (0..3).all(|a| lettered.column(a).dot(&directions.column(a)) > 0.5)
 }

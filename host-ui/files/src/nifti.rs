@@ -1,4 +1,4 @@
-//! The voxels of a NIfTI-1 file (.nii, .nii.gz); believes nothing that its header says.
+//! The voxels of a NIfTI-1 file (.nii, .nii.gz); every value of its header is checked.
 
 pub mod write;
 
@@ -14,7 +14,7 @@ const HEADER_BYTES: usize = 348;
 const MAX_VOX_OFFSET: f32 = 16_777_216.0;
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// Whether the first bytes are such a file's, packed or not.
+/// Returns whether the first bytes are those of such a file, packed or not.
 pub fn is_nifti(bytes: &[u8]) -> bool {
     bytes.starts_with(&GZIP) || declared_size(bytes).is_some_and(|n| n == 348 || n == 540)
 }
@@ -25,7 +25,7 @@ fn declared_size(bytes: &[u8]) -> Option<i32> {
     Some(if [348, 540].contains(&big) { big } else { little })
 }
 
-/// The whole file, packed or not.
+/// Reads the whole file, packed or not.
 pub fn read<V>(bytes: &[u8], sink: Sink<V>) -> Result<VoxelValues<V>, ContentError> {
     let packed = bytes.starts_with(&GZIP);
     let mut from: Box<dyn Read + '_> = if packed {
@@ -72,7 +72,7 @@ fn read_header(from: &mut dyn Read, file_bytes: usize) -> Result<NiftiHeader, Co
     }
     if !start.ends_with(b"n+1\0") {
         return Err(
-            "its magic is not \"n+1\", so it is no NIfTI-1 file; export the segmentation as NIfTI-1 (.nii or .nii.gz)"
+            "its magic is not \"n+1\", so it is not a NIfTI-1 file; export the segmentation as NIfTI-1 (.nii or .nii.gz)"
                 .into(),
         );
     }
@@ -96,7 +96,7 @@ fn checked_dims(h: &NiftiHeader) -> Result<[usize; 3], ContentError> {
     }
     if h.dim[4..=rank].iter().any(|&d| d != 1) {
         return Err(ContentError::Invalid(format!(
-            "it holds a series of volumes ({:?}); take one volume out of it",
+            "it contains a series of volumes ({:?}); take one volume out of it",
             &h.dim[1..=rank]
         )));
     }
@@ -134,7 +134,7 @@ fn data_at(h: &NiftiHeader) -> Result<usize, ContentError> {
     )))
 }
 
-/// As the standard has it, a slope of 0 means that nothing is scaled.
+/// Returns the scaling; in the standard, a slope of 0 means none.
 fn scale(h: &NiftiHeader) -> [f64; 2] {
     let (slope, intercept) = (f64::from(h.scl_slope), f64::from(h.scl_inter));
     if slope == 0.0 || !slope.is_finite() || !intercept.is_finite() {

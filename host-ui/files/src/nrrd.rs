@@ -1,4 +1,4 @@
-//! The voxels of an NRRD file (.nrrd, .nhdr with its data beside it, Slicer's .seg.nrrd).
+//! The voxels of an NRRD file (.nrrd, .nhdr with its data file, Slicer's .seg.nrrd).
 
 mod header;
 pub mod segments;
@@ -15,15 +15,15 @@ use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use std::io::Read;
 
-/// A "byte skip" of -1 stands for at most so much.
+/// Most bytes that a "byte skip" of -1 skips.
 const MAX_BEFORE_END: u64 = 1 << 20;
 
-/// Whether the bytes begin as an NRRD file does.
+/// Returns whether the bytes begin like an NRRD file.
 pub fn is_nrrd(bytes: &[u8]) -> bool {
     bytes.starts_with(b"NRRD000")
 }
 
-/// A file as labels; `beside` reads the data of a detached header.
+/// Reads a file as labels; `beside` reads the data of a detached header.
 pub fn read(bytes: &[u8], beside: Beside, sink: Sink<u8>) -> Result<Voxels, ContentError> {
     let (header, voxels) = open(bytes, beside, sink)?;
     match list_axis(&header)? {
@@ -32,26 +32,26 @@ pub fn read(bytes: &[u8], beside: Beside, sink: Sink<u8>) -> Result<Voxels, Cont
     }
 }
 
-/// A file as an image.
+/// Reads a file as an image.
 pub fn read_image(bytes: &[u8], beside: Beside, sink: Sink<f32>) -> Result<VoxelValues<f32>, ContentError> {
     let (header, voxels) = open(bytes, beside, sink)?;
     match list_axis(&header)? {
         None => Ok(voxels),
         Some(list) => Err(ContentError::Invalid(format!(
-            "it holds {} values for each voxel; save one of them as a volume",
+            "it has {} values for each voxel; save one of them as a volume",
             header.sizes[list]
         ))),
     }
 }
 
-/// The axis along which a voxel holds several values.
+/// Returns the axis along which a voxel has several values.
 fn list_axis(h: &Header) -> Result<Option<usize>, ContentError> {
     let space = h.space_axes()?;
     let list = (0..h.sizes.len()).find(|a| !space.contains(a));
     Ok(list.filter(|&a| h.sizes[a] > 1))
 }
 
-/// The whole file, all values of all voxels.
+/// Reads the whole file, all values of all voxels.
 fn open<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<(Header, VoxelValues<V>), ContentError> {
     let (header, rest) = Header::parse(bytes)?;
     let space = header.space_axes()?;
@@ -82,7 +82,7 @@ fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<
     match encoding {
         "raw" => {
             let data = match h.byte_skip {
-                // The data are the end of the file, whatever is before them.
+                // The data are the end of the file, after any header.
                 -1 => &skipped[skipped.len().saturating_sub(size as usize)..],
                 n => skipped.get(n as usize..).unwrap_or_default(),
             };
@@ -121,7 +121,7 @@ fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<
     }
 }
 
-/// The last bytes of packed data; a header of another format may stand before them.
+/// Returns the last bytes of packed data; a header of another format may precede them.
 fn unpacked_end(packed: &[u8], size: u64) -> Result<Vec<u8>, ContentError> {
     must_hold(size, packed.len() as u64, true)?;
     let mut all = Vec::new();
@@ -133,7 +133,7 @@ fn unpacked_end(packed: &[u8], size: u64) -> Result<Vec<u8>, ContentError> {
     match before {
         Some(before) if before <= MAX_BEFORE_END => Ok(all.split_off(before as usize)),
         Some(_) => Err(ContentError::Invalid(format!(
-            "its data have more than {MAX_BEFORE_END} bytes before what its size asks for"
+            "its data have more than {MAX_BEFORE_END} bytes before those that its size requires"
         ))),
         None => Err(ContentError::Invalid(format!(
             "it is cut off: {} of {size} bytes are there; copy or export it again",
@@ -152,12 +152,12 @@ fn exactly(needed: u64, have: u64) -> Result<(), ContentError> {
     Ok(())
 }
 
-/// A longer stream than the header says is another volume's.
+/// Refuses a stream that is longer than the header says: it belongs to another volume.
 pub(super) fn nothing_left(mut from: impl Read) -> Result<(), ContentError> {
     match from.read(&mut [0]) {
         Ok(0) => Ok(()),
         Ok(_) => Err(ContentError::Invalid(
-            "its data go on behind what its size asks for: header and data do not belong together".to_owned(),
+            "its data continue beyond the size in its header: header and data do not belong together".to_owned(),
         )),
         Err(e) => Err(ContentError::Invalid(format!(
             "it is damaged ({e}); copy or export it again"
@@ -183,16 +183,16 @@ fn unhex(text: &[u8]) -> Result<Vec<u8>, ContentError> {
         .filter(|b| !b.is_ascii_whitespace())
         .map(|&b| digit(b))
         .collect();
-    let digits = digits.ok_or("its data hold a character that is no hexadecimal digit")?;
+    let digits = digits.ok_or("its data contain a character that is not a hexadecimal digit")?;
     if digits.len() % 2 == 1 {
-        return Err(ContentError::Invalid("its data hold half a byte too many".to_owned()));
+        return Err(ContentError::Invalid("its data have half a byte too many".to_owned()));
     }
     Ok(digits.chunks_exact(2).map(|d| d[0] << 4 | d[1]).collect())
 }
 
 const NO_SPACE: &str = "the file names no anatomical space; its axes are taken as right, anterior, superior";
 
-/// RAS, m.
+/// Returns the frame in RAS, m.
 fn frame(h: &Header, space: [usize; 3]) -> Result<VoxelFrame, ContentError> {
     let (flip, named) = match h.space.as_deref() {
         Some("right-anterior-superior" | "ras") => ([1.0, 1.0, 1.0], true),
@@ -201,7 +201,7 @@ fn frame(h: &Header, space: [usize; 3]) -> Result<VoxelFrame, ContentError> {
         Some("scanner-xyz" | "3d-right-handed" | "3d-left-handed") | None => ([1.0, 1.0, 1.0], false),
         Some(other) => {
             return Err(ContentError::Invalid(format!(
-                "its space \"{}\" is none of an anatomical volume; save it as left-posterior-superior or right-anterior-superior",
+                "its space \"{}\" is not an anatomical space; save it as left-posterior-superior or right-anterior-superior",
                 super::element::short(other)
             )));
         }
@@ -220,7 +220,7 @@ fn frame(h: &Header, space: [usize; 3]) -> Result<VoxelFrame, ContentError> {
             }
             _ => {
                 return Err(
-                    "it says nothing of the size of its voxels: neither \"space directions\" nor \"spacings\"".into(),
+                    "it does not give the size of its voxels: neither \"space directions\" nor \"spacings\"".into(),
                 );
             }
         };
@@ -238,7 +238,7 @@ fn frame(h: &Header, space: [usize; 3]) -> Result<VoxelFrame, ContentError> {
     Ok(frame)
 }
 
-/// The types an NRRD may have, by their many names.
+/// Returns the type for one of its many NRRD names.
 fn element(name: &str) -> Option<Element> {
     Some(match name {
         "signed char" | "int8" | "int8_t" => Element::I8,
@@ -261,7 +261,7 @@ fn element(name: &str) -> Option<Element> {
     })
 }
 
-/// Key and value pairs of a header, as Slicer keeps its segments in.
+/// Key and value pairs of a header, in which Slicer keeps its segments.
 type Pairs = BTreeMap<String, String>;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Which format a file has, by what is in it; the formats' own readers do the rest.
+//! The format of a file, by its content; the formats' own readers do the rest.
 
 use super::bytes::{beside, whole};
 use super::element::Sink;
@@ -9,11 +9,11 @@ use super::{dicom, metaimage, nifti, nrrd};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Formats of label volumes, for people.
+/// Formats of label volumes, for display.
 pub const FORMATS: &str =
     "NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr, .seg.nrrd), MetaImage (.mha, .mhd), DICOM RT Structure Set (.dcm)";
 
-/// What is in a file.
+/// Content of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// DICOM, with or without a preamble.
@@ -27,7 +27,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// By its first bytes, whatever its name.
+    /// Detects the format by the first bytes, whatever the name.
     pub fn of(bytes: &[u8]) -> Option<Self> {
         type Test = fn(&[u8]) -> bool;
         let tests: [(Self, Test); 4] = [
@@ -40,7 +40,7 @@ impl Format {
     }
 }
 
-/// The labels as they lie in the file.
+/// Reads the labels as they are stored in the file.
 pub fn read_voxels(path: &Path, progress: &Progress) -> Result<Voxels, FileError> {
     let refused = |why: ContentError| FileError::of(path, why);
     let bytes = whole(path, progress).map_err(refused)?;
@@ -52,7 +52,7 @@ pub fn read_voxels(path: &Path, progress: &Progress) -> Result<Voxels, FileError
         Some(Format::Nifti) => nifti::read(&bytes, sink).map(|v| v.named(BTreeMap::new())),
         Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink).map(|v| v.named(BTreeMap::new())),
         None => Err(ContentError::Invalid(format!(
-            "it is none of the formats that are read: {FORMATS}; export the segmentation as one of them"
+            "its format is not supported; supported are {FORMATS}; export the segmentation as one of them"
         ))),
     };
     voxels.map_err(refused)

@@ -1,12 +1,13 @@
-//! Structures that lie in one another, as one label a voxel: the smaller structure has it.
+//! Overlapping structures as one label a voxel: the smaller structure wins.
 
 use super::volume::Voxels;
 use std::collections::BTreeMap;
 
-/// Labels of the voxels, those that voxels have beside it, and what that leaves out in words.
+/// Labels of the voxels, further labels of voxels, and the resulting losses in words.
 pub type Settled = (Vec<u8>, Vec<(u8, u32)>, Option<String>);
 
-/// `of_voxel` adds every label that a voxel has; voxels of `voxel_m3` each.
+/// Gives each voxel to its smallest structure. `of_voxel` adds every label of a voxel; voxels of
+/// `voxel_m3` each.
 pub fn smallest_wins(
     count: usize,
     voxel_m3: f64,
@@ -26,7 +27,7 @@ pub fn smallest_wins(
     for (voxel, label) in labels.iter_mut().enumerate() {
         found.clear();
         of_voxel(voxel, &mut found);
-        // The lower label where sizes are equal.
+        // The lower label if sizes are equal.
         let Some(&smallest) = found.iter().min_by_key(|&&l| (sizes[usize::from(l)], l)) else {
             continue;
         };
@@ -53,7 +54,7 @@ pub fn smallest_wins(
     (labels, also, warning)
 }
 
-/// A lost volume for a note; small ones with more digits.
+/// Formats a lost volume for a note; small ones with more digits.
 pub fn in_cc(m3: f64) -> String {
     let cc = m3 * 1e6;
     match cc < 0.1 {
@@ -62,7 +63,7 @@ pub fn in_cc(m3: f64) -> String {
     }
 }
 
-/// The volume with one more warning for the user.
+/// Returns the volume with one more warning for the user.
 pub fn with_warning(mut voxels: Voxels, warning: Option<String>) -> Voxels {
     voxels.frame.warning = match (voxels.frame.warning.take(), warning) {
         (Some(one), Some(other)) => Some(format!("{one}; {other}")),

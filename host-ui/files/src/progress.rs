@@ -1,25 +1,25 @@
-//! How far the reading of a file is, for another thread, which may also end it.
+//! Progress of reading a file, for another thread, which may also cancel it.
 
 use crate::error::ContentError;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use stylet_base::interrupt::Interrupt;
 
-/// What is being done with a file.
+/// Stage of reading a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// The bytes of the file are read.
+    /// Reading the bytes of the file.
     Bytes,
-    /// Voxels are read out of the bytes.
+    /// Extracting voxels from the bytes.
     Voxels,
-    /// Elements are made from the voxels.
+    /// Making elements from the voxels.
     Elements,
 }
 
 impl Stage {
     const ALL: [Self; 3] = [Self::Bytes, Self::Voxels, Self::Elements];
 
-    /// The stage, for people.
+    /// Returns the display name of the stage.
     pub fn name(self) -> &'static str {
         match self {
             Self::Bytes => "reading the file",
@@ -29,10 +29,10 @@ impl Stage {
     }
 }
 
-/// Steps in which a share is reported.
+/// Resolution of a reported share.
 const STEPS: u32 = 1000;
 
-/// How far one reading is; clones share it.
+/// Progress of one reading; clones share it.
 #[derive(Clone, Debug, Default)]
 pub struct Progress {
     at: Arc<AtomicU32>,
@@ -40,15 +40,15 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// The same reading, which ends once `end` is requested.
+    /// Returns the same progress, which ends once `end` is requested.
     pub fn ended_by(self, end: Interrupt) -> Self {
         Self { end, ..self }
     }
 
-    /// From the reader, now and then; an error when the user ended the work.
+    /// Reports progress from the reader; returns an error if the user cancelled the work.
     pub fn report(&self, stage: Stage, done: usize, of: usize) -> Result<(), ContentError> {
         let steps = (done as f64 / of.max(1) as f64).min(1.0) * f64::from(STEPS);
-        // SYNC: read by `at`; nothing but the number is carried.
+        // SYNC: read by `at`; only the number is carried.
         self.at
             .store(stage as u32 * (STEPS + 1) + steps as u32, Ordering::Relaxed);
         if self.end.asked() {
@@ -57,9 +57,9 @@ impl Progress {
         Ok(())
     }
 
-    /// The stage, and the share of it that is done.
+    /// Returns the stage, and its completed share.
     pub fn at(&self) -> (Stage, f32) {
-        // SYNC: stored by `report`; nothing but the number is carried.
+        // SYNC: stored by `report`; only the number is carried.
         let at = self.at.load(Ordering::Relaxed);
         let stage = Stage::ALL.get((at / (STEPS + 1)) as usize);
         let share = (at % (STEPS + 1)) as f32 / STEPS as f32;

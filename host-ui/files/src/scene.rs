@@ -1,4 +1,5 @@
-//! Scene files (TOML): a volume, what its structures are made of, needle, device and plan; all problems are reported at once.
+//! Scene files (TOML): a volume, materials of its structures, needle, device and plan; all problems
+//! are reported at once.
 
 mod keys;
 
@@ -15,16 +16,17 @@ use stylet_anatomy::{Beyond, Material, Role, Surroundings};
 const MAX_BYTES: usize = 1 << 20;
 const MAX_STRUCTURES: usize = 255;
 
-/// What a scene file says.
+/// Content of a scene file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneFile {
     /// Name of the scene.
     pub name: Option<String>,
-    /// Beside the scene file, or from its folder on.
+    /// Path of the volume, relative to the scene file.
     pub volume: PathBuf,
-    /// Of the same patient, for the slices of the window; beside the scene file too.
+    /// Path of an image of the same patient, for the slices of the window, relative to the scene
+    /// file.
     pub image: Option<PathBuf>,
-    /// Empty: as the names of the volume say.
+    /// Structures; if empty, those named in the volume.
     pub structures: Vec<Part>,
     /// Speed of insertion, in m/s.
     pub insert_m_per_s: Option<f64>,
@@ -32,11 +34,11 @@ pub struct SceneFile {
     pub retract_m_per_s: Option<f64>,
     /// Name of the haptic device.
     pub device: Option<String>,
-    /// Plan file, beside the scene file.
+    /// Path of a plan, relative to the scene file.
     pub plan: Option<PathBuf>,
 }
 
-/// How a structure is picked in the volume.
+/// Selection of a structure in the volume.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pick {
     /// By its label.
@@ -45,28 +47,29 @@ pub enum Pick {
     Name(String),
 }
 
-/// One structure of the scene; omitted fields are inferred from its name.
+/// Structure of the scene; omitted fields are inferred from its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// Which structure of the volume it is.
+    /// Selection in the volume.
     pub pick: Pick,
     /// Name in the scene instead of that in the volume.
     pub called: Option<String>,
-    /// `None` within: the structure is left out.
+    /// Role; an inner `None` leaves the structure out.
     pub role: Option<Option<Role>>,
     /// Young's modulus, in Pa.
     pub young_pa: Option<f64>,
     /// Poisson's ratio.
     pub poisson: Option<f64>,
-    /// For links along x, y, z: shortest and longest as a share of the rest length, and shear in rad.
+    /// Limits of links along x, y, z: shortest and longest as a share of the rest length, and shear
+    /// in rad.
     pub limits: Option<[[f64; 3]; 3]>,
-    /// Whether it never moves.
+    /// True if it never moves.
     pub fixed: Option<bool>,
-    /// What it rests on at the outside of the body.
+    /// Support at the outside of the body.
     pub surroundings: Option<Surroundings>,
 }
 
-/// Whether a file is a scene file: the only format here that is known by its name.
+/// Returns whether a file is a scene file, the only format here that is recognised by its name.
 pub fn is_scene(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
@@ -84,7 +87,7 @@ pub fn read(path: &Path) -> Result<SceneFile, FileError> {
     parse(text).map_err(refused)
 }
 
-/// The volume of a scene file, its structures made of what the file says.
+/// Loads the volume of a scene file, with the structures that the file defines.
 pub fn load(path: &Path, progress: &Progress) -> Result<(SceneFile, LabelVolume), FileError> {
     let scene = read(path)?;
     let beside = path.parent().unwrap_or(Path::new("")).join(&scene.volume);
@@ -96,7 +99,7 @@ pub fn load(path: &Path, progress: &Progress) -> Result<(SceneFile, LabelVolume)
     Ok((scene, volume))
 }
 
-/// From the text of a scene file.
+/// Parses the text of a scene file.
 pub fn parse(text: &str) -> Result<SceneFile, ContentError> {
     let root: toml::Table = text.parse().map_err(|e| format!("it is not TOML: {e}"))?;
     let mut problems = Vec::new();
@@ -214,7 +217,7 @@ fn part(k: &mut Keys) -> Option<Part> {
     })
 }
 
-/// One word for all faces, or six for those towards -x, +x, -y, +y, -z, +z of the scene.
+/// Reads one word for all faces, or six for those towards -x, +x, -y, +y, -z, +z of the scene.
 fn surroundings(k: &mut Keys) -> Option<Surroundings> {
     let words = k.words("surroundings")?;
     let beyond: Option<Vec<Beyond>> = words.iter().map(|word| Beyond::of_name(word)).collect();
@@ -232,7 +235,7 @@ fn surroundings(k: &mut Keys) -> Option<Surroundings> {
 }
 
 impl SceneFile {
-    /// What each label of the volume is made of; labels that no structure names are left out.
+    /// Returns the tissue of each label of the volume, without labels that no structure names.
     fn tissues(&self, voxels: &Voxels) -> Result<Vec<Tissue>, ContentError> {
         if self.structures.is_empty() {
             return Ok(super::volume::by_name(voxels));
@@ -278,7 +281,7 @@ impl Part {
         }
     }
 
-    /// `None` for one that is left out.
+    /// Returns the tissue of a label; `None` if it is left out.
     fn tissue(&self, label: u8, voxels: &Voxels) -> Option<Tissue> {
         let picked = match &self.pick {
             Pick::Name(name) => Some(name.clone()),

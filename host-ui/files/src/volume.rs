@@ -1,4 +1,4 @@
-//! A segmented volume as the core takes it: cubic elements on the lattice of the scene frame.
+//! A segmented volume in the core's form: cubic elements on the lattice of the scene frame.
 
 mod cover;
 
@@ -10,66 +10,68 @@ use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use stylet_anatomy::{Material, Organ, PatientFrame, Role};
 
-/// Room around the tissue.
+/// Margin around the tissue.
 const MARGIN_M: f64 = 0.020;
 const MAX_DIM: usize = 1024;
 const MAX_TISSUE: usize = 4_000_000;
 const MAX_CELLS: usize = 64 << 20;
 const COARSER: f64 = 1.1;
 
-/// One structure of a volume and what it is made of.
+/// Structure of a volume and its material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tissue {
     /// Label of its cells.
     pub label: u8,
     /// Name of the structure.
     pub name: String,
-    /// What it is in the procedure.
+    /// Role in the procedure.
     pub role: Role,
-    /// How it yields.
+    /// Elastic material.
     pub material: Material,
 }
 
-/// Element (i, j, k) has its centre at ((i + 0.5) h, (j + 0.5) h, (k + 0.5) h), x fastest; every cell but 0 is tissue.
+/// Volume of labels. Element (i, j, k) has its centre at ((i + 0.5) h, (j + 0.5) h, (k + 0.5) h), x
+/// fastest; every cell but 0 is tissue.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelVolume {
-    /// Elements along x, y, z.
+    /// Number of elements along x, y, z.
     pub dims: [usize; 3],
     /// Side of an element, in m.
     pub spacing_m: f64,
     /// Label of each element, x fastest.
     pub cells: Vec<u8>,
-    /// What the cells with each label are; empty: all tissue is one.
+    /// Tissue of each label; if empty, all tissue is the same.
     pub structures: Vec<Tissue>,
-    /// Where the patient lies in the scene.
+    /// Place of the patient in the scene.
     pub patient: PatientFrame,
     /// Name of the volume.
     pub name: String,
     /// Every label of the file with its number of voxels, by label.
     pub voxels_per_label: Vec<(u8, u64)>,
-    /// What the user should know about how the file was read.
+    /// Remarks for the user on the reading of the file.
     pub warnings: Vec<String>,
 }
 
-/// The voxels of a file as they lie in it, x fastest.
+/// Voxels of a file in stored order, x fastest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Voxels {
-    /// Voxels along each axis.
+    /// Number of voxels along each axis.
     pub dims: [usize; 3],
     /// Label of each voxel.
     pub labels: Vec<u8>,
-    /// Where the voxels lie in the patient.
+    /// Place of the voxels in the patient.
     pub frame: VoxelFrame,
-    /// What the file calls its labels, where it says so.
+    /// Names of labels in the file, if there are any.
     pub names: BTreeMap<u8, String>,
-    /// Where structures overlap: labels that voxels, by their index, have beside the one that stands there.
+    /// Overlaps: further labels of voxels, by index, in addition to the stored one.
     pub also: Vec<(u8, u32)>,
-    /// What the one label of a voxel leaves out of that, in words.
+    /// Losses through the limit of one label a voxel, in words.
     pub overlap: Option<String>,
 }
 
 impl Voxels {
-    /// Indices of all voxels of a label, lowest first, also of those where another label stands.
+    /// Returns the indices of all voxels of a label, lowest first, including those where another
+    /// label is stored.
     pub fn of_label(&self, label: u8) -> Vec<usize> {
         let here = (0..self.labels.len()).filter(|&n| self.labels[n] == label);
         let also = self
@@ -82,7 +84,7 @@ impl Voxels {
         all
     }
 
-    /// Every label but 0 that a voxel has, lowest first.
+    /// Returns every label but 0 in any voxel, lowest first.
     pub fn present(&self) -> Vec<u8> {
         let mut is_there = [false; 256];
         self.labels
@@ -95,19 +97,19 @@ impl Voxels {
     }
 }
 
-/// What a file holds in its voxels, x fastest, whatever the numbers mean.
+/// Values of a file's voxels, x fastest, of any meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoxelValues<V> {
-    /// Voxels along each axis.
+    /// Number of voxels along each axis.
     pub dims: [usize; 3],
     /// Value of each voxel.
     pub values: Vec<V>,
-    /// Where the voxels lie in the patient.
+    /// Place of the voxels in the patient.
     pub frame: VoxelFrame,
 }
 
 impl VoxelValues<u8> {
-    /// As labels, under the names that the file gives them.
+    /// Converts values to labels with the names of the file.
     pub fn named(self, names: BTreeMap<u8, String>) -> Voxels {
         Voxels {
             dims: self.dims,
@@ -126,17 +128,18 @@ type Bounds = ([usize; 3], [usize; 3]);
 type Resampled = ([usize; 3], [f64; 3], Vec<u8>);
 
 impl LabelVolume {
-    /// Number of elements that are tissue.
+    /// Returns the number of tissue elements.
     pub fn tissue_elements(&self) -> usize {
         self.cells.iter().filter(|&&c| c != 0).count()
     }
 
-    /// Of the lattice, in the scene.
+    /// Returns the centre of the lattice, in the scene.
     pub fn middle_m(&self) -> [f64; 3] {
         self.dims.map(|d| d as f64 * self.spacing_m / 2.0)
     }
 
-    /// The structures that the volume names, or all labels as one tissue, or only the one asked for.
+    /// Creates the structures that the volume names, or all labels as one tissue, or only the
+    /// requested one.
     pub fn from_voxels(
         voxels: &Voxels,
         label: Option<u8>,
@@ -160,7 +163,7 @@ impl LabelVolume {
         Ok(volume)
     }
 
-    /// Labels that none of the structures has are left out.
+    /// Creates a volume of these structures; other labels are left out.
     pub fn from_tissues(
         voxels: &Voxels,
         structures: Vec<Tissue>,
@@ -188,7 +191,7 @@ impl LabelVolume {
         }
         for t in structures.iter().filter(|t| Organ::of_name(&t.name).is_none()) {
             notes.push(format!(
-                "\"{}\" is no name of TG-263 that is known here (as Prostate, Urethra, Rectum, Bladder are); it is taken as {}",
+                "\"{}\" is not a known TG-263 name (such as Prostate, Urethra, Rectum, Bladder); it is taken as {}",
                 t.name,
                 match t.role {
                     Role::Target => "a target",
@@ -206,7 +209,8 @@ impl LabelVolume {
         Ok(volume)
     }
 
-    /// With elements as large as the longest side of a voxel, or larger when that would be too many.
+    /// Resamples to elements as large as the longest side of a voxel, or larger if that would be
+    /// too many.
     fn resized(
         voxels: &Voxels,
         keep: &[u8; 256],
@@ -249,7 +253,8 @@ impl LabelVolume {
         }
     }
 
-    /// Size, corner of the lattice in the upright voxel frame (m), and cells; `None` when it would be too large.
+    /// Returns size, corner of the lattice in the upright voxel frame (m), and cells; `None` if it
+    /// would be too large.
     fn resampled(
         v: &Voxels,
         keep: &[u8; 256],
@@ -292,7 +297,7 @@ fn tissue(cells: &[u8]) -> usize {
     cells.iter().filter(|&&c| c != 0).count()
 }
 
-/// The first axis is turned round when the voxel axes are left-handed.
+/// Returns whether the first axis is reversed, because the voxel axes are left-handed.
 fn mirrored(frame: &VoxelFrame) -> bool {
     frame.directions.determinant() < 0.0
 }
@@ -304,7 +309,7 @@ fn upright((mut low, mut high): Bounds, flip: bool, dims: [usize; 3]) -> Bounds 
     (low, high)
 }
 
-/// Each label but 0 with its number of voxels.
+/// Returns each label but 0 with its number of voxels.
 fn present(v: &Voxels) -> Vec<(u8, u64)> {
     let mut counts = [0_u64; 256];
     v.labels.iter().for_each(|&l| counts[usize::from(l)] += 1);
@@ -314,12 +319,12 @@ fn present(v: &Voxels) -> Vec<(u8, u64)> {
         .collect()
 }
 
-/// What a structure is by its name; tissue of one kind where the name says nothing.
+/// Returns role and material of a structure by its name; generic tissue for an unknown name.
 pub fn role_and_material(name: &str) -> (Role, Material) {
     Organ::of_name(name).map_or((Role::Tissue, Material::OTHER), |o| (o.role(), o.material()))
 }
 
-/// The labels that a volume has, each what its name says.
+/// Returns the labels of a volume, each with the tissue of its name.
 pub fn by_name(v: &Voxels) -> Vec<Tissue> {
     let tissue = |(label, _)| {
         let name = v.names.get(&label).cloned().unwrap_or_else(|| format!("label {label}"));
@@ -366,7 +371,8 @@ fn no_tissue(label: Option<u8>, present: &[(u8, u64)]) -> String {
     }
 }
 
-/// The corner of voxel 0 lies half a voxel before its centre, where the file puts the origin.
+/// Returns the patient frame. The corner of voxel 0 lies half a voxel before its centre, where the
+/// file puts the origin.
 fn patient_frame(frame: &VoxelFrame, dims: [usize; 3], corner_m: [f64; 3]) -> PatientFrame {
     let side = Vector3::from(frame.spacing_m);
     let mut rotation: Matrix3<f64> = frame.directions;

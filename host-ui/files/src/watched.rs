@@ -1,4 +1,4 @@
-//! Reading for a command: while it takes long, the terminal shows how far it is.
+//! Reading for a command: a long one shows its progress on the terminal.
 
 use super::bytes::file_name;
 use super::progress::Progress;
@@ -8,10 +8,10 @@ use std::time::Duration;
 use stylet_base::format::printable;
 use stylet_base::progress_bar::ShareBar;
 
-/// Shorter readings show nothing, and the others are looked at so often.
+/// Period of the checks, and duration below which a reading shows nothing.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
 
-/// Carries out a reading of `path`; standard error shows its stage and share while it takes long.
+/// Runs a reading of `path`; a long one shows its stage and share on standard error.
 pub fn watched<T>(path: &Path, read: impl FnOnce(&Progress) -> T) -> T {
     watched_by(read, |progress| {
         let mut bar = ShareBar::new();
@@ -23,13 +23,13 @@ pub fn watched<T>(path: &Path, read: impl FnOnce(&Progress) -> T) -> T {
     })
 }
 
-/// `look` makes what is called again and again on a thread of its own until the reading ends.
+/// Runs a reading while the function from `look` is called periodically on another thread.
 fn watched_by<T, L: FnMut()>(read: impl FnOnce(&Progress) -> T, look: impl FnOnce(Progress) -> L + Send) -> T {
     let progress = Progress::default();
     let seen = progress.clone();
     std::thread::scope(|scope| {
         let (reads, ended) = channel::<()>();
-        // Without a thread the file is read all the same.
+        // Without a thread the file is still read.
         let _watches = std::thread::Builder::new()
             .name("progress".to_owned())
             .spawn_scoped(scope, move || {
@@ -50,9 +50,9 @@ mod tests {
     use crate::Stage;
     use std::sync::Mutex;
 
-    /// The commands read files of many seconds without a word.
+    /// Guards against commands that read files for many seconds in silence.
     #[test]
-    fn a_long_reading_is_seen_while_it_lasts_and_a_short_one_is_not() {
+    fn only_a_long_reading_shows_progress() {
         let seen = Mutex::new(Vec::new());
         let look = |progress: Progress| {
             let seen = &seen;

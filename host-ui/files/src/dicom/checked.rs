@@ -1,4 +1,5 @@
-//! A DICOM file as an object; its lengths and its depth are checked first, as the parser makes room for what an element claims.
+//! A DICOM file as an object. Lengths and depth are checked first, because the parser allocates the
+//! length that an element claims.
 
 use crate::error::ContentError;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
@@ -9,20 +10,20 @@ use std::io::Read;
 
 const MAX_DEPTH: usize = 16;
 const MAX_ELEMENTS: usize = 1 << 20;
-/// Every value of a list becomes a string of its own.
+/// Most values of a list, because each becomes a string of its own.
 const MAX_VALUES: usize = 8 << 20;
-/// Retired, but there are files in it.
+/// Retired transfer syntax, still found in files.
 const EXPLICIT_VR_BIG_ENDIAN: &str = "1.2.840.10008.1.2.2";
-/// Kinds whose length has two bytes; all others have four.
+/// Value representations with a length of two bytes; all others have four.
 const SHORT: &str = "AE AS AT CS DA DS DT FD FL IS LO LT PN SH SL SS ST TM UI UL US";
 const UNDEFINED: u32 = u32::MAX;
 const ITEM: Tag = Tag(0xfffe, 0xe000);
 const ITEM_END: Tag = Tag(0xfffe, 0xe00d);
 const SEQUENCE_END: Tag = Tag(0xfffe, 0xe0dd);
-/// Pixels of any kind begin here; they are not read.
+/// First tag of pixels of any kind; they are not read.
 const FIRST_PIXELS: Tag = Tag(0x7fe0, 0x0008);
 
-/// A DICOM data set without its pixels.
+/// DICOM data set without its pixels.
 pub struct Object {
     /// SOP class UID.
     pub sop_class: String,
@@ -30,7 +31,7 @@ pub struct Object {
     pub data: InMemDicomObject,
 }
 
-/// Whether the bytes begin as a DICOM file does.
+/// Returns whether the bytes begin like a DICOM file.
 pub fn is_dicom(bytes: &[u8]) -> bool {
     has_preamble(bytes) || is_bare(bytes)
 }
@@ -39,12 +40,13 @@ fn has_preamble(bytes: &[u8]) -> bool {
     bytes.get(128..132) == Some(b"DICM")
 }
 
-/// Old files begin with their first element, of group 8, little endian; nearly always the length of that group or the character set.
+/// Returns whether the bytes begin like an old file: with their first element, of group 8, little
+/// endian; nearly always the length of that group or the character set.
 fn is_bare(bytes: &[u8]) -> bool {
     bytes.len() > 132 && bytes[..2] == [8, 0] && matches!(bytes[2..4], [0x00 | 0x01 | 0x05 | 0x08 | 0x12 | 0x16, 0])
 }
 
-/// Where the data set begins and how it is written; in a bare file two letters show which.
+/// Returns start and encoding of the data set; in a bare file two letters show the encoding.
 fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), ContentError> {
     if has_preamble(bytes) {
         let (uid, from) = transfer_syntax(bytes)?;
@@ -52,7 +54,7 @@ fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), ContentError> {
     }
     if !is_bare(bytes) {
         return Err(ContentError::Invalid(
-            "it has no DICM at byte 128, so it is no DICOM file; export it again".to_owned(),
+            "it has no DICM at byte 128, so it is not a DICOM file; export it again".to_owned(),
         ));
     }
     let letters = [bytes[4], bytes[5]];
@@ -67,12 +69,12 @@ fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), ContentError> {
     ))
 }
 
-/// Everything before the pixels.
+/// Reads everything before the pixels.
 pub fn read(bytes: &[u8]) -> Result<Object, ContentError> {
     Ok(before_pixels(bytes)?.0)
 }
 
-/// As [`read`], with the bytes of the pixels, and whether their numbers begin with the highest byte.
+/// Like [`read`]; also returns the bytes of the pixels, and whether their numbers are big-endian.
 pub fn read_with_pixels(bytes: &[u8]) -> Result<(Object, &[u8], bool), ContentError> {
     let (object, mut walk) = before_pixels(bytes)?;
     if walk.at >= bytes.len() {
@@ -107,7 +109,7 @@ fn before_pixels(bytes: &[u8]) -> Result<(Object, Walk<'_>), ContentError> {
     Ok((Object { sop_class, data }, walk))
 }
 
-/// With a group 2 of our own in front, as that of the file has served.
+/// Parses with a group 2 of our own in front, because the file's has served.
 fn parse(syntax: Syntax, dataset: &[u8]) -> Result<InMemDicomObject, ContentError> {
     let meta = FileMetaTableBuilder::new()
         .transfer_syntax(syntax.uid())
@@ -143,7 +145,7 @@ impl Syntax {
             uids::IMPLICIT_VR_LITTLE_ENDIAN => Ok(Self::ImplicitLittle),
             uids::EXPLICIT_VR_LITTLE_ENDIAN => Ok(Self::ExplicitLittle),
             EXPLICIT_VR_BIG_ENDIAN => Ok(Self::ExplicitBig),
-            // Packed pixels: everything before them is written as without.
+            // Compressed pixels: everything before them is encoded normally.
             packed if packed.starts_with("1.2.840.10008.1.2.4.") || packed == uids::RLE_LOSSLESS => {
                 Ok(Self::ExplicitLittle)
             }
@@ -155,7 +157,7 @@ impl Syntax {
     }
 }
 
-/// Group 2, always explicit and little: which syntax the rest has, and where that begins.
+/// Reads group 2, always explicit and little-endian: the encoding of the rest, and its start.
 fn transfer_syntax(bytes: &[u8]) -> Result<(String, usize), ContentError> {
     let mut walk = Walk {
         bytes,
@@ -178,7 +180,7 @@ fn transfer_syntax(bytes: &[u8]) -> Result<(String, usize), ContentError> {
         .ok_or_else(|| "it does not say its transfer syntax; export it again".into())
 }
 
-/// Bytes of one value of a kind that is written in binary.
+/// Returns the bytes of one value of a binary kind.
 fn size_of_number(vr: VR) -> u32 {
     match vr {
         VR::US | VR::SS | VR::OW => 2,
@@ -202,7 +204,7 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    /// Through the whole data set; gives where it ends or its pixels begin.
+    /// Walks through the whole data set; returns its end, or the start of its pixels.
     fn top(&mut self) -> Result<usize, ContentError> {
         while self.at < self.bytes.len() {
             let begin = self.at;
@@ -232,7 +234,7 @@ impl<'a> Walk<'a> {
     fn sequence(&mut self, head: &Head, end: usize, depth: usize) -> Result<(), ContentError> {
         if depth > MAX_DEPTH {
             return Err(ContentError::Invalid(format!(
-                "its sequences lie more than {MAX_DEPTH} deep in one another"
+                "its sequences are nested more than {MAX_DEPTH} deep"
             )));
         }
         let sequence_end = self.end_of(head, end)?;
@@ -270,7 +272,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// `None` for a length that a mark at the end gives.
+    /// Returns the end of an element; `None` if a delimiter marks it.
     fn end_of(&self, head: &Head, end: usize) -> Result<Option<usize>, ContentError> {
         if head.length == UNDEFINED {
             return Ok(None);
@@ -284,7 +286,7 @@ impl<'a> Walk<'a> {
 
     fn too_long(&self, head: &Head, end: usize) -> String {
         format!(
-            "it is cut off or damaged: the element {} claims {} bytes and {} are left",
+            "it is truncated or damaged: the element {} claims {} bytes and {} remain",
             head.tag,
             head.length,
             end.saturating_sub(self.at)
@@ -296,7 +298,7 @@ impl<'a> Walk<'a> {
             return Ok(());
         }
         Err(ContentError::Invalid(format!(
-            "it is damaged: the element {tag} is longer than what it is in"
+            "it is damaged: the element {tag} is longer than its parent"
         )))
     }
 
@@ -307,7 +309,7 @@ impl<'a> Walk<'a> {
                 head.tag, head.vr
             )));
         }
-        // The parser takes whole numbers only, and would go on in the middle of the value.
+        // The parser takes whole numbers only, and would continue in the middle of the value.
         if !head.length.is_multiple_of(size_of_number(head.vr)) {
             return Err(ContentError::Invalid(format!(
                 "it is damaged: the element {} ({}) has {} bytes, no whole number of values",

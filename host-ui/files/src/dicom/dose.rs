@@ -8,11 +8,11 @@ pub use write::bytes;
 
 use super::Identity;
 
-/// Dose of x fastest; the middle of the first voxel and the steps between them (RAS, m).
+/// Dose, x fastest; centre of the first voxel and spacing (RAS, m).
 pub struct DoseImage<'a> {
-    /// Voxels along x, y, z.
+    /// Number of voxels along x, y, z.
     pub dims: [usize; 3],
-    /// Middle of the first voxel (RAS), in m.
+    /// Centre of the first voxel (RAS), in m.
     pub origin_m: [f64; 3],
     /// Sides of a voxel, in m.
     pub spacing_m: [f64; 3],
@@ -20,7 +20,7 @@ pub struct DoseImage<'a> {
     pub dose_gy: &'a [f64],
 }
 
-/// What a dose belongs to.
+/// References of a dose.
 pub struct DoseOf<'a> {
     /// SOP instance UID of the dose itself.
     pub uid: &'a str,
@@ -28,13 +28,13 @@ pub struct DoseOf<'a> {
     pub identity: &'a Identity,
     /// SOP instance UID of the RT Plan.
     pub plan: &'a str,
-    /// SOP instance UID of the structure set that the histograms are of.
+    /// SOP instance UID of the structure set of the histograms.
     pub structure_set: Option<&'a str>,
     /// Histograms of its structures.
     pub histograms: &'a [Histogram],
 }
 
-/// Cumulative: the volume that gets at least a dose.
+/// Cumulative histogram: the volume with at least a dose.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Histogram {
     /// Number of the structure in its structure set.

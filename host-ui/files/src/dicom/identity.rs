@@ -1,4 +1,4 @@
-//! To whom, to which study and to which frame of reference a file belongs.
+//! Patient, study and frame of reference of a file.
 
 use super::super::element::short;
 use super::checked::{self, Object};
@@ -10,7 +10,7 @@ use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
 use std::path::Path;
 
-/// Number of bytes that distinguish a DICOM file from others.
+/// Number of bytes that identify a DICOM file.
 const START_BYTES: u64 = 160;
 
 /// Names of the parts in a table, in the order of `fields`.
@@ -29,37 +29,37 @@ pub const COLUMNS: [&str; 12] = [
     "dicom_position_reference",
 ];
 
-/// To whom, to which study and to which frame a file belongs; a text is empty where the file leaves it open.
+/// Patient, study and frame of a file; a text is empty if the file omits it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identity {
     /// Name of the patient.
     pub patient_name: String,
     /// Identifier of the patient.
     pub patient_id: String,
-    /// Day of birth, as DICOM writes it.
+    /// Day of birth, in DICOM format.
     pub birth_date: String,
     /// Sex: M, F or O.
     pub sex: String,
     /// Study instance UID.
     pub study: String,
-    /// Day of the study, as DICOM writes it.
+    /// Day of the study, in DICOM format.
     pub study_date: String,
-    /// Time of the study, as DICOM writes it.
+    /// Time of the study, in DICOM format.
     pub study_time: String,
     /// Identifier of the study.
     pub study_id: String,
     /// Number of the order.
     pub accession_number: String,
-    /// Name of the physician who asked for the study.
+    /// Name of the referring physician.
     pub referring_physician: String,
     /// Frame of reference UID.
     pub frame_of_reference: String,
-    /// What the frame of reference lies by.
+    /// Position reference of the frame.
     pub position_reference: String,
 }
 
 impl Identity {
-    /// Nobody's, in a study and a frame of its own.
+    /// Creates an anonymous identity, in a new study and frame.
     pub fn new() -> Self {
         let (study_date, study_time) = now();
         Self {
@@ -78,7 +78,7 @@ impl Identity {
         }
     }
 
-    /// That of a DICOM object; study and frame are made where it has none.
+    /// Returns the identity of a DICOM object; creates study and frame if it has none.
     pub fn of(object: &Object) -> Self {
         let data = &object.data;
         let of = |tag| text(data, tag).unwrap_or_default();
@@ -98,7 +98,7 @@ impl Identity {
         }
     }
 
-    /// That of the file at `path`; `None` for a file that is no DICOM.
+    /// Returns the identity of the file at `path`; `None` for a file that is not DICOM.
     pub fn of_file(path: &Path) -> Result<Option<Self>, FileError> {
         let refused = |why| FileError::of(path, why);
         if !crate::bytes::start(path, START_BYTES).is_some_and(|start| checked::is_dicom(&start)) {
@@ -109,7 +109,7 @@ impl Identity {
         Ok(Some(Self::of(&object)))
     }
 
-    /// As columns of a table, which [`Identity::of_columns`] reads; those without a value are left out.
+    /// Returns the parts as columns of a table for [`Identity::of_columns`], without empty ones.
     pub fn to_columns(&self) -> Vec<(&'static str, String)> {
         let mut copy = self.clone();
         let columns = COLUMNS.into_iter().zip(copy.fields());
@@ -117,11 +117,11 @@ impl Identity {
         filled.map(|(column, field)| (column, field.clone())).collect()
     }
 
-    /// Out of one row of a table; `None` where it names no study and no frame.
+    /// Reads the identity from one row of a table; `None` if it names no study and no frame.
     pub fn of_columns<'a>(value: impl Fn(&str) -> Option<&'a str>) -> Option<Self> {
         let mut found = Self::new();
         for (column, field) in COLUMNS.into_iter().zip(found.fields()) {
-            // No value of DICOM that stands here is longer.
+            // No DICOM value among these is longer.
             let text = value(column).unwrap_or_default().chars();
             *field = text.filter(|c| !c.is_control()).take(64).collect();
         }
@@ -146,7 +146,8 @@ impl Identity {
         ]
     }
 
-    /// Why files of both cannot be parts of one study: another patient, or places in another frame.
+    /// Returns the reason why files of both cannot be parts of one study: another patient, or
+    /// another frame.
     pub fn differs_from(&self, other: &Self) -> Option<String> {
         if self.patient_id != other.patient_id {
             let (one, two) = (short(&self.patient_id), short(&other.patient_id));
@@ -168,7 +169,8 @@ impl Default for Identity {
     }
 }
 
-/// A structure set may name its frame only in the sequence of frames, or with its structures.
+/// Returns the frame of reference. A structure set may name it only in the sequence of frames, or
+/// with its structures.
 fn frame_of_reference(data: &InMemDicomObject) -> Option<String> {
     let first = |sequence, tag| items(data, sequence).iter().find_map(|item| text(item, tag));
     text(data, tags::FRAME_OF_REFERENCE_UID)

@@ -1,4 +1,4 @@
-//! The grid of the image series that a structure set was drawn on.
+//! The grid of the image series under a structure set.
 
 use super::super::element::voxel_count;
 use super::super::frame::VoxelFrame;
@@ -11,24 +11,24 @@ use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 use stylet_anatomy::ras_from_lps;
 
-/// A series has some hundreds.
+/// Most files of a series; a usual one has some hundreds.
 const MAX_FILES: usize = 4096;
-/// Slices may be so far from even distances, as a share of one.
+/// Largest deviation of slices from even distances, as a share of one.
 const UNEVEN: f64 = 0.02;
 
-/// A contour off its image by so much still lies in it.
+/// Distance from an image within which a contour lies in it.
 const SAME_PLANE_MM: f64 = 0.05;
 
-/// Voxels without their values.
+/// Grid of voxels without values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
-    /// Voxels along each axis.
+    /// Number of voxels along each axis.
     pub dims: [usize; 3],
-    /// Where they lie in the patient.
+    /// Place of the voxels in the patient.
     pub frame: VoxelFrame,
 }
 
-/// One slice of an image series, without its pixels; LPS, mm.
+/// Slice of an image series, without its pixels; LPS, mm.
 #[derive(Clone, Debug)]
 pub struct Slice {
     /// SOP instance UID.
@@ -44,11 +44,11 @@ pub struct Slice {
     corner: Vector3<f64>,
     /// Steps from column to column, and from row to row.
     steps: [Vector3<f64>; 2],
-    /// Columns, rows.
+    /// Number of columns, rows.
     size: [u64; 2],
 }
 
-/// The slice that a file holds; `None` for anything that is not one.
+/// Reads the slice in a file; `None` for anything else.
 pub fn slice(file: &[u8]) -> Option<Result<(String, Slice), ContentError>> {
     let object = checked::is_dicom(file).then(|| checked::read(file).ok())??;
     let series = text(&object.data, tags::SERIES_INSTANCE_UID)?;
@@ -80,7 +80,8 @@ pub fn slice(file: &[u8]) -> Option<Result<(String, Slice), ContentError>> {
 }
 
 impl Slice {
-    /// A slice of a series; corner in LPS, mm, steps from column to column and from row to row, columns and rows.
+    /// Creates a slice of a series; corner in LPS, mm, steps from column to column and from row to
+    /// row, columns and rows.
     pub(super) fn new(
         (series, identity): (String, Identity),
         corner: Vector3<f64>,
@@ -99,17 +100,17 @@ impl Slice {
         }
     }
 
-    /// Not a unit vector.
+    /// Returns the normal, not of unit length.
     fn normal(&self) -> Vector3<f64> {
         self.steps[0].cross(&self.steps[1])
     }
 
-    /// Pixels of it.
+    /// Returns the number of its pixels.
     pub(super) fn pixels(&self) -> usize {
         self.size[0] as usize * self.size[1] as usize
     }
 
-    /// The image that a contour lies in; corners in RAS, m.
+    /// Returns the image that a contour lies in; corners in RAS, m.
     pub fn under<'a>(images: &'a [Self], corners_m: &[Vector3<f64>]) -> Option<&'a Self> {
         let first = images.first()?;
         let normal = first.steps[0].cross(&first.steps[1]).try_normalize(1e-9)?;
@@ -124,12 +125,12 @@ impl Slice {
     }
 }
 
-/// The slices in a folder, of whatever series.
+/// Returns the slices of every series in a folder.
 pub fn all_in(folder: &Path) -> Result<Vec<Slice>, ContentError> {
     slices_of(folder, |_| true)
 }
 
-/// The slices in a folder that belong to a series or are named one by one.
+/// Returns the slices in a folder that belong to a series or are named one by one.
 pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Slice>, ContentError> {
     slices_of(folder, |slice| {
         series.contains(&slice.series) || named.contains(&slice.uid)
@@ -157,12 +158,12 @@ fn slices_of(folder: &Path, wanted: impl Fn(&Slice) -> bool) -> Result<Vec<Slice
     Ok(found)
 }
 
-/// Only the start is read, so that a folder with other large files costs little.
+/// Returns whether a file begins like DICOM. Reads only its start, so that large files cost little.
 pub(super) fn begins_as_dicom(path: &Path) -> bool {
     bytes::start(path, 160).is_some_and(|start| checked::is_dicom(&start))
 }
 
-/// Puts what has slices in the order of [`grid`].
+/// Sorts items with slices in the order of [`grid`].
 pub(super) fn sort<T>(all: &mut [T], slice: impl Fn(&T) -> &Slice) {
     let Some(normal) = all.first().map(|first| slice(first).normal()) else {
         return;
@@ -171,7 +172,7 @@ pub(super) fn sort<T>(all: &mut [T], slice: impl Fn(&T) -> &Slice) {
     all.sort_by(|a, b| height(a).total_cmp(&height(b)));
 }
 
-/// `None` for fewer than two slices.
+/// Returns the grid; `None` for fewer than two slices.
 pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
     let Some(first) = slices.first().cloned() else {
         return Ok(None);
@@ -199,7 +200,7 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
     let uneven = |(i, h): (usize, &f64)| (h - heights[0] - step * i as f64).abs() > UNEVEN * step.abs().max(1e-3);
     if step < 1e-3 || heights.iter().enumerate().any(uneven) {
         return Err(ContentError::Invalid(format!(
-            "the {count} images of its series do not lie at even distances (on average {step:.3} mm): some are missing or there twice"
+            "the {count} images of its series do not lie at even distances (on average {step:.3} mm): some are missing or duplicated"
         )));
     }
     let across = (slices[count - 1].corner - slices[0].corner) / (count - 1) as f64;
@@ -217,9 +218,9 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
 mod tests {
     use super::*;
 
-    /// A pipe beside a structure set was opened and waited for without an end.
+    /// Guards against a pipe next to a structure set, which was opened and never ended.
     #[test]
-    fn a_pipe_beside_a_structure_set_is_passed_over() {
+    fn a_pipe_near_a_structure_set_is_skipped() {
         let folder = tempfile::tempdir().unwrap();
         let pipe = folder.path().join("pipe.dcm");
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();

@@ -1,4 +1,4 @@
-//! RT Plan of a permanent implant: the sources, and where each seed lies.
+//! RT Plan of a permanent implant: the sources, and the place of each seed.
 
 mod permanent;
 mod read;
@@ -14,46 +14,46 @@ use crate::progress::Progress;
 use std::path::Path;
 use stylet_base::format::printable;
 
-/// Patient frame (RAS, m); strengths in U on the day to which each of them refers.
+/// Plan in the patient frame (RAS, m); each strength in U on its own reference day.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeedPlan {
     /// Label of the plan.
     pub label: String,
     /// Patient, study and frame of reference.
     pub identity: Identity,
-    /// Of the file itself; a dose refers to it.
+    /// SOP instance UID of the file; a dose refers to it.
     pub uid: String,
-    /// The structure set that it was made on.
+    /// Structure set of the plan.
     pub structure_set: Option<PlannedOn>,
     /// Prescribed dose, in Gy.
     pub prescription_gy: Option<f64>,
     /// Day of the plan itself.
     pub planned_on: Option<Date>,
-    /// The model of all seeds.
+    /// Model of all seeds.
     pub source: PlanSource,
     /// The seeds.
     pub seeds: Vec<PlanSeed>,
-    /// What the user should know about how it was read.
+    /// Remarks on the reading for the user.
     pub notes: Vec<String>,
 }
 
-/// The structure set that a plan was made on.
+/// Structure set of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedOn {
     /// SOP instance UID of the structure set.
     pub uid: String,
-    /// Number of the structure that the prescription is for.
+    /// Number of the structure of the prescription.
     pub target: Option<usize>,
 }
 
-/// The model that all seeds are of.
+/// Model of all seeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSource {
     /// Name of the model.
     pub model: String,
-    /// Who makes it.
+    /// Manufacturer.
     pub manufacturer: String,
-    /// As DICOM has it: I-125.
+    /// Isotope in DICOM notation: I-125.
     pub isotope: String,
     /// Half-life, in days.
     pub half_life_days: f64,
@@ -61,12 +61,12 @@ pub struct PlanSource {
     pub active_length_m: f64,
 }
 
-/// One seed of a plan.
+/// Seed of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanSeed {
-    /// Number of the needle that brings it in, from 1.
+    /// Number of its needle, from 1.
     pub needle: Option<u32>,
-    /// The needle's hole in the template, or what else the plan calls it; empty where it has no name.
+    /// The needle's hole in the template, or another name in the plan; empty without a name.
     pub hole: String,
     /// Place (RAS), in m.
     pub position_m: [f64; 3],
@@ -74,11 +74,11 @@ pub struct PlanSeed {
     pub axis: Option<[f64; 3]>,
     /// Air kerma strength, in U.
     pub strength_u: f64,
-    /// Day to which the strength refers.
+    /// Reference day of the strength.
     pub strength_on: Option<Date>,
 }
 
-/// The DICOM plan in the file at `path`; its notes go to standard error.
+/// Reads the DICOM plan in the file at `path`; prints its notes to standard error.
 pub fn open(path: &Path) -> Result<SeedPlan, FileError> {
     let refused = |why| FileError::of(path, why);
     let bytes = crate::bytes::whole(path, &Progress::default()).map_err(refused)?;

@@ -16,15 +16,17 @@ use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A series has some hundreds.
+/// Most files of a series; a usual one has some hundreds.
 const MAX_FILES: usize = 4096;
-/// Frames of one file.
+/// Most frames of one file.
 const MAX_FRAMES: f64 = 65_535.0;
 
-/// The one series of a folder, or the series of which `path` is a file: its values, such as Hounsfield units.
+/// Reads the only series of a folder, or the series of the file `path`: its values, such as
+/// Hounsfield units.
 ///
 /// # Errors
-/// No series, several of them in a folder, compressed pixels, colours, slices that are missing or there twice.
+///
+/// No series, several of them in a folder, compressed pixels, colours, missing or duplicate slices.
 pub fn read(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, FileError> {
     of_path(path, progress).map_err(|why| FileError::of(path, why))
 }
@@ -44,7 +46,7 @@ fn of_path(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, Content
     let slices: Vec<Slice> = frames.iter().map(|frame| frame.slice.clone()).collect();
     let grid = images::grid(slices)?.ok_or("it is one slice alone; a volume has at least two")?;
     let [columns, rows, _] = grid.dims;
-    // As the grid has them.
+    // In the order of the grid.
     images::sort(&mut frames, |frame| &frame.slice);
     let mut values = Vec::with_capacity(columns * rows * frames.len());
     for frame in frames {
@@ -63,7 +65,7 @@ struct Frame {
     values: Vec<f32>,
 }
 
-/// The files of a folder that begin as DICOM does.
+/// Returns the files of a folder that begin like DICOM.
 fn dicom_files(folder: &Path) -> Result<Vec<PathBuf>, ContentError> {
     let entries = std::fs::read_dir(folder).map_err(|why| ContentError::Unreadable(why.to_string()))?;
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
@@ -103,13 +105,13 @@ fn of_folder(folder: &Path, progress: &Progress) -> Result<Vec<Frame>, ContentEr
     }
     let mut series: Vec<(Vec<PathBuf>, String)> = series.into_values().collect();
     let Some((paths, _)) = series.pop() else {
-        return Err("it holds no image series of DICOM; choose another folder".into());
+        return Err("it contains no DICOM image series; choose another folder".into());
     };
     if !series.is_empty() {
         let mut all: Vec<String> = series.iter().map(|(p, about)| one_of_several(p, about)).collect();
         all.push(one_of_several(&paths, "the last"));
         return Err(ContentError::Invalid(format!(
-            "it holds {} series; give a file of the one that is meant:\n  {}",
+            "it contains {} series; give a file of the one you mean:\n  {}",
             all.len(),
             all.join("\n  ")
         )));
@@ -122,7 +124,7 @@ fn one_of_several(paths: &[PathBuf], about: &str) -> String {
     format!("{first}: {about}, {} files", paths.len())
 }
 
-/// The files beside one that are of its series.
+/// Returns the files of the same series in the folder of a file.
 fn beside(path: &Path, object: &Object, progress: &Progress) -> Result<Vec<Frame>, ContentError> {
     if object.data.get(tags::IMAGE_POSITION_PATIENT).is_none() {
         return Err(unplaced(object));
@@ -147,11 +149,11 @@ fn beside(path: &Path, object: &Object, progress: &Progress) -> Result<Vec<Frame
     frames_of(&paths, progress)
 }
 
-/// Why an image without a place in the patient is refused.
+/// Explains why an image without a place in the patient is refused.
 fn unplaced(object: &Object) -> ContentError {
     let modality = text(&object.data, tags::MODALITY).unwrap_or_default();
     ContentError::Invalid(format!(
-        "its {} image says nothing of where it lies in the patient ({}); export a volume with a place, or as NRRD",
+        "its {} image does not give its position in the patient ({}); export a volume with a position, or as NRRD",
         short(&modality),
         name(tags::IMAGE_POSITION_PATIENT)
     ))
@@ -187,7 +189,7 @@ fn is_enhanced(object: &Object) -> bool {
     object.data.get(tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE).is_some()
 }
 
-/// Slope and intercept from the stored number to the value.
+/// Returns slope and intercept from the stored number to the value.
 fn scale_of(data: &InMemDicomObject) -> Result<[f64; 2], ContentError> {
     let slope = number(data, tags::RESCALE_SLOPE)?.unwrap_or(1.0);
     let intercept = number(data, tags::RESCALE_INTERCEPT)?.unwrap_or(0.0);
@@ -206,10 +208,10 @@ fn check_size(of_slice: usize, slices: usize) -> Result<(), ContentError> {
     }
 }
 
-/// How a pixel is stored.
+/// Storage of a pixel.
 struct Pixel {
     element: Element,
-    /// Bits that count, and whether the highest of them is a sign.
+    /// Significant bits, and whether the highest of them is a sign.
     stored: u32,
     is_signed: bool,
 }
@@ -250,7 +252,7 @@ impl Pixel {
         })
     }
 
-    /// The values of so many pixels.
+    /// Reads the values of this number of pixels.
     fn values(
         &self,
         pixels: &[u8],
@@ -260,7 +262,7 @@ impl Pixel {
     ) -> Result<Vec<f32>, ContentError> {
         let progress = Progress::default();
         let raw = read_values(pixels, self.element, endian, count, [1.0, 0.0], Sink::exact(&progress))?;
-        // Bits above those that count may hold overlays.
+        // Bits above the significant ones may hold overlays.
         let kept = (1_u64 << self.stored) - 1;
         let sign = 1_u64 << (self.stored - 1);
         let value = |raw: f64| {
@@ -275,7 +277,7 @@ impl Pixel {
     }
 }
 
-/// The frames of an enhanced image: what holds for all of them stands once, and what differs with each.
+/// Reads the frames of an enhanced image: common attributes stand once, the others with each frame.
 fn enhanced(object: &Object, pixels: &[u8], endian: Endian, progress: &Progress) -> Result<Vec<Frame>, ContentError> {
     let data = &object.data;
     let count = needed(data, tags::NUMBER_OF_FRAMES, 1.0, MAX_FRAMES)? as usize;
@@ -318,7 +320,7 @@ fn enhanced(object: &Object, pixels: &[u8], endian: Endian, progress: &Progress)
                     missing(tags::IMAGE_POSITION_PATIENT)
                 }
                 (None, _) => {
-                    "its frames lie in the volume of the probe and not in the patient; export it as NRRD".into()
+                    "its frames are positioned relative to the probe, not the patient; export it as NRRD".into()
                 }
                 (_, None) => missing(tags::IMAGE_ORIENTATION_PATIENT),
                 _ => missing(tags::PIXEL_SPACING),
@@ -328,7 +330,7 @@ fn enhanced(object: &Object, pixels: &[u8], endian: Endian, progress: &Progress)
         let scale = scale.as_ref().map_or(Ok([1.0, 0.0]), scale_of)?;
         let raw = pixels.get(n * bytes..(n + 1) * bytes).ok_or_else(|| {
             ContentError::Invalid(format!(
-                "it is cut off: frame {} of {count} is not there; copy or export it again",
+                "it is truncated: frame {} of {count} is missing; copy or export it again",
                 n + 1
             ))
         })?;

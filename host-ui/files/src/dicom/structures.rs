@@ -24,13 +24,13 @@ use stylet_anatomy::ras_from_lps;
 
 const MAX_STRUCTURES: usize = 255;
 const MAX_MM: f64 = 10_000.0;
-/// Side of a voxel where there are no images, and where contours do not run along cells, whose sides are then divided into such parts
-/// at most.
+/// Side of a voxel without images. For contours that do not run along cells, the cell sides are
+/// divided into parts of at most this length.
 const SIDE_M: f64 = 0.5e-3;
-/// Contours that are farther apart are of different planes.
+/// Distance beyond which contours are of different planes.
 const SAME_PLANE_M: f64 = 0.05e-3;
 
-/// The closed contours of one structure; corners in RAS, m.
+/// Closed contours of one structure; corners in RAS, m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contoured {
     /// Name of the structure.
@@ -40,7 +40,7 @@ pub struct Contoured {
 }
 
 impl Contoured {
-    /// Unit vector across the plane of its largest contour.
+    /// Returns the unit vector across the plane of its largest contour.
     fn normal(&self) -> Result<Vector3<f64>, ContentError> {
         let largest = self.contours.iter().map(|c| area_vector(c));
         let largest = largest.max_by(|a, b| a.norm().total_cmp(&b.norm()));
@@ -48,7 +48,7 @@ impl Contoured {
         normal.ok_or_else(|| ContentError::Invalid(format!("the contours of {} enclose no area", short(&self.name))))
     }
 
-    /// The smallest distance between two of its planes, m; infinite for one plane.
+    /// Returns the smallest distance between two of its planes, m; infinite for one plane.
     fn plane_distance_m(&self) -> Result<f64, ContentError> {
         let normal = self.normal()?;
         let mut heights: Vec<f64> = self.contours.iter().map(|c| c[0].dot(&normal)).collect();
@@ -58,7 +58,7 @@ impl Contoured {
     }
 }
 
-/// The contours of an RT Structure Set.
+/// Contours of an RT Structure Set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StructureSet {
     /// Structures that have a volume.
@@ -67,11 +67,11 @@ pub struct StructureSet {
     pub series: Vec<String>,
     /// SOP instance UIDs of single images that it was drawn on.
     pub images: Vec<String>,
-    /// What was left out, and why.
+    /// Omissions, with reasons.
     pub notes: Vec<String>,
 }
 
-/// Whether contours of one plane lie in each other, so that the inner ones are holes.
+/// Returns whether contours of one plane are nested, so that the inner ones are holes.
 fn nested(contours: &[Vec<Vector3<f64>>]) -> bool {
     let largest = contours.iter().map(|c| area_vector(c));
     let largest = largest.max_by(|a, b| a.norm().total_cmp(&b.norm()));
@@ -83,7 +83,8 @@ fn nested(contours: &[Vec<Vector3<f64>>]) -> bool {
         .any(|polygons| polygons.len() > planes::MOST_NESTED || any_in_another(polygons))
 }
 
-/// Loops along voxels may touch at corners, and never along an edge.
+/// Returns whether polygons are nested. Loops along voxels may touch at corners, but never along an
+/// edge.
 fn any_in_another(polygons: &[Vec<[f64; 2]>]) -> bool {
     let middle = |p: &[[f64; 2]]| [0, 1].map(|a| (p[0][a] + p[1 % p.len()][a]) / 2.0);
     let is_in = |n: usize| {
@@ -94,7 +95,7 @@ fn any_in_another(polygons: &[Vec<[f64; 2]>]) -> bool {
     (0..polygons.len()).any(is_in)
 }
 
-/// Of a file and the images beside it.
+/// Reads a structure set and the images in its folder.
 pub fn read(object: &Object, folder: Option<&Path>) -> Result<Voxels, ContentError> {
     let set = StructureSet::of(object)?;
     let slices = folder.map_or(Ok(Vec::new()), |f| images::find(f, &set.series, &set.images))?;
@@ -102,7 +103,7 @@ pub fn read(object: &Object, folder: Option<&Path>) -> Result<Voxels, ContentErr
 }
 
 impl StructureSet {
-    /// The structures of a DICOM object; the error lists every problem.
+    /// Reads the structures of a DICOM object; the error lists every problem.
     pub fn of(object: &Object) -> Result<Self, ContentError> {
         if object.sop_class != uids::RT_STRUCTURE_SET_STORAGE {
             return Err(ContentError::Invalid(format!(
@@ -142,12 +143,12 @@ impl StructureSet {
                 notes.join("; ")
             };
             return Err(ContentError::Invalid(format!(
-                "it holds no structure that has a volume: {why}"
+                "it contains no structure with a volume: {why}"
             )));
         }
         if structures.len() > MAX_STRUCTURES {
             return Err(ContentError::Invalid(format!(
-                "it holds {} structures; at most {MAX_STRUCTURES} are supported",
+                "it contains {} structures; at most {MAX_STRUCTURES} are supported",
                 structures.len()
             )));
         }
@@ -160,7 +161,7 @@ impl StructureSet {
         })
     }
 
-    /// On the grid of the images, or else on one around the contours.
+    /// Returns the voxels on the grid of the images, or else on one around the contours.
     pub fn voxels(self, grid: Option<Grid>) -> Result<Voxels, ContentError> {
         let mut notes = self.notes.clone();
         let grid = match grid {
@@ -168,7 +169,7 @@ impl StructureSet {
             None => {
                 let grid = self.grid_around()?;
                 notes.push(format!(
-                    "its images are not beside it: a grid of {} in the plane of the contours is taken",
+                    "its images are not in its folder: a grid of {} in the plane of the contours is used",
                     in_mm(&grid.frame)
                 ));
                 grid
@@ -188,7 +189,8 @@ impl StructureSet {
         Ok(with_warning(voxels, (!notes.is_empty()).then(|| notes.join("; "))))
     }
 
-    /// Two voxels larger than all contours on each side; their faces, not their middles, lie along the outermost contours.
+    /// Returns a grid two voxels larger than all contours on each side; the faces of its voxels,
+    /// not their centres, lie along the outermost contours.
     fn grid_around(&self) -> Result<Grid, ContentError> {
         let points = || self.structures.iter().flat_map(|s| s.contours.iter().flatten());
         let largest = self
@@ -200,7 +202,7 @@ impl StructureSet {
         let normal = largest
             .and_then(|a| a.try_normalize(1e-12))
             .ok_or("its contours enclose no area")?;
-        // Along the patient's axes where the planes allow it.
+        // Along the patient's axes if the planes allow it.
         let right = (Vector3::x() - normal * normal.x).try_normalize(0.5);
         let across = right
             .or((Vector3::y() - normal * normal.y).try_normalize(0.5))
@@ -219,7 +221,7 @@ impl StructureSet {
             let along = axes.transpose() * p;
             (low, high) = (low.inf(&along), high.sup(&along));
         }
-        // Planes lie in the middle of their voxels.
+        // Planes lie in the centres of their voxels.
         let half = Vector3::new(sides[0], sides[1], 0.0) / 2.0;
         let margin = Vector3::new(2.0 * sides[0], 2.0 * sides[1], step_m);
         let first = low - margin + half;
@@ -232,7 +234,7 @@ impl StructureSet {
         })
     }
 
-    /// The smallest distance between two planes of one structure.
+    /// Returns the smallest distance between two planes of one structure.
     fn plane_distance_m(&self) -> Result<f64, ContentError> {
         let mut smallest = f64::INFINITY;
         for structure in &self.structures {
@@ -242,13 +244,13 @@ impl StructureSet {
             return Ok(smallest);
         }
         Err(
-            "each of its structures has contours in one plane only, so none has a thickness; put its images beside it"
+            "each of its structures has contours in one plane only, so none has a thickness; put its images in its folder"
                 .into(),
         )
     }
 }
 
-/// Sides of the voxels of a slice.
+/// Formats the sides of the voxels of a slice.
 fn in_mm(frame: &VoxelFrame) -> String {
     let [x, y] = [0, 1].map(|a| format!("{:.2}", frame.spacing_m[a] * 1e3));
     if x == y {
@@ -258,9 +260,9 @@ fn in_mm(frame: &VoxelFrame) -> String {
     }
 }
 
-/// Why a structure cannot be taken.
+/// Reason why a structure cannot be used.
 enum Unusable {
-    /// It is none with a volume.
+    /// It has no volume.
     LeftOut(String),
     Wrong(String),
 }
@@ -294,7 +296,7 @@ fn closed(contour: &InMemDicomObject) -> Result<Vec<Vector3<f64>>, ContentError>
     }
     if let Some(far) = values.iter().find(|v| v.abs() > MAX_MM) {
         return Err(ContentError::Invalid(format!(
-            "a corner lies at {far} mm; at most {MAX_MM} mm is accepted"
+            "a corner is at {far} mm; at most {MAX_MM} mm is accepted"
         )));
     }
     let points: Vec<_> = values
@@ -316,7 +318,7 @@ fn closed(contour: &InMemDicomObject) -> Result<Vec<Vector3<f64>>, ContentError>
     Ok(points)
 }
 
-/// Normal to the plane of a polygon, as long as its area (m2).
+/// Returns the normal to the plane of a polygon, as long as its area (m2).
 fn area_vector(corners: &[Vector3<f64>]) -> Vector3<f64> {
     let next = corners.iter().cycle().skip(1);
     let origin = corners[0];

@@ -1,4 +1,4 @@
-//! Values out of a DICOM object, as text and numbers that can be trusted.
+//! Values from a DICOM object, as checked text and numbers.
 
 use super::super::element::short;
 use crate::error::ContentError;
@@ -8,13 +8,14 @@ use dicom_core::value::{PrimitiveValue, Value};
 use dicom_dictionary_std::StandardDataDictionary;
 use dicom_object::InMemDicomObject;
 
-/// As the standard calls it, with its number.
+/// Returns the standard's name of a tag, with its number.
 pub fn name(tag: Tag) -> String {
     let alias = StandardDataDictionary.by_tag(tag).map_or("element", |e| e.alias());
     format!("{alias} {tag}")
 }
 
-/// Without control characters, which a terminal would obey; `None` where it is absent or empty.
+/// Returns a text without control characters, which a terminal would execute; `None` if it is
+/// absent or empty.
 pub fn text(object: &InMemDicomObject, tag: Tag) -> Option<String> {
     let element = object.get(tag)?;
     let value = match element.value() {
@@ -31,14 +32,14 @@ pub fn items(object: &InMemDicomObject, tag: Tag) -> &[InMemDicomObject] {
     object.get(tag).and_then(|e| e.items()).unwrap_or_default()
 }
 
-/// All finite; `None` where it is absent or empty.
+/// Returns finite numbers; `None` if they are absent or empty.
 pub fn numbers(object: &InMemDicomObject, tag: Tag) -> Result<Option<Vec<f64>>, ContentError> {
     let (Some(element), Some(shown)) = (object.get(tag), text(object, tag)) else {
         return Ok(None);
     };
     let wrong = || {
         let shown = short(&shown);
-        ContentError::Invalid(format!("{} is \"{shown}\", which is no list of numbers", name(tag)))
+        ContentError::Invalid(format!("{} is \"{shown}\", which is not a list of numbers", name(tag)))
     };
     let values = element.to_multi_float64().map_err(|_| wrong())?;
     if values.iter().all(|v| v.is_finite()) {
@@ -62,7 +63,7 @@ pub fn number(object: &InMemDicomObject, tag: Tag) -> Result<Option<f64>, Conten
     Ok(exactly::<1>(object, tag)?.map(|[v]| v))
 }
 
-/// A number that there must be, within limits.
+/// Returns a mandatory number within limits.
 pub fn needed(object: &InMemDicomObject, tag: Tag, least: f64, most: f64) -> Result<f64, ContentError> {
     match number(object, tag)? {
         Some(v) if (least..=most).contains(&v) => Ok(v),

@@ -1,4 +1,4 @@
-//! What all DICOM files of ours have in common: who, when, and numbers that nobody else uses.
+//! Common parts of all DICOM files written here: author, time, and unique identifiers.
 
 use super::Identity;
 use crate::error::ContentError;
@@ -8,10 +8,10 @@ use dicom_dictionary_std::{tags, uids};
 use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
 use std::hash::{BuildHasher, Hasher, RandomState};
 
-/// Names the program in the files it writes; under 2.25 as it has no root of its own.
+/// Identifier of the program in its files; under 2.25 because it has no root of its own.
 const IMPLEMENTATION: &str = "2.25.302416733929811471066208173541526011461";
 
-/// 128 random bits under 2.25, as the standard has it for those without a root.
+/// Returns 128 random bits under 2.25, the standard's prefix for writers without a root.
 pub fn new_uid() -> String {
     let random = || u128::from(RandomState::new().build_hasher().finish());
     format!("2.25.{}", (random() << 64 | random()).max(1))
@@ -21,7 +21,7 @@ pub fn string(tag: Tag, vr: VR, value: &str) -> DataElement<InMemDicomObject> {
     DataElement::new(tag, vr, PrimitiveValue::from(value))
 }
 
-/// Numbers as text, to the 16 characters that there is room for.
+/// Writes numbers as text, within the 16 characters available.
 pub fn decimals(tag: Tag, values: &[f64]) -> DataElement<InMemDicomObject> {
     let texts: Vec<String> = values.iter().map(|&v| decimal(v)).collect();
     DataElement::new(tag, VR::DS, PrimitiveValue::Strs(texts.into()))
@@ -32,7 +32,7 @@ fn decimal(value: f64) -> String {
     if exact.len() <= 16 {
         return exact;
     }
-    // As near as sixteen characters come to it, with an exponent or without.
+    // The nearest that sixteen characters allow, with an exponent or without.
     (0..=15)
         .flat_map(|digits| [format!("{value:.digits$}"), format!("{value:.digits$e}")])
         .filter(|text| text.len() <= 16)
@@ -43,7 +43,7 @@ fn decimal(value: f64) -> String {
         .unwrap_or_else(|| format!("{value:.8e}"))
 }
 
-/// One item that names another object by its class and its UID.
+/// Returns one item that refers to another object by its class and its UID.
 pub fn reference(sop_class: &str, uid: &str) -> InMemDicomObject {
     item([
         string(tags::REFERENCED_SOP_CLASS_UID, VR::UI, sop_class),
@@ -63,7 +63,7 @@ pub fn item(elements: impl IntoIterator<Item = DataElement<InMemDicomObject>>) -
     InMemDicomObject::from_element_iter(elements)
 }
 
-/// The modules of patient, study, series, frame and equipment.
+/// Returns the modules of patient, study, series, frame and equipment.
 pub fn common(sop_class: &str, modality: &str, of: &Identity) -> InMemDicomObject {
     let (date, time) = now();
     item([
@@ -98,19 +98,19 @@ pub fn common(sop_class: &str, modality: &str, of: &Identity) -> InMemDicomObjec
     ])
 }
 
-/// UTC as DICOM writes date and time.
+/// Returns date and time of UTC in DICOM format.
 pub fn now() -> (String, String) {
     let now = jiff::Timestamp::now();
     let of = |format: &str| now.strftime(format).to_string();
     (of("%Y%m%d"), of("%H%M%S"))
 }
 
-/// The whole file, each element with its kind.
+/// Returns the bytes of the file, each element with its kind.
 pub fn bytes(object: InMemDicomObject) -> Result<Vec<u8>, ContentError> {
     bytes_in(uids::EXPLICIT_VR_LITTLE_ENDIAN, object)
 }
 
-/// As [`bytes`], without the kinds: then lists of numbers may be longer than 64 KiB.
+/// Like [`bytes`], without the kinds: lists of numbers may then be longer than 64 KiB.
 pub fn implicit_bytes(object: InMemDicomObject) -> Result<Vec<u8>, ContentError> {
     bytes_in(uids::IMPLICIT_VR_LITTLE_ENDIAN, object)
 }
@@ -133,7 +133,7 @@ fn bytes_in(syntax: &str, object: InMemDicomObject) -> Result<Vec<u8>, ContentEr
 mod tests {
     use super::decimal;
 
-    /// A small number once lost most of its digits to leading zeros.
+    /// Guards against small numbers that lost most of their digits to leading zeros.
     #[test]
     fn sixteen_characters_keep_as_many_digits_as_they_can() {
         for (value, relative) in [

@@ -14,18 +14,18 @@ pub struct Header {
     pub endian: Endian,
     pub binary: bool,
     pub compressed: bool,
-    /// One axis a column, LPS.
+    /// Directions in LPS, one axis a column.
     pub directions: Option<Matrix3<f64>>,
     pub letters: Option<String>,
     pub origin_mm: [f64; 3],
     pub spacing_mm: [f64; 3],
-    /// Bytes before the data; -1: the data are the end of the file.
+    /// Number of bytes before the data; -1 if the data are the end of the file.
     pub header_bytes: i64,
     pub data_file: String,
 }
 
 impl Header {
-    /// The header, and what lies behind it.
+    /// Parses the header; also returns the bytes behind it.
     pub fn parse(bytes: &[u8]) -> Result<(Self, &[u8]), ContentError> {
         let mut fields: BTreeMap<&str, &str> = BTreeMap::new();
         let mut problems = Vec::new();

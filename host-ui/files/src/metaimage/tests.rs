@@ -24,7 +24,7 @@ fn each_row_of_the_matrix_is_an_axis_and_the_patient_is_in_lps() {
     let v = read(GOOD.as_bytes(), &no_file).unwrap();
     assert_eq!(v.values, [0, 1, 2, 3]);
     assert_eq!(v.frame.origin_m, Vector3::new(-1e-3, -2e-3, 3e-3));
-    // The first axis goes to posterior: -y in RAS.
+    // The first axis points to posterior: -y in RAS.
     let step = v.frame.columns_m().column(0) - Vector3::new(0.0, -1e-3, 0.0);
     assert!(step.norm() < 1e-12);
     assert!(v.frame.warning.is_none());

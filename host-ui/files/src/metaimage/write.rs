@@ -1,4 +1,4 @@
-//! A label volume as MetaImage; names of structures have no place in it.
+//! A label volume as MetaImage, a format without names of structures.
 
 use super::super::volume::Voxels;
 use crate::error::ContentError;
@@ -6,7 +6,7 @@ use flate2::{Compression, write::ZlibEncoder};
 use std::io::Write;
 use stylet_anatomy::ras_from_lps;
 
-/// The whole file, packed, in LPS.
+/// Returns the bytes of the file, packed, in LPS.
 pub fn bytes(v: &Voxels) -> Result<Vec<u8>, ContentError> {
     let cannot = |e: std::io::Error| format!("the labels cannot be packed ({e})");
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::default());

@@ -109,7 +109,7 @@ fn every_broken_file_is_refused_with_its_reason() {
 }
 
 #[test]
-fn any_cut_and_any_flipped_byte_is_an_answer_and_no_panic() {
+fn damaged_recordings_never_panic() {
     let good = small();
     for at in 0..352 {
         let mut b = good.clone();
@@ -122,7 +122,7 @@ fn any_cut_and_any_flipped_byte_is_an_answer_and_no_panic() {
 }
 
 #[test]
-fn a_label_is_picked_and_a_wrong_one_is_answered_with_what_there_is() {
+fn a_wrong_label_is_refused_with_the_valid_ones() {
     let temp = file("labels.nii", &small());
     let all = read(&temp.0, None).unwrap();
     assert_eq!(all.tissue_elements(), 48);
@@ -140,7 +140,8 @@ fn slope_is_applied() {
     assert_eq!(read(&temp.0, None).unwrap().voxels_per_label, [(2, 32), (6, 16)]);
 }
 
-/// An ellipsoid known in patient space, through an oblique frame with unequal sides, right-handed and mirrored.
+/// Tests an ellipsoid known in patient space, through an oblique frame with unequal sides,
+/// right-handed and mirrored.
 #[test]
 fn an_oblique_gland_stays_where_it_is_in_the_patient() {
     let rotation = Rotation3::from_euler_angles(0.3, -0.5, 0.9);
@@ -190,7 +191,7 @@ fn an_oblique_gland_stays_where_it_is_in_the_patient() {
     }
 }
 
-/// Of two orientations that differ one was taken in silence.
+/// Guards against a silent choice between two orientations that differ.
 #[test]
 fn an_sform_that_differs_from_the_qform_is_reported_by_how_much() {
     let with_qform = |shift_mm: f32| {

@@ -1,4 +1,5 @@
-//! A label volume as NIfTI-1 (.nii.gz), with its sform and qform off; names of structures have no place in it.
+//! A label volume as NIfTI-1 (.nii.gz), with sform and qform from its frame; the format has no
+//! names of structures.
 
 use super::super::volume::Voxels;
 use crate::error::ContentError;
@@ -10,7 +11,7 @@ const UINT8: i16 = 2;
 const MILLIMETRES: u8 = 2;
 const DATA_AT: usize = 352;
 
-/// The whole file, packed. Places in the header are the standard's.
+/// Returns the bytes of the file, packed. Offsets in the header are the standard's.
 pub fn bytes(v: &Voxels) -> Result<Vec<u8>, ContentError> {
     if v.dims.iter().any(|&d| d > 32767) {
         return Err(ContentError::Invalid(format!(

@@ -4,11 +4,11 @@ use super::super::element::{Element, Endian, short};
 use super::{Pairs, element};
 use crate::error::ContentError;
 
-/// Slicer keeps much in its headers, but not more.
+/// Largest header; Slicer keeps much in it, but not more.
 const MAX_HEADER_BYTES: usize = 4 << 20;
 const MAX_DIMENSION: usize = 4;
 const MAX_PROBLEMS: usize = 8;
-/// Fields that say nothing about where or what the labels are.
+/// Fields without information on place or content of the labels.
 const UNUSED: [&str; 16] = [
     "content",
     "number",
@@ -28,12 +28,12 @@ const UNUSED: [&str; 16] = [
     "measurement frame",
 ];
 
-/// What is known of one axis.
+/// Description of one axis.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Axis {
     Direction([f64; 3]),
     Spacing(f64),
-    /// Not an axis of space, as that of a list.
+    /// Not a spatial axis, such as that of a list.
     None,
 }
 
@@ -42,24 +42,24 @@ pub struct Header {
     pub element: Element,
     pub encoding: String,
     pub endian: Option<Endian>,
-    /// The first runs fastest.
+    /// Sizes; the first axis runs fastest.
     pub sizes: Vec<u64>,
     pub axes: Vec<Axis>,
-    /// Lower case.
+    /// Name of the space, lower case.
     pub space: Option<String>,
     pub origin: Option<[f64; 3]>,
-    /// Of the three axes of the space.
+    /// Units of the three axes of the space.
     pub units_m: [f64; 3],
     pub kinds: Vec<String>,
     pub data_file: Option<String>,
     pub line_skip: usize,
-    /// -1: the data are the end of the file.
+    /// Number of bytes to skip; -1 if the data are the end of the file.
     pub byte_skip: i64,
     pub pairs: Pairs,
 }
 
 impl Header {
-    /// The header, and what lies behind it.
+    /// Parses the header; also returns the bytes behind it.
     pub fn parse(bytes: &[u8]) -> Result<(Self, &[u8]), ContentError> {
         let (lines, rest) = lines(bytes)?;
         let mut fields: Vec<(String, &str)> = Vec::new();
@@ -92,7 +92,7 @@ impl Header {
             .ok_or_else(|| "its header is not complete".into())
     }
 
-    /// Which of its axes are those of space.
+    /// Returns which of its axes are spatial.
     pub fn space_axes(&self) -> Result<[usize; 3], ContentError> {
         if self.sizes.len() == 3 {
             return Ok([0, 1, 2]);
@@ -110,7 +110,7 @@ impl Header {
     }
 }
 
-/// Up to the first empty line.
+/// Returns the lines up to the first empty one.
 fn lines(bytes: &[u8]) -> Result<(Vec<&str>, &[u8]), ContentError> {
     let (mut lines, mut rest) = (Vec::new(), bytes);
     loop {
@@ -237,7 +237,7 @@ fn build(r: &mut Fields, pairs: Pairs) -> Option<Header> {
     let unknown: Vec<String> = r
         .fields
         .iter()
-        .map(|(name, _)| format!("\"{}\" is no field of NRRD", short(name)))
+        .map(|(name, _)| format!("\"{}\" is not a field of NRRD", short(name)))
         .collect();
     r.problems.extend(unknown);
     Some(Header {
@@ -303,7 +303,7 @@ fn axes(r: &mut Fields, dimension: usize) -> Vec<Axis> {
     }
 }
 
-/// `none` and vectors of not-a-number are no axis of space.
+/// Parses vectors; `none` and vectors of NaN are not spatial axes.
 fn vectors(text: &str) -> Option<Vec<Option<[f64; 3]>>> {
     let mut all = Vec::new();
     let mut rest = text.trim();
@@ -342,7 +342,7 @@ fn units(r: &mut Fields) -> [f64; 3] {
     })
 }
 
-/// Words with or without quotation marks.
+/// Splits words with or without quotation marks.
 fn words(text: &str) -> Vec<String> {
     let mut all = Vec::new();
     let mut rest = text.trim_start();

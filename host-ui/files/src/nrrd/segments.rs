@@ -1,4 +1,4 @@
-//! Slicer's segments: names, label values and layers, out of the pairs of an NRRD header.
+//! Slicer's segments: names, label values and layers, from the pairs of an NRRD header.
 
 use super::super::element::short;
 use super::super::frame::VoxelFrame;
@@ -18,7 +18,7 @@ struct Segment {
     layer: usize,
 }
 
-/// Names by label of a volume without layers.
+/// Returns the names by label of a volume without layers.
 pub fn names(pairs: &Pairs) -> Result<BTreeMap<u8, String>, ContentError> {
     let mut names = BTreeMap::new();
     for segment in segments(pairs)? {
@@ -73,7 +73,7 @@ fn segments(pairs: &Pairs) -> Result<Vec<Segment>, ContentError> {
     )))
 }
 
-/// One label a segment; where segments overlap the smaller one has the voxel.
+/// Returns one label for each segment; an overlap goes to the smaller segment.
 pub fn flatten(
     h: &Header,
     values: &[u8],
@@ -86,7 +86,7 @@ pub fn flatten(
     let kind = h.kinds.get(list).map_or("?", String::as_str);
     if segments.is_empty() {
         return Err(ContentError::Invalid(format!(
-            "it holds {layers} volumes (an axis of kind {kind}) and no segments that would say what they are; save one volume of it"
+            "it contains {layers} volumes (an axis of kind {kind}) without segments that identify them; save one volume of it"
         )));
     }
     if let Some(s) = segments.iter().find(|s| s.layer >= layers) {

@@ -96,7 +96,7 @@ fn each_wrong_header_is_refused_with_its_reason() {
         (
             "space: RAS",
             "space: left-posterior-superior-time",
-            "none of an anatomical volume",
+            "not an anatomical space",
         ),
         (
             "space directions: (1,0,0) (0,2,0) (0,0,3)\n",
@@ -118,7 +118,8 @@ fn each_wrong_header_is_refused_with_its_reason() {
     assert!(why(b"NRRD0004").contains("header"));
 }
 
-/// A few bytes of gzip stand for any size; what they unpack to is bounded by what the header asks for.
+/// Checks a bound: a few bytes of gzip may stand for any size, so unpacking stops at the size in
+/// the header.
 #[test]
 fn packed_data_are_unpacked_no_further_than_the_header_asks() {
     use std::io::Write;
@@ -133,7 +134,7 @@ fn packed_data_are_unpacked_no_further_than_the_header_asks() {
         file.extend(&packed);
         file
     };
-    assert!(why(&file("2 2 1")).contains("go on behind"));
+    assert!(why(&file("2 2 1")).contains("continue beyond"));
     let to_end = |sizes: &str| {
         let bytes = file(sizes);
         let at = bytes.windows(9).position(|w| w == b"encoding:").unwrap();
@@ -159,7 +160,7 @@ fn layers_without_segments_and_segments_that_contradict_are_refused() {
         head.replace("\n\n0 1 2 3", &format!("{more}\n\n0 0 1 0 1 1 0 1"))
             .into_bytes()
     };
-    assert!(why(&four("")).contains("no segments"));
+    assert!(why(&four("")).contains("without segments"));
     let layer = |n: usize, value: u8, layer: u8| {
         format!("\nSegment{n}_Name:=s{n}\nSegment{n}_LabelValue:={value}\nSegment{n}_Layer:={layer}")
     };
@@ -167,10 +168,11 @@ fn layers_without_segments_and_segments_that_contradict_are_refused() {
     assert!(why(&four(&layer(0, 0, 0))).contains("the background"));
     assert!(why(&four(&format!("{}{}", layer(0, 1, 0), layer(1, 1, 0)))).contains("two segments"));
     let both = format!("{}{}", layer(0, 1, 0), layer(1, 1, 1));
-    // Layer 0 holds 0 1 1 0, layer 1 holds 0 0 1 1: of the same size, the first has what both want.
+    // Layer 0 holds 0 1 1 0, layer 1 holds 0 0 1 1: for equal sizes, the first gets the common
+    // voxels.
     let read = read(&four(&both), &no_file).unwrap();
     assert_eq!(read.labels, [0, 1, 1, 2]);
-    // Nothing of the second is lost: its outline and its dose have all of it.
+    // The second loses nothing: its outline and its dose have all of it.
     assert_eq!(read.also, [(2, 2)]);
     assert_eq!((read.of_label(1), read.of_label(2)), (vec![1, 2], vec![2, 3]));
     assert!(

@@ -6,11 +6,11 @@ use flate2::{Compression, write::GzEncoder};
 use nalgebra::Vector3;
 use std::io::Write;
 
-/// The whole file, packed.
+/// Returns the bytes of the file, packed.
 pub fn bytes(v: &Voxels) -> Result<Vec<u8>, ContentError> {
     let vector = |c: Vector3<f64>| format!("({},{},{})", c.x * 1e3, c.y * 1e3, c.z * 1e3);
     let columns = v.frame.columns_m();
-    // The patient in LPS, as nearly all have it.
+    // In LPS, like nearly all files.
     let lps = stylet_anatomy::ras_from_lps;
     let directions: Vec<String> = (0..3).map(|a| vector(lps(columns.column(a).into()))).collect();
     let mut out = format!(
@@ -30,7 +30,7 @@ pub fn bytes(v: &Voxels) -> Result<Vec<u8>, ContentError> {
     }
     out.push('\n');
     let mut packed = GzEncoder::new(out.into_bytes(), Compression::default());
-    // The header is in front as it is: only what is written from here on is packed.
+    // The header stays unpacked: only bytes written from here on are packed.
     packed
         .write_all(&v.labels)
         .and_then(|()| packed.finish())

@@ -1,11 +1,11 @@
-//! Values out of a TOML table by name; what is wrong or not known is gathered.
+//! Values from a TOML table by name; invalid and unknown ones are collected.
 
 use std::path::PathBuf;
 use toml::{Table, Value};
 
 pub struct Keys<'a, 'p> {
     table: &'a Table,
-    /// Of the table, for messages.
+    /// Place of the table, for messages.
     place: String,
     problems: &'p mut Vec<String>,
 }
@@ -47,7 +47,7 @@ impl<'a, 'p> Keys<'a, 'p> {
         self.text(key).map(PathBuf::from)
     }
 
-    /// A text, or a list of texts.
+    /// Returns a text, or a list of texts.
     pub fn words(&mut self, key: &str) -> Option<Vec<String>> {
         match self.table.get(key)? {
             Value::Array(list) => {
@@ -99,7 +99,7 @@ impl<'a, 'p> Keys<'a, 'p> {
         }
     }
 
-    /// A list of tables.
+    /// Returns a list of tables.
     pub fn tables<T>(&mut self, key: &str, most: usize, read: impl Fn(&mut Keys) -> Option<T>) -> Vec<T> {
         let Some(value) = self.table.get(key) else {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! Scene files, good and with everything wrong at once.
+//! Scene files, valid ones and one with every error at once.
 
 use super::*;
 use nalgebra::{Matrix3, Vector3};
@@ -43,7 +43,7 @@ fn voxels() -> Voxels {
 }
 
 #[test]
-fn structures_are_found_by_name_or_label_and_made_of_what_the_file_says() {
+fn structures_get_the_materials_of_the_file() {
     let scene = parse(FULL).unwrap();
     assert_eq!(scene.insert_m_per_s, Some(5e-3));
     assert_eq!(scene.image.as_deref(), Some(Path::new("trus.nii.gz")));
@@ -121,7 +121,7 @@ name = 7
 }
 
 #[test]
-fn structures_that_the_volume_has_not_are_reported_together() {
+fn missing_structures_are_reported_together() {
     let scene = parse("[volume]\nfile = \"a\"\n[[structure]]\nname = \"Bladder\"\n[[structure]]\nlabel = 9\n[[structure]]\nlabel = 1\n[[structure]]\nname = \"prostate\"").unwrap();
     let why = scene.tissues(&voxels()).unwrap_err().to_string();
     assert!(why.contains("no structure \"Bladder\"; it has Prostate"), "{why}");
@@ -131,9 +131,9 @@ fn structures_that_the_volume_has_not_are_reported_together() {
     );
 }
 
-/// The example stood in two places, and each knew fields that the other lacked.
+/// Guards against two copies of the example that each lacked fields of the other.
 #[test]
-fn the_example_in_the_help_and_on_the_page_is_a_scene_file_with_every_field() {
+fn the_documented_example_has_every_field() {
     let scene = parse(include_str!("../../../../scenes/example.toml")).unwrap();
     assert_eq!(scene.name.as_deref(), Some("phantom"));
     assert_eq!(scene.volume, Path::new("gland.nii.gz"));

@@ -1,8 +1,8 @@
-//! Which voxels an element covers, and which label it takes from them.
+//! Voxels covered by an element, and the label that it takes from them.
 
 use super::Voxels;
 
-/// Voxels under each element with their shares of its length.
+/// Returns the voxels under each element with their shares of its length.
 pub(super) fn covers(elements: usize, corner: f64, h: f64, side: f64, voxels: usize) -> Vec<Vec<(usize, f64)>> {
     (0..elements)
         .map(|e| {
@@ -17,7 +17,8 @@ pub(super) fn covers(elements: usize, corner: f64, h: f64, side: f64, voxels: us
         .collect()
 }
 
-/// The label that covers most of an element, of those that together cover at least half of it; else 0.
+/// Returns the label that covers most of an element, if labels together cover at least half of it;
+/// else 0.
 pub(super) fn covered(v: &Voxels, keep: &[u8; 256], flip: bool, [xs, ys, zs]: [&Vec<(usize, f64)>; 3]) -> u8 {
     let mut shares: [(u8, f64); 8] = [(0, 0.0); 8];
     let mut sum = 0.0;
@@ -31,7 +32,7 @@ pub(super) fn covered(v: &Voxels, keep: &[u8; 256], flip: bool, [xs, ys, zs]: [&
                     continue;
                 }
                 sum += wx * wy * wz;
-                // More than eight structures meet in no element that is worth an argument.
+                // More than eight structures in one element are not worth more effort.
                 if let Some(share) = shares.iter_mut().find(|(l, _)| *l == label || *l == 0) {
                     *share = (label, share.1 + wx * wy * wz);
                 }

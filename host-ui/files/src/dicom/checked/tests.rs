@@ -1,4 +1,4 @@
-//! Files cut and bent by hand.
+//! Truncated and corrupted files.
 
 use super::super::plan::{PlanSeed, PlanSource, SeedPlan, bytes, of};
 use super::super::{Identity, new_uid};
@@ -37,18 +37,19 @@ fn why(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn a_cut_anywhere_is_an_answer_and_a_cut_inside_of_an_element_is_reported() {
+fn truncated_files_never_panic_and_cut_elements_are_reported() {
     let good = good();
     assert!(read(&good).and_then(|o| of(&o)).is_ok());
     let refused = (0..good.len()).filter(|&n| read(&good[..n]).is_err()).count();
-    // Only between two elements of the outermost level is a cut not seen.
+    // Only a cut between two elements of the outermost level goes unnoticed.
     assert!(refused > good.len() * 9 / 10, "{refused} of {}", good.len());
     assert!(why(&good[..good.len() - 3]).contains("cut off"));
     assert!(why(&good[..140]).contains("cut off"));
     assert!(why(b"no").contains("no DICM"));
 }
 
-/// The parser makes room for what an element claims before it reads: four gigabytes, were it not refused here.
+/// Guards against an allocation of four gigabytes: the parser allocates the length that an element
+/// claims before it reads.
 #[test]
 fn a_length_beyond_the_end_is_refused_before_it_is_parsed() {
     let good = good();
@@ -67,7 +68,7 @@ fn sequences_deeper_than_any_plan_has_are_refused() {
     let mut bytes = good();
     let mut deep = Vec::new();
     for _ in 0..MAX_DEPTH + 1 {
-        // Private sequence of no length, item of no length.
+        // Private sequence of zero length, item of zero length.
         deep.extend([0xff, 0x7f, 0x10, 0x10, b'S', b'Q', 0, 0, 0xff, 0xff, 0xff, 0xff]);
         deep.extend([0xfe, 0xff, 0x00, 0xe0, 0xff, 0xff, 0xff, 0xff]);
     }
@@ -83,7 +84,7 @@ fn an_old_file_that_begins_with_its_first_element_is_read_too() {
 }
 
 #[test]
-fn a_kind_of_value_that_there_is_not_and_a_foreign_syntax_are_reported() {
+fn unknown_value_types_and_syntaxes_are_reported() {
     let good = good();
     let mut bent = good.clone();
     let at = good.windows(2).rposition(|w| w == b"DS").unwrap();

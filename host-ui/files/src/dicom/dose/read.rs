@@ -1,4 +1,5 @@
-//! A dose out of DICOM: any even grid along the patient's axes, whichever way its rows and frames run.
+//! A dose from DICOM: any even grid along the patient's axes, whatever the directions of its rows
+//! and frames.
 
 use super::super::super::element::{short, voxel_count};
 use super::super::values::{exactly, items, name, needed, numbers, text};
@@ -11,25 +12,26 @@ use nalgebra::Vector3;
 use std::path::Path;
 use stylet_anatomy::ras_from_lps;
 
-/// Axes that are off the patient's by more, as a cosine of what is across them, are oblique.
+/// Largest deviation of an axis from the patient's, as the sine of the angle; beyond it the axis is
+/// oblique.
 const OBLIQUE: f64 = 1e-3;
-/// Frames may be so far from even distances, as a share of one.
+/// Largest deviation of frames from even distances, as a share of one.
 const UNEVEN: f64 = 1e-3;
 
-/// A dose as a file has it, its voxels in the order of [`super::DoseImage`].
+/// Dose from a file, its voxels in the order of [`super::DoseImage`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadDose {
     /// Patient, study and frame of reference.
     pub identity: Identity,
     /// SOP instance UID of the dose itself.
     pub uid: String,
-    /// SOP instance UID of the RT Plan that it is of.
+    /// SOP instance UID of its RT Plan.
     pub plan: Option<String>,
     /// SOP instance UID of the structure set of its histograms.
     pub structure_set: Option<String>,
-    /// Voxels along x, y, z.
+    /// Number of voxels along x, y, z.
     pub dims: [usize; 3],
-    /// Middle of the first voxel (RAS), in m.
+    /// Centre of the first voxel (RAS), in m.
     pub origin_m: [f64; 3],
     /// Sides of a voxel, in m.
     pub spacing_m: [f64; 3],
@@ -37,7 +39,7 @@ pub struct ReadDose {
     pub dose_gy: Vec<f64>,
 }
 
-/// The dose in the file at `path`.
+/// Reads the dose in the file at `path`.
 pub fn of_file(path: &Path) -> Result<ReadDose, FileError> {
     let refused = |why| FileError::of(path, why);
     let bytes = crate::bytes::whole(path, &Progress::default()).map_err(refused)?;
@@ -79,15 +81,16 @@ fn of(object: &Object, pixels: &[u8], is_big_endian: bool) -> Result<ReadDose, C
     })
 }
 
-/// How the voxels of a file lie in the patient: columns, rows and frames, in this order, each with an axis of the patient.
+/// Layout of a file's voxels in the patient: columns, rows and frames, in this order, each with an
+/// axis of the patient.
 struct Layout {
-    /// Columns, rows, frames.
+    /// Number of columns, rows, frames.
     counts: [usize; 3],
-    /// Which axis of the patient each of them runs along.
+    /// Axis of the patient along which each of them runs.
     axes: [usize; 3],
-    /// The step along that axis (RAS, m), negative where it runs the other way.
+    /// Step along that axis (RAS, m), negative in the opposite direction.
     steps_m: [f64; 3],
-    /// Middle of the first voxel of the file (RAS, m).
+    /// Centre of the first voxel of the file (RAS, m).
     first_m: Vector3<f64>,
 }
 
@@ -122,7 +125,7 @@ impl Layout {
             let aside = ras.norm_squared() - ras[axis] * ras[axis];
             // NaN compares false.
             if !(aside.max(0.0).sqrt() <= OBLIQUE * ras.norm() && ras.norm() > 1e-6) {
-                return Err("its grid lies obliquely in the patient; export it along the patient's axes".into());
+                return Err("its grid is oblique to the patient; export it along the patient's axes".into());
             }
             (axes[n], steps_m[n]) = (axis, ras[axis]);
         }
@@ -142,7 +145,7 @@ impl Layout {
         })
     }
 
-    /// From columns, rows and frames to the patient's x, y, z.
+    /// Reorders columns, rows and frames to the patient's x, y, z.
     fn turned<T: Copy + Default>(&self, of_file: [T; 3]) -> [T; 3] {
         let mut turned = [T::default(); 3];
         for (n, axis) in self.axes.into_iter().enumerate() {
@@ -167,7 +170,7 @@ impl Layout {
         origin.into()
     }
 
-    /// The values of the file with x fastest, from right to left or however the file has them.
+    /// Returns the values of the file with x fastest, for any order of the file.
     fn in_order<'a>(&'a self, raw: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
         let strides = [1, self.counts[0], self.counts[0] * self.counts[1]];
         let (strides, is_turned) = (self.turned(strides), self.turned(self.steps_m.map(|s| s < 0.0)));
@@ -178,7 +181,8 @@ impl Layout {
     }
 }
 
-/// The distance of frames along the normal of the rows, in mm; 1 where there is one frame without a thickness.
+/// Returns the distance of frames along the normal of the rows, in mm; 1 for one frame without a
+/// thickness.
 fn frame_step_mm(
     data: &InMemDicomObject,
     frames: usize,
@@ -213,7 +217,7 @@ fn frame_step_mm(
     })
 }
 
-/// The stored numbers, unscaled.
+/// Returns the stored numbers, unscaled.
 fn values(data: &InMemDicomObject, pixels: &[u8], is_big_endian: bool, count: usize) -> Result<Vec<f64>, ContentError> {
     let bits = needed(data, tags::BITS_ALLOCATED, 1.0, 64.0)?;
     if ![16.0, 32.0].contains(&bits) {

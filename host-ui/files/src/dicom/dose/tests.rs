@@ -1,4 +1,4 @@
-//! A dose that was written is read back, whichever way its grid runs.
+//! A dose that was written reads back equal, for any direction of its grid.
 
 use super::super::Identity;
 use super::*;
@@ -9,7 +9,7 @@ fn values(dims: [usize; 3]) -> Vec<f64> {
         .collect()
 }
 
-/// RT Dose was written and could not be read.
+/// Guards against an RT Dose that was written and could not be read.
 #[test]
 fn a_dose_read_back_equals_what_was_written() {
     let (dims, identity) = ([5, 4, 3], Identity::new());
@@ -53,7 +53,7 @@ fn a_dose_read_back_equals_what_was_written() {
             "{read} and {written}"
         );
     }
-    // Cut off in the pixels.
+    // Truncated in the pixels.
     let mut short = std::fs::read(&path).unwrap();
     short.truncate(short.len() - 5);
     std::fs::write(&path, short).unwrap();

@@ -8,7 +8,7 @@ use dicom_core::{DataElement, VR};
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 
-/// The whole file; the dose is that of a plan.
+/// Returns the bytes of the file; the dose refers to a plan.
 pub fn bytes(image: &DoseImage, of: &DoseOf) -> Result<Vec<u8>, ContentError> {
     let [nx, ny, nz] = image.dims;
     if nx * ny * nz != image.dose_gy.len() || image.dims.iter().any(|&d| !(1..=65535).contains(&d)) {
@@ -25,13 +25,13 @@ pub fn bytes(image: &DoseImage, of: &DoseOf) -> Result<Vec<u8>, ContentError> {
     let highest = image.dose_gy.iter().copied().fold(0.0, f64::max);
     if !image.dose_gy.iter().all(|d| d.is_finite() && *d >= 0.0) || highest == 0.0 {
         return Err(ContentError::Invalid(
-            "the dose is nowhere above 0, or it is no number somewhere".to_owned(),
+            "the dose is nowhere above 0, or not a number somewhere".to_owned(),
         ));
     }
     let scaling = highest / f64::from(u32::MAX - 1);
     let scaling: f64 = format!("{scaling:.9e}").parse().unwrap_or(scaling);
     let pixels = pixels(image, scaling);
-    // Left and posterior are up: the rows of the file begin at the last voxel of ours.
+    // Left and posterior are positive in DICOM, so the rows of the file begin at our last voxel.
     let corner_mm = [
         -(image.origin_m[0] + (nx - 1) as f64 * image.spacing_m[0]),
         -(image.origin_m[1] + (ny - 1) as f64 * image.spacing_m[1]),

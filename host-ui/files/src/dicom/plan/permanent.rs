@@ -1,4 +1,4 @@
-//! Whether the sources of a plan stay in the patient for good: dose is counted to the end of their decay.
+//! Check that a plan's sources are permanent, because dose is counted to the end of their decay.
 
 use super::super::super::element::short;
 use super::super::values::{items, name, number, text};
@@ -19,14 +19,14 @@ pub fn is_brachytherapy(data: &InMemDicomObject) -> Result<(), ContentError> {
             "it is a plan of {beams} external beams; a seed plan is one of brachytherapy"
         ))),
         None => Err(ContentError::Invalid(format!(
-            "{} is missing, so it is no plan of brachytherapy",
+            "{} is missing, so it is not a brachytherapy plan",
             name(tags::BRACHY_TREATMENT_TECHNIQUE)
         ))),
     }
 }
 
-/// Refuses sources that are taken out again, by technique, type, nuclide, movement and time; a note where the technique leaves
-/// it open.
+/// Refuses temporary sources, by technique, type, nuclide, movement and time; returns a note if the
+/// technique leaves it open.
 pub fn check(data: &InMemDicomObject, source: &PlanSource) -> Result<Option<String>, ContentError> {
     let technique = text(data, tags::BRACHY_TREATMENT_TECHNIQUE).unwrap_or_default();
     let kind = text(data, tags::BRACHY_TREATMENT_TYPE).unwrap_or_default();
@@ -44,7 +44,8 @@ pub fn check(data: &InMemDicomObject, source: &PlanSource) -> Result<Option<Stri
     if is_permanent {
         return Ok(None);
     }
-    // Some programs give the approach as the technique, and seeds by the type: then everything else must speak of seeds.
+    // Some programs give the approach as the technique, and mark seeds by the type: then everything
+    // else must indicate seeds.
     let isotope = short(&source.isotope);
     if !Nuclide::parse(&source.isotope).is_some_and(|n| n.is_of_permanent_seeds()) {
         let technique = short(&technique);

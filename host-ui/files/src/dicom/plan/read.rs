@@ -1,4 +1,4 @@
-//! A plan out of DICOM: seeds from the control points of every channel; every problem is listed.
+//! A plan from DICOM: seeds from the control points of every channel; every problem is listed.
 
 use super::super::super::element::short;
 use super::super::Identity;
@@ -17,12 +17,12 @@ const MAX_SEEDS: usize = 10_000;
 const MAX_NEEDLE: f64 = 1e9;
 const MAX_PROBLEMS: usize = 8;
 const MAX_MM: f64 = 10_000.0;
-/// Control points nearer than this are one place.
+/// Distance below which control points are at one place.
 const SAME_PLACE_MM: f64 = 1e-3;
-/// Half-lives of one isotope agree so well, as a share.
+/// Largest difference between half-lives of one isotope, as a share.
 const SAME_HALF_LIFE: f64 = 0.01;
 
-/// The plan of an RT Plan of permanent seeds; the error lists every problem.
+/// Reads an RT Plan of permanent seeds; the error lists every problem.
 pub fn of(object: &Object) -> Result<SeedPlan, ContentError> {
     if object.sop_class != uids::RT_PLAN_STORAGE {
         return Err(ContentError::Invalid(format!(
@@ -48,7 +48,7 @@ pub fn of(object: &Object) -> Result<SeedPlan, ContentError> {
     ContentError::all(problems)?;
     if seeds.is_empty() {
         return Err(ContentError::Invalid(
-            "it holds no seed: no channel has a control point with a place".to_owned(),
+            "it contains no seed: no channel has a control point with a position".to_owned(),
         ));
     }
     let (source, mut notes) = one_model(sources)?;
@@ -131,7 +131,7 @@ fn number_within(item: &InMemDicomObject, most: f64) -> Result<f64, ContentError
     }
 }
 
-/// Seeds of one plan are of one model; dose knows no other.
+/// Returns the model, which all seeds of one plan must share, because dose knows only one.
 fn one_model(sources: Vec<Source>) -> Result<(PlanSource, Vec<String>), ContentError> {
     let mut all = sources.into_iter().map(|s| s.model);
     let first = all.next().ok_or("no source")?;
@@ -161,7 +161,7 @@ fn of_channel(channel: &InMemDicomObject, sources: &[Source], seeds: &mut Vec<Pl
     let at = |why: ContentError| why.within(format_args!("channel {channel_number}"));
     let referenced = needed(channel, tags::REFERENCED_SOURCE_NUMBER, 0.0, 1e9).map_err(at)?;
     let source = sources.iter().find(|s| s.number == referenced);
-    let source = source.ok_or_else(|| at(format!("it refers to source {referenced}, which is not there").into()))?;
+    let source = source.ok_or_else(|| at(format!("it refers to source {referenced}, which is missing").into()))?;
     let hole = text(channel, tags::SOURCE_APPLICATOR_ID).unwrap_or_default();
     let applicator = number(channel, tags::SOURCE_APPLICATOR_NUMBER).map_err(at)?;
     let is_number = |n: &f64| n.fract() == 0.0 && (1.0..=MAX_NEEDLE).contains(n);
@@ -173,7 +173,7 @@ fn of_channel(channel: &InMemDicomObject, sources: &[Source], seeds: &mut Vec<Pl
         };
         if place.iter().any(|v| v.abs() > MAX_MM) {
             return Err(at(format!(
-                "a seed lies at {place:?} mm; at most {MAX_MM} mm is accepted"
+                "a seed is at {place:?} mm; at most {MAX_MM} mm is accepted"
             )
             .into()));
         }
@@ -219,7 +219,7 @@ fn prescription_gy(data: &InMemDicomObject) -> Result<Option<f64>, ContentError>
     Ok(None)
 }
 
-/// The structure set that the plan was made on, and which of its structures the prescription is for.
+/// Returns the structure set of the plan, and the number of its target.
 fn structure_set(data: &InMemDicomObject) -> Option<PlannedOn> {
     let referenced = items(data, tags::REFERENCED_STRUCTURE_SET_SEQUENCE).first()?;
     let target = items(data, tags::DOSE_REFERENCE_SEQUENCE)
@@ -234,9 +234,9 @@ fn structure_set(data: &InMemDicomObject) -> Option<PlannedOn> {
     })
 }
 
-/// `None` for a day that is absent or none of the calendar.
+/// Returns a date; `None` if it is absent or invalid.
 fn date(object: &InMemDicomObject, tag: Tag) -> Option<Date> {
-    // Files of before 1993 have points between.
+    // Files from before 1993 have points between.
     let digits: String = text(object, tag)?.chars().filter(|c| *c != '.').collect();
     Date::strptime("%Y%m%d", digits).ok()
 }

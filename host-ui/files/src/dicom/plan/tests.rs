@@ -1,4 +1,4 @@
-//! Plans that were written are read as they were.
+//! Plans that were written read back equal.
 
 use super::super::checked;
 use super::super::new_uid;
@@ -42,7 +42,7 @@ fn again(plan: &SeedPlan) -> Result<SeedPlan, ContentError> {
 }
 
 #[test]
-fn a_plan_that_is_written_is_the_same_plan_when_it_is_read() {
+fn a_written_plan_reads_back_equal() {
     let plan = plan(90);
     let mut again = again(&plan).unwrap();
     for (seed, was) in again.seeds.iter_mut().zip(&plan.seeds) {
@@ -56,9 +56,10 @@ fn a_plan_that_is_written_is_the_same_plan_when_it_is_read() {
     assert_eq!(again, plan);
 }
 
-/// Needles without a hole were all one applicator, and a table's number of a needle was lost.
+/// Guards against one applicator for all needles without a hole, and against lost needle numbers of
+/// a table.
 #[test]
-fn needles_keep_their_number_and_those_without_one_get_one_for_each_hole() {
+fn needles_keep_or_get_a_number() {
     let mut plan = plan(6);
     for (seed, (needle, hole)) in plan.seeds.iter_mut().zip([
         (Some(7), ""),
@@ -77,7 +78,7 @@ fn needles_keep_their_number_and_those_without_one_get_one_for_each_hole() {
 }
 
 #[test]
-fn patients_of_dicom_look_to_the_left_and_back_where_ours_look_to_the_right_and_front() {
+fn dicom_axes_are_left_and_posterior() {
     use super::super::values::{exactly, items};
     use dicom_dictionary_std::tags;
     let object = checked::read(&bytes(&plan(1)).unwrap()).unwrap();
@@ -139,9 +140,10 @@ fn plans_that_mix_isotopes_or_refer_to_nothing_are_refused() {
     assert!(read(&data).unwrap_err().to_string().contains("taken out again"));
 }
 
-/// A temporary plan of Ir-192, loaded by hand, was computed as a permanent one of I-125.
+/// Guards against a temporary plan of Ir-192, loaded by hand, that was computed as a permanent one
+/// of I-125.
 #[test]
-fn sources_that_are_taken_out_again_are_refused_by_nuclide_movement_and_time() {
+fn temporary_sources_are_refused() {
     use dicom_core::dictionary::DataDictionary;
     use dicom_core::ops::{ApplyOp, AttributeAction, AttributeOp};
     use dicom_dictionary_std::StandardDataDictionary;

@@ -14,12 +14,12 @@ use stylet_anatomy::ras_from_lps;
 const SECONDS_PER_DAY: f64 = 86_400.0;
 const DOSE_REFERENCE: usize = 1;
 const SETUP: usize = 1;
-/// The usual needle; no file that is read here says another length.
+/// Length of the usual needle; no file read here gives another.
 const NEEDLE_LENGTH_MM: f64 = 200.0;
 
 type Element = dicom_core::DataElement<InMemDicomObject>;
 
-/// The whole file.
+/// Returns the bytes of the file.
 pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
     if plan.seeds.is_empty() {
         return Err(ContentError::Invalid(
@@ -91,7 +91,7 @@ pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
     super::super::write::bytes(object)
 }
 
-/// A source of the file: seeds of one strength on one day.
+/// Source of the file: seeds of one strength on one day.
 #[derive(PartialEq)]
 struct Strength {
     u: f64,
@@ -115,7 +115,7 @@ fn digits(date: Date) -> String {
     date.strftime("%Y%m%d").to_string()
 }
 
-/// Without a day of its own the strength is that of now.
+/// Writes a source; without a day of its own the strength is that of now.
 fn source(plan: &SeedPlan, number: usize, strength: &Strength, (today, now): (&str, &str)) -> InMemDicomObject {
     let s = &plan.source;
     let date = strength.on.map_or_else(|| today.to_owned(), digits);
@@ -182,7 +182,7 @@ fn setup(plan: &SeedPlan, strengths: &[Strength]) -> InMemDicomObject {
     ])
 }
 
-/// A needle and its hole; there is no structure that stands for it.
+/// Returns a needle and its hole, without a structure.
 fn applicator(number: u32, hole: &str) -> [Element; 5] {
     [
         whole(tags::SOURCE_APPLICATOR_NUMBER, number as usize),
@@ -197,8 +197,8 @@ fn applicator(number: u32, hole: &str) -> [Element; 5] {
     ]
 }
 
-/// The number of each seed's needle: its own, or the next free one for each hole of needles without a number; none for seeds
-/// without either.
+/// Returns the number of each seed's needle: its own, or the next free one for each hole of needles
+/// without a number; none for seeds without either.
 fn needle_numbers(plan: &SeedPlan) -> Vec<Option<u32>> {
     let mut last = plan.seeds.iter().filter_map(|s| s.needle).max().unwrap_or(0);
     let mut by_hole = BTreeMap::new();
@@ -215,7 +215,7 @@ fn needle_numbers(plan: &SeedPlan) -> Vec<Option<u32>> {
     numbers
 }
 
-/// A fixed source has two, at the same place (PS3.3 C.8.8.15.7, example b).
+/// Writes a control point; a fixed source has two, at the same place (PS3.3 C.8.8.15.7, example b).
 fn point(seed: &PlanSeed, index: usize, weight: f64) -> InMemDicomObject {
     let place_mm: [f64; 3] = (ras_from_lps(Vector3::from(seed.position_m)) * 1e3).into();
     let mut point = item([

@@ -1,4 +1,5 @@
-//! Series whose values say where their voxels lie, against the geometry that they were written with.
+//! Series whose values encode the places of their voxels, against the geometry that they were
+//! written with.
 
 use super::super::write::{bytes as file_bytes, common, decimals, item, sequence, string};
 use super::*;
@@ -18,7 +19,8 @@ fn turn() -> Rotation3<f64> {
     Rotation3::from_axis_angle(&Unit::new_normalize(Vector3::new(0.3, -0.2, 0.9)), 0.4)
 }
 
-/// What a scanner stores at a place (LPS, mm): 24 bits would be needed for fractions, so the slope has them.
+/// Returns the stored value at a place (LPS, mm). Fractions would need 24 bits, so the slope has
+/// them.
 fn stored_at(place_mm: Vector3<f64>) -> i16 {
     (place_mm.x * 3.0 + place_mm.y * 5.0 - place_mm.z * 2.0).round() as i16
 }
@@ -32,7 +34,7 @@ fn place_mm(i: usize, j: usize, k: usize) -> Vector3<f64> {
     Vector3::from(CORNER_MM) + turn() * along
 }
 
-/// Twelve bits with a sign; the four above hold something else.
+/// Returns twelve bits with a sign; the four above hold other data.
 fn pixels(k: usize) -> Vec<u8> {
     let pixel = |n: usize| {
         let value = stored_at(place_mm(n % COLUMNS, n / COLUMNS, k));
@@ -55,7 +57,7 @@ fn directions() -> Vec<f64> {
         .collect()
 }
 
-/// Of a series, without a place.
+/// Returns an image of a series, without a place.
 fn image(series: &str, pixels: Vec<u8>) -> InMemDicomObject {
     let mut object = common(uids::CT_IMAGE_STORAGE, "CT", &Identity::new());
     for element in [
@@ -95,7 +97,7 @@ fn put(folder: &Path, name: &str, object: InMemDicomObject) -> PathBuf {
     path
 }
 
-/// In an order that is not that of the slices.
+/// Writes a series in an order other than that of the slices.
 fn write_series(folder: &Path, series: &str, slices: &[usize]) -> PathBuf {
     let name = |k: &usize| format!("{series}.{}.dcm", (k * 7 + 3) % 5);
     let paths = slices.iter().map(|k| put(folder, &name(k), slice(series, *k)));
@@ -106,7 +108,7 @@ fn check(volume: &VoxelValues<f32>) {
     assert_eq!(volume.dims, [COLUMNS, ROWS, SLICES]);
     for n in 0..COLUMNS * ROWS * SLICES {
         let at = [n % COLUMNS, n / COLUMNS % ROWS, n / COLUMNS / ROWS];
-        // The same two axes are turned either way.
+        // The same two axes, in either order.
         let place = ras_from_lps(volume.frame.place_m(at.map(|i| i as f64))) * 1e3;
         let expected = f64::from(stored_at(place)) * 0.5 - 1000.0;
         // A place on the edge of two whole numbers may be rounded to either.
@@ -118,12 +120,12 @@ fn check(volume: &VoxelValues<f32>) {
 }
 
 #[test]
-fn a_series_lies_where_its_slices_say_and_holds_rescaled_values() {
+fn a_series_has_its_place_and_rescaled_values() {
     let folder = tempfile::tempdir().unwrap();
     let file = write_series(folder.path(), "2.25.11", &[0, 1, 2, 3]);
     check(&read(folder.path(), &Progress::default()).unwrap());
     std::fs::write(folder.path().join("notes.txt"), "no image").unwrap();
-    // Another series beside it: a folder of several is refused with each of them, a file is of one.
+    // Another series in the folder: the folder is refused with both named, a file is of one series.
     write_series(folder.path(), "2.25.12", &[0, 1]);
     check(&read(&file, &Progress::default()).unwrap());
     let why = read(folder.path(), &Progress::default()).unwrap_err().to_string();
@@ -134,13 +136,13 @@ fn a_series_lies_where_its_slices_say_and_holds_rescaled_values() {
 }
 
 #[test]
-fn a_slice_that_is_missing_or_there_twice_is_reported() {
+fn missing_and_duplicate_slices_are_reported() {
     for slices in [&[0, 1, 3][..], &[0][..]] {
         let folder = tempfile::tempdir().unwrap();
         write_series(folder.path(), "2.25.11", slices);
         let why = read(folder.path(), &Progress::default()).unwrap_err().to_string();
         assert!(
-            why.contains("missing or there twice") || why.contains("one slice alone"),
+            why.contains("missing or duplicated") || why.contains("one slice alone"),
             "{why}"
         );
     }
@@ -148,10 +150,10 @@ fn a_slice_that_is_missing_or_there_twice_is_reported() {
     write_series(folder.path(), "2.25.11", &[0, 1, 2, 3]);
     put(folder.path(), "again.dcm", slice("2.25.11", 2));
     let why = read(folder.path(), &Progress::default()).unwrap_err().to_string();
-    assert!(why.contains("missing or there twice"), "{why}");
+    assert!(why.contains("missing or duplicated"), "{why}");
 }
 
-/// Frames in any order, with what they have in common stated once.
+/// Returns frames in any order, with common attributes stated once.
 fn multi_frame(order: &[usize]) -> InMemDicomObject {
     let mut object = image("2.25.13", order.iter().flat_map(|k| pixels(*k)).collect());
     let own = order.iter().map(|k| {
@@ -187,7 +189,7 @@ fn an_enhanced_image_is_the_same_volume_in_one_file() {
     check(&read(&path, &Progress::default()).unwrap());
     check(&read(folder.path(), &Progress::default()).unwrap());
     check(&crate::image::read_values(folder.path(), &Progress::default()).unwrap());
-    // Cut off in its last frame, and with a frame that nothing is said of.
+    // Truncated in its last frame, and with a frame without attributes.
     let mut short = std::fs::read(&path).unwrap();
     let whole = short.len();
     short.truncate(whole - 20);
@@ -201,14 +203,14 @@ fn an_enhanced_image_is_the_same_volume_in_one_file() {
 }
 
 #[test]
-fn what_cannot_be_read_is_refused_with_its_reason() {
+fn unreadable_files_are_refused_with_a_reason() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |object: InMemDicomObject| {
         let path = put(folder.path(), "one.dcm", object);
         read(&path, &Progress::default()).unwrap_err().to_string()
     };
     let why = refused(image("2.25.14", pixels(0)));
-    assert!(why.contains("nothing of where it lies"), "{why}");
+    assert!(why.contains("does not give its position"), "{why}");
     let with = |element: DataElement<InMemDicomObject>| {
         let mut object = slice("2.25.14", 0);
         object.put(element);

@@ -1,16 +1,17 @@
-//! Contours that run along the cells of a lattice, as programs outline a segmentation: their voxels should be those cells.
+//! Contours that run along the cells of a lattice, as programs outline a segmentation: their voxels
+//! should be those cells.
 
-/// Corners nearer than this have the same coordinate; files keep some ten digits.
+/// Distance below which corners have the same coordinate; files keep some ten digits.
 const SAME_M: f64 = 1e-6;
-/// A coordinate may be so far off its lattice, as a share of the pitch.
+/// Largest deviation of a coordinate from its lattice, as a share of the pitch.
 const OFF: f64 = 0.01;
-/// Cells of a segmentation are larger than this: the corners of a contour that was drawn lie anywhere, and near each other.
+/// Smallest cell of a segmentation: corners of a drawn contour lie anywhere, and closer together.
 const FINEST_M: f64 = 0.1e-3;
-/// Fewer lines than this show no lattice.
+/// Fewest lines that show a lattice.
 const FEWEST: usize = 3;
 
-/// The distance between two neighbouring lines of the lattice on which all these coordinates of corners lie; `None` where there is
-/// none.
+/// Returns the pitch of the lattice on which all these coordinates of corners lie; `None` if there
+/// is none.
 pub fn pitch_m(coordinates: impl Iterator<Item = f64>) -> Option<f64> {
     let mut lines: Vec<f64> = coordinates.collect();
     lines.sort_by(f64::total_cmp);

@@ -1,11 +1,12 @@
-//! Outlines of a structure in one slice, along the edges of its voxels, so that drawing them again gives the same voxels.
+//! Outlines of a structure in one slice, along the edges of its voxels, so that rasterising them
+//! gives the same voxels.
 
 use std::collections::BTreeMap;
 
-/// A corner of voxels: corner (i, j) lies between voxels i - 1 and i, j - 1 and j.
+/// Corner of voxels: corner (i, j) lies between voxels i - 1 and i, j - 1 and j.
 pub type Corner = [usize; 2];
 
-/// Closed loops; a hole has one of its own. `inside` is asked for whole columns and rows.
+/// Returns closed loops, with a loop for each hole. Calls `inside` for whole columns and rows.
 pub fn loops([columns, rows]: [usize; 2], inside: impl Fn(usize, usize) -> bool) -> Vec<Vec<Corner>> {
     let mut next: BTreeMap<Corner, Vec<Corner>> = BTreeMap::new();
     let mut edge = |from: Corner, to: Corner| next.entry(from).or_default().push(to);
@@ -33,7 +34,7 @@ pub fn loops([columns, rows]: [usize; 2], inside: impl Fn(usize, usize) -> bool)
     all
 }
 
-/// As many edges leave a corner as reach it, so that a loop always closes.
+/// Follows a loop. As many edges leave a corner as reach it, so a loop always closes.
 fn follow(start: Corner, next: &mut BTreeMap<Corner, Vec<Corner>>) -> Vec<Corner> {
     let mut corners = vec![start];
     let mut at = start;

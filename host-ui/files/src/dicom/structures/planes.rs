@@ -1,4 +1,4 @@
-//! Contours that are there twice are counted once, and planes that are missing are reported with the volume at stake.
+//! Duplicate contours count once, and missing planes are reported with the volume at stake.
 
 use super::super::super::element::short;
 use super::solid::encloses;
@@ -6,24 +6,25 @@ use super::{Contoured, SAME_PLANE_M, area_vector};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::{BTreeSet, HashSet};
 
-/// Planes of contours that are farther apart than this many usual distances lack some between them.
+/// Distance, in usual distances, beyond which planes between two contours are missing.
 const WIDE: f64 = 1.5;
-/// A gap of more than this many usual distances lies between two bodies; up to it, planes are missing in one.
+/// Largest gap, in usual distances, that missing planes explain; beyond it there are two bodies.
 pub const WIDEST: f64 = 3.5;
-/// Corners nearer than this are the same corner.
+/// Distance below which two corners are the same.
 const SAME_CORNER_M: f64 = 1e-6;
-/// Contours of one plane whose nesting is looked at.
+/// Most contours of one plane whose nesting is checked.
 pub const MOST_NESTED: usize = 32;
-/// Gaps that a note lists.
+/// Most gaps that a note lists.
 const LISTED: usize = 4;
 
-/// One plane of a structure: its height along the normal (m), and the area that its contours enclose (m²).
+/// Plane of a structure: its height along the normal (m), and the area that its contours enclose
+/// (m²).
 struct Plane {
     height_m: f64,
     area_m2: f64,
 }
 
-/// Takes out contours that are there twice; what is irregular comes back in words.
+/// Removes duplicate contours; returns irregularities in words.
 pub fn tidy(structure: &mut Contoured) -> Vec<String> {
     let largest = structure.contours.iter().map(|c| area_vector(c));
     let largest = largest.max_by(|a, b| a.norm().total_cmp(&b.norm()));
@@ -43,7 +44,7 @@ pub fn tidy(structure: &mut Contoured) -> Vec<String> {
     notes
 }
 
-/// Heights of the contours that went, one a contour.
+/// Removes duplicates; returns the height of each removed contour.
 fn without_duplicates(structure: &mut Contoured, normal: Vector3<f64>) -> Vec<f64> {
     let (mut seen, mut twice_m) = (HashSet::new(), Vec::new());
     structure.contours.retain(|contour| {
@@ -56,7 +57,8 @@ fn without_duplicates(structure: &mut Contoured, normal: Vector3<f64>) -> Vec<f6
     twice_m
 }
 
-/// The same for a contour wherever it begins, whichever way it goes round, and whether or not it repeats its first corner.
+/// Returns a normal form of a contour, independent of its start, its direction, and a repeated
+/// first corner.
 fn shape(contour: &[Vector3<f64>]) -> Vec<[i64; 3]> {
     let corner = |p: &Vector3<f64>| [p.x, p.y, p.z].map(|v| (v / SAME_CORNER_M).round() as i64);
     let mut corners: Vec<[i64; 3]> = contour.iter().map(corner).collect();
@@ -74,7 +76,7 @@ fn shape(contour: &[Vector3<f64>]) -> Vec<[i64; 3]> {
     corners.min(reversed)
 }
 
-/// The contours plane by plane, as polygons in their plane.
+/// Returns the contours plane by plane, as polygons in their plane.
 pub fn flat(contours: &[Vec<Vector3<f64>>], normal: Vector3<f64>) -> Vec<Vec<Vec<[f64; 2]>>> {
     let aside = if normal.x.abs() < 0.9 {
         Vector3::x()
@@ -117,7 +119,7 @@ fn planes(structure: &Contoured, normal: Vector3<f64>) -> Vec<Plane> {
                 };
                 let others = polygons.iter().enumerate().filter(|(other, _)| *other != n);
                 let depth = others.filter(|(_, polygon)| encloses(polygon, corner)).count();
-                // What lies in another contour is a hole of it.
+                // A contour inside another one is a hole of it.
                 area_vector(contour).norm() * if depth % 2 == 0 { 1.0 } else { -1.0 }
             });
             Plane {
@@ -143,7 +145,7 @@ fn duplicates(name: &str, twice_m: &[f64], planes: &[Plane]) -> String {
     )
 }
 
-/// The middle one of the distances between planes, in m.
+/// Returns the median distance between planes, in m.
 fn usual_m(planes: &[Plane]) -> Option<f64> {
     let mut gaps: Vec<f64> = planes.windows(2).map(|w| w[1].height_m - w[0].height_m).collect();
     gaps.sort_by(f64::total_cmp);
@@ -161,7 +163,7 @@ fn distances(name: &str, planes: &[Plane]) -> Vec<String> {
         return Vec::new();
     }
     let mut text = format!(
-        "{name}: its planes do not lie at even distances ({:.1} to {:.1} mm, usually {:.1} mm)",
+        "{name}: its planes are unevenly spaced ({:.1} to {:.1} mm, usually {:.1} mm)",
         least_m * 1e3,
         most_m * 1e3,
         usual_m * 1e3

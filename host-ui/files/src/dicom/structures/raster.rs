@@ -1,4 +1,5 @@
-//! Contours to voxels: a voxel belongs to a structure that covers at least half of it in the plane of the slice.
+//! Rasterisation of contours: a voxel belongs to a structure that covers at least half of it in the
+//! plane of the slice.
 
 use super::super::super::element::short;
 use super::super::super::overlap::in_cc;
@@ -10,15 +11,15 @@ use crate::error::ContentError;
 use nalgebra::Vector3;
 use std::ops::Range;
 
-/// Lines across each row of voxels along which coverage is measured.
+/// Number of lines across each row of voxels along which coverage is measured.
 const LINES: usize = 4;
-/// Crossings of lines and edges in one file; a pelvis on fine images has some million.
+/// Most crossings of lines and edges in one file; a pelvis on fine images has some million.
 const MAX_CROSSINGS: f64 = 1e7;
-/// Voxels that are looked at and painted in one file; a whole pelvis has some ten million.
+/// Most voxels checked and painted in one file; a whole pelvis has some ten million.
 const MAX_VOXELS_TOUCHED: usize = 150_000_000;
 const MAX_RUNS: usize = 20_000_000;
 
-/// Columns from and to (exclusive), in a row of a slice.
+/// Range of columns, the end exclusive, in a row of a slice.
 #[derive(Clone, Copy)]
 struct Run {
     row: u32,
@@ -26,7 +27,7 @@ struct Run {
     to: u32,
 }
 
-/// What was done so far; a file may not ask for any amount.
+/// Work done so far, which is limited for each file.
 #[derive(Default)]
 struct Scratch {
     crossings: f64,
@@ -46,7 +47,7 @@ impl Scratch {
     }
 }
 
-/// The labels 1, 2, ... of the structures in their order, and what they took from each other in words.
+/// Returns the labels 1, 2, ... of the structures in their order, and their overlaps in words.
 pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<String>), ContentError> {
     let mut scratch = Scratch::default();
     let mut all = Vec::new();
@@ -60,7 +61,7 @@ pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<Str
         .map(|runs| runs.iter().map(|r| (r.to - r.from) as usize).sum())
         .collect();
     let mut order: Vec<usize> = (0..all.len()).collect();
-    // Larger ones first, so that what lies in them is painted over them.
+    // Larger ones first, so that structures inside them are painted over them.
     order.sort_by_key(|&s| (std::cmp::Reverse(sizes[s]), s));
     let mut labels = vec![0_u8; grid.dims.iter().product()];
     let mut taken = vec![0_usize; all.len() + 1];
@@ -106,10 +107,10 @@ fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec
     };
     let heights: Vec<f64> = planes.iter().map(|(h, _)| *h).collect();
     let mut runs = Vec::new();
-    // A single plane stands for the slice it is in.
+    // A single plane fills the slice it is in.
     for (plane, [from, to]) in planes.iter().zip(slabs(&heights, 1.0)) {
         let mut covered: Option<Vec<Run>> = None;
-        // Middles of slices from the lower end of a slab up to its upper end.
+        // Centres of slices from the lower end of a slab up to its upper end.
         let (first, last) = (
             (from - 1e-6).ceil().max(0.0),
             (to - 1e-6).ceil().min(grid.dims[2] as f64),
@@ -131,7 +132,8 @@ fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec
     Ok(runs)
 }
 
-/// Contours that lie across the slices: a voxel belongs to the body that they enclose where five of nine points in it do.
+/// Rasterises contours across the slices: a voxel belongs to the enclosed body if five of nine
+/// points in it do.
 fn runs_of_solid(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
     let own_m = structure.plane_distance_m()?;
     let solid = Solid::of(
@@ -165,7 +167,7 @@ fn runs_of_solid(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> R
             let place = [0, 1, 2].map(|a| at[a] as f64 + if n >> a & 1 == 0 { -0.25 } else { 0.25 });
             solid.contains(grid.frame.place_m(place).into())
         };
-        // With the middle as the ninth there is no half, which would count for one side alone.
+        // With the centre as the ninth there is no tie, which would favour one side.
         let middle = solid.contains(grid.frame.place_m(at.map(|i| i as f64)).into());
         (0..8).filter(|&n| part(n)).count() + usize::from(middle) >= 5
     };
@@ -191,7 +193,8 @@ fn runs_of_solid(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> R
     Ok(runs)
 }
 
-/// The contours by the height of their plane, in slices; `None` where they do not lie in the slices.
+/// Returns the contours by the height of their plane, in slices; `None` if they do not lie in the
+/// slices.
 fn planes(structure: &Contoured, grid: &Grid) -> Option<Vec<(f64, Polygons)>> {
     let step_m = grid.frame.spacing_m[2];
     let mut placed = Vec::new();
@@ -215,7 +218,7 @@ fn planes(structure: &Contoured, grid: &Grid) -> Option<Vec<(f64, Polygons)>> {
     Some(planes)
 }
 
-/// From where to where each plane stands for its structure: half-way to its neighbours, but no farther than half of the
+/// Returns the slab of each plane: half-way to its neighbours, but no farther than half of the
 /// usual distance across a gap; `single` is the thickness of one without neighbours.
 pub fn slabs(heights: &[f64], single: f64) -> Vec<[f64; 2]> {
     let mut gaps: Vec<f64> = heights.windows(2).map(|w| w[1] - w[0]).collect();
@@ -235,7 +238,8 @@ pub fn slabs(heights: &[f64], single: f64) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Even and odd: what lies in two contours of a plane is a hole, and so is what a keyhole leads to.
+/// Fills by the even-odd rule: the overlap of two contours of a plane is a hole, and so is the end
+/// of a keyhole.
 fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
     let mut crossed: Vec<(u32, f64)> = Vec::new();
     for polygon in polygons {
@@ -258,7 +262,7 @@ fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], scratch: &mut Scratch)
     Ok(runs)
 }
 
-/// Where an edge crosses the lines. A voxel reaches half a step to each side of its index.
+/// Records where an edge crosses the lines. A voxel reaches half a step to each side of its index.
 fn cross(
     a: [f64; 2],
     b: [f64; 2],
@@ -281,13 +285,13 @@ fn cross(
     Ok(())
 }
 
-/// What the lines of one row cover of each of its voxels.
+/// Coverage of each voxel by the lines of one row.
 struct Coverage {
-    /// Of a voxel in which a line begins or ends.
+    /// Coverage of voxels in which a line begins or ends.
     ends: Vec<f64>,
-    /// Change from the voxel before of what lines cover that go right through.
+    /// Difference, from the voxel before, in coverage by lines that pass right through.
     through: Vec<f64>,
-    /// Columns outside of these are not covered at all.
+    /// Columns outside of which coverage is zero.
     touched: Range<usize>,
 }
 
@@ -300,7 +304,7 @@ impl Coverage {
         }
     }
 
-    /// Its crossings in order.
+    /// Adds a line with its crossings in order.
     fn add_line(&mut self, line: &[(u32, f64)]) {
         let columns = self.ends.len() - 1;
         for pair in line.chunks_exact(2) {
@@ -322,7 +326,7 @@ impl Coverage {
         }
     }
 
-    /// The runs of a row that are covered at least by half; ready for the next row then.
+    /// Returns the runs of a row with coverage of at least half, and resets for the next row.
     fn take_row(&mut self, row: u32, runs: &mut Vec<Run>) {
         let (mut through, mut begun) = (0.0, None);
         let touched = std::mem::take(&mut self.touched);

@@ -1,4 +1,5 @@
-//! The body that the contours of one structure enclose, asked point by point: dose is counted in it as it is drawn, whatever overlaps.
+//! The body inside the contours of one structure, queried point by point: dose counts in it as
+//! drawn, independent of overlaps.
 
 use super::super::super::element::short;
 use super::raster::slabs;
@@ -6,12 +7,12 @@ use super::{Contoured, SAME_PLANE_M, StructureSet};
 use crate::error::ContentError;
 use nalgebra::{Matrix3, Vector3};
 
-/// RAS, m.
+/// Body in RAS, m.
 #[derive(Clone, Debug)]
 pub struct Solid {
     /// Name of the structure.
     pub name: String,
-    /// One axis a column; the third is across the planes.
+    /// Axes, one a column; the third is across the planes.
     axes: Matrix3<f64>,
     planes: Vec<Plane>,
     /// Lower corner of a box around it.
@@ -28,7 +29,7 @@ struct Plane {
 }
 
 impl StructureSet {
-    /// Every structure by itself, in the planes that it is drawn in.
+    /// Returns every structure as a body, in the planes of its contours.
     pub fn solids(&self) -> Result<Vec<Solid>, ContentError> {
         let usual_m = self.plane_distance_m()?;
         self.structures.iter().map(|s| Solid::of(s, usual_m)).collect()
@@ -36,7 +37,8 @@ impl StructureSet {
 }
 
 impl Solid {
-    /// The body of a structure, whose planes may lie in any direction; `usual_m` is the thickness of a single plane.
+    /// Creates the body of a structure, whose planes may lie in any direction; `usual_m` is the
+    /// thickness of a single plane.
     pub fn of(structure: &Contoured, usual_m: f64) -> Result<Self, ContentError> {
         let normal = structure.normal()?;
         let aside = if normal.x.abs() < 0.9 {
@@ -86,7 +88,7 @@ impl Solid {
         })
     }
 
-    /// Whether a place (RAS, m) lies inside.
+    /// Returns whether a place (RAS, m) lies inside.
     pub fn contains(&self, place_m: [f64; 3]) -> bool {
         let at = self.axes.transpose() * Vector3::from(place_m);
         // The last plane that begins below.
@@ -103,7 +105,7 @@ impl Solid {
     }
 }
 
-/// Edges that a ray to the right crosses, even or odd.
+/// Returns whether a ray to the right crosses an odd number of edges.
 pub fn encloses(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
     let next = polygon.iter().cycle().skip(1);
     let crossed = |(a, b): (&[f64; 2], &[f64; 2])| {

@@ -17,7 +17,7 @@ fn grid(dims: [usize; 3], sides_mm: [f64; 3]) -> Grid {
     }
 }
 
-/// In columns and rows of a slice.
+/// Returns a circle in columns and rows of a slice.
 fn circle(grid: &Grid, slice: f64, middle_mm: [f64; 2], radius_mm: f64) -> Vec<Vector3<f64>> {
     let corner = |i: usize| {
         let t = i as f64 / 200.0 * 2.0 * PI;
@@ -66,7 +66,8 @@ fn a_cylinder_has_its_volume_and_its_hole_is_no_part_of_it() {
         .flat_map(|k| [outer(f64::from(k)), inner(f64::from(k))])
         .collect();
     let v = set(vec![("Rectum", ring)]).voxels(Some(grid.clone())).unwrap();
-    // Every voxel against a fine lattice of points in it: only where about half is covered may four lines see it otherwise.
+    // Every voxel against a fine lattice of points in it: only at about half coverage may four
+    // lines decide differently.
     let mut near_half = 0;
     for index in 0..90 * 70 {
         let at = [index % 90, index / 90].map(|i| i as f64);
@@ -109,13 +110,13 @@ fn a_cylinder_has_its_volume_and_its_hole_is_no_part_of_it() {
 }
 
 #[test]
-fn what_lies_inside_of_a_structure_has_its_own_label_and_the_user_is_reported() {
+fn nested_structures_keep_their_label_with_a_report() {
     let grid = grid([60, 60, 5], [0.5, 0.5, 2.0]);
     let gland: Vec<_> = (0..5)
         .map(|k| circle(&grid, f64::from(k), [15.0, 15.0], 10.0))
         .collect();
     let urethra: Vec<_> = (0..5).map(|k| circle(&grid, f64::from(k), [13.0, 15.0], 3.0)).collect();
-    // Whichever comes first.
+    // In either order.
     for (order, label) in [([0, 1], 2), ([1, 0], 1)] {
         let both = [("Prostate", gland.clone()), ("Urethra", urethra.clone())];
         let v = set(order.map(|i| both[i].clone()).to_vec())
@@ -127,16 +128,17 @@ fn what_lies_inside_of_a_structure_has_its_own_label_and_the_user_is_reported() 
     }
 }
 
-/// Dose is counted in a solid: its volume is that of what was drawn, and what lies in it takes nothing from it.
+/// Checks a solid, in which dose is counted: its volume is that of its contours, and structures
+/// inside it take nothing from it.
 #[test]
-fn a_solid_is_what_was_drawn_with_its_hole_and_whatever_else_lies_in_it() {
+fn a_solid_keeps_its_hole_and_its_inner_structures() {
     let grid = grid([60, 60, 5], [0.5, 0.5, 2.0]);
     let ring = (0..5)
         .flat_map(|k| [10.0, 4.0].map(|r| circle(&grid, f64::from(k), [15.0, 15.0], r)))
         .collect();
     let inside: Vec<_> = (1..3).map(|k| circle(&grid, f64::from(k), [22.0, 15.0], 1.5)).collect();
     let solids = set(vec![("Prostate", ring), ("Urethra", inside)]).solids().unwrap();
-    // The trapezoid rule over a lattice that is not in line with the planes.
+    // The trapezoid rule over a lattice that is not aligned with the planes.
     let volume = |solid: &Solid, step: f64| {
         let counts = [0, 1, 2].map(|a| ((solid.upper_m[a] - solid.lower_m[a]) / step).ceil() as usize);
         let total: usize = counts.iter().product();
@@ -168,9 +170,9 @@ fn planes_farther_apart_than_slices_fill_the_slices_between_but_not_a_gap() {
     assert_eq!(used, [1, 2, 3, 4, 5, 6, 13, 14, 15, 16]);
 }
 
-/// A seeded scatter of blobs with holes and voxels that touch at corners.
+/// Tests a seeded scatter of blobs with holes and voxels that touch at corners.
 #[test]
-fn voxels_that_are_outlined_and_drawn_again_are_the_same() {
+fn outlined_voxels_rasterise_back_equal() {
     let grid = grid([23, 19, 6], [0.7, 0.9, 2.0]);
     let count = 23 * 19 * 6;
     let mut state = 7_u32;
@@ -200,19 +202,21 @@ fn voxels_that_are_outlined_and_drawn_again_are_the_same() {
             frame: grid.frame,
         }))
         .unwrap();
-    // Labels are counted anew: 1 and 2.
+    // Labels are renumbered: 1 and 2.
     let expected: Vec<u8> = v.labels.iter().map(|l| [0, 1, 0, 2][usize::from(*l)]).collect();
     assert_eq!(again.labels, expected);
     assert!(again.frame.warning.is_none());
 }
 
-/// Contours of sagittal images were refused beside axial ones, and dose was counted in a body that was none of them.
+/// Guards against refused contours of sagittal images next to axial ones, and against dose in a
+/// body that was neither.
 #[test]
 fn contours_across_the_slices_enclose_the_same_body() {
     let grid = grid([60, 60, 30], [0.5, 0.5, 1.0]);
     let (middle, radius_m) = (grid.frame.place_m([30.0, 30.0, 15.0]), 9e-3);
     let columns = grid.frame.directions;
-    // A ball in discs across the first axis of the grid, across one that is oblique to all, and across the slices.
+    // A ball in discs across the first axis of the grid, across one that is oblique to all, and
+    // across the slices.
     let oblique = (columns.column(0) + columns.column(1) * 0.4 + columns.column(2) * 0.7).normalize();
     let expected_mm3 = 4.0 / 3.0 * PI * (radius_m * 1e3_f64).powi(3);
     let discs = |normal: Vector3<f64>| -> Vec<Vec<Vector3<f64>>> {
@@ -269,9 +273,9 @@ fn contours_across_the_slices_enclose_the_same_body() {
 }
 
 #[test]
-fn contours_beyond_all_measure_are_refused() {
+fn excessive_contours_are_refused() {
     let grid = grid([40, 40, 6], [0.5, 0.5, 2.0]);
-    // A saw from one end of the slice to the other, again and again.
+    // A sawtooth from one end of the slice to the other, again and again.
     let saw: Vec<_> = (0..200_000)
         .map(|i| {
             grid.frame
@@ -285,13 +289,14 @@ fn contours_beyond_all_measure_are_refused() {
     assert!(why.contains("too many to be drawn"), "{why}");
 }
 
-/// Planes 2 and 4 mm apart made 24.6 cc of a gland of 37.6 cc, and contours that were there twice made 34.8 cc; in silence.
+/// Guards against two silent errors: planes 2 and 4 mm apart made 24.6 cc of a gland of 37.6 cc,
+/// duplicate contours made 34.8 cc.
 #[test]
-fn missing_planes_are_bridged_and_contours_there_twice_count_once_and_both_are_reported() {
+fn missing_planes_and_duplicate_contours_are_reported() {
     let (middle, radius) = ([20.0, 20.0], 17.0);
     let sides = [0.5, 0.5, 1.0];
     let grid = grid([80, 80, 60], sides);
-    // 2 and 4 mm, one after the other: every third plane of 2 mm is missing.
+    // 2 and 4 mm, alternating: every third plane of 2 mm is missing.
     let heights: Vec<f64> = (0..38)
         .map(f64::from)
         .filter(|k| k % 6.0 == 3.0 || k % 6.0 == 5.0)
@@ -336,7 +341,7 @@ fn missing_planes_are_bridged_and_contours_there_twice_count_once_and_both_are_r
         "{notes}"
     );
     assert!(notes.contains(" cc of its volume"), "{notes}");
-    // One from another corner on and the other way round.
+    // One from another corner on and in the other direction.
     let mut other = contours[5].clone();
     other.reverse();
     other.rotate_left(7);
@@ -351,7 +356,7 @@ fn missing_planes_are_bridged_and_contours_there_twice_count_once_and_both_are_r
     assert_eq!(volumes(even).1, "");
 }
 
-/// An outline of more than some 1,300 corners could not be written at all.
+/// Guards against an outline of more than some 1,300 corners, which could not be written.
 #[test]
 fn an_outline_of_many_corners_is_written_and_read() {
     let grid = grid([1500, 3, 2], [0.1, 0.1, 1.0]);

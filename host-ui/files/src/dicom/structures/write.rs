@@ -1,4 +1,5 @@
-//! Structures as RT Structure Set: those of another one contour by contour, those of a label volume slice by slice along its voxels.
+//! Structures as RT Structure Set: those of another one contour by contour, those of a label volume
+//! slice by slice along its voxels.
 
 use super::super::super::volume::Voxels;
 use super::super::Identity;
@@ -16,13 +17,13 @@ use nalgebra::Vector3;
 use std::collections::HashSet;
 use stylet_anatomy::{Organ, ras_from_lps};
 
-/// Class of a study in references to it; retired for all else.
+/// Class of a study in references to it; retired for any other use.
 const STUDY_CLASS: &str = "1.2.840.10008.3.1.2.3.1";
 
-/// Three numbers of 16 characters for each corner then fit into 64 KiB.
+/// Most corners of a contour: three numbers of 16 characters for each corner then fit into 64 KiB.
 const MOST_CORNERS: usize = 65_534 / (3 * 17);
 
-/// Distinct on a dark background.
+/// Colours, distinct on a dark background.
 const COLOURS: [[u8; 3]; 8] = [
     [230, 75, 60],
     [240, 200, 60],
@@ -34,27 +35,27 @@ const COLOURS: [[u8; 3]; 8] = [
     [240, 150, 190],
 ];
 
-/// A structure to be written; corners in RAS, m. Structures are numbered from 1 in their order.
+/// Structure to write; corners in RAS, m. Structures are numbered from 1 in their order.
 pub struct Outlined {
     /// Name of the structure.
     pub name: String,
-    /// Closed polygons in planes; what lies in two of one plane is outside.
+    /// Closed polygons in planes; the overlap of two in one plane is outside.
     pub contours: Vec<Vec<Vector3<f64>>>,
 }
 
-/// A structure set, and what it belongs to.
+/// Structure set and its references.
 pub struct Written<'a> {
     /// SOP instance UID of the file.
     pub uid: &'a str,
     /// Patient, study and frame of reference.
     pub identity: &'a Identity,
-    /// The images that the structures are drawn on, if there are any.
+    /// Images under the structures, if there are any.
     pub images: &'a [Slice],
     /// The structures.
     pub structures: &'a [Outlined],
 }
 
-/// The structures of a label volume, by label.
+/// Returns the structures of a label volume, by label.
 pub fn of_voxels(v: &Voxels) -> Result<Vec<Outlined>, ContentError> {
     let all: Vec<Outlined> = v
         .present()
@@ -72,7 +73,7 @@ pub fn of_voxels(v: &Voxels) -> Result<Vec<Outlined>, ContentError> {
     Ok(all)
 }
 
-/// The structures of another structure set, as they are drawn.
+/// Returns the structures of another structure set, contour by contour.
 pub fn of_set(set: StructureSet) -> Vec<Outlined> {
     set.structures
         .into_iter()
@@ -83,7 +84,7 @@ pub fn of_set(set: StructureSet) -> Vec<Outlined> {
         .collect()
 }
 
-/// The whole file.
+/// Returns the bytes of the file.
 pub fn bytes(set: &Written) -> Result<Vec<u8>, ContentError> {
     let of = set.identity;
     let numbered = || set.structures.iter().zip(1_usize..);
@@ -147,7 +148,7 @@ pub fn bytes(set: &Written) -> Result<Vec<u8>, ContentError> {
     }
 }
 
-/// The frame of reference, and the study and the series of the images in it.
+/// Returns the frame of reference, and the study and the series of the images in it.
 fn frame(set: &Written) -> InMemDicomObject {
     let of = set.identity;
     let mut frame = item([string(tags::FRAME_OF_REFERENCE_UID, VR::UI, &of.frame_of_reference)]);

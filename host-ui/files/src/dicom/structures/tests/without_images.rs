@@ -1,4 +1,4 @@
-//! The grid that is taken where the images of contours are not there.
+//! The grid of contours whose images are missing.
 
 use super::*;
 
@@ -14,11 +14,11 @@ fn without_images_the_grid_is_around_the_contours() {
     assert!((v.frame.spacing_m[2] - 3e-3).abs() < 1e-9);
     let normal = grid.frame.directions.column(2);
     assert!(v.frame.directions.column(2).dot(&normal).abs() > 1.0 - 1e-9);
-    assert!(v.frame.warning.unwrap().contains("images are not beside"));
+    assert!(v.frame.warning.unwrap().contains("images are not in its folder"));
 }
 
-/// The middles of the outermost voxels lay on the outermost contours: structures of whole half millimetres were read half a millimetre
-/// wider, the urethra of `pelvis` by 3.2 % in volume.
+/// Guards against voxel centres on the outermost contours: structures of whole half millimetres
+/// were read half a millimetre wider, the urethra of `pelvis` by 3.2 % in volume.
 #[test]
 fn rods_that_are_outlined_along_cells_have_the_volume_of_their_cells() {
     for side_mm in [0.3, 0.5, 0.93, 1.0, 1.7, 2.0] {
@@ -54,9 +54,10 @@ fn rods_that_are_outlined_along_cells_have_the_volume_of_their_cells() {
     }
 }
 
-/// The closed form, wherever the axis lies between the voxels: contours that were drawn lie on no lattice.
+/// Compares with the closed form, for any place of the axis between the voxels: drawn contours lie
+/// on no lattice.
 #[test]
-fn thin_cylinders_have_their_volume_on_a_grid_of_their_own() {
+fn thin_cylinders_keep_their_volume_without_images() {
     for radius_mm in [2.0, 3.0, 4.5] {
         let share = |n: u32| {
             let grid = grid([60, 60, 9], [0.5, 0.5, 2.0]);
@@ -70,8 +71,8 @@ fn thin_cylinders_have_their_volume_on_a_grid_of_their_own() {
         };
         let shares: Vec<f64> = (0..12).map(share).collect();
         let mean = shares.iter().sum::<f64>() / 12.0;
-        // Of points of a lattice in a circle of R steps there are more or fewer than its area by 0.676 R (variance; Kendall,
-        // Quart. J. Math. 19, 1, 1948).
+        // The number of lattice points in a circle of R steps deviates from its area by 0.676 R
+        // (variance; Kendall, Quart. J. Math. 19, 1, 1948).
         let steps = radius_mm / 0.5;
         let deviation = (0.676 * steps).sqrt() / (PI * steps * steps);
         let worst = shares.iter().map(|s| (s - 1.0).abs()).fold(0.0, f64::max);
