@@ -3,17 +3,18 @@
 use stylet_anatomy::PatientFrame;
 
 const MM_PER_M: f64 = 1000.0;
-/// Lengths and angles of the axes of a rigid body may be off by this.
+/// Tolerance for lengths and angles of the axes of a rigid body.
 const AXES_OFF: f64 = 1e-3;
 
 pub fn place_mm(patient: &PatientFrame, in_scene_m: [f64; 3]) -> [f32; 3] {
     patient.patient_from_scene(in_scene_m).map(|m| (m * MM_PER_M) as f32)
 }
 
-/// Columns of the needle's frame in RAS: the third axis points where the needle goes, the origin is the tip.
+/// Returns the columns of the needle's frame in RAS: the third axis points along the needle, the
+/// origin is the tip.
 pub fn needle(patient: &PatientFrame, tip_in_scene_m: [f64; 3], direction_in_scene: [f64; 3]) -> [[f32; 3]; 4] {
     let along = unit(patient.patient_from_scene_direction(direction_in_scene));
-    // Any axis that is not nearly parallel fixes the roll, which the needle does not have.
+    // Any axis that is not nearly parallel fixes the roll, which the needle lacks.
     let aside = if along[0].abs() < 0.9 {
         [1.0, 0.0, 0.0]
     } else {
@@ -47,10 +48,10 @@ pub fn unit(v: [f64; 3]) -> [f64; 3] {
     }
 }
 
-/// What a hand holds, in the scene.
+/// Tool of a hand, in the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tool {
-    /// Its foremost point, m.
+    /// Foremost point, m.
     pub tip_m: [f64; 3],
     /// Unit vector along it, towards the tip.
     pub direction: [f64; 3],
@@ -58,7 +59,7 @@ pub struct Tool {
     pub up: [f64; 3],
 }
 
-/// By a transform of the same form; nothing where its axes are not those of a rigid body.
+/// Reads a transform of the same form; `None` unless its axes are those of a rigid body.
 pub fn tool(patient: &PatientFrame, columns: &[[f32; 3]; 4]) -> Option<Tool> {
     let [x, y, z, origin_mm] = columns.map(|column| column.map(f64::from));
     let product = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
@@ -79,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_needle_is_a_right_handed_frame_in_mm_whose_third_axis_is_its_direction() {
+    fn the_needle_s_frame_is_right_handed_in_mm() {
         for direction in [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.3, -0.4, 0.866]] {
             let [x, y, z, tip] = needle(&PatientFrame::default(), [0.01, -0.02, 0.03], direction);
             let wide = |v: [f32; 3]| v.map(f64::from);
@@ -98,7 +99,8 @@ mod tests {
         let its = tool(&turned, &columns).expect("rigid");
         let is = |a: [f64; 3], b: [f64; 3]| (0..3).all(|c| (a[c] - b[c]).abs() < 1e-6);
         assert!(is(its.tip_m, tip_m) && is(its.direction, direction), "{its:?}");
-        // The second axis in RAS is the second column; the patient is turned by a right angle about superior.
+        // The second axis in RAS is the second column; the patient is turned by a right angle about
+        // superior.
         let second = columns[1].map(f64::from);
         assert!(is(its.up, turned.scene_from_patient_direction(second)), "{its:?}");
     }

@@ -1,4 +1,5 @@
-//! A simulated hand that a tracker or a stepper moves: which client's transforms count, and which of them are possible.
+//! A simulated hand that a tracker or a stepper moves: the client in control, and the check of its
+//! transforms.
 
 use crate::frame;
 use crate::server::{Received, Refusal};
@@ -7,30 +8,30 @@ use std::time::{Duration, Instant};
 use stylet_anatomy::PatientFrame;
 use stylet_shm_schema::{HandMove, ProbeMove, Request};
 
-/// A client that is silent for so long moves the hand no longer, and the hand stops.
+/// Silence of a client after which it loses control and the hand stops.
 pub const SILENCE: Duration = Duration::from_millis(300);
 const ACCELERATION_M_PER_S2: f64 = 2.0;
 
-/// How clients may move the hand.
+/// Options of clients that move the hand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandOptions {
-    /// The device whose transforms move it.
+    /// Device whose transforms move it.
     pub device: String,
-    /// As fast as this at most, m/s.
+    /// Largest speed, m/s.
     pub speed_m_per_s: f64,
 }
 
-/// What a hand holds.
+/// Tool of a hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Held {
     /// The needle.
     Needle,
-    /// The ultrasound probe, which a transform turns about its axis as well.
+    /// Ultrasound probe, which a transform turns about its axis as well.
     Probe,
 }
 
 impl Held {
-    /// Its name, for people.
+    /// Returns the display name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Needle => "needle",
@@ -38,7 +39,7 @@ impl Held {
         }
     }
 
-    /// What moves the hand.
+    /// Returns the request that moves the hand.
     pub fn moved(self, goal: ProbeMove) -> Request {
         match self {
             Self::Needle => Request::MoveHand(goal.hand),
@@ -46,7 +47,7 @@ impl Held {
         }
     }
 
-    /// What stops the hand.
+    /// Returns the request that stops the hand.
     pub fn stopped(self) -> Request {
         match self {
             Self::Needle => Request::StopHand,
@@ -55,17 +56,17 @@ impl Held {
     }
 }
 
-/// Who moves the hand.
+/// Hand under remote control.
 pub struct Hand {
     held: Held,
     options: Option<HandOptions>,
     holder: Option<(SocketAddr, Instant)>,
-    /// The last goal, which is not sent again while it does not change.
+    /// Last goal, which is not sent again while it is unchanged.
     goal: Option<ProbeMove>,
 }
 
 impl Hand {
-    /// That nobody moves; without options nobody may.
+    /// Creates a hand at rest; without options it cannot be moved.
     pub fn new(held: Held, options: Option<HandOptions>) -> Self {
         Self {
             held,
@@ -75,17 +76,17 @@ impl Hand {
         }
     }
 
-    /// What it holds.
+    /// Returns its tool.
     pub fn held(&self) -> Held {
         self.held
     }
 
-    /// Whether the transforms of this name move it.
+    /// Returns whether the transforms of this name move it.
     pub fn is_moved_by(&self, device: &str) -> bool {
         self.options.as_ref().is_some_and(|options| options.device == device)
     }
 
-    /// Where the hand goes by a transform; nothing where it goes there already.
+    /// Returns the request for a transform; `None` if the goal is unchanged.
     pub fn take(
         &mut self,
         received: &Received,
@@ -110,8 +111,7 @@ impl Hand {
         let tool = frame::tool(patient, &received.columns).ok_or_else(|| Refusal {
             code: 10,
             name: "Configuration error",
-            words: "its axes are not those of a rigid body: three of length 1 that stand on each other, right-handed"
-                .to_owned(),
+            words: "its axes are not those of a rigid body: three perpendicular, right-handed, of length 1".to_owned(),
         })?;
         let goal = ProbeMove {
             hand: HandMove {
@@ -136,12 +136,12 @@ impl Hand {
         }
     }
 
-    /// Whether a client moves it.
+    /// Returns whether a client controls it.
     pub fn is_held(&self) -> bool {
         self.holder.is_some()
     }
 
-    /// True once when whoever moved the hand has fallen silent.
+    /// Returns true once when the controlling client has fallen silent.
     pub fn falls_silent(&mut self, now: Instant) -> bool {
         let is_silent = self.holder.is_some_and(|(_, heard)| now - heard >= SILENCE);
         if is_silent {
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_transform_moves_the_tip_to_its_origin_along_its_third_axis_and_is_sent_once() {
+    fn a_transform_moves_the_tip_along_its_third_axis() {
         let (mut hand, now, frame) = (hand(options()), Instant::now(), PatientFrame::default());
         let goal = hand.take(&sent(1, "Stylus", UPRIGHT), &frame, now).expect("possible");
         let goal = goal.expect("new");
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_agreed_or_no_rigid_body_is_refused() {
+    fn unwanted_and_invalid_transforms_are_refused() {
         let (now, frame) = (Instant::now(), PatientFrame::default());
         assert_eq!(code(hand(None).take(&sent(1, "Stylus", UPRIGHT), &frame, now)), 5);
         let mut hand = hand(options());
@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn one_client_holds_the_hand_until_it_is_silent_and_then_it_stops_once() {
+    fn one_client_holds_the_hand_until_it_is_silent() {
         let (mut hand, start, frame) = (hand(options()), Instant::now(), PatientFrame::default());
         assert!(hand.take(&sent(1, "Stylus", UPRIGHT), &frame, start).is_ok());
         let soon = start + SILENCE / 2;

@@ -1,4 +1,4 @@
-//! From the transforms of clients to requests, and from the core's answers to clients.
+//! Requests from the transforms of clients, and answers from the core to clients.
 
 use crate::hand::{Hand, HandOptions, Held};
 use crate::server::{Received, Refusal, Server};
@@ -6,21 +6,21 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkStatus};
 
-/// Requests whose answer may be awaited.
+/// Most requests whose answer is awaited.
 const AWAITED_AT_MOST: usize = 64;
-/// The link's thread has sent a request after so long.
+/// Time after which the link's thread has sent a request.
 const SENT_AFTER: Duration = Duration::from_millis(100);
 
-/// What clients asked for.
+/// Requests of clients.
 pub struct Requests {
-    /// That with the needle, and that with the probe.
+    /// Hands with the needle and with the probe.
     hands: [Hand; 2],
-    /// Requests that the core has not answered yet, and for whom they were made.
+    /// Requests that the core has not answered yet, and their clients.
     awaited: VecDeque<(u64, Received)>,
 }
 
 impl Requests {
-    /// Of clients that may move needle and probe as these say, or not at all.
+    /// Creates requests of clients that may move needle and probe by these options, or not at all.
     pub fn new(needle: Option<HandOptions>, probe: Option<HandOptions>) -> Self {
         Self {
             hands: [Hand::new(Held::Needle, needle), Hand::new(Held::Probe, probe)],
@@ -28,7 +28,7 @@ impl Requests {
         }
     }
 
-    /// Takes what clients have sent, and hands on what the core answered.
+    /// Takes the transforms of clients, and passes on the answers of the core.
     pub fn pass(&mut self, link: &mut Link, server: &Server) {
         for received in server.received() {
             if let Err(refusal) = self.take(link, server, &received) {
@@ -50,7 +50,7 @@ impl Requests {
         });
     }
 
-    /// The hand does not go on for a client that is served no longer.
+    /// Stops the hands when clients are no longer served.
     pub fn end(&mut self, link: &mut Link) {
         let held = self.hands.iter().filter(|hand| hand.is_held());
         let stopped = held.filter(|hand| link.send(&hand.held().stopped()).is_ok()).count();

@@ -1,5 +1,5 @@
-//! Sends what the core publishes: the needle, the seeds, the surface of the gland and the state in words, in RAS and mm. Moves the
-//! simulated hands where a client may.
+//! Serves the state of the core: needle, seeds, surface of the gland and a text, in RAS and mm.
+//! Moves the simulated hands for clients with permission.
 
 use crate::codec::{Body, CodecError, Message, Point, PolyData, Timestamp};
 use crate::frame::{needle, place_mm};
@@ -19,43 +19,44 @@ use stylet_shm_schema::Instance;
 use stylet_shm_schema::{HapticState, Phase, StructureInfo, role};
 
 const MM_PER_M: f64 = 1000.0;
-/// What clients send is taken so often at least, however rarely something is sent to them.
+/// Longest time between two readings of clients' messages, however rarely something is sent to
+/// them.
 const PASS: Duration = Duration::from_millis(10);
-/// The surface and the words change slowly, and cost Slicer more than the needle.
+/// Period of surface and text, which change slowly and cost Slicer more than the needle.
 const SLOW_EVERY: Duration = Duration::from_millis(500);
 
-/// What to serve.
+/// Options of the service.
 pub struct Options {
-    /// Which core.
+    /// Instance of the core.
     pub instance: Instance,
-    /// Where to listen.
+    /// Address to listen on.
     pub listen: SocketAddr,
-    /// Transforms of the needle in a second.
+    /// Transforms of the needle per second.
     pub rate_hz: f64,
-    /// Whose transforms move the needle, if any do.
+    /// Clients that may move the needle, if any.
     pub hand: Option<HandOptions>,
-    /// Whose transforms move the probe, if any do.
+    /// Clients that may move the probe, if any.
     pub probe: Option<HandOptions>,
 }
 
-/// Why serving ended with an error.
+/// Error that ended the service.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// The server does not start.
+    /// The server could not start.
     #[error(transparent)]
     Server(#[from] ServerError),
-    /// A message has no bytes.
+    /// A message could not be encoded.
     #[error(transparent)]
     Codec(#[from] CodecError),
-    /// Ctrl-C cannot be taken.
+    /// Ctrl-C cannot be caught.
     #[error("signals cannot be taken: {0}")]
     Signals(String),
 }
 
-/// Serves until interrupted; a core that starts later or again is served as well.
+/// Serves until interrupted, including cores that start later or again.
 pub fn run(options: &Options) -> Result<(), ServeError> {
     let interrupted = Interrupt::on_signals().map_err(|e| ServeError::Signals(e.to_string()))?;
-    // A terminal that is stopped or closed must not hold up the loop that watches for silent clients.
+    // A terminal that is stopped or closed must not block the loop that watches for silent clients.
     let lines = Arc::new(Lines::to_stdout());
     let log = Arc::clone(&lines);
     let server = Server::listen(options.listen, move |line| {
@@ -138,7 +139,8 @@ fn seeds(patient: &PatientFrame, snapshot: &Snapshot) -> Vec<Point> {
         .collect()
 }
 
-/// Of the targets, with the vertices that they use; of the whole body where no target is drawn by itself.
+/// Returns the surface of the targets, with the vertices that they use; of the whole body if no
+/// target has a surface of its own.
 fn surface(patient: &PatientFrame, scene: &SceneModel, snapshot: &Snapshot) -> PolyData {
     let header = &scene.header;
     let own = |s: &&StructureInfo| s.role & role::TARGET != 0 && s.triangle_count > 0;
@@ -164,7 +166,7 @@ fn surface(patient: &PatientFrame, scene: &SceneModel, snapshot: &Snapshot) -> P
     PolyData { points, triangles }
 }
 
-/// Phase, depth, force and seeds; or why there is nothing.
+/// Formats phase, depth, force and seeds; or the reason why there is nothing.
 fn words(status: &LinkStatus, state: Option<&HapticState>) -> String {
     match (status, state) {
         (LinkStatus::Absent { why }, _) => why.clone(),

@@ -1,8 +1,9 @@
-//! Sends messages to every client over TCP, and takes transforms from them; a client that does not read, or does not finish what it
-//! sends, costs neither the sender nor the others anything.
+//! Sends messages to every client over TCP, and receives transforms from them. A client that does
+//! not read, or leaves a message unfinished, delays neither the sender nor the others.
 //!
-//! Each client has two threads. It keeps at most one message of each device that waits, and one transform of each device that it has
-//! sent: a newer one replaces it. So memory is bounded, and whoever is slow sees what is newest.
+//! Each client has two threads. It keeps at most one pending message of each device, and one
+//! received transform of each device; newer ones replace them. So memory is bounded, and a slow
+//! client sees the newest data.
 
 mod door;
 mod incoming;
@@ -19,24 +20,24 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use stylet_base::format::printable_line;
 
-/// How often a thread looks whether the server has ended.
+/// Period at which a thread checks whether the server has ended.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// Devices whose transforms one client may send.
+/// Most devices whose transforms one client may send.
 const DEVICES_AT_MOST: usize = 16;
 
 type Bytes = Arc<[u8]>;
-/// Takes a line for each client that comes, goes or is refused.
+/// Receiver of a line for each client that comes, goes or is refused.
 type Log = Arc<dyn Fn(String) + Send + Sync>;
 
-/// Why the server cannot serve.
+/// Reason why the server cannot serve.
 #[derive(Debug, thiserror::Error)]
 pub enum ServerError {
     /// The address is in use, or not one of this machine.
     #[error("cannot listen on {address}: {source}; choose another address with --listen")]
     Listen {
-        /// The address asked for.
+        /// Requested address.
         address: SocketAddr,
-        /// What the system says.
+        /// Message of the system.
         source: io::Error,
     },
     /// The system gives no thread.
@@ -44,14 +45,14 @@ pub enum ServerError {
     Thread(io::Error),
 }
 
-/// Why a message of a client is not carried out, as the protocol's STATUS says it.
+/// Reason why a message of a client is refused, for the protocol's STATUS.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
-    /// The protocol's number.
+    /// Protocol's number.
     pub code: u16,
-    /// Its name.
+    /// Protocol's name.
     pub name: &'static str,
-    /// In words.
+    /// Description.
     pub words: String,
 }
 
@@ -66,12 +67,12 @@ impl Refusal {
     }
 }
 
-/// A transform that a client sent.
+/// Transform from a client.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Received {
-    /// Which client.
+    /// Client.
     pub from: SocketAddr,
-    /// Of which of its devices.
+    /// Device of the client.
     pub device: String,
     /// Columns of the matrix: three axes, and the origin in mm.
     pub columns: [[f32; 3]; 4],
@@ -79,22 +80,22 @@ pub struct Received {
 
 #[derive(Default)]
 struct Shared {
-    /// The newest message of each device: what a new client gets first.
+    /// Newest message of each device, sent first to a new client.
     newest: BTreeMap<String, Bytes>,
     clients: Vec<Arc<Client>>,
-    /// The newest transform of each client's devices that was not taken yet.
+    /// Newest transform of each client's devices that was not taken yet.
     received: BTreeMap<(SocketAddr, String), [[f32; 3]; 4]>,
 }
 
-/// A server; it ends when it is dropped.
+/// Server, which ends when it is dropped.
 pub struct Server {
     shared: Arc<Mutex<Shared>>,
-    // SYNC: a flag alone, no data is published by it.
+    // SYNC: a flag alone; it publishes no data.
     ended: Arc<AtomicBool>,
     address: SocketAddr,
 }
 
-/// A thread that panicked leaves only whole maps behind.
+/// Locks; a thread that panicked leaves only whole maps behind.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -119,7 +120,7 @@ impl Server {
             address: listener.local_addr().map_err(failed)?,
         };
         let (shared, ended) = (server.shared.clone(), server.ended.clone());
-        // Clients choose the words of some lines.
+        // Clients choose the text of some lines.
         let log: Log = Arc::new(move |line| log(printable_line(&line)));
         std::thread::Builder::new()
             .name("igtl-accept".to_owned())
@@ -128,17 +129,18 @@ impl Server {
         Ok(server)
     }
 
-    /// Where it listens.
+    /// Returns the address of the server.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// How many clients are connected.
+    /// Returns the number of connected clients.
     pub fn clients(&self) -> usize {
         lock(&self.shared).clients.len()
     }
 
-    /// Gives the bytes of a message to every client, in place of an older one of this device. Never waits for a client.
+    /// Queues a message for every client, replacing an older one of this device. Never waits for a
+    /// client.
     pub fn publish(&self, device: &str, bytes: Vec<u8>) {
         let bytes: Bytes = bytes.into();
         let mut shared = lock(&self.shared);
@@ -148,7 +150,7 @@ impl Server {
         }
     }
 
-    /// The newest transform of each device of each client since the last call.
+    /// Returns the newest transform of each device of each client since the last call.
     pub fn received(&self) -> Vec<Received> {
         let all = std::mem::take(&mut lock(&self.shared).received);
         all.into_iter()
@@ -156,14 +158,16 @@ impl Server {
             .collect()
     }
 
-    /// Notes that a transform of this client moved a hand: no other client takes its place for a while.
+    /// Records that a transform of this client moved a hand: no other client takes its place for a
+    /// while.
     pub fn has_moved(&self, from: SocketAddr) {
         if let Some(client) = lock(&self.shared).clients.iter().find(|c| c.address == from) {
             client.has_moved();
         }
     }
 
-    /// Answers a client's message with a STATUS, and logs it; the same words to the same client once in a while.
+    /// Answers a client's message with a STATUS, and logs it; repeats the same text to the same
+    /// client only once in a while.
     pub fn refuse(&self, from: SocketAddr, device: &str, refusal: &Refusal) {
         let client = lock(&self.shared).clients.iter().find(|c| c.address == from).cloned();
         if let Some(client) = client {
@@ -217,7 +221,8 @@ fn accept(listener: &TcpListener, mut door: Door, shared: &Arc<Mutex<Shared>>, e
     }
 }
 
-/// One thread sends, the other reads. A client may close its own direction and go on receiving.
+/// Starts a thread that sends and one that reads. A client may close its own direction and continue
+/// to receive.
 fn start(
     stream: TcpStream,
     client: &Arc<Client>,

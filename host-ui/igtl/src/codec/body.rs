@@ -1,4 +1,4 @@
-//! What a message says, of six types.
+//! Content of a message, of six types.
 
 use super::CodecError;
 use super::polydata::PolyData;
@@ -13,20 +13,20 @@ const UINT8: u8 = 3;
 const BIG_ENDIAN: u8 = 1;
 const RAS: u8 = 1;
 
-/// A picture of one byte a pixel, in RAS.
+/// Picture of one byte a pixel, in RAS.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
     /// Pixels along i, j and k.
     pub size: [u16; 3],
     /// Steps from pixel to pixel along i, j and k, mm: direction times spacing.
     pub steps_mm: [[f32; 3]; 3],
-    /// The centre of the picture, mm; not its corner.
+    /// Centre of the picture, mm; not its corner.
     pub centre_mm: [f32; 3],
     /// Brightness, i fastest.
     pub pixels: Vec<u8>,
 }
 
-/// A place with a name.
+/// Named place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Point {
     /// At most 64 bytes.
@@ -37,44 +37,44 @@ pub struct Point {
     pub rgba: [u8; 4],
     /// Place, mm.
     pub place_mm: [f32; 3],
-    /// 0 for a place without extent, mm.
+    /// Diameter, mm; 0 for a place without extent.
     pub diameter_mm: f32,
     /// Device of the image that it belongs to, at most 20 bytes, or none.
     pub owner: String,
 }
 
-/// How a device does.
+/// State of a device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Status {
-    /// 1 is well; others are in the protocol's table.
+    /// Code: 1 is OK; the protocol's table lists the others.
     pub code: u16,
-    /// The device's own number.
+    /// Device's own number.
     pub subcode: i64,
     /// Name of the error, at most 20 bytes.
     pub error: String,
-    /// In words.
+    /// Description.
     pub text: String,
 }
 
-/// What a message says.
+/// Content of a message.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Body {
     /// Columns of a matrix: three axes, and the origin in mm.
     Transform([[f32; 3]; 4]),
     /// A picture.
     Image(Image),
-    /// Places with names.
+    /// Named places.
     Points(Vec<Point>),
     /// A surface.
     PolyData(PolyData),
-    /// How a device does.
+    /// State of a device.
     Status(Status),
     /// A text.
     Text(String),
 }
 
 impl Body {
-    /// Type of the message in the header.
+    /// Returns the type of the message in the header.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Transform(_) => "TRANSFORM",
@@ -169,7 +169,7 @@ impl Image {
 
     fn decode(reader: &mut Reader) -> Result<Self, CodecError> {
         let version = reader.u16()?;
-        // The order of bytes does not matter to pixels of one byte.
+        // Byte order does not matter to pixels of one byte.
         let (components, scalar, _order, axes) = (reader.u8()?, reader.u8()?, reader.u8()?, reader.u8()?);
         if (version, components, scalar, axes) != (IMAGE_VERSION, 1, UINT8, RAS) {
             return Err(CodecError::Field(

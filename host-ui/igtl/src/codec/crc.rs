@@ -23,7 +23,7 @@ const fn table() -> [u64; 256] {
     table
 }
 
-/// CRC-64 (ECMA-182) of the bytes.
+/// Computes the CRC-64 (ECMA-182) of the bytes.
 pub fn crc64(bytes: &[u8]) -> u64 {
     let step = |sum: u64, byte: &u8| (sum << 8) ^ TABLE[((sum >> 56) as u8 ^ byte) as usize];
     bytes.iter().fold(0, step)

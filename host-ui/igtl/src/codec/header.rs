@@ -7,9 +7,10 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 /// Length of a header of version 1.
 pub const HEADER_BYTES: usize = 58;
 const VERSION: u16 = 1;
-/// Its bodies begin with a second header and end with pairs of words, which are passed over.
+/// Version whose bodies begin with a second header and end with pairs of words, both of which are
+/// skipped.
 const EXTENDED_VERSION: u16 = 2;
-/// What an extended body may be longer by.
+/// Largest extension of an extended body.
 const EXTENSION_AT_MOST: u64 = 4096;
 
 /// Types and the largest bodies of them that are accepted or sent, in bytes.
@@ -27,17 +28,17 @@ const LIMITS: [(&str, u64); 6] = [
 pub struct Timestamp {
     /// Whole seconds.
     pub seconds: u32,
-    /// Parts of a second, of 2^32.
+    /// Fraction of a second, in units of 2^-32.
     pub fraction: u32,
 }
 
 impl Timestamp {
-    /// By this machine's clock.
+    /// Reads this machine's clock.
     pub fn now() -> Self {
         Self::since_1970(SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default())
     }
 
-    /// Of a time since 1970; seconds beyond 32 bits (the year 2106) are cut off.
+    /// Converts a time since 1970; seconds beyond 32 bits (the year 2106) are cut off.
     pub fn since_1970(time: Duration) -> Self {
         Self {
             seconds: time.as_secs() as u32,
@@ -46,16 +47,16 @@ impl Timestamp {
     }
 }
 
-/// What stands before a body.
+/// Header of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Header {
-    /// One of the six types.
+    /// Type, one of six.
     pub kind: &'static str,
-    /// Of version 2, as protocol 3 sends it.
+    /// True for version 2, as protocol 3 sends it.
     pub is_extended: bool,
     /// Name of the device.
     pub device: String,
-    /// When it was measured.
+    /// Time of the measurement.
     pub time: Timestamp,
     /// Length of the body, within the limit of its type.
     pub body_bytes: usize,
@@ -63,7 +64,7 @@ pub struct Header {
     pub checksum: u64,
 }
 
-/// Fails when a body of this type may not be so long.
+/// Checks the length of a body against the limit of its type.
 pub fn check_length(kind: &'static str, found: u64) -> Result<(), CodecError> {
     let limit = LIMITS.iter().find(|row| row.0 == kind).map_or(0, |row| row.1);
     match found <= limit {
@@ -73,7 +74,7 @@ pub fn check_length(kind: &'static str, found: u64) -> Result<(), CodecError> {
 }
 
 impl Header {
-    /// From 58 bytes; the length is within its limit afterwards.
+    /// Decodes 58 bytes; the length is within its limit afterwards.
     pub fn decode(bytes: &[u8]) -> Result<Self, CodecError> {
         let mut reader = Reader::new("header", bytes);
         let version = reader.u16()?;
@@ -109,7 +110,8 @@ impl Header {
         })
     }
 
-    /// What a body says, without the second header and the words that an extended one has around it.
+    /// Returns the content of a body, without the second header and the words around an extended
+    /// one.
     pub(super) fn content<'a>(&self, body: &'a [u8]) -> Result<&'a [u8], CodecError> {
         if !self.is_extended {
             return Ok(body);
@@ -126,7 +128,7 @@ impl Header {
             ))
     }
 
-    /// Its 58 bytes, of version 1.
+    /// Returns its 58 bytes, of version 1.
     pub fn encode(&self) -> Result<[u8; HEADER_BYTES], CodecError> {
         let mut bytes = Vec::with_capacity(HEADER_BYTES);
         bytes.extend(VERSION.to_be_bytes());

@@ -1,7 +1,8 @@
-//! Bytes of OpenIGTLink messages, header version 1, and back; version 2 is read, not written. No I/O; every length is checked before memory is taken for it.
+//! Codec of OpenIGTLink messages, header version 1; version 2 is read, not written. No I/O; every
+//! length is checked before memory is allocated for it.
 //!
-//! Source: the messages that libOpenIGTLink 1.11 writes, byte for byte.
-//! Lengths are in mm and places in the frame that the sender names, for Stylet the patient's (RAS).
+//! Source: the messages that libOpenIGTLink 1.11 writes, byte for byte. Lengths are in mm and
+//! places in the frame that the sender names, for Stylet the patient's (RAS).
 
 mod body;
 mod crc;
@@ -14,35 +15,35 @@ pub use crc::crc64;
 pub use header::{HEADER_BYTES, Header, Timestamp};
 pub use polydata::PolyData;
 
-/// Why bytes are no message, or a message has no bytes.
+/// Error of bytes that are not a message, or of a message that cannot be encoded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CodecError {
-    /// Bytes end before the message does.
+    /// The bytes end before the message does.
     #[error("{what}: {needed} bytes expected, {found} found")]
     Short {
-        /// Which part.
+        /// Part of the message.
         what: &'static str,
-        /// Bytes that it needs.
+        /// Number of bytes needed.
         needed: usize,
-        /// Bytes that there are.
+        /// Number of bytes present.
         found: usize,
     },
-    /// A header of a version that is not known.
+    /// The version of the header is unknown.
     #[error("header version 1 or 2 expected, {0} found")]
     Version(u16),
-    /// A type of message that is not among the six.
+    /// The type of message is not among the six.
     #[error(
         "message type {kind:?} is not supported; supported are TRANSFORM, IMAGE, POINT, POLYDATA, STATUS and STRING"
     )]
     Type {
-        /// Its name.
+        /// Name of the type.
         kind: String,
-        /// Who sent it.
+        /// Device of the sender.
         device: String,
-        /// Length of the body that the header states: to pass over it.
+        /// Length of the body in the header, so that it can be skipped.
         body_bytes: u64,
     },
-    /// The body is longer than this type may be.
+    /// The body exceeds the limit of its type.
     #[error("{kind} of {found} bytes: at most {limit} are accepted")]
     TooLong {
         /// Type of the message.
@@ -52,32 +53,32 @@ pub enum CodecError {
         /// Largest length accepted.
         limit: u64,
     },
-    /// The checksum of the body is another than the header's.
+    /// The checksum of the body differs from the header's.
     #[error("checksum {found:#018x}: the header states {stated:#018x}")]
     Checksum {
-        /// In the header.
+        /// Checksum in the header.
         stated: u64,
-        /// Of the body.
+        /// Checksum of the body.
         found: u64,
     },
-    /// A field that contradicts another or lies outside its range.
+    /// A field contradicts another or is outside its range.
     #[error("{0}")]
     Field(&'static str),
 }
 
-/// One message: from which device, when, and what.
+/// Message of a device, with time and content.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Message {
     /// Name of the device, at most 20 bytes; Slicer names its node after it.
     pub device: String,
-    /// When it was measured.
+    /// Time of the measurement.
     pub time: Timestamp,
-    /// What it says.
+    /// Content.
     pub body: Body,
 }
 
 impl Message {
-    /// The bytes to send. Fails when a text or a list is longer than its field.
+    /// Encodes the message. Fails if a text or a list is longer than its field.
     pub fn encode(&self) -> Result<Vec<u8>, CodecError> {
         let body = self.body.encode()?;
         let kind = self.body.kind();
@@ -95,7 +96,7 @@ impl Message {
         Ok(bytes)
     }
 
-    /// One whole message; bytes after its end are an error.
+    /// Decodes one whole message; bytes after its end are an error.
     pub fn decode(bytes: &[u8]) -> Result<Self, CodecError> {
         let (head, body) = bytes.split_at_checked(HEADER_BYTES).ok_or(CodecError::Short {
             what: "header",
@@ -105,7 +106,7 @@ impl Message {
         Self::of(&Header::decode(head)?, body)
     }
 
-    /// A message of a header that was decoded, and its body.
+    /// Creates a message of a header that was decoded, and its body.
     pub fn of(header: &Header, body: &[u8]) -> Result<Self, CodecError> {
         if body.len() != header.body_bytes {
             return Err(CodecError::Short {

@@ -3,17 +3,17 @@
 use super::CodecError;
 use super::reader::{Reader, put_f32s, put_u32s};
 
-/// A surface without attributes.
+/// Surface without attributes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PolyData {
     /// Places, mm.
     pub points: Vec<[f32; 3]>,
-    /// Three points of each triangle.
+    /// Points of each triangle.
     pub triangles: Vec<[u32; 3]>,
 }
 
 const POINT_BYTES: usize = 12;
-/// The number of its points, and these.
+/// Bytes of a triangle: the number of its points, and their indices.
 const TRIANGLE_BYTES: usize = 16;
 
 impl PolyData {

@@ -2,7 +2,7 @@
 
 use super::CodecError;
 
-/// What is left of a message.
+/// Rest of a message.
 pub struct Reader<'a> {
     bytes: &'a [u8],
     what: &'static str,
@@ -69,7 +69,7 @@ impl<'a> Reader<'a> {
         Ok(values)
     }
 
-    /// A text in a field of fixed length, up to its first zero.
+    /// Reads a text in a field of fixed length, up to its first zero.
     pub fn text(&mut self, count: usize) -> Result<String, CodecError> {
         let field = self.take(count)?;
         let end = field.iter().position(|byte| *byte == 0).unwrap_or(count);
@@ -96,7 +96,7 @@ pub fn put_u32s(bytes: &mut Vec<u8>, values: &[u32]) {
     values.iter().for_each(|value| bytes.extend(value.to_be_bytes()));
 }
 
-/// A text in a field of fixed length, filled up with zeros.
+/// Writes a text into a field of fixed length, padded with zeros.
 pub fn put_text(bytes: &mut Vec<u8>, text: &str, count: usize) -> Result<(), CodecError> {
     if text.len() > count || text.contains('\0') {
         return Err(CodecError::Field(

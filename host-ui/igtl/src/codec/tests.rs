@@ -1,10 +1,10 @@
-//! Messages against the bytes of the C++ library, and the decoder against bytes that are no message.
+//! Messages against the bytes of the C++ library, and the decoder against invalid bytes.
 
 use super::*;
 
 mod library;
 
-/// The messages of `tests/goldens.cpp`.
+/// Returns the messages of `tests/goldens.cpp`.
 pub fn examples() -> Vec<(&'static str, Message)> {
     let point = |name: &str, place_mm| Point {
         name: name.to_owned(),
@@ -77,7 +77,7 @@ fn messages_are_those_of_the_library_byte_for_byte() {
     }
 }
 
-/// Protocol 3 puts a second header before a body, and pairs of words behind it.
+/// Tests protocol 3, which puts a second header before a body, and pairs of words behind it.
 #[test]
 fn an_extended_message_of_the_library_says_the_same() {
     let golden = include_bytes!("../../tests/goldens/transform2.bin");
@@ -92,13 +92,13 @@ fn an_extended_message_of_the_library_says_the_same() {
     }
 }
 
-/// The check value of the catalogue of CRCs for CRC-64/ECMA-182.
+/// Compares with the check value in the catalogue of CRCs for CRC-64/ECMA-182.
 #[test]
 fn the_checksum_has_its_published_check_value() {
     assert_eq!(crc64(b"123456789"), 0x6c40_df5f_0b49_7347);
 }
 
-/// xorshift64*, so that a failure repeats.
+/// Generator xorshift64*, so that a failure repeats.
 struct Random(u64);
 
 impl Random {
@@ -110,7 +110,7 @@ impl Random {
     }
 }
 
-/// A checksum that fits lets a mutation reach the decoder of the body.
+/// Tests mutations with a valid checksum, so that they reach the decoder of the body.
 #[test]
 fn mutated_messages_are_refused_or_decoded_and_never_panic() {
     let mut random = Random(19);
@@ -156,7 +156,7 @@ fn a_length_beyond_the_limit_is_refused_by_the_header_alone() {
 }
 
 #[test]
-fn a_body_that_was_changed_is_refused_by_its_checksum() {
+fn a_changed_body_fails_its_checksum() {
     let mut bytes = examples()[0].1.encode().unwrap();
     bytes[HEADER_BYTES] ^= 1;
     assert!(matches!(Message::decode(&bytes), Err(CodecError::Checksum { .. })));

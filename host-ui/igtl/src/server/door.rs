@@ -1,4 +1,4 @@
-//! Who is let in: whoever only reads keeps nobody else out.
+//! Admission of clients: readers cannot keep others out.
 
 use super::outgoing::Client;
 use crate::codec::{Body, Message, Status, Timestamp};
@@ -8,17 +8,17 @@ use std::net::{IpAddr, Ipv6Addr, SocketAddr, TcpStream};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Addresses that are remembered.
+/// Most addresses in memory.
 const ADDRESSES_AT_MOST: usize = 256;
 
-/// How many clients there may be.
+/// Limits on clients.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
     pub clients: usize,
     pub of_one_address: usize,
-    /// A client that has not moved a hand for so long gives its place to another where there is no room.
+    /// Time without moving a hand after which a client may be replaced if the server is full.
     pub place_for: Duration,
-    /// Connections of one address in [`Limits::within`].
+    /// Most connections of one address in [`Limits::within`].
     pub connections: u32,
     pub within: Duration,
 }
@@ -42,17 +42,17 @@ struct Seen {
     was_refused: bool,
 }
 
-/// Lets clients in.
+/// Admission of clients.
 pub struct Door {
     limits: Limits,
     seen: BTreeMap<IpAddr, Seen>,
 }
 
-/// Why a client is not let in.
+/// Reason why a client is refused.
 #[derive(Debug)]
 pub struct Refused {
     pub words: String,
-    /// The first refusal of this address in a while: the only one that is logged.
+    /// True for the first refusal of this address in a while, the only one that is logged.
     pub is_said: bool,
 }
 
@@ -62,7 +62,7 @@ impl Door {
         Self { limits, seen }
     }
 
-    /// Lets a client in, in the place of the one that is returned; or says why not.
+    /// Admits a client, replacing the returned one; or gives the reason of the refusal.
     pub fn admit(&mut self, from: SocketAddr, clients: &[Arc<Client>]) -> Result<Option<Arc<Client>>, Refused> {
         let Limits {
             clients: most,
@@ -116,7 +116,8 @@ impl Door {
     }
 }
 
-/// What counts as one address: of IPv6 the network, from which one machine may choose any.
+/// Returns the part that identifies a machine: for IPv6 the network, in which a machine may choose
+/// any address.
 fn place(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(v6) => {
@@ -127,7 +128,7 @@ fn place(address: IpAddr) -> IpAddr {
     }
 }
 
-/// Says to a client why it is not let in, as far as its socket takes it at once.
+/// Tells a client why it is refused, as far as its socket accepts data at once.
 pub fn answer(mut stream: &TcpStream, words: &str) {
     let status = Status {
         code: 13,
@@ -141,7 +142,7 @@ pub fn answer(mut stream: &TcpStream, words: &str) {
         body: Body::Status(status),
     };
     if let (Ok(bytes), Ok(())) = (message.encode(), stream.set_nonblocking(true)) {
-        // It is refused, whether or not it hears why.
+        // It is refused, whether or not it receives the reason.
         let _ = stream.write(&bytes);
     }
 }
@@ -161,7 +162,7 @@ mod tests {
         })
     }
 
-    /// Sixteen clients that only read kept all others out.
+    /// Guards against sixteen clients that only read and kept all others out.
     #[test]
     fn clients_of_one_address_leave_room_for_others() {
         let mut door = door(Duration::from_secs(3600));
@@ -191,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_only_reads_gives_its_place_and_whoever_moves_a_hand_keeps_it() {
+    fn clients_that_move_a_hand_keep_their_place() {
         let wait = Duration::from_millis(200);
         let mut door = door(wait);
         let clients: Vec<_> = (1..=16).map(|n| client(&format!("10.0.0.{n}:1"))).collect();
@@ -207,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn an_address_that_comes_again_and_again_is_refused_and_said_once() {
+    fn a_repeated_address_is_refused_and_logged_once() {
         let mut door = door(Duration::ZERO);
         let said = (0..1000).filter(|n| {
             let admitted = door.admit(format!("10.0.0.1:{}", n + 1).parse().unwrap(), &[]);

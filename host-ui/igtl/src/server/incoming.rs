@@ -1,4 +1,5 @@
-//! What one client sends: transforms are kept, everything else is answered with the reason why it is not taken.
+//! Messages from one client: transforms are kept; every other one is answered with the reason why
+//! it is refused.
 
 use super::outgoing::Client;
 use super::{DEVICES_AT_MOST, Refusal, Shared, lock};
@@ -8,10 +9,10 @@ use std::net::TcpStream;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Bodies of types that are not known are passed over up to this length.
+/// Longest body of an unknown type that is skipped.
 const PASSED_OVER_AT_MOST: u64 = 16 << 20;
 
-/// Why reading ends: the client closed its direction, its connection broke, or the server ends.
+/// End of reading: the client closed its direction, its connection broke, or the server ends.
 struct Ended;
 
 /// Reads until the client or the server ends.
@@ -95,7 +96,7 @@ fn pass_over(mut length: u64, whole: &mut impl FnMut(&mut [u8]) -> Result<(), En
     Ok(())
 }
 
-/// Waits for as long as the connection lasts: a message that is never finished keeps nobody else waiting.
+/// Waits for as long as the connection lasts: an unfinished message delays nobody else.
 fn read_whole(stream: &mut TcpStream, mut bytes: &mut [u8], client: &Client, ended: &AtomicBool) -> Result<(), Ended> {
     while !bytes.is_empty() {
         // SYNC: a flag alone.

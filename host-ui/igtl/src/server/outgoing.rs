@@ -1,4 +1,4 @@
-//! What one client is still to get.
+//! Messages still to be sent to one client.
 
 use super::{Bytes, LOOK_EVERY, Log, Refusal, lock};
 use crate::codec::{Body, Message, Timestamp};
@@ -9,19 +9,19 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// A client that has not taken one message for so long is disconnected.
+/// Time without taking a message after which a client is disconnected.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// The same refusal is said again after so long, and another one after the shorter time.
+/// Times after which the same refusal is repeated, and after which another one follows.
 const REFUSAL_EVERY: Duration = Duration::from_secs(10);
 const OTHER_REFUSAL_EVERY: Duration = Duration::from_millis(50);
-/// Under this name an answer waits; no device has it, and it is sent before what devices say.
+/// Key of an answer, which no device has; it is sent before the devices' messages.
 const ANSWER: &str = "";
 
 #[derive(Default)]
 struct Waiting {
-    /// The newest message of each device.
+    /// Newest message of each device.
     messages: BTreeMap<String, Bytes>,
-    /// After these messages the connection ends, and why.
+    /// Reason for ending the connection after these messages.
     end: Option<&'static str>,
 }
 
@@ -31,7 +31,7 @@ pub struct Client {
     waiting: Mutex<Waiting>,
     arrived: Condvar,
     refused: Mutex<Option<(Refusal, Instant)>>,
-    /// When it came, or last moved a hand.
+    /// Time at which it came, or last moved a hand.
     active: Mutex<Instant>,
     log: Log,
 }
@@ -69,13 +69,13 @@ impl Client {
         lock(&self.waiting).messages.clone_from(messages);
     }
 
-    /// Sends what waits, then disconnects.
+    /// Sends the pending messages, then disconnects.
     pub fn end(&self, why: &'static str) {
         lock(&self.waiting).end = Some(why);
         self.arrived.notify_one();
     }
 
-    /// Whether the connection ends or has ended.
+    /// Returns whether the connection ends or has ended.
     pub fn ends(&self) -> bool {
         lock(&self.waiting).end.is_some()
     }
@@ -102,17 +102,17 @@ impl Client {
             time: Timestamp::now(),
             body: Body::Status(refusal.status()),
         };
-        // A name that is not text cannot be answered under.
+        // A name that is not text cannot be used in an answer.
         if let Ok(bytes) = message.encode() {
             self.put(ANSWER, bytes.into());
         }
     }
 
-    /// Sends until the client or the server ends; why it ended.
+    /// Sends until the client or the server ends; returns the reason.
     pub fn send_to(&self, mut stream: TcpStream, ended: &AtomicBool) -> String {
         let why = self.send_all(&mut stream, ended);
         lock(&self.waiting).end.get_or_insert("it has ended");
-        // The thread that reads ends by it as well.
+        // This also ends the thread that reads.
         let _ = stream.shutdown(Shutdown::Both);
         why
     }

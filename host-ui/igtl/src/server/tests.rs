@@ -22,7 +22,7 @@ fn next(stream: &mut TcpStream) -> Message {
 }
 
 #[test]
-fn a_client_that_hangs_is_disconnected_with_a_reason_and_the_other_gets_what_is_newest() {
+fn a_hung_client_is_disconnected_and_others_get_the_newest() {
     let (log, lines) = mpsc::channel();
     let server = Server::listen("127.0.0.1:0".parse().unwrap(), move |line| drop(log.send(line))).unwrap();
     server.publish("State", text("State", "first"));
@@ -32,7 +32,7 @@ fn a_client_that_hangs_is_disconnected_with_a_reason_and_the_other_gets_what_is_
     let name = hangs.local_addr().unwrap().to_string();
     let large = "x".repeat(60_000);
     let mut disconnected = None;
-    // What the system buffers for a connection is filled first.
+    // First fill the system's buffer of the connection.
     for _ in 0..60_000 {
         server.publish("State", text("State", &large));
         assert_eq!(next(&mut reads).device, "State");
@@ -76,7 +76,7 @@ fn refused(stream: &mut TcpStream) -> Status {
 }
 
 #[test]
-fn transforms_are_taken_in_pieces_and_everything_else_is_refused_in_words() {
+fn fragmented_transforms_are_read_and_other_messages_refused() {
     let server = Server::listen("127.0.0.1:0".parse().unwrap(), |_| ()).unwrap();
     let mut client = TcpStream::connect(server.address()).unwrap();
     let mut hangs = TcpStream::connect(server.address()).unwrap();
@@ -93,7 +93,7 @@ fn transforms_are_taken_in_pieces_and_everything_else_is_refused_in_words() {
     };
     assert_eq!(received(&server), std::slice::from_ref(&expected));
 
-    // A type of the six and one that is not known are passed over, whatever their length.
+    // Known and unknown types are skipped, whatever their length.
     client.write_all(&text("Words", &"x".repeat(9000))).unwrap();
     assert!(refused(&mut client).text.contains("STRING is not taken"));
     std::thread::sleep(Duration::from_millis(60));
@@ -109,7 +109,7 @@ fn transforms_are_taken_in_pieces_and_everything_else_is_refused_in_words() {
     std::thread::sleep(Duration::from_millis(60));
     client.write_all(&changed).unwrap();
     assert_eq!(refused(&mut client).code, 9);
-    // Where the next message begins is not known after this.
+    // After this the start of the next message is unknown.
     let mut endless = bytes;
     endless[42..50].copy_from_slice(&u64::MAX.to_be_bytes());
     std::thread::sleep(Duration::from_millis(60));
@@ -120,7 +120,7 @@ fn transforms_are_taken_in_pieces_and_everything_else_is_refused_in_words() {
 }
 
 #[test]
-fn a_client_keeps_so_many_devices_and_no_more() {
+fn the_devices_of_a_client_are_limited() {
     let server = Server::listen("127.0.0.1:0".parse().unwrap(), |_| ()).unwrap();
     let mut client = TcpStream::connect(server.address()).unwrap();
     for number in 0..3 * DEVICES_AT_MOST {
@@ -131,9 +131,9 @@ fn a_client_keeps_so_many_devices_and_no_more() {
     assert_eq!(server.received().len(), DEVICES_AT_MOST);
 }
 
-/// A client wrote escape sequences to the terminal with the type of a message.
+/// Guards against escape sequences that a client wrote to the terminal in the type of a message.
 #[test]
-fn no_line_of_the_log_holds_what_commands_a_terminal() {
+fn the_log_has_no_escape_sequences() {
     let (log, lines) = mpsc::channel();
     let server = Server::listen("127.0.0.1:0".parse().unwrap(), move |line| drop(log.send(line))).unwrap();
     let mut client = TcpStream::connect(server.address()).unwrap();
@@ -142,7 +142,7 @@ fn no_line_of_the_log_holds_what_commands_a_terminal() {
     client.write_all(&message).unwrap();
     let _ = refused(&mut client);
     std::thread::sleep(Duration::from_millis(60));
-    // Where a reason quotes the header, the whole of it is the client's.
+    // If a reason quotes the header, the client chose all of it.
     client.write_all(&[0x1b; HEADER_BYTES]).unwrap();
     let _ = refused(&mut client);
     assert_eq!(client.read(&mut [0]).unwrap(), 0, "the connection ends");
@@ -163,7 +163,7 @@ fn no_line_of_the_log_holds_what_commands_a_terminal() {
 }
 
 #[test]
-fn one_that_reads_gives_its_place_to_one_that_comes_and_is_said_why() {
+fn a_reader_is_replaced_by_a_newcomer_with_a_reason() {
     let (log, lines) = mpsc::channel();
     let limits = Limits {
         of_one_address: 2,

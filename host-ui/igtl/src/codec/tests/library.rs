@@ -1,4 +1,5 @@
-//! libOpenIGTLink itself, compiled here: what it writes, and what it reads of ours. `make igtl-test` installs it.
+//! libOpenIGTLink itself, compiled here: its output, and its reading of ours. `make igtl-test`
+//! installs it.
 
 use super::*;
 use std::io::Write;
@@ -9,7 +10,7 @@ fn sources() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests")
 }
 
-/// A program of `tests/` with the library, in a folder of its own.
+/// Compiles a program of `tests/` with the library, in a folder of its own.
 fn compiled(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("stylet-igtl-{}-{name}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for temporary files");
@@ -46,7 +47,8 @@ fn goldens_are_what_the_library_writes_now() {
     std::fs::remove_dir_all(folder).expect("ours");
 }
 
-/// Numbers whose sums and roots are exact, so that the library's own arithmetic changes no bit.
+/// Returns a message of numbers whose sums and roots are exact, so that the library's arithmetic
+/// changes no bit.
 fn message(kind: usize, random: &mut Random) -> Message {
     let number = |random: &mut Random| (random.below(1 << 20) as f32 - 524_288.0) / 256.0;
     let place = |random: &mut Random| [0; 3].map(|_| number(random));
@@ -112,7 +114,7 @@ fn message(kind: usize, random: &mut Random) -> Message {
     }
 }
 
-/// The library reads each, checks its checksum, takes it apart and puts it together again.
+/// Lets the library read each message, check its checksum, unpack it and pack it again.
 #[test]
 #[ignore = "needs libopenigtlink-dev: make igtl-test"]
 fn three_thousand_messages_come_back_from_the_library_byte_for_byte() {
