@@ -1,4 +1,4 @@
-//! What is looked at: labels of the body at rest, what each is made of, and the metal in it.
+//! The imaged object: labels of the body at rest, the tissue of each, and the metal in it.
 
 use crate::Tissue;
 use nalgebra::Vector3;
@@ -11,25 +11,25 @@ pub const SEED_LENGTH_M: f64 = 4.5e-3;
 /// Radius of a seed, m.
 pub const SEED_RADIUS_M: f64 = 0.4e-3;
 
-/// The body at rest.
+/// Body at rest.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// Grid of the cells; its nodes are their middles.
+    /// Grid of the cells; its nodes are their centres.
     pub grid: GridInfo,
     /// Label of each cell, x fastest; 0 is outside.
     pub cells: Vec<u8>,
-    /// What each label is made of.
+    /// Tissue of each label.
     pub tissues: [Tissue; 256],
 }
 
 impl Body {
-    /// `None` where the cells are not those of the grid.
+    /// Creates a body; `None` unless the cells fit the grid.
     pub fn new(grid: GridInfo, cells: Vec<u8>, tissues: [Tissue; 256]) -> Option<Self> {
         let fits = grid.node_count() == Some(cells.len()) && grid.dims.iter().all(|&d| d > 0) && grid.spacing_m > 0.0;
         fits.then_some(Self { grid, cells, tissues })
     }
 
-    /// The body of a scene, its tissues by the names of its structures.
+    /// Creates the body of a scene, its tissues by the names of its structures.
     pub fn of_scene(header: &SceneHeader, labels: &[u8]) -> Option<Self> {
         let mut tissues = [Tissue::OUTSIDE; 256];
         for (slot, structure) in tissues[1..].iter_mut().zip(header.structures()) {
@@ -38,34 +38,34 @@ impl Body {
         Self::new(header.labels, labels.to_vec(), tissues)
     }
 
-    /// Lower corner of the grid's cells, scene frame, m.
+    /// Returns the lower corner of the grid's cells, scene frame, m.
     pub fn corner_m(&self) -> Vector3<f64> {
         Vector3::from(self.grid.origin_m).add_scalar(-0.5 * self.grid.spacing_m)
     }
 
-    /// Edges of the grid, m.
+    /// Returns the edges of the grid, m.
     pub fn size_m(&self) -> Vector3<f64> {
         Vector3::from(self.grid.dims).map(|d| f64::from(d) * self.grid.spacing_m)
     }
 }
 
-/// A seed as it lies now.
+/// Present pose of a seed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seed {
-    /// Middle, scene frame, m.
+    /// Centre, scene frame, m.
     pub middle_m: Vector3<f64>,
     /// Unit vector along it.
     pub axis: Vector3<f64>,
 }
 
-/// A needle as it lies now.
+/// Present shape of a needle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Needle {
-    /// Places along its middle from the tip back, scene frame, m.
+    /// Places along its axis from the tip back, scene frame, m.
     pub points_m: Vec<Vector3<f64>>,
 }
 
-/// The metal in the body.
+/// Metal in the body.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Metal {
     /// All seeds.

@@ -1,4 +1,4 @@
-//! A graphics device, and what all passes need of it.
+//! A graphics device, and operations common to all passes.
 
 use wgpu::util::DeviceExt;
 
@@ -11,7 +11,7 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
 }
 
-/// No device computes pictures here.
+/// No device can compute pictures here.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "no graphics device can compute pictures: {0}; install a Vulkan driver, such as Mesa's in software (mesa-vulkan-drivers)"
@@ -19,10 +19,11 @@ pub struct Gpu {
 pub struct NoGpu(String);
 
 impl Gpu {
-    /// A device without a window. `software` asks for the driver that computes on the processor, which gives the same
-    /// pictures on every machine.
+    /// Creates a device without a window. `software` selects the driver that computes on the
+    /// processor, which gives the same pictures on every machine.
     ///
     /// # Errors
+    ///
     /// No Vulkan driver, or one that does not compute.
     pub fn headless(software: bool) -> Result<Self, NoGpu> {
         let mut asked = wgpu::InstanceDescriptor::new_without_display_handle();
@@ -42,7 +43,7 @@ impl Gpu {
         Ok(Self { device, queue })
     }
 
-    /// Whether it computes at all; drivers of OpenGL may not.
+    /// Returns whether it can compute; drivers of OpenGL may not.
     pub fn computes(&self) -> bool {
         self.device.limits().max_compute_workgroups_per_dimension > 0
     }
@@ -106,7 +107,7 @@ impl Gpu {
         self.queue.write_texture(texture.as_image_copy(), bytes, layout, size);
     }
 
-    /// What a buffer holds, once the passes before are done.
+    /// Returns the content of a buffer, once the earlier passes are done.
     pub(crate) fn read<T: bytemuck::Pod>(&self, buffer: &wgpu::Buffer) -> Vec<T> {
         let size = buffer.size();
         let near = self.device.create_buffer(&wgpu::BufferDescriptor {
@@ -121,7 +122,7 @@ impl Gpu {
         self.mapped(&near)
     }
 
-    /// The texels of a texture of four bytes each, row by row.
+    /// Returns the texels of a texture of four bytes each, row by row.
     pub(crate) fn pixels<T: bytemuck::Pod>(&self, texture: &wgpu::Texture) -> Vec<T> {
         let size = texture.size();
         let row = (size.width * 4).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
@@ -178,7 +179,7 @@ impl Gpu {
         })
     }
 
-    /// Pipelines of these passes of one module.
+    /// Creates pipelines for these passes of one module.
     pub(crate) fn compute<const N: usize>(
         &self,
         layout: &wgpu::BindGroupLayout,
@@ -210,7 +211,7 @@ impl Gpu {
         })
     }
 
-    /// Between texels straight, beyond the outermost as that.
+    /// Creates a sampler, linear between texels and constant beyond the outermost.
     pub(crate) fn clamped(&self) -> wgpu::Sampler {
         self.device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("stylet imaging"),
@@ -231,21 +232,21 @@ impl Gpu {
     }
 }
 
-/// A uniform, a buffer that is read, and one that is written.
+/// Bindings of a uniform, a buffer that is read, and one that is written.
 pub(crate) const UNIFORM: wgpu::BindingType = buffer(wgpu::BufferBindingType::Uniform);
 pub(crate) const READ: wgpu::BindingType = buffer(wgpu::BufferBindingType::Storage { read_only: true });
 pub(crate) const WRITE: wgpu::BindingType = buffer(wgpu::BufferBindingType::Storage { read_only: false });
-/// A volume, and how it is read between its texels.
+/// Binding of a volume, and of its sampler.
 pub(crate) const VOLUME: wgpu::BindingType = wgpu::BindingType::Texture {
     sample_type: wgpu::TextureSampleType::Float { filterable: true },
     view_dimension: wgpu::TextureViewDimension::D3,
     multisampled: false,
 };
 pub(crate) const SAMPLER: wgpu::BindingType = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-/// For a texture that is filled from here and read by passes.
+/// Usage of a texture that is filled from here and read by passes.
 pub(crate) const FILLED: wgpu::TextureUsages =
     wgpu::TextureUsages::TEXTURE_BINDING.union(wgpu::TextureUsages::COPY_DST);
-/// Numbers by column and row, read one by one.
+/// Binding of numbers by column and row, read one by one.
 pub(crate) const GRID: wgpu::BindingType = wgpu::BindingType::Texture {
     sample_type: wgpu::TextureSampleType::Float { filterable: false },
     view_dimension: wgpu::TextureViewDimension::D2,

@@ -1,8 +1,9 @@
-//! Pictures of the body as it lies now, computed on the graphics card: the ultrasound of a transrectal probe,
-//! radiographs of a C-arm.
+//! Pictures of the deformed body, computed on the graphics card: the ultrasound of a transrectal
+//! probe, radiographs of a C-arm.
 //!
-//! The crate takes plain arrays: labels with what each is made of, a field of displacements, seeds and needles. It knows no
-//! ports and no windows. What the pictures are, and what they leave out, stands in `docs/imaging.md`.
+//! The crate takes plain arrays: labels with their tissues, a field of displacements, seeds and
+//! needles. It knows no ports and no windows. `docs/imaging.md` describes the pictures and their
+//! limits.
 #![warn(missing_docs)]
 
 mod body;

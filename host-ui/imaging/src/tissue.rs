@@ -1,38 +1,39 @@
-//! What tissues are for sound and X-rays: how bright, how much they take, and what they reflect where they meet.
+//! Properties of tissues for sound and X-rays: brightness, attenuation, and reflection at
+//! interfaces.
 
 use crate::xray::{BONE_PER_M, SOFT_PER_M};
 use stylet_anatomy::{Organ, Part};
 use stylet_shm_schema::{StructureInfo, role};
 
-/// Brightness of what is not tissue: jelly around a gland that stands alone.
+/// Brightness outside of tissue: jelly around a gland that stands alone.
 pub const OUTSIDE: f32 = 0.13;
-/// Brightness of the gland: 14 dB below fat, and a whole number of the steps in which a graphics card keeps it.
+/// Brightness of the gland: 14 dB below fat, and a whole number of a graphics card's steps.
 const GLAND: f32 = 77.0 / 255.0;
 
-/// What one tissue is.
+/// Properties of one tissue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tissue {
-    /// How bright it is on the screen, 0 to 1; see [`brightness`].
+    /// Brightness on the screen, 0 to 1; see [`brightness`].
     pub brightness: f32,
-    /// Loss of sound on its way, in dB per cm and MHz, one way.
+    /// Attenuation of sound, in dB per cm and MHz, one way.
     pub loss_db_per_cm_mhz: f32,
     /// Acoustic impedance, MRayl.
     pub impedance_mrayl: f32,
-    /// Loss of X-rays, per m.
+    /// Attenuation of X-rays, per m.
     pub xray_per_m: f32,
 }
 
 impl Tissue {
-    /// Water or jelly around the probe and in the bladder: next to no echo and no loss.
+    /// Water or jelly around the probe and in the bladder: almost no echo and no attenuation.
     pub const COUPLING: Self = Self::new(0.0, 0.0, 1.52);
     /// Prostate and every soft tissue without a row of its own: 0.5 dB per cm and MHz, as scanners assume.
     pub const SOFT: Self = Self::new(GLAND, 0.5, 1.63);
-    /// Gas: nothing is seen behind it.
+    /// Gas, which hides everything behind it.
     pub const GAS: Self = Self::new(0.0, 25.0, 0.04).with_xray(0.0);
     const BONE: Self = Self::new(0.92, 10.0, 6.5).with_xray(BONE_PER_M);
     const FAT: Self = Self::new(0.54, 0.6, 1.40);
 
-    /// Where there is no body: jelly for the probe, air for X-rays.
+    /// Medium outside the body: jelly for the probe, air for X-rays.
     pub const OUTSIDE: Self = Self::COUPLING.with_xray(0.0);
 
     const fn with_xray(mut self, xray_per_m: f32) -> Self {
@@ -40,7 +41,7 @@ impl Tissue {
         self
     }
 
-    /// See the fields; X-rays lose as much as in soft tissue.
+    /// Creates a tissue with the X-ray attenuation of soft tissue.
     pub const fn new(brightness: f32, loss_db_per_cm_mhz: f32, impedance_mrayl: f32) -> Self {
         Self {
             brightness,
@@ -50,7 +51,7 @@ impl Tissue {
         }
     }
 
-    /// That of a structure, by its name.
+    /// Returns the tissue of a structure, by its name.
     pub fn of(structure: &StructureInfo) -> Self {
         let name = structure.name.read().to_lowercase();
         let base = match Part::of_name(&name) {
@@ -67,7 +68,8 @@ impl Tissue {
     }
 }
 
-/// Brightness of a structure, 0 to 1, as seen in transrectal ultrasound: by its name, otherwise by its role.
+/// Returns the brightness of a structure, 0 to 1, as seen in transrectal ultrasound: by its name,
+/// otherwise by its role.
 pub fn brightness(structure: &StructureInfo) -> f32 {
     by_name(&structure.name.read()).unwrap_or(match structure.role {
         bits if bits & role::TARGET != 0 => GLAND,
@@ -83,14 +85,14 @@ fn by_name(name: &str) -> Option<f32> {
     match part {
         Some(Part::Content) => Some(0.02),
         _ if mentioned(Organ::Urethra) => Some(0.20),
-        // As the fat and fascia round it: a rim, not a line.
+        // Like the fat and fascia round it: a rim, not a line.
         Some(Part::Capsule) => Some(0.54),
         Some(Part::Wall) => Some(0.62),
         None => BY_ORGAN.iter().find(|(organ, _)| mentioned(*organ)).map(|(_, b)| *b),
     }
 }
 
-/// The first organ that a name mentions.
+/// Brightness by the first organ that a name mentions.
 const BY_ORGAN: [(Organ, f32); 5] = [
     (Organ::RectalWall, 0.50),
     (Organ::Bladder, 0.06),

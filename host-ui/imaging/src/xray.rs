@@ -1,6 +1,7 @@
-//! How much radiation materials take, at one effective energy.
+//! Attenuation of materials at one effective energy.
 
-/// Mass attenuation (cm²/g) at 60 and 80 keV, and density (g/cm³): NIST, Hubbell and Seltzer, tables 3 and 4.
+/// Mass attenuation (cm²/g) at 60 and 80 keV, and density (g/cm³): NIST, Hubbell and Seltzer,
+/// tables 3 and 4.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attenuation {
     /// Mass attenuation at 60 and 80 keV, cm²/g.
@@ -9,7 +10,8 @@ pub struct Attenuation {
     pub g_per_cm3: f64,
 }
 
-/// Effective energy of the beam, keV: a tube at 110 to 120 kV behind 3 mm of aluminium; one energy, so beams do not harden.
+/// Effective energy of the beam, keV: a tube at 110 to 120 kV behind 3 mm of aluminium. With one
+/// energy, beams do not harden.
 const KEV: f64 = 70.0;
 
 impl Attenuation {
@@ -31,7 +33,7 @@ impl Attenuation {
         }
     }
 
-    /// Loss per m at 70 keV: between the energies of the table straight lines in logarithms.
+    /// Returns the attenuation per m at 70 keV, log-linear between the energies of the table.
     pub fn per_m(&self) -> f64 {
         let [low, high] = self.cm2_per_g;
         let share = (KEV / 60.0).ln() / (80.0_f64 / 60.0).ln();

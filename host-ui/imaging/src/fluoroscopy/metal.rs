@@ -1,29 +1,29 @@
-//! What rays lose in seeds and needles: the length of their way through cylinders, in closed form.
+//! Attenuation in seeds and needles: path length of rays through cylinders, in closed form.
 
 use super::CArm;
 use crate::body::{Metal, NEEDLE_RADIUS_M, SEED_LENGTH_M, SEED_RADIUS_M};
 use crate::xray::{SILVER_PER_M, SOFT_PER_M, STEEL_PER_M, TITANIUM_PER_M};
 use nalgebra::Vector3;
 
-/// Wall of a seed, and how thick its welded ends are, m: as a 6711.
+/// Thickness of a seed's wall and of its welded ends, m, as in a 6711.
 pub const WALL_M: f64 = 0.05e-3;
 pub const WELD_M: f64 = 0.4e-3;
-/// Silver within: radius and length, m.
+/// Radius and length of the silver core, m.
 pub const CORE_RADIUS_M: f64 = 0.25e-3;
 pub const CORE_LENGTH_M: f64 = 3.0e-3;
 
-/// A straight cylinder with flat ends.
+/// Straight cylinder with flat ends.
 pub struct Cylinder {
     pub middle_m: Vector3<f64>,
     pub axis: Vector3<f64>,
     pub radius_m: f64,
     pub length_m: f64,
-    /// Loss over that of the soft tissue in its place, per m.
+    /// Attenuation beyond that of the soft tissue in its place, per m.
     pub per_m: f64,
 }
 
 impl Cylinder {
-    /// Length of a ray within, m; `along` is a unit vector.
+    /// Returns the path length of a ray inside, m; `along` is a unit vector.
     fn way_m(&self, source_m: Vector3<f64>, along: Vector3<f64>) -> f64 {
         let from = source_m - self.middle_m;
         let (at, per) = (from.dot(&self.axis), along.dot(&self.axis));
@@ -55,7 +55,7 @@ impl Cylinder {
     }
 }
 
-/// Seeds as a shell of titanium with silver in it, needles with their stylet as solid steel.
+/// Models seeds as a shell of titanium with silver in it, needles with their stylet as solid steel.
 pub fn cylinders(metal: &Metal) -> Vec<Cylinder> {
     let soft = f64::from(SOFT_PER_M);
     let of_seed = metal.seeds.iter().flat_map(move |seed| {
@@ -87,11 +87,12 @@ pub fn cylinders(metal: &Metal) -> Vec<Cylinder> {
     of_seed.chain(of_needle).collect()
 }
 
-/// Rays to both sides of the middle of a pixel, along each of its edges.
+/// Number of rays along each edge of a pixel.
 const RAYS: u32 = 3;
 
-/// Loss in metal of each pixel, over that of the tissue in its place: the mean of what comes through nine rays, so that seeds of
-/// a pixel's width do not jump from pixel to pixel.
+/// Returns the attenuation in metal of each pixel, beyond that of the tissue in its place. It is
+/// the mean of nine transmitted rays, so that seeds of a pixel's width do not jump from pixel to
+/// pixel.
 pub fn losses(arm: &CArm, metal: &Metal) -> Vec<f32> {
     let [wide, high] = arm.pixels;
     let mut of_ray = vec![0.0_f64; 0];
@@ -133,11 +134,12 @@ pub fn losses(arm: &CArm, metal: &Metal) -> Vec<f32> {
     losses
 }
 
-/// Columns and rows, from and up to, in which a cylinder can be seen.
+/// Returns the columns and rows, end exclusive, in which a cylinder can be seen.
 fn seen_in(arm: &CArm, one: &Cylinder) -> [u32; 4] {
     let half = one.axis * (0.5 * one.length_m);
     let ends = [one.middle_m - half, one.middle_m + half].map(|end| arm.pixel_of(end));
-    // Nearer to the source than its middle by no more than its length: this is enlarged at most as by a fifth of the way.
+    // Its nearest point is at most its length closer to the source than its centre, which magnifies
+    // by at most a fifth.
     let margin = 2.0 + 5.0 * one.radius_m / arm.pixel_m() * arm.source_to_detector_m / arm.source_to_isocentre_m;
     let (low, high) = (ends[0].inf(&ends[1]), ends[0].sup(&ends[1]));
     let clamp = |v: f64, count: u32| v.clamp(0.0, f64::from(count)) as u32;

@@ -1,4 +1,4 @@
-//! Radiographs of the body as it lies now, by a C-arm that turns about it.
+//! Radiographs of the deformed body, by a C-arm that turns about it.
 
 mod arm;
 mod exposure;
@@ -14,26 +14,27 @@ use nalgebra::Vector3;
 use std::mem::size_of;
 use stylet_surfaces::field::{Field, SEEN_M, STEPS};
 
-/// Distance between two places of a ray at which the material point is sought, m: displacements come every 8 mm (ADR 9).
+/// Distance between two points of a ray at which the material point is found, m: displacements come
+/// every 8 mm (ADR 9).
 const PIECE_M: f64 = 2e-3;
 
-/// As `Shot` in `radiograph.wgsl`.
+/// Same layout as `Shot` in `radiograph.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 struct Shot([[f32; 4]; 8]);
 
-/// A picture: of each pixel, row by row from above, the share of the radiation that comes through.
+/// Picture: the transmitted share of the radiation for each pixel, row by row from the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Radiograph {
-    /// Pixels to the right and down.
+    /// Number of pixels to the right and down.
     pub pixels: [u32; 2],
-    /// From 0 to 1.
+    /// Transmission from 0 to 1.
     pub transmission: Vec<f32>,
 }
 
 impl Radiograph {
-    /// Greys as on the screen of a C-arm, metal and bone dark: the logarithm of what comes through, its brightest and darkest
-    /// hundredth white and black.
+    /// Returns greys as on the screen of a C-arm, metal and bone dark: the logarithm of the
+    /// transmission, its brightest and darkest hundredth white and black.
     pub fn greys(&self) -> Vec<u8> {
         let lost: Vec<f32> = self.transmission.iter().map(|t| -t.max(1e-6).ln()).collect();
         let mut sorted = lost.clone();
@@ -46,19 +47,19 @@ impl Radiograph {
     }
 }
 
-/// Takes radiographs; the last one is held until the next.
+/// Fluoroscope that holds its last picture until the next.
 pub struct Fluoroscope {
     gpu: Gpu,
     layout: wgpu::BindGroupLayout,
     pipeline: [wgpu::ComputePipeline; 1],
     sampler: wgpu::Sampler,
-    /// What has been spent on pictures.
+    /// Dose of all pictures so far.
     pub dose: DoseCounter,
     held: Option<Radiograph>,
 }
 
 impl Fluoroscope {
-    /// No picture yet, no dose.
+    /// Creates a fluoroscope without picture and dose.
     pub fn new(gpu: Gpu) -> Self {
         let layout = gpu.layout(
             wgpu::ShaderStages::COMPUTE,
@@ -75,7 +76,7 @@ impl Fluoroscope {
         }
     }
 
-    /// The last picture.
+    /// Returns the last picture.
     pub fn held(&self) -> Option<&Radiograph> {
         self.held.as_ref()
     }

@@ -1,10 +1,11 @@
-// One ray for each pixel: what it loses in the cells that it crosses, on the way that it takes through the body at rest. Between
-// places where the material point is sought that way is straight, and on each straight piece every cell counts by its length.
+// One ray for each pixel: its attenuation in the cells along its path through the body at rest.
+// Between points where the material point is found the path is straight, and on each straight piece
+// every cell counts by its length.
 
 struct Shot {
     // Source (m), and the largest displacement along an axis (m).
     source_m: vec4<f32>,
-    // Middle of the detector (m), and the edge of a pixel (m).
+    // Centre of the detector (m), and the edge of a pixel (m).
     detector_m: vec4<f32>,
     // To the right and up on the detector, each with its count of pixels.
     right: vec4<f32>,
@@ -32,7 +33,7 @@ fn displacement_m(rest_m: vec3<f32>) -> vec3<f32> {
     return textureSampleLevel(nodes, clamped, at, 0.0).xyz;
 }
 
-// Begins at the displacement of the piece before.
+// Starts from the displacement of the previous piece.
 fn shift_of(place_m: vec3<f32>, before_m: vec3<f32>) -> vec3<f32> {
     var shift_m = before_m;
     for (var step = 0; step < STEPS; step++) {
@@ -46,7 +47,8 @@ fn shift_of(place_m: vec3<f32>, before_m: vec3<f32>) -> vec3<f32> {
     return shift_m;
 }
 
-// Sum of loss over a straight piece between two places (cells), each cell by its share of the piece.
+// Sum of attenuation over a straight piece between two places (cells), each cell by its share of
+// the piece.
 fn loss_between(start: vec3<f32>, end: vec3<f32>) -> f32 {
     let way = end - start;
     let forward = way >= vec3(0.0);
@@ -94,7 +96,7 @@ fn radiograph(@builtin(global_invocation_id) id: vec3<u32>) {
     let way_m = pixel_m - shot.source_m.xyz;
     let length_m = length(way_m);
     let along = way_m / length_m;
-    // The box that the body can be in now.
+    // The box that may contain the deformed body.
     let low_m = shot.corner_m.xyz - shot.source_m.w;
     let high_m = shot.corner_m.xyz + shot.dims.xyz * shot.corner_m.w + shot.source_m.w;
     let inverse = 1.0 / select(along, vec3(1e-9), abs(along) < vec3(1e-9));

@@ -2,17 +2,19 @@
 
 use super::{Plane, View};
 
-/// Depths between two places at which the material point is sought: displacements vary over millimetres.
+/// Number of depths between two points at which the material point is found: displacements vary
+/// over millimetres.
 pub const MAP_CELL: u32 = 8;
 
-/// Beams, depths and slices across the plane.
+/// Number of beams, depths and slices across the plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
     pub lines: u32,
     pub samples: u32,
     pub slices: u32,
-    /// Distance between scatterers along x, y, z, m. Beams go across the probe, so along z they may lie farther apart. A distance
-    /// below that between samples would let speckle change at once where it should change slowly.
+    /// Distance between scatterers along x, y, z, m. Beams go across the probe, so along z they may
+    /// lie farther apart. A distance below that between samples would let speckle change abruptly
+    /// instead of slowly.
     pub scatterers_m: [f64; 3],
 }
 
@@ -27,7 +29,7 @@ impl Grid {
                 slices: 5,
                 scatterers_m: [0.25e-3, 0.25e-3, 0.9e-3],
             },
-            // Here the slices follow each other across the probe, where scatterers lie near each other.
+            // Here the slices are stacked across the probe, where scatterers are dense.
             View::Sagittal => Self {
                 lines: 192,
                 samples,
@@ -41,14 +43,14 @@ impl Grid {
         self.lines as usize * self.samples as usize
     }
 
-    /// Places at which the material point is sought, at both ends of the slices.
+    /// Returns the grid of points at which the material point is found, at both ends of the slices.
     pub fn map_cells(&self) -> [u32; 2] {
         [self.lines, self.samples].map(|n| (n - 1) / MAP_CELL + 2)
     }
 }
 
-/// Power of the sum of echoes of each sample over that of one, beyond what its weights alone would give: neighbours among the
-/// samples share scatterers.
+/// Returns the power of each sample's sum of echoes over that of one, beyond the effect of its
+/// weights: neighbouring samples share scatterers.
 pub fn powers(plane: &Plane, grid: Grid) -> Vec<f32> {
     let [fine_m, _, along_m] = grid.scatterers_m;
     let (across_m, slices_m) = match plane.view {
@@ -61,7 +63,7 @@ pub fn powers(plane: &Plane, grid: Grid) -> Vec<f32> {
         let depth_m = f64::from(sample) * sample_m;
         let pitch_m = plane.pitch_m(grid.lines, depth_m);
         let across = sum_of_neighbours(plane.probe.lateral_at_m(depth_m) / pitch_m, pitch_m / across_m);
-        // Slices lie two spreads to both sides.
+        // Slices extend two spreads to both sides.
         let per_spread = f64::from(grid.slices - 1) / 4.0;
         let slice_m = plane.probe.thickness_at_m(depth_m) / per_spread;
         (pulse * across * sum_of_neighbours(per_spread, slice_m / slices_m)) as f32
@@ -69,7 +71,8 @@ pub fn powers(plane: &Plane, grid: Grid) -> Vec<f32> {
     (0..grid.samples).map(at).collect()
 }
 
-/// Gaussian weights with a spread of so many steps, over scatterers at a distance of which a step is this share.
+/// Sums Gaussian weights with this spread in steps, over scatterers at a distance of which a step
+/// is this share.
 fn sum_of_neighbours(spread: f64, step: f64) -> f64 {
     let lags = (1..200).map(f64::from).take_while(|lag| lag * step < 2.0);
     1.0 + 2.0
@@ -78,8 +81,8 @@ fn sum_of_neighbours(spread: f64, step: f64) -> f64 {
             .sum::<f64>()
 }
 
-/// Correlation of two places on the straight lines between scatterers at distance 1, each of the same power: the mean over where
-/// the first one lies.
+/// Returns the correlation of two points, linearly interpolated between scatterers at distance 1
+/// and of equal power: the mean over the position of the first one.
 fn shared(apart: f64) -> f64 {
     const PLACES: u32 = 16;
     let weights = |at: f64| {

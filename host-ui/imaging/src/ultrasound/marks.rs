@@ -1,26 +1,27 @@
-//! Metal among the beams: how bright needles and seeds are where the beam meets them, what rings behind them, and their shadow.
+//! Metal among the beams: echo of needles and seeds, reverberation behind them, and their shadow.
 
 use super::beams::Grid;
 use super::{Plane, Probe};
 use crate::body::{Metal, NEEDLE_RADIUS_M, SEED_LENGTH_M, SEED_RADIUS_M};
 use nalgebra::Vector3;
 
-/// Brightness of the wall of a needle over the gland where the beam is square to it, as an amplitude: 32 dB.
+/// Amplitude of a needle's wall over the gland at perpendicular incidence: 32 dB.
 pub const NEEDLE_ECHO: f64 = 40.0;
-/// That of a seed: 26 dB.
+/// Amplitude of a seed over the gland: 26 dB.
 pub const SEED_ECHO: f64 = 20.0;
-/// One way through a needle or a seed in the middle of the plane, dB.
+/// One-way loss through a needle or a seed in the middle of the plane, dB.
 pub const SHADOW_DB: f64 = 7.0;
-/// Rings behind the wall of a needle, between them and each under the one before: sound that goes to and fro within.
+/// Number, spacing and decay of reverberations behind the wall of a needle: sound that bounces
+/// within.
 const RINGS: i32 = 7;
 pub const RING_M: f64 = 1.1e-3;
 pub const RING_FALL: f64 = 0.55;
-/// Two places along the metal.
+/// Distance between two points along the metal.
 const STEP_M: f64 = 0.15e-3;
-/// Weaker than this share of the whole nothing is seen.
+/// Smallest visible share of the whole.
 const LEAST: f64 = 1e-3;
 
-/// Echo and loss (dB, one way) of each sample of each beam.
+/// Echo and attenuation (dB, one way) of each sample of each beam.
 #[derive(Debug, Default)]
 pub struct Marks {
     pub of_sample: Vec<[f32; 2]>,
@@ -34,7 +35,7 @@ struct Wall {
 }
 
 impl Marks {
-    /// Draws all metal near the plane anew.
+    /// Redraws all metal near the plane.
     pub fn draw(&mut self, plane: &Plane, grid: Grid, metal: &Metal) {
         if self.of_sample.len() == grid.count() {
             self.touched.drain(..).for_each(|n| self.of_sample[n] = [0.0; 2]);
@@ -95,7 +96,7 @@ impl Marks {
         let line = |across: f64| ((across + half) / pitch).round();
         let (first, last) = (line(at.across - wide), line(at.across + wide));
         let sample_m = plane.depth_m / f64::from(grid.samples - 1);
-        // The pulse spreads a thin line over depths; its height is meant.
+        // The pulse spreads a thin line over depths; its height must remain.
         let height = plane.probe.axial_m / sample_m * std::f64::consts::TAU.sqrt();
         for line in (first as i64..=last as i64).filter(|l| (0..i64::from(grid.lines)).contains(l)) {
             for ring in 0..=wall.rings {
@@ -109,7 +110,7 @@ impl Marks {
         }
     }
 
-    /// The brightest of what lies in a sample.
+    /// Keeps the brightest mark of a sample.
     fn put(&mut self, sample: usize, mark: [f64; 2]) {
         let old = &mut self.of_sample[sample];
         if *old == [0.0; 2] {
@@ -119,7 +120,7 @@ impl Marks {
     }
 }
 
-/// The share of an echo that comes back from beside the plane.
+/// Returns the share of an echo from outside the plane.
 fn seen(probe: &Probe, beside_m: f64, depth_m: f64) -> f64 {
     (-0.5 * (beside_m / probe.thickness_at_m(depth_m)).powi(2)).exp()
 }

@@ -1,27 +1,28 @@
-//! Where the beams of a probe go, how wide they are, and where a place stands in the picture.
+//! Geometry of a probe: direction and width of its beams, and projection into the picture.
 
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use stylet_anatomy::Organ;
 use stylet_shm_schema::SceneHeader;
 
-/// How the probe stands: the middle of its array on its axis, the axis, and where its middle beam goes.
+/// Pose of the probe: centre of its array on its axis, the axis, and direction of its middle beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Middle of the array, on the axis of the probe, scene frame, m.
+    /// Centre of the array, on the axis of the probe, scene frame, m.
     pub middle_m: Vector3<f64>,
     /// Unit vector along the axis, into the patient.
     pub axis: Vector3<f64>,
-    /// Unit vector along the middle beam, square to the axis: it turns with the probe.
+    /// Unit vector along the middle beam, perpendicular to the axis: it turns with the probe.
     pub up: Vector3<f64>,
 }
 
-/// From the middle of a probe to the target, where a scene has no rectum, m.
+/// Distance from the probe's centre to the target in a scene without a rectum, m.
 const BEHIND_M: f64 = 15e-3;
 
 impl Pose {
-    /// The probe on its stepper, not yet moved: along the patient's axis through the middle of the rectum, or behind the target
-    /// where the scene has none; its array at the middle of the target.
+    /// Returns the probe on its stepper, not yet moved. It lies along the patient's axis through
+    /// the centre of the rectum, or behind the target without a rectum; its array is at the centre
+    /// of the target.
     pub fn of_scene(scene: &SceneHeader) -> Self {
         let frame = scene.patient();
         let [across, axis, up] = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]
@@ -41,7 +42,8 @@ impl Pose {
         }
     }
 
-    /// The pose after a turn about the axis, from the patient's right over anterior to the left, and a way along it.
+    /// Returns the pose after a turn about the axis, from the patient's right over anterior to the
+    /// left, and a move along it.
     pub fn moved(&self, way_m: f64, turn_rad: f64) -> Self {
         let (sin, cos) = turn_rad.sin_cos();
         Self {
@@ -51,8 +53,9 @@ impl Pose {
         }
     }
 
-    /// The probe in a hand, by the frame of what the hand holds: its axis is +z of that frame, towards the tip, and its middle
-    /// beam +y. So a probe that is held straight looks where the scene's y goes.
+    /// Returns the probe in a hand, from the frame of the tool: its axis is +z of that frame,
+    /// towards the tip, and its middle beam +y. So a probe that is held straight looks along the
+    /// scene's y.
     pub fn of_tool(tip_m: Vector3<f64>, scene_from_tool: &UnitQuaternion<f64>, probe: &Probe) -> Self {
         let axis = scene_from_tool * Vector3::z();
         Self {
@@ -62,18 +65,19 @@ impl Pose {
         }
     }
 
-    /// The foremost point of the probe, m.
+    /// Returns the foremost point of the probe, m.
     pub fn tip_m(&self, probe: &Probe) -> Vector3<f64> {
         self.middle_m + self.axis * probe.behind_tip_m
     }
 
-    /// The frame of what the hand holds, as [`Pose::of_tool`] takes it.
+    /// Returns the frame of the tool, as in [`Pose::of_tool`].
     pub fn scene_from_tool(&self) -> UnitQuaternion<f64> {
         let columns = Matrix3::from_columns(&[self.up.cross(&self.axis), self.up, self.axis]);
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(columns))
     }
 
-    /// How far it is along the axis of another pose (m), and turned about that (rad): what [`Pose::moved`] takes.
+    /// Returns the move along the axis of another pose (m), and the turn about it (rad): the
+    /// arguments of [`Pose::moved`].
     pub fn way_and_turn(&self, from: &Self) -> (f64, f64) {
         let aside = from.axis.cross(&from.up);
         let turn_rad = self.up.dot(&aside).atan2(self.up.dot(&from.up));
@@ -81,7 +85,7 @@ impl Pose {
     }
 }
 
-/// Which of the two planes is seen.
+/// Plane of the probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// Across the probe: a sector about its axis.
@@ -94,7 +98,7 @@ impl View {
     /// Both planes.
     pub const ALL: [Self; 2] = [Self::Transverse, Self::Sagittal];
 
-    /// Its name, for people.
+    /// Returns the display name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Transverse => "Transverse",
@@ -103,30 +107,30 @@ impl View {
     }
 }
 
-/// Sizes of a probe, and how its beams spread.
+/// Dimensions of a probe, and spread of its beams.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Probe {
-    /// From its axis to its surface, m.
+    /// Distance from its axis to its surface, m.
     pub radius_m: f64,
-    /// From its tip back to the middle of both arrays, m.
+    /// Distance from its tip back to the centre of both arrays, m.
     pub behind_tip_m: f64,
     /// Half the angle of the sector, rad.
     pub half_angle: f64,
     /// Half the length of the sagittal array, m.
     pub half_length_m: f64,
-    /// Middle of the band, MHz.
+    /// Centre frequency, MHz.
     pub mhz: f64,
     /// Standard deviation of a point's echo along the beam, m.
     pub axial_m: f64,
     /// Standard deviation across the beam near the probe, m.
     pub lateral_m: f64,
-    /// Standard deviation across the beam per depth, where that is more.
+    /// Growth of that deviation with depth, used where it is larger.
     pub lateral_per_depth: f64,
     /// Standard deviation across the plane at the focus of the lens, m.
     pub thickness_m: f64,
     /// Depth of that focus, m.
     pub focus_m: f64,
-    /// At so much more or less depth the plane is thicker by the square root of two, m.
+    /// Change of depth that widens the plane by the square root of two, m.
     pub focal_depth_m: f64,
 }
 
@@ -136,9 +140,10 @@ const SOUND_M_PER_S: f64 = 1540.0;
 pub const FWHM: f64 = 2.354_820_045;
 
 impl Default for Probe {
-    /// 7 MHz, 20 mm thick. Across the beam the width at half maximum is the wavelength times the f-number (3.5, then depth over an
-    /// aperture of 12 mm); along it 0.3 mm; the plane is 2 mm thick at 25 mm. The arrays end where the half ball of the tip begins.
-    /// The sizes are assumed, see `docs/imaging.md`.
+    /// Returns the default probe: 7 MHz, 20 mm thick. Across the beam the width at half maximum is
+    /// the wavelength times the f-number (3.5, then depth over an aperture of 12 mm). Along it the
+    /// width is 0.3 mm, and the plane is 2 mm thick at 25 mm. The arrays end where the half ball of
+    /// the tip begins. The sizes are assumed, see `docs/imaging.md`.
     fn default() -> Self {
         let mhz = 7.0;
         let wavelength_m = SOUND_M_PER_S / (mhz * 1e6);
@@ -159,17 +164,17 @@ impl Default for Probe {
 }
 
 impl Probe {
-    /// Standard deviation of the beam across the plane, m.
+    /// Returns the standard deviation of the beam across the plane, m.
     pub fn thickness_at_m(&self, depth_m: f64) -> f64 {
         self.thickness_m * (1.0 + ((depth_m - self.focus_m) / self.focal_depth_m).powi(2)).sqrt()
     }
 
-    /// Standard deviation of a point's echo across the beam, m.
+    /// Returns the standard deviation of a point's echo across the beam, m.
     pub fn lateral_at_m(&self, depth_m: f64) -> f64 {
         self.lateral_m.max(self.lateral_per_depth * depth_m)
     }
 
-    /// Half the fan: an angle of the sector (rad), a length of parallel beams (m).
+    /// Returns half the fan: an angle of the sector (rad), a length of parallel beams (m).
     pub fn half(&self, view: View) -> f64 {
         match view {
             View::Transverse => self.half_angle,
@@ -181,31 +186,31 @@ impl Probe {
 /// The plane of one picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// How the probe stands.
+    /// Pose of the probe.
     pub pose: Pose,
-    /// Which plane of it.
+    /// Plane of the probe.
     pub view: View,
     /// The probe.
     pub probe: Probe,
-    /// How deep it looks, from the surface of the probe, m.
+    /// Depth of view, from the surface of the probe, m.
     pub depth_m: f64,
     /// Pixels of the picture.
     pub pixels: [u32; 2],
 }
 
-/// A place in the coordinates of the beams.
+/// Place in the coordinates of the beams.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InBeams {
-    /// Which beam: an angle from the middle beam (rad), or a way along the probe (m).
+    /// Beam: an angle from the middle beam (rad), or a distance along the probe (m).
     pub across: f64,
-    /// From the surface of the probe, m.
+    /// Depth from the surface of the probe, m.
     pub depth_m: f64,
-    /// Before or behind the plane, m.
+    /// Distance before or behind the plane, m.
     pub beside_m: f64,
 }
 
 impl Plane {
-    /// Unit vector to the right of the picture: the patient's left, or superior.
+    /// Returns the unit vector to the right of the picture: the patient's left, or superior.
     pub fn right(&self) -> Vector3<f64> {
         match self.view {
             View::Transverse => self.pose.axis.cross(&self.pose.up),
@@ -213,12 +218,12 @@ impl Plane {
         }
     }
 
-    /// Unit vector across the plane.
+    /// Returns the unit vector across the plane.
     pub fn normal(&self) -> Vector3<f64> {
         self.right().cross(&self.pose.up)
     }
 
-    /// Distance between neighbours among so many beams, m.
+    /// Returns the distance between neighbours among this number of beams, m.
     pub(super) fn pitch_m(&self, lines: u32, depth_m: f64) -> f64 {
         let per_half = 2.0 * self.probe.half(self.view) / f64::from(lines - 1);
         match self.view {
@@ -227,7 +232,7 @@ impl Plane {
         }
     }
 
-    /// Where a place of the scene lies among the beams.
+    /// Returns the beam coordinates of a scene point.
     pub fn in_beams(&self, place_m: Vector3<f64>) -> InBeams {
         let from = place_m - self.pose.middle_m;
         let (x, y) = (from.dot(&self.right()), from.dot(&self.pose.up));
@@ -242,7 +247,7 @@ impl Plane {
         }
     }
 
-    /// Size of a pixel, m: all of the fan is seen.
+    /// Returns the size of a pixel, m, at which all of the fan is visible.
     pub fn m_per_pixel(&self) -> f64 {
         let high_m = self.probe.radius_m + self.depth_m;
         let wide_m = match self.view {
@@ -252,18 +257,20 @@ impl Plane {
         (wide_m / f64::from(self.pixels[0])).max(high_m / f64::from(self.pixels[1]))
     }
 
-    /// The axis of the probe stands at the lower edge of the picture; what does not fill it lies in its middle.
+    /// Returns the height of the lower edge. The axis of the probe is at the lower edge of the
+    /// picture; a smaller fan is centred.
     pub fn lowest_m(&self) -> f64 {
         let high_m = self.probe.radius_m + self.depth_m;
         0.5 * (high_m - f64::from(self.pixels[1]) * self.m_per_pixel())
     }
 
-    /// What the fan covers of the picture: x and y from its left and upper edge, width and height, pixels.
+    /// Returns the part of the picture that the fan covers: x and y from its left and upper edge,
+    /// width and height, pixels.
     pub(super) fn covered(&self) -> [u32; 4] {
         let near_m = self.probe.radius_m;
         let far_m = near_m + self.depth_m;
         let (half_m, least_m) = match self.view {
-            // Its ends are lowest at the probe, or at the depth where they go under the axis.
+            // Its ends are lowest at the probe, or at the depth where they pass below the axis.
             View::Transverse => {
                 let half = self.probe.half_angle;
                 (
@@ -285,7 +292,8 @@ impl Plane {
         [x, y, width, height]
     }
 
-    /// Where a place of the scene, dropped onto the plane, stands in the picture: pixels from its left and upper edge.
+    /// Projects a scene point onto the plane and returns its pixel, from the left and upper edge of
+    /// the picture.
     pub fn pixel_of(&self, place_m: Vector3<f64>) -> Vector2<f64> {
         let from = place_m - self.pose.middle_m;
         let scale = self.m_per_pixel();
@@ -294,20 +302,20 @@ impl Plane {
         Vector2::new(0.5 * wide + x / scale, high - (y - self.lowest_m()) / scale)
     }
 
-    /// Where a straight line through a place crosses the plane, scene frame, m; `None` where it runs along it. The holes of a
-    /// template are drawn so.
+    /// Returns where a straight line through a place crosses the plane, scene frame, m; `None` if
+    /// it runs along it. The holes of a template are drawn so.
     pub fn crossing_m(&self, place_m: Vector3<f64>, direction: Vector3<f64>) -> Option<Vector3<f64>> {
         let (beside_m, per) = (self.in_beams(place_m).beside_m, direction.dot(&self.normal()));
         (per.abs() > 0.2).then(|| place_m - direction * (beside_m / per))
     }
 
-    /// Where that place stands in the picture.
+    /// Returns the pixel of that crossing.
     pub fn crossing(&self, place_m: Vector3<f64>, direction: Vector3<f64>) -> Option<Vector2<f64>> {
         self.crossing_m(place_m, direction)
             .map(|place_m| self.pixel_of(place_m))
     }
 
-    /// The place in the plane under a place in the picture.
+    /// Returns the place in the plane under a place in the picture.
     pub fn place_of(&self, pixel: Vector2<f64>) -> Vector3<f64> {
         let scale = self.m_per_pixel();
         let [wide, high] = self.pixels.map(f64::from);

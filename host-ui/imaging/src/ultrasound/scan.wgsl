@@ -1,4 +1,4 @@
-// From beams and depths to the picture: as a scanner draws it, black where no beam goes.
+// Scan conversion from beams and depths to the picture, black outside the beams.
 
 struct Scan {
     // Size of the picture in pixels, size of a pixel (m), height of its lower edge over the probe's axis (m).

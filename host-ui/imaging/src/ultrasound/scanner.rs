@@ -1,4 +1,4 @@
-//! The passes that compute a picture, and what they hold on the graphics card.
+//! The passes that compute a picture, and their resources on the graphics card.
 
 mod passes;
 
@@ -17,31 +17,33 @@ use stylet_surfaces::field::Field;
 /// The largest loss of a texel, dB per cm and MHz, and the largest impedance, MRayl.
 pub(super) const LARGEST_LOSS: f32 = 25.5;
 pub(super) const LARGEST_IMPEDANCE: f32 = 10.2;
-/// Decibels from black to white of an unaltered picture.
+/// Range from black to white of an unaltered picture, in decibels.
 pub(super) const RANGE_DB: f32 = 60.0;
-/// Tissue of this brightness has a mean echo of 0 dB: the gland.
+/// Brightness of tissue with a mean echo of 0 dB: the gland.
 pub(super) const ZERO_BRIGHTNESS: f32 = Tissue::SOFT.brightness;
-/// Between places so far apart the brightness of soft tissue goes in straight lines, so patches are some 4 mm across; m.
+/// Distance between points whose texture is linearly interpolated, so that patches of soft tissue
+/// are some 4 mm across; m.
 pub(super) const PATCH_M: f64 = 3e-3;
-/// Brightness of edges: where impedance steps by a share, that share times this is the amplitude over the gland's.
+/// Brightness of edges: the relative step of impedance times this is the amplitude over the
+/// gland's.
 const EDGE: f32 = 90.0;
 
-/// What the operator sets on the machine.
+/// Operator's settings of the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Gain of the whole picture, dB.
     pub gain_db: f64,
-    /// Gain with depth, dB per cm: makes up for the loss of tissue on the way to and fro.
+    /// Gain with depth, dB per cm, which compensates the two-way attenuation of tissue.
     pub tgc_db_per_cm: f64,
-    /// Decibels from black to white.
+    /// Range from black to white, in decibels.
     pub range_db: f64,
-    /// How uneven soft tissue is: standard deviation of its level from place to place, dB. Not a knob of a machine, but of what
-    /// is simulated; 0 leaves speckle alone.
+    /// Unevenness of soft tissue: standard deviation of its level from place to place, dB. This is
+    /// a property of the simulation, not of a machine; 0 leaves speckle alone.
     pub texture_db: f64,
 }
 
 impl Default for Settings {
-    /// Makes up for 0.5 dB per cm and MHz at 7 MHz, both ways.
+    /// Returns settings that compensate 0.5 dB per cm and MHz at 7 MHz, both ways.
     fn default() -> Self {
         Self {
             gain_db: 0.0,
@@ -52,12 +54,12 @@ impl Default for Settings {
     }
 }
 
-/// As `Shot` in `ultrasound.wgsl`.
+/// Same layout as `Shot` in `ultrasound.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 struct Shot([[f32; 4]; 13]);
 
-/// As `Scan` in `scan.wgsl`.
+/// Same layout as `Scan` in `scan.wgsl`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 struct Scan([[f32; 4]; 3]);
@@ -71,20 +73,20 @@ struct OnCard {
     size_m: Vector3<f64>,
 }
 
-/// Computes the pictures of a probe.
+/// Renderer of a probe's pictures.
 pub struct Scanner {
     gpu: Gpu,
     passes: Passes,
     body: Option<OnCard>,
     buffers: Option<Buffers>,
     marks: Marks,
-    /// Of the fan for which they are on the card.
+    /// Fan whose powers are on the card.
     powers: Option<(View, f64, Probe)>,
     texels: Vec<[u16; 4]>,
 }
 
 impl Scanner {
-    /// Without a body yet.
+    /// Creates a scanner without a body.
     pub fn new(gpu: Gpu) -> Self {
         Self {
             passes: Passes::new(&gpu),
@@ -97,7 +99,8 @@ impl Scanner {
         }
     }
 
-    /// Takes a body and the grid of its displacements, at rest. A body too large for the card has no picture.
+    /// Takes a body and the grid of its displacements, at rest. A body too large for the card has
+    /// no picture.
     pub fn set_body(&mut self, body: &Body, field: &Field) {
         let longest = self.gpu.device.limits().max_texture_dimension_3d;
         (self.body, self.buffers) = (None, None);
@@ -105,7 +108,7 @@ impl Scanner {
         if !fits(body.grid.dims) || !fits(field.info.dims) {
             return;
         }
-        // One cell of coupling all round: the card goes on with the outermost.
+        // One cell of coupling all round, because the card repeats the outermost.
         let dims = body.grid.dims.map(|d| d + 2);
         let mut texels = vec![texel(&body.tissues[0]); dims.iter().map(|&d| d as usize).product()];
         let [wide, high, _] = body.grid.dims.map(|d| d as usize);
@@ -133,7 +136,7 @@ impl Scanner {
         self.set_field(field);
     }
 
-    /// Takes the displacements of the tissue as it lies now.
+    /// Takes the present displacements of the tissue.
     pub fn set_field(&mut self, field: &Field) {
         let Some(body) = &mut self.body else { return };
         if field.info == body.field.info && *field != body.field {
@@ -175,14 +178,15 @@ impl Scanner {
         Some(buffers.target.create_view(&Default::default()))
     }
 
-    /// The pixels of the last picture, row by row from above; empty without one.
+    /// Returns the pixels of the last picture, row by row from the top; empty without one.
     pub fn pixels(&self) -> Vec<[u8; 4]> {
         self.buffers
             .as_ref()
             .map_or_else(Vec::new, |b| self.gpu.pixels(&b.target))
     }
 
-    /// Decibels over the mean echo of the gland, by sample and beam, before they become a picture.
+    /// Returns decibels over the mean echo of the gland, by sample and beam, before scan
+    /// conversion.
     pub fn levels_db(&self) -> Vec<f32> {
         self.buffers
             .as_ref()
@@ -191,7 +195,7 @@ impl Scanner {
 
     /// Waits until the last picture is computed.
     pub fn wait(&self) {
-        // A device that is lost is noticed by the window.
+        // The window notices a lost device.
         let _ = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
     }
 }
@@ -246,7 +250,7 @@ fn shot(plane: &Plane, settings: &Settings, grid: Grid, body: &OnCard) -> Shot {
 
 fn scan(plane: &Plane, settings: &Settings, grid: Grid) -> Scan {
     let [wide, high] = plane.pixels.map(f64::from);
-    // The gland keeps its grey whatever the range.
+    // The gland keeps its grey at any range.
     let white_db = (1.0 - f64::from(ZERO_BRIGHTNESS)) * settings.range_db;
     Scan([
         [wide, high, plane.m_per_pixel(), plane.lowest_m()].map(|c| c as f32),

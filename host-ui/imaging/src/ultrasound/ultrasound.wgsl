@@ -1,16 +1,18 @@
-// The echoes of one plane of a probe, from tissue to decibels, on a grid of beams and depths: beam l, sample k in column l, row k.
-// In this order: rest_map, echo, beam, axial, lateral. What each number means stands in plane.rs and docs/imaging.md.
+// The echoes of one plane of a probe, from tissue to decibels, on a grid of beams and depths: beam
+// l, sample k in column l, row k. Order of the passes: rest_map, echo, beam, axial, lateral.
+// plane.rs and docs/imaging.md explain each number.
 
 struct Shot {
-    // Middle of the array on the probe's axis; beside it 0 for a sector, 1 for parallel beams.
+    // Centre of the array on the probe's axis; in w, 0 for a sector, 1 for parallel beams.
     origin_m: vec4<f32>,
-    // To the right of the picture; beside it the radius of the probe (m).
+    // To the right of the picture; in w, the radius of the probe (m).
     right: vec4<f32>,
-    // Along the middle beam; beside it the depth (m).
+    // Along the middle beam; in w, the depth (m).
     up: vec4<f32>,
-    // Across the plane; beside it half the angle (rad) or half the length (m) of the fan.
+    // Across the plane; in w, half the angle (rad) or half the length (m) of the fan.
     normal: vec4<f32>,
-    // Beams, samples, slices across the plane, cells between places where the material point is sought.
+    // Beams, samples, slices across the plane, cells between points where the material point is
+    // found.
     counts: vec4<f32>,
     // Spread along the beam (m), smallest spread across it (m), spread across it per depth, loss of marks per sample.
     spread: vec4<f32>,
@@ -28,13 +30,13 @@ struct Shot {
 
 override STEPS: i32;
 override SEEN_M: f32;
-// What the largest value of a texel stands for: dB per cm and MHz, MRayl.
+// Values of a full texel: dB per cm and MHz, MRayl.
 override LARGEST_LOSS: f32;
 override LARGEST_IMPEDANCE: f32;
 // Decibels from black to white, and the brightness whose mean echo is 0 dB.
 override RANGE_DB: f32;
 override ZERO_BRIGHTNESS: f32;
-// Distance between places of which each has a texture of its own (m), and the loss below which texture fades.
+// Distance between points with independent texture (m), and the loss below which texture fades.
 override PATCH_M: f32;
 override SOFT_LOSS: f32;
 
@@ -43,17 +45,17 @@ override SOFT_LOSS: f32;
 @group(0) @binding(2) var nodes: texture_3d<f32>;
 @group(0) @binding(3) var clamped: sampler;
 @group(0) @binding(4) var<storage, read> marks: array<vec2<f32>>;
-// Of each sample: power of its sum of echoes, beyond that of its weights.
+// For each sample, the power of its sum of echoes, beyond that of its weights.
 @group(0) @binding(5) var<storage, read> powers: array<f32>;
-// What the pass before left and what this one leaves, by beam and sample. They are textures since Mesa's software driver reads
-// those eight at once, but one word of a buffer after the other.
+// Output of the previous pass and of this one, by beam and sample. They are textures because Mesa's
+// software driver reads eight of those at once, but buffers word by word.
 @group(0) @binding(6) var before: texture_2d<f32>;
 @group(0) @binding(7) var after: texture_storage_2d<rgba32float, write>;
 @group(0) @binding(8) var levels_db: texture_storage_2d<r32float, write>;
 
-// Slices reach so many spreads to both sides.
+// Slices extend this many spreads to both sides.
 const REACH: f32 = 2.0;
-// Neighbours that are computed together, as in passes.rs: they share what they read.
+// Neighbours that are computed together, as in passes.rs: they share their inputs.
 const AT_ONCE: i32 = 4;
 
 fn depth_of(sample: f32) -> f32 {
@@ -65,7 +67,7 @@ fn thickness_of(depth_m: f32) -> f32 {
     return shot.thickness.x * sqrt(1.0 + x * x);
 }
 
-// Where a beam goes, in the plane: its place at depth r from the axis is that of its start and r times its direction.
+// A beam in the plane: its point at depth r from the axis is its start plus r times its direction.
 struct Beam {
     start_m: vec3<f32>,
     along: vec3<f32>,
@@ -92,8 +94,9 @@ fn kept_at(at: vec2<u32>) -> vec4<f32> {
     return textureLoad(before, at, 0);
 }
 
-// How far what lies at a place now is from where it was at rest, at the edges of cells of the grid, at both ends of the slices: one
-// end under the other in a corner of the texture, which has more columns and rows than both.
+// Displacement of the tissue from rest, at the edges of cells of the grid, at both ends of the
+// slices: one end below the other in a corner of the texture, which has more columns and rows than
+// both.
 @compute @workgroup_size(64)
 fn rest_map(@builtin(global_invocation_id) id: vec3<u32>) {
     let cell = u32(shot.counts.w);
@@ -121,8 +124,9 @@ fn shift_m(at: vec2<u32>, x: f32) -> vec3<f32> {
     return mix(kept_at(at).xyz, kept_at(at + vec2(1u, 0u)).xyz, x);
 }
 
-// Two parts of the echo of a scatterer, from a hash of where it stands (the end of MurmurHash3), so that none is met again; evenly
-// spread, which their sums do not show. A row is a hash of its own.
+// Two parts of a scatterer's echo, from a hash of its position (the finaliser of MurmurHash3), so
+// that none repeats. They are uniformly distributed, which their sums do not show. A row has a hash
+// of its own.
 fn scatterer(row: u32, x: i32) -> vec2<f32> {
     var h = row + u32(x) * 0x9E3779B1u;
     h = (h ^ (h >> 16u)) * 0x85EBCA6Bu;
@@ -130,7 +134,8 @@ fn scatterer(row: u32, x: i32) -> vec2<f32> {
     return unpack2x16snorm(h ^ (h >> 16u));
 }
 
-// Between the scatterers of a grid, in its steps; of mean power 1 everywhere: an even spread over -1 to 1 has a variance of a third.
+// Interpolates between the scatterers of a grid, in its steps; of mean power 1 everywhere, because
+// a uniform distribution over -1 to 1 has a variance of a third.
 fn scattering(at: vec3<f32>) -> vec2<f32> {
     let low = floor(at);
     let b = at - low;
@@ -150,7 +155,8 @@ fn scattering(at: vec3<f32>) -> vec2<f32> {
     return (near * a.x + far * b.x) * sqrt(1.5) * inverseSqrt(power.x * power.y * power.z);
 }
 
-// By how much a material point is brighter than its tissue. Fluids take no sound and have no texture.
+// Returns how much a material point is brighter than its tissue. Fluids do not absorb and have no
+// texture.
 fn texture_db(rest_m: vec3<f32>, loss: f32) -> f32 {
     if (shot.gain.w == 0.0) {
         return 0.0;
@@ -159,8 +165,8 @@ fn texture_db(rest_m: vec3<f32>, loss: f32) -> f32 {
     return shot.gain.w * min(loss / SOFT_LOSS, 1.0) * sqrt(2.0) * scattering(rest_m / PATCH_M).x;
 }
 
-// What a sample of a beam sends back: two parts of its echo, loss, impedance. Its material points lie this far from it at both
-// ends of the slices.
+// Returns the echo of a sample of a beam: two parts, attenuation, impedance. Its material points
+// lie this far from it at both ends of the slices.
 fn sent_back(beam: Beam, sample: f32, before_m: vec3<f32>, behind_m: vec3<f32>) -> vec4<f32> {
     let place_m = place_of(beam, sample);
     let thick_m = thickness_of(depth_of(sample));
@@ -183,7 +189,7 @@ fn sent_back(beam: Beam, sample: f32, before_m: vec3<f32>, behind_m: vec3<f32>) 
     return vec4(sum * strength * inverseSqrt(power), tissue.y * LARGEST_LOSS, tissue.z * LARGEST_IMPEDANCE);
 }
 
-// Four samples of a beam, between the same places of the map, whose cells are a multiple of four.
+// Four samples of a beam, between the same points of the map, whose cells are a multiple of four.
 @compute @workgroup_size(64)
 fn echo(@builtin(global_invocation_id) id: vec3<u32>) {
     let lines = u32(shot.counts.x);
@@ -209,7 +215,7 @@ fn echo(@builtin(global_invocation_id) id: vec3<u32>) {
     }
 }
 
-// One beam: what is left of the sound, edges that it meets, marks of metal and their shadow.
+// One beam: remaining sound, edges, marks of metal and their shadow.
 @compute @workgroup_size(16)
 fn beam(@builtin(global_invocation_id) id: vec3<u32>) {
     let lines = u32(shot.counts.x);
@@ -240,12 +246,13 @@ struct Sums {
     whole: vec4<f32>,
 }
 
-// From a texel on along `step`, of which there are so many that way; `from_edge` is where the first of the four stands among them.
+// Sums from a texel on along `step`, with the number of texels in that direction; `from_edge` is
+// the index of the first of the four among them.
 fn sums_of_four(at: vec2<i32>, step: vec2<i32>, from_edge: i32, size: i32, spread: f32, reach: i32) -> Sums {
     var sums = Sums();
     var weight = vec4(0.0);
     for (var j = -reach; j <= reach + 3; j++) {
-        // What lies j from the first lies j - 1 from the second.
+        // An element j from the first is j - 1 from the second.
         let x = f32(j) / spread;
         weight = vec4(select(0.0, exp(-0.5 * x * x), abs(j) <= reach), weight.xyz);
         let n = from_edge + j;
@@ -261,8 +268,8 @@ fn sums_of_four(at: vec2<i32>, step: vec2<i32>, from_edge: i32, size: i32, sprea
     return sums;
 }
 
-// The pulse, over four samples of a beam. Echoes of scatterers keep their mean power, bright lines their height where they are
-// long across the beam.
+// The pulse, over four samples of a beam. Echoes of scatterers keep their mean power, bright lines
+// keep their height where they are long across the beam.
 @compute @workgroup_size(64)
 fn axial(@builtin(global_invocation_id) id: vec3<u32>) {
     let samples = i32(shot.counts.y);

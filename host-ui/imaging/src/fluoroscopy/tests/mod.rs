@@ -1,4 +1,4 @@
-//! Radiographs against ray casters of other kinds, in double precision.
+//! Radiographs against other ray casters, in double precision.
 
 use super::metal::{CORE_LENGTH_M, CORE_RADIUS_M, WALL_M, WELD_M};
 use super::*;
@@ -10,7 +10,7 @@ use stylet_shm_schema::GridInfo;
 
 const SPACING_M: f64 = 1.36e-3;
 
-/// An ellipsoid of soft tissue with two rods of bone in it and a hole of gas.
+/// Returns an ellipsoid of soft tissue with two rods of bone in it and a hole of gas.
 fn body() -> Body {
     let dims = [50_u32, 44, 56];
     let grid = GridInfo {
@@ -85,7 +85,8 @@ fn per_m(body: &Body, at: Vector3<f64>) -> f64 {
     f64::from(body.tissues[usize::from(body.cells[(z * high + y) * wide + x])].xray_per_m)
 }
 
-/// Siddon 1985: every crossing of a ray with a plane between cells, sorted; each cell by the length between two of them.
+/// Casts a ray by Siddon (1985): sorts every crossing with a plane between cells, and weights each
+/// cell by the length between two crossings.
 fn siddon(body: &Body, source: Vector3<f64>, end: Vector3<f64>) -> f64 {
     let way = end - source;
     let mut crossings = vec![0.0, 1.0];
@@ -106,7 +107,8 @@ fn siddon(body: &Body, source: Vector3<f64>, end: Vector3<f64>) -> f64 {
     sum * way.norm()
 }
 
-/// Worst and root mean square of the difference in intensity, as a share of it, over pixels with a stride.
+/// Returns the largest and the root mean square difference in intensity, as a share of it, over
+/// pixels with a stride.
 fn compare(shown: &Radiograph, arm: &CArm, loss: impl Fn(Vector3<f64>, Vector3<f64>) -> f64) -> [f64; 2] {
     let (mut worst, mut squares, mut count) = (0.0_f64, 0.0, 0.0);
     for row in (1..arm.pixels[1]).step_by(5) {
@@ -123,7 +125,7 @@ fn compare(shown: &Radiograph, arm: &CArm, loss: impl Fn(Vector3<f64>, Vector3<f
 }
 
 #[test]
-fn the_body_at_rest_is_that_of_siddon() {
+fn the_body_at_rest_matches_siddon() {
     let (body, mut scope) = (body(), fluoroscope());
     let still = field(|_| Vector3::zeros());
     for (orbital, cranial) in [(0.0, 0.0), (30.0, 0.0), (-90.0, 0.0), (20.0, -25.0)] {
@@ -139,7 +141,8 @@ fn the_body_at_rest_is_that_of_siddon() {
     }
 }
 
-/// Where the tissue that is now at a place was at rest, by Newton's method from the place before.
+/// Returns the place at rest of the tissue that is now at a place, by Newton's method from the
+/// previous place.
 fn newton(field: &Field, place: Vector3<f64>, start: Vector3<f64>) -> Vector3<f64> {
     const H_M: f64 = 1e-6;
     let mut rest = start;
@@ -160,7 +163,7 @@ fn newton(field: &Field, place: Vector3<f64>, start: Vector3<f64>) -> Vector3<f6
 }
 
 #[test]
-fn the_deformed_body_is_that_of_fine_steps() {
+fn the_deformed_body_matches_fine_steps() {
     let (body, mut scope) = (body(), fluoroscope());
     let pushed = field(|p| {
         let near = (-(p - Vector3::new(5e-3, 0.0, 0.0)).norm_squared() / (2.0 * 16e-3_f64.powi(2))).exp();
@@ -172,7 +175,7 @@ fn the_deformed_body_is_that_of_fine_steps() {
         let [worst, rms] = compare(shown, &arm, |source, end| {
             const STEP_M: f64 = 0.05e-3;
             let along = (end - source).normalize();
-            // 6 cm to both sides of the isocentre hold the body.
+            // 6 cm to both sides of the isocentre contain the body.
             let (first, last) = (0.65 - 0.06, 0.65 + 0.06);
             let count = ((last - first) / STEP_M) as usize;
             let mut rest = source + along * first;
@@ -193,9 +196,9 @@ fn the_deformed_body_is_that_of_fine_steps() {
     }
 }
 
-/// In fine steps through cylinders as they are put together: what lies in what.
+/// Compares with fine steps through nested cylinders.
 #[test]
-fn metal_is_that_of_fine_steps() {
+fn metal_matches_fine_steps() {
     let axis = Vector3::new(0.3, -0.2, 0.9).normalize();
     let metal = Metal {
         seeds: vec![Seed {
@@ -244,7 +247,7 @@ fn metal_is_that_of_fine_steps() {
             let end = middle + right * off(ray % 3) + up * off(ray / 3);
             let along = (end - arm.source_m()).normalize();
             const STEP_M: f64 = 4e-6;
-            // All of the seed and the tip of the needle; where the shaft leaves this, nothing is compared.
+            // All of the seed and the tip of the needle; beyond, nothing is compared.
             let loss: f64 = if *loss == 0.0 && n % 700 != 0 {
                 0.0
             } else {
@@ -264,9 +267,10 @@ fn metal_is_that_of_fine_steps() {
     assert!(worst < 0.01, "{worst}");
 }
 
-/// Trigonometry of the arm, written out: a place is turned into the arm's frame and seen through a pinhole.
+/// Compares with explicit trigonometry: a place is rotated into the arm's frame and projected
+/// through a pinhole.
 #[test]
-fn seeds_are_seen_where_projection_puts_them_to_a_pixel() {
+fn seeds_are_projected_to_a_pixel() {
     let (body, mut scope) = (body(), fluoroscope());
     let still = field(|_| Vector3::zeros());
     for (orbital, cranial) in [(0.0, 0.0), (40.0, 0.0), (-35.0, 20.0)] {
@@ -292,7 +296,8 @@ fn seeds_are_seen_where_projection_puts_them_to_a_pixel() {
             let found = sum / whole;
             let (a, b) = (arm.orbital, arm.cranial);
             let from = place - arm.isocentre_m;
-            // Patient: x right, y anterior, z superior. About the long axis first, then towards the head.
+            // Patient: x right, y anterior, z superior. About the long axis first, then towards the
+            // head.
             let (left, forward) = (
                 -from.x * a.cos() - from.y * a.sin(),
                 -from.x * a.sin() + from.y * a.cos(),
@@ -322,9 +327,9 @@ fn losses_are_those_of_the_tables_at_70_kev() {
     close(SILVER_PER_M, Attenuation::SILVER);
 }
 
-/// 80 kV at 1.016 m gives 49.8 uGy/mAs; at 0.5 m 0.4 mAs give 82 uGy.
+/// Checks the dose: 80 kV at 1.016 m gives 49.8 uGy/mAs; at 0.5 m 0.4 mAs give 82 uGy.
 #[test]
-fn each_pulse_counts_by_the_inverse_square_law_and_the_last_picture_is_held() {
+fn pulses_count_by_the_inverse_square_law() {
     let (body, mut scope) = (body(), fluoroscope());
     let (arm, still) = (arm(0.0, 0.0), field(|_| Vector3::zeros()));
     assert!(scope.held().is_none());
@@ -340,7 +345,8 @@ fn each_pulse_counts_by_the_inverse_square_law_and_the_last_picture_is_held() {
         scope.dose.air_kerma_gy
     );
     assert_eq!(scope.held().map(|held| held.transmission.len()), Some(128 * 128));
-    // The field is as wide as the detector, narrower by the way to it, and the product is the same at any distance.
+    // The field is as wide as the detector, scaled by the distance, and the product is equal at any
+    // distance.
     let edge_m = arm.detector_m * 0.5 / 1.0;
     assert!((scope.dose.kerma_area_gy_m2 / (expected * edge_m * edge_m) - 1.0).abs() < 1e-12);
     let far = CArm {

@@ -10,7 +10,7 @@ use stylet_surfaces::field::{SEEN_M, STEPS};
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const BETWEEN: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 const LEVELS: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
-/// Groups of the passes, and neighbours that are computed together, as the shader has them.
+/// Sizes of the passes' groups, and neighbours that are computed together, as in the shader.
 const GROUP: u32 = 64;
 const BEAM_GROUP: u32 = 16;
 const LATERAL_GROUP: [u32; 2] = [16, 4];
@@ -20,13 +20,13 @@ const ENTRIES: [&str; 5] = ["rest_map", "echo", "beam", "axial", "lateral"];
 pub struct Passes {
     layout: wgpu::BindGroupLayout,
     scan_layout: wgpu::BindGroupLayout,
-    /// In the order of [`ENTRIES`].
+    /// Pipelines in the order of [`ENTRIES`].
     compute: [wgpu::ComputePipeline; 5],
     scan: wgpu::RenderPipeline,
     sampler: wgpu::Sampler,
 }
 
-/// Of one grid and one size of picture.
+/// Buffers of one grid and one size of picture.
 pub struct Buffers {
     grid: Grid,
     pixels: [u32; 2],
@@ -36,7 +36,8 @@ pub struct Buffers {
     pub levels: wgpu::Texture,
     pub powers: wgpu::Buffer,
     pub target: wgpu::Texture,
-    /// Passes read and write by turns: the first of two textures from the second, then the second from the first.
+    /// Bindings of alternate passes: the first of two textures from the second, then the second
+    /// from the first.
     bind: [wgpu::BindGroup; 2],
     scan_bind: wgpu::BindGroup,
 }
@@ -141,7 +142,7 @@ impl Passes {
         }
     }
 
-    /// Beyond `covered`, x, y, width and height in pixels, no beam goes.
+    /// Runs the passes. No beam reaches beyond `covered`, x, y, width and height in pixels.
     pub fn run(&self, gpu: &Gpu, buffers: &Buffers, covered: [u32; 4]) {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let Grid { lines, samples, .. } = buffers.grid;
@@ -191,7 +192,7 @@ impl Passes {
     }
 }
 
-/// A texture that a pass writes.
+/// Returns a texture that a pass writes.
 fn written(format: wgpu::TextureFormat) -> wgpu::BindingType {
     wgpu::BindingType::StorageTexture {
         access: wgpu::StorageTextureAccess::WriteOnly,

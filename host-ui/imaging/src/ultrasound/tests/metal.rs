@@ -1,4 +1,4 @@
-//! Where needles and seeds are seen, how bright, and what lies behind them.
+//! Place and brightness of needles and seeds, and the region behind them.
 
 use super::{block, field, plane, scanner};
 use crate::body::{NEEDLE_RADIUS_M, SEED_RADIUS_M};
@@ -31,7 +31,7 @@ fn along(place_m: Vector3<f64>, axis: Vector3<f64>) -> Metal {
     }
 }
 
-/// Middle of the brightness within some pixels of a place.
+/// Returns the centroid of the brightness near a pixel.
 fn middle_of_light(pixels: &[[u8; 4]], plane: &Plane, about: Vector2<f64>, within: f64) -> Vector2<f64> {
     let wide = plane.pixels[0] as usize;
     let mut sum = Vector2::zeros();
@@ -48,9 +48,10 @@ fn middle_of_light(pixels: &[[u8; 4]], plane: &Plane, about: Vector2<f64>, withi
     sum / whole
 }
 
-/// A needle across each plane shows its wall, nearest to the probe, where trigonometry puts it: within a pixel.
+/// Checks a needle across each plane: it shows its wall, nearest to the probe, at the place by
+/// trigonometry within a pixel.
 #[test]
-fn a_needle_stands_where_it_is_to_a_pixel() {
+fn a_needle_is_imaged_in_place_to_a_pixel() {
     let mut scanner = water();
     let low_gain = Settings { gain_db: -20.0, ..FLAT };
     for view in View::ALL {
@@ -99,7 +100,7 @@ fn a_needle_stands_where_it_is_to_a_pixel() {
     }
 }
 
-/// From the probe's axis to a place, as the beam goes.
+/// Distance from the probe's axis along the beam.
 trait AlongBeam {
     fn with_z(&self, view: View, r_m: f64) -> Vector3<f64>;
 }
@@ -119,9 +120,9 @@ fn peak_db(scanner: &mut Scanner, plane: &Plane, metal: &Metal) -> f64 {
     f64::from(levels.iter().copied().fold(f32::MIN, f32::max))
 }
 
-/// Beside the plane the echo falls as the thickness of the beam says, until nothing is seen.
+/// Checks that the echo outside the plane falls with the beam's profile, until nothing is visible.
 #[test]
-fn a_needle_beside_the_plane_vanishes_by_the_thickness_of_the_beam() {
+fn the_echo_outside_the_plane_falls_with_the_beam() {
     let mut scanner = water();
     let plane = plane(View::Sagittal);
     let r_m = 35e-3;
@@ -142,9 +143,9 @@ fn a_needle_beside_the_plane_vanishes_by_the_thickness_of_the_beam() {
     assert!(far_db < -100.0, "{far_db}");
 }
 
-/// Behind the wall of a needle that lies along the plane it rings, each time weaker.
+/// Checks reverberations behind the wall of a needle along the plane, each weaker than the last.
 #[test]
-fn a_needle_rings_behind_its_wall() {
+fn a_needle_reverberates_behind_its_wall() {
     let mut scanner = water();
     let plane = plane(View::Sagittal);
     scanner.picture(&plane, &FLAT, &along(Vector3::new(0.0, 30e-3, 0.0), Vector3::z()));
@@ -158,7 +159,7 @@ fn a_needle_rings_behind_its_wall() {
     };
     let wall_m = 20e-3 - NEEDLE_RADIUS_M;
     let expected_db = 20.0 * RING_FALL.log10();
-    // The first ring lies in the shadow of the wall as well.
+    // The first reverberation lies in the shadow of the wall as well.
     for ring in 2..5 {
         let fall_db = at(wall_m + RING_M * f64::from(ring)) - at(wall_m + RING_M * f64::from(ring - 1));
         assert!(
@@ -170,7 +171,7 @@ fn a_needle_rings_behind_its_wall() {
     println!("between rings {between_db:.1} dB");
 }
 
-/// Mean level (dB) behind something, before it is set against what lies beside.
+/// Returns the mean level (dB) of a region, before it is compared with its neighbourhood.
 fn mean_db(levels: &[f32], grid: Grid, samples: std::ops::Range<usize>, lines: std::ops::Range<usize>) -> f64 {
     let all: Vec<f64> = samples
         .flat_map(|k| lines.clone().map(move |l| k * grid.lines as usize + l))
@@ -179,9 +180,9 @@ fn mean_db(levels: &[f32], grid: Grid, samples: std::ops::Range<usize>, lines: s
     10.0 * (all.iter().sum::<f64>() / all.len() as f64).log10()
 }
 
-/// The same speckle with and without what throws the shadow: the difference is the loss on the way to and fro.
+/// Compares the same speckle with and without an obstacle: the difference is the two-way loss.
 #[test]
-fn shadows_are_as_deep_as_the_loss_and_as_wide_as_what_throws_them() {
+fn shadows_match_the_loss_and_the_width_of_the_obstacle() {
     let mut scanner = scanner();
     let plane = plane(View::Sagittal);
     let grid = Grid::of(&plane);
@@ -224,7 +225,8 @@ fn shadows_are_as_deep_as_the_loss_and_as_wide_as_what_throws_them() {
         ..Metal::default()
     };
     let dark = levels(&mut scanner, soft, &seed);
-    // Clear of the wall and its ring, and of the ends of the seed by the spread of the beam.
+    // Clear of the wall and its reverberation, and of the ends of the seed by the spread of the
+    // beam.
     let after = ((15e-3 - SEED_RADIUS_M + 3.0 * RING_M) / plane.depth_m * f64::from(grid.samples - 1)) as usize;
     let lines = line(-10.8e-3)..line(-9.2e-3);
     let found_db = mean_db(&dark, grid, after..300, lines.clone()) - mean_db(&clear, grid, after..300, lines);
@@ -232,7 +234,7 @@ fn shadows_are_as_deep_as_the_loss_and_as_wide_as_what_throws_them() {
     assert!((found_db + 2.0 * SHADOW_DB).abs() < 0.5, "{found_db}");
 }
 
-/// The gain with depth that makes up for the loss leaves a picture as bright below as above.
+/// Checks that gain with depth that equals the loss leaves a picture as bright below as above.
 #[test]
 fn gain_with_depth_makes_up_for_the_loss() {
     let mut scanner = scanner();

@@ -1,4 +1,4 @@
-//! Pictures against closed forms and a slow calculation of the same.
+//! Pictures against closed forms and a slow computation of the same.
 
 mod metal;
 mod pose;
@@ -15,12 +15,13 @@ use stylet_surfaces::field::Field;
 
 const SPACING_M: f64 = 1e-3;
 
-/// The device on which pictures are the same everywhere.
+/// Returns the device that gives the same pictures everywhere.
 fn scanner() -> Scanner {
     Scanner::new(Gpu::headless(true).expect("Mesa's software driver"))
 }
 
-/// A block of tissues, a cell each millimetre, by a function of the place (m); the probe's axis lies in its lower part.
+/// Returns a block of tissues, a cell each millimetre, by a function of the place (m); the probe's
+/// axis lies in its lower part.
 fn block(tissue: [Tissue; 3], label: impl Fn(Vector3<f64>) -> u8) -> Body {
     let dims = [120, 100, 90];
     let grid = GridInfo {
@@ -42,7 +43,7 @@ fn block(tissue: [Tissue; 3], label: impl Fn(Vector3<f64>) -> u8) -> Body {
     Body::new(grid, cells, tissues).expect("cells of the grid")
 }
 
-/// Displacements every 8 mm over the block.
+/// Returns displacements every 8 mm over the block.
 fn field(displacement: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Field {
     let info = GridInfo {
         dims: [16, 14, 13],

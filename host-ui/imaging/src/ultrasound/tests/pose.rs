@@ -1,4 +1,4 @@
-//! Where the probe stands in a scene, and where the holes of a template are drawn.
+//! Pose of the probe in a scene, and projection of the holes of a template.
 
 use super::plane;
 use crate::ultrasound::{Plane, Pose, Probe, View};
@@ -18,7 +18,7 @@ fn a_hole_is_drawn_where_a_needle_through_it_crosses_the_plane() {
     assert_eq!(plane.crossing(hole, Vector3::x()), None, "along the plane");
 }
 
-/// A patient on his side: superior is y of the scene, anterior is x.
+/// Tests a patient on his side: superior is y of the scene, anterior is x.
 #[test]
 fn the_probe_lies_in_the_rectum_at_the_middle_of_the_target() {
     let mut scene = SceneHeader::zeroed();
@@ -46,7 +46,7 @@ fn the_probe_lies_in_the_rectum_at_the_middle_of_the_target() {
     assert!((moved.up + Vector3::z()).norm() < 1e-9, "{}", moved.up);
 }
 
-/// The convention of roll: the axis of the probe is +z of the tool, its middle beam +y.
+/// Checks the convention of roll: the axis of the probe is +z of the tool, its middle beam +y.
 #[test]
 fn a_probe_in_the_hand_looks_where_its_tool_says() {
     let probe = Probe::default();
@@ -55,7 +55,7 @@ fn a_probe_in_the_hand_looks_where_its_tool_says() {
     let (axis, up) = (Vector3::z(), Vector3::y());
     assert!((straight.axis - axis).norm() < 1e-12 && (straight.up - up).norm() < 1e-12);
     assert!((straight.middle_m - Vector3::new(1e-3, -30e-3, -2.5e-3)).norm() < 1e-12);
-    // Turned by 30 degrees from y towards -x, the patient's left in a scene that is not turned.
+    // Turned by 30 degrees from y towards -x, the patient's left in an unrotated scene.
     let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 30_f64.to_radians());
     let turned = Pose::of_tool(tip_m, &turn, &probe);
     assert!(
@@ -66,12 +66,12 @@ fn a_probe_in_the_hand_looks_where_its_tool_says() {
     let (way_m, turn_rad) = turned.way_and_turn(&straight);
     assert!(way_m.abs() < 1e-12 && (turn_rad - 30_f64.to_radians()).abs() < 1e-12);
     assert!((straight.moved(0.0, turn_rad).up - turned.up).norm() < 1e-12);
-    // Tipped by 90 degrees about x: the tip goes where -y was, and the beam along z.
+    // Tipped by 90 degrees about x: the tip points along the former -y, and the beam along z.
     let tip = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 90_f64.to_radians());
     let tipped = Pose::of_tool(tip_m, &tip, &probe);
     assert!((tipped.axis + Vector3::y()).norm() < 1e-12 && (tipped.up - Vector3::z()).norm() < 1e-12);
     assert!((tipped.middle_m - tip_m - Vector3::y() * 42.5e-3).norm() < 1e-12);
-    // A place before the middle of the array, 20 mm deep, stands in the middle of the picture.
+    // A place before the centre of the array, 20 mm deep, is in the centre of the picture.
     for pose in [straight, turned, tipped] {
         let plane = Plane {
             pose,
@@ -84,9 +84,9 @@ fn a_probe_in_the_hand_looks_where_its_tool_says() {
     }
 }
 
-/// Pixel by pixel: the rectangle that is drawn holds all of the fan, and little else.
+/// Checks pixel by pixel that the drawn rectangle contains all of the fan, and little else.
 #[test]
-fn what_the_fan_covers_is_drawn() {
+fn all_of_the_fan_is_drawn() {
     for (view, half_deg, pixels) in [
         (View::Transverse, 80.0_f64, [640, 480]),
         (View::Transverse, 80.0, [300, 500]),
@@ -122,7 +122,7 @@ fn what_the_fan_covers_is_drawn() {
 }
 
 #[test]
-fn way_and_turn_are_what_a_stepper_was_set_to() {
+fn way_and_turn_match_the_stepper() {
     let base = Pose::of_tool(
         Vector3::new(0.01, 0.02, 0.03),
         &UnitQuaternion::from_euler_angles(0.3, -0.2, 0.5),

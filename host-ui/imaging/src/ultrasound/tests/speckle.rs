@@ -1,4 +1,4 @@
-//! Statistics of speckle, and that it belongs to the tissue.
+//! Statistics of speckle, and its attachment to the tissue.
 
 use super::{block, field, plane, scanner};
 use crate::ultrasound::beams::Grid;
@@ -22,7 +22,7 @@ fn scattering() -> Scanner {
     scanner
 }
 
-/// Intensities by sample and beam.
+/// Returns intensities by sample and beam.
 fn intensities(scanner: &mut Scanner, plane: &Plane) -> Vec<Vec<f64>> {
     scanner.picture(plane, &FLAT, &Metal::default()).expect("a picture");
     let lines = Grid::of(plane).lines as usize;
@@ -37,7 +37,8 @@ pub(super) fn mean(values: impl Iterator<Item = f64>) -> f64 {
     sum / count
 }
 
-/// Correlation of what lies in the same places of two pictures, the second moved by so many samples and beams.
+/// Returns the correlation of the same places in two pictures, the second shifted by samples and
+/// beams.
 fn correlation(one: &[Vec<f64>], other: &[Vec<f64>], [down, right]: [usize; 2], samples: Range<usize>) -> f64 {
     let lines = 20..one[0].len() - 20 - right;
     let pairs: Vec<(f64, f64)> = samples
@@ -50,15 +51,14 @@ fn correlation(one: &[Vec<f64>], other: &[Vec<f64>], [down, right]: [usize; 2], 
     product / squares.sqrt()
 }
 
-/// Of places so far apart that they know nothing of each other, in planes 6.1 mm apart, which lie differently among the
-/// scatterers: mean over deviation is 1.913, and the
-/// distribution is that of Rayleigh by Kolmogorov and Smirnov.
+/// Checks independent places in planes 6.1 mm apart, which lie differently among the scatterers.
+/// Mean over deviation is 1.913, and the distribution is Rayleigh's by Kolmogorov and Smirnov.
 #[test]
 fn many_scatterers_give_rayleigh_speckle() {
     let mut scanner = scattering();
     for view in View::ALL {
-        // Samples and beams apart; how many places count as one, since the power of a plane changes by up to 15 % with where it
-        // lies among the scatterers.
+        // Separation in samples and beams. Number of places that count as one, since the power of a
+        // plane varies by up to 15 % with its position among the scatterers.
         let (apart, alike) = match view {
             View::Transverse => ([8, 14], 4.0),
             View::Sagittal => ([8, 8], 3.0),
@@ -82,7 +82,8 @@ fn many_scatterers_give_rayleigh_speckle() {
         let level = mean(amplitudes.iter().copied());
         let power = mean(amplitudes.iter().map(|a| a * a));
         let ratio = level / (power - level * level).sqrt();
-        // Standard error by the moments of the distribution: 1.36 over the root of the count of independent places.
+        // Standard error by the moments of the distribution: 1.36 over the root of the number of
+        // independent places.
         let error = 1.36 / independent.sqrt();
         amplitudes.sort_by(f64::total_cmp);
         let farthest = amplitudes
@@ -104,8 +105,8 @@ fn many_scatterers_give_rayleigh_speckle() {
     }
 }
 
-/// Correlation of places that lie apart by a share of the distance between scatterers, on straight lines between them that are
-/// made of the same power everywhere: an integral over where they lie.
+/// Returns the correlation of points separated by a share of the distance between scatterers,
+/// linearly interpolated with equal power: an integral over their position.
 pub(super) fn between_scatterers(apart: f64) -> f64 {
     let at = |place: f64, node: f64| (1.0 - (place - node).abs()).max(0.0);
     let power = |place: f64| (-1..6).map(|n| at(place, f64::from(n)).powi(2)).sum::<f64>();
@@ -117,8 +118,8 @@ pub(super) fn between_scatterers(apart: f64) -> f64 {
     both.sum::<f64>() / 200.0
 }
 
-/// Intensities are correlated as the square of amplitudes are: by the overlap of a Gaussian with itself, and by the scatterers
-/// that both places share.
+/// Checks that intensities are correlated like the square of amplitudes: by the overlap of a
+/// Gaussian with itself, and by common scatterers.
 #[test]
 fn speckle_is_as_wide_as_the_point_spread() {
     let mut scanner = scattering();
@@ -159,7 +160,8 @@ fn speckle_is_as_wide_as_the_point_spread() {
     }
 }
 
-/// Tissue that moves takes its speckle with it: by two samples towards depth, by two beams along the probe, and between beams.
+/// Checks that moving tissue takes its speckle with it: by two samples in depth, by two beams along
+/// the probe, and between beams.
 #[test]
 fn speckle_follows_the_tissue() {
     let mut scanner = scattering();
@@ -171,7 +173,7 @@ fn speckle_follows_the_tissue() {
         let rest = intensities(&mut scanner, &plane);
         scanner.set_field(&field(|_| Vector3::new(0.0, 2.0 * sample_m, 0.0)));
         let moved = intensities(&mut scanner, &plane);
-        // Of a sector only the middle beams go along y.
+        // In a sector only the middle beams run along y.
         let middle = |all: &[Vec<f64>]| -> Vec<Vec<f64>> {
             let half = if view == View::Sagittal { 96 } else { 30 };
             let lines = grid.lines as usize / 2;
@@ -194,7 +196,8 @@ fn speckle_follows_the_tissue() {
     assert!(with > 0.95, "{with}");
 }
 
-/// Scatterers that were kept in a cube, and used again, gave the same picture 32 mm to the right (correlation 1.00).
+/// Guards against scatterers from a periodic cube, which repeated the picture 32 mm to the right
+/// (correlation 1.00).
 #[test]
 fn no_grain_is_seen_again_elsewhere() {
     let mut scanner = scattering();
@@ -222,7 +225,7 @@ fn no_grain_is_seen_again_elsewhere() {
             most = most.max(alike.abs());
             println!("{} {by:?} mm: {alike:.3}", view.name());
         }
-        // Some 1,600 places that know nothing of each other: four standard errors.
+        // Some 1,600 independent places: four standard errors.
         assert!(most < 0.1, "{view:?}: {most}");
     }
 }

@@ -1,4 +1,4 @@
-//! Pictures a second, for `docs/imaging.md`.
+//! Pictures per second, for `docs/imaging.md`.
 
 use super::{block, field, plane, scanner};
 use crate::ultrasound::{Settings, View};
@@ -45,7 +45,8 @@ fn pictures_a_second() {
     }
 }
 
-/// What this process computed so far, in ms: other programs do not count, as they do for time on the wall.
+/// Returns the processor time of this process so far, in ms, independent of other programs, unlike
+/// wall-clock time.
 fn cpu_ms() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").expect("a Linux process");
     let fields: Vec<&str> = stat.rsplit(')').next().expect("fields").split_whitespace().collect();

@@ -1,4 +1,4 @@
-//! Texture of soft tissue: how much, where, and that it belongs to the tissue.
+//! Texture of soft tissue: strength, place, and attachment to the tissue.
 
 use super::speckle::{between_scatterers, mean};
 use super::{block, field, plane, scanner};
@@ -25,14 +25,15 @@ fn levels_db(scanner: &mut Scanner, plane: &Plane, texture_db: f64) -> Vec<f32> 
     scanner.levels_db()
 }
 
-/// By how much tissue is brighter than without texture: the speckle is the same in both pictures.
+/// Returns the change of brightness by texture: the speckle is the same in both pictures.
 fn brighter_db(scanner: &mut Scanner, plane: &Plane, texture_db: f64) -> Vec<f64> {
     let even = levels_db(scanner, plane, 0.0);
     let uneven = levels_db(scanner, plane, texture_db);
     uneven.iter().zip(&even).map(|(a, b)| f64::from(a - b)).collect()
 }
 
-/// Mean in boxes of a sagittal picture, whose lower corners lie so far along the probe and from it.
+/// Returns the mean in boxes of a sagittal picture, whose lower corners are given along the probe
+/// and from it.
 fn boxes_db(of_sample: &[f64], plane: &Plane, corners_m: impl Iterator<Item = [f64; 2]>) -> Vec<f64> {
     let grid = Grid::of(plane);
     let (lines, half_m) = (f64::from(grid.lines - 1), plane.probe.half_length_m);
@@ -48,7 +49,8 @@ fn boxes_db(of_sample: &[f64], plane: &Plane, corners_m: impl Iterator<Item = [f
     corners_m.map(of_box).collect()
 }
 
-/// Box beside box, clear of the edges of the picture by what tissue moves in these tests.
+/// Returns adjacent boxes, clear of the edges of the picture by the motion of the tissue in these
+/// tests.
 fn corners_m() -> impl Iterator<Item = [f64; 2]> {
     let place = |n: u32, first_m: f64| f64::from(n).mul_add(BOX_M, first_m);
     (0..17).flat_map(move |i| (0..15).map(move |j| [place(i, -27e-3), place(j, 6e-3)]))
@@ -65,7 +67,8 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
     product / (spread(a) * spread(b))
 }
 
-/// A mean over a box varies less than a place does: by the correlation of all pairs of places along each edge.
+/// Checks the spread of boxes: a mean over a box varies less than a point, by the correlation of
+/// all pairs of points along each edge.
 #[test]
 fn boxes_of_tissue_differ_by_the_stated_spread() {
     const PLACES: u32 = 60;
@@ -83,7 +86,7 @@ fn boxes_of_tissue_differ_by_the_stated_spread() {
     }
     let (found_db, middle_db) = (spread(&all), mean(all.iter().copied()));
     println!("boxes differ by {found_db:.2} dB, {expected_db:.2} by their size; mean {middle_db:.2} dB");
-    // Neighbours among some 1,500 boxes know of each other: as if there were a third of them.
+    // Neighbours among some 1,500 boxes are correlated, as if there were a third of them.
     let independent = all.len() as f64 / 3.0;
     assert!(
         (found_db / expected_db - 1.0).abs() < 3.0 / (2.0 * independent).sqrt(),
@@ -92,7 +95,7 @@ fn boxes_of_tissue_differ_by_the_stated_spread() {
     assert!(middle_db.abs() < 3.0 * expected_db / independent.sqrt(), "{middle_db}");
 }
 
-/// Out of the plane, away from the probe and along it.
+/// Moves tissue out of the plane, away from the probe and along it.
 #[test]
 fn texture_follows_the_tissue() {
     let texture_db = Settings::default().texture_db;
@@ -110,11 +113,11 @@ fn texture_follows_the_tissue() {
     assert!(with > 0.95 && without.abs() < 0.3, "{with}, in place {without}");
 }
 
-/// Urine has none, and a texture of next to nothing changes nothing else.
+/// Checks that urine has no texture, and that a negligible texture changes nothing else.
 #[test]
-fn no_texture_leaves_every_bit_of_the_picture() {
+fn zero_texture_changes_no_bit_of_the_picture() {
     let urine = Tissue::new(0.02, Tissue::COUPLING.loss_db_per_cm_mhz, 1.52);
-    // Not the gland's 0 dB, beside which the least number counts.
+    // Not the gland's 0 dB, at which the smallest number counts.
     let soft = Tissue::new(0.50, Tissue::SOFT.loss_db_per_cm_mhz, 1.63);
     for view in View::ALL {
         let plane = plane(view);

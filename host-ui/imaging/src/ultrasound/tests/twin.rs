@@ -1,4 +1,5 @@
-//! The same echoes in double precision, each from its own sum over places, with the material point by Newton's method.
+//! The same echoes in double precision, each from its own sum over places, with the material point
+//! by Newton's method.
 
 use super::{block, field, plane, scanner};
 use crate::ultrasound::beams::{Grid, powers as of_neighbours};
@@ -7,7 +8,7 @@ use crate::{Metal, Tissue};
 use nalgebra::{Matrix3, Vector2, Vector3};
 use stylet_surfaces::field::Field;
 
-/// Where the tissue that is now at a place was at rest.
+/// Returns the place at rest of the tissue that is now at a place.
 fn rest_m(field: &Field, place_m: Vector3<f64>) -> Vector3<f64> {
     const H_M: f64 = 1e-6;
     let mut rest = place_m;
@@ -115,7 +116,7 @@ impl Twin {
 }
 
 #[test]
-fn the_shader_computes_what_a_slow_sum_in_double_precision_does() {
+fn the_shader_matches_a_slow_sum_in_double_precision() {
     let mut scanner = scanner();
     let body = block([Tissue::new(Tissue::SOFT.brightness, 0.0, 1.63); 3], |_| 1);
     let field = field(|p| Vector3::new(0.05 * p.y, 2e-3 - 0.1 * p.y + 0.04 * p.z, 0.1 * p.x + 1e-3));
