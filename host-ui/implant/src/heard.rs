@@ -1,4 +1,5 @@
-//! A procedure as any host hears it, with no hand in it: what a debrief is made of where another window plans and drives.
+//! A procedure as any host receives it, without control of the hand: the basis of a debrief when
+//! another window plans and drives.
 
 use crate::pairing;
 use crate::plan::{Hole, Template};
@@ -9,45 +10,46 @@ use stylet_host::link::Link;
 use stylet_host::moments::{Moment, Moments};
 use stylet_shm_schema::{HapticState, PlanInForce, Prescribed, SceneHeader, SeedPose, TickRecord};
 
-/// Seeds that left a needle which was there before this host did so no farther from its axis, m.
+/// Largest distance, m, from a needle's axis at which a seed dropped before this host listened
+/// belongs to it.
 const OF_NEEDLE_M: f64 = 3e-3;
-/// A needle that is planned farther from a hole goes through none, m.
+/// Distance from a hole beyond which a planned needle goes through none, m.
 const BESIDE_HOLE_M: f64 = 0.5e-3;
 
-/// A plan that was in force, and the seeds in the tissue when it came.
+/// Plan that was in force, and the number of seeds in the tissue when it came.
 #[derive(Clone, Debug)]
 struct HeardNeedle {
     plan: PlanInForce,
     first_seed: usize,
 }
 
-/// One procedure, from when this host began to listen.
+/// Procedure, from when this host began to listen.
 #[derive(Clone, Debug, Default)]
 pub struct Heard {
     trace: Trace,
     moments: Moments,
     scene: Option<SceneHeader>,
     needles: Vec<HeardNeedle>,
-    /// The plan that was looked at last.
+    /// Generation of the plan that was checked last.
     generation: Option<(u64, u64)>,
     seeds: Vec<SeedPose>,
 }
 
-/// A planned seed and the one that was dropped for it, by its place among those in the tissue.
+/// Planned seed and the one that was dropped for it, by its index among those in the tissue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeardSeed {
-    /// Which needle it was planned for, counted from 0.
+    /// Needle that it was planned for, counted from 0.
     pub needle: usize,
-    /// As planned.
+    /// Planned seed.
     pub planned: Seed,
-    /// `None` while it is missing.
+    /// Index of the dropped seed; `None` while it is missing.
     pub placed: Option<usize>,
 }
 
 impl Heard {
-    /// What is new since the last call; `records` are those that the link gave.
+    /// Takes the data that arrived since the last call; `records` are those from the link.
     pub fn take(&mut self, link: &Link, records: &[TickRecord]) {
-        // What a reset begins is a procedure of its own.
+        // A reset begins a new procedure.
         if self.moments.take(link.events()) {
             self.begin_anew();
         }
@@ -78,7 +80,7 @@ impl Heard {
     }
 
     fn take_plan(&mut self, plan: Option<&PlanInForce>, state: Option<&HapticState>) {
-        // That of the board is newer than that of the last picture.
+        // The board is newer than the last picture.
         let seeds = state.map_or(self.seeds.len(), |s| s.seed_count as usize);
         if self.needles.last().is_some_and(|last| seeds < last.first_seed) {
             self.needles.clear();
@@ -88,7 +90,7 @@ impl Heard {
             return;
         };
         let generation = (plan.session_id, plan.generation);
-        // Seeds that were there before are looked at one by one.
+        // Earlier seeds are checked one by one.
         if self.generation == Some(generation) || self.needles.is_empty() && self.seeds.len() != seeds {
             return;
         }
@@ -101,7 +103,7 @@ impl Heard {
             (None, _) => seeds,
         };
         self.generation = Some(generation);
-        // A needle that is planned again, or one by hand, is in place of what was heard of it.
+        // A needle that is planned again, or one by hand, replaces the received one.
         let goes_on = |of: &Prescribed| number > of.needle && of.needle > 0;
         self.needles.retain(|heard| goes_on(&heard.plan.prescribed));
         self.needles.push(HeardNeedle {
@@ -110,33 +112,33 @@ impl Heard {
         });
     }
 
-    /// Force and speed, and how the hand moved.
+    /// Returns force and speed, and the motion of the hand.
     pub fn trace(&self) -> &Trace {
         &self.trace
     }
 
-    /// What was marked, put in or went wrong in this run of the core.
+    /// Returns the marks, exercises and faults of this run of the core.
     pub fn moments(&self) -> &Moments {
         &self.moments
     }
 
-    /// Those of this procedure.
+    /// Returns the moments of this procedure.
     pub fn own_moments(&self) -> Vec<Moment> {
         self.moments.since(self.trace.began_ns().unwrap_or(u64::MAX))
     }
 
-    /// What the seeds of the newest plan are.
+    /// Returns the prescription of the newest plan.
     pub fn prescribed(&self) -> Option<Prescribed> {
         self.needles.last().map(|heard| heard.plan.prescribed)
     }
 
-    /// Seeds in the tissue of which nobody here knows what they were planned for.
+    /// Returns the number of seeds in the tissue whose plan is unknown here.
     pub fn seeds_before(&self) -> usize {
         self.needles.first().map_or(self.seeds.len(), |heard| heard.first_seed)
     }
 
-    /// Every seed that was planned in the needles that were heard of; `strength_u` is that of seeds by hand, and of those whose plan
-    /// names none.
+    /// Returns every planned seed of the received needles; `strength_u` is that of seeds by hand,
+    /// and of plans without a strength.
     pub fn planned(&self, strength_u: f64) -> Vec<HeardSeed> {
         let of_needle = |(number, heard): (usize, &HeardNeedle)| {
             let (plan, count) = (&heard.plan, self.seeds.len());
@@ -171,7 +173,8 @@ impl Heard {
         self.needles.iter().enumerate().flat_map(of_needle).collect()
     }
 
-    /// What a score is made of: the seeds in the tissue, each beside its planned one, and those that are missing.
+    /// Returns the input of a score: the seeds in the tissue, each with its planned one, and the
+    /// missing ones.
     pub fn pairs(&self, strength_u: f64) -> (Vec<SeedPair>, Vec<Seed>) {
         let template = self.scene.as_ref().map(Template::before);
         let hole = |planned_m, direction| template.and_then(|t| hole_of(&t, planned_m, direction));
@@ -197,14 +200,15 @@ impl Heard {
         (pairs, lost)
     }
 
-    /// Every planned seed lies in the tissue, of the last needle of the plan as well.
+    /// Returns whether every planned seed lies in the tissue, including those of the plan's last
+    /// needle.
     pub fn is_whole(&self) -> bool {
         let is_last = |of: Prescribed| of.needle == of.last_needle;
         self.prescribed().is_some_and(is_last) && self.planned(0.0).iter().all(|seed| seed.placed.is_some())
     }
 }
 
-/// The hole of the usual template that a needle along this line came through; `None` for one beside its holes.
+/// Returns the hole of the usual template on this line; `None` for a needle through no hole.
 fn hole_of(template: &Template, place_m: [f64; 3], direction: [f64; 3]) -> Option<Hole> {
     let hole = template.nearest(place_m)?;
     let (off, direction) = (
@@ -214,7 +218,7 @@ fn hole_of(template: &Template, place_m: [f64; 3], direction: [f64; 3]) -> Optio
     ((off - direction * off.dot(&direction)).norm() < BESIDE_HOLE_M).then_some(hole)
 }
 
-/// How many of the last seeds left a needle on the axis of the plan.
+/// Returns how many of the last seeds left a needle on the axis of the plan.
 fn own_seeds(plan: &PlanInForce, seeds: &[SeedPose]) -> usize {
     let (entry, direction) = (Vector3::from(plan.entry_m), Vector3::from(plan.direction));
     let is_near = |seed: &&SeedPose| {

@@ -1,4 +1,4 @@
-//! The implant: its plan, the procedure that carries it out, compensation by rehearsal, and its score.
+//! The implant: its plan, the procedure that executes it, compensation by rehearsal, and its score.
 
 #![warn(missing_docs)]
 

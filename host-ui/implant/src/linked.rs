@@ -14,22 +14,22 @@ use stylet_files::{ContentError, FileError};
 
 /// Names of the files.
 const NAMES: [&str; 3] = ["structure_set.dcm", "plan.dcm", "dose.dcm"];
-/// A histogram ends at so many prescriptions, far above every limit.
+/// End of a histogram, in prescriptions, far above every limit.
 const MOST_PRESCRIPTIONS: f64 = 10.0;
-/// Bins of a histogram: its numbers have to fit into 64 KiB.
+/// Most bins of a histogram: its numbers must fit into 64 KiB.
 const MOST_BINS: f64 = 2000.0;
 
-/// What a study is made of. Patient frame (RAS, m).
+/// Content of a study. Patient frame (RAS, m).
 pub struct LinkedStudy<'a> {
     /// Patient, study and frame of reference of all three.
     pub identity: Identity,
-    /// The images that the structures are drawn on; none if there are none.
+    /// Images under the structures; may be empty.
     pub images: Vec<Slice>,
-    /// The structures, numbered from 1 in their order.
+    /// Structures, numbered from 1 in their order.
     pub structures: Vec<Outlined>,
-    /// Number of the structure that the prescription is for.
+    /// Number of the structure of the prescription.
     pub target: Option<usize>,
-    /// The seeds; which study and structure set they belong to is written anew.
+    /// Seeds; their study and structure set are replaced on writing.
     pub plan: SeedPlan,
     /// Dose of the seeds.
     pub dose: &'a DoseGrid,
@@ -39,9 +39,9 @@ pub struct LinkedStudy<'a> {
     pub prescription_gy: f64,
 }
 
-/// UIDs of what was written, and where it is.
+/// UIDs and paths of the written files.
 pub struct WrittenStudy {
-    /// Structure set, plan, dose.
+    /// Paths: structure set, plan, dose.
     pub files: [PathBuf; 3],
     /// SOP instance UIDs, in the same order.
     pub uids: [String; 3],
@@ -98,7 +98,7 @@ pub fn write(folder: &Path, study: LinkedStudy) -> Result<WrittenStudy, FileErro
     Ok(WrittenStudy { files, uids })
 }
 
-/// In whole gray, or coarser where there would be too many bins.
+/// Returns a histogram in whole gray, or coarser if there would be too many bins.
 fn histogram(structure: usize, dvh: &Dvh, prescription_gy: f64) -> Histogram {
     let most_gy = dvh.highest_gy().min(MOST_PRESCRIPTIONS * prescription_gy);
     let bin_gy = (most_gy / MOST_BINS).ceil().max(1.0);

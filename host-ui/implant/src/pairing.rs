@@ -1,20 +1,20 @@
-//! Which seed in the tissue belongs to which planned seed, and how far it rests from it.
+//! Pairs of placed and planned seeds, and the error of each.
 
 use nalgebra::Vector3;
 
-/// From a planned seed to the seed placed for it, m.
+/// Offset from a planned seed to the seed placed for it, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeedOffset {
-    /// From the planned place to where the seed rests, scene frame.
+    /// Vector from the planned place to the place at rest, scene frame.
     pub vector_m: Vector3<f64>,
-    /// Along the needle; positive: deeper than planned.
+    /// Component along the needle; positive: deeper than planned.
     pub along_m: f64,
-    /// Across the needle.
+    /// Component across the needle.
     pub across_m: f64,
 }
 
 impl SeedOffset {
-    /// `direction`: unit vector of the needle, into the body.
+    /// Computes the offset. `direction` is the unit vector of the needle, into the body.
     pub fn of(planned_m: [f64; 3], placed_m: [f64; 3], direction: [f64; 3]) -> Self {
         let (vector_m, direction) = (
             Vector3::from(placed_m) - Vector3::from(planned_m),
@@ -28,14 +28,14 @@ impl SeedOffset {
         }
     }
 
-    /// Distance from plan, m.
+    /// Returns the distance from plan, m.
     pub fn distance_m(&self) -> f64 {
         self.vector_m.norm()
     }
 }
 
-/// For each of `planned` seeds, in the order of the drops, the place of its seed among `placed`; `lost` are the numbers of drops
-/// that left none.
+/// Returns, for each of `planned` seeds in the order of the drops, the index of its seed among
+/// `placed`; `lost` are the numbers of drops that left none.
 pub fn in_order(planned: usize, lost: &[usize], placed: usize) -> Vec<Option<usize>> {
     let mut next = 0..placed;
     (0..planned)
@@ -43,8 +43,8 @@ pub fn in_order(planned: usize, lost: &[usize], placed: usize) -> Vec<Option<usi
         .collect()
 }
 
-/// The same where the order of the drops is not known. A seed belongs to the nearest planned one from where it was *dropped*,
-/// nearest pairs first: where it drifted later must not change whom it was meant for.
+/// Returns the same if the order of the drops is unknown. A seed belongs to the nearest planned one
+/// from where it was *dropped*, nearest pairs first: a later drift must not change its pair.
 pub fn nearest(planned_m: &[[f64; 3]], dropped_at_m: &[[f64; 3]]) -> Vec<Option<usize>> {
     let mut pairs: Vec<(f64, usize, usize)> = Vec::with_capacity(planned_m.len() * dropped_at_m.len());
     for (i, target_m) in planned_m.iter().enumerate() {
@@ -65,11 +65,11 @@ pub fn nearest(planned_m: &[[f64; 3]], dropped_at_m: &[[f64; 3]]) -> Vec<Option<
     placed
 }
 
-/// A seed that left the tip farther than this from a planned drop was dropped for something else, m. A tip that is held back
-/// counts as arrived within 2 mm.
+/// Distance from a planned drop within which a seed that left the tip belongs to it, m. A tip that
+/// is held back counts as arrived within 2 mm.
 const DROPPED_WITHIN_M: f64 = 2.5e-3;
 
-/// Which of the planned drops were made, by where the tip was when seeds left it: for each drop, whether there is a seed of it.
+/// Returns which of the planned drops were made, by the place of the tip when seeds left it.
 pub fn made(drops_m: &[[f64; 3]], dropped_at_m: &[[f64; 3]]) -> Vec<bool> {
     let seeds = nearest(drops_m, dropped_at_m);
     let is_near = |(drop_m, seed): (&[f64; 3], &Option<usize>)| {
@@ -95,9 +95,9 @@ mod tests {
         assert!((off.along_m - 0.001).abs() < 1e-12 && (off.across_m - 0.003).abs() < 1e-12);
     }
 
-    /// After a seed dropped by hand elsewhere, counting seeds would leave a planned one out.
+    /// Guards against counting seeds: one dropped by hand elsewhere would leave a planned one out.
     #[test]
-    fn drops_are_known_by_their_places_and_a_seed_elsewhere_is_of_none() {
+    fn drops_are_identified_by_their_places() {
         let at = |z: f64| [0.0, 0.0, z];
         let planned = [at(0.05), at(0.04), at(0.03)];
         let dropped = [at(0.0505), [0.02, 0.0, 0.04], at(0.031)];

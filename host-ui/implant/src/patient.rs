@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 use stylet_shm_schema::SceneHeader;
 
-/// An axis of the patient (0 right, 2 superior) in the scene; `otherwise` when the transform is not one.
+/// Returns an axis of the patient (0 right, 2 superior) in the scene; `otherwise` if the transform
+/// is not a rotation.
 pub fn patient_axis(scene: &SceneHeader, axis: usize, otherwise: Vector3<f64>) -> Vector3<f64> {
     let mut in_patient = [0.0; 3];
     in_patient[axis] = 1.0;

@@ -4,7 +4,7 @@ mod child;
 mod debrief;
 mod error;
 mod gland;
-/// What a procedure does: its needles, planned and dropped.
+/// Content of a procedure: its needles, planned and dropped.
 pub mod job;
 mod parameters;
 mod report;
@@ -28,37 +28,37 @@ use stylet_host::core_args::{CoreArgs, SceneChoice};
 use stylet_host::link::{Link, LinkStatus, SceneModel};
 use stylet_shm_schema::*;
 
-/// Nobody watches: what has not arrived by then does not.
+/// Patience of a run that nobody watches: anything late by more will not come.
 const UNWATCHED: Patience = Patience::AtLeast(60.0);
 const POLL_EVERY: Duration = Duration::from_millis(5);
 const FIND_LIMIT: Duration = Duration::from_secs(3);
 const START_LIMIT: Duration = Duration::from_secs(20);
 const LOAD_LIMIT: Duration = Duration::from_secs(60);
 
-/// Which core, and which scene in it.
+/// Choice of a core, and of its scene.
 pub struct Connect {
-    /// Which core and which scene.
+    /// Core and scene requested by the user.
     pub asked: CoreArgs,
-    /// To be started when none is running.
+    /// Program to start if no core is running.
     pub core: Option<PathBuf>,
 }
 
-/// A core that answers, with the scene that was asked for.
+/// Core that answers, with the requested scene.
 pub struct Live {
     /// The link to the core.
     pub link: Link,
-    /// The core that was started for this; ends with it.
+    /// Core that was started here; ends with this value.
     core: Option<Core>,
-    /// The scene that runs.
+    /// Running scene.
     pub scene: Arc<SceneModel>,
-    /// What the scene file says beside the scene.
+    /// Content of the scene file beyond the scene.
     said: Option<SceneFile>,
     /// Set when the user ends the program.
     pub interrupted: Interrupt,
 }
 
 impl Live {
-    /// Finds or starts the core and loads the scene; an error where one of them fails.
+    /// Finds or starts the core and loads the scene; returns an error if that fails.
     pub fn connect(options: &Connect) -> Result<Self, ProcedureError> {
         let asked = &options.asked;
         let volume = asked
@@ -100,31 +100,31 @@ impl Live {
     }
 }
 
-/// What a headless procedure does.
+/// Options of a headless procedure.
 pub struct Options {
-    /// Which core and which scene.
+    /// Core and scene.
     pub connect: Connect,
-    /// Folder of the results; otherwise one named for the time.
+    /// Folder of the results; otherwise one named after the time.
     pub out: Option<PathBuf>,
-    /// Otherwise as the scene file says, or as usual.
+    /// Speed of insertion; otherwise that of the scene file, or the usual one.
     pub insert_m_per_s: Option<f64>,
-    /// Seeds of the suggested needle, where there is no plan.
+    /// Number of seeds of the suggested needle, without a plan.
     pub seeds: usize,
-    /// Many needles, from a file; else one through the middle.
+    /// File with many needles; otherwise one needle through the middle.
     pub plan: Option<PathBuf>,
-    /// Rehearse each needle first, and move its drops.
+    /// True to rehearse each needle first and shift its drops.
     pub compensate: bool,
-    /// So many needles go in first and stay until the others have left their seeds.
+    /// Number of needles that go in first and stay until the others have left their seeds.
     pub stabilise: usize,
-    /// For the score; else the one that the plan names.
+    /// Source for the score; otherwise the one that the plan names.
     pub source: Option<PathBuf>,
-    /// Turn the force on although a fault stands.
+    /// True to turn the force on although a fault stands.
     pub rearm: bool,
-    /// Set before anything else; they stay in force.
+    /// Parameters set before anything else; they stay in force.
     pub parameters: Vec<ParameterChange>,
 }
 
-/// What was seen while the script ran.
+/// Observations while the script ran.
 struct Seen {
     motion: TargetMotion,
     records: Vec<TickRecord>,
@@ -134,11 +134,11 @@ struct Seen {
     events: Vec<Event>,
     /// Numbers of planned drops that left no seed.
     lost: Vec<usize>,
-    /// Needles that stayed in, as many as there were at once.
+    /// Needles that stayed in, the most at any time.
     left: Vec<LeftNeedlePose>,
 }
 
-/// An error when not every step was completed.
+/// Runs the procedure; returns an error if a step was not completed.
 pub fn run(options: Options) -> Result<(), ProcedureError> {
     if let Some(out) = &options.out {
         new_folder(out).map_err(|e| ProcedureError::Input(e.to_string()))?;
@@ -202,7 +202,7 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
     let run = if options.rearm { run.rearming() } else { run };
     let outcome = perform(&mut link, &job, run, &interrupted, &mut seen);
     if outcome.is_err() {
-        // Nobody holds the device any more: the motion stops, and the force goes off.
+        // Nobody holds the device any more: the motion stops, and the force turns off.
         let _asked = [Request::StopHand, Request::Disengage].map(|request| link.send(&request));
     }
     let out = options
@@ -307,7 +307,7 @@ fn perform(
     interrupted: &Interrupt,
     seen: &mut Seen,
 ) -> Result<(), ProcedureError> {
-    // A terminal that is closed or stopped holds up no needle.
+    // A terminal that is closed or stopped must not delay a needle.
     let lines = Lines::to_stdout();
     let begun = Instant::now();
     let mut step: Option<(usize, Option<usize>, Step)> = None;

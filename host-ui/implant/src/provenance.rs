@@ -1,4 +1,4 @@
-//! What a result was made from: each input with its SHA-256, the program with its version, and when.
+//! Provenance of a result: each input with its SHA-256, the program with its version, and the time.
 
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use stylet_base::format::utc_now;
 use stylet_base::input;
 
-/// Read at a time.
+/// Number of bytes read at a time.
 const PART_BYTES: usize = 1 << 16;
 
-/// An input that could not be read again for its digest.
+/// Error of an input that could not be read again for its digest.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: its digest cannot be computed ({why}); was it moved?", .path.display())]
 pub struct DigestError {
@@ -20,7 +20,8 @@ pub struct DigestError {
     pub why: Error,
 }
 
-/// As [`made`] where inputs are not files: each by its name, with size and SHA-256 of what it holds.
+/// Like [`made`], for inputs that are not files: each by its name, with size and SHA-256 of its
+/// content.
 pub fn made_of(inputs: &[(&str, &[u8])]) -> Value {
     let input = |(name, content): &(&str, &[u8])| json!({ "input": name, "bytes": content.len(), "sha256": hexadecimal(&Sha256::digest(content)) });
     json!({
@@ -35,7 +36,8 @@ fn hexadecimal(digest: &[u8]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Program, version, time, and each of the `inputs` by the option that named it, with size and SHA-256.
+/// Returns program, version, time, and each of the `inputs` by the option that named it, with size
+/// and SHA-256.
 pub fn made(inputs: &[(&str, &Path)]) -> Result<Value, DigestError> {
     let inputs: Result<Vec<Value>, DigestError> = inputs
         .iter()
@@ -52,8 +54,8 @@ pub fn made(inputs: &[(&str, &Path)]) -> Result<Value, DigestError> {
     }))
 }
 
-/// Digest in hexadecimal digits, and size in bytes; of a folder that of the list of its files as `sha256sum` prints it, sorted by
-/// their names.
+/// Returns the digest in hexadecimal digits, and the size in bytes. For a folder it is that of the
+/// list of its files as `sha256sum` prints it, sorted by name.
 fn sha256(path: &Path) -> Result<(String, u64), DigestError> {
     let failed = |why| DigestError {
         path: path.to_owned(),
@@ -91,7 +93,7 @@ fn sha256(path: &Path) -> Result<(String, u64), DigestError> {
 mod tests {
     use super::*;
 
-    /// A result said nothing of the files that it was made from.
+    /// Guards against a result without its input files.
     #[test]
     fn an_input_is_named_with_its_digest() {
         let folder = tempfile::tempdir().unwrap();
@@ -110,7 +112,7 @@ mod tests {
         );
         assert!(made["version"].is_string() && made["made_at"].is_string());
         assert!(super::made(&[("--seeds", &folder.path().join("none"))]).is_err());
-        // A folder by its list, as sha256sum would have it.
+        // A folder by its list, as sha256sum prints it.
         std::fs::write(folder.path().join("empty"), "").unwrap();
         let made = super::made(&[("--images", folder.path())]).unwrap();
         let list = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad  abc\n\

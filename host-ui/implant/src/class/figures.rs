@@ -1,23 +1,24 @@
-//! Means with intervals where there are enough values, and a trend where there is one.
+//! Means with intervals for enough values, and a trend for enough sessions.
 
-/// Fewer values have no interval.
+/// Fewest values with an interval.
 const LEAST_FOR_INTERVAL: usize = 3;
-/// Fewer sessions have no trend.
+/// Fewest sessions with a trend.
 const LEAST_FOR_TREND: usize = 5;
 
 /// Mean of some values, with its 95 % interval (Student's t) from three values on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Summary {
-    /// How many values.
+    /// Number of values.
     pub count: usize,
     /// Their mean.
     pub mean: f64,
-    /// Where the mean of many more would be, with a probability of 95 %, were they normal and independent.
+    /// Range that contains the mean of many more with a probability of 95 %, if they are normal and
+    /// independent.
     pub interval: Option<[f64; 2]>,
 }
 
 impl Summary {
-    /// `None` without a value.
+    /// Summarises values; `None` without any.
     pub fn of(values: &[f64]) -> Option<Self> {
         let count = values.len();
         if count == 0 {
@@ -39,14 +40,15 @@ impl Summary {
 pub struct Trend {
     /// Value of the line at the first session.
     pub first: f64,
-    /// Of each session more.
+    /// Change per session.
     pub slope: f64,
-    /// Of the slope.
+    /// Interval of the slope.
     pub interval: [f64; 2],
 }
 
 impl Trend {
-    /// Over values of sessions that follow each other; `None` for fewer than five, and where the interval holds no change at all.
+    /// Fits values of successive sessions; `None` for fewer than five, and if the interval contains
+    /// zero.
     pub fn of(values: &[f64]) -> Option<Self> {
         let n = values.len();
         if n < LEAST_FOR_TREND {
@@ -77,7 +79,8 @@ impl Trend {
     }
 }
 
-/// Two-sided 95 % quantile of Student's t: exact to the third decimal up to 10, then a series that is as near.
+/// Returns the two-sided 95 % quantile of Student's t: exact to the third decimal up to 10, then an
+/// equally accurate series.
 fn t_95(freedom: usize) -> f64 {
     const TABLE: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
     match TABLE.get(freedom.saturating_sub(1)) {
@@ -124,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trend_is_shown_only_where_its_interval_leaves_out_none() {
+    fn a_trend_is_shown_only_if_significant() {
         assert_eq!(Trend::of(&[5.0, 4.0, 3.0, 2.0]), None, "too few");
         assert_eq!(Trend::of(&[3.0, 2.0, 3.1, 1.9, 3.0, 2.2]), None, "noise");
         let falls = Trend::of(&[5.0, 4.1, 3.0, 1.9, 1.0]).expect("falls");

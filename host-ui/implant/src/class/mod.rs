@@ -11,20 +11,20 @@ pub use page::page;
 pub use read::{Class, ClassError, folder_of, is_name};
 pub use table::write as write_table;
 
-/// One procedure of one trainee.
+/// Procedure of a trainee.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Attempt {
     /// Name of the trainee's folder.
     pub trainee: String,
     /// Name of the procedure's folder, which begins with its date.
     pub session: String,
-    /// Heading of the debrief: its scene, for one.
+    /// Heading of the debrief, such as its scene.
     pub title: String,
     /// Mean distance of the seeds from plan, mm.
     pub mean_error_mm: f64,
-    /// The largest, mm.
+    /// Largest distance of a seed from plan, mm.
     pub worst_error_mm: f64,
-    /// Seeds that were planned, and those that were lost.
+    /// Number of planned seeds, and of lost ones.
     pub seeds: [u64; 2],
     /// D90 of the target over the prescription, %.
     pub d90_percent: Option<f64>,
@@ -34,29 +34,29 @@ pub struct Attempt {
     pub duration_s: f64,
     /// Largest force on the hand, N.
     pub peak_force_n: f64,
-    /// Times that an instructor stopped the hand.
+    /// Number of times that an instructor stopped the hand.
     pub stops: u64,
-    /// Faults that took the force off.
+    /// Number of faults that turned the force off.
     pub faults: u64,
-    /// Faults that an instructor put in.
+    /// Number of faults that an instructor injected.
     pub exercises: u64,
 }
 
-/// One figure of an attempt, as page and table show it.
+/// Figure of an attempt, as page and table show it.
 pub struct Figure {
-    /// For people.
+    /// Display name.
     pub name: &'static str,
-    /// Of the table's column.
+    /// Name of the table's column.
     pub column: &'static str,
-    /// It counts what seldom happens: an interval of Student's t would be wrong.
+    /// True for a count of rare events, for which an interval of Student's t would be wrong.
     pub is_count: bool,
-    /// Decimals that are shown.
+    /// Number of decimals shown.
     pub decimals: usize,
-    /// Of an attempt, where it has one.
+    /// Value of an attempt, if it has one.
     pub of: fn(&Attempt) -> Option<f64>,
 }
 
-/// In the order of the columns.
+/// Figures in the order of the columns.
 pub const FIGURES: [Figure; 9] = [
     Figure {
         name: "mean seed error (mm)",

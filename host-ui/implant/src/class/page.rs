@@ -1,4 +1,4 @@
-//! The page of a class, which stands by itself.
+//! The page of a class, self-contained.
 
 use super::{Attempt, Class, FIGURES, Figure, Summary, Trend, picture};
 use crate::score::STYLE;
@@ -17,7 +17,7 @@ th,td{padding:5px 6px}
 @media(max-width:720px){.curves{grid-template-columns:1fr}}
 ";
 
-/// As HTML.
+/// Returns the page as HTML.
 pub fn page(class: &Class) -> String {
     let trainees = class.trainees();
     let page = html! {
@@ -33,10 +33,10 @@ pub fn page(class: &Class) -> String {
                 main {
                     h1 { "Class" }
                     p { (counted(trainees.len(), "trainee")) ", " (counted(class.attempts.len(), "procedure")) }
-                    h2 { "Trainees beside each other" }
+                    h2 { "Comparison of trainees" }
                     p {
                         "Mean of all procedures of each trainee. Below it where the mean of many more would be with a probability of "
-                        "95 % (Student's t), from three procedures on; fewer have no interval, nor have counts of what seldom happens. Scenes, plans and exercises may differ "
+                        "95 % (Student's t), from three procedures on; fewer have no interval, and neither do counts of rare events. Scenes, plans and exercises may differ "
                         "between procedures: compare trainees who had the same."
                     }
                     (compared(&trainees))
@@ -58,7 +58,7 @@ pub fn page(class: &Class) -> String {
                     footer {
                         p {
                             "Made by a simulator for research and training. Not a medical device, and no examination: how a "
-                            "trainee does here says nothing certain of how a trainee does with patients."
+                            "trainee does here does not predict performance with patients."
                         }
                     }
                 }
@@ -97,7 +97,7 @@ fn compared(trainees: &[(&str, &[Attempt])]) -> Markup {
 }
 
 fn summary(figure: &Figure, own: &[Attempt]) -> Markup {
-    // The mean of counts is seldom one.
+    // The mean of counts is rarely an integer.
     let decimals = |v: f64| {
         if figure.is_count && v.fract() != 0.0 {
             1
@@ -137,7 +137,7 @@ fn learning(class: &Class, name: &str, own: &[Attempt]) -> Markup {
     }
 }
 
-/// The next round number, for the scale.
+/// Returns the next round number, for the scale.
 fn upwards(most: f64) -> f64 {
     let step = 10_f64.powf(most.max(1e-3).log10().floor()) / 2.0;
     ((most / step).ceil() * step).max(step)
@@ -153,11 +153,11 @@ fn in_words(figure: &Figure, trend: Option<&Trend>, count: usize) -> String {
             signed(t.interval[1])
         ),
         None if count < 5 => format!("{}: too few for a trend", counted(count, "session")),
-        None => "no trend: its interval holds no change at all".to_owned(),
+        None => "no trend: its interval includes zero".to_owned(),
     }
 }
 
-/// Names of folders that are no times are names that somebody gave.
+/// Formats the session: its local time, or the folder's name if that is not a time.
 fn when(attempt: &Attempt) -> String {
     format::local_time(&attempt.session).unwrap_or_else(|| attempt.session.clone())
 }

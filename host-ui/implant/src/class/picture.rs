@@ -5,10 +5,10 @@ use maud::{Markup, html};
 use stylet_base::format;
 
 const SIZE: [f64; 2] = [360.0, 190.0];
-/// Left, right, above, below.
+/// Margins: left, right, above, below.
 const EDGES: [f64; 4] = [46.0, 12.0, 12.0, 30.0];
 
-/// Session by session; the scale is that of all trainees.
+/// Draws values session by session; all trainees share the scale.
 pub fn curve(values: &[Option<f64>], most: f64, sessions: usize, decimals: usize, trend: Option<&Trend>) -> Markup {
     let [width, height] = SIZE;
     let [left, right, above, below] = EDGES;

@@ -1,4 +1,4 @@
-//! The folders of a class: one for each trainee, in it one for each procedure with its `score.json`.
+//! The folders of a class: one for each trainee, with one for each procedure and its `score.json`.
 
 use super::Attempt;
 use serde_json::Value;
@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use stylet_base::format;
 use stylet_host::moments::{MomentKind, STOPPED};
 
-/// A score is no larger.
+/// Largest size of a score.
 const MOST_BYTES: u64 = 16 << 20;
 const LONGEST_NAME: usize = 60;
 
-/// The folders cannot be read, or hold nothing.
+/// Error of folders that cannot be read, or are empty.
 #[derive(Debug, thiserror::Error)]
 pub enum ClassError {
     /// A folder that cannot be listed.
@@ -18,7 +18,7 @@ pub enum ClassError {
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// As the system has it.
+        /// Message of the system.
         why: std::io::Error,
     },
     /// No debrief in any of them.
@@ -26,18 +26,18 @@ pub enum ClassError {
     Empty(String),
 }
 
-/// Everything that was read.
+/// Result of reading class folders.
 #[derive(Debug, Default)]
 pub struct Class {
-    /// By trainee, then in the order of the sessions.
+    /// Attempts by trainee, then in the order of the sessions.
     pub attempts: Vec<Attempt>,
-    /// Files that were left out, and why.
+    /// Files that were left out, with reasons.
     pub left_out: Vec<String>,
     /// Files that were read.
     pub files: Vec<PathBuf>,
 }
 
-/// A name that is a folder of its own in a class's: not empty, not hidden, no path.
+/// Returns whether a name is valid for a folder inside a class: not empty, not hidden, no path.
 pub fn is_name(name: &str) -> bool {
     let is_plain = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_' | '.');
     !name.is_empty()
@@ -47,13 +47,13 @@ pub fn is_name(name: &str) -> bool {
         && name.chars().all(is_plain)
 }
 
-/// Folder of a debrief that is written now.
+/// Returns the folder for a debrief that is written now.
 pub fn folder_of(class: &Path, name: &str) -> PathBuf {
     class.join(name).join(format::utc_now())
 }
 
 impl Class {
-    /// Of each class folder. A file that is no debrief is left out with a note.
+    /// Reads class folders. Leaves out a file that is not a debrief, with a note.
     pub fn read(folders: &[PathBuf]) -> Result<Self, ClassError> {
         let mut class = Self::default();
         for folder in folders {
@@ -93,7 +93,7 @@ impl Class {
         }
     }
 
-    /// Names of the trainees, each with what they did, in the order of the sessions.
+    /// Returns the names of the trainees with their attempts, in the order of the sessions.
     pub fn trainees(&self) -> Vec<(&str, &[Attempt])> {
         let each = self.attempts.chunk_by(|a, b| a.trainee == b.trainee);
         each.map(|own| (own[0].trainee.as_str(), own)).collect()
@@ -116,7 +116,7 @@ fn folders_in(folder: &Path) -> Result<Vec<PathBuf>, ClassError> {
     Ok(all)
 }
 
-/// As `score::to_json` writes it; those of an older version have no moments.
+/// Reads the output of `score::to_json`; older versions have no moments.
 fn attempt(score: &Value) -> Option<Attempt> {
     let number = |value: &Value| value.as_f64().filter(|v| v.is_finite());
     let delivered = &score["delivered"];

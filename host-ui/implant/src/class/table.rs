@@ -3,10 +3,11 @@
 use super::{Class, FIGURES};
 use stylet_base::format::cell;
 
-/// CSV with a head.
+/// Writes CSV with a header.
 ///
 /// # Errors
-/// Where nothing more can be written.
+///
+/// If writing fails.
 pub fn write(class: &Class, to: impl std::io::Write) -> Result<(), csv::Error> {
     let mut table = csv::Writer::from_writer(to);
     let head = ["trainee", "session"]

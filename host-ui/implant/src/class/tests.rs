@@ -5,7 +5,7 @@ use serde_json::json;
 use std::path::Path;
 use stylet_host::moments::STOPPED;
 
-/// As `score::to_json` has it, as far as a class needs it.
+/// Writes the part of `score::to_json` that a class needs.
 fn debrief(folder: &Path, name: &str, session: &str, mean_error_mm: f64, d90_gy: f64) {
     let score = json!({
         "title": "Scene pelvis", "prescription_gy": 160.0, "seeds_planned": 40, "seeds_lost": 1,
@@ -59,7 +59,7 @@ fn class() -> (tempfile::TempDir, Class) {
 }
 
 #[test]
-fn debriefs_are_read_with_their_figures_and_what_is_none_is_named() {
+fn debriefs_are_read_and_other_files_named() {
     let (_folder, class) = class();
     assert_eq!(class.attempts.len(), 7);
     let trainees = class.trainees();
@@ -116,7 +116,7 @@ fn the_page_compares_trainees_and_shows_a_trend_only_of_who_has_one() {
         page.contains("<small>1.00 to 5.00</small>"),
         "the interval of Otto's mean error"
     );
-    // Counts are whole, and a session is named by its local time.
+    // Counts are integers, and a session is named by its local time.
     assert!(page.contains("<td>1</td>") && !page.contains("<td>1.0</td>"), "counts");
     let first = stylet_base::format::local_time("20261101T090000Z").expect("a time");
     assert!(
@@ -139,7 +139,7 @@ fn the_table_has_a_row_for_each_procedure() {
 }
 
 #[test]
-fn a_folder_without_a_debrief_says_what_one_looks_like_and_names_are_no_paths() {
+fn a_folder_without_a_debrief_is_refused_with_the_expected_layout() {
     let folder = tempfile::tempdir().expect("a folder");
     let why = Class::read(&[folder.path().to_owned()]).expect_err("empty").to_string();
     assert!(why.contains("NAME/DATE/score.json"), "{why}");
@@ -151,7 +151,7 @@ fn a_folder_without_a_debrief_says_what_one_looks_like_and_names_are_no_paths() 
     }
 }
 
-/// A trainee's name is that of a folder; a spreadsheet computed it.
+/// Guards against a spreadsheet that computed a trainee's name, which is that of a folder.
 #[test]
 fn a_name_that_is_a_formula_is_text_in_the_table() {
     let folder = tempfile::tempdir().expect("a folder");

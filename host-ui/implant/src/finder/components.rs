@@ -1,4 +1,4 @@
-//! Connected voxels above the threshold, with those around them that hold the rest of the signal.
+//! Connected voxels above the threshold, with their neighbours that hold the rest of the signal.
 
 use super::FinderError;
 use super::level::Level;
@@ -6,30 +6,32 @@ use super::shape::Patch;
 use nalgebra::Vector3;
 use stylet_files::VoxelValues;
 
-/// Voxels so far around a component hold the rest of its signal.
+/// Radius around a component that contains the rest of its signal.
 const REACH_M: f64 = 2.5e-3;
-/// Voxels around a component's box that show the tissue.
+/// Margin in voxels around a component's box that shows the tissue.
 const ROOM: usize = 2;
-/// A larger share of the volume above the threshold is no implant.
+/// Largest share of the volume above the threshold; more is not an implant.
 const MOST_SHARE: f64 = 0.05;
 const NONE: u32 = 0;
 
-/// One component; places in the frame of the voxels (m along each axis, from the middle of the first voxel).
+/// Component; places in the frame of the voxels (m along each axis, from the centre of the first
+/// voxel).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Component {
-    /// Indices of its voxels and of those around, in the order of the volume.
+    /// Indices of its voxels and of their neighbours, in the order of the volume.
     pub voxels: Vec<usize>,
     /// Value above the tissue, of each of the voxels.
     pub excess: Vec<f64>,
-    /// What the tissue around it is above that of the volume: tissue is not even, and a component has many voxels.
+    /// Value of the tissue around it above that of the volume: tissue is uneven, and a component
+    /// has many voxels.
     pub tissue: f64,
     /// Sum of the values above the tissue around it.
     pub signal: f64,
-    /// Middle of the signal.
+    /// Centre of the signal.
     pub middle_m: Vector3<f64>,
 }
 
-/// Components of the volume, in the order of their first voxels.
+/// Returns the components of the volume, in the order of their first voxels.
 pub fn of(volume: &VoxelValues<f32>, level: &Level) -> Result<Vec<Component>, FinderError> {
     let is_bright = |n: usize| f64::from(volume.values[n]) >= level.threshold;
     let bright = (0..volume.values.len()).filter(|&n| is_bright(n)).count();
@@ -122,7 +124,8 @@ fn component(volume: &VoxelValues<f32>, level: &Level, mut voxels: Vec<usize>) -
     }
 }
 
-/// The median of what the voxels around a component are above the tissue of the volume; other seeds have fewer than half of them.
+/// Returns the median excess of the voxels around a component over the tissue of the volume; other
+/// seeds have fewer than half of them.
 fn tissue_around(volume: &VoxelValues<f32>, level: &Level, voxels: &[usize]) -> f64 {
     let patch = Patch::of(volume.dims, volume.frame.spacing_m, voxels);
     let around = patch.with_room(volume.dims, ROOM);
@@ -133,18 +136,18 @@ fn tissue_around(volume: &VoxelValues<f32>, level: &Level, voxels: &[usize]) -> 
     above.get(above.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Middle of a voxel, along the axes of the volume.
+/// Returns the centre of a voxel, along the axes of the volume.
 pub fn place_m(volume: &VoxelValues<f32>, n: usize) -> Vector3<f64> {
     let at = index(volume.dims, n);
     Vector3::from([0, 1, 2].map(|a| at[a] as f64 * volume.frame.spacing_m[a]))
 }
 
-/// Numbers of a voxel along each axis.
+/// Returns the indices of a voxel along each axis.
 pub fn index([nx, ny, _]: [usize; 3], n: usize) -> [usize; 3] {
     [n % nx, n / nx % ny, n / nx / ny]
 }
 
-/// Up to 26 voxels around one, in the directions that are allowed.
+/// Returns up to 26 neighbours of a voxel, in the allowed directions.
 fn neighbours(volume: &VoxelValues<f32>, n: usize, along: [bool; 3]) -> impl Iterator<Item = usize> {
     let dims = volume.dims;
     let at = index(dims, n);

@@ -1,8 +1,9 @@
-//! How many seeds each component holds, by its signal; their sum is the number of seeds that were implanted, where it is known.
+//! Number of seeds in each component, from its signal; the sum is the number of implanted seeds, if
+//! known.
 
-/// Signal of one seed differs from that of another by at least this standard deviation, as a share.
+/// Smallest standard deviation of the signals of single seeds, as a share.
 const LEAST_SPREAD: f64 = 0.1;
-/// Seeds that a count may be off the signal for the sake of the number implanted.
+/// Largest deviation of a count from the signal, in seeds, to match the number implanted.
 const MOST_OFF: f64 = 0.75;
 const ROUNDS: usize = 8;
 
@@ -18,12 +19,12 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Signal of a component, in seeds.
+    /// Returns the signal of a component, in seeds.
     pub fn signal(&self, component: usize) -> f64 {
         self.signals[component] / self.of_one
     }
 
-    /// Probability of the count of a component, beside one more and one fewer.
+    /// Returns the probability of the count of a component, against one more and one fewer.
     pub fn probability(&self, component: usize) -> f64 {
         let (signal, count) = (self.signal(component), self.seeds[component]);
         let weight = |seeds: usize| (-0.5 * cost(signal, seeds) / self.spread.powi(2)).exp();
@@ -32,7 +33,8 @@ impl Counts {
         if own > 0.0 { own / (own + others) } else { 0.0 }
     }
 
-    /// Square of what the signal of a component is off so many seeds, in variances.
+    /// Returns the squared deviation of a component's signal from this number of seeds, in
+    /// variances.
     pub fn cost(&self, component: usize, seeds: usize) -> f64 {
         cost(self.signal(component), seeds) / self.spread.powi(2)
     }
@@ -43,12 +45,13 @@ impl Counts {
     }
 }
 
-/// Square of what the signal is off the count; the spread of a sum grows with the root of its parts.
+/// Returns the squared deviation of a signal from a count; the spread of a sum grows with the root
+/// of its parts.
 fn cost(signal: f64, seeds: usize) -> f64 {
     (signal - seeds as f64).powi(2) / seeds.max(1) as f64
 }
 
-/// Every component as one seed.
+/// Returns every component as one seed.
 pub fn one_each(signals: &[f64]) -> Counts {
     Counts {
         seeds: vec![1; signals.len()],
@@ -58,11 +61,12 @@ pub fn one_each(signals: &[f64]) -> Counts {
     }
 }
 
-/// The counts that fit the signals best; a component of more than `most` seeds has none.
+/// Returns the counts that fit the signals best; a component of more than `most` seeds has none.
 pub fn of(signals: &[f64], count: Option<usize>, most: f64) -> Counts {
     let middle = median(signals.to_vec());
     let in_reach: f64 = signals.iter().filter(|s| **s < most * middle).sum();
-    // Where most components are several seeds the middle one is no seed; then the number of seeds shows it.
+    // If most components are several seeds, the median one is not a single seed; then the number of
+    // seeds shows it.
     let starts = [Some(middle), count.map(|count| in_reach / count.max(1) as f64)];
     let found = starts
         .into_iter()
@@ -103,7 +107,8 @@ fn of_start(signals: &[f64], start: f64, count: Option<usize>, most: f64) -> Cou
     counts
 }
 
-/// Adds or takes seeds one by one where it costs least, until there are as many as were implanted; never from or to what is no seed.
+/// Adds or removes seeds one by one at the smallest cost, until there are as many as were
+/// implanted; skips components that are not seeds.
 fn constrain(counts: &mut Counts, count: usize, most: f64) {
     for _ in 0..counts.seeds.len() * 4 {
         let total: usize = counts.seeds.iter().sum();
@@ -135,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn signals_become_counts_and_the_number_implanted_settles_what_lies_between() {
+    fn the_implanted_number_settles_doubtful_counts() {
         let signals = [1.02, 0.97, 1.0, 2.1, 0.99, 1.46, 0.1, 40.0].map(|s| s * 4000.0);
         let free = of(&signals, None, 12.0);
         assert_eq!(free.seeds, [1, 1, 1, 2, 1, 1, 0, 0]);
@@ -145,7 +150,7 @@ mod tests {
             free.probability(5)
         );
         assert_eq!(of(&signals, Some(8), 12.0).seeds, [1, 1, 1, 2, 1, 2, 0, 0]);
-        // More than the signals hold is not made up.
+        // Seeds beyond the signals are not invented.
         assert_eq!(of(&signals, Some(30), 12.0).seeds.iter().sum::<usize>(), 8);
     }
 }

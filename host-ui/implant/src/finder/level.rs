@@ -1,35 +1,36 @@
-//! Value of the tissue, its noise, and the value from which a voxel belongs to a seed.
+//! Value of the tissue, its noise, and the threshold of seeds.
 
 use super::{FinderError, Search};
 use stylet_files::VoxelValues;
 
-/// Values of soft tissue, in HU; a volume in another unit has all its values taken.
+/// Values of soft tissue, in HU; in another unit, all values of a volume are used.
 const SOFT: std::ops::RangeInclusive<f32> = -200.0..=300.0;
-/// Share of the voxels that must be soft tissue for the volume to be one in HU.
+/// Share of the voxels that must be soft tissue for the volume to be in HU.
 const SOFT_SHARE: f64 = 0.05;
-/// Voxels that medians are taken of.
+/// Number of voxels in a median.
 const SAMPLED: usize = 1 << 20;
-/// Peaks must rise above the tissue by so many standard deviations of its noise.
+/// Height of peaks above the tissue, in standard deviations of its noise.
 const ABOVE_NOISE: f64 = 8.0;
-/// Without a number of seeds, peaks below are bone or calcifications, in HU above the tissue.
+/// Height above the tissue, in HU, below which peaks are bone or calcifications if the number of
+/// seeds is unknown.
 const ABOVE_BONE: f64 = 800.0;
 /// Height of the threshold between tissue and the typical peak of a seed.
 const SHARE_OF_PEAK: f64 = 0.3;
 
-/// What voxels are compared with.
+/// Reference values of voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
     /// Value of the tissue.
     pub tissue: f64,
     /// Standard deviation of the tissue.
     pub noise: f64,
-    /// Value from which a voxel belongs to a seed.
+    /// Smallest value of a seed's voxel.
     pub threshold: f64,
-    /// Value that the scanner does not exceed, where many voxels have it.
+    /// Value at which the scanner saturates, if many voxels have it.
     pub saturated: Option<f64>,
 }
 
-/// From the voxels; the threshold is that of the search where it names one.
+/// Estimates the level from the voxels; a threshold of the search takes precedence.
 pub fn of(volume: &VoxelValues<f32>, search: &Search) -> Result<Level, FinderError> {
     let every = volume.values.len().div_ceil(SAMPLED).max(1);
     let some = volume.values.iter().step_by(every).copied().filter(|v| v.is_finite());
@@ -57,7 +58,7 @@ pub fn of(volume: &VoxelValues<f32>, search: &Search) -> Result<Level, FinderErr
         tissue,
         noise,
         threshold: search.threshold.unwrap_or(tissue + SHARE_OF_PEAK * (typical - tissue)),
-        // Noise does not give the same highest value again and again.
+        // Noise does not repeat the same highest value.
         saturated: (at_highest > 4).then_some(highest),
     })
 }
@@ -67,7 +68,7 @@ fn median(values: &mut [f32]) -> Option<f64> {
     (!values.is_empty()).then(|| f64::from(*values.select_nth_unstable_by(middle, f32::total_cmp).1))
 }
 
-/// Values of voxels above `least` that no neighbour exceeds, highest first.
+/// Returns values of voxels above `least` that no neighbour exceeds, highest first.
 fn peaks(volume: &VoxelValues<f32>, least: f64) -> Vec<f64> {
     let [nx, ny, nz] = volume.dims;
     let at = |i: usize, j: usize, k: usize| volume.values[(k * ny + j) * nx + i];

@@ -1,8 +1,10 @@
-//! Seeds found in a CT volume: bright components, each split into as many seeds as its signal holds.
+//! Seeds found in a CT volume: bright components, each split into as many seeds as its signal
+//! holds.
 //!
-//! A seed is smaller than a voxel, so its voxels hold parts of it. The sum of what they have above the tissue around them, the signal,
-//! is the same for every seed however it lies, and two seeds that touch have twice as much. A component is fitted by as many
-//! seeds as its signal holds, each a line of the seed's length blurred by the scanner.
+//! A seed is smaller than a voxel, so its voxels contain parts of it. The sum of their excess over
+//! the tissue around them, the signal, is the same for every seed in any direction, and two seeds
+//! that touch have twice as much. A component is fitted by as many seeds as its signal holds, each
+//! a line of the seed's length blurred by the scanner.
 
 mod components;
 mod counts;
@@ -18,32 +20,33 @@ use nalgebra::{Matrix3, Vector3};
 use split::{Fitted, Fitter};
 use stylet_files::VoxelValues;
 
-/// A component with the signal of more seeds is bone, contrast medium or a hip.
+/// Largest number of seeds in a component; a stronger signal is bone, contrast medium or a hip.
 const MOST_IN_ONE: f64 = 12.0;
-/// A component with less than this share of a seed's signal is noise and is not reported.
+/// Smallest signal of a component, in seeds; a weaker one is noise and is not reported.
 const LEAST_REPORTED: f64 = 0.15;
-/// A count of seeds that is less probable is reported as doubtful.
+/// Probability below which a count is reported as doubtful.
 const SURE: f64 = 0.9;
-/// A place that is less certain is reported as doubtful.
+/// Deviation above which a place is reported as doubtful.
 const CERTAIN_M: f64 = 0.5e-3;
 
-/// What is known of the seeds before the search.
+/// Prior knowledge of the seeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Search {
-    /// Voxels of this value or more belong to seeds; found from the data where none is given.
+    /// Threshold of the voxels of seeds; found from the data if not given.
     pub threshold: Option<f64>,
-    /// Number of seeds that were implanted, where it is known.
+    /// Number of implanted seeds, if known.
     pub count: Option<usize>,
     /// Length of a seed, in m.
     pub length_m: f64,
     /// Diameter of a seed, in m.
     pub diameter_m: f64,
-    /// Whether a component may be several seeds; without it every component is one seed at its centre, as a null model.
+    /// True if a component may be several seeds; otherwise every component is one seed at its
+    /// centre, as a null model.
     pub split: bool,
 }
 
 impl Default for Search {
-    /// Seeds of 4.5 mm x 0.8 mm, of any number.
+    /// Returns seeds of 4.5 mm x 0.8 mm, of unknown number.
     fn default() -> Self {
         Self {
             threshold: None,
@@ -55,12 +58,12 @@ impl Default for Search {
     }
 }
 
-/// One seed; patient frame of the volume (RAS).
+/// Seed that was found; patient frame of the volume (RAS).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundSeed {
-    /// Place of its middle, in m.
+    /// Place of its centre, in m.
     pub position_m: [f64; 3],
-    /// Unit vector, with its sign so that it points to the head.
+    /// Unit vector, with its sign towards the head.
     pub axis: [f64; 3],
     /// From 0 to 1: probability of the number of seeds in its component, times the share of the signal that the fit explains.
     pub confidence: f64,
@@ -70,27 +73,27 @@ pub struct FoundSeed {
     pub together: usize,
 }
 
-/// Something bright that leaves a doubt.
+/// Bright object that leaves a doubt.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Doubt {
-    /// Where it is (RAS), in m.
+    /// Place (RAS), in m.
     pub place_m: [f64; 3],
     /// Its signal, in seeds.
     pub signal: f64,
-    /// Seeds that it was counted as.
+    /// Number of seeds that it was counted as.
     pub counted: usize,
-    /// What is doubtful, for people.
+    /// Doubt, in words.
     pub why: String,
 }
 
 /// Result of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// The seeds, from the head to the feet.
+    /// Seeds, from the head to the feet.
     pub seeds: Vec<FoundSeed>,
-    /// What is doubtful, largest signal first.
+    /// Doubts, largest signal first.
     pub doubts: Vec<Doubt>,
-    /// Value that a voxel of a seed has at least.
+    /// Smallest value of a seed's voxel.
     pub threshold: f64,
     /// Value of the tissue around, and its standard deviation.
     pub tissue: [f64; 2],
@@ -102,11 +105,11 @@ pub struct Found {
     pub blur_m: f64,
 }
 
-/// Why no seed can be found.
+/// Reason why no seed can be found.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FinderError {
-    /// All voxels are alike, or no number.
-    #[error("it holds nothing that is brighter than its tissue; is it the CT?")]
+    /// All voxels are equal, or NaN.
+    #[error("nothing in it is brighter than its tissue; is it the CT?")]
     Nothing,
     /// No voxel reaches the threshold.
     #[error("no voxel reaches {threshold}; its highest value is {highest}; choose a lower --threshold")]
@@ -175,7 +178,7 @@ pub fn find(volume: &VoxelValues<f32>, search: &Search) -> Result<Found, FinderE
     })
 }
 
-/// Where and why a component is doubtful.
+/// Returns place and reason if a component is doubtful.
 fn doubt(component: &Component, fit: &Fitted, signal: f64, sure: f64) -> Option<(Vector3<f64>, String)> {
     let counted = fit.seeds.len();
     let worst_m = fit.seeds.iter().map(|s| s.deviation_m).fold(0.0, f64::max);

@@ -1,35 +1,40 @@
-//! Counts of seeds settled by the fit: where the signal leaves a doubt, one seed more and one fewer are fitted too.
+//! Refinement of the counts by the fit: for a doubtful signal, one seed more and one fewer are
+//! fitted too.
 //!
-//! The signal of a component alone does not distinguish two strong seeds from three faint ones; how well they explain the voxels does.
+//! The signal of a component alone does not distinguish two strong seeds from three faint ones; the
+//! fit of the voxels does.
 
 use super::components::Component;
 use super::counts::Counts;
 use super::shape::Line;
 use super::split::{Fitted, Fitter};
 
-/// Single seeds whose count is less probable by their signal are fitted again, as all that touch another are.
+/// Probability by the signal below which single seeds are fitted again; seeds that touch another
+/// always are.
 const SURE: f64 = 0.98;
-/// Sum of squares that another count must gain where no number of seeds asks for it.
+/// Reduction of the sum of squares that another count must bring, unless the number of seeds
+/// requires it.
 const WORTHWHILE: f64 = 12.0;
-/// A count that the number of seeds asks for may cost so much, and no more: rather is a doubt reported.
+/// Largest cost of a count that the number of seeds requires; beyond it a doubt is reported.
 const MOST_COST: f64 = 400.0;
-/// Changes at most.
+/// Most changes.
 const CHANGES: usize = 8;
 
-/// Components as they are fitted so far.
+/// Present fits of the components.
 pub struct Fits {
-    /// The seeds of each component.
+    /// Seeds of each component.
     pub lines: Vec<Vec<Line>>,
-    /// The same with what is known of them.
+    /// Seeds with the statistics of their fit.
     pub fitted: Vec<Fitted>,
-    /// What all of them give to every voxel.
+    /// Contribution of all seeds to every voxel.
     pub field: Vec<f64>,
-    /// What the tissue around each component is above that of the volume.
+    /// Value of the tissue around each component above that of the volume.
     pub tissue: Vec<f64>,
 }
 
-/// Another count for a component, with its seeds and what the sum of squares grows by, that of the signal among them: more seeds
-/// always explain the voxels a little better, and a count that the signal excludes is not worth that.
+/// Another count for a component, with its seeds and the increase of the sum of squares, including
+/// that of the signal. More seeds always explain the voxels a little better, which does not justify
+/// a count that the signal excludes.
 struct Change {
     component: usize,
     lines: Vec<Line>,
@@ -38,7 +43,8 @@ struct Change {
 }
 
 impl Fitter<'_> {
-    /// Changes counts by one where the fit asks for it: to the number of seeds where that is `wanted`, and between components.
+    /// Changes counts by one if the fit requires it: towards the number of seeds if `wanted`, and
+    /// between components.
     pub fn settle(&self, components: &[Component], fits: &mut Fits, counts: &mut Counts, wanted: Option<usize>) {
         let is_open = |n: &usize| counts.seeds[*n] > 1 || (counts.seeds[*n] == 1 && counts.probability(*n) < SURE);
         let doubtful = (0..components.len()).filter(is_open);
@@ -72,7 +78,7 @@ impl Fitter<'_> {
         }
     }
 
-    /// One seed more, and one fewer where one is left.
+    /// Tries one seed more, and one fewer if one remains.
     fn changes(&self, components: &[Component], fits: &mut Fits, by_signal: &Counts, n: usize) -> Vec<Change> {
         let component = &components[n];
         let own = fits.lines[n].clone();
@@ -97,7 +103,7 @@ impl Fitter<'_> {
     }
 }
 
-/// Places of the changes to make next; none where nothing is gained.
+/// Returns the indices of the changes to make next; none without a gain.
 fn choose(changes: &[Change], total: usize, wanted: Option<usize>) -> Option<Vec<usize>> {
     let best = |is_more: bool, but: Option<usize>| {
         let fits = |&at: &usize| changes[at].is_more == is_more && Some(changes[at].component) != but;

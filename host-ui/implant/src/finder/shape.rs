@@ -1,4 +1,4 @@
-//! What a seed looks like in a CT: a line of its length, blurred, summed in each voxel.
+//! Model of a seed in a CT: a line of its length, blurred, summed in each voxel.
 
 use super::components::index;
 use nalgebra::Vector3;
@@ -7,10 +7,10 @@ use std::f64::consts::SQRT_2;
 /// Points along a seed.
 const POINTS: usize = 5;
 
-/// A seed in the frame of the voxels (m along each axis, from the middle of the first voxel).
+/// Seed in the frame of the voxels (m along each axis, from the centre of the first voxel).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
-    /// Its middle.
+    /// Centre.
     pub middle_m: Vector3<f64>,
     /// Unit vector.
     pub axis: Vector3<f64>,
@@ -18,7 +18,7 @@ pub struct Line {
     pub amount: f64,
 }
 
-/// What all seeds have in common.
+/// Parameters common to all seeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Length, in m.
@@ -31,18 +31,18 @@ pub struct Look {
     pub signal: f64,
 }
 
-/// The voxels of a component, within a box.
+/// Voxels of a component, within a box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
     low: [usize; 3],
     size: [usize; 3],
     spacing_m: [f64; 3],
-    /// Number along each axis in the box, of every voxel.
+    /// Indices along each axis in the box, of every voxel.
     at: Vec<[usize; 3]>,
 }
 
 impl Patch {
-    /// Of voxels of a volume, by their indices.
+    /// Creates a patch of voxels, by their indices in the volume.
     pub fn of(dims: [usize; 3], spacing_m: [f64; 3], voxels: &[usize]) -> Self {
         let places: Vec<[usize; 3]> = voxels.iter().map(|n| index(dims, *n)).collect();
         let of_axis = |a: usize| places.iter().map(move |p| p[a]);
@@ -56,7 +56,8 @@ impl Patch {
         }
     }
 
-    /// Indices in the volume of all voxels of the box, with `room` voxels more on every side.
+    /// Returns the indices in the volume of all voxels of the box, with `room` voxels more on every
+    /// side.
     pub fn with_room(&self, dims: [usize; 3], room: usize) -> Vec<usize> {
         let range = |a: usize| self.low[a].saturating_sub(room)..(self.low[a] + self.size[a] + room).min(dims[a]);
         let [nx, ny, _] = dims;
@@ -69,7 +70,7 @@ impl Patch {
         all
     }
 
-    /// Adds what a seed gives to each voxel, `share` times.
+    /// Adds the contribution of a seed to each voxel, `share` times.
     pub fn add(&self, seed: &Line, look: &Look, share: f64, to: &mut [f64]) {
         // A disc of radius r has the standard deviation r/2 along each of its axes.
         let blur_m = look.blur_m.hypot(look.diameter_m / 4.0);
@@ -84,7 +85,7 @@ impl Patch {
         }
     }
 
-    /// Share of a blurred point between the faces of each voxel along an axis.
+    /// Returns the share of a blurred point between the faces of each voxel along an axis.
     fn parts(&self, axis: usize, place_m: f64, blur_m: f64) -> Vec<f64> {
         let side = self.spacing_m[axis];
         let below = |face: usize| {
@@ -96,7 +97,7 @@ impl Patch {
     }
 }
 
-/// Error function, to 1.5e-7 (Abramowitz and Stegun, 7.1.26).
+/// Computes the error function, to 1.5e-7 (Abramowitz and Stegun, 7.1.26).
 fn erf(x: f64) -> f64 {
     let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
     let series =

@@ -4,14 +4,17 @@ use super::components::Component;
 use super::shape::{Line, Patch};
 use super::split::Fitter;
 
-/// Voxels to which seeds give less than so many standard deviations of the noise are dim, and so many of them show the tissue.
+/// Contribution of seeds, in standard deviations of the noise, below which voxels are dim; and the
+/// number of dim voxels that show the tissue.
 const DIM: f64 = 0.5;
 const FEWEST_DIM: usize = 20;
 
 impl Fitter<'_> {
-    /// Signal of each component without what its neighbours' seeds give to its voxels; `field` is that of all seeds.
+    /// Returns the signal of each component without its neighbours' seeds; `field` is that of all
+    /// seeds.
     ///
-    /// What its own seeds have, and what they leave in the bright voxels: in the many others tissue that is not even would add up.
+    /// Adds the signal of its own seeds and their residuals in the bright voxels: in the many
+    /// others uneven tissue would add up.
     pub fn signals(&self, components: &[Component], lines: &[Vec<Line>], field: &[f64], tissue: &[f64]) -> Vec<f64> {
         let bright = self.level.threshold - self.level.tissue;
         let of_component = |((component, lines), tissue): ((&Component, &Vec<Line>), &f64)| {
@@ -27,8 +30,9 @@ impl Fitter<'_> {
         components.iter().zip(lines).zip(tissue).map(of_component).collect()
     }
 
-    /// What the tissue around a component is above that of the volume: the median of what its dim voxels have beyond the seeds so far;
-    /// without seeds, and where few are dim, that of the voxels around it.
+    /// Returns the value of the tissue around a component above that of the volume. It is the
+    /// median of what its dim voxels have beyond the seeds so far; without seeds, or with few dim
+    /// voxels, that of the voxels around it.
     pub fn tissue_beside(&self, component: &Component, lines: &[Line], others: &[f64]) -> f64 {
         if lines.is_empty() {
             return component.tissue;

@@ -1,4 +1,5 @@
-//! Components fitted by seeds: least squares over place, direction and signal of each (Levenberg and Marquardt).
+//! Fit of components by seeds: least squares over place, direction and signal of each (Levenberg
+//! and Marquardt).
 
 use super::Search;
 use super::components::{Component, place_m};
@@ -9,7 +10,7 @@ use super::shape::{Line, Look, Patch};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use stylet_files::VoxelValues;
 
-/// Place in mm (three), two turns in rad, signal.
+/// Parameters of a seed: place in mm (three), two turns in rad, signal.
 const PARAMETERS: usize = 6;
 const M_PER_MM: f64 = 1e-3;
 /// Steps of the numerical derivatives, in those units.
@@ -17,23 +18,23 @@ const STEPS: [f64; PARAMETERS] = [0.02, 0.02, 0.02, 0.02, 0.02, 0.01];
 const ITERATIONS: usize = 40;
 /// Standard deviation of the signal of one seed, as a share.
 const SIGNAL_SPREAD: f64 = 0.1;
-/// Standard deviation of a seed's direction about that of all, as a sine.
+/// Standard deviation of a seed's direction about the common one, as a sine.
 const TURN_SPREAD: f64 = 0.4;
-/// Rows of a seed beside those of the voxels: its signal, and two of its direction.
+/// Rows of a seed in addition to the voxels: its signal, and two of its direction.
 const OWN_ROWS: usize = 3;
-/// What the shape is off that of a real seed, as a share of the highest voxel.
+/// Deviation of the model from a real seed, as a share of the highest voxel.
 const OFF_SHAPE: f64 = 0.05;
-/// Blurs of scanners that are tried, m.
+/// Candidate blurs of scanners, m.
 const BLURS_M: [f64; 6] = [0.3e-3, 0.45e-3, 0.6e-3, 0.75e-3, 0.95e-3, 1.2e-3];
-/// Single seeds that the blur is found from.
+/// Number of single seeds for the estimate of the blur.
 const CALIBRATED: usize = 10;
-/// Fits of all components.
+/// Number of passes over all components.
 const SWEEPS: usize = 3;
 
-/// A seed of a fit; frame of the voxels.
+/// Seed of a fit; frame of the voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FittedSeed {
-    /// Its middle.
+    /// Centre.
     pub middle_m: Vector3<f64>,
     /// Unit vector.
     pub axis: Vector3<f64>,
@@ -41,41 +42,41 @@ pub struct FittedSeed {
     pub deviation_m: f64,
 }
 
-/// The seeds of a component.
+/// Fitted seeds of a component.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fitted {
-    /// The seeds; none for what is no seed.
+    /// Seeds; none for an object that is not a seed.
     pub seeds: Vec<FittedSeed>,
     /// Share of the squared signal that they explain.
     pub explained: f64,
 }
 
-/// Fits components of one volume.
+/// Fitter of the components of one volume.
 pub struct Fitter<'a> {
     /// The CT.
     pub volume: &'a VoxelValues<f32>,
-    /// What voxels are compared with.
+    /// Reference values of voxels.
     pub level: &'a Level,
-    /// What seeds look like.
+    /// Model of the seeds.
     pub look: Look,
-    /// Direction of all seeds, and two across it.
+    /// Common direction of all seeds, and two perpendicular to it.
     pub axes: [Vector3<f64>; 3],
 }
 
-/// A component on the way to its fit.
+/// Fit of a component in progress.
 pub struct Task {
-    /// The voxels.
+    /// Voxels.
     pub patch: Patch,
-    /// Values above the tissue, without what neighbours give.
+    /// Values above the tissue, without the contribution of neighbours.
     pub data: Vec<f64>,
     /// Weight of each residual.
     per_value: f64,
-    /// Data from here on are cut off.
+    /// Value from which data are saturated.
     saturated: f64,
 }
 
 impl<'a> Fitter<'a> {
-    /// With the blur and the signal that fit single seeds best.
+    /// Creates a fitter with the blur and the signal that fit single seeds best.
     pub fn calibrated(
         volume: &'a VoxelValues<f32>,
         level: &'a Level,
@@ -133,13 +134,13 @@ impl<'a> Fitter<'a> {
         fitter
     }
 
-    /// Blur of the scanner, standard deviation, in m.
+    /// Returns the blur of the scanner, standard deviation, in m.
     pub fn blur_m(&self) -> f64 {
         self.look.blur_m
     }
 
-    /// Fits every component; then again, with counts from the signal that is left once neighbours and what lies outside of the
-    /// component are known.
+    /// Fits every component; then again, with counts from the signal that remains once neighbours
+    /// and surroundings are known.
     pub fn fit_all(
         &self,
         components: &[Component],
@@ -184,14 +185,15 @@ impl<'a> Fitter<'a> {
         (all.fitted, counts)
     }
 
-    /// A component as one seed at the middle of its signal.
+    /// Returns a component as one seed at the middle of its signal.
     pub fn centre(&self, component: &Component) -> Fitted {
         let task = self.task(component, None, component.tissue);
         let line = self.start(component, &task.data);
         self.fitted(&task, &[line])
     }
 
-    /// What a component is fitted to, without what `neighbours` and the `tissue` around give to its voxels.
+    /// Returns the data of a component's fit, without the contribution of `neighbours` and `tissue`
+    /// to its voxels.
     pub fn task(&self, component: &Component, neighbours: Option<&[f64]>, tissue: f64) -> Task {
         let of_others = |n: &usize| neighbours.map_or(0.0, |field| field[*n]);
         let data: Vec<f64> = component
@@ -213,7 +215,8 @@ impl<'a> Fitter<'a> {
         }
     }
 
-    /// Adds seeds to the field of all, in the box of their component with room around for the neighbours.
+    /// Adds seeds to the field of all, in the box of their component with a margin for the
+    /// neighbours.
     pub fn spread(&self, component: &Component, lines: &[Line], share: f64, field: &mut [f64]) {
         if lines.is_empty() {
             return;
@@ -229,7 +232,7 @@ impl<'a> Fitter<'a> {
         voxels.iter().zip(values).for_each(|(n, value)| field[*n] += value);
     }
 
-    /// One seed along the largest extent of the signal.
+    /// Returns one seed along the largest extent of the signal.
     fn start(&self, component: &Component, data: &[f64]) -> Line {
         let mut spread = Matrix3::zeros();
         let mut weight = 0.0;
@@ -238,7 +241,7 @@ impl<'a> Fitter<'a> {
             spread += off * off.transpose() * value.max(0.0);
             weight += value.max(0.0);
         }
-        // Voxels are longer along some axes; that is not the seed's extent.
+        // Voxels are longer along some axes, which is not the seed's extent.
         let sides = Vector3::from(self.volume.frame.spacing_m);
         let spread =
             spread / weight.max(f64::MIN_POSITIVE) - Matrix3::from_diagonal(&sides.component_mul(&sides)) / 12.0;
@@ -251,7 +254,7 @@ impl<'a> Fitter<'a> {
         }
     }
 
-    /// Residuals in standard deviations: voxels, then the signals of the seeds.
+    /// Returns the residuals in standard deviations: voxels, then the signals of the seeds.
     pub fn residuals(&self, task: &Task, lines: &[Line]) -> DVector<f64> {
         let voxels = task.data.len();
         let mut model = vec![0.0; voxels];
@@ -260,13 +263,13 @@ impl<'a> Fitter<'a> {
             .for_each(|line| task.patch.add(line, &self.look, 1.0, &mut model));
         DVector::from_fn(voxels + OWN_ROWS * lines.len(), |n, _| match n.checked_sub(voxels) {
             Some(own) => self.own_rows(&lines[own / OWN_ROWS])[own % OWN_ROWS],
-            // Of what is cut off only the lower bound is known.
+            // A saturated value is only a lower bound.
             None if task.data[n] >= task.saturated && model[n] > task.data[n] => 0.0,
             None => (model[n] - task.data[n]) * task.per_value,
         })
     }
 
-    /// How far signal and direction of a seed are off those of all.
+    /// Returns the deviation of a seed's signal and direction from the common ones.
     fn own_rows(&self, line: &Line) -> [f64; OWN_ROWS] {
         [
             (line.amount - 1.0) / SIGNAL_SPREAD,
@@ -299,7 +302,7 @@ impl<'a> Fitter<'a> {
         all
     }
 
-    /// Moves seeds to the least sum of squares, which it returns.
+    /// Moves seeds to the smallest sum of squares, and returns it.
     pub fn improve(&self, task: &Task, lines: &mut Vec<Line>) -> f64 {
         let mut residuals = self.residuals(task, lines);
         let (mut cost, mut damping) = (residuals.norm_squared(), 1e-2);
@@ -338,7 +341,7 @@ impl<'a> Fitter<'a> {
         cost
     }
 
-    /// The seeds of a component with what the fit leaves open.
+    /// Returns the seeds of a component with the uncertainties of the fit.
     pub fn fitted(&self, task: &Task, lines: &[Line]) -> Fitted {
         let residuals = self.residuals(task, lines);
         let of_voxels: f64 = residuals.iter().take(task.data.len()).map(|r| r * r).sum();
@@ -346,7 +349,7 @@ impl<'a> Fitter<'a> {
         let jacobian = self.jacobian(task, lines);
         let mut normal = jacobian.transpose() * &jacobian;
         for n in 0..normal.nrows() {
-            // A direction that the data do not show may be any.
+            // A direction that the data do not determine is arbitrary.
             normal[(n, n)] += 1e-3;
         }
         // Noise and shape are in the weights; a worse fit is less certain.
@@ -365,7 +368,7 @@ impl<'a> Fitter<'a> {
     }
 }
 
-/// A seed moved, turned and made brighter.
+/// Returns a seed after a change of place, direction and signal.
 fn changed(line: &Line, by: &[f64; PARAMETERS]) -> Line {
     let [across, other] = two_across(&line.axis);
     Line {

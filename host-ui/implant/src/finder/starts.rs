@@ -1,16 +1,17 @@
-//! Where the seeds of a component are looked for first, and where they are tried again.
+//! Initial places of a component's seeds, and exchanges of seeds.
 
 use super::components::{Component, place_m};
 use super::shape::Line;
 use super::split::{Fitter, Task};
 use nalgebra::Vector3;
 
-/// Times that each seed of a component may be taken away and put where signal is left.
+/// Number of times that each seed of a component may be moved to where signal remains.
 const EXCHANGES: usize = 2;
-/// An exchange must lower the sum of squares by this share.
+/// Factor by which an exchange must lower the sum of squares.
 const WORTHWHILE: f64 = 0.99;
 impl Fitter<'_> {
-    /// Seeds of a component, one after the other where most signal is left, or by k-means: which of both fits better.
+    /// Places the seeds of a component one after the other where most signal remains, or by
+    /// k-means, whichever fits better.
     pub fn starts(&self, task: &Task, component: &Component, count: usize) -> Vec<Line> {
         if count < 2 {
             return (0..count).map(|_| self.new_line(component.middle_m)).collect();
@@ -29,10 +30,10 @@ impl Fitter<'_> {
         if one <= other { by_remainder } else { by_means }
     }
 
-    /// Where most signal is, summed over the voxels within a seed's reach.
+    /// Returns the place of most signal, summed over the voxels within a seed's reach.
     fn brightest(&self, component: &Component, left: &[f64]) -> Vector3<f64> {
         let places: Vec<Vector3<f64>> = component.voxels.iter().map(|n| place_m(self.volume, *n)).collect();
-        // A voxel is thicker than a seed, and its middle beside the seed all the same.
+        // A voxel is thicker than a seed, so its centre may lie outside the seed.
         let across_m = self.look.blur_m.hypot(self.look.diameter_m) + self.volume.frame.spacing_m[0] / 2.0;
         let is_near = |p: &Vector3<f64>, middle: &Vector3<f64>| {
             let off = p - middle;
@@ -52,7 +53,7 @@ impl Fitter<'_> {
         if sum > 0.0 { moment / sum } else { middle }
     }
 
-    /// k-means on the weighted voxels, from places far from each other.
+    /// Returns the k-means of the weighted voxels, from places far from each other.
     fn means(&self, component: &Component, data: &[f64], count: usize) -> Vec<Line> {
         let places: Vec<Vector3<f64>> = component.voxels.iter().map(|n| place_m(self.volume, *n)).collect();
         let weights: Vec<f64> = data.iter().map(|v| v.max(0.0)).collect();
@@ -82,7 +83,7 @@ impl Fitter<'_> {
         middles.into_iter().map(|middle_m| self.new_line(middle_m)).collect()
     }
 
-    /// Takes each seed away in turn and puts it where most signal is left, as long as the fit becomes better.
+    /// Removes each seed in turn and puts it where most signal remains, while the fit improves.
     pub fn exchange(&self, task: &Task, component: &Component, lines: &mut Vec<Line>) {
         if lines.len() < 2 {
             return;

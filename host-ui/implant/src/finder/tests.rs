@@ -1,4 +1,4 @@
-//! A synthetic CT of an implant that is known: what is found of it, beside components that are not split.
+//! A synthetic CT of a known implant: the seeds found in it, compared with unsplit components.
 
 use super::{FinderError, Found, Search, find};
 use crate::pairing;
@@ -22,7 +22,7 @@ impl Region for Gland {
     }
 }
 
-/// D90 of the gland by seeds of 0.45 U with their axes, in Gy.
+/// Returns the D90 of the gland by seeds of 0.45 U with their axes, in Gy.
 fn d90_gy(seeds: impl Iterator<Item = ([f64; 3], [f64; 3])>) -> f64 {
     let source = Source::known("6711").unwrap();
     let kernel = DoseKernel::new(&source, Interval::ALL);
@@ -38,7 +38,7 @@ fn d90_gy(seeds: impl Iterator<Item = ([f64; 3], [f64; 3])>) -> f64 {
     dvh.dose_of_gy(0.9 * gland.volume_m3()).unwrap()
 }
 
-/// What a search found of what was implanted.
+/// Comparison of found and implanted seeds.
 #[derive(Debug)]
 #[allow(dead_code, reason = "shown where a test fails")]
 struct Outcome {
@@ -68,10 +68,11 @@ fn outcome(phantom: &Phantom, found: &Found) -> Outcome {
     }
 }
 
-/// 53 of the seeds touch another: side by side, end to end, and three together.
+/// Tests 53 seeds that touch another: side by side, end to end, and three together.
 #[test]
 fn a_hundred_seeds_are_found_within_a_millimetre_and_give_the_same_d90() {
-    // In the second implant 101 seeds were found and D90 was 3.7 % off: uneven tissue counted as signal.
+    // Guards against uneven tissue that counted as signal: in the second implant 101 seeds were
+    // found and D90 was 3.7 % off.
     for random_seed in [1, 2, 5, 6] {
         let phantom = Phantom::new(random_seed, None);
         let search = Search {
@@ -97,7 +98,8 @@ fn a_hundred_seeds_are_found_within_a_millimetre_and_give_the_same_d90() {
     }
 }
 
-/// Uneven tissue counted as signal: a seed that lay alone in a dark place was left out as too faint, and another one was made up for it.
+/// Guards against uneven tissue that counted as signal: a single seed in a dark place was left out
+/// as too faint, and another one was invented for it.
 #[test]
 #[ignore = "a minute or two; the command is in docs/after-implant.md"]
 fn implants_one_to_twelve_are_found() {
@@ -132,7 +134,8 @@ fn implants_one_to_twelve_are_found() {
     );
 }
 
-/// Seeds that are not found within 1 mm: place, distance of what was found, distance of the nearest other seed, mm.
+/// Returns seeds that are not found within 1 mm: place, distance of the found seed, distance of the
+/// nearest other seed, mm.
 fn far(phantom: &Phantom, found: &Found) -> Vec<([f64; 3], f64, f64)> {
     let truth: Vec<[f64; 3]> = phantom.seeds.iter().map(|s| s.0).collect();
     let places: Vec<[f64; 3]> = found.seeds.iter().map(|s| s.position_m).collect();
@@ -149,7 +152,7 @@ fn far(phantom: &Phantom, found: &Found) -> Vec<([f64; 3], f64, f64)> {
     all.filter(|(_, off_mm, _)| *off_mm > 1.0).collect()
 }
 
-/// The null model: every component is one seed. It loses most seeds that touch another.
+/// Tests the null model: every component is one seed. It loses most seeds that touch another.
 #[test]
 fn components_that_are_not_split_lose_the_seeds_that_touch() {
     let phantom = Phantom::new(1, None);
@@ -164,9 +167,9 @@ fn components_that_are_not_split_lose_the_seeds_that_touch() {
     assert!(result.within_1_mm < 100 - TOUCHING / 2, "{result:?}");
 }
 
-/// Without the number implanted the signal alone has to show how many there are: 104 for 100 here.
+/// Tests the signal alone, without the number implanted: it gives 104 for 100 here.
 #[test]
-fn the_number_of_seeds_is_found_where_it_is_not_given() {
+fn the_number_of_seeds_is_estimated_if_unknown() {
     let phantom = Phantom::new(3, None);
     let found = find(&phantom.volume, &Search::default()).unwrap();
     let result = outcome(&phantom, &found);
@@ -181,7 +184,7 @@ fn the_number_of_seeds_is_found_where_it_is_not_given() {
     );
 }
 
-/// A scanner that ends at 3071 HU cuts the highest voxels off.
+/// Tests a scanner that ends at 3071 HU and saturates the highest voxels.
 #[test]
 fn seeds_are_found_where_the_scanner_cuts_their_values_off() {
     let phantom = Phantom::new(4, Some(3071.0));

@@ -1,10 +1,10 @@
-//! Plans as they are heard one after the other, with the seeds that are in the tissue then.
+//! Plans received one after the other, with the seeds in the tissue at the time.
 
 use super::*;
 use bytemuck::Zeroable;
 use stylet_shm_schema::PlannedSeed;
 
-/// Needle `number` of three, at its own x, with two seeds.
+/// Creates needle `number` of three, at its own x, with two seeds.
 fn plan(generation: u64, number: u32) -> PlanInForce {
     let mut plan = PlanInForce::zeroed();
     (plan.session_id, plan.generation, plan.seed_count) = (1, generation, 2);
@@ -23,7 +23,7 @@ fn plan(generation: u64, number: u32) -> PlanInForce {
     plan
 }
 
-/// As the needle of that number leaves it, 2 mm too deep.
+/// Returns a seed from the needle of that number, 2 mm too deep.
 fn seed(number: u32, z: f64) -> SeedPose {
     let x = 0.01 * f64::from(number);
     SeedPose {
@@ -67,7 +67,7 @@ fn each_needle_has_the_seeds_that_came_after_its_plan() {
             .iter()
             .all(|p| p.planned.strength_u == 0.4 && p.delivered.strength_u == 0.4)
     );
-    // A needle that is planned again keeps its seeds; one by hand stands by itself.
+    // A needle that is planned again keeps its seeds; one by hand is separate.
     heard.hear(&plan(3, 3), &seeds[..3]);
     assert_eq!(placed(&heard)[2..], [(2, Some(2)), (2, None)]);
     let mut by_hand = plan(4, 0);
@@ -82,13 +82,13 @@ fn each_needle_has_the_seeds_that_came_after_its_plan() {
 }
 
 #[test]
-fn an_implant_that_begins_anew_is_heard_anew() {
+fn a_reset_starts_a_new_implant() {
     let mut heard = Heard::default();
     let seeds = [seed(1, 0.05), seed(1, 0.04), seed(2, 0.05), seed(2, 0.04)];
     heard.hear(&plan(1, 1), &[]);
     heard.hear(&plan(2, 2), &seeds[..2]);
     heard.hear(&plan(2, 2), &seeds);
-    // A reset takes all seeds away; the plan of the first needle comes a moment later.
+    // A reset removes all seeds; the plan of the first needle comes a moment later.
     heard.hear(&plan(2, 2), &[]);
     heard.hear(&plan(3, 1), &[]);
     assert_eq!(placed(&heard), [(0, None), (0, None)]);
@@ -97,7 +97,7 @@ fn an_implant_that_begins_anew_is_heard_anew() {
 }
 
 #[test]
-fn who_comes_late_knows_whose_seeds_lie_on_the_needle_and_counts_the_others() {
+fn a_late_host_attributes_seeds_on_its_needle() {
     let mut heard = Heard::default();
     let seeds = [seed(1, 0.05), seed(1, 0.04), seed(2, 0.05)];
     heard.hear(&plan(7, 2), &seeds);

@@ -1,29 +1,30 @@
-//! How well two bodies agree: overlap, and the distance of their surfaces.
+//! Agreement of two bodies: overlap, and the distance of their surfaces.
 
 use crate::plan::anatomy::Body;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Pitch of the places at which inside and outside are compared, m.
+/// Pitch of the points at which inside and outside are compared, m.
 const PITCH_M: f64 = 0.8e-3;
-/// Places of a surface from which the distance to the other one is taken, at most.
+/// Most points of a surface whose distance to the other one is taken.
 const PLACES: usize = 2000;
 
 /// Agreement of two bodies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Agreement {
-    /// Twice the common volume over the sum of both (Dice 1945): 1 where they are the same, 0 where they have nothing in common.
+    /// Twice the common volume over the sum of both (Dice 1945): 1 if they are equal, 0 if they are
+    /// disjoint.
     pub dice: f64,
     /// Mean distance of the surfaces, from both sides, by area, m.
     pub mean_m: f64,
-    /// Largest distance of a place of one surface from the other surface, m.
+    /// Largest distance of a point of one surface from the other, m.
     pub hausdorff_m: f64,
     /// Volumes of the first and the second body, m³.
     pub volumes_m3: [f64; 2],
 }
 
 impl Agreement {
-    /// `None` where one of them has no volume.
+    /// Compares two bodies; `None` if one of them has no volume.
     pub fn of(first: &Body, second: &Body) -> Option<Self> {
         let ((low_a, high_a), (low_b, high_b)) = (first.bounds_m(), second.bounds_m());
         let low_m = [0, 1, 2].map(|a| low_a[a].min(low_b[a]));
@@ -73,7 +74,8 @@ impl Triangles {
         )
     }
 
-    /// Sum over places of this surface of area times distance from another, sum of area, and the largest distance.
+    /// Returns the sum over points of this surface of area times distance from another, the sum of
+    /// area, and the largest distance.
     fn off(&self, other: &Self) -> (f64, f64, f64) {
         let every = self.0.len().div_ceil(PLACES).max(1);
         let of = |[a, b, c]: &[Vector3<f64>; 3]| {
@@ -82,7 +84,7 @@ impl Triangles {
             (area_m2 * off_m, area_m2, off_m)
         };
         let add = |a: (f64, f64, f64), b: (f64, f64, f64)| (a.0 + b.0, a.1 + b.1, a.2.max(b.2));
-        // Summed in order: sums of parts in any order would round otherwise each time.
+        // Summed in order: partial sums in any order would round differently each time.
         let each: Vec<_> = self.0.par_iter().step_by(every).map(of).collect();
         each.into_iter().fold((0.0, 0.0, 0.0), add)
     }
@@ -93,7 +95,8 @@ impl Triangles {
     }
 }
 
-/// The place of a triangle nearest to another place (Ericson, Real-Time Collision Detection, 2005, 5.1.5).
+/// Returns the point of a triangle nearest to a place (Ericson, Real-Time Collision Detection,
+/// 2005, 5.1.5).
 fn nearest(place: Vector3<f64>, [a, b, c]: &[Vector3<f64>; 3]) -> Vector3<f64> {
     let (ab, ac, ap) = (b - a, c - a, place - a);
     let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
@@ -134,9 +137,9 @@ mod tests {
     use super::*;
     use crate::plan::anatomy::ball;
 
-    /// A ball within a ball, and one beside it, by closed form.
+    /// Compares a ball within a ball, and one next to it, with the closed form.
     #[test]
-    fn balls_agree_as_their_radii_and_middles_say() {
+    fn the_agreement_of_balls_matches_the_closed_form() {
         let middle = [0.05, 0.04, 0.06];
         let (small, large) = (ball("small", middle, [0.018; 3]), ball("large", middle, [0.020; 3]));
         let found = Agreement::of(&small, &large).expect("two bodies");
@@ -148,7 +151,8 @@ mod tests {
         );
         let beside = ball("beside", [0.053, 0.04, 0.06], [0.020; 3]);
         let found = Agreement::of(&large, &beside).expect("two bodies");
-        // The common part of two balls of one radius is two caps; the distance from a ball that is 3 mm aside is 3 mm at most.
+        // The common part of two balls of one radius is two caps; the distance from a ball that is
+        // shifted by 3 mm is 3 mm at most.
         let (r, d) = (0.020_f64, 0.003_f64);
         let both = std::f64::consts::PI / 12.0 * (4.0 * r + d) * (2.0 * r - d).powi(2);
         let one = 4.0 / 3.0 * std::f64::consts::PI * r.powi(3);
@@ -163,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_place_of_a_triangle_is_that_of_a_fine_grid_on_it() {
+    fn the_nearest_point_of_a_triangle_matches_a_fine_grid() {
         let triangle = [[0.0, 0.0, 0.0], [1.0, 0.2, 0.1], [0.3, 0.9, -0.2]].map(Vector3::from);
         for place in [
             [0.4, 0.3, 0.5],

@@ -1,15 +1,16 @@
-//! Clicks on the edge of the gland in transverse planes, as plain values: each edit gives a new one.
+//! Clicks on the edge of the gland in transverse planes, as plain values: each edit returns a new
+//! one.
 
 use super::outline::Outline;
 use nalgebra::{Vector2, Vector3};
 
-/// Two planes nearer than this are one, m.
+/// Distance below which two planes are one, m.
 const SAME_PLANE_M: f64 = 0.5e-3;
 
-/// The directions of transverse planes, which all lie across one axis.
+/// Directions of transverse planes, which are all perpendicular to one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transverse {
-    /// A place on the axis, where ways along it begin, scene frame, m.
+    /// Origin on the axis, scene frame, m.
     pub origin_m: Vector3<f64>,
     /// Unit vector to the right in the planes.
     pub right: Vector3<f64>,
@@ -20,14 +21,15 @@ pub struct Transverse {
 }
 
 impl Transverse {
-    /// A place of the scene: to the right and up in its plane, and where the plane is along the axis, m.
+    /// Converts a scene point to its offset to the right and up in its plane, and the place of the
+    /// plane along the axis, m.
     pub fn in_plane_m(&self, place_m: Vector3<f64>) -> (Vector2<f64>, f64) {
         let off = place_m - self.origin_m;
         let across = Vector2::new(off.dot(&self.right), off.dot(&self.up));
         (across, off.dot(&self.along))
     }
 
-    /// The place of the scene, m.
+    /// Converts back to a scene point, m.
     pub fn place_m(&self, across_m: Vector2<f64>, at_m: f64) -> Vector3<f64> {
         self.origin_m + self.right * across_m.x + self.up * across_m.y + self.along * at_m
     }
@@ -36,9 +38,9 @@ impl Transverse {
 /// Clicks in one plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clicks {
-    /// Where the plane is along the axis, m.
+    /// Place of the plane along the axis, m.
     pub at_m: f64,
-    /// To the right and up in the plane, m.
+    /// Points to the right and up in the plane, m.
     pub points_m: Vec<[f64; 2]>,
 }
 
@@ -49,28 +51,28 @@ pub struct Contour {
 }
 
 impl Contour {
-    /// In the order of their places along the axis.
+    /// Returns the planes in their order along the axis.
     pub fn planes(&self) -> &[Clicks] {
         &self.planes
     }
 
-    /// Clicks in all planes together.
+    /// Returns the number of clicks in all planes.
     pub fn points(&self) -> usize {
         self.planes.iter().map(|plane| plane.points_m.len()).sum()
     }
 
-    /// The clicks in the plane at this place.
+    /// Returns the clicks in the plane at this place.
     pub fn at(&self, at_m: f64) -> Option<&Clicks> {
         self.planes.iter().find(|plane| is_same(plane, at_m))
     }
 
-    /// One more click.
+    /// Returns the contour with one more click.
     #[must_use]
     pub fn with(&self, at_m: f64, point_m: [f64; 2]) -> Self {
         self.with_all(at_m, &[point_m])
     }
 
-    /// More clicks in one plane.
+    /// Returns the contour with more clicks in one plane.
     #[must_use]
     pub fn with_all(&self, at_m: f64, points_m: &[[f64; 2]]) -> Self {
         let mut contour = self.clone();
@@ -85,7 +87,8 @@ impl Contour {
         contour
     }
 
-    /// A click of the plane at this place, by its number, moved; unchanged where there is none.
+    /// Returns the contour with a click of the plane at this place moved, by its number; unchanged
+    /// if there is none.
     #[must_use]
     pub fn with_moved(&self, at_m: f64, number: usize, to_m: [f64; 2]) -> Self {
         let mut contour = self.clone();
@@ -96,7 +99,7 @@ impl Contour {
         contour
     }
 
-    /// Without a click of the plane at this place.
+    /// Returns the contour without a click of the plane at this place.
     #[must_use]
     pub fn without(&self, at_m: f64, number: usize) -> Self {
         let mut contour = self.clone();
@@ -109,7 +112,7 @@ impl Contour {
         contour
     }
 
-    /// The outline of each plane that has one, with its place along the axis.
+    /// Returns the outline of each plane that has one, with its place along the axis.
     pub fn outlines(&self) -> Vec<(f64, Outline)> {
         let outline = |plane: &Clicks| Some((plane.at_m, Outline::through(&plane.points_m)?));
         self.planes.iter().filter_map(outline).collect()

@@ -1,22 +1,22 @@
-//! Seeds where they are seen, paired one to one with those that lie in the tissue.
+//! Visible seeds, paired one to one with those in the tissue.
 
 use crate::registration::least_cost;
 use nalgebra::Vector3;
 
-/// A mark farther from every seed than this is of none, m: the pitch of a strand.
+/// Distance from every seed beyond which a mark has none, m: the pitch of a strand.
 const FAR_M: f64 = 10e-3;
 
-/// Which mark is of which seed.
+/// Pairs of marks and seeds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Marks {
-    /// For each seed its mark, and how far that is from the seed, m.
+    /// Mark of each seed, and its distance from the seed, m.
     pub of_seeds: Vec<Option<(usize, f64)>>,
-    /// Marks that are of no seed.
+    /// Marks without a seed.
     pub without_seed: Vec<usize>,
 }
 
 impl Marks {
-    /// The pairs of least total square; pairs farther apart than 10 mm are none.
+    /// Returns the pairs of least total square; never pairs farther apart than 10 mm.
     pub fn of(seeds_m: &[[f64; 3]], marks_m: &[[f64; 3]]) -> Self {
         let off_m = |seed: usize, mark: usize| (Vector3::from(seeds_m[seed]) - Vector3::from(marks_m[mark])).norm();
         let cost = |seed: usize, mark: usize| off_m(seed, mark).min(FAR_M).powi(2);
@@ -33,12 +33,12 @@ impl Marks {
         }
     }
 
-    /// Seeds that have no mark.
+    /// Returns the number of seeds without a mark.
     pub fn without_mark(&self) -> usize {
         self.of_seeds.iter().filter(|mark| mark.is_none()).count()
     }
 
-    /// Mean and largest distance of a mark from its seed, m; `None` without a pair.
+    /// Returns mean and largest distance of a mark from its seed, m; `None` without a pair.
     pub fn residuals_m(&self) -> Option<[f64; 2]> {
         let off = || self.of_seeds.iter().flatten().map(|(_, off_m)| *off_m);
         let most = off().reduce(f64::max)?;
@@ -51,9 +51,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn marks_find_their_seeds_and_what_is_left_on_either_side_is_said() {
+    fn marks_find_their_seeds() {
         let seeds: Vec<[f64; 3]> = (0..4).map(|n| [0.01 * f64::from(n), 0.0, 0.05]).collect();
-        // In reverse, 2 mm off; the third seed is not seen, and a calcification is taken for one.
+        // In reverse, 2 mm off; the third seed is invisible, and a calcification is mistaken for
+        // one.
         let mut marks: Vec<[f64; 3]> = seeds.iter().rev().map(|p| [p[0], p[1] + 2e-3, p[2]]).collect();
         marks.remove(1);
         marks.push([0.01, 0.04, 0.05]);
@@ -67,7 +68,8 @@ mod tests {
         assert_eq!((none.without_mark(), none.residuals_m()), (4, None));
     }
 
-    /// Nearest pairs first would give the mark between two seeds to the nearer one, and leave a seed without one.
+    /// Guards against nearest pairs first, which would give a mark between two seeds to the nearer
+    /// one and leave a seed without.
     #[test]
     fn one_mark_does_not_take_the_seed_of_another() {
         let along = |mm: f64| [0.0, 0.0, mm * 1e-3];

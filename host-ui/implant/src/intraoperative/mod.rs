@@ -1,5 +1,5 @@
-//! The plan brought up to date while needles go in: the gland as it is seen now, the seeds where they are seen, the dose of what lies
-//! there, and the needles that are left planned anew.
+//! Update of the plan while needles go in: the gland and the seeds as seen now, the dose of the
+//! placed seeds, and a new plan for the remaining needles.
 //!
 //! Lengths in m, scene frame, as the tissue lies at that moment.
 

@@ -4,33 +4,35 @@ use super::spline::Periodic;
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::{PI, TAU};
 
-/// Directions in which an outline has a radius, evenly about its middle.
+/// Number of directions in which an outline has a radius, evenly about its centre.
 pub const DIRECTIONS: usize = 96;
-/// A line that encloses less is no outline, m².
+/// Smallest area of an outline, m².
 const LEAST_M2: f64 = 1e-6;
-/// Neighbouring points are seen from the middle under at least so much less than half a turn, rad.
+/// Smallest difference to half a turn in the angle between neighbouring points, rad.
 const LEAST_RAD: f64 = 1e-3;
-/// Points from which an ellipse follows.
+/// Number of points that determine an ellipse.
 const OF_ELLIPSE: usize = 5;
-/// Rounds of the stretch; an ellipse is off by a thousandth of its radius after three, and by 10⁻⁵ after six.
+/// Iterations of the stretch; an ellipse is off by a thousandth of its radius after three, and by
+/// 10⁻⁵ after six.
 const ROUNDS: usize = 6;
 
-/// A closed line that every ray from its middle crosses once.
+/// Closed line that every ray from its centre crosses once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outline {
-    /// Middle: to the right and up in the plane, m.
+    /// Centre: to the right and up in the plane, m.
     pub middle_m: Vector2<f64>,
-    /// From the middle to the line, one for each of `DIRECTIONS`, from the right over up, m.
+    /// Distances from the centre, one for each of `DIRECTIONS`, from the right over up, m.
     pub radii_m: Vec<f64>,
 }
 
-/// Unit vector of a direction.
+/// Returns the unit vector of a direction.
 fn direction(n: usize) -> Vector2<f64> {
     let (sine, cosine) = (n as f64 / DIRECTIONS as f64 * TAU).sin_cos();
     Vector2::new(cosine, sine)
 }
 
-/// A middle, and the stretch that makes a disc of radius 1 about it the ellipse with the moments of an outline.
+/// Centre, and the stretch that turns a disc of radius 1 about it into the ellipse with the moments
+/// of an outline.
 #[derive(Clone, Copy)]
 struct Stretch {
     middle_m: Vector2<f64>,
@@ -38,8 +40,9 @@ struct Stretch {
 }
 
 impl Stretch {
-    /// The smooth outline through the points: where the ellipse is a disc, the logarithm of the radius is a periodic spline of the
-    /// angle. `None` where the points do not go around the middle.
+    /// Returns the smooth outline through the points: after the stretch to a disc, the logarithm of
+    /// the radius is a periodic spline of the angle. `None` if the points do not surround the
+    /// centre.
     fn outline(&self, points: &[Vector2<f64>]) -> Option<Outline> {
         let back = self.of_disc.try_inverse()?;
         let polar = |point: &Vector2<f64>| {
@@ -61,9 +64,10 @@ impl Stretch {
         outline.radii_m.iter().all(|r| r.is_finite()).then_some(outline)
     }
 
-    /// By the area of an outline: its middle, and twice the root of its second moments. `None` where there is hardly any.
+    /// Returns the stretch of an outline's area: its centre, and twice the root of its second
+    /// moments. `None` for almost no area.
     fn of(outline: &Outline) -> Option<Self> {
-        // In polar coordinates about the middle each direction is a thin triangle.
+        // In polar coordinates about the centre each direction is a thin triangle.
         let per = TAU / DIRECTIONS as f64;
         let (mut area_m2, mut first, mut second) = (0.0, Vector2::zeros(), Matrix2::zeros());
         for (n, r) in outline.radii_m.iter().enumerate() {
@@ -85,8 +89,8 @@ impl Stretch {
 }
 
 impl Outline {
-    /// The smooth line through these points, whatever their order; `None` for fewer than three, or where they enclose nothing. Five
-    /// points or more of an ellipse give that ellipse.
+    /// Returns the smooth line through these points, in any order; `None` for fewer than three, or
+    /// if they enclose nothing. Five points or more of an ellipse give that ellipse.
     pub fn through(points_m: &[[f64; 2]]) -> Option<Self> {
         let points: Vec<Vector2<f64>> = points_m.iter().map(|p| Vector2::from(*p)).collect();
         let middle_m = points.iter().sum::<Vector2<f64>>() / points.len().max(1) as f64;
@@ -109,13 +113,13 @@ impl Outline {
         Stretch::of(&outline).is_some().then_some(outline)
     }
 
-    /// Points of the line, to the right and up in the plane, m.
+    /// Returns the points of the line, to the right and up in the plane, m.
     pub fn points_m(&self) -> impl Iterator<Item = Vector2<f64>> + '_ {
         let point = |(n, radius_m): (usize, &f64)| self.middle_m + direction(n) * *radius_m;
         self.radii_m.iter().enumerate().map(point)
     }
 
-    /// So many of its points, evenly about the middle.
+    /// Returns this number of its points, evenly about the centre.
     pub fn some_points_m(&self, count: usize) -> Vec<[f64; 2]> {
         let all: Vec<Vector2<f64>> = self.points_m().collect();
         (0..count).map(|n| all[n * DIRECTIONS / count.max(1)].into()).collect()
@@ -133,7 +137,7 @@ mod tests {
         [0.01 + HALF_M[0] * cosine, HALF_M[1] * sine - 0.02]
     }
 
-    /// Largest distance from the ellipse, as a share of its radius.
+    /// Returns the largest distance from the ellipse, as a share of its radius.
     fn off(outline: &Outline) -> f64 {
         let off = |p: Vector2<f64>| (((p.x - 0.01) / HALF_M[0]).hypot((p.y + 0.02) / HALF_M[1]) - 1.0).abs();
         outline.points_m().map(off).fold(0.0, f64::max)
@@ -155,9 +159,9 @@ mod tests {
         assert!(Outline::through(&line).is_none(), "they lie on a line");
     }
 
-    /// A gland that is flat behind: the line goes through its clicks all the same.
+    /// Tests a gland with a flat back: the line still goes through its clicks.
     #[test]
-    fn the_line_goes_through_its_clicks() {
+    fn the_outline_goes_through_its_clicks() {
         let clicked: Vec<[f64; 2]> = [10.0, 70.0, 130.0, 190.0, 230.0, 270.0, 310.0]
             .map(point)
             .map(|[x, y]| [x, y.max(-0.032)])

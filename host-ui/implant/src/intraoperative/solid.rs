@@ -1,24 +1,26 @@
-//! The gland between and beyond the planes that were clicked: a closed body.
+//! The gland between and beyond the clicked planes: a closed body.
 //!
-//! Between planes the middle and the squares of the radii are interpolated. Those of an ellipsoid are a straight line and a parabola,
-//! which the interpolation repeats exactly; beyond the outermost planes the parabola says where the gland ends.
+//! Between planes the centre and the squares of the radii are interpolated. Those of an ellipsoid
+//! are a straight line and a parabola, which the interpolation reproduces exactly. Beyond the
+//! outermost planes the parabola gives the end of the gland.
 
 use super::contour::{Contour, Transverse};
 use super::outline::{DIRECTIONS, Outline};
 use crate::plan::PlanError;
 use crate::plan::anatomy::{Body, body_of};
 
-/// Planes with an outline that a body needs.
+/// Number of planes with an outline that a body needs.
 pub const PLANES: usize = 3;
-/// From one ring of corners to the next, m.
+/// Distance between rings of corners, m.
 const RING_M: f64 = 1e-3;
-/// Rings of each end beyond the outermost plane.
+/// Number of rings at each end beyond the outermost plane.
 const END_RINGS: usize = 8;
-/// An end is at least so long, m, and at most so many times the distance of the last two planes: beyond that there would be another.
+/// Length limits of an end: at least this, m, and at most this multiple of the distance of the last
+/// two planes; a longer one would contain another plane.
 const SHORTEST_M: f64 = 0.5e-3;
 const LONGEST: f64 = 2.0;
 
-/// Why clicks make no body.
+/// Reason why clicks do not define a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ContourError {
     /// Too few planes have an outline.
@@ -26,7 +28,7 @@ pub enum ContourError {
     Planes(usize),
 }
 
-/// Middle and squares of the radii of a plane, or what they change by along the axis.
+/// Centre and squares of the radii of a plane, or their derivatives along the axis.
 #[derive(Clone, Debug)]
 struct Values(Vec<f64>);
 
@@ -42,12 +44,13 @@ impl Values {
         Self((0..length).map(sum).collect())
     }
 
-    /// Mean square of the radii.
+    /// Returns the mean square of the radii.
     fn mean_square(&self) -> f64 {
         self.0[2..].iter().sum::<f64>() / DIRECTIONS as f64
     }
 
-    /// Squares that rounding or a swing of the cubic has made less than nothing are none.
+    /// Returns the outline. Squares that rounding or an overshooting cubic made negative become
+    /// zero.
     fn outline(&self) -> Outline {
         Outline {
             middle_m: [self.0[0], self.0[1]].into(),
@@ -56,22 +59,23 @@ impl Values {
     }
 }
 
-/// One end of the gland.
+/// End of the gland.
 #[derive(Clone, Debug)]
 struct End {
-    /// Its outermost plane, and from there to the pole.
+    /// Place of its outermost plane, and distance from there to the pole.
     at_m: f64,
     length_m: f64,
     values: Values,
-    /// How far the middle moves from the plane to the pole.
+    /// Drift of the centre from the plane to the pole.
     drift_m: [f64; 2],
-    /// `(1 - u) (1 + curved u)` is the share of the squares of the radii at the share `u` of the length.
+    /// Curvature: `(1 - u) (1 + curved u)` is the share of the squares of the radii at the share
+    /// `u` of the length.
     curved: f64,
 }
 
 impl End {
-    /// `outer` is the outermost plane, `inner` the next one; `change` what the values change by along the axis at the outer one,
-    /// outwards, and `bend` half their second derivative.
+    /// Creates an end. `outer` is the outermost plane, `inner` the next one; `change` is the
+    /// derivative along the axis at the outer one, outwards, and `bend` half the second derivative.
     fn of(outer: (f64, &Values), inner: (f64, &Values), change: &Values, bend: &Values) -> Self {
         let apart_m = (outer.0 - inner.0).abs();
         let (square, slope, bend) = (outer.1.mean_square(), change.mean_square(), bend.mean_square());
@@ -99,17 +103,17 @@ impl End {
     }
 }
 
-/// The gland as outlines at every place along the axis.
+/// Gland as outlines at every place along the axis.
 #[derive(Clone, Debug)]
 pub struct Solid {
-    /// Places along the axis, m, with the values there and what they change by.
+    /// Places along the axis, m, with the values there and their derivatives.
     planes: Vec<(f64, Values, Values)>,
     /// The lower and the upper end.
     ends: [End; 2],
 }
 
 impl Solid {
-    /// The body that these clicks are on.
+    /// Creates the body through these clicks.
     pub fn of(contour: &Contour) -> Result<Self, ContourError> {
         let outlines = contour.outlines();
         let count = outlines.len();
@@ -144,13 +148,13 @@ impl Solid {
         Ok(Self { planes, ends })
     }
 
-    /// Places of both poles along the axis, m.
+    /// Returns the places of both poles along the axis, m.
     pub fn poles_m(&self) -> [f64; 2] {
         let [low, high] = &self.ends;
         [low.at_m - low.length_m, high.at_m + high.length_m]
     }
 
-    /// The outline at a place along the axis; `None` beyond the poles.
+    /// Returns the outline at a place along the axis; `None` beyond the poles.
     pub fn at(&self, at_m: f64) -> Option<Outline> {
         let [low, high] = &self.ends;
         let beyond = |end: &End| (at_m - end.at_m).abs() / end.length_m;
@@ -176,7 +180,7 @@ impl Solid {
         Some(Values::combined(&terms).outline())
     }
 
-    /// The closed body, scene frame.
+    /// Returns the closed body, scene frame.
     pub fn body(&self, frame: &Transverse, name: &str) -> Result<Body, PlanError> {
         let [low, high] = &self.ends;
         // Denser towards the poles, where the outline shrinks fastest.
@@ -211,8 +215,9 @@ impl Solid {
     }
 }
 
-/// What is proposed in a plane without an outline of its own: that of the body, or while there are too few planes for one, straight
-/// lines between two and the nearest beyond them; `None` where nothing is clicked or the body ends before.
+/// Returns the proposal for a plane without an outline of its own: that of the body. With too few
+/// planes, interpolates between two and holds the nearest beyond them; `None` without clicks or
+/// beyond the body.
 pub fn proposed_at(contour: &Contour, at_m: f64) -> Option<Outline> {
     if let Ok(solid) = Solid::of(contour) {
         return solid.at(at_m);

@@ -3,13 +3,13 @@
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
-/// Two values whose angles differ by less are one, rad.
+/// Difference below which two angles are one, rad.
 const SAME_RAD: f64 = 0.02;
 
-/// A function with continuous second derivative all around.
+/// Function with continuous second derivative all around.
 #[derive(Clone, Debug)]
 pub struct Periodic {
-    /// Rising, within one turn, rad.
+    /// Angles, rising, within one turn, rad.
     angles: Vec<f64>,
     values: Vec<f64>,
     /// Second derivatives at the angles.
@@ -17,7 +17,8 @@ pub struct Periodic {
 }
 
 impl Periodic {
-    /// Through these values at their angles, in any order; of values at one angle the mean. `None` for fewer than three angles.
+    /// Interpolates these values at their angles, in any order; values at one angle are averaged.
+    /// `None` for fewer than three angles.
     pub fn through(mut points: Vec<(f64, f64)>) -> Option<Self> {
         points.iter_mut().for_each(|(angle, _)| *angle = angle.rem_euclid(TAU));
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -54,7 +55,7 @@ impl Periodic {
         Some(spline)
     }
 
-    /// From an angle to the next one.
+    /// Returns the span from an angle to the next one.
     fn span(&self, n: usize) -> f64 {
         match self.angles.get(n + 1) {
             Some(next) => next - self.angles[n],
@@ -62,12 +63,12 @@ impl Periodic {
         }
     }
 
-    /// The largest distance between neighbouring angles, rad.
+    /// Returns the largest distance between neighbouring angles, rad.
     pub fn widest_gap(&self) -> f64 {
         (0..self.angles.len()).map(|n| self.span(n)).fold(0.0, f64::max)
     }
 
-    /// The value at an angle.
+    /// Returns the value at an angle.
     pub fn at(&self, angle: f64) -> f64 {
         let past = (angle - self.angles[0]).rem_euclid(TAU);
         let count = self.angles.len();
@@ -88,9 +89,10 @@ impl Periodic {
 mod tests {
     use super::*;
 
-    /// Between equal angles h apart the spline of a cosine is off in the middle by a closed form.
+    /// Compares with the closed-form error of the spline of a cosine, in the middle between equal
+    /// angles h apart.
     #[test]
-    fn a_cosine_at_six_angles_is_off_by_what_the_closed_form_says() {
+    fn the_error_of_a_cosine_matches_the_closed_form() {
         let h = TAU / 6.0;
         let spline = Periodic::through((0..6).map(|n| (f64::from(n) * h, (f64::from(n) * h).cos())).collect());
         let spline = spline.expect("six angles");
@@ -107,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn values_at_one_angle_count_as_their_mean_and_two_angles_are_no_turn() {
+    fn values_at_one_angle_are_averaged() {
         let spline = Periodic::through(vec![(3.0, 1.0), (1.0, 2.0), (5.0, 3.0), (-TAU + 1.001, 4.0)]);
         assert!((spline.expect("three angles").at(1.0) - 3.0).abs() < 1e-12);
         assert!(Periodic::through(vec![(0.0, 1.0), (1.0, 2.0), (TAU, 3.0)]).is_none());

@@ -1,46 +1,47 @@
-//! Dose of what lies in the tissue now, and the needles that are left planned anew beside it.
+//! Dose of the placed seeds, and a new plan for the remaining needles around them.
 
 use crate::plan::optimise::{self, Engine, Figures, Method, Objectives, Present, Search};
 use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Needle, NeedleSeed, PlanError};
 use std::ops::ControlFlow;
 use stylet_dose::{DoseKernel, Seed, Source};
 
-/// Needles of an implant where its first plan had fewer.
+/// Number of needles of an implant whose first plan had fewer.
 const USUAL_NEEDLES: usize = 25;
 
-/// Which places of the seeds a dose is of.
+/// Source of the seeds' positions for a dose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SeedsFrom {
-    /// As they lie in the tissue, which a simulator knows.
+    /// Positions in the tissue, which a simulator knows.
     #[default]
     Tissue,
-    /// Where the operator marked them.
+    /// Positions of the operator's marks.
     Marks,
 }
 
 impl SeedsFrom {
-    /// Its name, for people.
+    /// Returns the display name.
     pub fn name(self) -> &'static str {
         match self {
-            Self::Tissue => "as they lie",
+            Self::Tissue => "actual positions",
             Self::Marks => "as marked",
         }
     }
 }
 
-/// An implant in the middle of its procedure.
+/// Implant in the middle of its procedure.
 pub struct Situation<'a> {
-    /// The plan that is carried out.
+    /// Plan in progress.
     pub plan: &'a ImplantPlan,
-    /// Needles of it that were inserted: the first ones.
+    /// Number of its needles that were inserted: the first ones.
     pub begun: usize,
     /// Seeds in the tissue, scene frame.
     pub lying: Vec<Seed>,
     /// Seeds of inserted needles that are still to be dropped, as planned.
     pub to_drop: Vec<Seed>,
-    /// Target and what is spared, as they are now.
+    /// Target and spared structures at present.
     pub anatomy: &'a Anatomy,
-    /// Needles that were rehearsed, with where their seeds would rest. Of those that were not, seeds are taken to rest as planned.
+    /// Rehearsed needles, with the predicted places of their seeds. Seeds of other needles are
+    /// assumed to rest as planned.
     pub rehearsed: &'a [(Needle, Compensation)],
     /// Dose of one seed.
     pub kernel: &'a DoseKernel,
@@ -51,61 +52,63 @@ pub struct Situation<'a> {
 /// Measures of the dose at a moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Doses {
-    /// Of the seeds that lie in the tissue.
+    /// Measures of the seeds in the tissue.
     pub now: Figures,
-    /// Of all seeds if the plan is carried on unchanged, those of needles that were rehearsed where they would rest.
+    /// Measures of all seeds if the plan is continued unchanged, with rehearsed seeds at their
+    /// predicted places.
     pub continued: Figures,
 }
 
-/// The needles that are left, planned anew.
+/// New plan for the remaining needles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Update {
-    /// The plan: needles that were inserted, unchanged, and then the new ones.
+    /// Plan: inserted needles, unchanged, and then the new ones.
     pub plan: ImplantPlan,
-    /// Needles of it that were inserted.
+    /// Number of its needles that were inserted.
     pub begun: usize,
-    /// Before the update.
+    /// Doses before the update.
     pub doses: Doses,
-    /// Of all seeds if the new needles go in.
+    /// Measures of all seeds if the new needles go in.
     pub updated: Figures,
 }
 
-/// What the operator found out and decided, for the debrief.
+/// Findings and decision of the operator, for the debrief.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reviewed {
-    /// Needles that were inserted at that time.
+    /// Number of needles inserted at that time.
     pub begun: usize,
-    /// Seeds that lay in the tissue.
+    /// Number of seeds in the tissue.
     pub lying: usize,
-    /// Which places of the seeds the dose was of.
+    /// Source of the seeds' positions for the dose.
     pub seeds_from: SeedsFrom,
     /// The contoured gland against the true one.
     pub agreement: Option<super::Agreement>,
-    /// Seeds that were marked, and marks that were of no seed.
+    /// Number of marked seeds, and of marks without a seed.
     pub marked: [usize; 2],
     /// Mean and largest distance of a mark from its seed, m.
     pub residuals_m: Option<[f64; 2]>,
-    /// Of the plan as it was, in the contoured gland.
+    /// Doses of the previous plan, in the contoured gland.
     pub doses: Doses,
-    /// Of the new plan, in the contoured gland.
+    /// Measures of the new plan, in the contoured gland.
     pub updated: Figures,
-    /// Needles and seeds that were left in the plan as it was, and in the new one.
+    /// Remaining needles and seeds in the previous plan, and in the new one.
     pub left: [[usize; 2]; 2],
-    /// Whether the operator took the new plan.
+    /// True if the operator accepted the new plan.
     pub accepted: bool,
 }
 
-/// An update that waits for a decision, with what the debrief keeps of it.
+/// Update that waits for a decision, with its record for the debrief.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proposed {
     /// The update.
     pub update: Update,
-    /// What was found out; not accepted yet.
+    /// Findings; not accepted yet.
     pub reviewed: Reviewed,
 }
 
 impl Situation<'_> {
-    /// Measures now and with the plan carried on; an error where the target has no volume.
+    /// Computes measures now and with the plan continued; returns an error if the target has no
+    /// volume.
     pub fn doses(&self) -> Result<Doses, PlanError> {
         self.doses_by(&Engine::new(self.kernel, optimise::bodies(self.anatomy)))
     }
@@ -122,13 +125,13 @@ impl Situation<'_> {
         figures.ok_or(PlanError::NoDose)
     }
 
-    /// All seeds once the needles that are left in a plan are in.
+    /// Returns all seeds after the remaining needles of a plan.
     pub fn with(&self, plan: &ImplantPlan) -> Vec<Seed> {
         let left = left_of(plan, self.begun).iter().flat_map(|needle| self.resting(needle));
         self.lying.iter().chain(&self.to_drop).copied().chain(left).collect()
     }
 
-    /// The seeds of a needle where they would rest.
+    /// Returns the seeds of a needle at their predicted places.
     fn resting(&self, needle: &Needle) -> Vec<Seed> {
         let rehearsed = self.rehearsed.iter().find(|(of, _)| of == needle);
         let off_m = rehearsed.map_or(&[][..], |(_, done)| &done.after_m);
@@ -144,8 +147,8 @@ impl Situation<'_> {
         resting.collect()
     }
 
-    /// Searches for the needles that are left, through holes that are not used yet, with seeds of the strength at hand. `report` gets
-    /// the share that is done; where it breaks, the search is cancelled.
+    /// Searches for the remaining needles, through unused holes, with seeds of the available
+    /// strength. `report` gets the completed share; if it breaks, the search is cancelled.
     pub fn update(&self, report: impl Fn(f32) -> ControlFlow<()>) -> Result<Update, PlanError> {
         let plan = self.plan;
         let begun = &plan.needles[..self.begun.min(plan.needles.len())];
@@ -191,14 +194,15 @@ impl Situation<'_> {
 }
 
 impl Update {
-    /// Whether less is beyond the limits than with the plan carried on, or with as little the coldest tenth of the target gets more.
+    /// Returns whether the plan improves: limits are violated less than with the plan continued, or
+    /// equally and the coldest tenth of the target gets more.
     pub fn improves(&self) -> bool {
         let order = |figures: &Figures| [figures.beyond(), -figures.d90];
         order(&self.updated) < order(&self.doses.continued)
     }
 }
 
-/// Needles that are not inserted yet.
+/// Returns the needles that are not inserted yet.
 fn left_of(plan: &ImplantPlan, begun: usize) -> &[Needle] {
     &plan.needles[begun.min(plan.needles.len())..]
 }

@@ -1,4 +1,5 @@
-//! The study of a plan in a scene: outlines of the scene's structures, the plan, and the dose of its seeds.
+//! The study of a plan in a scene: outlines of the scene's structures, the plan, and the dose of
+//! its seeds.
 
 use super::{LinkedStudy, write as write_linked};
 use crate::plan::{Anatomy, ImplantPlan, PlanError, exchange, file};
@@ -20,18 +21,19 @@ use stylet_files::dicom::{self, Identity};
 use stylet_files::{ContentError, FileError, Progress, VoxelFrame, Voxels, bytes, scene as scene_file};
 use stylet_host::link::SceneModel;
 
-/// Pitch of the points of the histograms, as everywhere where a plan is judged, and side of a voxel of the dose.
+/// Pitch of the points of the histograms, as in every evaluation of a plan, and side of a voxel of
+/// the dose.
 const PITCH_M: f64 = 1e-3;
 const POINTS: usize = 100_000;
-/// The grid reaches so far beyond structures and seeds.
+/// Margin of the grid around structures and seeds.
 const STRUCTURE_MARGIN_M: f64 = 5e-3;
 const SEED_MARGIN_M: f64 = 20e-3;
-/// Share of the work that is the dose.
+/// Share of the dose in the whole work.
 const SHARE_OF_DOSE: f32 = 0.9;
-/// Seeds whose dose is added between two looks at whether the study is still wanted.
+/// Number of seeds added between two checks for cancellation.
 const TOGETHER: usize = 16;
 
-/// Why a study was not written.
+/// Reason why a study was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneStudyError {
     /// The plan cannot be written as DICOM.
@@ -46,7 +48,7 @@ pub enum SceneStudyError {
     /// The dose cannot be computed or counted.
     #[error("the dose of the plan: {0}")]
     Dose(#[from] stylet_dose::DoseError),
-    /// The folder is there and not empty, or cannot be made.
+    /// The folder exists and is not empty, or cannot be created.
     #[error("{0}")]
     Folder(String),
     /// `study.json` cannot be written.
@@ -55,18 +57,19 @@ pub enum SceneStudyError {
     /// A figure is not representable in JSON.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
-    /// Whoever asked for it ended the work.
+    /// The work was cancelled.
     #[error("the study was cancelled; nothing was written")]
     Cancelled,
 }
 
-/// Writes `structure_set.dcm`, `plan.dcm`, `dose.dcm` and `study.json` into a new or empty folder, and gives what there is to know
-/// about them. Patient, study and frame of reference, contours and images are those of `like` where that is a DICOM structure set;
-/// otherwise the structures are outlined along the cells of the scene. `report` gets the share that is done; where it breaks,
-/// nothing is written.
+/// Writes `structure_set.dcm`, `plan.dcm`, `dose.dcm` and `study.json` into a new or empty folder,
+/// and returns the remarks on them. Patient, study, frame of reference, contours and images are
+/// those of `like` if it is a DICOM structure set; otherwise the structures are outlined along the
+/// cells of the scene. `report` gets the completed share; if it breaks, nothing is written.
 ///
 /// # Errors
-/// A source that is not known, a plan without seeds, a file that cannot be written.
+///
+/// An unknown source, a plan without seeds, a file that cannot be written.
 pub fn write(
     folder: &Path,
     plan: &ImplantPlan,
@@ -112,7 +115,7 @@ pub fn write(
     let verdict = judge.judge(&kernel, &plan.seeds());
     proceed(0.05)?;
     let mut dose = grid(&seeds, &drawn.structures)?;
-    // Sums of doses are exact, so that the order in which seeds are added does not matter.
+    // Sums of doses are exact, so the order in which seeds are added does not matter.
     let parts = seeds.len().div_ceil(TOGETHER);
     for (n, part) in seeds.chunks(TOGETHER).enumerate() {
         dose.add(&kernel, part);
@@ -164,7 +167,7 @@ pub fn write(
     });
     let text = serde_json::to_string_pretty(&record)? + "\n";
     write_whole(&folder.join("study.json"), text.as_bytes())?;
-    // It is written; there is nothing left to cancel.
+    // The files are written; there is nothing left to cancel.
     let _ = report(1.0);
     Ok(notes)
 }
@@ -174,14 +177,15 @@ fn known(plan: &ImplantPlan) -> Result<Source, PlanError> {
     Source::known(&plan.source).ok_or_else(missing)
 }
 
-/// Structures with what they belong to.
+/// Structures with their images and identity.
 struct Drawn {
     structures: Vec<Outlined>,
     identity: Identity,
     images: Vec<Slice>,
 }
 
-/// The contours of a structure set, or of the one that a scene file names; `None` for any other file.
+/// Reads the contours of a structure set, or of the one that a scene file names; `None` for any
+/// other file.
 fn of_file(path: &Path) -> Result<Option<Drawn>, SceneStudyError> {
     let named = match scene_file::is_scene(path) {
         true => Some(path.with_file_name(scene_file::read(path)?.volume)),
@@ -203,7 +207,7 @@ fn of_file(path: &Path) -> Result<Option<Drawn>, SceneStudyError> {
     }))
 }
 
-/// The cells of a scene as a volume of the patient.
+/// Returns the cells of a scene as a volume of the patient.
 fn voxels(scene: &SceneModel) -> Result<Voxels, SceneStudyError> {
     let (header, labels) = (&scene.header, &scene.header.labels);
     let patient = header.patient();
@@ -222,7 +226,7 @@ fn voxels(scene: &SceneModel) -> Result<Voxels, SceneStudyError> {
     })
 }
 
-/// Around all structures and seeds, without dose.
+/// Creates a grid around all structures and seeds, without dose.
 fn grid(seeds: &[Seed], structures: &[Outlined]) -> Result<DoseGrid, SceneStudyError> {
     let corners: Vec<[f64; 3]> = structures
         .iter()

@@ -1,4 +1,5 @@
-//! What a plan must know of the body: the target and what is to be spared, as closed surfaces of the scene at rest.
+//! The anatomy for a plan: the target and the structures to be spared, as closed surfaces of the
+//! scene at rest.
 
 use super::PlanError;
 use nalgebra::Vector3;
@@ -11,28 +12,28 @@ use stylet_host::link::SceneModel;
 use stylet_shm_schema::{StructureInfo, role};
 use stylet_surfaces::bodies::{Bodies, Follows, shown_alone};
 
-/// Steps in which a needle's way is looked at.
+/// Step of the search along a needle's path.
 const STEP_M: f64 = 0.5e-3;
 
-/// Lines of a template run along the planes on which corners of a mesh lie, where inside and outside cannot be
-/// distinguished: a place is tested at this small distance from itself.
+/// Small offset at which a place is tested. Lines of a template run along the planes on which
+/// corners of a mesh lie, where inside and outside are ambiguous.
 const BESIDE_M: [f64; 3] = [0.0, 1.37e-8, 2.71e-8];
 
-/// One structure, closed.
+/// Closed structure.
 pub struct Body {
     /// Name as the scene gives it.
     pub name: String,
     mesh: Mesh,
-    /// Of the closed surface that decides what is inside.
+    /// Corners of the closed surface that decides what is inside.
     corners_m: Vec<[f64; 3]>,
     faces: Vec<[usize; 3]>,
-    /// Of the surface that is drawn.
+    /// Points of the drawn surface.
     points_m: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
 }
 
 impl Body {
-    /// The mesh must be closed.
+    /// Creates a structure. The mesh must be closed.
     fn new(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Self, PlanError> {
         Ok(Self {
             name: name.to_owned(),
@@ -47,14 +48,15 @@ impl Body {
         })
     }
 
-    /// The same structure, drawn by this part of the scene's surfaces where they follow the segmentation.
+    /// Returns the same structure, drawn by this part of the scene's surfaces if they follow the
+    /// segmentation.
     fn drawn_as(mut self, bodies: &Bodies, part: Option<usize>) -> Self {
         let triangles = part.and_then(|n| bodies.triangles.get(bodies.parts.get(n)?.clone()));
         let triangles = triangles
             .filter(|_| bodies.follows == Follows::Segmentation)
             .unwrap_or(&[]);
         let vertices = || triangles.iter().flatten().copied();
-        // The vertices of a part stand together.
+        // The vertices of a part are contiguous.
         if let (Some(first), Some(last)) = (vertices().min(), vertices().max()) {
             self.points_m = bodies.rest_m[first as usize..=last as usize].to_vec();
             self.triangles = triangles.iter().map(|t| t.map(|v| v - first)).collect();
@@ -62,38 +64,39 @@ impl Body {
         self
     }
 
-    /// The same structure with each of its corners moved, as by the tissue that it is part of; drawn by its closed surface.
+    /// Returns the same structure with each of its corners moved, for example by its tissue; drawn
+    /// by its closed surface.
     pub fn moved(&self, to_m: impl Fn([f64; 3]) -> [f64; 3]) -> Result<Self, PlanError> {
         let moved: Vec<[f64; 3]> = self.corners_m.iter().map(|corner| to_m(*corner)).collect();
         Self::new(&self.name, &moved, &self.faces)
     }
 
-    /// Corners and triangles of the closed surface that decides what is inside, m.
+    /// Returns corners and triangles of the closed surface that decides what is inside, m.
     pub fn closed_surface(&self) -> (&[[f64; 3]], &[[usize; 3]]) {
         (&self.corners_m, &self.faces)
     }
 
-    /// Its surface, as it is drawn.
+    /// Returns the drawn surface.
     pub fn surface(&self) -> (&[[f32; 3]], &[[u32; 3]]) {
         (&self.points_m, &self.triangles)
     }
 
-    /// Whether a point, scene frame, m, lies inside.
+    /// Returns whether a point, scene frame, m, lies inside.
     pub fn contains(&self, point_m: [f64; 3]) -> bool {
         self.mesh.contains([0, 1, 2].map(|a| point_m[a] + BESIDE_M[a]))
     }
 
-    /// Bounding box: smallest and largest corner, m.
+    /// Returns the bounding box: smallest and largest corner, m.
     pub fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
         self.mesh.bounds_m()
     }
 
-    /// Points for dose, one a cell.
+    /// Returns points for dose, one a cell.
     pub fn structure(&self, pitch_m: f64) -> Structure {
         Structure::of_region(&self.name, &self.mesh, pitch_m)
     }
 
-    /// The pieces of a line inside, as distances from its start; to half a step.
+    /// Returns the pieces of a line inside, as distances from its start; to half a step.
     pub fn pieces_m(&self, from_m: [f64; 3], direction: [f64; 3], length_m: f64) -> Vec<[f64; 2]> {
         let mut pieces: Vec<[f64; 2]> = Vec::new();
         let mut was_inside = false;
@@ -110,7 +113,7 @@ impl Body {
         pieces
     }
 
-    /// Whether a point or one of eight around it, across `direction`, lies inside.
+    /// Returns whether a point or one of eight around it, across `direction`, lies inside.
     pub fn is_near(&self, point_m: [f64; 3], direction: [f64; 3], within_m: f64) -> bool {
         let direction = Vector3::from(direction);
         let helper = if direction.x.abs() < 0.7 {
@@ -128,24 +131,25 @@ impl Body {
     }
 }
 
-/// Target, what is spared, and the box of all tissue.
+/// Target, spared structures, and the box of all tissue.
 pub struct Anatomy {
-    /// What seeds are planned in.
+    /// Structure in which seeds are planned.
     pub target: Body,
-    /// What needles and dose are kept from.
+    /// Structures to be spared by needles and dose.
     pub spared: Vec<Body>,
-    /// What no needle goes through: the pubic arch.
+    /// Structures that no needle crosses: the pubic arch.
     pub bone: Vec<Body>,
     /// Smallest corner of the box of all tissue, m.
     pub lower_m: [f64; 3],
     /// Largest corner of that box, m.
     pub upper_m: [f64; 3],
-    /// Where the patient lies in the scene.
+    /// Place of the patient in the scene.
     pub patient: PatientFrame,
 }
 
 impl Anatomy {
-    /// From what the core sent; an error when the scene has no closed target.
+    /// Creates the anatomy from the core's data; returns an error if the scene has no closed
+    /// target.
     pub fn of(scene: &SceneModel) -> Result<Self, PlanError> {
         let header = &scene.header;
         let alone = shown_alone(header);
@@ -181,7 +185,7 @@ impl Anatomy {
         })
     }
 
-    /// The anatomy of a moment: this target, and all else moved with the tissue.
+    /// Returns the anatomy of a moment: this target, and everything else moved with the tissue.
     pub fn seen_as(&self, target: Body, to_m: &dyn Fn([f64; 3]) -> [f64; 3]) -> Result<Self, PlanError> {
         let moved = |bodies: &[Body]| bodies.iter().map(|body| body.moved(to_m)).collect::<Result<_, _>>();
         Ok(Self {
@@ -192,13 +196,14 @@ impl Anatomy {
         })
     }
 
-    /// The structures that dose is counted in, the target first.
+    /// Returns the structures in which dose is counted, the target first.
     pub fn structures(&self, pitch_m: f64) -> Vec<Structure> {
         let bodies = std::iter::once(&self.target).chain(&self.spared);
         bodies.map(|b| b.structure(pitch_m)).collect()
     }
 
-    /// The first structure to be spared that the needle enters within `margin_m` on its way to `depth_m`.
+    /// Returns the first spared structure that the needle enters within `margin_m` on its way to
+    /// `depth_m`.
     pub fn spared_in_the_way(
         &self,
         entry_m: [f64; 3],
@@ -220,8 +225,8 @@ impl Anatomy {
     }
 }
 
-/// The surface that the core draws goes through the middles of the outermost elements: the body ends half an element further
-/// out.
+/// Returns the body inside a surface of the core, which goes through the centres of the outermost
+/// elements: the body ends half an element further out.
 fn body(scene: &SceneModel, name: &str, triangles: &[[u32; 3]]) -> Result<Body, PlanError> {
     let mut numbers = BTreeMap::new();
     let mut points_m: Vec<Vector3<f64>> = Vec::new();
@@ -246,12 +251,12 @@ fn body(scene: &SceneModel, name: &str, triangles: &[[u32; 3]]) -> Result<Body, 
     Body::new(name, &moved, &corners)
 }
 
-/// A body from a closed surface that is not the core's.
+/// Creates a body from a closed surface that is not the core's.
 pub fn body_of(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Body, PlanError> {
     Body::new(name, points_m, triangles)
 }
 
-/// A ball, drawn by triangles; for tests and for scenes without files.
+/// Creates a ball of triangles, for tests and for scenes without files.
 pub fn ball(name: &str, middle_m: [f64; 3], half_m: [f64; 3]) -> Body {
     const ROWS: usize = 24;
     const COLUMNS: usize = 48;
@@ -290,7 +295,7 @@ pub fn ball(name: &str, middle_m: [f64; 3], half_m: [f64; 3]) -> Body {
     body.unwrap_or_else(|why| unreachable!("the grid of a ball is closed: {why}"))
 }
 
-/// Box around points.
+/// Returns the box around points.
 pub fn bounds_of(points_m: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     structure::bounds(points_m)
 }
@@ -300,7 +305,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_ball_has_its_volume_and_a_needle_through_it_the_right_piece() {
+    fn a_ball_has_its_volume_and_chord() {
         let ball = ball("gland", [0.05, 0.04, 0.03], [0.02, 0.015, 0.01]);
         let volume: f64 = ball.structure(1e-3).volumes_m3.iter().sum();
         let exact = 4.0 / 3.0 * std::f64::consts::PI * 0.02 * 0.015 * 0.01;

@@ -1,30 +1,31 @@
-//! A first plan by modified peripheral loading: many needles near the edge of the gland, fewer inside, none near the urethra.
+//! A first plan by modified peripheral loading: many needles near the edge of the gland, fewer
+//! inside, none near the urethra.
 //!
-//! The strength of a seed follows: dose is linear in it, so one sum of doses of 1 U says which strength gives the
-//! prescription to the share of the gland that is asked for.
+//! The strength of a seed follows. Dose is linear in it, so one sum of doses of 1 U gives the
+//! strength at which the required share of the gland gets the prescription.
 
 use super::check::SPARED_MARGIN_M;
 use super::{Anatomy, Hole, ImplantPlan, Loading, Needle, NeedleSeed, PlanError, SEED_LENGTH_M, SPACER_M, Template};
 use std::ops::ControlFlow;
 use stylet_dose::{DoseKernel, DosePoints, Dvh, Seed};
 
-/// What a first plan aims at.
+/// Aims of a first plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aims {
     /// Prescribed dose, Gy.
     pub prescription_gy: f64,
-    /// Share of the target that gets the prescription.
+    /// Share of the target that must get the prescription.
     pub covered: f64,
-    /// Needles stay so far from what is spared, besides their margin.
+    /// Distance of needles from spared structures, in addition to their margin.
     pub spared_m: f64,
-    /// As many needles as are usual for a whole gland.
+    /// Usual number of needles for a whole gland.
     pub needles: [usize; 2],
-    /// Seeds that are usually ordered.
+    /// Usual strengths of ordered seeds.
     pub strengths_u: [f64; 2],
 }
 
 impl Aims {
-    /// The usual aims for a prescription, Gy.
+    /// Returns the usual aims for a prescription, Gy.
     pub fn new(prescription_gy: f64) -> Self {
         Self {
             prescription_gy,
@@ -36,19 +37,19 @@ impl Aims {
     }
 }
 
-/// One way to load a gland; several are tried, and the one that overdoses least is taken.
+/// Pattern for loading a gland; several are tried, and the one that overdoses least is used.
 #[derive(Clone, Copy, Debug)]
 struct Pattern {
     /// Every second hole, as on a chessboard, or all.
     parity: Option<u8>,
-    /// Needles this near to the edge of the target across count as peripheral.
+    /// Distance from the edge of the target within which needles count as peripheral.
     rim_m: f64,
-    /// Two needles of the rim, and two others, are at least so far apart.
+    /// Smallest distance of two needles at the rim, and of two others.
     rim_apart_m: f64,
     inside_apart_m: f64,
-    /// The outermost seeds of a needle stay so far inside the target.
+    /// Distance of the outermost seeds of a needle from the edge of the target.
     inset_m: f64,
-    /// Needles inside have seeds at their ends only.
+    /// True if needles inside have seeds at their ends only.
     thinned: bool,
 }
 
@@ -73,27 +74,28 @@ fn patterns() -> impl Iterator<Item = Pattern> {
 
 const UNIT_U: f64 = 1.0;
 const PITCH_M: f64 = SEED_LENGTH_M + SPACER_M;
-/// Seeds whose distance is within this of a strand's are ordered as a strand.
+/// Tolerance within which seeds at the distance of a strand's are ordered as a strand.
 const NEARLY_M: f64 = 1e-3;
-/// Shorter pieces of target get no needle, nor do those nearer to its edge: tissue there gives way before it is pierced.
+/// Shortest piece of target that gets a needle, and distance of needles from its edge: tissue there
+/// gives way before it is pierced.
 const SHORTEST_M: f64 = 15e-3;
 const NEAREST_RIM_M: f64 = 2.5e-3;
 const DOSE_PITCH_M: f64 = 1e-3;
-/// Coarse is enough to compare patterns.
+/// Pitch for comparing patterns; coarse is enough.
 const TRIAL_PITCH_M: f64 = 2e-3;
-/// Seeds that a thinned needle keeps at each end.
+/// Number of seeds that a thinned needle keeps at each end.
 const KEPT_AT_END: usize = 1;
 
-/// A hole that a needle can use, and the piece of target behind it.
+/// Hole that a needle can use, and the piece of target behind it.
 struct Way {
     hole: Hole,
     piece_m: [f64; 2],
-    /// To the nearest place outside the target across the needle, halfway down.
+    /// Distance to the nearest place outside the target across the needle, halfway down.
     rim_m: f64,
 }
 
-/// Needles, seeds and their strength; an error when no needle fits. `report` gets the share that is done; where it breaks, the
-/// search is cancelled.
+/// Plans needles, seeds and their strength; returns an error if no needle fits. `report` gets the
+/// completed share; if it breaks, the search is cancelled.
 pub fn plan(
     template: Template,
     anatomy: &Anatomy,
@@ -125,13 +127,13 @@ pub fn plan(
     Ok(plan.with_strength(strength_u))
 }
 
-/// Seeds of 1 U by one pattern.
+/// Places seeds of 1 U by one pattern.
 fn load(template: &Template, ways: &[Way], pattern: &Pattern, source: &str, aims: &Aims) -> ImplantPlan {
     let mut needles: Vec<Needle> = chosen(template, ways, pattern)
         .into_iter()
         .map(|(way, is_rim)| needle(template, way, is_rim, pattern))
         .collect();
-    // From anterior to posterior, as it is done: what lies behind stays visible to the probe.
+    // From anterior to posterior, as in practice: the part behind stays visible to the probe.
     needles.sort_by(|a, b| {
         b.hole
             .map(Hole::row)
@@ -146,8 +148,8 @@ fn load(template: &Template, ways: &[Way], pattern: &Pattern, source: &str, aims
     }
 }
 
-/// Percent of the target above 150 % of the prescription, and as much again for each needle and each tenth of strength that is
-/// out of the usual; `None` without dose.
+/// Returns the percent of the target above 150 % of the prescription. Each needle and each tenth of
+/// strength outside the usual range adds one; `None` without dose.
 fn shortfall(plan: &ImplantPlan, of_one_u: &Dvh, aims: &Aims) -> Option<f64> {
     let reached_gy = of_one_u
         .dose_of_gy(aims.covered * of_one_u.volume_m3())
@@ -162,7 +164,7 @@ fn shortfall(plan: &ImplantPlan, of_one_u: &Dvh, aims: &Aims) -> Option<f64> {
     Some(v150 * (1.0 + 0.2 * unusual))
 }
 
-/// The strength with which `aims.covered` of the target gets the prescription.
+/// Returns the strength at which `aims.covered` of the target gets the prescription.
 pub fn strength_u(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel, aims: &Aims) -> Result<f64, PlanError> {
     let target = anatomy.target.structure(DOSE_PITCH_M);
     let of_one_u: Vec<Seed> = plan.with_strength(UNIT_U).seeds();
@@ -206,7 +208,8 @@ fn farthest_m(template: &Template, low: [f64; 3], high: [f64; 3]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// From a place in the target straight out across the needles, the shortest of 16 ways.
+/// Returns the distance from a place in the target straight out across the needles, the shortest of
+/// 16 directions.
 fn rim_m(template: &Template, anatomy: &Anatomy, place_m: [f64; 3]) -> f64 {
     const STEP_M: f64 = 0.5e-3;
     let out_m = |direction: usize| {
@@ -223,7 +226,8 @@ fn rim_m(template: &Template, anatomy: &Anatomy, place_m: [f64; 3]) -> f64 {
     (0..16).map(out_m).fold(f64::INFINITY, f64::min)
 }
 
-/// The rim first, its outermost holes before the others; then inside, from the outside inwards.
+/// Returns the rim first, its outermost holes before the others; then inside, from the outside
+/// inwards.
 fn chosen<'a>(template: &Template, ways: &'a [Way], pattern: &Pattern) -> Vec<(&'a Way, bool)> {
     let is_on = |w: &&Way| pattern.parity.is_none_or(|p| (w.hole.column() + w.hole.row()) % 2 == p);
     let mut ways: Vec<&Way> = ways.iter().filter(is_on).collect();
@@ -247,7 +251,7 @@ fn chosen<'a>(template: &Template, ways: &'a [Way], pattern: &Pattern) -> Vec<(&
     taken
 }
 
-/// Seeds about 10 mm apart from end to end of the piece; inside the gland only at its ends.
+/// Places seeds about 10 mm apart from end to end of the piece; inside the gland only at its ends.
 fn needle(template: &Template, way: &Way, is_rim: bool, pattern: &Pattern) -> Needle {
     let [from_m, to_m] = way.piece_m;
     let room_m = (to_m - from_m - 2.0 * pattern.inset_m).max(0.0);
@@ -335,7 +339,7 @@ mod tests {
         assert_eq!(*reported.borrow(), [0.0, 1.0 / all, 2.0 / all, 3.0 / all]);
     }
 
-    /// A gland of 49 cc and one of 25 cc: neither is the paper's.
+    /// Tests a gland of 49 cc and one of 25 cc, neither of them the paper's.
     #[test]
     fn a_first_plan_covers_the_gland_and_has_no_problem() {
         let (source, kernel) = iodine();

@@ -1,29 +1,29 @@
-//! What is wrong with a plan, all of it at once.
+//! Problems of a plan, all of them at once.
 
 use super::anatomy::Body;
 use super::{Anatomy, ImplantPlan, Loading, Needle, NeedleSeed, SEED_LENGTH_M};
 use nalgebra::Vector3;
 use stylet_shm_schema::MAX_SEEDS;
 
-/// How far beyond the template's face the tip of a needle of 20 cm reaches.
+/// Reach of a 20 cm needle's tip beyond the template's face.
 pub const REACH_M: f64 = 0.20;
-/// Least distance of a needle from what is spared.
+/// Smallest distance of a needle from spared structures.
 pub const SPARED_MARGIN_M: f64 = 1e-3;
-/// A seed may lie so far outside the target: seeds at its edge are planned there.
+/// Distance outside the target up to which a seed is allowed: seeds at its edge are planned there.
 const EDGE_M: f64 = 1e-3;
-/// Two lengths that differ by less are one.
+/// Difference below which two lengths are equal.
 const SAME_M: f64 = 1e-6;
-/// Seeds on sale.
+/// Range of strengths on sale.
 pub const STRENGTHS_U: [f64; 2] = [0.05, 10.0];
 
-/// One thing wrong, in words, with where it is.
+/// Problem, in words, with its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Problem {
-    /// Counted from 0; `None` for the plan as a whole.
+    /// Index of the needle, from 0; `None` for the plan as a whole.
     pub needle: Option<usize>,
-    /// On its needle, deepest first.
+    /// Index of the seed on its needle, deepest first.
     pub seed: Option<usize>,
-    /// What is wrong, and what to do.
+    /// Problem and remedy.
     pub what: String,
 }
 
@@ -37,7 +37,7 @@ impl std::fmt::Display for Problem {
     }
 }
 
-/// Every problem, in the order of needles.
+/// Returns every problem, in the order of needles.
 pub fn problems(plan: &ImplantPlan, anatomy: &Anatomy) -> Vec<Problem> {
     let mut found = Found::default();
     if plan.needles.is_empty() {
@@ -90,7 +90,7 @@ fn way(found: &mut Found, needle: &Needle, anatomy: &Anatomy) {
         .chain([&needle.depth_m, &needle.retract_to_m])
         .all(|v| v.is_finite());
     if !finite || (Vector3::from(needle.direction).norm() - 1.0).abs() > 1e-3 {
-        return found.add("its entry, direction or depth is no number, or the direction is no unit vector");
+        return found.add("its entry, direction or depth is not a number, or the direction is not a unit vector");
     }
     if needle.seeds.is_empty() {
         found.add("it has no seed; load or remove it");
@@ -116,7 +116,7 @@ fn way(found: &mut Found, needle: &Needle, anatomy: &Anatomy) {
     }
 }
 
-/// The first needle before this one that goes through the same hole.
+/// Returns the first needle before this one that goes through the same hole.
 fn same_hole(plan: &ImplantPlan, number: usize) -> Option<usize> {
     let hole = plan.needles[number].hole?;
     plan.needles[..number].iter().position(|n| n.hole == Some(hole))
@@ -174,7 +174,7 @@ fn strand(found: &mut Found, needle: &Needle) {
     }
 }
 
-/// Seeds of different needles that would overlap.
+/// Reports seeds of different needles that would overlap.
 fn too_close(found: &mut Found, plan: &ImplantPlan) {
     let of_needle = |(n, needle): (usize, &Needle)| {
         needle

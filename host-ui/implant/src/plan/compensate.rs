@@ -1,11 +1,13 @@
-//! Where to drop each seed so that it rests on plan: rehearse, see where the seeds end, drop them elsewhere, rehearse again.
+//! Search for drops that let each seed rest on plan: rehearse, compare the places at rest, shift
+//! the drops, rehearse again.
 //!
-//! What a seed does depends on its own drop and on those before it, not on those that come after. So the deepest seed's drop is
-//! sought first, and with that fixed the next one's. The deeper a seed is dropped the deeper it rests, but not in
-//! proportion: tissue that sticks to the needle goes along for millimetres, so that many drops leave a seed in one place,
-//! and where it lets go a seed's place jumps. A drop is therefore sought between one that leaves the seed short and one that leaves it too far in.
-//! Seeds that are not sought yet move along by what they are off, which often is enough. What was found is then rehearsed with
-//! stops beside every drop (`edges`).
+//! A seed's place depends on its own drop and on earlier ones, not on later ones. So the deepest
+//! seed's drop is searched first, and with that fixed the next one's. The deeper a seed is dropped
+//! the deeper it rests, but not in proportion. Tissue that sticks to the needle moves along for
+//! millimetres, so that many drops leave a seed in one place; when it slips, a seed's place jumps.
+//! A drop is therefore searched between one that leaves the seed short and one that leaves it too
+//! deep. Later seeds shift along by their own error, which often is enough. The result is then
+//! rehearsed with stops near every drop (`edges`).
 
 pub mod edges;
 mod search;
@@ -20,18 +22,19 @@ use serde::{Deserialize, Serialize};
 use stylet_procedure::Pace;
 use tried::{Rehearsals, Tried, aside};
 
-/// What compensation may do.
+/// Limits of compensation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// A drop is never further from its planned place along the needle.
+    /// Largest shift of a drop along the needle.
     pub along_m: f64,
-    /// Nor the needle across; 0 keeps it in its hole.
+    /// Largest shift of the needle across; 0 keeps it in its hole.
     pub across_m: f64,
     /// Deepest that the tip may go, from the entry.
     pub reach_m: f64,
-    /// Rehearsals of one needle at most, the first one included, until its drops are found; those that look for edges come to it.
+    /// Most rehearsals of one needle, the first one included, until its drops are found; those for
+    /// edges are extra.
     pub rehearsals: usize,
-    /// Good enough: no seed is farther from plan.
+    /// Largest error of a seed that is good enough.
     pub enough_m: f64,
 }
 
@@ -47,39 +50,40 @@ impl Default for Limits {
     }
 }
 
-/// One needle, before and after.
+/// Compensation of one needle, with its errors before and after.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compensation {
-    /// The drops that leave the smallest errors.
+    /// Drops with the smallest errors.
     pub drops: Drops,
-    /// Rest minus plan of each seed, deepest first, when dropped as planned; `None` where that cannot be done: the tip would be
-    /// outside the tissue, which has moved ahead.
+    /// Rest minus plan of each seed, deepest first, when dropped as planned. `None` if that is
+    /// impossible, because the tip would be outside the tissue, which has moved ahead.
     pub before_m: Option<Vec<[f64; 3]>>,
-    /// The same when dropped as `drops` says.
+    /// Rest minus plan when dropped as in `drops`.
     pub after_m: Vec<[f64; 3]>,
-    /// Rehearsals that it took.
+    /// Number of rehearsals.
     pub rehearsals: usize,
-    /// Of them those that looked for edges beside the drops, and for drops clear of them.
+    /// Number of those that searched for edges near the drops, and for drops clear of them.
     #[serde(default)]
     pub for_edges: usize,
-    /// Seeds that are on an edge even so.
+    /// Seeds that are still on an edge.
     #[serde(default)]
     pub sensitive: Vec<Sensitive>,
 }
 
 impl Compensation {
-    /// Distance of each seed from plan when dropped as planned, m.
+    /// Returns the distance of each seed from plan when dropped as planned, m.
     pub fn errors_before_m(&self) -> impl Iterator<Item = f64> + '_ {
         self.before_m.iter().flatten().map(|e| Vector3::from(*e).norm())
     }
 
-    /// Distance of each seed from plan with the compensated drops, m.
+    /// Returns the distance of each seed from plan with the compensated drops, m.
     pub fn errors_after_m(&self) -> impl Iterator<Item = f64> + '_ {
         self.after_m.iter().map(|e| Vector3::from(*e).norm())
     }
 }
 
-/// The best way found; dropping as planned where nothing is better. An error when no way was found to go through with the needle.
+/// Returns the best drops found; the planned ones if nothing is better. Returns an error if the
+/// needle could not be completed in any way.
 pub fn compensate(
     needle: &Needle,
     pace: &Pace,
@@ -94,7 +98,7 @@ pub fn compensate(
         count: 0,
     };
     let (start, is_as_planned) = start(&mut rehearsals)?;
-    // Tries that found no way to begin do not count.
+    // Attempts that could not begin do not count.
     let until = rehearsals.count - 1 + limits.rehearsals;
     let (mut best, mut last) = (start.clone(), start.clone());
     let mut drops = start.drops.clone();
@@ -122,7 +126,8 @@ pub fn compensate(
     })
 }
 
-/// As planned, and whether that could be done; else with drops deeper by the first millimetres that can.
+/// Rehearses the planned drops, and returns whether they are possible; else shifts them deeper
+/// until they are.
 fn start(rehearsals: &mut Rehearsals) -> Result<(Tried, bool), RehearsalError> {
     let (needle, limits) = (rehearsals.needle, rehearsals.limits);
     let planned = Drops::as_planned(needle);
@@ -131,7 +136,8 @@ fn start(rehearsals: &mut Rehearsals) -> Result<(Tried, bool), RehearsalError> {
         Err(why) => why,
     };
     let last = planned.along_m.len().saturating_sub(1).max(1) as f64;
-    // All by as much; or, where seeds are loose, the last one most: the first may be near the far end of the tissue.
+    // All equally; or, for loose seeds, the last one most: the first may be near the far end of the
+    // tissue.
     let ways: &[fn(usize, f64) -> f64] = match needle.loading {
         Loading::Loose => &[|_, _| 1.0, |i, last| i as f64 / last],
         Loading::Stranded { .. } => &[|_, _| 1.0],
@@ -149,7 +155,8 @@ fn start(rehearsals: &mut Rehearsals) -> Result<(Tried, bool), RehearsalError> {
     Err(why)
 }
 
-/// Means and the worst: before, of the needles that can be done as planned; after, of all.
+/// Returns mean and largest errors: before, of the needles that can be dropped as planned; after,
+/// of all.
 pub fn summary_m<'a>(all: impl IntoIterator<Item = &'a Compensation> + Clone) -> [[f64; 2]; 2] {
     let figures = |errors: Vec<f64>| {
         let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;

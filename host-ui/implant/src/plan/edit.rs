@@ -1,27 +1,27 @@
-//! Edits of a plan: each gives a new one, so that undo is a stack of values.
+//! Edits of a plan: each returns a new one, so that undo is a stack of values.
 
 use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, PlanError, SEED_LENGTH_M, SPACER_M};
 
-/// Steps that can be taken back.
+/// Largest number of steps that can be undone.
 const STEPS: usize = 100;
 
-/// The seeds of a needle, evenly apart.
+/// Seeds of a needle, evenly spaced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// Number of seeds, at least 1.
     pub count: usize,
-    /// From the entry to the first one.
+    /// Depth of the first one from the entry.
     pub deepest_m: f64,
-    /// From middle to middle.
+    /// Distance from centre to centre.
     pub pitch_m: f64,
-    /// Whether they are joined to a strand.
+    /// True if they are joined to a strand.
     pub stranded: bool,
     /// Strength of each seed, U.
     pub strength_u: f64,
 }
 
 impl Row {
-    /// As many seeds as fill a piece of a needle at the usual distance, in its middle.
+    /// Fills a piece of a needle with seeds at the usual distance, centred.
     pub fn filling([from_m, to_m]: [f64; 2], strength_u: f64) -> Self {
         let pitch_m = SEED_LENGTH_M + SPACER_M;
         let count = ((to_m - from_m) / pitch_m).max(0.0) as usize + 1;
@@ -34,7 +34,7 @@ impl Row {
         }
     }
 
-    /// As the first two seeds of a needle have it; `None` without seeds.
+    /// Returns the row of a needle by its first two seeds; `None` without seeds.
     pub fn of(needle: &Needle) -> Option<Self> {
         let first = needle.seeds.first()?;
         let pitch_m = match needle.seeds.get(1) {
@@ -68,7 +68,7 @@ impl ImplantPlan {
         })
     }
 
-    /// A needle through a hole of the template, without seeds.
+    /// Returns the plan with a new needle through a hole of the template, without seeds.
     pub fn with_needle(&self, hole: Hole, depth_m: f64) -> Result<Self, PlanError> {
         if self.needles.iter().any(|n| n.hole == Some(hole)) {
             return Err(PlanError::HoleTaken(hole));
@@ -86,7 +86,7 @@ impl ImplantPlan {
         Ok(plan)
     }
 
-    /// The plan without one of its needles.
+    /// Returns the plan without one of its needles.
     pub fn without_needle(&self, needle: usize) -> Result<Self, PlanError> {
         let mut plan = self.clone();
         if needle >= plan.needles.len() {
@@ -96,7 +96,7 @@ impl ImplantPlan {
         Ok(plan)
     }
 
-    /// The needle and its seeds to another hole, as deep as before.
+    /// Returns the plan with a needle and its seeds moved to another hole, at the same depth.
     pub fn with_needle_at(&self, needle: usize, hole: Hole) -> Result<Self, PlanError> {
         if self
             .needles
@@ -113,7 +113,7 @@ impl ImplantPlan {
         })
     }
 
-    /// One more loose seed; a strand becomes loose.
+    /// Returns the plan with one more loose seed; a strand becomes loose.
     pub fn with_seed(&self, needle: usize, along_m: f64, strength_u: f64) -> Result<Self, PlanError> {
         self.change(needle, |n| {
             n.loading = Loading::Loose;
@@ -122,7 +122,7 @@ impl ImplantPlan {
         })
     }
 
-    /// A strand loses the seed at its end only.
+    /// Returns the plan without a seed; a strand loses seeds at its ends only.
     pub fn without_seed(&self, needle: usize, seed: usize) -> Result<Self, PlanError> {
         self.change(needle, |n| {
             if seed >= n.seeds.len() {
@@ -136,7 +136,7 @@ impl ImplantPlan {
         })
     }
 
-    /// The whole strand moves with a seed of it.
+    /// Returns the plan with a seed moved; the whole strand moves with it.
     pub fn with_seed_at(&self, needle: usize, seed: usize, along_m: f64) -> Result<Self, PlanError> {
         self.change(needle, |n| {
             let by_m = along_m - n.seeds.get(seed).ok_or(PlanError::NoSeed)?.along_m;
@@ -163,7 +163,7 @@ impl ImplantPlan {
         })
     }
 
-    /// The seeds stay where they are and are no longer joined.
+    /// Returns the plan with separate seeds at the same places.
     pub fn with_loose_seeds(&self, needle: usize) -> Result<Self, PlanError> {
         self.change(needle, |n| {
             n.loading = Loading::Loose;
@@ -171,7 +171,7 @@ impl ImplantPlan {
         })
     }
 
-    /// Every seed gets this strength.
+    /// Returns the plan with this strength for every seed.
     pub fn with_strength(&self, strength_u: f64) -> Self {
         let mut plan = self.clone();
         let seeds = plan.needles.iter_mut().flat_map(|n| &mut n.seeds);
@@ -192,7 +192,7 @@ impl ImplantPlan {
     }
 }
 
-/// A value that is edited, such as a plan, with the values that it was before, and those that were taken back.
+/// Edited value, such as a plan, with its earlier values, and those that were undone.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History<T> {
     now: T,
@@ -201,7 +201,7 @@ pub struct History<T> {
 }
 
 impl<T: Clone + PartialEq> History<T> {
-    /// A history that begins with this value.
+    /// Creates a history that begins with this value.
     pub fn new(value: T) -> Self {
         Self {
             now: value,
@@ -210,12 +210,12 @@ impl<T: Clone + PartialEq> History<T> {
         }
     }
 
-    /// The present value.
+    /// Returns the present value.
     pub fn now(&self) -> &T {
         &self.now
     }
 
-    /// A value that is the same is no step.
+    /// Adds a value; an equal one is not a step.
     pub fn put(&mut self, value: T) {
         if value == self.now {
             return;
@@ -227,30 +227,30 @@ impl<T: Clone + PartialEq> History<T> {
         }
     }
 
-    /// In place of the present value, without a step: one that is still being drawn.
+    /// Replaces the present value without a step, while it is being dragged.
     pub fn replace(&mut self, value: T) {
         self.now = value;
         self.taken_back.clear();
     }
 
-    /// Whether there is a step to undo.
+    /// Returns whether there is a step to undo.
     pub fn can_undo(&self) -> bool {
         !self.before.is_empty()
     }
 
-    /// Whether there is a step to redo.
+    /// Returns whether there is a step to redo.
     pub fn can_redo(&self) -> bool {
         !self.taken_back.is_empty()
     }
 
-    /// False when there is nothing to take back.
+    /// Undoes a step; returns false if there is none.
     pub fn undo(&mut self) -> bool {
         let Some(value) = self.before.pop() else { return false };
         self.taken_back.push(std::mem::replace(&mut self.now, value));
         true
     }
 
-    /// False when there is nothing to redo.
+    /// Redoes a step; returns false if there is none.
     pub fn redo(&mut self) -> bool {
         let Some(value) = self.taken_back.pop() else {
             return false;

@@ -1,11 +1,12 @@
-//! Why a plan cannot be made, changed, read or written.
+//! Reasons why a plan cannot be made, changed, read or written.
 
 use super::needle::SEED_LENGTH_M;
 use super::template::{Hole, NotAHole};
 use std::path::{Path, PathBuf};
 use stylet_base::WriteError;
 
-/// Why a plan cannot be made, changed, read or written; each text says what to do where something can be done.
+/// Reason why a plan cannot be made, changed, read or written; the text gives the remedy if there
+/// is one.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
     /// An edit names a needle that the plan does not have.
@@ -34,33 +35,33 @@ pub enum PlanError {
     Surface {
         /// Name of the structure.
         name: String,
-        /// What is wrong with the surface.
+        /// Problem of the surface.
         why: String,
     },
     /// No needle fits.
-    #[error("no hole of the template leads through the target past what is to be spared; plan by hand")]
+    #[error("no hole of the template reaches the target past the structures to be spared; plan by hand")]
     NoWay,
-    /// The strength cannot follow from the dose.
+    /// The strength cannot be derived from the dose.
     #[error("the seeds give the target no dose")]
     NoDose,
-    /// Seeds beside those that lie in the tissue have one strength.
-    #[error("where seeds lie in the tissue, those to be added have one strength")]
+    /// Seeds added to those in the tissue must have one strength.
+    #[error("with seeds in the tissue, those to be added must have one strength")]
     Strengths,
-    /// Whoever asked for the plan ended the search.
+    /// The search was cancelled.
     #[error("the search was cancelled")]
     Cancelled,
-    /// Seeds need a source that is known.
+    /// Seeds need a known source.
     #[error("{0}")]
     Source(String),
-    /// A text is no plan; every problem, one a line.
+    /// A text is not a plan; every problem, one a line.
     #[error("{}", .0.join("\n"))]
     Invalid(Vec<String>),
-    /// A file cannot be read as a plan, or a plan not be put in its format.
+    /// A file cannot be read as a plan, or a plan cannot be written in its format.
     #[error("{}: {why}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Problem of the file.
         why: String,
     },
     /// A file cannot be written.
@@ -69,7 +70,7 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// An error about a file, which it names.
+    /// Creates an error about a file, which it names.
     pub(super) fn of_file(path: &Path, why: impl ToString) -> Self {
         Self::File {
             path: path.to_owned(),

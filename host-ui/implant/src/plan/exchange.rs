@@ -1,4 +1,4 @@
-//! Plans in and out of files of any of the formats, by the file's ending.
+//! Plans from and to files of all formats, by the file's extension.
 
 use super::{ImplantPlan, PlanError, Template, file, seeds};
 use crate::readers::{DayOfImplant, Declared, SeedDefaults};
@@ -10,10 +10,10 @@ use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
 use stylet_files::dicom::{Identity, new_uid};
 use stylet_shm_schema::SceneHeader;
 
-/// Model of the source where a file names none.
+/// Model of the source for files that name none.
 pub const USUAL_SOURCE: &str = "6711";
 
-/// The usual source and its prescription, Gy, for plans that name none.
+/// Returns the usual source and its prescription, Gy, for plans that name none.
 pub fn usual() -> Result<(Source, f64), PlanError> {
     let missing = |what: &str| PlanError::Source(what.to_owned());
     let source = Source::known(USUAL_SOURCE).ok_or_else(|| missing("the usual source is not known"))?;
@@ -23,7 +23,8 @@ pub fn usual() -> Result<(Source, f64), PlanError> {
     Ok((source, prescription_gy))
 }
 
-/// A plan file (.toml), a table of seeds (.csv) or an RT Plan (.dcm); the error names the file.
+/// Reads a plan file (.toml), a table of seeds (.csv) or an RT Plan (.dcm); the error names the
+/// file.
 pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, PlanError> {
     let patient = scene.patient();
     if has_ending(path, "toml") {
@@ -54,7 +55,8 @@ pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, PlanError> 
     )
 }
 
-/// The source that the seeds of a plan are of, or another one of their nuclide, among those that need no file.
+/// Returns the source that the plan declares, or another one of its nuclide, among those that need
+/// no file.
 fn source_of(declared: &Declared) -> Result<Source, PlanError> {
     let mut fitting: Vec<Source> = Source::all_known().filter(|s| declared.check(s).is_ok()).collect();
     let place = fitting.iter().position(|s| declared.is_of_model(s)).unwrap_or(0);
@@ -67,7 +69,7 @@ fn source_of(declared: &Declared) -> Result<Source, PlanError> {
     )))
 }
 
-/// All of the plan as .toml, its seeds as .csv or .dcm.
+/// Writes all of the plan as .toml, its seeds as .csv or .dcm.
 pub fn write(path: &Path, plan: &ImplantPlan, patient: &PatientFrame) -> Result<(), PlanError> {
     let bytes = if has_ending(path, "toml") {
         file::to_text(plan, patient)
@@ -85,11 +87,11 @@ pub fn write(path: &Path, plan: &ImplantPlan, patient: &PatientFrame) -> Result<
     Ok(stylet_base::write_whole(path, &bytes)?)
 }
 
-/// The seeds of a plan as an RT Plan has them; an error where its source is not known.
+/// Returns the seeds of a plan in the form of an RT Plan; an error if its source is unknown.
 pub fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, PlanError> {
     let source = Source::known(&plan.source).ok_or_else(|| {
         PlanError::Source(format!(
-            "an RT Plan holds isotope and half-life, and those of source {} are not known; write .toml",
+            "an RT Plan contains isotope and half-life, and those of source {} are unknown; write .toml",
             plan.source
         ))
     })?;
@@ -124,7 +126,7 @@ fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
-/// A source as an RT Plan describes it.
+/// Returns a source in the form of an RT Plan.
 pub fn plan_source(source: &Source) -> PlanSource {
     PlanSource {
         model: source.model.clone(),

@@ -1,4 +1,4 @@
-//! Plans in files: TOML with everything, CSV with the seeds alone; mm, patient frame (RAS).
+//! Plans in files: TOML for the whole plan, CSV for the seeds alone; mm, patient frame (RAS).
 
 use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, NotAHole, PlanError, Template};
 use crate::readers::SeedFile;
@@ -13,7 +13,7 @@ const FORMAT: &str = "stylet plan, mm, RAS";
 const MAX_BYTES: u64 = 4 << 20;
 const MAX_NEEDLES: usize = 169;
 const MAX_MM: f64 = 10_000.0;
-/// Seeds whose lines are nearer than this are on one needle.
+/// Distance below which the lines of seeds are one needle.
 const SAME_LINE_M: f64 = 0.5e-3;
 const HEADER: &str = "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,needle,hole";
 
@@ -48,15 +48,15 @@ struct NeedleFile {
     depth_mm: f64,
     #[serde(default)]
     retract_to_mm: f64,
-    /// Absent: the seeds are loose.
+    /// Spacer; absent for loose seeds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     spacer_mm: Option<f64>,
-    /// From the entry; deepest first.
+    /// Distances from the entry, deepest first.
     seed_along_mm: Vec<f64>,
     strength_u: Vec<f64>,
 }
 
-/// As TOML.
+/// Formats a plan as TOML.
 pub fn to_text(plan: &ImplantPlan, patient: &PatientFrame) -> Result<String, PlanError> {
     let (mm, turned) = (
         |v: [f64; 3]| patient.patient_from_scene(v).map(|c| c * 1e3),
@@ -92,9 +92,10 @@ pub fn to_text(plan: &ImplantPlan, patient: &PatientFrame) -> Result<String, Pla
     toml::to_string(&file).map_err(|e| PlanError::Invalid(vec![format!("the plan cannot be written as TOML: {e}")]))
 }
 
-/// From TOML; lists every problem.
+/// Parses TOML; lists every problem.
 pub fn from_text(text: &str, patient: &PatientFrame) -> Result<ImplantPlan, PlanError> {
-    let file: PlanFile = toml::from_str(text).map_err(|e| PlanError::Invalid(vec![format!("it is no plan: {e}")]))?;
+    let file: PlanFile =
+        toml::from_str(text).map_err(|e| PlanError::Invalid(vec![format!("it is not a plan: {e}")]))?;
     let mut problems = Vec::new();
     if file.format != FORMAT {
         problems.push(format!("format is \"{}\"; it must be \"{FORMAT}\"", file.format));
@@ -132,7 +133,7 @@ pub fn from_text(text: &str, patient: &PatientFrame) -> Result<ImplantPlan, Plan
 }
 
 impl Needle {
-    /// Deepest first, with the depth that the file gives.
+    /// Sorts the seeds deepest first, keeping the depth of the file.
     fn in_order_of_file(self) -> Self {
         let depth_m = self.depth_m;
         Self {
@@ -212,7 +213,7 @@ fn place(what: &str, mm: [f64; 3], problems: &mut Vec<String>) {
 
 fn unit(what: &str, axis: [f64; 3], problems: &mut Vec<String>) {
     if !(0.999..1.001).contains(&Vector3::from(axis).norm()) {
-        problems.push(format!("{what} is {axis:?}, no unit vector"));
+        problems.push(format!("{what} is {axis:?}, not a unit vector"));
     }
 }
 
@@ -228,7 +229,7 @@ pub fn read(path: &Path, patient: &PatientFrame) -> Result<ImplantPlan, PlanErro
     from_text(&text, patient).map_err(|e| PlanError::of_file(path, e))
 }
 
-/// Seeds as `host-ui dose --seeds` reads them, with the number of their needle and its hole.
+/// Formats seeds for `host-ui dose --seeds`, with the number of their needle and its hole.
 pub fn seeds_to_csv(plan: &ImplantPlan, patient: &PatientFrame) -> String {
     let mut text = format!("{HEADER}\n");
     for (number, needle) in (1..).zip(&plan.needles) {
@@ -243,8 +244,9 @@ pub fn seeds_to_csv(plan: &ImplantPlan, patient: &PatientFrame) -> String {
     text
 }
 
-/// Seeds as needles through a template: those of one number are on one needle, and those without one where they are
-/// on one line, which goes along their axis, or along the template's where they have none.
+/// Converts seeds to needles through a template. Seeds with one number are on one needle; those
+/// without numbers are grouped by lines along their axes, or along the template's axis if they have
+/// none.
 pub fn import(
     path: &Path,
     file: SeedFile,
@@ -253,7 +255,7 @@ pub fn import(
     source: &str,
     prescription_gy: f64,
 ) -> Result<ImplantPlan, PlanError> {
-    // A plan names holes of the template that it was made with, and its needles may be curved.
+    // A plan names holes of its own template, and its needles may be curved.
     let is_table = file.declared.is_none();
     let rows = file.rows;
     if rows.len() > MAX_SEEDS {
@@ -306,7 +308,7 @@ fn is_on_line(needle: &Needle, place_m: [f64; 3], direction: [f64; 3]) -> bool {
     off.norm() < SAME_LINE_M && Vector3::from(needle.direction).dot(&Vector3::from(direction)) > 0.999
 }
 
-/// What a file says of a needle against where its seeds are.
+/// Compares the file's data on a needle with the places of its seeds.
 fn fits(
     needle: &Needle,
     hole: Option<&str>,
@@ -324,18 +326,19 @@ fn fits(
         return Ok(());
     }
     Err(format!(
-        "its seeds are {:.1} mm beside hole {hole} of the template before this scene; correct them, or leave the column hole out",
+        "its seeds are {:.1} mm off hole {hole} of this scene's template; correct them, or leave the column hole out",
         off.norm() * 1e3
     ))
 }
 
-/// A seed has no front: its axis is taken the way that needles go.
+/// Returns the seed's axis in the direction of the needles; a seed has no front.
 fn inwards(template: &Template, axis: [f64; 3]) -> [f64; 3] {
     let along = Vector3::from(axis).dot(&Vector3::from(template.inwards));
     if along < 0.0 { axis.map(|c| -c) } else { axis }
 }
 
-/// The needle through a place, from the template's face; through a hole where it leads through one.
+/// Returns the needle through a place, from the template's face; through a hole if one is on the
+/// line.
 fn through(template: &Template, place_m: [f64; 3], direction: [f64; 3]) -> Needle {
     let (place, inwards, along) = (
         Vector3::from(place_m),

@@ -1,4 +1,5 @@
-//! The automatic plan: inverse planning where the scene says what is to be spared, else modified peripheral loading.
+//! The automatic plan: inverse planning if the scene names structures to be spared, else modified
+//! peripheral loading.
 
 use super::automatic::{self, Aims};
 use super::optimise::{self, Figures, Method, Objectives, Proposal, Search, Statistic};
@@ -6,25 +7,26 @@ use super::{Anatomy, ImplantPlan, PlanError, Template};
 use std::ops::ControlFlow;
 use stylet_dose::{DoseKernel, Source};
 
-/// A plan, and what there is to know about how it was made.
+/// Plan, with remarks on how it was made.
 #[derive(Clone, Debug)]
 pub struct FirstPlan {
-    /// What distinguishes it from the other proposals, in a word or two.
+    /// Short name that distinguishes it from the other proposals.
     pub name: &'static str,
-    /// The same in a sentence.
+    /// Description in a sentence.
     pub why: &'static str,
     /// The plan.
     pub plan: ImplantPlan,
-    /// Its measures; `None` for one that was made without limits.
+    /// Measures of the plan; `None` if it was made without limits.
     pub measures: Option<Measures>,
-    /// For people: what is beyond its limit and by how much, or why the plan was made without limits. Empty where all limits are kept.
+    /// Remarks: limits that are violated and by how much, or why the plan was made without limits.
+    /// Empty if all limits are met.
     pub notes: Vec<String>,
 }
 
-/// What proposals are compared by.
+/// Measures by which proposals are compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measures {
-    /// Of the dose.
+    /// Measures of the dose.
     pub figures: Figures,
     /// Share of trials with misplaced seeds whose D90 is at least 90 % of the prescription.
     pub robust: f64,
@@ -34,13 +36,13 @@ pub struct Measures {
     pub d90_p10: f64,
 }
 
-/// What a plan without a known urethra says.
+/// Remark on a plan without a known urethra.
 pub const NO_URETHRA: &str = "no urethra is known, so the plan only covers the target (modified peripheral loading)";
-/// What a needle costs where few of them are wanted.
+/// Cost of a needle in a plan with few of them.
 const FEW_NEEDLES: f32 = 6e-3;
 
-/// One plan for the objectives; an error where no needle fits. `report` gets the share that is done; where it breaks, the search is
-/// cancelled.
+/// Makes one plan for the objectives; returns an error if no needle fits. `report` gets the
+/// completed share; if it breaks, the search is cancelled.
 pub fn plan(
     template: Template,
     anatomy: &Anatomy,
@@ -58,7 +60,8 @@ pub fn plan(
     Ok(FirstPlan::of("Robust", ROBUST, found))
 }
 
-/// Several plans to choose from, the usual one first; one alone where no urethra is known. `report` as for [`plan`].
+/// Makes several plans to choose from, the usual one first; only one without a known urethra.
+/// `report` as for [`plan`].
 pub fn proposals(
     template: Template,
     anatomy: &Anatomy,
@@ -84,12 +87,12 @@ pub fn proposals(
         ("Robust", ROBUST, objectives),
         (
             "Fewer needles",
-            "Robust as well, with as few needles as that takes.",
+            "Robust as well, with as few needles as possible.",
             &few,
         ),
         (
-            "Cooler",
-            "The dose as planned alone: the least of the target gets 150 %, and seeds that miss their places cost more coverage.",
+            "Lower V150",
+            "Optimised for the planned dose alone: the smallest V150, but misplaced seeds cost more coverage.",
             &planned,
         ),
     ];
@@ -103,7 +106,7 @@ pub fn proposals(
     aims.into_iter().enumerate().map(find).collect()
 }
 
-const ROBUST: &str = "Most trials with misplaced seeds keep a D90 of 90 % of the prescription.";
+const ROBUST: &str = "Most trials with misplaced seeds meet a D90 of 90 % of the prescription.";
 
 fn peripheral(
     template: Template,
@@ -149,7 +152,7 @@ mod tests {
     use stylet_dose::decay::Interval;
 
     #[test]
-    fn without_a_urethra_the_plan_is_the_peripheral_one_and_says_so() {
+    fn without_a_urethra_the_plan_is_peripheral() {
         let middle_m = [0.05, 0.05, 0.06];
         let template = Template {
             middle_m: [0.05, 0.05, -0.01],

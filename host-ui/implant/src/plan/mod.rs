@@ -1,4 +1,5 @@
-//! The implant: template, needles and seeds as plain values, and what can be done with them. No window, no shared memory.
+//! The implant: template, needles and seeds as plain values, with their operations. No window, no
+//! shared memory.
 //!
 //! Lengths in m, scene frame; strength in U; files are in mm, in the patient's frame (RAS).
 
@@ -28,32 +29,33 @@ use stylet_dose as dose;
 use stylet_shm_schema::{Prescribed, Text};
 pub use template::{HOLES, Hole, NotAHole, PITCH_M, Template};
 
-/// Everything that is decided before the first needle goes in.
+/// Plan of an implant, complete before the first needle goes in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImplantPlan {
-    /// The template that its needles go through.
+    /// Template of its needles.
     pub template: Template,
-    /// As the model of a source file names itself.
+    /// Name of the source's model, as in its file.
     pub source: String,
     /// Prescribed dose, Gy.
     pub prescription_gy: f64,
-    /// In the order in which they go in.
+    /// Needles in the order of insertion.
     pub needles: Vec<Needle>,
 }
 
 impl ImplantPlan {
-    /// Seeds of all needles.
+    /// Returns the number of seeds of all needles.
     pub fn seed_count(&self) -> usize {
         self.needles.iter().map(|n| n.seeds.len()).sum()
     }
 
-    /// Place of its needle for each of [`ImplantPlan::seeds`].
+    /// Returns the index of its needle for each of [`ImplantPlan::seeds`].
     pub fn needle_of_seeds(&self) -> Vec<usize> {
         let of_needle = |(n, needle): (usize, &Needle)| vec![n; needle.seeds.len()];
         self.needles.iter().enumerate().flat_map(of_needle).collect()
     }
 
-    /// What other hosts are shown of the seeds of a needle, counted from 0. Where they differ in strength, it is that of the first.
+    /// Returns the prescription of a needle's seeds for other hosts, counted from 0. If strengths
+    /// differ, the first one is given.
     pub fn prescribed(&self, needle: usize) -> Prescribed {
         let number = |n: usize| u32::try_from(n + 1).unwrap_or(0);
         let seeds = self.needles.get(needle).map_or(&[][..], |n| &n.seeds[..]);
@@ -66,7 +68,7 @@ impl ImplantPlan {
         }
     }
 
-    /// As dose takes them, needle by needle, deepest first.
+    /// Returns the seeds for dose computation, needle by needle, deepest first.
     pub fn seeds(&self) -> Vec<dose::Seed> {
         let of_needle = |n: &Needle| {
             let (axis, places) = (n.direction, n.seeds_m().collect::<Vec<_>>());

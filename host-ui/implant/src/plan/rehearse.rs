@@ -1,4 +1,4 @@
-//! One needle rehearsed: what the operator would do, and where the seeds would rest.
+//! Rehearsal of one needle: the operator's actions, and the predicted places of the seeds.
 
 use super::Needle;
 use serde::{Deserialize, Serialize};
@@ -9,27 +9,27 @@ use stylet_procedure::{NeedleWay, Pace};
 use stylet_shm_schema::{MAX_EARLIER_NEEDLES, NeedleRehearsal, Reason, RefusalCode, Request, StabilisingNeedle};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
-/// The largest scene takes a second for a second.
+/// Time limit of a rehearsal; the largest scene takes a second for a second.
 const LONGEST: Duration = Duration::from_secs(300);
 
-/// What is done with one needle; the plan says what for.
+/// Actions with one needle; the plan gives their aims.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Drops {
-    /// Where the tip starts, outside the body, scene frame, m.
+    /// Start of the tip, outside the body, scene frame, m.
     pub entry_m: [f64; 3],
     /// Unit vector into the body.
     pub direction: [f64; 3],
-    /// How far from the entry the tip is when each seed leaves it, deepest first.
+    /// Distance of the tip from the entry when each seed leaves it, deepest first.
     pub along_m: Vec<f64>,
-    /// How far from the entry the tip is drawn back to after the last drop, m.
+    /// Distance from the entry to which the tip is drawn back after the last drop, m.
     pub retract_to_m: f64,
-    /// From middle to middle of two seeds, m, where they are one strand.
+    /// Distance from centre to centre of two seeds, m, if they are one strand.
     #[serde(default)]
     pub strand_pitch_m: Option<f64>,
 }
 
 impl Drops {
-    /// Each seed where it is planned, as if tissue did not move.
+    /// Returns drops of each seed at its planned place, as if tissue did not move.
     pub fn as_planned(needle: &Needle) -> Self {
         Self {
             entry_m: needle.entry_m,
@@ -40,17 +40,17 @@ impl Drops {
         }
     }
 
-    /// The place at a distance from the entry, m.
+    /// Returns the place at a distance from the entry, m.
     pub fn at_m(&self, along_m: f64) -> [f64; 3] {
         [0, 1, 2].map(|a| self.entry_m[a] + self.direction[a] * along_m)
     }
 
-    /// Where the tip leaves each seed, m, in the order of the drops.
+    /// Returns the places of the tip when the seeds leave it, m, in the order of the drops.
     pub fn drops_m(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         self.along_m.iter().map(|&along| self.at_m(along))
     }
 
-    /// The needle as one that comes and goes, to its deepest drop.
+    /// Returns the needle as one that comes and goes, to its deepest drop.
     pub fn pass(&self) -> StabilisingNeedle {
         StabilisingNeedle {
             entry_m: self.entry_m,
@@ -59,7 +59,7 @@ impl Drops {
         }
     }
 
-    /// Where the tip goes.
+    /// Returns the path of the tip.
     pub fn way(&self) -> NeedleWay {
         NeedleWay {
             entry_m: self.entry_m.into(),
@@ -70,7 +70,8 @@ impl Drops {
         }
     }
 
-    /// Has the core rehearse them, beside needles that go in before and stay, after others that came and went beside these.
+    /// Requests a rehearsal with needles that were inserted before and stay, after others that came
+    /// and went.
     pub fn rehearsal(
         &self,
         pace: &Pace,
@@ -92,20 +93,25 @@ impl Drops {
             retract_to_m: self.retract_to_m,
             strand_pitch_m: self.strand_pitch_m,
             stabilising: stabilising.to_vec(),
+<<<<<<< HEAD
             earlier: earlier[first..].to_vec(),
+=======
+            // The last ones, if a request has no room for all.
+            earlier: earlier[earlier.len().saturating_sub(self.room_for_earlier(stabilising.len()))..].to_vec(),
+>>>>>>> 4ca17348 (Write the implant crate in plain English)
             drops_m: self.drops_m().collect(),
         }
     }
 }
 
-/// Where seeds come to rest.
+/// Result of a rehearsal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rest {
-    /// In the order of the drops.
+    /// Places of the seeds at rest, in the order of the drops.
     pub seeds_m: Vec<[f64; 3]>,
-    /// Where the tip was when it left each: the hand stops near where it is sent to.
+    /// Place of the tip when it left each seed: the hand stops near its goal.
     pub dropped_at_m: Vec<[f64; 3]>,
-    /// When each was dropped, after the tip's first contact with tissue.
+    /// Time of each drop after the tip's first contact with tissue.
     pub dropped_after_s: Vec<f64>,
     /// Largest force on the hand, N.
     pub peak_force_n: f64,
@@ -113,10 +119,10 @@ pub struct Rest {
     pub displacement_before_puncture_m: f64,
 }
 
-/// Why a needle could not be rehearsed.
+/// Reason why a needle could not be rehearsed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RehearsalError {
-    /// The user ended it.
+    /// The user cancelled it.
     #[error("interrupted")]
     Interrupted,
     /// The core is absent; the text says what to do.
@@ -125,18 +131,18 @@ pub enum RehearsalError {
     /// The request could not be sent.
     #[error(transparent)]
     Link(#[from] LinkError),
-    /// The core refused, or the rehearsal did not come to its end; the text says why.
+    /// The core refused, or the rehearsal did not finish; the text says why.
     #[error("the rehearsal failed: {text}")]
     Refused {
-        /// Why, for people.
+        /// Reason, for display.
         text: String,
-        /// Number of the drop, from 0, where one was refused.
+        /// Number of the refused drop, from 0, if there is one.
         drop: Option<usize>,
     },
     /// A reply came without its result.
     #[error("the core sent no result of the rehearsal")]
     NoResult,
-    /// The scene changed meanwhile.
+    /// The scene changed during the rehearsal.
     #[error("another scene was loaded during the rehearsal; rehearse again")]
     OtherScene,
     /// It took too long.
@@ -144,21 +150,21 @@ pub enum RehearsalError {
     TooLong,
 }
 
-/// Simulates a needle ahead of time.
+/// Simulator of a needle ahead of time.
 pub trait Rehearser {
-    /// Where the seeds of these drops come to rest.
+    /// Returns the predicted places of the seeds of these drops.
     fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError>;
 }
 
-/// The core that runs, under the parameters in force.
+/// Rehearser on the running core, with the parameters in force.
 pub struct LinkRehearser<'a> {
     /// The link to the core.
     pub link: &'a mut Link,
-    /// Ends a rehearsal early.
+    /// Flag that ends a rehearsal early.
     pub interrupted: &'a Interrupt,
-    /// Needles that go in before and stay.
+    /// Needles that were inserted before and stay.
     pub stabilising: &'a [StabilisingNeedle],
-    /// Needles that come and go beside those, before this one.
+    /// Needles that come and go with those in place, before this one.
     pub earlier: &'a [StabilisingNeedle],
 }
 
@@ -207,7 +213,7 @@ impl Rehearser for LinkRehearser<'_> {
     }
 }
 
-/// Which of these drops a reason is about.
+/// Returns the drop to which a reason refers.
 fn refused_drop(reason: &Reason, drops: &Drops) -> Option<usize> {
     let is_of_loop = reason.code() != Some(RefusalCode::RehearsalFailed);
     (is_of_loop && (reason.subject as usize) < drops.along_m.len()).then_some(reason.subject as usize)

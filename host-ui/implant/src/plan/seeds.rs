@@ -1,4 +1,4 @@
-//! Seeds out of any file that holds some: a plan file, a table, an RT Plan.
+//! Seeds from any file that contains some: a plan file, a table, an RT Plan.
 
 use super::{PlanError, file};
 use crate::readers::{Declared, SeedDefaults, SeedFile, SeedRow, read_seed_rows};
@@ -8,7 +8,8 @@ use stylet_base::format::printable;
 use stylet_dose::decay::s_to_days;
 use stylet_dose::{Seed, Source};
 
-/// The seeds of a file in the patient's frame; a plan file is known by its ending, an RT Plan by its content.
+/// Reads the seeds of a file in the patient's frame; a plan file is recognised by its extension, an
+/// RT Plan by its content.
 pub fn read(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, PlanError> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         return of_plan_file(path);
@@ -52,7 +53,7 @@ fn of_plan_file(path: &Path) -> Result<SeedFile, PlanError> {
     })
 }
 
-/// Notes about a file, to standard error.
+/// Prints notes about a file to standard error.
 pub fn report(path: &Path, notes: &[String]) {
     for note in notes {
         eprintln!("note: {}: {}", path.display(), printable(note));

@@ -1,4 +1,5 @@
-//! Holes for needles that go in first and stay, to hold the gland while the others come and go.
+//! Holes for stabilising needles, which go in first and hold the gland while the others come and
+//! go.
 
 use super::template::{Hole, PITCH_M, Template};
 use super::{Anatomy, Needle};
@@ -7,28 +8,29 @@ use stylet_host::link::Link;
 use stylet_procedure::NeedleWay;
 use stylet_shm_schema::StabilisingNeedle;
 
-/// A stabilising needle keeps that far from the way of every needle of the plan, m.
+/// Distance of a stabilising needle from the path of every needle of the plan, m.
 const FROM_NEEDLES_M: f64 = 0.8 * PITCH_M;
-/// It keeps that far from what is spared.
+/// Distance from spared structures.
 const FROM_SPARED_M: f64 = 2e-3;
-/// Halfway through the target it keeps that far from the target's side: a needle along the edge holds next to nothing.
+/// Distance from the target's side, halfway through it: a needle along the edge holds almost
+/// nothing.
 const FROM_SIDE_M: f64 = 5e-3;
-/// Its tip stays before the far side of the target by that share of its way through it.
+/// Distance of its tip from the far side of the target, as a share of its path through it.
 const SHORT: f64 = 0.2;
-/// It goes through at least so much of the target, m.
+/// Shortest path through the target, m.
 const LEAST_M: f64 = 10e-3;
 
-/// A stabilising needle: where it goes in, and where its tip stays.
+/// Stabilising needle: its hole, and the place of its tip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stabilising {
     /// Hole of the template.
     pub hole: Hole,
-    /// The needle as the core takes it.
+    /// Needle in the core's form.
     pub needle: StabilisingNeedle,
 }
 
 impl Stabilising {
-    /// Where its tip goes.
+    /// Returns the path of its tip.
     pub fn way(&self) -> NeedleWay {
         let (entry_m, direction) = (Vector3::from(self.needle.entry_m), Vector3::from(self.needle.direction));
         NeedleWay {
@@ -41,8 +43,9 @@ impl Stabilising {
     }
 }
 
-/// At most `count` needles as far from each other as the template has holes for, the first as far from the middle of the target as
-/// may be; fewer where no more holes keep clear of the plan and of what is spared.
+/// Chooses at most `count` needles as far from each other as the holes allow, the first as far from
+/// the centre of the target as possible. Returns fewer if no more holes are clear of the plan and
+/// of spared structures.
 pub fn stabilising(template: &Template, anatomy: &Anatomy, needles: &[Needle], count: usize) -> Vec<Stabilising> {
     let direction = template.inwards;
     let across_m = |a: [f64; 3], b: [f64; 3]| {
@@ -119,13 +122,14 @@ fn at_hole(template: &Template, anatomy: &Anatomy, hole: Hole) -> Option<Stabili
     })
 }
 
-/// Number of the needle that was left first, of those that stay in.
+/// Returns the number of the first needle that was left in, among those still in.
 pub fn first_left(link: &Link) -> Option<u32> {
     let left = link.snapshot()?.header.left().first()?.number;
     u32::try_from(left).ok()
 }
 
-/// Whether a snapshot shows the needles that stay in by now: one may be older than the state that counts them.
+/// Returns whether a snapshot already shows the needles that stay in: it may be older than the
+/// state that counts them.
 pub fn shows_left(link: &Link) -> bool {
     let counts = link.snapshot().zip(link.state());
     counts.is_none_or(|(snapshot, state)| snapshot.header.left_count == state.left_count)

@@ -1,17 +1,17 @@
-//! The template: 13 x 13 holes through which needles go, columns A to M, rows 1 to 13.
+//! The template: 13 x 13 holes for needles, columns A to M, rows 1 to 13.
 
 use crate::patient::patient_axis;
 use nalgebra::Vector3;
 use stylet_shm_schema::SceneHeader;
 
-/// Holes along a side.
+/// Number of holes along a side.
 pub const HOLES: u8 = 13;
 /// Distance between two holes, m.
 pub const PITCH_M: f64 = 5e-3;
-/// The template stands this far outside the body.
+/// Distance of the template from the body.
 const CLEARANCE_M: f64 = 0.010;
 
-/// One hole: A1 is at the patient's right, posterior.
+/// Hole; A1 is at the patient's right, posterior.
 #[derive(Clone, Copy, Debug, Hash, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Hole {
     column: u8,
@@ -19,12 +19,12 @@ pub struct Hole {
 }
 
 impl Hole {
-    /// Counted from 0.
+    /// Creates a hole from column and row, counted from 0.
     pub fn new(column: u8, row: u8) -> Option<Self> {
         (column < HOLES && row < HOLES).then_some(Self { column, row })
     }
 
-    /// G7.
+    /// Returns the middle hole, G7.
     pub fn middle() -> Self {
         Self {
             column: HOLES / 2,
@@ -32,24 +32,24 @@ impl Hole {
         }
     }
 
-    /// So many columns and rows on; `None` beyond the edge.
+    /// Returns the hole offset by columns and rows; `None` beyond the edge.
     pub fn beside(self, [columns, rows]: [i8; 2]) -> Option<Self> {
         let column = self.column.checked_add_signed(columns)?;
         let row = self.row.checked_add_signed(rows)?;
         Self::new(column, row)
     }
 
-    /// Every hole, row by row.
+    /// Returns every hole, row by row.
     pub fn all() -> impl Iterator<Item = Self> {
         (0..HOLES).flat_map(|row| (0..HOLES).map(move |column| Self { column, row }))
     }
 
-    /// Column, counted from 0 at A.
+    /// Returns the column, counted from 0 at A.
     pub fn column(self) -> u8 {
         self.column
     }
 
-    /// Row, counted from 0.
+    /// Returns the row, counted from 0.
     pub fn row(self) -> u8 {
         self.row
     }
@@ -61,9 +61,9 @@ impl std::fmt::Display for Hole {
     }
 }
 
-/// A text that names no hole.
+/// Error of a text that names no hole.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("\"{0}\" is no hole; they go from A1 to M13")]
+#[error("\"{0}\" is not a hole; holes go from A1 to M13")]
 pub struct NotAHole(String);
 
 impl std::str::FromStr for Hole {
@@ -79,10 +79,10 @@ impl std::str::FromStr for Hole {
     }
 }
 
-/// Where the holes are, scene frame.
+/// Place of the holes, scene frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Template {
-    /// The middle hole, G7, scene frame, m.
+    /// Middle hole, G7, scene frame, m.
     pub middle_m: [f64; 3],
     /// Unit vector along the columns, from A to M.
     pub columns: [f64; 3],
@@ -95,7 +95,7 @@ pub struct Template {
 }
 
 impl Template {
-    /// Before the perineum, its middle hole before the middle of the target.
+    /// Places a template before the perineum, its middle hole before the centre of the target.
     pub fn before(scene: &SceneHeader) -> Self {
         let inwards = patient_axis(scene, 2, Vector3::z());
         let left = -patient_axis(scene, 0, Vector3::x());
@@ -124,14 +124,15 @@ impl Template {
         }
     }
 
-    /// Where a hole is, scene frame, m.
+    /// Returns the place of a hole, scene frame, m.
     pub fn hole_m(&self, hole: Hole) -> [f64; 3] {
         let middle = f64::from(HOLES / 2);
         let [u, v] = [hole.column, hole.row].map(|n| (f64::from(n) - middle) * self.pitch_m);
         [0, 1, 2].map(|a| self.middle_m[a] + self.columns[a] * u + self.rows[a] * v)
     }
 
-    /// The hole nearest to the line from a point along the template's axis; `None` where that is none of its holes.
+    /// Returns the hole nearest to the line from a point along the template's axis; `None` if no
+    /// hole is near.
     pub fn nearest(&self, point_m: [f64; 3]) -> Option<Hole> {
         let off = Vector3::from(point_m) - Vector3::from(self.middle_m);
         let count = |axis: [f64; 3]| (off.dot(&Vector3::from(axis)) / self.pitch_m).round() + f64::from(HOLES / 2);
@@ -175,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_template_stands_before_the_body_with_its_first_hole_right_and_posterior() {
+    fn the_first_hole_is_right_and_posterior() {
         let template = Template::before(&scene());
         let near = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-12);
         assert!(near(template.hole_m("G7".parse().unwrap()), [0.04, 0.04, -0.01]));
@@ -185,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn the_nearest_hole_of_each_hole_is_itself_and_there_is_none_beyond_the_edge() {
+    fn each_hole_is_its_own_nearest_hole() {
         let template = Template::before(&scene());
         for hole in Hole::all() {
             let mut place = template.hole_m(hole);

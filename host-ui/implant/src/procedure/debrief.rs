@@ -1,4 +1,4 @@
-//! After the last needle: what the implant was worth, written beside the other results.
+//! The score after the last needle, written next to the other results.
 
 use super::Seen;
 use super::error::ProcedureError;
@@ -14,8 +14,8 @@ use stylet_host::link::{Link, SceneModel};
 use stylet_host::moments::Moment;
 use stylet_shm_schema::SeedPose;
 
-/// Writes `score.json` and `debrief.html`; nothing without a plan file, whose seeds have no strength. `source` by the plan's name
-/// where no file is given.
+/// Writes `score.json` and `debrief.html`; nothing without a plan file, whose seeds have no
+/// strength. `source` defaults to the plan's source.
 pub fn write(
     out: &Path,
     link: &Link,
@@ -87,13 +87,14 @@ pub fn write(
     Ok(())
 }
 
-/// The source that the score is computed with: the one asked for, or the plan's. One of another isotope than the plan's is refused.
+/// Returns the source for the score: the requested one, or the plan's. Refuses one of another
+/// isotope than the plan's.
 pub fn source_of(implant: &ImplantPlan, asked: Option<&Path>) -> Result<Source, ProcedureError> {
     let of_plan = Source::known(&implant.source);
     let Some(path) = asked else {
         return of_plan.ok_or_else(|| {
             let model = &implant.source;
-            ProcedureError::Input(format!("no source is known as \"{model}\"; give --source FILE"))
+            ProcedureError::Input(format!("unknown source \"{model}\"; give --source FILE"))
         });
     };
     let source = Source::read(path).map_err(|e| ProcedureError::Input(e.to_string()))?;

@@ -1,4 +1,4 @@
-//! Why a headless procedure ends early.
+//! Reasons why a headless procedure ends early.
 
 use crate::plan::{PlanError, RehearsalError};
 use crate::score::ScoreError;
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use stylet_base::WriteError;
 use stylet_host::link::LinkError;
 
-/// Why a procedure ends early; each text says what to do where something can be done.
+/// Reason why a procedure ends early; the text gives the remedy if there is one.
 #[derive(Debug, thiserror::Error)]
 pub enum ProcedureError {
     /// The user ended it.
@@ -25,7 +25,7 @@ pub enum ProcedureError {
         why: std::io::Error,
     },
     /// The core that was started has ended.
-    #[error("the rt-core that was started has ended ({0}); its message stands above")]
+    #[error("the rt-core that was started has ended ({0}); see its message above")]
     CoreEnded(std::process::ExitStatus),
     /// The core refused the scene; the text says why.
     #[error("the core refused the scene: {0}")]
@@ -33,7 +33,7 @@ pub enum ProcedureError {
     /// The core refused parameters; the text says why.
     #[error("the core refused the parameters: {0}")]
     ParametersRefused(String),
-    /// The core did not send what the procedure needs.
+    /// The core did not send data that the procedure needs.
     #[error("{0}")]
     NothingReceived(&'static str),
     /// A file of the scene, the plan's seeds or the source cannot be used; the text names it.
@@ -51,13 +51,13 @@ pub enum ProcedureError {
     /// A step could not be completed.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A fault stands, and nobody asked to re-arm.
+    /// A fault stands, and re-arming was not requested.
     #[error("{0}. See to its cause, then re-arm in the window (key E), or give --rearm")]
     FaultStands(RunError),
     /// The implant cannot be scored.
     #[error(transparent)]
     Score(#[from] ScoreError),
-    /// The folder of the results cannot be made.
+    /// The folder of the results cannot be created.
     #[error("{} cannot be written ({why}); choose another folder with --out", folder.display())]
     Folder {
         /// The folder.
@@ -65,7 +65,7 @@ pub enum ProcedureError {
         /// What the system reported.
         why: std::io::Error,
     },
-    /// A result cannot be put into JSON.
+    /// A result cannot be represented in JSON.
     #[error(transparent)]
     Json(#[from] serde_json::Error),
     /// A file of the results cannot be written.

@@ -1,4 +1,4 @@
-//! How far each needle moves the target while it is in, and how far tissue is displaced anywhere.
+//! Displacement of the target and of any tissue by each needle.
 
 use crate::plan::Anatomy;
 use nalgebra::Vector3;
@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 use stylet_host::link::{SceneModel, Snapshot};
 use stylet_surfaces::field::Field;
 
-/// The target is looked at at some so many points, evenly in all of it.
+/// Number of points of the target, evenly distributed.
 const POINTS: f64 = 500.0;
 
-/// A displacement, and where the tip was when it was largest.
+/// Largest displacement, and the place of the tip at that time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Largest {
     /// Size, m.
@@ -26,17 +26,18 @@ impl Largest {
     }
 }
 
-/// What one needle did.
+/// Effect of one needle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeedleMotion {
-    /// Mean displacement of the target, from where it was before the needle.
+    /// Mean displacement of the target, relative to its state before the needle.
     pub target: Largest,
-    /// Displacement of any tissue, from where it is at rest: the skin under a tip before it gives way, and what sticks to the shaft.
+    /// Displacement of any tissue from rest: the skin under a tip before it gives way, and tissue
+    /// that sticks to the shaft.
     pub tissue: Largest,
     before_m: Vector3<f64>,
 }
 
-/// Adds up the motion of every needle of a procedure, snapshot by snapshot.
+/// Accumulator of the motion by every needle of a procedure, snapshot by snapshot.
 pub struct TargetMotion {
     points_m: Vec<Vector3<f64>>,
     needles: BTreeMap<usize, NeedleMotion>,
@@ -44,7 +45,7 @@ pub struct TargetMotion {
 }
 
 impl TargetMotion {
-    /// Of the scene's target; without one no needle has a motion.
+    /// Creates an accumulator of the scene's target; without one no needle has a motion.
     pub fn of(scene: &SceneModel) -> Self {
         let target = Anatomy::of(scene).ok().map(|anatomy| anatomy.target);
         let points_m = target.map_or_else(Vec::new, |target| {
@@ -68,7 +69,7 @@ impl TargetMotion {
         }
     }
 
-    /// A snapshot while that needle, counted from 0, is at work.
+    /// Takes a snapshot while that needle, counted from 0, is in use.
     pub fn take(&mut self, needle: usize, scene: &SceneModel, snapshot: &Snapshot) {
         let header = &snapshot.header;
         if self.points_m.is_empty() || self.last_tick == Some(header.tissue_tick) {
@@ -96,7 +97,7 @@ impl TargetMotion {
         motion.tissue.take(tissue_m, tip_m);
     }
 
-    /// Of that needle; `None` where nothing was seen of it.
+    /// Returns the motion by that needle; `None` if it was never observed.
     pub fn of_needle(&self, needle: usize) -> Option<&NeedleMotion> {
         self.needles.get(&needle)
     }
@@ -107,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_needle_has_its_largest_motion_from_where_the_target_was_before_it() {
+    fn the_motion_of_each_needle_is_relative_to_the_state_before_it() {
         let mut motion = TargetMotion {
             points_m: Vec::new(),
             needles: BTreeMap::new(),

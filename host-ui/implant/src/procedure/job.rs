@@ -1,4 +1,5 @@
-//! What a procedure is asked to do: needles with what is planned and what is done, from a plan file or as the scene suggests.
+//! The task of a procedure: needles with plans and drops, from a plan file or as the scene
+//! suggests.
 
 use super::error::ProcedureError;
 use crate::pairing;
@@ -14,24 +15,26 @@ use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, SceneModel};
 use stylet_shm_schema::{MAX_SEEDS, SeedPose};
 
-/// A seed as it is planned, in the order of the drops.
+/// Planned seed, in the order of the drops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlannedDrop {
-    /// Counted from 0.
+    /// Index of the needle, from 0.
     pub needle: usize,
     /// Hole of the needle; `None` for one that is held by hand.
     pub hole: Option<Hole>,
-    /// Where it is planned, scene frame, m.
+    /// Planned place, scene frame, m.
     pub planned_m: [f64; 3],
-    /// Of the needle, into the body.
+    /// Direction of the needle, into the body.
     pub direction: [f64; 3],
-    /// `None` where no plan file says.
+    /// Strength; `None` without a plan file.
     pub strength_u: Option<f64>,
-    /// Where the seed came to rest in the rehearsal of this drop, scene frame, m; `None` where it was not rehearsed.
+    /// Place of the seed at rest in the rehearsal of this drop, scene frame, m; `None` without a
+    /// rehearsal.
     pub rehearsed_m: Option<[f64; 3]>,
 }
 
-/// Each seed in the tissue with what was planned for it; `lost` are the numbers of drops that left none.
+/// Returns each seed in the tissue with its planned one; `lost` are the numbers of drops that left
+/// none.
 pub fn placed<'a>(
     planned: &'a [PlannedDrop],
     lost: &'a [usize],
@@ -42,20 +45,20 @@ pub fn placed<'a>(
     planned.iter().zip(pairs).filter_map(pair)
 }
 
-/// Everything that is done in one procedure.
+/// Task of one procedure.
 pub struct Job {
-    /// `None` without a plan file: one needle as the scene suggests.
+    /// Plan; `None` without a plan file: one needle as the scene suggests.
     pub implant: Option<ImplantPlan>,
-    /// Its needles, in their order.
+    /// Needles, in their order.
     pub tasks: Vec<NeedleTask>,
-    /// By the number of the needle, where it was asked for and possible.
+    /// Compensations by the number of the needle, if requested and possible.
     pub compensations: BTreeMap<usize, Compensation>,
     /// Needles that go in first and stay until the others have left their seeds.
     pub stabilising: Vec<Stabilising>,
 }
 
 impl Job {
-    /// One needle through the middle of the target.
+    /// Creates a task of one needle through the middle of the target.
     pub fn suggested(scene: &SceneModel, seeds: usize) -> Self {
         let plan = plan_with_seeds(&scene.header, seeds);
         Self {
@@ -66,8 +69,8 @@ impl Job {
         }
     }
 
-    /// From a plan file, a table of seeds or an RT Plan, in the patient's frame. What is doubtful in it is reported and
-    /// not refused.
+    /// Reads a plan file, a table of seeds or an RT Plan, in the patient's frame. Doubtful content
+    /// is reported and not refused.
     pub fn from_file(path: &Path, scene: &SceneModel) -> Result<Self, ProcedureError> {
         let plan = exchange::read(path, &scene.header)?;
         if plan.seed_count() == 0 || plan.seed_count() > MAX_SEEDS {
@@ -96,7 +99,8 @@ impl Job {
         })
     }
 
-    /// Chooses that many stabilising needles, as far apart as the template has room for; fewer where it has not, which is reported.
+    /// Chooses that many stabilising needles, as far apart as the template allows. Reports if there
+    /// is room for fewer.
     pub fn stabilise(&mut self, scene: &SceneModel, count: usize) -> Result<(), ProcedureError> {
         let anatomy = Anatomy::of(scene)?;
         let template = match &self.implant {
@@ -118,16 +122,16 @@ impl Job {
             }
         );
         if holes.len() < count {
-            println!("note: no more holes keep clear of the plan's needles and of what is spared");
+            println!("note: no more holes are clear of the plan's needles and of spared structures");
         }
         Ok(())
     }
 
-    /// Rehearses every needle and moves its drops so that the seeds rest on plan.
+    /// Rehearses every needle and shifts its drops so that the seeds rest on plan.
     pub fn compensate(&mut self, link: &mut Link, pace: &Pace, interrupted: &Interrupt) -> Result<(), ProcedureError> {
         let count = self.tasks.len();
         let beside: Vec<_> = self.stabilising.iter().map(|s| s.needle).collect();
-        // What needles do to those that stay in, those that come later find.
+        // Later needles find the effects of earlier ones on those that stay in.
         let mut earlier = Vec::new();
         for (number, task) in self.tasks.iter_mut().enumerate() {
             let needle = match &self.implant {
@@ -171,7 +175,7 @@ impl Job {
         Ok(())
     }
 
-    /// In the order of the drops.
+    /// Returns the planned seeds in the order of the drops.
     pub fn planned(&self) -> Vec<PlannedDrop> {
         let needles = || {
             self.implant
@@ -202,7 +206,7 @@ impl Job {
     }
 }
 
-/// A needle without a template, as a plan has it.
+/// Returns a needle without a template, in the form of a plan.
 fn needle_of(plan: &NeedlePlan) -> Needle {
     let along = plan.deepest_first().into_iter().map(|seed| plan.along_m(seed));
     Needle {

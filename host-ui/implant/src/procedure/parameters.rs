@@ -1,4 +1,4 @@
-//! Parameters that a procedure without a window sets before it begins.
+//! Parameters that a headless procedure sets before it begins.
 
 use super::error::ProcedureError;
 use super::wait;
@@ -9,35 +9,35 @@ use stylet_shm_schema::{PARAMETERS, ParameterChange, Request};
 
 const LIMIT: Duration = Duration::from_secs(5);
 
-/// Why a text is no parameter; each says what is allowed.
+/// Error of a text that is not a parameter; it says what is allowed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoParameter {
-    /// Something else than a pair.
+    /// The text is not a pair.
     #[error("{0}: write KEY=VALUE, such as needle.bending_stiffness=0.016")]
     NoPair(String),
-    /// A key that is not in the table.
-    #[error("{0}: there is no such parameter; there are {keys}", keys = keys())]
+    /// The key is not in the table.
+    #[error("{0}: no such parameter; valid keys are {keys}", keys = keys())]
     UnknownKey(String),
-    /// A value that cannot be read.
-    #[error("{key}: {value} is no number")]
+    /// The value cannot be read.
+    #[error("{key}: {value} is not a number")]
     NoNumber {
         /// The parameter.
         key: &'static str,
-        /// What was given.
+        /// Text that was given.
         value: String,
     },
-    /// A value that the table forbids.
+    /// The table forbids the value.
     #[error("{key}: {value} is outside of {least} to {most} {unit}")]
     OutOfLimits {
         /// The parameter.
         key: &'static str,
-        /// What was given, in `unit`.
+        /// Value that was given, in `unit`.
         value: f64,
         /// Least value.
         least: f64,
         /// Largest value.
         most: f64,
-        /// The unit that a person reads.
+        /// Display unit.
         unit: &'static str,
     },
 }
@@ -46,7 +46,7 @@ fn keys() -> String {
     PARAMETERS.map(|spec| spec.key).join(", ")
 }
 
-/// `KEY=VALUE` of the command line, in the unit that the window shows.
+/// Parses `KEY=VALUE` of the command line, in the window's unit.
 pub fn parameter(text: &str) -> Result<ParameterChange, NoParameter> {
     let (key, value) = text
         .split_once('=')
@@ -58,7 +58,7 @@ pub fn parameter(text: &str) -> Result<ParameterChange, NoParameter> {
         value: value.to_owned(),
     })?;
     let si = given / spec.display_per_si;
-    // The factor to a person's unit and back may leave the limits by a bit.
+    // The factor to the display unit and back may leave the limits by a bit.
     let within = si.clamp(spec.min, spec.max);
     if !si.is_finite() || (si - within).abs() > 1e-9 * spec.max.abs() {
         let [least, most] = [spec.min, spec.max].map(|limit| limit * spec.display_per_si);
@@ -76,7 +76,7 @@ pub fn parameter(text: &str) -> Result<ParameterChange, NoParameter> {
     })
 }
 
-/// Waits until they are in force.
+/// Sends parameters and waits until they are in force.
 pub(super) fn set(link: &mut Link, changes: &[ParameterChange], interrupted: &Interrupt) -> Result<(), ProcedureError> {
     if changes.is_empty() {
         return Ok(());
@@ -104,7 +104,7 @@ mod tests {
     use stylet_shm_schema::ParameterId;
 
     #[test]
-    fn a_parameter_is_read_in_the_unit_of_the_window() {
+    fn parameters_use_the_window_s_unit() {
         let change = parameter("needle.template_gap=0.2").expect("valid");
         assert_eq!(change.id, ParameterId::TemplateGap);
         assert!((change.value - 2e-4).abs() < 1e-15);

@@ -128,8 +128,8 @@ fn needles(job: &Job, seen: &Seen) -> Vec<Value> {
     job.tasks.iter().zip(deflections_m).enumerate().map(of_task).collect()
 }
 
-/// Largest deflection of the tip of each needle, from where a rigid one would have it. A tick counts for the needle on whose line
-/// the hand is.
+/// Returns the largest deflection of the tip of each needle from a rigid one. A tick counts for the
+/// needle on whose line the hand is.
 fn deflections_m(job: &Job, records: &[TickRecord]) -> Vec<f64> {
     let beside_m = |task: &NeedleTask, tip_m: [f64; 3]| {
         let from_entry = Vector3::from(tip_m) - Vector3::from(task.drops.entry_m);
@@ -149,7 +149,8 @@ fn deflections_m(job: &Job, records: &[TickRecord]) -> Vec<f64> {
     largest_m
 }
 
-/// Those that were asked for, each with where its tip was when it stayed in; `null` where it did not.
+/// Returns the requested stabilising needles, each with its tip when it stayed in; `null` if it did
+/// not.
 fn stabilising(job: &Job, seen: &Seen) -> Vec<Value> {
     let each = job.stabilising.iter().enumerate();
     each.map(|(number, of_plan)| {
@@ -162,7 +163,7 @@ fn stabilising(job: &Job, seen: &Seen) -> Vec<Value> {
     .collect()
 }
 
-/// As the rehearsals had it.
+/// Returns the predictions of the rehearsals.
 fn compensation(job: &Job) -> Option<Value> {
     let [[mean_before, worst_before], [mean_after, worst_after]] =
         summary_m(job.compensations.values()).map(|e| e.map(|m| m * 1e3));
@@ -177,7 +178,8 @@ fn compensation(job: &Job) -> Option<Value> {
     })
 }
 
-/// Seeds that rest elsewhere if the tip stops a little deeper or shallower; `null` where they would be lost.
+/// Returns the seeds that rest elsewhere if the tip stops a little deeper or shallower; `null` for
+/// lost seeds.
 fn sensitive(job: &Job) -> Vec<Value> {
     let each = job.compensations.iter();
     each.flat_map(|(needle, done)| done.sensitive.iter().map(move |found| (needle, found)))
@@ -214,7 +216,8 @@ fn force(link: &Link, direction: [f64; 3], seen: &Seen) -> Value {
     })
 }
 
-/// The least displacement of the tissue at the tip at which its linear answer folded; `None` where it never did.
+/// Returns the smallest displacement of the tissue at the tip at which its linear answer folded;
+/// `None` if it never did.
 fn folded_from_mm(records: &[TickRecord]) -> Option<f64> {
     let folded = records.iter().map(|r| r.folded_from_um).filter(|um| *um > 0);
     folded.min().map(|um| f64::from(um) * 1e-3)
@@ -291,7 +294,7 @@ fn force_csv(file: &mut impl Write, direction: [f64; 3], seen: &Seen) -> std::io
     Ok(())
 }
 
-/// That number of each that has it.
+/// Returns that number of each entry that has it.
 fn all<'a>(list: &'a Value, key: &'a str) -> impl Iterator<Item = f64> + 'a {
     list.as_array()
         .into_iter()
@@ -299,7 +302,7 @@ fn all<'a>(list: &'a Value, key: &'a str) -> impl Iterator<Item = f64> + 'a {
         .filter_map(move |v| v[key].as_f64())
 }
 
-/// How far needles moved the target, and which of them most.
+/// Describes how far needles moved the target, and names the one with the largest effect.
 fn motion_line(needles: &Value) {
     let each = || needles.as_array().into_iter().flatten().enumerate();
     let most = |key: &str| {

@@ -1,11 +1,12 @@
-//! Which column of a table is what: names of ours, headers that state a quantity and its unit, or what a person says.
+//! Meaning of a table's columns: our names, headers that state a quantity and its unit, or a user's
+//! mapping.
 
 use super::table::{LineError, shown};
 use std::str::FromStr;
 
-/// Words for the axes of a place.
+/// Words that announce the axes of a place.
 const PLACE_WORDS: [&str; 6] = ["position", "pos", "coordinate", "coord", "seed", "location"];
-/// Units by the quantity of a column, with what a number in them is multiplied by.
+/// Units by the quantity of a column, with the factor of its numbers.
 const UNITS: [(Quantity, &str, f64); 9] = [
     (Quantity::Length, "mm", 1.0),
     (Quantity::Length, "cm", 10.0),
@@ -19,13 +20,13 @@ const UNITS: [(Quantity, &str, f64); 9] = [
     (Quantity::Activity, "gbq", 1000.0 / 37.0),
 ];
 
-/// What the numbers of a column are.
+/// Quantity in a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Quantity {
     Length,
     Strength,
     Activity,
-    /// Directions, numbers of needles, names, dates.
+    /// Numbers without a unit: directions, numbers of needles, names, dates.
     Plain,
 }
 
@@ -39,7 +40,7 @@ impl Quantity {
         }
     }
 
-    /// What a number in this unit is multiplied by.
+    /// Returns the factor of numbers in this unit.
     fn unit(self, name: &str) -> Option<f64> {
         let name = name
             .trim()
@@ -54,22 +55,22 @@ impl Quantity {
     }
 }
 
-/// What a person says of one column: `x_mm=-Lateral:cm`.
+/// User's mapping of one column: `x_mm=-Lateral:cm`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mapped {
-    /// Name of ours.
+    /// Our name.
     known: String,
     /// Header in the file.
     header: String,
     is_negated: bool,
-    /// What a number is multiplied by, where a unit was given.
+    /// Factor of its numbers, if a unit was given.
     factor: Option<f64>,
 }
 
-/// A mapping that cannot be used.
+/// Error of a mapping that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "\"{0}\" is no column; write NAME=HEADER, as in x_mm=\"Pos X:cm\" or y_mm=-Y:cm; units are mm, cm, m, U, mCi, MBq, GBq"
+    "\"{0}\" is not a column; write NAME=HEADER, as in x_mm=\"Pos X:cm\" or y_mm=-Y:cm; units are mm, cm, m, U, mCi, MBq, GBq"
 )]
 pub struct NotAColumn(String);
 
@@ -107,16 +108,16 @@ impl FromStr for Mapped {
     }
 }
 
-/// A column of a table: its name among ours, and what its numbers are multiplied by.
+/// Column of a table: our name, and the factor of its numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Column {
-    /// Empty where it is passed over.
+    /// Our name; empty if the column is skipped.
     pub name: String,
     pub factor: f64,
 }
 
-/// The columns of a header, and those that are passed over. Without a mapping every header must be one of `known` or state its
-/// quantity and unit.
+/// Returns the columns of a header, and the skipped ones. Without a mapping every header must be
+/// one of `known` or state its quantity and unit.
 pub(super) fn of_header(
     headers: &[String],
     known: &[&str],
@@ -139,7 +140,7 @@ pub(super) fn of_header(
     }
     if mapped.is_empty() && !passed_over.is_empty() {
         problems.push(format!(
-            "the column{} \"{}\" {} not known; there may be {}, or say what columns are with --column",
+            "the column{} \"{}\" {} unknown; valid are {}, or name columns with --column",
             if passed_over.len() == 1 { "" } else { "s" },
             passed_over.join("\", \""),
             if passed_over.len() == 1 { "is" } else { "are" },
@@ -174,7 +175,7 @@ pub(super) fn of_header(
     }
 }
 
-/// `None` for one that nothing is known of.
+/// Recognises one column; `None` for an unknown one.
 fn of_one(header: &str, known: &[&str], mapped: &[Mapped]) -> Result<Option<Column>, String> {
     if let Some(wanted) = mapped.iter().find(|wanted| wanted.header == *header) {
         let quantity = Quantity::of(&wanted.known);
@@ -204,7 +205,7 @@ fn of_one(header: &str, known: &[&str], mapped: &[Mapped]) -> Result<Option<Colu
     let Some(name) = recognised(&words, unit.as_deref()).filter(|name| known.contains(name)) else {
         return Ok(None);
     };
-    // What a person mapped from elsewhere is not taken from here.
+    // A column that the user mapped from elsewhere is not taken from here.
     if mapped.iter().any(|wanted| wanted.known == name) {
         return Ok(None);
     }
@@ -212,7 +213,7 @@ fn of_one(header: &str, known: &[&str], mapped: &[Mapped]) -> Result<Option<Colu
     match (quantity, unit.as_deref().and_then(|unit| quantity.unit(unit))) {
         (Quantity::Plain, _) => Ok(Some(1.0)),
         (_, Some(factor)) => Ok(Some(factor)),
-        // A length without a unit may be of any.
+        // A length without a unit is ambiguous.
         (_, None) => Ok(None),
     }
     .map(|factor| {
@@ -223,7 +224,8 @@ fn of_one(header: &str, known: &[&str], mapped: &[Mapped]) -> Result<Option<Colu
     })
 }
 
-/// The words of a header, and the unit in brackets or after the last underscore or space: "Pos X (cm)", "y_cm", "Z [mm]".
+/// Returns the words of a header, and the unit in brackets or after the last underscore or space:
+/// "Pos X (cm)", "y_cm", "Z [mm]".
 fn stated(header: &str) -> (Vec<String>, Option<String>) {
     let (name, unit) = match header.find(['(', '[']) {
         Some(at) => {
@@ -246,7 +248,7 @@ fn stated(header: &str) -> (Vec<String>, Option<String>) {
     (words, unit)
 }
 
-/// The name of ours that words stand for.
+/// Returns our name for these words.
 fn recognised(words: &[String], unit: Option<&str>) -> Option<&'static str> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let without: Vec<&str> = words
@@ -262,7 +264,7 @@ fn recognised(words: &[String], unit: Option<&str>) -> Option<&'static str> {
     }
     match words[..] {
         ["strength"] | ["air", "kerma", "strength"] | ["aks"] | ["sk"] => Some("strength_u"),
-        // Some call an activity a strength, and its unit shows which it is.
+        // Some call an activity a strength; its unit tells.
         ["activity"] | ["apparent", "activity"] | ["seed", "activity"] => match unit {
             Some(unit) if Quantity::Strength.unit(unit).is_some() => Some("strength_u"),
             _ => Some("activity_mci"),
@@ -289,7 +291,7 @@ mod tests {
         "strength_date",
     ];
 
-    /// Names with factors, and headers that are passed over.
+    /// Names with factors, and skipped headers.
     type Columns = (Vec<(String, f64)>, Vec<String>);
 
     fn columns(headers: &[&str], mapped: &[&str]) -> Result<Columns, String> {
@@ -331,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mapping_gives_names_units_and_signs_and_reports_what_is_passed_over() {
+    fn a_mapping_sets_names_units_and_signs() {
         let mapped = [
             "x_mm=-Lateral:cm",
             "y_mm=Height (mm)",

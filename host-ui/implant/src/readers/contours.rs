@@ -1,4 +1,5 @@
-//! Structures out of a DICOM RT Structure Set as they are drawn: one that lies in another takes nothing from it.
+//! Structures from a DICOM RT Structure Set as drawn: a structure inside another takes nothing from
+//! it.
 
 use std::path::Path;
 use stylet_dose::{Region, Structure};
@@ -20,10 +21,11 @@ impl Region for Drawing<'_> {
     }
 }
 
-/// Structures, and what was left out of the file.
+/// Structures, and omissions of the file.
 type Drawn = (Vec<Structure>, Vec<String>);
 
-/// The structures of an RT Structure Set, each of at most `most_points` points; `None` for a file that is no DICOM.
+/// Returns the structures of an RT Structure Set, each of at most `most_points` points; `None` for
+/// a file that is not DICOM.
 pub fn structures(path: &Path, most_points: usize) -> Result<Option<Drawn>, FileError> {
     let refused = |why| FileError::of(path, why);
     let bytes = watched(path, |progress| bytes::whole(path, progress)).map_err(refused)?;
@@ -41,7 +43,8 @@ pub fn structures(path: &Path, most_points: usize) -> Result<Option<Drawn>, File
     )))
 }
 
-/// The box around it is filled at most half by a rounded body, and a pitch finer than wanted does no harm.
+/// Samples a body. A rounded one fills its box at most by half, and a finer pitch than wanted does
+/// no harm.
 fn of_solid(solid: &Solid, most_points: usize) -> Structure {
     let box_m3: f64 = (0..3).map(|a| (solid.upper_m[a] - solid.lower_m[a]).max(0.0)).product();
     let finest = (box_m3 / most_points as f64).cbrt();

@@ -1,5 +1,5 @@
-//! What a plan says of its seeds, compared with the source and the options that dose is computed with: refused where the dose
-//! would be wrong, reported where it may be.
+//! Declarations of a plan about its seeds, compared with the source and the options of the dose:
+//! refused if the dose would be wrong, reported if it may be.
 
 use super::{SeedFile, SeedRow};
 use stylet_base::format::printable;
@@ -8,14 +8,14 @@ use stylet_dose::Source;
 use stylet_dose::decay::{days_to_s, left_after, s_to_days};
 use stylet_files::dicom::plan::Date;
 
-/// Half-lives of one isotope agree so well, as a share; tables differ by less.
+/// Largest difference between half-lives of one isotope, as a share; tables differ by less.
 const SAME_HALF_LIFE: f64 = 0.01;
-/// Days that a strength may be old or young; a date beyond is a slip of the pen.
+/// Largest age of a strength in days; a date beyond is a typing error.
 const MAX_DAYS: i32 = 3650;
-/// Doses that differ by less are one.
+/// Difference below which doses are equal.
 const SAME_GY: f64 = 1e-6;
 
-/// What a plan says of all its seeds.
+/// Declarations of a plan about all its seeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Declared {
     /// Name of the model.
@@ -30,7 +30,7 @@ pub struct Declared {
     pub planned_on: Option<Date>,
 }
 
-/// Why the dose would be wrong; the texts follow the name of the file.
+/// Reason why the dose would be wrong; the texts follow the name of the file.
 #[derive(Debug, thiserror::Error)]
 pub enum Mismatch {
     /// The seeds are of another nuclide than the source.
@@ -48,7 +48,7 @@ pub enum Mismatch {
         /// Model of the source.
         source_model: String,
     },
-    /// A strength whose day is years from that of the implant.
+    /// The reference day of a strength is years from the implant.
     #[error(
         "the strength of its seeds refers to {strength_on}, {days} days from the implant on {implant}; correct --implant-date"
     )]
@@ -63,7 +63,7 @@ pub enum Mismatch {
 }
 
 impl Declared {
-    /// Compares with the source; what may be wrong comes back in words.
+    /// Compares with the source; returns possible errors in words.
     pub fn check(&self, source: &Source) -> Result<Vec<String>, Mismatch> {
         let source_days = s_to_days(source.half_life_s);
         let other_days = self
@@ -71,7 +71,7 @@ impl Declared {
             .filter(|days| (days / source_days - 1.0).abs() > SAME_HALF_LIFE);
         let is_same = match (Nuclide::parse(&self.isotope), Nuclide::parse(&source.nuclide)) {
             (Some(found), Some(of_source)) => found == of_source,
-            // A name that nobody can read: nuclides of seeds differ in their half-lives.
+            // An unreadable name: nuclides of seeds differ in their half-lives.
             _ => other_days.is_none(),
         };
         if !is_same {
@@ -99,14 +99,15 @@ impl Declared {
         Ok(notes)
     }
 
-    /// Whether the model has the name of the source's.
+    /// Returns whether the model has the name of the source's.
     pub fn is_of_model(&self, source: &Source) -> bool {
         is_same_model(&self.model, &source.model)
     }
 }
 
 impl SeedFile {
-    /// Compares with source and options, and lets the strengths decay: the prescription in Gy, and what should be reported.
+    /// Compares with source and options, and decays the strengths. Returns the prescription in Gy,
+    /// and remarks.
     pub fn agree(
         &mut self,
         source: &Source,
@@ -123,18 +124,19 @@ impl SeedFile {
     }
 }
 
-/// "OncoSeed 6711" is 6711; a plan that names no model is of any.
+/// Compares models: "OncoSeed 6711" is 6711; a plan without a model matches any.
 fn is_same_model(found: &str, of_source: &str) -> bool {
     let plain = |name: &str| name.to_lowercase().replace(|c: char| !c.is_alphanumeric(), "");
     plain(found).is_empty() || plain(found).contains(&plain(of_source))
 }
 
-/// The beginning of a name out of a file.
+/// Returns the beginning of a name from a file.
 fn shown(name: &str) -> String {
     printable(name).chars().take(40).collect()
 }
 
-/// The prescription in Gy: what was asked for, or the plan's, or the source's; and a note where they differ.
+/// Returns the prescription in Gy: the requested one, or the plan's, or the source's; and a note if
+/// they differ.
 fn prescription(asked_gy: Option<f64>, declared: Option<&Declared>, source: &Source) -> (Option<f64>, Option<String>) {
     let of_plan = declared.and_then(|d| d.prescription_gy);
     let used = asked_gy.or(of_plan).or(source.prescription_gy);
@@ -154,12 +156,13 @@ fn prescription(asked_gy: Option<f64>, declared: Option<&Declared>, source: &Sou
     (Some(used), note)
 }
 
-/// The day on which the seeds are implanted, and what the strengths of a file are then.
+/// Day of the implant, for the decay of a file's strengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DayOfImplant(pub Option<Date>);
 
 impl DayOfImplant {
-    /// Lets every strength that has a day decay to that of the implant. Without one the strengths stay, which is reported.
+    /// Decays every strength with a date to the day of the implant. Without that day the strengths
+    /// stay, which is reported.
     fn decay(
         self,
         rows: &mut [SeedRow],
@@ -203,7 +206,7 @@ impl DayOfImplant {
         }
         let left = left_after(days_to_s(f64::from(days_between(last, implant))), source.half_life_s);
         Ok(Some(format!(
-            "strengths of {when} decay to the implant on {implant}: {:.1} % of the last are left",
+            "strengths of {when} decay to the implant on {implant}: {:.1} % of the last one remain",
             left * 100.0
         )))
     }

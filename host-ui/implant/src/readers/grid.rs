@@ -1,4 +1,4 @@
-//! A dose grid as `host-ui dose` writes it.
+//! A dose grid in the format of `host-ui dose`.
 
 use super::table::{self, LineError, PLACE};
 use std::path::Path;
@@ -10,9 +10,9 @@ const START_BYTES: u64 = 160;
 
 /// Doses on a regular grid of places in RAS; x runs fastest.
 pub struct DoseFile {
-    /// Places along x, y, z.
+    /// Number of places along x, y, z.
     pub dims: [usize; 3],
-    /// The first place, in m.
+    /// First place, in m.
     pub origin_m: [f64; 3],
     /// Distances between places along x, y, z, in m.
     pub spacing_m: [f64; 3],
@@ -32,7 +32,7 @@ impl From<ReadDose> for DoseFile {
 }
 
 impl DoseFile {
-    /// Every place, x fastest, in m.
+    /// Returns every place, x fastest, in m.
     pub fn places_m(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         let [nx, ny, nz] = self.dims;
         (0..nx * ny * nz).map(move |n| {
@@ -41,7 +41,8 @@ impl DoseFile {
         })
     }
 
-    /// Linear between the eight voxels around a place; `None` outside of the middles of the outermost.
+    /// Interpolates linearly between the eight voxels around a place; `None` outside of the centres
+    /// of the outermost.
     pub fn at_gy(&self, place_m: [f64; 3]) -> Option<f64> {
         let (mut low, mut share) = ([0; 3], [0.0; 3]);
         for a in 0..3 {
@@ -71,7 +72,7 @@ impl DoseFile {
     }
 }
 
-/// A dose out of an RT Dose or a table, which of both is found out from the content.
+/// Reads a dose from an RT Dose or a table, detected by the content.
 pub fn read_any_dose(path: &Path) -> Result<DoseFile, FileError> {
     let is_dicom = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
     match is_dicom {
@@ -80,7 +81,7 @@ pub fn read_any_dose(path: &Path) -> Result<DoseFile, FileError> {
     }
 }
 
-/// A dose grid as `host-ui dose` writes it: every place of a regular grid, x fastest.
+/// Reads a dose grid in the format of `host-ui dose`: every place of a regular grid, x fastest.
 pub fn read_dose(path: &Path) -> Result<DoseFile, FileError> {
     let (rows, _) = table::read(path, &[PLACE.as_slice(), &["dose_gy"]].concat(), &[], |row| {
         let dose = row
@@ -91,7 +92,7 @@ pub fn read_dose(path: &Path) -> Result<DoseFile, FileError> {
     grid_of(&rows).ok_or_else(|| {
         FileError::of(
             path,
-            "its places are no grid with x running fastest, as dose_grid.csv has them",
+            "its places are not a grid with x running fastest, like those of dose_grid.csv",
         )
     })
 }
@@ -108,7 +109,7 @@ fn grid_of(rows: &[([f64; 3], f64)]) -> Option<DoseFile> {
     let dims = [stride_y, stride_z / stride_y, rows.len() / stride_z];
     let last = rows.last()?.0;
     let spacing_m = [0, 1, 2].map(|a| match dims[a] {
-        // One layer has no distance to the next; it is as thick as the grid is fine.
+        // One layer has no distance to the next; its thickness is the pitch of the grid.
         1 => (last[0] - origin_m[0]) / (dims[0].max(2) - 1) as f64,
         n => (last[a] - origin_m[a]) / (n - 1) as f64,
     });

@@ -1,4 +1,4 @@
-//! Structures out of a label volume; a voxel belongs to its structure from wall to wall.
+//! Structures from a label volume; a voxel belongs to its structure from wall to wall.
 
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -6,11 +6,12 @@ use stylet_dose::Structure;
 use stylet_dose::structure::Scatter;
 use stylet_files::Voxels;
 
-/// Finer than this only for structures too small to have [`FEWEST_POINTS`] otherwise.
+/// Smallest pitch, unless a structure is too small to have [`FEWEST_POINTS`] otherwise.
 const PITCH_M: f64 = 0.5e-3;
 const FEWEST_POINTS: f64 = 20_000.0;
 
-/// One structure for each label but 0, in the order of labels, all of it where structures overlap; `names` where the user gave them.
+/// Returns one structure for each label but 0, in the order of labels, whole even if structures
+/// overlap; `names` are the user's.
 pub fn structures(voxels: &Voxels, names: &BTreeMap<u8, String>, most_points: usize) -> Vec<Structure> {
     let of_label = |label: u8| {
         let name = names.get(&label).cloned().unwrap_or_else(|| format!("label {label}"));
@@ -37,7 +38,7 @@ fn structure(v: &Voxels, name: String, indices: &[usize], most_points: usize) ->
         for part in 0..count {
             let part = [part % parts[0], part / parts[0] % parts[1], part / parts[0] / parts[1]];
             let within = random.point();
-            // The index of a voxel is that of its middle.
+            // The index of a voxel is that of its centre.
             let place = Vector3::from([0, 1, 2].map(|a| {
                 let share = (part[a] as f64 + within[a]) / parts[a] as f64;
                 (at[a] as f64 + share - 0.5) * v.frame.spacing_m[a]

@@ -1,4 +1,4 @@
-//! What dose is computed from and for, out of files: seeds, structures, points, and a dose that was written.
+//! Inputs of dose computation from files: seeds, structures, points, and an existing dose.
 
 mod columns;
 pub mod contours;

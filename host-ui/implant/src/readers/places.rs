@@ -1,18 +1,19 @@
-//! Where seeds lie that lie oddly: on one spot, or outside the target; reported with how many and how far.
+//! Suspicious places of seeds: on one spot, or outside the target; reported with number and
+//! distance.
 
 use std::collections::HashSet;
 use stylet_dose::{Seed, Structure};
 
-/// Thickness of a seed: two cannot be nearer.
+/// Thickness of a seed, the smallest possible distance of two.
 const SAME_SPOT_M: f64 = 0.8e-3;
-/// Seeds at the edge of the target are planned there.
+/// Distance from the edge of the target up to which seeds are planned.
 const EDGE_M: f64 = 1e-3;
-/// Points of the target that the distance of a seed outside is taken from.
+/// Most points of the target for the distance of a seed outside.
 const MOST_POINTS: usize = 50_000;
-/// Pairs of seeds that are looked at; beyond, only exact doubles are.
+/// Most pairs of seeds that are compared; beyond, only exact duplicates are found.
 const MOST_PAIRS: usize = 5_000;
 
-/// Seeds that lie on the spot of another one.
+/// Reports seeds that lie on the spot of another one.
 pub fn on_one_spot(seeds: &[Seed]) -> Option<String> {
     let (mut on_another, mut first) = (0, None);
     if seeds.len() <= MOST_PAIRS {
@@ -42,10 +43,10 @@ pub fn on_one_spot(seeds: &[Seed]) -> Option<String> {
     })
 }
 
-/// Seeds that lie outside the target by more than its edge.
+/// Reports seeds that lie outside the target by more than its edge.
 pub fn outside(seeds: &[Seed], target: &Structure) -> Option<String> {
     let point_m3 = target.volume_m3() / target.points_m.len().max(1) as f64;
-    // Points stand for cells of about this side: nearer to the edge than that nothing is known.
+    // Points represent cells of about this side: nearer to the edge nothing is known.
     let edge_m = EDGE_M.max(point_m3.cbrt());
     let cell = |p: [f64; 3]| p.map(|v| (v / edge_m).floor() as i64);
     let cells: HashSet<[i64; 3]> = target.points_m.iter().map(|p| cell(*p)).collect();
@@ -91,7 +92,7 @@ mod tests {
         places_mm.iter().map(seed).collect()
     }
 
-    /// A seed that was in the file twice gave twice its dose, in silence.
+    /// Guards against a silently doubled dose of a seed that was in the file twice.
     #[test]
     fn seeds_on_one_spot_are_reported_with_their_number() {
         assert_eq!(on_one_spot(&seeds(&[[0.0; 3], [0.0, 0.0, 5.0]])), None);
@@ -104,7 +105,7 @@ mod tests {
         assert!(on_one_spot(&seeds(&many)).unwrap().contains("3000 of its 6000 seeds"));
     }
 
-    /// Seeds beside the target, as those of another frame are, gave their dose in silence.
+    /// Guards against the silent dose of seeds outside the target, such as those of another frame.
     #[test]
     fn seeds_outside_the_target_are_reported_with_the_farthest() {
         let target = Structure::of_box("Prostate", [0.0; 3], [0.02; 3], 0.5e-3);

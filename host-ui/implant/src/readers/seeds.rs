@@ -1,4 +1,4 @@
-//! Seeds out of a table (CSV) or a DICOM RT Plan, which of both is found out from the content.
+//! Seeds from a table (CSV) or a DICOM RT Plan, detected by the content.
 
 use super::columns::Mapped;
 use super::declared::Declared;
@@ -14,58 +14,60 @@ use stylet_files::{FileError, bytes};
 const MAX_U: f64 = 1e5;
 /// Columns of the direction.
 pub const AXIS: [&str; 3] = ["axis_x", "axis_y", "axis_z"];
-/// Columns that say how sure a seed of a CT is; dose has no use for them.
+/// Columns with the certainty of a seed in a CT, which dose ignores.
 pub const FOUND: [&str; 3] = ["confidence", "deviation_mm", "together"];
 /// Number of bytes that distinguish a DICOM file from a table.
 const START_BYTES: u64 = 160;
 
-/// What is assumed of seeds whose file does not say it.
+/// Defaults for seeds whose file omits them.
 #[derive(Clone, Debug, Default)]
 pub struct SeedDefaults {
     /// Air kerma strength, in U.
     pub strength_u: Option<f64>,
-    /// For a column `activity_mci`.
+    /// Conversion for a column `activity_mci`.
     pub strength_per_activity_u_per_mci: Option<f64>,
-    /// What the columns of a table are, where their headers do not say it.
+    /// Meaning of the columns of a table, if the headers do not state it.
     pub columns: Vec<Mapped>,
 }
 
-/// A seed, and the needle that it belongs to where the file says so.
+/// Seed, and its needle if the file names one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeedRow {
-    /// The seed; patient frame (RAS) for an RT Plan.
+    /// Seed; patient frame (RAS) for an RT Plan.
     pub seed: Seed,
     /// Number of the needle, from 1.
     pub needle: Option<u32>,
-    /// The needle's hole in the template, as the file has it.
+    /// Hole of the needle in the template, as in the file.
     pub hole: Option<String>,
-    /// Day to which the strength refers, where the file gives one.
+    /// Reference day of the strength, if the file gives one.
     pub strength_on: Option<Date>,
 }
 
-/// Seeds of a file, and what the file says of all of them.
+/// Seeds of a file, with its declarations about all of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeedFile {
     /// The seeds with their needles.
     pub rows: Vec<SeedRow>,
-    /// `None` for a table, which says nothing of its source.
+    /// Declarations; `None` for a table, which says nothing of its source.
     pub declared: Option<Declared>,
-    /// Patient, study and frame of reference, where the file names them.
+    /// Patient, study and frame of reference, if the file names them.
     pub identity: Option<Identity>,
-    /// What should be reported of how the file was read.
+    /// Remarks on the reading of the file.
     pub notes: Vec<String>,
 }
 
-/// As [`read_seed_rows`], the seeds alone.
+/// Like [`read_seed_rows`], the seeds alone.
 pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, FileError> {
     let rows = read_seed_rows(path, defaults)?.rows;
     Ok(rows.into_iter().map(|row| row.seed).collect())
 }
 
-/// Seeds of a file with the columns `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci][,strength_date][,needle][,hole]`,
-/// and those of [`dicom::COLUMNS`],
-/// or those of a DICOM RT Plan, which gives their strength itself. A table may also have columns that state their quantity and unit,
-/// such as "Pos X (cm)", or any columns that [`SeedDefaults::columns`] names; commas, semicolons or tabs lie between them.
+/// Reads a table of seeds or a DICOM RT Plan, which gives the strengths itself. A table has the
+/// columns
+/// `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci][,strength_date][,needle][,hole]`,
+/// and those of [`dicom::COLUMNS`]. It may also have columns that state their quantity and unit,
+/// such as "Pos X (cm)", or any columns that [`SeedDefaults::columns`] names. Commas, semicolons or
+/// tabs separate them.
 pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileError> {
     let is_plan = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
     if is_plan {
@@ -79,7 +81,7 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
         &dicom::COLUMNS,
     ]
     .concat();
-    // Of the first row; all are of one patient.
+    // From the first row; all are of one patient.
     let identity = OnceCell::new();
     let row = |row: &Row| {
         identity.get_or_init(|| Identity::of_columns(|column| row.text(column)));

@@ -1,4 +1,4 @@
-//! Tables of numbers (CSV): columns by name, and every problem listed with its line.
+//! Tables of numbers (CSV): columns by name; every problem is listed with its line.
 
 use super::columns::{self, Column, Mapped};
 use std::path::Path;
@@ -11,17 +11,17 @@ const MAX_BYTES: u64 = 256 << 20;
 const MAX_PROBLEMS: usize = 8;
 const COMMENT: u8 = b'#';
 const MAX_MM: f64 = 10_000.0;
-/// Characters of a field that a message repeats.
+/// Most characters of a field that a message repeats.
 const SHOWN_CHARS: usize = 40;
 /// Columns of a place.
 pub const PLACE: [&str; 3] = ["x_mm", "y_mm", "z_mm"];
 
-/// Points of a file with the columns `x_mm,y_mm,z_mm`, in m.
+/// Reads points from the columns `x_mm,y_mm,z_mm`, in m.
 pub fn read_points(path: &Path) -> Result<Vec<[f64; 3]>, FileError> {
     Ok(read(path, &PLACE, &[], |row| row.position_m())?.0)
 }
 
-/// The beginning of a field, for a message.
+/// Returns the beginning of a field, for a message.
 pub fn shown(field: &str) -> String {
     let start: String = printable(field).chars().take(SHOWN_CHARS).collect();
     if field.chars().count() > SHOWN_CHARS {
@@ -31,13 +31,13 @@ pub fn shown(field: &str) -> String {
     }
 }
 
-/// Why a line was refused.
+/// Reason why a line was refused.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct LineError(String);
 
 impl LineError {
-    /// From a text that says what was found and what to do.
+    /// Creates an error from a text that says what was found and what to do.
     pub fn new(why: impl Into<String>) -> Self {
         Self(why.into())
     }
@@ -47,24 +47,24 @@ impl LineError {
 pub struct Row<'a> {
     columns: &'a [Column],
     record: &'a csv::StringRecord,
-    /// What stands before the fractions of a number.
+    /// Decimal separator of the numbers.
     point: char,
 }
 
 impl Row<'_> {
-    /// The field, where there is one that is not empty.
+    /// Returns the field, unless it is empty.
     pub fn text(&self, column: &str) -> Option<&str> {
         self.field(column).map(|(text, _)| text)
     }
 
-    /// With what a number in it is multiplied by.
+    /// Returns the field with the factor of its numbers.
     fn field(&self, column: &str) -> Option<(&str, f64)> {
         let place = self.columns.iter().position(|c| c.name == column)?;
         let text = self.record.get(place).filter(|text| !text.is_empty())?;
         Some((text, self.columns[place].factor))
     }
 
-    /// The number in the field, where there is one.
+    /// Returns the number in the field, if there is one.
     pub fn number(&self, column: &str) -> Result<Option<f64>, LineError> {
         let Some((text, factor)) = self.field(column) else {
             return Ok(None);
@@ -79,13 +79,13 @@ impl Row<'_> {
         }
     }
 
-    /// Three numbers.
+    /// Returns three numbers.
     pub fn three(&self, columns: [&str; 3]) -> Result<[Option<f64>; 3], LineError> {
         let [a, b, c] = columns.map(|column| self.number(column));
         Ok([a?, b?, c?])
     }
 
-    /// The place of the line, in m.
+    /// Returns the place of the line, in m.
     pub fn position_m(&self) -> Result<[f64; 3], LineError> {
         let [Some(x), Some(y), Some(z)] = self.three(PLACE)? else {
             return Err(LineError::new("x_mm, y_mm or z_mm is empty"));
@@ -100,8 +100,9 @@ impl Row<'_> {
     }
 }
 
-/// One value for each line, and what there is to know about the columns. Without a mapping the header may have the columns `known`,
-/// or such that state their quantity and unit, and must have those of a place.
+/// Reads one value for each line, with remarks on the columns. Without a mapping the header may
+/// have the columns `known`, or columns that state their quantity and unit, and must have those of
+/// a place.
 pub fn read<T>(
     path: &Path,
     known: &[&str],
@@ -112,7 +113,7 @@ pub fn read<T>(
     parse_lines(&text, known, mapped, parse).map_err(|why| FileError::of(path, why.0))
 }
 
-/// What stands between the fields, by the header: a comma, a semicolon or a tab.
+/// Returns the separator of the fields, by the header: a comma, a semicolon or a tab.
 fn delimiter(text: &[u8]) -> u8 {
     let mut lines = text.split(|&b| b == b'\n');
     let header = lines.find(|line| !matches!(line.first(), None | Some(&b'\r' | &COMMENT)));
@@ -130,7 +131,8 @@ fn parse_lines<T>(
     let lines = record_lines(text);
     let line_of = |record: usize| lines.get(record).copied().unwrap_or(1);
     let delimiter = delimiter(text);
-    // Between semicolons numbers may have commas; a table that has both has points in its numbers.
+    // With semicolons numbers may have decimal commas; a table that also has points uses points in
+    // its numbers.
     let point = if delimiter == b';' && !text.contains(&b'.') {
         ','
     } else {
@@ -179,7 +181,8 @@ fn parse_lines<T>(
     }
 }
 
-/// Numbers of the lines that hold records: the crate's own count stops before the empty lines and comments that it skips.
+/// Returns the numbers of the lines that hold records: the crate does not count the empty lines and
+/// comments that it skips.
 fn record_lines(text: &[u8]) -> Vec<usize> {
     let lines = text.split(|&b| b == b'\n').zip(1..);
     let records = lines.filter(|(line, _)| !matches!(line.first(), None | Some(&b'\r' | &COMMENT)));
@@ -211,7 +214,7 @@ fn check_place(columns: &[Column], known: &[&str]) -> Result<(), String> {
     ))
 }
 
-/// What columns were taken as, where they are called otherwise, and which were passed over.
+/// Reports columns with other names, and skipped ones.
 fn notes(headers: &[String], columns: &[Column], passed_over: &[String]) -> Vec<String> {
     let renamed = headers.iter().zip(columns);
     let renamed: Vec<String> = renamed
@@ -235,9 +238,9 @@ fn notes(headers: &[String], columns: &[Column], passed_over: &[String]) -> Vec<
 mod tests {
     use super::*;
 
-    /// A field of 50 MB was repeated whole in the message.
+    /// Guards against a message that repeated a field of 50 MB.
     #[test]
-    fn a_message_repeats_only_the_beginning_of_a_field_and_no_escape_sequence() {
+    fn messages_shorten_fields_and_drop_escape_sequences() {
         let text = format!("x_mm,y_mm,z_mm\n1,2,\u{1b}[31m{}\n", "9x".repeat(25_000_000));
         let why = parse_lines(text.as_bytes(), &PLACE, &[], |row| row.position_m())
             .unwrap_err()
@@ -254,7 +257,7 @@ mod tests {
         assert!(why.len() < 200, "{why}");
     }
 
-    /// A table of another program was refused whatever it said of its columns.
+    /// Guards against the refusal of a table of another program whose columns state their units.
     #[test]
     fn tables_of_other_programs_are_read_with_their_units() {
         let comma = "# exported\nNeedle #;X (cm);Y (cm);Z (cm)\n1;-0,35;2,5;1e1\n";

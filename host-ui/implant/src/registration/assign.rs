@@ -1,6 +1,8 @@
-//! Pairs of least total cost: the assignment problem by shortest paths (Kuhn, Munkres; Jonker and Volgenant).
+//! Pairs of least total cost: the assignment problem by shortest paths (Kuhn, Munkres; Jonker and
+//! Volgenant).
 
-/// For each row its column, so that the sum of the costs is least; every row has one where there are as many columns or more.
+/// Returns a column for each row, so that the sum of the costs is least; every row has one if there
+/// are at least as many columns.
 pub fn least_cost(rows: usize, columns: usize, cost: &dyn Fn(usize, usize) -> f64) -> Vec<Option<usize>> {
     if rows > columns {
         let of_columns = least_cost(columns, rows, &|c, r| cost(r, c));
@@ -12,7 +14,7 @@ pub fn least_cost(rows: usize, columns: usize, cost: &dyn Fn(usize, usize) -> f6
         }
         return of_rows;
     }
-    // Column 0 is where the path of a row begins; rows and columns count from 1.
+    // Column 0 is the start of a row's path; rows and columns count from 1.
     let (mut of_row, mut of_column) = (vec![0.0; rows + 1], vec![0.0; columns + 1]);
     let mut row_of = vec![0; columns + 1];
     for row in 1..=rows {
@@ -58,7 +60,7 @@ pub fn least_cost(rows: usize, columns: usize, cost: &dyn Fn(usize, usize) -> f6
 mod tests {
     use super::*;
 
-    /// All orders of a few columns, tried one by one.
+    /// Returns the least cost by trying every order of a few columns.
     fn by_trial(costs: &[[f64; 5]], row: usize, taken: u32) -> f64 {
         if row == costs.len() {
             return 0.0;
@@ -83,7 +85,7 @@ mod tests {
                 let found = least_cost(rows, 5, &|r, c| costs[r][c]);
                 let sum: f64 = found.iter().enumerate().map(|(r, c)| costs[r][c.unwrap()]).sum();
                 assert!((sum - by_trial(&costs, 0, 0)).abs() < 1e-6);
-                // The same pairs the other way round.
+                // The same pairs with rows and columns exchanged.
                 let turned = least_cost(5, rows, &|c, r| costs[r][c]);
                 assert_eq!(turned.iter().flatten().count(), rows);
                 for (row, column) in found.iter().enumerate() {

@@ -1,7 +1,9 @@
-//! The frame of seeds that were found, fitted to that of the plan: a turn and a shift, with the seeds paired one to one.
+//! The frame of found seeds, fitted to that of the plan: a rotation and a shift, with the seeds
+//! paired one to one.
 //!
-//! Nearest pairs and the fit to them (Kabsch) alternate from several turns; from the best on, the pairs are those of least total
-//! square. A pair far off its fellows does not pull the frame: a seed may have been lost, or have migrated.
+//! Nearest pairs and the fit to them (Kabsch) alternate from several rotations; from the best one,
+//! the pairs are those of least total square. An outlying pair does not pull the frame: a seed may
+//! have been lost, or have migrated.
 
 mod assign;
 
@@ -10,48 +12,48 @@ pub(crate) use assign::least_cost;
 use crate::pairing;
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 
-/// Turns that are tried, about each axis.
+/// Initial rotations about each axis.
 const STARTS_DEG: [f64; 4] = [-24.0, -12.0, 12.0, 24.0];
 const ROUNDS: usize = 40;
-/// Pairs farther apart than so many times the middle one do not count for the fit.
+/// Distance, in medians, beyond which pairs are excluded from the fit.
 const FAR: f64 = 3.0;
-/// Pairs nearer than this always count, m.
+/// Distance below which pairs always count, m.
 const NEAR_M: f64 = 3e-3;
-/// With fewer seeds a turn is not defined.
+/// Fewest seeds that define a rotation.
 const FEWEST: usize = 4;
 
-/// Why two sets of seeds cannot be fitted.
+/// Reason why two sets of seeds cannot be fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FitError {
-    /// A turn needs more places.
+    /// A rotation needs more places.
     #[error("a fit of frames needs {FEWEST} seeds or more on both sides, and there are {planned} and {found}")]
     TooFew {
-        /// Seeds of the plan.
+        /// Number of planned seeds.
         planned: usize,
-        /// Seeds that were found.
+        /// Number of found seeds.
         found: usize,
     },
 }
 
-/// Plan from found: `planned = rotation * found + shift`.
+/// Transform from found to plan: `planned = rotation * found + shift`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigidFit {
-    /// The turn.
+    /// Rotation.
     pub rotation: Matrix3<f64>,
-    /// The shift, in m.
+    /// Shift, in m.
     pub shift_m: Vector3<f64>,
-    /// For each seed of the plan the seed that was found for it.
+    /// Found seed for each planned one.
     pub pairs: Vec<Option<usize>>,
     /// Distance of each pair after the fit, in m, in the order of the plan.
     pub residuals_m: Vec<f64>,
-    /// Pairs that counted for the fit.
+    /// Number of pairs in the fit.
     pub counted: usize,
     /// Extent of the found seeds over that of the plan, by their pairs: more than 1 in a swollen gland.
     pub stretch: f64,
 }
 
 impl RigidFit {
-    /// The fit of places that were found to those of a plan, m.
+    /// Fits found places to those of a plan, m.
     pub fn of(planned_m: &[[f64; 3]], found_m: &[[f64; 3]]) -> Result<Self, FitError> {
         if planned_m.len() < FEWEST || found_m.len() < FEWEST {
             return Err(FitError::TooFew {
@@ -94,25 +96,26 @@ impl RigidFit {
         })
     }
 
-    /// A place that was found, in the frame of the plan, m.
+    /// Returns a found place in the frame of the plan, m.
     pub fn place_m(&self, found_m: [f64; 3]) -> [f64; 3] {
         (self.rotation * Vector3::from(found_m) + self.shift_m).into()
     }
 
-    /// A direction that was found, in the frame of the plan.
+    /// Returns a found direction in the frame of the plan.
     pub fn direction(&self, found: [f64; 3]) -> [f64; 3] {
         (self.rotation * Vector3::from(found)).into()
     }
 
-    /// Angle of the turn, in degrees.
+    /// Returns the angle of the rotation, in degrees.
     pub fn turn_deg(&self) -> f64 {
-        // By sine and cosine: rounding can take the cosine of no turn beyond 1, which no angle has, and near it the angle is lost.
+        // By sine and cosine: rounding can take the cosine of the identity beyond 1, for which no
+        // angle exists, and near it the angle loses its digits.
         let r = &self.rotation;
         let twice_sine = Vector3::new(r.m32 - r.m23, r.m13 - r.m31, r.m21 - r.m12).norm();
         twice_sine.atan2(r.trace() - 1.0).to_degrees()
     }
 
-    /// Mean, root mean square and largest residual, m.
+    /// Returns mean, root mean square and largest residual, m.
     pub fn residual_figures_m(&self) -> [f64; 3] {
         let count = self.residuals_m.len().max(1) as f64;
         let mean = self.residuals_m.iter().sum::<f64>() / count;
@@ -129,7 +132,8 @@ type Frame = (Matrix3<f64>, Vector3<f64>);
 type Places = Vec<(Vector3<f64>, Vector3<f64>)>;
 type Pairing<'a> = &'a dyn Fn(&[Vector3<f64>]) -> Vec<Option<usize>>;
 
-/// Pairs and fits until both stay; the mean square of the pairs, and the frame.
+/// Alternates pairs and fits until both are stable; returns the mean square of the pairs, and the
+/// frame.
 fn alternate(planned: &[Vector3<f64>], found: &[Vector3<f64>], start: Frame, pairing: Pairing) -> (f64, Frame) {
     let (mut frame, mut before) = (start, Vec::new());
     let mut square = f64::INFINITY;
@@ -154,7 +158,7 @@ fn pairs_of(planned: &[Vector3<f64>], moved: &[Vector3<f64>], pairs: &[Option<us
     planned.iter().zip(pairs).filter_map(place).collect()
 }
 
-/// Pairs that are not far off their fellows.
+/// Returns the pairs without outliers.
 fn near(places: &Places) -> Places {
     let mut distances: Vec<f64> = places.iter().map(|(p, f)| (p - f).norm()).collect();
     distances.sort_by(f64::total_cmp);
@@ -162,7 +166,8 @@ fn near(places: &Places) -> Places {
     places.iter().copied().filter(|(p, f)| (p - f).norm() <= most).collect()
 }
 
-/// The turn and shift that bring the second of each pair nearest to the first (Kabsch, Acta Cryst. A32, 922, 1976).
+/// Returns the rotation and shift that bring the second of each pair nearest to the first (Kabsch,
+/// Acta Cryst. A32, 922, 1976).
 fn kabsch(places: &Places) -> Frame {
     let (to, from) = middles(places);
     let spread: Matrix3<f64> = places.iter().map(|(p, f)| (f - from) * (p - to).transpose()).sum();
@@ -204,7 +209,8 @@ fn turn(axis: &Unit<Vector3<f64>>, deg: f64) -> Matrix3<f64> {
 mod tests {
     use super::*;
 
-    /// Strands with seeds every 10 mm, which fit onto themselves shifted by one seed nearly as well.
+    /// Returns strands with seeds every 10 mm, which fit onto themselves shifted by one seed almost
+    /// as well.
     fn plan() -> Vec<[f64; 3]> {
         let holes = [
             (-15.0, -10.0),
@@ -224,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turned_and_shifted_implant_is_fitted_in_spite_of_errors_and_lost_seeds() {
+    fn a_moved_implant_is_fitted_despite_errors_and_losses() {
         let planned = plan();
         let rotation = turn(&Unit::new_normalize(Vector3::new(1.0, -0.4, 0.7)), 14.0);
         let shift = Vector3::new(0.021, -0.034, 0.113);
@@ -252,7 +258,7 @@ mod tests {
         assert!(fit.counted >= planned.len() - 3);
     }
 
-    /// The extent of the seeds shows the edema.
+    /// Checks that the extent of the seeds shows the edema.
     #[test]
     fn a_swollen_implant_shows_its_stretch() {
         let planned = plan();
@@ -262,13 +268,13 @@ mod tests {
         assert!(RigidFit::of(&planned, &found[..3]).is_err());
     }
 
-    /// The page after the implant said "NaN" degrees where day 30 lay as planned.
+    /// Guards against "NaN" degrees on the page when day 30 lay as planned.
     #[test]
-    fn no_turn_is_0_degrees_and_a_small_one_is_not_lost() {
+    fn small_and_zero_rotations_have_exact_angles() {
         let planned = plan();
         let mut fit = RigidFit::of(&planned, &planned).unwrap();
         assert!(fit.turn_deg() < 1e-6, "{}", fit.turn_deg());
-        // What rounding leaves of a product of turns.
+        // The rounding error of a product of rotations.
         fit.rotation = Matrix3::identity() * (1.0 + 4.0 * f64::EPSILON);
         assert_eq!(fit.turn_deg(), 0.0);
         for deg in [1e-7, 0.3, 90.0, 179.0] {

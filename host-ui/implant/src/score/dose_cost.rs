@@ -1,16 +1,18 @@
-//! What each seed's error cost: the measures that the implant would have with this one seed on plan, less those that it has.
+//! Cost of each seed's error: the measures of the implant with this one seed on plan, minus the
+//! actual ones.
 
 use stylet_anatomy::Organ;
 use stylet_dose::{DoseKernel, DosePoints, Dvh, Metric, Seed, Structure};
 
-/// Gain if this seed alone lay on plan; positive D90 and V100 were lost, positive doses to the urethra were saved.
+/// Gain if this seed alone were on plan; positive D90 and V100 were lost, positive doses to the
+/// urethra were saved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
     /// D90 of the target, Gy.
     pub target_d90_gy: f64,
     /// V100 of the target, %.
     pub target_v100_percent: f64,
-    /// `None` without a urethra.
+    /// D10 of the urethra, Gy; `None` without a urethra.
     pub urethra_d10_gy: Option<f64>,
     /// D30 of the urethra, Gy; `None` without a urethra.
     pub urethra_d30_gy: Option<f64>,
@@ -33,7 +35,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// With one seed taken from where it is to where it was planned.
+    /// Returns the doses with one seed moved to its planned place.
     fn mended(&self, kernel: &DoseKernel, planned: &Seed, delivered: &Seed) -> Option<Dvh> {
         let there = self.points.of_seeds_gy(kernel, std::slice::from_ref(planned));
         let here = self.points.of_seeds_gy(kernel, std::slice::from_ref(delivered));
@@ -49,7 +51,7 @@ impl<'a> Field<'a> {
     }
 }
 
-/// In the order of the seeds; `structures` begins with the target.
+/// Returns the costs in the order of the seeds; `structures` begins with the target.
 pub fn costs(
     structures: &[Structure],
     kernel: &DoseKernel,

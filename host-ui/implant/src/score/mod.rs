@@ -1,5 +1,5 @@
-//! What an implant was worth: every seed's error and what it cost in dose, the measures of planned and delivered dose, and how the
-//! hand moved.
+//! Score of an implant: every seed's error and its cost in dose, the measures of planned and
+//! delivered dose, and the motion of the hand.
 
 mod dose_cost;
 mod motion;
@@ -26,50 +26,50 @@ pub use write::{to_json, write};
 const DOSE_PITCH_M: f64 = 1e-3;
 const POINTS: usize = 100_000;
 
-/// One seed, planned and delivered, scene frame.
+/// Seed, planned and delivered, scene frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeedPair {
-    /// Counted from 0.
+    /// Index of the needle, from 0.
     pub needle: usize,
     /// Hole of the needle; `None` for one that is held by hand.
     pub hole: Option<Hole>,
-    /// The seed as planned.
+    /// Planned seed.
     pub planned: Seed,
-    /// The seed as it rests in the tissue.
+    /// Delivered seed at rest.
     pub delivered: Seed,
-    /// Of the needle, into the body.
+    /// Direction of the needle, into the body.
     pub direction: [f64; 3],
 }
 
 impl SeedPair {
-    /// How far the delivered seed rests from the planned one.
+    /// Returns the offset of the delivered seed from the planned one.
     pub fn offset(&self) -> SeedOffset {
         SeedOffset::of(self.planned.position_m, self.delivered.position_m, self.direction)
     }
 
-    /// Distance from plan, m.
+    /// Returns the distance from plan, m.
     pub fn error_m(&self) -> f64 {
         self.offset().distance_m()
     }
 
-    /// Distance along the needle, m; positive: deeper than planned.
+    /// Returns the distance along the needle, m; positive: deeper than planned.
     pub fn error_along_m(&self) -> f64 {
         self.offset().along_m
     }
 
-    /// Distance across the needle, m.
+    /// Returns the distance across the needle, m.
     pub fn error_across_m(&self) -> f64 {
         self.offset().across_m
     }
 }
 
-/// Why an implant cannot be scored, or its score not be written.
+/// Reason why an implant cannot be scored, or its score cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ScoreError {
     /// There is nothing to score.
     #[error("no seed was placed; there is nothing to score")]
     NoSeed,
-    /// The dose cannot be counted; the text says why.
+    /// The dose cannot be computed; the text says why.
     #[error("{0}")]
     Dose(String),
     /// The drawing library failed.
@@ -83,48 +83,48 @@ pub enum ScoreError {
     Write(#[from] stylet_base::WriteError),
 }
 
-/// What is scored.
+/// Input of a score.
 pub struct Implant<'a> {
     /// Heading of the page.
     pub title: String,
     /// The seeds that were delivered.
     pub pairs: Vec<SeedPair>,
-    /// Planned, and not delivered.
+    /// Planned seeds that were not delivered.
     pub lost: Vec<Seed>,
-    /// Target and what is spared.
+    /// Target and spared structures.
     pub anatomy: &'a Anatomy,
     /// Dose of one seed.
     pub kernel: &'a DoseKernel,
-    /// As the source file names itself.
+    /// Name of the source, as in its file.
     pub source: String,
     /// Prescribed dose, Gy.
     pub prescription_gy: f64,
-    /// How the hand moved.
+    /// Motion of the hand.
     pub motion: Motion,
     /// Force and speed over time; every tick or some of them.
     pub records: &'a [TickRecord],
-    /// What was marked, put in by an instructor, or went wrong meanwhile.
+    /// Marks, exercises and faults during the procedure.
     pub moments: Vec<Moment>,
-    /// Updates of the plan while needles went in, taken or not.
+    /// Updates of the plan while needles went in, accepted or not.
     pub updates: Vec<Reviewed>,
 }
 
 /// The result.
 pub struct Score<'a> {
-    /// What was scored.
+    /// Scored implant.
     pub implant: Implant<'a>,
-    /// The structures that dose was counted in.
+    /// Structures in which dose was counted.
     pub judge: Judge,
     /// Measures of the plan.
     pub planned: Verdict,
     /// Measures of the implant as delivered.
     pub delivered: Verdict,
-    /// In the order of the pairs.
+    /// Costs in the order of the pairs.
     pub costs: Vec<Cost>,
 }
 
 impl<'a> Score<'a> {
-    /// Scores an implant; an error when there is no seed, or no dose can be counted.
+    /// Scores an implant; returns an error if there is no seed, or the dose cannot be computed.
     pub fn of(implant: Implant<'a>) -> Result<Self, ScoreError> {
         if implant.pairs.is_empty() {
             return Err(ScoreError::NoSeed);
@@ -153,13 +153,13 @@ impl<'a> Score<'a> {
         })
     }
 
-    /// When a moment was, from the first record on, s.
+    /// Returns the time of a moment since the first record, s.
     pub fn at_s(&self, moment: &Moment) -> f64 {
         let begin_ns = self.implant.records.first().map_or(moment.time_ns, |r| r.due_ns);
         (moment.time_ns as f64 - begin_ns as f64) * 1e-9
     }
 
-    /// Mean and worst error of the seeds.
+    /// Returns mean and largest error of the seeds.
     pub fn errors_m(&self) -> [f64; 2] {
         let errors = || self.implant.pairs.iter().map(SeedPair::error_m);
         let mean = errors().sum::<f64>() / self.implant.pairs.len() as f64;

@@ -1,39 +1,39 @@
-//! How the hand moved: time, speed, force, and how often a needle went in again.
+//! Motion of the hand: time, speed, force, and number of reinsertions.
 
 use nalgebra::Vector3;
 use stylet_base::seen::{Seen, TickOrder};
 use stylet_shm_schema::{TickRecord, flags};
 
-/// Slower than this the needle rests.
+/// Speed below which the needle rests.
 const RESTS_M_PER_S: f64 = 2e-3;
-/// A needle that came back by this much and goes in by as much again was inserted again.
+/// Distance of withdrawal and of advance that counts as a reinsertion.
 const AGAIN_M: f64 = 2e-3;
 
-/// Summary of how the hand moved.
+/// Summary of the motion of the hand.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motion {
-    /// From the first record to the last.
+    /// Time from the first record to the last.
     pub duration_s: f64,
-    /// With the tip in tissue.
+    /// Time with the tip in tissue.
     pub in_tissue_s: f64,
-    /// Of the tip while it moves inwards in tissue, along the needle.
+    /// Mean speed of the tip while it moves inwards in tissue, along the needle.
     pub mean_insertion_m_per_s: f64,
     /// Largest speed inwards, m/s.
     pub peak_insertion_m_per_s: f64,
     /// Largest force on the hand, N.
     pub peak_force_n: f64,
-    /// Largest deflection of the tip from where a rigid needle would have it, m.
+    /// Largest deflection of the tip from a rigid needle, m.
     pub deflection_m: f64,
-    /// Times that the tip came into tissue.
+    /// Number of times that the tip entered tissue.
     pub insertions: usize,
-    /// Times that it turned inwards again without having left.
+    /// Number of times that it turned inwards again without leaving.
     pub reinsertions: usize,
-    /// Of the ticks in this time; every figure here is of those that were seen.
+    /// Share of the ticks of this time that were seen, on which every figure here is based.
     pub seen: Seen,
 }
 
 impl Motion {
-    /// `direction`: of the needles, into the body.
+    /// Computes the motion. `direction` is that of the needles, into the body.
     pub fn of(records: &[TickRecord], direction: [f64; 3]) -> Self {
         let mut meter = MotionMeter::default();
         let mut order = TickOrder::default();
@@ -45,11 +45,11 @@ impl Motion {
     }
 }
 
-/// Adds up a motion, record by record.
+/// Accumulator of a motion, record by record.
 #[derive(Clone, Debug, Default)]
 pub struct MotionMeter {
     motion: Motion,
-    /// Of the first record and of the last.
+    /// Times of the first record and of the last.
     due_ns: Option<[u64; 2]>,
     inwards_s: f64,
     inwards_m: f64,
@@ -57,16 +57,16 @@ pub struct MotionMeter {
 }
 
 impl MotionMeter {
-    /// Ticks that ran before the next record and were not seen.
+    /// Counts ticks that ran unseen before the next record.
     pub fn miss(&mut self, ticks: u64) {
         self.motion.seen.unseen += ticks;
     }
 
-    /// `direction`: of the needle, into the body.
+    /// Takes a record. `direction` is that of the needle, into the body.
     pub fn take(&mut self, record: &TickRecord, direction: [f64; 3]) {
         let [first_ns, before_ns] = self.due_ns.unwrap_or([record.due_ns; 2]);
         self.due_ns = Some([first_ns, record.due_ns]);
-        // A gap in the records is no time in tissue.
+        // A gap in the records does not count as time in tissue.
         let dt_s = seconds(record.due_ns.saturating_sub(before_ns)).min(0.01);
         let motion = &mut self.motion;
         motion.seen.seen += 1;
@@ -104,11 +104,11 @@ fn seconds(ns: u64) -> f64 {
     ns as f64 / 1e9
 }
 
-/// Turning points of the tip, with hysteresis.
+/// Detector of turning points of the tip, with hysteresis.
 #[derive(Clone, Debug)]
 struct Turns {
     inwards: bool,
-    /// The farthest place since the last turn.
+    /// Farthest place since the last turn.
     extreme_m: f64,
 }
 
@@ -120,7 +120,7 @@ impl Turns {
         }
     }
 
-    /// True in the tick that makes it an insertion.
+    /// Returns true in the tick that makes it a reinsertion.
     fn goes_in_again(&mut self, along_m: f64) -> bool {
         let beyond_m = if self.inwards {
             along_m - self.extreme_m
@@ -142,7 +142,7 @@ mod tests {
     use super::*;
     use bytemuck::Zeroable;
 
-    /// The tip at places along z, a millisecond apart, in tissue above 0.
+    /// Returns the tip at places along z, a millisecond apart, in tissue above 0.
     fn records(z_mm: impl Iterator<Item = f64>) -> Vec<TickRecord> {
         let mut before = None;
         let record = |(i, z): (usize, f64)| {
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn one_insertion_has_its_speed_time_and_force_and_none_again() {
+    fn one_insertion_has_no_reinsertion() {
         let way = ramp(-10.0, 50.0, 0.05)
             .chain(std::iter::repeat_n(50.0, 100))
             .chain(ramp(50.0, -10.0, 0.1));

@@ -4,18 +4,19 @@ use crate::plan::anatomy::Body;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
-/// A place in a picture.
+/// Place in a picture.
 pub type Place = (f64, f64);
 
-/// Two corners of the surface that lie on different sides of the plane, the one in front of it first.
+/// Two corners of the surface on different sides of the plane, the one in front of it first.
 type Edge = (u32, u32);
 
-/// Rings in which a plane cuts the surface of the body, one for each piece and each hole; scene frame, m.
+/// Returns the rings in which a plane cuts the surface of the body, one for each piece and each
+/// hole; scene frame, m.
 pub fn rings(body: &Body, on_plane_m: Vector3<f64>, normal: Vector3<f64>) -> Vec<Vec<Vector3<f64>>> {
     let (points_m, triangles) = body.surface();
     let at = |n: u32| Vector3::from(points_m[n as usize].map(f64::from));
     let side = |n: u32| (at(n) - on_plane_m).dot(&normal);
-    // The surface has an inside, so what enters an edge in one triangle leaves it in the next.
+    // The surface is closed, so a path that enters an edge in one triangle leaves it in the next.
     let mut next: BTreeMap<Edge, Vec<Edge>> = BTreeMap::new();
     for &[a, b, c] in triangles {
         let (mut from, mut to) = (None, None);
@@ -49,7 +50,7 @@ pub fn rings(body: &Body, on_plane_m: Vector3<f64>, normal: Vector3<f64>) -> Vec
     rings
 }
 
-/// Removes one way on from an edge.
+/// Removes one continuation from an edge.
 fn taken(next: &mut BTreeMap<Edge, Vec<Edge>>, edge: Edge) -> Option<Edge> {
     let ways = next.get_mut(&edge)?;
     let to = ways.pop();
@@ -59,11 +60,11 @@ fn taken(next: &mut BTreeMap<Edge, Vec<Edge>>, edge: Edge) -> Option<Edge> {
     to
 }
 
-/// The part of a ring inside the square of this half side about the origin, closed along its border; empty where there is none.
-/// (Sutherland and Hodgman 1974.)
+/// Returns the part of a ring inside the square of this half side about the origin, closed along
+/// its border; empty if there is none. (Sutherland and Hodgman 1974.)
 pub fn clipped(ring: &[Place], half: f64) -> Vec<Place> {
     let mut inside = ring.to_vec();
-    // How far a place is within each of the four sides.
+    // Distance of a place inside each of the four sides.
     let sides: [fn(Place) -> f64; 4] = [|p| p.0, |p| -p.0, |p| p.1, |p| -p.1];
     for side in sides {
         let within = |p: Place| side(p) + half;
@@ -88,7 +89,7 @@ mod tests {
     use super::*;
     use crate::plan::anatomy::{ball, body_of};
 
-    /// In mm, as the picture has it: across is x, up is y.
+    /// Returns the outline in mm, as in the picture: across is x, up is y.
     fn drawn(body: &Body, half_mm: f64) -> Vec<Vec<Place>> {
         rings(body, Vector3::zeros(), Vector3::z())
             .into_iter()
@@ -108,7 +109,7 @@ mod tests {
             / 2.0
     }
 
-    /// The longest side that does not lie on the border.
+    /// Returns the longest side that does not lie on the border.
     fn longest_mm(ring: &[Place], half_mm: f64) -> f64 {
         let is_on = |a: f64, b: f64| (a.abs() - half_mm).abs() < 1e-9 && (a - b).abs() < 1e-9;
         let next = ring.iter().cycle().skip(1);
@@ -119,7 +120,7 @@ mod tests {
         sides.map(|(a, b)| (a.0 - b.0).hypot(a.1 - b.1)).fold(0.0, f64::max)
     }
 
-    /// The outline was an open line, cut at the border and joined across the picture.
+    /// Guards against an open outline, cut at the border and joined across the picture.
     #[test]
     fn a_body_beyond_the_border_is_a_closed_ring_along_the_border() {
         let body = ball("rectum", [0.012, 0.0, 0.0], [0.016, 0.02, 0.02]);
@@ -142,7 +143,7 @@ mod tests {
         assert!((area / exact - 1.0).abs() < 0.01, "{area} mm2 against {exact} mm2");
     }
 
-    /// Rays from the middle between two pieces drew one star of both.
+    /// Guards against rays from the middle between two pieces, which drew one star of both.
     #[test]
     fn a_body_of_two_pieces_is_two_rings() {
         let balls = [-0.009, 0.009].map(|x| ball("nerve", [x, 0.0, 0.0], [0.005; 3]));

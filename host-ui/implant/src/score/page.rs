@@ -1,10 +1,10 @@
-//! The debrief: one page that stands by itself, with the pictures in it.
+//! The debrief: one self-contained page, with its pictures.
 
 use super::{Score, ScoreError, picture, updates};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use stylet_base::format;
 
-/// Look of every page.
+/// Style of every page.
 pub const STYLE: &str = "\
 :root{--ink:#1c2126;--soft:#5b6570;--line:#d9dee3;--card:#f5f7f9;--planned:#0072b2;--delivered:#d55e00}
 *{box-sizing:border-box}
@@ -32,10 +32,10 @@ footer{margin-top:40px;border-top:1px solid var(--line);padding-top:12px}
 @media print{.card{border:1px solid var(--line)}h2{break-after:avoid}}
 ";
 
-/// Most seeds that the table lists; the others are in the JSON.
+/// Most seeds in the table; the others are in the JSON.
 const ROWS: usize = 20;
 
-/// The page as HTML; an error where a picture cannot be drawn.
+/// Returns the page as HTML; an error if a picture cannot be drawn.
 pub fn page(score: &Score) -> Result<String, ScoreError> {
     let i = &score.implant;
     let views = picture::views(score)?;
@@ -102,7 +102,7 @@ pub fn page(score: &Score) -> Result<String, ScoreError> {
 fn moments(score: &Score) -> Markup {
     html! {
         @if !score.implant.moments.is_empty() {
-            h2 { "What was marked, put in or went wrong" }
+            h2 { "Marks, exercises and faults" }
             div class="scroll" {
                 table {
                     thead { tr { th { "Time (s)" } th { "what" } th { "words" } } }
@@ -180,7 +180,7 @@ fn cards(score: &Score) -> Markup {
             }
         }
         @if !m.seen.is_all() {
-            p class="note" { "Force, speed and times are of what was seen: " (m.seen.words()) "." }
+            p class="note" { "Force, speed and times cover the ticks that were seen: " (m.seen.words()) "." }
         }
     }
 }
@@ -189,7 +189,7 @@ fn clock(seconds: f64) -> String {
     format!("{}:{:04.1} min", (seconds / 60.0) as u64, seconds % 60.0)
 }
 
-/// Every measure of every structure, planned beside delivered.
+/// Returns every measure of every structure, planned next to delivered.
 fn measures(score: &Score) -> Markup {
     let (planned, delivered) = (score.judge.values(&score.planned), score.judge.values(&score.delivered));
     let number = |v: &Option<f64>, name: &str| {
@@ -222,13 +222,13 @@ fn decimals(name: &str) -> usize {
     if name.ends_with("[1]") { 3 } else { 1 }
 }
 
-/// Names carry their unit in brackets.
+/// Returns the name without its unit in brackets.
 fn named(name: &str) -> String {
     let name = name.replace("[gy]", "(Gy)").replace("[percent]", "(%)");
     name.trim_end_matches(" [1]").to_owned()
 }
 
-/// The most costly seeds.
+/// Returns the most costly seeds.
 fn seeds(score: &Score) -> Markup {
     let mut order: Vec<usize> = (0..score.costs.len()).collect();
     order.sort_by(|&a, &b| score.costs[b].target_d90_gy.total_cmp(&score.costs[a].target_d90_gy));

@@ -14,7 +14,7 @@ type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 const BLUE: RGBColor = RGBColor(0, 114, 178);
 const ORANGE: RGBColor = RGBColor(213, 94, 0);
-/// Okabe-Ito, for structures.
+/// Colours of structures (Okabe-Ito).
 const COLOURS: [RGBColor; 6] = [
     BLUE,
     ORANGE,
@@ -23,7 +23,7 @@ const COLOURS: [RGBColor; 6] = [
     RGBColor(86, 180, 233),
     RGBColor(0, 0, 0),
 ];
-/// What is to be spared.
+/// Colour of spared structures.
 const SPARED: RGBColor = RGBColor(204, 121, 167);
 const INK: RGBColor = RGBColor(70, 70, 70);
 const FAINT: RGBColor = RGBColor(225, 225, 225);
@@ -40,7 +40,7 @@ fn drawn(size: (u32, u32), draw: impl FnOnce(&Canvas) -> Drawn<()>) -> Result<St
     Ok(text)
 }
 
-/// Which two axes are seen, and what they are called.
+/// Axes of a view, and their names.
 struct View {
     title: &'static str,
     across: [f64; 3],
@@ -48,12 +48,13 @@ struct View {
     labels: [&'static str; 2],
 }
 
-/// The implant along the needles, from the side, and from the front; planned, delivered, and the way between them.
+/// Draws the implant along the needles, from the side, and from the front: planned, delivered, and
+/// the lines between them.
 pub fn views(score: &Score) -> Result<String, ScoreError> {
     let implant = &score.implant;
     let frame = implant.anatomy.patient;
     let axis = |patient: [f64; 3]| frame.scene_from_patient_direction(patient);
-    // As one looks at a patient: his right is on the left.
+    // Facing the patient: his right is on the left.
     let (left, anterior, superior) = (axis([-1.0, 0.0, 0.0]), axis([0.0, 1.0, 0.0]), axis([0.0, 0.0, 1.0]));
     let views = [
         View {
@@ -134,7 +135,8 @@ fn one_view(area: &Canvas, score: &Score, view: &View) -> Drawn<()> {
     Ok(())
 }
 
-/// Edges of a body in the plane of the view through its middle, each ending where it begins, as far as they are in the picture.
+/// Returns the edges of a body in the plane of the view through its centre, closed and clipped to
+/// the picture.
 fn closed_rings(
     body: &Body,
     view: &View,
@@ -154,7 +156,7 @@ fn closed_rings(
     rings.filter(|ring| !ring.is_empty()).collect()
 }
 
-/// Planned dashed, delivered drawn through.
+/// Draws histograms, planned dashed, delivered solid.
 pub fn dvh(score: &Score) -> Result<String, ScoreError> {
     let most_gy = 3.0 * score.implant.prescription_gy;
     drawn((1170, 460), |root| {
@@ -215,13 +217,13 @@ fn curve(dvh: &Dvh, most_gy: f64) -> Vec<(f64, f64)> {
     (0..=STEPS).map(|i| (at(i), share(at(i)))).collect()
 }
 
-/// Stretches of a curve over time that can be distinguished.
+/// Number of distinguishable stretches of a curve over time.
 const STRETCHES: usize = 900;
-/// Records so many times farther apart than usual, and by this at least, have a gap between them.
+/// Distance of records that counts as a gap, in usual distances and as a minimum.
 const USUAL_TIMES: u64 = 4;
 const LEAST_GAP_NS: u64 = 40_000_000;
 
-/// Force above, speed along the needle below.
+/// Draws force above, speed along the needle below.
 pub fn over_time(records: &[TickRecord]) -> Result<String, ScoreError> {
     let force = |r: &TickRecord| Vector3::from(r.force_on_hand_n).norm();
     let speed = |r: &TickRecord| r.speed_m_per_s * 1e3;
@@ -283,7 +285,7 @@ fn series(
     Ok(())
 }
 
-/// Cut where records are farther apart than most: what was between was not seen.
+/// Cuts records at gaps: the part between was not seen.
 fn pieces(records: &[TickRecord]) -> impl Iterator<Item = &[TickRecord]> {
     let apart_ns = |a: &TickRecord, b: &TickRecord| b.due_ns.saturating_sub(a.due_ns);
     let mut all: Vec<u64> = records.windows(2).map(|pair| apart_ns(&pair[0], &pair[1])).collect();
@@ -293,7 +295,7 @@ fn pieces(records: &[TickRecord]) -> impl Iterator<Item = &[TickRecord]> {
     records.chunk_by(move |a, b| apart_ns(a, b) <= most_ns)
 }
 
-/// Lowest and highest of each stretch, so that no peak is lost.
+/// Keeps the minimum and maximum of each stretch, so that no peak is lost.
 fn thinned(
     records: &[TickRecord],
     per_stretch: usize,

@@ -1,4 +1,4 @@
-//! Scores of implants whose errors are known, against dose computed anew.
+//! Scores of implants with known errors, against a recomputed dose.
 
 use super::*;
 use crate::intraoperative::{Agreement, Doses, SeedsFrom};
@@ -28,7 +28,7 @@ fn kernel() -> DoseKernel {
     DoseKernel::new(&Source::read(&file).unwrap(), Interval::ALL)
 }
 
-/// A grid of seeds, those named in `off` deeper by 6 mm.
+/// Returns a grid of seeds, those named in `off` deeper by 6 mm.
 fn pairs(off: &[usize]) -> Vec<SeedPair> {
     let places = (0..36).map(|i| [i % 3, i / 3 % 3, i / 9].map(f64::from));
     let seed = |(i, at): (usize, [f64; 3])| {
@@ -89,7 +89,7 @@ fn an_implant_on_plan_has_no_error_and_no_seed_costs_anything() {
 }
 
 #[test]
-fn what_was_marked_stands_on_the_page_and_in_the_figures() {
+fn marks_are_on_the_page_and_in_the_figures() {
     let (anatomy, kernel) = (anatomy(), kernel());
     let records = [TickRecord {
         due_ns: 500_000_000,
@@ -105,7 +105,7 @@ fn what_was_marked_stands_on_the_page_and_in_the_figures() {
 }
 
 #[test]
-fn an_update_of_the_plan_is_in_the_debrief_with_the_contour_against_the_true_gland() {
+fn an_update_is_in_the_debrief_with_its_contour_error() {
     let (anatomy, kernel) = (anatomy(), kernel());
     let records = [<TickRecord as Zeroable>::zeroed()];
     let mut score = score(&[], &anatomy, &kernel, &records);
@@ -157,14 +157,14 @@ fn an_update_of_the_plan_is_in_the_debrief_with_the_contour_against_the_true_gla
 }
 
 #[test]
-fn the_cost_of_the_only_seed_off_plan_is_all_that_the_implant_lost() {
+fn the_only_misplaced_seed_has_the_whole_cost() {
     let (anatomy, kernel) = (anatomy(), kernel());
     let score = score(&[4], &anatomy, &kernel, &[]);
     assert!((score.implant.pairs[4].error_along_m() - 6e-3).abs() < 1e-12);
     assert!(score.implant.pairs[4].error_across_m() < 1e-12);
     let [mean, worst] = score.errors_m();
     assert!((mean - 6e-3 / 36.0).abs() < 1e-12 && (worst - 6e-3).abs() < 1e-12);
-    // Dose of all seeds anew, with this one on plan: the plan itself.
+    // Dose of all seeds recomputed with this one on plan: the plan itself.
     let structures = anatomy.structures(DOSE_PITCH_M);
     let value = |one: fn(&SeedPair) -> Seed, structure: usize, name: &str| {
         let seeds: Vec<Seed> = score.implant.pairs.iter().map(one).collect();
@@ -184,7 +184,7 @@ fn the_cost_of_the_only_seed_off_plan_is_all_that_the_implant_lost() {
 }
 
 #[test]
-fn a_lost_seed_is_missing_from_the_dose_delivered_and_not_from_the_plan() {
+fn a_lost_seed_counts_in_the_planned_dose_only() {
     let (anatomy, kernel) = (anatomy(), kernel());
     let mut pairs = pairs(&[]);
     let lost = vec![pairs.remove(7).planned];
@@ -204,7 +204,7 @@ fn a_lost_seed_is_missing_from_the_dose_delivered_and_not_from_the_plan() {
 }
 
 #[test]
-fn the_page_stands_by_itself_and_escapes_what_it_is_given() {
+fn the_page_is_self_contained_and_escapes_its_input() {
     let (anatomy, kernel) = (anatomy(), kernel());
     let mut record = TickRecord::zeroed();
     let records: Vec<TickRecord> = (0..5000_u64)
@@ -217,7 +217,7 @@ fn the_page_stands_by_itself_and_escapes_what_it_is_given() {
     let score = score(&[4, 20], &anatomy, &kernel, &records);
     let page = super::page::page(&score).unwrap();
     assert_eq!(page.matches("<svg").count(), 3);
-    // A change of nothing read "−0.0", and one of -0.001 Gy "-0.00".
+    // Guards against "−0.0" for no change, and "-0.00" for -0.001 Gy.
     for zero in ["-0.0<", "-0.00<", "-0.000<", "+0.0<", "+0.00<", "+0.000<", "−"] {
         assert!(!page.contains(zero), "{zero}");
     }
@@ -231,7 +231,7 @@ fn the_page_stands_by_itself_and_escapes_what_it_is_given() {
     assert!((json["seeds"][4]["error_along_mm"].as_f64().unwrap() - 6.0).abs() < 1e-9);
 }
 
-/// The legend named an outline "to be spared" where the scene has none.
+/// Guards against a legend with an outline "to be spared" in a scene without one.
 #[test]
 fn the_legend_names_only_what_is_drawn() {
     let (mut anatomy, kernel) = (anatomy(), kernel());

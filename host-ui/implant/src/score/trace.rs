@@ -1,4 +1,4 @@
-//! Force and speed of a whole procedure in bounded memory, and how the hand moved.
+//! Force and speed of a whole procedure in bounded memory, and the motion of the hand.
 
 use super::motion::{Motion, MotionMeter};
 use stylet_base::envelope::{Band, Envelope};
@@ -6,21 +6,21 @@ use stylet_base::format;
 use stylet_base::seen::TickOrder;
 use stylet_shm_schema::{SceneId, TickRecord, flags};
 
-/// Records kept at most: ten of a second for twenty minutes; of a longer procedure fewer of a second.
+/// Most records kept: ten per second for twenty minutes, fewer for a longer procedure.
 const MOST: usize = 12_000;
-/// Of so many ticks one is kept at first, at 1 kHz a hundred of a second.
+/// Initial thinning: one tick kept of this number, at 1 kHz a hundred per second.
 const FIRST_STRETCH: usize = 10;
-/// A plot of all of it has so many places at most, and at first each is of this time.
+/// Most places in a plot of the whole, and the initial duration of each.
 const MOST_SLOTS: usize = 600;
 const FIRST_SLOT_NS: u64 = 10_000_000;
-/// A tip that is outside for longer belongs to no procedure until it touches tissue again.
+/// Time outside after which the tip belongs to no procedure until it touches tissue again.
 const OUTSIDE_NS: u64 = 2_000_000_000;
 
 /// Force and speed of one procedure, in bounded memory.
 #[derive(Clone, Debug)]
 pub struct Trace {
     scene: Option<SceneId>,
-    /// Of each stretch of ticks the one with the largest force.
+    /// Tick with the largest force in each stretch.
     records: Vec<TickRecord>,
     stretch: usize,
     strongest: Option<TickRecord>,
@@ -28,7 +28,7 @@ pub struct Trace {
     /// Force, N, and speed, mm/s.
     curves: Envelope<2>,
     began_ns: Option<u64>,
-    /// When the tip touched tissue last.
+    /// Time at which the tip touched tissue last.
     contact_ns: Option<u64>,
     meter: MotionMeter,
     order: TickOrder,
@@ -52,7 +52,8 @@ impl Default for Trace {
 }
 
 impl Trace {
-    /// `direction`: of the needle, into the body. Another scene starts a new trace.
+    /// Takes records. `direction` is that of the needle, into the body. Another scene starts a new
+    /// trace.
     pub fn take(&mut self, records: &[TickRecord], scene: Option<SceneId>, direction: [f64; 3]) {
         if scene.is_some() && scene != self.scene {
             *self = Self {
@@ -102,27 +103,28 @@ impl Trace {
         }
     }
 
-    /// When it began, `CLOCK_MONOTONIC` of the core.
+    /// Returns its start, `CLOCK_MONOTONIC` of the core.
     pub fn began_ns(&self) -> Option<u64> {
         self.began_ns
     }
 
-    /// The records that were kept, in their order.
+    /// Returns the records that were kept, in their order.
     pub fn records(&self) -> &[TickRecord] {
         &self.records
     }
 
-    /// Whether the tip has not touched tissue yet.
+    /// Returns whether the tip has not touched tissue yet.
     pub fn is_empty(&self) -> bool {
         self.curves.is_empty()
     }
 
-    /// Smallest and largest over seconds since it began, in pieces: between two of them nothing was seen.
+    /// Returns the minimum and maximum over seconds since the start, in pieces with gaps between
+    /// them.
     pub fn force_n(&self) -> Vec<Vec<[f64; 3]>> {
         self.curve(0)
     }
 
-    /// The same of the speed.
+    /// Returns the same of the speed.
     pub fn speed_mm_per_s(&self) -> Vec<Vec<[f64; 3]>> {
         self.curve(1)
     }
@@ -135,7 +137,7 @@ impl Trace {
         pieces.iter().map(|piece| piece.iter().map(point).collect()).collect()
     }
 
-    /// How the hand has moved so far.
+    /// Returns the motion of the hand so far.
     pub fn motion(&self) -> Motion {
         self.meter.motion()
     }
@@ -157,7 +159,8 @@ mod tests {
         }
     }
 
-    /// A millisecond apart; the force rises and falls once a second, with one tick of 9 N.
+    /// Returns records a millisecond apart; the force rises and falls once a second, with one tick
+    /// of 9 N.
     fn records(ticks: std::ops::Range<u64>, in_contact: bool) -> Vec<TickRecord> {
         let record = |tick: u64| {
             let mut r = TickRecord::zeroed();
@@ -205,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_before_the_tissue_and_long_after_it_is_no_part_of_the_procedure() {
+    fn ticks_far_from_tissue_are_not_part_of_the_procedure() {
         let mut trace = Trace::default();
         trace.take(&records(0..10_000, false), Some(scene(1)), [0.0, 0.0, 1.0]);
         assert!(trace.records().is_empty());
@@ -218,7 +221,8 @@ mod tests {
         assert_eq!(trace.records().len(), 1, "another scene");
     }
 
-    /// Peaks and curves of a procedure were of the ticks that arrived, and nothing said how many that were.
+    /// Guards against peaks and curves from the ticks that arrived, without a remark on how many
+    /// those were.
     #[test]
     fn ticks_that_were_not_seen_cut_the_curves_and_are_counted() {
         let mut trace = Trace::default();

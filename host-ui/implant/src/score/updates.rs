@@ -1,4 +1,5 @@
-//! Updates of the plan during the procedure: what the operator contoured and marked, and what the dose was to become.
+//! Updates of the plan during the procedure: contours and marks of the operator, and the predicted
+//! dose.
 
 use crate::intraoperative::Reviewed;
 use crate::plan::optimise::Figures;
@@ -6,7 +7,7 @@ use maud::{Markup, html};
 use serde_json::{Value, json};
 use stylet_base::format;
 
-/// Nothing where the plan was not updated.
+/// Returns the section; empty if the plan was not updated.
 pub(super) fn section(updates: &[Reviewed]) -> Markup {
     html! {
         @if !updates.is_empty() {
@@ -23,7 +24,7 @@ pub(super) fn section(updates: &[Reviewed]) -> Markup {
 fn table(number: usize, update: &Reviewed) -> Markup {
     let columns = [
         ("lay in the tissue", &update.doses.now),
-        ("plan carried on", &update.doses.continued),
+        ("plan if continued", &update.doses.continued),
         ("plan updated", &update.updated),
     ];
     html! {
@@ -64,7 +65,7 @@ const MEASURES: [(&str, Of); 7] = [
 
 fn left(update: &Reviewed) -> String {
     let [[needles, seeds], [new_needles, new_seeds]] = update.left;
-    format!("{needles} needles with {seeds} seeds were left, {new_needles} with {new_seeds} in the update.")
+    format!("{needles} needles with {seeds} seeds remained, {new_needles} with {new_seeds} in the update.")
 }
 
 fn contour(update: &Reviewed) -> String {

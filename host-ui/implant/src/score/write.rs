@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use std::path::Path;
 use stylet_base::write_whole;
 
-/// Every figure of a score; lengths in mm, patient frame (RAS) for places.
+/// Returns every figure of a score; lengths in mm, patient frame (RAS) for places.
 pub fn to_json(score: &Score) -> Value {
     let i = &score.implant;
     let frames = i.anatomy.patient;
@@ -44,7 +44,7 @@ pub fn to_json(score: &Score) -> Value {
     })
 }
 
-/// `score.json` and `debrief.html` in a folder that is there; `made` says what they were made from.
+/// Writes `score.json` and `debrief.html` into an existing folder; `made` is their provenance.
 pub fn write(score: &Score, made: Value, folder: &Path) -> Result<(), ScoreError> {
     let mut value = to_json(score);
     value["made"] = made;

@@ -1,4 +1,4 @@
-//! The figures of the page, row by row: each a number, or why there is none.
+//! The figures of the page, row by row: each a number, or the reason why there is none.
 
 use super::{Column, Implant};
 use stylet_anatomy::Organ;
@@ -6,7 +6,7 @@ use stylet_dose::effect::Response;
 use stylet_dose::metric::Value;
 use stylet_dose::{Dvh, Metric};
 
-/// What the figures mean, for the foot of the page.
+/// Definitions of the figures, for the foot of the page.
 pub const DEFINITIONS: [&str; 7] = [
     "D: dose that a share of the structure gets at least. V: share or volume with at least that percentage of the prescription.",
     "Conformity (van 't Riet 1997; COIN without organs, Baltas 1998): share of the target at the prescription, times the target's share of \
@@ -20,24 +20,24 @@ pub const DEFINITIONS: [&str; 7] = [
     "D100 is the lowest of the points that the structure is made of, so it depends on their number.",
 ];
 
-/// A figure of every state.
+/// Figure of every state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// What it belongs to: "target".
+    /// Group: "target".
     pub group: &'static str,
-    /// Its name: "D90".
+    /// Name: "D90".
     pub name: String,
-    /// Its unit; empty for a number.
+    /// Unit; empty for a number.
     pub unit: &'static str,
-    /// Digits after the point.
+    /// Number of digits after the point.
     pub digits: usize,
-    /// The value in each column, or why there is none.
+    /// Value in each column, or the reason why there is none.
     pub values: Vec<Result<f64, NotComputed>>,
 }
 
 type Cell = Result<f64, NotComputed>;
 
-/// Why a figure cannot be computed.
+/// Reason why a figure cannot be computed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct NotComputed(String);
@@ -54,7 +54,7 @@ impl From<&str> for NotComputed {
     }
 }
 
-/// All rows, in the order of the page.
+/// Returns all rows, in the order of the page.
 pub fn rows(implant: &Implant, columns: &[Column]) -> Vec<Row> {
     let mut all = Vec::new();
     let mut row = |group: &'static str, name: &str, unit: &'static str, digits: usize, of: &dyn Fn(&Column) -> Cell| {
@@ -98,7 +98,7 @@ pub fn rows(implant: &Implant, columns: &[Column]) -> Vec<Row> {
     }
     row("indices", "conformity", "", 3, &|c| {
         let (inside, all) = (target(c)?.at_least_m3(rx), at_prescription_m3(c)?);
-        // The two volumes come from different points, which may leave a share just above 1.
+        // The two volumes come from different points, so the share may slightly exceed 1.
         Ok(inside / target(c)?.volume_m3() * if all > 0.0 { (inside / all).min(1.0) } else { 0.0 })
     });
     row("indices", "homogeneity", "", 3, &|c| Ok(1.0 - non_uniformity(c, rx)?));
@@ -153,7 +153,7 @@ fn organ(column: &Column, organ: Organ) -> Result<&Dvh, NotComputed> {
 }
 
 fn around(column: &Column) -> Result<&super::Around, NotComputed> {
-    let why = "with edema what lies around the gland does not move with it";
+    let why = "with edema the surroundings do not move with the gland";
     column.around.as_ref().ok_or_else(|| why.into())
 }
 
@@ -180,20 +180,20 @@ fn value(dvh: &Dvh, name: &str, rx_gy: f64) -> Result<Value, NotComputed> {
 fn gy(dvh: &Dvh, name: &str, rx_gy: f64) -> Cell {
     match value(dvh, name, rx_gy)? {
         Value::Dose { gy, .. } => Ok(gy),
-        _ => Err(format!("{name} is no dose").into()),
+        _ => Err(format!("{name} is not a dose").into()),
     }
 }
 
 fn percent(dvh: &Dvh, name: &str, rx_gy: f64) -> Cell {
     match value(dvh, name, rx_gy)? {
         Value::Volume { percent, .. } => Ok(percent),
-        _ => Err(format!("{name} is no volume").into()),
+        _ => Err(format!("{name} is not a volume").into()),
     }
 }
 
 fn cc(dvh: &Dvh, name: &str, rx_gy: f64) -> Cell {
     match value(dvh, name, rx_gy)? {
         Value::Volume { cc, .. } => Ok(cc),
-        _ => Err(format!("{name} is no volume").into()),
+        _ => Err(format!("{name} is not a volume").into()),
     }
 }

@@ -1,4 +1,5 @@
-//! One page of an implant by AAPM TG-137: dose of target, urethra and rectum, indices, effect, sectors; several states side by side.
+//! One page of an implant by AAPM TG-137: dose of target, urethra and rectum, indices, effect,
+//! sectors; several states side by side.
 
 mod figures;
 mod natural;
@@ -17,50 +18,50 @@ use stylet_dose::edema::Edema;
 use stylet_dose::structure::bounds;
 use stylet_dose::{DoseKernel, DosePoints, Dvh, Seed, Source, Structure};
 
-/// Room around seeds and target in which volumes at a dose are looked for.
+/// Margin around seeds and target in which volumes at a dose are searched.
 const MARGIN_M: f64 = 0.03;
-/// Points in that room.
+/// Number of points in that region.
 const POINTS_AROUND: f64 = 200_000.0;
 
-/// What all states of an implant have in common.
+/// Data common to all states of an implant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Implant {
     /// Name of the page.
     pub title: String,
-    /// The model of seed.
+    /// Model of the seeds.
     pub source: Source,
     /// Prescribed dose, in Gy.
     pub prescription_gy: f64,
-    /// Day to which the strengths refer, in words.
+    /// Reference day of the strengths, in words.
     pub calibrated: String,
-    /// Swelling of the gland that one more column of each state is of.
+    /// Swelling of the gland for an additional column of each state.
     pub edema: Option<Edema>,
-    /// Whether dose is that of the whole life of the seeds; effects are of that only.
+    /// True if the dose covers the whole life of the seeds; effects require that.
     pub is_for_ever: bool,
 }
 
-/// An implant at one time: as planned, as delivered, on a day after.
+/// State of an implant: as planned, as delivered, on a later day.
 #[derive(Clone, Debug)]
 pub struct State {
-    /// What it is called: "planned", "day 30".
+    /// Name: "planned", "day 30".
     pub name: String,
     /// File of the seeds.
     pub file: String,
-    /// Whose outlines the dose is counted in, and in which frame.
+    /// Origin and frame of the outlines in which the dose is counted.
     pub structures_are: String,
-    /// Time after the implant at which seeds and structures lie so, in s.
+    /// Time after the implant of these positions, in s.
     pub seen_s: f64,
     /// The seeds, in the frame of the structures.
     pub seeds: Vec<Seed>,
     /// The structures.
     pub structures: Vec<Structure>,
-    /// Which of them the prescription is for.
+    /// Index of the target among them.
     pub target: usize,
-    /// How the seeds fit those of the plan.
+    /// Fit of the seeds to those of the plan.
     pub fit: Option<RigidFit>,
 }
 
-/// A structure with its histogram.
+/// Structure with its histogram.
 #[derive(Clone, Debug)]
 pub struct Histogram {
     /// Name of the structure.
@@ -69,10 +70,11 @@ pub struct Histogram {
     pub dvh: Dvh,
 }
 
-/// Volumes at a dose beyond the target, which indices are made of.
+/// Volumes at a dose beyond the target, the basis of indices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Around {
-    /// All that gets the prescription, in m³; `None` where it leaves the room of 30 mm around seeds and target.
+    /// Whole volume at the prescription, in m³; `None` if it leaves the margin of 30 mm around
+    /// seeds and target.
     pub at_prescription_m3: Option<f64>,
     /// Natural dose, in Gy.
     pub natural_gy: Option<f64>,
@@ -83,20 +85,20 @@ pub struct Around {
 pub struct Column {
     /// The state.
     pub state: State,
-    /// Name, with what was considered.
+    /// Name, with the effects considered.
     pub name: String,
     /// Histograms, in the order of the structures.
     pub histograms: Vec<Histogram>,
-    /// `None` with edema: what lies around the gland does not swell with it.
+    /// Volumes around; `None` with edema, because the surroundings do not swell with the gland.
     pub around: Option<Around>,
     /// Sectors of the target.
     pub sectors: Vec<Sector>,
-    /// Whether the dose is that of a gland that swells.
+    /// True if the dose is that of a gland that swells.
     pub swells: bool,
 }
 
 impl Column {
-    /// Computes the dose of a state, with its edema where one is given.
+    /// Computes the dose of a state, with its edema if one is given.
     pub fn of(implant: &Implant, kernel: &DoseKernel, state: State, edema: Option<Edema>) -> Self {
         let dose = |structure: &Structure| match edema {
             Some(edema) => {
@@ -130,7 +132,7 @@ impl Column {
         }
     }
 
-    /// Histogram of the target.
+    /// Returns the histogram of the target.
     pub fn target(&self) -> Option<&Dvh> {
         let name = self.state.structures.get(self.state.target).map(|s| s.name.as_str());
         self.histograms
@@ -139,7 +141,8 @@ impl Column {
             .map(|h| &h.dvh)
     }
 
-    /// Histogram of the first structure that is called like an organ; the wall of the rectum stands for it where it is drawn alone.
+    /// Returns the histogram of the first structure named like an organ; the wall of the rectum
+    /// replaces it if it is drawn alone.
     pub fn organ(&self, organ: Organ) -> Option<&Dvh> {
         let called = |organ: Organ| self.histograms.iter().find(|h| organ.is_mentioned_in(&h.name));
         let wall = || (organ == Organ::Rectum).then(|| called(Organ::RectalWall)).flatten();
@@ -147,7 +150,7 @@ impl Column {
     }
 }
 
-/// Dose in the room around seeds and target.
+/// Computes the dose in the region around seeds and target.
 fn around(implant: &Implant, kernel: &DoseKernel, state: &State) -> Around {
     let mut corners: Vec<[f64; 3]> = state.seeds.iter().map(|s| s.position_m).collect();
     corners.extend(
@@ -180,7 +183,7 @@ fn around(implant: &Implant, kernel: &DoseKernel, state: &State) -> Around {
     }
 }
 
-/// The figures of all states as JSON; what cannot be computed says why.
+/// Returns the figures of all states as JSON; a missing one gives its reason.
 pub fn to_json(implant: &Implant, columns: &[Column]) -> Value {
     let of_column = |n: usize, column: &Column| {
         let cell = |row: &Row| match &row.values[n] {

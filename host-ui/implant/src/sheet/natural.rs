@@ -1,14 +1,16 @@
-//! Natural dose of an implant: where the volume histogram without the inverse square has its low-dose edge.
+//! Natural dose of an implant: the low-dose edge of the volume histogram without the inverse
+//! square.
 
 /// Width of a bin of u, which is 1 at the prescription.
 const BIN: f64 = 0.04;
-/// Bins; the last is at a quarter of the prescription.
+/// Number of bins; the last is at a quarter of the prescription.
 const BINS: usize = 200;
-/// Bins on each side that a value is the mean of.
+/// Number of bins on each side in the moving average.
 const SMOOTH: usize = 3;
 
-/// The dose at which the natural histogram dV/du, with u = D^(-3/2) (Anderson, Med. Phys. 13, 898, 1986), has fallen from its peak
-/// to half of it towards low doses; `None` where it does not fall so far above the dose at which the volume leaves the room.
+/// Returns the dose at which the natural histogram dV/du has fallen from its peak to half of it
+/// towards low doses. Here u = D^(-3/2) (Anderson, Med. Phys. 13, 898, 1986). `None` if it does not
+/// fall so far above the dose at which the volume leaves the region.
 pub fn natural_dose_gy(dose_gy: &[f64], prescription_gy: f64, leaves_gy: f64) -> Option<f64> {
     let mut counts = vec![0.0; BINS];
     for gy in dose_gy.iter().filter(|gy| **gy > 0.0) {
@@ -35,7 +37,7 @@ pub fn natural_dose_gy(dose_gy: &[f64], prescription_gy: f64, leaves_gy: f64) ->
 mod tests {
     use super::*;
 
-    /// Doses whose volume over u is even up to an edge.
+    /// Tests doses whose volume over u is constant up to an edge.
     #[test]
     fn the_edge_of_a_histogram_is_found_and_a_lone_source_has_none() {
         let to = |edge: f64| -> Vec<f64> {

@@ -1,4 +1,4 @@
-//! The page as HTML that stands by itself and prints on one sheet of A4.
+//! The page as self-contained HTML that prints on one sheet of A4.
 
 use super::figures::{DEFINITIONS, NotComputed, Row, rows};
 use super::{Column, Implant};
@@ -8,10 +8,10 @@ use stylet_base::format::printable;
 use stylet_dose::decay::s_to_days;
 use stylet_dose::effect::Response;
 
-/// More columns than this are printed across.
+/// Most columns in portrait format.
 const UPRIGHT: usize = 3;
 
-/// Smaller than the debrief: all of it stands on one sheet.
+/// Style of the sheet, smaller than the debrief's, so that everything fits.
 const SHEET: &str = "\
 body{font-size:13px;line-height:1.35}
 main{max-width:1100px;padding:18px 20px}
@@ -27,7 +27,7 @@ h1{font-size:13pt}h2{font-size:9pt;margin:5pt 0 1pt}tr.group td{padding-top:2.5p
 .why{font-size:6.5pt}sup{font-size:5pt}footer{font-size:6pt;margin-top:4pt;line-height:1.15}}
 ";
 
-/// The page of one state or of several.
+/// Returns the page of one state or of several.
 pub fn page(implant: &Implant, columns: &[Column]) -> String {
     let size = if columns.len() > UPRIGHT {
         "landscape"
@@ -108,13 +108,14 @@ fn figures(rows: &[Row], columns: &[Column]) -> Markup {
     }
 }
 
-/// Why no column has this figure, where that is one reason.
+/// Returns the reason why no column has this figure, if it is the same for all.
 fn lacked_by_all(row: &Row) -> Option<&NotComputed> {
     let first = row.values.first()?.as_ref().err()?;
     row.values.iter().all(|v| v.as_ref() == Err(first)).then_some(first)
 }
 
-/// Why some columns lack a figure that others have; each reason once, for the notes under the table.
+/// Returns the reasons why some columns lack a figure that others have, each once, for the notes
+/// under the table.
 fn reasons(rows: &[Row]) -> Vec<&NotComputed> {
     let mut reasons = Vec::new();
     let lacking = rows.iter().filter(|row| lacked_by_all(row).is_none());

@@ -3,27 +3,27 @@
 use stylet_dose::Dvh;
 use stylet_dose::Structure;
 
-/// From the head to the feet.
+/// Thirds from the head to the feet.
 const LEVELS: [&str; 3] = ["base", "mid", "apex"];
 const QUADRANTS: [&str; 4] = ["anterior right", "anterior left", "posterior right", "posterior left"];
-/// How the sectors are cut, for people.
+/// Definition of the sectors, for display.
 pub const CUTS: &str = "Thirds of the length of the target along the patient's axis; quadrants by the planes through the middle of each \
     third. Patient frame (RAS).";
 
 /// Dose of one sector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sector {
-    /// Its name, as "apex, posterior left".
+    /// Name, such as "apex, posterior left".
     pub name: String,
     /// Volume, in m³.
     pub volume_m3: f64,
     /// Dose to 90 % of it, in Gy; `None` for one without volume.
     pub d90_gy: Option<f64>,
-    /// Share of it at the prescription.
+    /// Share of its volume at the prescription.
     pub v100: Option<f64>,
 }
 
-/// The sectors of a target with the dose of each of its points.
+/// Returns the sectors of a target from the dose of each of its points.
 pub fn of(target: &Structure, dose_gy: &[f64], prescription_gy: f64) -> Vec<Sector> {
     let (low, high) = target.bounds_m();
     let third_m = (high[2] - low[2]) / 3.0;
@@ -65,9 +65,9 @@ pub fn of(target: &Structure, dose_gy: &[f64], prescription_gy: f64) -> Vec<Sect
 mod tests {
     use super::*;
 
-    /// A box with a dose that rises to the head, to the right and to the front.
+    /// Tests a box with a dose that rises to the head, to the right and to the front.
     #[test]
-    fn a_sector_has_the_part_of_the_target_that_its_name_says() {
+    fn sectors_match_their_names() {
         let target = Structure::of_box("Prostate", [-0.02, 0.0, -0.03], [0.02, 0.04, 0.03], 1e-3);
         let dose: Vec<f64> = target
             .points_m

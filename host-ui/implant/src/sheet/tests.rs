@@ -12,7 +12,7 @@ fn implant(edema: Option<Edema>) -> Implant {
     }
 }
 
-/// A cube of seeds in a box, with a urethra and no rectum.
+/// Returns a cube of seeds in a box, with a urethra and no rectum.
 fn state() -> State {
     let seed = |n: usize| Seed {
         position_m: [n % 4, n / 4 % 4, n / 16].map(|i| (i as f64 - 1.5) * 9e-3),
@@ -35,7 +35,7 @@ fn state() -> State {
 }
 
 #[test]
-fn the_page_has_every_figure_of_the_report_or_why_there_is_none() {
+fn the_page_has_every_figure_or_its_reason() {
     let edema = Some(Edema::of_days(0.5, 9.3));
     let implant = implant(edema);
     let kernel = DoseKernel::new(&implant.source, Interval::ALL);
@@ -68,7 +68,7 @@ fn the_page_has_every_figure_of_the_report_or_why_there_is_none() {
     let page = page(&implant, &columns);
     assert!(page.contains("@page{size:A4 portrait") && page.contains("case &lt;1&gt;"));
     assert!(page.contains("not computed: no structure is called rectum"));
-    // The same sentence stood in seven cells and made every other column as wide as it.
+    // Guards against the same sentence in seven cells, which made every other column as wide.
     let edema_s = "not computed: with edema the dose rate does not decay with the source alone";
     assert_eq!(page.matches(edema_s).count(), 1, "{page}");
     assert!(page.contains("–<sup>1</sup>") && page.contains("–<sup>2</sup>"));
@@ -78,9 +78,10 @@ fn the_page_has_every_figure_of_the_report_or_why_there_is_none() {
     assert!(json["states"][1]["figures"]["effect BED of target D90 [Gy]"]["not_computed"].is_string());
 }
 
-/// The page of `pelvis`, which draws the wall alone, had no rectum, while the plan kept its limit.
+/// Guards against a page of `pelvis`, which draws the wall alone, without a rectum, although the
+/// plan kept its limit.
 #[test]
-fn the_wall_of_the_rectum_stands_for_it_where_it_is_drawn_alone() {
+fn the_rectal_wall_replaces_a_missing_rectum() {
     let (implant, at) = (implant(None), |low: f64| {
         ([-0.01, low, -0.016], [0.01, low + 0.004, 0.016])
     });
@@ -98,6 +99,6 @@ fn the_wall_of_the_rectum_stands_for_it_where_it_is_drawn_alone() {
     };
     let wall = d2cc(&[("rectal wall", -0.024)]);
     assert_eq!(wall, d2cc(&[("Rectum", -0.024)]));
-    // A rectum that is drawn counts, whichever comes first.
+    // A drawn rectum counts, in any order.
     assert_eq!(wall, d2cc(&[("rectal wall", -0.03), ("Rectum", -0.024)]));
 }

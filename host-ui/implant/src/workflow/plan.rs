@@ -5,31 +5,32 @@ use crate::plan::ImplantPlan;
 use nalgebra::Vector3;
 use stylet_shm_schema::{HandMove, MAX_SEEDS, PlannedNeedle, Prescribed, Request, SceneHeader, StructureInfo, role};
 
-/// The needle begins this far outside the body.
+/// Distance of the needle's start from the body.
 const ENTRY_CLEARANCE_M: f64 = 0.010;
-/// The seeds lie between these shares of the needle's way through the gland.
+/// Range of the seeds, as shares of the needle's path through the gland.
 const SEEDED_SHARE: (f64, f64) = (0.2, 0.8);
 const SEEDS: usize = 5;
-/// The needle keeps this far from the boxes around urethra, rectum and bladder.
+/// Distance of the needle from the boxes around urethra, rectum and bladder.
 const SPARED_M: f64 = 0.005;
-/// Places beside the middle of the target that are tried are so far apart: half the holes of a usual template.
+/// Distance of the places tried beside the centre of the target: half the pitch of a usual
+/// template.
 const ASIDE_M: f64 = 0.0025;
 
-/// The needle's path and the seeds along it, scene frame.
+/// Path of the needle and the seeds along it, scene frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeedlePlan {
-    /// Where the tip starts, outside the body, m.
+    /// Start of the tip, outside the body, m.
     pub entry_m: [f64; 3],
     /// Unit vector from the entry into the gland.
     pub direction: [f64; 3],
-    /// In the order in which they are dropped: deepest first.
+    /// Seeds in the order of dropping: deepest first.
     pub seeds_m: Vec<[f64; 3]>,
-    /// What they are, for other hosts.
+    /// Prescription of the seeds, for other hosts.
     pub prescribed: Prescribed,
 }
 
 impl NeedlePlan {
-    /// A needle of a plan, counted from 0; `None` where it has no such needle.
+    /// Creates a needle of a plan, counted from 0; `None` if it has no such needle.
     pub fn of(plan: &ImplantPlan, number: usize) -> Option<Self> {
         let needle = plan.needles.get(number)?;
         Some(Self {
@@ -40,12 +41,12 @@ impl NeedlePlan {
         })
     }
 
-    /// Distance of a point from the entry, along the needle.
+    /// Returns the distance of a point from the entry, along the needle.
     pub fn along_m(&self, point: [f64; 3]) -> f64 {
         (Vector3::from(point) - Vector3::from(self.entry_m)).dot(&Vector3::from(self.direction))
     }
 
-    /// The seeds in the order in which they are dropped.
+    /// Returns the seeds in the order in which they are dropped.
     pub fn deepest_first(&self) -> Vec<[f64; 3]> {
         let mut seeds = self.seeds_m.clone();
         seeds.sort_by(|a, b| self.along_m(*b).total_cmp(&self.along_m(*a)));
@@ -53,13 +54,13 @@ impl NeedlePlan {
     }
 }
 
-/// Five seeds along one needle through the middle of the target.
+/// Plans five seeds along one needle through the centre of the target.
 pub fn default_plan(scene: &SceneHeader) -> NeedlePlan {
     plan_with_seeds(scene, SEEDS)
 }
 
-/// As [`default_plan`], with 1 to [`MAX_SEEDS`] seeds. The needle comes from the perineum, which is inferior; where
-/// something to be spared is in its way it goes beside the middle.
+/// Like [`default_plan`], with 1 to [`MAX_SEEDS`] seeds. The needle comes from the perineum, which
+/// is inferior; if a spared structure is in its way, it avoids the centre.
 pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> NeedlePlan {
     let direction = patient_axis(scene, 2, Vector3::z());
     let target = Box3::of(scene.target_lower_m, scene.target_upper_m);
@@ -95,14 +96,15 @@ pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> NeedlePlan {
     }
 }
 
-/// The middle of the target, then places to its left and right, the nearest first, to half-way to its side.
+/// Returns the centre of the target, then places to its left and right, the nearest first, to
+/// half-way to its side.
 fn beside(scene: &SceneHeader, target: &Box3, direction: Vector3<f64>) -> Vec<Vector3<f64>> {
     let right = patient_axis(scene, 0, Vector3::x());
     let Some(aside) = (right - direction * right.dot(&direction)).try_normalize(1e-3) else {
         return vec![target.middle()];
     };
     let farthest_m = 0.5 * target.way_from_middle_m(aside);
-    // A hair more, as the quotient may be a whole number.
+    // Slightly more, because the quotient may be an integer.
     let steps = (farthest_m / ASIDE_M + 1e-6).clamp(0.0, 100.0) as usize;
     let each = (1..=steps).flat_map(|n| [n as f64, -(n as f64)]);
     std::iter::once(0.0)
@@ -111,7 +113,7 @@ fn beside(scene: &SceneHeader, target: &Box3, direction: Vector3<f64>) -> Vec<Ve
         .collect()
 }
 
-/// A box along the axes of the scene.
+/// Box along the axes of the scene.
 struct Box3 {
     lower: Vector3<f64>,
     upper: Vector3<f64>,
@@ -125,7 +127,7 @@ impl Box3 {
         }
     }
 
-    /// What the needle must not come into on behalf of a structure.
+    /// Returns the box that the needle must avoid for a structure.
     fn around(structure: &StructureInfo) -> Self {
         let margin = Vector3::repeat(SPARED_M);
         Self {
@@ -138,7 +140,8 @@ impl Box3 {
         (self.lower + self.upper) / 2.0
     }
 
-    /// How far a line from the middle goes before it leaves: the nearest pair of faces ends it.
+    /// Returns the distance of a line from the centre to the box's surface: the nearest pair of
+    /// faces ends it.
     fn way_from_middle_m(&self, direction: Vector3<f64>) -> f64 {
         self.way_out_m(self.middle(), direction)
     }
@@ -157,7 +160,7 @@ impl Box3 {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether the piece of a line between two distances from `through` comes into the box.
+    /// Returns whether the piece of a line between two distances from `through` enters the box.
     fn is_met(&self, through: Vector3<f64>, direction: Vector3<f64>, [from_m, to_m]: [f64; 2]) -> bool {
         let (mut enter, mut leave) = (from_m, to_m);
         for a in 0..3 {
@@ -175,7 +178,7 @@ impl Box3 {
     }
 }
 
-/// Publishes the plan to all hosts.
+/// Returns the request that publishes the plan to all hosts.
 pub fn plan_request(plan: &NeedlePlan) -> Request {
     Request::SetPlan(Some(PlannedNeedle {
         entry_m: plan.entry_m,
@@ -185,7 +188,7 @@ pub fn plan_request(plan: &NeedlePlan) -> Request {
     }))
 }
 
-/// Moves the simulated hand to `tip_m`; m/s and m/s².
+/// Returns the request that moves the simulated hand to `tip_m`; m/s and m/s².
 pub fn move_request(tip_m: [f64; 3], direction: [f64; 3], speed: f64, acceleration: f64) -> Request {
     Request::MoveHand(HandMove {
         tip_m,
@@ -223,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn the_needle_goes_from_inferior_to_superior_whatever_the_scene_axes_are() {
+    fn the_needle_goes_superior_in_any_scene_frame() {
         // Superior is -y of the scene.
         let plan = default_plan(&scene([1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0]));
         assert!((plan.direction[1] + 1.0).abs() < 1e-12);
@@ -241,12 +244,12 @@ mod tests {
     }
 
     #[test]
-    fn the_needle_goes_beside_what_is_spared_and_no_farther_than_it_must() {
+    fn the_needle_avoids_spared_structures() {
         let mut scene = scene(IDENTITY);
         scene.structure_count = 2;
         let urethra = &mut scene.structures[0];
         (urethra.role, urethra.lower_m, urethra.upper_m) = (role::SPARE, [0.037, 0.03, 0.02], [0.043, 0.05, 0.08]);
-        // Beyond the deepest seed: not in the way.
+        // Beyond the deepest seed, so not in the way.
         let bladder = &mut scene.structures[1];
         (bladder.role, bladder.lower_m, bladder.upper_m) = (role::SPARE, [0.02, 0.02, 0.068], [0.06, 0.06, 0.09]);
         let plan = default_plan(&scene);

@@ -15,31 +15,33 @@ use stylet_procedure::{
 };
 use stylet_shm_schema::{Event, EventKind, Fault, HapticState, NeedleAxis, RefusalCode, Request};
 
-/// A core that is absent for less is waited for: a busy machine may hold it up.
+/// Longest absence of a core that is tolerated: a busy machine may delay it.
 const ABSENT_LIMIT: Duration = Duration::from_secs(10);
 
-/// What of [`EventKind::MotionGivenUp`] is not the needle's.
+/// Value of [`EventKind::MotionGivenUp`] for the second hand.
 const SECOND_HAND: u32 = 1;
-/// A program that stood still for less, on a busy machine, goes on with its motion; after more, a person has to.
+/// Standstill after which a program may not continue its motion by itself; a shorter one happens on
+/// a busy machine.
 const GOES_ON_AFTER: Duration = Duration::from_secs(2);
 
-/// One needle of a script: what is planned, and what is done for it.
+/// Needle of a script: its plan, and its drops.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeedleTask {
-    /// What is planned.
+    /// Plan.
     pub plan: NeedlePlan,
-    /// Where the seeds are dropped for it.
+    /// Drops of its seeds.
     pub drops: Drops,
 }
 
 impl NeedleTask {
-    /// A needle of a plan, counted from 0, its seeds dropped so; `None` where the plan has no such needle.
+    /// Creates a needle of a plan, counted from 0, with these drops; `None` if the plan has no such
+    /// needle.
     pub fn of(plan: &ImplantPlan, number: usize, drops: Drops) -> Option<Self> {
         let plan = NeedlePlan::of(plan, number)?;
         Some(Self { plan, drops })
     }
 
-    /// Each seed dropped where it is planned.
+    /// Creates a needle whose seeds are dropped at their planned places.
     pub fn as_planned(plan: NeedlePlan) -> Self {
         let drops = Drops {
             entry_m: plan.entry_m,
@@ -56,20 +58,20 @@ impl NeedleTask {
     }
 }
 
-/// What of the needles of a script is in the tissue already.
+/// Part of a script's needles that is in the tissue already.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Placed {
     done: Done,
-    /// Seeds of each needle that are in the tissue.
+    /// Number of seeds of each needle in the tissue.
     seeds: Vec<usize>,
     drops: usize,
-    /// The first needle that has something left to do.
+    /// First needle with something left to do.
     next: usize,
 }
 
 impl Placed {
-    /// By where the tip was when seeds left it, and where it is now; `lost` are the numbers of drops that are known to have left
-    /// no seed.
+    /// Finds placed seeds by the tip's place when they left it, and its present place; `lost` are
+    /// the numbers of drops known to have left no seed.
     pub fn find(tasks: &[NeedleTask], dropped_at_m: &[[f64; 3]], tip_m: Option<[f64; 3]>, lost: &[usize]) -> Self {
         let ways: Vec<NeedleWay> = tasks.iter().map(|task| task.drops.way()).collect();
         let drops_m: Vec<[f64; 3]> = ways
@@ -107,60 +109,63 @@ impl Placed {
         }
     }
 
-    /// Whether something was done and something is left: it can be continued.
+    /// Returns whether it can be continued: something was done and something is left.
     pub fn is_partial(&self) -> bool {
         let made = self.done.drops.len();
         made > 0 && (made < self.drops || self.done.inside.is_some())
     }
 
-    /// The needle that it goes on with, counted from 0.
+    /// Returns the needle to continue with, counted from 0.
     pub fn next_needle(&self) -> usize {
         self.next
     }
 
-    /// Seeds of a needle that are in the tissue.
+    /// Returns the number of a needle's seeds in the tissue.
     pub fn seeds_of(&self, needle: usize) -> usize {
         self.seeds.get(needle).copied().unwrap_or(0)
     }
 }
 
-/// One scripted implantation. Call [`Run::advance`] after each [`Link::poll`].
+/// Scripted implantation. Call [`Run::advance`] after each [`Link::poll`].
 pub struct Run {
     tasks: Vec<NeedleTask>,
     stabilising: Vec<Stabilising>,
     procedure: Procedure,
-    /// A fault of the second device does not keep it from beginning: somebody asked to re-arm, or there was none.
+    /// True if a fault of the second device does not prevent the start: re-arming was requested, or
+    /// there was no fault.
     rearms: bool,
     status: RunStatus,
     session_id: Option<u64>,
     absent_since: Option<Instant>,
     started: Instant,
     sent: Option<u64>,
-    /// The motion that it asked for, to be ordered again where the core gave it up.
+    /// Motion that it requested, to be requested again if the core gave it up.
     motion: Option<Request>,
-    /// The tick from which the state shows the request.
+    /// First tick whose state shows the request.
     effective_tick: Option<u64>,
 }
 
 impl Run {
-    /// One needle, each seed dropped where it is planned.
+    /// Creates a run of one needle, each seed dropped at its planned place.
     pub fn new(plan: NeedlePlan, pace: Pace) -> Self {
         Self::of_needles(vec![NeedleTask::as_planned(plan)], pace)
     }
 
-    /// One needle after another; between two of them the tissue comes to rest.
+    /// Creates a run of one needle after another; between two of them the tissue comes to rest.
     pub fn of_needles(tasks: Vec<NeedleTask>, pace: Pace) -> Self {
         let ways = tasks.iter().map(|task| task.drops.way()).collect();
         Self::of(tasks, Procedure::of_needles(ways, pace))
     }
 
-    /// The same from where it was stopped: nothing is reset, and no seed is dropped twice.
+    /// Creates a run that continues from where it was stopped: nothing is reset, and no seed is
+    /// dropped twice.
     pub fn continuing(tasks: Vec<NeedleTask>, pace: Pace, placed: &Placed) -> Self {
         let ways = tasks.iter().map(|task| task.drops.way()).collect();
         Self::of(tasks, Procedure::continuing(ways, pace, &placed.done))
     }
 
-    /// With needles that go in first, stay while the others come and go, and are drawn out at the end.
+    /// Adds needles that go in first, stay while the others come and go, and are withdrawn at the
+    /// end.
     #[must_use]
     pub fn stabilised(self, stabilising: &[Stabilising]) -> Self {
         let ways = stabilising.iter().map(Stabilising::way).collect();
@@ -171,12 +176,13 @@ impl Run {
         }
     }
 
-    /// Which stabilising needle is at work, counted from 0; `None` while one that leaves seeds is.
+    /// Returns the stabilising needle in use, counted from 0; `None` while one that leaves seeds
+    /// is.
     pub fn stabilising(&self) -> Option<usize> {
         self.procedure.stabilising()
     }
 
-    /// Re-arms after a fault that stands at the beginning, since somebody asked for it.
+    /// Allows re-arming after a fault that stands at the beginning, on the operator's request.
     #[must_use]
     pub fn rearming(self) -> Self {
         Self {
@@ -186,7 +192,7 @@ impl Run {
         }
     }
 
-    /// How long it waits for what does not arrive; without this, until the operator decides.
+    /// Sets how long it waits; without this, until the operator decides.
     #[must_use]
     pub fn with_patience(self, patience: Patience) -> Self {
         let procedure = self.procedure.with_patience(patience);
@@ -209,37 +215,38 @@ impl Run {
         }
     }
 
-    /// The step at present.
+    /// Returns the present step.
     pub fn step(&self) -> Step {
         self.procedure.step()
     }
 
-    /// The needles, in the order in which they are inserted.
+    /// Returns the needles, in the order in which they are inserted.
     pub fn tasks(&self) -> &[NeedleTask] {
         &self.tasks
     }
 
-    /// What it waits for, and for how long.
+    /// Returns the condition for which it waits, and for how long.
     pub fn waiting(&self) -> Waiting {
         self.procedure.waiting()
     }
 
-    /// Which needle is at work, counted from 0; the last one when all are done.
+    /// Returns the needle in use, counted from 0; the last one when all are done.
     pub fn needle(&self) -> usize {
         self.procedure.needle()
     }
 
-    /// Numbers of the drops that left no seed, counted from 0 over all needles: the tip was outside the tissue.
+    /// Returns the numbers of the drops that left no seed, because the tip was outside the tissue,
+    /// counted from 0 over all needles.
     pub fn lost(&self) -> &[usize] {
         self.procedure.lost()
     }
 
-    /// Plan of the needle at work.
+    /// Returns the plan of the needle in use.
     pub fn plan(&self) -> Option<&NeedlePlan> {
         self.tasks.get(self.needle()).map(|task| &task.plan)
     }
 
-    /// Does what can be done now.
+    /// Does everything that is possible now.
     pub fn advance(&mut self, link: &mut Link) -> RunStatus {
         while self.status == RunStatus::Working {
             match self.try_advance(link) {
@@ -282,7 +289,7 @@ impl Run {
         Ok(next)
     }
 
-    /// False while it is to be waited for.
+    /// Returns whether there is a core; false while a missing one is tolerated.
     fn has_core(&mut self, link: &Link) -> Result<bool, RunFailure> {
         if let LinkStatus::Absent { why } = link.status() {
             let since = *self.absent_since.get_or_insert_with(Instant::now);
@@ -300,7 +307,7 @@ impl Run {
         Ok(true)
     }
 
-    /// What the core gave up while this program stood still for a moment is ordered again.
+    /// Requests again the motion that the core gave up while this program stood still for a moment.
     fn order_again(&mut self, link: &mut Link) -> Result<(), RunFailure> {
         let (Some(motion), Some(from)) = (&self.motion, self.effective_tick) else {
             return Ok(());
@@ -353,7 +360,7 @@ impl Run {
         Ok(sent)
     }
 
-    /// What became of the request that was sent last.
+    /// Returns the reply to the last request.
     fn reply(&mut self, link: &mut Link, state: &HapticState) -> Reply {
         let Some(id) = self.sent else { return Reply::Pending };
         if self.effective_tick.is_none() {

@@ -1,29 +1,31 @@
-//! The generator: strands with their seeds every 10 mm, some that touch, in tissue with bone, noise, and voxels of 1 x 1 x 3 mm.
+//! The generator: strands with their seeds every 10 mm, some that touch, in tissue with bone,
+//! noise, and voxels of 1 x 1 x 3 mm.
 //!
-//! It shares nothing with the search: points scattered in each seed's cylinder are moved by the scanner's blur and counted.
+//! It is independent of the search: points scattered in each seed's cylinder are moved by the
+//! scanner's blur and counted.
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use stylet_files::{VoxelFrame, VoxelValues};
 
-/// Half the axes of the gland, m.
+/// Half axes of the gland, m.
 pub const SEMI_AXES_M: [f64; 3] = [24e-3, 19e-3, 23e-3];
-/// Seeds that touch another one.
+/// Number of seeds that touch another one.
 pub const TOUCHING: usize = 27;
 const SPACING_MM: [f64; 3] = [1.0, 1.0, 3.0];
 const DIMS: [usize; 3] = [84, 76, 26];
-/// Points of each seed.
+/// Number of points of each seed.
 const POINTS: usize = 6_000;
 /// Sum of the values of a seed above the tissue, in HU times voxels.
 const SIGNAL: f64 = 6000.0;
 const NOISE_HU: f64 = 25.0;
 
-/// A volume with the seeds that are in it.
+/// Volume with its seeds.
 pub struct Phantom {
     /// The CT.
     pub volume: VoxelValues<f32>,
-    /// Place (RAS, m) and axis of each.
+    /// Place (RAS, m) and axis of each seed.
     pub seeds: Vec<([f64; 3], [f64; 3])>,
 }
 
@@ -38,7 +40,7 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
-    /// Box and Muller.
+    /// Draws a normal number (Box and Muller).
     fn normal(&mut self) -> f64 {
         let (u, v) = (1.0 - self.unit(), self.unit());
         (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()
@@ -46,7 +48,7 @@ impl Random {
 }
 
 impl Phantom {
-    /// A hundred seeds; a scanner that `cuts_at` a value gives strong seeds that exceed it.
+    /// Creates a hundred seeds; a scanner that `cuts_at` a value gives strong seeds that exceed it.
     pub fn new(random_seed: u64, cuts_at: Option<f32>) -> Self {
         let mut random = Random(ChaCha8Rng::seed_from_u64(random_seed));
         let seeds_mm = implant(&mut random);
@@ -80,7 +82,7 @@ impl Phantom {
     }
 }
 
-/// Soft tissue that is not even, a piece of bone, and a small calcification.
+/// Creates uneven soft tissue, a piece of bone, and a small calcification.
 fn tissue(random: &mut Random) -> Vec<f32> {
     let phases: [f64; 3] = std::array::from_fn(|_| random.within(0.0, 6.0));
     let value = |n: usize| {
@@ -100,11 +102,12 @@ fn tissue(random: &mut Random) -> Vec<f32> {
     (0..DIMS.iter().product()).map(value).collect()
 }
 
-/// Strands through the gland, every seed with its own small error, and groups that touch; in mm.
+/// Creates strands through the gland, every seed with its own small error, and groups that touch;
+/// in mm.
 fn implant(random: &mut Random) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let mut seeds: Vec<(Vector3<f64>, Vector3<f64>)> = Vec::new();
     let alone = 100 - TOUCHING;
-    // From the outside inwards, as peripheral loading has it.
+    // From the outside inwards, as in peripheral loading.
     let rings = [(0.86, 11), (0.52, 7), (0.12, 2)];
     let mut strands = Vec::new();
     for (share, count) in rings {
@@ -127,7 +130,8 @@ fn implant(random: &mut Random) -> Vec<(Vector3<f64>, Vector3<f64>)> {
         let turned = (tilt + Vector3::new(random.normal(), random.normal(), 0.0) * 0.06).normalize();
         seeds.push((place + error, turned));
     }
-    // 13 get a neighbour end to end where their strand ends, 13 one at their side, and one of those two.
+    // 13 get a neighbour end to end at the end of their strand, 13 one at their side, and one of
+    // those two.
     for n in 0..TOUCHING {
         let with = if n < 13 { alone - 13 + n } else { (n - 13) % 13 };
         let (place, axis) = seeds[with];
@@ -152,7 +156,7 @@ fn draw(volume: &mut VoxelValues<f32>, random: &mut Random, place_mm: Vector3<f6
     for _ in 0..POINTS {
         let (radius, angle) = (0.4 * random.unit().sqrt(), random.within(0.0, std::f64::consts::TAU));
         let solid = axis * random.within(-2.25, 2.25) + across * radius * angle.cos() + other * radius * angle.sin();
-        // In the plane a normal blur, along the table one of a box, as a spiral gives it.
+        // In the plane a normal blur, along the table a box, as in a spiral CT.
         let blur = Vector3::new(0.55 * random.normal(), 0.55 * random.normal(), random.within(-0.8, 0.8));
         let index = volume
             .frame

@@ -1,4 +1,4 @@
-//! An ellipsoid clicked at a few points is that ellipsoid again, by closed form.
+//! An ellipsoid clicked at a few points is reproduced, by closed form.
 
 use super::*;
 use crate::intraoperative::agreement::Agreement;
@@ -6,7 +6,7 @@ use crate::plan::anatomy::ball;
 use nalgebra::{Rotation3, Vector2, Vector3};
 use std::f64::consts::PI;
 
-/// Right, up and along the axis, m.
+/// Half axes: right, up and along the axis, m.
 const HALF_M: [f64; 3] = [0.024, 0.018, 0.021];
 const MIDDLE_M: [f64; 3] = [0.05, 0.04, 0.06];
 
@@ -19,7 +19,8 @@ fn straight() -> Transverse {
     }
 }
 
-/// Points of the ellipsoid in planes along its axis, unevenly about it; the middle of its planes moves by `sheared` along it.
+/// Clicks points of the ellipsoid in planes along its axis, unevenly about it; the centre of its
+/// planes moves by `sheared` along it.
 fn clicked(planes_m: &[f64], points: usize, sheared: f64, error_m: f64) -> Contour {
     let mut contour = Contour::default();
     for (plane, at_m) in planes_m.iter().enumerate() {
@@ -96,9 +97,10 @@ fn clicks_a_millimetre_off_cost_about_a_millimetre() {
     );
 }
 
-/// Volume by the planes of a sheared ellipsoid is that of the ellipsoid (Cavalieri), in any direction of the probe.
+/// Compares the volume of a sheared ellipsoid with that of the ellipsoid (Cavalieri), in any
+/// direction of the probe.
 #[test]
-fn a_gland_that_lies_obliquely_in_a_turned_frame_keeps_its_volume() {
+fn an_oblique_gland_in_a_rotated_frame_keeps_its_volume() {
     let turned = Rotation3::from_euler_angles(0.4, -0.2, 0.9);
     let frame = Transverse {
         origin_m: Vector3::from(MIDDLE_M),
@@ -115,7 +117,7 @@ fn a_gland_that_lies_obliquely_in_a_turned_frame_keeps_its_volume() {
     assert!((volume_m3 / exact_m3() - 1.0).abs() < 0.01, "{volume_m3}");
 }
 
-/// A plane between two that were clicked, by the closed form.
+/// Compares a plane between two clicked ones with the closed form.
 #[test]
 fn a_plane_without_clicks_has_the_outline_of_the_ellipsoid() {
     let contour = clicked(&FIVE_M, 8, 0.0, 0.0);
@@ -144,9 +146,9 @@ fn with_few_planes_there_is_a_proposal_but_no_body() {
     assert_eq!(Solid::of(&little).err(), Some(ContourError::Planes(2)));
 }
 
-/// Where outlines do not shrink towards an end, the gland ends half a plane farther.
+/// Tests outlines that do not shrink towards an end: the gland ends half a plane farther.
 #[test]
-fn a_gland_whose_last_plane_is_its_largest_is_closed_all_the_same() {
+fn a_gland_whose_last_plane_is_largest_is_closed() {
     let ring = |radius_m: f64| {
         (0..8).map(move |n| {
             let (sine, cosine) = (f64::from(n) / 8.0 * 2.0 * PI).sin_cos();

@@ -1,4 +1,4 @@
-//! Seeds that landed beside their places in a gland that moved: what planning anew is worth, on the true result.
+//! Misplaced seeds in a gland that moved: the benefit of replanning, on the true result.
 
 use super::*;
 use crate::intraoperative::{Agreement, Contour, Solid, Transverse};
@@ -44,12 +44,12 @@ fn anatomy() -> Anatomy {
     }
 }
 
-/// Towards the patient's left and back and deeper, and swollen by so much.
+/// Moves towards the patient's left and back and deeper, and swells by a factor.
 fn moved(by_m: [f64; 3], swollen: f64) -> impl Fn([f64; 3]) -> [f64; 3] {
     move |p| [0, 1, 2].map(|a| MIDDLE_M[a] + (p[a] - MIDDLE_M[a]) * swollen + by_m[a])
 }
 
-/// Clicked at six points in five planes: the ellipsoid that the target is now, by its closed form.
+/// Clicks six points in five planes of the displaced target, an ellipsoid, by its closed form.
 fn contoured(by_m: [f64; 3], swollen: f64) -> Body {
     let frame = Transverse {
         origin_m: Vector3::from(MIDDLE_M),
@@ -74,7 +74,7 @@ fn contoured(by_m: [f64; 3], swollen: f64) -> Body {
     solid.body(&frame, "prostate").expect("closed")
 }
 
-/// The first plan of the anatomy, and the seeds of its first needles moved.
+/// Returns the first plan of the anatomy, and the displaced seeds of its first needles.
 fn half_done(landed: impl Fn([f64; 3]) -> [f64; 3]) -> (ImplantPlan, usize, Vec<Seed>) {
     let (source, kernel) = iodine();
     let objectives = Objectives::new(&source, 145.0);
@@ -101,10 +101,10 @@ fn half_done(landed: impl Fn([f64; 3]) -> [f64; 3]) -> (ImplantPlan, usize, Vec<
     (found.plan, begun, lying)
 }
 
-/// Half of the needles are in when the gland turns out to lie 4 mm deeper, 3 mm aside and 10 % larger, and their seeds 5 mm too shallow.
-/// The null model carries the plan on.
+/// Tests a gland that proves to lie 4 mm deeper, 3 mm aside and 10 % larger when half of the
+/// needles are in, with seeds 5 mm too shallow. The null model continues the plan.
 #[test]
-fn needles_planned_anew_give_the_true_gland_more_than_the_plan_carried_on() {
+fn replanning_covers_the_true_gland_better_than_continuing() {
     let (by_m, swollen) = ([3e-3, -1e-3, 4e-3], 1.1);
     let (plan, begun, lying) = half_done(|p| [p[0], p[1], p[2] - 5e-3]);
     let (source, kernel) = iodine();
@@ -126,7 +126,7 @@ fn needles_planned_anew_give_the_true_gland_more_than_the_plan_carried_on() {
     let started = std::time::Instant::now();
     let update = situation.update(proceed).unwrap();
     let seconds = started.elapsed().as_secs_f64();
-    // What was inserted stays, and no hole is used twice.
+    // Inserted needles stay, and no hole is used twice.
     assert_eq!(update.plan.needles[..begun], plan.needles[..begun]);
     let mut holes: Vec<_> = update.plan.needles.iter().filter_map(|n| n.hole).collect();
     holes.sort();
@@ -159,7 +159,7 @@ fn needles_planned_anew_give_the_true_gland_more_than_the_plan_carried_on() {
     assert!(updated.d90 > continued.d90 + 3.0, "{} {}", updated.d90, continued.d90);
     assert!(updated.d90 >= 98.0, "{}", updated.d90);
     assert!(updated.beyond() < continued.beyond());
-    // What the operator is shown is what comes true, as near as the contour is.
+    // The figures shown to the operator come true, within the error of the contour.
     assert!(
         (update.updated.d90 - updated.d90).abs() < 3.0,
         "{} {}",
@@ -169,9 +169,9 @@ fn needles_planned_anew_give_the_true_gland_more_than_the_plan_carried_on() {
     assert!((update.doses.continued.d90 - continued.d90).abs() < 3.0);
 }
 
-/// The dose of 1 U and that of what lies there are added by the search; the full engine must say the same.
+/// Compares with the full engine: the search adds the dose of 1 U and that of the placed seeds.
 #[test]
-fn the_dose_of_what_lies_there_counts_once() {
+fn the_dose_of_placed_seeds_counts_once() {
     let (source, kernel) = iodine();
     let anatomy = anatomy();
     let present = ImplantPlan {
@@ -229,11 +229,11 @@ fn the_dose_of_what_lies_there_counts_once() {
 }
 
 #[test]
-fn doses_now_and_carried_on_are_those_of_the_full_engine_and_a_search_can_be_cancelled() {
+fn present_and_continued_doses_match_the_full_engine() {
     let (plan, begun, lying) = half_done(|p| p);
     let (source, kernel) = iodine();
     let anatomy = anatomy();
-    // The last seed of the needle at work is still to be dropped.
+    // The last seed of the present needle is still to be dropped.
     let (to_drop, lying) = lying
         .split_last()
         .map(|(last, others)| (vec![*last], others.to_vec()))
@@ -252,7 +252,7 @@ fn doses_now_and_carried_on_are_those_of_the_full_engine_and_a_search_can_be_can
     let doses = situation.doses().unwrap();
     let of = |seeds: &[Seed]| engine.histograms(seeds).figures(1.0, 145.0).unwrap();
     assert_eq!(doses.now, of(&lying));
-    // On plan so far: carried on, it is the plan. Sums in another order round otherwise.
+    // On plan so far: continued, it is the plan. Sums in another order round differently.
     let planned = of(&plan.seeds());
     assert!((doses.continued.d90 - planned.d90).abs() < 1e-6 && doses.now.d90 < planned.d90);
     let cancelled = situation.update(|share| match share > 0.1 {
@@ -263,7 +263,7 @@ fn doses_now_and_carried_on_are_those_of_the_full_engine_and_a_search_can_be_can
 }
 
 #[test]
-fn carried_on_a_needle_that_was_rehearsed_counts_where_its_seeds_would_rest_and_others_as_planned() {
+fn continued_doses_use_rehearsed_places() {
     let (plan, begun, lying) = half_done(|p| p);
     let (source, kernel) = iodine();
     let anatomy = anatomy();

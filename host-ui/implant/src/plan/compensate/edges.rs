@@ -1,8 +1,8 @@
-//! Edges: drops beside which the tissue does something else, so that a tip that stops a little deeper or shallower than it
-//! should leaves its seed elsewhere.
+//! Edges: drops near which the tissue behaves differently, so that a tip that stops a little deeper
+//! or shallower leaves its seed elsewhere.
 //!
-//! A membrane that gives way, or a layer that ends in front of the tip, moves the tissue by millimetres at one place of the tip. A
-//! rehearsal stops at one place; a live hand stops near it.
+//! A membrane that gives way, or a layer that ends in front of the tip, moves the tissue by
+//! millimetres at one place of the tip. A rehearsal stops at one place; a live hand stops near it.
 
 use super::search::seek;
 use super::tried::{Left, Rehearsals, Tried, keep_within};
@@ -12,32 +12,35 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use stylet_shm_schema::MAX_SEEDS;
 
-/// An edge within so much of a drop, deeper or shallower, is looked for. A live hand counts as arrived within that distance of its goal
-/// (`stylet_procedure::tolerance`); it stops within 0.1 mm of where the rehearsed one does, steps of the encoder and late ticks included.
+/// Distance from a drop, deeper or shallower, within which edges are searched. A live hand counts
+/// as arrived within that distance of its goal (`stylet_procedure::tolerance`). It stops within 0.1
+/// mm of the rehearsed one, steps of the encoder and late ticks included.
 pub const BESIDE_M: f64 = stylet_procedure::tolerance::AT_TARGET_M;
-/// From one stop beside a drop to the next.
+/// Distance between stops near a drop.
 const STEP_M: f64 = 0.5 * BESIDE_M;
-/// Stops on either side: a hand that sticks arrives up to [`BESIDE_M`] before its goal, so they go twice as far.
+/// Number of stops on either side: a hand that sticks arrives up to [`BESIDE_M`] before its goal,
+/// so they extend twice as far.
 const STOPS: i8 = 4;
-/// Between two stops a seed follows its drop by up to so many times as much, and a little more; else there is an edge between them. A
-/// live hand that stops 0.1 mm from the rehearsed one leaves a seed that is on none within 0.35 mm of where it was rehearsed.
+/// Largest ratio by which a seed follows its drop between two stops, with a small allowance; beyond
+/// it there is an edge. A live hand that stops 0.1 mm from the rehearsed one leaves a seed without
+/// an edge within 0.35 mm of its rehearsed place.
 const STEADY: f64 = 2.0;
 const UNSTEADY_M: f64 = 0.15e-3;
-/// Places closer than this are the same.
+/// Distance below which places are equal.
 const SAME_M: f64 = 1e-9;
-/// Edges of one needle that are moved away from, one after the other, at most.
+/// Most edges of one needle that are avoided, one after the other.
 const ROUNDS: usize = 3;
-/// Steps to one side, until a drop is clear there, at most.
+/// Most steps to one side until a drop is clear there.
 const STEPS_ASIDE: usize = 3;
-/// Rehearsals, at most, that seek the drops of the seeds behind one that was moved.
+/// Most rehearsals that search the drops of the seeds after one that was moved.
 const SEEK_AGAIN: usize = 12;
 
-/// A seed on an edge: it rests elsewhere if the tip stops up to [`BESIDE_M`] deeper or shallower.
+/// Seed on an edge: it rests elsewhere if the tip stops up to [`BESIDE_M`] deeper or shallower.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensitive {
     /// Number of the seed, deepest first.
     pub seed: usize,
-    /// How far from where it rests otherwise, m; `None` where it would be left outside the tissue.
+    /// Distance from its usual place at rest, m; `None` if it would be left outside the tissue.
     pub moves_m: Option<f64>,
 }
 
@@ -58,20 +61,21 @@ impl std::fmt::Display for Sensitive {
     }
 }
 
-/// An edge between two stops on one side of a drop: how far the tip is from it at each.
+/// Edge between two stops on one side of a drop: distances of the tip from it.
 type Edge = Option<[f64; 2]>;
 
-/// What one seed does with shallower and with deeper stops.
+/// Response of one seed to shallower and deeper stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Beside {
-    /// The nearest edge on each side.
+    /// Nearest edge on each side.
     edges: [Edge; 2],
-    /// Farthest that it rests, beyond an edge, from where it does otherwise, m; infinite where it is lost.
+    /// Largest displacement beyond an edge, m; infinite for a lost seed.
     moves_m: f64,
 }
 
 impl Beside {
-    /// Of a seed that is dropped with the tip at `tip_m`, by what becomes of it at stops beside that.
+    /// Evaluates a seed that is dropped with the tip at `tip_m`, by its places for the stops
+    /// around.
     fn of(tip_m: f64, mut stops: Vec<Left>) -> Self {
         stops.sort_by(|a, b| a.tip_m.total_cmp(&b.tip_m));
         let mut beside = Self::default();
@@ -101,7 +105,7 @@ impl Beside {
         self.moves_m = self.moves_m.max(other.moves_m);
     }
 
-    /// It is left outside the tissue.
+    /// Marks the seed as left outside the tissue.
     fn lose(&mut self, side: usize) {
         (self.edges[side], self.moves_m) = (Some([0.0, BESIDE_M]), f64::INFINITY);
     }
@@ -110,13 +114,14 @@ impl Beside {
         self.edges.iter().any(Option::is_some)
     }
 
-    /// So much deeper, on that side of here, the drop is clear of the edge that lies next to it by [`BESIDE_M`]; `None` where there is none.
+    /// Returns the shift to that side at which the drop is clear of the nearest edge by
+    /// [`BESIDE_M`]; `None` if there is none.
     fn way_m(&self, side: usize) -> Option<f64> {
         let sign = if side == 0 { -1.0 } else { 1.0 };
         let clear_m = match (self.edges[side], self.edges[1 - side]) {
             // Beyond the edge on that side.
             (Some([_, far_m]), _) => far_m + BESIDE_M,
-            // Away from the one on the other.
+            // Away from the one on the other side.
             (None, Some([near_m, _])) => BESIDE_M - near_m,
             (None, None) => return None,
         };
@@ -124,12 +129,12 @@ impl Beside {
     }
 }
 
-/// What every seed of a needle does.
+/// Response of every seed of a needle.
 #[derive(Clone, Debug, PartialEq)]
 struct Moves(Vec<Beside>);
 
 impl Moves {
-    /// The deepest seed on an edge.
+    /// Returns the deepest seed on an edge.
     fn first(&self) -> Option<usize> {
         self.0.iter().position(Beside::is_on_edge)
     }
@@ -144,7 +149,7 @@ impl Moves {
             .collect()
     }
 
-    /// What seeds are off in the mean where every edge is on the wrong side, m.
+    /// Returns the mean error of the seeds if every edge is on the wrong side, m.
     fn worst_mean_m(&self, tried: &Tried) -> f64 {
         let each = tried.error_m.iter().zip(&self.0);
         let off = |(error, beside): (&Vector3<f64>, &Beside)| {
@@ -154,15 +159,15 @@ impl Moves {
     }
 }
 
-/// One stop beside a drop.
+/// Stop near a drop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Stop {
     seed: usize,
     along_m: f64,
 }
 
-/// Where the tip stops beside the drops: on the way in from before the first to beyond it, on the way out from beyond to before the
-/// others.
+/// Returns the stops around the drops: on the way in from before the first to beyond it, on the way
+/// out from beyond to before the others.
 fn stops(drops: &Drops, steps: &[i8]) -> Vec<Stop> {
     let beside = |(seed, drop_m): (usize, &f64)| {
         let drop_m = *drop_m;
@@ -183,7 +188,8 @@ fn stops(drops: &Drops, steps: &[i8]) -> Vec<Stop> {
     stops
 }
 
-/// One rehearsal with a loose seed at every drop and at every stop beside it, so many steps shallower and deeper.
+/// Rehearses with a loose seed at every drop and at every stop around it, by these numbers of steps
+/// shallower and deeper.
 fn at_stops(rehearsals: &mut Rehearsals, at: &Tried, [shallower, deeper]: [i8; 2]) -> Result<Moves, RehearsalError> {
     let steps: Vec<i8> = (-shallower..=deeper).collect();
     let mut stops = stops(&at.drops, &steps);
@@ -206,7 +212,8 @@ fn at_stops(rehearsals: &mut Rehearsals, at: &Tried, [shallower, deeper]: [i8; 2
     Ok(Moves(at.left.iter().enumerate().map(look).collect()))
 }
 
-/// All seeds in one rehearsal; where one of them would be left outside the tissue, with fewer stops, then shallower and deeper apart.
+/// Rehearses all seeds at once; if one of them would be left outside the tissue, with fewer stops,
+/// then shallower and deeper separately.
 fn look(rehearsals: &mut Rehearsals, at: &Tried) -> Result<Moves, RehearsalError> {
     for steps in [STOPS, STOPS / 2] {
         match at_stops(rehearsals, at, [steps; 2]) {
@@ -215,7 +222,7 @@ fn look(rehearsals: &mut Rehearsals, at: &Tried) -> Result<Moves, RehearsalError
         }
     }
     let mut moves = Moves(vec![Beside::default(); at.error_m.len()]);
-    // Shallower the last seed may be before the tissue, deeper the first beyond it.
+    // A shallower last seed may be before the tissue, a deeper first one beyond it.
     let last = at.error_m.len().saturating_sub(1);
     for (side, steps, lost) in [(0, [STOPS / 2, 0], last), (1, [0, STOPS / 2], 0)] {
         match at_stops(rehearsals, at, steps) {
@@ -231,7 +238,8 @@ fn look(rehearsals: &mut Rehearsals, at: &Tried) -> Result<Moves, RehearsalError
     Ok(moves)
 }
 
-/// The same drops with that seed moved along, and those behind it sought again; `None` where it cannot be dropped there.
+/// Returns the same drops with that seed shifted, and later ones searched again; `None` if it
+/// cannot be dropped there.
 fn moved_along(rehearsals: &mut Rehearsals, from: &Tried, seed: usize, by_m: f64) -> Option<Tried> {
     let mut drops = from.drops.clone();
     match rehearsals.needle.loading {
@@ -243,8 +251,8 @@ fn moved_along(rehearsals: &mut Rehearsals, from: &Tried, seed: usize, by_m: f64
     Some(seek(rehearsals, seed + 1, tried.clone(), tried, SEEK_AGAIN))
 }
 
-/// Moves the drop of that seed to one side until it is clear of the edges there. A hand that sticks stops where it stopped before,
-/// so one step may not be enough.
+/// Moves the drop of that seed to one side until it is clear of the edges there. A hand that sticks
+/// stops at its old place, so one step may not be enough.
 fn to_side(
     rehearsals: &mut Rehearsals,
     from: &Tried,
@@ -269,8 +277,8 @@ fn to_side(
     Ok(at)
 }
 
-/// Drops clear of edges, as far as there are such: moved to the side on which less is lost. Beside them the seeds that are on an
-/// edge even so.
+/// Returns drops clear of edges, as far as possible, moved to the side with the smaller loss; and
+/// the seeds that are still on an edge.
 pub(super) fn keep_clear(rehearsals: &mut Rehearsals, found: Tried) -> Result<(Tried, Vec<Sensitive>), RehearsalError> {
     let mut moves = look(rehearsals, &found)?;
     let mut best = found;

@@ -5,19 +5,19 @@ use super::tried::{Rehearsals, Tried, aside, keep_within};
 use crate::plan::rehearse::{Drops, RehearsalError};
 use crate::plan::{Loading, Needle};
 
-/// A drop is not sought any closer.
+/// Resolution of the search.
 const LEAST_MOVE_M: f64 = 0.05e-3;
-/// Between two drops the next one keeps from both by this part of their distance.
+/// Distance of the next drop from both ends, as a part of their distance.
 const KEPT_FROM_ENDS: f64 = 0.1;
-/// Where a step leaves a seed on the same side, the next one is so many times as long.
+/// Growth of the step if a seed stays on the same side.
 const LONGER: f64 = 1.5;
-/// Rehearsals for one seed, at most.
+/// Most rehearsals for one seed.
 const PER_SEED: usize = 9;
-/// Where dropping as planned is not possible, drops are tried so much deeper at a time.
+/// Step by which drops are shifted deeper if the planned ones are impossible.
 pub(super) const DEEPER_M: f64 = 1e-3;
 
-/// Seeks the drops of the seeds from that number on; those before it stay as they are in `last`. Returns the best that was
-/// rehearsed, `best` among them, after at most so many rehearsals.
+/// Searches the drops of the seeds from that number on; earlier ones stay as in `last`. Returns the
+/// best rehearsal, `best` included, after a limited number.
 pub(super) fn seek(rehearsals: &mut Rehearsals, from: usize, mut best: Tried, mut last: Tried, most: usize) -> Tried {
     let (needle, limits) = (rehearsals.needle, rehearsals.limits);
     let sought = match needle.loading {
@@ -31,7 +31,7 @@ pub(super) fn seek(rehearsals: &mut Rehearsals, from: usize, mut best: Tried, mu
     let until = rehearsals.count + most;
     let mut search = Search::begin(from, needle, last.clone());
     let mut others_move = true;
-    // Drops behind the sought one that were refused: they are made no shallower.
+    // Later drops that were refused: they are made no shallower.
     let mut least_m = vec![0.0_f64; best.error_m.len()];
     let mut next = search.next_m(needle, limits);
     while rehearsals.count < until && best.worst_m() > limits.enough_m {
@@ -62,12 +62,13 @@ pub(super) fn seek(rehearsals: &mut Rehearsals, from: usize, mut best: Tried, mu
                 last = new;
                 others_move = true;
             }
-            // It may be another seed that cannot be dropped where it was moved along to.
+            // The refused drop may be that of another seed that was shifted along.
             Err(_) if others_move && search.seed + 1 < sought => {
                 others_move = false;
                 continue;
             }
-            // The tissue is farther in than the one behind it would be dropped: with the sought one there, that goes deeper.
+            // The tissue lies deeper than the next drop: with the present one there, that one goes
+            // deeper.
             Err(RehearsalError::Refused {
                 drop: Some(refused), ..
             }) if (search.seed + 1..sought).contains(&refused) && asked[refused] + DEEPER_M < asked[refused - 1] => {
@@ -81,15 +82,15 @@ pub(super) fn seek(rehearsals: &mut Rehearsals, from: usize, mut best: Tried, mu
     best
 }
 
-/// Where one seed's drop is sought, while those before it stay; of a strand, that of its first seed.
+/// Search for one seed's drop while earlier ones stay; for a strand, that of its first seed.
 struct Search {
     /// Number of the seed.
     seed: usize,
-    /// The deepest drop that leaves it short of its place, and the shallowest that leaves it beyond; how far, unless it could not be
-    /// dropped there.
+    /// Deepest drop that leaves the seed short, and shallowest that leaves it too deep, with its
+    /// error, unless it could not be dropped there.
     short: Option<(f64, Option<f64>)>,
     beyond: Option<(f64, Option<f64>)>,
-    /// The rehearsal that brought it nearest.
+    /// Rehearsal with the smallest error.
     nearest: Tried,
     step_m: f64,
     tries: usize,
@@ -123,7 +124,7 @@ impl Search {
         }
     }
 
-    /// It could not be dropped there.
+    /// Records that the seed could not be dropped there.
     fn refuse(&mut self, drop_m: f64) {
         if drop_m > self.nearest.drops.along_m[self.seed] {
             self.beyond = Some((drop_m, None));
@@ -132,7 +133,8 @@ impl Search {
         }
     }
 
-    /// The next drop to try; `None` where it is near enough, or nothing better is to be expected.
+    /// Returns the next drop to try; `None` if the error is small enough, or no improvement is
+    /// likely.
     fn next_m(&mut self, needle: &Needle, limits: &Limits) -> Option<f64> {
         let is_near = self.nearest.off_m(needle, self.seed).abs() <= limits.enough_m;
         if is_near || self.tries >= PER_SEED {
@@ -145,7 +147,7 @@ impl Search {
         match (self.short, self.beyond) {
             (Some((from_m, short)), Some((to_m, beyond))) => {
                 let part = match (short, beyond) {
-                    // By turns, as the rest of a seed may hardly depend on its drop on one side.
+                    // Alternate, because a seed's place may hardly depend on its drop on one side.
                     (Some(short), Some(beyond)) if self.tries % 2 == 1 => short / (short - beyond),
                     _ => 0.5,
                 };
@@ -165,7 +167,8 @@ impl Search {
     }
 }
 
-/// The drops of the nearest rehearsal with that of the sought seed at `drop_m`; those after it by what they were off last.
+/// Returns the drops of the best rehearsal with that of this seed at `drop_m`; later ones shift by
+/// their last error.
 fn moved(needle: &Needle, search: &Search, last: &Tried, drop_m: f64, others_move: bool, limits: &Limits) -> Drops {
     let mut drops = search.nearest.drops.clone();
     let by_m = drop_m - drops.along_m[search.seed];

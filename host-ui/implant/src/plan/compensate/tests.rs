@@ -1,17 +1,18 @@
-//! Compensation in tissues of known motion: what must come out is known without a rehearsal.
+//! Compensation in tissues of known motion, whose result is known without a rehearsal.
 
 use super::*;
 use crate::plan::NeedleSeed;
 use crate::plan::rehearse::Rest;
 
-/// Tissue lies so far ahead, by a law of the drop's place along the needle; seeds are off so far across.
+/// Tissue that lies ahead by a law of the drop's place along the needle, and seeds that are off
+/// across.
 struct Known<F> {
     ahead_m: F,
     across_m: [f64; 3],
-    /// Before and beyond this the tip is outside.
+    /// Range beyond which the tip is outside.
     tissue_from_m: f64,
     tissue_to_m: f64,
-    /// The hand stops at multiples of this; 0 stops anywhere.
+    /// Step of the hand; 0 stops anywhere.
     sticks_m: f64,
     asked: usize,
 }
@@ -76,7 +77,7 @@ fn run(needle: &Needle, tissue: &mut dyn Rehearser) -> Compensation {
 }
 
 #[test]
-fn in_tissue_that_moves_with_depth_every_seed_comes_to_rest_on_plan() {
+fn compensation_works_in_tissue_that_moves_with_depth() {
     // z - (2 mm + 0.1 z) = planned: the drop must be at (planned + 2 mm) / 0.9.
     let mut known = tissue(|z| 2e-3 + 0.1 * z);
     let done = run(&needle(Loading::Loose), &mut known);
@@ -84,7 +85,7 @@ fn in_tissue_that_moves_with_depth_every_seed_comes_to_rest_on_plan() {
         assert!((drop - (planned + 2e-3) / 0.9).abs() < 0.1e-3, "{drop} {planned}");
     }
     assert!(done.errors_before_m().all(|e| e > 4e-3) && done.errors_after_m().all(|e| e < 0.1e-3));
-    // One of them looked for edges.
+    // One of them searched for edges.
     assert!(known.asked <= 5 && done.for_edges == 1, "{} rehearsals", known.asked);
     assert!(done.sensitive.is_empty(), "{:?}", done.sensitive);
 }
@@ -101,7 +102,7 @@ fn a_strand_takes_the_mean_and_keeps_its_pitch() {
 }
 
 #[test]
-fn a_needle_that_is_pushed_aside_is_aimed_beside_but_not_past_its_limit() {
+fn a_deflected_needle_is_shifted_within_its_limit() {
     let mut known = tissue(|_| 0.0);
     known.across_m = [1e-3, 0.0, 0.0];
     let done = run(&needle(Loading::Loose), &mut known);
@@ -115,7 +116,8 @@ fn a_needle_that_is_pushed_aside_is_aimed_beside_but_not_past_its_limit() {
     );
 }
 
-/// A needle moved aside by nanometres is another needle to the core, which solves for its line again.
+/// Guards against a needle shifted by nanometres, which is a new needle for the core and makes it
+/// compute the line again.
 #[test]
 fn a_needle_whose_seeds_are_hardly_aside_stays_in_its_place() {
     let mut known = tissue(|z| 2e-3 + 0.1 * z);
@@ -130,7 +132,7 @@ fn a_needle_whose_seeds_are_hardly_aside_stays_in_its_place() {
 }
 
 #[test]
-fn limits_hold_and_what_cannot_be_had_is_approached() {
+fn limits_hold_and_unreachable_goals_are_approached() {
     let mut known = tissue(|_| 20e-3);
     let done = run(&needle(Loading::Loose), &mut known);
     assert!(
@@ -152,7 +154,8 @@ fn limits_hold_and_what_cannot_be_had_is_approached() {
     assert!(done.drops.along_m[0] <= 0.052);
     let [mean_before, mean_after]: [f64; 2] = [done.errors_before_m().sum(), done.errors_after_m().sum()];
     assert!(mean_after < mean_before);
-    // Tissue that begins beyond the plan's last drop: nothing can be done as planned, but deeper.
+    // Tissue that begins beyond the plan's last drop: nothing can be dropped as planned, only
+    // deeper.
     let mut ahead = tissue(|_| 4e-3);
     ahead.tissue_from_m = 0.032;
     let done = run(&needle(Loading::Loose), &mut ahead);
@@ -171,17 +174,18 @@ fn limits_hold_and_what_cannot_be_had_is_approached() {
 }
 
 #[test]
-fn tissue_that_overshoots_does_not_send_the_drops_to_and_fro() {
-    // A slope of 1.9 at first sight, bent.
+fn overshooting_tissue_does_not_make_drops_oscillate() {
+    // A slope of 1.9 at first, curved.
     let mut known = tissue(|z| 3e-3 - 0.6 * (z - 0.04) + 40.0 * (z - 0.04).powi(2));
     let done = run(&needle(Loading::Loose), &mut known);
     let [[before, _], [after, _]] = summary_m(&[done]);
     assert!(after < 0.1 * before, "{before} {after}");
 }
 
-/// Live, the base of a gland gave way 0.05 mm before the deepest drop, and its seed came to rest 6.88 mm from where it was rehearsed.
+/// Guards against a base of the gland that gave way live 0.05 mm before the deepest drop, so that
+/// its seed came to rest 6.88 mm from the rehearsed place.
 #[test]
-fn a_seed_beside_an_edge_is_dropped_clear_of_it_on_either_side() {
+fn a_seed_near_an_edge_is_dropped_clear_of_it() {
     // On plan at 52 mm, where the tissue stays for 0.05 mm more, or has given way 0.05 mm before.
     type Law = fn(f64) -> f64;
     let ahead: [(f64, Law); 2] = [
@@ -223,7 +227,7 @@ fn a_strand_is_moved_from_an_edge_as_a_whole() {
 }
 
 #[test]
-fn where_edges_are_everywhere_the_seed_is_named_with_how_far_it_moves() {
+fn unavoidable_edges_are_reported_with_their_jump() {
     // Gives way by 4 mm and holds again, every 0.4 mm, from 45 mm on.
     let mut known = tissue(|z| match z > 0.045 && ((z - 0.05) / 0.4e-3).rem_euclid(2.0) < 1.0 {
         true => 4e-3,
@@ -243,7 +247,7 @@ fn where_edges_are_everywhere_the_seed_is_named_with_how_far_it_moves() {
 }
 
 #[test]
-fn a_drop_at_the_end_of_the_tissue_is_moved_into_it() {
+fn a_drop_beyond_the_tissue_is_shifted_into_it() {
     // The last seed is on plan at 32 mm.
     let mut known = tissue(|_| 2e-3);
     known.tissue_from_m = 0.0319;
@@ -256,9 +260,9 @@ fn a_drop_at_the_end_of_the_tissue_is_moved_into_it() {
     assert!(done.sensitive.is_empty(), "{:?}", done.sensitive);
 }
 
-/// Who ends a compensation does not want its seeds called lost.
+/// Checks that cancelling a compensation does not report its seeds as lost.
 #[test]
-fn an_edge_is_not_made_of_a_core_that_ended() {
+fn an_ended_core_is_not_taken_for_an_edge() {
     struct Closed(usize);
     impl Rehearser for Closed {
         fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
@@ -287,9 +291,10 @@ fn a_seed_that_follows_its_drop_steeply_is_on_no_edge() {
     assert!(done.errors_after_m().all(|e| e < 0.1e-3), "{:?}", done.after_m);
 }
 
-/// A needle that was moved from its edge by as much as the edge was near stuck where it had been, and the other side was taken.
+/// Guards against a shift equal to the distance of an edge: a hand that stuck stayed where it was,
+/// and the other side was chosen.
 #[test]
-fn a_hand_that_sticks_is_sent_on_until_its_tip_is_clear() {
+fn a_sticking_hand_is_moved_until_its_tip_is_clear() {
     let mut known = tissue(|z| if z < 0.05205 { 2e-3 } else { -5e-3 });
     known.sticks_m = 0.4e-3;
     let done = run(&needle(Loading::Loose), &mut known);
@@ -299,10 +304,10 @@ fn a_hand_that_sticks_is_sent_on_until_its_tip_is_clear() {
     assert!(tip_m <= 0.05205 - edges::BESIDE_M && tip_m > 0.051, "{tip_m}");
 }
 
-/// The deeper the first seed is dropped, the farther in the tissue begins for the last one: each refusal was taken for one of the first seed's
-/// drop, which was then sought no deeper, and left 10 mm short.
+/// Guards against refusals attributed to the first seed. The deeper it is dropped, the deeper the
+/// tissue begins for the last one; the first was then searched no deeper, and left 10 mm short.
 #[test]
-fn a_seed_is_sought_deeper_although_the_last_one_cannot_be_dropped_as_before() {
+fn a_refused_last_drop_does_not_stop_a_deeper_search() {
     struct Dragged;
     impl Rehearser for Dragged {
         fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {

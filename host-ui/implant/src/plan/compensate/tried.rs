@@ -1,4 +1,4 @@
-//! Rehearsals of one needle: drops, and where their seeds rest.
+//! Rehearsals of one needle: drops, and the places of their seeds.
 
 use super::Limits;
 use crate::plan::rehearse::{Drops, RehearsalError, Rehearser, Rest};
@@ -6,23 +6,23 @@ use crate::plan::{Loading, Needle};
 use nalgebra::Vector3;
 use stylet_procedure::Pace;
 
-/// Drops of one needle keep their order by at least this.
+/// Smallest distance between successive drops of one needle.
 const APART_M: f64 = 0.1e-3;
 
-/// One needle, and who rehearses it.
+/// Needle, and its rehearser.
 pub(super) struct Rehearsals<'a> {
     pub needle: &'a Needle,
     pub pace: &'a Pace,
     pub limits: &'a Limits,
     pub rehearser: &'a mut dyn Rehearser,
-    /// Rehearsals so far.
+    /// Number of rehearsals so far.
     pub count: usize,
 }
 
-/// Where one seed was left, and where it rests.
+/// Place of a seed when it was left, and at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Left {
-    /// Where the tip was, from the entry along the needle, m.
+    /// Place of the tip, from the entry along the needle, m.
     pub tip_m: f64,
     /// Place at rest, m.
     pub rest_m: Vector3<f64>,
@@ -39,7 +39,7 @@ impl Rehearsals<'_> {
         })
     }
 
-    /// What becomes of the seeds, in the order of the drops.
+    /// Returns the places of the seeds, in the order of the drops.
     pub fn left(&mut self, drops: &Drops) -> Result<Vec<Left>, RehearsalError> {
         self.count += 1;
         let Rest {
@@ -56,7 +56,7 @@ impl Rehearsals<'_> {
     }
 }
 
-/// Drops that were rehearsed, and the errors of their seeds.
+/// Rehearsed drops, and the errors of their seeds.
 #[derive(Clone)]
 pub(super) struct Tried {
     pub drops: Drops,
@@ -74,7 +74,8 @@ impl Tried {
         self.error_m.iter().map(Vector3::norm).fold(0.0, f64::max)
     }
 
-    /// How far a seed lies beyond its place along the needle; of a strand, all of it.
+    /// Returns the error of a seed along the needle, positive if too deep; for a strand, of all of
+    /// it.
     pub fn off_m(&self, needle: &Needle, seed: usize) -> f64 {
         let direction = Vector3::from(needle.direction);
         let along = |e: &Vector3<f64>| e.dot(&direction);
@@ -85,7 +86,7 @@ impl Tried {
     }
 }
 
-/// What a strand is off: moved by that, its seeds are off by the least in the mean.
+/// Returns the median error of a strand: shifted by it, its seeds have the smallest mean error.
 fn median(mut off_m: Vec<f64>) -> f64 {
     off_m.sort_by(f64::total_cmp);
     let n = off_m.len();
@@ -95,7 +96,8 @@ fn median(mut off_m: Vec<f64>) -> f64 {
     }
 }
 
-/// Drops near enough to the plan, none deeper than the tip may go, deepest first: a drop must not need the tip to go in again.
+/// Restricts drops to the neighbourhood of the plan and the reach of the tip, deepest first: a drop
+/// must not need the tip to go in again.
 pub(super) fn keep_within(needle: &Needle, limits: &Limits, drops: &mut Drops) {
     for (along_m, planned) in drops.along_m.iter_mut().zip(&needle.seeds) {
         let [least, most] = [planned.along_m - limits.along_m, planned.along_m + limits.along_m];
@@ -106,8 +108,8 @@ pub(super) fn keep_within(needle: &Needle, limits: &Limits, drops: &mut Drops) {
     }
 }
 
-/// The needle as a whole moves across by what its seeds are off on average; for next to nothing it stays in its place, where the
-/// tissue is ready for it.
+/// Shifts the needle across by the mean error of its seeds; for a negligible one it stays in place,
+/// where the tissue is prepared.
 pub(super) fn aside(needle: &Needle, last: &Tried, limits: &Limits, drops: &mut Drops) {
     let direction = Vector3::from(needle.direction);
     let sum = last.error_m.iter().fold(Vector3::zeros(), |sum, e| sum + e);

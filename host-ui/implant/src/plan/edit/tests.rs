@@ -1,4 +1,5 @@
-//! Edits against what they say, undo against the plans that were, and checks against plans with one fault each.
+//! Edits against their results, undo against earlier plans, and checks against plans with one fault
+//! each.
 
 use super::*;
 use crate::plan::anatomy::ball;
@@ -38,7 +39,7 @@ fn hole(name: &str) -> Hole {
     name.parse().expect("a hole")
 }
 
-/// Two needles beside the urethra, three seeds each.
+/// Returns two needles next to the urethra, three seeds each.
 fn good() -> ImplantPlan {
     let plan = empty().with_needle(hole("E7"), 0.08).unwrap();
     let plan = plan.with_strand(0, 3, 0.08, 0.5).unwrap();
@@ -49,7 +50,7 @@ fn good() -> ImplantPlan {
 }
 
 #[test]
-fn a_good_plan_has_no_problem_and_its_seeds_are_where_they_were_put() {
+fn a_good_plan_has_no_problem() {
     let plan = good();
     assert_eq!(problems(&plan, &anatomy()), Vec::new());
     let z: Vec<f64> = plan.seeds().iter().map(|s| s.position_m[2]).collect();
@@ -126,7 +127,7 @@ fn a_hole_takes_one_needle() {
 }
 
 #[test]
-fn undo_gives_back_each_plan_and_redo_the_next() {
+fn undo_and_redo_restore_each_plan() {
     let plans = [
         empty(),
         empty().with_needle(hole("E7"), 0.08).unwrap(),
@@ -149,7 +150,7 @@ fn undo_gives_back_each_plan_and_redo_the_next() {
 }
 
 #[test]
-fn a_row_lies_evenly_from_its_deepest_seed_and_reads_back_as_it_was_put() {
+fn a_row_is_even_and_reads_back_equal() {
     let row = Row {
         count: 4,
         deepest_m: 0.081,
@@ -172,7 +173,7 @@ fn a_row_lies_evenly_from_its_deepest_seed_and_reads_back_as_it_was_put() {
 }
 
 #[test]
-fn a_row_fills_a_piece_at_the_usual_distance_and_does_not_leave_it() {
+fn a_row_fills_a_piece_at_the_usual_pitch() {
     for (from_m, to_m, count) in [(0.05, 0.083, 4), (0.05, 0.0801, 4), (0.05, 0.079, 3), (0.05, 0.055, 1)] {
         let row = Row::filling([from_m, to_m], 0.5);
         assert_eq!((row.count, row.stranded), (count, count > 1), "{from_m} to {to_m}");
@@ -186,7 +187,7 @@ fn a_row_fills_a_piece_at_the_usual_distance_and_does_not_leave_it() {
 }
 
 #[test]
-fn a_value_that_is_being_drawn_is_one_step() {
+fn a_drag_is_one_undo_step() {
     let mut history = History::new(empty());
     history.put(good());
     for deepest_m in [0.081, 0.082, 0.083] {

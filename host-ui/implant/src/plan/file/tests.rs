@@ -1,9 +1,9 @@
-//! A plan written and read is the same plan; a broken one is refused with everything that is wrong.
+//! A plan that was written reads back equal; a broken one is refused with every problem.
 
 use super::*;
 use crate::readers::{SeedDefaults, read_seed_rows, read_seeds};
 
-/// A quarter turn about x, and a shift: patient y is the scene's -z.
+/// Returns a quarter turn about x, and a shift: patient y is the scene's -z.
 fn frames() -> PatientFrame {
     PatientFrame::of_wire(&[1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0, 0.01, -0.02, 0.03])
 }
@@ -57,7 +57,7 @@ fn same(a: &ImplantPlan, b: &ImplantPlan) {
 }
 
 #[test]
-fn a_plan_written_and_read_is_the_same_plan_in_the_patient_s_frame() {
+fn a_plan_round_trip_keeps_the_patient_frame() {
     let text = to_text(&plan(), &frames()).unwrap();
     // The scene's z is the patient's -y: the needle goes posterior.
     assert!(text.contains("direction = [0.0, -1.0, 0.0]"), "{text}");
@@ -69,7 +69,7 @@ fn a_plan_written_and_read_is_the_same_plan_in_the_patient_s_frame() {
 }
 
 #[test]
-fn a_broken_plan_is_refused_with_all_that_is_wrong() {
+fn a_broken_plan_is_refused_with_every_problem() {
     let good = to_text(&plan(), &frames()).unwrap();
     assert!(from_text("", &frames()).is_err());
     assert!(from_text(&good.replace("source =", "sauce ="), &frames()).is_err());
@@ -86,7 +86,7 @@ fn a_broken_plan_is_refused_with_all_that_is_wrong() {
 }
 
 #[test]
-fn seeds_written_for_the_dose_command_are_the_same_seeds_when_they_are_read_and_imported() {
+fn written_seeds_read_back_equal() {
     let folder = std::env::temp_dir().join(format!("stylet-plan-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let file = folder.join("seeds.csv");
@@ -107,7 +107,7 @@ fn seeds_written_for_the_dose_command_are_the_same_seeds_when_they_are_read_and_
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// What `import` makes of a table.
+/// Imports a table.
 fn imported(name: &str, csv: &str) -> Result<ImplantPlan, String> {
     let file = std::env::temp_dir().join(format!("stylet-plan-{name}-{}.csv", std::process::id()));
     std::fs::write(&file, csv).unwrap();

@@ -1,26 +1,26 @@
-//! Simulated annealing: random moves of seeds and needles, worse ones taken less and less often (Kirkpatrick, Gelatt, Vecchi,
-//! Science 220, 671, 1983).
+//! Simulated annealing: random moves of seeds and needles; worse ones are accepted ever more rarely
+//! (Kirkpatrick, Gelatt, Vecchi, Science 220, 671, 1983).
 
 use super::state::{Move, State};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::ops::ControlFlow;
 
-/// The same every time: one input has one plan.
+/// Random seed, constant so that one input gives one plan.
 const SEED: u64 = 0x5eed;
-/// Moves between two reports.
+/// Number of moves between two reports.
 const REPORT_EVERY: usize = 200;
 
-/// How long and how hot.
+/// Length and temperatures of an annealing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
-    /// Moves that are tried.
+    /// Number of tried moves.
     pub moves: usize,
-    /// A move that costs so much more is taken with probability 1/e at first, and at last.
+    /// Cost increases that are accepted with probability 1/e, at first and at last.
     pub temperatures: [f32; 2],
 }
 
-/// Ends with the best choice that was found.
+/// Anneals; ends with the best choice found.
 pub fn anneal(state: &mut State, schedule: &Schedule, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
     let mut random = ChaCha8Rng::seed_from_u64(SEED);
     let mut best = state.clone();
@@ -84,7 +84,7 @@ fn propose(state: &State, random: &mut ChaCha8Rng) -> Option<Move> {
             } else {
                 on_used_way(state, random)?
             };
-            // Stronger seeds are fewer.
+            // Stronger seeds need fewer.
             let [without, with] = if up {
                 [vec![one], Vec::new()]
             } else {
@@ -103,7 +103,7 @@ fn any_seed(state: &State, random: &mut ChaCha8Rng) -> Option<usize> {
     below(random, state.seeds.len()).map(|n| state.seeds[n])
 }
 
-/// A free place one or two places on, along the same needle.
+/// Returns a free place one or two places on, along the same needle.
 fn along(state: &State, seed: usize, random: &mut ChaCha8Rng) -> Option<usize> {
     let places = &state.candidates.ways[state.candidates.places[seed].way].places;
     let by = below(random, 2)? + 1;
@@ -115,7 +115,7 @@ fn along(state: &State, seed: usize, random: &mut ChaCha8Rng) -> Option<usize> {
     (places.contains(&to) && !state.chosen[to]).then_some(to)
 }
 
-/// A free place on a needle that has seeds.
+/// Returns a free place on a needle that has seeds.
 fn on_used_way(state: &State, random: &mut ChaCha8Rng) -> Option<usize> {
     let way = state.candidates.places[any_seed(state, random)?].way;
     let places = &state.candidates.ways[way].places;
@@ -123,7 +123,7 @@ fn on_used_way(state: &State, random: &mut ChaCha8Rng) -> Option<usize> {
     (!state.chosen[place]).then_some(place)
 }
 
-/// All seeds of a needle through one of the eight holes around it.
+/// Returns all seeds of a needle through one of the eight holes around it.
 fn needle_aside(state: &State, random: &mut ChaCha8Rng) -> Option<Move> {
     let candidates = state.candidates;
     let from = candidates.places[any_seed(state, random)?].way;
@@ -146,7 +146,8 @@ fn needle_aside(state: &State, random: &mut ChaCha8Rng) -> Option<Move> {
     })
 }
 
-/// As deep as these on another way; two that would share a place become one.
+/// Returns the places at the same depths on another needle line; two that would coincide become
+/// one.
 fn nearest_places(state: &State, places: &[usize], way: usize) -> Vec<usize> {
     let candidates = state.candidates;
     let off_m = |p: usize, along_m: f64| (candidates.places[p].along_m - along_m).abs();
@@ -162,7 +163,7 @@ fn nearest_places(state: &State, places: &[usize], way: usize) -> Vec<usize> {
     found
 }
 
-/// A needle at a free way takes over the seeds of another one.
+/// Moves the seeds of a needle to an unused hole.
 fn new_needle(state: &State, random: &mut ChaCha8Rng) -> Option<Move> {
     let to = below(random, state.of_way.len())?;
     if state.of_way[to] > 0 {

@@ -1,52 +1,53 @@
-//! What a search may choose from: holes whose way is free, and places for seeds along them.
+//! Choices of a search: holes with a free path, and places for seeds along them.
 
 use crate::plan::check::SPARED_MARGIN_M;
 use crate::plan::{Anatomy, Hole, ImplantPlan, Loading, Needle, NeedleSeed, SEED_LENGTH_M, SPACER_M, Template};
 use std::ops::Range;
 
-/// From one place to the next along a needle, half the pitch of a strand.
+/// Distance between places along a needle, half the pitch of a strand.
 pub const PLACE_PITCH_M: f64 = (SEED_LENGTH_M + SPACER_M) / 2.0;
-/// Needles stay so far from what is spared, besides the margin that the check asks for.
+/// Distance of needles from spared structures, in addition to the margin of the check.
 const SPARED_M: f64 = 1e-3;
-/// Needles stay so far from bone.
+/// Distance of needles from bone.
 const BONE_M: f64 = 1e-3;
-/// A way through less of the target than this gets no needle.
+/// Shortest path through the target that gets a needle.
 const SHORTEST_M: f64 = 10e-3;
-/// A needle goes so far inside the target's edge, seen along it.
+/// Distance of a needle's end from the target's edge, along it.
 const INSIDE_M: f64 = 1.5e-3;
 const STEP_M: f64 = 1e-3;
 
-/// A hole that a needle can go through.
+/// Hole that a needle can go through.
 pub struct Way {
     /// The hole.
     pub hole: Hole,
-    /// Its places, deepest first.
+    /// Range of its places, deepest first.
     pub places: Range<usize>,
 }
 
-/// A place for a seed.
+/// Place for a seed.
 pub struct Place {
-    /// The way that it is on.
+    /// Index of its hole.
     pub way: usize,
-    /// From the hole, along the needle, m.
+    /// Distance from the hole, along the needle, m.
     pub along_m: f64,
     /// Scene frame, m.
     pub position_m: [f64; 3],
 }
 
-/// All ways with all places.
+/// All holes with all places.
 pub struct Candidates {
     template: Template,
     /// Holes, row by row.
     pub ways: Vec<Way>,
     /// Places, way by way.
     pub places: Vec<Place>,
-    /// Holes with target behind them that are not offered because bone is in the way.
+    /// Number of holes with target behind them that bone blocks.
     pub behind_bone: usize,
 }
 
 impl Candidates {
-    /// Every hole but the used ones with enough target behind it that is reached past bone and past what is spared.
+    /// Returns every unused hole with enough target behind it that is reachable past bone and
+    /// spared structures.
     pub fn new(template: &Template, anatomy: &Anatomy, used: &[Hole]) -> Self {
         let mut found = Self {
             template: *template,
@@ -85,7 +86,7 @@ impl Candidates {
             self.behind_bone += 1;
             return;
         }
-        // The needle may end before what is spared.
+        // The needle may end before a spared structure.
         let spared_m = free_until(&anatomy.spared, SPARED_MARGIN_M + SPARED_M);
         let to_m = spared_m.map_or(to_m, |spared_m| to_m.min(spared_m - SEED_LENGTH_M));
         if to_m - from_m < SHORTEST_M {
@@ -106,19 +107,19 @@ impl Candidates {
         self.ways.push(Way { hole, places });
     }
 
-    /// Unit vector along all needles.
+    /// Returns the unit vector along all needles.
     pub fn inwards(&self) -> [f64; 3] {
         self.template.inwards
     }
 
-    /// The plan whose seeds lie at the chosen places.
+    /// Returns the plan whose seeds lie at the chosen places.
     pub fn plan(&self, chosen: &[bool], strength_u: f64, source: &str, prescription_gy: f64) -> ImplantPlan {
         let mut needles: Vec<Needle> = self
             .ways
             .iter()
             .filter_map(|way| self.needle(way, chosen, strength_u))
             .collect();
-        // From anterior to posterior, as it is done: what lies behind stays visible to the probe.
+        // From anterior to posterior, as in practice: the part behind stays visible to the probe.
         needles.sort_by(|a, b| {
             let row = |needle: &Needle| needle.hole.map(Hole::row);
             row(b).cmp(&row(a)).then(a.hole.cmp(&b.hole))
@@ -154,7 +155,7 @@ impl Candidates {
     }
 }
 
-/// Whether all places around one across the needles lie in the target.
+/// Returns whether all places around one across the needles lie in the target.
 fn is_inside(template: &Template, anatomy: &Anatomy, place_m: [f64; 3]) -> bool {
     (0..8).all(|direction| {
         let (sine, cosine) = (f64::from(direction) * std::f64::consts::FRAC_PI_4).sin_cos();
@@ -165,7 +166,7 @@ fn is_inside(template: &Template, anatomy: &Anatomy, place_m: [f64; 3]) -> bool 
     })
 }
 
-/// From the template's face to the far side of a box.
+/// Returns the distance from the template's face to the far side of a box.
 fn farthest_m(template: &Template, low: [f64; 3], high: [f64; 3]) -> f64 {
     let depth_m = |corner: usize| {
         let at = |a: usize| if corner >> a & 1 == 0 { low[a] } else { high[a] };

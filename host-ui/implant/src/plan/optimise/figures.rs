@@ -1,14 +1,15 @@
-//! The measures that objectives are about, at the points of the full dose engine and at those of the search.
+//! Measures of the objectives, at the points of the full dose engine and at those of the search.
 
 use super::samples::{RECTUM_M3, Samples};
 use crate::plan::anatomy::Body;
 use crate::plan::dose::{DoseKernel, DosePoints, Dvh, Seed, Structure};
 use std::fmt;
 
-/// Pitch of the full engine's points, as everywhere where a plan is judged.
+/// Pitch of the full engine's points, as in every evaluation of a plan.
 const DOSE_PITCH_M: f64 = 1e-3;
 
-/// Measures of a plan in percent, of the target or of the prescription; those of a structure that is not there are `None`.
+/// Measures of a plan in percent, of the target or of the prescription; `None` for a missing
+/// structure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
     /// Share of the target with the prescription.
@@ -17,7 +18,7 @@ pub struct Figures {
     pub d90: f64,
     /// Share of the target with 150 % of the prescription.
     pub v150: f64,
-    /// Share of the target with 200 % of the prescription; it has no limit.
+    /// Share of the target with 200 % of the prescription, without a limit.
     pub v200: f64,
     /// Dose to the hottest tenth of the urethra.
     pub urethra_d10: Option<f64>,
@@ -27,7 +28,7 @@ pub struct Figures {
     pub rectum_d2cc: Option<f64>,
 }
 
-/// A measure with what it should be between.
+/// Measure with its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measure {
     name: &'static str,
@@ -38,12 +39,12 @@ pub struct Measure {
 }
 
 impl Measure {
-    /// Structure and measure, for people.
+    /// Returns structure and measure, for display.
     pub fn name(&self) -> &'static str {
         self.name
     }
 
-    /// How far it is beyond its limits, percent; 0 within them.
+    /// Returns the excess over its limits, percent; 0 within them.
     pub fn beyond(&self) -> f64 {
         let [least, most] = self.limits;
         (least - self.value).max(self.value - most).max(0.0)
@@ -65,7 +66,8 @@ impl fmt::Display for Measure {
 }
 
 impl Figures {
-    /// From histograms of target, urethra and rectum; `None` without a target. `rectum` is 2 cc in the unit of its volumes.
+    /// Computes measures from histograms of target, urethra and rectum; `None` without a target.
+    /// `rectum` is 2 cc in the unit of its volumes.
     fn of(dvhs: &[Option<Dvh>; 3], prescription: f64, rectum: f64) -> Option<Self> {
         let [target, urethra, other] = dvhs;
         let percent = |dose: Option<f64>| dose.map(|dose| dose / prescription * 100.0);
@@ -83,7 +85,7 @@ impl Figures {
         })
     }
 
-    /// At the points of the search, from doses as shares of the prescription.
+    /// Computes measures at the points of the search, from doses as shares of the prescription.
     pub(super) fn of_samples(samples: &Samples, dose: &[f32]) -> Option<Self> {
         let dvh = |range: &std::ops::Range<usize>| {
             let doubles = |values: &[f32]| values[range.clone()].iter().map(|v| f64::from(*v)).collect::<Vec<_>>();
@@ -92,7 +94,7 @@ impl Figures {
         Self::of(&[&samples.target, &samples.urethra, &samples.rectum].map(dvh), 1.0, 1.0)
     }
 
-    /// Each measure with its limits.
+    /// Returns each measure with its limits.
     pub fn measures(&self) -> impl Iterator<Item = Measure> + use<> {
         let measure = |name, value: Option<f64>, limits| value.map(|value| Measure { name, value, limits });
         let most = |percent| [0.0, percent];
@@ -108,26 +110,26 @@ impl Figures {
         .flatten()
     }
 
-    /// Sum of what is beyond limits, percent.
+    /// Returns the sum of all excesses over limits, percent.
     pub fn beyond(&self) -> f64 {
         self.measures().map(|m| m.beyond()).sum()
     }
 
-    /// What is beyond its limit, and by how much.
+    /// Returns the violated limits with their excess.
     pub fn broken(&self) -> Vec<String> {
         let broken = self.measures().filter(|m| m.beyond() > 0.0);
         broken.map(|m| m.to_string()).collect()
     }
 }
 
-/// The full dose engine on the structures that objectives are about.
+/// Full dose engine on the structures of the objectives.
 pub struct Engine<'a> {
     kernel: &'a DoseKernel,
     structures: [Option<(DosePoints, Structure)>; 3],
 }
 
 impl<'a> Engine<'a> {
-    /// For target, urethra and rectum.
+    /// Creates an engine for target, urethra and rectum.
     pub fn new(kernel: &'a DoseKernel, bodies: [Option<&Body>; 3]) -> Self {
         let structure = |body: Option<&Body>| {
             let structure = body?.structure(DOSE_PITCH_M);
@@ -139,7 +141,7 @@ impl<'a> Engine<'a> {
         }
     }
 
-    /// Histograms of seeds.
+    /// Computes histograms of seeds.
     pub fn histograms(&self, seeds: &[Seed]) -> Histograms {
         let dvh = |structure: &Option<(DosePoints, Structure)>| {
             let (points, structure) = structure.as_ref()?;
@@ -148,7 +150,7 @@ impl<'a> Engine<'a> {
         Histograms([0, 1, 2].map(|n| dvh(&self.structures[n])))
     }
 
-    /// Points of all structures, m.
+    /// Returns the points of all structures, m.
     pub fn points_m(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         let structures = self.structures.iter().flatten();
         structures.flat_map(|(_, structure)| structure.points_m.iter().copied())
@@ -159,7 +161,7 @@ impl<'a> Engine<'a> {
 pub struct Histograms([Option<Dvh>; 3]);
 
 impl Histograms {
-    /// The measures of the same seeds with so many times their strength.
+    /// Returns the measures of the same seeds at a multiple of their strength.
     pub fn figures(&self, strengthened: f64, prescription_gy: f64) -> Option<Figures> {
         Figures::of(&self.0, prescription_gy / strengthened, RECTUM_M3)
     }

@@ -1,4 +1,5 @@
-//! Irregular glands with urethra, rectum and, in some, a pubic arch in the way: twelve that were chosen, and any number that are drawn.
+//! Irregular glands with urethra, rectum and, in some, a pubic arch in the way: twelve fixed ones,
+//! and any number of random ones.
 
 use crate::plan::anatomy::{Body, ball, body_of};
 use crate::plan::{Anatomy, PITCH_M, Template};
@@ -8,20 +9,20 @@ use stylet_anatomy::PatientFrame;
 
 const MIDDLE_M: [f64; 3] = [0.05, 0.05, 0.08];
 
-/// One gland; x to the patient's left, y anterior, z into the body.
+/// Gland; x to the patient's left, y anterior, z into the body.
 #[derive(Clone, Copy)]
 pub struct Gland {
     pub number: usize,
     pub cc: f64,
-    /// Not looked at while the search was tuned.
+    /// True for a gland that was not used while the search was tuned.
     pub is_kept_aside: bool,
-    /// How far the symphysis is above the gland, mm; the rami go down from there.
+    /// Height of the symphysis above the gland, mm; the rami go down from there.
     pub arch_mm: Option<f64>,
-    /// Width, height and length beside each other.
+    /// Relative width, height and length.
     shape: [f64; 3],
-    /// Share of the radius by which its surface goes in and out.
+    /// Amplitude of its surface's bumps, as a share of the radius.
     bumps: [f64; 3],
-    /// How much the urethra bends, 1/m.
+    /// Curvature of the urethra, 1/m.
     bend_per_m: f64,
 }
 
@@ -68,7 +69,7 @@ pub const TEMPLATE: Template = Template {
     pitch_m: PITCH_M,
 };
 
-/// A ball of radius 1, each of its points moved.
+/// Returns a ball of radius 1, each of its points moved.
 fn deformed(name: &str, to_m: impl Fn([f64; 3]) -> [f64; 3]) -> Body {
     let unit = ball("unit", [0.0; 3], [1.0; 3]);
     let (points, triangles) = unit.surface();
@@ -77,7 +78,7 @@ fn deformed(name: &str, to_m: impl Fn([f64; 3]) -> [f64; 3]) -> Body {
     body_of(name, &points_m, &corners).expect("as closed as a ball")
 }
 
-/// A rod with flat ends from one place to another, about `[across, along]` m thick.
+/// Returns a rod with flat ends from one place to another, about `[across, along]` m thick.
 fn rod(name: &str, from_m: [f64; 3], to_m: [f64; 3], half_m: [f64; 2], bend_per_m: f64) -> Body {
     let axis = nalgebra::Vector3::from([0, 1, 2].map(|a| (to_m[a] - from_m[a]) / 2.0));
     let u = axis.cross(&nalgebra::Vector3::new(0.1, 1.0, 0.2)).normalize();
@@ -92,15 +93,15 @@ fn rod(name: &str, from_m: [f64; 3], to_m: [f64; 3], half_m: [f64; 2], bend_per_
     })
 }
 
-/// Volumes of drawn glands, cc, and what else is drawn: the ranges of the twelve.
+/// Ranges of volumes and other parameters of random glands, cc: those of the twelve.
 const VOLUMES_CC: [f64; 2] = [25.0, 60.0];
 const SHAPES: [[f64; 2]; 3] = [[1.15, 1.3], [0.85, 1.0], [0.9, 1.15]];
 const BUMPS: [f64; 2] = [0.02, 0.07];
 const BENDS_PER_M: [f64; 2] = [0.0, 6.0];
 const ARCHES_MM: [f64; 2] = [5.0, 7.0];
 
-/// Four glands, one from each quarter of the volumes, that follow from a random seed alone; one of three has a pubic arch in the way.
-/// Their numbers go on from those of the twelve.
+/// Draws four glands, one from each quarter of the volumes, from a random seed alone; one of three
+/// has a pubic arch in the way. Their numbers continue those of the twelve.
 pub fn drawn(random_seed: u64) -> [Gland; 4] {
     let mut random = ChaCha8Rng::seed_from_u64(random_seed);
     let mut within = |[low, high]: [f64; 2]| {

@@ -1,9 +1,10 @@
-//! Greedy with exchange: the seed that helps most, one after the other, then moves of one seed as long as one of them helps.
+//! Greedy search with exchange: adds the most helpful seed, one after the other, then moves single
+//! seeds while that helps.
 
 use super::state::{Move, State};
 use std::ops::ControlFlow;
 
-/// Adds the seed that makes the cost smallest until none does.
+/// Adds the seed that reduces the cost most, until none does.
 pub fn build(state: &mut State, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
     loop {
         report(0.0)?;
@@ -19,8 +20,8 @@ pub fn build(state: &mut State, report: &dyn Fn(f32) -> ControlFlow<()>) -> Cont
     }
 }
 
-/// Takes the best of removing a seed and of moving it to any other place, seed by seed, then new seeds and another strength where
-/// they help; until nothing does, or for so many rounds over all seeds.
+/// Applies the best of removing a seed and of moving it to any other place, seed by seed, then new
+/// seeds and another strength if they help; until nothing does, or for a number of rounds.
 pub fn exchange(state: &mut State, rounds: usize, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
     for round in 0..rounds {
         let before = state.cost;

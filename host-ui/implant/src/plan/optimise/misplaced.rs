@@ -1,15 +1,16 @@
-//! Mean and variance of what a seed gives to points of the target when it misses its place.
+//! Mean and variance of a misplaced seed's dose at points of the target.
 //!
-//! The errors of two seeds are independent in the search, so that both add up over the seeds. What seeds of one strand or of one
-//! implant have in common is counted by the trials that judge a plan ([`super::robust`]).
+//! The errors of two seeds are independent in the search, so that both add up over the seeds.
+//! Common errors of seeds of one strand or one implant are counted by the trials that judge a plan
+//! ([`super::robust`]).
 
 use crate::plan::dose::perturb::{Perturbation, moved};
 use crate::plan::dose::{DoseKernel, DosePoints, Seed};
 
-/// Errors of a seed that are drawn; all places have the same.
+/// Number of drawn errors of a seed; all places share them.
 const DRAWS: usize = 32;
-/// What a seed gives beyond this share of the prescription does not matter to a point that may be cold: the dose near a seed is
-/// far from a normal distribution.
+/// Share of the prescription beyond which a seed's dose does not matter to a cold point: the dose
+/// near a seed is far from a normal distribution.
 const MOST: f64 = 0.6;
 
 /// Points, and the errors of a seed.
@@ -17,12 +18,12 @@ pub struct Misplaced {
     points: DosePoints,
     errors: Vec<Option<Seed>>,
     prescription_gy: f64,
-    /// Of 1 U, Gy.
+    /// Largest dose of 1 U that counts, Gy.
     most_gy: f64,
 }
 
 impl Misplaced {
-    /// For seeds along `axis`; of a strength of about `usual_u`.
+    /// Prepares points for seeds along `axis`, of a strength of about `usual_u`.
     pub fn new(
         points_m: &[[f64; 3]],
         how: Perturbation,
@@ -34,7 +35,7 @@ impl Misplaced {
             axis: Some(axis),
             strength_u: 1.0,
         };
-        // A seed that is lost is none.
+        // A lost seed has no dose.
         let error = |trial: usize| moved(&[seed], &[], how, trial).first().copied();
         Self {
             points: DosePoints::new(points_m),
@@ -44,8 +45,8 @@ impl Misplaced {
         }
     }
 
-    /// Adds mean and variance of the dose of 1 U at a place to a row: first the means of all points, then the variances, as shares
-    /// of the prescription and of its square.
+    /// Writes mean and variance of the dose of 1 U at a place to a row: first the means of all
+    /// points, then the variances, as shares of the prescription and of its square.
     pub fn moments(&self, kernel: &DoseKernel, place_m: [f64; 3], row: &mut Vec<f32>) {
         let count = self.points.dose_gy().len();
         let (mut sum, mut squares) = (vec![0.0; count], vec![0.0; count]);

@@ -1,60 +1,62 @@
-//! What a search makes small: how far the dose at the sample points is beyond the limits, and a little for what is nice to have.
+//! Cost of a plan: the excess of the dose at the sample points over the limits, and small terms for
+//! preferences.
 //!
-//! Each limit of a histogram is a limit of a share: D10 at most 150 % means that at most a tenth gets more than 150 %. Shares
-//! are counted with soft edges, so that a seed that moves by a place is felt.
+//! Each limit of a histogram is a limit of a share: D10 at most 150 % means that at most a tenth
+//! gets more than 150 %. Shares are counted with soft edges, so that the cost responds to a seed
+//! that moves by one place.
 
 use super::samples::{LANES, Samples};
 
-/// Half of the soft edge of a share, as a share of the prescription.
+/// Half width of the soft edge of a share, as a share of the prescription.
 const EDGE: f32 = 0.05;
-/// Cost of a share beyond its limit, beside 1 for a share of cold target within it.
+/// Cost of a share beyond its limit, relative to a share of cold target within it.
 const BEYOND: f32 = 12.0;
-/// Cost of what is within its limit: less of it is still better.
+/// Cost of values within their limits: less is still better.
 const WITHIN_HOT: f32 = 0.4;
 const WITHIN_SPARED: f32 = 0.05;
-/// Cost of a share of the target that is expected to be cold when seeds miss their places.
+/// Cost of the share of the target that is expected to be cold with misplaced seeds.
 const EXPECTED: f32 = 2.0;
-/// Where the smooth step that stands for the normal distribution ends, in standard deviations.
+/// End of the smooth step that replaces the normal distribution, in standard deviations.
 const STEP_ENDS: f32 = 2.2;
-/// How cold the cold part is, and how hot the hot part of the urethra.
+/// Weights of the depth of the cold part, and of the excess in the hot part of the urethra.
 const DEPTH: f32 = 2.0;
 const SEED: f32 = 2e-4;
 
-/// Limits as the search sees them: shares, and doses as shares of the prescription.
+/// Limits in the search: shares, and doses as shares of the prescription.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// What the target should get: the prescription and a reserve for seeds that miss their places.
+    /// Dose for the target: the prescription and a reserve for misplaced seeds.
     pub level: f32,
-    /// At most so much of the target gets less than that.
+    /// Largest share of the target with less than that.
     pub cold: f32,
-    /// At most 90 % of the target gets more than this: the upper limit of D90.
+    /// Upper limit of D90: at most 90 % of the target gets more than this.
     pub most: f32,
-    /// At most so much of the target gets more than 150 %.
+    /// Largest share of the target with more than 150 %.
     pub hot: f32,
-    /// At most a tenth of the urethra gets more than this.
+    /// Upper limit of D10 of the urethra.
     pub urethra_tenth: f32,
-    /// At most 30 % of the urethra gets more than this.
+    /// Upper limit of D30 of the urethra.
     pub urethra_third: f32,
-    /// At most 2 cc of the rectum get more than this.
+    /// Upper limit of D2cc of the rectum.
     pub rectum: f32,
-    /// When seeds miss their places, so much of the target is expected to get less than `kept`; `None` where nothing is asked.
+    /// Expected coverage with misplaced seeds; `None` if nothing is required.
     pub expected: Option<Expected>,
-    /// Needles at most.
+    /// Largest number of needles.
     pub needles: usize,
     /// Cost of a needle.
     pub of_needle: f32,
 }
 
-/// What the dose should be when seeds miss their places.
+/// Dose that must be kept with misplaced seeds.
 #[derive(Clone, Copy, Debug)]
 pub struct Expected {
     /// A dose, as a share of the prescription.
     pub kept: f32,
-    /// At most so much of the target may be expected to get less.
+    /// Largest expected share of the target with less.
     pub cold: f32,
 }
 
-/// The cost of a dose that is given for seeds of 1 U.
+/// Returns the cost of a dose that is given for seeds of 1 U.
 pub fn cost(
     samples: &Samples,
     of_one_u: &[f32],
@@ -108,7 +110,7 @@ pub fn cost(
         + seeds as f32 * SEED
 }
 
-/// Share of the target that gets less than `kept` over the errors of the seeds.
+/// Returns the share of the target with less than `kept` over the errors of the seeds.
 fn expected_cold(samples: &Samples, of_one_u: &[f32], strength_u: f32, kept: f32) -> f32 {
     let means = &of_one_u[samples.mean.clone()];
     let variances = &of_one_u[samples.variance.clone()];
@@ -117,7 +119,7 @@ fn expected_cold(samples: &Samples, of_one_u: &[f32], strength_u: f32, kept: f32
     let chunks = means.chunks_exact(LANES).zip(variances.chunks_exact(LANES));
     for ((mean, variance), weights) in chunks.zip(weights.chunks_exact(LANES)) {
         for lane in 0..LANES {
-            // Rounding may leave a little less than nothing.
+            // Rounding may leave a slightly negative number.
             let deviation = variance[lane].max(1e-8).sqrt() * strength_u;
             lanes[lane] += probability((kept - mean[lane] * strength_u) / deviation) * weights[lane];
         }
@@ -125,7 +127,7 @@ fn expected_cold(samples: &Samples, of_one_u: &[f32], strength_u: f32, kept: f32
     lanes.iter().sum()
 }
 
-/// About the normal distribution up to a number of standard deviations.
+/// Approximates the normal distribution up to a number of standard deviations.
 fn probability(deviations: f32) -> f32 {
     let t = (deviations * (0.5 / STEP_ENDS) + 0.5).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -139,7 +141,7 @@ fn below(dose: f32, level: f32) -> f32 {
     1.0 - above(dose, level)
 }
 
-/// Weighted sums of several functions of the dose; their order is fixed, lane by lane.
+/// Returns weighted sums of several functions of the dose; their order is fixed, lane by lane.
 fn sums<const N: usize>(dose: &[f32], weights: &[f32], of: impl Fn(f32) -> [f32; N]) -> [f32; N] {
     let mut lanes = [[0.0_f32; LANES]; N];
     for (dose, weights) in dose.chunks_exact(LANES).zip(weights.chunks_exact(LANES)) {

@@ -1,34 +1,34 @@
-//! What is left of the coverage when seeds miss their places: trials with every seed moved at random.
+//! Robustness of the coverage against misplaced seeds: trials with every seed moved at random.
 
 use crate::plan::anatomy::Body;
 use crate::plan::dose::perturb::{Perturbation, moved};
 use crate::plan::dose::{DoseKernel, DosePoints, Dvh, Seed};
 use rayon::prelude::*;
 
-/// Coarse is enough: the spread of trials is wider than the error of the points.
+/// Pitch of the points, coarse, because the spread of trials is wider than their error.
 const PITCH_M: f64 = 3e-3;
-/// The D90 that should be kept, as a share of the prescription.
+/// D90 to be kept, as a share of the prescription.
 const KEPT: f64 = 0.9;
-/// A search aims at a share of the trials that is a little larger than asked for: its own trials are few, and others differ by 1.3 %
-/// (standard deviation of 95 % of 300).
+/// Reserve of a search over the requested share of the trials: its own trials are few, and others
+/// differ by 1.3 % (standard deviation of 95 % of 300).
 const AIMED_ABOVE: f64 = 0.02;
 
-/// Which D90 should be at least 90 % of the prescription.
+/// D90 that must be at least 90 % of the prescription.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Statistic {
-    /// That of the plan alone; what becomes of it when seeds miss their places is reported.
+    /// D90 of the plan alone; its robustness is only reported.
     Planned,
-    /// The mean of the trials.
+    /// Mean D90 of the trials.
     Expected,
-    /// The one that this share of the trials reaches, such as 0.9 for the tenth percentile.
+    /// D90 that this share of the trials reaches, such as 0.9 for the tenth percentile.
     KeptBy(f64),
 }
 
 impl Statistic {
-    /// The usual one: 95 % of the trials keep it.
+    /// Usual choice: 95 % of the trials keep it.
     pub const USUAL: Self = Self::KeptBy(0.95);
 
-    /// How much of the target may be expected to get less, for a search to begin with.
+    /// Returns the largest expected cold share of the target, for the start of a search.
     pub(super) fn cold(self) -> Option<f32> {
         match self {
             Self::Planned => None,
@@ -45,8 +45,8 @@ pub struct Trials {
 }
 
 impl Trials {
-    /// Moves seeds and computes the dose of the target for each trial. Seeds with the same number in `needles` may share their errors;
-    /// those that lie there already stay.
+    /// Moves seeds and computes the dose of the target for each trial. Seeds with the same number
+    /// in `needles` may share their errors; seeds in the tissue stay.
     pub fn new(
         target: &Body,
         kernel: &DoseKernel,
@@ -70,26 +70,26 @@ impl Trials {
         Self { d90_gy }
     }
 
-    /// Share of the trials whose D90 is at least 90 % of the prescription.
+    /// Returns the share of the trials whose D90 is at least 90 % of the prescription.
     pub fn kept(&self, prescription_gy: f64) -> f64 {
         let below = self.d90_gy.partition_point(|gy| *gy < KEPT * prescription_gy);
         1.0 - below as f64 / self.d90_gy.len().max(1) as f64
     }
 
-    /// The mean D90, Gy; 0 without a trial.
+    /// Returns the mean D90, Gy; 0 without a trial.
     pub fn expected_gy(&self) -> f64 {
         self.d90_gy.iter().sum::<f64>() / self.d90_gy.len().max(1) as f64
     }
 
-    /// The D90 that a share of the trials reaches, Gy; `None` without a trial.
+    /// Returns the D90 that a share of the trials reaches, Gy; `None` without a trial.
     pub fn kept_by_gy(&self, share: f64) -> Option<f64> {
         self.d90_gy
             .get(((1.0 - share) * self.d90_gy.len() as f64) as usize)
             .copied()
     }
 
-    /// How far the D90 that is asked for, with the reserve of a search, is below 90 % of the prescription, as a share of that; 0 where
-    /// it is not.
+    /// Returns the distance of the requested D90, with the reserve of a search, below 90 % of the
+    /// prescription, as a share of that; 0 if it is not below.
     pub fn shortfall(&self, which: Statistic, prescription_gy: f64) -> f64 {
         let gy = match which {
             Statistic::Planned => return 0.0,
@@ -99,8 +99,8 @@ impl Trials {
         (1.0 - gy / (KEPT * prescription_gy)).max(0.0)
     }
 
-    /// So many times the strength give the D90 that is asked for, with a little reserve; `None` where nothing is asked or without
-    /// dose.
+    /// Returns the factor of the strength that gives the requested D90, with a small reserve;
+    /// `None` if nothing is required or without dose.
     pub fn strengthening(&self, which: Statistic, prescription_gy: f64) -> Option<f64> {
         let gy = match which {
             Statistic::Planned => None,

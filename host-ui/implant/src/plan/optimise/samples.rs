@@ -1,4 +1,4 @@
-//! Points that the search looks at, and the dose that a seed of 1 U at each place gives to each of them.
+//! Sample points of the search, and the dose of a seed of 1 U at each place for each of them.
 
 use super::candidates::Candidates;
 use super::misplaced::Misplaced;
@@ -8,16 +8,16 @@ use crate::plan::dose::{DoseKernel, DosePoints, Seed};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Points of a group are filled up to a multiple of this with points that count nothing.
+/// Number of which a group's size is a multiple, padded with points of zero weight.
 pub const LANES: usize = 8;
 const TARGET_POINTS: f64 = 3000.0;
 const URETHRA_POINTS: f64 = 400.0;
 const RECTUM_POINTS: f64 = 4000.0;
-/// Points of the target at which the dose of misplaced seeds is looked at: it varies less from place to place.
+/// Number of target points for the dose of misplaced seeds, which varies less from place to place.
 const MISPLACED_POINTS: f64 = 1000.0;
-/// Of the rectum only so much is kept, where seeds reach most: the hottest 2 cc lie there.
+/// Volume of the rectum that is kept, closest to the seeds: the hottest 2 cc lie there.
 const RECTUM_KEPT_M3: f64 = 5e-6;
-/// The volume that the limit of the rectum is about.
+/// Volume in the limit of the rectum.
 pub const RECTUM_M3: f64 = 2e-6;
 
 /// Points of target, urethra and rectum, one group after the other.
@@ -34,15 +34,16 @@ pub struct Samples {
     pub variance: Range<usize>,
     /// Weight of each point.
     pub weights: Vec<f32>,
-    /// Dose of the seeds that lie there already, for each U of those that are added: zeros where there are none.
+    /// Dose of the seeds in the tissue, per U of the added ones; zeros without any.
     pub present: Vec<f32>,
     /// Dose of 1 U as a share of the prescription, place by place.
     of_one_u: Vec<f32>,
 }
 
 impl Samples {
-    /// Draws the points and computes the dose of each place at each of them, where it is planned and over the errors of `how`.
-    /// `usual_u` is a strength in the middle of the catalogue; seeds that are `present` have their strength for each U of the others.
+    /// Draws the points and computes the dose of each place at each of them, for the planned place
+    /// and over the errors of `how`. `usual_u` is a strength in the middle of the catalogue; seeds
+    /// that are `present` have their strength per U of the others.
     pub fn new(
         bodies: [Option<&Body>; 3],
         candidates: &Candidates,
@@ -84,7 +85,7 @@ impl Samples {
             misplaced.moments(kernel, seed.position_m, &mut row);
             row
         };
-        // What lies there no longer misses its place: its mean is its dose, and nothing varies.
+        // Seeds in the tissue are no longer misplaced: their mean is their dose, without variance.
         let share = |gy: f64| (gy / prescription_gy) as f32;
         let mut of_present: Vec<f32> = DosePoints::new(&drawn.points_m)
             .of_seeds_gy(kernel, present)
@@ -104,13 +105,13 @@ impl Samples {
         }
     }
 
-    /// Values of a place: doses at points, then means and variances.
+    /// Returns the number of values of a place: doses at points, then means and variances.
     pub fn row_len(&self) -> usize {
         self.weights.len()
     }
 
-    /// What a seed of 1 U at a place gives to each point, as a share of the prescription, and the moments of that
-    /// over its errors.
+    /// Returns the dose of 1 U at a place for each point, as a share of the prescription, and its
+    /// moments over the errors.
     pub fn of_place(&self, place: usize) -> &[f32] {
         let count = self.row_len();
         &self.of_one_u[place * count..(place + 1) * count]
@@ -125,7 +126,7 @@ struct Drawn {
 }
 
 impl Drawn {
-    /// Points of one more structure; weights are shares of `unit_m3`, or of all.
+    /// Adds points of one more structure; weights are shares of `unit_m3`, or of all.
     fn add(&mut self, of_body: Option<Vec<([f64; 3], f64)>>, unit_m3: Option<f64>) -> Range<usize> {
         let from = self.points_m.len();
         let of_body = of_body.unwrap_or_default();
@@ -141,7 +142,7 @@ impl Drawn {
     }
 }
 
-/// About so many points, with the volume that each stands for.
+/// Returns about this number of points, each with its volume.
 fn points(body: &Body, count: f64) -> Vec<([f64; 3], f64)> {
     let (low, high) = body.bounds_m();
     let box_m3: f64 = (0..3).map(|a| high[a] - low[a]).product();
@@ -151,7 +152,7 @@ fn points(body: &Body, count: f64) -> Vec<([f64; 3], f64)> {
     structure.points_m.into_iter().zip(structure.volumes_m3).collect()
 }
 
-/// The points that get most if every place has a seed.
+/// Returns the points with the highest dose if every place has a seed.
 fn hottest(points: Vec<([f64; 3], f64)>, kernel: &DoseKernel, seeds: &[Seed]) -> Vec<([f64; 3], f64)> {
     let places: Vec<[f64; 3]> = points.iter().map(|p| p.0).collect();
     let gy = DosePoints::new(&places).of_seeds_gy(kernel, seeds);

@@ -1,4 +1,5 @@
-//! The search: a greedy choice from several strengths, the method on the best of them, and corrections by the full dose engine.
+//! The search: a greedy choice from several strengths, the method on the best of them, and
+//! corrections by the full dose engine.
 
 use super::annealing::{self, Schedule};
 use super::candidates::Candidates;
@@ -12,13 +13,14 @@ use crate::plan::dose::{DoseKernel, Seed};
 use crate::plan::{Anatomy, PlanError, Template};
 use std::ops::ControlFlow;
 
-/// Places in the catalogue that a search may begin with, 0.36, 0.44 and 0.52 U for I-125; the one whose greedy choice costs least is
-/// taken.
+/// Indices in the catalogue at which a search may begin, 0.36, 0.44 and 0.52 U for I-125; the
+/// cheapest greedy choice is used.
 const FIRST_STRENGTHS: [usize; 3] = [3, 7, 11];
-/// Where that leads to no plan that is all that was asked for, another attempt begins so many places weaker than the last one ended:
-/// more and weaker seeds depend less on each of them, and annealing hardly changes the strength by much.
+/// Number of catalogue steps by which another attempt begins weaker, if no plan meets all
+/// requirements. More and weaker seeds depend less on each of them, and annealing hardly changes
+/// the strength by much.
 const WEAKER: usize = 6;
-/// The search, and corrections of it by what the full engine found.
+/// Number of searches, each corrected by the full engine.
 const ROUNDS: usize = 3;
 const FIRST_SEARCH: Schedule = Schedule {
     moves: 90_000,
@@ -28,26 +30,26 @@ const CORRECTION: Schedule = Schedule {
     moves: 20_000,
     temperatures: [0.002, 0.0003],
 };
-/// Another correction of an attempt is made where the last one left less than this share of what was short.
+/// Share of the shortfall below which another correction of an attempt is made.
 const WORTHWHILE: f64 = 0.6;
-/// Share of all that is reported once the samples are there, and after each attempt.
+/// Reported shares after the samples, and after each attempt.
 const ATTEMPTED: [f32; 4] = [0.05, 0.6, 0.8, 1.0];
-/// Share of an attempt that is reported after its greedy choice, and after its first round.
+/// Reported shares of an attempt after its greedy choice, and after its first round.
 const GREEDY: f32 = 0.05;
 const SEARCHED: f32 = 0.7;
 /// Share of annealing in a round.
 const ANNEALED: f32 = 0.7;
-/// The dose that is to be kept when seeds miss their places, as a share of the prescription: at first, and the largest.
+/// Dose to be kept with misplaced seeds, as a share of the prescription: initial and largest.
 const FIRST_KEPT: f32 = 0.9;
 const HIGHEST_KEPT: f32 = 1.1;
-/// What the target should get, as a share of the prescription.
+/// Dose for the target, as a share of the prescription.
 const LEVEL: f32 = 1.0;
-/// Rounds over all seeds after which an exchange ends, whatever it still finds.
+/// Most rounds of an exchange over all seeds.
 const MOST_EXCHANGES: usize = 12;
 
 type Report<'a> = &'a dyn Fn(f32) -> ControlFlow<()>;
 
-/// What is computed once for all plans of an anatomy.
+/// Data computed once for all plans of an anatomy.
 pub struct Search<'a> {
     anatomy: &'a Anatomy,
     kernel: &'a DoseKernel,
@@ -55,13 +57,13 @@ pub struct Search<'a> {
     candidates: Candidates,
     samples: Samples,
     engine: Engine<'a>,
-    /// Seeds that lie there already, each with its strength for each U of those that are added.
+    /// Seeds in the tissue, each with its strength per U of the added ones.
     present: Vec<Seed>,
 }
 
 impl<'a> Search<'a> {
-    /// Doses of all places; prescription, strengths, misplacement and what is present are those of `objectives`. `report` as for
-    /// [`super::plan`].
+    /// Computes doses of all places; prescription, strengths, misplacement and present seeds come
+    /// from `objectives`. `report` as for [`super::plan`].
     pub fn new(
         template: Template,
         anatomy: &'a Anatomy,
@@ -99,7 +101,8 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// A plan for these objectives, which differ from those of [`Search::new`] in needles and robustness alone.
+    /// Returns a plan for these objectives, which differ from those of [`Search::new`] in needles
+    /// and robustness alone.
     pub fn find(&self, objectives: &Objectives, method: Method, report: Report<'_>) -> Result<Proposal, PlanError> {
         let mut best: Option<Proposal> = None;
         let mut first_strengths = FIRST_STRENGTHS.to_vec();
@@ -116,8 +119,8 @@ impl<'a> Search<'a> {
         best.ok_or(PlanError::NoDose)
     }
 
-    /// Searches on from a state, and leaves in `best` what is better than it; ends where that is all that was asked for, and where a
-    /// correction did not help much.
+    /// Continues the search from a state, and leaves a better plan in `best`. Ends when all
+    /// requirements are met, or when a correction did not help much.
     fn attempt(
         &self,
         state: &mut State,
@@ -155,7 +158,7 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// The greedy choice that costs least, from these strengths of the catalogue.
+    /// Returns the cheapest greedy choice, from these strengths of the catalogue.
     fn begin<'s>(
         &'s self,
         objectives: &'s Objectives,
@@ -179,8 +182,8 @@ impl<'a> Search<'a> {
         begun.ok_or(PlanError::NoWay)
     }
 
-    /// The plan of a state with the strength that the full engine and the trials find best, which the state takes over; and the
-    /// trials of 1 U.
+    /// Returns the plan of a state with the strength that the full engine and the trials find best,
+    /// which the state adopts; and the trials of 1 U.
     fn judge(&self, state: &mut State, objectives: &Objectives) -> Result<(Proposal, Trials), PlanError> {
         let prescription_gy = objectives.prescription_gy;
         let of_one_u = self.candidates.plan(&state.chosen, 1.0, &self.source, prescription_gy);
@@ -229,13 +232,13 @@ fn go_on(flow: ControlFlow<()>) -> Result<(), PlanError> {
     }
 }
 
-/// Anneals, and then moves each seed once more where that helps.
+/// Anneals, and then moves each seed once more if that helps.
 fn anneal(state: &mut State, schedule: &Schedule, report: Report<'_>) -> ControlFlow<()> {
     annealing::anneal(state, schedule, &|share| report(share * ANNEALED))?;
     greedy::exchange(state, 1, &|share| report(ANNEALED + (1.0 - ANNEALED) * share))
 }
 
-/// The limits with a small reserve, moved by what the sample points were wrong.
+/// Returns the limits with a small reserve, shifted by the error of the sample points.
 fn limits(objectives: &Objectives, kept: f32, seen: Option<(&Figures, &Figures)>) -> Limits {
     let off = |of: fn(&Figures) -> f64| seen.map_or(0.0, |(full, sampled)| ((of(full) - of(sampled)) / 100.0) as f32);
     let ratio = |of: fn(&Figures) -> Option<f64>| {

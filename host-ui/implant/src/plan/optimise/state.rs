@@ -1,55 +1,55 @@
-//! Chosen places with their dose at the sample points, changed by moves that can be taken back.
+//! Chosen places with their dose at the sample points, changed by moves that can be undone.
 
 use super::candidates::Candidates;
 use super::objective::{Limits, cost};
 use super::samples::Samples;
 use rayon::prelude::*;
 
-/// Accepted moves after which the dose is summed anew: rounding adds up.
+/// Number of accepted moves after which the dose is summed again, because rounding adds up.
 const REFRESH_EVERY: usize = 500;
-/// Moves that a thread tries at least.
+/// Smallest number of moves that a thread tries.
 const TRIED_TOGETHER: usize = 16;
 
-/// What a search changes.
+/// Variables of a search.
 #[derive(Clone)]
 pub struct State<'a> {
-    /// Ways and places.
+    /// Holes and places.
     pub candidates: &'a Candidates,
     samples: &'a Samples,
     /// Strengths that can be ordered, U.
     strengths_u: &'a [f64],
     /// The limits.
     pub limits: Limits,
-    /// Whether a place has a seed.
+    /// True for each place with a seed.
     pub chosen: Vec<bool>,
-    /// Places with a seed.
+    /// Indices of the places with a seed.
     pub seeds: Vec<usize>,
-    /// Seeds of each way.
+    /// Number of seeds of each hole.
     pub of_way: Vec<usize>,
-    /// Ways with seeds.
+    /// Number of holes with seeds.
     pub needles: usize,
-    /// Place in the list of strengths.
+    /// Index in the list of strengths.
     pub strength: usize,
-    /// Of the present choice.
+    /// Cost of the present choice.
     pub cost: f32,
     of_one_u: Vec<f32>,
     tried: Vec<f32>,
     accepted: usize,
 }
 
-/// Places that lose and get a seed, and the strength after it.
+/// Change of a choice: places that lose and get a seed, and the new strength.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Move {
     /// Places that lose their seed.
     pub without: Vec<usize>,
-    /// Places that get one.
+    /// Places that get a seed.
     pub with: Vec<usize>,
-    /// Place in the list of strengths.
+    /// Index in the list of strengths.
     pub strength: usize,
 }
 
 impl<'a> State<'a> {
-    /// No seed at all.
+    /// Creates a state without seeds.
     pub fn empty(
         candidates: &'a Candidates,
         samples: &'a Samples,
@@ -76,35 +76,36 @@ impl<'a> State<'a> {
         state
     }
 
-    /// The strength, U.
+    /// Returns the strength, U.
     pub fn strength_u(&self) -> f64 {
         self.strengths_u[self.strength]
     }
 
-    /// Strengths to choose from.
+    /// Returns the number of strengths to choose from.
     pub fn strengths(&self) -> usize {
         self.strengths_u.len()
     }
 
-    /// Dose at the sample points as a share of the prescription.
+    /// Returns the dose at the sample points as a share of the prescription.
     pub fn dose(&self) -> Vec<f32> {
         let planned = &self.of_one_u[..self.samples.mean.start];
         planned.iter().map(|d| d * self.strength_u() as f32).collect()
     }
 
-    /// The same choice with another strength.
+    /// Sets another strength for the same choice.
     pub fn set_strength(&mut self, strength: usize) {
         self.strength = strength;
         self.refresh();
     }
 
-    /// The same choice under other limits.
+    /// Sets other limits for the same choice.
     pub fn set_limits(&mut self, limits: Limits) {
         self.limits = limits;
         self.refresh();
     }
 
-    /// The cost after a move; `None` for one with too many needles. [`State::accept`] takes it.
+    /// Returns the cost after a move; `None` for one with too many needles. [`State::accept`]
+    /// applies it.
     pub fn try_move(&mut self, change: &Move) -> Option<f32> {
         let mut tried = std::mem::take(&mut self.tried);
         let cost = self.cost_after(change, &mut tried);
@@ -112,7 +113,8 @@ impl<'a> State<'a> {
         cost
     }
 
-    /// The best of these moves with its cost, the first of those that are alike; `None` where none makes the cost smaller.
+    /// Returns the best of these moves with its cost, the first of equal ones; `None` if none
+    /// reduces the cost.
     pub fn best_of(&self, moves: &[Move]) -> Option<(usize, f32)> {
         let try_one = |tried: &mut Vec<f32>, change: &Move| self.cost_after(change, tried).unwrap_or(f32::INFINITY);
         let costs: Vec<f32> = moves
@@ -124,7 +126,7 @@ impl<'a> State<'a> {
         (least.1 < self.cost - 1e-6).then_some(least)
     }
 
-    /// The cost after a move, whose dose is left in `tried`.
+    /// Returns the cost after a move, whose dose is left in `tried`.
     fn cost_after(&self, change: &Move, tried: &mut [f32]) -> Option<f32> {
         let needles = self.needles_after(change);
         if needles > self.limits.needles {
@@ -150,7 +152,7 @@ impl<'a> State<'a> {
         Some(cost(self.samples, tried, strength_u, &self.limits, needles, seeds))
     }
 
-    /// Takes the move that was tried last, with its cost.
+    /// Applies the move that was tried last, with its cost.
     pub fn accept(&mut self, change: &Move, cost: f32) {
         std::mem::swap(&mut self.of_one_u, &mut self.tried);
         for &place in &change.without {
@@ -171,7 +173,7 @@ impl<'a> State<'a> {
         }
     }
 
-    /// Tries a move and takes it where it makes the cost smaller.
+    /// Tries a move and applies it if it reduces the cost.
     pub fn take_if_better(&mut self, change: &Move) -> bool {
         match self.try_move(change) {
             Some(cost) if cost < self.cost - 1e-6 => {

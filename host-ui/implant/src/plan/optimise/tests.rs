@@ -1,4 +1,4 @@
-//! Plans of synthetic glands keep their limits, cancel, and are the same each time.
+//! Plans of synthetic glands meet their limits, can be cancelled, and are reproducible.
 
 use super::candidates::Candidates;
 use super::glands::{GLANDS, Gland, TEMPLATE, drawn};
@@ -39,7 +39,8 @@ fn row(gland: &str, method: &str, plan: &ImplantPlan, figures: &Figures, seconds
     );
 }
 
-/// Over 1,000 trials of 4 mm: share with D90 of at least 90 %, and V150 with the strength that makes it 95 %.
+/// Runs 1,000 trials of 4 mm; returns the share with D90 of at least 90 %, and V150 at the strength
+/// that makes it 95 %.
 fn robustness(anatomy: &Anatomy, engine: &Engine, kernel: &DoseKernel, plan: &ImplantPlan) -> [f64; 4] {
     let how = crate::plan::dose::perturb::Perturbation {
         errors: crate::plan::dose::perturb::Errors::of_sigma(4e-3),
@@ -57,7 +58,7 @@ fn robustness(anatomy: &Anatomy, engine: &Engine, kernel: &DoseKernel, plan: &Im
     ]
 }
 
-/// Seconds of the straightforward loop over all points of the full engine.
+/// Returns the time of the plain loop over all points of the full engine, s.
 fn straightforward_s(engine: &Engine, kernel: &DoseKernel, plan: &ImplantPlan) -> f64 {
     let (begun, seeds) = (Instant::now(), plan.seeds());
     let dose_at = |point_m: [f64; 3]| seeds.iter().map(|s| kernel.exact_at_gy(s, point_m)).sum::<f64>();
@@ -118,7 +119,8 @@ fn study<'a>(glands: impl Iterator<Item = &'a Gland>) {
     assert_eq!(missed, Vec::<String>::new());
 }
 
-/// The peripheral pattern gave V150 84.5 % and a urethra D10 of 291 Gy in `pelvis`, and nothing aimed at either.
+/// Guards against the peripheral pattern, which gave V150 84.5 % and a urethra D10 of 291 Gy in
+/// `pelvis`, and aimed at neither.
 #[test]
 fn a_plan_keeps_its_limits_by_the_full_engine() {
     let anatomy = GLANDS[0].anatomy();
@@ -161,7 +163,7 @@ fn no_needle_is_offered_through_bone() {
     anatomy.bone = bone;
     assert!(behind_bone > 0 && without.len() > past_bone.len());
     assert!(without.iter().any(|hole| crosses(hole, &anatomy)));
-    // A plan that was made without the arch is not free of problems beside it.
+    // A plan that was made without the arch has problems near it.
     let through_bone = unaware
         .needles
         .iter()
@@ -203,7 +205,7 @@ fn a_search_reports_its_share_and_ends_when_it_is_cancelled() {
 }
 
 #[test]
-fn what_is_beyond_a_limit_says_by_how_much() {
+fn violated_limits_give_their_excess() {
     let figures = Figures {
         v100: 94.0,
         d90: 101.0,
@@ -244,9 +246,9 @@ fn glands_that_were_kept_aside() {
     study(GLANDS.iter().filter(|g| g.is_kept_aside));
 }
 
-/// No choice of the search or of its settings was made with these.
+/// Tests glands that influenced neither the search nor its settings.
 #[test]
 #[ignore = "minutes; the command is in docs/plan.md"]
-fn glands_that_were_drawn_once_the_search_was_done() {
+fn glands_that_the_search_was_not_tuned_on() {
     study([1, 2, 3, 4, 5].map(drawn).as_flattened().iter());
 }

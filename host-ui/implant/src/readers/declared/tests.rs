@@ -33,7 +33,8 @@ fn rows() -> Vec<SeedRow> {
     .to_vec()
 }
 
-/// A plan of I-125 with the source of Pd-103 gave 28.4 Gy instead of 190.1 and no word.
+/// Guards against a plan of I-125 with the source of Pd-103, which gave 28.4 Gy instead of 190.1 in
+/// silence.
 #[test]
 fn another_isotope_is_refused_and_another_model_or_half_life_is_reported() {
     let (iodine, palladium) = (Source::known("6711").unwrap(), Source::known("200").unwrap());
@@ -60,9 +61,9 @@ fn another_isotope_is_refused_and_another_model_or_half_life_is_reported() {
     );
 }
 
-/// A prescription of 110 Gy in the plan was ignored, and 145 taken from the source.
+/// Guards against a prescription of 110 Gy in the plan that was ignored for 145 of the source.
 #[test]
-fn the_prescription_of_the_plan_counts_before_that_of_the_source_and_after_an_option() {
+fn the_plan_s_prescription_overrides_the_source_s() {
     let source = Source::known("6711").unwrap();
     let (used, note) = prescription(None, Some(&declared()), &source);
     assert_eq!(used, Some(110.0));
@@ -74,9 +75,9 @@ fn the_prescription_of_the_plan_counts_before_that_of_the_source_and_after_an_op
     assert_eq!(prescription(None, None, &source), (Some(145.0), None));
 }
 
-/// A strength of 60 days before the implant was used as it is.
+/// Guards against a strength of 60 days before the implant that was used without decay.
 #[test]
-fn strengths_decay_to_the_implant_and_without_its_day_they_are_reported_with_theirs() {
+fn strengths_decay_to_the_day_of_the_implant() {
     let source = Source::known("6711").unwrap();
     let mut aged = rows();
     let implant = DayOfImplant(Some(Date::constant(2026, 10, 31)));

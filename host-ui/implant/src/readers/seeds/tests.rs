@@ -1,4 +1,4 @@
-//! Needles of a plan stay with its seeds.
+//! Seeds of a plan keep their needles.
 
 use super::*;
 use stylet_files::dicom::plan::{PlanSource, SeedPlan};
@@ -34,9 +34,9 @@ fn plan() -> Vec<u8> {
     dicom::plan::bytes(&plan).unwrap()
 }
 
-/// The reader of plans found needle and hole, and the seeds lost them.
+/// Guards against seeds that lost needle and hole, although the reader of plans found them.
 #[test]
-fn seeds_of_a_plan_keep_needle_and_hole_whatever_the_file_is_called() {
+fn seeds_of_a_plan_keep_needle_and_hole() {
     let folder = tempfile::tempdir().unwrap();
     for name in ["plan.dcm", "plan", "PLAN.IMG"] {
         let path = folder.path().join(name);
@@ -48,7 +48,7 @@ fn seeds_of_a_plan_keep_needle_and_hole_whatever_the_file_is_called() {
     }
 }
 
-/// A pipe was waited for, and a device read until the memory ended.
+/// Guards against waiting for a pipe, and against reading a device until memory ran out.
 #[test]
 fn a_pipe_and_a_device_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -61,7 +61,7 @@ fn a_pipe_and_a_device_are_refused() {
     }
 }
 
-/// The columns that say how sure a seed of a CT is were refused as unknown.
+/// Guards against refused columns for the certainty of a seed in a CT.
 #[test]
 fn a_table_of_seeds_found_in_a_ct_is_read() {
     let folder = tempfile::tempdir().unwrap();

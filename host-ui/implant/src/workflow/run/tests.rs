@@ -1,8 +1,8 @@
-//! Where a run goes on, by what is in the tissue.
+//! Continuation of a run, from the state of the tissue.
 
 use super::*;
 
-/// Two needles with two seeds each, along z.
+/// Creates two needles with two seeds each, along z.
 fn tasks() -> Vec<NeedleTask> {
     let needle = |x: f64| NeedlePlan {
         entry_m: [x, 0.0, 0.0],
@@ -14,7 +14,7 @@ fn tasks() -> Vec<NeedleTask> {
 }
 
 #[test]
-fn what_is_in_the_tissue_says_where_to_go_on() {
+fn placed_seeds_determine_the_continuation() {
     let tasks = tasks();
     let found = |dropped: &[[f64; 3]], tip_m| Placed::find(&tasks, dropped, tip_m, &[]);
     let none = found(&[], Some([0.0, 0.0, -0.01]));
@@ -30,7 +30,7 @@ fn what_is_in_the_tissue_says_where_to_go_on() {
     let all = [&three[..], &[[0.01, 0.0, 0.04]]].concat();
     assert!(!found(&all, Some([0.0, 0.0, -0.01])).is_partial(), "nothing is left");
     assert!(found(&all, Some([0.01, 0.0, 0.03])).is_partial(), "but to take it out");
-    // A drop that left no seed is not made again.
+    // A drop that left no seed is not repeated.
     let lost = Placed::find(&tasks, &three[1..], None, &[0]);
     assert_eq!((lost.next_needle(), lost.done.lost.as_slice()), (1, &[0][..]));
 }
