@@ -1,4 +1,4 @@
-//! Dose of each implant as planned and as its seeds came to rest, in the target of its scene.
+//! Dose of each implant, as planned and with its seeds at rest, in the target of its scene.
 
 use crate::error::PopulationError;
 use std::collections::BTreeMap;
@@ -13,12 +13,12 @@ use stylet_insertions::{Insertion, Table, structures_file};
 /// Points in a target.
 const POINTS: usize = 20_000;
 
-/// What a target gets.
+/// Dose of a target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Covered {
     /// Least dose of the hottest 90 % of the target, in percent of the prescription.
     pub d90_percent: f64,
-    /// Share of the target that gets the prescription.
+    /// Share of the target at the prescription or more.
     pub v100_percent: f64,
 }
 
@@ -27,22 +27,22 @@ pub struct Covered {
 pub struct ImplantDose {
     /// Scene, plan and number.
     pub id: String,
-    /// Seeds.
+    /// Number of seeds.
     pub seeds: usize,
-    /// With its seeds where they are planned.
+    /// Dose of the seeds at their planned places.
     pub planned: Covered,
-    /// With its seeds where they rest.
+    /// Dose of the seeds at rest.
     pub delivered: Covered,
 }
 
-/// All implants of which every needle went in.
+/// Implants whose needles were all inserted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scored {
-    /// In the order of the study.
+    /// Implants in the order of the study.
     pub implants: Vec<ImplantDose>,
-    /// Implants with a needle that failed or that is in a shard which is not finished: they have no dose.
+    /// Implants with a failed needle or in an unfinished shard: they have no dose.
     pub incomplete: usize,
-    /// Why no dose was computed at all.
+    /// Reason why no dose was computed.
     pub missing: Option<String>,
 }
 
@@ -51,10 +51,11 @@ struct Target {
     volumes_m3: Vec<f64>,
 }
 
-/// Scores every implant; `folder` has the structures of the scenes. `done` is called after each.
+/// Scores every implant; `folder` has the structures of the scenes. Calls `done` after each.
 ///
 /// # Errors
-/// Structures that cannot be read, or a source that is not known.
+///
+/// If structures cannot be read, or a source is unknown.
 pub fn score(folder: &Path, table: &Table, done: impl Fn()) -> Result<Scored, PopulationError> {
     let mut implants: BTreeMap<&str, Vec<&Insertion>> = BTreeMap::new();
     for row in &table.rows {
@@ -96,7 +97,7 @@ pub fn score(folder: &Path, table: &Table, done: impl Fn()) -> Result<Scored, Po
     Ok(scored)
 }
 
-/// The id without the needle.
+/// Returns the id without the needle.
 fn implant_id(row: &Insertion) -> &str {
     row.id.rsplit_once('/').map_or(&row.id, |(implant, _)| implant)
 }
@@ -120,7 +121,7 @@ fn kernel(model: &str) -> Result<DoseKernel, PopulationError> {
     Ok(DoseKernel::new(&source, Interval::ALL))
 }
 
-/// As the plan has them, or where they rest.
+/// Returns the seeds at their planned places, or at rest.
 fn seeds(rows: &[&Insertion], at_rest: bool) -> Vec<DoseSeed> {
     let all = rows.iter().flat_map(|row| &row.seeds);
     let seed = |seed: &stylet_insertions::Seed| {

@@ -1,4 +1,4 @@
-//! Why there is no page.
+//! Reasons why there is no page.
 
 use std::path::PathBuf;
 use stylet_base::WriteError;
@@ -6,7 +6,7 @@ use stylet_dose::DoseError;
 use stylet_files::FileError;
 use stylet_insertions::{Shard, TableError};
 
-/// What is wrong with a folder of results.
+/// Problem of a folder of results.
 #[derive(Debug, thiserror::Error)]
 pub enum PopulationError {
     /// No finished shard.
@@ -18,8 +18,8 @@ pub enum PopulationError {
     /// A file of a shard.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// Results that do not belong together.
-    #[error("{}: it is of another study, or of another version of it, than {}; keep each in a folder of its own", .other.display(), .first.display())]
+    /// Results of different studies.
+    #[error("{}: it is of another study, or of another version of it, than {}; keep each in a separate folder", .other.display(), .first.display())]
     OtherStudy {
         /// The first file.
         first: PathBuf,
@@ -48,7 +48,7 @@ pub enum PopulationError {
     /// Seeds without a source.
     #[error("the plan names source \"{model}\"; known are {known}")]
     Source {
-        /// As the plan names it.
+        /// Name of the model in the plan.
         model: String,
         /// Models that come with the program.
         known: String,

@@ -1,14 +1,14 @@
-//! What the seeds of a population missed their places by, as errors for trials of another plan.
+//! Placement errors of a population's seeds, as errors for trials of another plan.
 
 use nalgebra::{Matrix3, Vector3};
 use stylet_dose::perturb::Errors;
 use stylet_insertions::{Insertion, Table};
 
-/// Errors of seeds, in the patient's frame; `None` for fewer than two seeds that came to rest.
+/// Returns the errors of seeds, in the patient's frame; `None` for fewer than two seeds at rest.
 ///
-/// `sigma_m` is the standard deviation across the needle, `along_m` that along it, both about the mean, which is `shift_m`.
-/// `within_strand` is the correlation of the errors of two seeds of one needle. A seed that no needle left is not counted as lost:
-/// its needle was not inserted.
+/// `sigma_m` is the standard deviation across the needle, `along_m` that along it, both about the
+/// mean, which is `shift_m`. `within_strand` is the correlation of the errors of two seeds of one
+/// needle. A seed that no needle left does not count as lost: its needle was not inserted.
 pub fn misplacement(table: &Table) -> Option<Errors> {
     let rows: Vec<Vec<(Vector3<f64>, Vector3<f64>)>> = table.rows.iter().map(of_row).collect();
     let all = || rows.iter().flatten();
@@ -23,7 +23,7 @@ pub fn misplacement(table: &Table) -> Option<Errors> {
         along += off.dot(axis).powi(2);
         across += (off - axis * off.dot(axis)).norm_squared();
     }
-    // Of two seeds of one needle: sums over pairs are the square of the sum without the squares.
+    // For two seeds of one needle: sums over pairs are the square of the sum without the squares.
     let (mut together, mut pairs) = (0.0, 0.0);
     for row in &rows {
         let offs = || row.iter().map(|(error_m, _)| error_m - mean_m);
@@ -46,7 +46,7 @@ pub fn misplacement(table: &Table) -> Option<Errors> {
     })
 }
 
-/// The same errors in a frame that is turned by `turn`, such as that of a scene.
+/// Returns the same errors in a frame that is rotated by `turn`, such as that of a scene.
 pub fn turned(errors: Errors, turn: &Matrix3<f64>) -> Errors {
     Errors {
         shift_m: (turn * Vector3::from(errors.shift_m)).into(),
@@ -54,7 +54,7 @@ pub fn turned(errors: Errors, turn: &Matrix3<f64>) -> Errors {
     }
 }
 
-/// Error of each seed that came to rest, m, with the axis of its needle.
+/// Returns the error of each seed at rest, m, with the axis of its needle.
 fn of_row(row: &Insertion) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let of_seed = |seed: &stylet_insertions::Seed| {
         let rest_mm = Vector3::from(seed.rest.as_ref()?.at_mm);
@@ -72,7 +72,7 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use stylet_insertions::{Rest, Seed};
 
-    /// Errors of known deviations, with a part that all seeds of a needle share.
+    /// Checks errors of known deviations, with a part common to all seeds of a needle.
     #[test]
     fn what_went_in_comes_out() {
         let mut random = ChaCha8Rng::seed_from_u64(5);

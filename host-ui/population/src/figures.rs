@@ -1,4 +1,4 @@
-//! Distributions of what insertions did, and what goes with their misplacement.
+//! Distributions of the results of insertions, and influences on their misplacement.
 
 use crate::dose::Scored;
 use stylet_insertions::{Insertion, Table};
@@ -10,14 +10,14 @@ pub struct Distribution {
     pub name: &'static str,
     /// Unit.
     pub unit: &'static str,
-    /// One value of what: a seed, an insertion, an implant.
+    /// Item with one value: a seed, an insertion, an implant.
     pub each: &'static str,
-    /// Ascending.
+    /// Values, ascending.
     pub values: Vec<f64>,
 }
 
 impl Distribution {
-    /// Of values in any order.
+    /// Creates a distribution of values in any order.
     pub fn new(name: &'static str, unit: &'static str, each: &'static str, mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         Self {
@@ -28,20 +28,20 @@ impl Distribution {
         }
     }
 
-    /// `None` without values.
+    /// Returns the mean; `None` without values.
     pub fn mean(&self) -> Option<f64> {
         let count = self.values.len();
         (count > 0).then(|| self.values.iter().sum::<f64>() / count as f64)
     }
 
-    /// Standard deviation of a sample; `None` for fewer than two values.
+    /// Returns the standard deviation of a sample; `None` for fewer than two values.
     pub fn deviation(&self) -> Option<f64> {
         let (mean, count) = (self.mean()?, self.values.len());
         let square = self.values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
         (count > 1).then(|| (square / (count - 1) as f64).sqrt())
     }
 
-    /// Linear between neighbours; `None` without values.
+    /// Returns a percentile, linear between neighbours; `None` without values.
     pub fn percentile(&self, percent: f64) -> Option<f64> {
         let last = self.values.len().checked_sub(1)?;
         let at = (percent / 100.0).clamp(0.0, 1.0) * last as f64;
@@ -51,7 +51,7 @@ impl Distribution {
     }
 }
 
-/// All distributions, in the order of the page.
+/// Returns all distributions, in the order of the page.
 pub fn figures(table: &Table, scored: &Scored) -> Vec<Distribution> {
     let seeds = || {
         table
@@ -110,13 +110,14 @@ pub fn figures(table: &Table, scored: &Scored) -> Vec<Distribution> {
     all.into_iter().filter(|d| !d.values.is_empty()).collect()
 }
 
-/// Mean misplacement of the seeds of one needle, mm.
+/// Returns the mean misplacement of the seeds of one needle, mm.
 pub fn mean_misplacement_mm(row: &Insertion) -> Option<f64> {
     let seeds: Vec<f64> = row.seeds.iter().filter_map(|s| Some(s.misplacement_mm()?[0])).collect();
     (!seeds.is_empty()).then(|| seeds.iter().sum::<f64>() / seeds.len() as f64)
 }
 
-/// What varies with its rank correlation (Spearman) to the mean misplacement of a needle, strongest first.
+/// Returns the varied quantities with their rank correlation (Spearman) to the mean misplacement of
+/// a needle, strongest first.
 pub fn influences(table: &Table) -> Vec<(String, f64)> {
     let rows: Vec<(&Insertion, f64)> = table
         .rows
@@ -133,7 +134,7 @@ pub fn influences(table: &Table) -> Vec<(String, f64)> {
     found
 }
 
-/// Place of each value among all; equal ones share the mean of their places.
+/// Returns the rank of each value; equal ones share the mean of their ranks.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
@@ -147,7 +148,7 @@ fn ranks(values: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// Pearson's; `None` where one of both does not vary.
+/// Returns Pearson's correlation; `None` if one of both does not vary.
 fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
     let (ma, mb) = (mean(a), mean(b));

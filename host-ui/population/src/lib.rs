@@ -1,6 +1,8 @@
-//! A population of simulated insertions: its distributions, its dose, and a page with both beside published values.
+//! A population of simulated insertions: its distributions, its dose, and a page that compares both
+//! with published values.
 //!
-//! Reads the Parquet files that `rt-core study` writes. Lengths in mm, forces in N, times in s, dose in Gy.
+//! Reads the Parquet files that `rt-core study` writes. Lengths in mm, forces in N, times in s,
+//! dose in Gy.
 
 #![warn(missing_docs)]
 

@@ -1,4 +1,4 @@
-//! The page: every distribution beside what was published, dose, and how it was made. Stands by itself.
+//! The page: every distribution with published values, dose, and provenance. Self-contained.
 
 use crate::dose::Scored;
 use crate::error::PopulationError;
@@ -25,13 +25,15 @@ code{font-size:.93em}
 .bar.minus{background:var(--delivered)}
 ";
 
-/// What has no effect on the misplacement beyond chance is left out below this rank correlation.
+/// Rank correlation below which an influence on the misplacement is indistinguishable from chance
+/// and left out.
 const LEAST_CORRELATION: f64 = 0.05;
 
-/// The page as HTML.
+/// Returns the page as HTML.
 ///
 /// # Errors
-/// Where a picture cannot be drawn.
+///
+/// If a picture cannot be drawn.
 pub fn page(p: &Population, scored: &Scored, figures: &[Distribution]) -> Result<String, PopulationError> {
     let plots = figures.iter().map(plot).collect::<Result<Vec<_>, _>>()?;
     let page = html! {
@@ -150,7 +152,7 @@ fn plot(d: &Distribution) -> Result<Markup, PopulationError> {
                 (thousands(d.values.len())) " " (d.each) "s: mean " b { (value(d.mean())) } ", SD " (value(d.deviation())) ", median "
                 b { (value(d.percentile(50.0))) } ", p5 " (value(d.percentile(5.0))) ", p95 " (value(d.percentile(95.0)))
                 ", largest " (value(d.percentile(100.0))) " " (d.unit) "."
-                @if beyond > 0 { " The last bar holds " (beyond) " beyond it." }
+                @if beyond > 0 { " The last bar includes " (beyond) " beyond it." }
                 @for (n, p) in published.iter().enumerate() {
                     br; span class="ref" { (n + 1) " published: " (p.value) " " (p.unit) } ", " (p.how) " (" (p.source) "; " (p.used.name()) ")"
                 }
@@ -185,7 +187,7 @@ fn dose(scored: &Scored) -> Markup {
     html! {
         h2 { "Dose of the target" }
         p { "TG-43U1, as the plan has its seeds and as they came to rest; every needle began in a gland at rest, so that "
-            "needles that push or hold the gland for others are not part of it." }
+            "needles that only push or hold the gland are not part of it." }
         div class="scroll" {
             table {
                 thead { tr { th { "" } th { "planned, mean" } th { "delivered, mean" } th { "SD" } th { "p5" } th { "median" } th { "p95" } } }
@@ -213,8 +215,8 @@ fn what_goes_with_it(p: &Population) -> Markup {
     }
     let (shown, rest): (Vec<_>, Vec<_>) = found.into_iter().partition(|(_, r)| r.abs() >= LEAST_CORRELATION);
     html! {
-        h2 { "What goes with the misplacement" }
-        p { "Rank correlation (Spearman) of what was drawn with the mean misplacement of a needle; a correlation is no cause." }
+        h2 { "Influences on the misplacement" }
+        p { "Rank correlation (Spearman) of the varied quantities with the mean misplacement of a needle; correlation is not causation." }
         div class="scroll" {
             table {
                 thead { tr { th { "quantity" } th { "correlation" } th class="text" { "" } } }
@@ -241,12 +243,12 @@ fn published_table() -> Markup {
     html! {
         h2 { "Published values" }
         p {
-            "Fitted: a parameter of " code { "docs/study/people.toml" } " was fitted to it, so that agreement there says nothing. Check: no parameter \
+            "Fitted: a parameter of " code { "docs/study/people.toml" } " was fitted to it, so that agreement proves nothing. Check: no parameter \
              was fitted to it. Context: another organ, needle or cause than what is simulated."
         }
         div class="scroll" {
             table {
-                thead { tr { th { "measured" } th { "value" } th class="text" { "of what" } th class="text" { "source" } th class="text" { "used as" } th class="text" { "to be kept in mind" } } }
+                thead { tr { th { "measured" } th { "value" } th class="text" { "of what" } th class="text" { "source" } th class="text" { "used as" } th class="text" { "remarks" } } }
                 tbody {
                     @for p in PUBLISHED {
                         tr {
@@ -267,7 +269,7 @@ fn made(p: &Population) -> Markup {
         pre { (printable_lines(&about.definition)) }
         footer {
             p { "Made by " (printable(&about.made_by)) ", page by host-ui " (env!("CARGO_PKG_VERSION")) ". "
-                (p.files.len()) " files; SHA-256 of the rows, in whatever shards: " code { (p.digest) } }
+                (p.files.len()) " files; SHA-256 of the rows, independent of the shards: " code { (p.digest) } }
             p { "Query the same files: " code { "duckdb -c \"SELECT scene, avg(peak_force_n) FROM 'shard-*.parquet' GROUP BY scene\"" } }
             p { "Made by a simulator for research and training. Not a medical device." }
         }
@@ -282,7 +284,7 @@ fn printable_lines(text: &str) -> String {
         .join("\n")
 }
 
-/// Three significant digits, as people read them.
+/// Formats three significant digits.
 fn value(value: Option<f64>) -> String {
     let Some(v) = value else { return "\u{2013}".to_owned() };
     let digits = match v.abs() {

@@ -12,17 +12,18 @@ const INK: RGBColor = RGBColor(70, 70, 70);
 const FAINT: RGBColor = RGBColor(225, 225, 225);
 const FONT: &str = "sans-serif";
 const MOST_BINS: usize = 40;
-/// What is beyond this percentile is drawn in the last bar, or one outlier would press all others into one.
+/// Percentile beyond which values count in the last bar, so that one outlier does not compress all
+/// others into one.
 const LAST_PERCENTILE: f64 = 99.5;
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
-/// Edges of equal bars from below the least value to above nearly all.
+/// Edges of equal bars from below the smallest value to above nearly all.
 struct Bars {
     from: f64,
     width: f64,
     counts: Vec<usize>,
-    /// Values beyond the last bar, which are counted in it.
+    /// Number of values beyond the last bar, which are counted in it.
     beyond: usize,
     /// Both ends of the axis.
     axis: [f64; 2],
@@ -63,7 +64,7 @@ impl Bars {
     }
 }
 
-/// 1, 2 or 5 times a power of ten, at least `width`.
+/// Returns 1, 2 or 5 times a power of ten, at least `width`.
 fn round_width(width: f64) -> f64 {
     let power = 10.0_f64.powf(width.log10().floor());
     let times = [1.0, 2.0, 5.0, 10.0]
@@ -72,7 +73,7 @@ fn round_width(width: f64) -> f64 {
     times.unwrap_or(10.0) * power
 }
 
-/// The histogram; published values in orange, in the order of their numbers in the caption.
+/// Returns the histogram; published values in orange, in the order of their numbers in the caption.
 pub fn histogram(d: &Distribution, published: &[&Published]) -> Result<(String, usize), PopulationError> {
     let bars = Bars::of(d, published);
     let mut text = String::new();

@@ -1,39 +1,39 @@
-//! What was measured in patients and phantoms, for comparison.
+//! Published measurements in patients and phantoms, for comparison.
 
 /// One published value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Published {
-    /// Distribution of the page that it is drawn in; empty: in the table alone.
+    /// Distribution of the page in which it is drawn; if empty, it is in the table only.
     pub beside: &'static str,
-    /// What was measured.
+    /// Measured quantity.
     pub what: &'static str,
-    /// Mean or median, as the text says.
+    /// Mean or median, as `how` states.
     pub value: f64,
     /// Unit.
     pub unit: &'static str,
-    /// Which statistic, range, and of how many.
+    /// Statistic, range and sample.
     pub how: &'static str,
     /// Source.
     pub source: &'static str,
-    /// What it is used for.
+    /// Use of the value.
     pub used: Use,
-    /// What makes it comparable or not.
+    /// Reason why it is comparable or not.
     pub note: &'static str,
 }
 
-/// What a published value is to the parameters.
+/// Relation of a published value to the parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
-    /// A parameter was fitted to it or set by it; agreement says nothing.
+    /// A parameter was fitted to it or set by it, so agreement proves nothing.
     Fitted,
-    /// No parameter was fitted to it: it checks.
+    /// No parameter was fitted to it, so it is a check.
     Check,
-    /// Beside what is simulated: another organ, needle, or cause.
+    /// Related to the simulation: another organ, needle, or cause.
     Context,
 }
 
 impl Use {
-    /// For people.
+    /// Returns the display name.
     pub fn name(self) -> &'static str {
         match self {
             Use::Fitted => "fitted",
@@ -217,7 +217,7 @@ pub const PUBLISHED: &[Published] = &[
     },
 ];
 
-/// Those that are drawn in one distribution.
+/// Returns the values that are drawn in one distribution.
 pub fn beside(name: &str) -> impl Iterator<Item = &'static Published> {
     PUBLISHED.iter().filter(move |p| p.beside == name)
 }

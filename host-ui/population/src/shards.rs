@@ -9,18 +9,19 @@ use stylet_insertions::{Table, digest, read, shard_files};
 pub struct Population {
     /// Rows in the order of the study.
     pub table: Table,
-    /// Finished shards, and how many there should be.
+    /// Number of finished shards, and total number.
     pub shards: [u32; 2],
     /// SHA-256 of the rows.
     pub digest: String,
-    /// The files that were read.
+    /// Files that were read.
     pub files: Vec<PathBuf>,
 }
 
 /// Reads the finished shards of a folder.
 ///
 /// # Errors
-/// None there, one that is damaged, or two that do not belong together.
+///
+/// If there is none, one is damaged, or two do not belong together.
 pub fn load(folder: &Path) -> Result<Population, PopulationError> {
     let found = shard_files(folder)?;
     let Some((first_shard, first)) = found.first().cloned() else {

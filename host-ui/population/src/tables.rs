@@ -11,7 +11,8 @@ use stylet_insertions::Table;
 /// Writes insertions.csv, implants.csv and distributions.csv.
 ///
 /// # Errors
-/// Where the folder takes no file.
+///
+/// If the folder cannot be written.
 pub fn write_tables(
     folder: &Path,
     table: &Table,

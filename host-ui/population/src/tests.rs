@@ -1,4 +1,5 @@
-//! Figures against closed forms, folders that do not hold one study, dose of seeds that did and did not move.
+//! Figures against closed forms, folders with inconsistent studies, dose of moved and unmoved
+//! seeds.
 
 use super::*;
 use figures::influences;
@@ -7,7 +8,7 @@ use stylet_insertions::{About, Insertion, Motion, Rest, Seed, Shard, Table, stru
 
 const SIDE: usize = 20;
 
-/// Moves every seed by `off_mm` along z.
+/// Returns an insertion whose seeds are off by `off_mm` along z.
 fn row(implant: i32, needle: i32, off_mm: f64) -> Insertion {
     let seed = |z: f64| Seed {
         planned_mm: [8.0 + 4.0 * f64::from(needle), 20.0, z],
@@ -41,7 +42,7 @@ fn row(implant: i32, needle: i32, off_mm: f64) -> Insertion {
     }
 }
 
-/// An insertion with other seeds.
+/// Returns an insertion with other seeds.
 pub fn insertion_with(seeds: Vec<Seed>) -> Insertion {
     Insertion {
         seeds,
@@ -65,7 +66,7 @@ fn write(folder: &Path, number: u32, of: u32, table: &Table) {
     stylet_insertions::write(&Shard { number, of }.file(folder), table).expect("written");
 }
 
-/// A cube of 40 mm, all of it target.
+/// Writes a cube of 40 mm that is all target.
 fn structures(folder: &Path) {
     let text = format!(
         "NRRD0004\ntype: unsigned char\ndimension: 3\nspace: right-anterior-superior\nsizes: {SIDE} {SIDE} {SIDE}\n\
@@ -89,7 +90,7 @@ fn figures_are_those_of_the_closed_form() {
 }
 
 #[test]
-fn a_monotone_influence_has_rank_correlation_one_and_an_unrelated_one_none() {
+fn a_monotone_influence_has_rank_correlation_one() {
     let rows = (1..=8).map(|n| row(n, 1, f64::from((n + 1) / 2))).collect();
     let found = influences(&table(rows));
     assert_eq!(found[0].0, "grows");
@@ -100,7 +101,7 @@ fn a_monotone_influence_has_rank_correlation_one_and_an_unrelated_one_none() {
 }
 
 #[test]
-fn seeds_that_do_not_move_give_the_dose_of_the_plan_and_those_that_leave_the_target_less() {
+fn unmoved_seeds_give_the_planned_dose() {
     let folder = tempfile::tempdir().unwrap();
     structures(folder.path());
     let mut rows: Vec<Insertion> = (1..=3).map(|needle| row(1, needle, 0.0)).collect();
@@ -123,7 +124,7 @@ fn seeds_that_do_not_move_give_the_dose_of_the_plan_and_those_that_leave_the_tar
 }
 
 #[test]
-fn shards_are_joined_and_what_does_not_belong_together_is_refused() {
+fn only_shards_of_one_study_are_joined() {
     let folder = tempfile::tempdir().unwrap();
     assert!(matches!(load(folder.path()), Err(PopulationError::Empty(_))));
     let (first, second) = (table(vec![row(1, 1, 1.0)]), table(vec![row(2, 1, 2.0)]));
@@ -146,7 +147,7 @@ fn shards_are_joined_and_what_does_not_belong_together_is_refused() {
 }
 
 #[test]
-fn the_page_stands_by_itself_and_shows_what_is_missing() {
+fn the_page_is_self_contained_and_shows_missing_data() {
     let folder = tempfile::tempdir().unwrap();
     structures(folder.path());
     let mut rows: Vec<Insertion> = (1..=30).map(|n| row(n, 1, 0.1 * f64::from(n))).collect();
