@@ -1,27 +1,28 @@
-//! The field of displacements as a texture takes it, and which material point lies at a place.
+//! The field of displacements as a texture, and the material point at a place.
 
 use half::f16;
 use nalgebra::Vector3;
 use stylet_shm_schema::GridInfo;
 
-/// A displacement smaller than this is not seen (m).
+/// Smallest visible displacement (m).
 pub const SEEN_M: f32 = 5e-6;
-/// Steps of the fixed point that finds the material point; with tissue stretched to 1.75 the last is a hundredth of the first.
+/// Iterations of the fixed point that finds the material point; with tissue stretched to 1.75 the
+/// last is a hundredth of the first.
 pub const STEPS: u32 = 8;
 
 /// Displacements on a grid over the body at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Field {
-    /// The grid.
+    /// Grid of the field.
     pub info: GridInfo,
     /// Displacement of each node, x fastest.
     pub displacements_m: Vec<[f32; 3]>,
-    /// None of them can be seen.
+    /// True if no displacement is visible.
     pub at_rest: bool,
 }
 
 impl Field {
-    /// `None` where the displacements are not one for each node.
+    /// Creates a field; `None` unless there is one displacement for each node.
     pub fn of(info: GridInfo, displacements_m: &[[f32; 3]]) -> Option<Self> {
         let fits = info.node_count() == Some(displacements_m.len()) && info.dims.iter().all(|&d| d > 0);
         fits.then(|| Self {
@@ -31,7 +32,7 @@ impl Field {
         })
     }
 
-    /// No displacement anywhere.
+    /// Creates a field without displacement.
     pub fn rest(info: GridInfo) -> Self {
         Self {
             displacements_m: vec![[0.0; 3]; info.node_count().unwrap_or(0)],
@@ -40,7 +41,7 @@ impl Field {
         }
     }
 
-    /// Straight lines between nodes; beyond the outermost their displacement.
+    /// Interpolates linearly between nodes; beyond the outermost, holds their displacement.
     pub fn displacement_m(&self, rest: Vector3<f64>) -> Vector3<f64> {
         let dims = self.info.dims.map(|d| d as usize);
         if self.displacements_m.len() != dims.iter().product::<usize>() || dims.contains(&0) {
@@ -64,7 +65,7 @@ impl Field {
         sum
     }
 
-    /// Where the tissue that is now at `place` was at rest: as the shader finds it.
+    /// Returns the place at rest of the tissue that is now at `place`, like the shader.
     pub fn rest_of_m(&self, place: Vector3<f64>) -> Vector3<f64> {
         let mut rest = place;
         for _ in 0..STEPS {
@@ -73,7 +74,7 @@ impl Field {
         rest
     }
 
-    /// Four halves for each node, the last 0: as a texture takes them.
+    /// Writes four halves for each node, the last 0, for a texture.
     pub fn texels(&self, out: &mut Vec<[u16; 4]>) {
         out.clear();
         let node = |d: &[f32; 3]| [texel(d[0]), texel(d[1]), texel(d[2]), f16::ZERO].map(f16::to_bits);
@@ -81,7 +82,7 @@ impl Field {
     }
 }
 
-/// A displacement for a texture; one that is not a number is none.
+/// Returns a displacement for a texture; NaN becomes zero.
 fn texel(metres: f32) -> f16 {
     if metres.is_nan() {
         return f16::ZERO;
@@ -94,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn texels_hold_displacements_to_11_bits_and_what_no_half_can_hold_is_bounded() {
+    fn texels_hold_displacements_to_11_bits() {
         for metres in [0.0, 1e-3, -4.2e-3, 0.0313] {
             assert!((texel(metres).to_f32() - metres).abs() <= metres.abs() / 2048.0);
         }
@@ -134,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn outside_the_grid_the_nearest_nodes_speak() {
+    fn outside_the_grid_the_nearest_nodes_count() {
         let field = linear(0.1);
         let far = field.displacement_m(Vector3::new(-1.0, 0.0, 0.0));
         let near = field.displacement_m(Vector3::new(0.01, 0.0, 0.0));

@@ -1,5 +1,5 @@
-//! What is computed for each picture of the body: its surfaces, found in the labels, carried by the tissue and cut by planes, and the
-//! field of displacements. No port, no window.
+//! Computations for each picture of the body: its surfaces, extracted from the labels, carried by
+//! the tissue and cut by planes, and the field of displacements. No port, no window.
 
 #![warn(missing_docs)]
 

@@ -1,4 +1,5 @@
-//! The gland's surface for the graphics card: positions with smooth normals, indices. Only what moves is computed again.
+//! The gland's surface for the graphics card: positions with smooth normals, indices. Only the
+//! moving part is computed again.
 
 pub mod coarse;
 pub mod cut;
@@ -7,20 +8,22 @@ use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 use std::ops::Range;
 
-/// A surface cut from a lattice has steps; the light should not show them.
+/// Smoothing passes of the normals, because a surface cut from a lattice has steps that light must
+/// not show.
 const SMOOTHINGS: usize = 2;
-/// A twentieth of a pixel, where a body of 100 mm fills a picture of 500 pixels.
+/// Smallest visible motion, a twentieth of a pixel, if a body of 100 mm fills a picture of 500
+/// pixels.
 const SEEN_M: f32 = 1e-5;
-/// Runs of vertices with a gap no longer than this between them are sent as one.
+/// Longest gap between runs of vertices that are sent as one.
 const GAP: usize = 64;
 
-/// A vertex as the graphics card takes it.
+/// Vertex for the graphics card.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct SurfaceVertex {
-    /// Scene frame.
+    /// Place in the scene frame.
     pub place_m: [f32; 3],
-    /// Not of unit length: the shader normalises.
+    /// Normal, not of unit length: the shader normalises.
     pub normal: [f32; 3],
 }
 
@@ -28,17 +31,18 @@ pub struct SurfaceVertex {
 #[derive(Debug, Default)]
 pub struct Surface {
     vertices: Vec<SurfaceVertex>,
-    /// Those whose vertices are all there.
+    /// Triangles whose vertices all exist.
     triangles: Vec<[u32; 3]>,
-    /// `triangles_of[first_of[v]..first_of[v + 1]]` have the vertex v.
+    /// Offsets: `triangles_of[first_of[v]..first_of[v + 1]]` have the vertex v.
     first_of: Vec<u32>,
     triangles_of: Vec<u32>,
-    /// Unit normals before the smoothing, and after each pass but the last, which are those of the vertices.
+    /// Unit normals before the smoothing, and after each pass but the last, which are those of the
+    /// vertices.
     normals: [Vec<[f32; 3]>; SMOOTHINGS],
     near: Near,
 }
 
-/// A set of vertices.
+/// Set of vertices.
 #[derive(Debug, Default)]
 struct Near {
     vertices: Vec<u32>,
@@ -46,7 +50,7 @@ struct Near {
 }
 
 impl Surface {
-    /// A triangle with a vertex that is not there is left out.
+    /// Creates a surface; leaves out triangles with a missing vertex.
     pub fn new(positions_m: &[[f32; 3]], triangles: &[[u32; 3]]) -> Self {
         let count = positions_m.len();
         let triangles: Vec<[u32; 3]> = whole(triangles, count).collect();
@@ -85,18 +89,19 @@ impl Surface {
         surface
     }
 
-    /// With their normals, in the order of the positions.
+    /// Returns the vertices with their normals, in the order of the positions.
     pub fn vertices(&self) -> &[SurfaceVertex] {
         &self.vertices
     }
 
-    /// As [`Self::vertices`].
+    /// Like [`Self::vertices`].
     pub fn into_vertices(self) -> Vec<SurfaceVertex> {
         self.vertices
     }
 
-    /// Gives the runs of vertices that are others now; none where nothing has moved. A vertex stays until its place is farther
-    /// away than 10 um: tissue that creeps would otherwise have the picture drawn again in each frame.
+    /// Returns the runs of vertices that have changed; none if nothing has moved. A vertex stays
+    /// until its place is farther away than 10 um: otherwise creeping tissue would redraw the
+    /// picture in each frame.
     pub fn move_to(&mut self, positions_m: &[[f32; 3]]) -> Vec<Range<usize>> {
         self.near.vertices.clear();
         for ((vertex, place_m), number) in self.vertices.iter_mut().zip(positions_m).zip(0..) {
@@ -113,7 +118,7 @@ impl Surface {
         self.near.runs()
     }
 
-    /// Normals about the vertices that have moved: those reach one triangle farther with each pass.
+    /// Updates the normals about moved vertices, which reach one triangle farther with each pass.
     fn light(&mut self) {
         self.spread();
         for &v in &self.near.vertices {
@@ -132,7 +137,7 @@ impl Surface {
         }
     }
 
-    /// To the vertices of all triangles about those of the set.
+    /// Extends the set to the vertices of all adjacent triangles.
     fn spread(&mut self) {
         let Near { vertices, has } = &mut self.near;
         for &v in vertices.iter() {
@@ -159,7 +164,7 @@ impl Surface {
         of.map(|&t| self.triangles[t as usize].map(|u| u as usize))
     }
 
-    /// Sum of the area vectors of the triangles about a vertex.
+    /// Returns the sum of the area vectors of the triangles about a vertex.
     fn area(&self, v: u32) -> Vector3<f32> {
         let place = |u: usize| Vector3::from(self.vertices[u].place_m);
         self.about(v)
@@ -167,7 +172,8 @@ impl Surface {
             .fold(Vector3::zeros(), |sum, area| sum + area)
     }
 
-    /// The normal of a vertex and those of its neighbours, one for each triangle that they share.
+    /// Returns the normal of a vertex and those of its neighbours, one for each triangle that they
+    /// share.
     fn smoothed(&self, v: u32, pass: usize) -> Vector3<f32> {
         let normals = &self.normals[pass];
         let normal = |u: usize| Vector3::from(normals[u]);
@@ -205,7 +211,7 @@ fn whole(triangles: &[[u32; 3]], vertex_count: usize) -> impl Iterator<Item = [u
     triangles.iter().filter(is_whole).copied()
 }
 
-/// Only triangles whose vertices are all there, so that no index leaves the buffer.
+/// Returns the indices of triangles whose vertices all exist, so that no index leaves the buffer.
 pub fn indices(triangles: &[[u32; 3]], vertex_count: usize) -> Vec<u32> {
     whole(triangles, vertex_count).flatten().collect()
 }
@@ -224,7 +230,7 @@ mod tests {
         assert_eq!(indices(&triangles, 4).len(), 9);
     }
 
-    /// A sheet of `side` by `side` vertices, and one vertex that belongs to nothing.
+    /// Returns a sheet of `side` by `side` vertices, and one vertex that belongs to nothing.
     fn sheet(side: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
         let place = |n: u32| [(n % side) as f32, (n / side) as f32, (n as f32 * 0.7).sin()];
         let mut positions: Vec<[f32; 3]> = (0..side * side).map(place).collect();
@@ -240,7 +246,7 @@ mod tests {
         (positions, triangles)
     }
 
-    /// Against a new surface, bit by bit; and the runs hold everything that changed.
+    /// Compares with a new surface, bit by bit; the runs cover everything that changed.
     #[test]
     fn a_surface_that_moved_is_that_of_a_new_one() {
         let (mut positions, triangles) = sheet(40);
@@ -266,7 +272,7 @@ mod tests {
                 .find(|v| !runs.iter().any(|run| run.contains(v)));
             assert_eq!(missed, None, "{runs:?}");
             let sent: usize = runs.iter().map(|run| run.len()).sum();
-            // Area and two smoothings reach one row farther each, either way.
+            // Area and two smoothings reach one row farther each, in both directions.
             let rows: std::collections::BTreeSet<usize> = moved.iter().map(|v| v / 40).collect();
             assert!(sent <= rows.len() * 7 * 40, "{sent} are sent for {} rows", rows.len());
         }

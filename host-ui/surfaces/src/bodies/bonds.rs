@@ -1,12 +1,13 @@
-//! Which elements of the lattice each vertex moves with, and how much with each.
+//! Bonds of each vertex: the lattice elements it moves with, and their weights.
 
 use stylet_shm_schema::GridInfo;
 
 const NONE: u32 = u32::MAX;
-/// Added to each share, so that a vertex near the middle of an element without a place still moves with the others.
+/// Weight added to each share, so that a vertex near the middle of an element without a place still
+/// moves with the others.
 const LEAST: f32 = 1e-3;
 
-/// For each vertex, elements at the surface and shares of one.
+/// Surface elements of each vertex, with shares that sum to one.
 #[derive(Clone, Debug, Default)]
 pub struct Bonds {
     /// Where the bonds of each vertex end.
@@ -14,7 +15,7 @@ pub struct Bonds {
     bonds: Vec<(u32, f32)>,
 }
 
-/// For each cell of the grid, the surface element there.
+/// Returns the surface element in each cell of the grid.
 pub fn elements_of_cells(grid: &GridInfo, rest_m: &[[f32; 3]]) -> Vec<u32> {
     let dims = grid.dims.map(i64::from);
     let mut elements = vec![NONE; grid.node_count().unwrap_or(0)];
@@ -33,7 +34,8 @@ fn number_of(dims: [i64; 3], cell: [i64; 3]) -> Option<usize> {
 }
 
 impl Bonds {
-    /// Of a vertex in a cube: with the elements at its corners, by its place between them. `None` where there are none.
+    /// Bonds a vertex in a cube to the elements at its corners, by its place between them. Returns
+    /// `None` if there are none.
     pub fn push(&mut self, grid: &GridInfo, elements: &[u32], cube: [i32; 3], point: [f32; 3]) -> Option<()> {
         let dims = grid.dims.map(i64::from);
         let start = self.bonds.len();
@@ -55,7 +57,7 @@ impl Bonds {
         (self.bonds.len() > start).then_some(())
     }
 
-    /// Places of the vertices while the elements are at `now_m`.
+    /// Returns the places of the vertices while the elements are at `now_m`.
     pub fn moved(&self, vertices_m: &[[f32; 3]], rest_m: &[[f32; 3]], now_m: &[[f32; 3]], out: &mut Vec<[f32; 3]>) {
         let off = |(now, rest): (&[f32; 3], &[f32; 3])| [now[0] - rest[0], now[1] - rest[1], now[2] - rest[2]];
         let moved_m: Vec<[f32; 3]> = now_m.iter().zip(rest_m).map(off).collect();

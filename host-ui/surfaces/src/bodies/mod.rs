@@ -1,4 +1,5 @@
-//! Surfaces of a scene as they are drawn: they follow the segmentation below the size of a cell and move with the lattice.
+//! Drawn surfaces of a scene: they follow the segmentation below the size of a cell and move with
+//! the lattice.
 
 mod bonds;
 mod net;
@@ -9,12 +10,13 @@ use net::Net;
 use std::ops::Range;
 use stylet_shm_schema::{GridInfo, SceneHeader, role};
 
-/// What the core sends of a scene, as far as surfaces are made from it.
+/// Data of a scene from which surfaces are made.
 #[derive(Clone, Copy)]
 pub struct Segmentation<'a> {
     /// Counts, grids, structures.
     pub header: &'a SceneHeader,
-    /// One for each cell of `header.labels`: 0 outside, else one more than the place among the header's structures.
+    /// Label of each cell of `header.labels`: 0 outside, else one more than its index in the
+    /// header's structures.
     pub labels: &'a [u8],
     /// Places at rest of the surface elements of the lattice, m.
     pub rest_m: &'a [[f32; 3]],
@@ -31,24 +33,24 @@ pub struct Bodies {
     pub triangles: Vec<[u32; 3]>,
     /// The whole body first, then one part for each of [`shown_alone`].
     pub parts: Vec<Range<usize>>,
-    /// What the surfaces follow.
+    /// Reference of the surfaces.
     pub follows: Follows,
     bonds: Bonds,
 }
 
-/// What drawn surfaces follow.
+/// Reference of drawn surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Follows {
-    /// The cells of the segmentation: the middle of each cell lies on its own side of each surface.
+    /// Cells of the segmentation: the middle of each cell lies on its own side of each surface.
     #[default]
     Segmentation,
-    /// The middles of the outermost elements, because the core sends the labels of only every so many cells: what is thinner
-    /// than that would not be drawn.
+    /// Middles of the outermost elements, because the core sends labels for only some of the cells:
+    /// thinner parts would vanish.
     Lattice,
 }
 
-/// The structures that have a surface of their own: place of the first in the header's list, and which belong to it. The
-/// targets together are one; a body of one structure has none.
+/// Returns the structures that have a surface of their own: index of the first in the header's
+/// list, and which belong to it. The targets together are one; a body of one structure has none.
 pub fn shown_alone(header: &SceneHeader) -> Vec<(usize, Vec<bool>)> {
     let structures = header.structures();
     if structures.len() < 2 {
@@ -70,18 +72,19 @@ pub fn shown_alone(header: &SceneHeader) -> Vec<(usize, Vec<bool>)> {
         .collect()
 }
 
-/// Whether the core sends the label of every cell, so that surfaces can follow the segmentation.
+/// Returns whether the core sends the label of every cell, so that surfaces can follow the
+/// segmentation.
 pub fn has_every_label(header: &SceneHeader) -> bool {
     (header.labels.spacing_m / header.spacing_m - 1.0).abs() < 1e-6
 }
 
 impl Bodies {
-    /// Takes tens of milliseconds: not for a frame.
+    /// Creates the surfaces. Takes tens of milliseconds: too long for a frame.
     pub fn of(scene: Segmentation) -> Self {
         Self::smooth(scene).unwrap_or_else(|| Self::of_lattice(scene))
     }
 
-    /// Surfaces through the middles of the outermost elements, as the core cuts them.
+    /// Creates surfaces through the middles of the outermost elements, as the core cuts them.
     pub fn of_lattice(scene: Segmentation) -> Self {
         let header = scene.header;
         let alone = shown_alone(header).into_iter().map(|(n, _)| {
@@ -100,7 +103,7 @@ impl Bodies {
         }
     }
 
-    /// `None` where the core did not send the label of every cell.
+    /// Creates smooth surfaces; `None` if the core did not send the label of every cell.
     fn smooth(scene: Segmentation) -> Option<Self> {
         let (header, grid) = (scene.header, scene.header.labels);
         let is_whole = grid.node_count() == Some(scene.labels.len()) && !scene.labels.is_empty();
@@ -121,7 +124,7 @@ impl Bodies {
         Some(bodies)
     }
 
-    /// `None` where a vertex has no element to move with.
+    /// Adds a structure; returns `None` if a vertex has no element to move with.
     fn push(&mut self, grid: &GridInfo, labels: &[u8], is_in: impl Fn(u8) -> bool, elements: &[u32]) -> Option<()> {
         let mut net = Net::of(grid.dims.map(|d| d as usize), labels, is_in);
         relax::relax(&mut net);
@@ -137,7 +140,8 @@ impl Bodies {
         Some(())
     }
 
-    /// Where the vertices are while the surface elements of the lattice are at `now_m`, in place of those in `out`.
+    /// Computes the vertices while the surface elements of the lattice are at `now_m`, replacing
+    /// the content of `out`.
     pub fn deformed(&self, rest_m: &[[f32; 3]], now_m: &[[f32; 3]], out: &mut Vec<[f32; 3]>) {
         out.clear();
         match self.follows {

@@ -1,23 +1,24 @@
-//! Surface nets about the cells of a structure: one vertex in each cube between eight middles of cells that differ.
+//! Surface nets about the cells of a structure: one vertex in each cube between eight middles of
+//! cells that differ.
 
 use fast_surface_nets::ndshape::{RuntimeShape, Shape};
 use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
 
-/// A closed net, counted in cells from the middle of the first one.
+/// Closed net, counted in cells from the middle of the first one.
 #[derive(Clone, Debug, Default)]
 pub struct Net {
     /// One vertex for each cube.
     pub points: Vec<[f32; 3]>,
-    /// The lowest corner of the cube that the vertex stays in.
+    /// Lowest corner of the cube in which each vertex stays.
     pub cubes: Vec<[i32; 3]>,
-    /// Anticlockwise seen from outside.
+    /// Triangles, anticlockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Cells inside.
+    /// Number of cells inside.
     pub cells: usize,
 }
 
 impl Net {
-    /// About the cells of a grid (x fastest) whose label is in the structure.
+    /// Creates a net about the cells of a grid (x fastest) whose label is in the structure.
     pub fn of([nx, ny, nz]: [usize; 3], labels: &[u8], is_in: impl Fn(u8) -> bool) -> Self {
         let is_in: [bool; 256] = std::array::from_fn(|label| is_in(label as u8));
         let (mut low, mut high, mut cells) = ([usize::MAX; 3], [0; 3], 0);
@@ -33,7 +34,7 @@ impl Net {
         if cells == 0 {
             return Self::default();
         }
-        // Nothing around it, so that the net closes; the crate makes no faces in the last layer.
+        // An empty border, so that the net closes; the crate makes no faces in the last layer.
         let dims = [0, 1, 2].map(|a| (high[a] - low[a]) as u32 + 4);
         let shape = RuntimeShape::<u32, 3>::new(dims);
         let mut field = vec![1.0_f32; shape.usize()];
@@ -66,7 +67,7 @@ impl Net {
         }
     }
 
-    /// Six times the volume inside, in cells.
+    /// Returns six times the volume inside, in cells.
     pub fn sixfold_volume(&self) -> f64 {
         // From a point near by, so that no digits are lost.
         let from = self.points.first().copied().unwrap_or_default();

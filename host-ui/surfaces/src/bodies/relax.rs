@@ -1,22 +1,24 @@
-//! The smoothest net whose vertices stay in their cubes and that holds as much as its cells.
+//! The smoothest net whose vertices stay in their cubes and that encloses the volume of its cells.
 //!
-//! A vertex in its cube keeps the net between the middles of the cells inside and outside (Gibson 1998): nothing that is one
-//! cell thick can vanish. The bending of the net is made small by gradient steps with momentum, cut off at the cubes.
+//! A vertex in its cube keeps the net between the middles of the cells inside and outside (Gibson
+//! 1998), so a part of one cell's thickness cannot vanish. Gradient steps with momentum minimise
+//! the bending of the net, clipped at the cubes.
 
 use super::net::Net;
 
-/// Steps; a slope of one cell in ten is smooth after about so many.
+/// Number of steps; a slope of one cell in ten is smooth after about this many.
 const STEPS: usize = 60;
-/// Of the gradient; more than a quarter diverges.
+/// Step of the gradient; more than a quarter diverges.
 const STEP: f32 = 0.24;
-/// How far a vertex may go from the middle of its cube, in cells. At a half, both sides of a sheet could meet.
+/// Largest distance of a vertex from the middle of its cube, in cells. At a half, both sides of a
+/// sheet could meet.
 const REACH: f32 = 0.45;
-/// Rounds in which the net is pushed out until it holds its cells.
+/// Most rounds in which the net is pushed out until it encloses its cells.
 const PUSHES: usize = 8;
-/// Of what a flat surface would need: a thin wire overshoots with all of it.
+/// Share of the push that a flat surface would need: a thin wire overshoots with all of it.
 const PUSH: f64 = 0.7;
 
-/// Moves the vertices of a net as it comes from the cells.
+/// Relaxes a net as it comes from the cells.
 pub fn relax(net: &mut Net) {
     let neighbours = Neighbours::of(net);
     let mut ahead = net.points.clone();
@@ -47,7 +49,7 @@ fn in_cube(point: [f32; 3], cube: [i32; 3]) -> [f32; 3] {
     })
 }
 
-/// Along the normals, by what the volume of the cells asks for.
+/// Pushes the net along its normals towards the volume of its cells.
 fn push(net: &mut Net) {
     let mut areas = vec![[0.0_f32; 3]; net.points.len()];
     let mut whole = 0.0_f64;
@@ -81,7 +83,7 @@ fn length(v: [f32; 3]) -> f32 {
     v.iter().map(|c| c * c).sum::<f32>().sqrt()
 }
 
-/// Vertices in cubes that share a face, where the net goes through it.
+/// Vertices in cubes that share a face through which the net passes.
 struct Neighbours {
     first_of: Vec<u32>,
     of: Vec<u32>,
@@ -94,7 +96,7 @@ impl Neighbours {
             (0..3).map(|i| (p[i] - q[i]).abs()).sum::<i32>() == 1
         };
         let edges = net.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
-        // The triangle on the other side has the edge the other way round.
+        // The triangle on the other side has the edge in the other direction.
         let mut edges: Vec<(u32, u32)> = edges.filter(|&(a, b)| is_beside(a, b)).collect();
         edges.sort_unstable();
         edges.dedup();
@@ -111,7 +113,7 @@ impl Neighbours {
         }
     }
 
-    /// How far each value is from the mean of those beside it.
+    /// Computes the distance of each value from the mean of its neighbours.
     fn bend(&self, values: &[[f32; 3]], out: &mut [[f32; 3]]) {
         for (v, bend) in out.iter_mut().enumerate() {
             let beside = &self.of[self.first_of[v] as usize..self.first_of[v + 1] as usize];

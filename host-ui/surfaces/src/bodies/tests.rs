@@ -1,11 +1,12 @@
-//! Drawn surfaces against the cells that they are drawn from; `tests/tests/system/scene_surfaces.rs` has whole scenes.
+//! Drawn surfaces against the cells that they are made from; `tests/tests/system/scene_surfaces.rs`
+//! has whole scenes.
 
 use super::*;
 use bytemuck::Zeroable;
 
 const SPACING_M: f64 = 1e-3;
 
-/// A body of one structure, as the core sends it: every cell is an element at the surface.
+/// Returns a body of one structure, as the core sends it: every cell is an element at the surface.
 fn scene(dims: [usize; 3], is_in: impl Fn([usize; 3]) -> bool) -> (SceneHeader, Vec<u8>, Vec<[f32; 3]>) {
     let mut header = SceneHeader::zeroed();
     header.spacing_m = SPACING_M;
@@ -47,7 +48,7 @@ fn volume_mm3(bodies: &Bodies) -> f64 {
     bodies.triangles.iter().map(of).sum()
 }
 
-/// Every edge runs once each way.
+/// Asserts that every edge runs once each way.
 fn assert_closed(bodies: &Bodies) {
     let edges = |[a, b, c]: [u32; 3]| [(a, b), (b, c), (c, a)];
     let mut there: Vec<(u32, u32)> = bodies.triangles.iter().flat_map(|t| edges(*t)).collect();
@@ -60,7 +61,7 @@ fn assert_closed(bodies: &Bodies) {
 #[test]
 fn a_plate_a_wire_and_a_cell_that_are_one_cell_thick_do_not_vanish() {
     let far = |c: [usize; 3]| c.iter().all(|i| (2..13).contains(i));
-    // What is one cell thick at the seventh cell, along x; x and y; x, y and z.
+    // One cell thick at the seventh cell, along x; x and y; x, y and z.
     for (name, thin) in [("plate", 1), ("wire", 2), ("cell", 3)] {
         let scene = scene([15; 3], |c| far(c) && c[..thin].iter().all(|&i| i == 7));
         let bodies = bodies(&scene);
@@ -98,9 +99,10 @@ fn vertices_move_with_the_elements_beside_them() {
     }
 }
 
-/// A host that gets the label of every second cell only would draw holes where a wall is thinner.
+/// Guards against holes: a host that gets the label of every second cell only would open thin
+/// walls.
 #[test]
-fn without_the_label_of_every_cell_the_lattice_is_drawn() {
+fn without_every_label_the_lattice_is_drawn() {
     let mut scene = scene([9; 3], |c| c.iter().all(|i| (2..7).contains(i)));
     scene.0.spacing_m = SPACING_M / 2.0;
     assert_eq!(bodies(&scene).follows, Follows::Lattice);

@@ -3,15 +3,17 @@
 use super::SurfaceVertex;
 use std::collections::HashMap;
 
-/// Vertices in a cube become one. Its side is this part of the largest side of the surface, within limits.
+/// Side of the cubes whose vertices become one, as a part of the largest side of the surface,
+/// within limits.
 const PART: f32 = 1.0 / 14.0;
 const CELL_M: [f32; 2] = [2.5e-3, 8e-3];
 
-/// A cube, and whether the surface looks outwards there.
+/// Cube, and whether the surface faces outwards there.
 type Cell = ([i32; 3], bool);
 
-/// Indices of a surface whose corners are some of the vertices of this one: in each cube the one nearest to the
-/// middle of those there (vertex clustering, Rossignac and Borrel 1993). They move with the surface.
+/// Returns indices of a surface on some of the same vertices: in each cube, the one nearest to the
+/// middle of those there (vertex clustering, Rossignac and Borrel 1993). They move with the
+/// surface.
 pub fn coarse(vertices: &[SurfaceVertex], indices: &[u32]) -> Vec<u32> {
     let place = |vertex: u32| vertices[vertex as usize].place_m;
     let bounds = [0, 1, 2].map(|a| {
@@ -20,7 +22,8 @@ pub fn coarse(vertices: &[SurfaceVertex], indices: &[u32]) -> Vec<u32> {
     });
     let side_m = bounds.iter().map(|[low, high]| high - low).fold(0.0, f32::max);
     let cell_m = (side_m * PART).clamp(CELL_M[0], CELL_M[1]);
-    // Both faces of a thin wall lie in one cube and stay apart: one looks away from the middle, the other to it.
+    // Both faces of a thin wall lie in one cube and stay apart: one faces away from the middle, the
+    // other towards it.
     let cell = |vertex: u32| -> Cell {
         let SurfaceVertex { place_m, normal } = vertices[vertex as usize];
         let from_middle = |a: usize| place_m[a] - 0.5 * (bounds[a][0] + bounds[a][1]);
@@ -60,7 +63,7 @@ pub fn coarse(vertices: &[SurfaceVertex], indices: &[u32]) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    /// A ball of so many rings, each with twice as many vertices.
+    /// Returns a ball of this many rings, each with twice as many vertices.
     fn ball(radius_m: f32, rings: u32) -> (Vec<SurfaceVertex>, Vec<u32>) {
         let across = 2 * rings;
         let mut vertices = Vec::new();
@@ -108,7 +111,7 @@ mod tests {
         assert!((0.95..=1.0).contains(&ratio), "{ratio}");
     }
 
-    /// The wall of a bladder.
+    /// Tests the wall of a bladder.
     #[test]
     fn a_thin_wall_keeps_its_volume() {
         let (mut vertices, mut indices) = ball(0.022, 90);
@@ -130,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_smaller_than_a_cube_has_no_triangles() {
+    fn parts_smaller_than_a_cube_have_no_triangles() {
         let (mut vertices, indices) = ball(0.001, 8);
         vertices
             .iter_mut()

@@ -1,4 +1,4 @@
-//! Where a plane cuts a triangle mesh: lines, joined end to end.
+//! The cut of a plane through a triangle mesh: lines, joined end to end.
 
 /// An edge of the mesh by its two vertices, the smaller first.
 type Edge = (u32, u32);
@@ -6,16 +6,17 @@ type Edge = (u32, u32);
 /// One line; closed when its first point is its last.
 pub type Line = Vec<[f32; 3]>;
 
-/// On which side of a plane each point lies.
+/// Side of a plane for each point.
 pub struct Sides {
-    /// How far before the plane.
+    /// Distance before the plane.
     before_m: Vec<f32>,
-    /// A point on the plane counts as in front. Of a byte each, because every triangle looks at three of them.
+    /// True in front of the plane or on it. One byte each, because every triangle reads three of
+    /// them.
     front: Vec<bool>,
 }
 
 impl Sides {
-    /// Of the plane `normal · p = offset`.
+    /// Classifies points by the plane `normal · p = offset`.
     pub fn of(points_m: &[[f32; 3]], normal: [f32; 3], offset_m: f32) -> Self {
         let before_m = |p: &[f32; 3]| p[0] * normal[0] + p[1] * normal[1] + p[2] * normal[2] - offset_m;
         let before_m: Vec<f32> = points_m.iter().map(before_m).collect();
@@ -24,7 +25,7 @@ impl Sides {
     }
 }
 
-/// Cuts a mesh at the plane of these sides. Triangles with a vertex that is not there are left out.
+/// Cuts a mesh at the plane of these sides. Leaves out triangles with a missing vertex.
 pub fn cut(points_m: &[[f32; 3]], triangles: &[[u32; 3]], sides: &Sides) -> Vec<Line> {
     let place = |(a, b): Edge| {
         let (pa, pb) = (points_m[a as usize], points_m[b as usize]);
@@ -39,7 +40,7 @@ pub fn cut(points_m: &[[f32; 3]], triangles: &[[u32; 3]], sides: &Sides) -> Vec<
         .collect()
 }
 
-/// The edges through which the plane enters and leaves a triangle.
+/// Returns the edges through which the plane enters and leaves a triangle.
 fn crossed(front: &[bool], triangle: &[u32; 3]) -> Option<(Edge, Edge)> {
     let [a, b, c] = triangle.map(|v| front.get(v as usize).copied());
     let front = [a?, b?, c?];
@@ -51,11 +52,12 @@ fn crossed(front: &[bool], triangle: &[u32; 3]) -> Option<(Edge, Edge)> {
     let [a, b, c] = [0, 1, 2].map(|i| triangle[(alone + i) % 3]);
     let edge = |u: u32, v: u32| (u.min(v), u.max(v));
     let (first, second) = (edge(a, b), edge(a, c));
-    // Always the same way round, so that the lines of neighbouring triangles join head to tail.
+    // Always in the same direction, so that the lines of neighbouring triangles join head to tail.
     Some(if front[alone] { (first, second) } else { (second, first) })
 }
 
-/// Chains of edges, each followed until it closes or ends; in the order of the mesh, so that the same cut gives the same lines.
+/// Joins edges into chains, each until it closes or ends; in the order of the mesh, so that equal
+/// cuts give equal lines.
 fn join(mut segments: Vec<(Edge, Edge)>) -> Vec<Vec<Edge>> {
     segments.sort_unstable();
     let next_of = |(_, to): &(Edge, Edge)| segments.binary_search_by_key(to, |(from, _)| *from).ok();
@@ -64,7 +66,7 @@ fn join(mut segments: Vec<(Edge, Edge)>) -> Vec<Vec<Edge>> {
     for &n in next.iter().flatten() {
         is_entered[n] = true;
     }
-    // Open lines first, from their beginnings.
+    // Open lines first, from their starts.
     let (inner, first): (Vec<usize>, Vec<usize>) = (0..segments.len()).partition(|&n| is_entered[n]);
     let mut is_left = vec![true; segments.len()];
     let mut lines = Vec::new();
@@ -88,7 +90,7 @@ fn join(mut segments: Vec<(Edge, Edge)>) -> Vec<Vec<Edge>> {
 mod tests {
     use super::*;
 
-    /// A sphere of triangles about the origin.
+    /// Returns a sphere of triangles about the origin.
     fn sphere(radius: f32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
         const RINGS: u32 = 24;
         const SIDES: u32 = 48;
@@ -132,7 +134,8 @@ mod tests {
         assert!(cut(&points, &triangles, &Sides::of(&points, [0.0, 0.0, 1.0], 2.0)).is_empty());
     }
 
-    /// Every triangle by itself: how many the plane goes through, and how long it is in all of them.
+    /// Returns the number of triangles that the plane crosses, and the length of the cut, triangle
+    /// by triangle.
     fn twin(points: &[[f32; 3]], triangles: &[[u32; 3]], normal: [f32; 3], offset: f32) -> (usize, f64) {
         let before = |p: [f32; 3]| (0..3).map(|i| f64::from(p[i] * normal[i])).sum::<f64>() - f64::from(offset);
         let (mut count, mut length) = (0, 0.0);
@@ -153,15 +156,15 @@ mod tests {
         (count, length)
     }
 
-    /// Two spheres, of which one has a hole, cut in closed and in open lines.
+    /// Tests two spheres, one with a hole, cut in closed and in open lines.
     #[test]
-    fn the_lines_go_through_every_triangle_that_the_plane_meets_once() {
+    fn the_cut_crosses_each_met_triangle_once() {
         let (mut points, mut triangles) = sphere(1.0);
         let (other, its) = sphere(0.7);
         let first = points.len() as u32;
         points.extend(other.iter().map(|p| [p[0] + 0.4, p[1], p[2] + 0.9]));
         triangles.extend(its.iter().skip(300).map(|t| t.map(|v| v + first)));
-        // In no order.
+        // In random order.
         triangles.sort_unstable_by_key(|t| t[0].wrapping_mul(2_654_435_761));
         let normal = [0.48, 0.6, 0.64];
         let (mut open, mut closed) = (0, 0);
@@ -186,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_with_a_corner_that_is_not_there_is_left_out() {
+    fn triangles_with_missing_corners_are_left_out() {
         let points = [[0.0, 0.0, -1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
         let lines = cut(
             &points,
