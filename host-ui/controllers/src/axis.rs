@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn a_driver_without_or_with_a_senseless_dead_zone_or_range_gives_a_usable_axis() {
+    fn a_bad_dead_zone_or_range_gives_a_usable_axis() {
         assert_eq!(axis(0, 255, 0).share(127 + 9), 0.0, "8 % of the way is dead");
         assert!(axis(0, 255, 0).share(127 + 14) > 0.0);
         assert_eq!(axis(0, 255, i32::MAX).share(255), 1.0);

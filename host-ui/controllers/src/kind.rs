@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn gamepads_and_3d_mice_are_known_from_mice_keyboards_sensors_and_joysticks() {
+    fn gamepads_and_3d_mice_are_told_from_other_devices() {
         let pad = sysfs("7cdb000000000000 0 0 0 0", "3003f", "0", "0", 0x045e);
         assert_eq!(Kind::of(&pad), Some(Kind::Gamepad));
         let cap = sysfs("3 0 0 0 0", "3f", "0", "0", 0x256f);

@@ -1,4 +1,4 @@
-//! Gamepads and 3D mice that hold the needle: found, read and interpreted on a thread of their own.
+//! Gamepads and 3D mice that hold the needle: found, read and interpreted on a separate thread.
 //!
 //! Events go one way: `found` (list of devices) → `state` (events to a [`Wish`]) → `hub` (choice of
 //! the device that holds the needle) → `reader` (the thread) → the window, which asks the core to

@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thread_that_has_ended_leaves_no_wish_and_is_reported() {
+    fn an_ended_thread_leaves_no_wish() {
         struct Broken;
         impl DeviceSource for Broken {
             type Device = RawDevice;

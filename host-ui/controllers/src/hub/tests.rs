@@ -82,7 +82,7 @@ fn holder(latest: &Latest) -> &str {
 }
 
 #[test]
-fn a_plugged_in_device_controls_the_needle_and_an_unplugged_one_leaves_it_at_rest_and_is_reported() {
+fn an_unplugged_device_leaves_the_needle_at_rest() {
     let (table, mut hub) = Table::with(&[]);
     assert_eq!(holder(hub.read(0.0)), "n/a");
     table.there.borrow_mut().push("a");
@@ -130,7 +130,7 @@ fn another_device_takes_over_only_while_the_needle_is_at_rest() {
 }
 
 #[test]
-fn with_two_hands_the_other_device_moves_the_probe_and_stops_but_drops_no_seed() {
+fn with_two_hands_the_other_device_drops_no_seed() {
     let (table, mut hub) = Table::with(&["a", "b"]);
     hub.use_two_hands(true);
     assert_eq!(holder(hub.read(0.0)), "pad a");
@@ -188,7 +188,7 @@ fn lost_events_have_the_state_read_again() {
 }
 
 #[test]
-fn a_device_without_permission_is_reported_with_its_cure_until_it_can_be_read() {
+fn an_unreadable_device_is_reported_with_its_remedy() {
     let (table, mut hub) = Table::with(&[]);
     *table.locked.borrow_mut() = true;
     table.there.borrow_mut().push("a");

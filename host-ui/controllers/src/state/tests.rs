@@ -43,7 +43,7 @@ fn cap() -> DeviceState {
 }
 
 #[test]
-fn a_stick_pushed_away_advances_at_full_speed_and_a_shoulder_button_makes_it_slow() {
+fn a_shoulder_button_slows_the_stick() {
     let mut state = State::new(Kind::Gamepad, &stick(0));
     feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -32768)]);
     assert!((state.wish(0.0).along_m_per_s - 0.04).abs() < 1e-6);
@@ -60,7 +60,7 @@ fn a_stick_pushed_away_advances_at_full_speed_and_a_shoulder_button_makes_it_slo
 }
 
 #[test]
-fn the_needle_does_not_move_until_a_stick_that_came_deflected_was_released() {
+fn a_stick_plugged_in_deflected_must_be_released_first() {
     let mut state = State::new(Kind::Gamepad, &stick(-32768));
     assert_eq!(state.wish(0.0), Wish::REST);
     feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -30000)]);
@@ -71,7 +71,7 @@ fn the_needle_does_not_move_until_a_stick_that_came_deflected_was_released() {
 }
 
 #[test]
-fn stop_holds_until_the_stick_was_released() {
+fn stop_holds_until_the_stick_is_released() {
     let mut state = State::new(Kind::Gamepad, &stick(0));
     feed(&mut state, 0.0, &[(EventType::ABSOLUTE, Y, -32768)]);
     let taken = feed(&mut state, 0.0, &[(EventType::KEY, KeyCode::BTN_EAST.0, 1)]);
@@ -83,7 +83,7 @@ fn stop_holds_until_the_stick_was_released() {
 }
 
 #[test]
-fn a_button_counts_once_and_not_when_it_was_held_before() {
+fn a_button_counts_once_per_press() {
     let mut whole = stick(0);
     whole.keys.insert(KeyCode::BTN_START);
     let mut state = State::new(Kind::Gamepad, &whole);
@@ -125,7 +125,7 @@ fn after_lost_events_the_state_is_that_of_the_device() {
 }
 
 #[test]
-fn of_a_cap_only_the_direction_that_is_meant_counts() {
+fn only_the_dominant_direction_of_a_cap_counts() {
     let mut state = State::new(Kind::Mouse3d, &cap());
     let push = |state: &mut State, xyz: [i32; 3]| {
         let events: Vec<_> = (0..3).map(|a| (EventType::ABSOLUTE, a, xyz[usize::from(a)])).collect();
@@ -165,7 +165,7 @@ fn a_relative_cap_that_falls_silent_is_at_rest() {
 }
 
 #[test]
-fn any_event_gives_a_wish_that_the_core_takes() {
+fn any_event_gives_a_valid_wish() {
     let mut state = State::new(Kind::Mouse3d, &cap());
     let values = [i32::MIN, -351, -30, -1, 0, 29, 31, 40, 350, i32::MAX];
     for code in [0, 1, 2, 3, 40, u16::MAX] {
@@ -182,7 +182,7 @@ fn any_event_gives_a_wish_that_the_core_takes() {
 }
 
 #[test]
-fn a_stick_moves_the_probe_in_or_turns_it_and_never_both_at_once() {
+fn a_stick_either_advances_or_turns_the_probe() {
     const X: u16 = AbsoluteAxisCode::ABS_X.0;
     let mut state = State::new(Kind::Gamepad, &stick(0));
     feed(
