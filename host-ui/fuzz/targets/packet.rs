@@ -1,4 +1,4 @@
-//! What the force process takes from its bridge: any bytes may come.
+//! Packets that the force process receives from its bridge: any bytes may come.
 
 #![no_main]
 

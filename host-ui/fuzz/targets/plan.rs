@@ -1,4 +1,4 @@
-//! RT Plan; what is read can be written and is the same when read again.
+//! RT Plan; a plan that was read can be written and reads back equal.
 
 #![no_main]
 

@@ -1,7 +1,8 @@
-//! Reads the messages of a session from its standard input, as MCAP, and serves them to viewers that speak Foxglove's protocol.
+//! Reads the messages of a session from its standard input, as MCAP, and serves them to viewers
+//! that speak Foxglove's protocol.
 //!
-//! `host-ui record --live` starts it. Channels and schemas are those of a recording, for they come with the messages. A viewer
-//! that is slow loses the oldest of what waits for it, and nobody waits for a viewer.
+//! `host-ui record --live` starts it. Channels and schemas come with the messages and are those of
+//! a recording. A slow viewer loses its oldest waiting messages and delays nobody.
 
 use foxglove::{ChannelBuilder, PartialMetadata, RawChannel, Schema, WebSocketServer};
 use mcap::records::Record;
@@ -12,7 +13,7 @@ use std::io::Read;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-/// A record of ours is never larger.
+/// Largest record of a session.
 const LONGEST_RECORD_BYTES: usize = 64 << 20;
 /// Messages that may wait for one viewer: four seconds.
 const BACKLOG: usize = 4096;
@@ -48,7 +49,7 @@ fn run() -> Result<(), Box<dyn Error>> {
 
 const USAGE: &str = "is started by 'host-ui record --live [ADDRESS:PORT]'";
 
-/// Until the input ends.
+/// Serves until the input ends.
 fn serve(mut input: impl Read) -> Result<(), Box<dyn Error>> {
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
