@@ -93,12 +93,7 @@ impl Drops {
             retract_to_m: self.retract_to_m,
             strand_pitch_m: self.strand_pitch_m,
             stabilising: stabilising.to_vec(),
-<<<<<<< HEAD
             earlier: earlier[first..].to_vec(),
-=======
-            // The last ones, if a request has no room for all.
-            earlier: earlier[earlier.len().saturating_sub(self.room_for_earlier(stabilising.len()))..].to_vec(),
->>>>>>> 4ca17348 (Write the implant crate in plain English)
             drops_m: self.drops_m().collect(),
         }
     }
