@@ -60,8 +60,8 @@ pub use exercise::{EXERCISE_STIFFNESS_RANGE, Exercise, ExercisesInForce, MOST_MO
 pub use instance::{Attendance, Epoch, Instance, InstanceError, Owned};
 pub use params::ParametersInForce;
 pub use plan::{
-    MAX_EARLIER_NEEDLES, MAX_SEEDS, MOST_PLANNED_NEEDLES, PRESCRIPTION_RANGE_GY, PlanInForce, PlannedSeed, Prescribed,
-    SEED_STRENGTH_RANGE_U, SOURCE_BYTES,
+    MAX_EARLIER_NEEDLES, MAX_SEEDS, MOST_PLANNED_NEEDLES, PRESCRIPTION_RANGE_GY, PlanInForce, PlannedNeedle,
+    PlannedSeed, Prescribed, SEED_STRENGTH_RANGE_U, SOURCE_BYTES,
 };
 pub use record::TickRecord;
 pub use refusal::{Reason, Refusal, RefusalCode};
@@ -69,7 +69,7 @@ pub use rehearsal::Rehearsal;
 pub use relayed::Relayed;
 pub use request::{
     ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, MARK_BEFORE_RANGE_S, Mark, NeedleAxis,
-    NeedleRehearsal, ParameterChange, PlannedNeedle, ProbeMove, RETRACT_RANGE_M, Request, RequestError, RequestErrors,
+    NeedleRehearsal, ParameterChange, ProbeMove, RETRACT_RANGE_M, Request, RequestError, RequestErrors,
     SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M, StabilisingNeedle, VALID_RANGE_S,
 };
 pub use scene::{SceneHeader, SceneId, StructureInfo, UploadHeader, UploadStructure, role};

@@ -1,6 +1,6 @@
 //! The plan that `rt-core` keeps, whichever hosts are connected.
 
-use crate::{PlannedNeedle, Text};
+use crate::Text;
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
@@ -47,6 +47,20 @@ impl Default for Prescribed {
     fn default() -> Self {
         Self::zeroed()
     }
+}
+
+/// A needle and the seeds along it, scene frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlannedNeedle {
+    /// Where the needle enters, m.
+    pub entry_m: [f64; 3],
+    /// Unit vector from the entry into the body.
+    pub direction: [f64; 3],
+    /// Positions of at most [`MAX_SEEDS`] seeds, m.
+    pub seeds_m: Vec<[f64; 3]>,
+    /// What the seeds are.
+    #[serde(default)]
+    pub prescribed: Prescribed,
 }
 
 /// The needle's path and the seeds planned along it.

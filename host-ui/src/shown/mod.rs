@@ -160,7 +160,7 @@ impl Shown {
             self.bend.take(&snapshot.header);
             self.body_moved_m = snapshot.header.body_moved_m;
             let count = snapshot.header.seed_count as usize;
-            self.seeds.extend(snapshot.header.seeds.iter().take(count).copied());
+            self.seeds.extend(&snapshot.header.seeds[..count]);
             self.left.extend_from_slice(snapshot.header.left());
             self.snapshot_residual = Some(snapshot.header.residual);
         }
@@ -380,8 +380,7 @@ mod tests {
     use super::*;
     use bytemuck::Zeroable;
 
-    /// Guards against the puncture depth of the gland for every membrane: skin of 12 mm seemed
-    /// punctured at 8 mm.
+    /// Skin of 12 mm seemed punctured at 8 mm, the depth of the gland's capsule.
     #[test]
     fn the_tension_is_that_of_the_membrane_in_front_of_the_tip() {
         let mut shown = Shown::empty("lab");

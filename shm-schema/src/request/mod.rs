@@ -4,7 +4,7 @@ mod verify;
 
 pub use verify::{RequestError, RequestErrors};
 
-use crate::{Command, Exercise, ParameterId, Prescribed};
+use crate::{Command, Exercise, ParameterId, PlannedNeedle};
 use bytemuck::Zeroable;
 use num_enum::TryFromPrimitive;
 use serde::{Deserialize, Serialize};
@@ -145,20 +145,6 @@ pub struct ParameterChange {
     pub id: ParameterId,
     /// The value, SI.
     pub value: f64,
-}
-
-/// A needle and the seeds along it, scene frame.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PlannedNeedle {
-    /// Where the needle enters, m.
-    pub entry_m: [f64; 3],
-    /// Unit vector from the entry into the body.
-    pub direction: [f64; 3],
-    /// Positions of at most [`crate::MAX_SEEDS`] seeds, m.
-    pub seeds_m: Vec<[f64; 3]>,
-    /// What the seeds are.
-    #[serde(default)]
-    pub prescribed: Prescribed,
 }
 
 /// Goal of the simulated hand, scene frame.

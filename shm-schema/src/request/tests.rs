@@ -1,7 +1,7 @@
 //! Every request survives the record, and no record of any bytes is taken for what it is not.
 
 use super::*;
-use crate::{BUILTIN_SCENES, COMMAND_BYTES, MAX_SEEDS, PARAMETERS, Reason, RefusalCode, Text};
+use crate::{BUILTIN_SCENES, COMMAND_BYTES, MAX_SEEDS, PARAMETERS, Prescribed, Reason, RefusalCode, Text};
 
 fn needle(seeds: usize) -> PlannedNeedle {
     PlannedNeedle {

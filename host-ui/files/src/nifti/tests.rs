@@ -109,7 +109,7 @@ fn every_broken_file_is_refused_with_its_reason() {
 }
 
 #[test]
-fn damaged_recordings_never_panic() {
+fn damaged_volumes_never_panic() {
     let good = small();
     for at in 0..352 {
         let mut b = good.clone();

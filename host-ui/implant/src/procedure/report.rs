@@ -354,26 +354,8 @@ fn table(result: &Value) {
         let lag_ms = result["lag"]["worst_ms"].as_f64().unwrap_or(f64::NAN);
         println!("without a line the tissue was up to {lag_ms:.0} ms behind, the tip up to {lag_mm:.2} mm ahead");
     }
-    let off: Vec<f64> = all(&result["seeds"], "off_rehearsal_mm").collect();
-    if !off.is_empty() {
-        let (mean, worst) = (
-            off.iter().sum::<f64>() / off.len() as f64,
-            off.iter().copied().fold(0.0, f64::max),
-        );
-        println!(
-            "live against rehearsed: {} seeds, mean {mean:.3} mm, worst {worst:.3} mm apart",
-            off.len()
-        );
-    }
-    let errors: Vec<f64> = all(&result["seeds"], "error_mm").collect();
-    if !errors.is_empty() {
-        println!(
-            "off plan: {} seeds, mean {:.2} mm, worst {:.2} mm",
-            errors.len(),
-            errors.iter().sum::<f64>() / errors.len() as f64,
-            errors.iter().copied().fold(0.0, f64::max)
-        );
-    }
+    print_distances("live against rehearsed", all(&result["seeds"], "off_rehearsal_mm"));
+    print_distances("off plan", all(&result["seeds"], "error_mm"));
     let (force, timing) = (&result["force"], &result["timing"]);
     let number = |v: &Value| v.as_f64().map_or_else(|| "-".to_owned(), |n| format!("{n:.3}"));
     println!(
@@ -384,7 +366,7 @@ fn table(result: &Value) {
     );
     if let Some(mm) = result["tissue_folded_from_mm"].as_f64() {
         println!(
-            "the linear answer of the tissue is folded at the tip from {mm:.1} mm of displacement on: force and places are not those of tissue there"
+            "the linear tissue model folds at the tip from {mm:.1} mm of displacement: force and places are wrong there"
         );
     }
     println!(
@@ -397,5 +379,16 @@ fn table(result: &Value) {
     );
     if let Some(why) = timing["not_real_time_because"].as_str() {
         println!("{why}");
+    }
+}
+
+fn print_distances(name: &str, mm: impl Iterator<Item = f64>) {
+    let mm: Vec<f64> = mm.collect();
+    if !mm.is_empty() {
+        let (mean, worst) = (
+            mm.iter().sum::<f64>() / mm.len() as f64,
+            mm.iter().copied().fold(0.0, f64::max),
+        );
+        println!("{name}: {} seeds, mean {mean:.2} mm, worst {worst:.2} mm", mm.len());
     }
 }
