@@ -389,6 +389,6 @@ fn print_distances(name: &str, mm: impl Iterator<Item = f64>) {
             mm.iter().sum::<f64>() / mm.len() as f64,
             mm.iter().copied().fold(0.0, f64::max),
         );
-        println!("{name}: {} seeds, mean {mean:.2} mm, worst {worst:.2} mm", mm.len());
+        println!("{name}: {} seeds, mean {mean:.3} mm, worst {worst:.3} mm", mm.len());
     }
 }
