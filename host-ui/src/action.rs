@@ -65,6 +65,8 @@ pub enum Action {
     ToggleIsodose,
     ToggleImage,
     ToggleTheme,
+    /// Starts a core in place of one that has ended.
+    StartCore,
     /// Saves the window as PNG.
     SavePicture,
     /// Saves the debrief as files.

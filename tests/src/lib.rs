@@ -113,6 +113,12 @@ impl Core {
         self.child.id()
     }
 
+    /// Kills the process and keeps what the test knows of it.
+    pub fn kill_only(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+
     pub fn is_running(&mut self) -> bool {
         matches!(self.child.try_wait(), Ok(None))
     }

@@ -94,6 +94,7 @@ impl App {
             }
             Action::SavePicture => self.pictures.request(ctx),
             Action::SaveDebrief => self.save_debrief(),
+            Action::StartCore => self.start_core(),
             Action::DismissDisconnected => self.shown.disconnected = None,
             Action::DismissRefusals => {
                 if let Some(session) = &self.shown.session {

@@ -1,6 +1,7 @@
 //! The window: takes new data, draws the panels, executes their requests. A frame never waits.
 
 mod act;
+mod core;
 mod debrief;
 mod drive;
 mod error;
@@ -88,6 +89,7 @@ struct Waiting {
 /// Window of the program.
 pub struct App {
     link: Link,
+    started_core: Option<core::StartedCore>,
     label: Option<u8>,
     /// Scene from the command line, until it is read.
     first_scene: Option<SceneChoice>,
@@ -219,6 +221,7 @@ impl App {
         };
         Self {
             link: Link::new(options.instance),
+            started_core: None,
             label: options.label,
             first_scene: options.scene,
             first_image: options.image,

@@ -266,11 +266,16 @@ fn absent(shown: &Shown, why: &str) -> Banner {
     } else {
         format!("{}{}", what_ended(shown), sentence(why))
     };
+    let has_ended = shown.session.is_some() && shown.relayed.is_none();
+    let remedy = match has_ended {
+        true => ("Start it again", Action::StartCore),
+        false => ("Watch an example", Action::Watch(WatchAction::Example)),
+    };
     Banner {
         level: BannerLevel::Bad,
         title: "rt-core is absent",
         text,
-        remedy: (!shown.reads_recording).then_some(("Watch an example", Action::Watch(WatchAction::Example))),
+        remedy: (!shown.reads_recording).then_some(remedy),
     }
 }
 

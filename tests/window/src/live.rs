@@ -108,6 +108,28 @@ fn a_window_that_comes_moves_nothing_by_itself() {
 }
 
 #[test]
+fn a_core_that_was_killed_is_started_again_by_a_click() {
+    let mut driven = Driven::open_plain([1280.0, 800.0]);
+    driven.plan_and_place();
+    let run = |app: &App| app.link().session().map(|session| session.session_id);
+    let first = run(driven.window.state());
+    driven.core.kill_only();
+    for _ in 0..200 {
+        driven.window.run_steps(1);
+        if driven.window.query_by_label("Start it again").is_some() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    driven.picture("ended");
+    driven.click("Start it again");
+    driven.until("another run", |app| {
+        run(app).is_some_and(|id| Some(id) != first) && app.link().state().is_some()
+    });
+    assert!(driven.window.query_by_label("rt-core is absent").is_none());
+}
+
+#[test]
 fn keys_drive_the_needle_and_letting_go_stops_it() {
     let mut driven = Driven::open([1280.0, 800.0]);
     driven.plan_and_place();
