@@ -61,7 +61,7 @@ impl Tree {
         self.files.iter().map(String::as_str).filter(checked)
     }
 
-    /// Names of all test functions.
+    /// Returns the names of all test functions.
     fn tests(&self) -> BTreeSet<String> {
         let mut found = BTreeSet::new();
         for file in self.files.iter().filter(|file| file.ends_with(".rs")) {
@@ -264,6 +264,39 @@ fn every_link_and_path_on_a_page_leads_to_a_file() {
     }
     assert!(checked > 50, "only {checked} paths found");
     assert!(wrong.is_empty(), "these lead nowhere:\n{}", wrong.join("\n"));
+}
+
+/// Returns formulas between `\\(` and `\\)` or `\\[` and `\\]`, as mdBook's MathJax takes them.
+fn formulas(page: &str) -> Vec<&str> {
+    let mut found = Vec::new();
+    for (opening, closing) in [(r"\\(", r"\\)"), (r"\\[", r"\\]")] {
+        let after = page.split(opening).skip(1);
+        found.extend(after.map(|rest| rest.split(closing).next().unwrap_or_default()));
+    }
+    found
+}
+
+/// Tells whether Markdown takes a part of a formula as its own: an escape such as `\\,` or emphasis.
+fn loses_by_markdown(formula: &str) -> bool {
+    let plain = formula.replace(r"\\", "");
+    let pairs = || plain.chars().zip(plain.chars().skip(1));
+    plain.contains('*')
+        || pairs().any(|(first, second)| first == '\\' && second.is_ascii_punctuation())
+        || pairs().any(|(first, second)| second == '_' && !first.is_alphanumeric())
+}
+
+#[test]
+fn formulas_survive_markdown() {
+    let tree = Tree::of_workspace();
+    let (mut wrong, mut checked) = (Vec::new(), 0);
+    for page in tree.pages() {
+        let text = tree.text(page);
+        checked += formulas(&text).len();
+        let lost = formulas(&text).into_iter().filter(|formula| loses_by_markdown(formula));
+        wrong.extend(lost.map(|formula| format!("{page}: {formula}")));
+    }
+    assert!(checked > 100, "only {checked} formulas found");
+    assert!(wrong.is_empty(), "Markdown changes:\n{}", wrong.join("\n"));
 }
 
 /// A page that `docs/SUMMARY.md` does not list is not in the book of `make book`.
