@@ -30,14 +30,6 @@ pub enum DoseError {
         /// Errors in the file.
         why: String,
     },
-    /// A picture that cannot be drawn.
-    #[error("{} cannot be drawn ({why})", .path.display())]
-    Picture {
-        /// The file.
-        path: PathBuf,
-        /// Message of the drawing library.
-        why: String,
-    },
     /// A file that cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),

@@ -5,6 +5,7 @@ use stylet_base::WriteError;
 use stylet_dose::DoseError;
 use stylet_files::FileError;
 use stylet_insertions::{Shard, TableError};
+use stylet_report::picture::DrawError;
 
 /// Problem of a folder of results.
 #[derive(Debug, thiserror::Error)]
@@ -54,8 +55,8 @@ pub enum PopulationError {
         known: String,
     },
     /// A picture.
-    #[error("a picture cannot be drawn: {0}")]
-    Picture(String),
+    #[error(transparent)]
+    Picture(#[from] DrawError),
     /// A file of the results.
     #[error(transparent)]
     Write(#[from] WriteError),

@@ -6,19 +6,16 @@ use crate::figures::{Distribution, influences};
 use crate::picture;
 use crate::published::{PUBLISHED, Published, beside};
 use crate::shards::Population;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 use stylet_base::format::printable;
-use stylet_implant::score::STYLE;
+use stylet_report::parts::{self, Column, cell, num};
 
 const OWN: &str = "\
-.cards{grid-template-columns:repeat(auto-fit,minmax(150px,1fr))}
 .plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(460px,1fr));gap:26px 30px}
-figure{margin:0}figure h3{font-size:15px;font-weight:650;margin:0 0 2px}
-figcaption{color:var(--soft);font-size:13px;line-height:1.4}
+figure h3{margin:0 10px 2px}
+figcaption{color:var(--soft);font-size:13px;font-weight:400;line-height:1.4}
 figcaption b{color:var(--ink);font-weight:600;font-variant-numeric:tabular-nums}
 figcaption .ref{color:#b04a00}
-.warn{background:#fff4e8;border-left:4px solid #d55e00;border-radius:4px;padding:8px 12px;color:var(--ink);margin:14px 0 0}
-td.text,th.text{text-align:left;white-space:normal}
 pre{background:var(--card);border-radius:8px;padding:12px 14px;font-size:12.5px;line-height:1.45;overflow-x:auto}
 code{font-size:.93em}
 .bar{display:inline-block;height:9px;border-radius:2px;background:var(--planned);vertical-align:1px}
@@ -36,35 +33,26 @@ const LEAST_CORRELATION: f64 = 0.05;
 /// If a picture cannot be drawn.
 pub fn page(p: &Population, scored: &Scored, figures: &[Distribution]) -> Result<String, PopulationError> {
     let plots = figures.iter().map(plot).collect::<Result<Vec<_>, _>>()?;
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width";
-                title { "Study " (printable(&p.table.about.study)) }
-                style { (PreEscaped(STYLE)) (PreEscaped(OWN)) }
-            }
-            body {
-                main {
-                    (head(p, scored))
-                    (cards(figures))
-                    (warnings(p, scored))
-                    h2 { "Distributions" }
-                    p class="key" {
-                        span { i class="line" {} "median of the simulation" }
-                        span { i class="line" style="border-top:2px dashed #d55e00" {} "published, numbered as in the caption" }
-                    }
-                    div class="plots" { @for plot in &plots { (plot) } }
-                    (dose(scored))
-                    (what_goes_with_it(p))
-                    (published_table())
-                    (made(p))
-                }
-            }
+    let main = html! {
+        (head(p, scored))
+        (cards(figures))
+        (warnings(p, scored))
+        h2 { "Distributions" }
+        p class="key" {
+            span { i class="line" {} "median of the simulation" }
+            span { i class="line" style="border-top:2px dashed #d55e00" {} "published, numbered as in the caption" }
         }
+        div class="plots" { @for plot in &plots { (plot) } }
+        (dose(scored))
+        (what_goes_with_it(p))
+        (published_table())
+        (made(p))
     };
-    Ok(page.into_string() + "\n")
+    Ok(stylet_report::page(
+        &format!("Study {}", printable(&p.table.about.study)),
+        OWN,
+        &main,
+    ))
 }
 
 fn head(p: &Population, scored: &Scored) -> Markup {
@@ -95,16 +83,13 @@ fn cards(figures: &[Distribution]) -> Markup {
         "D90 of the implant",
         "V100 of the implant",
     ];
-    html! {
-        div class="cards" {
-            @for d in names.into_iter().filter_map(of) {
-                div class="card" {
-                    b { (value(d.percentile(50.0))) " " (d.unit.split(' ').next().unwrap_or_default()) }
-                    span { (d.name) ", median" br; "p5 " (value(d.percentile(5.0))) ", p95 " (value(d.percentile(95.0))) }
-                }
-            }
-        }
-    }
+    parts::cards(names.into_iter().filter_map(of).map(|d| {
+        let unit = d.unit.split(' ').next().unwrap_or_default();
+        (
+            html! { b { (value(d.percentile(50.0))) " " (unit) } },
+            html! { (d.name) ", median" br; "p5 " (value(d.percentile(5.0))) ", p95 " (value(d.percentile(95.0))) },
+        )
+    }))
 }
 
 fn warnings(p: &Population, scored: &Scored) -> Markup {
@@ -124,20 +109,20 @@ fn warnings(p: &Population, scored: &Scored) -> Markup {
     reasons.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
     html! {
         @if found < of {
-            p class="warn" { (found) " of " (of) " shards are finished: the page shows these alone." }
+            p class="warning" { (found) " of " (of) " shards are finished: the page shows these alone." }
         }
         @if failed > 0 {
-            p class="warn" {
+            p class="warning" {
                 "Failed insertions, in no distribution: " (thousands(failed)) " of " (thousands(p.table.rows.len())) ". "
                 @for (count, why) in reasons.iter().take(5) { (count) " \u{d7} \u{201c}" (printable(why)) "\u{201d}. " }
             }
         }
         @if scored.incomplete > 0 {
-            p class="warn" {
+            p class="warning" {
                 "Implants without a dose: " (scored.incomplete) ". A needle failed, or its shard is not finished."
             }
         }
-        @if let Some(why) = &scored.missing { p class="warn" { "No dose was computed: " (printable(why)) } }
+        @if let Some(why) = &scored.missing { p class="warning" { "No dose was computed: " (printable(why)) } }
     }
 }
 
@@ -172,13 +157,19 @@ fn dose(scored: &Scored) -> Markup {
     let column = |of: fn(&crate::ImplantDose) -> f64| {
         Distribution::new("", "%", "implant", scored.implants.iter().map(of).collect())
     };
+    let row = |name: &str, planned: Distribution, delivered: Distribution| {
+        let figures = [planned.mean(), delivered.mean(), delivered.deviation()];
+        let percentiles = [5.0, 50.0, 95.0].map(|p| delivered.percentile(p));
+        let values = figures.into_iter().chain(percentiles).map(|v| cell(value(v)));
+        std::iter::once(cell(name)).chain(values).collect()
+    };
     let rows = [
-        (
+        row(
             "D90, % of the prescription",
             column(|i| i.planned.d90_percent),
             column(|i| i.delivered.d90_percent),
         ),
-        (
+        row(
             "V100, % of the target",
             column(|i| i.planned.v100_percent),
             column(|i| i.delivered.v100_percent),
@@ -188,19 +179,7 @@ fn dose(scored: &Scored) -> Markup {
         h2 { "Dose of the target" }
         p { "TG-43U1, as the plan has its seeds and as they came to rest; every needle began in a gland at rest, so that "
             "needles that only push or hold the gland are not part of it." }
-        div class="scroll" {
-            table {
-                thead { tr { th { "" } th { "planned, mean" } th { "delivered, mean" } th { "SD" } th { "p5" } th { "median" } th { "p95" } } }
-                tbody {
-                    @for (name, planned, delivered) in &rows {
-                        tr {
-                            td { (name) } td { (value(planned.mean())) } td { (value(delivered.mean())) } td { (value(delivered.deviation())) }
-                            @for p in [5.0, 50.0, 95.0] { td { (value(delivered.percentile(p))) } }
-                        }
-                    }
-                }
-            }
-        }
+        (parts::numbers(&["", "planned, mean", "delivered, mean", "SD", "p5", "median", "p95"], &rows))
         p {
             "D90 is at least 90 % of the prescription in " b { (format!("{:.1} %", share(&|i| i.delivered.d90_percent >= 90.0))) }
             " of the implants, and at least 100 % in " b { (format!("{:.1} %", share(&|i| i.delivered.d90_percent >= 100.0))) } "."
@@ -214,25 +193,19 @@ fn what_goes_with_it(p: &Population) -> Markup {
         return html! {};
     }
     let (shown, rest): (Vec<_>, Vec<_>) = found.into_iter().partition(|(_, r)| r.abs() >= LEAST_CORRELATION);
+    let row = |(name, r): &(String, f64)| {
+        let (class, width) = (if *r < 0.0 { "bar minus" } else { "bar" }, 320.0 * r.abs());
+        vec![
+            html! { code { (name) } },
+            cell(format!("{r:+.2}").replace('-', "\u{2212}")),
+            html! { span class=(class) style=(format!("width:{width:.0}px")) {} },
+        ]
+    };
+    let rows: Vec<_> = shown.iter().map(row).collect();
     html! {
         h2 { "Influences on the misplacement" }
         p { "Rank correlation (Spearman) of the varied quantities with the mean misplacement of a needle; correlation is not causation." }
-        div class="scroll" {
-            table {
-                thead { tr { th { "quantity" } th { "correlation" } th class="text" { "" } } }
-                tbody {
-                    @for (name, r) in &shown {
-                        tr {
-                            td { code { (name) } }
-                            td { (format!("{r:+.2}").replace('-', "\u{2212}")) }
-                            td class="text" {
-                                span class=(if *r < 0.0 { "bar minus" } else { "bar" }) style=(format!("width:{:.0}px", 320.0 * r.abs())) {}
-                            }
-                        }
-                    }
-                }
-            }
-        }
+        (parts::table(&["quantity", "correlation", ""], &rows, &[Column::Text, Column::Number, Column::Text]))
         @if !rest.is_empty() {
             p { "Below " (LEAST_CORRELATION) ": " (rest.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")) "." }
         }
@@ -240,25 +213,26 @@ fn what_goes_with_it(p: &Population) -> Markup {
 }
 
 fn published_table() -> Markup {
+    let head = ["measured", "value", "of what", "source", "used as", "remarks"];
+    let row = |p: &Published| {
+        let value = html! { (p.value) " " (p.unit) };
+        vec![
+            cell(p.what),
+            value,
+            cell(p.how),
+            cell(p.source),
+            cell(p.used.name()),
+            cell(p.note),
+        ]
+    };
+    let rows: Vec<_> = PUBLISHED.iter().map(row).collect();
     html! {
         h2 { "Published values" }
         p {
             "Fitted: a parameter of " code { "docs/study/people.toml" } " was fitted to it, so that agreement proves nothing. Check: no parameter \
              was fitted to it. Context: another organ, needle or cause than what is simulated."
         }
-        div class="scroll" {
-            table {
-                thead { tr { th { "measured" } th { "value" } th class="text" { "of what" } th class="text" { "source" } th class="text" { "used as" } th class="text" { "remarks" } } }
-                tbody {
-                    @for p in PUBLISHED {
-                        tr {
-                            td { (p.what) } td { (p.value) " " (p.unit) }
-                            td class="text" { (p.how) } td class="text" { (p.source) } td class="text" { (p.used.name()) } td class="text" { (p.note) }
-                        }
-                    }
-                }
-            }
-        }
+        (parts::table(&head, &rows, &[Column::Text, Column::Number]))
     }
 }
 
@@ -284,32 +258,11 @@ fn printable_lines(text: &str) -> String {
         .join("\n")
 }
 
-/// Formats three significant digits.
+/// Returns three significant digits, as people read them.
 fn value(value: Option<f64>) -> String {
-    let Some(v) = value else { return "\u{2013}".to_owned() };
-    let digits = match v.abs() {
-        0.0..9.995 => 2,
-        9.995..99.95 => 1,
-        _ => 0,
-    };
-    // No signed zero.
-    let text = format!("{:.digits$}", v);
-    let zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
-    if zero {
-        text.trim_start_matches('-').to_owned()
-    } else {
-        text.replace('-', "\u{2212}")
-    }
+    value.map_or_else(|| "\u{2013}".to_owned(), |v| num(v).replace('-', "\u{2212}"))
 }
 
 fn thousands(count: usize) -> String {
-    let digits = count.to_string();
-    let mut text = String::new();
-    for (n, digit) in digits.chars().enumerate() {
-        if n > 0 && (digits.len() - n).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
+    num(count as f64)
 }

@@ -1,22 +1,15 @@
 //! A histogram as SVG, with published values as lines.
 
-use crate::error::PopulationError;
 use crate::figures::Distribution;
 use crate::published::Published;
 use plotters::prelude::*;
+use stylet_report::picture::{BLUE, Canvas, DrawError, Drawn, INK, ORANGE, axes, drawn, label};
 
 const SIZE: (u32, u32) = (560, 300);
-const BLUE: RGBColor = RGBColor(0, 114, 178);
-const ORANGE: RGBColor = RGBColor(213, 94, 0);
-const INK: RGBColor = RGBColor(70, 70, 70);
-const FAINT: RGBColor = RGBColor(225, 225, 225);
-const FONT: &str = "sans-serif";
 const MOST_BINS: usize = 40;
 /// Percentile beyond which values count in the last bar, so that one outlier does not compress all
 /// others into one.
 const LAST_PERCENTILE: f64 = 99.5;
-
-type Drawn = Result<(), Box<dyn std::error::Error>>;
 
 /// Edges of equal bars from below the smallest value to above nearly all.
 struct Bars {
@@ -74,40 +67,32 @@ fn round_width(width: f64) -> f64 {
 }
 
 /// Returns the histogram; published values in orange, in the order of their numbers in the caption.
-pub fn histogram(d: &Distribution, published: &[&Published]) -> Result<(String, usize), PopulationError> {
+pub fn histogram(d: &Distribution, published: &[&Published]) -> Result<(String, usize), DrawError> {
     let bars = Bars::of(d, published);
-    let mut text = String::new();
-    draw(&mut text, d, published, &bars).map_err(|e| PopulationError::Picture(e.to_string()))?;
-    Ok((text, bars.beyond))
+    let svg = drawn(SIZE, |root| draw(root, d, published, &bars))?;
+    Ok((svg, bars.beyond))
 }
 
-fn draw(text: &mut String, d: &Distribution, published: &[&Published], bars: &Bars) -> Drawn {
-    let root = SVGBackend::with_string(text, SIZE).into_drawing_area();
+fn draw(root: &Canvas, d: &Distribution, published: &[&Published], bars: &Bars) -> Drawn {
     let [low, high] = bars.axis;
     let share = |count: usize| 100.0 * count as f64 / d.values.len() as f64;
     let highest = bars.counts.iter().copied().map(share).fold(0.0, f64::max) * 1.18;
-    let mut chart = ChartBuilder::on(&root)
+    let mut chart = ChartBuilder::on(root)
         .margin(8)
         .margin_right(16)
         .x_label_area_size(44)
         .y_label_area_size(52)
         .build_cartesian_2d(low..high, 0.0..highest)?;
     let digits = usize::from(high - low < 4.0);
-    chart
-        .configure_mesh()
-        .x_desc(format!("{} ({})", d.name, d.unit))
-        .y_desc(format!("{}s (%)", d.each))
-        .disable_x_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(FAINT)
-        .axis_style(INK)
-        .x_labels(8)
-        .y_labels(5)
-        .x_label_formatter(&|x| format!("{:.*}", digits, x + 0.0))
-        .y_label_formatter(&|y| format!("{y:.0}"))
-        .label_style((FONT, 13).into_font().color(&INK))
-        .axis_desc_style((FONT, 14).into_font().color(&INK))
-        .draw()?;
+    let names = [&format!("{} ({})", d.name, d.unit), &format!("{}s (%)", d.each)];
+    let of_x = |x: &f64| format!("{:.*}", digits, x + 0.0);
+    axes(&mut chart, names.map(String::as_str), |mesh| {
+        mesh.disable_x_mesh()
+            .x_labels(8)
+            .y_labels(5)
+            .x_label_formatter(&of_x)
+            .y_label_formatter(&|y| format!("{y:.0}"));
+    })?;
     let gap = 0.04 * bars.width;
     chart.draw_series(bars.counts.iter().enumerate().map(|(n, &count)| {
         let left = bars.from + n as f64 * bars.width;
@@ -125,7 +110,7 @@ fn draw(text: &mut String, d: &Distribution, published: &[&Published], bars: &Ba
     for (n, p) in published.iter().enumerate() {
         let line = [(p.value, 0.0), (p.value, highest * 0.9)];
         chart.draw_series(DashedLineSeries::new(line, 6, 4, ORANGE.stroke_width(2)))?;
-        let style = (FONT, 15).into_font().color(&ORANGE);
+        let style = label(15).color(&ORANGE);
         let half_a_letter = 0.008 * (high - low);
         chart.draw_series([Text::new(
             (n + 1).to_string(),
@@ -133,6 +118,5 @@ fn draw(text: &mut String, d: &Distribution, published: &[&Published], bars: &Ba
             style,
         )])?;
     }
-    root.present()?;
     Ok(())
 }

@@ -8,6 +8,7 @@ use stylet_base::output::new_folder;
 use stylet_base::progress_bar::LongTask;
 use stylet_base::write_whole;
 use stylet_dose::kernel::DoseKernel;
+use stylet_dose::picture::Curve;
 use stylet_dose::seed::Seed;
 use stylet_dose::{DoseGrid, DosePoints, picture, structure};
 use stylet_implant::provenance;
@@ -104,7 +105,13 @@ impl DoseArgs {
             let prescription_gy = c.prescription_gy(&loaded)?;
             let curves: Vec<_> = judge.names().zip(&verdict.dvhs).collect();
             write::dvh(&c.out.join("dvh.csv"), &curves, prescription_gy, self.bin_gy)?;
-            picture::dvh(&c.out.join("dvh.svg"), &curves, prescription_gy)?;
+            let structures = curves.iter().map(|&(name, dvh)| Curve {
+                name,
+                dvh,
+                planned: None,
+            });
+            let drawn = picture::dvh((900, 560), &structures.collect::<Vec<_>>(), prescription_gy)?;
+            write_whole(&c.out.join("dvh.svg"), drawn.as_bytes())?;
             let mut metrics = judge.to_json(verdict);
             metrics["dose"] = c.provenance(source, seeds);
             metrics["made"] = made.clone();

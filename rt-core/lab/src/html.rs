@@ -1,8 +1,7 @@
-//! The report as one page that needs nothing else: light, system fonts, pictures inside.
+//! The report of a measurement as one page.
 
 mod causes;
 mod machine;
-pub mod parts;
 mod steady;
 pub mod times;
 
@@ -10,53 +9,42 @@ use crate::compare::Against;
 use crate::measure::Measured;
 use crate::plots::{self, BLUE, DrawError, ORANGE, Series};
 use crate::report::{NO_DIGEST, Report};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
-use parts::{Column, badge, cell, micro, num, or_na, table};
-
-/// The style sheet of every page of the laboratory.
-pub const STYLE: &str = include_str!("report.css");
+use crate::verdict::Outcome;
+use maud::{Markup, PreEscaped, html};
+use stylet_report::parts::{Column, cards, cell, micro, num, or_na, table};
 
 /// The whole page; the report's digest stands in it as zeros, once.
 pub fn page(report: &Report, measured: &Measured) -> Result<String, DrawError> {
     let pictures = pictures(report, measured)?;
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                title { "Latency report, " (report.made_at) }
-                meta name="viewport" content="width=device-width";
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                main {
-                    (header(report))
-                    (key_figures(report))
-                    (limits(report))
-                    (pictures)
-                    (times::of_loop("Force loop", &report.haptic))
-                    (times::of_loop("Tissue loop", &report.tissue))
-                    @if let Some(second) = &report.second {
-                        (times::of_loop("Loop of the second device", second))
-                    }
-                    (times::host(report))
-                    (times::comparison(report))
-                    (times::spin(report))
-                    (machine::stiffness(report))
-                    (machine::counters(report))
-                    (times::late(report))
-                    (causes::causes(report))
-                    (steady::steady(report))
-                    (machine::provenance(report))
-                    (machine::method(report))
-                    footer {
-                        "SHA-256 of report.json: " code { (NO_DIGEST) } ". Check with " code { "rt-core verify" } "."
-                    }
-                }
-            }
+    let main = html! {
+        (header(report))
+        (key_figures(report))
+        (limits(report))
+        (pictures)
+        (times::of_loop("Force loop", &report.haptic))
+        (times::of_loop("Tissue loop", &report.tissue))
+        @if let Some(second) = &report.second {
+            (times::of_loop("Loop of the second device", second))
+        }
+        (times::host(report))
+        (times::comparison(report))
+        (times::spin(report))
+        (machine::stiffness(report))
+        (machine::counters(report))
+        (times::late(report))
+        (causes::causes(report))
+        (steady::steady(report))
+        (machine::provenance(report))
+        (machine::method(report))
+        footer {
+            "SHA-256 of report.json: " code { (NO_DIGEST) } ". Check with " code { "rt-core verify" } "."
         }
     };
-    Ok(page.into_string() + "\n")
+    Ok(stylet_report::page(
+        &format!("Latency report, {}", report.made_at),
+        "",
+        &main,
+    ))
 }
 
 fn header(r: &Report) -> Markup {
@@ -102,7 +90,7 @@ fn key_figures(r: &Report) -> Markup {
     let share = r.haptic.work_p999_of_period.map(|s| s * 100.0);
     let margin = r.stiffness.margins.iter().find(|m| m.at == "p99.9");
     let k = margin.and_then(|m| m.k_max_n_per_m);
-    let cards = [
+    let figures = [
         ("wake-up, p50", of("wake-up", "p50"), "\u{b5}s"),
         ("wake-up, p99", of("wake-up", "p99"), "\u{b5}s"),
         ("own work, p99.9", of("whole tick", "p99.9"), "\u{b5}s"),
@@ -110,13 +98,17 @@ fn key_figures(r: &Report) -> Markup {
         ("missed deadlines", cell(r.haptic.counts.missed_deadlines), ""),
         ("stiffness margin, p99.9", or_na(k.map(|k| k / 1e3)), "N/mm"),
     ];
-    html! {
-        section class="cards" {
-            @for (what, value, unit) in &cards {
-                div { b { (value) } " " (unit) br; span { (what) } }
-            }
-        }
-    }
+    cards(figures.map(|(what, value, unit)| (html! { b { (value) } " " (unit) }, cell(what))))
+}
+
+/// The outcome of a verdict or of one limit.
+pub fn badge(outcome: Outcome) -> Markup {
+    let class = match outcome {
+        Outcome::Pass => "pass",
+        Outcome::Fail => "fail",
+        Outcome::NotMeasurable => "open",
+    };
+    html! { span class={ "badge " (class) } { (outcome.words()) } }
 }
 
 fn limits(r: &Report) -> Markup {

@@ -8,46 +8,16 @@ pub use trend::{TrendPoint, trend, trend_range_us};
 
 use crate::collect::{LoopTiming, Window};
 use hdrhistogram::Histogram;
-use plotters::coord::Shift;
 use plotters::coord::ranged1d::{KeyPointHint, Ranged, ValueFormatter};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+pub use stylet_report::picture::{BLUE, DrawError, ORANGE};
+use stylet_report::picture::{Canvas, Drawn, axes, drawn, label};
 
 const SIZE: (u32, u32) = (560, 300);
-const FONT: &str = "system-ui, sans-serif";
-const INK: RGBColor = RGBColor(0x33, 0x3d, 0x47);
-const FAINT: RGBColor = RGBColor(0xe3, 0xe7, 0xeb);
-/// Color of our loop.
-pub const BLUE: RGBColor = RGBColor(0x1f, 0x6f, 0xb2);
-/// Color of the second series: cyclictest, or the work of the loop.
-pub const ORANGE: RGBColor = RGBColor(0xd9, 0x7a, 0x1a);
 
-/// A picture cannot be drawn.
-#[derive(Debug, thiserror::Error)]
-#[error("a picture of the report cannot be drawn: {0}")]
-pub struct DrawError(String);
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), Box<dyn std::error::Error>>;
-
-fn picture(draw: impl FnOnce(&Area) -> Drawn) -> Result<String, DrawError> {
-    picture_of(SIZE, draw)
-}
-
-fn picture_of(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> Result<String, DrawError> {
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        draw(&root).map_err(|e| DrawError(e.to_string()))?;
-        root.present().map_err(|e| DrawError(e.to_string()))?;
-    }
-    // The page scales it; a fixed size would not fit a narrow window.
-    let fixed = format!("width=\"{}\" height=\"{}\" ", size.0, size.1);
-    Ok(svg.replacen(&fixed, "", 1))
-}
-
-fn label() -> TextStyle<'static> {
-    (FONT, 12).into_font().color(&INK)
+fn picture(draw: impl FnOnce(&Canvas) -> Drawn) -> Result<String, DrawError> {
+    drawn(SIZE, draw)
 }
 
 /// Short, without trailing zeros: 0.1, 20, 5000.
@@ -195,15 +165,9 @@ pub fn stages(timing: &LoopTiming) -> Result<String, DrawError> {
             .set_label_area_size(LabelAreaPosition::Left, 128)
             .set_label_area_size(LabelAreaPosition::Bottom, 40)
             .build_cartesian_2d(Decades(0.01..decade_above(longest), number), 0.0..count)?;
-        chart
-            .configure_mesh()
-            .disable_y_mesh()
-            .disable_y_axis()
-            .bold_line_style(FAINT)
-            .axis_style(FAINT)
-            .x_desc("microseconds: bar p50 to p99.9, point max")
-            .label_style(label())
-            .draw()?;
+        axes(&mut chart, ["microseconds: bar p50 to p99.9, point max", ""], |mesh| {
+            mesh.disable_y_mesh().disable_y_axis();
+        })?;
         for (row, (name, h)) in rows.iter().enumerate() {
             let y = count - row as f64 - 0.5;
             let [p50, p999] = [0.5, 0.999].map(|q| us(h.value_at_quantile(q)));
@@ -218,7 +182,7 @@ pub fn stages(timing: &LoopTiming) -> Result<String, DrawError> {
             )])?;
             chart.draw_series([Circle::new((us(h.max()), y), 3, color.filled())])?;
             let (_, at) = chart.backend_coord(&(0.01, y));
-            let style = label().pos(Pos::new(HPos::Right, VPos::Center));
+            let style = label(12).pos(Pos::new(HPos::Right, VPos::Center));
             root.draw(&Text::new((*name).to_owned(), (128, at), style))?;
         }
         Ok(())
@@ -304,43 +268,35 @@ fn above(histogram: &Histogram<u64>) -> Vec<(f64, f64)> {
     line
 }
 
+/// Axes whose x is a number of decimals as short as can be.
 fn mesh<X, Y>(chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>, x: &str, y: &str) -> Drawn
 where
     X: Ranged<ValueType = f64> + ValueFormatter<f64>,
     Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
-    chart
-        .configure_mesh()
-        .bold_line_style(FAINT)
-        .light_line_style(TRANSPARENT)
-        .axis_style(FAINT)
-        .x_labels(6)
-        .x_desc(x)
-        .y_desc(y)
-        .x_label_formatter(&|v| number(*v))
-        .label_style(label())
-        .draw()?;
-    Ok(())
+    axes(chart, [x, y], |mesh| {
+        mesh.x_labels(6).x_label_formatter(&|v| number(*v));
+    })
 }
 
 /// In the upper right corner.
-fn legend(root: &Area, entries: &[(String, RGBColor)]) -> Drawn {
+fn legend(root: &Canvas, entries: &[(String, RGBColor)]) -> Drawn {
     let right = root.dim_in_pixel().0 as i32 - 30;
     for (i, (name, color)) in entries.iter().enumerate() {
         let y = 22 + 18 * i as i32;
         root.draw(&Rectangle::new([(right - 10, y - 5), (right, y + 5)], color.filled()))?;
-        let style = label().pos(Pos::new(HPos::Right, VPos::Center));
+        let style = label(12).pos(Pos::new(HPos::Right, VPos::Center));
         root.draw(&Text::new(name.clone(), (right - 16, y), style))?;
     }
     Ok(())
 }
 
 /// In the lower left corner, where a tail has nothing to show.
-fn legend_at_left(root: &Area, entries: &[(String, RGBColor)]) -> Drawn {
+fn legend_at_left(root: &Canvas, entries: &[(String, RGBColor)]) -> Drawn {
     for (i, (name, color)) in entries.iter().rev().enumerate() {
         let y = SIZE.1 as i32 - 66 - 18 * i as i32;
         root.draw(&Rectangle::new([(82, y - 5), (92, y + 5)], color.filled()))?;
-        let style = label().pos(Pos::new(HPos::Left, VPos::Center));
+        let style = label(12).pos(Pos::new(HPos::Left, VPos::Center));
         root.draw(&Text::new(name.clone(), (98, y), style))?;
     }
     Ok(())

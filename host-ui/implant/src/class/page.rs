@@ -1,9 +1,9 @@
 //! The page of a class, self-contained.
 
 use super::{Attempt, Class, FIGURES, Figure, Summary, Trend, picture};
-use crate::score::STYLE;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 use stylet_base::format;
+use stylet_report::parts::{cell, numbers};
 
 /// Figures with a curve for each trainee: mean seed error, D90, time.
 const CURVES: [usize; 3] = [0, 2, 4];
@@ -11,61 +11,48 @@ const CURVES: [usize; 3] = [0, 2, 4];
 const OWN: &str = "\
 .curves{display:grid;grid-template-columns:repeat(3,minmax(0,1fr));gap:14px}
 .curves p{font-size:13px}
-td small{color:var(--soft);display:block}
 th{white-space:normal}
 th,td{padding:5px 6px}
+td.n,th.n{white-space:normal}
 @media(max-width:720px){.curves{grid-template-columns:1fr}}
 ";
 
 /// Returns the page as HTML.
 pub fn page(class: &Class) -> String {
     let trainees = class.trainees();
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width";
-                title { "Class" }
-                style { (PreEscaped(STYLE)) (PreEscaped(OWN)) }
-            }
-            body {
-                main {
-                    h1 { "Class" }
-                    p { (counted(trainees.len(), "trainee")) ", " (counted(class.attempts.len(), "procedure")) }
-                    h2 { "Comparison of trainees" }
-                    p {
-                        "Mean of all procedures of each trainee. Below it where the mean of many more would be with a probability of "
-                        "95 % (Student's t), from three procedures on; fewer have no interval, and neither do counts of rare events. Scenes, plans and exercises may differ "
-                        "between procedures: compare trainees who had the same."
-                    }
-                    (compared(&trainees))
-                    h2 { "Learning" }
-                    p {
-                        "Session by session. A dashed line is a least-squares trend; it is drawn from five sessions on, and only where "
-                        "its 95 % interval leaves out no change at all. Few sessions say little, and sessions of one trainee are not "
-                        "independent."
-                    }
-                    @for (name, own) in &trainees {
-                        (learning(class, name, own))
-                    }
-                    h2 { "All procedures" }
-                    (every(&class.attempts))
-                    @if !class.left_out.is_empty() {
-                        h2 { "Left out" }
-                        @for why in &class.left_out { p class="bad" { (why) } }
-                    }
-                    footer {
-                        p {
-                            "Made by a simulator for research and training. Not a medical device, and no examination: how a "
-                            "trainee does here does not predict performance with patients."
-                        }
-                    }
-                }
+    let main = html! {
+        h1 { "Class" }
+        p { (counted(trainees.len(), "trainee")) ", " (counted(class.attempts.len(), "procedure")) }
+        h2 { "Comparison of trainees" }
+        p {
+            "Mean of all procedures of each trainee. Below it where the mean of many more would be with a probability of "
+            "95 % (Student's t), from three procedures on; fewer have no interval, and neither do counts of rare events. Scenes, plans and exercises may differ "
+            "between procedures: compare trainees who had the same."
+        }
+        (compared(&trainees))
+        h2 { "Learning" }
+        p {
+            "Session by session. A dashed line is a least-squares trend; it is drawn from five sessions on, and only where "
+            "its 95 % interval leaves out no change at all. Few sessions say little, and sessions of one trainee are not "
+            "independent."
+        }
+        @for (name, own) in &trainees {
+            (learning(class, name, own))
+        }
+        h2 { "All procedures" }
+        (every(&class.attempts))
+        @if !class.left_out.is_empty() {
+            h2 { "Left out" }
+            @for why in &class.left_out { p class="bad" { (why) } }
+        }
+        footer {
+            p {
+                "Made by a simulator for research and training. Not a medical device, and no examination: how a "
+                "trainee does here does not predict performance with patients."
             }
         }
     };
-    page.into_string()
+    stylet_report::page("Class", OWN, &main)
 }
 
 fn counted(count: usize, what: &str) -> String {
@@ -77,23 +64,14 @@ fn of_all(figure: &Figure, attempts: &[Attempt]) -> Vec<f64> {
 }
 
 fn compared(trainees: &[(&str, &[Attempt])]) -> Markup {
-    html! {
-        div class="scroll" {
-            table {
-                thead {
-                    tr { th { "Trainee" } th { "procedures" } @for figure in &FIGURES { th { (figure.name) } } }
-                }
-                tbody {
-                    @for (name, own) in trainees {
-                        tr {
-                            td { (name) } td { (own.len()) }
-                            @for figure in &FIGURES { td { (summary(figure, own)) } }
-                        }
-                    }
-                }
-            }
-        }
-    }
+    let row = |(name, own): &(&str, &[Attempt])| {
+        let figures = FIGURES.iter().map(|figure| summary(figure, own));
+        [cell(name), cell(own.len())].into_iter().chain(figures).collect()
+    };
+    let head = ["Trainee", "procedures"]
+        .into_iter()
+        .chain(FIGURES.iter().map(|f| f.name));
+    numbers(&head.collect::<Vec<_>>(), &trainees.iter().map(row).collect::<Vec<_>>())
 }
 
 fn summary(figure: &Figure, own: &[Attempt]) -> Markup {
@@ -166,26 +144,13 @@ fn every(attempts: &[Attempt]) -> Markup {
     let shown = |figure: &Figure, a: &Attempt| {
         (figure.of)(a).map_or_else(|| "n/a".to_owned(), |v| format::decimal(v, figure.decimals))
     };
-    html! {
-        div class="scroll" {
-            table {
-                thead {
-                    tr {
-                        th { "Trainee" } th { "session" }
-                        @for figure in &FIGURES { th { (figure.name) } }
-                        th { "exercises" }
-                    }
-                }
-                tbody {
-                    @for a in attempts {
-                        tr {
-                            td { (a.trainee) } td { (when(a)) @if !a.title.is_empty() { small { (a.title) } } }
-                            @for figure in &FIGURES { td { (shown(figure, a)) } }
-                            td { (a.exercises) }
-                        }
-                    }
-                }
-            }
-        }
-    }
+    let row = |a: &Attempt| {
+        let session = html! { (when(a)) @if !a.title.is_empty() { small { (a.title) } } };
+        let figures = FIGURES.iter().map(|figure| cell(shown(figure, a)));
+        let before = [cell(&a.trainee), session].into_iter();
+        before.chain(figures).chain([cell(a.exercises)]).collect()
+    };
+    let figures = FIGURES.iter().map(|f| f.name);
+    let head = ["Trainee", "session"].into_iter().chain(figures).chain(["exercises"]);
+    numbers(&head.collect::<Vec<_>>(), &attempts.iter().map(row).collect::<Vec<_>>())
 }

@@ -15,10 +15,10 @@ use crate::pairing::SeedOffset;
 use crate::plan::{Anatomy, Hole};
 pub use dose_cost::{Cost, costs};
 pub use motion::Motion;
-pub use page::STYLE;
 use stylet_dose::report::{Judge, Verdict};
 use stylet_dose::{DoseKernel, Seed};
 use stylet_host::moments::Moment;
+use stylet_report::picture::DrawError;
 use stylet_shm_schema::TickRecord;
 pub use trace::Trace;
 pub use write::{to_json, write};
@@ -73,8 +73,8 @@ pub enum ScoreError {
     #[error("{0}")]
     Dose(String),
     /// The drawing library failed.
-    #[error("a picture of the debrief cannot be drawn ({0})")]
-    Picture(String),
+    #[error("the debrief: {0}")]
+    Picture(#[from] DrawError),
     /// A figure is not representable in JSON.
     #[error(transparent)]
     Json(#[from] serde_json::Error),

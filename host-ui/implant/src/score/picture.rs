@@ -1,44 +1,13 @@
 //! Pictures of a debrief, as SVG: the implant from three sides, dose-volume histograms, force and speed over time.
 
 use super::outline;
-use super::{Score, ScoreError, SeedPair};
+use super::{Score, SeedPair};
 use crate::plan::anatomy::Body;
 use nalgebra::Vector3;
-use plotters::coord::Shift;
 use plotters::prelude::*;
-use stylet_dose::Dvh;
+use stylet_dose::picture::Curve;
+use stylet_report::picture::{BLUE, Canvas, DrawError, Drawn, GREEN, INK, ORANGE, PURPLE, axes, drawn, label};
 use stylet_shm_schema::TickRecord;
-
-type Drawn<T> = Result<T, Box<dyn std::error::Error>>;
-type Canvas<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-
-const BLUE: RGBColor = RGBColor(0, 114, 178);
-const ORANGE: RGBColor = RGBColor(213, 94, 0);
-/// Colours of structures (Okabe-Ito).
-const COLOURS: [RGBColor; 6] = [
-    BLUE,
-    ORANGE,
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(0, 0, 0),
-];
-/// Colour of spared structures.
-const SPARED: RGBColor = RGBColor(204, 121, 167);
-const INK: RGBColor = RGBColor(70, 70, 70);
-const FAINT: RGBColor = RGBColor(225, 225, 225);
-const FONT: &str = "sans-serif";
-
-fn drawn(size: (u32, u32), draw: impl FnOnce(&Canvas) -> Drawn<()>) -> Result<String, ScoreError> {
-    let mut text = String::new();
-    {
-        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
-        draw(&root)
-            .and_then(|()| root.present().map_err(Into::into))
-            .map_err(|e| ScoreError::Picture(e.to_string()))?;
-    }
-    Ok(text)
-}
 
 /// Axes of a view, and their names.
 struct View {
@@ -50,7 +19,7 @@ struct View {
 
 /// Draws the implant along the needles, from the side, and from the front: planned, delivered, and
 /// the lines between them.
-pub fn views(score: &Score) -> Result<String, ScoreError> {
+pub fn views(score: &Score) -> Result<String, DrawError> {
     let implant = &score.implant;
     let frame = implant.anatomy.patient;
     let axis = |patient: [f64; 3]| frame.scene_from_patient_direction(patient);
@@ -85,7 +54,7 @@ pub fn views(score: &Score) -> Result<String, ScoreError> {
     })
 }
 
-fn one_view(area: &Canvas, score: &Score, view: &View) -> Drawn<()> {
+fn one_view(area: &Canvas, score: &Score, view: &View) -> Drawn {
     let anatomy = score.implant.anatomy;
     let (low, high) = anatomy.target.bounds_m();
     let middle = (Vector3::from(low) + Vector3::from(high)) / 2.0;
@@ -102,24 +71,15 @@ fn one_view(area: &Canvas, score: &Score, view: &View) -> Drawn<()> {
         .chain([seen(Vector3::from(low)), seen(Vector3::from(high))]);
     let reach = corners.fold(0.0_f64, |r, (x, y)| r.max(x.abs()).max(y.abs())) + 3.0;
     let mut chart = ChartBuilder::on(area)
-        .caption(view.title, (FONT, 17).into_font().color(&INK))
+        .caption(view.title, label(17))
         .margin(8)
         .x_label_area_size(38)
         .y_label_area_size(48)
         .build_cartesian_2d(-reach..reach, -reach..reach)?;
-    chart
-        .configure_mesh()
-        .x_desc(view.labels[0])
-        .y_desc(view.labels[1])
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(FAINT)
-        .axis_style(INK)
-        .x_labels(7)
-        .y_labels(7)
-        .label_style((FONT, 13))
-        .axis_desc_style((FONT, 14))
-        .draw()?;
-    let bodies = anatomy.spared.iter().map(|body| (body, SPARED.stroke_width(1)));
+    axes(&mut chart, view.labels, |mesh| {
+        mesh.x_labels(7).y_labels(7);
+    })?;
+    let bodies = anatomy.spared.iter().map(|body| (body, PURPLE.stroke_width(1)));
     for (body, style) in bodies.chain([(&anatomy.target, INK.stroke_width(2))]) {
         for ring in closed_rings(body, view, &seen, reach) {
             chart.draw_series([PathElement::new(ring, style)])?;
@@ -157,64 +117,18 @@ fn closed_rings(
 }
 
 /// Draws histograms, planned dashed, delivered solid.
-pub fn dvh(score: &Score) -> Result<String, ScoreError> {
-    let most_gy = 3.0 * score.implant.prescription_gy;
-    drawn((1170, 460), |root| {
-        root.fill(&WHITE)?;
-        let mut chart = ChartBuilder::on(root)
-            .margin(14)
-            .x_label_area_size(46)
-            .y_label_area_size(56)
-            .build_cartesian_2d(0.0..most_gy, 0.0..104.0)?;
-        chart
-            .configure_mesh()
-            .x_desc("Dose (Gy)")
-            .y_desc("Volume with at least this dose (%)")
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(FAINT)
-            .axis_style(INK)
-            .label_style((FONT, 14))
-            .axis_desc_style((FONT, 15))
-            .draw()?;
-        let prescription = score.implant.prescription_gy;
-        chart.draw_series(DashedLineSeries::new(
-            [(prescription, 0.0), (prescription, 100.0)],
-            3,
-            3,
-            INK.into(),
-        ))?;
-        let pairs = score.planned.dvhs.iter().zip(&score.delivered.dvhs);
-        for (i, (name, (planned, delivered))) in score.judge.names().zip(pairs).enumerate() {
-            let colour = COLOURS[i % COLOURS.len()];
-            chart.draw_series(DashedLineSeries::new(
-                curve(planned, most_gy),
-                6,
-                4,
-                colour.stroke_width(2),
-            ))?;
-            chart
-                .draw_series(LineSeries::new(curve(delivered, most_gy), colour.stroke_width(2)))?
-                .label(name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], colour.stroke_width(3)));
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::UpperRight)
-            .margin(12)
-            .legend_area_size(30)
-            .background_style(WHITE)
-            .border_style(FAINT)
-            .label_font((FONT, 15))
-            .draw()?;
-        Ok(())
-    })
-}
-
-fn curve(dvh: &Dvh, most_gy: f64) -> Vec<(f64, f64)> {
-    const STEPS: usize = 300;
-    let at = |i: usize| i as f64 * most_gy / STEPS as f64;
-    let share = |gy: f64| dvh.at_least_m3(gy) / dvh.volume_m3() * 100.0;
-    (0..=STEPS).map(|i| (at(i), share(at(i)))).collect()
+pub fn dvh(score: &Score) -> Result<String, DrawError> {
+    let pairs = score.planned.dvhs.iter().zip(&score.delivered.dvhs);
+    let curves = score
+        .judge
+        .names()
+        .zip(pairs)
+        .map(|(name, (planned, delivered))| Curve {
+            name,
+            dvh: delivered,
+            planned: Some(planned),
+        });
+    stylet_dose::picture::dvh((1170, 460), &curves.collect::<Vec<_>>(), score.implant.prescription_gy)
 }
 
 /// Number of distinguishable stretches of a curve over time.
@@ -224,20 +138,19 @@ const USUAL_TIMES: u64 = 4;
 const LEAST_GAP_NS: u64 = 40_000_000;
 
 /// Draws force above, speed along the needle below.
-pub fn over_time(records: &[TickRecord]) -> Result<String, ScoreError> {
+pub fn over_time(records: &[TickRecord]) -> Result<String, DrawError> {
     let force = |r: &TickRecord| Vector3::from(r.force_on_hand_n).norm();
     let speed = |r: &TickRecord| r.speed_m_per_s * 1e3;
     drawn((1170, 420), |root| {
         root.fill(&WHITE)?;
         let (upper, lower) = root.split_vertically(200);
-        series(&upper, records, force, "Force on the hand (N)", "", BLUE)?;
+        series(&upper, records, force, ["", "Force on the hand (N)"], BLUE)?;
         series(
             &lower,
             records,
             speed,
-            "Speed along the needle (mm/s)",
-            "Time (s)",
-            RGBColor(0, 158, 115),
+            ["Time (s)", "Speed along the needle (mm/s)"],
+            GREEN,
         )
     })
 }
@@ -246,10 +159,9 @@ fn series(
     area: &Canvas,
     records: &[TickRecord],
     value: impl Fn(&TickRecord) -> f64,
-    label: &str,
-    time: &str,
+    names: [&str; 2],
     colour: RGBColor,
-) -> Drawn<()> {
+) -> Drawn {
     let begin_ns = records.first().map_or(0, |r| r.due_ns);
     let seconds = |r: &TickRecord| r.due_ns.saturating_sub(begin_ns) as f64 / 1e9;
     let last_s = records.last().map_or(1.0, seconds).max(1e-3);
@@ -261,20 +173,12 @@ fn series(
         .margin_left(14)
         .margin_right(14)
         .margin_top(8)
-        .x_label_area_size(if time.is_empty() { 22 } else { 40 })
+        .x_label_area_size(if names[0].is_empty() { 22 } else { 40 })
         .y_label_area_size(56)
         .build_cartesian_2d(0.0..last_s, low..high + room)?;
-    chart
-        .configure_mesh()
-        .x_desc(time)
-        .y_desc(label)
-        .y_labels(5)
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(FAINT)
-        .axis_style(INK)
-        .label_style((FONT, 13))
-        .axis_desc_style((FONT, 14))
-        .draw()?;
+    axes(&mut chart, names, |mesh| {
+        mesh.y_labels(5);
+    })?;
     let per_stretch = records.len().div_ceil(STRETCHES).max(1);
     for piece in pieces(records) {
         chart.draw_series(LineSeries::new(

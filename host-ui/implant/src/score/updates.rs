@@ -6,6 +6,7 @@ use crate::plan::optimise::Figures;
 use maud::{Markup, html};
 use serde_json::{Value, json};
 use stylet_base::format;
+use stylet_report::parts::{cell, numbers};
 
 /// Returns the section; empty if the plan was not updated.
 pub(super) fn section(updates: &[Reviewed]) -> Markup {
@@ -22,32 +23,17 @@ pub(super) fn section(updates: &[Reviewed]) -> Markup {
 }
 
 fn table(number: usize, update: &Reviewed) -> Markup {
-    let columns = [
-        ("lay in the tissue", &update.doses.now),
-        ("plan if continued", &update.doses.continued),
-        ("plan updated", &update.updated),
-    ];
+    let columns = [&update.doses.now, &update.doses.continued, &update.updated];
+    let value = |v: Option<f64>| cell(v.map_or_else(|| "not defined".to_owned(), |v| format::decimal(v, 1)));
+    let row = |(name, of): (&str, Of)| [cell(name)].into_iter().chain(columns.map(|c| value(of(c)))).collect();
+    let rows = MEASURES.map(row);
     html! {
         p {
             b { "Update " (number) ", " (if update.accepted { "taken" } else { "not taken" }) ": " }
             "after " (update.begun) " needles and " (update.lying) " seeds, " (update.seeds_from.name()) ". "
             (left(update)) " " (contour(update)) " " (marks(update))
         }
-        div class="scroll" {
-            table {
-                thead { tr { th { "Measure" } @for (head, _) in columns { th { (head) } } } }
-                tbody {
-                    @for (name, of) in MEASURES {
-                        tr {
-                            td { (name) }
-                            @for (_, figures) in columns {
-                                td { (of(figures).map_or_else(|| "not defined".to_owned(), |v| format::decimal(v, 1))) }
-                            }
-                        }
-                    }
-                }
-            }
-        }
+        (numbers(&["Measure", "lay in the tissue", "plan if continued", "plan updated"], &rows))
     }
 }
 

@@ -2,8 +2,7 @@
 
 use super::figures::{DEFINITIONS, NotComputed, Row, rows};
 use super::{Column, Implant};
-use crate::score::STYLE;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 use stylet_base::format::printable;
 use stylet_dose::decay::s_to_days;
 use stylet_dose::effect::Response;
@@ -15,8 +14,8 @@ const UPRIGHT: usize = 3;
 const SHEET: &str = "\
 body{font-size:13px;line-height:1.35}
 main{max-width:1100px;padding:18px 20px}
-h1{font-size:21px}h2{font-size:14px;margin:12px 0 4px}
-th,td{padding:1.5px 8px}.why{white-space:normal;color:var(--soft);font-size:11px}sup{font-size:8px;line-height:0}p.why{margin:3px 8px}
+h1{font-size:21px}h2{font-size:14px;margin:12px 0 4px;padding:0;border:0}
+p{margin:4px 0;color:var(--soft)}table{font-size:inherit}th,td{padding:1.5px 8px;text-align:right;white-space:nowrap}td:first-child,th:first-child{text-align:left}.why{white-space:normal;color:var(--soft);font-size:11px}sup{font-size:8px;line-height:0}p.why{margin:3px 8px}
 tr.group td{font-weight:650;border-bottom:1px solid var(--ink);padding-top:7px}
 td:nth-child(2),th:nth-child(2){text-align:left;color:var(--soft)}
 .two{display:grid;grid-template-columns:auto auto;gap:0 26px;align-items:start}
@@ -36,36 +35,27 @@ pub fn page(implant: &Implant, columns: &[Column]) -> String {
     };
     let print = format!("@page{{size:A4 {size};margin:9mm}}");
     let sectors = columns.iter().any(|c| !c.sectors.is_empty());
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width";
-                title { "Implant: " (printable(&implant.title)) }
-                style { (PreEscaped(STYLE)) (PreEscaped(SHEET)) (PreEscaped(print)) }
-            }
-            body {
-                main {
-                    h1 { "Dose of a permanent implant (AAPM TG-137)" }
-                    (head(implant, columns))
-                    div class=[(columns.len() <= UPRIGHT).then_some("two")] {
-                        div { h2 { "Figures" } (figures(&rows(implant, columns), columns)) }
-                        @if sectors {
-                            div { h2 { "Sectors of the target: D90 (Gy) and V100 (%)" } (of_sectors(columns)) (fits(columns)) }
-                        }
-                    }
-                    footer {
-                        @for line in DEFINITIONS { p { (line) } }
-                        p { (super::sectors::CUTS) }
-                        p { (Response::PROSTATE.words()) ". " (Response::LATE.words()) "." }
-                        p { "Made by a simulator for research and training. Not a medical device: no treatment may rest on it." }
-                    }
-                }
+    let main = html! {
+        h1 { "Dose of a permanent implant (AAPM TG-137)" }
+        (head(implant, columns))
+        div class=[(columns.len() <= UPRIGHT).then_some("two")] {
+            div { h2 { "Figures" } (figures(&rows(implant, columns), columns)) }
+            @if sectors {
+                div { h2 { "Sectors of the target: D90 (Gy) and V100 (%)" } (of_sectors(columns)) (fits(columns)) }
             }
         }
+        footer {
+            @for line in DEFINITIONS { p { (line) } }
+            p { (super::sectors::CUTS) }
+            p { (Response::PROSTATE.words()) ". " (Response::LATE.words()) "." }
+            p { "Made by a simulator for research and training. Not a medical device: no treatment may rest on it." }
+        }
     };
-    page.into_string()
+    stylet_report::page(
+        &format!("Implant: {}", printable(&implant.title)),
+        &format!("{SHEET}{print}"),
+        &main,
+    )
 }
 
 fn head(implant: &Implant, columns: &[Column]) -> Markup {

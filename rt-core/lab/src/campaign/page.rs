@@ -2,11 +2,10 @@
 
 use super::progress::time;
 use super::report::{CampaignReport, LoopOfPart, PartReport};
-use crate::html::STYLE;
-use crate::html::parts::{Column, cell, num, or_na, table};
 use crate::html::times::time_table;
 use crate::plots::{self, BLUE, DrawError, MaximaPart, ORANGE, Series};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
+use stylet_report::parts::{Column, cell, num, or_na, table};
 
 /// The whole page, which needs nothing else.
 pub fn page(r: &CampaignReport) -> Result<String, DrawError> {
@@ -16,45 +15,32 @@ pub fn page(r: &CampaignReport) -> Result<String, DrawError> {
         format!("Latency campaign: {}", r.name)
     };
     let pictures = pictures(r)?;
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                title { (title) }
-                meta name="viewport" content="width=device-width";
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                main {
-                    header { h1 { (title) } }
-                    p class="sub" {
-                        b { (time(r.measured_s)) } " of " (time(r.planned_s)) " measured in " (r.sessions.len()) " sessions. "
-                        (r.made_at) ", " (r.program) "."
-                    }
-                    @if !r.complete { div class="warning" { strong { "Not complete." } " The same command continues it." } }
-                    @if let Some(name) = &r.hypervisor {
-                        div class="warning" {
-                            strong { "Environment not qualified." }
-                            " This is a virtual machine (" (name) "): the tail says more about the machine below than about this program."
-                        }
-                    }
-                    h2 { "Parts" }
-                    (overview(r))
-                    (pictures)
-                    @for (i, part) in r.parts.iter().enumerate() { (of_part(i, part)) }
-                    h2 { "Sessions" }
-                    (sessions(r))
-                    footer {
-                        "A session is what one start of the program measured without a break. Its file is replaced at each checkpoint; \
-                         what was measured after the last checkpoint of a session that was killed is not counted, and was measured \
-                         again. Two sessions of the same moment are refused. Commit " code { (r.commit) } ", schema " (r.schema) "."
-                    }
-                }
+    let main = html! {
+        header { h1 { (title) } }
+        p class="sub" {
+            b { (time(r.measured_s)) } " of " (time(r.planned_s)) " measured in " (r.sessions.len()) " sessions. "
+            (r.made_at) ", " (r.program) "."
+        }
+        @if !r.complete { div class="warning" { strong { "Not complete." } " The same command continues it." } }
+        @if let Some(name) = &r.hypervisor {
+            div class="warning" {
+                strong { "Environment not qualified." }
+                " This is a virtual machine (" (name) "): the tail says more about the machine below than about this program."
             }
         }
+        h2 { "Parts" }
+        (overview(r))
+        (pictures)
+        @for (i, part) in r.parts.iter().enumerate() { (of_part(i, part)) }
+        h2 { "Sessions" }
+        (sessions(r))
+        footer {
+            "A session is what one start of the program measured without a break. Its file is replaced at each checkpoint; \
+             what was measured after the last checkpoint of a session that was killed is not counted, and was measured \
+             again. Two sessions of the same moment are refused. Commit " code { (r.commit) } ", schema " (r.schema) "."
+        }
     };
-    Ok(page.into_string() + "\n")
+    Ok(stylet_report::page(&title, "", &main))
 }
 
 fn name(part: &PartReport) -> String {

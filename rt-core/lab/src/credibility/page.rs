@@ -1,51 +1,37 @@
 //! The credibility file as a page; every id is a place that can be linked to.
 
 use super::{Credibility, Traced};
-use crate::html::STYLE;
-use crate::html::parts::{Column, cell, table};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
 use std::collections::BTreeMap;
+use stylet_report::parts::{Column, cell, table};
 
 /// The whole page, which needs nothing else.
 pub fn page(c: &Credibility) -> String {
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                title { "Credibility file of Stylet" }
-                meta name="viewport" content="width=device-width";
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                main {
-                    header { h1 { "Credibility file of Stylet" } }
-                    p class="sub" { (c.made_at) ", " (c.program) ", commit " code { (c.commit) } "." }
-                    div class="warning" { strong { "No claim of conformity." } " " (c.claim) }
-                    h2 { "Context of use" }
-                    @for (heading, text) in c.context { h3 { (heading) } p { (text) } }
-                    h2 { "Hazards" }
-                    (hazards(c))
-                    h2 { "Requirements, hazards, tests, runs" }
-                    p class="faint" {
-                        "A test is named by its file in the repository and its function; all of them run in " code { "make test" } ". "
-                        "The last column has the outcomes of the runs below, by their number."
-                    }
-                    (requirements(c))
-                    h2 { "Runs" }
-                    (runs(c))
-                    h2 { "Evidence by the categories of the FDA's guidance (2023)" }
-                    (categories(c))
-                    h2 { "Credibility factors of ASME V&V 40-2018" }
-                    (factors(c))
-                    h2 { "Software of unknown provenance" }
-                    (packages(c))
-                    footer { "Made by " code { "rt-core credibility" } ". Schema " (c.schema) "." }
-                }
-            }
+    let main = html! {
+        header { h1 { "Credibility file of Stylet" } }
+        p class="sub" { (c.made_at) ", " (c.program) ", commit " code { (c.commit) } "." }
+        div class="warning" { strong { "No claim of conformity." } " " (c.claim) }
+        h2 { "Context of use" }
+        @for (heading, text) in c.context { h3 { (heading) } p { (text) } }
+        h2 { "Hazards" }
+        (hazards(c))
+        h2 { "Requirements, hazards, tests, runs" }
+        p class="faint" {
+            "A test is named by its file in the repository and its function; all of them run in " code { "make test" } ". "
+            "The last column has the outcomes of the runs below, by their number."
         }
+        (requirements(c))
+        h2 { "Runs" }
+        (runs(c))
+        h2 { "Evidence by the categories of the FDA's guidance (2023)" }
+        (categories(c))
+        h2 { "Credibility factors of ASME V&V 40-2018" }
+        (factors(c))
+        h2 { "Software of unknown provenance" }
+        (packages(c))
+        footer { "Made by " code { "rt-core credibility" } ". Schema " (c.schema) "." }
     };
-    page.into_string() + "\n"
+    stylet_report::page("Credibility file of Stylet", "", &main)
 }
 
 /// A place with this id.

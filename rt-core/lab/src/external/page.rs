@@ -2,9 +2,8 @@
 
 use super::External;
 use super::budget::Delay;
-use crate::html::STYLE;
-use crate::html::parts::{Column, cell, micro, num, table};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, html};
+use stylet_report::parts::{Column, cell, micro, num, table};
 
 /// The whole page, which needs nothing else.
 pub fn page(e: &External) -> String {
@@ -34,32 +33,19 @@ pub fn page(e: &External) -> String {
         .into_iter()
         .map(|(what, value)| vec![cell(what), cell(value)])
         .collect();
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                title { "Capture of an instrument" }
-                meta name="viewport" content="width=device-width";
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                main {
-                    header { h1 { "Capture of an instrument" } }
-                    p class="sub" { (e.kind) ", " code { (e.capture) } "." }
-                    h2 { "Agreement with our clock" }
-                    div class="half" { (table(&["", ""], &rows, &[Column::Text, Column::Number])) }
-                    @for d in &e.delays { (delay(d)) }
-                    @for why in &e.without { p { "No delay: " (why) "." } }
-                    footer {
-                        "Uncertainties after the GUM (NIST TN 1297): each term is a standard uncertainty, the expanded one has a coverage \
-                         factor of 2, about 95 %. What happens between the register and the plug is in no term: look it up for the port."
-                    }
-                }
-            }
+    let main = html! {
+        header { h1 { "Capture of an instrument" } }
+        p class="sub" { (e.kind) ", " code { (e.capture) } "." }
+        h2 { "Agreement with our clock" }
+        div class="half" { (table(&["", ""], &rows, &[Column::Text, Column::Number])) }
+        @for d in &e.delays { (delay(d)) }
+        @for why in &e.without { p { "No delay: " (why) "." } }
+        footer {
+            "Uncertainties after the GUM (NIST TN 1297): each term is a standard uncertainty, the expanded one has a coverage \
+             factor of 2, about 95 %. What happens between the register and the plug is in no term: look it up for the port."
         }
     };
-    page.into_string() + "\n"
+    stylet_report::page("Capture of an instrument", "", &main)
 }
 
 fn delay(d: &Delay) -> Markup {

@@ -3,11 +3,11 @@
 use super::Pc;
 use super::change::{self, Change, Common, Growth};
 use super::entry::{Entry, Percentile, Unread};
-use crate::html::STYLE;
-use crate::html::parts::{Column, badge, cell, num, or_na, table};
+use crate::html::badge;
 use crate::plots::{self, DrawError, TrendPoint};
 use crate::verdict::Outcome;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
+use stylet_report::parts::{Column, cards, cell, num, or_na, table};
 
 /// The whole page, which needs nothing else.
 pub fn page(pcs: &[Pc], unread: &[Unread]) -> Result<String, DrawError> {
@@ -19,40 +19,27 @@ pub fn page(pcs: &[Pc], unread: &[Unread]) -> Result<String, DrawError> {
     let reports: usize = pcs.iter().map(|pc| pc.entries.len()).sum();
     let times = || pcs.iter().flat_map(|pc| pc.entries.iter().map(|e| e.made_at.as_str()));
     let heading = format!("Latency of {}", counted(pcs.len(), "PC", "PCs"));
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                title { (heading) }
-                meta name="viewport" content="width=device-width";
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                main {
-                    header { h1 { (heading) } }
-                    p class="sub" {
-                        (counted(reports, "report", "reports")) ", " (times().min().unwrap_or_default()) " to " (times().max().unwrap_or_default())
-                        ". Times are wake-up latencies of the force loop."
-                    }
-                    (cards(pcs, growths.len()))
-                    h2 { "Latest report of each PC" }
-                    (overview(pcs))
-                    h2 { "Trend of each PC" }
-                    (trends)
-                    (grown(&growths))
-                    (common(pcs, &change::in_common(pcs)))
-                    (not_counted(unread))
-                    footer {
-                        "A tail counts as grown where p99.9 (else p99) is more than 1.25 times that of the previous report of the same PC, \
-                         scene, load, rate and spin, and the 95 % intervals lie apart. A change beside it is not yet its cause. All \
-                         reports as a table: fleet.csv."
-                    }
-                }
-            }
+    let main = html! {
+        header { h1 { (heading) } }
+        p class="sub" {
+            (counted(reports, "report", "reports")) ", " (times().min().unwrap_or_default()) " to " (times().max().unwrap_or_default())
+            ". Times are wake-up latencies of the force loop."
+        }
+        (counts(pcs, growths.len()))
+        h2 { "Latest report of each PC" }
+        (overview(pcs))
+        h2 { "Trend of each PC" }
+        (trends)
+        (grown(&growths))
+        (common(pcs, &change::in_common(pcs)))
+        (not_counted(unread))
+        footer {
+            "A tail counts as grown where p99.9 (else p99) is more than 1.25 times that of the previous report of the same PC, \
+             scene, load, rate and spin, and the 95 % intervals lie apart. A change beside it is not yet its cause. All \
+             reports as a table: fleet.csv."
         }
     };
-    Ok(page.into_string() + "\n")
+    Ok(stylet_report::page(&heading, "", &main))
 }
 
 /// A count with the noun that goes with it.
@@ -60,19 +47,15 @@ pub(super) fn counted(count: usize, one: &str, more: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { more })
 }
 
-fn cards(pcs: &[Pc], grown: usize) -> Markup {
+fn counts(pcs: &[Pc], grown: usize) -> Markup {
     let with = |outcome| pcs.iter().filter(|pc| pc.latest().outcome == outcome).count();
-    let cards = [
+    let all = [
         ("PC passes", "PCs pass", with(Outcome::Pass)),
         ("PC fails", "PCs fail", with(Outcome::Fail)),
         ("PC not measurable", "PCs not measurable", with(Outcome::NotMeasurable)),
         ("tail grew", "tails grew", grown),
     ];
-    html! {
-        section class="cards four" {
-            @for (one, more, count) in cards { div { b { (count) } br; span { (if count == 1 { one } else { more }) } } }
-        }
-    }
+    cards(all.map(|(one, more, count)| (html! { b { (count) } }, cell(if count == 1 { one } else { more }))))
 }
 
 fn overview(pcs: &[Pc]) -> Markup {

@@ -1,10 +1,10 @@
 //! The late ticks of a traced run: what made them late, each with a small picture of the trace around it.
 
-use super::parts::{Column, cell, count, micro, num, table};
 use crate::report::Report;
 use crate::trace::{Kind, Lane, Outlier, TracePiece, TraceSection};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
+use stylet_report::parts::{Column, cell, count, micro, num, table};
 
 /// Size of a picture in its own units; the page scales it.
 const WIDTH: f64 = 520.0;
@@ -12,8 +12,8 @@ const LEFT: f64 = 74.0;
 const LANE: f64 = 18.0;
 const TOP: f64 = 18.0;
 const LANES: [(Lane, &str, &str); 4] = [
-    (Lane::Loop, "force loop", "#1f6fb2"),
-    (Lane::Threads, "threads", "#d97a1a"),
+    (Lane::Loop, "force loop", "#0072b2"),
+    (Lane::Threads, "threads", "#d55e00"),
     (Lane::Interrupts, "interrupts", "#b3362b"),
     (Lane::Idle, "idle", "#b9c2ca"),
 ];

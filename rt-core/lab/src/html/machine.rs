@@ -1,9 +1,9 @@
 //! What the figures come from: counters of the kernel, settings, machine, packages, method.
 
-use super::parts::{Column, cell, count, num, or_na, table};
 use crate::bound::MissBound;
 use crate::report::{LoopCounts, Report};
 use maud::{Markup, html};
+use stylet_report::parts::{Column, cell, count, num, or_na, table};
 
 const COUNTS: [Column; 4] = [Column::Text, Column::Number, Column::Number, Column::Number];
 

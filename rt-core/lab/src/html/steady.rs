@@ -1,11 +1,11 @@
 //! Whether the run stayed the same, and how late a wake-up may become in a longer one.
 
-use super::parts::{Column, cell, duration, num, or_na, table};
 use super::times::time_table;
 use crate::extreme::{Extremes, Tail};
 use crate::report::Report;
 use crate::stationary::LEVEL;
 use maud::{Markup, html};
+use stylet_report::parts::{Column, cell, duration, num, or_na, table};
 
 pub fn steady(r: &Report) -> Markup {
     let s = &r.extremes.stationarity;

@@ -1,10 +1,10 @@
 //! What took how long: loops, host, comparison, latest wake-ups.
 
-use super::parts::{Column, cell, count, duration, micro, num, or_na, table};
 use crate::compare::Against;
 use crate::report::{LoopSection, Report};
 use crate::summary::{QUANTILES, Quantile, Summary};
 use maud::{Markup, html};
+use stylet_report::parts::{Column, cell, count, duration, micro, num, or_na, table};
 
 pub fn of_loop(title: &str, section: &LoopSection) -> Markup {
     html! {

@@ -1,8 +1,9 @@
 //! The worst wake-up of each window over hours, part by part.
 
-use super::{BLUE, Decades, DrawError, FAINT, INK, ORANGE, decade_above, label, legend, number, picture_of};
+use super::{Decades, decade_above, legend, number};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use stylet_report::picture::{BLUE, DrawError, INK, ORANGE, axes, drawn, label};
 
 const SIZE: (u32, u32) = (1_120, 320);
 
@@ -29,7 +30,7 @@ fn places(parts: &[MaximaPart]) -> Vec<Vec<(f64, f64)>> {
 
 /// Wake-ups and own work, logarithmic microseconds over hours; a line parts the parts.
 pub fn maxima(parts: &[MaximaPart]) -> Result<String, DrawError> {
-    picture_of(SIZE, |root| {
+    drawn(SIZE, |root| {
         let places = places(parts);
         let end_s = places.iter().flatten().map(|(_, end)| *end).fold(1.0, f64::max);
         let (unit_s, unit) = if end_s >= 7_200.0 {
@@ -47,17 +48,10 @@ pub fn maxima(parts: &[MaximaPart]) -> Result<String, DrawError> {
             .set_label_area_size(LabelAreaPosition::Left, 58)
             .set_label_area_size(LabelAreaPosition::Bottom, 40)
             .build_cartesian_2d(0.0..end_s / unit_s, Decades(10_f64.powf(low)..high, number))?;
-        chart
-            .configure_mesh()
-            .disable_x_mesh()
-            .bold_line_style(FAINT)
-            .light_line_style(TRANSPARENT)
-            .axis_style(FAINT)
-            .x_desc(format!("{unit} of measurement"))
-            .y_desc("worst in a window, \u{b5}s")
-            .x_label_formatter(&|v| number(*v))
-            .label_style(label())
-            .draw()?;
+        let names = [&format!("{unit} of measurement"), "worst in a window, \u{b5}s"];
+        axes(&mut chart, names, |mesh| {
+            mesh.disable_x_mesh().x_label_formatter(&|v| number(*v));
+        })?;
         for (part, at) in parts.iter().zip(&places) {
             let begin = at.first().map_or(0.0, |(s, _)| s / unit_s);
             if begin > 0.0 {
@@ -66,7 +60,7 @@ pub fn maxima(parts: &[MaximaPart]) -> Result<String, DrawError> {
                     INK.mix(0.4).stroke_width(1),
                 )])?;
             }
-            let style = label().pos(Pos::new(HPos::Left, VPos::Bottom));
+            let style = label(12).pos(Pos::new(HPos::Left, VPos::Bottom));
             chart.draw_series([Text::new(
                 part.name.to_owned(),
                 (begin + 0.004 * end_s / unit_s, 10_f64.powf(low) * 1.1),

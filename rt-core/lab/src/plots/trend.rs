@@ -1,8 +1,9 @@
 //! The wake-ups of one PC over its reports.
 
-use super::{BLUE, Decades, DrawError, FAINT, ORANGE, decade_above, label, number, picture_of};
+use super::{Decades, decade_above, number};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use stylet_report::picture::{BLUE, DrawError, ORANGE, axes, drawn, label};
 
 const SIZE: (u32, u32) = (400, 220);
 
@@ -42,7 +43,7 @@ fn unit(seconds: f64) -> (f64, &'static str) {
 
 /// p50 and the tail, whose name is `tail`, over the time; a bar is the 95 % interval, a full point a report that passed.
 pub fn trend(points: &[TrendPoint], tail: &str, range_us: [f64; 2]) -> Result<String, DrawError> {
-    picture_of(SIZE, |root| {
+    drawn(SIZE, |root| {
         let first_s = points.iter().map(|p| p.time_s).fold(f64::MAX, f64::min);
         let span_s = (points.iter().map(|p| p.time_s).fold(first_s, f64::max) - first_s).max(1.0);
         let (unit_s, unit_name) = unit(span_s);
@@ -54,18 +55,12 @@ pub fn trend(points: &[TrendPoint], tail: &str, range_us: [f64; 2]) -> Result<St
             .set_label_area_size(LabelAreaPosition::Left, 46)
             .set_label_area_size(LabelAreaPosition::Bottom, 36)
             .build_cartesian_2d(-0.03 * span..span * 1.03, Decades(range_us[0]..range_us[1], number))?;
-        chart
-            .configure_mesh()
-            .disable_x_mesh()
-            .bold_line_style(FAINT)
-            .light_line_style(TRANSPARENT)
-            .axis_style(FAINT)
-            .x_labels(5)
-            .x_desc(format!("{unit_name} since the first report"))
-            .y_desc("\u{b5}s")
-            .x_label_formatter(&|v| number(v.max(0.0)))
-            .label_style(label())
-            .draw()?;
+        let names = [&format!("{unit_name} since the first report"), "\u{b5}s"];
+        axes(&mut chart, names, |mesh| {
+            mesh.disable_x_mesh()
+                .x_labels(5)
+                .x_label_formatter(&|v| number(v.max(0.0)));
+        })?;
         let line = |of: fn(&TrendPoint) -> Option<f64>| -> Vec<(f64, f64)> {
             points.iter().filter_map(|p| of(p).map(|us| (x(p), us))).collect()
         };
@@ -87,7 +82,7 @@ pub fn trend(points: &[TrendPoint], tail: &str, range_us: [f64; 2]) -> Result<St
         // The names stand below and above the first points.
         for (values, name, side, factor) in [(&p50, "p50", VPos::Top, 0.8), (&late, tail, VPos::Bottom, 1.25)] {
             if let Some(&(x, us)) = values.first() {
-                let style = label().pos(Pos::new(HPos::Left, side));
+                let style = label(12).pos(Pos::new(HPos::Left, side));
                 chart.draw_series([Text::new(name.to_owned(), (x, us * factor), style)])?;
             }
         }

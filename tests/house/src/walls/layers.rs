@@ -65,6 +65,12 @@ pub const LAYERS: &[Layer] = &[
         not_itself: &[],
     },
     Layer {
+        folder: "shm-schema/report",
+        may_use: &[],
+        never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
+        not_itself: &[],
+    },
+    Layer {
         folder: "shm-schema/write",
         may_use: &[],
         never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
@@ -150,6 +156,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema",
             "shm-schema/anatomy",
             "shm-schema/wall",
+            "shm-schema/report",
             "shm-schema/write",
             "shm-schema/text",
         ],
@@ -209,7 +216,7 @@ pub const LAYERS: &[Layer] = &[
     },
     Layer {
         folder: "host-ui/dose",
-        may_use: &["host-ui/base", "host-ui/files", "shm-schema", "shm-schema/anatomy"],
+        may_use: &["host-ui/base", "host-ui/files", "shm-schema", "shm-schema/anatomy", "shm-schema/report"],
         never: &[WINDOW, DEVICES],
         not_itself: &[PORTS],
     },
@@ -249,6 +256,7 @@ pub const LAYERS: &[Layer] = &[
             "host-ui/surfaces",
             "shm-schema",
             "shm-schema/anatomy",
+            "shm-schema/report",
         ],
         never: &[WINDOW, DEVICES],
         not_itself: &[PORTS],
@@ -257,6 +265,7 @@ pub const LAYERS: &[Layer] = &[
         folder: "host-ui/population",
         may_use: &[
             "shm-schema/insertions",
+            "shm-schema/report",
             "host-ui/base",
             "host-ui/dose",
             "host-ui/files",

@@ -2,12 +2,11 @@
 
 use super::MendReport;
 use super::file::State;
-use crate::html::STYLE;
-use crate::html::parts::{Column, cell, num, or_na, table};
 use crate::html::times::time_table;
 use crate::plots::{self, BLUE, DrawError, ORANGE, Series};
 use crate::summary::Summary;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
+use stylet_report::parts::{Column, cell, num, or_na, table};
 
 /// Name of each percentile, and after over before.
 pub fn ratios(before: &Summary, after: &Summary) -> Vec<(&'static str, String)> {
@@ -29,43 +28,34 @@ pub fn page(r: &MendReport) -> Result<String, DrawError> {
         series("after", BLUE, &r.after.wake_times),
     ];
     let (wake, tail) = (plots::wake_histogram(&both)?, plots::tail(&both)?);
-    let page = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                title { "Settings changed, " (r.made_at) }
-                meta name="viewport" content="width=device-width";
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                main {
-                    header { h1 { "Settings changed" } }
-                    p class="sub" {
-                        "Force loop on core " (r.core) ", measured for " (num(r.measured_for_s)) " s before and again after. " (r.made_at) ", "
-                        (r.program) "."
-                    }
-                    h2 { "Settings" }
-                    (changes(r))
-                    h2 { "Before" }
-                    (time_table(&[r.before.wake.clone(), r.before.work.clone()]))
-                    h2 { "After" }
-                    (time_table(&[r.after.wake.clone(), r.after.work.clone()]))
-                    (compared(r))
-                    h2 { "Pictures" }
-                    section class="figures" {
-                        figure { figcaption { "Wake-up of the force loop" } (PreEscaped(wake)) }
-                        figure { figcaption { "Cumulative tail" } (PreEscaped(tail)) }
-                    }
-                    footer {
-                        "One measurement before and one after: a PC that was busy with something else in one of them shows a difference \
-                         that no setting made. A restart undoes every setting; so does " code { "rt-core doctor --undo" } "."
-                    }
-                }
-            }
+    let main = html! {
+        header { h1 { "Settings changed" } }
+        p class="sub" {
+            "Force loop on core " (r.core) ", measured for " (num(r.measured_for_s)) " s before and again after. " (r.made_at) ", "
+            (r.program) "."
+        }
+        h2 { "Settings" }
+        (changes(r))
+        h2 { "Before" }
+        (time_table(&[r.before.wake.clone(), r.before.work.clone()]))
+        h2 { "After" }
+        (time_table(&[r.after.wake.clone(), r.after.work.clone()]))
+        (compared(r))
+        h2 { "Pictures" }
+        section class="figures" {
+            figure { figcaption { "Wake-up of the force loop" } (PreEscaped(wake)) }
+            figure { figcaption { "Cumulative tail" } (PreEscaped(tail)) }
+        }
+        footer {
+            "One measurement before and one after: a PC that was busy with something else in one of them shows a difference \
+             that no setting made. A restart undoes every setting; so does " code { "rt-core doctor --undo" } "."
         }
     };
-    Ok(page.into_string() + "\n")
+    Ok(stylet_report::page(
+        &format!("Settings changed, {}", r.made_at),
+        "",
+        &main,
+    ))
 }
 
 fn changes(r: &MendReport) -> Markup {

@@ -1,11 +1,11 @@
-//! Numbers, cells and tables, as every section of the page writes them.
+//! Numbers, cells, tables and cards, as every section of a page writes them.
 
-use crate::verdict::Outcome;
 use maud::{Markup, Render, html};
 
 /// Alignment of a column of a [`table`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Column {
+    /// To the left.
     Text,
     /// To the right, on one line.
     Number,
@@ -23,7 +23,7 @@ impl Column {
     }
 }
 
-/// Three significant digits or whole numbers; a thin space between thousands.
+/// Formats three significant digits or whole numbers, with a thin space between thousands.
 pub fn num(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
@@ -40,7 +40,7 @@ pub fn num(value: f64) -> String {
     let whole = format!("{value:.0}");
     let mut grouped = String::new();
     for (i, digit) in whole.chars().enumerate() {
-        if i > 0 && (whole.len() - i).is_multiple_of(3) && digit != '-' {
+        if i > usize::from(value < 0.0) && (whole.len() - i).is_multiple_of(3) {
             grouped.push('\u{202f}');
         }
         grouped.push(digit);
@@ -48,7 +48,7 @@ pub fn num(value: f64) -> String {
     grouped
 }
 
-/// Seconds or minutes, rounded up.
+/// Formats seconds or minutes, rounded up.
 pub fn duration(seconds: f64) -> String {
     if seconds < 120.0 {
         format!("{} s", num(seconds.ceil()))
@@ -57,21 +57,22 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// The same sentence with the micro sign.
+/// Returns the sentence with the micro sign.
 pub fn micro(text: &str) -> String {
     text.replace(" us", " \u{b5}s")
 }
 
-/// Text, or what shows itself, as a cell.
+/// Renders text, or anything that renders itself, as a cell.
 pub fn cell(content: impl Render) -> Markup {
     html! { (content) }
 }
 
-/// A number as a cell.
+/// Renders a number as a cell.
 pub fn count(value: f64) -> Markup {
     cell(num(value))
 }
 
+/// Renders a number as a cell, or that there is none.
 pub fn or_na(value: Option<f64>) -> Markup {
     html! {
         @match value {
@@ -81,28 +82,35 @@ pub fn or_na(value: Option<f64>) -> Markup {
     }
 }
 
-pub fn badge(outcome: Outcome) -> Markup {
-    let class = match outcome {
-        Outcome::Pass => "pass",
-        Outcome::Fail => "fail",
-        Outcome::NotMeasurable => "open",
-    };
-    html! { span class={ "badge " (class) } { (outcome.words()) } }
+/// Renders a row of cards, each with a value and the name of the value.
+pub fn cards(all: impl IntoIterator<Item = (Markup, Markup)>) -> Markup {
+    html! {
+        section class="cards" { @for (value, what) in all { div { (value) br; span { (what) } } } }
+    }
 }
 
-/// A table; a column past the end of `columns` is text.
+/// Renders a table; a column past the end of `columns` is text.
 pub fn table(head: &[impl Render], rows: &[Vec<Markup>], columns: &[Column]) -> Markup {
     let class = |i: usize| columns.get(i).and_then(|column| column.class());
     html! {
-        table {
-            thead { tr { @for (i, name) in head.iter().enumerate() { th class=[class(i)] { (name) } } } }
-            tbody {
-                @for row in rows {
-                    tr { @for (i, content) in row.iter().enumerate() { td class=[class(i)] { (content) } } }
+        div class="scroll" {
+            table {
+                thead { tr { @for (i, name) in head.iter().enumerate() { th class=[class(i)] { (name) } } } }
+                tbody {
+                    @for row in rows {
+                        tr { @for (i, content) in row.iter().enumerate() { td class=[class(i)] { (content) } } }
+                    }
                 }
             }
         }
     }
+}
+
+/// Renders a table in which all columns but the first are numbers.
+pub fn numbers(head: &[impl Render], rows: &[Vec<Markup>]) -> Markup {
+    let mut columns = vec![Column::Number; head.len()];
+    columns[0] = Column::Text;
+    table(head, rows, &columns)
 }
 
 #[cfg(test)]
@@ -116,7 +124,7 @@ mod tests {
             ["0", "0.073", "1.5", "14.3", "812"]
         );
         assert_eq!(num(4_862_000.0), "4\u{202f}862\u{202f}000");
-        assert_eq!([100.0, 20.0].map(num), ["100", "20"]);
+        assert_eq!([100.0, 20.0, -250.0].map(num), ["100", "20", "-250"]);
     }
 
     #[test]
@@ -124,8 +132,8 @@ mod tests {
         let page = table(&["<b>"], &[vec![cell("&\"")], vec![or_na(None)]], &[Column::Number]);
         assert_eq!(
             page.into_string(),
-            "<table><thead><tr><th class=\"n\">&lt;b&gt;</th></tr></thead><tbody>\
-             <tr><td class=\"n\">&amp;&quot;</td></tr><tr><td class=\"n\"><span class=\"na\">n/a</span></td></tr></tbody></table>"
+            "<div class=\"scroll\"><table><thead><tr><th class=\"n\">&lt;b&gt;</th></tr></thead><tbody>\
+             <tr><td class=\"n\">&amp;&quot;</td></tr><tr><td class=\"n\"><span class=\"na\">n/a</span></td></tr></tbody></table></div>"
         );
     }
 }
