@@ -1,10 +1,7 @@
 //! Our wake-up latency, alternating with another one: that of `cyclictest` on the same core with the same priority and interval, or our own without
 //! the load.
 
-mod timerlat;
-
 use crate::load::{Load, LoadError, Running};
-use crate::machine::Machine;
 use crate::measure::{MeasureError, Measured, Setup, measure};
 use crate::sample::histogram;
 use crate::summary::quantile_us;
@@ -32,8 +29,6 @@ const COMPARED: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999
 pub enum Against {
     /// `cyclictest` (Debian package rt-tests) under the same load: same core, priority and interval
     Cyclictest,
-    /// `rtla timerlat` (Debian package rtla), where the kernel has the tracer: same core, priority and period
-    Timerlat,
     /// The same loops without the load
     Unloaded,
     /// The same loops without the trace of --trace
@@ -44,7 +39,6 @@ impl Against {
     pub fn name(self) -> &'static str {
         match self {
             Self::Cyclictest => "cyclictest",
-            Self::Timerlat => "timerlat",
             Self::Unloaded => "without the load",
             Self::Untraced => "without the trace",
         }
@@ -154,21 +148,16 @@ pub fn compare(
     };
     let tool = match against {
         Against::Cyclictest => version(),
-        Against::Timerlat => timerlat::version(),
         Against::Unloaded | Against::Untraced => Some(String::new()),
     };
     let mut comparison = Comparison {
         against,
         absent: match (against, &tool, setup.load) {
-            (Against::Timerlat, _, _) if timerlat::missing(&Machine::this()).is_some() => {
-                timerlat::missing(&Machine::this()).map(str::to_owned)
-            }
-            (Against::Timerlat, None, _) => Some(missing(timerlat::PROGRAM, "rtla").to_string()),
             (Against::Untraced, _, _) if setup.trace_over_ns.is_none() => {
                 Some("there is no trace to compare with; give --trace".to_owned())
             }
             (_, None, _) => Some(missing(CYCLICTEST, "rt-tests").to_string()),
-            (Against::Cyclictest | Against::Timerlat, _, Load::Window) => {
+            (Against::Cyclictest, _, Load::Window) => {
                 Some("the window draws nothing without our loops; give --compare unloaded".to_owned())
             }
             (Against::Unloaded, _, Load::None) => Some("there is no load to compare with; give --load".to_owned()),
@@ -198,7 +187,6 @@ pub fn compare(
         let ours = &measured.haptic.wake;
         let others = match against {
             Against::Cyclictest => cyclictest(&setup, interrupted),
-            Against::Timerlat => timerlat::turn(&setup, interrupted),
             Against::Unloaded => without(&setup, Load::None, interrupted),
             Against::Untraced => without(&setup, setup.load, interrupted),
         };

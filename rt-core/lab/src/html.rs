@@ -202,9 +202,6 @@ fn pictures(r: &Report, m: &Measured) -> Result<Markup, DrawError> {
                 plots::wake_histogram(turns)?,
             ));
         }
-        Some((Against::Timerlat, turns)) => {
-            figures.push(("Wake-up beside timerlat, all turns", plots::wake_histogram(turns)?));
-        }
         None => {
             let seen = Series {
                 name: "tip moved to host saw it",

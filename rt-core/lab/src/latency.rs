@@ -99,7 +99,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
         Some(against) => {
             let ours = match against {
                 Against::Unloaded | Against::Untraced => "with and ",
-                Against::Cyclictest | Against::Timerlat => "with ",
+                Against::Cyclictest => "with ",
             };
             eprintln!("rt-core: alternating {ours}{}, {} rounds", against.name(), args.rounds);
             Some(compare(&setup, against, args.rounds, interrupted)?)
@@ -173,7 +173,6 @@ fn print_verdict(report: &Report) {
                     .collect();
                 let over = match comparison.against {
                     Against::Cyclictest => "ours over cyclictest",
-                    Against::Timerlat => "ours over timerlat",
                     Against::Unloaded => "with the load over without it",
                     Against::Untraced => "with the trace over without it",
                 };

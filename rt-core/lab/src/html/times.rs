@@ -65,7 +65,6 @@ pub fn comparison(r: &Report) -> Markup {
     };
     let (title, heads) = match c.against {
         Against::Cyclictest => ("Beside cyclictest", ["ours", "theirs"]),
-        Against::Timerlat => ("Beside timerlat", ["ours", "theirs"]),
         Against::Unloaded => ("With and without the load", ["with", "without"]),
         Against::Untraced => ("What tracing costs", ["with", "without"]),
     };
@@ -94,10 +93,6 @@ pub fn comparison(r: &Report) -> Markup {
                 Against::Cyclictest => {
                     (c.tool) ", alternating (turns of " (turns) " s): same core, priority and interval, microseconds, both read \
                      right after the sleep. The force loop does all its work, cyclictest sleeps only."
-                }
-                Against::Timerlat => {
-                    (c.tool) ", alternating (turns of " (turns) " s): latency of a thread of the same core, priority and period, \
-                     known to a microsecond."
                 }
                 Against::Untraced => {
                     "The same loops with and without the trace, alternating (turns of " (turns) " s), microseconds."
