@@ -110,15 +110,6 @@ impl Edema {
         }
         dose_gy
     }
-
-    /// Estimates the swelling at the implant from two volumes of one gland on two days, for a given
-    /// half-life; `None` unless the later one is smaller.
-    pub fn of_volumes(volumes_m3: [f64; 2], seen_s: [f64; 2], half_life_s: f64) -> Option<Self> {
-        let [early, late] = seen_s.map(|t| (-t / half_life_s).exp2());
-        let ratio = volumes_m3[0] / volumes_m3[1];
-        let magnitude = (ratio - 1.0) / (early - ratio * late);
-        (magnitude.is_finite() && magnitude > 0.0).then_some(Self { magnitude, half_life_s })
-    }
 }
 
 impl std::fmt::Display for Edema {
@@ -196,15 +187,5 @@ mod tests {
                 );
             }
         }
-    }
-
-    /// Checks the same implant, seen on day 0 and on day 30: one dose.
-    #[test]
-    fn two_volumes_show_the_magnitude() {
-        let edema = Edema::of_days(0.4, 9.3);
-        let volume = |day: f64| 30e-6 * edema.stretch(days_to_s(day)).powi(3);
-        let found = Edema::of_volumes([volume(0.0), volume(30.0)], [0.0, days_to_s(30.0)], edema.half_life_s).unwrap();
-        assert!((found.magnitude - 0.4).abs() < 1e-9, "{found}");
-        assert!(Edema::of_volumes([30e-6, 31e-6], [0.0, days_to_s(30.0)], edema.half_life_s).is_none());
     }
 }

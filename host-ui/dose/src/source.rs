@@ -10,8 +10,6 @@ use stylet_base::input;
 
 mod read;
 
-/// 1 mCi = 37 MBq.
-pub const MBQ_PER_MCI: f64 = 37.0;
 const M_PER_CM: f64 = 0.01;
 /// 1 cGy/h in Gy/s.
 const GY_PER_S_PER_CGY_PER_H: f64 = 0.01 / 3600.0;

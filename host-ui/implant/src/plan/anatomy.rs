@@ -5,9 +5,9 @@ use super::PlanError;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use stylet_anatomy::{Organ, PatientFrame};
+use stylet_dose::Structure;
 use stylet_dose::mesh::Mesh;
 use stylet_dose::structure::Region;
-use stylet_dose::{Structure, structure};
 use stylet_host::link::SceneModel;
 use stylet_shm_schema::{StructureInfo, role};
 use stylet_surfaces::bodies::{Bodies, Follows, shown_alone};
@@ -293,11 +293,6 @@ pub fn ball(name: &str, middle_m: [f64; 3], half_m: [f64; 3]) -> Body {
     }
     let body = Body::new(name, &points_m, &triangles);
     body.unwrap_or_else(|why| unreachable!("the grid of a ball is closed: {why}"))
-}
-
-/// Returns the box around points.
-pub fn bounds_of(points_m: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
-    structure::bounds(points_m)
 }
 
 #[cfg(test)]

@@ -136,18 +136,6 @@ impl ImplantPlan {
         })
     }
 
-    /// Returns the plan with a seed moved; the whole strand moves with it.
-    pub fn with_seed_at(&self, needle: usize, seed: usize, along_m: f64) -> Result<Self, PlanError> {
-        self.change(needle, |n| {
-            let by_m = along_m - n.seeds.get(seed).ok_or(PlanError::NoSeed)?.along_m;
-            let alone = n.loading == Loading::Loose;
-            for (number, s) in n.seeds.iter_mut().enumerate() {
-                s.along_m += if alone && number != seed { 0.0 } else { by_m };
-            }
-            Ok(())
-        })
-    }
-
     /// Replaces all seeds of a needle by a strand with the usual spacers.
     pub fn with_strand(
         &self,
@@ -159,14 +147,6 @@ impl ImplantPlan {
         self.change(needle, |n| {
             n.loading = Loading::Stranded { spacer_m: SPACER_M };
             n.seeds = Needle::strand(count, first_along_m, SPACER_M, strength_u);
-            Ok(())
-        })
-    }
-
-    /// Returns the plan with separate seeds at the same places.
-    pub fn with_loose_seeds(&self, needle: usize) -> Result<Self, PlanError> {
-        self.change(needle, |n| {
-            n.loading = Loading::Loose;
             Ok(())
         })
     }

@@ -99,21 +99,10 @@ fn each_fault_is_reported_once_and_all_together() {
 }
 
 #[test]
-fn a_strand_moves_as_one_and_gives_up_its_ends_only() {
+fn a_strand_gives_up_its_ends_only() {
     let plan = good();
-    let moved = plan.with_seed_at(0, 1, 0.072).unwrap();
-    let along = |p: &ImplantPlan| p.needles[0].seeds.iter().map(|s| s.along_m).collect::<Vec<_>>();
-    for (a, b) in along(&moved).iter().zip([0.082, 0.072, 0.062]) {
-        assert!((a - b).abs() < 1e-12);
-    }
-    assert!(
-        (moved.needles[0].depth_m - 0.082).abs() < 1e-12,
-        "the tip goes as deep as the deepest seed"
-    );
     assert!(plan.without_seed(0, 1).is_err());
     assert_eq!(plan.without_seed(0, 0).unwrap().needles[0].seeds.len(), 2);
-    let loose = plan.with_loose_seeds(0).unwrap().with_seed_at(0, 1, 0.072).unwrap();
-    assert!((along(&loose)[0] - 0.08).abs() < 1e-12 && (along(&loose)[1] - 0.072).abs() < 1e-12);
 }
 
 #[test]
