@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
+use stylet_benches::error::quantile;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseGrid, DoseKernel, Dvh, Metric, Region, Seed, Source, Structure};
 
@@ -48,11 +49,6 @@ impl Row {
         let made = black_box(work());
         self.millis.push(start.elapsed().as_secs_f64() * 1e3);
         made
-    }
-
-    fn quantile(&mut self, q: f64) -> f64 {
-        self.millis.sort_by(f64::total_cmp);
-        self.millis[((self.millis.len() - 1) as f64 * q).round() as usize]
     }
 }
 
@@ -173,9 +169,9 @@ fn main() {
         "{:<50} {:>9} {:>9} {:>9} {:>8}",
         "", "min ms", "p50 ms", "max ms", "ratio"
     );
-    let base = rows[0].quantile(0.5);
+    let base = quantile(&rows[0].millis, 0.5);
     for row in &mut rows {
-        let (min, p50, max) = (row.quantile(0.0), row.quantile(0.5), row.quantile(1.0));
+        let [min, p50, max] = [0.0, 0.5, 1.0].map(|q| quantile(&row.millis, q));
         println!("{:<50} {min:>9.2} {p50:>9.2} {max:>9.2} {:>8.1}", row.name, base / p50);
     }
     println!(

@@ -4,6 +4,8 @@
 
 use std::time::Instant;
 
+use stylet_benches::error::quantile;
+use stylet_dose::structure::Scatter;
 use stylet_sim::line::{
     ColumnQueue, Compliance, Line, LineInput, LineLayer, LineModel, LineOutput, LineSettings, LineState, MAX_STATIONS,
     StationSettings, Stations, TOLERANCE, step,
@@ -211,23 +213,9 @@ fn made_up(stations: usize) -> Compliance {
     })
 }
 
-/// Numbers that look random and are the same on every run (splitmix64).
-struct Random(u64);
-
-impl Random {
-    /// In [0, 1).
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
-
 /// 20 s of a hand that goes in, back and on, at up to 200 mm/s.
 fn way(length_m: f64) -> Vec<f64> {
-    let mut random = Random(3);
+    let mut random = Scatter::of_cell([3, 0, 0]);
     let (mut tip_m, mut to_m, mut speed) = (0.0, 0.0, 1e-4);
     let mut places = Vec::new();
     for _ in 0..20_000 {
@@ -308,8 +296,5 @@ fn ticks(name: &str, compliance: &Compliance) {
 
 /// p50, p99, p99.9 and the largest.
 fn quantiles(values: &[f64]) -> [f64; 4] {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let at = |part: f64| sorted[((sorted.len() - 1) as f64 * part) as usize];
-    [at(0.5), at(0.99), at(0.999), at(1.0)]
+    [0.5, 0.99, 0.999, 1.0].map(|q| quantile(values, q))
 }

@@ -82,6 +82,14 @@ impl Error {
     }
 }
 
+/// The value below which a share `q` of them lies.
+pub fn quantile(values: &[f64], q: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let place = (sorted.len().max(1) - 1) as f64 * q;
+    sorted.get(place.round() as usize).copied().unwrap_or(f64::NAN)
+}
+
 pub fn norm(v: [f64; 3]) -> f64 {
     v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use std::path::Path;
+use stylet_benches::error::quantile;
 use stylet_benches::live::{Live, LiveCase, LiveTick, OwnTick, Theatre, Twins};
 use stylet_sim::scene::TissueKind;
 
@@ -182,15 +183,6 @@ fn row(case: LiveCase, kind: TissueKind, live: &Live, prepared_s: f64, twin_resi
         columns_mb: live.column_bytes as f64 * 1e-6,
         twin_residual,
     }
-}
-
-fn quantile(values: &[f64], q: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted
-        .get(((sorted.len().max(1) - 1) as f64 * q).round() as usize)
-        .copied()
-        .unwrap_or(f64::NAN)
 }
 
 pub fn write(rows: &[Ships], path: &Path) -> Result<(), csv::Error> {
