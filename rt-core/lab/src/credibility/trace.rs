@@ -50,7 +50,7 @@ pub const REQUIREMENTS: &[Requirement] = &[
         hazards: &["HAZ-01", "HAZ-08"],
         tests: &[(
             "rt-core/sim/src/force/gate/tests.rs",
-            "a_force_that_is_no_number_leads_to_zero_within_the_ramp_and_says_so",
+            "a_force_that_is_nan_ramps_to_zero_and_reports",
         )],
     },
     Requirement {

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn tissue_without_forces_answers_by_the_displacement_of_its_element() {
+    fn tissue_without_forces_answers_by_displacement() {
         let response = LocalResponse {
             tick: 1,
             displacement_m: AXIS * 2e-3,

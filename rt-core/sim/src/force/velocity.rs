@@ -189,7 +189,7 @@ mod tests {
 
     /// Against the motion itself: a tip that speeds up and turns back within a second.
     #[test]
-    fn the_estimate_is_the_velocity_of_its_stated_delay_within_its_stated_noise() {
+    fn the_estimate_is_within_its_stated_delay_and_noise() {
         let mut estimator = VelocityEstimator::new(STEP_M);
         // Most of 0.15 m/s, 0.94 m/s2 and 5.9 m/s3.
         let omega = std::f64::consts::TAU;

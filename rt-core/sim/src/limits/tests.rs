@@ -42,7 +42,7 @@ fn every_problem_is_listed_at_once() {
 }
 
 #[test]
-fn equation_1_in_three_dimensions_is_the_sign_of_the_smallest_corner() {
+fn folding_is_the_sign_of_the_smallest_corner() {
     // Oracle: the least determinant over all signs of all six shears.
     let mut random = crate::scene::test_bodies::Random(5);
     for _ in 0..2000 {
@@ -62,7 +62,7 @@ fn equation_1_in_three_dimensions_is_the_sign_of_the_smallest_corner() {
 }
 
 #[test]
-fn angles_at_the_edge_of_folding_are_accepted_and_those_beyond_refused() {
+fn angles_beyond_folding_are_refused() {
     let with = |shear_deg, shear_vert_deg| TissueParameters {
         shear_deg,
         shear_vert_deg,

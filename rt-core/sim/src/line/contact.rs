@@ -58,18 +58,18 @@ pub(super) fn step_in(
             ..state.last
         };
     }
-    state.leave_company();
+    state.forget_others();
     let (rows, common_m_per_n) = (&model.compliance.rows, model.compliance.common_m_per_n());
     state
         .memory
         .begin(rows, common_m_per_n, &model.settings.prony, input.dt_s);
     state.move_from_outside();
     scratch.begin();
-    advance(model, state, input, &mut Alone(scratch))
+    advance(model, state, input, &mut NoOthers(scratch))
 }
 
 /// What a needle shares a tick with: nothing, or needles that stay in.
-pub(super) trait Company {
+pub(super) trait OtherNeedles {
     /// Where the shaft touches and the tip loads is known; membrane and tip are made ready for [`solve`](Self::solve).
     fn begin(&mut self, model: &LineModel, state: &mut LineState, tip_m: f64, membrane: Option<usize>);
     /// Forces of all; returns how far the tip is beyond where the material has it.
@@ -87,9 +87,9 @@ pub(super) trait Company {
     fn end(&mut self) {}
 }
 
-struct Alone<'a>(&'a mut Scratch);
+struct NoOthers<'a>(&'a mut Scratch);
 
-impl Company for Alone<'_> {
+impl OtherNeedles for NoOthers<'_> {
     fn begin(&mut self, model: &LineModel, state: &mut LineState, tip_m: f64, membrane: Option<usize>) {
         touch(model, state, tip_m, self.0);
         state.move_membrane_from_outside(model);
@@ -118,7 +118,7 @@ pub(super) fn advance(
     model: &LineModel,
     state: &mut LineState,
     input: &LineInput,
-    company: &mut impl Company,
+    company: &mut impl OtherNeedles,
 ) -> LineOutput {
     let tip_m = input.tip_m.clamp(-FURTHEST_M, FURTHEST_M);
     let input = &LineInput { tip_m, ..*input };

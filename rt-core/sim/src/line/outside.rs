@@ -13,7 +13,7 @@ const MOST: usize = rows(MAX_STATIONS);
 
 /// Displacement of each row of a line: shaft of each station, then tip at each, then stations across along each direction.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Outside {
+pub(super) struct ExternalDisplacement {
     /// Now, and to be reached, m.
     now_m: Vec<f64>,
     to_m: Vec<f64>,
@@ -27,7 +27,7 @@ pub(super) struct Outside {
 
 /// The same in a flight recording of a needle that stays in, with room for the longest line.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct OutsideRecord {
+pub(super) struct ExternalRecord {
     #[serde(with = "BigArray")]
     now_m: [f64; MOST],
     #[serde(with = "BigArray")]
@@ -37,9 +37,9 @@ pub(super) struct OutsideRecord {
     at_tip_m: f64,
 }
 
-impl OutsideRecord {
+impl ExternalRecord {
     /// Blank; every page is written to.
-    pub const BLANK: Self = OutsideRecord {
+    pub const BLANK: Self = ExternalRecord {
         now_m: [1.0; MOST],
         to_m: [1.0; MOST],
         ticks: 1,
@@ -47,8 +47,8 @@ impl OutsideRecord {
         at_tip_m: 1.0,
     };
 
-    pub fn of(outside: &Outside) -> Self {
-        let mut record = OutsideRecord {
+    pub fn of(outside: &ExternalDisplacement) -> Self {
+        let mut record = ExternalRecord {
             now_m: [0.0; MOST],
             to_m: [0.0; MOST],
             ticks: outside.ticks,
@@ -64,9 +64,9 @@ impl OutsideRecord {
     }
 }
 
-impl Outside {
+impl ExternalDisplacement {
     /// Goes on from `record`, as far as the line has rows.
-    pub fn take_record(&mut self, record: &OutsideRecord) {
+    pub fn take_record(&mut self, record: &ExternalRecord) {
         for (rows_m, kept) in [(&mut self.now_m, &record.now_m), (&mut self.to_m, &record.to_m)] {
             for (row_m, kept_m) in rows_m.iter_mut().zip(kept) {
                 *row_m = *kept_m;
@@ -78,10 +78,10 @@ impl Outside {
     /// Of a line of so many stations, with room for any across.
     pub fn new(stations: usize, value: f64) -> Self {
         let rows = rows(stations);
-        Outside {
+        ExternalDisplacement {
             now_m: vec![value; rows],
             to_m: vec![value; rows],
-            ..Outside::default()
+            ..ExternalDisplacement::default()
         }
     }
 
@@ -104,8 +104,8 @@ impl Outside {
     }
 
     /// Keeps what `from` holds; does not allocate where there is room. Names every field, so that a new one is not forgotten.
-    pub fn copy_from(&mut self, from: &Outside) {
-        let Outside {
+    pub fn copy_from(&mut self, from: &ExternalDisplacement) {
+        let ExternalDisplacement {
             now_m,
             to_m,
             ticks,

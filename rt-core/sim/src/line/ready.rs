@@ -27,7 +27,7 @@ pub use bend::NeedleBending;
 pub use body::{BodyAnswer, BodyLine};
 pub use source::LineSource;
 pub use track::Track;
-use way::{Way, layer};
+use way::{LineLayers, layer};
 
 /// The needle is on a line whose entry it would meet so far from it, and whose direction is that close to its own.
 const BESIDE_M: f64 = 1e-3;
@@ -57,7 +57,7 @@ pub struct HandLine {
     /// Rises with each line of a run, from 1.
     pub generation: u64,
     line: Line,
-    way: Way,
+    way: LineLayers,
     pub(super) model: LineModel,
     pub(super) state: LineState,
     /// What its ticks work in.
@@ -131,7 +131,7 @@ impl ReadyLine {
         report: &mut dyn FnMut(QueueProgress) -> bool,
     ) -> Result<ReadyLine, LineError> {
         let settings = StationSettings::of_lattice(body.spacing_m());
-        let way = Way::along(&line, lattice, layer_of);
+        let way = LineLayers::along(&line, lattice, layer_of);
         let before_bone = way
             .bone_m
             .map_or(MAX_STATIONS, |bone_m| (bone_m / settings.spacing_m).round() as usize);
@@ -167,7 +167,7 @@ impl ReadyLine {
 }
 
 impl HandLine {
-    fn new(generation: u64, line: Line, way: Way, compliance: Compliance) -> Result<Self, LineError> {
+    fn new(generation: u64, line: Line, way: LineLayers, compliance: Compliance) -> Result<Self, LineError> {
         let layers = way.layers(&LayerForces::default());
         let bending = Bending::new(&compliance);
         let model = LineModel::new(compliance, &layers, LineSettings::default()).map_err(|problems| {

@@ -2,7 +2,7 @@
 
 use super::beam::BeamState;
 use super::model::LineModel;
-use super::outside::Outside;
+use super::outside::ExternalDisplacement;
 use super::prony::Memory;
 use super::rows::dot;
 use serde::{Deserialize, Serialize};
@@ -88,7 +88,7 @@ pub struct LineState {
     /// The last tick was one beside other needles: what they move is in the memory's offset.
     pub(super) is_beside: bool,
     /// How the probe moves the tissue past the needle.
-    pub(super) outside: Outside,
+    pub(super) outside: ExternalDisplacement,
     /// How far the tip is ahead of where the hand has it: a needle that was taken up again, m.
     pub(super) grip_m: f64,
     /// End of a track that an earlier needle cut where this line lies, and the layers that it opened.
@@ -128,7 +128,7 @@ impl LineState {
             beam: BeamState::default(),
             beside_whole_m: 0.0,
             is_beside: false,
-            outside: Outside::new(stations, value),
+            outside: ExternalDisplacement::new(stations, value),
             grip_m: 0.0,
             open_m: 0.0,
             open_layers: 0,
@@ -225,7 +225,7 @@ impl LineState {
     }
 
     /// The needle is alone from now on.
-    pub(super) fn leave_company(&mut self) {
+    pub(super) fn forget_others(&mut self) {
         if std::mem::take(&mut self.is_beside) {
             self.memory.offset_m.fill(0.0);
             self.beside_whole_m = self.outside.at_tip_m;

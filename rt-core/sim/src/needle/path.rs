@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn the_count_of_depth_restarts_at_each_membrane_and_at_nothing_else() {
+    fn depth_restarts_at_each_membrane_only() {
         let (layers, mut path) = through();
         let front = path.front(&layers, 0.053).unwrap();
         assert!((front.depth_m - 0.003).abs() < 1e-15 && !front.open);
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn an_open_membrane_closes_only_behind_the_hysteresis_and_old_news_changes_nothing() {
+    fn an_open_membrane_closes_only_behind_the_hysteresis() {
         let (layers, mut path) = through();
         path.open();
         assert!(!path.leave(0.0496, 5e-4) && path.innermost() == 3);

@@ -14,7 +14,7 @@ const ROWS: usize = 2 * (MAX_STATIONS + MAX_ACROSS);
 
 /// One of them.
 #[derive(Clone, Debug)]
-struct Beside {
+struct LineOnWall {
     /// Number of the line; 0 is none.
     generation: u64,
     rows: usize,
@@ -26,7 +26,7 @@ struct Beside {
 #[derive(Clone, Debug)]
 pub(super) struct LinesBeside {
     pads: usize,
-    lines: Vec<Beside>,
+    lines: Vec<LineOnWall>,
 }
 
 impl LinesBeside {
@@ -35,7 +35,7 @@ impl LinesBeside {
         let line = || {
             let mut table = vec![1.0; ROWS * pads];
             table.fill(0.0);
-            Beside {
+            LineOnWall {
                 generation: 0,
                 rows: 0,
                 table,
@@ -102,14 +102,14 @@ impl LinesBeside {
         line.rows.min(rows_m.len())
     }
 
-    fn find(&self, generation: u64) -> Option<&Beside> {
+    fn find(&self, generation: u64) -> Option<&LineOnWall> {
         self.lines
             .iter()
             .find(|line| line.generation == generation && generation != 0)
     }
 }
 
-impl Beside {
+impl LineOnWall {
     fn rows_with(&self, pads: usize) -> impl Iterator<Item = &[f32]> {
         self.table.chunks_exact(pads.max(1)).take(self.rows)
     }

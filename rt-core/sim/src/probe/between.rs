@@ -11,14 +11,14 @@ const RIDGE: f64 = 1e-4;
 const MOST_RIDGE: f64 = 1.0;
 
 /// Shares and compliance of points.
-pub(super) struct Between {
+pub(super) struct PointCompliance {
     /// Loads of the pads' rows by a newton on each row of the points: one row of the points after another.
     pub shares: Vec<f32>,
     /// How all points move along x, y, z with a newton on each point along x, y, z, m/N: one row of so many after another.
     pub rows: Vec<f32>,
 }
 
-impl Between {
+impl PointCompliance {
     /// `answers` is `S`, `compliance` `C`, both row after row of so many columns.
     pub fn of(answers: &[f64], compliance: &[f64], rows: usize) -> Self {
         let points = answers.len() / rows.max(1) / 3;
@@ -28,7 +28,7 @@ impl Between {
         let half = half.unwrap_or_else(|| DMatrix::zeros(rows, 3 * points));
         let all = half.tr_mul(&half);
         let shares = factor.solve(&answers.transpose());
-        Between {
+        PointCompliance {
             // Column after column of `C^-1 S'`.
             shares: shares.iter().map(|share| *share as f32).collect(),
             // Symmetric: columns are rows.
@@ -73,7 +73,7 @@ mod tests {
                 0.0
             }
         }));
-        let between = Between::of(&answers, &compliance, rows);
+        let between = PointCompliance::of(&answers, &compliance, rows);
         let along_y = |a: usize, b: usize| f64::from(between.rows[(3 * a + 1) * 9 + 3 * b + 1]);
         for (found, wanted) in [
             (along_y(0, 0), 1e-3),

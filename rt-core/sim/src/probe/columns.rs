@@ -1,7 +1,7 @@
 //! The body's answer to a newton along x, y and z on each pad, eight at once, in slices of bounded work.
 
-use super::between::Between;
-use super::onto::Onto;
+use super::between::PointCompliance;
+use super::onto::ElementMap;
 use super::shape::ProbeShape;
 use super::wall::{NoWall, Wall};
 use crate::scene::Lattice;
@@ -112,7 +112,7 @@ pub struct ProbeQueue {
     /// Loads of each row, and of the points where others load the body.
     loads: Vec<Vec<NodeWeight>>,
     read: Vec<Vec<NodeWeight>>,
-    onto: Onto,
+    onto: ElementMap,
 }
 
 /// What the solution of a batch works in.
@@ -151,7 +151,7 @@ impl ProbeQueue {
             edge_m: body.spacing_m(),
             loads: rows_of(&weights),
             read: rows_of(&points),
-            onto: Onto::new(body.lattice(), displaced),
+            onto: ElementMap::new(body.lattice(), displaced),
         })
     }
 
@@ -220,13 +220,13 @@ impl ProbeQueue {
         let compliance = (0..rows * rows).map(|n| 0.5 * (moved(n / rows, n % rows) + moved(n % rows, n / rows)));
         let compliance: Vec<f64> = compliance.collect();
         let between = if self.wall.is_loaded_at_points {
-            Between {
+            PointCompliance {
                 shares: Vec::new(),
                 rows: compliance.iter().map(|moved| *moved as f32).collect(),
             }
         } else {
             let points = (0..self.read.len() * rows).map(|n| answers[n % rows].points[n / rows]);
-            Between::of(&points.collect::<Vec<f64>>(), &compliance, rows)
+            PointCompliance::of(&points.collect::<Vec<f64>>(), &compliance, rows)
         };
         Ok(ReadyProbe {
             shape: self.shape,

@@ -4,7 +4,7 @@ use crate::scene::Lattice;
 use crate::tissue::ElementField;
 
 /// Which element each small one lies in.
-pub(super) struct Onto {
+pub(super) struct ElementMap {
     elements: usize,
     /// By small element; empty where both are the same.
     of: Vec<u32>,
@@ -12,13 +12,13 @@ pub(super) struct Onto {
     shares: Vec<f32>,
 }
 
-impl Onto {
+impl ElementMap {
     /// From the elements of `from` to those of `to`, whose edge is some times as long.
     pub fn new(from: &Lattice, to: &Lattice) -> Self {
         let elements = to.element_count();
         let times = (to.spacing_m / from.spacing_m).round() as usize;
         if times <= 1 {
-            return Onto {
+            return ElementMap {
                 elements,
                 of: Vec::new(),
                 shares: Vec::new(),
@@ -35,7 +35,7 @@ impl Onto {
                 *count += 1;
             }
         }
-        Onto {
+        ElementMap {
             elements,
             of,
             shares: counts.into_iter().map(|count| 1.0 / count.max(1) as f32).collect(),
@@ -78,7 +78,7 @@ mod tests {
     fn an_element_moves_as_what_is_in_it() {
         let scene = Scene::builtin("pelvis").expect("built in");
         let coarse = scene.clone().for_lines(TissueKind::ChainMail).expect("has lines").body;
-        let onto = Onto::new(&scene.lattice, &coarse);
+        let onto = ElementMap::new(&scene.lattice, &coarse);
         let moved = |at: [f64; 3]| [0.1 * at[1] - 0.02 * at[0], 0.05 * at[2], 0.3 * at[0]].map(|u| u as f32);
         let mut field = ElementField::zeros(scene.lattice.element_count());
         let mut middles = vec![([0.0; 3], 0); coarse.element_count()];
@@ -100,7 +100,7 @@ mod tests {
                 assert!((axis[element] - wanted).abs() < 1e-7, "element {element}");
             }
         }
-        let same = Onto::new(&coarse, &coarse);
+        let same = ElementMap::new(&coarse, &coarse);
         assert!(std::ptr::eq(same.mean(&field, &mut room), &field));
     }
 }

@@ -214,7 +214,7 @@ fn a_body_is_displaced_as_the_finer_one_that_was_solved_for() {
     let (force_n, field) = pressed(&alone);
     let (onto_n, onto_field) = pressed(&Fixture::solved_in(&fine, coarse.clone(), 5e-3));
     assert!(force_n.norm() > 0.5 && (onto_n - force_n).norm() < 1e-9 * force_n.norm());
-    let onto = onto::Onto::new(&fine.body, &coarse.body);
+    let onto = onto::ElementMap::new(&fine.body, &coarse.body);
     let mut room = crate::tissue::ElementField::zeros(coarse.body.element_count());
     let mean = onto.mean(&field, &mut room);
     let largest = mean.0.iter().flatten().fold(0.0_f32, |most, u| most.max(u.abs()));
@@ -248,7 +248,7 @@ fn a_body_is_displaced_as_the_finer_one_that_was_solved_for() {
 
 /// Points that load the body themselves: beside the contact at the same points solved in full, without pads that are close enough.
 #[test]
-fn points_that_load_the_body_press_as_with_the_contact_solved_in_full() {
+fn loaded_points_press_as_the_full_contact_does() {
     let scene = block(true);
     let wall = Wall::of(&scene, 5e-3).expect("a rectum").loaded_at_points();
     let fixture = Fixture::solved_for(&scene.clone(), scene, wall);

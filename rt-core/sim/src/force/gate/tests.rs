@@ -127,7 +127,7 @@ fn the_device_limit_holds_whatever_the_settings_say() {
 }
 
 #[test]
-fn a_force_that_is_no_number_leads_to_zero_within_the_ramp_and_says_so() {
+fn a_force_that_is_nan_ramps_to_zero_and_reports() {
     let parameters = full_scale();
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let mut state = engaged(&parameters);
@@ -157,7 +157,7 @@ fn a_force_that_is_no_number_leads_to_zero_within_the_ramp_and_says_so() {
 }
 
 #[test]
-fn engaging_waits_for_a_small_force_then_ramps_in_and_the_scale_applies() {
+fn engaging_waits_for_a_small_force_then_ramps_in() {
     let parameters = GateParameters {
         force_scale: 0.5,
         ..GateParameters::default()

@@ -64,7 +64,7 @@ fn outside_there_is_no_force_but_the_weight() {
 }
 
 #[test]
-fn the_membrane_pushes_out_most_at_the_critical_depth_and_then_lets_go() {
+fn the_membrane_pushes_most_at_the_critical_depth() {
     let parameters = ForceParameters::default();
     let gland = parameters.layers.of(LayerKind::Gland);
     let critical = gland.puncture_depth_m;
@@ -110,7 +110,7 @@ fn guide_points_to_the_path_and_never_along_it() {
 }
 
 #[test]
-fn the_torque_turns_the_needle_to_its_path_as_a_spring_of_the_angle() {
+fn the_guide_torque_is_a_spring_of_the_angle() {
     let parameters = ForceParameters::default();
     for angle in [-0.3, -0.01, 0.0, 0.01, 0.3] {
         let mut at = input(0.02, true, Phase::Hold);
@@ -172,7 +172,7 @@ fn each_term_is_off_at_gain_zero_and_the_rest_stays() {
 }
 
 #[test]
-fn coupled_the_tissue_answers_for_membrane_and_friction_and_for_nothing_else() {
+fn coupled_tissue_replaces_membrane_and_friction_only() {
     let coupled = ForceParameters {
         coupling: 1.0,
         ..ForceParameters::default()
@@ -204,7 +204,7 @@ fn coupled_the_tissue_answers_for_membrane_and_friction_and_for_nothing_else() {
 }
 
 #[test]
-fn friction_and_damping_oppose_motion_both_ways_and_grow_with_depth() {
+fn friction_and_damping_oppose_motion_both_ways() {
     let parameters = ForceParameters::default();
     let mut state = ForceState::default();
     let mut sizes = Vec::new();

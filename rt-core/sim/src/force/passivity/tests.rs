@@ -43,7 +43,7 @@ fn wall(stiffness: f64, late: usize, parameters: &PassivityParameters) -> f64 {
 }
 
 #[test]
-fn a_wall_past_its_stable_stiffness_is_quietened_whatever_the_delay() {
+fn a_wall_beyond_its_stable_stiffness_is_quietened() {
     // b < K (T / 2 + delay): 0.2 against at least 0.4.
     for (stiffness, late) in [(800.0, 0), (4000.0, 0), (800.0, 1), (800.0, 3)] {
         let free = wall(stiffness, late, &PassivityParameters::OFF);

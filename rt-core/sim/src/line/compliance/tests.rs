@@ -196,7 +196,7 @@ fn lines_that_leave_the_body_or_the_numbers_have_no_stations() {
 
 /// In tissue of 170 kPa a stuck shaft had 2.6 N/mm, with which a hand over a late link sings.
 #[test]
-fn a_needle_makes_stiff_tissue_as_soft_as_a_loop_can_hold_and_leaves_soft_tissue_alone() {
+fn stiff_tissue_is_softened_to_what_a_loop_can_hold() {
     let soft = Compliance::diagonal(10, 1e-3, 0.02);
     assert!((soft.stuck_n_per_m() - 500.0).abs() < 1e-6, "{}", soft.stuck_n_per_m());
     assert_eq!(soft.clone().behind_needle(1000.0), soft);

@@ -112,18 +112,18 @@ pub(in crate::line) struct Shaft<'a> {
 /// What shares the sweeps of a needle: nothing, or needles that stay in.
 pub(in crate::line) trait Neighbours {
     /// The force of a station of the shaft has changed; dents of as much take `taken_n` from those of the neighbours.
-    fn feel_shaft(&mut self, n: usize, change_n: f64, taken_n: f64);
+    fn shaft_changed(&mut self, n: usize, change_n: f64, taken_n: f64);
     /// The tip's has.
-    fn feel_tip(&mut self, change_n: f64);
+    fn tip_changed(&mut self, change_n: f64);
     /// Corrects its own forces, and adds what that moves of the stations and the tip; returns the largest correction.
     fn sweep(&mut self, is_backwards: bool, shaft: Shaft<'_>, tip_u_m: &mut f64) -> f64;
 }
 
 impl Neighbours for () {
     #[inline(always)]
-    fn feel_shaft(&mut self, _n: usize, _change_n: f64, _taken_n: f64) {}
+    fn shaft_changed(&mut self, _n: usize, _change_n: f64, _taken_n: f64) {}
     #[inline(always)]
-    fn feel_tip(&mut self, _change_n: f64) {}
+    fn tip_changed(&mut self, _change_n: f64) {}
     #[inline(always)]
     fn sweep(&mut self, _is_backwards: bool, _shaft: Shaft<'_>, _tip_u_m: &mut f64) -> f64 {
         0.0
@@ -182,7 +182,7 @@ pub(in crate::line) fn sweep(
                         *u -= gain * change * taken * (of_tip - spring.common_m_per_n);
                     }
                 }
-                neighbours.feel_shaft(n, change, change * taken);
+                neighbours.shaft_changed(n, change, change * taken);
                 largest_m = largest_m.max((change * own).abs());
             }
         }
@@ -193,7 +193,7 @@ pub(in crate::line) fn sweep(
                 tip_n = wanted;
                 add_scaled(gain * change, tip_column, u_m);
                 tip_u_m += tip_gain * change;
-                neighbours.feel_tip(change);
+                neighbours.tip_changed(change);
                 largest_m = largest_m.max((change * tip_gain).abs());
             }
         }

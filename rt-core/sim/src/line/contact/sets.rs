@@ -9,7 +9,7 @@ use super::super::model::MAX_STATIONS;
 use super::super::rows::Rows;
 use super::Spring;
 use crate::simd::{LANES, Vector, in_vectors};
-use gradients::{Of, add, answer, hold, places, product};
+use gradients::{ForceSet, add, answer, hold, places, product};
 use stylet_settings::MAX_LEFT_NEEDLES;
 
 mod gradients;
@@ -257,7 +257,7 @@ fn to_limits<V: Vector<f64>, const B: usize>(rows: &Rows, scratch: &mut Scratch<
     }
     scratch.tip.force_n = scratch.tip.bounded_n;
     let change_n = scratch.tip.change_n;
-    let tip = answer::<V, B>(rows, scratch, &at[..count], Of::Changes, change_n);
+    let tip = answer::<V, B>(rows, scratch, &at[..count], ForceSet::Changes, change_n);
     for b in 0..scratch.blocks() {
         add::<V>(&mut scratch.u_m.0[b], 1.0, &scratch.moved_m.0[b]);
     }

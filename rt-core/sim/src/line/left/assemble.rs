@@ -9,23 +9,23 @@ use crate::simd::{Simd, vectorised};
 
 /// What joins two lines, from either side.
 #[derive(Clone, Copy)]
-pub(super) struct Between<'a> {
+pub(super) struct PairCoupling<'a> {
     cross: &'a Cross,
     is_turned: bool,
 }
 
 /// `None` where neither knows the other.
-pub(super) fn between<'a>(a: &'a HandLine, b: &'a HandLine) -> Option<Between<'a>> {
+pub(super) fn pair_coupling<'a>(a: &'a HandLine, b: &'a HandLine) -> Option<PairCoupling<'a>> {
     let rows = [a, b].map(|line| 2 * line.model.compliance.stations);
     let found = |of: &'a HandLine, with: &HandLine, is_turned: bool| {
         let cross = of.beside.iter().find(|cross| cross.with == with.generation)?;
         let wanted = if is_turned { [rows[1], rows[0]] } else { rows };
-        (cross.rows() == wanted).then_some(Between { cross, is_turned })
+        (cross.rows() == wanted).then_some(PairCoupling { cross, is_turned })
     };
     found(a, b, false).or_else(|| found(b, a, true))
 }
 
-impl Between<'_> {
+impl PairCoupling<'_> {
     fn at(&self, a: usize, b: usize) -> f64 {
         if self.is_turned {
             self.cross.at(b, a)
@@ -56,7 +56,7 @@ impl LeftNeedles {
         self.own[..self.count * self.stride].fill(0.0);
         for (n, a) in self.needles.iter().enumerate() {
             for b in &self.needles[n..] {
-                let joined = between(&a.line, &b.line);
+                let joined = pair_coupling(&a.line, &b.line);
                 let is_same = std::ptr::eq(a, b);
                 let rows = &a.line.model.compliance;
                 for i in 0..=a.stations {
@@ -115,7 +115,7 @@ impl LeftNeedles {
             self.all.row_mut(elements + n)[elements..elements + stations].copy_from_slice(row);
         }
         for needle in &self.needles {
-            let Some(joined) = between(&needle.line, moving) else {
+            let Some(joined) = pair_coupling(&needle.line, moving) else {
                 continue;
             };
             for i in 0..=needle.stations {

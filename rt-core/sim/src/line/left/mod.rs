@@ -190,7 +190,7 @@ impl LeftNeedles {
     pub fn knows(&self, line: &HandLine) -> bool {
         self.needles
             .iter()
-            .all(|needle| assemble::between(&needle.line, line).is_some())
+            .all(|needle| assemble::pair_coupling(&needle.line, line).is_some())
     }
 
     /// Leaves the needle of `line` where its tip is. It comes back where there is no room, and where it does not know the others.
@@ -216,7 +216,7 @@ impl LeftNeedles {
         });
         self.assemble(None);
         self.displace(None);
-        self.rest_where_it_is(self.needles.len() - 1);
+        self.hold_in_place(self.needles.len() - 1);
         self.begin_moved(self.needles.len() - 1);
         Ok(())
     }
@@ -322,7 +322,7 @@ impl LeftNeedles {
     }
 
     /// Each element of that needle holds what it holds where it is now.
-    fn rest_where_it_is(&mut self, at: usize) {
+    fn hold_in_place(&mut self, at: usize) {
         let needle = &self.needles[at];
         let elements = needle.first..=needle.first + needle.stations;
         self.rest_m[elements.clone()].copy_from_slice(&self.u_m[elements]);

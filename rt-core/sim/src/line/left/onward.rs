@@ -54,7 +54,7 @@ impl LeftNeedles {
     }
 
     /// Displacements of the stations; those from `before` on are new, and stick to where they are. False where nothing was kept.
-    pub(super) fn stations_go_on(
+    pub(super) fn extrapolate_stations(
         &mut self,
         model: &LineModel,
         state: &mut LineState,
@@ -84,7 +84,7 @@ impl LeftNeedles {
     }
 
     /// Displacements of the elements.
-    pub(super) fn elements_go_on(&mut self, state: &LineState) {
+    pub(super) fn extrapolate_elements(&mut self, state: &LineState) {
         let (count, tip_n) = (self.count, state.tip.force_n);
         let kept = self.without_tip.elements_m[..count].iter().zip(&self.by_tip);
         for (u, (without_m, by_tip)) in self.u_m[..count].iter_mut().zip(kept) {

@@ -2,7 +2,7 @@
 
 use super::{LeftNeedle, LeftNeedles, MAX_LEFT};
 use crate::line::model::MAX_STATIONS;
-use crate::line::outside::OutsideRecord;
+use crate::line::outside::ExternalRecord;
 use crate::line::ready::HandLine;
 use crate::line::state::TipState;
 use serde::{Deserialize, Serialize};
@@ -28,7 +28,7 @@ struct NeedleRecord {
     rest_m: [f64; MAX_STATIONS + 1],
     #[serde(with = "BigArray")]
     u_m: [f64; MAX_STATIONS + 1],
-    outside: OutsideRecord,
+    outside: ExternalRecord,
 }
 
 /// All of them at one tick; copied without allocating.
@@ -67,7 +67,7 @@ impl LeftRecord {
             force_n: [1.0; MAX_STATIONS + 1],
             rest_m: [1.0; MAX_STATIONS + 1],
             u_m: [1.0; MAX_STATIONS + 1],
-            outside: OutsideRecord::BLANK,
+            outside: ExternalRecord::BLANK,
         };
         let mut record = LeftRecord::default();
         record.needles.resize(MAX_LEFT, blank);
@@ -104,7 +104,7 @@ impl LeftRecord {
                 force_n: [0.0; MAX_STATIONS + 1],
                 rest_m: [0.0; MAX_STATIONS + 1],
                 u_m: [0.0; MAX_STATIONS + 1],
-                outside: OutsideRecord::of(&state.outside),
+                outside: ExternalRecord::of(&state.outside),
             };
             record.force_n[..count].copy_from_slice(&left.force_n[first..first + count]);
             record.rest_m[..count].copy_from_slice(&left.rest_m[first..first + count]);

@@ -3,7 +3,7 @@
 
 use super::{LeftNeedle, LeftNeedles};
 use crate::line::contact::{
-    Company, LineInput, Neighbours, Shaft, Spring, advance, lay, meet, press, step, stick, sweep,
+    LineInput, Neighbours, OtherNeedles, Shaft, Spring, advance, lay, meet, press, step, stick, sweep,
 };
 use crate::line::model::{LineModel, MAX_STATIONS};
 use crate::line::ready::HandLine;
@@ -34,11 +34,11 @@ pub(super) fn step_beside(left: &mut LeftNeedles, line: &mut HandLine, input: &L
     advance(model, state, input, left)
 }
 
-impl Company for LeftNeedles {
+impl OtherNeedles for LeftNeedles {
     fn begin(&mut self, model: &LineModel, state: &mut LineState, tip_m: f64, membrane: Option<usize>) {
         let before = lay(model, state);
         state.move_membrane_from_outside(model);
-        let goes_on = self.stations_go_on(model, state, tip_m, before);
+        let goes_on = self.extrapolate_stations(model, state, tip_m, before);
         if !goes_on {
             stick(model, state, tip_m, before, &mut self.scratch);
         }
@@ -53,7 +53,7 @@ impl Company for LeftNeedles {
         }
         self.reach(model, state, kept);
         if goes_on {
-            self.elements_go_on(state);
+            self.extrapolate_elements(state);
         } else {
             self.displace(Some(state));
         }
@@ -248,7 +248,7 @@ impl LeftNeedles {
 
 impl Neighbours for LeftNeedles {
     #[inline(always)]
-    fn feel_shaft(&mut self, n: usize, change_n: f64, taken_n: f64) {
+    fn shaft_changed(&mut self, n: usize, change_n: f64, taken_n: f64) {
         let row = &self.from_moving[n * self.stride..n * self.stride + self.count];
         add_scaled(change_n, row, &mut self.u_m[..self.count]);
         if taken_n != 0.0 {
@@ -257,7 +257,7 @@ impl Neighbours for LeftNeedles {
     }
 
     #[inline(always)]
-    fn feel_tip(&mut self, change_n: f64) {
+    fn tip_changed(&mut self, change_n: f64) {
         add_scaled(change_n, &self.by_tip[..self.count], &mut self.u_m[..self.count]);
     }
 

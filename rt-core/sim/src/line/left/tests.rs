@@ -76,7 +76,7 @@ fn one_left(apart_m: f64, whole: f64) -> (Box<LeftNeedles>, Box<HandLine>) {
 }
 
 #[test]
-fn needles_far_apart_in_tissue_that_is_held_do_not_feel_each_other() {
+fn distant_needles_do_not_move_each_other() {
     let (mut left, mut second) = one_left(1.0, 0.0);
     let before = left.forces_n().to_vec();
     let mut alone = line(3, [1.0, 0.0, 0.0], &[], 0.0);

@@ -1,6 +1,6 @@
 //! What the force loop's half of a line can be made from again: kept beside a recording.
 
-use super::way::Way;
+use super::way::LineLayers;
 use super::{HandLine, LineError, STIFFEST_N_PER_M};
 use crate::line::beam::MAX_ACROSS;
 use crate::line::{Compliance, Cross, Line, LineState, MAX_STATIONS, Rows};
@@ -15,7 +15,7 @@ pub struct LineSource {
     pub generation: u64,
     /// Where the line is at rest.
     pub line: Line,
-    way: Way,
+    way: LineLayers,
     compliance: Compliance,
     beside: Vec<Cross>,
     /// End of the track that was open there, and the layers that it opened.
@@ -102,7 +102,7 @@ impl HandLine {
     ///
     /// [`LineError::Unusable`]: too many stations.
     pub fn uniform(generation: u64, line: Line, stations: usize) -> Result<Self, LineError> {
-        let way = Way {
+        let way = LineLayers {
             kinds: vec![(0.0, LayerKind::Gland, true)],
             bone_m: None,
         };
@@ -122,7 +122,7 @@ impl HandLine {
     /// A line of a made-up body, for tests.
     #[cfg(test)]
     pub(in crate::line) fn made_up(generation: u64, line: Line, compliance: Compliance, beside: Vec<Cross>) -> Self {
-        let way = Way {
+        let way = LineLayers {
             kinds: vec![(0.0, LayerKind::Gland, true)],
             bone_m: None,
         };

@@ -77,7 +77,7 @@ fn a_needle_beside_the_line_or_across_it_is_not_on_it() {
 
 /// The tissue of the loop is where the needle has it: the element at the tip, moved by the columns, is at the tip.
 #[test]
-fn the_body_follows_the_loads_of_the_line_and_is_at_rest_without_them() {
+fn the_body_follows_the_loads_of_the_line() {
     let (scene, body, _) = paper();
     let ReadyLine {
         mut hand,
@@ -118,7 +118,7 @@ fn the_body_follows_the_loads_of_the_line_and_is_at_rest_without_them() {
 }
 
 #[test]
-fn a_line_that_was_reset_or_has_taken_new_forces_answers_like_a_new_one() {
+fn a_reset_line_answers_like_a_new_one() {
     let (scene, body, _) = paper();
     let mut hand = ready(&scene, &body).hand;
     let new = hand.clone();
@@ -320,7 +320,7 @@ fn a_line_that_is_prepared_twice_is_the_same_in_every_bit() {
 
 /// What a flight recording keeps of a line, as bytes and back: the same answers from there on, and no heap call for the copy.
 #[test]
-fn a_line_made_again_from_its_source_goes_on_from_a_copied_state_in_every_bit() {
+fn a_line_is_restored_from_source_and_state_in_every_bit() {
     let (scene, body) = block();
     let mut hand = ready(&scene, &body).hand;
     let mut kept = LineState::with_room();

@@ -12,7 +12,7 @@ const STEPS: usize = 8;
 
 /// Where each layer begins, and where the needle is stopped.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Way {
+pub(super) struct LineLayers {
     /// In order of depth, up to [`MAX_LAYERS`], the rest is felt as the last; the membrane of a kind that was met before is felt
     /// once only.
     pub kinds: Vec<(f64, LayerKind, bool)>,
@@ -20,10 +20,10 @@ pub(super) struct Way {
     pub bone_m: Option<f64>,
 }
 
-impl Way {
+impl LineLayers {
     /// From the entry on through `lattice`; what `layer_of` knows nothing of is bone.
     pub fn along(line: &Line, lattice: &Lattice, layer_of: &dyn Fn(u32) -> Option<LayerKind>) -> Self {
-        let mut way = Way {
+        let mut way = LineLayers {
             kinds: Vec::new(),
             bone_m: None,
         };

@@ -177,7 +177,7 @@ fn what_moves_the_wall_besides_changes_the_contact() {
 }
 
 #[test]
-fn the_loop_s_probe_displaces_the_body_as_its_loads_do_and_lets_it_go() {
+fn the_probe_displaces_the_body_by_its_loads_and_releases_it() {
     let fixture = small();
     let mut body = BodyProbe::new(fixture.probe.clone());
     let mut state = ProbeState::new(&fixture.probe);

@@ -27,7 +27,7 @@ fn line() -> ReadyLine {
 }
 
 #[test]
-fn what_the_probe_does_to_a_line_is_what_the_line_does_to_the_probe() {
+fn probe_and_line_displace_each_other_reciprocally() {
     let fixture = small();
     let line = line();
     let columns = line.body.answer.columns();

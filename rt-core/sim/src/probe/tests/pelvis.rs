@@ -139,7 +139,7 @@ fn between_the_points() {
 /// from a body whose cells are half as large.
 #[test]
 #[ignore = "half an hour, 8 GB"]
-fn in_the_scenes_own_cells_the_press_is_that_of_cells_half_as_large() {
+fn halving_the_cells_does_not_change_the_press() {
     let scene = Scene::builtin("pelvis").expect("built in");
     let bodies = [
         scene.clone().for_lines(TissueKind::ChainMail).expect("has lines"),

@@ -107,7 +107,7 @@ fn a_body_that_is_fixed_all_over_is_refused() {
 }
 
 #[test]
-fn moduli_and_poisson_s_ratios_out_of_range_are_refused_with_their_value() {
+fn elastic_constants_out_of_range_are_refused_with_their_value() {
     for (young_pa, poisson, parts) in [
         (f64::NAN, 0.49, "young_pa is NaN"),
         (0.0, 0.49, "young_pa is 0"),
@@ -148,7 +148,7 @@ fn limits_that_are_none_or_fold_cells_are_refused() {
 }
 
 #[test]
-fn structures_whose_links_would_fold_a_corner_between_them_are_refused() {
+fn structures_that_fold_a_shared_corner_are_refused() {
     let paper = limits(0.55, 1.75, 26.565);
     let (wide, narrow) = (limits(0.55, 1.75, 60.0), limits(0.55, 1.75, 5.0));
     let mut labels = halves(two());

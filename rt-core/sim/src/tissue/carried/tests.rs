@@ -46,7 +46,7 @@ fn off(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// Between centres of the coarser body's elements an affine field is found again, and at the surface half a coarse element
 /// farther out nothing else than what is nearest.
 #[test]
-fn an_affine_field_is_interpolated_exactly_and_what_is_fixed_stays() {
+fn an_affine_field_is_interpolated_exactly() {
     let (scene, coarse) = held_scene();
     let half = packed(&coarse, |place_m| affine(place_m).map(|c| 0.5 * c));
     let mut field = CarriedField::new(&scene, coarse);
@@ -87,7 +87,7 @@ fn an_affine_field_is_interpolated_exactly_and_what_is_fixed_stays() {
 }
 
 #[test]
-fn a_saved_field_is_the_same_in_every_bit_and_another_length_changes_nothing() {
+fn a_saved_field_is_restored_in_every_bit() {
     let (scene, coarse) = held_scene();
     let mut field = CarriedField::new(&scene, coarse.clone());
     field.set(Carry {

@@ -40,7 +40,7 @@ fn no_limit_is_violated_on_any_body_at_any_speed() {
 }
 
 #[test]
-fn re_anchoring_reaches_the_limits_from_any_state_and_spares_other_parts() {
+fn re_anchoring_reaches_the_limits_from_any_state() {
     let parameters = TissueParameters::default();
     let model = model_of(&test_bodies::two_parts());
     let mut random = Random(8);
@@ -97,7 +97,7 @@ fn shear_just_inside_equation_1_is_solved() {
 }
 
 #[test]
-fn long_step_leaves_violations_after_one_pass_and_none_after_a_step() {
+fn a_long_step_needs_more_than_one_pass() {
     let model = paper();
     let element = model.lattice().element_of_cell(53, 31, 88).expect("inside");
     let mut state = TissueState::at_rest(&model);
@@ -129,7 +129,7 @@ fn body_returns_to_rest_when_nothing_is_held() {
 }
 
 #[test]
-fn body_left_alone_comes_to_rest_exactly_and_not_through_denormals() {
+fn a_free_body_comes_to_rest_without_denormals() {
     let model = model_of(&test_bodies::block([4, 4, 4]));
     let mut state = TissueState::at_rest(&model);
     let held = held_at(&model, 9, [1.0, 1.0, 1.0]);

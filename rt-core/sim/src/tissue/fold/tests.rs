@@ -39,7 +39,7 @@ fn by_search(body: &Deformed, is_near: impl Fn(u32) -> bool) -> f64 {
 }
 
 #[test]
-fn the_smallest_corner_near_a_place_is_what_a_search_over_all_elements_finds() {
+fn the_smallest_corner_is_that_of_a_full_search() {
     let lattice = Scene::from_labels("test", &test_bodies::with_hole())
         .expect("valid")
         .lattice;

@@ -124,7 +124,7 @@ fn no_cell_folds_where_a_tip_pushes_tissue_by_10_mm() {
 }
 
 #[test]
-fn nothing_changes_where_no_corner_is_small_and_next_to_nothing_where_strain_is() {
+fn small_strain_is_left_to_the_linear_answer() {
     let pushed = Pushed::new(12);
     let mut large = LargeStrain::new(&pushed.scene);
     assert!(apart(&pushed.corrected(&mut large, 2.0), &pushed.linear(2.0)) == 0.0);
@@ -217,7 +217,7 @@ fn block() -> Solver {
 }
 
 #[test]
-fn turned_tissue_has_no_forces_and_little_strain_those_of_linear_tissue() {
+fn rotation_causes_no_force_and_small_strain_a_linear_one() {
     let solver = block();
     let (mut out, mut other) = (Sides::new(&solver.grid), Sides::new(&solver.grid));
     let mut turned = solver.now.clone();

@@ -79,7 +79,7 @@ fn relaxed(slipped_s: f64, held_s: f64) -> f64 {
 }
 
 #[test]
-fn a_needle_held_at_depth_relaxes_as_the_chain_of_its_stations_says() {
+fn a_held_needle_relaxes_as_its_prony_chain() {
     let limit_n = ForceParameters::default()
         .layers
         .of(LayerKind::Gland)

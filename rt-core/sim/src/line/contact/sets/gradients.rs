@@ -46,7 +46,7 @@ pub(super) fn hold<V: Vector<f64>, const B: usize>(rows: &Rows, inverse: Option<
         if square <= enough {
             break;
         }
-        let tip_moved = answer::<V, B>(rows, scratch, at, Of::Along, tip_along);
+        let tip_moved = answer::<V, B>(rows, scratch, at, ForceSet::Along, tip_along);
         let mut sum = V::splat(0.0);
         for b in 0..blocks {
             sum = sum.add(V::load(&scratch.along_n.0[b]).mul(V::load(&scratch.moved_m.0[b])));
@@ -129,7 +129,7 @@ fn product_left<V: Vector<f64>, const B: usize>(
 
 /// Which forces [`answer`] is asked for.
 #[derive(Clone, Copy, PartialEq)]
-pub(super) enum Of {
+pub(super) enum ForceSet {
     Changes,
     Along,
 }
@@ -140,13 +140,13 @@ pub(super) fn answer<V: Vector<f64>, const B: usize>(
     rows: &Rows,
     scratch: &mut Scratch<B>,
     places: &[u16],
-    of: Of,
+    of: ForceSet,
     tip_n: f64,
 ) -> f64 {
     let blocks = scratch.blocks();
     let force_n = match of {
-        Of::Changes => &scratch.change_n,
-        Of::Along => &scratch.along_n,
+        ForceSet::Changes => &scratch.change_n,
+        ForceSet::Along => &scratch.along_n,
     };
     product::<V, B>(rows, blocks, places, force_n.numbers(), &mut scratch.moved_m);
     if scratch.taken_n_per_m != 0.0 {

@@ -51,7 +51,7 @@ pub fn stored_j(state: &LineState, model: &LineModel) -> f64 {
 
 /// Membranes that are no stiffer than what they hold, as in the cycles without creep.
 #[test]
-fn ten_thousand_random_cycles_in_tissue_that_creeps_make_no_energy() {
+fn random_cycles_in_creeping_tissue_make_no_energy() {
     let layers = [
         LineLayer {
             puncture_force_n: 1.2,

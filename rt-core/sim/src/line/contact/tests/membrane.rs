@@ -11,7 +11,7 @@ fn on_foundation(layers: &[LineLayer]) -> LineModel {
 
 /// Soft tissue carries 1.6 N under the tip before the depth is reached: the capsule, of 5.6 N, was not felt.
 #[test]
-fn a_membrane_met_at_rest_resists_in_proportion_and_gives_way_at_its_force() {
+fn a_membrane_resists_in_proportion_up_to_its_force() {
     for model in [
         made_up(30, 1.364e-3, &[GLAND], LineSettings::default()),
         on_foundation(&[GLAND]),
@@ -86,7 +86,7 @@ fn a_membrane_met_in_the_middle_of_a_cut_is_relaxed_there() {
 /// A tip that stopped within a nanometre before the surface was held by the membrane there and laid no load on it: it went through the
 /// body without a force. Encoders bring a needle there where the plan's entry lies on one of their steps.
 #[test]
-fn a_tip_that_stops_a_hair_before_the_surface_is_held_by_it_as_one_that_reaches_it() {
+fn a_tip_just_before_the_surface_is_held_as_at_it() {
     let model = on_foundation(&[GLAND]);
     let forces = |stop_m: f64| {
         let mut state = LineState::new(&model);

@@ -22,7 +22,7 @@ fn moved(model: &LineModel, state: &mut LineState, tip_m: f64, by_m: f64, ticks:
 }
 
 #[test]
-fn tissue_that_moves_past_the_needle_pulls_it_as_the_hand_would_the_other_way() {
+fn moving_tissue_pulls_like_the_opposite_hand_motion() {
     let (model, state) = needle_in(LineSettings::default());
     for by_m in [0.1e-3, 1e-3, -0.1e-3, -1e-3] {
         let (mut by_tissue, mut by_hand) = (state.clone(), state.clone());
@@ -76,7 +76,7 @@ fn a_membrane_is_not_stretched_by_what_moves_all_of_the_tissue() {
 }
 
 #[test]
-fn a_needle_past_which_nothing_moves_any_more_has_the_bits_of_one_that_was_never_moved() {
+fn motion_that_has_ended_leaves_no_bit() {
     let creep = [
         PronyTerm {
             strength: 0.6,

@@ -18,7 +18,7 @@ fn stored_j(line: &HandLine, left: &LeftNeedles) -> f64 {
 /// The hand's work in each tick, by the force after it, is at least what is stored more: from an energy `E` on, no motion gets more than
 /// `E` out. Tissue is new after each round, for the membranes' sake.
 #[test]
-fn no_cycle_beside_a_needle_that_is_left_gets_out_more_than_was_stored() {
+fn no_cycle_beside_a_left_needle_gains_energy() {
     let mut seed = 0x9e37_79b9_7f4a_7c15;
     let (mut worst_j, mut cycles, mut most_n) = (0.0_f64, 0, 0.0_f64);
     for _ in 0..60 {
@@ -57,7 +57,7 @@ fn no_cycle_beside_a_needle_that_is_left_gets_out_more_than_was_stored() {
 }
 
 #[test]
-fn a_needle_that_is_drawn_out_leaves_the_tissue_at_rest_and_keeps_its_track() {
+fn a_drawn_needle_leaves_tissue_at_rest_and_its_track() {
     let (mut left, mut second) = one_left(6e-3, WHOLE);
     go(&mut second, Some(&mut left), -1e-3, 20e-3, 1e-4);
     let beside_n = go(&mut second, Some(&mut left), 20e-3, 20e-3, 1e-4);

@@ -22,7 +22,7 @@ fn left_alone() -> Box<LeftNeedles> {
 
 /// Far from its limits, so that where the needle's end is does not count.
 #[test]
-fn tissue_that_goes_past_a_needle_that_stays_in_is_as_if_that_were_drawn() {
+fn moving_tissue_acts_on_a_left_needle_like_drawing_it() {
     let (mut by_tissue, mut drawn) = (left_alone(), left_alone());
     let (by_m, ticks) = (40e-6, 5);
     assert!(by_tissue.displace_from_outside(1, &alike(by_m), ticks));
@@ -48,7 +48,7 @@ fn tissue_that_goes_past_a_needle_that_stays_in_is_as_if_that_were_drawn() {
 /// Stations and tip of one needle, each moved by another way within one tick, beside the dense problem: what sticks is where it was in the
 /// tissue, and what slips does so against its limit.
 #[test]
-fn a_needle_past_which_tissue_moves_is_what_the_dense_problem_gives() {
+fn moving_tissue_gives_the_forces_of_the_dense_problem() {
     let mut mixed = 0;
     for by_m in [0.02e-3, 0.1e-3, -0.1e-3, 0.2e-3, -0.2e-3, 0.4e-3, -0.4e-3] {
         let mut left = left_alone();
@@ -111,7 +111,7 @@ fn a_needle_past_which_tissue_moves_is_what_the_dense_problem_gives() {
 
 /// It is held as before when the tissue is back, and by the hand that takes it up meanwhile as by the template.
 #[test]
-fn a_needle_that_is_taken_up_where_tissue_was_moved_holds_what_it_held() {
+fn a_needle_taken_up_in_moved_tissue_keeps_its_forces() {
     let mut left = left_alone();
     left.displace_from_outside(1, &alike(30e-6), 5);
     for _ in 0..50 {

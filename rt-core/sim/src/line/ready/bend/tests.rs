@@ -56,7 +56,7 @@ fn insert(line: &mut HandLine, depth_m: f64) -> LineOutput {
 
 /// Hetenyi: `2 P beta / k` at the end of a long beam on springs. P is the bevel's part of the cutting force, by the roll of the hand.
 #[test]
-fn a_bevel_in_a_uniform_medium_bends_the_needle_as_an_elastic_foundation_says() {
+fn a_bevel_bends_the_needle_as_a_beam_on_springs() {
     let (mut line, mut forces) = uniform(&WITHOUT_BEVEL);
     // The tip is at the end of a station across: it hardly moves the tissue before it.
     let depth_m = 0.124;
@@ -88,7 +88,7 @@ fn a_bevel_in_a_uniform_medium_bends_the_needle_as_an_elastic_foundation_says() 
 }
 
 #[test]
-fn a_straight_needle_in_a_straight_track_is_not_bent_and_one_that_does_not_bend_has_no_beam() {
+fn a_straight_track_does_not_bend_the_needle() {
     let (mut line, mut forces) = uniform(&WITHOUT_BEVEL);
     let cut = insert(&mut line, 0.06);
     let bent = line.bend(&(Vector3::z() * 0.06), &tool(0.0), &cut).expect("bends");

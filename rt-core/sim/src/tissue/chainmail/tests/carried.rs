@@ -31,7 +31,7 @@ fn column(coarse: &Lattice) -> PackedField {
 
 /// ChainMail alone leaves a gland where it is while its middle is pushed by millimetres.
 #[test]
-fn a_body_that_is_carried_moves_with_its_field_and_holds_what_it_was_asked_to() {
+fn a_carried_body_follows_its_field_and_its_held_element() {
     let (scene, mut tissue) = tissue();
     let coarse = scene.body_of_lines().expect("has lines");
     let element = scene.lattice.element_of_cell(53, 31, 80).unwrap();
@@ -98,7 +98,7 @@ fn how_a_body_is_carried_is_part_of_its_memory() {
 
 /// A newton squeezes the body along z, more and more towards the middle.
 #[test]
-fn a_body_that_is_carried_too_far_gives_way_until_the_next_step_and_remembers_how() {
+fn a_body_carried_too_far_is_corrected_until_the_next_step() {
     let (scene, mut tissue) = tissue();
     let coarse = scene.body_of_lines().expect("has lines");
     let element = scene.lattice.element_of_cell(53, 31, 80).unwrap();
@@ -155,7 +155,7 @@ fn a_body_that_is_carried_too_far_gives_way_until_the_next_step_and_remembers_ho
 }
 
 #[test]
-fn lines_of_chainmail_are_solved_for_in_a_body_that_is_soon_solved() {
+fn chainmail_lines_are_solved_in_a_coarser_body() {
     for name in ["paper", "pelvis"] {
         let scene = Scene::builtin(name).unwrap();
         let all = scene.lattice.element_count();

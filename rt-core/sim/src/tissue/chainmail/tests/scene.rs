@@ -127,7 +127,7 @@ fn random_limits_that_meet_equation_1_fold_no_cell() {
 }
 
 #[test]
-fn bone_never_moves_and_says_when_it_lets_the_needle_go_no_farther() {
+fn bone_never_moves_and_reports_a_limited_needle() {
     let [followed, limited] = walk_about(&test_bodies::bone(), 0.4, 5);
     assert!(followed > 50 && limited > 10, "{followed} followed, {limited} limited");
 }

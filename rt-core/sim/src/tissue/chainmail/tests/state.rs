@@ -121,7 +121,7 @@ fn steps_copies_and_new_limits_do_not_touch_the_heap() {
 
 /// Such a state used to be followed out of its bounds.
 #[test]
-fn state_of_another_body_with_as_many_elements_and_runs_is_refused() {
+fn state_of_another_body_of_equal_size_is_refused() {
     let other = |labels| {
         let model = model_of(&labels);
         TissueState::at_rest(&model)

@@ -140,7 +140,7 @@ fn work_ahead_makes_no_heap_calls_and_gives_the_same_bytes() {
 }
 
 #[test]
-fn step_with_cycles_leaves_no_time_and_a_step_has_time_for_one_piece() {
+fn a_step_prepares_one_piece_only_without_cycles() {
     let model = hard_body();
     let [first, second] = two_patches(&model);
     let mut state = FemState::at_rest(&model);
@@ -162,7 +162,7 @@ fn step_with_cycles_leaves_no_time_and_a_step_has_time_for_one_piece() {
 }
 
 #[test]
-fn what_was_prepared_is_dropped_when_the_needle_leaves_and_on_reset() {
+fn prepared_work_is_dropped_on_leaving_and_on_reset() {
     let model = hard_body();
     let [first, second] = two_patches(&model);
     let run = |ahead: bool| {

@@ -39,7 +39,7 @@ fn columns(scene: &Scene) -> Vec<PackedField> {
 
 /// Answers to what was held before a line were kept and went into later steps, so that no recording could begin on one.
 #[test]
-fn a_body_on_a_line_goes_on_from_its_memory_in_every_bit_whatever_was_held_before() {
+fn a_body_on_a_line_continues_from_its_memory_in_every_bit() {
     let (scene, mut first) = body();
     assert!(first.is_all_saved(), "a new one");
     for n in 1..8 {

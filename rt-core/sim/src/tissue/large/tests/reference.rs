@@ -70,7 +70,7 @@ fn errors(pushed: &Pushed, u: &[Vec<f32>; 3], by_mm: f64, column: usize) -> [f64
 }
 
 #[test]
-fn the_window_is_nearer_to_a_neo_hookean_body_than_the_linear_answer() {
+fn the_window_beats_the_linear_answer_against_neo_hooke() {
     let pushed = gland();
     let mut large = LargeStrain::new(&pushed.scene);
     for tick in 1..=40 {
