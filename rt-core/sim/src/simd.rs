@@ -1,4 +1,4 @@
-//! Which vector instructions the processor has, found when a model is built.
+//! Vector instructions of the processor, detected when a model is built.
 
 mod eight;
 
@@ -27,7 +27,7 @@ impl Simd {
         Simd::Portable
     }
 
-    /// Every set that this processor has.
+    /// Returns every set that this processor has.
     #[cfg(test)]
     pub fn all() -> Vec<Self> {
         let best = Simd::detect();
@@ -39,10 +39,42 @@ impl Simd {
     }
 }
 
-/// Makes a function that is compiled for each set of instructions and takes the one to use as its first argument.
+/// Compiles the caller's function `generic` for each set of instructions and calls the one for `$simd`: with the types
+/// `$portable`, or `$wide` where there is AVX2 or more.
 ///
-/// A closure would not do: what is called from several places is not inlined, and only what is inlined is compiled for the
-/// instructions of its caller.
+/// A closure would not do: what is called from several places is not inlined, and only what is inlined is compiled for
+/// the instructions of its caller.
+macro_rules! dispatch {
+    (
+        $simd:ident, [$($generics:tt)*] [$($names:tt)*] [$($portable:tt)*] [$($wide:tt)*]
+        ($($argument:ident: $type:ty),*) [$($result:tt)*]
+    ) => {{
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx2")]
+        fn avx2<$($generics)*>($($argument: $type),*) $($result)* {
+            generic::<$($wide)*>($($argument),*)
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = "avx512f,avx512vl")]
+        fn avx512<$($generics)*>($($argument: $type),*) $($result)* {
+            generic::<$($wide)*>($($argument),*)
+        }
+
+        match $simd {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `detect` has found AVX-512F and VL.
+            $crate::simd::Simd::Avx512 => unsafe { avx512::<$($names)*>($($argument),*) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `detect` has found AVX2.
+            $crate::simd::Simd::Avx2 => unsafe { avx2::<$($names)*>($($argument),*) },
+            $crate::simd::Simd::Portable => generic::<$($portable)*>($($argument),*),
+        }
+    }};
+}
+pub(crate) use dispatch;
+
+/// Makes a function that is compiled for each set of instructions and takes the one to use as its first argument.
 macro_rules! vectorised {
     (
         $(#[$attribute:meta])*
@@ -51,29 +83,12 @@ macro_rules! vectorised {
         $(#[$attribute])*
         pub(super) fn $name$(<$t: Real $(, $o: $bound<$t>)?>)?(simd: Simd, $($argument: $type),*) $(-> $result)? {
             #[inline(always)]
-            fn portable$(<$t: Real $(, $o: $bound<$t>)?>)?($($argument: $type),*) $(-> $result)? $body
+            fn generic$(<$t: Real $(, $o: $bound<$t>)?>)?($($argument: $type),*) $(-> $result)? $body
 
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2")]
-            fn avx2$(<$t: Real $(, $o: $bound<$t>)?>)?($($argument: $type),*) $(-> $result)? {
-                portable($($argument),*)
-            }
-
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx512f,avx512vl")]
-            fn avx512$(<$t: Real $(, $o: $bound<$t>)?>)?($($argument: $type),*) $(-> $result)? {
-                portable($($argument),*)
-            }
-
-            match simd {
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: `detect` has found AVX-512F and VL.
-                Simd::Avx512 => unsafe { avx512($($argument),*) },
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: `detect` has found AVX2.
-                Simd::Avx2 => unsafe { avx2($($argument),*) },
-                Simd::Portable => portable($($argument),*),
-            }
+            $crate::simd::dispatch!(
+                simd, [$($t: Real $(, $o: $bound<$t>)?)?] [$($t $(, $o)?)?] [$($t $(, $o)?)?] [$($t $(, $o)?)?]
+                ($($argument: $type),*) [$(-> $result)?]
+            )
         }
     };
 }

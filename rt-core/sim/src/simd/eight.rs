@@ -1,7 +1,7 @@
 //! Eight numbers side by side: in registers of the processor's width where it has them.
 //!
-//! Arrays of eight that a compiler makes vectors of itself are shuffled together from halves of other widths; these types say
-//! which registers to use. Nothing is reordered or fused, so that all of them give the same bits.
+//! Arrays of eight that a compiler makes vectors of itself are shuffled together from halves of other widths; these
+//! types say which registers to use. Nothing is reordered or fused, so that all of them give the same bits.
 
 use std::ops::{Add, Deref, DerefMut, Mul, Sub};
 
@@ -29,25 +29,26 @@ impl<T> DerefMut for Eight<T> {
     }
 }
 
-/// Arithmetic on eight numbers at once. [`Number::Wide`] may be used in functions alone that are compiled for AVX2 or more.
+/// Arithmetic on eight numbers at once. [`Number::Wide`] may be used in functions alone that are compiled for AVX2 or
+/// more.
 pub trait Vector<T>: Copy {
-    /// From memory.
+    /// Loads eight numbers from memory.
     fn load(from: &[T; LANES]) -> Self;
-    /// To memory.
+    /// Stores eight numbers to memory.
     fn store(self, to: &mut [T; LANES]);
-    /// The same number eight times.
+    /// Repeats a number eight times.
     fn splat(value: T) -> Self;
-    /// Sums.
+    /// Returns the eight sums.
     fn add(self, other: Self) -> Self;
-    /// Differences.
+    /// Returns the eight differences.
     fn sub(self, other: Self) -> Self;
-    /// Products.
+    /// Returns the eight products.
     fn mul(self, other: Self) -> Self;
 }
 
 /// A number type with registers for eight of it.
 pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// What to use in functions that are compiled for AVX2 or more.
+    /// Vector type for functions that are compiled for AVX2 or more.
     type Wide: Vector<Self>;
 }
 
@@ -197,8 +198,9 @@ mod wide {
     }
 }
 
-/// Makes a function as `vectorised` does, whose body is written in vectors: its second parameter of type is [`Number::Wide`]
-/// where there is AVX2, and [`Eight`] elsewhere. For one type of numbers: `<V: Vector<f64>>`, and `<V: Vector<f64>, const B: usize>`.
+/// Makes a function as `vectorised` does, whose body is written in vectors: its second parameter of type is
+/// [`Number::Wide`] where there is AVX2, and [`Eight`] elsewhere. For one type of numbers: `<V: Vector<f64>>`, and `<V:
+/// Vector<f64>, const B: usize>`.
 macro_rules! in_vectors {
     (
         $(#[$attribute:meta])*
@@ -207,29 +209,13 @@ macro_rules! in_vectors {
         $(#[$attribute])*
         pub(super) fn $name<const $b: usize>(simd: $crate::simd::Simd, $($argument: $type),*) $(-> $result)? {
             #[inline(always)]
-            fn with<$v: $crate::simd::Vector<$t>, const $b: usize>($($argument: $type),*) $(-> $result)? $body
+            fn generic<$v: $crate::simd::Vector<$t>, const $b: usize>($($argument: $type),*) $(-> $result)? $body
 
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2")]
-            fn avx2<const $b: usize>($($argument: $type),*) $(-> $result)? {
-                with::<<$t as $crate::simd::Number>::Wide, $b>($($argument),*)
-            }
-
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx512f,avx512vl")]
-            fn avx512<const $b: usize>($($argument: $type),*) $(-> $result)? {
-                with::<<$t as $crate::simd::Number>::Wide, $b>($($argument),*)
-            }
-
-            match simd {
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: `detect` has found AVX-512F and VL.
-                $crate::simd::Simd::Avx512 => unsafe { avx512::<$b>($($argument),*) },
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: `detect` has found AVX2.
-                $crate::simd::Simd::Avx2 => unsafe { avx2::<$b>($($argument),*) },
-                $crate::simd::Simd::Portable => with::<$crate::simd::Eight<$t>, $b>($($argument),*),
-            }
+            $crate::simd::dispatch!(
+                simd, [const $b: usize] [$b]
+                [$crate::simd::Eight<$t>, $b] [<$t as $crate::simd::Number>::Wide, $b]
+                ($($argument: $type),*) [$(-> $result)?]
+            )
         }
     };
     (
@@ -239,29 +225,13 @@ macro_rules! in_vectors {
         $(#[$attribute])*
         pub(super) fn $name(simd: $crate::simd::Simd, $($argument: $type),*) $(-> $result)? {
             #[inline(always)]
-            fn with<$v: $crate::simd::Vector<$t>>($($argument: $type),*) $(-> $result)? $body
+            fn generic<$v: $crate::simd::Vector<$t>>($($argument: $type),*) $(-> $result)? $body
 
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2")]
-            fn avx2($($argument: $type),*) $(-> $result)? {
-                with::<<$t as $crate::simd::Number>::Wide>($($argument),*)
-            }
-
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx512f,avx512vl")]
-            fn avx512($($argument: $type),*) $(-> $result)? {
-                with::<<$t as $crate::simd::Number>::Wide>($($argument),*)
-            }
-
-            match simd {
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: `detect` has found AVX-512F and VL.
-                $crate::simd::Simd::Avx512 => unsafe { avx512($($argument),*) },
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: `detect` has found AVX2.
-                $crate::simd::Simd::Avx2 => unsafe { avx2($($argument),*) },
-                $crate::simd::Simd::Portable => with::<$crate::simd::Eight<$t>>($($argument),*),
-            }
+            $crate::simd::dispatch!(
+                simd, [] []
+                [$crate::simd::Eight<$t>] [<$t as $crate::simd::Number>::Wide]
+                ($($argument: $type),*) [$(-> $result)?]
+            )
         }
     };
     (
@@ -275,29 +245,13 @@ macro_rules! in_vectors {
             $($argument: $type),*
         ) $(-> $result)? {
             #[inline(always)]
-            fn with<$t: $number, $v: $crate::simd::Vector<$t> $(, $o: $bound<$t>)?>($($argument: $type),*) $(-> $result)? $body
+            fn generic<$t: $number, $v: $crate::simd::Vector<$t> $(, $o: $bound<$t>)?>($($argument: $type),*) $(-> $result)? $body
 
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx2")]
-            fn avx2<$t: $number $(, $o: $bound<$t>)?>($($argument: $type),*) $(-> $result)? {
-                with::<$t, <$t as $crate::simd::Number>::Wide $(, $o)?>($($argument),*)
-            }
-
-            #[cfg(target_arch = "x86_64")]
-            #[target_feature(enable = "avx512f,avx512vl")]
-            fn avx512<$t: $number $(, $o: $bound<$t>)?>($($argument: $type),*) $(-> $result)? {
-                with::<$t, <$t as $crate::simd::Number>::Wide $(, $o)?>($($argument),*)
-            }
-
-            match simd {
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: `detect` has found AVX-512F and VL.
-                $crate::simd::Simd::Avx512 => unsafe { avx512($($argument),*) },
-                #[cfg(target_arch = "x86_64")]
-                // SAFETY: `detect` has found AVX2.
-                $crate::simd::Simd::Avx2 => unsafe { avx2($($argument),*) },
-                $crate::simd::Simd::Portable => with::<$t, $crate::simd::Eight<$t> $(, $o)?>($($argument),*),
-            }
+            $crate::simd::dispatch!(
+                simd, [$t: $number $(, $o: $bound<$t>)?] [$t $(, $o)?]
+                [$t, $crate::simd::Eight<$t> $(, $o)?] [$t, <$t as $crate::simd::Number>::Wide $(, $o)?]
+                ($($argument: $type),*) [$(-> $result)?]
+            )
         }
     };
 }

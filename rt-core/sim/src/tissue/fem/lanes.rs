@@ -1,6 +1,7 @@
 //! Arithmetic of lines in whole lanes.
 //!
-//! Each loop reads all of its lanes before it writes any, so that the compiler need not prove that lines do not overlap.
+//! Each loop reads all of its lanes before it writes any, so that the compiler need not prove that lines do not
+//! overlap.
 
 use super::real::Real;
 
@@ -19,7 +20,7 @@ pub(super) fn lanes_mut<T>(line: &mut [T]) -> &mut [Lane<T>] {
     line.as_chunks_mut().0
 }
 
-/// A lane from its entries.
+/// Returns a lane from its entries.
 #[inline(always)]
 pub(super) fn each<T: Real>(f: impl Fn(usize) -> T) -> Lane<T> {
     let mut lane = [T::ZERO; LANES];
@@ -29,7 +30,7 @@ pub(super) fn each<T: Real>(f: impl Fn(usize) -> T) -> Lane<T> {
     lane
 }
 
-/// `y += a x`, lane by lane.
+/// Computes `y += a x`, lane by lane.
 #[inline(always)]
 pub(super) fn add_products<T: Real>(a: &[T], x: &[T], y: &mut [T]) {
     for ((y, x), a) in lanes_mut(y).iter_mut().zip(lanes(x)).zip(lanes(a)) {
@@ -38,7 +39,7 @@ pub(super) fn add_products<T: Real>(a: &[T], x: &[T], y: &mut [T]) {
     }
 }
 
-/// `y += a x`.
+/// Computes `y += a x`.
 #[inline(always)]
 pub(super) fn add_scaled<T: Real>(a: T, x: &[T], y: &mut [T]) {
     for (y, x) in lanes_mut(y).iter_mut().zip(lanes(x)) {
@@ -47,7 +48,7 @@ pub(super) fn add_scaled<T: Real>(a: T, x: &[T], y: &mut [T]) {
     }
 }
 
-/// `y = x + a y`.
+/// Computes `y = x + a y`.
 #[inline(always)]
 pub(super) fn scale_and_add<T: Real>(a: T, x: &[T], y: &mut [T]) {
     for (y, x) in lanes_mut(y).iter_mut().zip(lanes(x)) {
@@ -56,7 +57,7 @@ pub(super) fn scale_and_add<T: Real>(a: T, x: &[T], y: &mut [T]) {
     }
 }
 
-/// `x` where `inverse` is not zero, zero elsewhere.
+/// Copies `x` where `inverse` is not zero, zero elsewhere.
 #[inline(always)]
 pub(super) fn keep_free<T: Real>(inverse: &[T], x: &[T], y: &mut [T]) {
     for ((y, x), inverse) in lanes_mut(y).iter_mut().zip(lanes(x)).zip(lanes(inverse)) {
@@ -65,7 +66,7 @@ pub(super) fn keep_free<T: Real>(inverse: &[T], x: &[T], y: &mut [T]) {
     }
 }
 
-/// `-x` where `inverse` is not zero, zero elsewhere.
+/// Copies `-x` where `inverse` is not zero, zero elsewhere.
 #[inline(always)]
 pub(super) fn keep_opposite<T: Real>(inverse: &[T], x: &[T], y: &mut [T]) {
     for ((y, x), inverse) in lanes_mut(y).iter_mut().zip(lanes(x)).zip(lanes(inverse)) {
@@ -74,7 +75,7 @@ pub(super) fn keep_opposite<T: Real>(inverse: &[T], x: &[T], y: &mut [T]) {
     }
 }
 
-/// `b - x` where `inverse` is not zero, zero elsewhere.
+/// Computes `b - x` where `inverse` is not zero, zero elsewhere.
 #[inline(always)]
 pub(super) fn difference_where_free<T: Real>(inverse: &[T], b: &[T], x: &[T], y: &mut [T]) {
     let lines = lanes_mut(y).iter_mut().zip(lanes(b)).zip(lanes(x)).zip(lanes(inverse));
@@ -84,9 +85,16 @@ pub(super) fn difference_where_free<T: Real>(inverse: &[T], b: &[T], x: &[T], y:
     }
 }
 
-/// `d = keep d + gain inverse (b - forces)`, then `x += d`.
+/// Computes `d = keep d + gain inverse (b - forces)`, then `x += d`.
 #[inline(always)]
-pub(super) fn chebyshev<T: Real>([keep, gain]: [T; 2], inverse: &[T], b: &[T], forces: &[T], d: &mut [T], x: &mut [T]) {
+pub(super) fn chebyshev_step<T: Real>(
+    [keep, gain]: [T; 2],
+    inverse: &[T],
+    b: &[T],
+    forces: &[T],
+    d: &mut [T],
+    x: &mut [T],
+) {
     let known = lanes(inverse).iter().zip(lanes(b)).zip(lanes(forces));
     for (((inverse, b), forces), (d, x)) in known.zip(lanes_mut(d).iter_mut().zip(lanes_mut(x))) {
         let (inverse, b, forces, d0, x0) = (*inverse, *b, *forces, *d, *x);
@@ -96,7 +104,7 @@ pub(super) fn chebyshev<T: Real>([keep, gain]: [T; 2], inverse: &[T], b: &[T], f
     }
 }
 
-/// `d = x = gain inverse b`: the first step of `chebyshev` from `x = 0`.
+/// Computes `d = x = gain inverse b`: the first step of `chebyshev_step` from `x = 0`.
 #[inline(always)]
 pub(super) fn first_chebyshev<T: Real>(gain: T, inverse: &[T], b: &[T], d: &mut [T], x: &mut [T]) {
     let known = lanes(inverse).iter().zip(lanes(b));
@@ -107,7 +115,7 @@ pub(super) fn first_chebyshev<T: Real>(gain: T, inverse: &[T], b: &[T], d: &mut 
     }
 }
 
-/// As many sums side by side as there are lanes, always in the same order, then in f64.
+/// Returns the dot product: as many sums side by side as there are lanes, always in the same order, then in f64.
 #[inline(always)]
 pub(super) fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
     let mut sums = [T::ZERO; LANES];

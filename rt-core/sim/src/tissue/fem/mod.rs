@@ -1,20 +1,22 @@
-//! Linear elasticity on the lattice, quasi-static: the ruler for ChainMail, and a tissue model of its own.
+//! Linear elasticity on the lattice, quasi-static: the reference for ChainMail, and a tissue model itself.
 //!
-//! Each element is a trilinear hexahedron; unknowns are the displacements of its corners. Nothing is assembled (`hexahedron`,
-//! `sweep`). The equations are solved by conjugate gradients, preconditioned with one V-cycle of geometric multigrid: coarse
-//! elements have the mean stiffness of their eight children, Chebyshev polynomials smooth, the coarsest level is factored.
+//! Each element is a trilinear hexahedron; unknowns are the displacements of its corners. Nothing is assembled
+//! (`hexahedron`, `sweep`). The equations are solved by conjugate gradients, preconditioned with one V-cycle of
+//! geometric multigrid: coarse elements have the mean stiffness of their eight children, Chebyshev polynomials smooth,
+//! the coarsest level is factored.
 //!
-//! *Locking.* With `Integration::MeanDilatation` the element's mean dilatation carries all volumetric energy (B-bar), the
-//! deviatoric part is integrated fully. `Integration::Full` is the textbook's element, for comparison. Pointwise smoothing
-//! loses to the volumetric part as nu comes near 0.5: to 1e-4 the gland needs 10 cycles at nu 0.45, 18 at 0.49, 50 at 0.499.
+//! *Locking.* With `Integration::MeanDilatation` the element's mean dilatation carries all volumetric energy (B-bar),
+//! the deviatoric part is integrated fully. `Integration::Full` is the textbook's element, for comparison. Pointwise
+//! smoothing loses to the volumetric part as nu comes near 0.5: to 1e-4 the gland needs 10 cycles at nu 0.45, 18 at
+//! 0.49, 50 at 0.499.
 //!
-//! *From tick to tick.* The problem is linear in the displacement of the held patch. While the patch stays, the response to
-//! each direction it has moved in is kept, so that a displacement in known directions costs no cycle at all. When the patch
-//! changes, the present displacement is the first guess of the new response: that tick is the costly one, unless idle ticks
-//! before have prepared the patch (`prepare`).
+//! *From tick to tick.* The problem is linear in the displacement of the held patch. While the patch stays, the
+//! response to each direction it has moved in is kept, so that a displacement in known directions costs no cycle at
+//! all. When the patch changes, the present displacement is the first guess of the new response: that tick is the
+//! costly one, unless idle ticks before have prepared the patch (`prepare`).
 //!
-//! *Foundation.* The surroundings are springs to rest on all free faces (`foundation_pa_per_m`) and fixed structures. A part of the body that has
-//! neither stays at rest unless it is held.
+//! *Foundation.* The surroundings are springs to rest on all free faces (`foundation_pa_per_m`) and fixed structures. A
+//! part of the body that has neither stays at rest unless it is held.
 //!
 //! ```
 //! use stylet_sim::scene::Scene;
@@ -35,6 +37,7 @@
 
 pub mod batch;
 mod cg;
+mod chebyshev;
 mod coarsest;
 mod compiled;
 mod grid;

@@ -1,8 +1,9 @@
-//! What is done with the forces of a sweep: Chebyshev smoothing, residuals, dot products.
+//! Operations on the forces of a sweep: Chebyshev smoothing, residuals, dot products.
 
 use std::ops::Range;
 
-use super::lanes::{chebyshev, difference_where_free, dot, first_chebyshev, keep_free};
+use super::chebyshev;
+use super::lanes::{chebyshev_step, difference_where_free, dot, first_chebyshev, keep_free};
 use super::level::Level;
 use super::real::Real;
 use super::sweep::{Field, LineOp, Planes, sweep};
@@ -23,15 +24,12 @@ impl<T: Real> LineOp<T> for Step<'_, T> {
         let inverse = &self.inverse_diagonal[at.clone()];
         for (c, x) in x.into_iter().enumerate() {
             let (d, b) = (&mut self.d[c][at.clone()], &self.b[c][at.clone()]);
-            chebyshev([self.keep, self.gain], inverse, b, forces[c], d, x);
+            chebyshev_step([self.keep, self.gain], inverse, b, forces[c], d, x);
         }
     }
 }
 
-/// Part of the spectrum, from the top, that the smoother is for.
-const SMOOTHED: f64 = 5.0;
-
-/// `steps` of a Chebyshev iteration for `A x = b`, which damps the upper part of the spectrum evenly.
+/// Makes `steps` steps of a Chebyshev iteration for `A x = b`, which damps the upper part of the spectrum evenly.
 pub(super) fn smooth<T: Real>(
     level: &Level<T>,
     inverse_diagonal: &[T],
@@ -40,11 +38,7 @@ pub(super) fn smooth<T: Real>(
     steps: u32,
     from_zero: bool,
 ) {
-    let (top, bottom) = (level.largest_eigenvalue, level.largest_eigenvalue / SMOOTHED);
-    let (middle, half) = (0.5 * (top + bottom), 0.5 * (top - bottom));
-    let mut rho = half / middle;
-    let (mut keep, mut gain) = (0.0, 1.0 / middle);
-    for n in 0..steps {
+    for (n, [keep, gain]) in (0..steps).zip(chebyshev::steps(level.largest_eigenvalue)) {
         if n == 0 && from_zero {
             first_step(level.simd, level, inverse_diagonal, x, b, d, T::of(gain));
         } else {
@@ -57,14 +51,11 @@ pub(super) fn smooth<T: Real>(
             };
             sweep(level, x, work, 0..level.grid.nodes[2], &mut op);
         }
-        let next = 1.0 / (2.0 * middle / half - rho);
-        (keep, gain) = (next * rho, 2.0 * next / half);
-        rho = next;
     }
 }
 
 vectorised! {
-/// The first step from `x = 0`, which needs no sweep.
+/// Makes the first step from `x = 0`, which needs no sweep.
 fn first_step<T>(
     level: &Level<T>,
     inverse_diagonal: &[T],

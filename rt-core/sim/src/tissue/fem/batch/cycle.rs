@@ -6,12 +6,10 @@ use super::Node;
 use super::kernel::{PlaneOp, TwoPlanes, answer, nothing, sweep};
 use super::level::{BatchLevel, BatchModel};
 use crate::simd::{Vector, in_vectors};
+use crate::tissue::fem::chebyshev;
 use crate::tissue::fem::real::Real;
 
-/// Part of the spectrum, from the top, that the smoother is for.
-const SMOOTHED: f64 = 5.0;
-
-/// What one level of a cycle works in.
+/// Work space of one level of a cycle.
 #[derive(Clone, Debug)]
 pub(super) struct Stage<T> {
     pub x: Vec<Node<T>>,
@@ -30,13 +28,10 @@ impl<T: Real> Stage<T> {
     }
 }
 
-/// `keep` and `gain` of the two Chebyshev steps on each side.
-fn coefficients(level_top: f64) -> [[f64; 2]; 2] {
-    let (top, bottom) = (level_top, level_top / SMOOTHED);
-    let (middle, half) = (0.5 * (top + bottom), 0.5 * (top - bottom));
-    let rho = half / middle;
-    let next = 1.0 / (2.0 * middle / half - rho);
-    [[0.0, 1.0 / middle], [next * rho, 2.0 * next / half]]
+/// Returns `keep` and `gain` of the two Chebyshev steps on each side.
+fn coefficients(top: f64) -> [[f64; 2]; 2] {
+    let mut steps = chebyshev::steps(top);
+    std::array::from_fn(|_| steps.next().unwrap_or_default())
 }
 
 /// `x += d` after `d = keep d + gain (b - A x) / diagonal`.
@@ -92,14 +87,14 @@ impl<T: Real> PlaneOp<T> for Residual<'_, T> {
     }
 }
 
-/// The first step from `x = 0`, which needs no sweep, then the second.
+/// Makes the first step from `x = 0`, which needs no sweep, then the second.
 pub(super) fn smooth_down<T: Real>(level: &BatchLevel<T>, stage: &mut Stage<T>, work: &mut TwoPlanes<T>) {
     let [[_, gain], _] = coefficients(level.largest_eigenvalue);
     first_step(level.simd, level, T::of(gain), stage);
     smooth(level, stage, work, 1);
 }
 
-/// Step 0 or 1 of the smoother.
+/// Makes step 0 or 1 of the smoother.
 pub(super) fn smooth<T: Real>(level: &BatchLevel<T>, stage: &mut Stage<T>, work: &mut TwoPlanes<T>, step: usize) {
     let [keep, gain] = coefficients(level.largest_eigenvalue)[step.min(1)];
     let mut op = Step {
@@ -126,7 +121,7 @@ fn first_step<T: Real, V>(level: &BatchLevel<T>, gain: T, stage: &mut Stage<T>) 
 }
 }
 
-/// The residual of `fine` becomes the right-hand side of `coarse`. What `d` held is lost.
+/// Restricts the residual of `fine` to the right-hand side of `coarse`. Overwrites `d`.
 pub(super) fn restrict<T: Real>(
     level: &BatchLevel<T>,
     fine: &mut Stage<T>,
@@ -142,7 +137,7 @@ pub(super) fn restrict<T: Real>(
     share_out(level.simd, level, &fine.d, &mut coarse.b);
 }
 
-/// What each of so many parents takes of a node; there are eight at most.
+/// Returns the weight of a node for each of so many parents; there are eight at most.
 fn weights<T: Real>() -> [T; 9] {
     std::array::from_fn(|count| T::of(1.0 / count.max(1) as f64))
 }
@@ -182,7 +177,7 @@ fn prolong<T: Real, V>(level: &BatchLevel<T>, coarse: &[Node<T>], x: &mut [Node<
 }
 }
 
-/// The coarsest level, by its inverse.
+/// Solves the coarsest level by its inverse.
 pub(super) fn solve_coarsest<T: Real>(model: &BatchModel<T>, stage: &mut Stage<T>) {
     let simd = model.levels[0].simd;
     multiply(simd, &model.coarsest, &model.coarsest_nodes, &stage.b, &mut stage.x);
