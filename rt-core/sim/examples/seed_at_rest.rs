@@ -1,5 +1,5 @@
-//! Drops seeds from a needle that drags the gland along, then draws the needle out: each seed comes to rest nearer to the
-//! apex than it was dropped.
+//! Drops seeds from a needle that drags the gland along, then draws the needle out: each seed comes to rest nearer to
+//! the apex than it was dropped.
 //!
 //! ```text
 //! cargo run --release -p stylet-sim --example seed_at_rest

@@ -17,7 +17,7 @@ pub struct Active {
     pub force: ForceParameters,
     /// Limits of the tissue, eq. 3 to 5.
     pub limits: Limits,
-    /// What seeds do after they were dropped.
+    /// Migration of seeds after they were dropped.
     pub migration: Migration,
 }
 
@@ -115,7 +115,7 @@ fn force(set: &ParameterSet, device: &DeviceInfo) -> ForceParameters {
     force
 }
 
-/// In the order of `LayerKind`.
+/// Returns the layers in the order of `LayerKind`.
 fn layers(set: &ParameterSet) -> Layers {
     use ParameterId as P;
     let layer = |depth: Option<P>, peak: Option<P>, cutting, friction| Layer {

@@ -1,6 +1,7 @@
 //! Simulation of a needle in soft tissue: a body of labelled cells, its deformation, and the force on the hand.
 //!
-//! The same input gives the same bytes. The crate has no thread, clock or port: `stylet-runtime` calls it from its loops.
+//! The same input gives the same bytes. The crate has no thread, clock or port: `stylet-runtime` calls it from its
+//! loops.
 //!
 //! ```
 //! use stylet_sim::scene::Scene;
@@ -19,8 +20,8 @@
 //! assert!(report.tip_force_n.unwrap()[2] < 0.0);
 //! ```
 //!
-//! Two programs show more: `cargo run --release -p stylet-sim --example needle_into_gland` prints depth, force and displacement
-//! of an insertion, `--example seed_at_rest` the places where dropped seeds come to rest.
+//! Two programs show more: `cargo run --release -p stylet-sim --example needle_into_gland` prints depth, force and
+//! displacement of an insertion, `--example seed_at_rest` the places where dropped seeds come to rest.
 //!
 //! | module | holds |
 //! |---|---|

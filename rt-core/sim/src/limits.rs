@@ -1,4 +1,4 @@
-//! What the tissue may do: the paper's limits as settings, validated, and as the loop uses them.
+//! Limits of the tissue: the paper's limits as settings, validated, and in the form that the loop uses.
 
 use serde::{Deserialize, Serialize};
 pub use stylet_settings::folding;
@@ -22,7 +22,7 @@ pub struct TissueParameters {
     pub residual_tolerance: f64,
     /// Passes of elastic relaxation after each propagation; 0 for none, at no cost.
     pub relaxation_iterations: u32,
-    /// How much of the way a pass of relaxation takes: 1 for all, up to below 2 to go beyond, which converges faster.
+    /// Share of the way that a pass of relaxation takes: 1 for all, up to below 2 to go beyond, which converges faster.
     pub relaxation_weight: f64,
     /// Stiffness of a link across, over that along it.
     pub shear_to_axial: f64,
@@ -81,7 +81,7 @@ impl LinkLimits {
         }
     }
 
-    /// The tighter of each limit.
+    /// Returns the tighter of each limit.
     pub(crate) fn tighter(&self, other: &LinkLimits) -> LinkLimits {
         LinkLimits {
             low: self.low.max(other.low),

@@ -1,4 +1,4 @@
-//! How many seeds migrate, and how fast: settings of the tissue loop's law (docs/physics.md, *Seeds that migrate*).
+//! Share and speed of migrating seeds: settings of the tissue loop's law (docs/physics.md, *Seeds that migrate*).
 
 use serde::{Deserialize, Serialize};
 
@@ -7,6 +7,6 @@ use serde::{Deserialize, Serialize};
 pub struct Migration {
     /// Share of the loose seeds that migrate.
     pub share: f64,
-    /// How fast, along the track to its entry.
+    /// Speed along the track to its entry.
     pub speed_m_per_s: f64,
 }

@@ -1,4 +1,4 @@
-//! What is wrong with a setting: every problem is listed with key, value and limit.
+//! Problems of settings: each is listed with key, value and limit.
 
 use core::fmt;
 
@@ -10,9 +10,9 @@ pub struct Problem {
     pub key: &'static str,
     /// Its value, in the unit that the key names.
     pub value: f64,
-    /// What would be accepted, in words.
+    /// Values that would be accepted, in words.
     pub limit: String,
-    /// What to do, or what the limit means; may be empty.
+    /// Remedy, or meaning of the limit; may be empty.
     pub advice: &'static str,
 }
 
@@ -33,13 +33,13 @@ impl fmt::Display for Advice<'_> {
 pub(crate) struct Problems(Vec<Problem>);
 
 impl Problems {
-    /// `value` must be finite and within `low..=high`.
+    /// Reports `value` unless it is finite and within `low..=high`.
     pub fn range(&mut self, key: &'static str, value: f64, low: f64, high: f64) {
         let is_inside = (low..=high).contains(&value);
         self.unless(is_inside, key, value, &format!("within {low} to {high}"), "");
     }
 
-    /// A problem with `key`, unless `holds`.
+    /// Reports a problem with `key`, unless `holds`.
     pub fn unless(&mut self, holds: bool, key: &'static str, value: f64, limit: &str, advice: &'static str) {
         if !holds {
             self.0.push(Problem {

@@ -32,7 +32,7 @@ struct Tip {
     phase: Phase,
 }
 
-/// One tick. `touch` is `None` while the tip is outside.
+/// Advances by one tick. `touch` is `None` while the tip is outside.
 pub fn step(
     parameters: &ChainParameters,
     device: &DeviceInfo,
@@ -91,7 +91,7 @@ pub fn step(
     }
 }
 
-/// Which layers the shaft is in, and what is in front of the tip.
+/// Follows the layers that the shaft is in, and returns the membrane in front of the tip.
 fn follow_path(
     parameters: &ChainParameters,
     state: &mut ChainState,
@@ -110,8 +110,8 @@ fn follow_path(
     state.path.front(layers, along_m)
 }
 
-/// Eq. 6 against the membrane in front; gives `u_tip` as well, 0 outside. In coupled mode the tip slips in the tissue only against
-/// the tissue's force: what slips with it would be driven by it.
+/// Applies eq. 6 against the membrane in front; returns `u_tip` as well, 0 outside. In coupled mode the tip slips in
+/// the tissue only against the tissue's force, which would otherwise drive it.
 fn follow_needle(
     parameters: &ChainParameters,
     state: &mut ChainState,
@@ -139,7 +139,7 @@ fn follow_needle(
     (output, front.map_or(0.0, |f| f.depth_m))
 }
 
-/// Eq. 8 to 10 and the tissue's answer, on the operator's hand.
+/// Computes eq. 8 to 10 and the tissue's answer, on the operator's hand.
 fn in_tissue(
     parameters: &ChainParameters,
     state: &mut ChainState,
@@ -178,7 +178,7 @@ fn in_tissue(
     force(&parameters.force, &mut state.law, &input)
 }
 
-/// A membrane that is whole lets go of a tip that leaves it.
+/// Removes the pull of a whole membrane, which lets go of a tip that leaves it.
 fn unpulled(answer: TissueForce, is_punctured: bool) -> TissueForce {
     if is_punctured || answer.along_n <= 0.0 {
         return answer;
@@ -189,7 +189,7 @@ fn unpulled(answer: TissueForce, is_punctured: bool) -> TissueForce {
     }
 }
 
-/// Outside there is only the weight; the sum says so if the sample was no number.
+/// Returns the terms outside, where there is only the weight; the sum is not finite if the sample was not.
 fn free(parameters: &ChainParameters, state: &mut ChainState, tip: &Tip) -> ForceTerms {
     let none = parameters.force.layers.of(LayerKind::Surroundings);
     let input = ForceInput {
@@ -211,7 +211,8 @@ fn free(parameters: &ChainParameters, state: &mut ChainState, tip: &Tip) -> Forc
     force(&parameters.force, &mut state.law, &input)
 }
 
-/// The gate: its output alone reaches the device. In debt, a stuck shaft softens: it is the stiffest spring.
+/// Passes the terms through the gate, whose output alone reaches the device. In debt, a stuck shaft softens: it is the
+/// stiffest spring.
 fn guard(
     parameters: &ChainParameters,
     device: &DeviceInfo,

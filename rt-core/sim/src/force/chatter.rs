@@ -5,10 +5,10 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A turn counts when it follows the last one within this time: a swing of 9 Hz. The tremor of a hand lies at 8 to 12 Hz,
-/// but its swings against a stuck shaft are shorter than what counts.
+/// A turn counts when it follows the last one within this time: a swing of 9 Hz. The tremor of a hand lies at 8 to 12
+/// Hz, but its swings against a stuck shaft are shorter than what counts.
 const QUICK_S: f64 = 0.055;
-/// So many quick turns in a row are a shake: one and a half swings.
+/// Quick turns in a row that count as a shake: one and a half swings.
 const TURNS: u32 = 3;
 /// A turn is a way back of so many encoder steps.
 const STEPS: f64 = 1.5;

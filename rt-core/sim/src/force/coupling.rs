@@ -7,7 +7,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// What the tissue answers at the tip.
+/// Response of the tissue at the tip.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LocalResponse {
     /// Tick of the tissue loop; 0 for no answer.
@@ -35,8 +35,8 @@ impl Default for LocalResponse {
 const SHORTEST_M: f64 = 1e-4;
 
 impl LocalResponse {
-    /// Force, and the stiffness of what would be added: of a linear body their ratio; `stiffness_n_per_m` for a
-    /// body without forces.
+    /// Returns the force, and the stiffness that would be added: the ratio of both for a linear body;
+    /// `stiffness_n_per_m` for a body without forces.
     fn linear(&self, stiffness_n_per_m: f64) -> (Vector3<f64>, f64) {
         let u = self.displacement_m;
         match self.force_n {
@@ -47,11 +47,11 @@ impl LocalResponse {
     }
 }
 
-/// What is carried from tick to tick.
+/// State that one tick leaves to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct CouplingState {
     answered: u64,
-    /// What the last answer corrected, and the share of it still to be blended in.
+    /// Correction by the last answer, and the share of it still to be blended in.
     correction_n: Vector3<f64>,
     share: f64,
     force_n: Vector3<f64>,
@@ -63,7 +63,8 @@ impl CouplingState {
         *self = Self::default();
     }
 
-    /// Whether the tissue's force would drive a tip that slips by `slip_m`: friction does not, so the tissue goes along instead.
+    /// Returns whether the tissue's force would drive a tip that slips by `slip_m`: friction does not, so the tissue
+    /// goes along instead.
     pub fn drives(&self, slip_m: &Vector3<f64>) -> bool {
         self.force_n.dot(slip_m) > 0.0
     }
@@ -72,13 +73,13 @@ impl CouplingState {
 /// The tissue's answer along the path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TissueForce {
-    /// On the hand, positive inwards.
+    /// Force on the hand, positive inwards.
     pub along_n: f64,
-    /// What the tissue holds along the path and may give back: half of force times displacement.
+    /// Energy that the tissue holds along the path and may give back: half of force times displacement.
     pub stored_j: f64,
 }
 
-/// The tissue's force on the hand now, along `axis`; `blend_ticks` is one tissue period in ticks of the caller.
+/// Returns the tissue's force on the hand now, along `axis`; `blend_ticks` is one tissue period in ticks of the caller.
 pub fn step(
     state: &mut CouplingState,
     response: &LocalResponse,
@@ -119,8 +120,8 @@ mod tests {
 
     const AXIS: Vector3<f64> = Vector3::new(0.0, 0.0, 1.0);
 
-    /// A tip that goes in at 50 mm/s against tissue that stiffens; answers come every fifth tick, one late.
-    /// Error and longest step; `held` carries nothing on.
+    /// Moves a tip in at 50 mm/s against tissue that stiffens; answers come every fifth tick, one late. Returns error
+    /// and longest step; `held` extrapolates nothing.
     fn errors(held: bool) -> (f64, f64) {
         let exact = |z: f64| -(600.0 * z + 5e3 * z * z);
         let (mut state, mut response) = (CouplingState::default(), LocalResponse::default());

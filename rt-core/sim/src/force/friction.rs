@@ -1,21 +1,21 @@
 //! Dry friction that sticks at zero speed: a set-valued law, solved implicitly in closed form.
 //!
-//! The tissue holds the shaft at an anchor through a spring. The implicit step of
-//! `force in -limit * sgn(anchor speed)` has one solution: the spring's force projected on what friction
-//! can hold, with the anchor dragged along by what is left over (Kikuuwe 2006). A damper beside the spring takes
-//! the energy that sampling would otherwise leak into a stuck shaft; the two together never pass the limit.
+//! The tissue holds the shaft at an anchor through a spring. The implicit step of `force in -limit * sgn(anchor speed)`
+//! has one solution: the spring's force projected on what friction can hold, with the anchor dragged along by what is
+//! left over (Kikuuwe 2006). A damper in parallel to the spring takes the energy that sampling would otherwise leak
+//! into a stuck shaft; the two together never pass the limit.
 
 use serde::{Deserialize, Serialize};
 
 /// Slip after which a softened shaft has its full stiffness again: at the limit a stiffer spring holds less energy.
 const RESTORE_M: f64 = 0.02;
 
-/// What friction can hold, on either side, and how.
+/// Largest friction on either side, with stiffness and damping below it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionLimits {
     /// Spring between shaft and anchor, N/m.
     pub stiffness_n_per_m: f64,
-    /// Damper beside it, N s/m.
+    /// Damper in parallel to it, N s/m.
     pub damping_n_s_per_m: f64,
     /// Against motion towards larger positions.
     pub forward_n: f64,
@@ -23,14 +23,14 @@ pub struct FrictionLimits {
     pub backward_n: f64,
 }
 
-/// Where the shaft is held. `None`: not in touch.
+/// Place where the tissue holds the shaft. `None`: not in touch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FrictionState {
     /// Place of the anchor along the axis, m.
     pub anchor_m: Option<f64>,
     /// Part of the stiffness that the loop has been able to hold, in 0..=1.
     pub softness: f64,
-    /// What the spring gives, without the damper.
+    /// Force of the spring, without the damper.
     pub elastic_n: f64,
 }
 
@@ -45,25 +45,25 @@ impl Default for FrictionState {
 }
 
 impl FrictionState {
-    /// Out of touch; the next touch begins with the full stiffness again.
+    /// Ends the contact; the next one begins with the full stiffness again.
     pub fn release(&mut self) {
         *self = Self::default();
     }
 
-    /// The loop shakes, or gives energy to the hand: a softer spring at the same anchor holds less of it. Down to
-    /// `floor`, a part of the full stiffness. Slip brings the stiffness back.
+    /// Softens the spring where the loop shakes, or gives energy to the hand: a softer spring at the same anchor holds
+    /// less of it. Down to `floor`, a part of the full stiffness. Slip brings the stiffness back.
     pub fn soften(&mut self, by: f64, floor: f64) {
         self.softness = (self.softness * by).max(floor.clamp(0.0, 1.0));
     }
 
-    /// Energy in the spring, at most what it can give back.
+    /// Returns the energy in the spring, at most what it can give back.
     pub fn stored_j(&self, limits: &FrictionLimits) -> f64 {
         0.5 * self.elastic_n * self.elastic_n / (limits.stiffness_n_per_m * self.softness).max(1.0)
     }
 }
 
-/// Force along the axis on the body at `position_m` that moves with `speed_m_per_s`, within
-/// `-forward_n ..= backward_n`.
+/// Returns the force along the axis on the body at `position_m` that moves with `speed_m_per_s`, within `-forward_n ..=
+/// backward_n`.
 ///
 /// A shaft that comes into touch does so sliding forward, with all of the friction at once.
 pub fn friction(limits: &FrictionLimits, state: &mut FrictionState, position_m: f64, speed_m_per_s: f64) -> f64 {

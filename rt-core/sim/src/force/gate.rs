@@ -26,7 +26,7 @@ enum Mode {
         from: Wrench,
         ticks: u32,
     },
-    /// Asked to engage; the model still asks for too much. What is left of a ramp out goes on.
+    /// Asked to engage while the model still asks for too much. A ramp out continues to its end.
     Waiting {
         from: Wrench,
         ticks: u32,
@@ -47,12 +47,13 @@ pub struct GateState {
     counts: GateCounts,
 }
 
-/// What the model asks for, and the motion that it was asked over.
+/// Force and torque of the model, with the motion over which they were computed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateInput {
     /// Wrench of the force law, before the force scale.
     pub wanted: Wrench,
-    /// The part of its force that is the same everywhere and at all times (`F_G`): what it gives on the way up it takes on the way down.
+    /// The part of its force that is the same everywhere and at all times (`F_G`): what it gives on the way up it takes
+    /// on the way down.
     pub constant_n: Vector3<f64>,
     /// Energy in the springs of the model.
     pub stored_j: f64,
@@ -60,12 +61,12 @@ pub struct GateInput {
     pub motion: Motion,
 }
 
-/// What goes to the device.
+/// Output of the gate for the device.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateOutput {
     /// Within every limit.
     pub wrench: Wrench,
-    /// Whether the device gives the force of the law.
+    /// Set while the device renders the force of the law.
     pub engaged: bool,
     /// Why the force goes to zero.
     pub fault: Option<ForceFault>,
@@ -119,43 +120,43 @@ impl GateState {
         self.release();
     }
 
-    /// Engaged, or to be as soon as the force is small.
+    /// Returns whether the force is engaged, or will be as soon as it is small.
     pub fn engaged(&self) -> bool {
         !matches!(self.mode, Mode::RampOut { .. })
     }
 
-    /// Asked to engage, and the model still asks for too much.
+    /// Returns whether it is to engage while the model still asks for too much.
     pub fn waiting(&self) -> bool {
         matches!(self.mode, Mode::Waiting { .. })
     }
 
-    /// Why the force went to zero, until it is engaged again.
+    /// Returns the reason for which the force went to zero, until it is engaged again.
     pub fn fault(&self) -> Option<ForceFault> {
         self.fault
     }
 
-    /// What the last tick gave the device.
+    /// Returns the wrench of the last tick.
     pub fn output(&self) -> &Wrench {
         &self.output
     }
 
-    /// How often each limit acted.
+    /// Returns how often each limit acted.
     pub fn counts(&self) -> &GateCounts {
         &self.counts
     }
 
-    /// The energy account.
+    /// Returns the energy account.
     pub fn passivity(&self) -> &PassivityState {
         &self.passivity
     }
 
-    /// Root mean square of the force over the thermal time, to show beside the continuous limit.
+    /// Returns the root mean square of the force over the thermal time, to show with the continuous limit.
     pub fn warmth_n(&self) -> f64 {
         self.warmth.rms_n()
     }
 }
 
-/// One tick.
+/// Advances by one tick.
 pub fn step(parameters: &GateParameters, device: &DeviceInfo, state: &mut GateState, input: &GateInput) -> GateOutput {
     if !input.wanted.is_finite() {
         state.counts.non_finite = state.counts.non_finite.wrapping_add(1);
@@ -204,7 +205,7 @@ pub fn step(parameters: &GateParameters, device: &DeviceInfo, state: &mut GateSt
     }
 }
 
-/// Passivity → slew → magnitude → continuous; the torque has slew and magnitude.
+/// Applies passivity → slew → magnitude → continuous limit; the torque has slew and magnitude.
 fn within_limits(
     parameters: &GateParameters,
     device: &DeviceInfo,
@@ -255,7 +256,7 @@ fn within_slew(from: &Vector3<f64>, to: &Vector3<f64>, longest: f64) -> (Vector3
     (from + change, cut)
 }
 
-/// The same direction, no longer than `limit`; and whether that cut anything.
+/// Returns the same direction, no longer than `limit`; and whether that cut anything.
 fn limited(v: Vector3<f64>, limit: f64) -> (Vector3<f64>, bool) {
     // Scaled first: the square of a huge length is not finite.
     let largest = v.amax();

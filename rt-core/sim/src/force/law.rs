@@ -15,13 +15,13 @@ pub struct ForceInput {
     pub tip_in_world: Vector3<f64>,
     /// Filtered.
     pub velocity_m_per_s: Vector3<f64>,
-    /// Unit vector along the needle as it is held.
+    /// Unit vector along the needle in the hand.
     pub needle_direction: Vector3<f64>,
     /// Any point of the straight path; the place of contact once there is one.
     pub path_origin_in_world: Vector3<f64>,
     /// `r`: into the tissue. Taken at contact and kept. Any length but zero.
     pub path_direction: Vector3<f64>,
-    /// How far the tip is along the path from the place of contact.
+    /// Distance of the tip along the path from the place of contact.
     pub along_m: f64,
     /// `u_tip`: since the tip met the membrane in front; negative before.
     pub depth_m: f64,
@@ -37,7 +37,7 @@ pub struct ForceInput {
     pub punctured: bool,
     /// The tip is in the tissue proper: some membrane is open, or there is none.
     pub guided: bool,
-    /// What the deformed tissue answers at the tip; `None` where it does not say.
+    /// Force of the deformed tissue at the tip; `None` where the model has none.
     pub answer: Option<TissueForce>,
 }
 
@@ -54,18 +54,18 @@ pub struct ForceTerms {
     pub friction_n: Vector3<f64>,
     /// `F_G`.
     pub gravity_n: Vector3<f64>,
-    /// Coupled mode: the tissue's answer, in place of its share of membrane and friction.
+    /// Coupled mode: the tissue's answer, instead of its share of membrane and friction.
     pub tissue_n: Vector3<f64>,
     /// Sum of all terms (eq. 8).
     pub total_n: Vector3<f64>,
-    /// Keeps the needle's axis along the path.
+    /// Torque that keeps the needle's axis along the path.
     pub torque_nm: Vector3<f64>,
-    /// What the springs of these terms hold and may give back.
+    /// Energy that the springs of these terms hold and may give back.
     pub stored_j: f64,
 }
 
 impl ForceTerms {
-    /// No force at all.
+    /// Returns no force at all.
     pub fn zero() -> Self {
         let zero = Vector3::zeros();
         Self {
@@ -82,14 +82,14 @@ impl ForceTerms {
     }
 }
 
-/// What the law remembers: where the tissue holds the shaft.
+/// State of the law: the place where the tissue holds the shaft.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ForceState {
     /// Anchor of the stuck shaft.
     pub friction: FrictionState,
 }
 
-/// The force on the operator. Input that is not finite comes out as such, for the gate to catch and report.
+/// Returns the force on the operator. Input that is not finite comes out as such, for the gate to catch and report.
 pub fn force(parameters: &ForceParameters, state: &mut ForceState, input: &ForceInput) -> ForceTerms {
     let gravity_n = gravity(parameters);
     let axis = input.path_direction.try_normalize(1e-9);
@@ -132,14 +132,13 @@ pub fn force(parameters: &ForceParameters, state: &mut ForceState, input: &Force
     }
 }
 
-/// Eq. 10, read as a membrane that resists in proportion to depth, most at `u_cri`, and not at all once it
-/// is open. Along `-r`, whichever way the tip moves: an elastic membrane has no reason to care, and a force
-/// that did would chatter at rest.
+/// Computes eq. 10, read as a membrane that resists in proportion to depth, most at `u_cri`, and not at all once it is
+/// open. It acts along `-r`, whichever way the tip moves: a force that depended on the direction would chatter at rest.
 pub fn membrane(parameters: &ForceParameters, input: &ForceInput, axis: &Vector3<f64>) -> Vector3<f64> {
     if input.punctured || !input.membrane.has_membrane() {
         return Vector3::zeros();
     }
-    // `clamp` keeps what is not a number, so that the gate sees it.
+    // `clamp` keeps NaN, so that the gate sees it.
     let stretched = (input.depth_m / input.membrane.puncture_depth_m).clamp(0.0, 1.0);
     axis * (-parameters.membrane_gain * input.membrane.puncture_force_n * stretched)
 }
@@ -149,7 +148,7 @@ fn offset(input: &ForceInput, axis: &Vector3<f64>) -> Vector3<f64> {
     from_origin - axis * axis.dot(&from_origin)
 }
 
-/// First part of eq. 9: towards the straight path, across it, once the needle is in.
+/// Returns the first part of eq. 9: towards the straight path, across it, once the needle is in.
 pub fn guide(parameters: &ForceParameters, input: &ForceInput, axis: &Vector3<f64>) -> Vector3<f64> {
     if !input.guided {
         return Vector3::zeros();
@@ -157,7 +156,7 @@ pub fn guide(parameters: &ForceParameters, input: &ForceInput, axis: &Vector3<f6
     offset(input, axis) * (-parameters.guide_stiffness_n_per_m * parameters.guide_gain)
 }
 
-/// The part of the guide that a device of six degrees of freedom can give: a torque about the place of entry
+/// Returns the part of the guide that a device of six degrees of freedom can give: a torque about the place of entry
 /// that turns the needle's axis to the path, in proportion to the sine of the angle between them.
 pub fn guide_torque(parameters: &ForceParameters, input: &ForceInput, axis: &Vector3<f64>) -> Vector3<f64> {
     if !input.guided {
@@ -166,7 +165,7 @@ pub fn guide_torque(parameters: &ForceParameters, input: &ForceInput, axis: &Vec
     input.needle_direction.cross(axis) * (parameters.guide_torque_nm_per_rad * parameters.guide_gain)
 }
 
-/// Second part of eq. 9, `K_V V`: against the velocity. A whole membrane releases a tip that leaves it
+/// Computes the second part of eq. 9, `K_V V`: against the velocity. A whole membrane releases a tip that leaves it
 /// rather than hold it back, so there the damping takes no more than the membrane gives.
 pub fn damping(
     parameters: &ForceParameters,
@@ -201,7 +200,7 @@ fn friction_limits(parameters: &ForceParameters, input: &ForceInput) -> Friction
     }
 }
 
-/// Second part of eq. 9, `K_f u`: friction along the shaft that grows with depth and opposes motion either
+/// Computes the second part of eq. 9, `K_f u`: friction along the shaft that grows with depth and opposes motion either
 /// way; on the way in the tip cuts as well.
 pub fn shaft(
     limits: &FrictionLimits,
@@ -216,7 +215,7 @@ pub fn shaft(
     axis * friction(limits, state, input.along_m, input.velocity_m_per_s.dot(axis))
 }
 
-/// `F_G` of eq. 8: takes the weight of the handle off the hand, so against gravity.
+/// Computes `F_G` of eq. 8: it takes the weight of the handle off the hand, so it acts against gravity.
 pub fn gravity(parameters: &ForceParameters) -> Vector3<f64> {
     parameters.gravity_in_world_m_per_s2 * -parameters.compensated_mass_kg
 }

@@ -1,8 +1,8 @@
 //! From the tip's motion to the force on the operator's hand.
 //!
-//! In the order of the data, as [`chain`] calls them: [`velocity`] → [`law`] (with [`friction`], [`chatter`] and [`coupling`]) →
-//! [`gate`] (with [`passivity`] and [`thermal`]) → device. Every force here acts on the operator's hand. Nothing called
-//! in a tick allocates or panics.
+//! In the order of the data, as [`chain`] calls them: [`velocity`] → [`law`] (with [`friction`], [`chatter`] and
+//! [`coupling`]) → [`gate`] (with [`passivity`] and [`thermal`]) → device. Every force here acts on the operator's
+//! hand. Nothing called in a tick allocates or panics.
 
 // What the lists of clippy.toml name has no place in a tick; tests may.
 #![cfg_attr(

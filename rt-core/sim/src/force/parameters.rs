@@ -14,7 +14,7 @@ pub const MAX_STICK_STIFFNESS_N_PER_M: f64 = 8000.0;
 /// Coefficients of eq. 8-10, and the gate behind them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ForceParameters {
-    /// What the needle goes through: membranes, cutting and friction of each.
+    /// Layers on the way: membrane, cutting and friction of each.
     pub layers: Layers,
     /// Scales `F_R` of every layer; 0 turns the term off. The next two as well.
     pub membrane_gain: f64,
@@ -25,7 +25,7 @@ pub struct ForceParameters {
     /// Share of membrane, cutting and friction that the tissue's own answer takes the place of: 0 for eq. 8-10
     /// alone, 1 for coupled mode.
     pub coupling: f64,
-    /// How stiffly tissue without forces of its own (ChainMail) answers the displacement of the held element.
+    /// Stiffness of tissue without forces of its own (ChainMail) against displacement of the held element.
     pub tissue_stiffness_n_per_m: f64,
     /// `K` of eq. 9, across the path.
     pub guide_stiffness_n_per_m: f64,
@@ -35,15 +35,15 @@ pub struct ForceParameters {
     pub damping_n_s_per_m: f64,
     /// Turns the needle's axis to the path, with `K_C`.
     pub guide_torque_nm_per_rad: f64,
-    /// How stiffly the tissue holds a needle that sticks to it.
+    /// Stiffness of the tissue around a needle that sticks to it.
     pub stick_stiffness_n_per_m: f64,
-    /// Beside that spring: takes what sampling leaks into it.
+    /// Damping in parallel to that spring: takes the energy that sampling leaks into it.
     pub stick_damping_n_s_per_m: f64,
     /// Mass whose weight `F_G` (eq. 8) takes off the operator's hand.
     pub compensated_mass_kg: f64,
-    /// How tissue on a needle line goes on giving way under a load that is held; strengths of 0 turn it off.
+    /// Creep of tissue on a needle line under a constant load; strengths of 0 turn it off.
     pub creep: [PronyTerm; 2],
-    /// How the needle bends on a needle line.
+    /// Bending of the needle on a needle line.
     pub bending: NeedleBending,
     /// Acceleration of gravity in world, m/s^2.
     pub gravity_in_world_m_per_s2: Vector3<f64>,
@@ -76,7 +76,7 @@ impl Default for ForceParameters {
 }
 
 impl ForceParameters {
-    /// Every setting that cannot be used on any device, or `Ok`. What a device cannot hold is refused before:
+    /// Returns every setting that cannot be used on any device, or `Ok`. What a device cannot hold is refused before:
     /// [`stylet_settings::ParameterSet::problems_on`].
     pub fn validate(&self) -> Result<(), Vec<Problem>> {
         let mut problems = Problems::default();

@@ -34,13 +34,13 @@ impl Default for PassivityParameters {
 }
 
 impl PassivityParameters {
-    /// Only watches.
+    /// Parameters that only watch.
     pub const OFF: Self = Self {
         margin_j: 5e-3,
         max_damping_n_s_per_m: 0.0,
     };
 
-    /// Every setting that cannot be used, or `Ok`.
+    /// Returns every setting that cannot be used, or `Ok`.
     pub fn validate(&self) -> Result<(), Vec<Problem>> {
         let mut problems = Problems::default();
         problems.range("passivity.margin_j", self.margin_j, 0.0, 10.0);
@@ -54,24 +54,24 @@ impl PassivityParameters {
 pub struct PassivityState {
     /// Taken from the hand minus given to it, by lateness. Below zero the simulator is a source of energy.
     accounts_j: [f64; DELAYS],
-    /// What was asked of the device, newest first.
+    /// Forces asked of the device, newest first.
     forces_n: [Vector3<f64>; DELAYS + 1],
-    /// In debt, as of the last tick.
+    /// Set while the account is in debt, as of the last tick.
     in_debt: bool,
 }
 
 impl PassivityState {
-    /// The worst account.
+    /// Returns the worst account.
     pub fn energy_j(&self) -> f64 {
         self.accounts_j.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether the worst account was below zero in the last tick, with the controller on.
+    /// Returns whether the worst account was below zero in the last tick, with the controller on.
     pub fn in_debt(&self) -> bool {
         self.in_debt
     }
 
-    /// What the device is asked for in this tick.
+    /// Books the force that the device is asked for in this tick.
     pub fn book(&mut self, given_n: &Vector3<f64>) {
         self.forces_n.rotate_right(1);
         if let Some(newest) = self.forces_n.first_mut() {
@@ -93,7 +93,7 @@ pub struct Motion {
     pub dt_s: f64,
 }
 
-/// The force to ask for instead of `wanted_n`; `stored_j` is what the springs behind it hold.
+/// Returns the force to ask for instead of `wanted_n`; `stored_j` is what the springs behind it hold.
 pub fn step(
     parameters: &PassivityParameters,
     state: &mut PassivityState,

@@ -1,4 +1,4 @@
-//! What warm motors may still give: the continuous force of the device over a long time.
+//! Thermal limit of the motors: the continuous force of the device over a long time.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ impl Warmth {
         }
     }
 
-    /// Root mean square of the force, to show beside the continuous limit.
+    /// Returns the root mean square of the force, to show with the continuous limit.
     pub fn rms_n(&self) -> f64 {
         self.heat_n2.sqrt()
     }

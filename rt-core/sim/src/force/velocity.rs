@@ -27,7 +27,7 @@ pub struct VelocityEstimator {
 }
 
 impl VelocityEstimator {
-    /// `position_step_m` is that of the device.
+    /// Makes an estimator; `position_step_m` is that of the device.
     pub fn new(position_step_m: f64) -> Self {
         Self {
             // A margin for the rounding of what lies exactly on the band.
@@ -39,7 +39,7 @@ impl VelocityEstimator {
         }
     }
 
-    /// The last estimate, m/s.
+    /// Returns the last estimate, m/s.
     pub fn velocity_m_per_s(&self) -> &Vector3<f64> {
         &self.velocity_m_per_s
     }
@@ -81,8 +81,8 @@ impl VelocityEstimator {
     }
 }
 
-/// Roundings of a comparison with the band are at most so many of the positions' own. Each has three of its own, and each
-/// of the bounds below five.
+/// Roundings of a comparison with the band are at most so many of the positions' own. Each has three of its own, and
+/// each of the bounds below five.
 const ROUNDINGS: f64 = 64.0 * f64::EPSILON;
 
 /// Slopes that pass each sample, so far, within a width.
@@ -111,11 +111,11 @@ impl Slopes {
     }
 }
 
-/// Slope of the longest admissible line through the newest of `samples`, on one axis, and how long it is. `per_s` is one
-/// over the age of each.
+/// Returns the slope and the length of the longest admissible line through the newest of `samples`, on one axis.
+/// `per_s` is one over the age of each.
 ///
-/// Samples bound the slopes of all longer lines, so that each line is compared with two numbers and not with every sample. Only where
-/// rounding could decide is it compared with the samples.
+/// Samples bound the slopes of all longer lines, so that each line is compared with two numbers and not with every
+/// sample. Only where rounding could decide is it compared with the samples.
 fn slope(
     samples: &[(Vector3<f64>, f64)],
     per_s: &[f64; WINDOW + 1],
@@ -147,7 +147,7 @@ fn slope(
     found
 }
 
-/// Whether a line through the newest passes each of the samples within the band.
+/// Returns whether a line through the newest sample passes each of the others within the band.
 #[cold]
 fn passes(
     samples: &[(Vector3<f64>, f64)],
@@ -240,7 +240,7 @@ mod tests {
         assert!(seen.is_some_and(|ticks| ticks <= 4), "{seen:?}");
     }
 
-    /// The longest line that passes every sample under it, each compared with each.
+    /// Returns the longest line that passes every sample under it, each compared with each.
     fn by_brute_force(samples: &[f64], dt_s: f64) -> (f64, f64) {
         let band_m = VelocityEstimator::new(STEP_M).step_m;
         let mut ages_s = vec![0.0];
@@ -261,7 +261,7 @@ mod tests {
         found
     }
 
-    /// Bit by bit, on paths that lie on the edge of the band or beside it by roundings.
+    /// Bit by bit, on paths that lie on the edge of the band or off it by roundings.
     #[test]
     fn bounds_of_slopes_give_what_comparing_every_sample_gives() {
         let mut drawn = 1_u64;

@@ -1,11 +1,11 @@
-//! Which settings of the tissue are valid.
+//! Validation of the tissue's settings.
 
 use super::{Limits, TissueParameters, folding};
 use crate::settings::{Problem, Problems};
 use stylet_settings::ParameterId;
 
 impl TissueParameters {
-    /// The limits as the loop uses them.
+    /// Returns the limits as the loop uses them.
     ///
     /// # Errors
     ///

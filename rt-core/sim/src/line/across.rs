@@ -7,18 +7,18 @@ use super::stations::Stations;
 const LENGTH_M: f64 = 4e-3;
 
 impl Stations {
-    /// Stations along the line that make one across.
+    /// Returns how many stations along the line make one across.
     pub fn group(&self) -> usize {
         let by_length = (LENGTH_M / self.settings.spacing_m).round() as usize;
         by_length.max(self.count().div_ceil(MAX_ACROSS)).max(1)
     }
 
-    /// How many there are across; what is left at the end of the line belongs to none.
+    /// Returns the number of stations across; the remainder at the end of the line belongs to none.
     pub fn across_count(&self) -> usize {
         self.count() / self.group()
     }
 
-    /// Nodes and weights, which add up to 1, of the shaft in station `n` across.
+    /// Returns the nodes and weights, which add up to 1, of the shaft in station `n` across.
     pub fn across_weights(&self, n: usize) -> Vec<(u32, f64)> {
         let group = self.group();
         let share = 1.0 / group as f64;
@@ -35,7 +35,7 @@ impl Stations {
         merged
     }
 
-    /// Compliance of station `n` across that the lattice lacks for a load along the line, m/N.
+    /// Returns the compliance of station `n` across that the lattice lacks for a load along the line, m/N.
     pub fn across_missing_m_per_n(&self, n: usize) -> f64 {
         let group = self.group();
         let own = self.missing_m_per_n.iter().skip(n * group).take(group);

@@ -1,8 +1,8 @@
 //! The needle as an Euler-Bernoulli beam: how it bends between hand, template hole and the tissue along its shaft.
 //!
-//! Each station across is tied to the tissue, both ways, at the place where the tip went through. With the tissue's compliance across
-//! the line `W` and the needle's `A`, known in closed form, the forces on the tissue solve
-//! `(W + A) f = (needle without tissue) - (track)`, which is positive definite. The hole leads the needle where it would lie
+//! Each station across is tied to the tissue, both ways, at the place where the tip went through. With the tissue's
+//! compliance across the line `W` and the needle's `A`, known in closed form, the forces on the tissue solve `(W + A) f
+//! = (needle without tissue) - (track)`, which is positive definite. The hole leads the needle where it would lie
 //! beyond the hole's play. A rigid needle has no beam and pays nothing.
 
 use super::rows::{Rows, dot};
@@ -22,9 +22,9 @@ const AT_TEMPLATE_M: f64 = 1e-3;
 pub struct BeamModel {
     /// E I; 0.016 N m^2 for 18 G steel.
     pub bending_stiffness_n_m2: f64,
-    /// From hand to tip.
+    /// Distance from hand to tip.
     pub length_m: f64,
-    /// How far the hand gives way across the needle, m/N, and how far it turns, rad/(N m). 0 is a clamp.
+    /// Compliance of the hand across the needle, m/N, and against rotation, rad/(N m). 0 is a clamp.
     pub grip: [f64; 2],
     /// Hole that leads the needle, along the line from the entry (negative: before it).
     pub template_m: Option<f64>,
@@ -32,23 +32,24 @@ pub struct BeamModel {
     pub gap_m: f64,
     /// Distance of stations, m.
     pub spacing_m: f64,
-    /// Of the body as a whole on its foundation, m/N: it takes the bevel's reaction. What that does close to the tip is left out.
+    /// Compliance of the body as a whole on its foundation, m/N: it takes the bevel's reaction. The local displacement
+    /// at the tip is left out.
     pub whole_m_per_n: f64,
-    /// How stations move across the line with forces on each, m/N, along both directions.
+    /// Displacement of each station across the line by forces on each, m/N, along both directions.
     pub across: [Rows; 2],
 }
 
 /// Forces across the line and the track that the tip has cut.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BeamState {
-    /// On the tissue, along both directions.
+    /// Forces on the tissue, along both directions.
     forces_n: [[f64; MAX_ACROSS]; 2],
-    /// Where each station's track lies in the tissue at rest, across the line.
+    /// Place of each station's track in the tissue at rest, across the line.
     track_m: [[f64; MAX_ACROSS]; 2],
-    /// How far the probe moves the tissue at each station, across the line.
+    /// Displacement of the tissue by the probe at each station, across the line.
     outside_m: [[f64; MAX_ACROSS]; 2],
-    /// Stations that the shaft is in. One that it leaves forgets its track: a needle that came back to it beside its own would be
-    /// bent by nobody's work.
+    /// Stations that the shaft is in. One that it leaves forgets its track: a needle that came back next to its own
+    /// track would be bent without work.
     in_contact: u32,
 }
 
@@ -60,14 +61,14 @@ pub struct BeamScratch {
     by_hole: [[f64; MAX_ACROSS]; 2],
 }
 
-/// What holds the needle across the line in one tick.
+/// Boundary conditions of the needle across the line in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BeamInput {
     /// Tip along the line from the entry, in the world.
     pub tip_m: f64,
     /// Place of the tip in the material of the line.
     pub material_m: f64,
-    /// Where the hand is across the line.
+    /// Position of the hand across the line.
     pub hand_m: [f64; 2],
     /// Slope that the hand gives the needle, along both directions.
     pub hand_slope: [f64; 2],
@@ -84,11 +85,11 @@ pub struct BeamOutput {
     pub tip_m: [f64; 2],
     /// Displacement of the tissue at the tip, across the line.
     pub displacement_m: [f64; 2],
-    /// Of the needle on the hand, across the line.
+    /// Force of the needle on the hand, across the line.
     pub force_on_hand_n: [f64; 2],
     /// Moment of the same about the tip of a rigid needle in that hand: force times place along the line.
     pub moment_nm: [f64; 2],
-    /// On the hand along the line: a bent beam slides out of what bends it.
+    /// Force on the hand along the line: a bent beam slides out of what bends it.
     pub axial_n: f64,
     /// Elastic energy of needle and tissue.
     pub stored_j: f64,
@@ -97,36 +98,36 @@ pub struct BeamOutput {
 }
 
 impl BeamModel {
-    /// Stations across.
+    /// Returns the number of stations across.
     pub fn stations(&self) -> usize {
         self.across[0].size().min(self.across[1].size()).min(MAX_ACROSS)
     }
 }
 
 impl BeamState {
-    /// On the tissue at each station, along direction 0 or 1.
+    /// Returns the force on the tissue at each station, along direction 0 or 1.
     pub fn forces_n(&self, side: usize) -> &[f64] {
         &self.forces_n[side.min(1)]
     }
 
-    /// Where the track of a station would lie across the line without the needle.
+    /// Returns where the track of a station would lie across the line without the needle.
     fn lies_m(&self, side: usize, n: usize) -> f64 {
         self.track_m[side][n] + self.outside_m[side][n]
     }
 
-    /// No tissue holds the needle across.
+    /// Releases the needle: no tissue holds it across.
     pub(super) fn release(&mut self) {
         if self.in_contact > 0 {
             *self = BeamState::default();
         }
     }
 
-    /// The probe moves some tissue across the line.
+    /// Returns whether the probe moves some tissue across the line.
     pub(super) fn is_moved(&self) -> bool {
         self.outside_m.iter().flatten().any(|m| *m != 0.0)
     }
 
-    /// The probe moves the tissue at the first so many stations so far along each direction, m.
+    /// Moves the tissue at the first so many stations by the probe, along each direction, m.
     pub(super) fn move_from_outside(&mut self, by_m: impl Fn(usize, usize) -> f64, stations: usize) {
         for (side, outside_m) in self.outside_m.iter_mut().enumerate() {
             for (n, slot) in outside_m.iter_mut().enumerate().take(stations) {
@@ -142,7 +143,7 @@ impl BeamState {
 }
 
 impl BeamScratch {
-    /// For that model.
+    /// Makes the work space of a model.
     pub fn new(model: &BeamModel) -> Self {
         let m = model.stations();
         BeamScratch {
@@ -153,7 +154,7 @@ impl BeamScratch {
     }
 }
 
-/// One tick; does not allocate. Input that is not finite changes nothing.
+/// Advances by one tick; does not allocate. Input that is not finite changes nothing.
 pub fn step(model: &BeamModel, state: &mut BeamState, scratch: &mut BeamScratch, input: &BeamInput) -> BeamOutput {
     let m = model.stations();
     let numbers = [input.hand_m, input.hand_slope, input.tip_force_n];
@@ -207,8 +208,8 @@ fn needle_of(model: &BeamModel, input: &BeamInput) -> BentNeedle {
     }
 }
 
-/// Solves for the forces of stations that the shaft was in before, by a Cholesky factor, as if there were no hole; and for what each newton of
-/// the hole adds to them.
+/// Solves for the forces of stations that the shaft was in before, by a Cholesky factor, as if there were no hole; and
+/// for what each newton of the hole adds to them.
 fn balance(
     model: &BeamModel,
     state: &mut BeamState,
@@ -260,14 +261,14 @@ fn solve(factor: &[f64], size: usize, values: &mut [f64]) {
     }
 }
 
-/// The template stands between hand and tip.
+/// Returns whether the template stands between hand and tip.
 fn leads(model: &BeamModel, needle: &BentNeedle) -> bool {
     model
         .template_m
         .is_some_and(|hole_m| hole_m > needle.hand_along_m() + AT_TEMPLATE_M && hole_m < needle.tip_m)
 }
 
-/// Where the needle would lie beyond the play of the hole, the hole holds it at its rim, on the side that it lies on.
+/// Holds the needle at the rim of the template's hole where it would lie beyond the play, on the side that it lies on.
 fn lead(model: &BeamModel, state: &mut BeamState, scratch: &BeamScratch, needle: &mut BentNeedle, tied: usize) {
     if !leads(model, needle) {
         return;
@@ -299,13 +300,13 @@ fn lead(model: &BeamModel, state: &mut BeamState, scratch: &BeamScratch, needle:
     }
 }
 
-/// Displacement of the tissue at a station, across the line.
+/// Returns the displacement of the tissue at a station, across the line.
 fn displacement_m(model: &BeamModel, state: &BeamState, needle: &BentNeedle, side: usize, n: usize) -> f64 {
     let by_needle_m = dot(model.across[side].row(n), &state.forces_n[side]) - model.whole_m_per_n * needle.tip_n[side];
     by_needle_m + state.outside_m[side][n]
 }
 
-/// New stations are tied to the tissue where the needle goes through it now: without a force.
+/// Ties new stations to the tissue where the needle goes through it now, without a force.
 fn enter(model: &BeamModel, state: &mut BeamState, needle: &BentNeedle, side: usize, now: usize) {
     for n in state.in_contact as usize..now {
         let lies_m = needle.across_m(side, needle.station_m(n), &state.forces_n[side]);

@@ -7,17 +7,17 @@ use crate::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight};
 use crate::tissue::{ElementField, PackedField};
 use std::sync::Arc;
 
-/// Residual over load down to which columns are solved: the compliance then is right to 6e-4 and the field to 7e-3 (paper's
-/// gland, nu 0.49; `docs/adr/0010-condensed-needle-line.md`).
+/// Residual over load down to which columns are solved: the compliance then is right to 6e-4 and the field to 7e-3
+/// (paper's gland, nu 0.49; `docs/adr/0010-condensed-needle-line.md`).
 pub const TOLERANCE: f64 = 4.5e-2;
 const MOST_ITERATIONS: u32 = 60;
 
-/// What a column answers to.
+/// Load of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Load {
-    /// Along the line, on the shaft of a station.
+    /// Load along the line, on the shaft of a station.
     Shaft(usize),
-    /// Along the line, on the tip's patch at a station.
+    /// Load along the line, on the tip's patch at a station.
     Tip(usize),
     /// Across the line (0 or 1), on the shaft of a station across.
     Across(usize, usize),
@@ -32,15 +32,15 @@ pub struct Column {
     pub field: PackedField,
     /// Displacement at the stations, m/N: of shaft and tip along the line, or of the shaft across it.
     pub samples_m: Vec<f64>,
-    /// Displacement at the stations of the lines beside, m/N, along them: see [`ColumnQueue::read_beside`].
+    /// Displacement at the stations of the other lines, m/N, along them: see [`ColumnQueue::read_beside`].
     pub beside_m: Vec<f64>,
     /// Force of the foundation on the body.
     pub foundation_n: [f64; 3],
-    /// Of the solver, over the load.
+    /// Residual of the solver, over the load.
     pub residual: f64,
 }
 
-/// How far the queue is.
+/// Progress of the queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct QueueProgress {
     /// Columns that are solved.
@@ -50,16 +50,16 @@ pub struct QueueProgress {
 }
 
 impl QueueProgress {
-    /// Whether nothing is left to solve.
+    /// Returns whether nothing is left to solve.
     pub fn is_done(&self) -> bool {
         self.ready == self.of
     }
 }
 
-/// What the next slice of work does.
+/// Work of the next slice.
 #[derive(Clone, Copy, Debug)]
 enum Slice {
-    /// Takes up the loads of eight columns.
+    /// Begins the loads of eight columns.
     Begin,
     Solve,
     /// Keeps the answer in this lane.
@@ -74,7 +74,7 @@ pub struct ColumnQueue<T = f32> {
     loads: Vec<Vec<NodeWeight>>,
     /// Loads of other lines, at which every column is read as well.
     beside: Vec<Vec<NodeWeight>>,
-    /// What columns are sampled with: `2 m` along the line, then those across it along each direction.
+    /// Weights that columns are sampled with: `2 m` along the line, then those across it along each direction.
     ready: usize,
     stations: usize,
     across: usize,
@@ -86,7 +86,7 @@ pub struct ColumnQueue<T = f32> {
 }
 
 impl<T: Compiled> ColumnQueue<T> {
-    /// Along the line, shaft then tip; with `is_flexible` those across it as well.
+    /// Makes a queue of the columns along the line, shaft then tip; with `is_flexible` those across it as well.
     pub fn new(model: &BatchModel<T>, stations: &Stations, is_flexible: bool, tolerance: f64) -> Self {
         let m = stations.count();
         let mut wanted: Vec<Load> = (0..m).map(Load::Shaft).chain((0..m).map(Load::Tip)).collect();
@@ -126,8 +126,8 @@ impl<T: Compiled> ColumnQueue<T> {
         }
     }
 
-    /// Reads every column that is not solved yet at the stations of other lines in the same body as well, shaft and then tip of
-    /// each.
+    /// Reads every column that is not solved yet at the stations of other lines in the same body as well, shaft and
+    /// then tip of each.
     #[must_use]
     pub fn read_beside(mut self, others: &[Arc<LineStations>]) -> Self {
         self.beside = others.iter().flat_map(|other| other.loads.iter().cloned()).collect();
@@ -137,7 +137,7 @@ impl<T: Compiled> ColumnQueue<T> {
         self
     }
 
-    /// How far the queue is.
+    /// Returns the progress of the queue.
     pub fn progress(&self) -> QueueProgress {
         QueueProgress {
             ready: self.ready,
@@ -145,24 +145,24 @@ impl<T: Compiled> ColumnQueue<T> {
         }
     }
 
-    /// Those that are ready.
+    /// Returns the columns that are ready.
     pub fn columns(&self) -> &[Column] {
         &self.columns[..self.ready]
     }
 
-    /// The displacement fields of those that are ready, in order.
+    /// Returns the displacement fields of the columns that are ready, in order.
     pub fn into_fields(mut self) -> Vec<PackedField> {
         self.columns.truncate(self.ready);
         self.columns.into_iter().map(|column| column.field).collect()
     }
 
-    /// Bytes of the columns, and of what they are solved in.
+    /// Returns the size of the columns and of their work space, in bytes.
     pub fn bytes(&self) -> [usize; 2] {
         let column = |c: &Column| c.field.bytes() + 8 * c.samples_m.len();
         [self.columns.iter().map(column).sum(), self.state.bytes()]
     }
 
-    /// At most so many slices of work, each one pass over one level of the body.
+    /// Does at most so many slices of work, each one pass over one level of the body.
     pub fn prepare(&mut self, model: &BatchModel<T>, slices: usize) -> QueueProgress {
         for _ in 0..slices {
             if self.progress().is_done() {
@@ -173,7 +173,7 @@ impl<T: Compiled> ColumnQueue<T> {
         self.progress()
     }
 
-    /// All that is left.
+    /// Does all of the remaining work.
     pub fn prepare_all(&mut self, model: &BatchModel<T>) {
         while !self.progress().is_done() {
             self.slice(model);

@@ -1,4 +1,5 @@
-//! How each station moves with the force at each: `W = B K^-1 B^T`, and what a lattice cannot know of a thin needle.
+//! Displacement of each station by a force at each, `W = B K^-1 B^T`, with what a lattice cannot resolve of a thin
+//! needle.
 
 use super::columns::Column;
 use super::rows::Rows;
@@ -7,8 +8,8 @@ use crate::tissue::fem::Compiled;
 use crate::tissue::fem::batch::BatchModel;
 use serde::{Deserialize, Serialize};
 
-/// Stations that were all solved for: symmetric, positive definite. Rows 0 to m - 1 are the shaft's stations, m to 2m - 1
-/// the tip's patch at the same places.
+/// Stations that were all solved for: symmetric, positive definite. Rows 0 to m - 1 are the shaft's stations, m to 2m -
+/// 1 the tip's patch at the same places.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compliance {
     /// Stations m.
@@ -17,22 +18,23 @@ pub struct Compliance {
     pub spacing_m: f64,
     /// Length over which the tip's load is spread along the line.
     pub tip_length_m: f64,
-    /// Of the body as a whole on its foundation, m/N; 0 where something holds it.
+    /// Compliance of the body as a whole on its foundation, m/N; 0 where something holds it.
     pub whole_m_per_n: f64,
-    /// Of the needle itself, between hand and tissue, m/N; see [`behind_needle`](Self::behind_needle).
+    /// Compliance of the needle itself, between hand and tissue, m/N; see [`behind_needle`](Self::behind_needle).
     pub needle_m_per_n: f64,
     /// m/N, 2m x 2m; with the needle's own.
     pub(super) rows: Rows,
     /// Distance of stations across, m.
     pub across_spacing_m: f64,
-    /// Of the stations across, along the two directions, m/N; empty where they were not solved for.
+    /// Compliance of the stations across, along the two directions, m/N; empty where they were not solved for.
     pub across: [Rows; 2],
     /// Force of the foundation on the body along the line for each newton on it, for each row.
     pub foundation: Vec<f64>,
 }
 
 impl Compliance {
-    /// From the answers to each station's load along the line: those of the shaft, then those of the tip.
+    /// Makes the compliance from the answers to each station's load along the line: those of the shaft, then those of
+    /// the tip.
     pub fn of_columns<T: Compiled>(
         model: &BatchModel<T>,
         stations: &Stations,
@@ -50,7 +52,8 @@ impl Compliance {
         let count = stations.across_count();
         for (side, columns) in sides.iter_mut().zip(across.chunks_exact(count.max(1))) {
             *side = symmetric(columns);
-            // The mean over all directions across is in effect that along, times (3 - 4 nu) / (4 (1 - nu)); see `physics.md`.
+            // The mean over all directions across is in effect that along, times (3 - 4 nu) / (4 (1 - nu)); see
+            // `physics.md`.
             for n in 0..columns.len() {
                 let middle_m = (n as f64 + 0.5) * stations.group() as f64 * stations.settings.spacing_m;
                 let nu = model
@@ -73,7 +76,7 @@ impl Compliance {
         })
     }
 
-    /// Stations that do not know each other, for tests and examples: `each_m_per_n` at shaft and tip.
+    /// Makes stations whose forces do not move each other, for tests and examples: `each_m_per_n` at shaft and tip.
     pub fn diagonal(stations: usize, spacing_m: f64, each_m_per_n: f64) -> Compliance {
         let entry = |i: usize, j: usize| {
             if i % stations.max(1) == j % stations.max(1) {
@@ -85,7 +88,7 @@ impl Compliance {
         Self::from_rows(stations, spacing_m, spacing_m, entry)
     }
 
-    /// From a function of two rows.
+    /// Makes the compliance from a function of two rows.
     pub fn from_rows(
         stations: usize,
         spacing_m: f64,
@@ -105,7 +108,8 @@ impl Compliance {
         }
     }
 
-    /// Force for each metre of a shaft that is stuck at every station, N/m: `1' W^-1 1`. Infinite where `W` is no compliance.
+    /// Returns the force for each metre of a shaft that is stuck at every station, N/m: `1' W^-1 1`. Infinite where `W`
+    /// is no compliance.
     pub fn stuck_n_per_m(&self) -> f64 {
         let matrix = nalgebra::DMatrix::from_fn(self.stations, self.stations, |i, j| self.at(i, j));
         let ones = nalgebra::DVector::from_element(self.stations, 1.0);
@@ -113,8 +117,8 @@ impl Compliance {
         solved.filter(|k| k.is_finite() && *k > 0.0).unwrap_or(f64::INFINITY)
     }
 
-    /// Puts a spring between hand and tissue that makes a stuck shaft no stiffer than this: what is stiffer no loop at 1 kHz can
-    /// hold still over a late link. Nothing where the tissue is soft enough by itself.
+    /// Puts a spring between hand and tissue that makes a stuck shaft no stiffer than this: what is stiffer no loop at
+    /// 1 kHz can hold still over a late link. Nothing where the tissue is soft enough by itself.
     pub fn behind_needle(mut self, stiffest_n_per_m: f64) -> Self {
         self.needle_m_per_n = (1.0 / stiffest_n_per_m - 1.0 / self.stuck_n_per_m()).max(0.0);
         if self.needle_m_per_n > 0.0 {
@@ -128,25 +132,25 @@ impl Compliance {
         self
     }
 
-    /// What any force on the line moves all of it by, m/N: the body as a whole, and the needle itself.
+    /// Returns the compliance that all stations share, m/N: of the body as a whole and of the needle itself.
     pub(super) fn common_m_per_n(&self) -> f64 {
         self.whole_m_per_n + self.needle_m_per_n
     }
 
-    /// How row `i` moves with a newton at row `j`, m/N.
+    /// Returns the displacement of row `i` by a newton at row `j`, m/N.
     pub fn at(&self, i: usize, j: usize) -> f64 {
         self.rows.row(i).get(j).copied().unwrap_or(f64::NAN)
     }
 }
 
-/// Half of each pair: what columns that are not quite solved leave.
+/// Returns the mean of each pair: columns that are not quite solved are not quite symmetric.
 fn symmetric(columns: &[Column]) -> Rows {
     let entry = |i: usize, j: usize| columns[j].samples_m.get(i).copied().unwrap_or(0.0);
     Rows::new(columns.len(), |i, j| 0.5 * (entry(i, j) + entry(j, i)))
 }
 
-/// Green function of a line load on a square lattice of bilinear elements, spacing and shear modulus 1; for large distances
-/// `-ln(r) / (2 pi)`. Made by `tests/oracles/lattice_green.py`.
+/// Green function of a line load on a square lattice of bilinear elements, spacing and shear modulus 1; for large
+/// distances `-ln(r) / (2 pi)`. Made by `tests/oracles/lattice_green.py`.
 const GREEN: [[f64; 5]; 5] = [
     [0.344768214, -0.018270257, -0.112937218, -0.176345437, -0.221452078],
     [-0.018270257, -0.042193314, -0.128532955, -0.183714754, -0.225939389],

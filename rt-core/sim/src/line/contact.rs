@@ -1,10 +1,11 @@
-//! The needle against the tissue on its line, once a tick: Coulomb friction with anchors in the tissue, membranes, cutting.
+//! The needle against the tissue on its line, once a tick: Coulomb friction with anchors in the tissue, membranes,
+//! cutting.
 //!
-//! Each station of the shaft sticks to the tissue until the force between them reaches the friction of its length, and slips
-//! with that force from then on. The tip pushes, and never pulls: against a membrane up to the force at which it gives way, in tissue up
-//! to the cutting force. All at once this is a convex problem with one solution, which is found from that of the last tick by sets of
-//! stations that stick (`sets`); by projected Gauss-Seidel where a rate term is on, or where sets go round in a circle. Nothing depends on speed
-//! unless a rate term is asked for.
+//! Each station of the shaft sticks to the tissue until the force between them reaches the friction of its length, and
+//! slips with that force from then on. The tip pushes, and never pulls: against a membrane up to the force at which it
+//! gives way, in tissue up to the cutting force. All at once this is a convex problem with one solution, which is found
+//! from that of the last tick by sets of stations that stick (`sets`); by projected Gauss-Seidel where a rate term is
+//! on, or where sets go round in a circle. Nothing depends on speed unless a rate term is asked for.
 
 use super::model::LineModel;
 use super::rows::{add_scaled, dot};
@@ -20,32 +21,33 @@ mod forces;
 mod membrane;
 pub(super) mod sets;
 
-/// For the stations of one line. It is kept from tick to tick: what a tick reads of it, the tick has written.
+/// Work space for the stations of one line. It is kept from tick to tick: what a tick reads of it, the tick has
+/// written.
 pub(super) type Scratch = sets::Scratch<LINE_BLOCKS>;
 
-/// Solutions in one tick at most: the tip goes on, a membrane gives way, the tip goes on again.
+/// Solutions in one tick at most: the tip advances, a membrane gives way, the tip advances again.
 const MAX_PASSES: u32 = 12;
 /// A gap at the tip that another pass would be wasted on.
 const CLOSED_M: f64 = 1e-7;
 /// The line is not followed further than this from its entry.
 const FURTHEST_M: f64 = 10.0;
 
-/// Where the needle is in one tick.
+/// Position of the needle in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineInput {
-    /// How far the needle's tip is along the line from the place of entry at rest, in the world.
+    /// Distance of the needle's tip along the line from the place of entry at rest, in the world.
     pub tip_m: f64,
-    /// Only rate terms and relaxation use it.
+    /// Period, s; only rate terms and relaxation use it.
     pub dt_s: f64,
 }
 
-/// One tick. Its work is bounded, it does not allocate, and every finite input gives finite forces. A state of another model
-/// is left as it is.
+/// Advances by one tick. Its work is bounded, it does not allocate, and every finite input gives finite forces. A state
+/// of another model does not change.
 pub fn step(model: &LineModel, state: &mut LineState, input: &LineInput) -> LineOutput {
     step_in(model, state, input, &mut Scratch::new())
 }
 
-/// The same in a scratch that other ticks have used.
+/// Advances by one tick, in a scratch that other ticks have used.
 pub(super) fn step_in(
     model: &LineModel,
     state: &mut LineState,
@@ -68,11 +70,11 @@ pub(super) fn step_in(
     advance(model, state, input, &mut NoOthers(scratch))
 }
 
-/// What a needle shares a tick with: nothing, or needles that stay in.
+/// Needles that share a tick with this one, and are solved with it: none, or those that stay in.
 pub(super) trait OtherNeedles {
-    /// Where the shaft touches and the tip loads is known; membrane and tip are made ready for [`solve`](Self::solve).
+    /// Begins a tick: stations in contact are known; membrane and tip are made ready for [`solve`](Self::solve).
     fn begin(&mut self, model: &LineModel, state: &mut LineState, tip_m: f64, membrane: Option<usize>);
-    /// Forces of all; returns how far the tip is beyond where the material has it.
+    /// Solves for all forces; returns how far the tip is beyond where the material has it.
     fn solve(
         &mut self,
         model: &LineModel,
@@ -81,9 +83,9 @@ pub(super) trait OtherNeedles {
         limit_n: f64,
         output: &mut LineOutput,
     ) -> f64;
-    /// The needle that moves is outside of the tissue.
+    /// Called instead of a solution while the moving needle is outside of the tissue.
     fn rest(&mut self) {}
-    /// The forces of the tick are found.
+    /// Called once the forces of the tick are found.
     fn end(&mut self) {}
 }
 
@@ -113,7 +115,7 @@ impl OtherNeedles for NoOthers<'_> {
     }
 }
 
-/// The tick of a needle whose memory has begun it, with an input that is finite.
+/// Advances a needle, whose memory has begun the tick, with a finite input.
 pub(super) fn advance(
     model: &LineModel,
     state: &mut LineState,
@@ -165,7 +167,7 @@ pub(super) fn advance(
     output
 }
 
-/// Stations that reached their friction stick to where they are now.
+/// Lets stations that reached their friction stick where they are now.
 fn slip(model: &LineModel, state: &mut LineState, tip_m: f64) {
     for n in 0..state.in_contact {
         if state.shaft_n[n].abs() >= limit_n(model, state.tip.material_m, n) {
@@ -174,8 +176,8 @@ fn slip(model: &LineModel, state: &mut LineState, tip_m: f64) {
     }
 }
 
-/// Whether the needle is in the tissue or has come to its surface, which the past and other needles have moved. A tip that is
-/// outside is where the hand has it: one that stopped a hair before the surface is not held there.
+/// Returns whether the needle is in the tissue or has come to its surface, which the past and other needles have moved.
+/// A tip outside is where the hand has it: one that stopped a hair before the surface is not held there.
 fn has_met(model: &LineModel, state: &mut LineState, tip_m: f64) -> bool {
     let is_out = state.in_contact == 0 && state.tip.force_n == 0.0 && state.tip.material_m <= 0.0;
     if !is_out {
@@ -192,7 +194,7 @@ fn has_met(model: &LineModel, state: &mut LineState, tip_m: f64) -> bool {
     state.tip.material_m >= 0.0
 }
 
-/// A tick of a needle that has not met the surface.
+/// Advances a needle that has not met the surface.
 fn stay_outside(model: &LineModel, state: &mut LineState, output: &mut LineOutput) {
     // No station is touched, so none has to be found where it sticks.
     lay(model, state);
@@ -201,13 +203,13 @@ fn stay_outside(model: &LineModel, state: &mut LineState, output: &mut LineOutpu
     finish(model, state, output);
 }
 
-/// Which stations the shaft touches, where the tip loads, and where they are. A station that is new sticks to where it is.
+/// Finds the stations that the shaft touches, where the tip loads, and their places. A new station sticks where it is.
 fn touch(model: &LineModel, state: &mut LineState, tip_m: f64, scratch: &mut Scratch) {
     let before = lay(model, state);
     stick(model, state, tip_m, before, scratch);
 }
 
-/// Where the stations are by the forces of the solution before; those from `before` on stick there.
+/// Computes the places of the stations by the forces of the solution before; those from `before` on stick there.
 pub(super) fn stick<const B: usize>(
     model: &LineModel,
     state: &mut LineState,
@@ -235,7 +237,7 @@ pub(super) fn stick<const B: usize>(
     }
 }
 
-/// Which stations the shaft touches, and where the tip loads; returns how many it touched before.
+/// Finds the stations that the shaft touches, and where the tip loads; returns how many it touched before.
 pub(super) fn lay(model: &LineModel, state: &mut LineState) -> usize {
     let c = &model.compliance;
     let depth = state.tip.material_m / c.spacing_m;
@@ -266,7 +268,7 @@ pub(super) fn lay(model: &LineModel, state: &mut LineState) -> usize {
     before
 }
 
-/// Friction that each station can have, by how much of it the shaft is in.
+/// Returns the friction limit of a station, by how much of it the shaft is in.
 #[inline]
 pub(super) fn limit_n(model: &LineModel, place_m: f64, n: usize) -> f64 {
     let ds = model.compliance.spacing_m;

@@ -1,17 +1,18 @@
-//! How two lines in one body move each other: `W12 = B1 K^-1 B2'`.
+//! Displacement of two lines in one body by each other: `W12 = B1 K^-1 B2'`.
 //!
-//! The columns of the line that is solved for later are read at the stations of those that were there before. By reciprocity that is
-//! how the later line's stations move with the loads of the earlier ones, too, so each pair is solved for once.
+//! The columns of the line that is solved for later are read at the stations of the lines before it. By reciprocity
+//! this is also how the later line's stations move with the loads of the earlier ones, so each pair is solved for once.
 
 use super::columns::Column;
 use super::stations::Stations;
 use crate::tissue::fem::batch::NodeWeight;
 use serde::{Deserialize, Serialize};
 
-/// Where a line loads its body: shaft of each station along the line, then tip at each. Kept while other lines may come beside it.
+/// Places where a line loads its body: shaft of each station along the line, then tip at each. Kept while other lines
+/// may come beside it.
 #[derive(Clone, Debug)]
 pub struct LineStations {
-    /// That of its [`HandLine`](super::HandLine).
+    /// Number of its [`HandLine`](super::HandLine).
     pub generation: u64,
     /// Unit vector inwards.
     pub direction: [f64; 3],
@@ -19,7 +20,7 @@ pub struct LineStations {
 }
 
 impl LineStations {
-    /// Of a line that loads nothing, for tests and examples.
+    /// Makes the stations of a line that loads nothing, for tests and examples.
     pub fn none(generation: u64) -> Self {
         Self {
             generation,
@@ -38,12 +39,13 @@ impl LineStations {
     }
 }
 
-/// How the rows of one line move with a newton at each row of another, m/N; shaft of each station, then tip at each.
+/// Displacement of the rows of one line by a newton at each row of another, m/N; shaft of each station, then tip at
+/// each.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cross {
     /// Number of the other line.
     pub with: u64,
-    /// Of the body as a whole on its foundation, along both lines.
+    /// Compliance of the body as a whole on its foundation, along both lines.
     pub whole_m_per_n: f64,
     own_rows: usize,
     other_rows: usize,
@@ -51,7 +53,7 @@ pub struct Cross {
 }
 
 impl Cross {
-    /// From a function of own row and other row.
+    /// Makes it from a function of own row and other row.
     pub fn from_rows(
         with: u64,
         whole_m_per_n: f64,
@@ -68,7 +70,7 @@ impl Cross {
         }
     }
 
-    /// One for each of `others`, from columns that were read there; `whole_m_per_n` is that of the body.
+    /// Makes one for each of `others`, from columns that were read there; `whole_m_per_n` is that of the body.
     pub(super) fn of_columns(
         columns: &[Column],
         direction: [f64; 3],
@@ -93,18 +95,19 @@ impl Cross {
         all
     }
 
-    /// How own row `own` moves with a newton at row `other` of the other line, and the other way round.
+    /// Returns the displacement of own row `own` by a newton at row `other` of the other line, which is also that the
+    /// other way round.
     #[inline]
     pub fn at(&self, own: usize, other: usize) -> f64 {
         self.values.get(own * self.other_rows + other).copied().unwrap_or(0.0)
     }
 
-    /// Rows of both lines.
+    /// Returns the number of rows of both lines.
     pub fn rows(&self) -> [usize; 2] {
         [self.own_rows, self.other_rows]
     }
 
-    /// Whether it is one of lines of so many rows: one that was read from a file may not be.
+    /// Returns whether it joins lines of so many rows: one read from a file may not.
     pub(super) fn is_whole(&self, own_rows: usize) -> bool {
         self.own_rows == own_rows
             && self.own_rows.checked_mul(self.other_rows) == Some(self.values.len())

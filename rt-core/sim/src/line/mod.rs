@@ -1,9 +1,9 @@
 //! The condensed needle line: what the needle does to the tissue along its way, and what the hand feels of it.
 //!
-//! *Before the needle moves*: [`Line`] and [`Stations`] lie along the way; [`ColumnQueue`] solves for the body's answer to a unit
-//! force at each of them, in slices that fit into idle ticks; [`Compliance`] is how each station moves with each.
-//! *At 1 kHz*: [`step`] finds the forces of shaft and tip from friction, membranes and that compliance, with one slip state.
-//! *At the rate of the tissue*: the body is the sum of `loads_n` times columns.
+//! *Before the needle moves*: [`Line`] and [`Stations`] lie along the way; [`ColumnQueue`] solves for the body's answer
+//! to a unit force at each of them, in slices that fit into idle ticks; [`Compliance`] is how each station moves with
+//! each. *At 1 kHz*: [`step`] finds the forces of shaft and tip from friction, membranes and that compliance, with one
+//! slip state. *At the rate of the tissue*: the body is the sum of `loads_n` times columns.
 //!
 //! Derivations are in `docs/physics.md`, measurements in `docs/adr/0010-condensed-needle-line.md`.
 //!

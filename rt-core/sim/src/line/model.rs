@@ -1,4 +1,4 @@
-//! What the needle meets on its line, and how: built once, never changed.
+//! Model of a needle on its line: built once, never changed.
 
 use super::compliance::Compliance;
 use super::prony::PronyTerm;
@@ -15,11 +15,12 @@ const MAX_TIP_STATIONS: f64 = 24.0;
 /// Tissue from one place on the line to the next layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineLayer {
-    /// Along the line at rest, from the entry.
+    /// Beginning along the line at rest, from the entry.
     pub from_m: f64,
     /// Force at which its membrane gives way; 0 for tissue without one.
     pub puncture_force_n: f64,
-    /// How far the membrane may be pushed from rest; it gives way at whichever comes first. Infinite to go by force alone.
+    /// Largest distance that the membrane may be pushed from rest; it gives way at whichever comes first. Infinite to
+    /// go by force alone.
     pub puncture_depth_m: f64,
     /// Force at the tip while it cuts, N.
     pub cutting_force_n: f64,
@@ -49,11 +50,12 @@ pub struct LineSettings {
     pub viscous_n_s_per_m2: f64,
     /// Relaxation; terms of no strength are off.
     pub prony: [PronyTerm; 2],
-    /// Forces by sets of stations that stick, with sweeps where that fails; else by sweeps alone, as a twin to compare with.
+    /// Forces by sets of stations that stick, with sweeps where that fails; else by sweeps alone, as a twin to compare
+    /// with.
     pub by_sets: bool,
     /// Sweeps of the solver at most.
     pub sweeps: u32,
-    /// How far a place that sticks may be from where it sticks.
+    /// Largest distance of a place that sticks from where it sticks.
     pub tolerance_m: f64,
 }
 
@@ -134,7 +136,7 @@ impl LineModel {
         })
     }
 
-    /// Takes up other forces for the layers that `layer` knows, by number; where they begin stays. Does not allocate.
+    /// Sets other forces for the layers that `layer` knows, by number; their beginnings stay. Does not allocate.
     pub fn set_layers(&mut self, layer: impl Fn(usize) -> Option<LineLayer>) {
         for (n, slot) in self.layers.iter_mut().enumerate() {
             if let Some(new) = layer(n) {
@@ -150,7 +152,7 @@ impl LineModel {
         }
     }
 
-    /// Takes up how the tissue goes on giving way; terms out of range are left as they are. Does not allocate.
+    /// Sets the creep of the tissue; terms out of range are ignored. Does not allocate.
     pub fn set_prony(&mut self, terms: [PronyTerm; 2]) {
         let is_usable = |t: &PronyTerm| (0.0..=10.0).contains(&t.strength) && (1e-3..=1e5).contains(&t.time_s);
         if terms.iter().all(is_usable) {
@@ -158,22 +160,22 @@ impl LineModel {
         }
     }
 
-    /// How stations move with the loads on them.
+    /// Returns the displacement of the stations by the loads on them.
     pub fn compliance(&self) -> &Compliance {
         &self.compliance
     }
 
-    /// The settings it was made with.
+    /// Returns the settings that it was made with.
     pub fn settings(&self) -> &LineSettings {
         &self.settings
     }
 
-    /// Length of the line in the body.
+    /// Returns the length of the line in the body.
     pub fn length_m(&self) -> f64 {
         self.compliance.stations as f64 * self.compliance.spacing_m
     }
 
-    /// The layer at a place of the material, if there is tissue.
+    /// Returns the layer at a place of the material, if there is tissue.
     pub(super) fn layer_at(&self, place_m: f64) -> Option<&LineLayer> {
         if !(0.0..self.length_m()).contains(&place_m) {
             return None;
@@ -182,7 +184,7 @@ impl LineModel {
     }
 }
 
-/// Mean over a stretch of the line.
+/// Returns the mean over a stretch of the line.
 fn mean_friction(layers: &[LineLayer], from_m: f64, to_m: f64) -> f64 {
     let ends = layers.iter().skip(1).map(|l| l.from_m).chain([f64::INFINITY]);
     let part = |(layer, end_m): (&LineLayer, f64)| {

@@ -1,7 +1,7 @@
-//! How the tissue moves past a needle by what is none: the ultrasound probe displaces the stations of its line.
+//! Displacement of the tissue past a needle by something else: the ultrasound probe displaces the stations of its line.
 //!
-//! It is known for every tick of the tissue, and is reached in equal parts within one, so that the force has no steps. Stations stick and slip by
-//! where they are with it.
+//! It is known for every tick of the tissue, and is reached in equal parts within one, so that the force has no steps.
+//! Stations stick and slip by where they are with it.
 
 use super::beam::MAX_ACROSS;
 use super::model::MAX_STATIONS;
@@ -11,7 +11,8 @@ use serde_big_array::BigArray;
 /// Rows of the longest line.
 const MOST: usize = rows(MAX_STATIONS);
 
-/// Displacement of each row of a line: shaft of each station, then tip at each, then stations across along each direction.
+/// Displacement of each row of a line: shaft of each station, then tip at each, then stations across along each
+/// direction.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct ExternalDisplacement {
     /// Now, and to be reached, m.
@@ -21,7 +22,7 @@ pub(super) struct ExternalDisplacement {
     ticks: u32,
     /// Some of it is not zero, or was in the last tick.
     is_on: bool,
-    /// At the tip, m.
+    /// Displacement at the tip, m.
     pub at_tip_m: f64,
 }
 
@@ -65,7 +66,7 @@ impl ExternalRecord {
 }
 
 impl ExternalDisplacement {
-    /// Goes on from `record`, as far as the line has rows.
+    /// Continues from `record`, as far as the line has rows.
     pub fn take_record(&mut self, record: &ExternalRecord) {
         for (rows_m, kept) in [(&mut self.now_m, &record.now_m), (&mut self.to_m, &record.to_m)] {
             for (row_m, kept_m) in rows_m.iter_mut().zip(kept) {
@@ -75,7 +76,7 @@ impl ExternalDisplacement {
         (self.ticks, self.is_on, self.at_tip_m) = (record.ticks, record.is_on, record.at_tip_m);
     }
 
-    /// Of a line of so many stations, with room for any across.
+    /// Makes room for a line of so many stations, with any across.
     pub fn new(stations: usize, value: f64) -> Self {
         let rows = rows(stations);
         ExternalDisplacement {
@@ -85,7 +86,8 @@ impl ExternalDisplacement {
         }
     }
 
-    /// It is `to_m` after so many ticks; rows that it does not name are at rest then, and what is no number counts as no displacement.
+    /// Sets the displacement to reach after so many ticks; rows without a value go to rest, and a value that is not
+    /// finite counts as none.
     pub fn set(&mut self, to_m: &[f64], ticks: u32) {
         let finite = |m: f64| if m.is_finite() { m } else { 0.0 };
         let given = to_m.iter().copied().map(finite).chain(std::iter::repeat(0.0));
@@ -96,14 +98,15 @@ impl ExternalDisplacement {
         self.ticks = ticks.max(1);
     }
 
-    /// At rest at once; does not allocate.
+    /// Goes to rest at once; does not allocate.
     pub fn reset(&mut self) {
         self.now_m.fill(0.0);
         self.to_m.fill(0.0);
         (self.ticks, self.is_on, self.at_tip_m) = (0, false, 0.0);
     }
 
-    /// Keeps what `from` holds; does not allocate where there is room. Names every field, so that a new one is not forgotten.
+    /// Keeps what `from` holds; does not allocate where there is room. Names every field, so that a new one is not
+    /// forgotten.
     pub fn copy_from(&mut self, from: &ExternalDisplacement) {
         let ExternalDisplacement {
             now_m,
@@ -123,32 +126,32 @@ impl ExternalDisplacement {
         self.to_m.clear();
     }
 
-    /// Whether it is one of so many stations.
+    /// Returns whether it belongs to so many stations.
     pub fn fits(&self, stations: usize) -> bool {
         self.now_m.len() == rows(stations) && self.to_m.len() == rows(stations)
     }
 
-    /// Something displaces the line.
+    /// Returns whether something displaces the line.
     pub fn is_on(&self) -> bool {
         self.is_on
     }
 
-    /// It is not yet where it has to be.
+    /// Returns whether it is still on its way.
     pub fn is_going(&self) -> bool {
         self.ticks > 0
     }
 
-    /// Of each row, m.
+    /// Returns the displacement of each row, m.
     pub fn now_m(&self) -> &[f64] {
         &self.now_m
     }
 
-    /// Of one row, m.
+    /// Returns the displacement of one row, m.
     pub fn at_m(&self, row: usize) -> f64 {
         self.now_m.get(row).copied().unwrap_or(0.0)
     }
 
-    /// One tick nearer to where it has to be.
+    /// Advances by one tick towards the displacement to reach.
     pub fn go_on(&mut self) {
         if self.ticks == 0 {
             return;

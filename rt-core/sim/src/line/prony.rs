@@ -1,9 +1,9 @@
-//! Force over time: tissue that goes on giving way under a constant load.
+//! Creep: the displacement of tissue under a constant load grows with time.
 //!
-//! Creep in the form of a Kelvin chain on the stations: `u = W (f + sum J_i q_i)`, `time_i dq_i/dt = f - q_i`. A load held for ever
-//! moves its place by `1 + sum J_i` times what it does at once; a displacement that is held relaxes from 1 to
-//! `1 / (1 + sum J_i)` of its force. All of the body relaxes alike, what surrounds it included. Each step is implicit, so each
-//! element of the chain stores or dissipates and none makes energy.
+//! Creep in the form of a Kelvin chain on the stations: `u = W (f + sum J_i q_i)`, `time_i dq_i/dt = f - q_i`. A load
+//! held for ever moves its place by `1 + sum J_i` times what it does at once; a displacement that is held relaxes from
+//! 1 to `1 / (1 + sum J_i)` of its force. All of the body relaxes alike, what surrounds it included. Each step is
+//! implicit, so each element of the chain stores or dissipates and none makes energy.
 
 use super::rows::{Rows, dot};
 use serde::{Deserialize, Serialize};
@@ -43,7 +43,7 @@ pub(super) struct Memory {
     whole_sum_n: f64,
     /// Displacement at once and within the tick, over that at once.
     pub gain: f64,
-    /// What the chain held before this tick, J.
+    /// Energy that the chain held before this tick, J.
     pub held_j: f64,
     parts: [f64; 2],
     is_on: bool,
@@ -77,8 +77,8 @@ impl Memory {
         self.is_on = false;
     }
 
-    /// Keeps what `from` holds; does not allocate where there is room for as many rows. Names every field, so that a new one
-    /// is not forgotten.
+    /// Keeps what `from` holds; does not allocate where there is room for as many rows. Names every field, so that a
+    /// new one is not forgotten.
     pub fn copy_from(&mut self, from: &Memory) {
         let Memory {
             loads_n,
@@ -110,13 +110,13 @@ impl Memory {
         self.is_on = *is_on;
     }
 
-    /// Every vector of it.
+    /// Returns all of its vectors.
     pub fn vectors_mut(&mut self) -> [&mut Vec<f64>; 6] {
         let ([first, second], [third, fourth]) = (&mut self.loads_n, &mut self.moved_m);
         [first, second, third, fourth, &mut self.offset_m, &mut self.sum]
     }
 
-    /// Whether it is of that many rows.
+    /// Returns whether it has that many rows.
     pub fn fits(&self, rows: usize) -> bool {
         let ([first, second], [third, fourth]) = (&self.loads_n, &self.moved_m);
         [first, second, third, fourth, &self.offset_m, &self.sum]
@@ -124,8 +124,8 @@ impl Memory {
             .all(|v| v.len() == rows)
     }
 
-    /// What is known of this tick before its loads are. `common_m_per_n` is how far a newton moves the body as a whole. A chain
-    /// that is turned off forgets its loads.
+    /// Begins a tick before its loads are known. `common_m_per_n` is the displacement of the body as a whole by a
+    /// newton. A chain that is turned off forgets its loads.
     pub fn begin(&mut self, rows: &Rows, common_m_per_n: f64, terms: &[PronyTerm; 2], dt_s: f64) {
         if !terms.iter().any(|t| t.strength > 0.0) {
             if self.is_on {
@@ -171,8 +171,8 @@ impl Memory {
         self.whole_sum_n += left * whole_n;
     }
 
-    /// Takes in the loads of this tick, and makes them those under which the tissue without memory would be where it is. So for
-    /// what a membrane passes on to the body as a whole, which is returned.
+    /// Takes in the loads of this tick, and makes them those under which the tissue without memory would be where it
+    /// is. So for what a membrane passes on to the body as a whole, which is returned.
     pub fn finish(&mut self, loads_n: &mut [f64], whole_n: f64) -> f64 {
         if !self.is_on {
             return whole_n;
@@ -187,12 +187,12 @@ impl Memory {
         self.gain * whole_n + self.whole_sum_n
     }
 
-    /// Whether the tissue remembers loads.
+    /// Returns whether the tissue creeps.
     pub fn is_on(&self) -> bool {
         self.is_on
     }
 
-    /// In the springs of the chain, J.
+    /// Returns the energy in the springs of the chain, J.
     pub fn stored_j(&self, rows: &Rows, common_m_per_n: f64, terms: &[PronyTerm; 2]) -> f64 {
         let each = |((term, q), whole_n): ((&PronyTerm, &Vec<f64>), &f64)| {
             let work = |(n, f): (usize, &f64)| f * dot(rows.row(n), q);

@@ -32,8 +32,8 @@ use way::{LineLayers, layer};
 /// The needle is on a line whose entry it would meet so far from it, and whose direction is that close to its own.
 const BESIDE_M: f64 = 1e-3;
 const TILT_RAD: f64 = 0.02;
-/// A stuck shaft is felt no stiffer: by trial with every hand of the envelope, links up to three ticks late, tissue up to 1.7 MPa
-/// (docs/stability.md, 19). The paper's gland has 0.42 N/mm.
+/// A stuck shaft is felt no stiffer: by trial with every hand of the envelope, links up to three ticks late, tissue up
+/// to 1.7 MPa (docs/stability.md, 19). The paper's gland has 0.42 N/mm.
 const STIFFEST_N_PER_M: f64 = 1000.0;
 /// Bone is felt like a spring of that: the stiffest that every hand of the envelope holds over a slow link.
 const BONE_N_PER_M: f64 = STIFFEST_N_PER_M;
@@ -43,32 +43,32 @@ const SLICES: usize = 8;
 /// Both halves of a line, one for each loop.
 #[derive(Clone, Debug)]
 pub struct ReadyLine {
-    /// For the force loop.
+    /// Half for the force loop.
     pub hand: Box<HandLine>,
-    /// For the tissue loop.
+    /// Half for the tissue loop.
     pub body: Box<BodyLine>,
-    /// Where it loads the body: lines that are prepared later are read there.
+    /// Stations at which it loads the body: lines that are prepared later are read there.
     pub stations: Arc<LineStations>,
 }
 
-/// What the force loop needs: how the stations move with the forces on them, and what has happened so far.
+/// Half of a line for the force loop: compliance of the stations, and their state.
 #[derive(Clone, Debug)]
 pub struct HandLine {
-    /// Rises with each line of a run, from 1.
+    /// Number of the line; rises with each line of a run, from 1.
     pub generation: u64,
     line: Line,
     way: LineLayers,
     pub(super) model: LineModel,
     pub(super) state: LineState,
-    /// What its ticks work in.
+    /// Work space of its ticks.
     scratch: Box<Scratch>,
-    /// How it moves with lines that were there when it was solved for.
+    /// Coupling with the lines that were there when it was solved for.
     pub(super) beside: Vec<Cross>,
-    /// Where the body was solved for forces across the line as well.
+    /// Bending, where the body was solved for forces across the line as well.
     bending: Option<Box<Bending>>,
 }
 
-/// What the layers on the way resist with.
+/// Resistance of the layers on the way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LayerForces {
     /// Membrane, cutting and friction of each kind.
@@ -79,9 +79,9 @@ pub struct LayerForces {
     pub cutting_gain: f64,
     /// Scales friction.
     pub shaft_gain: f64,
-    /// How all of the tissue goes on giving way.
+    /// Creep of all of the tissue.
     pub creep: [PronyTerm; 2],
-    /// How the needle bends.
+    /// Bending of the needle.
     pub bending: NeedleBending,
 }
 
@@ -104,7 +104,7 @@ pub enum LineError {
     /// No tissue on the way.
     #[error("the needle's line does not pass through tissue that gives way")]
     NoTissue,
-    /// It was no longer wanted.
+    /// Work that is no longer wanted.
     #[error("the needle's line was given up before it was ready")]
     Stopped,
     /// The layers of the scene give no line: every problem, one a line.
@@ -113,9 +113,9 @@ pub enum LineError {
 }
 
 impl ReadyLine {
-    /// Solves for a line of needle at rest; some seconds for a body of 20,000 elements. `layer_of` says what an element of `lattice`
-    /// is to a needle, and nothing of what no needle enters. `others` are the lines beside which the needle may come. `report` is called between slices of work and ends it by returning
-    /// false.
+    /// Solves for a line of needle at rest; some seconds for a body of 20,000 elements. `layer_of` says what an element
+    /// of `lattice` is to a needle, and nothing of what no needle enters. `others` are the lines that the needle may
+    /// come close to. `report` is called between slices of work and ends it by returning false.
     #[expect(
         clippy::too_many_arguments,
         reason = "each says one thing of the line that is wanted"
@@ -186,12 +186,12 @@ impl HandLine {
         })
     }
 
-    /// The straight way at rest.
+    /// Returns the straight line at rest.
     pub fn line(&self) -> &Line {
         &self.line
     }
 
-    /// Takes up the layers' forces, how the tissue creeps and how the needle bends; does not allocate.
+    /// Sets the layers' forces, the creep of the tissue and the bending of the needle; does not allocate.
     pub fn set_forces(&mut self, forces: &LayerForces) {
         let kinds = &self.way.kinds;
         self.model.set_layers(|n| kinds.get(n).map(|kind| layer(forces, kind)));
@@ -201,24 +201,24 @@ impl HandLine {
         }
     }
 
-    /// Whether a needle held like this goes in on this line.
+    /// Returns whether a needle held like this goes in on this line.
     pub fn is_met_by(&self, tip_m: &Vector3<f64>, direction: &Vector3<f64>) -> bool {
         self.line.is_met_by(tip_m, direction, BESIDE_M, TILT_RAD)
     }
 
-    /// How far the tip is along the line from the entry at rest, m.
+    /// Returns the distance of the tip along the line from the entry at rest, m.
     pub fn along_m(&self, tip_m: &Vector3<f64>) -> f64 {
         (tip_m - Vector3::from(self.line.entry_m)).dot(&Vector3::from(self.line.axes[0])) + self.state.grip_m
     }
 
-    /// One tick of the needle, whose tip goes no farther than the bone.
+    /// Advances by one tick of the needle, whose tip goes no farther than the bone.
     pub fn step(&mut self, tip_m: f64, dt_s: f64) -> LineOutput {
         let tip_m = tip_m - self.in_bone_m(tip_m);
         let input = LineInput { tip_m, dt_s };
         step_in(&self.model, &mut self.state, &input, &mut self.scratch)
     }
 
-    /// How far a hand wants the tip to be in bone, m; what is no number stays.
+    /// Returns how far a hand wants the tip to be in bone, m; a value that is not finite is passed through.
     pub fn in_bone_m(&self, tip_m: f64) -> f64 {
         match self.way.bone_m {
             Some(bone_m) if tip_m > bone_m => tip_m - bone_m,
@@ -226,44 +226,46 @@ impl HandLine {
         }
     }
 
-    /// Bone against a tip that is held so far in it: force on the hand against the line, N, and the energy in that, J.
+    /// Returns the force of bone on a tip that is held so far in it, on the hand and against the line, N, and its
+    /// energy, J.
     pub fn bone(&self, tip_m: f64) -> (f64, f64) {
         let in_bone_m = self.in_bone_m(tip_m);
         (BONE_N_PER_M * in_bone_m, 0.5 * BONE_N_PER_M * in_bone_m * in_bone_m)
     }
 
-    /// The tissue is displaced past the needle so far at each row, in the order of [`BodyLine::answer`], m: after so many ticks. Does not allocate.
+    /// Displaces the tissue past the needle, row by row, in the order of [`BodyLine::answer`], m, within so many ticks.
+    /// Does not allocate.
     pub fn displace_from_outside(&mut self, rows_m: &[f64], ticks: u32) {
         self.state.outside.set(rows_m, ticks);
     }
 
-    /// What the state is.
+    /// Returns the state of the line.
     pub fn state(&self) -> &LineState {
         &self.state
     }
 
-    /// The elastic energy of needle and tissue, J.
+    /// Returns the elastic energy of needle and tissue, J.
     pub fn elastic_j(&self) -> f64 {
         self.state.elastic_j(&self.model)
     }
 
-    /// Displacement of the material at the tip along the line, m.
+    /// Returns the displacement of the material at the tip along the line, m.
     pub fn tip_displacement_m(&self) -> f64 {
         let load_n: f64 = self.state.loads_n().iter().sum::<f64>() + self.state.whole_n();
         self.state.tip_displacement_m() - self.model.compliance().needle_m_per_n * load_n
     }
 
-    /// How far the body is moved as a whole by what a membrane passes on to it, along the line, m.
+    /// Returns the displacement of the body as a whole by the force that a membrane passes on to it, along the line, m.
     pub fn whole_m(&self) -> f64 {
         self.state.whole_n() * self.model.compliance().whole_m_per_n
     }
 
-    /// The tip has tissue before or around it.
+    /// Returns whether the tip has tissue before or around it.
     pub fn is_in_tissue(&self) -> bool {
         self.state.is_in_contact()
     }
 
-    /// Depth at which the membrane that holds the tip gives way; 0 where none does.
+    /// Returns the depth at which the membrane that holds the tip gives way; 0 where none does.
     pub fn puncture_depth_m(&self, held_by: Option<usize>) -> f64 {
         let depth_m = held_by
             .and_then(|n| self.model.layers.get(n))
@@ -271,35 +273,35 @@ impl HandLine {
         depth_m.filter(|d| d.is_finite()).unwrap_or(0.0)
     }
 
-    /// Tissue at rest, with the tracks that were open when the line was taken up.
+    /// Brings the tissue to rest, with the tracks that were open when the line was taken up.
     pub fn reset(&mut self) {
         self.state.reset();
     }
 
-    /// Tissue at rest that no needle has touched.
+    /// Brings the tissue to rest, as if no needle had touched it.
     pub fn forget(&mut self) {
         (self.state.open_m, self.state.open_layers) = (0.0, 0);
         self.state.reset();
     }
 
-    /// The tip presses on a membrane that is whole.
+    /// Returns whether the tip presses on a whole membrane.
     pub fn is_held_by_membrane(&self) -> bool {
         self.state.tip.held_by != 0 && self.state.tip.force_n > 0.0
     }
 
-    /// The hand holds the needle so far behind where its tip is, m.
+    /// Sets how far the hand holds the needle behind its tip, m.
     pub fn grip_ahead(&mut self, ahead_m: f64) {
         self.state.grip_m = ahead_m;
     }
 
-    /// A needle that was taken up again is from now on where the hand has it; for one that is out.
+    /// Returns a needle that was taken up again to the hand's place, once it is out.
     pub fn let_grip_go(&mut self) {
         self.state.grip_m = 0.0;
     }
 }
 
 impl Line {
-    /// The line on which a needle at `tip_m` goes in; `None` where there is no tissue on its way.
+    /// Returns the line on which a needle at `tip_m` goes in; `None` where there is no tissue on its way.
     pub fn into_body(lattice: &Lattice, tip_m: [f64; 3], direction: [f64; 3]) -> Option<Line> {
         let line = Line::new(tip_m, direction)?;
         let (low, high) = lattice.bounds_m();
@@ -331,7 +333,8 @@ impl Line {
         Line::new(line.point_m(inside_m, [0.0; 2]), direction)
     }
 
-    /// Whether a needle held like this would go in within `beside_m` of the entry and `tilt_rad` of the direction.
+    /// Returns whether a needle held like this would go in within `beside_m` of the entry and `tilt_rad` of the
+    /// direction.
     pub fn is_met_by(&self, tip_m: &Vector3<f64>, direction: &Vector3<f64>, beside_m: f64, tilt_rad: f64) -> bool {
         let axis = Vector3::from(self.axes[0]);
         let from_entry = tip_m - Vector3::from(self.entry_m);

@@ -1,4 +1,4 @@
-//! What a line remembers from tick to tick, and what one tick gives.
+//! State of a line from tick to tick, and the output of a tick.
 
 use super::beam::BeamState;
 use super::model::LineModel;
@@ -24,7 +24,7 @@ pub struct TipState {
     pub opened: u32,
     /// Layer whose membrane holds it, from 1; 0: none does.
     pub held_by: u32,
-    /// How far the tissue there was displaced when the tip met that membrane.
+    /// Displacement of the tissue there when the tip met that membrane.
     pub met_u_m: f64,
     /// The same, less what the body as a whole was.
     pub met_dent_m: f64,
@@ -33,7 +33,7 @@ pub struct TipState {
 /// Forces of one tick, N.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LineOutput {
-    /// Along the line, positive inwards: the needle is pushed out by what is negative.
+    /// Force on the hand along the line, positive inwards: a negative force pushes the needle out.
     pub force_on_hand_n: f64,
     /// Force of the tip on the tissue.
     pub tip_n: f64,
@@ -45,9 +45,10 @@ pub struct LineOutput {
     pub punctured: Option<usize>,
     /// Layer whose membrane holds the tip.
     pub held_by: Option<usize>,
-    /// Least length of a stretch of the line between two stations, over that at rest; below 0 the linear answer is folded.
+    /// Least length of a stretch of the line between two stations, over that at rest; below 0 the linear answer is
+    /// folded.
     pub least_stretch: f64,
-    /// Of the solver, all passes together; or products with the compliance.
+    /// Sweeps of the solver, all passes together; or products with the compliance.
     pub sweeps: u32,
     /// Largest correction that is left.
     pub residual_m: f64,
@@ -60,7 +61,8 @@ pub struct LineOutput {
 pub struct LineState {
     /// Force of each station of the shaft on the tissue.
     pub(super) shaft_n: Vec<f64>,
-    /// Where on the needle each station sticks: tip's place in the world less displacement of the station.
+    /// Place on the needle where each station sticks: the tip's place in the world less the displacement of the
+    /// station.
     pub(super) anchor_m: Vec<f64>,
     /// Displacement of the stations in contact, and of the material at the tip.
     pub(super) u_m: Vec<f64>,
@@ -71,25 +73,25 @@ pub struct LineState {
     pub(super) tip_range: std::ops::Range<usize>,
     #[serde(with = "BigArray")]
     pub(super) tip_weights: [f64; 64],
-    /// How each station in contact moves with the tip's force, and how the tip does.
+    /// Displacement of each station in contact, and of the tip, by the tip's force.
     pub(super) tip_column: Vec<f64>,
     pub(super) tip_own: f64,
-    /// What the dent that a membrane was met with adds to the tip's displacement, m.
+    /// Displacement that the dent under the membrane adds to the tip's, m.
     pub(super) tip_offset_m: f64,
     /// Stiffness of the membrane that holds the tip, beyond that of the tissue under it, N/m.
     pub(super) membrane_n_per_m: f64,
-    /// How much of the tip's force goes to the body as a whole, by the membrane that holds it, N.
+    /// Part of the tip's force that the membrane passes on to the body as a whole, N.
     pub(super) whole_n: f64,
     pub(super) memory: Memory,
     /// Forces and track across the line, of a needle that bends.
     pub(super) beam: BeamState,
-    /// How far the needles beside it move the body as a whole along the line, m.
+    /// Displacement of the body as a whole along the line by the other needles, m.
     pub(super) beside_whole_m: f64,
-    /// The last tick was one beside other needles: what they move is in the memory's offset.
+    /// Set after a tick with other needles: their displacement is in the memory's offset.
     pub(super) is_beside: bool,
-    /// How the probe moves the tissue past the needle.
+    /// Displacement of the tissue past the needle by the probe.
     pub(super) outside: ExternalDisplacement,
-    /// How far the tip is ahead of where the hand has it: a needle that was taken up again, m.
+    /// Distance of the tip ahead of the hand's, after a needle was taken up again, m.
     pub(super) grip_m: f64,
     /// End of a track that an earlier needle cut where this line lies, and the layers that it opened.
     pub(super) open_m: f64,
@@ -99,12 +101,12 @@ pub struct LineState {
 }
 
 impl LineState {
-    /// Tissue at rest that no needle has touched.
+    /// Makes the state of tissue at rest that no needle has touched.
     pub fn new(model: &LineModel) -> Self {
         Self::filled(model.compliance.stations, 0.0)
     }
 
-    /// Outside; every vector but the memory's is of that value.
+    /// Makes the state outside; every vector but the memory's is filled with that value.
     fn filled(stations: usize, value: f64) -> Self {
         let each = || vec![value; stations];
         LineState {
@@ -137,22 +139,22 @@ impl LineState {
         }
     }
 
-    /// What the columns are multiplied with: newtons of each shaft station, then of the tip at each.
+    /// Returns the factors of the columns: newtons of each shaft station, then of the tip at each.
     pub fn loads_n(&self) -> &[f64] {
         &self.loads_n
     }
 
-    /// The tip: membrane, cutting, track.
+    /// Returns the state of the tip: membrane, cutting, track.
     pub fn tip(&self) -> &TipState {
         &self.tip
     }
 
-    /// Force of each shaft station on the tissue.
+    /// Returns the force of each shaft station on the tissue.
     pub fn shaft_n(&self) -> &[f64] {
         &self.shaft_n
     }
 
-    /// Elastic energy of the tissue, in joules.
+    /// Returns the elastic energy of the tissue, in joules.
     pub fn stored_j(&self, model: &LineModel) -> f64 {
         let m = model.compliance.stations;
         let rows = &model.compliance.rows;
@@ -170,22 +172,22 @@ impl LineState {
         at_once + self.memory.stored_j(rows, common_m_per_n, &model.settings.prony)
     }
 
-    /// The part of the tip's force that moves the body as a whole and is not among the loads, N.
+    /// Returns the part of the tip's force that moves the body as a whole and is not among the loads, N.
     pub fn whole_n(&self) -> f64 {
         self.whole_n
     }
 
-    /// Displacement of the material at the tip along the line, m.
+    /// Returns the displacement of the material at the tip along the line, m.
     pub fn tip_displacement_m(&self) -> f64 {
         self.tip_u_m
     }
 
-    /// The tip presses on tissue or is in it.
+    /// Returns whether the tip presses on tissue or is in it.
     pub fn is_in_contact(&self) -> bool {
         self.in_contact > 0 || self.tip.force_n > 0.0
     }
 
-    /// Tissue at rest, with the tracks that were open before the line was taken up; does not allocate.
+    /// Brings the tissue to rest, with the tracks that were open before the line was taken up; does not allocate.
     pub fn reset(&mut self) {
         for field in [
             &mut self.shaft_n,
@@ -215,7 +217,7 @@ impl LineState {
         self.last = LineOutput::default();
     }
 
-    /// The needle holds nothing any more; its track stays.
+    /// Clears the forces of the needle; its track stays.
     pub(super) fn clear_loads(&mut self) {
         self.shaft_n.fill(0.0);
         self.loads_n.fill(0.0);
@@ -224,7 +226,7 @@ impl LineState {
         self.tip.material_m = self.tip.material_m.min(0.0);
     }
 
-    /// The needle is alone from now on.
+    /// Forgets the other needles.
     pub(super) fn forget_others(&mut self) {
         if std::mem::take(&mut self.is_beside) {
             self.memory.offset_m.fill(0.0);

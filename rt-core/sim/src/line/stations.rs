@@ -4,29 +4,29 @@ use crate::tissue::fem::Compiled;
 use crate::tissue::fem::batch::{BatchModel, NodeWeight};
 use serde::{Deserialize, Serialize};
 
-/// What the lattice spreads a patch by, in squares of its spacing: 2 by the variance of trilinear weights, less by measurement
-/// (own compliance 2.7 to 3 % too large with 2, against the rigid sphere).
+/// Spread of a patch by the lattice, in squares of its spacing: 2 by the variance of trilinear weights, less by
+/// measurement (own compliance 2.7 to 3 % too large with 2, against the rigid sphere).
 const SPREAD: f64 = 1.2;
 /// Samples of a station's length, and around the needle.
 const ALONG: usize = 4;
 const AROUND: usize = 8;
 /// Samples across the patch that the tip loads.
 const ACROSS: usize = 8;
-/// Edge of a cube whose even load moves it on average as the same force moves a rigid sphere of radius 1: the mean of 1 / r
-/// over all pairs of points of a unit cube.
+/// Edge of a cube whose even load moves it on average as the same force moves a rigid sphere of radius 1: the mean of 1
+/// / r over all pairs of points of a unit cube.
 const CUBE_PER_RADIUS: f64 = 1.882_312_645;
 
 /// A straight way in the scene frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
-    /// Where it enters the body.
+    /// Place where it enters the body.
     pub entry_m: [f64; 3],
     /// Unit vectors: inwards, and two across.
     pub axes: [[f64; 3]; 3],
 }
 
 impl Line {
-    /// `None` where a number is not finite or the direction has no length.
+    /// Makes a line; `None` where a number is not finite or the direction has no length.
     pub fn new(entry_m: [f64; 3], direction: [f64; 3]) -> Option<Line> {
         let along = nalgebra::Vector3::from(direction).try_normalize(1e-9)?;
         let least = (0..3).min_by(|&a, &b| along[a].abs().total_cmp(&along[b].abs()))?;
@@ -41,14 +41,14 @@ impl Line {
         })
     }
 
-    /// The point so far along, and so far across.
+    /// Returns the point so far along, and so far across.
     pub fn point_m(&self, along_m: f64, across_m: [f64; 2]) -> [f64; 3] {
         let [t, a, b] = &self.axes;
         [0, 1, 2].map(|c| self.entry_m[c] + along_m * t[c] + across_m[0] * a[c] + across_m[1] * b[c])
     }
 }
 
-/// How a needle loads what it goes through.
+/// Loads of a needle on the tissue along its way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StationSettings {
     /// Distance of stations; about the lattice's.
@@ -60,8 +60,8 @@ pub struct StationSettings {
 }
 
 impl StationSettings {
-    /// An 18 G needle, a station for each element on the way. The tip's radius is that of what it presses before it cuts
-    /// (assumed): with its own 0.6 mm, 1.5 N would move soft tissue by 22 mm.
+    /// Returns the settings of an 18 G needle, a station for each element on the way. The tip's radius is that of what
+    /// it presses before it cuts (assumed): with its own 0.6 mm, 1.5 N would move soft tissue by 22 mm.
     pub fn of_lattice(spacing_m: f64) -> Self {
         StationSettings {
             spacing_m,
@@ -76,7 +76,7 @@ impl StationSettings {
 pub struct Stations {
     /// The line that the stations lie on.
     pub line: Line,
-    /// What they were made with.
+    /// Settings that they were made with.
     pub settings: StationSettings,
     /// Nodes and weights, which add up to 1, of the shaft in each station.
     pub shaft: Vec<Vec<(u32, f64)>>,
@@ -87,7 +87,7 @@ pub struct Stations {
 }
 
 impl Stations {
-    /// As many stations as lie inside the body from the entry on, `most` at most.
+    /// Makes as many stations as lie inside the body from the entry on, `most` at most.
     pub fn along<T: Compiled>(model: &BatchModel<T>, line: Line, settings: StationSettings, most: usize) -> Stations {
         let mut stations = Stations {
             line,
@@ -117,12 +117,12 @@ impl Stations {
         stations
     }
 
-    /// How many stations there are.
+    /// Returns the number of stations.
     pub fn count(&self) -> usize {
         self.shaft.len()
     }
 
-    /// Places of the samples around the needle, across its axis.
+    /// Returns the places of the samples around the needle, across its axis.
     pub(super) fn around_m(&self) -> [[f64; 2]; AROUND] {
         std::array::from_fn(|n| {
             let (sine, cosine) = (std::f64::consts::TAU * (n as f64 + 0.5) / AROUND as f64).sin_cos();
@@ -135,7 +135,7 @@ impl Stations {
         self.mean(model, middle_m, &across)
     }
 
-    /// The patch is narrower than its cube by what trilinear weights spread it.
+    /// Returns the weights of the tip's patch, which is narrower than its cube by the spread of trilinear weights.
     fn tip_weights<T: Compiled>(&self, model: &BatchModel<T>, middle_m: f64) -> Vec<(u32, f64)> {
         // So many samples have that much less variance than the box that they stand for.
         let edge_m = self.patch_edge_m(model.spacing_m()) / (1.0 - 1.0 / (ACROSS * ACROSS) as f64).sqrt();
@@ -144,13 +144,13 @@ impl Stations {
         self.mean(model, middle_m, &across)
     }
 
-    /// Edge of the box that is spread over the lattice to load it as the tip does.
+    /// Returns the edge of the box that is spread over the lattice to load it as the tip does.
     pub fn patch_edge_m(&self, lattice_spacing_m: f64) -> f64 {
         let cube_m = CUBE_PER_RADIUS * self.settings.tip_radius_m;
         (cube_m.powi(2) - SPREAD * lattice_spacing_m.powi(2)).max(0.0).sqrt()
     }
 
-    /// Mean of trilinear weights over samples; those outside the body do not count.
+    /// Returns the mean of trilinear weights over samples; those outside the body do not count.
     fn mean<T: Compiled>(&self, model: &BatchModel<T>, middle_m: f64, across: &[[f64; 2]]) -> Vec<(u32, f64)> {
         let mut all = Vec::new();
         let mut count = 0.0;

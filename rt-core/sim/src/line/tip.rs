@@ -10,9 +10,9 @@ const LEAST_KEPT: f64 = 0.02;
 const SAME_M: f64 = 1e-9;
 /// The tip's place is found to this.
 const PLACE_M: f64 = 1e-11;
-/// Where tissue in front is pressed together so far, a step through it counts at most so many times its length.
+/// Largest factor by which a step through compressed tissue in front counts more than its length.
 const MOST_PRESSED: f64 = 10.0;
-/// Between two places close together, the gap closes by so much of the way between them.
+/// Share of the way between two close places by which the gap closes at least.
 const LEAST_CLOSED: f64 = 0.25;
 const MOST_CLOSED: f64 = 3.0;
 /// Part of the gap that is left when the way to the second place was the right one.
@@ -20,12 +20,12 @@ const LEFT: f64 = 0.5;
 /// Stations around the tip that a pass can reach.
 const WINDOW: usize = 64;
 
-/// What is in front of the tip.
+/// Tissue in front of the tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Front {
-    /// Force at which the tip goes on.
+    /// Force at which the tip advances.
     pub limit_n: f64,
-    /// How far it may go on with that.
+    /// Place up to which it may advance with that.
     pub to_m: f64,
     /// Layer whose membrane holds it.
     pub membrane: Option<usize>,
@@ -66,8 +66,8 @@ impl LineModel {
         }
     }
 
-    /// What a membrane leaves of the dent that a force makes under it, from 0 to 1; `None` where it gives way by force alone.
-    /// `own` is how far the tip moves the tissue without it, m/N.
+    /// Returns the share that a membrane leaves of the dent that a force makes under it, from 0 to 1; `None` where it
+    /// gives way by force alone. `own` is the displacement of the tissue by the tip without it, m/N.
     pub(super) fn kept_of_dent(&self, layer: usize, own: f64) -> Option<f64> {
         let layer = self.layers.get(layer)?;
         let wanted = layer.puncture_depth_m / layer.puncture_force_n;
@@ -75,7 +75,7 @@ impl LineModel {
         (wanted.is_finite() && own > whole).then(|| ((wanted - whole) / (own - whole)).clamp(LEAST_KEPT, 1.0))
     }
 
-    /// First station and weights of the tip's load where it is; they add up to 1, or to 0 outside.
+    /// Computes the first station and the weights of the tip's load at its place; they add up to 1, or to 0 outside.
     pub(super) fn tip_weights(&self, place_m: f64, weights: &mut [f64; WINDOW]) -> std::ops::Range<usize> {
         let (ds, m) = (self.compliance.spacing_m, self.compliance.stations);
         if !(0.0..=self.length_m()).contains(&place_m) {
@@ -108,7 +108,7 @@ struct Around<'a> {
 }
 
 impl<'a> Around<'a> {
-    /// So far before and behind the tip.
+    /// Makes the stretch so far before and behind the tip.
     fn new(model: &'a LineModel, state: &LineState, reach_m: f64) -> Self {
         let c = &model.compliance;
         let half_m = 0.5 * c.tip_length_m.max(c.spacing_m) + reach_m;
@@ -132,13 +132,13 @@ impl<'a> Around<'a> {
         around
     }
 
-    /// Where a tip at this place of the material is in the world, less `tip_m`.
+    /// Returns where a tip at this place of the material is in the world, less `tip_m`.
     fn beyond_m(&self, place_m: f64, tip_m: f64) -> f64 {
         let mut weights = [0.0; WINDOW];
         let range = self.model.tip_weights(place_m, &mut weights);
         let c = &self.model.compliance;
         let mut u_m = 0.0;
-        // On the way in the shaft follows with friction of its own.
+        // On the way in the shaft follows with its own friction.
         let last = ((place_m / c.spacing_m) as usize).min(c.stations - 1);
         let friction = self.gain * self.model.friction_n_per_m[last] * (place_m - self.from_m).max(0.0);
         for (n, weight) in range.clone().zip(&weights) {
@@ -158,15 +158,16 @@ pub(super) struct Place {
     pub gap_m: f64,
 }
 
-/// Where the gap closes if it goes on changing as it did from the place before to this one; `None` where that says nothing.
+/// Returns where the gap closes if it keeps changing as it did from the place before to this one; `None` where these do
+/// not tell.
 fn onward_m(before: Place, now: Place) -> Option<f64> {
     let closed = (before.gap_m - now.gap_m) / (now.material_m - before.material_m);
     let is_plain = (LEAST_CLOSED..MOST_CLOSED).contains(&closed) && now.gap_m.abs() < LEFT * before.gap_m.abs();
     is_plain.then(|| now.material_m + now.gap_m / closed)
 }
 
-/// Moves the tip through the material to where the world has it, but not past `to_m`; returns whether it moved. `before` is the
-/// place that was tried before with the same front.
+/// Moves the tip through the material to where the world has it, but not past `to_m`; returns whether it moved.
+/// `before` is the place that was tried before with the same front.
 pub(super) fn follow(
     model: &LineModel,
     state: &mut LineState,
@@ -185,10 +186,10 @@ pub(super) fn follow(
     place_m != now.material_m
 }
 
-/// The nearest place that is where the world has the tip, by the present loads.
+/// Returns the nearest place that is where the world has the tip, by the present loads.
 fn nearest_m(model: &LineModel, state: &LineState, tip_m: f64, to_m: f64, now: Place) -> f64 {
     let (from_m, gap_m) = (now.material_m, now.gap_m);
-    // One pass goes no further than some stations; the next goes on.
+    // One pass goes no further than some stations; the next continues.
     let reach_m = (MOST_PRESSED * gap_m.abs()).min(8.0 * model.compliance.spacing_m);
     let around = Around::new(model, state, reach_m);
     let furthest_m = if gap_m > 0.0 {
@@ -200,7 +201,8 @@ fn nearest_m(model: &LineModel, state: &LineState, tip_m: f64, to_m: f64, now: P
     root(&around, tip_m, from_m, gap_m, furthest_m)
 }
 
-/// Place between `from_m` and `furthest_m` that is at `tip_m` in the world, the nearest found; or `furthest_m`.
+/// Returns the place between `from_m` and `furthest_m` that is at `tip_m` in the world, the nearest found; or
+/// `furthest_m`.
 fn root(around: &Around, tip_m: f64, from_m: f64, gap_m: f64, furthest_m: f64) -> f64 {
     let sign = gap_m.signum();
     let short = |place_m: f64| -sign * around.beyond_m(place_m, tip_m);

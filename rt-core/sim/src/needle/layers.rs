@@ -5,7 +5,7 @@ use crate::settings::{Problem, Problems};
 use serde::{Deserialize, Serialize};
 use stylet_anatomy::Organ;
 
-/// What the tip is in. The numbers are stable: they index [`Layers`] and appear between the loops.
+/// Kind of layer. The numbers are stable: they index [`Layers`] and appear between the loops.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[repr(u32)]
 pub enum LayerKind {
@@ -14,14 +14,14 @@ pub enum LayerKind {
     Gland = 0,
     /// Skin and perineum.
     Perineum = 1,
-    /// Fat and whatever else has no membrane of its own.
+    /// Fat and other tissue without a membrane.
     Surroundings = 2,
     /// Wall of a hollow organ: urethra, bladder, rectum.
     Wall = 3,
 }
 
 impl LayerKind {
-    /// What a structure of a scene is to the needle: by its role, and skin by its name.
+    /// Returns the kind of layer of a structure: by its role, and skin by its name.
     pub fn of_structure(structure: &Structure) -> LayerKind {
         let is_skin = [Organ::Skin, Organ::Perineum]
             .iter()
@@ -45,14 +45,14 @@ pub struct Layer {
     pub puncture_depth_m: f64,
     /// Height of `F_R` (eq. 10): what the membrane resists with when it gives way.
     pub puncture_force_n: f64,
-    /// What the tip resists with while it cuts.
+    /// Resistance at the tip while it cuts.
     pub cutting_force_n: f64,
     /// `K_f` of eq. 9: friction for each metre of shaft in this layer.
     pub shaft_friction_n_per_m: f64,
 }
 
 impl Layer {
-    /// In order of [`LayerKind`]; sources in `docs/physics.md`.
+    /// Default layers in order of [`LayerKind`]; sources in `docs/physics.md`.
     pub const DEFAULTS: [Layer; LAYER_COUNT] = [
         Layer {
             puncture_depth_m: 8e-3,
@@ -80,7 +80,7 @@ impl Layer {
         },
     ];
 
-    /// Whether there is a membrane to puncture.
+    /// Returns whether there is a membrane to puncture.
     pub fn has_membrane(&self) -> bool {
         self.puncture_depth_m > 0.0
     }
@@ -125,12 +125,12 @@ const KEYS: [[&str; 4]; LAYER_COUNT] = [
 ];
 
 impl Layers {
-    /// The layer of one kind.
+    /// Returns the layer of one kind.
     pub fn of(&self, kind: LayerKind) -> Layer {
         self.0.get(kind as usize).copied().unwrap_or(Layer::DEFAULTS[0])
     }
 
-    /// Every setting that cannot be used, or `Ok`.
+    /// Returns every setting that cannot be used, or `Ok`.
     pub fn validate(&self) -> Result<(), Vec<Problem>> {
         let mut problems = Problems::default();
         for (layer, keys) in self.0.iter().zip(KEYS) {
@@ -142,7 +142,7 @@ impl Layers {
         problems.finish()
     }
 
-    /// The largest force that any membrane gives, which a force scale has to fit to the device.
+    /// Returns the largest force that any membrane gives, which a force scale has to fit to the device.
     pub fn largest_puncture_force_n(&self) -> f64 {
         self.0.iter().map(|layer| layer.puncture_force_n).fold(0.0, f64::max)
     }

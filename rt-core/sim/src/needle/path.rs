@@ -1,4 +1,4 @@
-//! What the shaft is in: the layers along the needle's path, from the place of contact inwards.
+//! Path of the shaft: the layers that it is in, from the place of contact inwards.
 
 use super::layers::{Layer, LayerKind, Layers};
 use serde::{Deserialize, Serialize};
@@ -9,11 +9,11 @@ pub const MAX_SECTIONS: usize = 8;
 /// A stretch of the path in one layer.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Section {
-    /// What the layer is.
+    /// Kind of the layer.
     pub kind: LayerKind,
     /// Number under which the tissue loop announced it.
     pub number: u64,
-    /// Where it was met, along the path from the place of contact.
+    /// Place where it was met, along the path from the place of contact.
     pub entry_m: f64,
     /// Its membrane is open, or it has none.
     pub open: bool,
@@ -52,18 +52,18 @@ impl NeedlePath {
         self.sections.get(..self.count).unwrap_or(&[])
     }
 
-    /// The number of the innermost section; 0 outside.
+    /// Returns the number of the innermost section; 0 outside.
     pub fn innermost(&self) -> u64 {
         self.sections().last().map_or(0, |s| s.number)
     }
 
-    /// The largest number met, left again or not.
+    /// Returns the largest number met, left again or not.
     pub fn seen(&self) -> u64 {
         self.seen
     }
 
-    /// The tip has met `kind` at `entry_m`. Numbers rise; an old one changes nothing.
-    /// Returns whether the number is new.
+    /// Enters `kind`, which the tip has met at `entry_m`. Numbers rise; an old one changes nothing. Returns whether the
+    /// number is new.
     pub fn meet(&mut self, layers: &Layers, kind: LayerKind, number: u64, entry_m: f64) -> bool {
         if number <= self.seen || !entry_m.is_finite() {
             return false;
@@ -88,7 +88,7 @@ impl NeedlePath {
         let before = self.count;
         while let [_, .., inner] = self.sections() {
             let edge_m = inner.entry_m - if inner.open { hysteresis_m } else { 0.0 };
-            // What is not a number leaves nothing.
+            // NaN leaves nothing.
             if along_m > edge_m || along_m.is_nan() {
                 break;
             }
@@ -97,14 +97,14 @@ impl NeedlePath {
         self.count < before
     }
 
-    /// The membrane in front gave way.
+    /// Opens the membrane in front.
     pub fn open(&mut self) {
         if let Some(section) = self.count.checked_sub(1).and_then(|last| self.sections.get_mut(last)) {
             section.open = true;
         }
     }
 
-    /// `along_m` from the place of contact. `None` outside.
+    /// Returns the membrane in front of a tip `along_m` from the place of contact. `None` outside.
     pub fn front(&self, layers: &Layers, along_m: f64) -> Option<Front> {
         let innermost = self.sections().last()?;
         let with_membrane = |s: &&Section| layers.of(s.kind).has_membrane();
@@ -122,8 +122,8 @@ impl NeedlePath {
         })
     }
 
-    /// Friction that the shaft can have at `along_m`: the sum of `K_f` times length over the layers. A layer
-    /// whose membrane is whole does not touch the shaft.
+    /// Returns the friction that the shaft can have at `along_m`: the sum of `K_f` times length over the layers. A
+    /// layer whose membrane is whole does not touch the shaft.
     pub fn shaft_friction_n(&self, layers: &Layers, along_m: f64) -> f64 {
         let ends = self.sections().iter().skip(1).map(|s| s.entry_m).chain([along_m]);
         let friction = |(section, end_m): (&Section, f64)| {
@@ -142,7 +142,7 @@ impl NeedlePath {
 mod tests {
     use super::*;
 
-    /// Perineum at 0, fat at 30 mm, gland at 50 mm.
+    /// Returns a path through perineum at 0, fat at 30 mm, gland at 50 mm.
     fn through() -> (Layers, NeedlePath) {
         let layers = Layers::default();
         let mut path = NeedlePath::default();

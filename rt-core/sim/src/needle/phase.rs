@@ -1,4 +1,4 @@
-//! How much of the needle's motion the held tissue follows (paper eq. 6, 7), and when a membrane gives way.
+//! Share of the needle's motion that the held tissue follows (paper eq. 6, 7), and puncture of membranes.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -26,8 +26,8 @@ pub struct NeedleParameters {
 }
 
 impl Default for NeedleParameters {
-    /// A capsule that gives way at 8 mm, tissue that follows for about 14 mm behind it, and the mean clinical tip
-    /// speed (48 mm/s) well below the speed at which the tissue follows less.
+    /// Returns a capsule that gives way at 8 mm, tissue that follows for about 14 mm behind it, and the mean clinical
+    /// tip speed (48 mm/s) well below the speed at which the tissue follows less.
     fn default() -> Self {
         Self {
             puncture_depth_m: 8e-3,
@@ -42,7 +42,7 @@ impl Default for NeedleParameters {
 }
 
 impl NeedleParameters {
-    /// Every setting that cannot be used, or `Ok`.
+    /// Returns every setting that cannot be used, or `Ok`.
     pub fn validate(&self) -> Result<(), Vec<Problem>> {
         let mut problems = Problems::default();
         problems.range("needle.puncture_depth_m", self.puncture_depth_m, 1e-4, 0.05);
@@ -61,7 +61,7 @@ impl NeedleParameters {
     }
 }
 
-/// What the needle does to the tissue. The numbers are stable: they appear in records.
+/// Phase of needle and tissue. The numbers are stable: they appear in records.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[repr(u32)]
 pub enum Phase {
@@ -74,7 +74,7 @@ pub enum Phase {
     Penetration = 2,
     /// The tip comes out.
     Retraction = 3,
-    /// In the tissue, at rest.
+    /// Needle in the tissue, at rest.
     Hold = 4,
 }
 
@@ -98,10 +98,10 @@ pub struct NeedleInput {
     pub tip_step_m: Vector3<f64>,
 }
 
-/// What follows from it.
+/// Outcome of one tick of the needle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NeedleOutput {
-    /// What the needle does to the tissue.
+    /// Interaction of needle and tissue.
     pub phase: Phase,
     /// The membrane gave way in this tick.
     pub puncture: bool,
@@ -111,14 +111,14 @@ pub struct NeedleOutput {
     pub held_step_m: Vector3<f64>,
 }
 
-/// What one membrane remembers.
+/// State of one membrane.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct NeedleState {
     /// Phase of the last tick.
     pub phase: Phase,
     /// The membrane is open.
     pub punctured: bool,
-    /// How many membranes gave way.
+    /// Number of membranes that gave way.
     pub punctures: u32,
 }
 
@@ -155,7 +155,7 @@ pub fn step(parameters: &NeedleParameters, state: &mut NeedleState, input: &Need
     }
 }
 
-/// Puncture is a crossing of `u_cri`, once; the membrane closes when the tip is clear of it.
+/// Returns whether the tip crosses `u_cri`, which happens once; the membrane closes when the tip is clear of it.
 fn crosses_membrane(parameters: &NeedleParameters, state: &mut NeedleState, depth_m: f64) -> bool {
     if state.punctured {
         state.punctured = depth_m > -parameters.hysteresis_m;
@@ -181,7 +181,7 @@ fn phase(parameters: &NeedleParameters, state: &NeedleState, input: &NeedleInput
     }
 }
 
-/// Paper eq. 6: the part of the tip's step that the held element follows, in 0..=1.
+/// Returns the share of the tip's step that the held element follows, in 0..=1 (paper eq. 6).
 ///
 /// In `Hold` the tissue sticks to the needle, so it follows what little the tip creeps; the steps of a
 /// trembling tip then sum to nothing. The depth past `u_cri` does not count below zero.

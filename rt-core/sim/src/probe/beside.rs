@@ -1,6 +1,7 @@
 //! Needle lines beside the probe: how the rows of each and the pads of the wall displace each other.
 //!
-//! What a row does to a pad is what a pad does to the row, since both are read from one table: the body gives both the same work.
+//! What a row does to a pad is what a pad does to the row, since both are read from one table: the body gives both the
+//! same work.
 
 use crate::line::MAX_LEFT;
 use crate::line::MAX_STATIONS;
@@ -18,7 +19,8 @@ struct LineOnWall {
     /// Number of the line; 0 is none.
     generation: u64,
     rows: usize,
-    /// How each of the pads' rows moves with a newton at each row of the line, m/N: one row of the line after another.
+    /// Displacement of each of the pads' rows by a newton at each row of the line, m/N: one row of the line after
+    /// another.
     table: Vec<f32>,
 }
 
@@ -30,7 +32,7 @@ pub(super) struct LinesBeside {
 }
 
 impl LinesBeside {
-    /// Of a wall with so many rows.
+    /// Makes room for a wall with so many rows.
     pub fn with_room(pads: usize) -> Self {
         let line = || {
             let mut table = vec![1.0; ROWS * pads];
@@ -90,7 +92,7 @@ impl LinesBeside {
         }
     }
 
-    /// How far loads on the pads displace the rows of a line along it, m; says how many there are.
+    /// Computes the displacement of the rows of a line by loads on the pads, along it, m; returns the number of rows.
     pub fn displace_line(&self, generation: u64, loads_n: &[f64], rows_m: &mut [f64]) -> usize {
         let Some(line) = self.find(generation) else { return 0 };
         for (moved_m, row) in rows_m.iter_mut().zip(line.rows_with(self.pads)) {

@@ -1,12 +1,13 @@
 //! How points of the wall move with forces on points, by loads on the pads alone: `B = S C^-1 S'`.
 //!
-//! `S` is how points move with a newton on each pad, `C` how pads do. A force on a point is put on the pads as `C^-1 S'` says: of all loads on pads these
-//! move the points to where the force wants them with the least work. The points then move by exactly `B` in the body, wherever they lie between pads,
-//! and the work at points is that at pads.
+//! `S` is how points move with a newton on each pad, `C` how pads do. A force on a point is put on the pads as `C^-1
+//! S'` says: of all loads on pads these move the points to where the force wants them with the least work. The points
+//! then move by exactly `B` in the body, wherever they lie between pads, and the work at points is that at pads.
 
 use nalgebra::{Cholesky, DMatrix, Dyn};
 
-/// Of the mean of the diagonal of `C`: pads share elements of a coarse body, and columns are solved to a residual of 1 %.
+/// Addition to the diagonal, over the mean of that of `C`: pads share elements of a coarse body, and columns are solved
+/// to a residual of 1 %.
 const RIDGE: f64 = 1e-4;
 const MOST_RIDGE: f64 = 1.0;
 
@@ -14,12 +15,13 @@ const MOST_RIDGE: f64 = 1.0;
 pub(super) struct PointCompliance {
     /// Loads of the pads' rows by a newton on each row of the points: one row of the points after another.
     pub shares: Vec<f32>,
-    /// How all points move along x, y, z with a newton on each point along x, y, z, m/N: one row of so many after another.
+    /// Displacement of all points along x, y, z by a newton on each point along x, y, z, m/N: one row of so many after
+    /// another.
     pub rows: Vec<f32>,
 }
 
 impl PointCompliance {
-    /// `answers` is `S`, `compliance` `C`, both row after row of so many columns.
+    /// Computes `B`; `answers` is `S`, `compliance` `C`, both row after row of so many columns.
     pub fn of(answers: &[f64], compliance: &[f64], rows: usize) -> Self {
         let points = answers.len() / rows.max(1) / 3;
         let answers = DMatrix::from_row_slice(3 * points, rows, answers);

@@ -8,7 +8,7 @@ use super::response::ProbeResponse;
 use super::shape::ProbePose;
 use crate::tissue::{ElementField, PackedField};
 
-/// Made beside the loops; nothing is allocated after that.
+/// Probe in a body, made outside the loops; nothing is allocated after that.
 #[derive(Clone, Debug)]
 pub struct BodyProbe {
     ready: ReadyProbe,
@@ -20,18 +20,19 @@ pub struct BodyProbe {
     share: ElementField,
     /// Loads that the share was made from.
     shared_n: Vec<f64>,
-    /// Those that the next one is made from, and how many of its parts are.
+    /// Loads that the next displacement is made from, and how many of its parts are ready.
     coming_n: Vec<f64>,
     made: usize,
     parts: usize,
 }
 
-/// A body is added up over several ticks, so many elements in each where that takes no more ticks than this: the picture is late by them, the force is not.
+/// A body is added up over several ticks, so many elements in each where that takes no more ticks than this: the
+/// picture is late by them, the force is not.
 const ELEMENTS_A_TICK: usize = 2_048;
 const MOST_PARTS: usize = 14;
 
 impl BodyProbe {
-    /// Out of the body.
+    /// Makes the probe out of the body.
     pub fn new(ready: ReadyProbe) -> Self {
         let rows = ready.rows();
         let elements = ready.solved.columns.first().map_or(0, PackedField::elements);
@@ -49,51 +50,52 @@ impl BodyProbe {
         }
     }
 
-    /// What it can press.
+    /// Returns the wall and columns that it presses.
     pub fn ready(&self) -> &ReadyProbe {
         &self.ready
     }
 
-    /// What it answered last.
+    /// Returns the last answer.
     pub fn response(&self) -> &ProbeResponse {
         &self.response
     }
 
-    /// What came of the last tick.
+    /// Returns the report of the last tick.
     pub fn report(&self) -> ContactReport {
         self.state.report()
     }
 
-    /// Displacement of the body by the probe, m.
+    /// Returns the displacement of the body by the probe, m.
     pub fn share(&self) -> &ElementField {
         &self.share
     }
 
-    /// It presses the wall, or did in the tick before.
+    /// Returns whether it presses the wall, or did in the tick before.
     pub fn displaces(&self) -> bool {
         self.shared_n.iter().any(|n| *n != 0.0)
     }
 
-    /// No other load displaces the wall, and lines that are not kept are forgotten.
+    /// Removes every other load from the wall, and forgets lines that are not kept.
     pub fn nothing_beside(&mut self, is_kept: impl Fn(u64) -> bool) {
         self.lines.keep(is_kept);
         self.beside_m.fill(0.0);
     }
 
-    /// The loads on a line displace the wall as well: by its columns, of the same body; those of another do not count. Reads these columns where the
-    /// line is new.
+    /// Displaces the wall by the loads on a line: by its columns, of the same body; those of another do not count.
+    /// Reads these columns where the line is new.
     pub fn beside(&mut self, generation: u64, columns: &[PackedField], loads_n: &[f64]) {
         let own = self.ready.solved.columns.first().map(PackedField::elements);
         self.lines.join(generation, columns, &self.ready.elements, own);
         self.lines.displace_pads(generation, loads_n, &mut self.beside_m);
     }
 
-    /// How far the probe displaces the rows of a line along it, in the order of its columns, m; says how many there are.
+    /// Computes the displacement of the rows of a line by the probe, in the order of its columns, along it, m; returns
+    /// the number of rows.
     pub fn displace_line(&self, generation: u64, rows_m: &mut [f64]) -> usize {
         self.lines.displace_line(generation, self.state.loads_n(), rows_m)
     }
 
-    /// How far needles displace each pad in this tick, along x, y, z, m.
+    /// Returns the displacement of each pad by needles in this tick, along x, y, z, m.
     pub fn beside_m(&self) -> &[f64] {
         &self.beside_m
     }
@@ -103,7 +105,8 @@ impl BodyProbe {
         self.state.loads_n()
     }
 
-    /// Keeps what this tick leaves to the next. Allocates nothing where the room is of this probe; else there is no probe in it.
+    /// Keeps what this tick leaves to the next. Allocates nothing where the room is of this probe; else there is no
+    /// probe in it.
     pub fn save(&self, to: &mut ProbeMemory) {
         let rows = self.shared_n.len();
         let fits =
@@ -121,7 +124,8 @@ impl BodyProbe {
         }
     }
 
-    /// Goes on from what another probe of the same wall has left; false, and nothing changes, where it is of another.
+    /// Continues from the state of another probe on the same wall; returns false, and changes nothing, where the wall
+    /// differs.
     pub fn load(&mut self, from: &ProbeMemory) -> bool {
         let rows = self.shared_n.len();
         let fits = from.pressed.len() == self.ready.wall.points.len()
@@ -145,7 +149,7 @@ impl BodyProbe {
         true
     }
 
-    /// The probe is at this pose. Whether it displaces the body otherwise than before.
+    /// Moves the probe to this pose. Returns whether it displaces the body otherwise than before.
     pub fn follow(&mut self, pose: &ProbePose) -> bool {
         self.response = step(&self.ready, &mut self.state, pose, &self.beside_m);
         if self.made == 0 {
@@ -166,7 +170,7 @@ impl BodyProbe {
         is_whole
     }
 
-    /// Tissue at rest.
+    /// Brings the tissue to rest.
     pub fn reset(&mut self) {
         self.state.reset();
         for values in [&mut self.shared_n, &mut self.coming_n, &mut self.beside_m] {

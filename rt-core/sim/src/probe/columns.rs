@@ -13,16 +13,16 @@ use serde::{Deserialize, Serialize};
 const TOLERANCE: f64 = 1e-2;
 const MOST_ITERATIONS: u32 = 60;
 
-/// What a probe can press, and what the body answers: made beside the loops, never changed.
+/// Wall that a probe can press, with the body's answers: made outside the loops, never changed.
 #[derive(Clone, Debug)]
 pub struct ReadyProbe {
     /// The probe.
     pub shape: ProbeShape,
-    /// What it can press.
+    /// Wall that it can press.
     pub wall: Wall,
     /// The element behind the middle of each place that loads the body.
     pub elements: Vec<u32>,
-    /// What was solved for.
+    /// Solution for that wall.
     pub solved: SolvedProbe,
 }
 
@@ -31,9 +31,10 @@ pub struct ReadyProbe {
 pub struct SolvedProbe {
     /// Displacement of the body's elements, m/N; one place that loads it after another, along x, y, z.
     pub columns: Vec<PackedField>,
-    /// Loads of the pads by a newton on each point along x, y, z: row after row; nothing where the points load the body themselves.
+    /// Loads of the pads by a newton on each point along x, y, z: row after row; nothing where the points load the body
+    /// themselves.
     pub(super) shares: Vec<f32>,
-    /// How all points move along x, y, z with a newton on each along each of these, m/N: row after row.
+    /// Displacement of all points along x, y, z by a newton on each along each of these, m/N: row after row.
     pub(super) between: Vec<f32>,
     /// Residual over load of the worst column.
     pub residual: f64,
@@ -42,7 +43,7 @@ pub struct SolvedProbe {
 }
 
 impl SolvedProbe {
-    /// They are of that wall in a body of so many elements, and every number is finite.
+    /// Returns whether they belong to that wall in a body of so many elements, and every number is finite.
     fn is_of(&self, wall: &Wall, elements: usize) -> bool {
         let (rows, points) = (3 * wall.loads(), 3 * wall.points.len());
         let shares = if wall.is_loaded_at_points { 0 } else { points * rows };
@@ -56,7 +57,8 @@ impl SolvedProbe {
 }
 
 impl ReadyProbe {
-    /// From answers that were kept: of that wall, in a body with those elements. `None` where they are of another, or no numbers.
+    /// Makes a probe from kept answers: of that wall, in a body with those elements. `None` where they belong to
+    /// another, or are not finite.
     pub fn of_solved(solved: SolvedProbe, elements: &Lattice, wall: Wall, shape: ProbeShape) -> Option<Self> {
         solved.is_of(&wall, elements.element_count()).then(|| ReadyProbe {
             shape,
@@ -66,12 +68,13 @@ impl ReadyProbe {
         })
     }
 
-    /// Three for each place that loads the body.
+    /// Returns the number of rows: three for each place that loads the body.
     pub fn rows(&self) -> usize {
         3 * self.wall.loads()
     }
 
-    /// How all points move along x, y, z, point after point, with a newton on point `n` along x; along y; along z, m/N.
+    /// Returns the displacement of all points along x, y, z, point after point, by a newton on point `n` along x; along
+    /// y; along z, m/N.
     #[inline]
     pub(super) fn between(&self, n: usize) -> [&[f32]; 3] {
         let all = 3 * self.wall.points.len();
@@ -94,7 +97,7 @@ impl ReadyProbe {
             .chunks_exact(rows.max(1))
     }
 
-    /// Bytes of the columns, and of how points move each other and load pads.
+    /// Returns the size of the columns, and that of the tables between points and pads, in bytes.
     pub fn bytes(&self) -> [usize; 2] {
         [
             self.solved.columns.iter().map(PackedField::bytes).sum(),
@@ -115,7 +118,7 @@ pub struct ProbeQueue {
     onto: ElementMap,
 }
 
-/// What the solution of a batch works in.
+/// Work space for the solution of a batch.
 pub struct BatchRoom {
     state: BatchState<f32>,
     solved: ElementField,
@@ -129,7 +132,7 @@ pub struct BatchAnswers {
     answers: Vec<Answer>,
 }
 
-/// How rows of loads and of the points move, and the body, m/N.
+/// Displacement of the rows of loads, of the points, and of the body, m/N.
 struct Answer {
     loads: Vec<f64>,
     points: Vec<f64>,
@@ -137,8 +140,8 @@ struct Answer {
 }
 
 impl ProbeQueue {
-    /// For the wall of a scene in the body that is solved for. What is displaced are the elements of `displaced`, whose edge is as long or some
-    /// times as long.
+    /// Makes a queue for the wall of a scene in the body that is solved for. The elements of `displaced` are displaced,
+    /// whose edge is as long or some times as long.
     pub fn new(body: &BatchModel<f32>, displaced: &Lattice, wall: Wall, shape: ProbeShape) -> Result<Self, NoWall> {
         let weights = wall.load_weights(body).ok_or(NoWall::NotInBody)?;
         let points = wall.points.iter().map(|point| point.weights(body));
@@ -155,12 +158,12 @@ impl ProbeQueue {
         })
     }
 
-    /// How many there are.
+    /// Returns the number of batches.
     pub fn batches(&self) -> usize {
         self.loads.len().div_ceil(LOADS)
     }
 
-    /// Room for one after the other.
+    /// Makes the work space for one batch after the other.
     pub fn room(&self, body: &BatchModel<f32>) -> BatchRoom {
         BatchRoom {
             state: BatchState::new(body),
@@ -207,7 +210,7 @@ impl ProbeQueue {
         })
     }
 
-    /// The probe, from the answers of all batches in any order.
+    /// Makes the probe from the answers of all batches in any order.
     pub fn finish(self, mut solved: Vec<BatchAnswers>) -> Result<ReadyProbe, NoWall> {
         solved.sort_unstable_by_key(|of| of.batch);
         let residual = solved.iter().map(|of| of.residual).fold(0.0, f64::max);
@@ -242,7 +245,8 @@ impl ProbeQueue {
         })
     }
 
-    /// Solves for all of them in this thread. `goes_on` is given how many columns are ready, and of how many, between slices of work.
+    /// Solves for all of them in this thread. `goes_on` is given how many columns are ready, and of how many, between
+    /// slices of work.
     pub fn prepare(
         self,
         body: &BatchModel<f32>,
@@ -259,7 +263,7 @@ impl ProbeQueue {
     }
 }
 
-/// Along x, y and z of each.
+/// Returns the loads along x, y and z of each place.
 fn rows_of(places: &[Vec<(u32, f64)>]) -> Vec<Vec<NodeWeight>> {
     let row = |n: usize| {
         let of_place = places[n / 3].iter();

@@ -1,7 +1,8 @@
 //! Forces that only push: `gap = q + A p`, `gap >= 0`, `p >= 0`, `gap p = 0`.
 //!
-//! By active sets: which points are in contact says the forces, the forces and gaps say which points are in contact. Sets that do not settle are
-//! left for a way downhill, on which forces push at each step: what a wrong set says may be a thousand times too much.
+//! By active sets: which points are in contact says the forces, the forces and gaps say which points are in contact.
+//! Sets that do not settle are left for a way downhill, on which forces push at each step: what a wrong set says may be
+//! a thousand times too much.
 
 /// Rounds of active sets, at most.
 const ROUNDS: usize = 6;
@@ -10,14 +11,14 @@ const LEGS: usize = 6;
 const SWEEPS: usize = 8;
 /// A gap that is deeper is not closed, m.
 const CLOSED_M: f64 = 1e-10;
-/// Of the mean of the diagonal, added to it: pads share nodes of a coarse body.
+/// Addition to the diagonal, over its mean: pads share nodes of a coarse body.
 const RIDGE: f64 = 1e-5;
 
 /// Room for the largest problem; nothing is allocated after that.
 #[derive(Clone, Debug)]
 pub struct Problem {
     most: usize,
-    /// How many there are now.
+    /// Number of unknowns now.
     pub count: usize,
     /// `A`, row after row of `count`.
     pub matrix: Vec<f64>,
@@ -39,7 +40,7 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Of at most so many pads.
+    /// Makes room for at most so many pads.
     pub fn with_room(most: usize) -> Self {
         Problem {
             most,
@@ -57,7 +58,7 @@ impl Problem {
         }
     }
 
-    /// The matrix is another than before.
+    /// Marks the matrix as changed.
     pub fn is_new(&mut self) {
         self.is_factored = false;
     }
@@ -81,7 +82,7 @@ impl Problem {
         self.go_downhill();
     }
 
-    /// Those that push are in contact.
+    /// Takes the pushing points as those in contact.
     fn take_set(&mut self) {
         let n = self.count.min(self.most);
         for (is_in, force_n) in self.is_in.iter_mut().zip(&self.forces_n[..n]) {
@@ -89,7 +90,8 @@ impl Problem {
         }
     }
 
-    /// Forces with which the gaps of the set are closed and the others are 0; false where the matrix has no factor.
+    /// Finds the forces that close the gaps of the set while the others are 0; returns false where the matrix has no
+    /// factor.
     fn solve_set(&mut self) -> bool {
         let n = self.count.min(self.most);
         let is_in = &self.is_in[..n];
@@ -137,8 +139,8 @@ impl Problem {
         any
     }
 
-    /// Sweeps of projected Gauss-Seidel say who pushes, and the forces go towards those of that set until the first of them would pull. The energy falls with
-    /// each step.
+    /// Sweeps of projected Gauss-Seidel say who pushes, and the forces go towards those of that set until the first of
+    /// them would pull. The energy falls with each step.
     fn go_downhill(&mut self) {
         let n = self.count.min(self.most);
         for _ in 0..LEGS {
@@ -176,13 +178,13 @@ impl Problem {
         }
     }
 
-    /// What the forces close of the gap of each, m.
+    /// Returns how far the forces close the gap of pad `i`, m.
     pub fn closes_m(&self, i: usize) -> f64 {
         let n = self.count.min(self.most);
         dot(&self.matrix[i * n..(i + 1) * n], &self.forces_n[..n])
     }
 
-    /// Cholesky of the rows and columns in the set.
+    /// Factors the rows and columns of the set by Cholesky.
     fn decompose(&mut self) -> bool {
         let (n, m) = (self.count.min(self.most), self.set.len());
         let mean = (0..n).map(|i| self.matrix[i * n + i]).sum::<f64>() / n.max(1) as f64;
@@ -213,7 +215,7 @@ impl Problem {
     }
 }
 
-/// `L L' x = b` in place; rows of `factor` are as long as `values`.
+/// Solves `L L' x = b` in place; rows of `factor` are as long as `values`.
 fn substitute(factor: &[f64], values: &mut [f64]) {
     let m = values.len();
     for r in 0..m {
@@ -229,7 +231,7 @@ fn substitute(factor: &[f64], values: &mut [f64]) {
     }
 }
 
-/// In eight sums side by side.
+/// Returns the dot product, in eight sums side by side.
 #[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
@@ -250,7 +252,8 @@ mod tests {
 
     const N: usize = 40;
 
-    /// Points along a line, each of which moves those beside it nearly as much as itself: sets of such problems go round in circles.
+    /// Returns points along a line, each of which moves those beside it nearly as much as itself: sets of such problems
+    /// cycle.
     fn problem(turn: u32) -> Problem {
         let mut problem = Problem::with_room(N);
         problem.count = N;
@@ -277,7 +280,7 @@ mod tests {
             .sum()
     }
 
-    /// Brute force.
+    /// Solves by brute force.
     fn swept(turn: u32) -> Problem {
         let mut problem = problem(turn);
         (0..200_000).for_each(|_| problem.sweep());

@@ -11,17 +11,19 @@ use crate::tissue::ElementField;
 use nalgebra::Vector3;
 use near::{condense, left_over, list, measure, reach, turn};
 
-/// A pose farther from the one before is reached in steps, since the wall's way out of the probe is that to the nearest side.
+/// A pose farther from the one before is reached in steps, since the wall's way out of the probe is that to the nearest
+/// side.
 const STEP_M: f64 = 2e-3;
 const MOST_STEPS: usize = 8;
 /// Passes over the directions of the forces at the end of a tick, at most, and in a step on the way there.
 const PASSES: usize = 16;
 const PASSES_ON_THE_WAY: usize = 2;
-/// A pass that leaves no pad farther than that from the probe's surface, on the wrong side, and no force turned farther from it, is the last.
+/// A pass that leaves no pad farther than that from the probe's surface, on the wrong side, and no force turned farther
+/// from it, is the last.
 const CLOSED_M: f64 = 4e-7;
 const TURNED: f64 = 2e-4;
 
-/// What came of a tick.
+/// Outcome of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactReport {
     /// Passes in all of its steps.
@@ -32,29 +34,29 @@ pub struct ContactReport {
     pub near: u32,
     /// Deepest pad in the probe, and the largest gap under a force, m.
     pub open_m: f64,
-    /// How far a force is from square to the probe's surface, rad.
+    /// Largest angle between a force and the normal of the probe's surface, rad.
     pub turned: f64,
 }
 
-/// What a probe has done so far; nothing is allocated after `new`.
+/// State of a probe; nothing is allocated after `new`.
 #[derive(Clone, Debug)]
 pub struct ProbeState {
     pose: Option<ProbePose>,
-    /// On the tissue at each pad, along x, y, z, N.
+    /// Forces on the tissue at each pad, along x, y, z, N.
     loads_n: Vec<f64>,
-    /// How far each point is displaced by them, and by others, m.
+    /// Displacement of each point by them, and by others, m.
     moved_m: Vec<[f64; 3]>,
     beside_m: Vec<[f64; 3]>,
     /// Room for how others displace the pads.
     pads_m: Vec<f64>,
-    /// How hard each point is pressed, N, and where to.
+    /// Force on each point, N, and its direction.
     pressed_n: Vec<f64>,
     pushed: Vec<[f64; 3]>,
     /// Points that are looked at; how far each is from the probe, m, and where its surface faces there.
     reach: Vec<u32>,
     gaps_m: Vec<f64>,
     surface: Vec<[f64; 3]>,
-    /// Those that may be in contact, where their forces go, and where these went when the problem was condensed.
+    /// Points that may be in contact, the directions of their forces, and those when the problem was condensed.
     near: Vec<u32>,
     is_near: Vec<bool>,
     outward: Vec<[f64; 3]>,
@@ -62,13 +64,13 @@ pub struct ProbeState {
     /// One that may not be in contact overlaps.
     is_missed: bool,
     problem: Problem,
-    /// What the loads do to the body, m.
+    /// Displacement of the body by the loads, m.
     pub share: ElementField,
     report: ContactReport,
 }
 
 impl ProbeState {
-    /// No contact yet.
+    /// Makes a state without contact.
     pub fn new(probe: &ReadyProbe) -> Self {
         let (rows, points) = (probe.rows(), probe.wall.points.len());
         let elements = probe
@@ -103,23 +105,24 @@ impl ProbeState {
         &self.loads_n
     }
 
-    /// Displacements of the points of the wall by these loads, along x, y, z, m.
+    /// Returns the displacements of the points of the wall by these loads, along x, y, z, m.
     pub fn moved_m(&self) -> &[[f64; 3]] {
         &self.moved_m
     }
 
-    /// How hard the probe presses each point of the wall, N, and where to; no direction where it does not.
+    /// Iterates over the force of the probe on each point of the wall, N, and its direction; no direction without a
+    /// force.
     pub fn pressed(&self) -> impl Iterator<Item = (f64, [f64; 3])> {
         let pressed = self.pressed_n.iter().copied().zip(self.pushed.iter().copied());
         pressed.map(|(force_n, to)| (force_n, if force_n > 0.0 { to } else { [0.0; 3] }))
     }
 
-    /// Where the last tick had the probe.
+    /// Returns the pose of the last tick.
     pub(super) fn pose(&self) -> Option<ProbePose> {
         self.pose
     }
 
-    /// Goes on from forces on the points of the wall.
+    /// Continues from forces on the points of the wall.
     pub(super) fn take_up(&mut self, probe: &ReadyProbe, pose: Option<ProbePose>, pressed: &[(f64, [f64; 3])]) {
         self.reset();
         self.pose = pose;
@@ -144,17 +147,17 @@ impl ProbeState {
         self.reach.extend(0..probe.wall.points.len() as u32);
     }
 
-    /// What came of the last tick.
+    /// Returns the report of the last tick.
     pub fn report(&self) -> ContactReport {
         self.report
     }
 
-    /// Nothing is pressed.
+    /// Returns whether nothing is pressed.
     pub fn is_at_rest(&self) -> bool {
         self.pressed_n.iter().all(|p| *p == 0.0)
     }
 
-    /// Tissue at rest, and the probe out of it.
+    /// Brings the tissue to rest, and the probe out of it.
     pub fn reset(&mut self) {
         self.pose = None;
         for values in [&mut self.loads_n, &mut self.pressed_n] {
@@ -164,7 +167,8 @@ impl ProbeState {
     }
 }
 
-/// The probe goes to `pose`; `beside_m` is how far other loads displace each pad, along x, y, z. A pose that is no number counts as the one before.
+/// Moves the probe to `pose`; `beside_m` is the displacement of each pad by other loads, along x, y, z. A pose that is
+/// not finite counts as the one before.
 pub fn step(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside_m: &[f64]) -> ProbeResponse {
     let is_finite = pose.tip_m.iter().chain(&pose.axis).all(|c| c.is_finite());
     let from = state.pose.unwrap_or(*pose);
@@ -183,14 +187,15 @@ pub fn step(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside
     respond(state, probe, &pose)
 }
 
-/// Adds up what the loads do to the body; where they are others than before, which this does not look for. Does not allocate.
+/// Adds up what the loads do to the body; where they are others than before, which this does not look for. Does not
+/// allocate.
 pub fn displace(probe: &ReadyProbe, state: &mut ProbeState) {
     state.share.load(&probe.solved.columns, &state.loads_n);
 }
 
-/// The farthest that a point of the probe in the wall moves decides.
+/// Returns the number of steps, by the point of the probe in the wall that moves the farthest.
 fn steps_between(from: &ProbePose, to: &ProbePose) -> usize {
-    /// From the tip to the end of the wall.
+    /// Distance from the tip to the end of the wall.
     const REACH_M: f64 = 0.1;
     let motion = from.motion_to(to);
     let moved_m = Vector3::new(motion[0], motion[1], motion[2]).norm();
@@ -217,7 +222,8 @@ fn press(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, passes: u
         for (a, &point) in state.near.iter().enumerate() {
             state.problem.forces_n[a] = state.pressed_n[point as usize];
         }
-        // The problem may be that of directions which have turned a little since: what its forces close is taken from the gaps as they are.
+        // The problem may be that of directions which have turned a little since: what its forces close is taken from
+        // the gaps as they are.
         for (a, &point) in state.near.iter().enumerate() {
             state.problem.free_m[a] = state.gaps_m[point as usize] - state.problem.closes_m(a);
         }
@@ -237,7 +243,7 @@ fn press(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, passes: u
     state.report.open_m = left_over(probe, state)[0];
 }
 
-/// Where a point of the wall is.
+/// Returns the place of a point of the wall.
 fn place_m(probe: &ReadyProbe, state: &ProbeState, n: usize) -> [f64; 3] {
     let rest_m = probe.wall.points[n].place_m;
     [0, 1, 2].map(|c| rest_m[c] + state.moved_m[n][c] + state.beside_m[n][c])
@@ -277,7 +283,7 @@ fn respond(state: &mut ProbeState, probe: &ReadyProbe, pose: &ProbePose) -> Prob
     if response.contacts == 0 {
         return response;
     }
-    // The room is taken out meanwhile, so that the factor beside it can be read.
+    // The room is taken out meanwhile, so that the factor next to it can be read.
     let mut room = std::mem::take(&mut state.problem.work);
     let values = room.get_mut(..state.problem.set.len()).unwrap_or(&mut []);
     for motion in 0..6 {

@@ -1,4 +1,4 @@
-//! What a probe leaves from one tick to the next, for flight recordings; the rest follows from it.
+//! State that a probe leaves from one tick to the next, for flight recordings; the rest follows from it.
 
 use super::body::BodyProbe;
 use super::shape::ProbePose;
@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 /// Everything that one tick of the probe leaves to the next.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ProbeMemory {
-    /// There is one.
+    /// Set while there is a probe.
     pub is_there: bool,
     /// Edge of the elements that it was solved for in, m.
     pub edge_m: f64,
-    /// Where the last tick had it.
+    /// Pose of the last tick.
     pub(super) pose: Option<ProbePose>,
-    /// How hard each point of the wall is pressed, N, and where to.
+    /// Force on each point of the wall, N, and its direction.
     pub(super) pressed: Vec<(f64, [f64; 3])>,
     /// Loads that the body's displacement was made from, and those that the next is made from, N.
     pub(super) shared_n: Vec<f64>,
@@ -23,7 +23,7 @@ pub struct ProbeMemory {
 }
 
 impl ProbeMemory {
-    /// Room for that of a probe; there is none yet.
+    /// Makes room for the memory of a probe; it is empty.
     pub fn with_room(probe: &BodyProbe) -> Self {
         let mut memory = ProbeMemory::default();
         let rows = probe.ready().rows();
@@ -32,7 +32,7 @@ impl ProbeMemory {
         memory
     }
 
-    /// No probe; keeps its room.
+    /// Removes the probe; keeps its room.
     pub fn clear(&mut self) {
         self.is_there = false;
     }

@@ -1,8 +1,8 @@
 //! The ultrasound probe in the rectum: a rigid body that presses the wall, and through it the gland.
 //!
-//! *Before the probe moves*: [`ProbeQueue`] solves for the body's answer to a force on each [`Pad`] of the rectum's wall, in slices.
-//! *At the rate of the tissue*: [`step`] finds the forces between probe and pads, none of which pulls, and how the body is displaced by
-//! them. [`ProbeResponse::stiffness`] extrapolates the answer to the rate of the hand.
+//! *Before the probe moves*: [`ProbeQueue`] solves for the body's answer to a force on each [`Pad`] of the rectum's
+//! wall, in slices. *At the rate of the tissue*: [`step`] finds the forces between probe and pads, none of which pulls,
+//! and how the body is displaced by them. [`ProbeResponse::stiffness`] extrapolates the answer to the rate of the hand.
 //!
 //! The contact has no friction: the probe lies in gel. Measurements are in `docs/adr/0021-probe.md`.
 //!

@@ -1,9 +1,9 @@
-//! What forces on the points of the wall do to points and pads, and what others that move the pads do to the points.
+//! Displacement of points and pads by forces on the points of the wall, and of the points by what else moves the pads.
 
 use super::columns::ReadyProbe;
 use crate::simd::{Simd, vectorised};
 
-/// How far the points are displaced by forces on them, m.
+/// Computes the displacement of the points by forces on them, m.
 pub(super) fn wall(probe: &ReadyProbe, pressed_n: &[f64], pushed: &[[f64; 3]], moved_m: &mut [[f64; 3]]) {
     let simd = Simd::detect();
     moved_m.fill([0.0; 3]);
@@ -28,7 +28,7 @@ vectorised! {
     }
 }
 
-/// How these forces load the pads, which load the body, N.
+/// Computes the loads of these forces on the pads, which load the body, N.
 pub(super) fn pads(probe: &ReadyProbe, pressed_n: &[f64], pushed: &[[f64; 3]], loads_n: &mut [f64]) {
     loads_n.fill(0.0);
     if probe.wall.is_loaded_at_points {
@@ -50,7 +50,8 @@ pub(super) fn pads(probe: &ReadyProbe, pressed_n: &[f64], pushed: &[[f64; 3]], l
     }
 }
 
-/// How far others displace the points, who displace the pads by `beside_m`: all of the wall by its mean, and each point by what is beyond that. What is no number displaces none.
+/// Computes the displacement of the points by others, who displace the pads by `beside_m`: all of the wall by its mean,
+/// and each point by what exceeds that. A value that is not finite displaces none.
 pub(super) fn beside(probe: &ReadyProbe, beside_m: &[f64], pads_m: &mut [f64], points_m: &mut [[f64; 3]]) {
     let is_moved = beside_m.iter().any(|m| *m != 0.0) && beside_m.iter().all(|m| m.is_finite());
     if !is_moved || beside_m.len() != pads_m.len() {
@@ -80,7 +81,7 @@ pub(super) fn beside(probe: &ReadyProbe, beside_m: &[f64], pads_m: &mut [f64], p
 }
 
 vectorised! {
-/// In eight sums side by side.
+/// Returns the dot product, in eight sums side by side.
 fn dot(shares: &[f32], values: &[f64]) -> f64 {
     let mut sums = [0.0; 8];
     let (a8, b8) = (shares.as_chunks::<8>(), values.as_chunks::<8>());

@@ -3,17 +3,17 @@
 use crate::scene::Lattice;
 use crate::tissue::ElementField;
 
-/// Which element each small one lies in.
+/// Map from each small element to the one that it lies in.
 pub(super) struct ElementMap {
     elements: usize,
-    /// By small element; empty where both are the same.
+    /// Large element of each small one; empty where both are the same.
     of: Vec<u32>,
     /// One over how many lie in each.
     shares: Vec<f32>,
 }
 
 impl ElementMap {
-    /// From the elements of `from` to those of `to`, whose edge is some times as long.
+    /// Maps the elements of `from` to those of `to`, whose edge is some times as long.
     pub fn new(from: &Lattice, to: &Lattice) -> Self {
         let elements = to.element_count();
         let times = (to.spacing_m / from.spacing_m).round() as usize;
@@ -42,12 +42,12 @@ impl ElementMap {
         }
     }
 
-    /// How many are displaced.
+    /// Returns the number of displaced elements.
     pub fn elements(&self) -> usize {
         self.elements
     }
 
-    /// Each as those in it are on average: `field`, or what is in `room` then.
+    /// Averages the small elements in each large one: returns `field`, or the mean in `room`.
     pub fn mean<'a>(&self, field: &'a ElementField, room: &'a mut ElementField) -> &'a ElementField {
         if self.of.is_empty() {
             return field;

@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 pub struct Wrench(pub [f64; 6]);
 
 impl Wrench {
-    /// The force, N.
+    /// Returns the force, N.
     pub fn force_n(&self) -> [f64; 3] {
         [self.0[0], self.0[1], self.0[2]]
     }
 
-    /// The torque about the tip, N m.
+    /// Returns the torque about the tip, N m.
     pub fn torque_nm(&self) -> [f64; 3] {
         [self.0[3], self.0[4], self.0[5]]
     }
@@ -24,17 +24,17 @@ impl Wrench {
 pub struct ProbeResponse {
     /// The pose that was answered.
     pub pose: ProbePose,
-    /// There.
+    /// Wrench at that pose.
     pub wrench: Wrench,
-    /// How the wrench changes with the motion of the probe, as [`ProbePose::motion_to`] has it; row after row. No row has energy to give: it is
-    /// symmetric and nowhere positive.
+    /// Change of the wrench with the motion of the probe, as [`ProbePose::motion_to`] has it; row after row. It is
+    /// symmetric and nowhere positive, so no motion gains energy.
     pub stiffness: [[f64; 6]; 6],
     /// Pads that are pressed.
     pub contacts: u32,
 }
 
 impl ProbeResponse {
-    /// A probe that touches nothing.
+    /// Returns the answer to a probe that touches nothing.
     pub fn nothing(pose: ProbePose) -> Self {
         ProbeResponse {
             pose,

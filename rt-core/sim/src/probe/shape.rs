@@ -3,21 +3,21 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// A round shaft whose end is half a ball; the shaft goes on behind it as far as the wall does.
+/// Round shaft with a hemispherical end; it reaches back as far as the wall does.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProbeShape {
-    /// Of the shaft, m.
+    /// Radius of the shaft, m.
     pub radius_m: f64,
 }
 
 impl Default for ProbeShape {
-    /// 20 mm across: assumed (`docs/adr/0021-probe.md`).
+    /// Returns a probe 20 mm across: assumed (`docs/adr/0021-probe.md`).
     fn default() -> Self {
         ProbeShape { radius_m: 10e-3 }
     }
 }
 
-/// Where the probe is, scene frame.
+/// Pose of the probe, scene frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProbePose {
     /// The foremost point of its tip, m.
@@ -27,7 +27,7 @@ pub struct ProbePose {
 }
 
 impl ProbePose {
-    /// `None` where a number is not finite or the axis has no length.
+    /// Makes a pose; `None` where a number is not finite or the axis has no length.
     pub fn new(tip_m: [f64; 3], axis: [f64; 3]) -> Option<Self> {
         let axis = Vector3::from(axis).try_normalize(1e-9)?;
         let is_finite = tip_m.iter().chain(axis.iter()).all(|c| c.is_finite());
@@ -37,7 +37,8 @@ impl ProbePose {
         })
     }
 
-    /// From this one to another: displacement of the tip, and rotation about it as a vector, m and rad.
+    /// Returns the motion from this pose to another: displacement of the tip, and rotation about it as a vector, m and
+    /// rad.
     pub fn motion_to(&self, other: &ProbePose) -> [f64; 6] {
         let moved = Vector3::from(other.tip_m) - Vector3::from(self.tip_m);
         let (from, to) = (Vector3::from(self.axis), Vector3::from(other.axis));
@@ -49,7 +50,7 @@ impl ProbePose {
         [moved.x, moved.y, moved.z, turned.x, turned.y, turned.z]
     }
 
-    /// A part of the way to another pose.
+    /// Returns the pose that part of the way to another.
     pub(super) fn towards(&self, other: &ProbePose, part: f64) -> ProbePose {
         let mix = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|c| a[c] + part * (b[c] - a[c]));
         ProbePose::new(mix(self.tip_m, other.tip_m), mix(self.axis, other.axis)).unwrap_or(*other)
@@ -57,7 +58,8 @@ impl ProbePose {
 }
 
 impl ProbeShape {
-    /// Distance of a point from the probe's surface, negative inside, m, and the direction away from the probe there.
+    /// Returns the distance of a point from the probe's surface, negative inside, m, and the direction away from the
+    /// probe there.
     pub fn gap_m(&self, pose: &ProbePose, point_m: [f64; 3]) -> (f64, [f64; 3]) {
         let axis = Vector3::from(pose.axis);
         // The tip is half a ball about a point of the axis, behind which the shaft begins.
@@ -69,7 +71,7 @@ impl ProbeShape {
     }
 }
 
-/// Some direction across the axis, for a point on it.
+/// Returns some direction across the axis, for a point on it.
 fn across(axis: &Vector3<f64>) -> Vector3<f64> {
     let other = if axis.y.abs() < 0.9 { Vector3::y() } else { Vector3::x() };
     (other - axis * axis.dot(&other)).try_normalize(1e-9).unwrap_or(other)

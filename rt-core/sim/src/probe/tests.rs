@@ -1,4 +1,5 @@
-//! The probe in a small body and in the pelvis: what it must not do, and how it compares with the contact solved in full.
+//! The probe in a small body and in the pelvis: what it must not do, and how it compares with the contact solved in
+//! full.
 
 use super::wall::Wall;
 use super::*;
@@ -27,19 +28,19 @@ impl Fixture {
         Fixture::solved_in(&solved_in, scene, spacing_m)
     }
 
-    /// The body of another scene is solved for, of the same tissue in other elements.
+    /// Solves in the body of another scene, of the same tissue in other elements.
     pub fn solved_in(other: &Scene, scene: Scene, spacing_m: f64) -> Self {
         let wall = Wall::of(&scene, spacing_m).expect("a rectum");
         Fixture::solved_for(other, scene, wall)
     }
 
-    /// For that wall.
+    /// Solves for that wall.
     pub fn solved_for(other: &Scene, scene: Scene, wall: Wall) -> Self {
         let fem = FemTissue::<f32>::new(other).expect("valid");
         let body = BatchModel::new(&fem.model);
         drop(fem);
         let queue = ProbeQueue::new(&body, &scene.body, wall, ProbeShape::default()).expect("in the body");
-        // The later half of the batches by a thread of its own.
+        // The later half of the batches by a second thread.
         let half = queue.batches() / 2;
         let solve = |batches: std::ops::Range<usize>| {
             let mut room = queue.room(&body);
@@ -55,7 +56,8 @@ impl Fixture {
         Fixture { scene, body, probe }
     }
 
-    /// Along z in the middle, so far above where it meets the wall, its tip so far beyond the target's middle.
+    /// Returns a pose along z in the middle, so far above where it meets the wall, its tip so far beyond the target's
+    /// middle.
     pub fn pose(&self, pressed_m: f64, beyond_m: f64) -> ProbePose {
         let probe = &self.probe;
         probe
@@ -63,14 +65,14 @@ impl Fixture {
             .pose_below_target(&self.scene, &probe.shape, pressed_m, beyond_m)
     }
 
-    /// So far above where it meets the wall is the axis in the middle of the hollow.
+    /// Returns how far the axis in the middle of the hollow is above where it meets the wall.
     pub fn middle_m(&self) -> f64 {
         let heights = self.probe.wall.pads.iter().map(|p| p.place_m[1]);
         let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), y| (l.min(y), h.max(y)));
         0.5 * (low + high) - self.pose(0.0, 0.0).tip_m[1]
     }
 
-    /// In from outside in the middle of the hollow, to where it meets the wall, then pressed, in ticks at 50 mm/s.
+    /// Goes in from outside in the middle of the hollow, to where it meets the wall, then presses, in ticks at 50 mm/s.
     pub fn go_in_and_press(&self, state: &mut ProbeState, pressed_m: f64, beyond_m: f64) -> ProbeResponse {
         const TICK_M: f64 = 0.25e-3;
         let mut response = ProbeResponse::default();
@@ -92,13 +94,13 @@ impl Fixture {
     }
 }
 
-/// The same with pads that are closer than its elements are wide: all that forces on its wall can do to it.
+/// Returns the same with pads that are closer than its elements are wide: all that forces on its wall can do to it.
 pub(super) fn finely() -> &'static Fixture {
     static FINELY: OnceLock<Fixture> = OnceLock::new();
     FINELY.get_or_init(|| Fixture::new(block(true), 3.5e-3))
 }
 
-/// A block of gland, a hollow of 28 x 20 mm in rectal wall below it, 4 mm elements: some thousand of them.
+/// Returns a block of gland, a hollow of 28 x 20 mm in rectal wall below it, 4 mm elements: some thousand of them.
 pub(super) fn small() -> &'static Fixture {
     static SMALL: OnceLock<Fixture> = OnceLock::new();
     SMALL.get_or_init(|| Fixture::new(block(true), 5e-3))
@@ -109,7 +111,7 @@ pub(super) fn block(is_hollow: bool) -> Scene {
     scene.for_lines(TissueKind::ChainMail).expect("a model with lines")
 }
 
-/// So many times 4 mm large, in so many cells for each 4 mm.
+/// Makes a block so many times 4 mm large, in so many cells for each 4 mm.
 fn block_in(size: [usize; 3], times: usize, is_hollow: bool) -> Scene {
     let dims = size.map(|n| n * times);
     let mut cells = Vec::new();
@@ -195,7 +197,8 @@ fn pads_cover_the_wall_that_can_be_reached_once() {
     }
 }
 
-/// Solved in cells of 2 mm, a body in elements of 4 mm is pressed as the one of 2 mm is: its force, and each element as the cells in it.
+/// Solved in cells of 2 mm, a body in elements of 4 mm is pressed as the one of 2 mm is: its force, and each element as
+/// the cells in it.
 #[test]
 fn a_body_is_displaced_as_the_finer_one_that_was_solved_for() {
     const PRESSED_M: f64 = 4e-3;
@@ -246,7 +249,8 @@ fn a_body_is_displaced_as_the_finer_one_that_was_solved_for() {
     assert!(other_body.is_none());
 }
 
-/// Points that load the body themselves: beside the contact at the same points solved in full, without pads that are close enough.
+/// Points that load the body themselves, against the contact at the same points solved in full, without pads that are
+/// close enough.
 #[test]
 fn loaded_points_press_as_the_full_contact_does() {
     let scene = block(true);

@@ -1,4 +1,5 @@
-//! The wall that the probe can press: the inside of the rectum, in pads that load the body and points at which it touches the probe.
+//! The wall that the probe can press: the inside of the rectum, in pads that load the body and points at which it
+//! touches the probe.
 
 use super::shape::{ProbePose, ProbeShape};
 use crate::scene::{Lattice, Scene};
@@ -7,8 +8,8 @@ use stylet_anatomy::{Beyond, Organ};
 
 /// Faces of cells are staircases: each is moved to the mean of those that face the same way and lie so close, m.
 const SMOOTHED_M: f64 = 2.5e-3;
-/// The canal through which the probe comes in is closed in a scene, and wide enough in the patient: what is so close to that end of the hollow
-/// resists nothing.
+/// The canal through which the probe comes in is closed in a scene, and wide enough in the patient: what is so close to
+/// that end of the hollow resists nothing.
 const CANAL_M: f64 = 12e-3;
 /// The probe gets so far beyond the target at either end, m.
 const BEYOND_TARGET_M: f64 = 20e-3;
@@ -28,7 +29,7 @@ pub enum NoWall {
         "the scene has no rectum that a probe could lie in: it needs a structure \"rectal wall\" around a hollow, with nothing (\"free\") beyond its inner faces"
     )]
     NoRectum,
-    /// Nothing of it is beside the target.
+    /// Wall of which nothing is next to the target.
     #[error("the rectum of the scene is not beside the target: a probe in it would reach nothing")]
     OutOfReach,
     /// The tissue model knows no forces.
@@ -37,7 +38,7 @@ pub enum NoWall {
     /// A pad that no part of the body is at.
     #[error("a part of the rectum's wall is in no element of the body")]
     NotInBody,
-    /// It was no longer wanted.
+    /// Work that is no longer wanted.
     #[error("the probe was given up before it was ready")]
     Stopped,
 }
@@ -49,7 +50,7 @@ pub struct Pad {
     pub place_m: [f64; 3],
     /// Unit vector out of the tissue.
     pub outward: [f64; 3],
-    /// How large it is, m^2.
+    /// Area, m².
     pub area_m2: f64,
     /// Faces of cells in it.
     pub faces: Vec<Face>,
@@ -71,7 +72,7 @@ pub struct Face {
 /// A place of the smooth wall: the mean of faces around it at rest, and however they move.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// At rest, scene frame, m.
+    /// Place at rest, scene frame, m.
     pub place_m: [f64; 3],
     /// Unit vector out of the tissue.
     pub outward: [f64; 3],
@@ -82,9 +83,9 @@ pub struct Point {
 /// All pads and points, in order.
 #[derive(Clone, Debug)]
 pub struct Wall {
-    /// What loads the body: as far apart as they were asked for.
+    /// Pads that load the body, as far apart as was asked for.
     pub pads: Vec<Pad>,
-    /// Where it touches the probe.
+    /// Points where it touches the probe.
     pub points: Vec<Point>,
     /// The points load the body themselves: four times as many columns, and nothing between force and body.
     pub is_loaded_at_points: bool,
@@ -98,7 +99,7 @@ impl Wall {
             return Err(NoWall::NoRectum);
         }
         let (low, high) = scene.target_bounds_m();
-        // A hollow that goes on to the end of the volume has no end there.
+        // A hollow that continues to the end of the volume has no end there.
         let faces_inwards = |f: &&Face| f.outward[2] > 0.5;
         let end_m = all.iter().filter(faces_inwards).map(|f| f.place_m[2]);
         let open_m = end_m.fold(f64::INFINITY, f64::min) + CANAL_M;
@@ -133,7 +134,7 @@ impl Wall {
         })
     }
 
-    /// The same wall, loaded at its points.
+    /// Returns the same wall, loaded at its points.
     pub fn loaded_at_points(self) -> Self {
         Wall {
             is_loaded_at_points: true,
@@ -141,7 +142,7 @@ impl Wall {
         }
     }
 
-    /// How many places of it load the body.
+    /// Returns the number of pads.
     pub fn loads(&self) -> usize {
         if self.is_loaded_at_points {
             self.points.len()
@@ -150,7 +151,7 @@ impl Wall {
         }
     }
 
-    /// Nodes and weights of each; `None` where the body has no element there.
+    /// Returns the nodes and weights of each; `None` where the body has no element there.
     pub(super) fn load_weights(&self, body: &BatchModel<f32>) -> Option<Vec<Vec<(u32, f64)>>> {
         if self.is_loaded_at_points {
             return self.points.iter().map(|point| point.weights(body)).collect();
@@ -158,7 +159,7 @@ impl Wall {
         self.pads.iter().map(|pad| pad.weights(body)).collect()
     }
 
-    /// The element behind the middle of each.
+    /// Returns the element behind the middle of each.
     pub(super) fn elements_behind(&self, lattice: &Lattice) -> Vec<u32> {
         let behind = |place_m: [f64; 3], faces: &mut dyn Iterator<Item = &Face>| {
             let nearest = |f: &&Face| square_m2(f.place_m, place_m);
@@ -173,15 +174,15 @@ impl Wall {
         self.pads.iter().map(of).collect()
     }
 
-    /// The smooth wall at each of its faces, for a measurement.
+    /// Returns the smooth wall at each of its faces, for a measurement.
     #[cfg(test)]
     pub fn finely(&self, scene: &Scene) -> Vec<Point> {
         let (all, own) = (faces(scene), self.pads.iter().flat_map(|pad| &pad.faces));
         own.filter_map(|face| point(face, &all)).collect()
     }
 
-    /// A probe along z below the middle of the target, whose shaft is so far above where it first meets the wall towards the target, and whose
-    /// tip is so far beyond the target's middle, m.
+    /// Returns the pose of a probe along z below the middle of the target, whose shaft is so far above where it first
+    /// meets the wall towards the target, and whose tip is so far beyond the target's middle, m.
     pub fn pose_below_target(&self, scene: &Scene, shape: &ProbeShape, pressed_m: f64, beyond_m: f64) -> ProbePose {
         let towards_target = self.pads.iter().filter(|pad| pad.outward[1] < -0.5);
         let lowest_m = towards_target.map(|pad| pad.place_m[1]).fold(f64::INFINITY, f64::min);
@@ -195,7 +196,8 @@ impl Wall {
 }
 
 impl Pad {
-    /// Nodes and weights, which add up to 1, of the mean over its faces; `None` where the body has no element there.
+    /// Returns the nodes and weights, which add up to 1, of the mean over its faces; `None` where the body has no
+    /// element there.
     pub fn weights(&self, body: &BatchModel<f32>) -> Option<Vec<(u32, f64)>> {
         let share = 1.0 / self.faces.len() as f64;
         mean_weights(body, self.faces.iter().map(|face| (face, share)))
@@ -203,7 +205,7 @@ impl Pad {
 }
 
 impl Point {
-    /// Nodes and weights as of a [`Pad`].
+    /// Returns the nodes and weights as of a [`Pad`].
     pub fn weights(&self, body: &BatchModel<f32>) -> Option<Vec<(u32, f64)>> {
         mean_weights(body, self.faces.iter().map(|(face, share)| (face, *share)))
     }
@@ -283,7 +285,8 @@ fn face(lattice: &Lattice, element: u32, side: usize) -> Face {
 }
 
 impl Face {
-    /// Its middle; in a body of smaller elements the middle of each of their faces in it, or a load would sink in as a point does.
+    /// Its middle; in a body of smaller elements the middle of each of their faces in it, or a load would sink in as a
+    /// point does.
     fn inside_of(&self, elements_m: f64) -> impl Iterator<Item = [f64; 3]> {
         let times = (self.edge_m / elements_m).round().max(1.0) as usize;
         let (middle_m, axis, edge_m) = (self.inside_m, self.axis, self.edge_m);
@@ -297,7 +300,7 @@ impl Face {
     }
 }
 
-/// What faces away from each other is on two walls, however close.
+/// Returns whether two faces are on one wall: faces that look away from each other are on two, however close.
 fn faces_alike(a: &Face, b: &Face) -> bool {
     (0..3).map(|c| a.outward[c] * b.outward[c]).sum::<f64>() > -0.3
 }
@@ -369,7 +372,7 @@ fn pad(faces: Vec<Face>, face_m2: f64) -> Option<Pad> {
     })
 }
 
-/// The smooth wall at a face.
+/// Returns the smooth wall at a face.
 fn point(at: &Face, all: &[Face]) -> Option<Point> {
     let mut faces = Vec::new();
     let mut sum = 0.0;

@@ -45,7 +45,7 @@ impl Steps {
         }
     }
 
-    /// Cells of the lattice in the order of the grid.
+    /// Returns the cells of the lattice in the order of the grid.
     fn cells(&self) -> impl Iterator<Item = [usize; 3]> {
         let [nx, ny, nz] = self.dims;
         let (low, stride) = (self.low, self.stride);
@@ -57,7 +57,7 @@ impl Steps {
 }
 
 impl NodeGrid {
-    /// The grid over a body at rest.
+    /// Returns the grid over a body at rest.
     pub fn of(lattice: &Lattice) -> Self {
         let steps = Steps::over(lattice, MAX_NODES);
         let mut elements: Vec<Option<u32>> = steps
@@ -72,7 +72,7 @@ impl NodeGrid {
     }
 }
 
-/// The element in or nearest to a cell, no farther than `reach` cells along any axis.
+/// Returns the element in or nearest to a cell, no farther than `reach` cells along any axis.
 fn nearest(lattice: &Lattice, cell: [usize; 3], reach: i64) -> Option<u32> {
     let at = |by: [i64; 3]| lattice.element_at([0, 1, 2].map(|a| cell[a] as i64 + by[a]));
     if let Some(element) = at([0; 3]) {
@@ -86,7 +86,7 @@ fn nearest(lattice: &Lattice, cell: [usize; 3], reach: i64) -> Option<u32> {
         .map(|(_, element)| element)
 }
 
-/// Nodes without an element take that of a neighbour, layer by layer from those that have one.
+/// Gives nodes without an element that of a neighbour, layer by layer from those that have one.
 fn spread(elements: &mut [Option<u32>], [nx, ny, nz]: [usize; 3]) {
     let mut front: Vec<usize> = (0..elements.len()).filter(|&n| elements[n].is_some()).collect();
     while !front.is_empty() {
@@ -112,7 +112,7 @@ fn spread(elements: &mut [Option<u32>], [nx, ny, nz]: [usize; 3]) {
     }
 }
 
-/// The structure of cells over the body: 0 for none, else one more than its place in the scene's list.
+/// Returns the structure of cells over the body: 0 for none, else one more than its place in the scene's list.
 pub fn label_grid(lattice: &Lattice) -> (GridInfo, Vec<u8>) {
     let steps = Steps::over(lattice, MAX_LABEL_CELLS);
     let label = |[i, j, k]: [usize; 3]| {

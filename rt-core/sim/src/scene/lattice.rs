@@ -11,7 +11,7 @@ pub(crate) struct Run {
 }
 
 impl Run {
-    /// One past the last element.
+    /// Returns one past the last element.
     pub fn end(&self) -> u32 {
         self.first + self.len
     }
@@ -48,7 +48,7 @@ impl Lattice {
         lattice
     }
 
-    /// One structure, of all cells but those of zero.
+    /// Makes one structure of all cells but those of zero.
     fn of_cells(dims: [usize; 3], spacing_m: f64, cells: &[u8]) -> Self {
         let [nx, ny, nz] = dims;
         let mut lattice = Lattice {
@@ -69,8 +69,8 @@ impl Lattice {
         lattice
     }
 
-    /// Elements of twice the edge wherever any of their eight cells is tissue, each of the structure that most of those are of;
-    /// the same scene frame.
+    /// Returns a lattice with elements of twice the edge wherever any of their eight cells is tissue, each of the
+    /// structure that most of those have; the same scene frame.
     pub fn coarser(&self) -> Lattice {
         let dims = self.dims.map(|n| n.div_ceil(2));
         let index = |cell: &[u16; 3]| {
@@ -114,24 +114,24 @@ impl Lattice {
         }
     }
 
-    /// Number of elements.
+    /// Returns the number of elements.
     pub fn element_count(&self) -> usize {
         self.cells.len()
     }
 
-    /// The cell of an element; the last element's for a number past the end.
+    /// Returns the cell of an element; the last element's for a number past the end.
     pub fn cell(&self, element: u32) -> [usize; 3] {
         let last = self.cells.len().saturating_sub(1);
         let cell = self.cells.get((element as usize).min(last));
         cell.map_or([0; 3], |c| c.map(usize::from))
     }
 
-    /// Centre of an element at rest, in the scene frame.
+    /// Returns the centre of an element at rest, in the scene frame.
     pub fn rest_m(&self, element: u32) -> [f64; 3] {
         self.cell(element).map(|c| (c as f64 + 0.5) * self.spacing_m)
     }
 
-    /// The element in a cell; `None` where there is no tissue.
+    /// Returns the element in a cell; `None` where there is no tissue.
     pub fn element_of_cell(&self, i: usize, j: usize, k: usize) -> Option<u32> {
         if j >= self.dims[1] || k >= self.dims[2] {
             return None;
@@ -144,12 +144,12 @@ impl Lattice {
         (offset < run.len).then(|| run.first + offset)
     }
 
-    /// The element at a place of the scene frame while the body is at rest.
+    /// Returns the element at a place of the scene frame while the body is at rest.
     pub fn element_at_rest(&self, place_m: [f64; 3]) -> Option<u32> {
         self.element_at(place_m.map(|c| (c / self.spacing_m).floor() as i64))
     }
 
-    /// As `element_of_cell`, for coordinates that may lie below zero.
+    /// Returns the element in a cell as `element_of_cell`, for coordinates that may lie below zero.
     pub(crate) fn element_at(&self, [i, j, k]: [i64; 3]) -> Option<u32> {
         let index = |c: i64| usize::try_from(c).ok();
         self.element_of_cell(index(i)?, index(j)?, index(k)?)
@@ -168,17 +168,17 @@ impl Lattice {
         ]
     }
 
-    /// Number of an element's structure in the scene's list.
+    /// Returns the number of an element's structure in the scene's list.
     pub fn structure(&self, element: u32) -> u8 {
         self.structures.get(element as usize).copied().unwrap_or(0)
     }
 
-    /// Structure of every element, in their order; empty if there is only one.
+    /// Returns the structure of every element, in their order; empty if there is only one.
     pub fn structures(&self) -> &[u8] {
         &self.structures
     }
 
-    /// The same cells as one structure.
+    /// Returns the same cells as one structure.
     pub fn homogeneous(&self) -> Lattice {
         Lattice {
             structures: Vec::new(),
@@ -186,24 +186,24 @@ impl Lattice {
         }
     }
 
-    /// Volume of all elements at rest, m^3.
+    /// Returns the volume of all elements at rest, m^3.
     pub fn volume_m3(&self) -> f64 {
         self.element_count() as f64 * self.spacing_m.powi(3)
     }
 
-    /// Lowest and highest corner of the box around all elements at rest (faces, not centres).
+    /// Returns the lowest and highest corner of the box around all elements at rest (faces, not centres).
     pub fn bounds_m(&self) -> ([f64; 3], [f64; 3]) {
         let metres = |corner: [usize; 3]| corner.map(|c| c as f64 * self.spacing_m);
         let [low, high] = self.occupied;
         (metres(low), metres(high))
     }
 
-    /// Lowest and one past the highest cell that is occupied.
+    /// Returns the lowest and one past the highest cell that is occupied.
     pub fn occupied(&self) -> [[usize; 3]; 2] {
         self.occupied
     }
 
-    /// Size and box of each of the first `count` structures.
+    /// Returns the size and box of each of the first `count` structures.
     pub fn extents(&self, count: usize) -> Vec<Extent> {
         let mut boxes = vec![(0_u32, [usize::MAX; 3], [0; 3]); count];
         for (element, cell) in self.cells.iter().enumerate() {
@@ -229,7 +229,7 @@ impl Lattice {
     }
 }
 
-/// How large a structure is: its elements, and the box around them at rest (faces, not centres).
+/// Size of a structure: its elements, and the box around them at rest (faces, not centres).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
     /// Number of elements.
@@ -240,7 +240,7 @@ pub struct Extent {
     pub upper_m: [f64; 3],
 }
 
-/// The structure of most of a cell's members, which are in order; the first of several.
+/// Returns the structure of most of a cell's members, which are in order; the first of several.
 fn most_common(members: &[(u32, u8)]) -> u8 {
     let of_structure = members.chunk_by(|a, b| a.1 == b.1);
     let most = of_structure.reduce(|most, next| if next.len() > most.len() { next } else { most });

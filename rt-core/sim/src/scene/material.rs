@@ -1,15 +1,15 @@
-//! What a structure may be made of: stiffness that exists, and limits under which no cell folds over.
+//! Validation of a structure's material: stiffness that exists, and limits under which no cell folds over.
 
 use super::problem::SceneProblem;
 use super::structure::Structure;
 use crate::limits::{AxisLimits, folding};
 
-/// Largest Poisson's ratio that the solvers take: 0.5 would need a pressure of its own.
+/// Largest Poisson's ratio that the solvers take: 0.5 would need an extra unknown, the pressure.
 pub(super) const MAX_POISSON: f64 = 0.499;
 /// Above bone and steel, a number that is most likely in the wrong unit.
 const MAX_YOUNG_PA: f64 = 1e12;
 
-/// Everything wrong with the material of one structure.
+/// Returns everything wrong with the material of one structure.
 pub(super) fn problems_of(structure: &Structure) -> Vec<SceneProblem> {
     let mut found = Problems {
         structure: &structure.name,
@@ -39,8 +39,8 @@ pub(super) fn problems_of(structure: &Structure) -> Vec<SceneProblem> {
     found.found
 }
 
-/// Three links that meet in a corner may be of three structures: the widest angle along each axis must not fold it.
-/// Structures under the operator's limits are not counted; those are not known here.
+/// Finds a corner that folds where three links of different structures meet: the widest angle along each axis must not
+/// fold it. Structures under the operator's limits are not counted; those are not known here.
 pub(super) fn folding_between(structures: &[Structure]) -> Option<SceneProblem> {
     let own = structures
         .iter()
@@ -98,7 +98,7 @@ impl Problems<'_> {
         );
     }
 
-    /// Eq. 1 in three dimensions, which has eq. 1 for each pair of axes in it.
+    /// Checks eq. 1 in three dimensions, which implies eq. 1 for each pair of axes.
     fn folds(&mut self, shear_deg: [f64; 3]) {
         if shear_deg.iter().all(|angle| (0.0..90.0).contains(angle)) {
             self.unless(

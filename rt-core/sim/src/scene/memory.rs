@@ -1,12 +1,12 @@
-//! Whether a scene fits into the memory that there is.
+//! Check that a scene fits into available memory.
 
 use super::problem::SceneProblem;
 
-/// What `rt-core` takes for each element of a large scene: lattice, tissue, surface and the slices of shared memory.
-/// Measured as resident memory of `rt-core --scene full` above that of `--scene paper`, rounded up.
+/// Memory that `rt-core` takes for each element of a large scene: lattice, tissue, surface and the slices of shared
+/// memory. Measured as resident memory of `rt-core --scene full` above that of `--scene paper`, rounded up.
 const BYTES_PER_ELEMENT: u64 = 120;
 
-/// A problem when a scene of so many elements, cut from so many labels, needs more than there is.
+/// Returns a problem when a scene of so many elements, cut from so many labels, needs more memory than is available.
 pub(super) fn problem(elements: usize, cells: usize, available_bytes: u64) -> Option<SceneProblem> {
     let needed_bytes = elements as u64 * BYTES_PER_ELEMENT + cells as u64;
     (needed_bytes > available_bytes).then_some(SceneProblem::Memory {
@@ -16,7 +16,7 @@ pub(super) fn problem(elements: usize, cells: usize, available_bytes: u64) -> Op
     })
 }
 
-/// What the kernel says can be had without swapping; no limit where it does not say.
+/// Returns the memory that the kernel reports as available without swapping; no limit where it reports none.
 pub(super) fn available_bytes() -> u64 {
     let text = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
     available_in(&text).unwrap_or(u64::MAX)

@@ -1,7 +1,7 @@
-//! What a session runs on: a body of cubic elements and its surface, from labels or built in.
+//! Scene of a session: a body of cubic elements and its surface, from labels or built in.
 //!
-//! Scene frame: axes along the lattice, metres; the centre of cell (i, j, k) is at
-//! ((i + 0.5) h, (j + 0.5) h, (k + 0.5) h).
+//! Scene frame: axes along the lattice, metres; the centre of cell (i, j, k) is at ((i + 0.5) h, (j + 0.5) h, (k + 0.5)
+//! h).
 
 use std::sync::Arc;
 
@@ -56,11 +56,12 @@ pub struct Labels {
 pub struct Scene {
     /// Name, as the session announces it.
     pub name: String,
-    /// At least one; elements know theirs by its place here (`Lattice::structure`).
+    /// Structures, at least one; elements know theirs by its place here (`Lattice::structure`).
     pub structures: Vec<Structure>,
-    /// The labels' cells: what is where in the body at rest. Shared with the tissue model, which would otherwise hold a copy.
+    /// The labels' cells: what is where in the body at rest. Shared with the tissue model, which would otherwise hold a
+    /// copy.
     pub lattice: Arc<Lattice>,
-    /// What the tissue model moves: `lattice`, or a coarser one of it where that is too dear.
+    /// Body that the tissue model moves: `lattice`, or a coarser one where that is too expensive.
     pub body: Arc<Lattice>,
     /// Triangles over the body and its parts.
     pub surface: Surface,
@@ -71,7 +72,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A scene that needs no file, one of [`stylet_settings::BUILTIN_SCENES`].
+    /// Returns a scene that needs no file, one of [`stylet_settings::BUILTIN_SCENES`].
     pub fn builtin(name: &str) -> Result<Scene, SceneError> {
         let labels = builtin::labels(name).ok_or_else(|| SceneError::Unknown(name.to_owned()))?;
         labels
@@ -102,23 +103,24 @@ impl Scene {
         })
     }
 
-    /// The same scene with another tissue model, and as coarse a body as that needs.
+    /// Returns the same scene with another tissue model, and as coarse a body as that needs.
     pub fn with_tissue(self, tissue: TissueKind) -> Scene {
         self.with_body(tissue, tissue.most_elements())
     }
 
-    /// The same scene with the finite elements that needles' lines are solved for in, where `tissue` has lines.
+    /// Returns the same scene with the finite elements that needles' lines are solved for in, where `tissue` has lines.
     pub fn for_lines(self, tissue: TissueKind) -> Option<Scene> {
         let most = tissue.most_line_elements()?;
         Some(self.with_body(TissueKind::Fem, most))
     }
 
-    /// The same scene with the finite elements that a probe is worth minutes in: its own cells, or larger ones where those are too many.
+    /// Returns the same scene with the finite elements whose solution for a probe may take minutes: its own cells, or
+    /// larger ones where those are too many.
     pub fn in_cells(self) -> Scene {
         self.with_body(TissueKind::Fem, MOST_CELLS)
     }
 
-    /// The lattice of those finite elements, for the tissue of this scene.
+    /// Returns the lattice of those finite elements, for the tissue of this scene.
     pub fn body_of_lines(&self) -> Option<Arc<Lattice>> {
         self.tissue.most_line_elements().map(|most| self.coarser_body(most))
     }
@@ -139,7 +141,7 @@ impl Scene {
         self
     }
 
-    /// The same cells as one structure, without the surfaces of its parts.
+    /// Returns the same cells as one structure, without the surfaces of its parts.
     pub fn homogeneous(&self) -> Scene {
         let structures = vec![Structure::soft("tissue", 1)];
         let lattice = Arc::new(self.lattice.homogeneous());
@@ -153,17 +155,18 @@ impl Scene {
         .with_tissue(self.tissue)
     }
 
-    /// What computes where its elements are.
+    /// Returns the tissue model of the scene.
     pub fn tissue(&self) -> TissueKind {
         self.tissue
     }
 
-    /// Cells of the lattice along the edge of an element of the body.
+    /// Returns how many cells of the lattice lie along the edge of an element of the body.
     pub fn coarseness(&self) -> u32 {
         (self.body.spacing_m / self.lattice.spacing_m).round() as u32
     }
 
-    /// Structure of the material at a place in an element of the body; `local` runs from -0.5 to 0.5 across it.
+    /// Returns the structure of the material at a place in an element of the body; `local` runs from -0.5 to 0.5 across
+    /// it.
     pub fn structure_at(&self, element: u32, local: [f32; 3]) -> u8 {
         if Arc::ptr_eq(&self.body, &self.lattice) {
             return self.lattice.structure(element);
@@ -177,7 +180,7 @@ impl Scene {
         }
     }
 
-    /// Box around the targets at rest; around the whole body where there is none.
+    /// Returns the box around the targets at rest; around the whole body where there is none.
     pub fn target_bounds_m(&self) -> ([f64; 3], [f64; 3]) {
         let extents = self.lattice.extents(self.structures.len());
         let targets = self

@@ -1,4 +1,4 @@
-//! What can be wrong with a scene, said with the value, the limit and what to do.
+//! Problems of a scene, reported with the value, the limit and the remedy.
 
 use super::{MAX_CELLS_PER_AXIS, MAX_ELEMENTS, MAX_STRUCTURES, SPACING_RANGE_M};
 use stylet_settings::BUILTIN_SCENES;
@@ -58,9 +58,9 @@ pub enum SceneProblem {
     Memory {
         /// Cells with a label other than zero.
         elements: usize,
-        /// What they need.
+        /// Bytes that they need.
         needed_bytes: u64,
-        /// What the kernel has.
+        /// Bytes that the kernel has available.
         available_bytes: u64,
     },
     /// More structures than the protocol carries.
@@ -88,7 +88,7 @@ pub enum SceneProblem {
     UnknownLabel {
         /// Their label.
         label: u8,
-        /// How many there are.
+        /// Number of cells.
         cells: usize,
     },
     /// A structure without cells: empty, or outside the volume.
@@ -123,11 +123,11 @@ pub enum SceneProblem {
     Material {
         /// Its name.
         structure: String,
-        /// Which number.
+        /// Name of the value.
         what: String,
         /// Its value.
         value: f64,
-        /// What would be accepted, in words.
+        /// Values that would be accepted, in words.
         limit: &'static str,
     },
     /// Nothing can move.

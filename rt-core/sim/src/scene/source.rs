@@ -1,9 +1,9 @@
-//! Where a scene came from, small enough to be kept beside a recording.
+//! Source of a scene, small enough to be kept in a recording.
 
 use super::{Labels, Scene, SceneError, Structure};
 use serde::{Deserialize, Serialize};
 
-/// What a scene can be built from again.
+/// Source that a scene can be built from again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SceneSource {
     /// A built-in scene, by name.
@@ -18,13 +18,13 @@ pub enum SceneSource {
         spacing_m: f64,
         /// Label and number of cells, x fastest.
         runs: Vec<(u8, u32)>,
-        /// As in [`Labels`].
+        /// Structures as in [`Labels`].
         structures: Vec<Structure>,
     },
 }
 
 impl SceneSource {
-    /// The labels in runs.
+    /// Returns the labels in runs.
     pub fn of_labels(name: &str, labels: &Labels) -> Self {
         let mut runs: Vec<(u8, u32)> = Vec::new();
         for &cell in &labels.cells {
@@ -42,8 +42,8 @@ impl SceneSource {
         }
     }
 
-    /// The same scene with Young's modulus of all tissue multiplied; what it rests on stays as it is. A factor of 1 changes
-    /// nothing, a built-in scene stays built-in.
+    /// Returns the source of the same scene with Young's modulus of all tissue multiplied; its surroundings keep
+    /// theirs. A factor of 1 changes nothing, a built-in scene stays built-in.
     ///
     /// # Errors
     ///
@@ -70,7 +70,7 @@ impl SceneSource {
         Ok(source)
     }
 
-    /// The same scene again.
+    /// Builds the scene again.
     ///
     /// # Errors
     ///

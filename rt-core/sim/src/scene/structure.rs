@@ -1,4 +1,4 @@
-//! What a scene is made of: named structures, each with its own material.
+//! Structures of a scene, each with its name and material.
 
 use crate::limits::AxisLimits;
 use serde::{Deserialize, Serialize};
@@ -11,20 +11,20 @@ pub struct Structure {
     pub name: String,
     /// Label of its cells, 1 to 255.
     pub label: u8,
-    /// What it is in the procedure.
+    /// Role in the procedure.
     pub role: Role,
-    /// What it is made of.
+    /// Material.
     pub material: Material,
 }
 
-/// What a structure does when pushed.
+/// Mechanical properties of a structure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Material {
     /// Limits of ChainMail for links along x, y, z; `None` for those that the operator has set.
     pub limits: Option<[AxisLimits; 3]>,
     /// Bone, or a probe: never moves.
     pub fixed: bool,
-    /// What it rests on where it is at the outside of the body (FEM).
+    /// Surroundings that it rests on at the outside of the body (FEM).
     pub surroundings: Surroundings,
     /// Young's modulus (FEM).
     pub young_pa: f64,
@@ -33,7 +33,7 @@ pub struct Material {
 }
 
 impl Structure {
-    /// Tissue of one kind under the limits that the operator sets; modulus of the prostate: 17 kPa, Ahn 2010.
+    /// Makes tissue of one kind under the limits that the operator sets; modulus of the prostate: 17 kPa, Ahn 2010.
     pub fn soft(name: &str, label: u8) -> Structure {
         let material = Material {
             limits: None,

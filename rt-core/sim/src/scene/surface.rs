@@ -14,13 +14,13 @@ use super::{Lattice, Role, Structure};
 pub struct Surface {
     /// Every element on one of the surfaces, in the order of elements.
     pub vertex_elements: Vec<u32>,
-    /// Where each vertex is at rest: the centre of its element, m.
+    /// Place of each vertex at rest: the centre of its element, m.
     pub rest_m: Vec<[f32; 3]>,
     /// The element of a coarser body that each vertex goes with; empty where bodies are not coarser.
     pub moved_by: Vec<u32>,
     /// Indices into `vertex_elements`: the body's first, then the parts'.
     pub triangles: Vec<[u32; 3]>,
-    /// How many triangles are the body's.
+    /// Number of triangles of the body.
     pub body_triangles: usize,
     /// Elements on the surface of the body.
     pub body_elements: usize,
@@ -37,12 +37,12 @@ pub struct SurfacePart {
     pub triangles: Range<usize>,
 }
 
-/// Elements with at least one of their six neighbours missing.
+/// Returns the elements with at least one of their six neighbours missing.
 pub fn surface_elements(lattice: &Lattice) -> Vec<u32> {
     boundary(lattice, |_| true)
 }
 
-/// Elements of a part of the body with at least one of their six neighbours not in it.
+/// Returns the elements of a part of the body with at least one of their six neighbours not in it.
 fn boundary(lattice: &Lattice, is_in: impl Fn(u32) -> bool) -> Vec<u32> {
     let inner = |neighbour: &Option<u32>| neighbour.is_some_and(&is_in);
     (0..lattice.element_count() as u32)
@@ -85,7 +85,7 @@ impl Surface {
         }
     }
 
-    /// The same element is the same vertex in all of them.
+    /// Joins meshes, so that the same element is the same vertex in all of them.
     fn joined(meshes: &[(u8, Mesh)]) -> Self {
         let mut vertex_elements: Vec<u32> = meshes.iter().flat_map(|(_, m)| &m.vertex_elements).copied().collect();
         vertex_elements.sort_unstable();
@@ -115,7 +115,7 @@ impl Surface {
     }
 }
 
-/// The structures that have a surface of their own: number of the first, and which are in it.
+/// Returns the structures that have a surface of their own: number of the first, and which are in it.
 fn parts_of(structures: &[Structure]) -> Vec<(u8, Vec<bool>)> {
     if structures.len() < 2 {
         return Vec::new();
@@ -142,7 +142,7 @@ struct Mesh {
 }
 
 impl Mesh {
-    /// Marching cubes on the occupancy, each vertex moved onto the inside end of its cube edge.
+    /// Runs marching cubes on the occupancy, each vertex moved onto the inside end of its cube edge.
     fn of(lattice: &Lattice, is_in: impl Fn(u32) -> bool) -> Self {
         let vertex_elements = boundary(lattice, &is_in);
         let mut vertex_of_element = vec![NONE; lattice.element_count()];
@@ -171,10 +171,10 @@ impl Mesh {
     }
 }
 
-/// What is at a corner of a cube: nothing, an element inside the part (`Some(NONE)`) or a surface vertex.
+/// Corners of a cube: nothing, an element inside the part (`Some(NONE)`) or a surface vertex.
 type Corners = [Option<u32>; 8];
 
-/// The vertex that handles a cube, so that each cube is handled once.
+/// Returns the vertex that handles a cube, so that each cube is handled once.
 fn lowest_vertex(corners: &Corners) -> Option<u32> {
     let vertices = corners.iter().flatten().copied();
     vertices.filter(|&vertex| vertex != NONE).min()
@@ -250,7 +250,7 @@ fn without_opposites(triangles: Vec<[u32; 3]>) -> Vec<[u32; 3]> {
     kept
 }
 
-/// The triangle's vertices in ascending order, and whether that order turns the same way.
+/// Returns the triangle's vertices in ascending order, and whether that order turns the same way.
 fn unoriented([a, b, c]: [u32; 3]) -> ([u32; 3], i32) {
     let mut key = [a, b, c];
     key.sort_unstable();

@@ -19,7 +19,7 @@ pub fn block(dims: [usize; 3]) -> Labels {
     labels(dims, |_| true)
 }
 
-/// A block with a tunnel through it along z and a notch in its side: neither convex nor simply connected.
+/// Returns a block with a tunnel through it along z and a notch in its side: neither convex nor simply connected.
 pub fn with_hole() -> Labels {
     labels([14, 12, 10], |[i, j, k]| {
         let tunnel = (5..9).contains(&i) && (4..8).contains(&j);
@@ -28,7 +28,7 @@ pub fn with_hole() -> Labels {
     })
 }
 
-/// A U whose arms meet only at one end: straight lines between them leave the body.
+/// Returns a U whose arms meet only at one end: straight lines between them leave the body.
 pub fn horseshoe() -> Labels {
     labels([13, 4, 15], |[i, _, k]| k < 4 || !(4..9).contains(&i))
 }
@@ -37,14 +37,14 @@ pub fn two_parts() -> Labels {
     labels([15, 8, 8], |[i, _, _]| i != 7)
 }
 
-/// Cells kept at random, so that every way cubes can meet occurs.
+/// Keeps cells at random, so that every way cubes can meet occurs.
 pub fn speckle(seed: u64) -> Labels {
     let mut random = Random(seed);
     let keep: Vec<bool> = (0..9 * 9 * 9).map(|_| random.unit() < 0.6).collect();
     labels([9, 9, 9], |[i, j, k]| keep[i + 9 * j + 81 * k])
 }
 
-/// A stiff layer, anisotropic, in soft tissue.
+/// Returns a stiff layer, anisotropic, in soft tissue.
 pub fn layers() -> Labels {
     let mut labels = labels([12, 9, 10], |_| true);
     for (n, cell) in labels.cells.iter_mut().enumerate() {
@@ -62,7 +62,7 @@ pub fn layers() -> Labels {
     labels
 }
 
-/// Soft tissue between a fixed wall and a fixed bar.
+/// Returns soft tissue between a fixed wall and a fixed bar.
 pub fn bone() -> Labels {
     let mut labels = labels([12, 9, 10], |_| true);
     for (n, cell) in labels.cells.iter_mut().enumerate() {
@@ -80,7 +80,7 @@ pub fn bone() -> Labels {
 pub struct Random(pub u64);
 
 impl Random {
-    /// In [0, 1).
+    /// Draws a number in [0, 1).
     pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -89,7 +89,7 @@ impl Random {
         ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// In [-1, 1).
+    /// Draws a number in [-1, 1).
     pub fn signed(&mut self) -> f64 {
         2.0 * self.unit() - 1.0
     }

@@ -1,4 +1,4 @@
-//! Which tissue model a scene takes.
+//! Tissue model of a scene.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,15 +11,15 @@ pub enum TissueKind {
     ChainMail,
     /// Linear elastic finite elements.
     Fem,
-    /// Restricted ChainMail around a needle that slips by speed: the paper as it is printed, eq. 6.
+    /// Restricted ChainMail around a needle that slips by speed: the paper as printed, eq. 6.
     Paper,
 }
 
 impl TissueKind {
-    /// In the order of the help.
+    /// Kinds in the order of the help.
     pub const ALL: [Self; 3] = [Self::ChainMail, Self::Fem, Self::Paper];
 
-    /// Name on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             TissueKind::ChainMail => "chainmail",
@@ -28,7 +28,7 @@ impl TissueKind {
         }
     }
 
-    /// What it is good for, in one line.
+    /// Returns its purpose, in one line.
     pub fn help(self) -> &'static str {
         match self {
             TissueKind::ChainMail => {
@@ -43,12 +43,13 @@ impl TissueKind {
         }
     }
 
-    /// The model of that name.
+    /// Returns the model of that name.
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
-    /// A body of more elements is made coarser. FEM: a tick of 200 Hz and some seconds for a needle's line allow no more.
+    /// Returns the number of elements above which a body is made coarser. FEM: a tick of 200 Hz and some seconds for a
+    /// needle's line allow no more.
     pub fn most_elements(self) -> usize {
         match self {
             TissueKind::ChainMail | TissueKind::Paper => usize::MAX,
@@ -56,8 +57,8 @@ impl TissueKind {
         }
     }
 
-    /// Needles go along lines, which are solved for in a body of at most so many elements; `None` where they slip by speed.
-    /// ChainMail takes no more of the answer than how the line moves, and how the body is carried by it.
+    /// Needles go along lines, which are solved for in a body of at most so many elements; `None` where they slip by
+    /// speed. ChainMail takes no more of the answer than how the line moves, and how the body is carried by it.
     pub fn most_line_elements(self) -> Option<usize> {
         match self {
             TissueKind::ChainMail => Some(8_000),
@@ -66,18 +67,18 @@ impl TissueKind {
         }
     }
 
-    /// Whether needles go along lines.
+    /// Returns whether needles go along lines.
     pub fn has_lines(self) -> bool {
         self.most_line_elements().is_some()
     }
 
-    /// Whether the tissue answers a line's loads by the sum of its columns.
+    /// Returns whether the tissue answers a line's loads by the sum of its columns.
     pub fn adds_columns(self) -> bool {
         self == TissueKind::Fem
     }
 
-    /// Edge of the tissue that moves as one piece with the tip. FEM needs one: the force on a single node goes to
-    /// zero with the spacing.
+    /// Returns the edge of the tissue that moves as one piece with the tip. FEM needs one: the force on a single node
+    /// goes to zero with the spacing.
     pub fn tip_patch_m(self) -> f64 {
         match self {
             TissueKind::ChainMail | TissueKind::Paper => 0.0,
@@ -85,7 +86,7 @@ impl TissueKind {
         }
     }
 
-    /// Whether `TissueModel::prepare` does anything: only then need the loop look where the tip goes.
+    /// Returns whether `TissueModel::prepare` does anything: only then need the loop predict where the tip goes.
     pub fn prepares(self) -> bool {
         self == TissueKind::Fem
     }

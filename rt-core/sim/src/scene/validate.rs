@@ -1,10 +1,10 @@
-//! Whether labels make a scene: every problem at once.
+//! Validation of labels as a scene: every problem at once.
 
 use super::problem::SceneProblem;
 use super::structure::Structure;
 use super::{Labels, MAX_CELLS_PER_AXIS, MAX_ELEMENTS, MAX_STRUCTURES, SPACING_RANGE_M, material, memory};
 
-/// Everything wrong with `labels`.
+/// Returns everything wrong with `labels`.
 pub(super) fn problems_of(labels: &Labels) -> Vec<SceneProblem> {
     let mut problems = Vec::new();
     for (axis, &cells) in ['x', 'y', 'z'].into_iter().zip(&labels.dims) {

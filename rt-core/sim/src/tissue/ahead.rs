@@ -1,17 +1,17 @@
-//! Which element a moving tip comes into next.
+//! Prediction of the element that a moving tip comes into next.
 
 use super::{Deformed, MaterialPoint};
 
 /// Places looked at ahead of a held element, and from outside the body.
 const STEPS: usize = 24;
 const STEPS_OUTSIDE: usize = 40;
-/// A tip slower than this part of an element in each tick comes into every element on its way, if only for a moment: there
-/// the places are so close together.
+/// A tip slower than this part of an element in each tick comes into every element on its way, if only for a moment:
+/// there the places are so close together.
 const SLOW: f64 = 0.25;
 const CLOSE: f64 = 0.1;
 
-/// The first element other than `held` on the way of a tip that goes on by `step_m` in each tick. Where nothing is held
-/// the body is taken to be at rest.
+/// Returns the first element other than `held` on the way of a tip that advances by `step_m` in each tick. Where
+/// nothing is held the body is taken to be at rest.
 ///
 /// Bounded: it tries a few places, and walks a few elements from each.
 pub fn element_ahead(body: &Deformed, held: Option<u32>, tip_m: [f64; 3], step_m: [f64; 3]) -> Option<u32> {

@@ -6,21 +6,21 @@ use crate::scene::{Lattice, Scene};
 use crate::simd::Simd;
 use std::sync::Arc;
 
-/// How a body is to be carried from now on: by what a coarser body answers to the loads of needles.
+/// Motion that carries a body from now on: the answer of a coarser body to the loads of needles.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Carry<'a> {
     /// Displacement of every element of that body, m/N, and the load of each, N.
     pub columns: &'a [PackedField],
-    /// As many as there are columns; what has no load counts as 0.
+    /// Loads, as many as there are columns; a column without a load counts as 0.
     pub loads_n: &'a [f64],
     /// Displacements of that body besides, m.
     pub fields: &'a [&'a ElementField],
-    /// How far all of it is moved besides, m.
+    /// Displacement of all of it on top, m.
     pub whole_m: [f64; 3],
 }
 
 impl Carry<'_> {
-    /// Not at all.
+    /// No motion.
     pub const NOT: Self = Carry {
         columns: &[],
         loads_n: &[],
@@ -34,20 +34,20 @@ impl Carry<'_> {
     }
 }
 
-/// How a body is carried.
+/// Motion that carries a body.
 #[derive(Clone, Copy, Debug, Default)]
 pub enum Carried<'a> {
-    /// Not at all.
+    /// No motion.
     #[default]
     Not,
-    /// By a field of a coarser body.
+    /// Field of a coarser body.
     Field(&'a CarriedField),
-    /// By one, and near the tip as far as that has to give way.
+    /// Field of a coarser body, and near the tip the correction where it folds.
     Unfolded(&'a CarriedField, &'a LargeStrain),
 }
 
 impl Carried<'_> {
-    /// Displacement of an element, m.
+    /// Returns the displacement of an element, m.
     pub fn at_m(&self, lattice: &Lattice, element: u32) -> [f64; 3] {
         match self {
             Self::Not => [0.0; 3],
@@ -59,7 +59,7 @@ impl Carried<'_> {
         }
     }
 
-    /// No element is displaced farther, m; the body's elements have that spacing.
+    /// Returns a bound of the displacement of every element, m; the body's elements have that spacing.
     pub fn largest_m(&self, spacing_m: f64) -> f64 {
         match self {
             Self::Not => 0.0,
@@ -76,24 +76,26 @@ impl Carried<'_> {
 #[derive(Clone, Debug)]
 pub struct CarriedField {
     simd: Simd,
-    /// Of each element of the coarser body, m.
+    /// Displacement of each element of the coarser body, m.
     of_element: [Vec<f32>; 3],
-    /// The same at each cell of a box with one empty cell around the body: what is beside the body moves with it. The fourth
-    /// number is empty, so that a cell is one register.
+    /// The same at each cell of a box with one empty cell around the body: what is next to the body moves with it. The
+    /// fourth number is empty, so that a cell is one register.
     of_cell_m: Vec<[f32; 4]>,
-    /// Cells of the box that take their displacement from an element, with that element: a body may fill little of its box.
+    /// Cells of the box that take their displacement from an element, with that element: a body may fill little of its
+    /// box.
     source: Vec<[u32; 2]>,
     /// Cells of the box along x, y, z.
     dims: [usize; 3],
-    /// Where the centres of the scene's cells lie along x, y, z: the cell of the box before it, and how far to the next.
+    /// Places of the scene's cell centres along x, y, z: the cell of the box before each, and the part of the way to
+    /// the next.
     between: [Vec<(u32, f32)>; 3],
-    /// By structure.
+    /// Fixed structures.
     is_fixed: Vec<bool>,
     largest_m: f32,
 }
 
 impl CarriedField {
-    /// At rest; `coarse` is a coarser lattice of the scene's cells.
+    /// Makes a field at rest; `coarse` is a coarser lattice of the scene's cells.
     pub fn new(scene: &Scene, coarse: Arc<Lattice>) -> Self {
         let dims = coarse.dims.map(|n| n + 2);
         let cells = dims.iter().product::<usize>();
@@ -112,7 +114,7 @@ impl CarriedField {
         }
     }
 
-    /// The sum of loads times answers, fields and a shift; does not allocate.
+    /// Sets the field to the sum of loads times answers, fields and a shift; does not allocate.
     pub fn set(&mut self, by: Carry<'_>) {
         if by.is_at_rest() {
             return self.clear();
@@ -135,7 +137,7 @@ impl CarriedField {
         }
     }
 
-    /// Nothing is displaced by it.
+    /// Returns whether it displaces nothing.
     pub fn is_at_rest(&self) -> bool {
         self.largest_m == 0.0
     }
@@ -150,13 +152,13 @@ impl CarriedField {
                 *slot = moved_m;
             }
             let square = moved_m.iter().map(|c| c * c).sum::<f32>();
-            // What is no number stays, so that nobody takes the answer for one.
+            // NaN stays, so that no reader mistakes the answer for a number.
             largest = if square <= largest { largest } else { square };
         }
         self.largest_m = largest.sqrt();
     }
 
-    /// Displacement of an element of the scene's lattice, m.
+    /// Returns the displacement of an element of the scene's lattice, m.
     pub fn at_m(&self, lattice: &Lattice, element: u32) -> [f64; 3] {
         let structure = usize::from(lattice.structure(element));
         if self.is_fixed.get(structure).copied().unwrap_or(false) {
@@ -180,7 +182,7 @@ impl CarriedField {
         self.of_element.each_ref().map(|axis| bytemuck::cast_slice(axis))
     }
 
-    /// Bytes of [`Self::save`].
+    /// Returns the size of [`Self::save`], in bytes.
     pub fn memory_len(&self) -> usize {
         parts::len(&self.memory())
     }
@@ -190,7 +192,7 @@ impl CarriedField {
         parts::save(&self.memory(), to);
     }
 
-    /// Takes up what another field of the same body saved; nothing where `from` has another length.
+    /// Loads what another field of the same body saved; nothing where `from` has another length.
     pub fn load(&mut self, from: &[u8]) {
         let mut axes = self.of_element.each_mut().map(|axis| bytemuck::cast_slice_mut(axis));
         if parts::load(&mut axes, from) {
@@ -199,12 +201,12 @@ impl CarriedField {
     }
 }
 
-/// From `a` at 0 to `b` at 1.
+/// Interpolates from `a` at 0 to `b` at 1.
 fn mixed(a: [f32; 4], b: [f32; 4], part: f32) -> [f32; 4] {
     std::array::from_fn(|c| a[c] + part * (b[c] - a[c]))
 }
 
-/// Where the centres of the scene's cells lie along one axis, among those of the box around the coarser body.
+/// Returns the places of the scene's cell centres along one axis, among those of the box around the coarser body.
 fn between(lattice: &Lattice, coarse: &Lattice, axis: usize) -> Vec<(u32, f32)> {
     // Centres of cells are half a cell from their corners, and the box begins one cell before the body.
     let per_cell = lattice.spacing_m / coarse.spacing_m;
@@ -216,8 +218,9 @@ fn between(lattice: &Lattice, coarse: &Lattice, axis: usize) -> Vec<(u32, f32)> 
         .collect()
 }
 
-/// The element of a cell of the box, or else one of the neighbouring cells, in the order of `steps`; one that is mostly full where there is
-/// one: an element that is not is as soft as it is empty, and at the rim moves farther than what it holds.
+/// Returns the element of a cell of the box, or else of one of the neighbouring cells, in the order of `steps`. It
+/// prefers one that is mostly full: another is as soft as it is empty, and at the rim moves farther than the tissue in
+/// it.
 fn nearest(coarse: &Lattice, cell: [usize; 3], steps: &[[i64; 3]; 27], is_full: &[bool]) -> Option<u32> {
     let element = |step: &[i64; 3]| {
         let [i, j, k] = [0, 1, 2].map(|a| usize::try_from(cell[a] as i64 - 1 + step[a]).ok());
@@ -232,7 +235,7 @@ fn nearest(coarse: &Lattice, cell: [usize; 3], steps: &[[i64; 3]; 27], is_full: 
     around.find(full).or(Some(first))
 }
 
-/// By element of the coarser body, whether more than half of it is cells of the scene.
+/// Returns for each element of the coarser body whether more than half of it is cells of the scene.
 fn mostly_full(lattice: &Lattice, coarse: &Lattice) -> Vec<bool> {
     let per_edge = (coarse.spacing_m / lattice.spacing_m).round().max(1.0) as usize;
     let mut cells = vec![0_usize; coarse.element_count()];
@@ -247,7 +250,7 @@ fn mostly_full(lattice: &Lattice, coarse: &Lattice) -> Vec<bool> {
     cells.into_iter().map(|count| 2 * count > per_edge.pow(3)).collect()
 }
 
-/// To the cell itself, then over its faces, edges and corners.
+/// Returns the steps to the cell itself, then over its faces, edges and corners.
 fn steps_outward() -> [[i64; 3]; 27] {
     let mut steps = std::array::from_fn(|n| n as i64).map(|n| [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1]);
     steps.sort_by_key(|step: &[i64; 3]| step.iter().map(|c| c.abs()).sum::<i64>());

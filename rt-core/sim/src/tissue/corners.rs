@@ -8,8 +8,9 @@ type Point = [f32; 3];
 /// Places of element centres along z, y, x, in elements; not a number where no element is.
 type Places = [[[Point; WIDTH]; WIDTH]; WIDTH];
 
-/// Smallest volume that three links span, one along each axis, over that at rest, of displacements in elements over [`WIDTH`] elements
-/// along each axis; `None` where there is none. 1 where no three links meet. Does not allocate.
+/// Returns the smallest volume that three links span, one along each axis, over that at rest, of displacements in
+/// elements over [`WIDTH`] elements along each axis; `None` where there is none. 1 where no three links meet. Does not
+/// allocate.
 pub(super) fn least_corner_of(displacement: impl Fn([usize; 3]) -> Option<[f32; 3]>) -> f64 {
     let mut places = [[[[f32::NAN; 3]; WIDTH]; WIDTH]; WIDTH];
     for (k, plane) in places.iter_mut().enumerate() {
@@ -33,7 +34,8 @@ pub(super) fn least_corner_of(displacement: impl Fn([usize; 3]) -> Option<[f32; 
     if least < f32::INFINITY { f64::from(least) } else { 1.0 }
 }
 
-/// Over the eight corners of the cell between eight centres; not a number, or of those that are there, where some are missing.
+/// Returns the smallest volume over the eight corners of the cell between eight centres; not a number, or that of those
+/// present, where some are missing.
 fn least_of_cell(places: &Places, [i, j, k]: [usize; 3]) -> f32 {
     let at = |a: usize, b: usize, c: usize| places[k + c][j + b][i + a];
     let between = |to: Point, from: Point| [0, 1, 2].map(|c| to[c] - from[c]);

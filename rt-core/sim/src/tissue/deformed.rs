@@ -1,4 +1,4 @@
-//! The body as it is now: what everything but the models reads.
+//! The deformed body, which everything but the models reads.
 
 use super::Carried;
 use crate::scene::{Lattice, Surface};
@@ -8,7 +8,7 @@ use crate::scene::{Lattice, Surface};
 pub struct Deformed<'a> {
     /// Elements and their neighbours.
     pub lattice: &'a Lattice,
-    /// Along x, y, z; `scale` times these is in elements.
+    /// Displacement along x, y, z; `scale` times these is in elements.
     pub u: [&'a [f32]; 3],
     /// Elements for each unit of `u`.
     pub scale: f32,
@@ -19,7 +19,7 @@ pub struct Deformed<'a> {
 }
 
 impl Deformed<'_> {
-    /// Displacement from rest of one element, in elements; the last element's for a number past the end.
+    /// Returns the displacement from rest of one element, in elements; the last element's for a number past the end.
     pub fn displacement(&self, element: u32) -> [f64; 3] {
         let u = self.not_carried(element);
         if matches!(self.carried, Carried::Not) {
@@ -30,14 +30,15 @@ impl Deformed<'_> {
         [0, 1, 2].map(|a| u[a] + carried_m[a] / self.lattice.spacing_m)
     }
 
-    /// Without what carries the whole body: loops over a body that nothing carries look for that once.
+    /// Returns the displacement without the motion that carries the whole body: loops over a body that nothing carries
+    /// check for that once.
     #[inline(always)]
     pub(super) fn not_carried(&self, element: u32) -> [f64; 3] {
         let e = (element as usize).min(self.lattice.element_count().saturating_sub(1));
         self.u.map(|c| c.get(e).map_or(0.0, |u| f64::from(self.scale * u)))
     }
 
-    /// Centre of an element in the scene frame; the last element's for a number past the end.
+    /// Returns the centre of an element in the scene frame; the last element's for a number past the end.
     pub fn position_m(&self, element: u32) -> [f64; 3] {
         let rest = self.lattice.rest_m(element);
         let u = self.displacement(element);

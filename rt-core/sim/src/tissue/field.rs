@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct ElementField(pub [Vec<f32>; 3]);
 
 impl ElementField {
-    /// Zeros for that many elements, every page of which was written to.
+    /// Makes zeros for that many elements, every page of which was written to.
     pub fn with_room(elements: usize) -> Self {
         ElementField(std::array::from_fn(|_| {
             let mut axis = vec![1.0; elements];
@@ -17,7 +17,7 @@ impl ElementField {
         }))
     }
 
-    /// How many elements it has.
+    /// Returns the number of elements.
     pub fn elements(&self) -> usize {
         self.0[0].len()
     }
@@ -27,19 +27,19 @@ impl ElementField {
         add_up(Simd::detect(), columns, loads_n, 1.0, &mut self.0);
     }
 
-    /// One of several parts of that, in any order. Does not allocate.
+    /// Loads one of several parts of that, in any order. Does not allocate.
     pub fn load_part(&mut self, columns: &[PackedField], loads_n: &[f64], part: [usize; 2]) {
         add_up_part(Simd::detect(), (columns, loads_n), 1.0, &mut self.0, part);
     }
 
-    /// Zeros for that many elements.
+    /// Makes zeros for that many elements.
     pub fn zeros(elements: usize) -> Self {
         ElementField(std::array::from_fn(|_| vec![0.0; elements]))
     }
 }
 
-/// The same in half of the memory, which is what adding up many of them waits for: in steps of 1 / 32,767 of the largest
-/// displacement in it.
+/// The same in half of the memory, which is what adding up many of them waits for: in steps of 1 / 32,767 of the
+/// largest displacement in it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PackedField {
     step_m: f32,
@@ -47,7 +47,7 @@ pub struct PackedField {
 }
 
 impl PackedField {
-    /// Zeros for that many elements.
+    /// Makes zeros for that many elements.
     pub fn zeros(elements: usize) -> Self {
         PackedField {
             step_m: 0.0,
@@ -55,7 +55,7 @@ impl PackedField {
         }
     }
 
-    /// Takes up a field of as many elements; what is not finite in it counts as zero. Does not allocate.
+    /// Packs a field of as many elements; values that are not finite count as zero. Does not allocate.
     pub fn pack(&mut self, field: &ElementField) {
         let simd = Simd::detect();
         let largest = field.0.iter().map(|u| largest(simd, u)).fold(0.0, f32::max);
@@ -66,35 +66,35 @@ impl PackedField {
         }
     }
 
-    /// Displacement of an element, m/N; zero for a number past the end.
+    /// Returns the displacement of an element, m/N; zero for a number past the end.
     pub fn at(&self, element: u32) -> [f32; 3] {
         let steps = |axis: &Vec<i16>| axis.get(element as usize).copied().map_or(0.0, f32::from);
         self.steps.each_ref().map(|axis| steps(axis) * self.step_m)
     }
 
-    /// Every displacement as bits, to be compared.
+    /// Returns whether every displacement has the same bits.
     pub fn is_identical(&self, other: &PackedField) -> bool {
         self.step_m.to_bits() == other.step_m.to_bits() && self.steps == other.steps
     }
 
-    /// How many elements it has.
+    /// Returns the number of elements.
     pub fn elements(&self) -> usize {
         self.steps[0].len()
     }
 
-    /// As many along each axis, in steps of a finite size.
+    /// Returns whether it has as many along each axis, in steps of a finite size.
     pub fn is_sound(&self) -> bool {
         self.steps.iter().all(|axis| axis.len() == self.elements()) && self.step_m.is_finite()
     }
 
-    /// Bytes of the displacements.
+    /// Returns the size of the displacements, in bytes.
     pub fn bytes(&self) -> usize {
         self.steps.iter().map(|axis| axis.len() * size_of::<i16>()).sum()
     }
 }
 
 vectorised! {
-    /// Largest size among the numbers that are finite.
+    /// Returns the largest size among the numbers that are finite.
     fn largest(u: &[f32]) -> f32 {
         const TOGETHER: usize = 16;
         let mut largest = [0.0_f32; TOGETHER];
@@ -122,12 +122,12 @@ vectorised! {
 /// Elements that are added up at once: their sum stays in the first cache.
 const BLOCK: usize = 2048;
 
-/// The sum of factor times field for each factor other than zero, in place of `sum`.
+/// Replaces `sum` by the sum of factor times field for each factor other than zero.
 pub(crate) fn add_up(simd: Simd, fields: &[PackedField], factors: &[f64], scale: f64, sum: &mut [Vec<f32>; 3]) {
     add_up_part(simd, (fields, factors), scale, sum, [0, 1]);
 }
 
-/// The blocks of one of so many parts.
+/// Adds up the blocks of one of so many parts.
 fn add_up_part(
     simd: Simd,
     (fields, factors): (&[PackedField], &[f64]),
@@ -182,7 +182,7 @@ vectorised! {
 }
 
 vectorised! {
-    /// As one after the other, in every bit; the sum is read and written once in place of four times.
+    /// Adds four fields as one after the other, in every bit; the sum is read and written once instead of four times.
     fn add_four(sum: &mut [f32], factors: [f32; 4], steps: [&[i16]; 4]) {
         let [a, b, c, d] = steps;
         let both = a.iter().zip(b).zip(c.iter().zip(d));

@@ -1,13 +1,14 @@
-//! Whether tissue near a place is folded: the smallest volume that three links of an element span.
+//! Detection of folded tissue near a place: the smallest volume that three links of an element span.
 //!
-//! A linear answer knows no limit: twice the force, twice the displacement, until a cell is turned inside out. It is still an
-//! answer, but not of tissue, so that whoever uses it has to hear of it.
+//! A linear answer knows no limit: twice the force, twice the displacement, until a cell is turned inside out. It is
+//! still an answer, but not of tissue, so its user must be warned.
 
 use super::Deformed;
 use super::corners::{REACH, least_corner_of};
 
-/// Smallest volume that three links of an element span, one along each axis, over that at rest: over all corners between elements
-/// up to four from `element`. At rest it is 1; at 0 and below a cell is folded. 1 where no three links meet. Does not allocate.
+/// Returns the smallest volume that three links of an element span, one along each axis, over that at rest: over all
+/// corners between elements up to four from `element`. At rest it is 1; at 0 and below a cell is folded. 1 where no
+/// three links meet. Does not allocate.
 pub fn least_corner(body: &Deformed, element: u32) -> f64 {
     let low = body.lattice.cell(element).map(|c| c as i64 - REACH as i64);
     least_corner_of(|step| {

@@ -1,4 +1,4 @@
-//! What every tissue model is: a body that takes steps and can be read.
+//! Trait of tissue models: a body that takes steps and can be read.
 
 use super::{Carry, Deformed, ElementField, PackedField};
 use crate::limits::Limits;
@@ -13,26 +13,26 @@ pub const REACH: f64 = 2048.0;
 pub struct Held {
     /// Number of the element.
     pub element: u32,
-    /// Where its centre is kept, in the scene frame, m.
+    /// Position where its centre is kept, in the scene frame, m.
     pub position_m: [f64; 3],
     /// Edge of the cube around the element at rest whose elements go along with it; 0 for the element alone.
     pub patch_m: f64,
 }
 
-/// What became of the held element.
+/// Outcome for the held element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeldOutcome {
     /// None was given.
     None,
-    /// It is where it was asked to be.
+    /// Element that is where it was asked to be.
     Followed,
     /// Fixed tissue stopped it part of the way.
     Limited,
-    /// Not finite, out of reach, or no such element; the step only recovered.
+    /// Request that is not finite, out of reach, or for no element; the step only recovered.
     Refused,
 }
 
-/// How far the solver had to go, in this order.
+/// Effort of the solver, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Solve {
     /// Nothing had to move.
@@ -47,7 +47,7 @@ pub enum Solve {
     Cycles,
 }
 
-/// What came of one step.
+/// Outcome of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {
     /// Passes over the links (sweeps, projections, re-anchoring), or cycles of multigrid.
@@ -61,9 +61,9 @@ pub struct StepReport {
     pub converged: bool,
     /// No element is farther from rest, in elements.
     pub max_displacement: f32,
-    /// What became of the held element.
+    /// Outcome for the held element.
     pub held: HeldOutcome,
-    /// How far the solver had to go.
+    /// Effort of the solver.
     pub solve: Solve,
     /// Force of the tissue on the tip, where the model knows forces.
     pub tip_force_n: Option<[f64; 3]>,
@@ -79,55 +79,58 @@ pub trait TissueModel: Send {
     /// Advances by `dt_s` with `held` in place; a `dt_s` that is not above zero recovers nothing.
     fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport;
 
-    /// Called when a step's answer is out, with what will be held next if the needle goes on as it does: a model that
-    /// has time left in this tick may work ahead, by a bounded piece. Obligations as for `step`. A wrong guess costs
-    /// this work and no more; answers stay what they are within the model's tolerance.
+    /// Called when a step's answer is out, with what will be held next if the needle keeps going: a model that has time
+    /// left in this tick may work ahead, by a bounded piece. Obligations as for `step`. A wrong guess costs this work
+    /// and no more; answers stay the same within the model's tolerance.
     fn prepare(&mut self, _next: Option<Held>) {}
 
-    /// Displaces the body by the answers `columns` (m/N) to `loads_n` and by `whole_m` as a whole, in place of a step; what is held is let loose, and what
-    /// the model knew of it is dropped.
-    /// Obligations as for `step`. `None` from a model whose answers do not add up.
+    /// Sets the displacement to the sum of `columns` (m/N) times `loads_n` plus `whole_m`, instead of a step; releases
+    /// the held element and clears its solver state. Obligations as for `step`. `None` from a model whose answers do
+    /// not add up.
     fn displace(&mut self, _columns: &[PackedField], _loads_n: &[f64], _whole_m: [f64; 3]) -> Option<StepReport> {
         None
     }
 
-    /// Displaces the body by these fields (m) on top of what [`displace`](Self::displace) has just done, and reports anew. Obligations as
-    /// for `step`. `None` from a model whose answers do not add up.
+    /// Adds these fields (m) to the displacement that [`displace`](Self::displace) has just set, and reports it again.
+    /// Obligations as for `step`. `None` from a model whose answers do not add up.
     fn add(&mut self, _fields: &[&ElementField]) -> Option<StepReport> {
         None
     }
 
-    /// Called after a step, or [`displace`](Self::displace) in place of one, with the smallest volume of a corner around an element, at which the tip is: a model whose
-    /// answer knows no limit corrects it there, until the next step; what is held may be elsewhere until then. Whether it has. Obligations as for `step`.
+    /// Corrects inverted cells near the tip until the next step; returns whether it did. Called after a step, or after
+    /// [`displace`](Self::displace) instead of one, with the smallest volume of a corner around the tip's element. The
+    /// held element may be elsewhere until then. Obligations as for `step`.
     fn unfold(&mut self, _element: u32, _least_corner: f64) -> bool {
         false
     }
 
-    /// Displaces the whole body, on top of what its steps do, until the next call. Nothing in a model that does not know such a
-    /// displacement. Obligations as for `step`.
+    /// Displaces the whole body, on top of what its steps do, until the next call. Nothing in a model that does not
+    /// know such a displacement. Obligations as for `step`.
     fn carry(&mut self, _by: Carry<'_>) {}
 
-    /// Whether forces may go by this step: one that has not converged is for no hand, but where a model says otherwise.
+    /// Returns whether forces may go by this step: a hand feels no step that has not converged, unless a model allows
+    /// it.
     fn may_be_felt(&self, report: &StepReport) -> bool {
         report.converged
     }
 
-    /// The body after the last step.
+    /// Returns the body after the last step.
     fn deformed(&self) -> Deformed<'_>;
 
-    /// Every element to its place at rest, at once.
+    /// Returns every element to its place at rest, at once.
     fn return_to_rest(&mut self);
 
     /// Takes new limits, where the model has such; without allocating.
     fn set_limits(&mut self, limits: Limits);
 
-    /// Bytes of all that one step leaves to the next; constant for the life of the model. 0: it cannot be saved.
+    /// Returns the size of all that one step leaves to the next, in bytes; constant for the life of the model. 0: it
+    /// cannot be saved.
     fn memory_len(&self) -> usize {
         0
     }
 
-    /// Whether those bytes are all of it now: a model may carry more for a while than can be written in a tick. A recording
-    /// begins at a step before which they are.
+    /// Returns whether those bytes are all of its state now: a model may hold more for a while than can be written in a
+    /// tick. A recording begins at a step before which they are.
     fn is_all_saved(&self) -> bool {
         true
     }
@@ -135,6 +138,6 @@ pub trait TissueModel: Send {
     /// Writes those bytes, without allocating; nothing where `to` has another length.
     fn save(&self, _to: &mut [u8]) {}
 
-    /// Takes up what a model of the same body saved; nothing where `from` has another length.
+    /// Loads what a model of the same body saved; nothing where `from` has another length.
     fn load(&mut self, _from: &[u8]) {}
 }

@@ -1,6 +1,6 @@
 //! Parts of a state one after the other as bytes: for flight recordings.
 
-/// Bytes of all of them.
+/// Returns the size of all of them, in bytes.
 pub(super) fn len(parts: &[&[u8]]) -> usize {
     parts.iter().map(|part| part.len()).sum()
 }

@@ -22,7 +22,7 @@ const MAX_STARTS: usize = 32_768;
 const GAP: f64 = 0.3;
 
 impl MaterialPoint {
-    /// The material point at a place of the scene frame; `None` outside the tissue.
+    /// Returns the material point at a place of the scene frame; `None` outside the tissue.
     ///
     /// Walks through the deformed lattice from `hint`, or else from the nearest of a bounded sample.
     pub fn locate(body: &Deformed, point_m: [f64; 3], hint: Option<u32>) -> Option<MaterialPoint> {
@@ -31,7 +31,7 @@ impl MaterialPoint {
         from_hint.or_else(|| walk(body, p, nearest_sample(body, p)))
     }
 
-    /// The middle of an element.
+    /// Returns the middle of an element.
     pub fn centre(element: u32) -> MaterialPoint {
         MaterialPoint {
             element,
@@ -39,7 +39,7 @@ impl MaterialPoint {
         }
     }
 
-    /// The material point at a place of the scene frame while the body is at rest; `None` outside the tissue.
+    /// Returns the material point at a place of the scene frame while the body is at rest; `None` outside the tissue.
     pub fn at_rest(lattice: &Lattice, point_m: [f64; 3]) -> Option<MaterialPoint> {
         let p = point_m.map(|c| c / lattice.spacing_m);
         if !p.iter().all(|&c| c >= 0.0) {
@@ -58,14 +58,14 @@ impl MaterialPoint {
         [0, 1, 2].map(|a| centre_m[a] + f64::from(self.local[a]) * lattice.spacing_m)
     }
 
-    /// The same by a walk from `element` alone: as cheap where there is no tissue.
+    /// Returns it by a walk from `element` alone: as cheap where there is no tissue.
     pub fn locate_from(body: &Deformed, point_m: [f64; 3], element: u32) -> Option<MaterialPoint> {
         let p = in_reach(body, point_m)?;
         let is_known = (element as usize) < body.lattice.element_count();
         is_known.then(|| walk(body, p, element)).flatten()
     }
 
-    /// Where the point is now, in the scene frame.
+    /// Returns the present position of the point, in the scene frame.
     pub fn position_m(&self, body: &Deformed) -> [f64; 3] {
         match body.carried {
             Carried::Not => self.position_by(body, |element| body.not_carried(element)),
@@ -86,7 +86,8 @@ impl MaterialPoint {
         p.map(|c| c * body.lattice.spacing_m)
     }
 
-    /// Its displacement, m: between those of the elements around it, so that it does not jump from one element to the next.
+    /// Its displacement, m: between those of the elements around it, so that it does not jump from one element to the
+    /// next.
     pub fn displacement_m(&self, body: &Deformed) -> [f64; 3] {
         let cell = body.lattice.cell(self.element);
         let side = self.local.map(|l| if l < 0.0 { -1_i64 } else { 1 });
@@ -112,7 +113,7 @@ impl MaterialPoint {
         sum
     }
 
-    /// Where a direction of the tissue at rest points now, as a unit vector; unchanged if it has no length.
+    /// Returns where a direction of the tissue at rest points now, as a unit vector; unchanged if it has no length.
     pub fn direction(&self, body: &Deformed, rest_dir: [f64; 3]) -> [f64; 3] {
         let links = link_vectors(body, self.element);
         let mut now = [0.0; 3];
@@ -130,14 +131,14 @@ impl MaterialPoint {
     }
 }
 
-/// Centre of an element, in elements.
+/// Returns the centre of an element, in elements.
 fn centre(body: &Deformed, element: u32) -> [f64; 3] {
     let cell = body.lattice.cell(element);
     let u = body.displacement(element);
     [0, 1, 2].map(|a| cell[a] as f64 + 0.5 + u[a])
 }
 
-/// Links through an element along each axis: central differences, one-sided at the surface, as at rest
+/// Returns the links through an element along each axis: central differences, one-sided at the surface, as at rest
 /// where there is no neighbour.
 fn link_vectors(body: &Deformed, element: u32) -> [[f64; 3]; 3] {
     links_by(body, element, &|element| body.displacement(element))
@@ -182,13 +183,14 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// The place in elements, unless it is too far away for any element.
+/// Returns the place in elements, unless it is too far away for any element.
 fn in_reach(body: &Deformed, point_m: [f64; 3]) -> Option<[f64; 3]> {
     let p = point_m.map(|c| c / body.lattice.spacing_m);
     (p.iter().all(|c| c.is_finite()) && !out_of_reach(body, p)).then_some(p)
 }
 
-/// Farther from the body at rest than any element has moved, and its own size at the largest stretch.
+/// Returns whether a place is farther from the body at rest than any element has moved, and its own size at the largest
+/// stretch.
 fn out_of_reach(body: &Deformed, p: [f64; 3]) -> bool {
     let (low, high) = body.lattice.bounds_m();
     let [low, high] = [low, high].map(|corner| corner.map(|c| c / body.lattice.spacing_m));
@@ -227,7 +229,7 @@ fn walk(body: &Deformed, p: [f64; 3], start: u32) -> Option<MaterialPoint> {
     best.map(|(_, found)| found)
 }
 
-/// The element nearest to `p` now, among a sample.
+/// Returns the element nearest to `p` now, among a sample.
 fn nearest_sample(body: &Deformed, p: [f64; 3]) -> u32 {
     let stride = body.lattice.element_count().div_ceil(MAX_STARTS).max(1);
     let mut nearest = (f64::INFINITY, 0);

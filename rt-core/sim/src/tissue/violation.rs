@@ -2,8 +2,8 @@
 
 use super::chainmail::{ChainMail, Scaled, TissueState, link_violation, ordered};
 
-/// Largest violation of a limit over all links, in elements; zero if there is none, infinite for a state
-/// of another model.
+/// Returns the largest violation of a limit over all links, in elements; zero if there is none, infinite for a state of
+/// another model.
 ///
 /// Verifies every link by itself: the reference for what a step reports after verifying only what moved.
 pub fn largest_violation(model: &ChainMail, state: &TissueState) -> f64 {

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use stylet_device::{DeviceInfo, Sample};
 
 impl ChainParameters {
-    /// What layers resist with on a line.
+    /// Returns the resistance of each layer on a line.
     pub fn layer_forces(&self) -> LayerForces {
         LayerForces {
             layers: self.force.layers,
@@ -24,7 +24,7 @@ impl ChainParameters {
     }
 }
 
-/// One tick of a needle that is on `line`, in tissue or before it, and of those that stay in beside it.
+/// Advances a needle on `line` by one tick, in tissue or before it, with those that stay in beside it.
 pub fn step_on_line(
     parameters: &ChainParameters,
     device: &DeviceInfo,
@@ -100,7 +100,7 @@ pub fn step_on_line(
     }
 }
 
-/// The beam holds the needle to its path in place of the guide.
+/// Replaces the guide by the beam, which holds the needle to its path.
 fn bend(terms: &mut ForceTerms, bent: &BeamOutput, axis: &Vector3<f64>, across: [Vector3<f64>; 2]) {
     let [first, second] = across;
     let force_n = first * bent.force_on_hand_n[0] + second * bent.force_on_hand_n[1] + axis * bent.axial_n;
@@ -134,7 +134,7 @@ fn terms(
 ) -> ForceTerms {
     let force = &parameters.force;
     let gravity_n = law::gravity(force);
-    // Keeps what is no number, so that the gate sees it: the line goes on with its last answer.
+    // Keeps numbers that are not finite, so that the gate sees them: the line continues with its last answer.
     let unknown = (input.tip_in_world + input.velocity_m_per_s).sum() * 0.0;
     if input.phase == Phase::Outside {
         return ForceTerms {

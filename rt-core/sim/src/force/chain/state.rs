@@ -1,4 +1,4 @@
-//! What the chain works on and leaves behind: settings, contact, state, output.
+//! Types of the chain: settings, contact, state and output.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -22,7 +22,7 @@ pub struct ChainParameters {
     pub force: ForceParameters,
 }
 
-/// Where the tip meets tissue, as the tissue loop found it.
+/// Contact of the tip with tissue, as the tissue loop found it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
     /// Place where the tip met the tissue, m.
@@ -35,7 +35,7 @@ pub struct Touch {
     pub layer_number: u64,
     /// Place where the tip met that layer, m.
     pub layer_in_world: Vector3<f64>,
-    /// What the tissue answers at the tip.
+    /// Response of the tissue at the tip.
     pub local: LocalResponse,
 }
 
@@ -62,10 +62,10 @@ pub struct ChainState {
     pub held_travel_m: Vector3<f64>,
 }
 
-/// What came of one tick.
+/// Outcome of one tick.
 #[derive(Debug, Clone, Copy)]
 pub struct ChainOutput {
-    /// What the needle does to the tissue.
+    /// Interaction of needle and tissue.
     pub phase: Phase,
     /// `u_tip` of the membrane in front; 0 outside.
     pub depth_m: f64,
@@ -81,14 +81,14 @@ pub struct ChainOutput {
     pub puncture: bool,
     /// The tip left the tissue in this tick.
     pub left: bool,
-    /// What goes to the device.
+    /// Wrench for the device.
     pub wrench: Wrench,
     /// The bent needle, where it bends and is on a line.
     pub bent: Option<BeamOutput>,
 }
 
 impl ChainState {
-    /// Outside the tissue, with the force disengaged.
+    /// Returns the state outside the tissue, with the force disengaged.
     pub fn new(device: &DeviceInfo) -> Self {
         Self {
             estimator: VelocityEstimator::new(device.position_step_m),
@@ -103,7 +103,7 @@ impl ChainState {
         }
     }
 
-    /// The needle is out: tissue holds nothing of it.
+    /// Ends the contact of a needle that is out: tissue holds nothing of it.
     pub fn end_contact(&mut self) {
         self.needle = NeedleState {
             punctures: self.needle.punctures,

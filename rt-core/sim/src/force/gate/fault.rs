@@ -33,7 +33,7 @@ impl ForceFault {
     }
 }
 
-/// How often each limit acted, in the order of the gate.
+/// Count of interventions of each limit, in the order of the gate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct GateCounts {
     /// Forces that were not finite.
@@ -55,7 +55,7 @@ pub struct GateCounts {
 }
 
 impl GateCounts {
-    /// In the order of the fields.
+    /// Returns the counts in the order of the fields.
     pub fn all(&self) -> [u64; 8] {
         let c = self;
         [

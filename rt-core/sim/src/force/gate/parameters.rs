@@ -48,7 +48,7 @@ impl Default for GateParameters {
 }
 
 impl GateParameters {
-    /// Every setting that cannot be used, or `Ok`.
+    /// Returns every setting that cannot be used, or `Ok`.
     pub fn validate(&self) -> Result<(), Vec<Problem>> {
         let mut problems = Problems::default();
         problems.range("gate.force_scale", self.force_scale, 0.0, 2.0);

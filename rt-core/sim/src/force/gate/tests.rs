@@ -24,7 +24,7 @@ fn still(wanted_n: Vector3<f64>) -> GateInput {
     }
 }
 
-/// Engaged, the ramp over, at zero force.
+/// Returns an engaged gate after its ramp, at zero force.
 fn engaged(parameters: &GateParameters) -> GateState {
     let mut state = GateState::default();
     state.engage();
@@ -146,7 +146,7 @@ fn a_force_that_is_nan_ramps_to_zero_and_reports() {
             run(&parameters, &mut state, good, 1000).wrench.force_n,
             Vector3::zeros()
         );
-        // Engaged again it waits, as the force is not small; then it goes on.
+        // Engaged again it waits, as the force is not small; then it continues.
         state.engage();
         let waits = run(&parameters, &mut state, good, 1000);
         assert!(waits.fault.is_none() && !waits.engaged && waits.wrench.force_n == Vector3::zeros());
@@ -262,7 +262,7 @@ fn every_stage_counts_what_it_did() {
     assert_eq!((all[0], all[7]), (1, 1));
 }
 
-/// A handle of 0.2 kg that is carried: 50 mm up are 88 mJ that nobody has to pay for.
+/// A handle of 0.2 kg that is carried: 50 mm up are 88 mJ that the account must allow.
 #[test]
 fn a_constant_force_is_no_debt_and_what_is_beside_it_still_is() {
     let parameters = full_scale();

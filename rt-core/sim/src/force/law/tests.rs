@@ -5,7 +5,7 @@ use crate::needle::{LayerKind, Layers};
 use stylet_device::DeviceInfo;
 use stylet_settings::ParameterSet;
 
-/// In the gland alone.
+/// Returns the input for a needle in the gland alone.
 fn input(depth_m: f64, punctured: bool, phase: Phase) -> ForceInput {
     let path_direction = Vector3::z();
     let gland = Layers::default().of(LayerKind::Gland);

@@ -4,8 +4,8 @@ use super::*;
 
 const DT_S: f64 = 1e-3;
 
-/// A wall of `stiffness` against a mass in a weak hand, sampled at 1 kHz, its force late by `late` ticks.
-/// Gives the largest speed of the last second.
+/// Samples a wall of `stiffness` against a mass in a weak hand at 1 kHz, its force late by `late` ticks. Returns the
+/// largest speed of the last second.
 fn wall(stiffness: f64, late: usize, parameters: &PassivityParameters) -> f64 {
     let mut state = PassivityState::default();
     let (mut x, mut v, mut queue, mut fastest) = (0.0f64, 0.02f64, [0.0; DELAYS], 0.0f64);

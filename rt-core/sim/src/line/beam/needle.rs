@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 pub struct BentNeedle {
     /// E I, N m^2.
     pub bending_stiffness_n_m2: f64,
-    /// From hand to tip.
+    /// Distance from hand to tip.
     pub length_m: f64,
-    /// How far the hand gives way across the needle, m/N, and how far it turns, rad/(N m).
+    /// Compliance of the hand across the needle, m/N, and against rotation, rad/(N m).
     pub grip: [f64; 2],
     /// Tip along the line from the entry, in the world.
     pub tip_m: f64,
-    /// Where the hand is across the line.
+    /// Position of the hand across the line.
     pub hand_m: [f64; 2],
     /// Slope that the hand gives the needle.
     pub hand_slope: [f64; 2],
@@ -30,17 +30,17 @@ pub struct BentNeedle {
 }
 
 impl BentNeedle {
-    /// Where the hand holds it, along the line.
+    /// Returns the place along the line where the hand holds it.
     pub fn hand_along_m(&self) -> f64 {
         self.tip_m - self.length_m
     }
 
-    /// Middle of station `n`, along the line.
+    /// Returns the middle of station `n`, along the line.
     pub fn station_m(&self, n: usize) -> f64 {
         self.first_m + n as f64 * self.spacing_m
     }
 
-    /// Deflection at one place by a newton at another, m/N.
+    /// Returns the deflection at one place by a newton at another, m/N.
     pub(super) fn flexibility(&self, a_m: f64, b_m: f64) -> f64 {
         let from_hand = |place_m: f64| (place_m - self.hand_along_m()).max(0.0);
         let (x, y) = (from_hand(a_m.min(b_m)), from_hand(a_m.max(b_m)));
@@ -66,12 +66,13 @@ impl BentNeedle {
         self.without_tissue_m(side, at_m) - by_tissue
     }
 
-    /// How far a place of the shaft is off where a rigid needle in the same hand has it, along both directions across.
+    /// Returns the deflection of a place of the shaft from a rigid needle in the same hand, along both directions
+    /// across.
     pub fn deflection_m(&self, at_m: f64, forces_n: [&[f64]; 2]) -> [f64; 2] {
         [0, 1].map(|side| self.across_m(side, at_m, forces_n[side]) - self.straight_m(side, at_m))
     }
 
-    /// Finite in every number.
+    /// Returns whether every number is finite.
     pub fn is_finite(&self) -> bool {
         let pairs = [self.grip, self.hand_m, self.hand_slope, self.hole_n, self.tip_n];
         let own = [

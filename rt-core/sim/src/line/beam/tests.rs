@@ -18,7 +18,7 @@ fn model(stations: usize, spacing_m: f64, each_m_per_n: f64, template_m: Option<
     }
 }
 
-/// Soft tissue in which stations know each other.
+/// Returns soft tissue in which forces on one station move the others.
 fn gland(gap_m: f64) -> BeamModel {
     let rows = || {
         Rows::new(20, |i, j| {
@@ -35,7 +35,7 @@ fn gland(gap_m: f64) -> BeamModel {
     }
 }
 
-/// A tip so deep in tissue that does not follow it.
+/// Returns the input of a tip at that depth, in tissue that does not follow it.
 fn at(tip_m: f64) -> BeamInput {
     BeamInput {
         tip_m,
@@ -86,8 +86,8 @@ fn a_cantilever_bends_by_the_cube_of_its_length() {
     }
 }
 
-/// Hetenyi: at the end of a long beam on springs, `v = 2 P beta / k`; at x from it, `v = 2 P beta / k e^(-beta x) cos(beta x)`.
-/// The stations are as far apart as in the loops.
+/// Hetenyi: at the end of a long beam on springs, `v = 2 P beta / k`; at x from it, `v = 2 P beta / k e^(-beta x)
+/// cos(beta x)`. The stations are as far apart as in the loops.
 #[test]
 fn a_beam_on_an_elastic_foundation_decays_as_hetenyi_says() {
     let (stiffness_pa, spacing_m, force_n) = (44e3, 4e-3, 0.5);
@@ -169,7 +169,7 @@ fn a_hole_with_play_leads_only_a_needle_that_lies_at_its_rim() {
     }
 }
 
-/// A bevel bends the needle, the tissue holds it in its track, and a needle that was drawn back cuts its way anew.
+/// A bevel bends the needle, the tissue holds it in its track, and a needle that was drawn back cuts a new track.
 #[test]
 fn a_bevel_steers_and_the_tissue_holds_the_needle_in_its_track() {
     let mut run = Run::new(gland(1e-4));
@@ -233,7 +233,7 @@ fn how_far_a_bevel_steers_does_not_depend_on_speed() {
 struct Random(u64);
 
 impl Random {
-    /// From -1 to 1.
+    /// Draws a number from -1 to 1.
     fn both(&mut self) -> f64 {
         self.0 = self
             .0
@@ -243,8 +243,8 @@ impl Random {
     }
 }
 
-/// Hand across, its slope, and depth go to and fro at random, and the bevel's force comes and goes. The work of hand and bevel is
-/// at least what is stored, but for `1 uJ`.
+/// Moves hand, its slope and depth to and fro at random, while the bevel's force comes and goes. The work of hand and
+/// bevel is at least what is stored, up to `1 uJ`.
 fn worst_excess_j(model: BeamModel, depth_by_m: f64, ticks: u32) -> f64 {
     let mut run = Run::new(model);
     let mut random = Random(5);

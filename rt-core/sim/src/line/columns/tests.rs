@@ -5,7 +5,7 @@ use crate::line::{Compliance, Line, StationSettings};
 use crate::scene::{Labels, Scene};
 use crate::tissue::fem::{FemModel, FemSettings, Integration, Material};
 
-/// Time that this thread ran on a processor, whatever else the machine does.
+/// Returns the time that this thread ran on a processor, whatever else the machine does.
 pub(in crate::line) fn processor_time_s() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
     let nanoseconds: f64 = text
@@ -25,7 +25,7 @@ pub(in crate::line) fn material(nu: f64) -> Material {
     }
 }
 
-/// The paper's gland on 20 mm of fat, and a needle along z through the middle of it, from the apex in.
+/// Returns the paper's gland on 20 mm of fat, and a needle along z through the middle of it, from the apex in.
 pub(in crate::line) fn paper(spacing_part: f64) -> (BatchModel<f32>, Stations) {
     let lattice = Scene::builtin("paper").expect("built in").lattice;
     let h = lattice.spacing_m;

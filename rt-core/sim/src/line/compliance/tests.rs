@@ -37,7 +37,8 @@ const LENGTH: usize = 72;
 const RADIUS: f64 = 12.0;
 const SHEAR_PA: f64 = 17e3 / (2.0 * 1.49);
 const RADII: [f64; 6] = [0.3, 0.4, 0.5, 0.65, 0.8, 1.0];
-/// From the middle of the block, which is a node, in cells: on a node, in the middle of a cell, of an edge, elsewhere.
+/// Places from the middle of the block, which is a node, in cells: on a node, in the middle of a cell, of an edge,
+/// elsewhere.
 const PLACES: [[f64; 2]; 4] = [[0.0, 0.0], [0.5, 0.5], [0.0, 0.5], [0.2, 0.7]];
 
 fn from_middle(p: [f64; 3], place: [f64; 2]) -> f64 {
@@ -45,7 +46,8 @@ fn from_middle(p: [f64; 3], place: [f64; 2]) -> f64 {
     (p[0] / H - middle - place[0]).hypot(p[1] / H - middle - place[1])
 }
 
-/// The line load of needles of all radii in a fixed cylinder: stations, state, and how far tissue moves per N/m at a place.
+/// Solves the line load of needles of all radii in a fixed cylinder; returns stations, state, and the displacement of
+/// tissue per N/m at a place.
 fn cylinder(place: [f64; 2]) -> (BatchModel<f32>, Vec<Stations>, BatchState<f32>) {
     let lattice = block([CELLS, CELLS, LENGTH]);
     let fem =
@@ -69,7 +71,7 @@ fn cylinder(place: [f64; 2]) -> (BatchModel<f32>, Vec<Stations>, BatchState<f32>
     (model, stations.into(), state)
 }
 
-/// A newton for each metre of the needle.
+/// Returns a newton for each metre of the needle.
 fn even_load(stations: &Stations) -> Vec<NodeWeight> {
     assert_eq!(stations.count(), LENGTH);
     let mut load = Vec::new();

@@ -7,7 +7,7 @@ use crate::line::rows::{Rows, add_scaled, dot};
 use crate::line::state::{LineOutput, LineState};
 use crate::simd::{Simd, vectorised};
 
-/// Forces of shaft and tip; returns how far the tip is beyond where the material has it.
+/// Solves for the forces of shaft and tip; returns how far the tip is beyond where the material has it.
 pub(super) fn solve(
     model: &LineModel,
     state: &mut LineState,
@@ -77,7 +77,7 @@ fn solve_by_sets(
     is_found
 }
 
-/// [`sets::find`], for a tick beside other needles.
+/// Calls [`sets::find`] for a tick with other needles.
 pub(in crate::line) fn find_by_sets<const B: usize>(
     simd: Simd,
     rows: &Rows,
@@ -88,7 +88,7 @@ pub(in crate::line) fn find_by_sets<const B: usize>(
 }
 
 vectorised! {
-    /// [`sweep`] for the instructions that the processor has; the same bits with all of them.
+    /// Calls [`sweep`] for the instructions of the processor; all of them give the same bits.
     fn solve_by_sweeps(
         model: &LineModel,
         state: &mut LineState,
@@ -104,16 +104,17 @@ vectorised! {
 /// The stations of the needle that moves, to its neighbours.
 pub(in crate::line) struct Shaft<'a> {
     pub u_m: &'a mut [f64],
-    /// How each moves with the tip's force.
+    /// Displacement of each station by the tip's force.
     pub column: &'a [f64],
     pub spring: Option<Spring>,
 }
 
-/// What shares the sweeps of a needle: nothing, or needles that stay in.
+/// Needles whose forces are swept together with those of this one: none, or those that stay in.
 pub(in crate::line) trait Neighbours {
-    /// The force of a station of the shaft has changed; dents of as much take `taken_n` from those of the neighbours.
+    /// Called when the force of a station of the shaft has changed; dents of as much take `taken_n` from those of the
+    /// neighbours.
     fn shaft_changed(&mut self, n: usize, change_n: f64, taken_n: f64);
-    /// The tip's has.
+    /// Called when the force of the tip has changed.
     fn tip_changed(&mut self, change_n: f64);
     /// Corrects its own forces, and adds what that moves of the stations and the tip; returns the largest correction.
     fn sweep(&mut self, is_backwards: bool, shaft: Shaft<'_>, tip_u_m: &mut f64) -> f64;
@@ -130,7 +131,8 @@ impl Neighbours for () {
     }
 }
 
-/// Forces of shaft, tip and neighbours by projected Gauss-Seidel. Slowness is a rate term over the time of a tick.
+/// Finds the forces of shaft, tip and neighbours by projected Gauss-Seidel. Slowness is a rate term over the time of a
+/// tick.
 #[inline(always)]
 pub(in crate::line) fn sweep(
     model: &LineModel,

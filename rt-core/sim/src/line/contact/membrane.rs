@@ -1,10 +1,12 @@
-//! A membrane that holds the tip: a spring between the tip and the body as a whole, and what it takes from the tissue around.
+//! A membrane that holds the tip: a spring between the tip and the body as a whole, and what it takes from the tissue
+//! around.
 
 use crate::line::model::LineModel;
 use crate::line::rows::dot;
 use crate::line::state::LineState;
 
-/// A membrane is met where the tissue in front of it is by now: past loads and other needles may have moved it before the tip was there.
+/// Meets a membrane where the tissue in front of it is by now: past loads and other needles may have moved it before
+/// the tip was there.
 pub(in crate::line) fn meet(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
     let held_by = membrane.map_or(0, |n| n as u32 + 1);
     if held_by == state.tip.held_by || held_by == 0 {
@@ -15,8 +17,9 @@ pub(in crate::line) fn meet(model: &LineModel, state: &mut LineState, membrane: 
     state.tip_u_m = state.memory.gain * own + past_at_tip_m(model, state);
 }
 
-/// A membrane is stiffer than what it holds: between the place of the tip and the body as a whole it is a spring, of such a
-/// stiffness that both of its limits, force and depth, are met at once (eq. 10). It is relaxed when the tip meets it. Returns what it leaves of the dent, where one holds the tip.
+/// Presses the membrane: it is stiffer than what it holds, so it is a spring between the tip's place and the body as a
+/// whole. Its stiffness is such that both of its limits, force and depth, are met at once (eq. 10). It is relaxed when
+/// the tip meets it. Returns the share of the dent that it leaves, where one holds the tip.
 pub(in crate::line) fn press(model: &LineModel, state: &mut LineState, membrane: Option<usize>) -> Option<f64> {
     let whole = model.compliance.common_m_per_n();
     let count = state.in_contact;
@@ -54,7 +57,7 @@ pub(in crate::line) fn press(model: &LineModel, state: &mut LineState, membrane:
     Some(kept)
 }
 
-/// Displacement of the material at the tip that the past leaves.
+/// Returns the displacement of the material at the tip that the past leaves.
 pub(super) fn past_at_tip_m(model: &LineModel, state: &LineState) -> f64 {
     let places = state.tip_range.clone().zip(state.tip_weights);
     places
@@ -62,7 +65,7 @@ pub(super) fn past_at_tip_m(model: &LineModel, state: &LineState) -> f64 {
         .sum()
 }
 
-/// How far loads of that sum displace the body as a whole, with what the past leaves.
+/// Returns the displacement of the body as a whole by loads of that sum, with what the past leaves.
 fn whole_m(state: &LineState, whole_m_per_n: f64, load_n: f64) -> f64 {
     if state.memory.is_on() {
         state.memory.gain * whole_m_per_n * load_n + state.memory.whole_offset_m
@@ -71,7 +74,7 @@ fn whole_m(state: &LineState, whole_m_per_n: f64, load_n: f64) -> f64 {
     }
 }
 
-/// What the spring of a membrane that is stretched passes on to the body as a whole.
+/// Returns the force that the spring of a stretched membrane passes on to the body as a whole.
 pub(super) fn whole_n(model: &LineModel, state: &LineState) -> f64 {
     if state.membrane_n_per_m == 0.0 {
         return 0.0;
@@ -81,21 +84,22 @@ pub(super) fn whole_n(model: &LineModel, state: &LineState) -> f64 {
     state.membrane_n_per_m * (dent_m - state.tip.met_dent_m)
 }
 
-/// The membrane's spring as the stations meet it. It passes a part of what dents the tissue at the tip to the body as a whole, so it takes
-/// from each place `e s`: `s` is what it passes on, and `e` how much a newton at the tip dents the tissue there.
+/// The membrane's spring as the stations meet it. It passes a part of what dents the tissue at the tip to the body as a
+/// whole, so it takes from each place `e s`: `s` is what it passes on, and `e` how much a newton at the tip dents the
+/// tissue there.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::line) struct Spring {
-    /// What the dents that forces make by the columns as they are left, `e'`, take from each other: `n_per_m e' e'`.
+    /// Force that the remaining dents `e'` take from each other: `n_per_m e' e'`.
     pub n_per_m: f64,
-    /// What of a dent is left, `e' = kept e`.
+    /// Share of a dent that remains, `e' = kept e`.
     pub kept: f64,
-    /// How far any force moves all of the line.
+    /// Displacement of all of the line by any force.
     pub common_m_per_n: f64,
     gain: f64,
 }
 
 impl Spring {
-    /// `None` where no membrane holds the tip.
+    /// Returns the spring of the membrane that holds the tip, or `None`.
     pub fn of(model: &LineModel, state: &LineState) -> Option<Self> {
         if state.membrane_n_per_m == 0.0 {
             return None;
@@ -112,7 +116,8 @@ impl Spring {
         })
     }
 
-    /// What it passes on by the forces as they are. `moved_m` is what the past and other needles move the tip by, as the membrane leaves it.
+    /// Returns the force that it passes on under the present forces. `moved_m` is the displacement of the tip by the
+    /// past and other needles, as the membrane leaves it.
     pub fn passed_n(&self, state: &LineState, moved_m: f64) -> f64 {
         let count = state.in_contact;
         let shaft = &state.shaft_n[..count];
@@ -123,7 +128,7 @@ impl Spring {
         self.n_per_m * self.kept / self.gain * (dent_m - past_m - state.tip.met_dent_m)
     }
 
-    /// Work of the shaft over what the dent with which the membrane was met adds to its displacements.
+    /// Returns the work of the shaft over what the dent with which the membrane was met adds to its displacements.
     pub fn relaxed_j(&self, state: &LineState) -> f64 {
         let shaft = state.shaft_n.iter().zip(&state.tip_column).take(state.in_contact);
         let dent_j: f64 = shaft.map(|(f, of_tip)| f * (of_tip - self.common_m_per_n)).sum();
@@ -140,8 +145,8 @@ impl Spring {
 }
 
 impl LineState {
-    /// The elastic energy, J: half of force times displacement at once, and what the tissue that creeps held before the tick. What a
-    /// membrane was relaxed at is no displacement of the tissue. Does not allocate.
+    /// Returns the elastic energy, J: half of force times displacement at once, plus what creeping tissue held before
+    /// the tick. The displacement at which a membrane is relaxed does not count. Does not allocate.
     pub fn elastic_j(&self, model: &LineModel) -> f64 {
         if self.memory.is_on() {
             let at_once = |(n, f): (usize, &f64)| f * (self.u_m[n] - self.memory.offset_m[n]);

@@ -1,9 +1,10 @@
-//! The forces of one tick by sets: which stations stick, which have reached their friction, and the forces of those that stick.
+//! The forces of one tick by sets: which stations stick, which have reached their friction, and the forces of those
+//! that stick.
 //!
-//! Sweeps over the stations carry a change from neighbour to neighbour. Here the places of all stations say which of them stick,
-//! conjugate gradients on the compliance of that set give their forces, and these say again which stick: as a rule the set of the
-//! last tick is the right one. What ends it is what ends the sweeps: no station is off its place by more than the tolerance. Where
-//! the sets go round in a circle, the sweeps take over from what was reached.
+//! Sweeps over the stations carry a change from neighbour to neighbour. Here the places of all stations say which of
+//! them stick, conjugate gradients on the compliance of that set give their forces, and these say again which stick: as
+//! a rule the set of the last tick is the right one. What ends it is what ends the sweeps: no station is off its place
+//! by more than the tolerance. Where the sets go round in a circle, the sweeps take over from what was reached.
 
 use super::super::model::MAX_STATIONS;
 use super::super::rows::Rows;
@@ -51,20 +52,20 @@ impl<const B: usize> Each<B> {
 /// The tip, as one more station.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::line) struct Tip {
-    /// How far it moves for each newton, without the gain.
+    /// Displacement for each newton, without the gain.
     pub own_m_per_n: f64,
     /// Displacement with which it is where the material has it, and the most force it has.
     pub stuck_m: f64,
     pub limit_n: f64,
     pub force_n: f64,
     pub u_m: f64,
-    /// As for the stations, below.
+    /// Set while the tip sticks, as for the stations below.
     pub sticks: f64,
     pub bounded_n: f64,
     pub change_n: f64,
 }
 
-/// What a tick works in, for all of its solutions.
+/// Work space of a tick, for all of its solutions.
 #[derive(Clone, Debug)]
 pub(in crate::line) struct Scratch<const B: usize> {
     /// Stations in contact.
@@ -76,9 +77,10 @@ pub(in crate::line) struct Scratch<const B: usize> {
     pub stuck_m: Each<B>,
     pub low_n: Each<B>,
     pub high_n: Each<B>,
-    /// How each station moves with the tip's force, m/N.
+    /// Displacement of each station by the tip's force, m/N.
     pub column: Each<B>,
-    /// How much of that is a dent, and what dents take from each other where a membrane holds the tip ([`Spring`]); 0 for none.
+    /// Share of that which is a dent, and what dents take from each other where a membrane holds the tip ([`Spring`]);
+    /// 0 for none.
     pub dent: Each<B>,
     pub taken_n_per_m: f64,
     /// Forces, and the displacements that they make.
@@ -87,9 +89,9 @@ pub(in crate::line) struct Scratch<const B: usize> {
     pub tip: Tip,
     /// Products with the compliance.
     pub products: u32,
-    /// How far a station is off its place at most.
+    /// Largest distance of a station from its place.
     pub residual_m: f64,
-    /// Of how many stations the compliance by itself is known from the solution before in the same tick; 0 at its begin.
+    /// Number of stations whose own compliance is known from the solution before in the same tick; 0 at its beginning.
     pub owned: usize,
     own_m_per_n: Each<B>,
     n_per_own_m: Each<B>,
@@ -135,12 +137,12 @@ impl<const B: usize> Scratch<B> {
         }
     }
 
-    /// Nothing of the ticks before is known in the one that begins.
+    /// Begins a tick that knows nothing of the ticks before.
     pub fn begin(&mut self) {
         (self.owned, self.taken_n_per_m) = (0, 0.0);
     }
 
-    /// The membrane that holds the tip, if one does; `column` is set, and of it `whole` is no dent.
+    /// Sets the membrane that holds the tip, if one does; `column` is set, and of it `whole` is no dent.
     pub fn hold_by(&mut self, spring: Option<Spring>, whole: impl Iterator<Item = f64>) {
         let taken_n_per_m = spring.map_or(0.0, |spring| spring.n_per_m);
         if taken_n_per_m != 0.0 {
@@ -166,8 +168,8 @@ impl<const B: usize> Scratch<B> {
 }
 
 in_vectors! {
-/// Finds the forces from those of the last solution; returns whether they are within the tolerance. `inverse` is that of the compliance
-/// of the first so many stations: of needles that stay in, most of whose stations stick in every set.
+/// Finds the forces from those of the last solution; returns whether they are within the tolerance. `inverse` is that
+/// of the compliance of the first so many stations: of needles that stay in, most of whose stations stick in every set.
 fn find<V: Vector<f64>, const B: usize>(rows: &Rows, inverse: Option<&Rows>, scratch: &mut Scratch<B>) -> bool {
     let (count, gain) = (scratch.count, scratch.gain);
     if scratch.owned != count {
@@ -194,7 +196,7 @@ fn find<V: Vector<f64>, const B: usize>(rows: &Rows, inverse: Option<&Rows>, scr
 }
 
 in_vectors! {
-/// Displacement of the first `count` stations for these forces.
+/// Computes the displacement of the first `count` stations for these forces.
 fn displacement<V: Vector<f64>, const B: usize>(rows: &Rows, force_n: &[f64], scratch: &mut Scratch<B>) {
     let (mut places, mut at) = ([0; MOST], 0);
     for (n, force) in force_n.iter().enumerate().take(scratch.count.min(MOST)) {
@@ -205,7 +207,7 @@ fn displacement<V: Vector<f64>, const B: usize>(rows: &Rows, force_n: &[f64], sc
 }
 }
 
-/// Which stations stick, by where they are; and how far one is off at most.
+/// Chooses the stations that stick, by their places; returns the largest distance of one from its place.
 #[inline(always)]
 fn choose<const B: usize>(scratch: &mut Scratch<B>) {
     let mut off = [0.0_f64; LANES];

@@ -26,7 +26,7 @@ const GLAND: LineLayer = LineLayer {
     shaft_friction_n_per_m: 80.0,
 };
 
-/// A made-up gland: it moves as a whole, and near the load.
+/// Returns a made-up gland: it moves as a whole, and near the load.
 fn made_up(stations: usize, spacing_m: f64, layers: &[LineLayer], settings: LineSettings) -> LineModel {
     let entry = |i: usize, j: usize| {
         let distance_m = (i % stations).abs_diff(j % stations) as f64 * spacing_m;
@@ -41,7 +41,7 @@ fn made_up(stations: usize, spacing_m: f64, layers: &[LineLayer], settings: Line
     LineModel::new(compliance, layers, settings).expect("valid")
 }
 
-/// The paper's gland, solved: a station for each element, or two.
+/// Returns the paper's gland, solved: a station for each element, or two.
 fn solved(halves: bool) -> &'static LineModel {
     static WHOLE: OnceLock<LineModel> = OnceLock::new();
     static HALVES: OnceLock<LineModel> = OnceLock::new();
@@ -63,7 +63,7 @@ fn at(tip_m: f64) -> LineInput {
     LineInput { tip_m, dt_s: DT_S }
 }
 
-/// From place to place in steps of at most `step_m`; what the line says at each place.
+/// Moves the tip from place to place in steps of at most `step_m`; returns the output at each place.
 fn go(model: &LineModel, state: &mut LineState, places_m: &[f64], step_m: f64) -> Vec<LineOutput> {
     let mut tip_m = -1e-3;
     let mut outputs = Vec::new();
@@ -164,7 +164,7 @@ fn what_the_hand_feels_is_what_the_foundation_holds() {
 
 const PLACES_M: [f64; 8] = [12e-3, 20e-3, 28e-3, 36e-3, 40e-3, 30e-3, 22e-3, 14e-3];
 
-/// Largest difference of places (m) and of forces, over the largest force.
+/// Returns the largest difference of places (m) and of forces, over the largest force.
 fn difference(a: &[LineOutput], b: &[LineOutput]) -> (f64, f64) {
     let largest = a.iter().map(|o| o.force_on_hand_n.abs()).fold(0.0, f64::max);
     difference_of(a, b, largest)
@@ -263,7 +263,8 @@ fn ten_thousand_random_cycles_make_no_energy() {
     assert!(worst_j < 1e-6, "{worst_j}");
 }
 
-/// What a hand that goes to and fro at random can have had at most out of any stretch of ticks beyond what was stored, J.
+/// Returns the most that a hand moving to and fro at random can have gained in any stretch of ticks beyond what was
+/// stored, J.
 fn random_cycles(model: &LineModel, cycles: u32, stored: impl Fn(&LineState, &LineModel) -> f64) -> f64 {
     let mut state = LineState::new(model);
     let (mut stored_j, mut force_n) = (0.0, 0.0);
@@ -294,7 +295,7 @@ fn random_cycles(model: &LineModel, cycles: u32, stored: impl Fn(&LineState, &Li
     worst_j
 }
 
-/// A hand that goes to and fro: whether the tissue is new, where the tip is, and by how much it has moved.
+/// Moves a hand to and fro; gives `tick` whether the tissue is new, where the tip is, and by how much it has moved.
 fn random_hand(cycles: u32, mut tick: impl FnMut(bool, f64, f64)) {
     let mut random = Random(11);
     let (mut tip_m, mut is_new) = (-1e-3, true);
@@ -327,7 +328,7 @@ fn random_hand(cycles: u32, mut tick: impl FnMut(bool, f64, f64)) {
 struct Random(u64);
 
 impl Random {
-    /// In [0, 1).
+    /// Draws a number in [0, 1).
     fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

@@ -7,14 +7,14 @@ use crate::line::ready::HandLine;
 use crate::line::rows::{Rows, add_scaled};
 use crate::simd::{Simd, vectorised};
 
-/// What joins two lines, from either side.
+/// Coupling of two lines, from either side.
 #[derive(Clone, Copy)]
 pub(super) struct PairCoupling<'a> {
     cross: &'a Cross,
     is_turned: bool,
 }
 
-/// `None` where neither knows the other.
+/// Finds the coupling of two lines; `None` where neither knows the other.
 pub(super) fn pair_coupling<'a>(a: &'a HandLine, b: &'a HandLine) -> Option<PairCoupling<'a>> {
     let rows = [a, b].map(|line| 2 * line.model.compliance.stations);
     let found = |of: &'a HandLine, with: &HandLine, is_turned: bool| {
@@ -36,7 +36,7 @@ impl PairCoupling<'_> {
 }
 
 impl LeftNeedle {
-    /// Rows of its line that an element loads, each with its share.
+    /// Returns the rows of its line that an element loads, each with its share.
     pub(super) fn rows(&self, element: usize) -> impl Iterator<Item = (usize, f64)> + Clone + '_ {
         let state = &self.line.state;
         let m = self.line.model.compliance.stations;
@@ -48,7 +48,7 @@ impl LeftNeedle {
 }
 
 impl LeftNeedles {
-    /// Every matrix anew: after a needle was left or taken, or another moves beside them.
+    /// Assembles every matrix again after a needle was left or taken, or another moves beside them.
     pub(super) fn assemble(&mut self, moving: Option<&HandLine>) {
         let last = self.needles.last();
         self.count = last.map_or(0, |needle| needle.first + needle.stations + 1);
@@ -136,7 +136,8 @@ impl LeftNeedles {
 }
 
 vectorised! {
-    /// A symmetric, positive definite matrix becomes its inverse, by elimination; false, and nothing to be used, where it is none.
+    /// Inverts a symmetric, positive definite matrix in place by elimination; returns false, with nothing to be used,
+    /// where it is none.
     fn invert(rows: &mut Rows, pivot: &mut [f64]) -> bool {
         let size = rows.size();
         let pivot = &mut pivot[..size];

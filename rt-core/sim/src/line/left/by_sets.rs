@@ -8,13 +8,15 @@ use crate::line::model::LineModel;
 use crate::line::rows::dot;
 use crate::line::state::{LineOutput, LineState};
 
-/// A tip that is so far from its place will be solved for at another: until then forces are found to so many times the tolerance.
+/// A tip that is so far from its place will be solved for at another: until then forces are found to so many times the
+/// tolerance.
 const FAR_M: f64 = 1e-6;
 const FAR: f64 = 20.0;
 
 impl LeftNeedles {
-    /// Forces over the elements and then the stations of the needle that moves; `None` where that has not found them: with
-    /// rate terms and in tissue that creeps, where stations give way within the tick and elements do not, and where sets go round in a circle.
+    /// Finds the forces over the elements and then the stations of the moving needle. Returns `None` without a
+    /// solution: with rate terms and in creeping tissue, where stations give way within the tick and elements do not,
+    /// and where sets cycle.
     pub(super) fn solve_by_sets(
         &mut self,
         model: &LineModel,
@@ -102,7 +104,7 @@ impl LeftNeedles {
     }
 }
 
-/// Those of the elements, then those of the stations.
+/// Chains the values of the elements and those of the stations.
 fn each<'a>(of_elements: &'a [f64], of_stations: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
     of_elements.iter().chain(of_stations).copied()
 }

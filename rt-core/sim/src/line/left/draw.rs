@@ -20,12 +20,12 @@ impl LeftNeedles {
         }
     }
 
-    /// Whether one is being drawn, or held on its way.
+    /// Returns whether a needle is being drawn, or held on its way.
     pub fn is_drawing(&self) -> bool {
         self.needles.iter().any(|needle| needle.drawing_m_per_s != 0.0)
     }
 
-    /// Those that are drawn stay where they are.
+    /// Ends the drawing: needles that are drawn stay where they are.
     pub fn end_drawing(&mut self) {
         self.needles.iter_mut().for_each(|needle| needle.drawing_m_per_s = 0.0);
     }

@@ -1,9 +1,9 @@
-//! Needles that stay in: each is a line whose place along itself is held by the template, beside the needle that moves.
+//! Needles that stay in: each is a line whose place along itself is held by the template, while another needle moves.
 //!
-//! A needle that is left keeps what its shaft and tip hold. Friction goes on as ever, implicit Coulomb with anchors in the tissue; its tip
-//! pushes up to the force at which it cuts, on the patch that it had when it was left. All needles together are one convex
-//! problem over the stations of all lines (`docs/physics.md`, *Several needles*), solved once a tick of the force loop in
-//! [`solve`]. A needle alone never comes here.
+//! A needle that is left keeps what its shaft and tip hold. Friction acts as before, implicit Coulomb with anchors in
+//! the tissue; its tip pushes up to the force at which it cuts, on the patch that it had when it was left. All needles
+//! together are one convex problem over the stations of all lines (`docs/physics.md`, *Several needles*), solved once a
+//! tick of the force loop in [`solve`]. A needle alone never comes here.
 
 mod assemble;
 mod by_sets;
@@ -30,7 +30,7 @@ pub const MAX_LEFT: usize = MAX_LEFT_NEEDLES;
 pub const MAX_LEFT_LOADS: usize = MAX_STATIONS + 28;
 /// Shaft of each station, and one tip.
 const MAX_ELEMENTS: usize = MAX_LEFT * (MAX_STATIONS + 1);
-/// Those of all needles that stay in, and of the line of the one that moves.
+/// Blocks for all needles that stay in, and for the line of the one that moves.
 const ALL_BLOCKS: usize = (MAX_ELEMENTS + MAX_STATIONS).div_ceil(LANES);
 
 /// One needle that stays in.
@@ -40,14 +40,15 @@ pub struct LeftNeedle {
     /// Its first element, and how many stations its shaft touches; the tip follows them.
     first: usize,
     stations: usize,
-    /// Where its tip is along the line in the world.
+    /// Position of its tip along the line in the world.
     held_m: f64,
-    /// How far it has been drawn back since it was left, and how fast it is, m/s; below zero while it is held on its way.
+    /// Distance that it has been drawn back since it was left, and its speed, m/s; below zero while it is held on its
+    /// way.
     drawn_m: f64,
     drawing_m_per_s: f64,
 }
 
-/// What the tissue has of one of them.
+/// Share of one needle in the tissue's displacement.
 #[derive(Clone, Copy, Debug)]
 pub struct LeftShare<'a> {
     /// Number of its line.
@@ -73,13 +74,13 @@ pub struct LeftNeedles {
     own: Vec<f64>,
     /// The inverse of `own`: with it, forces of the elements are found in a few products as long as most of them stick.
     inverse: Rows,
-    /// For making it.
+    /// Work space for the inversion.
     pivot: Vec<f64>,
     force_n: Vec<f64>,
     /// Displacement along its own needle at which the element holds nothing, and that it has.
     rest_m: Vec<f64>,
     u_m: Vec<f64>,
-    /// What the probe moves the tissue by at the element, along its own needle: taken from `rest_m`.
+    /// Displacement of the tissue by the probe at the element, along its own needle: taken from `rest_m`.
     moved_m: Vec<f64>,
     low_n: Vec<f64>,
     high_n: Vec<f64>,
@@ -90,24 +91,24 @@ pub struct LeftNeedles {
     /// The same the other way round: elements by a newton at each row of that line, and by one at its tip.
     from_moving: Vec<f64>,
     by_tip: Vec<f64>,
-    /// What dents take from each other where a membrane holds the tip that moves; 0 where none does.
+    /// Force that dents take from each other where a membrane holds the moving tip; 0 where none does.
     taken_n_per_m: f64,
-    /// Of the body as a whole along each element and the moving line, m/N.
+    /// Compliance of the body as a whole along each element and the moving line, m/N.
     whole: Vec<f64>,
-    /// What was added to the displacements of the moving line, m.
+    /// Displacement added to the stations of the moving line, m.
     added_m: Vec<f64>,
     /// Nothing has moved in the last tick.
     is_still: bool,
     /// Corrections of an element by less are left out of sweeps, m.
     skipped_m: f64,
-    /// How all elements and then the stations of the moving line move with each, and what their forces are found in.
+    /// Compliance of all elements, then of the stations of the moving line, against each; their forces are found in it.
     all: Rows,
     scratch: Box<Scratch<ALL_BLOCKS>>,
     without_tip: onward::WithoutTip,
 }
 
 impl LeftNeedles {
-    /// None yet; every page is written to, so that no tick is the first to touch one.
+    /// Makes room for needles; every page is written to, so that no tick is the first to touch one.
     pub fn with_room() -> Box<Self> {
         let each = |length: usize| {
             let mut values = vec![1.0; length];
@@ -145,7 +146,7 @@ impl LeftNeedles {
         })
     }
 
-    /// Bytes of the room.
+    /// Returns the size of the room, in bytes.
     pub fn bytes(&self) -> usize {
         let all = [
             &self.own,
@@ -166,34 +167,35 @@ impl LeftNeedles {
         values + rows + self.without_tip.bytes() + size_of::<Scratch<ALL_BLOCKS>>()
     }
 
-    /// How many there are.
+    /// Returns the number of needles that stay in.
     pub fn len(&self) -> usize {
         self.needles.len()
     }
 
-    /// None is left in.
+    /// Returns whether no needle stays in.
     pub fn is_empty(&self) -> bool {
         self.needles.is_empty()
     }
 
-    /// In the order in which they were left.
+    /// Returns the needles in the order in which they were left.
     pub fn needles(&self) -> &[LeftNeedle] {
         &self.needles
     }
 
-    /// Number of the line that moves beside them; 0 for none.
+    /// Returns the number of the moving line beside them; 0 for none.
     pub fn moving(&self) -> u64 {
         self.moving
     }
 
-    /// Whether `line` and every needle that stays in know how they move each other.
+    /// Returns whether the displacements of `line` and of every needle that stays in by each other are known.
     pub fn knows(&self, line: &HandLine) -> bool {
         self.needles
             .iter()
             .all(|needle| assemble::pair_coupling(&needle.line, line).is_some())
     }
 
-    /// Leaves the needle of `line` where its tip is. It comes back where there is no room, and where it does not know the others.
+    /// Leaves the needle of `line` where its tip is. It comes back where there is no room, and where it does not know
+    /// the others.
     ///
     /// # Errors
     ///
@@ -221,14 +223,15 @@ impl LeftNeedles {
         Ok(())
     }
 
-    /// Takes the needle of that line up again, as it is; no needle moves beside the others until [`beside`](Self::beside) says so.
+    /// Takes the needle of that line up again unchanged; no needle moves beside the others until
+    /// [`beside`](Self::beside) says so.
     pub fn take(&mut self, generation: u64) -> Option<Box<HandLine>> {
         let at = self.needles.iter().position(|n| n.line.generation == generation)?;
         let needle = self.remove(at);
         Some(needle.line)
     }
 
-    /// One that has been drawn out of the tissue, if any.
+    /// Takes out a needle that has been drawn out of the tissue, if any.
     pub fn drawn_out(&mut self) -> Option<Box<HandLine>> {
         let is_out = |needle: &LeftNeedle| needle.drawn_m > 0.0 && needle.depth_m() <= 0.0;
         let at = self.needles.iter().position(is_out)?;
@@ -245,14 +248,14 @@ impl LeftNeedles {
         Some(line)
     }
 
-    /// From now on the needle of `line` moves beside them, or none does. False where it does not know one of them.
+    /// Sets the moving needle beside them, on `line`, or none. Returns false where it does not know one of them.
     pub fn beside(&mut self, line: Option<&HandLine>) -> bool {
         let is_known = line.is_none_or(|line| self.knows(line));
         self.assemble(line.filter(|_| is_known));
         is_known
     }
 
-    /// Takes up the layers' forces.
+    /// Sets the layers' forces.
     pub fn set_forces(&mut self, forces: &LayerForces) {
         for needle in &mut self.needles {
             needle.line.set_forces(forces);
@@ -260,7 +263,7 @@ impl LeftNeedles {
         self.limit();
     }
 
-    /// One tick in which no needle moves beside them.
+    /// Advances by one tick in which no needle moves.
     pub fn step_alone(&mut self, dt_s: f64) {
         self.taken_n_per_m = 0.0;
         self.draw(dt_s);
@@ -271,7 +274,7 @@ impl LeftNeedles {
         }
     }
 
-    /// One tick of the needle on `line` beside them, whose tip goes no farther than the bone.
+    /// Advances the needle on `line` by one tick beside them; its tip goes no farther than the bone.
     pub fn step_beside(&mut self, line: &mut HandLine, tip_m: f64, dt_s: f64) -> LineOutput {
         let tip_m = tip_m - line.in_bone_m(tip_m);
         self.draw(dt_s);
@@ -279,7 +282,7 @@ impl LeftNeedles {
         solve::step_beside(self, line, &LineInput { tip_m, dt_s })
     }
 
-    /// What the tissue has of each.
+    /// Iterates over the share of each needle in the tissue's displacement.
     pub fn shares(&self) -> impl Iterator<Item = LeftShare<'_>> {
         self.needles.iter().map(|needle| {
             let (first, tip) = (needle.first, needle.first + needle.stations);
@@ -294,18 +297,18 @@ impl LeftNeedles {
         })
     }
 
-    /// Half of force times displacement, J. Does not allocate.
+    /// Returns the elastic energy, half of force times displacement, J. Does not allocate.
     pub fn elastic_j(&self) -> f64 {
         let each = self.force_n.iter().zip(&self.u_m).take(self.count);
         0.5 * each.map(|(f, u)| f * u).sum::<f64>()
     }
 
-    /// Forces of all elements, needle by needle: its shaft's, then its tip's.
+    /// Returns the forces of all elements, needle by needle: its shaft's, then its tip's.
     pub fn forces_n(&self) -> &[f64] {
         &self.force_n[..self.count]
     }
 
-    /// Friction of each station by how much of it the shaft is in; the tip pushes up to its cutting force.
+    /// Limits the friction of each station by how much of it the shaft is in; the tip pushes up to its cutting force.
     fn limit(&mut self) {
         for needle in &self.needles {
             let model = &needle.line.model;
@@ -321,7 +324,7 @@ impl LeftNeedles {
         self.is_still = false;
     }
 
-    /// Each element of that needle holds what it holds where it is now.
+    /// Lets each element of that needle hold its force at its present place.
     fn hold_in_place(&mut self, at: usize) {
         let needle = &self.needles[at];
         let elements = needle.first..=needle.first + needle.stations;
@@ -329,12 +332,13 @@ impl LeftNeedles {
         self.is_still = false;
     }
 
-    /// The line gets its state back.
+    /// Removes a needle and gives the line its state back.
     fn remove(&mut self, at: usize) -> LeftNeedle {
         let mut needle = self.needles.remove(at);
         let (first, tip) = (needle.first, needle.first + needle.stations);
         let state = &mut needle.line.state;
-        // A needle in the hand is displaced by what the probe moves as well; here that was taken from where it is at rest.
+        // A needle in the hand is displaced by what the probe moves as well; here that was taken from where it is at
+        // rest.
         for (n, k) in (first..tip).enumerate() {
             let moved_m = state.outside.at_m(n);
             state.shaft_n[n] = self.force_n[k];

@@ -4,7 +4,7 @@ use super::LeftNeedle;
 use crate::line::ready::HandLine;
 
 impl LeftNeedle {
-    /// Number of its line.
+    /// Returns the number of its line.
     pub fn generation(&self) -> u64 {
         self.line.generation
     }
@@ -14,17 +14,17 @@ impl LeftNeedle {
         &self.line
     }
 
-    /// Where its tip is along the line in the world, m.
+    /// Returns the position of its tip along the line in the world, m.
     pub fn held_m(&self) -> f64 {
         self.held_m
     }
 
-    /// It is being drawn out.
+    /// Returns whether it is being drawn out.
     pub fn is_drawn(&self) -> bool {
         self.drawing_m_per_s > 0.0
     }
 
-    /// Depth of its tip in the material, m.
+    /// Returns the depth of its tip in the material, m.
     pub fn depth_m(&self) -> f64 {
         self.line.state.tip.material_m - self.drawn_m
     }

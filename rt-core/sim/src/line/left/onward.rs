@@ -1,22 +1,23 @@
-//! The next solution of a tick, with the tip at another place: all forces are those of the solution before, so that displacements are as
-//! well, but for what the tip's force makes of them.
+//! The next solution of a tick, with the tip at another place: all forces are those of the solution before, so that
+//! displacements are as well, but for what the tip's force makes of them.
 
 use super::{LeftNeedles, MAX_ELEMENTS};
 use crate::line::model::{LineModel, MAX_STATIONS};
 use crate::line::rows::dot;
 use crate::line::state::LineState;
 
-/// Displacements of the solution before in the same tick, less what the tip's force makes of them: where the tip goes on, that alone changes.
+/// Displacements of the solution before in the same tick, less the part by the tip's force: where the tip advances,
+/// that part alone changes.
 #[derive(Clone, Debug)]
 pub(super) struct WithoutTip {
-    /// How many stations the shaft touched; `None` where there is no such solution.
+    /// Number of stations that the shaft touched; `None` without such a solution.
     pub stations: Option<usize>,
     elements_m: Vec<f64>,
     stations_m: Vec<f64>,
 }
 
 impl WithoutTip {
-    /// None; every page is written to.
+    /// Makes room for a solution; every page is written to.
     pub fn with_room() -> Self {
         let each = |length: usize| {
             let mut values = vec![1.0; length];
@@ -30,15 +31,15 @@ impl WithoutTip {
         }
     }
 
-    /// Bytes of the room.
+    /// Returns the size of the room, in bytes.
     pub fn bytes(&self) -> usize {
         8 * (self.elements_m.len() + self.stations_m.len())
     }
 }
 
 impl LeftNeedles {
-    /// Keeps what the solution that was just found leaves without the tip's force. Not where a membrane holds the tip: by that the column of
-    /// its force changes within a tick.
+    /// Keeps what the solution that was just found leaves without the tip's force. Not where a membrane holds the tip:
+    /// by that the column of its force changes within a tick.
     pub(super) fn keep_without_tip(&mut self, state: &LineState) {
         let kept = &mut self.without_tip;
         kept.stations = Some(state.in_contact);
@@ -53,7 +54,8 @@ impl LeftNeedles {
         less(&mut kept.stations_m[..stations], &state.u_m, &state.tip_column);
     }
 
-    /// Displacements of the stations; those from `before` on are new, and stick to where they are. False where nothing was kept.
+    /// Extrapolates the displacements of the stations; those from `before` on are new, and stick where they are.
+    /// Returns false where nothing was kept.
     pub(super) fn extrapolate_stations(
         &mut self,
         model: &LineModel,
@@ -83,7 +85,7 @@ impl LeftNeedles {
         true
     }
 
-    /// Displacements of the elements.
+    /// Extrapolates the displacements of the elements.
     pub(super) fn extrapolate_elements(&mut self, state: &LineState) {
         let (count, tip_n) = (self.count, state.tip.force_n);
         let kept = self.without_tip.elements_m[..count].iter().zip(&self.by_tip);

@@ -1,4 +1,4 @@
-//! What needles that stay in remember from tick to tick, for flight recordings.
+//! State of the needles that stay in, for flight recordings.
 
 use super::{LeftNeedle, LeftNeedles, MAX_LEFT};
 use crate::line::model::MAX_STATIONS;
@@ -40,7 +40,7 @@ pub struct LeftRecord {
 }
 
 impl Default for LeftRecord {
-    /// None, with room for all.
+    /// Makes an empty record, with room for all needles.
     fn default() -> Self {
         LeftRecord {
             needles: Vec::with_capacity(MAX_LEFT),
@@ -51,7 +51,7 @@ impl Default for LeftRecord {
 }
 
 impl LeftRecord {
-    /// Every page of the room is written to.
+    /// Makes an empty record; every page of the room is written to.
     pub fn with_room() -> Self {
         let blank = NeedleRecord {
             generation: 1,
@@ -75,13 +75,13 @@ impl LeftRecord {
         record
     }
 
-    /// None.
+    /// Removes every needle.
     pub fn clear(&mut self) {
         self.needles.clear();
         self.moving = 0;
     }
 
-    /// Copies what `left` remembers.
+    /// Copies the state of `left`.
     pub fn copy_from(&mut self, left: &LeftNeedles) {
         self.clear();
         self.moving = left.moving;
@@ -113,15 +113,15 @@ impl LeftRecord {
         }));
     }
 
-    /// Numbers of their lines.
+    /// Returns the numbers of their lines.
     pub fn line_numbers(&self) -> impl Iterator<Item = u64> {
         self.needles.iter().map(|needle| needle.generation)
     }
 }
 
 impl LeftNeedles {
-    /// Goes on from `record` with the lines that it names, and `moving` beside them. False, and none is left in, where a line is missing
-    /// or of another size: a record that was read from a file may not fit.
+    /// Continues from `record` with the lines that it names, and `moving` beside them. False, and none is left in,
+    /// where a line is missing or of another size: a record that was read from a file may not fit.
     pub fn take_record(
         &mut self,
         record: &LeftRecord,

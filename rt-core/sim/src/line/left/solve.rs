@@ -1,5 +1,5 @@
-//! One tick of all needles at once, over the stations of the needle that moves, its tip, and the elements of those that stay in: by sets as
-//! for a needle alone, or by projected Gauss-Seidel.
+//! One tick of all needles at once, over the stations of the needle that moves, its tip, and the elements of those that
+//! stay in: by sets as for a needle alone, or by projected Gauss-Seidel.
 
 use super::{LeftNeedle, LeftNeedles};
 use crate::line::contact::{
@@ -16,7 +16,7 @@ const BEFORE_M: f64 = 20e-3;
 /// Corrections of an element that stays in by less than that share of the tolerance are left out: most of them are.
 pub(super) const SKIPPED: f64 = 0.02;
 
-/// One tick of the needle on `line`, and of those that stay in.
+/// Advances the needle on `line`, and those that stay in, by one tick.
 pub(super) fn step_beside(left: &mut LeftNeedles, line: &mut HandLine, input: &LineInput) -> LineOutput {
     let (model, state) = (&line.model, &mut line.state);
     let is_idle = left.is_still && state.in_contact == 0 && state.tip.force_n == 0.0 && input.tip_m < -BEFORE_M;
@@ -94,7 +94,7 @@ impl OtherNeedles for LeftNeedles {
 }
 
 impl LeftNeedles {
-    /// Beside a needle that does not reach them.
+    /// Advances them while the moving needle does not reach them.
     fn step_rest(&mut self) {
         self.taken_n_per_m = 0.0;
         if !self.is_still {
@@ -103,7 +103,7 @@ impl LeftNeedles {
         }
     }
 
-    /// What they move the line by is put into its offset, beside what the past leaves there.
+    /// Adds the displacement of the line by them to its offset, on top of what the past leaves there.
     fn enter(&mut self, model: &LineModel, state: &mut LineState, dt_s: f64) {
         let (rows, terms) = (&model.compliance.rows, &model.settings.prony);
         if !terms.iter().any(|term| term.strength > 0.0) {
@@ -138,7 +138,8 @@ impl LeftNeedles {
         state.beside_whole_m = dot(&self.whole[..self.count], &self.force_n[..self.count]) + state.outside.at_tip_m;
     }
 
-    /// How each element moves with the tip's force where it is now; a membrane that holds it takes its part of the dent.
+    /// Computes the displacement of each element by the tip's force at its present place; a membrane that holds the tip
+    /// takes its part of the dent.
     fn reach(&mut self, model: &LineModel, state: &LineState, kept: Option<f64>) {
         let (m, count) = (model.compliance.stations, self.count);
         self.by_tip[..count].fill(0.0);
@@ -158,8 +159,8 @@ impl LeftNeedles {
         }
     }
 
-    /// Takes from stations and elements what the spring of the membrane that holds the tip passes on; of the elements `by_tip` has taken
-    /// what it passes on of the tip's force.
+    /// Takes from stations and elements what the spring of the membrane that holds the tip passes on; of the elements
+    /// `by_tip` has taken what it passes on of the tip's force.
     fn relieve(&mut self, model: &LineModel, state: &mut LineState, spring: &Spring) {
         let count = self.count;
         self.taken_n_per_m = spring.n_per_m;
@@ -172,7 +173,8 @@ impl LeftNeedles {
         }
     }
 
-    /// What the past alone displaces the tip by: what the others do goes by `by_tip`, in which a membrane has its part.
+    /// Returns the displacement of the tip by the past alone: `by_tip` has that by the others, in which a membrane has
+    /// its part.
     fn past_m(&self, model: &LineModel, state: &LineState) -> f64 {
         let m = model.compliance.stations;
         let past = |n: usize| state.memory.offset_m[m + n] - self.added_m[m + n];
@@ -180,7 +182,8 @@ impl LeftNeedles {
         weights.map(|(n, w)| w * past(n)).sum()
     }
 
-    /// Displacement of each element by all forces as they are; of the moving needle's with `moving`.
+    /// Computes the displacement of each element by all present forces; with `moving`, those of the moving needle as
+    /// well.
     pub(super) fn displace(&mut self, moving: Option<&LineState>) {
         let (count, stride, simd) = (self.count, self.stride, self.simd);
         let u_m = &mut self.u_m[..count];
@@ -192,7 +195,7 @@ impl LeftNeedles {
         add_scaled(state.tip.force_n, &self.by_tip[..count], &mut self.u_m[..count]);
     }
 
-    /// Among themselves.
+    /// Solves for the elements among themselves.
     pub(super) fn solve_alone(&mut self) {
         let sweeps_and_tolerance = self.needles.first().map(|n| {
             let settings = &n.line.model.settings;
@@ -214,7 +217,7 @@ impl LeftNeedles {
         self.is_still = !has_moved && !self.needles.iter().any(LeftNeedle::is_drawn);
     }
 
-    /// What reached its limit holds from where it is now.
+    /// Lets elements that reached their limit hold from their present place.
     fn slip(&mut self) {
         for k in 0..self.count {
             if self.force_n[k] >= self.high_n[k] || (self.low_n[k] < 0.0 && self.force_n[k] <= self.low_n[k]) {
@@ -225,7 +228,8 @@ impl LeftNeedles {
 }
 
 impl LeftNeedles {
-    /// Forces of shaft, tip and all elements by sweeps; returns how far the tip is beyond where the material has it.
+    /// Finds the forces of shaft, tip and all elements by sweeps; returns how far the tip is beyond where the material
+    /// has it.
     fn solve_by_sweeps(
         &mut self,
         model: &LineModel,
@@ -309,7 +313,7 @@ vectorised! {
     }
 }
 
-/// A part of the columns, whose sums stay in registers.
+/// Adds a part of the columns, whose sums stay in registers.
 #[inline(always)]
 fn add_parts<const N: usize>(factors: &[f64], rows: &[f64], stride: usize, from: usize, sum: &mut [f64; N]) {
     let mut held = *sum;
@@ -369,7 +373,8 @@ vectorised! {
 }
 
 vectorised! {
-    /// [`sweep`] beside needles that stay in, for the instructions that the processor has; the same bits with all of them.
+    /// Calls [`sweep`] with needles that stay in, for the instructions of the processor; all of them give the same
+    /// bits.
     #[expect(clippy::too_many_arguments, reason = "those of `sweep`, and the instructions")]
     fn sweep_beside(
         model: &LineModel,

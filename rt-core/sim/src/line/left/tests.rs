@@ -15,7 +15,7 @@ const SPACING_M: f64 = 1.364e-3;
 const DT_S: f64 = 1e-3;
 const WHOLE: f64 = 1.0 / 1434.0;
 
-/// A made-up body: it moves as a whole, and around a load.
+/// Returns the compliance of a made-up body: it moves as a whole, and around a load.
 fn kernel(a: [f64; 3], b: [f64; 3], whole: f64) -> f64 {
     let square: f64 = (0..3).map(|c| (a[c] - b[c]).powi(2)).sum();
     whole + (-square.sqrt() / 5e-3).exp() / 270.0
@@ -29,7 +29,8 @@ fn cosine(a: &Line, b: &Line) -> f64 {
     (0..3).map(|c| a.axes[0][c] * b.axes[0][c]).sum()
 }
 
-/// A line that knows `others`. Shaft and tip have the same places; a station of the shaft gives way by itself as well.
+/// Makes a line that knows `others`. Shaft and tip have the same places; a station of the shaft gives way by itself as
+/// well.
 fn line(generation: u64, entry_m: [f64; 3], others: &[&HandLine], whole: f64) -> Box<HandLine> {
     let line = Line::new(entry_m, [0.0, 0.0, 1.0]).expect("a direction");
     let entry = |i: usize, j: usize| {
@@ -48,7 +49,7 @@ fn line(generation: u64, entry_m: [f64; 3], others: &[&HandLine], whole: f64) ->
     Box::new(HandLine::made_up(generation, line, compliance, beside))
 }
 
-/// From where it is to a depth, alone or beside others; what the hand feels at the end, N.
+/// Moves a needle from its place to a depth, alone or beside others; returns the force on the hand at the end, N.
 fn go(line: &mut HandLine, left: Option<&mut LeftNeedles>, from_m: f64, to_m: f64, step_m: f64) -> f64 {
     let steps = ((to_m - from_m).abs() / step_m).round().max(1.0) as usize;
     let mut left = left;
@@ -64,7 +65,7 @@ fn go(line: &mut HandLine, left: Option<&mut LeftNeedles>, from_m: f64, to_m: f6
     force_n
 }
 
-/// The first goes in to 25 mm and is left; the second knows it.
+/// Inserts the first needle to 25 mm and leaves it; the second knows it.
 fn one_left(apart_m: f64, whole: f64) -> (Box<LeftNeedles>, Box<HandLine>) {
     let mut first = line(1, [0.0; 3], &[], whole);
     let second = line(2, [apart_m, 0.0, 0.0], &[&first], whole);
@@ -116,7 +117,8 @@ fn two_needles_are_what_the_dense_problem_of_all_stations_gives() {
             left.step_beside(&mut second, tip_m, DT_S);
             let (m, k) = (second.state.in_contact, left.count);
             let lines = [*second.line(), *left.needles[0].line.line()];
-            // Rows: shaft of the second, its tip, shaft and tip of the first, each with its share at places of the body.
+            // Rows: shaft of the second, its tip, shaft and tip of the first, each with its share at places of the
+            // body.
             let own = |line: usize, n: usize| vec![(place(&lines[line], n), 1.0, Some((line, n)))];
             let tip = |line: usize, state: &crate::line::LineState| {
                 let weights = state.tip_range.clone().zip(state.tip_weights);

@@ -6,10 +6,10 @@ use crate::line::{Compliance, LineOutput};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// From hand to tip: needles for implants are 20 cm long.
+/// Distance from hand to tip: needles for implants are 20 cm long.
 const LENGTH_M: f64 = 0.2;
-/// How far a hand gives way, m/N, and turns, rad/(N m): 1 N/mm and 0.5 N m/rad, the stiffest that a loop at 1 kHz holds still over
-/// a late link (the needle close to its hub is stiffer).
+/// Compliance of a hand, m/N, and against rotation, rad/(N m): 1 N/mm and 0.5 N m/rad, the stiffest that a loop at 1
+/// kHz holds still over a late link (the needle close to its hub is stiffer).
 const GRIP: [f64; 2] = [1e-3, 2.0];
 
 /// A needle that bends, or not.
@@ -21,12 +21,12 @@ pub struct NeedleBending {
     pub bevel: f64,
     /// Play in the hole of the template, to each side, m.
     pub template_gap_m: f64,
-    /// From the template to the place of entry, m; 0 is none.
+    /// Distance from the template to the place of entry, m; 0 is none.
     pub template_distance_m: f64,
 }
 
 impl NeedleBending {
-    /// Whether the needle bends.
+    /// Returns whether the needle bends.
     pub fn is_on(&self) -> bool {
         self.bending_stiffness_n_m2 > 0.0
     }
@@ -70,8 +70,8 @@ impl Bending {
 }
 
 impl HandLine {
-    /// One tick of the beam, after that of the slip: `None` for a needle that does not bend, or a line without stations across. The
-    /// tip is that of a rigid needle in the same hand; the bevel leads towards +x of the tool.
+    /// Advances the beam by one tick, after the slip: `None` for a needle that does not bend, or a line without
+    /// stations across. The tip is that of a rigid needle in the same hand; the bevel leads towards +x of the tool.
     pub fn bend(
         &mut self,
         tip_in_world: &Vector3<f64>,
@@ -116,7 +116,7 @@ impl HandLine {
         (!output.is_refused).then_some(output)
     }
 
-    /// The body was solved for forces across the line as well.
+    /// Returns whether the body was solved for forces across the line as well.
     pub fn can_bend(&self) -> bool {
         self.bending.is_some()
     }
@@ -126,7 +126,8 @@ impl HandLine {
         [1, 2].map(|side: usize| Vector3::from(self.line.axes[side]))
     }
 
-    /// Forces across the line on each station of the tissue, along one direction; none where the line has no stations across.
+    /// Returns the forces across the line on each station of the tissue, along one direction; none where the line has
+    /// no stations across.
     pub fn across_loads_n(&self, side: usize) -> &[f64] {
         let count = self.bending.as_ref().map_or(0, |bending| bending.model.stations());
         self.state.beam.forces_n(side).get(..count).unwrap_or(&[])

@@ -3,23 +3,23 @@
 use crate::line::Line;
 use crate::tissue::{ElementField, PackedField};
 
-/// What the tissue loop needs: the body's answer to a newton at each station.
+/// Half of a line for the tissue loop: the body's answer to a newton at each station.
 #[derive(Clone, Debug)]
 pub struct BodyLine {
-    /// That of the [`HandLine`](super::HandLine) made with it.
+    /// Number of the [`HandLine`](super::HandLine) made with it.
     pub generation: u64,
-    /// Where the line is at rest.
+    /// Line at rest.
     pub line: Line,
-    /// How far a newton moves the body as a whole on its foundation, m; 0 where something holds it.
+    /// Displacement of the body as a whole on its foundation by a newton, m; 0 where something holds it.
     pub whole_m_per_n: f64,
-    /// For each newton: shaft of each station, then tip at each, then stations across along each direction.
+    /// Answer to each newton: shaft of each station, then tip at each, then stations across along each direction.
     pub answer: BodyAnswer,
-    /// What a needle that stays in on it does to the body, m: see [`stay`](Self::stay).
+    /// Displacement of the body by a needle that stays in on it, m: see [`stay`](Self::stay).
     pub share: ElementField,
 }
 
 impl BodyLine {
-    /// With its room for what it does when its needle stays in.
+    /// Makes the tissue loop's half, with room for the displacement by a needle that stays in.
     pub fn new(generation: u64, line: Line, whole_m_per_n: f64, answer: BodyAnswer) -> Self {
         let elements = answer.columns().first().map_or(0, PackedField::elements);
         BodyLine {
@@ -37,24 +37,25 @@ impl BodyLine {
     }
 }
 
-/// What a tissue model takes of the body's answers to the loads of a line: displacement of every element, m/N.
+/// Answer of the body to the loads of a line, in the form that a tissue model takes: displacement of every element,
+/// m/N.
 #[derive(Clone, Debug)]
 pub enum BodyAnswer {
-    /// For tissue that adds them up.
+    /// Columns for tissue that adds them up.
     Columns(Vec<PackedField>),
-    /// Of a coarser body, which carries tissue that finds the rest by itself.
+    /// Answer of a coarser body, which carries tissue that finds the rest by itself.
     Carrying(Vec<PackedField>),
 }
 
 impl BodyAnswer {
-    /// For tissue that does not add columns up: they carry it.
+    /// Turns the answer into one that carries the tissue, where a model does not add columns up.
     pub fn carry(&mut self) {
         if let Self::Columns(columns) = self {
             *self = Self::Carrying(std::mem::take(columns));
         }
     }
 
-    /// Displacements of every element.
+    /// Returns the displacements of every element.
     pub fn columns(&self) -> &[PackedField] {
         match self {
             Self::Columns(columns) | Self::Carrying(columns) => columns,

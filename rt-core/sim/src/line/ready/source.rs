@@ -1,4 +1,4 @@
-//! What the force loop's half of a line can be made from again: kept beside a recording.
+//! Source from which the force loop's half of a line can be made again: kept in a recording.
 
 use super::way::LineLayers;
 use super::{HandLine, LineError, STIFFEST_N_PER_M};
@@ -7,13 +7,13 @@ use crate::line::{Compliance, Cross, Line, LineState, MAX_STATIONS, Rows};
 use crate::needle::LayerKind;
 use serde::{Deserialize, Serialize};
 
-/// Where a line lies, how its stations move, and the layers on the way: all of a [`HandLine`] that does not change while it
-/// is in use, but for the layers' forces, which are parameters.
+/// Line, compliance of its stations, and layers on the way: all of a [`HandLine`] that does not change while it is in
+/// use, except the layers' forces, which are parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LineSource {
-    /// That of the [`HandLine`].
+    /// Number of the [`HandLine`].
     pub generation: u64,
-    /// Where the line is at rest.
+    /// Line at rest.
     pub line: Line,
     way: LineLayers,
     compliance: Compliance,
@@ -25,22 +25,22 @@ pub struct LineSource {
 }
 
 impl LineSource {
-    /// The body was solved for forces across the line as well.
+    /// Returns whether the body was solved for forces across the line as well.
     pub fn bends(&self) -> bool {
         self.compliance.across[0].size() > 0
     }
 
-    /// Young's modulus of the tissue that it was solved in, over that of the scene.
+    /// Returns Young's modulus of the tissue that it was solved in, over that of the scene.
     pub fn stiffness(&self) -> f64 {
         self.stiffness
     }
 
-    /// One that was solved in tissue so many times as stiff as that of the scene.
+    /// Returns the source for tissue so many times as stiff as that of the scene.
     pub fn in_tissue_as_stiff(self, stiffness: f64) -> LineSource {
         LineSource { stiffness, ..self }
     }
 
-    /// Stations of the line.
+    /// Returns the number of stations of the line.
     pub fn stations(&self) -> usize {
         self.compliance.stations
     }
@@ -50,7 +50,7 @@ impl LineSource {
         &mut self.compliance
     }
 
-    /// Whether two lines are the same in every bit, whatever their number in the run and what they know of others.
+    /// Returns whether two lines agree in every bit, apart from their number in the run and their coupling with others.
     pub fn is_identical(&self, other: &LineSource) -> bool {
         let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
         let place = |s: &LineSource| [bits(&s.line.entry_m), bits(s.line.axes.as_flattened())];
@@ -83,7 +83,7 @@ impl LineSource {
 }
 
 impl HandLine {
-    /// What it can be made from again. Allocates: for the thread that prepares lines.
+    /// Returns the source that it can be made from again. Allocates: for the thread that prepares lines.
     pub fn source(&self) -> LineSource {
         LineSource {
             generation: self.generation,
@@ -96,7 +96,7 @@ impl HandLine {
         }
     }
 
-    /// A line of stations that do not know each other, for tests and examples: 1 mm apart, 1 mm/N.
+    /// Makes a line of stations whose forces do not move each other, for tests and examples: 1 mm apart, 1 mm/N.
     ///
     /// # Errors
     ///
@@ -109,7 +109,7 @@ impl HandLine {
         Self::new(generation, line, way, Compliance::diagonal(stations, 1e-3, 1e-3))
     }
 
-    /// The same way through a body that was solved otherwise, at rest: what a measurement compares a line with.
+    /// Returns the same way through a body that was solved otherwise, at rest: the reference of a measurement.
     ///
     /// # Errors
     ///
@@ -119,7 +119,7 @@ impl HandLine {
         Self::new(self.generation, self.line, self.way.clone(), compliance)
     }
 
-    /// A line of a made-up body, for tests.
+    /// Makes a line of a made-up body, for tests.
     #[cfg(test)]
     pub(in crate::line) fn made_up(generation: u64, line: Line, compliance: Compliance, beside: Vec<Cross>) -> Self {
         let way = LineLayers {
@@ -132,7 +132,7 @@ impl HandLine {
         }
     }
 
-    /// The line in tissue at rest, with the default forces of its layers.
+    /// Makes the line in tissue at rest, with the default forces of its layers.
     ///
     /// # Errors
     ///
@@ -169,7 +169,7 @@ impl HandLine {
         Ok(line)
     }
 
-    /// Goes on from that state; false, and nothing changes, where it is one of another line.
+    /// Continues from that state; returns false, and changes nothing, where it belongs to another line.
     pub fn take_state(&mut self, state: &LineState) -> bool {
         let is_own = state.is_of(&self.model);
         if is_own {

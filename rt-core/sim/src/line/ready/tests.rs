@@ -9,7 +9,7 @@ fn paper() -> (Scene, BatchModel<f32>, FemModel<f32>) {
     (scene, BatchModel::new(&tissue.model), tissue.model)
 }
 
-/// Small, so that its columns are soon solved.
+/// Returns a small body, whose columns are soon solved.
 fn block() -> (Scene, BatchModel<f32>) {
     let labels = crate::scene::Labels {
         dims: [6, 6, 10],
@@ -23,12 +23,12 @@ fn block() -> (Scene, BatchModel<f32>) {
     (scene, body)
 }
 
-/// What the membrane passes on to the body as a whole.
+/// Returns the displacement of the body as a whole by the membrane.
 fn whole_m(hand: &HandLine) -> [f64; 3] {
     [0.0, 0.0, hand.whole_m()]
 }
 
-/// A line through the middle of the gland, along its axis.
+/// Returns a line through the middle of the gland, along its axis.
 fn ready(scene: &Scene, body: &BatchModel<f32>) -> ReadyLine {
     let (low, high) = scene.lattice.bounds_m();
     let start_m = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), low[2] - 0.01];
@@ -143,9 +143,11 @@ fn a_reset_line_answers_like_a_new_one() {
     }
 }
 
-/// What the coarser body of the pelvis is worth: `cargo test --release -p stylet-sim --lib a_coarser_pelvis -- --ignored --nocapture`
+/// Measures the coarser body of the pelvis: `cargo test --release -p stylet-sim --lib a_coarser_pelvis -- --ignored
+/// --nocapture`
 ///
-/// The same forces, 2 N of shaft friction along 50 mm and 1.5 N at the tip, on the body as it ships and on one of all cells.
+/// The same forces, 2 N of shaft friction along 50 mm and 1.5 N at the tip, act on the body as it ships and on one of
+/// all cells.
 #[test]
 #[ignore = "a measurement of some minutes"]
 fn a_coarser_pelvis_beside_one_of_all_cells() {
@@ -318,7 +320,8 @@ fn a_line_that_is_prepared_twice_is_the_same_in_every_bit() {
     assert!(!a.hand.source().is_identical(&other.hand.source()));
 }
 
-/// What a flight recording keeps of a line, as bytes and back: the same answers from there on, and no heap call for the copy.
+/// A flight recording keeps a line as bytes and restores it: the same answers from there on, and no heap call for the
+/// copy.
 #[test]
 fn a_line_is_restored_from_source_and_state_in_every_bit() {
     let (scene, body) = block();

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// A needle within its own radius of a track is in it, m (18 G).
 const WITHIN_M: f64 = 0.635e-3;
 
-/// Where a needle has cut, and which membranes it went through.
+/// Track that a needle has cut, with the membranes that it went through.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Track {
     line: Line,
@@ -17,7 +17,7 @@ pub struct Track {
 }
 
 impl HandLine {
-    /// The track that the needle has cut so far; `None` where it has cut nothing.
+    /// Returns the track that the needle has cut so far; `None` where it has cut nothing.
     pub fn track(&self) -> Option<Track> {
         let tip = self.state.tip();
         let opened = self
@@ -33,7 +33,8 @@ impl HandLine {
         })
     }
 
-    /// Finds `track` open where the needle goes in it all the way, within its radius; does not allocate. For a line that no needle is on.
+    /// Finds `track` open where the needle goes in it all the way, within its radius; does not allocate. For a line
+    /// that no needle is on.
     pub fn open_track(&mut self, track: &Track) {
         let axis = self.line.axes[0];
         let off_m = |along_m: f64| {

@@ -1,4 +1,4 @@
-//! What lies along a line: layers, and bone.
+//! Layers and bone along a line.
 
 use super::LayerForces;
 use crate::line::Line;
@@ -7,21 +7,21 @@ use crate::needle::LayerKind;
 use crate::scene::Lattice;
 use serde::{Deserialize, Serialize};
 
-/// Looks for each element on the way.
+/// Samples for each element on the way.
 const STEPS: usize = 8;
 
-/// Where each layer begins, and where the needle is stopped.
+/// Beginning of each layer, and the place where bone stops the needle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct LineLayers {
-    /// In order of depth, up to [`MAX_LAYERS`], the rest is felt as the last; the membrane of a kind that was met before is felt
-    /// once only.
+    /// Layers in order of depth, up to [`MAX_LAYERS`]; the rest counts as the last. Only the first layer of a kind has
+    /// its membrane.
     pub kinds: Vec<(f64, LayerKind, bool)>,
     /// Depth of the first element that no needle enters.
     pub bone_m: Option<f64>,
 }
 
 impl LineLayers {
-    /// From the entry on through `lattice`; what `layer_of` knows nothing of is bone.
+    /// Follows the line from the entry on through `lattice`; elements that `layer_of` does not know are bone.
     pub fn along(line: &Line, lattice: &Lattice, layer_of: &dyn Fn(u32) -> Option<LayerKind>) -> Self {
         let mut way = LineLayers {
             kinds: Vec::new(),
@@ -65,7 +65,7 @@ impl LineLayers {
     }
 }
 
-/// What a layer of the way resists with.
+/// Returns the resistance of a layer of the way.
 pub(super) fn layer(forces: &LayerForces, &(from_m, kind, has_membrane): &(f64, LayerKind, bool)) -> LineLayer {
     let layer = forces.layers.of(kind);
     let is_closed = has_membrane && layer.has_membrane() && forces.membrane_gain > 0.0;

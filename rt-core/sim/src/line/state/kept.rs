@@ -1,10 +1,10 @@
-//! A state that is kept beside the one in use: in flight recordings, and taken up again when one is repeated.
+//! A copy of the state in use: kept in flight recordings, and restored when one is repeated.
 
 use super::LineState;
 use crate::line::model::{LineModel, MAX_STATIONS};
 
 impl LineState {
-    /// Room for the state of any line. Every page is written to, so that no tick is the first to touch one.
+    /// Makes room for the state of any line. Every page is written to, so that no tick is the first to touch one.
     pub fn with_room() -> Self {
         let mut state = LineState::filled(MAX_STATIONS, 1.0);
         state.memory.vectors_mut().into_iter().for_each(|v| v.fill(1.0));
@@ -29,8 +29,8 @@ impl LineState {
         own.into_iter().chain(memory.vectors_mut()).for_each(Vec::clear);
     }
 
-    /// Copies all of `from`; names every field, so that a new one is not forgotten. Does not allocate where there is room
-    /// for as many stations.
+    /// Copies all of `from`; names every field, so that a new one is not forgotten. Does not allocate where there is
+    /// room for as many stations.
     pub fn copy_from(&mut self, from: &LineState) {
         let LineState {
             shaft_n,
@@ -79,7 +79,7 @@ impl LineState {
         self.last = *last;
     }
 
-    /// Whether it is one of `model`, in all of its parts: a state that was read from a file may not be.
+    /// Returns whether it fits `model` in all of its parts: a state read from a file may not.
     pub(in crate::line) fn is_of(&self, model: &LineModel) -> bool {
         let m = model.compliance.stations;
         let each = [&self.shaft_n, &self.anchor_m, &self.u_m, &self.tip_column];

@@ -1,10 +1,11 @@
-//! What the displacement from outside does to a line.
+//! Effect of displacements from outside on a line.
 
 use super::LineState;
 use crate::line::model::LineModel;
 
 impl LineState {
-    /// The tissue is displaced past the needle by what the probe does in this tick: beside what the past leaves. One comparison where nothing is.
+    /// Displaces the tissue past the needle by what the probe does in this tick, on top of what the past leaves. One
+    /// comparison where nothing moves.
     pub(in crate::line) fn move_from_outside(&mut self) {
         if !self.outside.is_on() {
             return;
@@ -21,7 +22,8 @@ impl LineState {
         }
     }
 
-    /// The same for the membrane at the tip, once it is known where that is: it is no more stretched by it than by tissue that is moved as a whole.
+    /// Displaces the membrane at the tip likewise, once its place is known: this stretches it no more than tissue that
+    /// is moved as a whole.
     pub(in crate::line) fn move_membrane_from_outside(&mut self, model: &LineModel) {
         if !self.outside.is_on() {
             return;
@@ -33,7 +35,7 @@ impl LineState {
         self.outside.at_tip_m = at_tip_m;
     }
 
-    /// The same across the line, at so many stations along each direction.
+    /// Displaces the tissue across the line likewise, at so many stations along each direction.
     pub(in crate::line) fn bend_from_outside(&mut self, across: usize) {
         let first = 2 * self.shaft_n.len();
         let outside = &self.outside;
@@ -43,7 +45,8 @@ impl LineState {
         }
     }
 
-    /// Work of the needle's forces over what moves the tissue from outside, J: no energy that they have stored.
+    /// Returns the work of the needle's forces over what moves the tissue from outside, J: no energy that they have
+    /// stored.
     pub(in crate::line) fn outside_j(&self) -> f64 {
         if !self.outside.is_on() {
             return 0.0;

@@ -1,4 +1,5 @@
-//! Points of the wall that may be in contact: where the probe's surface is there, where their forces go, and the problem of these forces.
+//! Points of the wall that may be in contact: where the probe's surface is there, where their forces go, and the
+//! problem of these forces.
 
 use super::{ProbeState, place_m};
 use crate::probe::columns::ReadyProbe;
@@ -10,11 +11,12 @@ const REACH_M: f64 = 4e-3;
 const NEAR_M: f64 = 0.15e-3;
 /// A point is pressed from the side of the hollow: the probe's surface there faces into the wall.
 const FACING: f64 = 0.2;
-/// A problem is condensed anew where a force has turned by more than that since.
+/// Angle by which a force may turn before the problem is condensed again.
 const OTHERWISE: f64 = 0.03;
 
-/// How far a force turns in a pass, of the way to the surface: farther in every other pass, since one that has turned moves its point on by up to half
-/// as much again; and half as far from the 12th on, since a point that is hardly pressed may be in contact in every other pass.
+/// Returns the share of the way to the surface that a force turns in a pass: farther in every other pass, since one
+/// that has turned moves its point on by up to half as much again; and half as far from the 12th on, since a lightly
+/// pressed point may be in contact in every other pass.
 fn part_of(pass: usize) -> f64 {
     match pass {
         12.. => 0.5,
@@ -23,7 +25,7 @@ fn part_of(pass: usize) -> f64 {
     }
 }
 
-/// How far the points that are looked at are from the probe.
+/// Measures the distance of the examined points from the probe.
 pub(super) fn measure(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose) {
     for &n in &state.reach {
         let n = n as usize;
@@ -31,7 +33,7 @@ pub(super) fn measure(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePo
     }
 }
 
-/// The probe's surface there faces into the wall.
+/// Returns whether the probe's surface faces into the wall there.
 fn faces(probe: &ReadyProbe, state: &ProbeState, n: usize) -> bool {
     let along: f64 = (0..3)
         .map(|c| state.surface[n][c] * probe.wall.points[n].outward[c])
@@ -39,7 +41,8 @@ fn faces(probe: &ReadyProbe, state: &ProbeState, n: usize) -> bool {
     along < FACING
 }
 
-/// Points that are looked at on the way to a pose: those near the probe whose wall it faces, and those that were pressed.
+/// Finds the points to examine on the way to a pose: those near the probe whose wall it faces, and those that were
+/// pressed.
 pub(super) fn reach(probe: &ReadyProbe, state: &mut ProbeState) {
     state.reach.clear();
     for n in 0..probe.wall.points.len() {
@@ -49,7 +52,8 @@ pub(super) fn reach(probe: &ReadyProbe, state: &mut ProbeState) {
     }
 }
 
-/// Forces turn to the probe's surface. False where other points may be in contact than before, or the directions are others than those of the problem.
+/// Turns the forces to the probe's surface. Returns false where other points may be in contact than before, or the
+/// directions differ from those of the problem.
 pub(super) fn turn(probe: &ReadyProbe, state: &mut ProbeState, pass: usize) -> bool {
     for at in 0..state.near.len() {
         let n = state.near[at] as usize;
@@ -63,7 +67,7 @@ pub(super) fn turn(probe: &ReadyProbe, state: &mut ProbeState, pass: usize) -> b
     true
 }
 
-/// Points that may be in contact.
+/// Lists the points that may be in contact.
 pub(super) fn list(probe: &ReadyProbe, state: &mut ProbeState, pass: usize) {
     state.near.clear();
     state.is_near.fill(false);
@@ -80,7 +84,7 @@ pub(super) fn list(probe: &ReadyProbe, state: &mut ProbeState, pass: usize) {
     }
 }
 
-/// How the gaps of the points that are near close with the forces on each.
+/// Computes how the gaps of the near points close with the forces on each.
 pub(super) fn condense(probe: &ReadyProbe, state: &mut ProbeState) {
     let n = state.near.len();
     state.problem.count = n;
@@ -96,7 +100,7 @@ pub(super) fn condense(probe: &ReadyProbe, state: &mut ProbeState) {
     state.problem.is_new();
 }
 
-/// How far point `b` moves along a direction by a newton on another along its own.
+/// Returns the displacement of point `b` along a direction by a newton on another along its own.
 #[inline]
 fn along(rows: [&[f32]; 3], b: usize, own: [f64; 3], to: [f64; 3]) -> f64 {
     let moved = |row: &[f32]| match row.get(3 * b..3 * b + 3) {
@@ -106,7 +110,8 @@ fn along(rows: [&[f32]; 3], b: usize, own: [f64; 3], to: [f64; 3]) -> f64 {
     own[0] * moved(rows[0]) + own[1] * moved(rows[1]) + own[2] * moved(rows[2])
 }
 
-/// Where the force of a point turns in a pass: one that did not press has no direction before.
+/// Returns the direction towards which the force of a point turns in a pass: a point that did not press has none
+/// before.
 fn towards(state: &ProbeState, n: usize, pass: usize) -> [f64; 3] {
     match state.pressed_n[n] > 0.0 {
         true => turned(state.pushed[n], state.surface[n], part_of(pass)),
@@ -114,15 +119,15 @@ fn towards(state: &ProbeState, n: usize, pass: usize) -> [f64; 3] {
     }
 }
 
-/// The direction of a force, that part of the way to another.
+/// Turns the direction of a force that part of the way to another.
 fn turned(before: [f64; 3], outward: [f64; 3], part: f64) -> [f64; 3] {
     let before = Vector3::from(before);
     let mixed = before + (Vector3::from(outward) - before) * part;
     mixed.try_normalize(1e-9).map_or(outward, Into::into)
 }
 
-/// How far points are on the wrong side: those that are pressed on either, the others in the probe. And how far a force is from square to the
-/// probe's surface.
+/// Returns how far points are on the wrong side: pressed ones on either, the others inside the probe. The second is the
+/// largest angle of a force from square to the probe's surface.
 pub(super) fn left_over(probe: &ReadyProbe, state: &mut ProbeState) -> [f64; 2] {
     let (mut open_m, mut turned) = (0.0_f64, 0.0_f64);
     state.is_missed = false;

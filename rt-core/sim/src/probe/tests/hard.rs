@@ -1,4 +1,4 @@
-//! What a hand does with a probe, and what the contact must not do then: stick, sink in, pull, or fail to end.
+//! Hard cases of a hand with a probe, in which the contact must not stick, sink in, pull, or fail to end.
 
 use super::small;
 use crate::probe::BodyProbe;

@@ -7,7 +7,7 @@ use crate::probe::BodyProbe;
 
 const NUMBER: u64 = 3;
 
-/// Through the gland above the hollow, along the probe.
+/// Makes a line through the gland above the hollow, along the probe.
 fn line() -> ReadyLine {
     let fixture = small();
     let line =
@@ -52,7 +52,8 @@ fn probe_and_line_displace_each_other_reciprocally() {
         (at_line_j - at_pads_j).abs() < 1e-12 * at_pads_j.abs() && at_pads_j.abs() > 1e-7,
         "{at_line_j} {at_pads_j}"
     );
-    // The other way round: the probe's own columns, read where the stations are, with another element's middle for each.
+    // The other way round: the probe's own columns, read where the stations are, with another element's middle for
+    // each.
     let stations = columns.len() / 2;
     let axis = line.body.line.axes[0];
     let (mut square, mut off) = (0.0, 0.0);

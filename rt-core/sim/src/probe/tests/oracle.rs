@@ -1,11 +1,11 @@
-//! The probe in a small body beside felupe's elements and SciPy's solvers (`tests/oracles/probe_felupe.py`).
+//! The probe in a small body against felupe's elements and SciPy's solvers (`tests/oracles/probe_felupe.py`).
 
 use super::finely;
 use crate::probe::{ProbePose, ProbeState, displace, step};
 use nalgebra::Vector3;
 
 const PRESSED: &str = include_str!("../../../../../tests/oracles/probe_pressed.csv");
-/// Where the script has the probe in the end, and the middle of the hollow.
+/// Last place of the probe in the script, and the middle of the hollow.
 const TIP_M: [f64; 3] = [36e-3, 28e-3, 48e-3];
 const MIDDLE_M: f64 = 20e-3;
 

@@ -1,4 +1,4 @@
-//! The pelvis under a probe that is pressed 10 mm: beside the reference, between the pads, and how long it takes.
+//! The pelvis under a probe that is pressed 10 mm: against the reference, between the pads, and how long it takes.
 
 use super::Fixture;
 use super::reference::{Reference, beside_reference};
@@ -12,7 +12,7 @@ use std::time::Instant;
 const PRESSED_M: f64 = 10e-3;
 /// The tip is so far beyond the middle of the gland: its base is at 22 mm.
 const BEYOND_M: f64 = 35e-3;
-/// What the wall between its points may be in the probe: measured, see docs/adr/0021-probe.md.
+/// Largest depth of the wall between its points in the probe: measured, see docs/adr/0021-probe.md.
 const DEEPEST_UM: f64 = 400.0;
 
 fn pelvis() -> &'static Fixture {
@@ -59,8 +59,8 @@ fn finer_pads() {
     }
 }
 
-/// The wall as the full solution of the whole body moves it under the forces of a tick, at each of its faces and between any two next to each other:
-/// that is 1.4 and 0.7 mm apart, where pads are 5.
+/// Returns the depths of the wall, as the full solution of the whole body moves it under the forces of a tick, at each
+/// of its faces and between neighbours: that is 1.4 and 0.7 mm apart, where pads are 5.
 fn depths_um(fixture: &Fixture, pressed_m: f64) -> Vec<f64> {
     let mut state = ProbeState::new(&fixture.probe);
     fixture.go_in_and_press(&mut state, pressed_m, BEYOND_M);
@@ -135,8 +135,8 @@ fn between_the_points() {
     }
 }
 
-/// One press, with columns that are solved for in ever smaller elements and displace those of ChainMail's lines: where the scene's own cells are
-/// from a body whose cells are half as large.
+/// One press, with columns that are solved for in ever smaller elements and displace those of ChainMail's lines: where
+/// the scene's own cells are from a body whose cells are half as large.
 #[test]
 #[ignore = "half an hour, 8 GB"]
 fn halving_the_cells_does_not_change_the_press() {
@@ -154,7 +154,8 @@ fn halving_the_cells_does_not_change_the_press() {
     assert!(gland < 0.02 && force < 0.05, "{gland} {force}");
 }
 
-/// What pads leave out in the scene's own cells: beside forces on the points themselves, which `rt-core probe` solves for.
+/// Measures the error of pads in the scene's own cells, against forces on the points themselves, which `rt-core probe`
+/// solves for.
 #[test]
 #[ignore = "a measurement, twelve minutes"]
 fn what_pads_leave_out() {
@@ -169,7 +170,7 @@ fn what_pads_leave_out() {
     }
 }
 
-/// Each cell in eight.
+/// Splits each cell into eight.
 fn halved(scene: &Scene) -> Scene {
     let dims = scene.lattice.dims.map(|n| 2 * n);
     let label = |n: usize| {
@@ -189,7 +190,7 @@ fn halved(scene: &Scene) -> Scene {
 /// Force on the hand, and how the elements of the gland move, m.
 type Press = (Vector3<f64>, Vec<Vector3<f64>>);
 
-/// Pressed with columns of that body, in the elements of ChainMail's lines; loaded at points where no pads are asked for.
+/// Presses with columns of that body, in the elements of ChainMail's lines; loads points where no pads are asked for.
 fn pressed_in(body: &Scene, pads_apart_m: Option<f64>) -> Press {
     let begun = Instant::now();
     let scene = Scene::builtin("pelvis").expect("built in");
@@ -226,7 +227,7 @@ fn pressed_in(body: &Scene, pads_apart_m: Option<f64>) -> Press {
     (Vector3::from(response.wrench.force_n()), gland)
 }
 
-/// How far the worst element of the gland is off, of the most that any moves; and the force.
+/// Returns the error of the worst element of the gland, over the largest displacement; and that of the force.
 fn off_by((force_n, gland): &Press, (wanted_n, wanted): &Press) -> [f64; 2] {
     let rms = |of: &[Vector3<f64>]| (of.iter().map(Vector3::norm_squared).sum::<f64>() / of.len() as f64).sqrt();
     let most = |of: &[Vector3<f64>]| of.iter().map(Vector3::norm).fold(0.0, f64::max);

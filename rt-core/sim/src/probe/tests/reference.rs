@@ -1,4 +1,5 @@
-//! The same contact solved in full: every free node by the multigrid, an active set outside of it, directions until they stand still.
+//! The same contact solved in full: every free node by the multigrid, an active set outside of it, directions until
+//! they stand still.
 //!
 //! Nothing is condensed and nothing packed: each product with the compliance is a solution for the whole body.
 
@@ -9,9 +10,9 @@ use crate::tissue::ElementField;
 use crate::tissue::fem::batch::{BatchState, NodeWeight};
 use nalgebra::Vector3;
 
-/// Of a solution, over its load.
+/// Residual of a solution, over its load.
 const TOLERANCE: f64 = 3e-6;
-/// Of the gaps of points in contact, m.
+/// Largest gap of points in contact, m.
 const CLOSED_M: f64 = 2e-7;
 
 /// The contact of a probe with the points of a wall, in full: each force is on the faces around its point.
@@ -23,7 +24,7 @@ pub(in crate::probe) struct Reference<'a> {
     moved: Vec<[f64; 3]>,
     is_in: Vec<bool>,
     pressed: Vec<f64>,
-    /// On the tissue, N.
+    /// Forces on the tissue, N.
     pub loads_n: Vec<[f64; 3]>,
     /// Displacement of the element centres, m.
     pub field: ElementField,
@@ -50,7 +51,7 @@ impl<'a> Reference<'a> {
         }
     }
 
-    /// How all points move with these loads.
+    /// Returns the displacement of all points by these loads.
     fn answer(&mut self, loads_n: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let load: Vec<NodeWeight> = loads_n
             .iter()
@@ -74,7 +75,7 @@ impl<'a> Reference<'a> {
         self.weights.iter().map(|of_point| self.sample(of_point)).collect()
     }
 
-    /// The body under these loads on the pads.
+    /// Solves the body under these loads on the pads.
     pub fn load_pads(&mut self, loads_n: &[[f64; 3]]) {
         let pads = self
             .wall
@@ -86,7 +87,7 @@ impl<'a> Reference<'a> {
         self.weights = points;
     }
 
-    /// Displacement of the last answer under weights, m.
+    /// Returns the displacement of the last answer under weights, m.
     pub fn sample(&self, weights: &[(u32, f64)]) -> [f64; 3] {
         [0, 1, 2].map(|c| {
             let along = weights.iter().map(|&(node, part)| {
@@ -98,7 +99,7 @@ impl<'a> Reference<'a> {
         })
     }
 
-    /// Forces with which no point is in the probe and none is pulled, from those of the pose before.
+    /// Finds the forces with which no point is in the probe and none is pulled, from those of the pose before.
     pub fn press(&mut self, pose: &ProbePose) {
         let count = self.wall.points.len();
         let mut moved = std::mem::take(&mut self.moved);
@@ -152,7 +153,7 @@ impl<'a> Reference<'a> {
         self.solver.write(&self.fixture.body, 0, &mut self.field);
     }
 
-    /// Conjugate gradients for the forces that close the gaps of a set.
+    /// Finds the forces that close the gaps of a set by conjugate gradients.
     fn close(&mut self, outward: &[Vector3<f64>], free: &[f64], is_in: &[bool], pressed: &mut [f64]) {
         let count = is_in.len();
         let product = |this: &mut Self, p: &[f64]| -> Vec<f64> {
@@ -193,7 +194,7 @@ impl<'a> Reference<'a> {
         }
     }
 
-    /// Of the tissue on the probe, N.
+    /// Returns the force of the tissue on the probe, N.
     pub fn force_n(&self) -> [f64; 3] {
         self.loads_n
             .iter()
@@ -201,7 +202,8 @@ impl<'a> Reference<'a> {
     }
 }
 
-/// Of element centres whose structure is asked for: mean and largest displacement of the reference, RMS and largest difference.
+/// Compares element centres of the chosen structures: mean and largest displacement of the reference, RMS and largest
+/// difference.
 pub(in crate::probe) fn compare(
     fixture: &Fixture,
     ours: &ElementField,
@@ -225,7 +227,7 @@ pub(in crate::probe) fn compare(
     [sum / count, largest, (square / count).sqrt(), worst]
 }
 
-/// What was measured beside the reference, and what the reference took.
+/// Measures a probe against the reference, and the time that the reference took.
 pub(in crate::probe) fn beside_reference(
     fixture: &Fixture,
     wall: &Wall,

@@ -18,7 +18,7 @@ const DIMS: [usize; 3] = [
 /// 19,304 elements of this edge are 49 cc.
 const SPACING_M: f64 = 1.3641e-3;
 
-/// The labels of a scene by name; `None` for a name that is not one.
+/// Returns the labels of a scene by name; `None` for a name that is not one.
 pub(super) fn labels(name: &str) -> Option<Result<Labels, Vec<SceneProblem>>> {
     match name {
         "paper" => Some(Ok(paper::labels())),

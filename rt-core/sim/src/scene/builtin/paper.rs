@@ -7,10 +7,10 @@ use crate::scene::Labels;
 pub(super) struct Gland {
     half_width: f64,
     half_height_anterior: f64,
-    /// Less than anterior: the side towards the rectum is flat.
+    /// Half height of the posterior side, less than anterior: the side towards the rectum is flat.
     half_height_posterior: f64,
     half_length: f64,
-    /// How much wider the base is than the middle, and the apex narrower.
+    /// Share by which the base is wider than the middle, and the apex narrower.
     taper: f64,
     /// 2 is an ellipse; more is boxier.
     exponent: f64,
@@ -26,7 +26,7 @@ pub(super) const PAPER_GLAND: Gland = Gland {
 };
 
 impl Gland {
-    /// `x`, `y`, `z` from the gland's centre, in elements.
+    /// Returns whether the gland contains a point, counted from its centre in elements.
     pub fn contains(&self, [x, y, z]: [f64; 3]) -> bool {
         let along = z / self.half_length;
         let left = 1.0 - along.abs().powf(self.exponent);

@@ -1,7 +1,8 @@
-//! What lies around the gland in a man on his back: the paper's future work, drawn by formula.
+//! Anatomy around the gland in a man on his back: the paper's future work, drawn by formula.
 //!
 //! Metres from the middle of the gland: x to the patient's left or right (the scene is the same both ways), y from
-//! posterior to anterior, z from the perineum, where needles come in, to the bladder. Sizes without a source are assumed.
+//! posterior to anterior, z from the perineum, where needles come in, to the bladder. Sizes without a source are
+//! assumed.
 
 use super::paper::PAPER_GLAND;
 use super::shape::{Bounds, Rod, Rounded, Tube};
@@ -45,7 +46,7 @@ pub(super) struct Urethra {
     pub radius_m: f64,
     pub lowest_m: f64,
     pub curvature_per_m: f64,
-    /// From where it leaves the pelvic floor to the bladder.
+    /// Stretch from the pelvic floor to the bladder.
     pub along_m: [f64; 2],
 }
 
@@ -180,8 +181,8 @@ impl Pelvis {
     }
 }
 
-/// Whether one of the 18 cells that share a face or an edge with a cell of the gland is outside it: the capsule is as
-/// thin as elements allow that are still linked to each other all the way round.
+/// Returns whether one of the 18 cells that share a face or an edge with a cell of the gland is outside it: the capsule
+/// is as thin as elements allow that are still linked to each other all the way round.
 fn at_rim(cell: [f64; 3]) -> bool {
     (0..27).any(|n| {
         let step = [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
@@ -191,7 +192,7 @@ fn at_rim(cell: [f64; 3]) -> bool {
     })
 }
 
-/// Softer structures have wider limits. The gland takes those that the operator sets.
+/// Returns the structures. Softer ones have wider limits; the gland takes those that the operator sets.
 fn structures() -> Vec<Structure> {
     let limits = |min_stretch, max_stretch, shear_deg| {
         let axis = AxisLimits {
@@ -215,7 +216,7 @@ fn structures() -> Vec<Structure> {
     };
     let mut arch = row("pubic arch", PUBIC_ARCH, Role::Tissue, None, 300e6, 0.3);
     arch.material.fixed = true;
-    // Needles come in through skin; beyond the other faces of the volume the body goes on.
+    // Needles come in through skin; beyond the other faces of the volume the body continues.
     let mut perineum = row("perineum", PERINEUM, Role::Tissue, limits(0.6, 1.65, 25.0), 15e3, 0.49);
     perineum.material.surroundings.0[TOWARDS_SKIN] = Beyond::Free;
     // Nothing is in the rectum.

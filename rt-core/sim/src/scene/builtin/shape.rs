@@ -26,7 +26,7 @@ impl Rounded {
         [side(-1.0), side(1.0)]
     }
 
-    /// The same solid without its outermost `wall_m`.
+    /// Returns the same solid without its outermost `wall_m`.
     pub fn inside(&self, wall_m: f64) -> Self {
         Self {
             half_m: self.half_m.map(|half| half - wall_m),
@@ -41,7 +41,7 @@ pub(super) struct Tube {
     /// Axis in x and y.
     pub centre_m: [f64; 2],
     pub half_m: [f64; 2],
-    /// From the tip of the round end to the open end.
+    /// Stretch from the tip of the round end to the open end.
     pub along_m: [f64; 2],
     pub round_end_m: f64,
 }

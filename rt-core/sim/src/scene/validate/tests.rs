@@ -11,7 +11,7 @@ fn text_of(problems: Vec<SceneProblem>) -> String {
     SceneError::Invalid(problems).to_string()
 }
 
-/// A block whose lower half has label 1 and upper half label 2.
+/// Returns a block whose lower half has label 1 and upper half label 2.
 fn halves(structures: Vec<Structure>) -> Labels {
     let mut labels = test_bodies::block([4, 4, 4]);
     labels.cells[32..].fill(2);

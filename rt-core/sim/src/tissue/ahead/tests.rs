@@ -37,7 +37,7 @@ impl Body {
     }
 }
 
-/// Brute force: a thousandth of an element at a time, with nothing known of where the tip was.
+/// Searches by brute force: a thousandth of an element at a time, with nothing known of where the tip was.
 fn creeping(body: &Deformed, held: Option<u32>, tip_m: [f64; 3], direction: [f64; 3]) -> Option<u32> {
     let h = body.lattice.spacing_m;
     let place = |n: u32| [0, 1, 2].map(|a| tip_m[a] + f64::from(n) * 1e-3 * h * direction[a]);

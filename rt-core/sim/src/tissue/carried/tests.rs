@@ -2,7 +2,7 @@ use super::*;
 use crate::scene::{Labels, Structure};
 use crate::tissue::{Deformed, ElementField};
 
-/// A block of 16 x 16 x 16 cells; the two lowest layers are fixed.
+/// Returns a block of 16 x 16 x 16 cells; the two lowest layers are fixed.
 fn held_scene() -> (Scene, Arc<Lattice>) {
     let mut bone = Structure::soft("bone", 2);
     bone.material.fixed = true;
@@ -43,8 +43,8 @@ fn off(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]).abs()).fold(0.0, f64::max)
 }
 
-/// Between centres of the coarser body's elements an affine field is found again, and at the surface half a coarse element
-/// farther out nothing else than what is nearest.
+/// Between centres of the coarser body's elements an affine field is found again, and at the surface half a coarse
+/// element farther out nothing else than what is nearest.
 #[test]
 fn an_affine_field_is_interpolated_exactly() {
     let (scene, coarse) = held_scene();
@@ -108,7 +108,8 @@ fn a_saved_field_is_restored_in_every_bit() {
     assert!(!other.is_at_rest());
 }
 
-/// The surface of a body that is carried, and displaced by itself besides: each vertex goes with its element, and bone stays.
+/// The surface of a body that is carried, and displaced by itself besides: each vertex goes with its element, and bone
+/// stays.
 #[test]
 fn a_carried_surface_goes_with_what_carries_it() {
     let (scene, coarse) = held_scene();

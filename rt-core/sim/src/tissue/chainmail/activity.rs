@@ -1,7 +1,7 @@
-//! Which stretches of which runs need looking at: what has moved, or is outside its limits.
+//! Active stretches of runs: those that have moved, or violate their limits.
 //!
-//! Recovery breaks no limit, so a link between elements that the solver has not moved stays as good as it was:
-//! only links at active stretches are swept and checked.
+//! Recovery breaks no limit, so a link between elements that the solver has not moved stays as good as it was: only
+//! links at active stretches are swept and checked.
 
 use super::kernels::Stretch;
 use super::spans::Rows;
@@ -16,7 +16,7 @@ pub(crate) struct Active {
 }
 
 impl Active {
-    /// None. Writes every page, so that no step is the first to touch one.
+    /// Makes room without an active stretch. Writes every page, so that no step is the first to touch one.
     pub fn none(runs: usize, planes: usize) -> Self {
         let touched = |n| (0..n).map(|_| std::hint::black_box(Stretch::EMPTY)).collect();
         Active {
@@ -61,7 +61,7 @@ impl Active {
         self.planes = self.planes.with(one(k));
     }
 
-    /// Everything in these rows of cells.
+    /// Activates everything in these rows of cells.
     pub fn add_all(&mut self, rows: &Rows, ny: usize) {
         for row in 0..rows.count() {
             for run in rows.numbers(row) {
@@ -98,7 +98,7 @@ impl Active {
         self.planes = Stretch::EMPTY;
     }
 
-    /// Elements in active stretches.
+    /// Returns the number of elements in active stretches.
     pub fn element_count(&self, rows: &Rows, ny: usize) -> u32 {
         let mut count = 0;
         self.for_each_row(|j, k| count += rows.numbers(j + ny * k).map(|run| self.of_run[run].len()).sum::<u32>());
@@ -109,7 +109,7 @@ impl Active {
         size_of::<Stretch>() * (self.of_run.len() + self.rows.len())
     }
 
-    /// What it is made of, as bytes.
+    /// Returns its parts, as bytes.
     pub fn memory(&self) -> [&[u8]; 3] {
         [
             bytemuck::cast_slice(&self.of_run),
@@ -126,7 +126,7 @@ impl Active {
         ]
     }
 
-    /// Every stretch that is not empty lies within its run, its plane and the lattice.
+    /// Returns whether every stretch that is not empty lies within its run, its plane and the lattice.
     pub fn is_of(&self, rows: &Rows, [_, ny, nz]: [usize; 3]) -> bool {
         let within = |s: &Stretch, start: u32, end: u32| s.is_empty() || (s.start >= start && s.end <= end);
         let of_run = self.of_run.iter().zip(&rows.runs);

@@ -34,7 +34,7 @@ impl Classes {
         classes
     }
 
-    /// Without allocating.
+    /// Sets the limits without allocating.
     pub fn set_limits(&mut self, limits: &Limits) {
         let count = self.own.len();
         self.least_room = f32::INFINITY;
@@ -65,7 +65,7 @@ impl Classes {
         self.least_room
     }
 
-    /// Longest that a link along each axis may be beyond its length at rest, in elements.
+    /// Returns the largest stretch of a link along each axis beyond its length at rest, in elements.
     pub fn longest(&self) -> [f32; 3] {
         [0, 1, 2].map(|axis| self.table.iter().map(|row| row[axis].high).fold(0.0, f32::max))
     }
@@ -78,7 +78,7 @@ impl Classes {
         self.any_fixed
     }
 
-    /// `None` between two fixed elements.
+    /// Returns the class of a link and its fixed end; `None` between two fixed elements.
     pub fn of_link(&self, lo: u8, hi: u8) -> Option<(u16, Pin)> {
         let pin = match (self.is_fixed(lo), self.is_fixed(hi)) {
             (true, true) => return None,

@@ -10,11 +10,11 @@ use crate::tissue::{Held, HeldOutcome, REACH};
 pub(super) struct Grip {
     pub element: u32,
     pub at: [f32; 3],
-    /// Elements beside it along each axis that go along.
+    /// Neighbours along each axis that go along.
     pub beside: usize,
 }
 
-/// What a step holds, if it can be followed.
+/// Returns the grip of a step, if it can be followed.
 pub(super) fn grip(model: &ChainMail, held: Option<Held>) -> (Option<Grip>, HeldOutcome) {
     let Some(held) = held else {
         return (None, HeldOutcome::None);
@@ -50,7 +50,7 @@ pub(super) fn put(model: &ChainMail, state: &mut TissueState, grip: &Grip) -> bo
     moved
 }
 
-/// Where something is held: the planes, and the rows of each.
+/// Returns the planes of what is held, and the rows of each.
 pub(super) fn planes_and_rows(model: &ChainMail, grip: &Grip) -> [std::ops::Range<usize>; 2] {
     let [_, j, k] = model.lattice.cell(grip.element);
     [
@@ -63,7 +63,7 @@ fn around(centre: usize, grip: &Grip, count: usize) -> std::ops::Range<usize> {
     centre.saturating_sub(grip.beside)..(centre + grip.beside + 1).min(count)
 }
 
-/// As `put`, for what is held in one row of `planes_and_rows`.
+/// Puts what is held in one row of `planes_and_rows` in its place, as `put` does.
 pub(super) fn put_row(model: &ChainMail, state: &mut TissueState, grip: &Grip, [j, k]: [usize; 2]) -> bool {
     let [held_i, ..] = model.lattice.cell(grip.element);
     let part = model.part(grip.element);

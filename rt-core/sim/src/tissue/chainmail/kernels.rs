@@ -22,7 +22,7 @@ pub(crate) struct Scaled {
 }
 
 impl LinkLimits {
-    /// `rest` is one element, `slack` a length, both in the state's unit.
+    /// Scales the limits; `rest` is one element, `slack` a length, both in the state's unit.
     #[inline(always)]
     pub(crate) fn scaled(&self, rest: f32, slack: f32) -> Scaled {
         Scaled {
@@ -59,7 +59,7 @@ impl Stretch {
         self.end.saturating_sub(self.start)
     }
 
-    /// The shortest stretch with both in it.
+    /// Returns the shortest stretch with both in it.
     #[inline(always)]
     pub fn with(self, other: Stretch) -> Stretch {
         Stretch {
@@ -68,7 +68,7 @@ impl Stretch {
         }
     }
 
-    /// The part inside `first..first + len`, counted from `first`.
+    /// Returns the part inside `first..first + len`, counted from `first`.
     #[inline(always)]
     pub fn within(self, first: u32, len: u32) -> Stretch {
         if self.end <= first || self.start >= first + len || self.is_empty() {
@@ -80,7 +80,7 @@ impl Stretch {
         }
     }
 
-    /// Moved up by `first`.
+    /// Moves the stretch up by `first`.
     #[inline(always)]
     pub fn from(self, first: u32) -> Stretch {
         if self.is_empty() {
@@ -109,7 +109,8 @@ pub(crate) fn clamp(value: f32, low: f32, high: f32) -> f32 {
     lesser(greater(value, low), high)
 }
 
-/// Where the outer end of a link must be, given both ends: stretch first, then shear; and whether it had to move.
+/// Returns where the outer end of a link must be, given both ends: stretch first, then shear; and whether it had to
+/// move.
 ///
 /// A component that is within its limits keeps its bits.
 #[inline(always)]
@@ -144,7 +145,7 @@ pub(crate) fn ordered<T>(axis: usize, [x, y, z]: [T; 3]) -> [T; 3] {
     }
 }
 
-/// The components of one element.
+/// Returns the components of one element.
 #[inline(always)]
 pub(crate) fn at(u: &[&mut [f32]; 3], e: usize) -> [f32; 3] {
     [u[0][e], u[1][e], u[2][e]]
@@ -160,21 +161,21 @@ pub(crate) trait Kernels {
     /// Moves the outer end of each link into its limits; says which, counted from 0.
     fn clamp<const OUTER: bool>(l: &Scaled, u: &mut [&mut [f32]; 3], inner: usize, outer: usize, n: usize) -> Stretch;
 
-    /// Largest violation; zero if there is none. The stretches may overlap (links along x).
+    /// Returns the largest violation; zero if there is none. The stretches may overlap (links along x).
     fn violation(l: &Scaled, u: &[&[f32]; 3], lo: usize, hi: usize, n: usize) -> f32;
 
-    /// First of the links between consecutive elements `start..end` and the next that is violated by more than
-    /// the slack, or `end`.
+    /// Returns the first of the links between consecutive elements `start..end` and the next that is violated by more
+    /// than the slack, or `end`.
     fn first_violated(l: &Scaled, u: &[&[f32]; 3], start: usize, end: usize) -> usize;
 
-    /// One past the last such link, or `start`.
+    /// Returns one past the last such link, or `start`.
     fn past_last_violated(l: &Scaled, u: &[&[f32]; 3], start: usize, end: usize) -> usize;
 
-    /// Largest square of a displacement.
+    /// Returns the largest square of a displacement.
     fn largest_square(u: &[&[f32]; 3], start: usize, end: usize) -> f32;
 }
 
-/// How far one link is outside its limits, at most; negative inside.
+/// Returns the largest violation of one link; negative inside its limits.
 #[inline(always)]
 pub(crate) fn link_violation(l: &Scaled, lo: [f32; 3], hi: [f32; 3]) -> f32 {
     let along = hi[0] - lo[0];
@@ -235,7 +236,7 @@ impl Kernels for Portable {
 /// converges (over-relaxation), and this needs fewer passes.
 const OVER_RELAXATION: f32 = 0.9;
 
-/// Differences of a link after orthogonal projections onto its half-spaces in turn.
+/// Returns the differences of a link after orthogonal projections onto its half-spaces in turn.
 #[inline(always)]
 pub(crate) fn projected_difference(l: &Scaled, mut d: [f32; 3]) -> [f32; 3] {
     d[0] = clamp(d[0], l.low, l.high);
@@ -248,7 +249,7 @@ pub(crate) fn projected_difference(l: &Scaled, mut d: [f32; 3]) -> [f32; 3] {
     d
 }
 
-/// Where both ends of a link go; an end that is fixed stays and the other gives all.
+/// Projects both ends of a link into its limits; a fixed end stays and the other moves all the way.
 #[inline(always)]
 pub(crate) fn projected(l: &Scaled, pin: Pin, lo: [f32; 3], hi: [f32; 3]) -> [[f32; 3]; 2] {
     let first = [hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]];
@@ -265,7 +266,7 @@ pub(crate) fn projected(l: &Scaled, pin: Pin, lo: [f32; 3], hi: [f32; 3]) -> [[f
     ]
 }
 
-/// Which end of a link never moves; links with two such ends are no links.
+/// Fixed end of a link; links with two fixed ends are no links.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Pin {
     None,
@@ -273,7 +274,7 @@ pub(crate) enum Pin {
     Hi,
 }
 
-/// Largest factor on all differences that leaves a link within `tolerance` of its limits.
+/// Returns the largest factor on all differences that leaves a link within `tolerance` of its limits.
 ///
 /// Each limit reads `A s <= B` in the factor s; zero always satisfies it.
 #[inline(always)]

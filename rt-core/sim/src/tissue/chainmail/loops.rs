@@ -1,5 +1,5 @@
-//! The loops over rows, compiled once for each set of instructions and called. Inlined wherever they are used they were some
-//! hundred copies, and 50 of the 52 s that this crate took to compile.
+//! The loops over rows, compiled once for each set of instructions and called. Inlined wherever they are used they were
+//! some hundred copies, and 50 of the 52 s that this crate took to compile.
 
 use super::held::Grip;
 use super::kernels::{Kernels, Portable};
@@ -10,7 +10,7 @@ use super::state::TissueState;
 use super::sweep::{Inner, Pass};
 use crate::limits::Relaxation;
 
-/// What passes over a body are made of.
+/// Inner loops of passes over a body.
 pub(super) trait Loops: Kernels + RowSprings {
     /// Sweeps one plane.
     fn plane(pass: &mut Pass, k: usize, inner_z: Option<Inner>);

@@ -8,7 +8,7 @@ use bytemuck::{bytes_of, bytes_of_mut, cast_slice, cast_slice_mut};
 const PARTS: usize = 18;
 
 impl TissueState {
-    /// Every part that a later step reads before it writes it.
+    /// Returns every part that a later step reads before it writes it.
     pub(super) fn memory(&self) -> [&[u8]; PARTS] {
         let [x, y, z] = &self.u;
         let [a, b, c] = self.active.memory();
@@ -36,7 +36,7 @@ impl TissueState {
         ]
     }
 
-    /// The same parts, in the same order.
+    /// Returns the same parts, in the same order.
     fn memory_mut(&mut self) -> [&mut [u8]; PARTS] {
         let [x, y, z] = &mut self.u;
         let [a, b, c] = self.active.memory_mut();

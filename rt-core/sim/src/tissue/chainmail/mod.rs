@@ -6,9 +6,9 @@
 //! as a whole, is in it. Hence: recovery toward rest never breaks a limit, and there is always a way back
 //! to a state without violations.
 //!
-//! A step works on what moves: `activity` remembers which stretches those are, `sweep` follows them outward,
-//! `residual` verifies what a pass leaves, `project` is for what sweeps do not solve, `follow` for what fixed tissue does
-//! not let happen, `relax` makes the body elastic where that is asked for.
+//! A step works on what moves: `activity` remembers which stretches those are, `sweep` follows them outward, `residual`
+//! verifies what a pass leaves, `project` is for what sweeps do not solve, `follow` for what fixed tissue does not let
+//! happen, `relax` makes the body elastic where that is asked for.
 
 mod activity;
 mod along_x;
@@ -51,16 +51,16 @@ const SLIGHT: f32 = 0.05;
 pub struct ChainMailTissue {
     /// Topology and limits.
     pub model: ChainMail,
-    /// Where every element is, in the body as it is carried.
+    /// State of every element, in the carried body.
     pub state: TissueState,
-    /// How the body is carried by the loads of needles on lines; none in a scene whose needles have none.
+    /// Field that carries the body by the loads of needles on lines; none in a scene without such needles.
     field: Option<CarriedField>,
-    /// Where such a body would fold near the tip, this opens it; on top of the last step.
+    /// Correction that opens folded cells near the tip, on top of the last step.
     near_tip: Option<LargeStrain>,
 }
 
 impl ChainMailTissue {
-    /// The body of a scene at rest.
+    /// Returns the body of a scene at rest.
     pub fn new(scene: &Scene, limits: Limits) -> Self {
         let model = ChainMail::new(scene, limits);
         let state = TissueState::at_rest(&model);
@@ -81,7 +81,8 @@ impl ChainMailTissue {
         }
     }
 
-    /// No element is farther from rest, in elements: what is carried the farthest, or has moved besides.
+    /// Returns a bound of the distance of every element from rest, in elements: the farthest that one is carried, plus
+    /// the farthest that one has moved.
     fn farthest(&self) -> f32 {
         let (carried, scale) = (self.largest_carried(), self.state.scale());
         if !carried.is_finite() {
@@ -103,7 +104,7 @@ impl ChainMailTissue {
         farthest
     }
 
-    /// No element is carried farther, in elements.
+    /// Returns a bound of the distance by which elements are carried, in elements.
     fn largest_carried(&self) -> f32 {
         let spacing_m = self.model.lattice.spacing_m;
         (self.carried().largest_m(spacing_m) / spacing_m) as f32
@@ -153,7 +154,8 @@ impl TissueModel for ChainMailTissue {
 
     fn deformed(&self) -> Deformed<'_> {
         let body = self.state.deformed(&self.model);
-        // A corner lies half an element from its element along each axis; a coarser body's elements have twice the edge at least.
+        // A corner lies half an element from its element along each axis; a coarser body's elements have twice the edge
+        // at least.
         const CORNER: f32 = 2.5;
         Deformed {
             carried: self.carried(),

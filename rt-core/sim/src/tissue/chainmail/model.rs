@@ -1,4 +1,4 @@
-//! What a ChainMail body is: topology and limits, built once.
+//! Model of a ChainMail body: topology and limits, built once.
 
 use super::classes::Classes;
 use super::segments::Segments;
@@ -28,7 +28,7 @@ pub struct ChainMail {
 }
 
 impl ChainMail {
-    /// The body of a scene.
+    /// Returns the body of a scene.
     pub fn new(scene: &Scene, limits: Limits) -> Self {
         let lattice = scene.lattice.clone();
         let rows = Rows::of(&lattice);
@@ -62,17 +62,17 @@ impl ChainMail {
         }
     }
 
-    /// Elements and their neighbours.
+    /// Returns the elements and their neighbours.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
 
-    /// Number of elements.
+    /// Returns the number of elements.
     pub fn element_count(&self) -> usize {
         self.lattice.element_count()
     }
 
-    /// The limits in force, but for structures with their own.
+    /// Returns the limits in force, but for structures with their own.
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
@@ -83,7 +83,7 @@ impl ChainMail {
         self.limits = limits;
     }
 
-    /// Memory that the model takes beside the scene's lattice.
+    /// Returns the size of the model without the scene's lattice, in bytes.
     pub fn bytes(&self) -> usize {
         let links = self.links.iter().map(Links::bytes).sum::<usize>();
         let parts = size_of::<u32>() * self.part_of_run.capacity() + self.part_is_fixed.capacity();

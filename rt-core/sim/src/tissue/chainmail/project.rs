@@ -6,7 +6,8 @@ use super::sweep::Pass;
 use crate::scene::MAX_CELLS_PER_AXIS;
 
 impl Pass<'_> {
-    /// One pass of orthogonal projections over all links, both ends giving half, or the whole against a fixed end.
+    /// Makes one pass of orthogonal projections over all links, both ends giving half, or the whole against a fixed
+    /// end.
     ///
     /// Projecting onto convex sets in turn, the held element's position among them, converges to a point in
     /// all of them. Passes alternate in direction so that a correction travels both ways.
@@ -93,7 +94,7 @@ fn project_links(l: &Scaled, pin: Pin, [la, lb, lc]: [&mut [f32]; 3], [ha, hb, h
     }
 }
 
-/// Each slice an argument of its own: the compiler then knows that they do not overlap.
+/// Projects with each slice as an argument: the compiler then knows that they do not overlap.
 #[expect(clippy::too_many_arguments, reason = "slices that may not overlap")]
 #[inline]
 fn project_slices(

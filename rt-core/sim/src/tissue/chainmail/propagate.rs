@@ -37,7 +37,7 @@ pub(super) fn propagate<K: Loops>(
     residual
 }
 
-/// When sweeps are given up.
+/// Point at which sweeps are given up.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Patience {
     ToTheLast,

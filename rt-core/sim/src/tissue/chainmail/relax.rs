@@ -11,7 +11,7 @@ use super::springs::{RowSprings, Shares};
 use super::state::TissueState;
 use crate::limits::Relaxation;
 
-/// One pass over the rows whose j + k is even (`parity` 0) or odd (1); what is held stays.
+/// Relaxes the rows whose j + k is even (`parity` 0) or odd (1) in one pass; what is held stays.
 #[inline(always)]
 pub(super) fn half_pass<K: RowSprings>(
     model: &ChainMail,
@@ -45,7 +45,7 @@ pub(super) fn half_pass<K: RowSprings>(
     }
 }
 
-/// Shares for a component, of neighbours whose links have these stiffnesses beside the reference.
+/// Shares for a component, of neighbours whose links have these stiffnesses relative to the reference.
 ///
 /// The divisor is the diagonal plus all that the element's row can add to it: no eigenvalue of a row's springs is
 /// above it, whence the bound of 2 on the weight.

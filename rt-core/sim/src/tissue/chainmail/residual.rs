@@ -1,4 +1,4 @@
-//! What a pass leaves outside the limits: verifies links that moved, and finds what stays active.
+//! Residual of a pass: verifies links that moved, and finds what stays active.
 
 use super::kernels::{self, Kernels, Stretch};
 use super::loops::Loops;
@@ -73,7 +73,7 @@ impl Pass<'_> {
         }
     }
 
-    /// What the pass found becomes what the next one works on; says how far it is outside, in elements.
+    /// Hands the findings of the pass on to the next; returns the largest violation, in elements.
     #[inline(always)]
     pub fn finish(&mut self) -> f32 {
         let state = &mut *self.state;
@@ -115,7 +115,7 @@ impl Pass<'_> {
         }
     }
 
-    /// Largest violation of some links of a span.
+    /// Returns the largest violation of some links of a span.
     #[inline(always)]
     pub fn violation<K: Kernels>(&self, axis: usize, span: &Span, links: Stretch) -> f32 {
         if links.is_empty() {

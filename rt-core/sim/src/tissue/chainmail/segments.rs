@@ -27,7 +27,7 @@ pub(crate) struct Segments {
     all: Vec<Segment>,
     /// First segment of each row, with one more entry at the end.
     first: Vec<u32>,
-    /// Stiffness of the links to the six neighbours beside that of the first structure; empty if all is one
+    /// Stiffness of the links to the six neighbours relative to that of the first structure; empty if all is one
     /// structure.
     weights: Vec<[f32; 6]>,
 }
@@ -72,7 +72,7 @@ impl Segments {
         self.weights.get(segment.weights as usize)
     }
 
-    /// Adds an element, to the last segment if it goes on alike.
+    /// Adds an element, to the last segment if it continues alike.
     fn push(&mut self, lattice: &Lattice, several: Option<&Scene>, element: u32) {
         let around = lattice.neighbours(element);
         let weights = several.map(|scene| link_weights(scene, element, &around));
@@ -100,7 +100,8 @@ impl Segments {
     }
 }
 
-/// Harmonic means of the moduli at both ends of each link, as of springs in line; a fixed end is no spring.
+/// Returns the harmonic means of the moduli at both ends of each link, as of springs in series; a fixed end is no
+/// spring.
 fn link_weights(scene: &Scene, element: u32, around: &[Option<u32>; 6]) -> [f32; 6] {
     let material = |e: u32| &scene.structures[scene.lattice.structure(e) as usize].material;
     let own = material(element).young_pa;

@@ -26,7 +26,7 @@ pub(crate) struct Links {
 }
 
 impl Links {
-    /// Links whose upper end is in row `row`.
+    /// Returns the links whose upper end is in row `row`.
     #[inline(always)]
     pub fn below(&self, row: usize) -> &[Span] {
         match (self.groups.get(row), self.groups.get(row + 1)) {
@@ -65,13 +65,13 @@ impl Rows {
         rows
     }
 
-    /// Numbers of the runs of a row.
+    /// Returns the numbers of the runs of a row.
     #[inline(always)]
     pub fn numbers(&self, row: usize) -> std::ops::Range<usize> {
         self.first[row] as usize..self.first[row + 1] as usize
     }
 
-    /// Numbers of the runs of rows `first..end`.
+    /// Returns the numbers of the runs of rows `first..end`.
     #[inline(always)]
     pub fn numbers_of_rows(&self, first: usize, end: usize) -> std::ops::Range<usize> {
         self.first[first] as usize..self.first[end] as usize
@@ -85,7 +85,7 @@ impl Rows {
         size_of::<Run>() * self.runs.capacity() + size_of::<u32>() * self.first.capacity()
     }
 
-    /// The run that an element is in.
+    /// Returns the run that an element is in.
     pub fn run_of(&self, element: u32) -> usize {
         self.runs.partition_point(|run| run.first <= element).saturating_sub(1)
     }
@@ -94,7 +94,7 @@ impl Rows {
 /// Says what class a link is of and which end is fixed, or `None` if nothing can move it.
 pub(crate) type ClassOf<'a> = &'a dyn Fn(usize, u32, u32) -> Option<(u16, Pin)>;
 
-/// All links along `axis`.
+/// Finds all links along `axis`.
 pub(crate) fn links_along(axis: usize, lattice: &Lattice, rows: &Rows, class_of: ClassOf) -> Links {
     let ny = lattice.dims[1];
     let mut links = Links::default();

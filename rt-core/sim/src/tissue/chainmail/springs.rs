@@ -1,9 +1,10 @@
-//! A row of springs: where the elements of a segment go, given their neighbours. Portable; `avx2` has the same arithmetic.
+//! A row of springs: where the elements of a segment go, given their neighbours. Portable; `avx2` has the same
+//! arithmetic.
 
 use super::kernels::Portable;
 use super::segments::{LEFT, RIGHT, Segment};
 
-/// What a row of springs does to one component: `new = own * u + sum of each neighbour's share`.
+/// Springs of a row for one component: `new = own * u + sum of each neighbour's share`.
 #[derive(Clone, Copy)]
 pub(super) struct Shares {
     pub own: f32,
@@ -16,7 +17,7 @@ pub(super) const NEGLIGIBLE: f32 = 1e-30;
 
 /// Relaxes one component of a segment.
 pub(super) trait RowSprings {
-    /// Elements outside `u` are left alone.
+    /// Relaxes a segment; elements outside `u` are left alone.
     fn relax(u: &mut [f32], segment: &Segment, shares: &Shares);
 }
 

@@ -1,4 +1,4 @@
-//! Where a body is: displacements times a scale, so that recovery is one multiplication.
+//! State of a body: displacements times a scale, so that recovery is one multiplication.
 
 use super::activity::Active;
 use super::kernels::Stretch;
@@ -15,9 +15,9 @@ pub struct TissueState {
     pub(super) scale: f64,
     /// Swept and checked by the next pass.
     pub(crate) active: Active,
-    /// Found by the pass under way for the one after.
+    /// Stretches that the present pass found for the next.
     pub(crate) next: Active,
-    /// What the solver has moved in this step.
+    /// Elements that the solver has moved in this step.
     pub(crate) moved: Active,
     /// Moved in a row after its links along z, and after those along y, were handled; for the row under way.
     pub(crate) late: [Vec<Stretch>; 2],
@@ -27,12 +27,12 @@ pub struct TissueState {
     pub(crate) max_displacement: f32,
     /// Largest violation of a link that is not active, at most, in elements.
     pub(crate) settled: f32,
-    /// What the last step left violated, in elements; infinite where it is unknown.
+    /// Violation that the last step left, in elements; infinite where it is unknown.
     pub(super) residual: f32,
     trial: Trial,
 }
 
-/// What a step that may be undone found: runs that moved, as they were.
+/// State before a step that may be undone: runs that moved, as they were.
 #[derive(Clone, Debug)]
 struct Trial {
     is_under_way: bool,
@@ -42,13 +42,13 @@ struct Trial {
     settled: f32,
 }
 
-/// Scale below which displacements are written anew: f32 squares still have room on both sides.
+/// Scale below which displacements are rescaled: f32 squares still have room on both sides.
 const SMALLEST_SCALE: f64 = 1e-9;
 /// Displacements below this become zero, long before they become denormal and slow.
 const AT_REST: f32 = 1e-12;
 
 impl TissueState {
-    /// The body at rest. Writes every page, so that no step is the first to touch one.
+    /// Returns the body at rest. Writes every page, so that no step is the first to touch one.
     pub fn at_rest(model: &ChainMail) -> Self {
         let zeros = |n: usize| {
             let mut values = Vec::with_capacity(n);
@@ -85,17 +85,17 @@ impl TissueState {
         }
     }
 
-    /// Displacement from rest along `axis` (0 to 2) of all elements; `scale` times these is in elements.
+    /// Returns the displacement from rest along `axis` (0 to 2) of all elements; `scale` times these is in elements.
     pub fn displacement(&self, axis: usize) -> &[f32] {
         self.u.get(axis).map_or(&[], Vec::as_slice)
     }
 
-    /// Elements for each unit of `displacement`.
+    /// Returns how many elements a unit of `displacement` is.
     pub fn scale(&self) -> f32 {
         self.scale as f32
     }
 
-    /// The body as it is now.
+    /// Returns the deformed body.
     pub fn deformed<'a>(&'a self, model: &'a ChainMail) -> Deformed<'a> {
         let stretch = model.classes.longest().iter().sum::<f32>();
         Deformed {
@@ -107,12 +107,12 @@ impl TissueState {
         }
     }
 
-    /// Centre of an element in the scene frame; the last element's for a number past the end.
+    /// Returns the centre of an element in the scene frame; the last element's for a number past the end.
     pub fn position_m(&self, model: &ChainMail, element: u32) -> [f64; 3] {
         self.deformed(model).position_m(element)
     }
 
-    /// Every element to its place at rest, at once.
+    /// Returns every element to its place at rest, at once.
     pub fn return_to_rest(&mut self, model: &ChainMail) {
         for component in &mut self.u {
             component.fill(0.0);
@@ -123,7 +123,7 @@ impl TissueState {
         (self.scale, self.max_displacement, self.settled, self.residual) = (1.0, 0.0, 0.0, 0.0);
     }
 
-    /// Has the next step look at every link, as it must when the limits are new.
+    /// Makes the next step check every link, as it must when the limits are new.
     pub fn disturb(&mut self, model: &ChainMail) {
         self.active.add_all(&model.rows, model.lattice.dims[1]);
         (self.settled, self.residual) = (0.0, f32::INFINITY);
@@ -149,7 +149,7 @@ impl TissueState {
         self.residual = other.residual;
     }
 
-    /// From here on, what moves can be undone; nothing may have moved in this step.
+    /// Begins a trial: from here on motion can be undone; nothing may have moved in this step.
     pub(super) fn begin_trial(&mut self) {
         self.trial.is_under_way = true;
         self.trial.settled = self.settled;
@@ -164,7 +164,7 @@ impl TissueState {
         self.trial.is_under_way = false;
     }
 
-    /// To be called before anything in a run moves.
+    /// Keeps a run; to be called before anything in it moves.
     #[inline(always)]
     pub(super) fn keep(&mut self, model: &ChainMail, run: usize) {
         if self.trial.is_under_way && self.moved.of_run(run).is_empty() {
@@ -176,7 +176,7 @@ impl TissueState {
         }
     }
 
-    /// Back to the begin of the trial.
+    /// Returns to the beginning of the trial.
     pub(super) fn undo(&mut self, model: &ChainMail) {
         let ny = model.lattice.dims[1];
         let (u, before, moved) = (&mut self.u, &self.trial.before, &self.moved);
@@ -198,7 +198,7 @@ impl TissueState {
         self.settled = self.trial.settled;
     }
 
-    /// Memory that the state takes.
+    /// Returns the size of the state, in bytes.
     pub fn bytes(&self) -> usize {
         let floats = self.u.iter().map(Vec::len).sum::<usize>() + self.run_square.len() + self.plane_square.len();
         let floats = floats + self.trial.before.iter().map(Vec::len).sum::<usize>();
@@ -220,7 +220,7 @@ impl TissueState {
         moved
     }
 
-    /// Whether every index of `model` lies inside this state: nothing in a step goes out of bounds then.
+    /// Returns whether every index of `model` lies inside this state, so that no step goes out of bounds.
     pub(crate) fn fits(&self, model: &ChainMail) -> bool {
         let (n, planes) = (model.element_count(), model.lattice.dims[2]);
         let kept = if model.classes.any_fixed() { n } else { 0 };
@@ -230,7 +230,7 @@ impl TissueState {
             && self.trial.before.iter().all(|c| c.len() == kept)
     }
 
-    /// Recovery by the surroundings: differences shrink in proportion, so no limit is broken.
+    /// Recovers towards rest by the surroundings: differences shrink in proportion, so no limit is broken.
     pub(crate) fn recover(&mut self, model: &ChainMail, kept: f64) {
         if self.max_displacement == 0.0 {
             return;

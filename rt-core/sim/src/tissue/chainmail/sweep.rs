@@ -10,7 +10,7 @@ use super::model::ChainMail;
 use super::spans::Span;
 use super::state::TissueState;
 
-/// What a pass works on, and at which scale.
+/// Data and scale of a pass.
 pub(super) struct Pass<'a> {
     pub model: &'a ChainMail,
     pub state: &'a mut TissueState,
@@ -22,7 +22,7 @@ pub(super) struct Pass<'a> {
     pub held_cell: [usize; 3],
 }
 
-/// Where the inner neighbours of a row are.
+/// Position of the inner neighbours of a row.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Inner {
     Below,
@@ -47,7 +47,7 @@ impl<'a> Pass<'a> {
         self.model.classes.limits(class, axis).scaled(self.rest, self.slack)
     }
 
-    /// One outward sweep. Leaves active what is still violated; says how far, in elements.
+    /// Makes one outward sweep. Leaves active what is still violated; returns the largest violation, in elements.
     pub fn outward<K: Loops>(&mut self) -> f32 {
         let nz = self.model.lattice.dims[2];
         let held_k = self.held_cell[2];
@@ -150,7 +150,7 @@ impl<'a> Pass<'a> {
         is_active
     }
 
-    /// The part of a span that touches an active stretch, counted from its first link.
+    /// Returns the part of a span that touches an active stretch, counted from its first link.
     #[inline(always)]
     fn touched(&self, span: &Span) -> Stretch {
         let lo = self.state.active.of_run(span.lo_run as usize).within(span.lo, span.len);

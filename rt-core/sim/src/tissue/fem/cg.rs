@@ -76,7 +76,7 @@ fn scale_and_add_fields<T>(grid: &Grid, a: T, x: &Field<T>, y: &mut Field<T>) {
 }
 
 vectorised! {
-/// `u += alpha p`, `r -= alpha q`; returns `r . r`.
+/// Computes `u += alpha p`, `r -= alpha q`; returns `r . r`.
 fn advance_fields<T>(grid: &Grid, alpha: T, p: &Field<T>, q: &Field<T>, u: &mut Field<T>, r: &mut Field<T>) -> f64 {
     let mut square = 0.0;
     for at in grid.node_spans() {
@@ -91,7 +91,7 @@ fn advance_fields<T>(grid: &Grid, alpha: T, p: &Field<T>, q: &Field<T>, u: &mut 
 }
 }
 
-/// How far a response is to be refined.
+/// Target of a refinement.
 pub(super) struct Goal {
     /// Norm of the residual that is to be met.
     pub residual: f64,
@@ -122,7 +122,7 @@ impl<T: Real> Grip<T> {
         used
     }
 
-    /// One cycle; false where the equations let it come no nearer.
+    /// Does one cycle; returns false where the equations let it come no nearer.
     fn advance(&mut self, model: &FemModel<T>, iteration: &mut Iteration, of: u32) -> bool {
         self.multigrid.cycle(&model.levels, of);
         let is_first = iteration.cycles == 0;
@@ -144,7 +144,7 @@ impl<T: Real> Grip<T> {
         is_sound
     }
 
-    /// The residual of response `n` becomes the right-hand side of the cycle.
+    /// Begins with the residual of response `n` as the right-hand side of the cycle.
     fn begin(&mut self, model: &FemModel<T>, n: usize) -> Iteration {
         let level = &model.levels[0];
         let stage = &mut self.multigrid.stages[0];
@@ -164,7 +164,7 @@ impl<T: Real> Grip<T> {
         }
     }
 
-    /// `r . z`, and `z . q` if there is a `q` yet.
+    /// Returns `r . z`, and `z . q` if there is a `q` yet.
     fn products(&self, model: &FemModel<T>, has_q: bool) -> (f64, f64) {
         let level = &model.levels[0];
         let stage = &self.multigrid.stages[0];
@@ -177,14 +177,14 @@ impl<T: Real> Grip<T> {
         (rz, zq)
     }
 
-    /// `p = z + beta p`.
+    /// Computes `p = z + beta p`.
     fn turn(&mut self, model: &FemModel<T>, beta: f64) {
         let level = &model.levels[0];
         let (z, p) = (&self.multigrid.stages[0].x, &mut self.p);
         scale_and_add_fields(level.simd, &level.grid, T::of(beta), z, p);
     }
 
-    /// `q = A p`; returns `p . q`.
+    /// Computes `q = A p`; returns `p . q`.
     fn product(&mut self, model: &FemModel<T>) -> f64 {
         let level = &model.levels[0];
         let multigrid = &mut self.multigrid;
@@ -198,7 +198,7 @@ impl<T: Real> Grip<T> {
         op.dot
     }
 
-    /// `u += alpha p`, `r -= alpha q`; returns the norm of `r`.
+    /// Computes `u += alpha p`, `r -= alpha q`; returns the norm of `r`.
     fn go_along(&mut self, model: &FemModel<T>, n: usize, alpha: f64) -> f64 {
         let level = &model.levels[0];
         let (u, r) = (&mut self.responses[n].u, &mut self.multigrid.stages[0].b);
@@ -206,8 +206,8 @@ impl<T: Real> Grip<T> {
         advance_fields(level.simd, &level.grid, T::of(alpha), p, q, u, r).sqrt()
     }
 
-    /// The force that moves the patch, and the residual: as it is where `recurred` says that it is small enough, else as
-    /// the recurrence has it, which spares a sweep of all but the planes at the patch.
+    /// Computes the force that moves the patch, and the residual: the true one where `recurred` is small enough, else
+    /// that of the recurrence, which spares a sweep of all but the planes at the patch.
     fn finish(&mut self, model: &FemModel<T>, n: usize, recurred: f64, target: f64) {
         let level = &model.levels[0];
         let is_done = recurred <= target;
@@ -218,7 +218,7 @@ impl<T: Real> Grip<T> {
         };
         let multigrid = &mut self.multigrid;
         let stage = &mut multigrid.stages[0];
-        // `r` is the cycle's, which has no use for it between two: `q` goes on.
+        // `r` is the cycle's, which has no use for it between two; `q` is needed further.
         let mut op = Answer {
             forces: &mut stage.r,
             inverse_diagonal: &stage.inverse_diagonal,
@@ -231,7 +231,7 @@ impl<T: Real> Grip<T> {
         (response.residual, response.force_n_per_m) = (residual, force_n_per_m);
     }
 
-    /// The planes of nodes that the elements around the patch touch.
+    /// Returns the planes of nodes that the elements around the patch touch.
     fn planes(&self, model: &FemModel<T>) -> Range<usize> {
         let end = model.levels[0].grid.nodes[2];
         match self.cells {
@@ -240,14 +240,14 @@ impl<T: Real> Grip<T> {
         }
     }
 
-    /// Sum over the patch of the forces in `r`.
+    /// Returns the sum over the patch of the forces in `r`.
     fn patch_force(&self) -> [f64; 3] {
         let force = |c: &Vec<T>| self.nodes().iter().map(|&node| c[node as usize].to_f64()).sum();
         self.multigrid.stages[0].r.each_ref().map(force)
     }
 
-    /// What the patch alone, moved by one metre along `direction`, causes: the norm of the forces on free nodes, and
-    /// the force that moves it.
+    /// Computes the effect of the patch alone, moved by one metre along `direction`: the norm of the forces on free
+    /// nodes, and the force that moves it.
     pub(super) fn load(&mut self, model: &FemModel<T>, direction: [f64; 3]) -> (f64, [f64; 3]) {
         let planes = self.planes(model);
         let x = &mut self.multigrid.stages[0].x;
@@ -275,7 +275,7 @@ impl<T: Real> Grip<T> {
         op.square
     }
 
-    /// Half of displacement times force, over elements and springs: the elastic energy.
+    /// Returns the elastic energy: half of displacement times force, over elements and springs.
     pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
         superpose(&self.responses[..self.count], 1.0, &mut self.multigrid.stages[0].x);
         self.answer_to_x(model, 0..model.levels[0].grid.nodes[2]);

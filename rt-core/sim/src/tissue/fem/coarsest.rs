@@ -1,4 +1,4 @@
-//! The coarsest level, solved directly: a dense Cholesky factor in f64, made anew when the fixed nodes change.
+//! The coarsest level, solved directly: a dense Cholesky factor in f64, made again when the fixed nodes change.
 
 use super::level::Level;
 use super::real::Real;
@@ -30,7 +30,8 @@ impl<T: Real> Coarsest<T> {
         }
     }
 
-    /// Assembles and factors, unless the same nodes are free as before; a direction without stiffness is left where it is.
+    /// Assembles and factors, unless the same nodes are free as before; a direction without stiffness is left where it
+    /// is.
     pub fn refactor(&mut self, level: &Level<T>, inverse_diagonal: &[T], work: &mut Planes<T>) {
         let free = inverse_diagonal.iter().enumerate().filter(|(_, d)| **d != T::ZERO);
         let known = self.nodes[..self.free].iter().map(|&node| node as usize);
@@ -80,7 +81,7 @@ impl<T: Real> Coarsest<T> {
         }
     }
 
-    /// `x` so that `A x = b`.
+    /// Solves `A x = b`.
     pub fn solve(&mut self, b: &Field<T>, x: &mut Field<T>) {
         let (n, stride) = (3 * self.free, self.values.len());
         for row in 0..n {

@@ -1,4 +1,5 @@
-//! The solver in each number type, compiled in this crate: generic functions are compiled again by every crate that calls them.
+//! The solver in each number type, compiled in this crate: generic functions are compiled again by every crate that
+//! calls them.
 
 use super::batch::{BatchModel, BatchState, NodeWeight, Progress};
 use super::material::{FemProblem, FemSettings};
@@ -11,33 +12,33 @@ use std::sync::Arc;
 
 /// A number type with a solver compiled for it.
 pub trait Compiled: Real {
-    /// [`FemModel::coarser`], with fixed nodes as in [`FemModel::with_fixed_nodes`].
+    /// Makes a model as [`FemModel::coarser`], with fixed nodes as in [`FemModel::with_fixed_nodes`].
     fn model(
         lattice: &Lattice,
         of: &Arc<Lattice>,
         settings: &FemSettings,
         is_fixed: &dyn Fn([f64; 3]) -> bool,
     ) -> Result<FemModel<Self>, Vec<FemProblem>>;
-    /// [`FemState::at_rest`].
+    /// Calls [`FemState::at_rest`].
     fn at_rest(model: &FemModel<Self>) -> FemState<Self>;
-    /// [`step`].
+    /// Calls [`step`].
     fn step(
         model: &FemModel<Self>,
         state: &mut FemState<Self>,
         held: Option<TipPatch>,
         settings: &SolveSettings,
     ) -> FemReport;
-    /// [`prepare`].
+    /// Calls [`prepare`].
     fn prepare(model: &FemModel<Self>, state: &mut FemState<Self>, next: Option<TipPatch>, settings: &SolveSettings);
-    /// [`FemState::strain_energy_j`].
+    /// Calls [`FemState::strain_energy_j`].
     fn strain_energy_j(state: &mut FemState<Self>, model: &FemModel<Self>) -> f64;
-    /// [`BatchModel::new`].
+    /// Calls [`BatchModel::new`].
     fn batch_model(model: &FemModel<Self>) -> BatchModel<Self>;
-    /// [`BatchState::new`].
+    /// Calls [`BatchState::new`].
     fn batch_state(model: &BatchModel<Self>) -> BatchState<Self>;
-    /// [`BatchState::begin`].
+    /// Calls [`BatchState::begin`].
     fn begin(state: &mut BatchState<Self>, model: &BatchModel<Self>, loads: &[&[NodeWeight]]);
-    /// [`BatchState::advance`].
+    /// Calls [`BatchState::advance`].
     fn advance(state: &mut BatchState<Self>, model: &BatchModel<Self>) -> Progress;
 }
 
@@ -100,12 +101,12 @@ macro_rules! compiled {
 compiled!(f32, f64);
 
 impl<T: Compiled> FemModel<T> {
-    /// The body of a lattice, or every problem with the settings.
+    /// Makes the body of a lattice, or returns every problem with the settings.
     pub fn new(lattice: &Arc<Lattice>, settings: &FemSettings) -> Result<Self, Vec<FemProblem>> {
         Self::with_fixed_nodes(lattice, settings, |_| false)
     }
 
-    /// The same with more fixed nodes: those for whose place in the scene frame (m) `is_fixed` holds.
+    /// Makes it with more fixed nodes: those for whose place in the scene frame (m) `is_fixed` holds.
     pub fn with_fixed_nodes(
         lattice: &Arc<Lattice>,
         settings: &FemSettings,
@@ -114,20 +115,20 @@ impl<T: Compiled> FemModel<T> {
         T::model(lattice, lattice, settings, &is_fixed)
     }
 
-    /// The body of `lattice` in the elements of `of`, a lattice some times [`Lattice::coarser`] than it: each as stiff as the
-    /// cells in it are on average, also where part of it is no tissue.
+    /// Makes the body of `lattice` in the elements of `of`, a lattice some times [`Lattice::coarser`] than it: each as
+    /// stiff as the cells in it are on average, also where part of it is no tissue.
     pub fn coarser(lattice: &Lattice, of: &Arc<Lattice>, settings: &FemSettings) -> Result<Self, Vec<FemProblem>> {
         T::model(lattice, of, settings, &|_| false)
     }
 }
 
 impl<T: Compiled> FemState<T> {
-    /// The body at rest.
+    /// Returns the body at rest.
     pub fn at_rest(model: &FemModel<T>) -> Self {
         T::at_rest(model)
     }
 
-    /// The elastic energy, in body and springs.
+    /// Returns the elastic energy, in body and springs.
     pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
         T::strain_energy_j(self, model)
     }
@@ -145,7 +146,7 @@ pub fn step<T: Compiled>(
     T::step(model, state, held, settings)
 }
 
-/// A piece of work on the answer to a patch that may be held soon, where the last step took no cycle: so much that both
+/// Does a piece of work on the answer to a patch that may be held soon, where the last step took no cycle: both
 /// together cost no more than a step with one cycle. Changes no answer.
 pub fn prepare<T: Compiled>(
     model: &FemModel<T>,
@@ -157,19 +158,19 @@ pub fn prepare<T: Compiled>(
 }
 
 impl<T: Compiled> BatchModel<T> {
-    /// The same body. Parts that nothing keeps in place do not move here: a load on them has no answer.
+    /// Makes the same body. Parts that nothing keeps in place do not move here: a load on them has no answer.
     pub fn new(model: &FemModel<T>) -> Self {
         T::batch_model(model)
     }
 }
 
 impl<T: Compiled> BatchState<T> {
-    /// Room for eight answers.
+    /// Makes room for eight answers.
     pub fn new(model: &BatchModel<T>) -> Self {
         T::batch_state(model)
     }
 
-    /// Takes up at most eight loads; those past the eighth are ignored, as are nodes that do not move.
+    /// Begins at most eight loads; those past the eighth are ignored, as are nodes that do not move.
     pub fn begin(&mut self, model: &BatchModel<T>, loads: &[&[NodeWeight]]) {
         T::begin(self, model, loads);
     }

@@ -7,7 +7,8 @@ use super::lanes::LANES;
 pub(super) struct Grid {
     /// Nodes along x, y, z: odd, so that every second one is a node of the next coarser grid.
     pub nodes: [usize; 3],
-    /// From one line of nodes to the next; those past `nodes[0]` touch no element. Room for whole lanes from any node.
+    /// Step from one line of nodes to the next; those past `nodes[0]` touch no element. Room for whole lanes from any
+    /// node.
     pub stride: usize,
     /// First and one past the last cell of the stretch in use of each row of cells, by row number `j + nodes[1] * k`.
     pub cell_rows: Vec<[u32; 2]>,
@@ -16,7 +17,7 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// `used` lists the cells in use.
+    /// Makes a grid; `used` lists the cells in use.
     pub fn new(cells: [usize; 3], used: impl Iterator<Item = [usize; 3]>) -> Self {
         let nodes = cells.map(|n| n.next_multiple_of(2) + 1);
         let rows = nodes[1] * nodes[2];
@@ -61,14 +62,14 @@ impl Grid {
         [index % nx, index / nx % ny, index / (nx * ny)]
     }
 
-    /// The stretches of nodes in use, in order.
+    /// Returns the stretches of nodes in use, in order.
     pub fn node_spans(&self) -> impl Iterator<Item = std::ops::Range<usize>> + '_ {
         let spans = self.node_rows.iter().enumerate();
         spans.map(|(row, &[first, end])| row * self.stride + first as usize..row * self.stride + end as usize)
     }
 }
 
-/// The eight nodes of a cell.
+/// Returns the eight nodes of a cell.
 pub(super) fn corners(grid: &Grid, cell: usize) -> [usize; 8] {
     let (nx, ny) = (grid.stride, grid.nodes[1]);
     std::array::from_fn(|c| cell + (c & 1) + nx * (c >> 1 & 1) + nx * ny * (c >> 2))

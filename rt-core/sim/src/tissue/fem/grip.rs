@@ -15,7 +15,7 @@ pub(super) const SAME_WAY: f64 = 0.9;
 /// Lowest and one past the highest cell of a patch in the finest grid, along each axis.
 pub(super) type PatchCells = [[usize; 2]; 3];
 
-/// How the body answers to the held patch moved by one metre along `direction`.
+/// Response of the body to the held patch moved by one metre along `direction`.
 #[derive(Clone, Debug)]
 pub(super) struct Response<T> {
     pub direction: [f64; 3],
@@ -30,7 +30,8 @@ pub(super) struct Response<T> {
     pub weight_m: f64,
 }
 
-/// Where conjugate gradients on one response are: they go on from tick to tick. `r`, `p` and `q` are in the grip's fields.
+/// State of conjugate gradients on one response, which continue from tick to tick. `r`, `p` and `q` are in the grip's
+/// fields.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Iteration {
     pub response: usize,
@@ -40,7 +41,8 @@ pub(super) struct Iteration {
     pub alpha: f64,
 }
 
-/// What is kept for one patch. Nothing in it depends on another, so that one can answer while the next is prepared.
+/// Responses and work space for one patch. Nothing in it depends on another, so that one can answer while the next is
+/// prepared.
 #[derive(Clone, Debug)]
 pub(super) struct Grip<T> {
     /// The patch; `None` before the first, and when what was known of it is dropped.
@@ -59,7 +61,7 @@ pub(super) struct Grip<T> {
 }
 
 impl<T: Real> Grip<T> {
-    /// On no patch. Writes every page, so that no step is the first to touch one.
+    /// Makes a grip on no patch. Writes every page, so that no step is the first to touch one.
     pub fn new(model: &FemModel<T>) -> Self {
         let nodes = model.levels[0].grid.len();
         let response = || Response {
@@ -105,23 +107,23 @@ impl<T: Real> Grip<T> {
         self.iteration = None;
     }
 
-    /// Whether it is on this patch, and knows or has begun most of the answer to this displacement.
+    /// Returns whether it is on this patch, and knows or has begun most of the answer to this displacement.
     pub fn is_for(&self, cells: PatchCells, by_m: [f64; 3]) -> bool {
         let along = |r: &Response<T>| dot(by_m, r.direction).powi(2);
         self.cells == Some(cells) && self.used().iter().map(along).sum::<f64>() > SAME_WAY.powi(2) * dot(by_m, by_m)
     }
 
-    /// How far the patch is from rest.
+    /// Returns the displacement of the patch from rest.
     pub fn held_at_m(&self) -> [f64; 3] {
         [0, 1, 2].map(|a| self.used().iter().map(|r| r.weight_m * r.direction[a]).sum())
     }
 
-    /// Held away from rest.
+    /// Returns whether it is held away from rest.
     pub fn is_moved(&self) -> bool {
         self.used().iter().any(|r| r.weight_m != 0.0)
     }
 
-    /// Back to rest; responses are kept for when the same patch is held again.
+    /// Returns to rest; responses are kept for when the same patch is held again.
     pub fn release(&mut self) {
         self.responses.iter_mut().for_each(|r| r.weight_m = 0.0);
     }

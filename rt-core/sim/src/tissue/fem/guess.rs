@@ -10,7 +10,7 @@ use crate::simd::{Simd, vectorised};
 /// A patch is the next one up to so many cells away.
 const NEXT_PATCH: isize = 2;
 
-/// The displacement that `before` answers with, per metre, moved along where `cells` is the next patch: deep inside a
+/// Guesses the next response: the displacement of `before`, per metre, moved along to the patch `cells`. Deep inside a
 /// body that would be the answer.
 pub(super) fn guess<T: Real>(
     model: &FemModel<T>,
@@ -33,7 +33,7 @@ pub(super) fn guess<T: Real>(
     }
 }
 
-/// The displacement that responses add up to, times `scale`.
+/// Sums the displacements of responses, times `scale`.
 pub(super) fn superpose<T: Real>(responses: &[Response<T>], scale: f64, to: &mut Field<T>) {
     let mut moving = responses.iter().filter(|r| r.weight_m != 0.0);
     match moving.next() {
@@ -53,8 +53,8 @@ pub(super) fn superpose<T: Real>(responses: &[Response<T>], scale: f64, to: &mut
     }
 }
 
-/// From one patch to the next of the same size: by how many nodes. Nothing where they are far apart, or pushed in
-/// different directions.
+/// Returns by how many nodes a patch has moved to the next of the same size. Nothing where they are far apart, or
+/// pushed in different directions.
 fn moved_along(before: PatchCells, now: PatchCells, at_m: [f64; 3], by_m: [f64; 3]) -> Option<[isize; 3]> {
     let by = [0, 1, 2].map(|a| now[a][0] as isize - before[a][0] as isize);
     let same_size = (0..3).all(|a| now[a][1] - now[a][0] == before[a][1] - before[a][0]);
@@ -64,7 +64,8 @@ fn moved_along(before: PatchCells, now: PatchCells, at_m: [f64; 3], by_m: [f64; 
 }
 
 vectorised! {
-/// `moved` at each node is `u` at the node so many nodes before it, or its own `u` where no element touches that one.
+/// Sets `moved` at each node to `u` at the node so many nodes before it, or to its own `u` where no element touches
+/// that one.
 fn shifted<T>(level: &Level<T>, by: [isize; 3], u: &[T], moved: &mut [T]) {
     let (grid, in_use) = (&level.grid, &level.inverse_diagonal);
     for (row, at) in grid.node_spans().enumerate() {

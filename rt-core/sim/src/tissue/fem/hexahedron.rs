@@ -1,8 +1,8 @@
 //! The forces of a row of cubic elements on their corners.
 //!
-//! The eight corner values of a component are turned into the coefficients of 1, x, y, z, xy, yz, zx, xyz (up
-//! to a factor: a Walsh-Hadamard transform, 24 additions). In these a cube's stiffness falls into blocks of at most
-//! three, by symmetry, for any isotropic material, and both integrations differ in one coefficient only. That is a third of
+//! The eight corner values of a component are turned into the coefficients of 1, x, y, z, xy, yz, zx, xyz (up to a
+//! factor: a Walsh-Hadamard transform, 24 additions). In these a cube's stiffness falls into blocks of at most three,
+//! by symmetry, for any isotropic material, and both integrations differ in one coefficient only. That is a third of
 //! the arithmetic of the 24 x 24 matrix, and there is no matrix to load.
 
 use super::lanes::{LANES, each, lanes, lanes_mut};
@@ -41,13 +41,13 @@ impl Stiffness {
         }
     }
 
-    /// What the element puts on the diagonal, the same for each corner and component.
+    /// Returns the element's entry on the diagonal, the same for each corner and component.
     pub fn diagonal(&self) -> f64 {
         let Stiffness { mean, varying, shear } = *self;
         mean + 4.0 * shear + 2.0 * (varying + shear) + 2.0 / 3.0 * shear + (varying + 4.0 / 3.0 * shear) / 3.0
     }
 
-    /// Largest eigenvalue of the element's matrix.
+    /// Returns the largest eigenvalue of the element's matrix.
     pub fn largest_eigenvalue(&self) -> f64 {
         let Stiffness { mean, varying, shear } = *self;
         let of_blocks = [
@@ -60,7 +60,7 @@ impl Stiffness {
     }
 }
 
-/// Sums and differences of four corners of a row: 1, y, z, yz.
+/// Returns sums and differences of four corners of a row: 1, y, z, yz.
 #[inline(always)]
 fn across<T: Real>([a, b, c, d]: [T; 4]) -> [T; 4] {
     let (low, high) = (a + b, c + d);
@@ -68,7 +68,7 @@ fn across<T: Real>([a, b, c, d]: [T; 4]) -> [T; 4] {
     [low + high, low_y + high_y, high - low, high_y - low_y]
 }
 
-/// The transpose of `across`.
+/// Applies the transpose of `across`.
 #[inline(always)]
 fn corners<T: Real>([one, y, z, yz]: [T; 4]) -> [T; 4] {
     let (low, high) = (one - z, one + z);
@@ -92,8 +92,8 @@ fn modes<T: Real>(lines: &[&[T]; 4], e: usize) -> Modes<T> {
     }
 }
 
-/// Forces of `count` times `LANES` elements in a row, at most `CHUNK`, from the displacements of the four lines of nodes
-/// around them. The scratch has them from `LANES` on; what is before stays zero.
+/// Computes the forces of `count` times `LANES` elements in a row, at most `CHUNK`, from the displacements of the four
+/// lines of nodes around them. The scratch has them from `LANES` on; what is before stays zero.
 #[inline(always)]
 pub(super) fn forces<'a, T: Real>(
     [ul, vl, wl]: [[&'a [T]; 4]; 3],

@@ -11,7 +11,7 @@ use crate::simd::Simd;
 /// Below so many free nodes the coarsest level is solved directly.
 const DIRECT_NODES: usize = 30;
 
-/// What a level is made from, in f64.
+/// Cells that a level is made from, in f64.
 pub(super) struct Cells {
     pub grid: Grid,
     pub stiffness: Vec<Stiffness>,
@@ -20,7 +20,7 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Nothing on any of the grid's cells and nodes.
+    /// Makes cells and nodes without stiffness, springs or fixed nodes.
     pub fn empty(grid: Grid) -> Self {
         Cells {
             stiffness: vec![Stiffness::default(); grid.len()],
@@ -49,7 +49,7 @@ impl<T: Real> Level<T> {
     }
 }
 
-/// From the finest to the coarsest, which is factored.
+/// Makes the levels from the finest to the coarsest, which is factored.
 pub(super) fn levels<T: Real>(cells: &Cells) -> Vec<Level<T>> {
     let mut work = Planes::new(cells.grid.stride * cells.grid.nodes[1]);
     let mut levels: Vec<Level<T>> = vec![Level::new(cells, &mut work)];
@@ -80,7 +80,8 @@ fn inverse_diagonal<T: Real>(cells: &Cells) -> Vec<T> {
         .collect()
 }
 
-/// No eigenvalue is above the largest of any element over its own diagonal (Rayleigh quotient, element by element).
+/// Returns a bound of all eigenvalues: the largest of any element over its own diagonal (Rayleigh quotient, element by
+/// element).
 fn bound(cells: &Cells) -> f64 {
     let stiff = cells.stiffness.iter().filter(|s| **s != Stiffness::default());
     let ratios = stiff.map(|s| s.largest_eigenvalue() / s.diagonal());
@@ -105,7 +106,8 @@ impl<T: Real> LineOp<T> for Rayleigh<'_, T> {
     }
 }
 
-/// Power iteration from a checkerboard with some disorder; with a margin, as it comes from below.
+/// Estimates the largest eigenvalue by power iteration from a checkerboard with some disorder; with a margin, as it
+/// comes from below.
 fn largest_eigenvalue<T: Real>(level: &Level<T>, work: &mut Planes<T>) -> f64 {
     const ITERATIONS: usize = 24;
     const MARGIN: f64 = 1.08;
@@ -146,8 +148,8 @@ fn norm<T: Real>(x: &Field<T>) -> f64 {
     x.iter().flatten().map(|v| v.to_f64().powi(2)).sum::<f64>().sqrt()
 }
 
-/// The same body on a grid of twice the edge: each cell as stiff as its eight children on average (exact where the strain is
-/// constant), springs shared out by interpolation, nodes fixed where a fixed node is.
+/// Returns the same body on a grid of twice the edge: each cell as stiff as its eight children on average (exact where
+/// the strain is constant), springs shared out by interpolation, nodes fixed where a fixed node is.
 pub(super) fn coarser(fine: &Cells) -> Cells {
     let used = |cell: usize| fine.stiffness[cell] != Stiffness::default();
     let cells = fine.grid.nodes.map(|n| (n - 1) / 2);

@@ -1,8 +1,8 @@
-//! What a structure is made of, and what that makes of one hexahedron.
+//! Materials of structures, and the stiffness of one hexahedron.
 
 use crate::scene::Surroundings;
 
-/// How the volumetric part of an element's energy is integrated.
+/// Integration of the volumetric part of an element's energy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integration {
     /// 2 x 2 x 2 Gauss points for everything, as textbooks do; locks as nu comes near 0.5.
@@ -18,7 +18,7 @@ pub struct Material {
     pub youngs_modulus_pa: f64,
     /// Poisson's ratio, up to [`MAX_POISSON_RATIO`].
     pub poisson_ratio: f64,
-    /// How the volumetric energy is integrated.
+    /// Integration of the volumetric energy.
     pub integration: Integration,
 }
 
@@ -36,7 +36,7 @@ impl Material {
     }
 }
 
-/// What a structure does when pushed.
+/// Mechanical behaviour of a structure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Structure {
     /// Tissue.
@@ -45,21 +45,21 @@ pub enum Structure {
     Fixed,
 }
 
-/// What a model is made from, besides the lattice.
+/// Settings that a model is made from, besides the lattice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FemSettings {
-    /// At least one.
+    /// Structures, at least one.
     pub structures: Vec<Structure>,
     /// Structure of each element; empty if there is one structure only.
     pub structure_of: Vec<u8>,
     /// Springs to rest that stand for the fat around the body: stiffness per surface area.
     pub foundation_pa_per_m: f64,
-    /// What each structure rests on where it is at the outside; empty: fat on all sides.
+    /// Surroundings that each structure rests on at the outside; empty: fat on all sides.
     pub surroundings: Vec<Surroundings>,
 }
 
 impl FemSettings {
-    /// One material, in surroundings of the given stiffness.
+    /// Returns the settings of one material, in surroundings of the given stiffness.
     pub fn homogeneous(material: Material, foundation_pa_per_m: f64) -> Self {
         FemSettings {
             structures: vec![Structure::Elastic(material)],
@@ -119,7 +119,7 @@ pub enum FemProblem {
     },
 }
 
-/// Every problem; of elements with an unknown structure, the first.
+/// Returns every problem; of elements with an unknown structure, the first.
 pub(super) fn problems_of(settings: &FemSettings, elements: usize) -> Vec<FemProblem> {
     let mut problems = Vec::new();
     if settings.structures.is_empty() {

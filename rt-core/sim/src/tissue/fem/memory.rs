@@ -1,4 +1,4 @@
-//! Where the elastic body is, as bytes: for flight recordings. On a needle line, and at rest, there is no more to it.
+//! State of the elastic body as bytes, for flight recordings. On a needle line, and at rest, there is no more to it.
 
 use super::real::Real;
 use super::state::FemState;
@@ -24,7 +24,7 @@ impl<T: Real> FemState<T> {
         parts::save(&self.memory(), to);
     }
 
-    /// What is held is forgotten.
+    /// Loads a state and forgets what is held.
     pub(super) fn load(&mut self, from: &[u8]) {
         let largest = bytes_of_mut(&mut self.max_displacement);
         let [x, y, z] = self.displacement.each_mut().map(|axis| cast_slice_mut(axis));

@@ -1,4 +1,4 @@
-//! What an elastic body is: built once, never changed.
+//! Model of an elastic body: built once, never changed.
 
 use super::grid::{Grid, corners};
 use super::hexahedron::Stiffness;
@@ -38,7 +38,7 @@ pub struct FemModel<T = f32> {
 }
 
 impl<T: Real> FemModel<T> {
-    /// The body of `lattice` in the elements of `of`, which is that lattice or a coarser one of it.
+    /// Makes the body of `lattice` in the elements of `of`, which is that lattice or a coarser one of it.
     pub(super) fn of_lattice(
         lattice: &Lattice,
         of: &Arc<Lattice>,
@@ -74,7 +74,7 @@ impl<T: Real> FemModel<T> {
         })
     }
 
-    /// Whether springs or something fixed hold the part of the body that an element belongs to.
+    /// Returns whether springs or something fixed hold the part of the body that an element belongs to.
     pub fn is_held(&self, element: u32) -> bool {
         let cell = self.lattice.cell(element);
         let place = [0, 1, 2].map(|a| cell[a].saturating_sub(self.low_cell[a]));
@@ -86,17 +86,17 @@ impl<T: Real> FemModel<T> {
             .any(|nodes| nodes.first().is_some_and(|&node| part_of(node as usize) == part))
     }
 
-    /// Elements and their neighbours.
+    /// Returns the elements and their neighbours.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
 
-    /// Number of elements.
+    /// Returns the number of elements.
     pub fn element_count(&self) -> usize {
         self.lattice.element_count()
     }
 
-    /// Nodes that touch an element.
+    /// Returns the number of nodes that touch an element.
     pub fn node_count(&self) -> usize {
         self.part.iter().filter(|&&part| part != NO_PART).count()
     }
@@ -115,7 +115,8 @@ struct Body {
 }
 
 impl Body {
-    /// In the cells of `lattice`; its lowest cell is the lowest of a group of `aligned_to` cells along each axis.
+    /// Makes the model in the cells of `lattice`; its lowest cell is the lowest of a group of `aligned_to` cells along
+    /// each axis.
     fn new(lattice: &Lattice, settings: &FemSettings, is_fixed: impl Fn([f64; 3]) -> bool, aligned_to: usize) -> Self {
         let edge_m = lattice.spacing_m;
         let [low, high] = lattice.occupied();
@@ -141,7 +142,8 @@ impl Body {
         body
     }
 
-    /// Where the elements of `lattice` are in the grid, whose cells are that many of the first lattice along each axis.
+    /// Sets the places of the elements of `lattice` in the grid, whose cells are that many of the first lattice along
+    /// each axis.
     fn set_elements(&mut self, lattice: &Lattice, cells_along_edge: usize) {
         self.low_cell = self.low_cell.map(|c| c / cells_along_edge);
         self.is_cell = vec![false; self.cells.grid.len()];
@@ -170,7 +172,7 @@ impl Body {
         }
     }
 
-    /// A quarter of the springs of each face that is at the outside to each of its nodes, by what lies beyond it.
+    /// Adds a quarter of the springs of each outside face to each of its nodes, by what lies beyond it.
     fn add_surroundings(&mut self, lattice: &Lattice, settings: &FemSettings) {
         let quarter_n_per_m = settings.foundation_pa_per_m * lattice.spacing_m.powi(2) / 4.0;
         let grid = &self.cells.grid;
@@ -208,7 +210,7 @@ impl Body {
     }
 }
 
-/// Cells of the elements in their order, counted from `low_cell`.
+/// Iterates over the cells of the elements in their order, counted from `low_cell`.
 fn cells_of(lattice: &Lattice, low_cell: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
     (0..lattice.element_count() as u32).map(move |element| {
         let cell = lattice.cell(element);
@@ -216,7 +218,7 @@ fn cells_of(lattice: &Lattice, low_cell: [usize; 3]) -> impl Iterator<Item = [us
     })
 }
 
-/// The part of each node, and whether the part has a spring or a fixed node.
+/// Returns the part of each node, and whether the part has a spring or a fixed node.
 fn parts(body: &Body) -> (Vec<u32>, Vec<bool>) {
     let grid = &body.cells.grid;
     let mut part = vec![NO_PART; grid.len()];

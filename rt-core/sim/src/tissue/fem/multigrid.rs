@@ -8,14 +8,15 @@ use super::smooth::{Residual, smooth};
 use super::sweep::{Field, Planes, sweep, zeros};
 use super::transfer::{prolong, restrict};
 
-/// Chebyshev steps before and after the correction from the next level: as many on both sides make the cycle symmetric, as
-/// conjugate gradients need in many cycles.
+/// Chebyshev steps before and after the correction from the next level: as many on both sides make the cycle symmetric,
+/// as conjugate gradients need in many cycles.
 const STEPS: u32 = 2;
-/// One step less after the correction spares a fifth of a cycle's sweeps. Where so few cycles are allowed they then leave as
-/// much error as symmetric ones (paper's gland, nu 0.45, two cycles: 0.53 % for 0.48 %); in many, hard bodies no longer converge.
+/// One step less after the correction spares a fifth of a cycle's sweeps. Where so few cycles are allowed they then
+/// leave as much error as symmetric ones (paper's gland, nu 0.45, two cycles: 0.53 % for 0.48 %); in many, hard bodies
+/// no longer converge.
 pub(super) const FEW_CYCLES: u32 = 4;
 
-/// What one level of a cycle works in.
+/// Work space of one level of a cycle.
 #[derive(Clone, Debug)]
 pub(super) struct Stage<T> {
     /// The level's, but zero also at nodes that are held.
@@ -23,7 +24,7 @@ pub(super) struct Stage<T> {
     pub x: Field<T>,
     pub b: Field<T>,
     d: Field<T>,
-    /// Between two cycles for any use; so is `x`.
+    /// Residual; between two cycles for any use, as is `x`.
     pub r: Field<T>,
 }
 
@@ -76,7 +77,7 @@ impl<T: Real> Multigrid<T> {
         }
     }
 
-    /// One of at most `of` cycles: `stages[0].x` becomes an approximation of the solution of `A x = stages[0].b`.
+    /// Does one of at most `of` cycles: `stages[0].x` becomes an approximation of the solution of `A x = stages[0].b`.
     pub fn cycle(&mut self, levels: &[Level<T>], of: u32) {
         let steps_up = if of <= FEW_CYCLES { STEPS - 1 } else { STEPS };
         let last = levels.len() - 1;

@@ -29,7 +29,7 @@ pub(super) fn write<T: Real>(model: &FemModel<T>, state: &mut FemState<T>) -> u3
 }
 
 vectorised! {
-/// The mean of the eight corners is the displacement of the centre. Returns elements moved and the largest square.
+/// Writes the displacement of centres: the mean of the eight corners. Returns elements moved and the largest square.
 fn write_piece<T>(model: &FemModel<T>, state: &mut FemState<T>, piece: &CellRun) -> (u32, f32) {
     let n = piece.len;
     let grid = &model.levels[0].grid;

@@ -27,9 +27,9 @@ pub trait Real:
     const ZERO: Self;
     /// Distance from 1 to the next larger number.
     const EPSILON: f64;
-    /// The nearest number of this type.
+    /// Returns the nearest number of this type.
     fn of(value: f64) -> Self;
-    /// The same number in f64.
+    /// Returns the same number in f64.
     fn to_f64(self) -> f64;
 }
 

@@ -11,8 +11,8 @@ use crate::tissue::{HeldOutcome, REACH};
 
 /// A direction that may come to be is prepared if this part of the displacement is outside those known.
 const EXPECTED_DIRECTION: f64 = 0.02;
-/// Where few cycles are allowed, those after the first are only for a residual above so many tolerances: what is left then
-/// is a few thousandths of the displacement, and can wait for the ticks after.
+/// Tolerances of residual above which cycles after the first are done where few are allowed: the rest is then a few
+/// thousandths of the displacement, and can wait for the next ticks.
 const ROUGH: f64 = 10.0;
 
 /// A cube of tissue around an element that moves as one piece with the needle's tip: a single node would be ill-posed,
@@ -21,13 +21,13 @@ const ROUGH: f64 = 10.0;
 pub struct TipPatch {
     /// The element in the middle.
     pub element: u32,
-    /// Where the element's centre is held, in the scene frame.
+    /// Position where the element's centre is held, in the scene frame.
     pub position_m: [f64; 3],
     /// Elements whose centres are within half of this of the held element's, along each axis, are held with it.
     pub edge_m: f64,
 }
 
-/// When a step ends.
+/// Tolerance and budget of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolveSettings {
     /// Forces left on free nodes, relative to those that the moved patch would cause in a body at rest.
@@ -36,14 +36,14 @@ pub struct SolveSettings {
     pub max_cycles: u32,
 }
 
-/// What came of one step.
+/// Outcome of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FemReport {
-    /// What became of the held patch.
+    /// Outcome for the held patch.
     pub held: HeldOutcome,
     /// Multigrid cycles that the step took.
     pub cycles: u32,
-    /// As in `SolveSettings::relative_tolerance`, measured after the step.
+    /// Residual as in `SolveSettings::relative_tolerance`, measured after the step.
     pub relative_residual: f64,
     /// Within the tolerance, and finite.
     pub converged: bool,
@@ -103,7 +103,7 @@ fn report<T: Real>(
     }
 }
 
-/// The cells of the finest grid that a patch holds, and how far it moves them.
+/// Returns the cells of the finest grid that a patch holds, and how far it moves them.
 fn cells_of<T: Real>(model: &FemModel<T>, held: &TipPatch) -> Option<([[usize; 2]; 3], [f64; 3])> {
     let (lattice, grid) = (&model.lattice, &model.levels[0].grid);
     if held.element as usize >= model.element_count() || !(0.0..f64::INFINITY).contains(&held.edge_m) {

@@ -1,4 +1,4 @@
-//! Where the elastic body is, and everything that a step works in.
+//! State of the elastic body, with the work space of a step.
 
 use super::grip::Grip;
 use super::model::FemModel;
@@ -31,12 +31,12 @@ impl<T: Real> FemState<T> {
         }
     }
 
-    /// Displacement from rest along `axis` (0 to 2) of the centres of all elements, in elements.
+    /// Returns the displacement from rest along `axis` (0 to 2) of the centres of all elements, in elements.
     pub fn displacement(&self, axis: usize) -> &[f32] {
         self.displacement.get(axis).map_or(&[], Vec::as_slice)
     }
 
-    /// Centre of an element in the scene frame; the last element's for a number past the end.
+    /// Returns the centre of an element in the scene frame; the last element's for a number past the end.
     pub fn position_m(&self, model: &FemModel<T>, element: u32) -> [f64; 3] {
         let rest = model.lattice.rest_m(element);
         let e = (element as usize).min(self.displacement[0].len().saturating_sub(1));
@@ -44,7 +44,8 @@ impl<T: Real> FemState<T> {
         [0, 1, 2].map(|a| rest[a] + model.lattice.spacing_m * u[a])
     }
 
-    /// Returns the displacement of the node at `corner`, counted in cells from the scene's origin, in metres; `None` without a node.
+    /// Returns the displacement of the node at `corner`, counted in cells from the scene's origin, in metres; `None`
+    /// without a node.
     #[cfg(test)]
     pub fn node_displacement_m(&self, model: &FemModel<T>, corner: [usize; 3]) -> Option<[f64; 3]> {
         let grid = &model.levels[0].grid;
@@ -67,8 +68,8 @@ impl<T: Real> FemState<T> {
         })
     }
 
-    /// Lets loose and forgets what is held, and displaces every element by the sum of loads times answers (m/N) and by `whole_m`; how
-    /// many moved.
+    /// Lets loose and forgets what is held, and displaces every element by the sum of loads times answers (m/N) and by
+    /// `whole_m`; how many moved.
     pub fn displace(
         &mut self,
         model: &FemModel<T>,
@@ -100,21 +101,21 @@ impl<T: Real> FemState<T> {
         self.measure()
     }
 
-    /// The largest displacement; returns how many are displaced.
+    /// Finds the largest displacement; returns how many elements are displaced.
     fn measure(&mut self) -> u32 {
         let [x, y, z] = &self.displacement;
         let (mut largest, mut moved) = (0.0_f32, 0);
         for ((x, y), z) in x.iter().zip(y).zip(z) {
             let square = x * x + y * y + z * z;
             moved += u32::from(square > 0.0);
-            // What is no number stays, so that nobody takes the answer for one.
+            // NaN stays, so that no reader mistakes the answer for a number.
             largest = if square <= largest { largest } else { square };
         }
         self.max_displacement = largest.sqrt();
         moved
     }
 
-    /// No answer is kept: steps from here on depend on nothing that came before.
+    /// Returns whether no answer is kept: steps from here on depend on nothing that came before.
     pub(super) fn has_forgotten(&self) -> bool {
         self.grip.cells.is_none() && self.next.cells.is_none()
     }

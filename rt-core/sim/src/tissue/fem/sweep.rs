@@ -1,7 +1,7 @@
 //! One pass over a level: the forces of all elements on the nodes, plane by plane, and what is done with them.
 //!
-//! A plane of nodes is handed on as soon as both planes of elements beside it are done. So forces need memory for two planes
-//! only, and what follows (a smoothing step, a residual, a dot product) finds them in the cache.
+//! A plane of nodes is handed on as soon as both planes of elements next to it are done. So forces need memory for two
+//! planes only, and what follows (a smoothing step, a residual, a dot product) finds them in the cache.
 
 use std::ops::Range;
 
@@ -14,9 +14,10 @@ use crate::simd::{Simd, vectorised};
 /// One value for each node along x, y, z.
 pub(super) type Field<T> = [Vec<T>; 3];
 
-/// What to do with the forces on a line of nodes.
+/// Operation on the forces of a line of nodes.
 pub(super) trait LineOp<T> {
-    /// `forces` is what the elements and springs answer to `x` with, on the nodes `at`; no later line needs this `x`.
+    /// Processes a line: `forces` are those of elements and springs for `x`, on the nodes `at`; no later line needs
+    /// this `x`.
     fn line(&mut self, at: Range<usize>, forces: [&[T]; 3], x: [&mut [T]; 3]);
 }
 
@@ -29,7 +30,7 @@ pub(super) struct Planes<T> {
 }
 
 impl<T: Real> Planes<T> {
-    /// Room for planes of so many nodes.
+    /// Makes room for planes of so many nodes.
     pub fn new(nodes: usize) -> Self {
         Planes {
             even: zeros(nodes),
@@ -39,13 +40,13 @@ impl<T: Real> Planes<T> {
     }
 }
 
-/// A zero for each node, in pages that have been written, so that no later write is the first; and a few more, as rows of elements
-/// are done in whole lanes.
+/// Makes a zero for each node, in pages that have been written, so that no later write is the first; and a few more, as
+/// rows of elements are done in whole lanes.
 pub(super) fn zeros<T: Real>(nodes: usize) -> Field<T> {
     std::array::from_fn(|_| touched(nodes + LANES + 1, T::ZERO))
 }
 
-/// Copies of a value in pages that have been written.
+/// Makes copies of a value in pages that have been written.
 pub(super) fn touched<V: Copy>(count: usize, value: V) -> Vec<V> {
     (0..count).map(|_| std::hint::black_box(value)).collect()
 }

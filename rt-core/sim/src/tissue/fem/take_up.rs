@@ -1,4 +1,4 @@
-//! How a grip takes up a patch, and a direction to move it in.
+//! Start of a grip on a patch, and of a direction to move it in.
 
 use super::grip::{DIRECTIONS, Grip, PatchCells, dot};
 use super::guess::guess;
@@ -6,8 +6,8 @@ use super::model::FemModel;
 use super::real::Real;
 
 impl<T: Real> Grip<T> {
-    /// Takes up a patch: the displacement that `before` answers with becomes the first guess of the response along `by_m`,
-    /// moved along where the patch is the next one: deep inside a body that would be the answer.
+    /// Begins a patch: the displacement that `before` answers with becomes the first guess of the response along
+    /// `by_m`, moved along where the patch is the next one: deep inside a body that would be the answer.
     ///
     /// False, and nothing changes, if no node in `cells` can move.
     pub fn take_up(&mut self, model: &FemModel<T>, cells: PatchCells, by_m: [f64; 3], before: &Grip<T>) -> bool {
@@ -40,7 +40,8 @@ impl<T: Real> Grip<T> {
         }
     }
 
-    /// From what `u` holds, or from nothing: then what is left to do is known already, and small for a small weight.
+    /// Begins a response from what `u` holds, or from nothing: then the residual is known already, and small for a
+    /// small weight.
     fn begin_response(&mut self, model: &FemModel<T>, n: usize, direction: [f64; 3], from_nothing: bool) {
         let (load, force_n_per_m) = self.load(model, direction);
         let response = &mut self.responses[n];
@@ -58,7 +59,8 @@ impl<T: Real> Grip<T> {
         response.residual = if from_nothing { load } else { f64::INFINITY };
     }
 
-    /// Expresses a displacement of the patch in the directions known, with a new one if more than `new` of it is outside them.
+    /// Expresses a displacement of the patch in the directions known, with a new one if more than `new` of it is
+    /// outside them.
     pub fn weigh(&mut self, model: &FemModel<T>, by_m: [f64; 3], new: f64) {
         let mut rest = by_m;
         for response in &mut self.responses[..self.count] {

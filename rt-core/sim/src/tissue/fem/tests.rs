@@ -1,4 +1,4 @@
-//! What the tests of the elastic body share.
+//! Fixtures of the elastic body's tests.
 
 use std::sync::Arc;
 
@@ -48,7 +48,7 @@ fn material(poisson_ratio: f64, integration: Integration) -> Material {
 const FULL: Integration = Integration::Full;
 const MEAN: Integration = Integration::MeanDilatation;
 
-/// Two materials by turns of cells, stiffness 1 to `contrast`.
+/// Returns the settings of two materials in alternating cells, stiffness 1 to `contrast`.
 fn two_materials(lattice: &Lattice, contrast: f64, foundation_pa_per_m: f64) -> FemSettings {
     let soft = material(0.3, FULL);
     let stiff = Material {

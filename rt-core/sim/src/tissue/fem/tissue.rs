@@ -11,11 +11,11 @@ use crate::tissue::{
     Carried, Deformed, ElementField, Held, HeldOutcome, LargeStrain, PackedField, Solve, StepReport, TissueModel,
 };
 
-/// What surrounds a body: 20 mm of fat of 5 kPa, per surface area (assumed).
+/// Stiffness of the surroundings of a body: 20 mm of fat of 5 kPa, per surface area (assumed).
 pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
 
-/// Cycles in one tick. Two fit into 5 ms on the paper's gland only just; what is left is done in the ticks before, ahead of the
-/// tip, and in those after.
+/// Cycles in one tick. Two fit into 5 ms on the paper's gland only just; what is left is done in the ticks before,
+/// ahead of the tip, and in those after.
 pub const LIVE_CYCLES: u32 = 1;
 /// Residual force, over the tip's, up to which an answer that is still being refined may be felt.
 const FELT: f64 = 0.2;
@@ -25,15 +25,15 @@ const FELT: f64 = 0.2;
 pub struct FemTissue<T = f32> {
     /// Topology, materials and multigrid.
     pub model: FemModel<T>,
-    /// Where every element is.
+    /// State of every element.
     pub state: FemState<T>,
-    /// When a step ends.
+    /// Tolerance and budget of a step.
     pub settings: SolveSettings,
     large: LargeStrain,
 }
 
 impl<T: Compiled> FemTissue<T> {
-    /// The scene's materials in its surroundings, solved as far as the loop has time for.
+    /// Makes the scene's materials in its surroundings, solved as far as the loop has time for.
     pub fn new(scene: &Scene) -> Result<Self, Vec<FemProblem>> {
         let structures = scene.structures.iter().map(|s| match s.material.fixed {
             true => Structure::Fixed,
@@ -71,7 +71,7 @@ fn patch(held: Held) -> TipPatch {
 }
 
 impl<T: Compiled> FemTissue<T> {
-    /// The report of a step that added answers up.
+    /// Returns the report of a step that added answers up.
     fn displaced(&self, moved: u32) -> StepReport {
         StepReport {
             passes: 0,
@@ -88,7 +88,7 @@ impl<T: Compiled> FemTissue<T> {
 }
 
 impl<T: Compiled> TissueModel for FemTissue<T> {
-    /// Quasi-static: `dt_s` plays no part, and tissue that nothing holds is at rest at once.
+    /// Solves the quasi-static problem: `dt_s` plays no part, and tissue that nothing holds is at rest at once.
     fn step(&mut self, held: Option<Held>, _dt_s: f64) -> StepReport {
         let report = step(&self.model, &mut self.state, held.map(patch), &self.settings);
         StepReport {
@@ -159,12 +159,13 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
         step(&self.model, &mut self.state, None, &self.settings);
     }
 
-    /// Displacements, and how far the window near the tip is from them: see [`is_all_saved`](TissueModel::is_all_saved).
+    /// Returns the size of displacements, and of the offsets in the window near the tip: see
+    /// [`is_all_saved`](TissueModel::is_all_saved).
     fn memory_len(&self) -> usize {
         self.state.memory_len() + self.large.memory_len()
     }
 
-    /// While a patch is held, or was and is kept for when it is held again, its answers and the solver's are not.
+    /// Returns whether no patch is held or kept for when it is held again: its answers and the solver's are not saved.
     fn is_all_saved(&self) -> bool {
         self.state.has_forgotten()
     }
@@ -185,6 +186,6 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
         }
     }
 
-    /// Elasticity has no limits.
+    /// Does nothing: elasticity has no limits.
     fn set_limits(&mut self, _limits: Limits) {}
 }

@@ -5,14 +5,14 @@ use super::real::Real;
 use super::sweep::Field;
 use crate::simd::{Simd, vectorised};
 
-/// Weight of the two or one coarse lines (or planes) that a fine one lies between.
+/// Returns the weight of the two or one coarse lines (or planes) that a fine one lies between.
 #[inline(always)]
 fn parents(fine: usize) -> ([usize; 2], usize) {
     ([fine / 2, fine.div_ceil(2)], fine % 2 + 1)
 }
 
 vectorised! {
-/// `coarse = transpose(interpolation) fine`. `line` has room for a line of fine nodes and two more.
+/// Computes `coarse = transpose(interpolation) fine`. `line` has room for a line of fine nodes and two more.
 fn restrict<T>(fine: &Grid, coarse: &Grid, values: &Field<T>, line: &mut [T], into: &mut Field<T>) {
     for k in 0..coarse.nodes[2] {
         for j in 0..coarse.nodes[1] {
@@ -60,7 +60,7 @@ fn gather<T: Real>(fine: &Grid, values: &[T], [j, k]: [usize; 2], start: usize, 
 }
 
 vectorised! {
-/// `fine += interpolation coarse` at free nodes. `line` has room for a line of coarse nodes and one more.
+/// Computes `fine += interpolation coarse` at free nodes. `line` has room for a line of coarse nodes and one more.
 fn prolong<T>(
     coarse: &Grid,
     fine: &Grid,
@@ -102,7 +102,7 @@ fn prolong<T>(
 }
 }
 
-/// Each coarse value to its node, the mean of two to the node between. `into` starts at an even node.
+/// Adds each coarse value to its node, the mean of two to the node between. `into` starts at an even node.
 #[inline(always)]
 fn spread<T: Real>(line: &[T], inverse: &[T], into: &mut [T]) {
     let half = T::of(0.5);

@@ -14,7 +14,7 @@ fn body<'a>(lattice: &'a Lattice, u: &'a [Vec<f32>; 3]) -> Deformed<'a> {
     }
 }
 
-/// Over the corners of every element, by its neighbours, in f64.
+/// Searches the corners of every element, by its neighbours, in f64.
 fn by_search(body: &Deformed, is_near: impl Fn(u32) -> bool) -> f64 {
     let mut least = f64::INFINITY;
     for element in 0..body.lattice.element_count() as u32 {

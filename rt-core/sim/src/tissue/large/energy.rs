@@ -1,8 +1,9 @@
 //! Energy of neo-Hookean cells between element centres, and of linear ones: the forces on the centres.
 //!
-//! A cell has eight corners, at each of which the three links that meet there are the columns of the deformation gradient F, with J its
-//! determinant. A corner has mu / 2 (|F|² - 3) - mu ln J, a cell lambda / 2 (mean J - 1)²: so the mean dilatation carries what is
-//! volumetric, as in the linear body. Below [`OPEN`] the logarithm goes on as its parabola: a cell that is folded is pushed open.
+//! A cell has eight corners, at each of which the three links that meet there are the columns of the deformation
+//! gradient F, with J its determinant. A corner has mu / 2 (|F|² - 3) - mu ln J, a cell lambda / 2 (mean J - 1)²: so
+//! the mean dilatation carries what is volumetric, as in the linear body. Below [`OPEN`] the logarithm continues as its
+//! parabola: a folded cell is pushed open.
 
 // Corners and axes are numbers that several arrays are read by.
 #![allow(clippy::needless_range_loop)]
@@ -13,7 +14,7 @@ use crate::simd::{Vector, in_vectors};
 /// Volume of a corner, over that at rest, below which the logarithm is a parabola.
 const OPEN: f32 = 0.1;
 
-/// For corners 0 to 7, each with code of its own: which links it has is known when that is compiled.
+/// Expands code for each of corners 0 to 7: which links a corner has is known when that is compiled.
 macro_rules! each_corner {
     ($corner:ident $body:block) => {
         each_corner!(@ $corner $body 0 1 2 3 4 5 6 7)
@@ -30,7 +31,7 @@ macro_rules! each_corner {
 /// Three numbers for each node.
 pub(super) type Nodes = [Vec<f32>; 3];
 
-/// What cells are made of, by their lowest node.
+/// Material of cells, by their lowest node.
 #[derive(Clone, Debug)]
 pub(super) struct Cells {
     /// Shear moduli of corners; 0 where three links do not meet.
@@ -39,8 +40,8 @@ pub(super) struct Cells {
     pub lambda: Vec<f32>,
 }
 
-/// Forces on nodes, in two parts while they are added up: what a row of cells does to the nodes behind it along x lies in
-/// memory where the cells do. A vector that is read across two that were just written waits for both.
+/// Forces on nodes, in two parts while they are added up: what a row of cells does to the nodes behind it along x lies
+/// in memory where the cells do. A vector that is read across two that were just written waits for both.
 #[derive(Clone, Debug)]
 pub(super) struct Sides {
     /// All of it, once it is added up.
@@ -114,7 +115,7 @@ fn neo_hookean<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut 
 }
 
 in_vectors! {
-/// The same of the linear energy that it has near rest.
+/// Computes the linear energy that it has near rest, likewise.
 fn linear<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut Sides) {
     out.clear();
     for at in grid.rows_of_cells() {
@@ -143,7 +144,7 @@ fn linear<V: Vector<f32>>(grid: &Grid, cells: &Cells, u: &Nodes, out: &mut Sides
 }
 }
 
-/// Of the logarithm.
+/// Returns the slope of the logarithm.
 #[inline(always)]
 fn slope<V: Vector<f32>>(j: V) -> V {
     let mut lanes = [0.0; ROW];
@@ -163,7 +164,7 @@ fn load<V: Vector<f32>>(of: &[f32], at: usize) -> V {
 /// A link along an axis: by where it lies along the two others.
 type Links<V> = [[[V; 3]; 4]; 3];
 
-/// Which of an axis' links a corner has.
+/// Returns which of an axis' links a corner has.
 #[inline(always)]
 fn beside(axis: usize, corner: usize) -> usize {
     let bit = |a: usize| corner >> a & 1;
@@ -174,7 +175,7 @@ fn beside(axis: usize, corner: usize) -> usize {
     }
 }
 
-/// Lowest node of such a link.
+/// Returns the lowest node of such a link.
 #[inline(always)]
 fn lowest(axis: usize, beside: usize) -> usize {
     let (low, high) = (beside & 1, beside >> 1);
@@ -203,7 +204,7 @@ fn links<V: Vector<f32>>(grid: &Grid, u: &Nodes, at: usize) -> Links<V> {
     links
 }
 
-/// Columns along x, y, z.
+/// Returns the columns along x, y, z.
 #[inline(always)]
 fn at_corner<V: Vector<f32>>(links: &Links<V>, corner: usize) -> [[V; 3]; 3] {
     [
@@ -227,7 +228,7 @@ fn dot<V: Vector<f32>>(a: [V; 3], b: [V; 3]) -> V {
     a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2]))
 }
 
-/// From links to nodes.
+/// Spreads forces from links to nodes.
 #[inline(always)]
 fn spread<V: Vector<f32>>(grid: &Grid, forces: &Links<V>, out: &mut Sides, at: usize) {
     for c in 0..3 {

@@ -1,9 +1,9 @@
-//! Where the nodes of a window are in memory.
+//! Layout of a window's nodes in memory.
 
 /// Numbers of a row that are worked on at once.
 pub(super) const ROW: usize = 8;
 
-/// As many nodes along each edge; rows along x are padded to whole [`ROW`]s.
+/// Grid with as many nodes along each edge; rows along x are padded to whole [`ROW`]s.
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
     pub side: usize,
@@ -18,7 +18,7 @@ impl Grid {
         }
     }
 
-    /// Numbers of one component, with what the last cells read past the end.
+    /// Returns how many numbers a component has, with those that the last cells read past the end.
     pub fn len(&self) -> usize {
         self.stride * self.side * self.side + ROW
     }
@@ -27,12 +27,12 @@ impl Grid {
         i + self.stride * (j + self.side * k)
     }
 
-    /// From a cell's lowest node to its others.
+    /// Returns the step from a cell's lowest node to another.
     pub fn step(&self, corner: usize) -> usize {
         self.at([corner & 1, corner >> 1 & 1, corner >> 2])
     }
 
-    /// Lowest nodes of the first cells of rows.
+    /// Returns the lowest nodes of the first cells of rows.
     pub fn rows_of_cells(&self) -> impl Iterator<Item = usize> {
         let (n, stride) = (self.side, self.stride);
         let rows = (0..(n - 1) * (n - 1)).map(move |r| stride * (r % (n - 1) + n * (r / (n - 1))));

@@ -73,7 +73,7 @@ fn add_square(to: &mut Nodes, factor: f32, by: &Nodes) -> f32 {
 }
 
 vectorised! {
-/// What may move, less a load, and what that is along `with`.
+/// Keeps the free part, less a load; returns its product with `with`.
 fn less_load(of: &mut Nodes, free: &[f32], load: &Nodes, with: &Nodes) -> f32 {
     let mut sum = [0.0_f32; ROW];
     for ((of, load), with) in of.iter_mut().zip(load).zip(with) {
@@ -91,7 +91,7 @@ fn less_load(of: &mut Nodes, free: &[f32], load: &Nodes, with: &Nodes) -> f32 {
 }
 
 vectorised! {
-/// Largest of all numbers.
+/// Returns the largest of all numbers.
 fn farthest(of: &Nodes) -> f32 {
     let mut most = [f32::MIN_POSITIVE; ROW];
     for of in of {

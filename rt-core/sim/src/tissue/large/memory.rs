@@ -1,4 +1,4 @@
-//! What a window leaves to the next tick, as bytes.
+//! State that a window leaves to the next tick, as bytes.
 
 use super::LargeStrain;
 use crate::tissue::parts;
@@ -12,7 +12,7 @@ impl LargeStrain {
         [bytes_of(&self.around), part, farthest, x, y, z, a, b, c]
     }
 
-    /// Bytes of [`Self::save`].
+    /// Returns the size of [`Self::save`], in bytes.
     pub fn memory_len(&self) -> usize {
         parts::len(&self.memory())
     }
@@ -22,7 +22,7 @@ impl LargeStrain {
         parts::save(&self.memory(), to);
     }
 
-    /// Takes up what another window of the same body saved; nothing where `from` has another length.
+    /// Loads what another window of the same body saved; nothing where `from` has another length.
     pub fn load(&mut self, from: &[u8]) {
         let [x, y, z] = self.off.each_mut().map(|axis| cast_slice_mut(axis));
         let [a, b, c] = self.moved.each_mut().map(|axis| cast_slice_mut(axis));

@@ -1,9 +1,10 @@
 //! Large strain near the tip: neo-Hookean tissue between element centres, in a window that the linear answer surrounds.
 //!
-//! A linear answer folds cells beside a tip that has moved by some of them. In a window of [`SIDE`] centres the loads are those that the
-//! linear answer stands for, the rim is where it has it, and so is the place of the loads: what it does not know is how the tissue
-//! between them gives way. Where strain is small this is the linear answer again. The solver goes on from the window of the tick
-//! before, a fixed number of evaluations a tick (`docs/adr/0020-large-strain-near-the-tip.md`).
+//! A linear answer folds cells next to a tip that has moved by some of them. In a window of [`SIDE`] centres the loads
+//! are those that the linear answer stands for, the rim is where it has it, and so is the place of the loads: what it
+//! does not know is how the tissue between them gives way. Where strain is small this is the linear answer again. The
+//! solver starts from the window of the tick before, a fixed number of evaluations a tick
+//! (`docs/adr/0020-large-strain-near-the-tip.md`).
 
 mod energy;
 mod grid;
@@ -23,9 +24,11 @@ const SIDE: usize = 13;
 const EVALUATIONS: usize = 12;
 /// The same in a tick whose window is folded even so.
 const MOST_EVALUATIONS: usize = 24;
-/// Lambda over mu at most: that of a Poisson ratio of 0.45. What is nearer to incompressible takes more evaluations than a tick has.
+/// Lambda over mu at most: that of a Poisson ratio of 0.45. What is nearer to incompressible takes more evaluations
+/// than a tick has.
 const FIRMEST: f32 = 9.0;
-/// Smallest volume of a corner of the linear answer at which the window begins to count, and at which it counts in full.
+/// Smallest volume of a corner of the linear answer at which the window begins to count, and at which it counts in
+/// full.
 const BEGINS: f64 = 0.6;
 const IN_FULL: f64 = 0.3;
 /// No window.
@@ -39,11 +42,11 @@ pub struct LargeStrain {
     moduli: Vec<f32>,
     /// Element in the middle of the window of the tick before.
     around: u32,
-    /// How far centres were from where the linear answer had them, in elements.
+    /// Distance of centres from where the linear answer had them, in elements.
     off: Nodes,
     /// The same less what displaced them besides the linear answer.
     moved: Nodes,
-    /// How much of that counts, from 0 to 1.
+    /// Share of that which counts, from 0 to 1.
     part: f32,
     /// No centre is farther off along an axis.
     farthest: f32,
@@ -52,7 +55,7 @@ pub struct LargeStrain {
 }
 
 impl LargeStrain {
-    /// For the body of a scene.
+    /// Makes a window for the body of a scene.
     pub fn new(scene: &Scene) -> Self {
         let materials = scene.structures.iter().map(|s| &s.material);
         let shear = materials.map(|m| if m.fixed { 0.0 } else { m.young_pa / (1.0 + m.poisson) });
@@ -71,7 +74,7 @@ impl LargeStrain {
         }
     }
 
-    /// The next window begins at the linear answer.
+    /// Forgets the window: the next begins at the linear answer.
     pub fn forget(&mut self) {
         if self.around != NOWHERE {
             (self.around, self.part) = (NOWHERE, 0.0);
@@ -79,19 +82,19 @@ impl LargeStrain {
         }
     }
 
-    /// Nothing is moved until the next call of [`Self::unfold`], which goes on from here all the same.
+    /// Moves nothing until the next call of [`Self::unfold`], which continues from here all the same.
     pub fn hide(&mut self) {
         self.part = 0.0;
     }
 
-    /// Something is moved.
+    /// Returns whether it moves something.
     pub fn is_shown(&self) -> bool {
         self.part > 0.0
     }
 
-    /// Looks for where the centres around `element` are to be, if the smallest volume of a corner there is too small. `linear` displaces
-    /// elements by the linear answer, `besides` by what a model does on top of it: the rim keeps both. In elements. Whether any is moved.
-    /// Does not allocate.
+    /// Looks for where the centres around `element` are to be, if the smallest volume of a corner there is too small.
+    /// `linear` displaces elements by the linear answer, `besides` by what a model does on top of it: the rim keeps
+    /// both. In elements. Whether any is moved. Does not allocate.
     pub fn unfold(
         &mut self,
         lattice: &Lattice,
@@ -109,14 +112,14 @@ impl LargeStrain {
         self.is_shown()
     }
 
-    /// Elements of the window and how far each is moved from where both have it, in elements.
+    /// Returns the elements of the window and how far each is moved from where both have it, in elements.
     pub fn moved(&self) -> impl Iterator<Item = (u32, [f32; 3])> {
         let nodes = self.elements.iter().enumerate();
         let is_moved = nodes.filter(|(_, element)| **element != NOWHERE && self.is_shown());
         is_moved.map(|(n, &element)| (element, self.at_node(n)))
     }
 
-    /// How far an element is moved from where both have it, in elements.
+    /// Returns the displacement of an element from where both have it, in elements.
     pub fn at(&self, lattice: &Lattice, element: u32) -> [f32; 3] {
         if !self.is_shown() {
             return [0.0; 3];
@@ -129,7 +132,7 @@ impl LargeStrain {
         }
     }
 
-    /// No element is moved farther along an axis, in elements.
+    /// Returns a bound of the motion along an axis, in elements.
     pub fn farthest(&self) -> f32 {
         self.part * self.farthest
     }
@@ -181,7 +184,7 @@ impl LargeStrain {
         self.part = ((BEGINS - least_corner) / (BEGINS - IN_FULL)).clamp(0.0, 1.0) as f32;
     }
 
-    /// The window goes along with the tip: what is known of a centre stays with it.
+    /// Moves the window along with the tip: what is known of a centre stays with it.
     fn follow(&mut self, lattice: &Lattice, element: u32) {
         if self.around != NOWHERE && self.around != element {
             let (from, to) = (lattice.cell(self.around), lattice.cell(element));

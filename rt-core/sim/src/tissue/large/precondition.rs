@@ -12,11 +12,11 @@ const HALF: usize = INNER / 2;
 /// Sines along an axis, in which the Laplacian is a number for each.
 #[derive(Clone, Debug)]
 pub(super) struct Laplacian {
-    /// Of each sine at the inner nodes up to the middle: beyond it they are those, or their negatives.
+    /// Halves of each sine at the inner nodes up to the middle: beyond it they are those, or their negatives.
     halves: [[f32; HALF + 1]; INNER],
-    /// By node and sine, in rows as long as those of the grid.
+    /// Sines by node and number, in rows as long as those of the grid.
     sines: Vec<f32>,
-    /// By node.
+    /// Inverse by node.
     inverse: Vec<f32>,
 }
 
@@ -43,7 +43,7 @@ impl Laplacian {
         }
     }
 
-    /// In place; the rim keeps what it has.
+    /// Applies it in place; the rim keeps its values.
     pub fn apply(&self, simd: Simd, grid: &Grid, of: &mut Nodes) {
         for axis in of {
             along_x(simd, grid, &self.sines, axis);
@@ -116,7 +116,7 @@ fn put<V: Vector<f32>>(values: &mut [f32], at: usize, step: usize, line: &[V; IN
     }
 }
 
-/// Sines are symmetric about the middle or the opposite, by turns: what both sides have together or apart is looked at once.
+/// Sines alternate between symmetric and antisymmetric about the middle, so sums and differences of both sides suffice.
 #[inline(always)]
 fn in_sines<V: Vector<f32>>(line: &[V; INNER], halves: &[[f32; HALF + 1]; INNER]) -> [V; INNER] {
     let (mut together, mut apart) = ([line[HALF]; HALF + 1], [line[HALF]; HALF]);

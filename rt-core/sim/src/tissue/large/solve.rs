@@ -10,7 +10,8 @@ use crate::simd::Simd;
 const KEPT: usize = 5;
 /// No centre moves farther in a step, in elements.
 const FARTHEST: f32 = 0.3;
-/// A step is too long if it ends on a slope up that is that part of the one down, or if the gradient's square has grown so.
+/// A step is too long if it ends on a slope up that is that part of the one down, or if the gradient's square has grown
+/// so.
 const OVERSHOT: f32 = 0.7;
 const GREW: f32 = 4.0;
 /// A window rests where the gradient is that part of the load: it is within about a thousandth of an element then.
@@ -32,12 +33,12 @@ pub(super) struct Solver {
     pub free: Vec<f32>,
     laplacian: Laplacian,
     simd: Simd,
-    /// Where the linear answer has the nodes, what displaces them besides, and where they are; in elements.
+    /// Place of the nodes by the linear answer, what displaces them besides, and their place now; in elements.
     pub linear: Nodes,
     pub besides: Nodes,
     pub now: Nodes,
     load: Nodes,
-    /// Of the load.
+    /// Norm of the load.
     length: f32,
     /// The load over its length.
     along: Nodes,
@@ -47,12 +48,12 @@ pub(super) struct Solver {
     pairs: Vec<Pair>,
     alphas: [f32; KEPT],
     used: usize,
-    /// Down the direction, how much of it was taken, and whether it is still to be shortened.
+    /// Slope down the direction, how much of it was taken, and whether it is still to be shortened.
     slope: f32,
     part: f32,
     is_trial: bool,
     best: Nodes,
-    /// What the Laplacian answers to `along`, and its share of it.
+    /// Answer of the Laplacian to `along`, and its share of it.
     answer: Nodes,
     share: f32,
 }
@@ -134,7 +135,7 @@ impl Solver {
         add(self.simd, &mut self.now, short / self.share, &self.answer);
     }
 
-    /// Forces less the loads, and less what holds the place of the load; returns their square.
+    /// Computes the forces less the loads, and less the force that holds the place of the load; returns their square.
     fn evaluate(&mut self) -> f32 {
         neo_hookean(self.simd, &self.grid, &self.cells, &self.now, &mut self.gradient);
         let gradient = &mut self.gradient.sum;
@@ -142,8 +143,8 @@ impl Solver {
         add_square(self.simd, gradient, -along / self.share, &self.along)
     }
 
-    /// Evaluations of the gradient: as many as it takes until the window rests, at most `evaluations`, and where it is folded then at
-    /// most `most`. Ends where the gradient was smallest.
+    /// Evaluations of the gradient: as many as it takes until the window rests, at most `evaluations`, and where it is
+    /// folded then at most `most`. Ends where the gradient was smallest.
     pub fn minimise(&mut self, [evaluations, most]: [usize; 2], is_folded: impl Fn(&Grid, &Nodes) -> bool) {
         let mut smallest = self.evaluate();
         keep(&self.now, &mut self.best);
@@ -178,7 +179,7 @@ impl Solver {
         keep(&self.best, &mut self.now);
     }
 
-    /// A step down from where the gradient was taken; false where there is none.
+    /// Steps down from where the gradient was taken; returns false where no step goes down.
     fn set_out(&mut self) -> bool {
         self.aim();
         self.slope = dot(self.simd, &self.direction, &self.gradient.sum);
@@ -211,7 +212,7 @@ impl Solver {
         }
     }
 
-    /// Down, by what the last steps have shown.
+    /// Aims down, by what the last steps have shown.
     fn aim(&mut self) {
         for (direction, gradient) in self.direction.iter_mut().zip(&self.gradient.sum) {
             for (direction, gradient) in direction.iter_mut().zip(gradient) {

@@ -64,7 +64,7 @@ impl Pushed {
         least_corner(&body, self.element)
     }
 
-    /// By the window, as a tick does it.
+    /// Corrects by the window, as a tick does it.
     fn corrected(&self, large: &mut LargeStrain, by_mm: f32) -> [Vec<f32>; 3] {
         let mut u = self.linear(by_mm);
         let least = self.least(&u);
@@ -190,7 +190,7 @@ fn a_window_that_moves_on_carries_its_answer_along() {
     assert!(jump < 0.25, "{jump}");
 }
 
-/// The hand rests: the window goes on in every tick until it rests as well.
+/// The hand rests: the window keeps solving in every tick until it rests as well.
 #[test]
 fn a_window_under_the_same_loads_goes_on_until_it_rests() {
     let pushed = Pushed::new(12);

@@ -11,7 +11,7 @@ fn model_of(scene: &Scene) -> ChainMail {
     ChainMail::new(scene, limits)
 }
 
-/// The paper's body with an element in its middle pushed aside by up to eight elements.
+/// Returns the paper's body with an element in its middle pushed aside by up to eight elements.
 fn deformed() -> (Scene, ChainMail, TissueState) {
     let scene = Scene::builtin("paper").expect("built in");
     let model = model_of(&scene);

@@ -21,7 +21,7 @@ const CREEP: [PronyTerm; 2] = [
     },
 ];
 
-/// Shaft friction alone, so that what a station feels is known in closed form.
+/// Returns parameters with shaft friction alone, so that the force of a station is known in closed form.
 fn parameters(creep: [PronyTerm; 2]) -> ChainParameters {
     ChainParameters {
         needle: NeedleParameters::default(),
@@ -34,7 +34,7 @@ fn parameters(creep: [PronyTerm; 2]) -> ChainParameters {
     }
 }
 
-/// Friction and wrench along the line in each tick: in to [`DEPTH_M`], then at rest for 10 s.
+/// Inserts to [`DEPTH_M`], then rests for 10 s; returns friction and wrench along the line in each tick.
 fn insert_and_hold(creep: [PronyTerm; 2]) -> Vec<[f64; 2]> {
     let info = DeviceInfo::phantom_premium_1_5();
     let parameters = parameters(creep);
@@ -58,8 +58,9 @@ fn insert_and_hold(creep: [PronyTerm; 2]) -> Vec<[f64; 2]> {
     ticks.split_off(way as usize)
 }
 
-/// Force of one station that has slipped for `slipped_s` under a newton and then stays where it is, after `held_s`: the two
-/// equations `T_i q_i' = f - q_i`, `f + sum J_i q_i` constant, by fourth-order Runge-Kutta in small steps.
+/// Returns the force of one station that has slipped for `slipped_s` under a newton and then stays where it is, after
+/// `held_s`: the two equations `T_i q_i' = f - q_i`, `f + sum J_i q_i` constant, by fourth-order Runge-Kutta in small
+/// steps.
 fn relaxed(slipped_s: f64, held_s: f64) -> f64 {
     let mut q = CREEP.map(|t| 1.0 - (-slipped_s / t.time_s).exp());
     let moved = |q: &[f64; 2]| CREEP.iter().zip(q).map(|(t, q)| t.strength * q).sum::<f64>();

@@ -35,7 +35,7 @@ const FAULTS: [ForceFault; 6] = [
     ForceFault::Stopped,
 ];
 
-/// SplitMix64 (Steele, Lea, Flood 2014): every seed gives a sequence of its own.
+/// SplitMix64 (Steele, Lea, Flood 2014): every seed gives another sequence.
 struct Bits(u64);
 
 impl Bits {
@@ -67,7 +67,7 @@ impl Bits {
         }
     }
 
-    /// Mostly of a size that the gate is built for, so that sequences get past the first tick.
+    /// Draws a number mostly of a size that the gate is built for, so that sequences get past the first tick.
     fn near(&mut self, size: f64) -> f64 {
         match self.one_in(64) {
             true => self.any(),
@@ -128,7 +128,7 @@ impl Bits {
     }
 }
 
-/// One sequence; an error names the tick and the claim that does not hold.
+/// Runs one sequence; an error names the tick and the claim that does not hold.
 fn sequence(seed: u64) -> Result<(), String> {
     let bits = &mut Bits(seed);
     let parameters = bits.parameters();

@@ -4,7 +4,7 @@ use super::{Each, MOST, MOST_PRODUCTS, Scratch, WITHIN};
 use crate::line::rows::Rows;
 use crate::simd::{LANES, Vector};
 
-/// The stations whose number is not zero.
+/// Lists the stations whose number is not zero.
 #[inline(always)]
 pub(super) fn places<const B: usize>(numbers: &Each<B>, count: usize, places: &mut [u16; MOST]) -> usize {
     let mut at = 0;
@@ -15,7 +15,7 @@ pub(super) fn places<const B: usize>(numbers: &Each<B>, count: usize, places: &m
     at
 }
 
-/// Conjugate gradients for the forces with which those that stick do not move.
+/// Finds, by conjugate gradients, the forces with which the sticking stations do not move.
 #[inline(always)]
 pub(super) fn hold<V: Vector<f64>, const B: usize>(rows: &Rows, inverse: Option<&Rows>, scratch: &mut Scratch<B>) {
     let blocks = scratch.blocks();
@@ -81,8 +81,8 @@ pub(super) fn hold<V: Vector<f64>, const B: usize>(rows: &Rows, inverse: Option<
     }
 }
 
-/// About the forces that take away what is left: by the inverse of a compliance in which more stations may stick, and beyond it as if each
-/// station stood alone. Without one, what is left itself.
+/// Approximates the forces that take away the residual: by the inverse of a compliance in which more stations may
+/// stick, and beyond it as if each station stood alone. Without an inverse it returns the residual itself.
 #[inline(always)]
 fn near<V: Vector<f64>, const B: usize>(inverse: Option<&Rows>, places: &[u16], scratch: &mut Scratch<B>) {
     let blocks = scratch.blocks();
@@ -109,7 +109,8 @@ fn near<V: Vector<f64>, const B: usize>(inverse: Option<&Rows>, places: &[u16], 
     }
 }
 
-/// Sum of what is left times the forces near it, with the tip's share; the square of what is left where they are the same.
+/// Returns the product of the residual with the forces near it, and the tip's share; the square of the residual where
+/// they are the same.
 #[inline(always)]
 fn product_left<V: Vector<f64>, const B: usize>(
     inverse: Option<&Rows>,
@@ -127,14 +128,14 @@ fn product_left<V: Vector<f64>, const B: usize>(
     total(sum) + of_tip
 }
 
-/// Which forces [`answer`] is asked for.
+/// Forces that [`answer`] is asked for.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum ForceSet {
     Changes,
     Along,
 }
 
-/// Displacement `moved_m` for forces of some stations, by number, and of the tip; returns that of the tip.
+/// Computes the displacement `moved_m` for forces of some stations, by number, and of the tip; returns that of the tip.
 #[inline(always)]
 pub(super) fn answer<V: Vector<f64>, const B: usize>(
     rows: &Rows,
@@ -187,7 +188,7 @@ fn take<V: Vector<f64>, const B: usize>(
     }
 }
 
-/// Sum of the rows of some stations times their numbers, in the first so many blocks.
+/// Computes the sum of the rows of some stations times their numbers, in the first so many blocks.
 #[inline(always)]
 pub(super) fn product<V: Vector<f64>, const B: usize>(
     rows: &Rows,

@@ -4,7 +4,7 @@ use super::bits::exact;
 use super::creep::{creeping, stored_j};
 use super::*;
 
-/// Displacement of the material at `place_m` after the last tick.
+/// Returns the displacement of the material at `place_m` after the last tick.
 fn field_m(model: &LineModel, state: &LineState, place_m: f64) -> f64 {
     let mut weights = [0.0; 64];
     let (m, whole_m) = (
@@ -16,8 +16,8 @@ fn field_m(model: &LineModel, state: &LineState, place_m: f64) -> f64 {
     moved_m.sum::<f64>() + whole_m
 }
 
-/// What a tick gives the hand beyond what was stored is at most what folded tissue pays: the tip that cuts goes backwards in the world where
-/// the tissue before it is folded. `f (s_k - s_k-1) >= E_k - E_k-1 + F (way of the tip through the tissue as it was)`.
+/// In a tick the hand gains at most what folded tissue pays: the tip that cuts goes backwards in the world where the
+/// tissue before it is folded. `f (s_k - s_k-1) >= E_k - E_k-1 + F (way of the tip through the tissue as it was)`.
 #[test]
 fn no_tick_gains_more_than_the_way_through_folded_tissue() {
     for settings in [LineSettings::default(), creeping()] {

@@ -81,7 +81,7 @@ fn force_relaxes_at_rest_only_where_it_is_asked_for() {
         ..LineSettings::default()
     };
     for (settings, relaxes) in [(LineSettings::default(), false), (settings, true)] {
-        // A membrane with a depth is a spring of its own, which does not relax.
+        // A membrane with a depth is a separate spring, which does not relax.
         let gland = LineLayer {
             puncture_depth_m: f64::INFINITY,
             ..GLAND

@@ -1,11 +1,12 @@
-//! What is off changes no bit of what a line gives.
+//! Features that are off change no bit of a line's output.
 
 use super::*;
 
-/// Made with the forces by sets and the surface that a tip meets where it is by then, and stations that a membrane relieves; a change of the contact itself makes it anew.
+/// Digest made with the forces by sets, the surface where it is by then, and stations that a membrane relieves; a
+/// change of the contact itself changes it.
 const BITS: u64 = 0xe544_b025_46c7_3867;
 
-/// The same as [`made_up`] without functions that round otherwise on another machine.
+/// Returns the same as [`made_up`] without functions that round otherwise on another machine.
 pub fn exact(settings: LineSettings) -> LineModel {
     let (stations, spacing_m) = (30, 1.364e-3);
     let entry = |i: usize, j: usize| {
@@ -64,7 +65,7 @@ fn rate_terms_that_are_off_leave_every_bit_as_it_was() {
     assert_eq!(hash, BITS, "{hash:#x}");
 }
 
-/// A scratch was made anew in each tick, of 17 KB of zeros. What another line has left in one is never read.
+/// Each tick used to make a scratch of 17 KB of zeros. What another line has left in one is never read.
 #[test]
 fn a_scratch_that_another_line_has_used_changes_no_bit() {
     let settings = LineSettings::default();

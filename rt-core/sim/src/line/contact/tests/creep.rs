@@ -21,7 +21,7 @@ pub fn creeping() -> LineSettings {
     }
 }
 
-/// Of the tissue under its own loads and that of the membrane's spring, of that spring, and of the chain.
+/// Returns the energy of the tissue under its own loads and the membrane's spring, of that spring, and of the chain.
 pub fn stored_j(state: &LineState, model: &LineModel) -> f64 {
     let (m, rows, common) = (
         model.compliance.stations,
@@ -72,8 +72,8 @@ fn random_cycles_in_creeping_tissue_make_no_energy() {
     assert!(worst_j < 1e-6, "{worst_j}");
 }
 
-/// A stiff membrane passes load on to the body as a whole, which creeps as well. A tip that met a surface that had crept was held there
-/// with the dent of a surface at rest, and the cycles made 99 uJ.
+/// A stiff membrane passes load on to the body as a whole, which creeps as well. A tip that met a surface that had
+/// crept was held there with the dent of a surface at rest, and the cycles made 99 uJ.
 #[test]
 fn stiff_membranes_in_tissue_that_creeps_make_no_energy() {
     for settings in [LineSettings::default(), creeping()] {

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A gland that also moves as a whole, which a membrane passes its load on to.
+/// Returns a gland that also moves as a whole, which a membrane passes its load on to.
 fn on_foundation(layers: &[LineLayer]) -> LineModel {
     let mut model = made_up(30, 1.364e-3, layers, LineSettings::default());
     model.compliance.whole_m_per_n = 1.0 / 1434.0;
@@ -83,8 +83,9 @@ fn a_membrane_met_in_the_middle_of_a_cut_is_relaxed_there() {
     assert!((2e-3..7e-3).contains(&(opened_m - met_m)) && held_n > inner.puncture_force_n);
 }
 
-/// A tip that stopped within a nanometre before the surface was held by the membrane there and laid no load on it: it went through the
-/// body without a force. Encoders bring a needle there where the plan's entry lies on one of their steps.
+/// A tip that stopped within a nanometre before the surface was held by the membrane there and laid no load on it: it
+/// went through the body without a force. Encoders bring a needle there where the plan's entry lies on one of their
+/// steps.
 #[test]
 fn a_tip_just_before_the_surface_is_held_as_at_it() {
     let model = on_foundation(&[GLAND]);

@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// Behind its membrane, in a body that does not move whole; with one that is about to be met on the way as well.
+/// Returns a needle behind its membrane, in a body that does not move whole; with a second membrane on the way that is
+/// about to be met.
 fn needle_in(settings: LineSettings) -> (LineModel, LineState) {
     let inner = LineLayer { from_m: 8e-3, ..GLAND };
     let model = made_up(30, 1.364e-3, &[GLAND, inner], settings);
@@ -11,7 +12,7 @@ fn needle_in(settings: LineSettings) -> (LineModel, LineState) {
     (model, state)
 }
 
-/// All of the line is moved so far within so many ticks, the hand at rest.
+/// Moves all of the line so far within so many ticks, the hand at rest.
 fn moved(model: &LineModel, state: &mut LineState, tip_m: f64, by_m: f64, ticks: u32) -> LineOutput {
     state.outside.set(&vec![by_m; 2 * model.compliance.stations], ticks);
     let mut output = step(model, state, &at(tip_m));
@@ -66,7 +67,7 @@ fn a_membrane_is_not_stretched_by_what_moves_all_of_the_tissue() {
         );
         assert!(n < 399 || a.held_by == Some(1), "{a:?}");
     }
-    // Pushed on against it, then the tissue goes on under both.
+    // Pushed on against it, then the tissue moves on under both.
     let before = shifted.last;
     let after = moved(&model, &mut shifted, 13.5e-3 + 399e-5 + 0.2e-3, by_m + 0.2e-3, 1);
     assert!(

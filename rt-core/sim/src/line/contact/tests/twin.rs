@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// Each tick is done twice from the same state: as it is done, and by sweeps alone, to a ten-thousandth of the tolerance.
+/// Each tick is solved twice from the same state: as in the loop, and by sweeps alone, to a ten-thousandth of the
+/// tolerance.
 #[test]
 fn sets_give_what_sweeps_give_in_every_tick_of_a_random_hand() {
     let deep = LineLayer {

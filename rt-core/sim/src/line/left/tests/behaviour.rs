@@ -1,9 +1,9 @@
-//! What no needle may do, and how many there may be.
+//! Claims that hold for every needle, and the limit on their number.
 
 use super::*;
 use stylet_heap as heap;
 
-/// Random numbers from 0 to 1.
+/// Draws a number from 0 to 1.
 fn random(seed: &mut u64) -> f64 {
     *seed ^= *seed << 13;
     *seed ^= *seed >> 7;
@@ -15,8 +15,8 @@ fn stored_j(line: &HandLine, left: &LeftNeedles) -> f64 {
     line.elastic_j() + left.elastic_j()
 }
 
-/// The hand's work in each tick, by the force after it, is at least what is stored more: from an energy `E` on, no motion gets more than
-/// `E` out. Tissue is new after each round, for the membranes' sake.
+/// The hand's work in each tick, by the force after it, is at least what is stored more: from an energy `E` on, no
+/// motion gets more than `E` out. Tissue is new after each round, for the membranes' sake.
 #[test]
 fn no_cycle_beside_a_left_needle_gains_energy() {
     let mut seed = 0x9e37_79b9_7f4a_7c15;
@@ -78,13 +78,13 @@ fn a_drawn_needle_leaves_tissue_at_rest_and_its_track() {
     assert!(left.beside(Some(&second)));
     let alone_n = second.step(20e-3, DT_S).force_on_hand_n;
     assert!((alone_n - beside_n).abs() > 1e-3, "the drawn needle was felt");
-    // Once it is out, the other goes on as one that was never beside any.
+    // Once it is out, the other continues as one that was never beside any.
     let deeper_n = go(&mut second, None, 20e-3, 26e-3, 1e-4);
     let twin_n = go(&mut line(3, [6e-3, 0.0, 0.0], &[], WHOLE), None, -1e-3, 26e-3, 1e-4);
     assert!((deeper_n - twin_n).abs() < 0.02 * twin_n.abs(), "{deeper_n} {twin_n}");
 }
 
-/// A later needle within the radius of a track meets it, on a line of its own.
+/// A later needle within the radius of a track meets it, on another line.
 #[test]
 fn a_track_is_met_within_the_radius_of_a_needle() {
     let mut first = line(1, [0.0; 3], &[], WHOLE);
@@ -141,7 +141,7 @@ fn as_many_as_there_is_room_for_move_together_without_the_heap() {
     record.copy_from(&left);
     let calls = heap::calls_of_this_thread() - before;
     assert_eq!(calls, 0);
-    // From its record it goes on with the same bits.
+    // From its record it continues with the same bits.
     let mut again = LeftNeedles::with_room();
     let named: Vec<u64> = record.line_numbers().collect();
     assert_eq!(named, [1, 2, 3, 4][..MAX_LEFT]);
@@ -166,8 +166,8 @@ fn as_many_as_there_is_room_for_move_together_without_the_heap() {
     assert_eq!(given_up, MAX_LEFT);
 }
 
-/// Time of a tick by how many needles are left, stations as in the paper's gland; the least of some rounds, each tick by itself:
-/// `cargo test --release -p stylet-sim --lib times_beside -- --ignored --nocapture`.
+/// Time of a tick by how many needles are left, stations as in the paper's gland; the least of some rounds, each tick
+/// by itself: `cargo test --release -p stylet-sim --lib times_beside -- --ignored --nocapture`.
 #[test]
 #[ignore = "times"]
 fn times_beside() {

@@ -5,7 +5,8 @@ use crate::line::cross::{Cross, LineStations};
 use crate::line::{Line, Stations};
 use std::sync::Arc;
 
-/// By reciprocity the columns of one line, read at the other, are those of the other, read at the one: as nearly as they are solved.
+/// By reciprocity the columns of one line, read at the other, are those of the other, read at the one: as nearly as
+/// they are solved.
 #[test]
 fn either_line_of_a_pair_may_be_the_one_that_is_solved_for() {
     let (model, first) = paper(1.0);

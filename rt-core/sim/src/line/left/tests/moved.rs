@@ -2,12 +2,12 @@
 
 use super::*;
 
-/// All rows of a line, displaced alike.
+/// Displaces all rows of a line alike.
 fn alike(by_m: f64) -> Vec<f64> {
     vec![by_m; 2 * STATIONS]
 }
 
-/// One that is left at 24.6 mm, drawn back a little before, so that some of it sticks.
+/// Leaves a needle at 24.6 mm, drawn back a little before, so that some of it sticks.
 fn left_alone() -> Box<LeftNeedles> {
     let mut needle = line(1, [0.0; 3], &[], WHOLE);
     // What is compared are ways to one place, each solved to a tolerance.
@@ -45,8 +45,8 @@ fn moving_tissue_acts_on_a_left_needle_like_drawing_it() {
     assert!(off_n < 1e-3 * changed_n, "{off_n} of {changed_n}");
 }
 
-/// Stations and tip of one needle, each moved by another way within one tick, beside the dense problem: what sticks is where it was in the
-/// tissue, and what slips does so against its limit.
+/// Stations and tip of one needle, each moved by another way within one tick, beside the dense problem: what sticks is
+/// where it was in the tissue, and what slips does so against its limit.
 #[test]
 fn moving_tissue_gives_the_forces_of_the_dense_problem() {
     let mut mixed = 0;

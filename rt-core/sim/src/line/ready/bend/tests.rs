@@ -11,7 +11,7 @@ const EI: f64 = 0.016;
 /// A hundredth of the gland's.
 const CUT_N: f64 = 0.015;
 
-/// Along z in a uniform medium of springs, with stations across as in the loops.
+/// Makes a line along z in a uniform medium of springs, with stations across as in the loops.
 fn uniform(settings: &NeedleBending) -> (HandLine, LayerForces) {
     let line = Line::new([0.0; 3], [0.0, 0.0, 1.0]).expect("a direction");
     let straight = HandLine::uniform(1, line, STATIONS).expect("valid");
@@ -43,7 +43,7 @@ fn tool(turned_rad: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Unit::new_unchecked(Vector3::z()), turned_rad)
 }
 
-/// Straight in, so deep.
+/// Inserts the needle straight to a depth.
 fn insert(line: &mut HandLine, depth_m: f64) -> LineOutput {
     let mut last = line.step(0.0, 1e-3);
     for n in 0..=(depth_m / 1e-4).round() as u32 {
@@ -54,7 +54,8 @@ fn insert(line: &mut HandLine, depth_m: f64) -> LineOutput {
     last
 }
 
-/// Hetenyi: `2 P beta / k` at the end of a long beam on springs. P is the bevel's part of the cutting force, by the roll of the hand.
+/// Hetenyi: `2 P beta / k` at the end of a long beam on springs. P is the bevel's part of the cutting force, by the
+/// roll of the hand.
 #[test]
 fn a_bevel_bends_the_needle_as_a_beam_on_springs() {
     let (mut line, mut forces) = uniform(&WITHOUT_BEVEL);

@@ -30,7 +30,7 @@ pub(super) fn lanes(l: &Scaled) -> Lanes {
     }
 }
 
-/// The first `n` of eight lanes, for n from 0 to 8.
+/// Returns the first `n` of eight lanes, for n from 0 to 8.
 #[target_feature(enable = "avx2")]
 #[inline]
 pub(super) fn first_lanes(n: usize) -> __m256i {

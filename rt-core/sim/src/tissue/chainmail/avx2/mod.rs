@@ -12,7 +12,7 @@ use super::kernels::{Kernels, Scaled, Stretch};
 use super::segments::{LEFT, RIGHT, Segment};
 use super::springs::{RowSprings, Shares};
 
-/// To be used only where the processor has AVX2 (`ChainMail::vectors`).
+/// Kernels for processors with AVX2 (`ChainMail::vectors`), and for no other.
 pub(crate) struct Avx2;
 
 impl Kernels for Avx2 {

@@ -1,4 +1,4 @@
-//! What the vector kernels do with stretches that are not inside the components.
+//! Vector kernels on stretches that are not inside the components.
 
 use super::*;
 use crate::limits::LinkLimits;

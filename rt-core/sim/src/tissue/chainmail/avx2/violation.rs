@@ -1,4 +1,4 @@
-//! How far links are outside their limits, and elements from rest.
+//! Violation of the limits of links, and distance of elements from rest.
 
 use std::arch::x86_64::*;
 

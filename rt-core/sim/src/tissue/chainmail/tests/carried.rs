@@ -11,7 +11,7 @@ fn tissue() -> (Scene, ChainMailTissue) {
     (scene, tissue)
 }
 
-/// What a newton does: the body goes along z, and is turned and sheared a little.
+/// Returns the displacement by a newton: the body goes along z, and is turned and sheared a little.
 fn per_newton([x, y, z]: [f64; 3]) -> [f64; 3] {
     [0.01 * y, 2.5e-4 - 0.01 * x + 0.01 * z, 1e-3 - 0.005 * y]
 }
@@ -55,8 +55,8 @@ fn a_carried_body_follows_its_field_and_its_held_element() {
     for (now, asked) in body.position_m(element).into_iter().zip(position_m) {
         assert!((now - asked).abs() < 1e-8, "{now} {asked}");
     }
-    // An element far from what is held moves with the field, half a coarse element at most from where that is known, and a point of the
-    // material is found where it is.
+    // An element far from what is held moves with the field, half a coarse element at most from where that is known,
+    // and a point of the material is found where it is.
     let far = 0;
     let moved_m = [0, 1, 2].map(|a| body.position_m(far)[a] - scene.lattice.rest_m(far)[a]);
     let mut wanted_m = per_newton(scene.lattice.rest_m(far)).map(|u| 2.0 * u);

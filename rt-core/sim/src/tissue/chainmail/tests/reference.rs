@@ -110,7 +110,7 @@ impl Reference {
         worst
     }
 
-    /// One half pass of relaxation, as `relax::half_pass`.
+    /// Makes one half pass of relaxation, as `relax::half_pass`.
     fn relax(&mut self, model: &ChainMail, held: u32, parity: usize) {
         let Some(relaxation) = model.limits().relaxation else {
             return;

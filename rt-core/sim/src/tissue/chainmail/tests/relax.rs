@@ -22,7 +22,7 @@ fn elastic() -> TissueParameters {
     }
 }
 
-/// One component at equilibrium with some elements held, by a dense solve over springs written out one by one.
+/// Returns one component at equilibrium with some elements held, by a dense solver over springs written out one by one.
 fn equilibrium(scene: &Scene, p: &TissueParameters, component: usize, held: impl Fn(u32) -> Option<f64>) -> Vec<f64> {
     let n = scene.lattice.element_count();
     let (mut a, mut b) = (
@@ -105,7 +105,7 @@ fn body_held_still_comes_to_the_equilibrium_of_its_springs() {
     }
 }
 
-/// Energy-like size of a body's displacement after passes with an unchecked weight, from a rough start.
+/// Returns the energy-like size of a body's displacement after passes with an unchecked weight, from a rough start.
 fn size_after(weight: f32, passes: u32) -> f32 {
     let mut model = model_of(&test_bodies::block([24, 12, 12]));
     let mut limits = elastic().validate().expect("valid");

@@ -12,7 +12,7 @@ fn positions(model: &ChainMail, state: &TissueState) -> Vec<[f64; 3]> {
     elements.map(|e| state.position_m(model, e)).collect()
 }
 
-/// Largest violation by positions in f64, with the rule for structures written out again.
+/// Returns the largest violation by positions in f64, with the rule for structures written out again.
 fn oracle_violation(scene: &Scene, model: &ChainMail, state: &TissueState, own: &TissueParameters) -> f64 {
     let x = positions(model, state);
     let operator = [own.shear_deg, own.shear_vert_deg, own.shear_vert_deg].map(|shear_deg| AxisLimits {

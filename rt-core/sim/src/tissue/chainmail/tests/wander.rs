@@ -1,4 +1,4 @@
-//! What the claims share: bodies, a needle that wanders, and oracles that share no code with the step.
+//! Fixtures of the claims: bodies, a needle that wanders, and oracles that share no code with the step.
 
 use crate::limits::TissueParameters;
 use crate::scene::test_bodies::Random;
@@ -21,7 +21,7 @@ pub(super) fn paper() -> ChainMail {
     ChainMail::new(&scene, limits)
 }
 
-/// Held at its rest position moved by `way`, in elements.
+/// Holds an element at its rest position moved by `way`, in elements.
 pub(super) fn held_at(model: &ChainMail, element: u32, way: [f64; 3]) -> Held {
     let rest = model.lattice().rest_m(element);
     let h = model.lattice().spacing_m;
@@ -32,7 +32,8 @@ pub(super) fn held_at(model: &ChainMail, element: u32, way: [f64; 3]) -> Held {
     }
 }
 
-/// Largest violation, by positions in f64 over each element's upper neighbours: shares no code with the step.
+/// Returns the largest violation, by positions in f64 over each element's upper neighbours: shares no code with the
+/// step.
 pub(super) fn oracle_violation(model: &ChainMail, state: &TissueState, parameters: &TissueParameters) -> f64 {
     let h = model.lattice().spacing_m;
     let mut worst = 0.0_f64;
@@ -58,7 +59,8 @@ pub(super) fn oracle_violation(model: &ChainMail, state: &TissueState, parameter
     worst
 }
 
-/// Smallest volume of a cell's corner, by positions in f64: over each element and each three of its neighbours.
+/// Returns the smallest volume of a cell's corner, by positions in f64: over each element and each three of its
+/// neighbours.
 ///
 /// Panics if one is smaller than limits kept to `residual` allow: at the paper's angles a corner may come to zero
 /// with every limit met, and so below it by what the residual leaves.

@@ -1,8 +1,8 @@
 //! The forces of all elements for eight loads at once, plane by plane, and what is done with them.
 //!
-//! The element is that of `hexahedron`: sums and differences of its corners, in which its stiffness falls into small blocks.
-//! Neighbours along x share a face, so each face is read, and each force written, once; what two elements do to the face
-//! between them is added up before it is turned back into forces on corners.
+//! The element is that of `hexahedron`: sums and differences of its corners, in which its stiffness falls into small
+//! blocks. Neighbours along x share a face, so each face is read, and each force written, once; what two elements do to
+//! the face between them is added up before it is turned back into forces on corners.
 
 use std::ops::Range;
 
@@ -11,13 +11,13 @@ use super::{LOADS, Node};
 use crate::simd::{Eight, Vector, in_vectors};
 use crate::tissue::fem::real::Real;
 
-/// What to do with the forces on a plane of nodes; no later plane needs this `x`.
+/// Operation on the forces of a plane of nodes; no later plane needs this `x`.
 pub(super) trait PlaneOp<T: Real> {
-    /// The answer of each node is that of its elements, `forces`, and of its spring: [`answer`].
+    /// Processes a plane. The answer of each node is that of its elements, `forces`, and of its spring: [`answer`].
     fn plane<V: Vector<T>>(&mut self, at: Range<usize>, forces: &[Node<T>], springs: &[T], x: &mut [Node<T>]);
 }
 
-/// Nothing on a node.
+/// Returns zeros for a node.
 pub(super) fn nothing<T: Real>() -> Node<T> {
     [Eight([T::ZERO; LOADS]); 3]
 }
@@ -37,7 +37,7 @@ impl<T: Real> TwoPlanes<T> {
     }
 }
 
-/// `A x`, for where it is needed once.
+/// Returns `A x`, for where it is needed once.
 pub(super) fn product<T: Real>(level: &BatchLevel<T>, x: &mut [Node<T>]) -> Vec<Node<T>> {
     struct Keep<'a, T>(&'a mut [Node<T>]);
     impl<T: Real> PlaneOp<T> for Keep<'_, T> {
@@ -76,13 +76,13 @@ fn sweep<T: Real, V, O: PlaneOp>(level: &BatchLevel<T>, x: &mut [Node<T>], work:
 }
 }
 
-/// What elements and spring answer to a displacement with.
+/// Returns the force of elements and spring for a displacement.
 #[inline(always)]
 pub(super) fn answer<T: Real, V: Vector<T>>(forces: &Eight<T>, spring: T, x: V) -> V {
     V::load(forces).add(V::splat(spring).mul(x))
 }
 
-/// Sums and differences of four corners of a face: 1, y, z, yz.
+/// Returns sums and differences of four corners of a face: 1, y, z, yz.
 #[inline(always)]
 fn across<T: Real, V: Vector<T>>([a, b, c, d]: [V; 4]) -> [V; 4] {
     let (low, high) = (a.add(b), c.add(d));
@@ -90,7 +90,7 @@ fn across<T: Real, V: Vector<T>>([a, b, c, d]: [V; 4]) -> [V; 4] {
     [low.add(high), low_y.add(high_y), high.sub(low), high_y.sub(low_y)]
 }
 
-/// The transpose of `across`.
+/// Applies the transpose of `across`.
 #[inline(always)]
 fn corners<T: Real, V: Vector<T>>([one, y, z, yz]: [V; 4]) -> [V; 4] {
     let (low, high) = (one.sub(z), one.add(z));
@@ -157,7 +157,7 @@ fn add_run<T: Real, V: Vector<T>>(
     }
 }
 
-/// Two lines of a plane, the lower one first.
+/// Returns two lines of a plane, the lower one first.
 #[inline(always)]
 fn two_lines<N>(plane: &mut [N], at: [usize; 2], len: usize) -> [&mut [N]; 2] {
     let (low, high) = plane.split_at_mut(at[1]);
@@ -169,7 +169,8 @@ fn add_to<T: Real, V: Vector<T>>(to: &mut Eight<T>, more: V) {
     V::load(to).add(more).store(to);
 }
 
-/// Parts of the forces even and odd in x, as `hexahedron::forces` has them; those even in x and constant on the face are zero.
+/// Parts of the forces even and odd in x, as `hexahedron::forces` has them; those even in x and constant on the face
+/// are zero.
 #[inline(always)]
 fn element<T: Real, V: Vector<T>>(near: &Face<V>, far: &Face<V>, [mean, varying, shear]: [T; 3]) -> (Face<V>, Face<V>) {
     let even = |c: usize, m: usize| near[c][m].add(far[c][m]);

@@ -12,12 +12,12 @@ use std::sync::Arc;
 /// A grid place that no element touches.
 const NO_NODE: u32 = u32::MAX;
 
-/// What a load puts on a node, or with what weight the node is read.
+/// Weight with which a load acts on a node, or with which the node is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NodeWeight {
     /// Number of the node.
     pub node: u32,
-    /// Along x, y, z.
+    /// Weight along x, y, z.
     pub weight: [f64; 3],
 }
 
@@ -49,7 +49,8 @@ pub(super) struct BatchLevel<T> {
     /// One over the diagonal; zero at nodes that do not move.
     pub inverse_diagonal: Vec<T>,
     pub largest_eigenvalue: f64,
-    /// Nodes of the next level that each node lies between: `parents[first_parent[n]..first_parent[n + 1]]`, equal weights.
+    /// Nodes of the next level that each node lies between: `parents[first_parent[n]..first_parent[n + 1]]`, equal
+    /// weights.
     pub first_parent: Vec<u32>,
     pub parents: Vec<u32>,
     pub simd: Simd,
@@ -57,7 +58,7 @@ pub(super) struct BatchLevel<T> {
     node_at: Vec<u32>,
 }
 
-/// What eight loads are solved on: built once from a model, never changed.
+/// Body on which eight loads are solved: built once from a model, never changed.
 #[derive(Clone, Debug)]
 pub struct BatchModel<T = f32> {
     /// Finest first.
@@ -132,27 +133,27 @@ impl<T: Real> BatchModel<T> {
         batch
     }
 
-    /// Nodes in use of the finest level.
+    /// Returns the number of nodes in use of the finest level.
     pub fn node_count(&self) -> usize {
         self.levels[0].node_count
     }
 
-    /// Elements of the lattice.
+    /// Returns the number of elements of the lattice.
     pub fn element_count(&self) -> usize {
         self.corners.len()
     }
 
-    /// The elements.
+    /// Returns the lattice of the elements.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
 
-    /// Edge of a cell, m.
+    /// Returns the edge of a cell, m.
     pub fn spacing_m(&self) -> f64 {
         self.spacing_m
     }
 
-    /// Shear modulus in pascals and Poisson's ratio at a point; `None` where nothing elastic is.
+    /// Returns shear modulus in pascals and Poisson's ratio at a point; `None` where nothing elastic is.
     pub fn material(&self, point_m: [f64; 3]) -> Option<[f64; 2]> {
         if !point_m.iter().all(|c| *c >= 0.0) {
             return None;
@@ -163,12 +164,12 @@ impl<T: Real> BatchModel<T> {
         (shear_pa > 0.0).then_some([shear_pa, poisson])
     }
 
-    /// The element at a point of the scene frame while the body is at rest.
+    /// Returns the element at a point of the scene frame while the body is at rest.
     pub fn element_at(&self, point_m: [f64; 3]) -> Option<u32> {
         self.lattice.element_at_rest(point_m)
     }
 
-    /// The nodes around a point in the scene frame and their trilinear weights; `None` where no element is.
+    /// Returns the nodes around a point in the scene frame with their trilinear weights; `None` where no element is.
     pub fn trilinear(&self, point_m: [f64; 3]) -> Option<[(u32, f64); 8]> {
         let place = [0, 1, 2].map(|a| (point_m[a] - self.low_m[a]) / self.spacing_m);
         if !place.iter().all(|p| *p >= 0.0) {
@@ -193,7 +194,7 @@ impl<T: Real> BatchModel<T> {
         Some(nodes)
     }
 
-    /// Whether a node can move.
+    /// Returns whether a node can move.
     pub fn is_free(&self, node: u32) -> bool {
         self.levels[0]
             .inverse_diagonal
@@ -201,7 +202,7 @@ impl<T: Real> BatchModel<T> {
             .is_some_and(|&d| d != T::ZERO)
     }
 
-    /// Bytes that the model keeps.
+    /// Returns the size of the model, in bytes.
     pub fn bytes(&self) -> usize {
         let level = |l: &BatchLevel<T>| {
             l.node_count * (2 * size_of::<T>() + 4)
@@ -211,7 +212,7 @@ impl<T: Real> BatchModel<T> {
         self.levels.iter().map(level).sum::<usize>() + self.coarsest.len() * size_of::<T>() + 16 * self.corners.len()
     }
 
-    /// A pseudo-inverse, so that a part without stiffness stays where it is.
+    /// Computes the pseudo-inverse of the coarsest level, so that a part without stiffness stays where it is.
     fn invert_coarsest(&mut self) {
         let level = &self.levels[self.levels.len() - 1];
         let free = (0..level.node_count as u32).filter(|&n| level.inverse_diagonal[n as usize] != T::ZERO);

@@ -1,11 +1,13 @@
 //! Eight loads on one body, solved side by side: the columns of a compliance.
 //!
-//! The solver next door takes one held patch, in rows of elements. Here nothing is held, the loads are many, and they share one
-//! operator. So each node keeps its value for all loads next to each other, one SIMD lane each: an element's stiffness is read
-//! once for eight answers, no row is padded to whole lanes, and only nodes in use take memory. The mathematics is that of
-//! `multigrid` and `cg`: the levels come from the same `FemModel`, the cycle is the symmetric one.
+//! The solver next door takes one held patch, in rows of elements. Here nothing is held, the loads are many, and they
+//! share one operator. So each node keeps its value for all loads next to each other, one SIMD lane each: an element's
+//! stiffness is read once for eight answers, no row is padded to whole lanes, and only nodes in use take memory. The
+//! mathematics is that of `multigrid` and `cg`: the levels come from the same `FemModel`, the cycle is the symmetric
+//! one.
 //!
-//! [`advance`](BatchState::advance) does one pass over one level and returns, so that idle ticks can prepare columns in slices.
+//! [`advance`](BatchState::advance) does one pass over one level and returns, so that idle ticks can prepare columns in
+//! slices.
 
 mod cycle;
 mod kernel;

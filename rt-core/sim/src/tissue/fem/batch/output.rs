@@ -1,4 +1,4 @@
-//! What is read from an answer: displacements of element centres, values under weights, and the force of the foundation.
+//! Output of an answer: displacements of element centres, values under weights, and the force of the foundation.
 
 use super::level::{BatchModel, NodeWeight};
 use super::solve::{BatchState, finest};
@@ -6,7 +6,8 @@ use crate::tissue::ElementField;
 use crate::tissue::fem::real::Real;
 
 impl<T: Real> BatchModel<T> {
-    /// How far the body moves as a whole for each newton, on the springs to rest: m/N; 0 where something of it is fixed.
+    /// Returns the displacement of the body as a whole for each newton, on the springs to rest, m/N; 0 where part of it
+    /// is fixed.
     pub fn whole_m_per_n(&self) -> f64 {
         let level = finest(self);
         let springs_n_per_m: f64 = level.springs.iter().map(|spring| spring.to_f64()).sum();
@@ -20,7 +21,7 @@ impl<T: Real> BatchModel<T> {
 }
 
 impl<T: Real> BatchState<T> {
-    /// Sum of weight times displacement of answer `load`, in metres.
+    /// Returns the sum of weight times displacement of answer `load`, in metres.
     pub fn sample(&self, load: usize, weights: &[NodeWeight]) -> f64 {
         let at = |entry: &NodeWeight| {
             let node = self.u.get(entry.node as usize)?;
@@ -29,7 +30,7 @@ impl<T: Real> BatchState<T> {
         weights.iter().filter_map(at).sum()
     }
 
-    /// What the springs to rest answer with: force of the foundation on the body, N.
+    /// Returns the force of the foundation on the body, N: that of the springs to rest.
     pub fn foundation_n(&self, model: &BatchModel<T>, load: usize) -> [f64; 3] {
         let mut force = [0.0; 3];
         for (u, &spring) in self.u.iter().zip(&finest(model).springs) {
@@ -54,7 +55,7 @@ impl<T: Real> BatchState<T> {
         }
     }
 
-    /// Sum over four nodes.
+    /// Sums over four nodes.
     #[inline(always)]
     fn over(&self, load: usize, nodes: &[u32; 4]) -> [T; 3] {
         let node = |at: u32, c: usize| self.u.get(at as usize).map_or(T::ZERO, |u| u[c].0[load]);

@@ -9,7 +9,7 @@ use super::{LOADS, Node};
 use crate::simd::{Eight, Vector, in_vectors};
 use crate::tissue::fem::real::Real;
 
-/// What the next slice of work does.
+/// Work of the next slice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Slice {
     Down(usize),
@@ -22,7 +22,7 @@ enum Slice {
     Advance,
 }
 
-/// How far the loads are.
+/// Progress of the loads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Progress {
     /// Whole iterations done.
@@ -81,7 +81,7 @@ impl<T: Real> BatchState<T> {
         self.slices.len()
     }
 
-    /// Bytes that the state keeps.
+    /// Returns the size of the state, in bytes.
     pub fn bytes(&self) -> usize {
         let nodes: usize = self.stages.iter().map(|s| 3 * s.x.len()).sum();
         (nodes + 3 * self.u.len()) * size_of::<Node<T>>()
@@ -140,7 +140,7 @@ impl<T: Real> BatchState<T> {
         self.progress()
     }
 
-    /// How far each of the loads is solved.
+    /// Returns the progress of each load.
     pub fn progress(&self) -> Progress {
         let relative = self
             .residuals
@@ -153,12 +153,12 @@ impl<T: Real> BatchState<T> {
         }
     }
 
-    /// Between two iterations, when answers may be read.
+    /// Returns whether it is between two iterations, when answers may be read.
     pub fn is_whole(&self) -> bool {
         self.next == 0
     }
 
-    /// `p = z + beta p` with Polak and Ribière's beta, then `q = A p`.
+    /// Computes `p = z + beta p` with Polak and Ribière's beta, then `q = A p`.
     fn turn(&mut self, model: &BatchModel<T>) {
         let simd = model.levels[0].simd;
         let Stage { x: z, b: r, .. } = &self.stages[0];
@@ -217,7 +217,7 @@ impl<T: Real> PlaneOp<T> for Product<'_, T> {
     }
 }
 
-/// Nodes whose products are summed before the sum goes on in f64.
+/// Nodes whose products are summed before the sum continues in f64.
 const SUMMED: usize = 256;
 
 #[inline(always)]
@@ -231,7 +231,7 @@ fn add_up<T: Real, V: Vector<T>>(total: &mut [f64; LOADS], sums: V) {
 }
 
 in_vectors! {
-/// `a . b` for both of `b`.
+/// Returns `a . b` for both of `b`.
 fn dots<T: Real, V>(a: &[Node<T>], b: [&[Node<T>]; 2]) -> [[f64; LOADS]; 2] {
     let mut totals = [[0.0; LOADS]; 2];
     for ((a, b0), b1) in a.chunks(SUMMED).zip(b[0].chunks(SUMMED)).zip(b[1].chunks(SUMMED)) {
@@ -249,7 +249,7 @@ fn dots<T: Real, V>(a: &[Node<T>], b: [&[Node<T>]; 2]) -> [[f64; LOADS]; 2] {
 }
 
 in_vectors! {
-/// `p = z + beta p`.
+/// Computes `p = z + beta p`.
 fn scale_and_add<T: Real, V>(beta: &Eight<T>, z: &[Node<T>], p: &mut [Node<T>]) {
     let beta = V::load(beta);
     for (z, p) in z.iter().zip(p) {
@@ -261,7 +261,7 @@ fn scale_and_add<T: Real, V>(beta: &Eight<T>, z: &[Node<T>], p: &mut [Node<T>]) 
 }
 
 in_vectors! {
-/// `u += alpha p`, `r -= alpha q`; returns `r . r`.
+/// Computes `u += alpha p`, `r -= alpha q`; returns `r . r`.
 fn advance_fields<T: Real, V>(
     alpha: &Eight<T>,
     p: &[Node<T>],
@@ -288,7 +288,7 @@ fn advance_fields<T: Real, V>(
 }
 }
 
-/// Nodes of the finest level, for what reads answers.
+/// Returns the finest level, whose nodes answers are read at.
 pub(super) fn finest<T>(model: &BatchModel<T>) -> &BatchLevel<T> {
     &model.levels[0]
 }

@@ -54,8 +54,8 @@ fn answers_are_reciprocal_and_balance_their_loads() {
     }
 }
 
-/// A gland on its foundation under a point load, on the same mesh: CalculiX (`tests/oracles/gland_ccx.py`), whose C3D8 is fully
-/// integrated, and B-bar elements assembled and factored by SciPy (`gland_bbar.py`).
+/// A gland on its foundation under a point load, on the same mesh: CalculiX (`tests/oracles/gland_ccx.py`), whose C3D8
+/// is fully integrated, and B-bar elements assembled and factored by SciPy (`gland_bbar.py`).
 #[test]
 fn a_loaded_gland_is_where_two_other_solvers_have_it() {
     assert_agrees(Integration::Full, include_str!("golden/gland_linear.csv"));
@@ -98,7 +98,7 @@ fn assert_agrees(integration: Integration, golden: &str) {
     for line in golden.lines().filter(|line| !line.starts_with('#')) {
         let numbers: Vec<f64> = line.split(',').map(|n| n.parse().expect("a number")).collect();
         let point = [0, 1, 2].map(|a| numbers[a] * h);
-        // A node is read by the weights of any cell beside it that is there.
+        // A node is read by the weights of any cell that it touches.
         let beside = (0..8).find_map(|c: usize| {
             model.trilinear([0, 1, 2].map(|a| point[a] + if c >> a & 1 == 1 { -1e-12 } else { 1e-12 }))
         });

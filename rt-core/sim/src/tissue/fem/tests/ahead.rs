@@ -24,7 +24,7 @@ fn hard_body() -> FemModel<f64> {
     FemModel::new(&lattice, &two_materials(&lattice, 5.0, 1e5)).expect("valid")
 }
 
-/// Two patches beside each other in the body with a hole, pushed the same way.
+/// Returns two neighbouring patches in the body with a hole, pushed the same way.
 fn two_patches(model: &FemModel<f64>) -> [TipPatch; 2] {
     let lattice = model.lattice();
     let [i, j, k] = lattice.cell(300);
@@ -48,7 +48,8 @@ fn assert_is_converged_answer(model: &FemModel<f64>, state: &FemState<f64>, held
     }
 }
 
-/// However far the work ahead has come, and however well its direction was guessed; only when it is done is the step free.
+/// However far the work ahead has come, and however well its direction was guessed; only when it is done is the step
+/// free.
 #[test]
 fn prepared_patch_answers_as_the_converged_solution() {
     let model = hard_body();
@@ -94,7 +95,8 @@ fn first_contact_is_prepared_while_nothing_is_held() {
     assert_is_converged_answer(&model, &state, met, &report);
 }
 
-/// Displacements and reports, bit by bit, of a straight insertion into the paper's gland with these guesses.
+/// Returns the displacements and reports, bit by bit, of a straight insertion into the paper's gland with these
+/// guesses.
 fn insertion(guess: impl Fn(usize) -> Option<[usize; 3]>) -> Vec<u64> {
     let scene = Scene::builtin("paper").expect("built in");
     let lattice = &scene.lattice;
@@ -121,7 +123,7 @@ fn insertion(guess: impl Fn(usize) -> Option<[usize; 3]>) -> Vec<u64> {
     bits
 }
 
-/// Where the tip does not come back to the patch before, which is still known unless work ahead took its place.
+/// The tip does not come back to the patch before, which is still known unless work ahead took its place.
 #[test]
 fn wrong_guess_changes_no_bit() {
     let without = insertion(|_| None);
@@ -257,7 +259,7 @@ fn live_insertion_with_work_ahead_stays_within_one_percent() {
         let (mut state, mut solved) = (FemState::at_rest(&live), FemState::at_rest(&exact));
         let (mut by_m, mut worst, mut with_cycles) = (0.0, 0.0_f64, 0);
         for tick in -9..=120 {
-            // 50 mm/s at 200 Hz; past 8 mm the tissue follows by half, and the tip goes on to the next element.
+            // 50 mm/s at 200 Hz; past 8 mm the tissue follows by half, and the tip passes on to the next element.
             let tip_m = 0.25e-3 * f64::from(tick);
             let at = |k: usize, by_m: f64| {
                 let element = lattice.element_of_cell(53, 31, k).expect("in the gland");

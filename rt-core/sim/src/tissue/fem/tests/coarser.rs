@@ -25,8 +25,8 @@ fn full_elements_are_those_of_a_coarse_lattice() {
     }
 }
 
-/// Half of each element at one side is no tissue: the force for a displacement is near that of the cells, where elements that
-/// were full would be twice as stiff.
+/// Half of each element at one side is no tissue: the force for a displacement is near that of the cells, where
+/// elements that were full would be twice as stiff.
 #[test]
 fn elements_that_are_partly_outside_are_as_stiff_as_their_part() {
     let (thin, thick) = (block([3, 8, 8], 1e-3), block([4, 8, 8], 1e-3));

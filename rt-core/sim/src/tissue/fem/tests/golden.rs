@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A golden file: force (N), strain energy (N mm), then places and displacements (mm).
+/// Reads a golden file: force (N), strain energy (N mm), then places and displacements (mm).
 fn golden(text: &str) -> (f64, f64, Vec<[f64; 6]>) {
     let after = |key: &str| {
         let from = text.find(key).expect(key) + key.len();
@@ -19,7 +19,7 @@ fn golden(text: &str) -> (f64, f64, Vec<[f64; 6]>) {
     (after("Fz_on_block="), after("strain energy="), rows.collect())
 }
 
-/// The golden problem on `n` elements along an edge.
+/// Solves the golden problem on `n` elements along an edge.
 fn solve_golden<T: Compiled>(n: usize, settings: &SolveSettings) -> (FemModel<T>, FemState<T>, FemReport) {
     let lattice = block([n; 3], 60e-3 / n as f64);
     let material = Material {
@@ -34,7 +34,8 @@ fn solve_golden<T: Compiled>(n: usize, settings: &SolveSettings) -> (FemModel<T>
     (model, state, report)
 }
 
-/// Displacements to the rounding of the file (a millionth of a millimetre, far below 1e-3 of any that is not zero).
+/// Compares displacements to the rounding of the file (a millionth of a millimetre, far below 1e-3 of any that is not
+/// zero).
 fn assert_agrees_with_golden<T: Compiled>(n: usize, text: &str, settings: &SolveSettings, within_mm: f64) {
     let (force_n, energy_n_mm, rows) = golden(text);
     let (model, mut state, report) = solve_golden::<T>(n, settings);

@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// A cantilever of 16 x 4 x 2 mm, clamped at x = 0: the force that moves its last millimetre sideways by 0.1 mm.
+/// Bends a cantilever of 16 x 4 x 2 mm, clamped at x = 0; returns the force that moves its last millimetre sideways by
+/// 0.1 mm.
 fn cantilever(poisson_ratio: f64, integration: Integration, refined: usize) -> f64 {
     let (length, height, depth) = (16 * refined, 4 * refined, 2 * refined);
     let h = 1e-3 / refined as f64;

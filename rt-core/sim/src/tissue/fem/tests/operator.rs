@@ -6,7 +6,8 @@ use crate::tissue::fem::hexahedron::Stiffness;
 use crate::tissue::fem::smooth::Product;
 use crate::tissue::fem::sweep::{Field, Planes, sweep, zeros};
 
-/// 24 x 24, from the definition: sum over Gauss points of `B^T D B`, or with the volumetric part of B averaged.
+/// Returns the matrix of 24 x 24 from the definition: sum over Gauss points of `B^T D B`, or with the volumetric part
+/// of B averaged.
 fn element_matrix(material: &Material, h: f64) -> [[f64; 24]; 24] {
     let (lambda, mu) = material.lame_pa();
     let g = 0.5 / 3.0_f64.sqrt();
@@ -56,7 +57,7 @@ fn element_matrix(material: &Material, h: f64) -> [[f64; 24]; 24] {
     matrix
 }
 
-/// `A x`, with all nodes free.
+/// Returns `A x`, with all nodes free.
 fn apply(model: &FemModel<f64>, x: &Field<f64>) -> Field<f64> {
     let level = &model.levels[0];
     let (mut x, mut q) = (x.clone(), zeros(level.grid.len()));
@@ -71,7 +72,7 @@ fn apply(model: &FemModel<f64>, x: &Field<f64>) -> Field<f64> {
     q
 }
 
-/// A field on the nodes that touch an element, from their places in cells.
+/// Makes a field on the nodes that touch an element, from their places in cells.
 fn field(model: &FemModel<f64>, mut f: impl FnMut([f64; 3]) -> [f64; 3]) -> Field<f64> {
     let grid = &model.levels[0].grid;
     let mut x = zeros(grid.len());

@@ -4,7 +4,7 @@ use super::*;
 use nalgebra::{DMatrix, DVector};
 use stylet_heap as heap;
 
-/// Nodes by place, and the dense matrix of a model with springs, column by column from unit displacements.
+/// Returns the nodes by place, and the dense matrix of a model with springs, column by column from unit displacements.
 fn dense(model: &FemModel<f64>) -> (Vec<usize>, DMatrix<f64>) {
     use crate::tissue::fem::smooth::Product;
     use crate::tissue::fem::sweep::{Planes, sweep, zeros};
@@ -83,7 +83,7 @@ fn step_finds_what_a_dense_solver_finds() {
     );
 }
 
-/// Holds one corner of a body whose cells are soft and stiff by turns.
+/// Holds one corner of a body whose cells alternate between soft and stiff.
 fn hold_corner<T: Compiled>(
     lattice: &Arc<Lattice>,
     contrast: f64,
@@ -96,8 +96,8 @@ fn hold_corner<T: Compiled>(
     (state, report)
 }
 
-/// With contrast 1:1000 the rounding of f32 leaves more force on the soft cells than 1e-4 of the load, so f32 must be near
-/// the solution there instead.
+/// With contrast 1:1000 the rounding of f32 leaves more force on the soft cells than 1e-4 of the load, so f32 must be
+/// near the solution there instead.
 #[test]
 fn hard_bodies_converge() {
     let bodies = [
@@ -137,7 +137,7 @@ fn hard_bodies_converge() {
     }
 }
 
-/// A part that nothing holds in place has no equilibrium of its own: it stays at rest until it is held.
+/// A part that nothing holds in place has no unique equilibrium: it stays at rest until it is held.
 #[test]
 fn loose_part_stays_at_rest() {
     let lattice = lattice_of(&test_bodies::two_parts());
@@ -248,7 +248,7 @@ fn warm_started_insertion_stays_within_one_percent() {
     };
     let (mut by_m, mut worst) = (0.0, 0.0_f64);
     for tick in 1..=120 {
-        // 50 mm/s at 200 Hz; past 8 mm the tissue follows by half, and the tip goes on to the next element.
+        // 50 mm/s at 200 Hz; past 8 mm the tissue follows by half, and the tip passes on to the next element.
         let tip_m = 0.25e-3 * f64::from(tick);
         by_m += if tip_m <= 8e-3 { 0.25e-3 } else { 0.125e-3 };
         let k = 72 + ((tip_m - by_m) / lattice.spacing_m) as usize;

@@ -1,4 +1,4 @@
-//! What a body rests on, face by face.
+//! Foundation of a body, face by face.
 
 use super::*;
 use crate::scene::Surroundings;

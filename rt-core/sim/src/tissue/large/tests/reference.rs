@@ -1,4 +1,4 @@
-//! Beside a neo-Hookean body of another program: `tests/oracles/gland_large_strain.py`.
+//! Comparison with a neo-Hookean body of another program: `tests/oracles/gland_large_strain.py`.
 
 use super::*;
 use crate::scene::Labels;
@@ -11,7 +11,7 @@ const CELL_MM: f64 = 2.2;
 const HELD: [[usize; 2]; 3] = [[9, 11], [7, 9], [2, 4]];
 const TIP: [usize; 3] = [10, 8, 3];
 
-/// The oracle's gland by linear elements, its patch moved by a millimetre.
+/// Solves the oracle's gland by linear elements, its patch moved by a millimetre.
 fn gland() -> Pushed {
     let [nx, ny, nz] = HALF.map(|n| 2 * n);
     let is_inside = |n: usize| {
@@ -42,7 +42,8 @@ fn gland() -> Pushed {
     }
 }
 
-/// RMS and largest distance over what moves by 1 % of the travel, and RMS up to four elements from the tip, in % of the travel.
+/// Returns RMS and largest distance over what moves by 1 % of the travel, and RMS up to four elements from the tip, in
+/// % of the travel.
 fn errors(pushed: &Pushed, u: &[Vec<f32>; 3], by_mm: f64, column: usize) -> [f64; 3] {
     let (mut all, mut near, mut worst) = ([0.0; 2], [0.0; 2], 0.0_f64);
     for line in ORACLE.lines().skip(2) {
