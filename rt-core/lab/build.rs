@@ -76,7 +76,7 @@ fn locked(lock: &Path) -> Option<Needs> {
     Some(needs)
 }
 
-/// What `program` needs, without itself.
+/// Returns the packages that `program` needs, without itself.
 fn needed(needs: &Needs, program: &str) -> BTreeSet<Package> {
     let mut found = BTreeSet::new();
     let mut open = vec![program.to_owned()];
@@ -95,7 +95,7 @@ fn needed(needs: &Needs, program: &str) -> BTreeSet<Package> {
     found
 }
 
-/// What the core needs: the force process and its bridge.
+/// Returns the packages of the core: the force process and its bridge.
 fn core(needs: &Needs) -> BTreeSet<Package> {
     let programs = ["rt-core", "stylet-bridge"].map(|program| needed(needs, program));
     programs.into_iter().flatten().collect()

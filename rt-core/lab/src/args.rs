@@ -25,10 +25,12 @@ pub struct LatencyArgs {
     /// Rate of the force loop, Hz
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(500..=10_000), value_name = "HZ")]
     pub rate: u32,
-    /// Spin for the last N microseconds before each deadline; auto finds the smallest with which p50 and p99 are a third of cyclictest's
+    /// Spin for the last N microseconds before each deadline; auto finds the smallest with which p50 and p99 are a
+    /// third of cyclictest's
     #[arg(long, default_value = "0", value_name = "N")]
     pub(crate) spin_us: Spin,
-    /// Wake once N microseconds before each deadline and sleep again, so that core and caches are ready; 0 for not [default: 100 up to 2,000 Hz, 0 beyond]
+    /// Wake once N microseconds before each deadline and sleep again, so that core and caches are ready; 0 for not
+    /// [default: 100 up to 2,000 Hz, 0 beyond]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(0..=500))]
     pub early_us: Option<u64>,
     /// Then measure again, alternating with something else
@@ -36,29 +38,31 @@ pub struct LatencyArgs {
     pub compare: Option<Against>,
     /// Name the cause of each late tick from a trace of the kernel, and measure what tracing costs; needs root
     ///
-    /// The trace runs in an instance of its own in tracefs, in a buffer of 256 KiB for each core. After a late tick it is frozen
-    /// and read. Tracing makes the loop a little slower: unless --compare asks for something else, the loops are then measured
-    /// again, with and without the trace by turns.
+    /// The trace runs in an instance of its own in tracefs, in a buffer of 256 KiB for each core. After a late tick it
+    /// is frozen and read. Tracing makes the loop a little slower: unless --compare asks for something else, the loops
+    /// are then measured again, with and without the trace by turns.
     #[arg(long)]
     pub trace: bool,
-    /// With --trace, a tick is late from N microseconds on, wake-up and own work together [default: a fifth of the period]
+    /// With --trace, a tick is late from N microseconds on, wake-up and own work together [default: a fifth of the
+    /// period]
     #[arg(long, value_name = "N", requires = "trace", value_parser = clap::value_parser!(u64).range(1..))]
     pub trace_over_us: Option<u64>,
     /// Rounds of the comparison; each measures both sides once, 0 measures none
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(0..=100), value_name = "N")]
     pub rounds: u32,
-    /// Let the force loop toggle a pin for an instrument: serial:0x3F8:rts, serial:0x3F8:dtr, /dev/ttyS0:rts or parallel:0x378; needs root
+    /// Let the force loop toggle a pin for an instrument: serial:0x3F8:rts, serial:0x3F8:dtr, /dev/ttyS0:rts or
+    /// parallel:0x378; needs root
     ///
-    /// One instruction writes the register, at irregular times of 20 to 83 ticks, and the loop notes when: DIR/toggles.csv. The
-    /// addresses of the ports are in /proc/ioports. Record the pin with a logic analyser, or with a sound card through a
-    /// divider; record beside it what answers to it, then give the capture to --external.
+    /// One instruction writes the register, at irregular times of 20 to 83 ticks, and the loop notes when:
+    /// DIR/toggles.csv. The addresses of the ports are in /proc/ioports. Record the pin with a logic analyser, or with
+    /// a sound card through a divider; record beside it what answers to it, then give the capture to --external.
     #[arg(long, value_name = "PORT")]
     pub toggle: Option<Pin>,
     /// Measure nothing: compare a capture of the pin (sigrok CSV or VCD, WAV) with the record of --toggle in DIR
     #[arg(long, value_name = "FILE", conflicts_with_all = ["toggle", "trace", "compare"])]
     pub external: Option<PathBuf>,
-    /// Input of the capture that shows when the handle moves, such as an accelerometer: delays after it are given as well, from motion to
-    /// photon and from motion to force
+    /// Input of the capture that shows when the handle moves, such as an accelerometer: delays after it are given as
+    /// well, from motion to photon and from motion to force
     #[arg(long, value_name = "INPUT", requires = "external")]
     pub motion: Option<String>,
     /// Limits in a TOML file, one `name = value` a line
@@ -99,7 +103,8 @@ pub enum ArgsError {
 }
 
 impl LatencyArgs {
-    /// Settings of the loops, with an instance of its own, so that a running simulator is not disturbed in its shared memory.
+    /// Settings of the loops, with an instance of its own, so that a running simulator is not disturbed in its shared
+    /// memory.
     pub fn options(&self) -> Result<Options, ArgsError> {
         let instance = format!("lab-{}", std::process::id());
         let mut options = self.real_time.options(&instance)?;
@@ -136,12 +141,12 @@ impl LatencyArgs {
             .then(|| self.trace_over_us.map_or(default_ns, |us| us * 1_000))
     }
 
-    /// The longest spin that the kernel's share for real-time threads permits.
+    /// Returns the longest spin that the kernel's share for real-time threads permits.
     pub fn longest_spin_us(&self) -> u64 {
         longest_spin_ns(measure::period_ns(self.rate), Machine::this().throttle()) / 1_000
     }
 
-    /// What the loops are compared with: with a trace, the loops without it.
+    /// Returns the reference that the loops are compared with: with a trace, the loops without it.
     pub fn against(&self) -> Option<Against> {
         self.compare
             .or(self.trace.then_some(Against::Untraced))
@@ -149,10 +154,10 @@ impl LatencyArgs {
     }
 }
 
-/// What the loop itself and all else of real-time priority on its core may need besides spinning.
+/// Share of a core that the loop itself, and all else of real-time priority on it, may need besides spinning.
 const SHARE_KEPT_FREE: f64 = 0.15;
 
-/// The longest spin that leaves the core below the kernel's share for real-time threads.
+/// Returns the longest spin that leaves the core below the kernel's share for real-time threads.
 pub(crate) fn longest_spin_ns(period_ns: u64, throttle: Option<Throttle>) -> u64 {
     let share = match throttle {
         Some(Throttle::Share(share)) => share,

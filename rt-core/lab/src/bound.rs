@@ -1,11 +1,12 @@
-//! How sure a count of missed deadlines is: a bound that needs no model of the times, after Clopper and Pearson (1934).
+//! Confidence bound of a count of missed deadlines, which needs no model of the times, after Clopper and Pearson
+//! (1934).
 
 use serde::Serialize;
 
 /// Confidence of every bound.
 const CONFIDENCE: f64 = 0.95;
 
-/// What a count of misses in so many grid points bounds, if misses are independent.
+/// Bound by a count of misses in so many grid points, if misses are independent.
 #[derive(Clone, Debug, Serialize)]
 pub struct MissBound {
     pub misses: u64,
@@ -20,7 +21,7 @@ pub struct MissBound {
     pub rule_of_three: Option<f64>,
 }
 
-/// The bound of `misses` in `of` grid points, `rate_hz` of them a second.
+/// Returns the bound of `misses` in `of` grid points, `rate_hz` of them a second.
 pub fn of_misses(misses: u64, of: u64, rate_hz: f64) -> MissBound {
     let at_most = (of > 0).then(|| upper(misses.min(of), of, CONFIDENCE));
     MissBound {
@@ -33,7 +34,7 @@ pub fn of_misses(misses: u64, of: u64, rate_hz: f64) -> MissBound {
     }
 }
 
-/// The one-sided upper bound of Clopper and Pearson for `k` in `n`.
+/// Returns the one-sided upper bound of Clopper and Pearson for `k` in `n`.
 fn upper(k: u64, n: u64, confidence: f64) -> f64 {
     if k >= n {
         return 1.0;
@@ -96,7 +97,7 @@ pub fn binomial_cdf(k: u64, n: u64, p: f64) -> f64 {
     incomplete_beta((n - k) as f64, k as f64 + 1.0, 1.0 - p)
 }
 
-/// The regularised incomplete beta function, by the continued fraction of Lentz.
+/// Returns the regularised incomplete beta function, by the continued fraction of Lentz.
 fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
     if x <= 0.0 || x >= 1.0 {
         return if x <= 0.0 { 0.0 } else { 1.0 };

@@ -8,10 +8,10 @@ use stylet_runtime::rt::timing::{MAX_STAGES, TickTimes};
 
 /// Latest wake-ups that are kept one by one.
 pub const WORST_KEPT: usize = 16;
-/// How often the ring is emptied; it holds seconds.
+/// Pause between two rounds that empty the ring; it holds seconds.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// How ticks are gathered.
+/// Plan by which ticks are gathered.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan {
     pub period_ns: u64,
@@ -62,7 +62,7 @@ pub struct LoopTiming {
     pub due_to_output: Histogram<u64>,
     /// Difference between the interval of two wake-ups and the period.
     pub jitter: Histogram<u64>,
-    /// What measuring costs the loop in each tick.
+    /// Cost of the measurement for the loop in each tick.
     pub recording: Histogram<u64>,
     pub windows: Vec<Window>,
     pub worst: [LateTick; WORST_KEPT],
@@ -78,7 +78,7 @@ pub struct LoopTiming {
     pub lost: u64,
     /// When the loop toggled its pin, warm-up included.
     pub toggles: Vec<ToggleTime>,
-    /// Where ticks that are late by so many nanoseconds are reported, wake-up and work together.
+    /// Channel for ticks that are late by so many nanoseconds, wake-up and work together.
     late: Option<(u64, Sender<LateTick>)>,
     plan: Plan,
     seen: u64,
@@ -123,7 +123,7 @@ impl LoopTiming {
         self.gather_with(ring, Duration::MAX, |_| {})
     }
 
-    /// The same; `checkpoint` sees what was gathered so far, as often as `every`, and at the end.
+    /// Returns the same; `checkpoint` sees what was gathered so far, as often as `every`, and at the end.
     pub fn gather_with(
         mut self,
         mut ring: rtrb::Consumer<TickTimes>,
@@ -149,7 +149,7 @@ impl LoopTiming {
         }
     }
 
-    /// Length of the grid that was served or missed, without the warm-up, in nanoseconds.
+    /// Returns the length of the grid that was served or missed, without the warm-up, in nanoseconds.
     pub fn measured_ns(&self) -> u64 {
         match self.ticks {
             0 => 0,
@@ -212,7 +212,7 @@ impl LoopTiming {
         if let Some((over_ns, late)) = &self.late
             && wake_ns + work_ns >= *over_ns
         {
-            // Nobody may listen any more.
+            // The receiver may be gone.
             let _ = late.send(tick);
         }
         self.note_worst(tick);
@@ -255,7 +255,7 @@ mod tests {
         LoopTiming::new(&["a", "b"], PLAN)
     }
 
-    /// A tick due at `due_ns` that wakes `wake_ns` late and has stages of 100 and 200 ns.
+    /// Returns a tick due at `due_ns` that wakes `wake_ns` late and has stages of 100 and 200 ns.
     fn tick(due_ns: u64, wake_ns: u64, missed: u32) -> TickTimes {
         let woke_ns = due_ns + wake_ns;
         let mut tick = TickTimes::default();

@@ -1,5 +1,5 @@
-//! Our wake-up latency, alternating with another one: that of `cyclictest` on the same core with the same priority and interval, or our own without
-//! the load.
+//! Our wake-up latency, alternating with another one: that of `cyclictest` on the same core with the same priority and
+//! interval, or our own without the load.
 
 use crate::load::{Load, LoadError, Running};
 use crate::measure::{MeasureError, Measured, Setup, measure};
@@ -23,7 +23,7 @@ const SHORTEST_TRACED_TURN_NS: u64 = 2_000_000_000;
 const BINS: u64 = 1_000_000;
 const COMPARED: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)];
 
-/// What our loops are compared with.
+/// Reference that our loops are compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Against {
@@ -55,7 +55,7 @@ pub struct Round {
     pub ratio: Turn,
 }
 
-/// What the turns showed, or why there were none.
+/// Result of the turns, or the reason why there were none.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     pub against: Against,
@@ -81,7 +81,7 @@ pub enum CompareError {
     /// Our side.
     #[error(transparent)]
     Measure(#[from] MeasureError),
-    /// The load beside the other side.
+    /// Load during the other side's turn.
     #[error(transparent)]
     Load(#[from] LoadError),
     /// The other side.
@@ -108,7 +108,7 @@ pub enum ToolError {
     Start {
         /// The program.
         program: &'static str,
-        /// What the system reports.
+        /// Error of the system.
         why: io::Error,
     },
     /// It cannot be waited for, or its file cannot be made.
@@ -116,7 +116,7 @@ pub enum ToolError {
     Wait {
         /// The program.
         program: &'static str,
-        /// What the system reports.
+        /// Error of the system.
         why: io::Error,
     },
     /// It failed.
@@ -251,7 +251,7 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     }
 }
 
-/// First line of its help; `None` where it is not installed.
+/// Returns the first line of its help; `None` where it is not installed.
 fn version() -> Option<String> {
     let output = Command::new("cyclictest").arg("--help").output().ok()?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);

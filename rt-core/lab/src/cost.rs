@@ -1,6 +1,7 @@
-//! What each part of a scene costs in a tick, measured on this machine: `rt-core cost --scene NAME`.
+//! Cost of each part of a scene in a tick, measured on this machine: `rt-core cost --scene NAME`.
 //!
-//! An insertion at clinical speed is replayed to each part, round by round, so that a noisy machine disturbs all parts alike.
+//! An insertion at clinical speed is replayed to each part, round by round, so that a noisy machine disturbs all parts
+//! alike.
 
 mod probe;
 
@@ -57,7 +58,7 @@ impl Part {
     }
 }
 
-/// The table that the command prints.
+/// Returns the table that the command prints.
 pub fn table(scene: &Scene) -> Result<String, CostError> {
     let parts = measure(scene)?;
     let mut text = format!(
@@ -139,7 +140,7 @@ fn part(name: &str, period_s: f64) -> Part {
     }
 }
 
-/// Of equal rounds, the least time of each tick; then in order.
+/// Keeps the least time of each tick among equal rounds, then sorts.
 fn keep_least(part: &mut Part) {
     let ticks = part.rounds.iter().map(Vec::len).min().unwrap_or(0);
     let least = |tick: usize| part.rounds.iter().map(|r| r[tick]).fold(f64::INFINITY, f64::min);
@@ -157,7 +158,7 @@ struct Timed {
     kind: TissueKind,
 }
 
-/// The scene as it is, and what single parts of it add.
+/// Returns the whole scene, and what single parts of it add.
 fn models(scene: &Scene) -> Result<Vec<Timed>, CostError> {
     let chainmail = |name: String, scene: &Scene, parameters: &TissueParameters| -> Result<Timed, CostError> {
         let limits = parameters.validate().map_err(CostError::Tissue)?;
@@ -193,7 +194,7 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, CostError> {
     Ok(models)
 }
 
-/// Where the tip is in each tick, on a straight line through the target.
+/// Place of the tip in each tick, on a straight line through the target.
 struct Script {
     tips_m: Vec<[f64; 3]>,
     first: u32,
@@ -264,7 +265,7 @@ fn play(
     }
 }
 
-/// What the loop reads from the body after each step.
+/// Reads from the body what the loop reads after each step.
 fn read_body(scene: &Scene, timed: &mut Timed, script: &Script, [locate, seeds, surface]: &mut [Vec<f64>; 3]) {
     let n = scene.lattice.element_count();
     let points: Vec<MaterialPoint> = (0..SEEDS)

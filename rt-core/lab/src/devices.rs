@@ -31,7 +31,8 @@ pub struct DevicesArgs {
     /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
     #[arg(long, value_name = "PATH")]
     libhd: Option<PathBuf>,
-    /// The library of the Force Dimension SDK, libdrd.so or libdhd.so [default: STYLET_LIBDRD, else where the system has it]
+    /// The library of the Force Dimension SDK, libdrd.so or libdhd.so [default: STYLET_LIBDRD, else where the system
+    /// has it]
     #[arg(long, value_name = "PATH")]
     libdrd: Option<PathBuf>,
     /// The Inverse service of Haply [default: STYLET_HAPLY_URL, else ws://localhost:10001]
@@ -42,10 +43,10 @@ pub struct DevicesArgs {
 /// One back end.
 #[derive(Debug, Serialize)]
 struct Listed {
-    /// What to write after `--device`.
+    /// Forms to write after `--device`.
     forms: Vec<String>,
     help: &'static str,
-    /// Nobody has tried it on the device itself.
+    /// Set where it was never tried on the device itself.
     untried: bool,
     /// A run can use it now.
     usable: bool,
@@ -148,7 +149,7 @@ fn inverse3(libraries: &Libraries, try_it: bool) -> Vec<Finding> {
     }
 }
 
-/// What the trial finds, or that the driver does not answer; its thread is then left alone.
+/// Returns the findings of the trial, or that the driver does not answer; its thread is then left alone.
 fn within_limit(trial: impl FnOnce() -> Vec<Finding> + Send + 'static) -> Vec<Finding> {
     let (found, findings) = mpsc::channel();
     std::thread::spawn(move || {

@@ -46,11 +46,11 @@ pub struct Tail {
     pub shape: f64,
     /// Anderson-Darling statistic of the fit.
     pub anderson_darling: f64,
-    /// What the statistic may be at most at 5 % (Choulakian and Stephens 2001, table 2).
+    /// Largest value of the statistic at 5 % (Choulakian and Stephens 2001, table 2).
     pub anderson_darling_5_percent: f64,
 }
 
-/// What a run shows about wake-ups later than those that it saw.
+/// Extrapolation from a run to wake-ups later than those that it saw.
 #[derive(Clone, Debug, Serialize)]
 pub struct Extremes {
     pub stationarity: Stationarity,
@@ -86,7 +86,7 @@ pub fn examine(sample: &Sample, rate_hz: f64) -> Extremes {
     found
 }
 
-/// The tail over its threshold with the fitted distribution in nanoseconds; an error names what is missing.
+/// Returns the tail over its threshold with the fitted distribution in nanoseconds; an error names what is missing.
 fn fit(sample: &Sample, found: &mut Extremes) -> Result<Option<(Tail, Pareto)>, String> {
     let largest = sample.largest();
     let wanted = (sample.grid / SHARE_OVER).min(MOST_OVER as u64) as usize;
@@ -142,7 +142,7 @@ fn fit(sample: &Sample, found: &mut Extremes) -> Result<Option<(Tail, Pareto)>, 
     Ok(Some((tail, Pareto { excesses, ..pareto })))
 }
 
-/// Whether clusters arrive evenly over the run, and are as large in its second half as in its first.
+/// Tests whether clusters arrive evenly over the run, and are as large in its second half as in its first.
 fn tail_tests(clusters: &[(u64, u64)], excesses: &[f64], grid: u64) -> Vec<TestResult> {
     let places: Vec<f64> = clusters
         .iter()

@@ -47,7 +47,7 @@ pub fn write(folder: &Path, report: &mut Report, measured: &Measured) -> Result<
     put(PAGE, page.replacen(NO_DIGEST, &report.sha256, 1).as_bytes())
 }
 
-/// Every histogram in the interval log format of HdrHistogram, nanoseconds, one tagged line each.
+/// Returns every histogram in the interval log format of HdrHistogram, nanoseconds, one tagged line each.
 fn raw_histograms(report: &Report, measured: &Measured) -> Result<Vec<u8>, FilesError> {
     let mut all: Vec<(String, &Histogram<u64>)> = Vec::new();
     let second = measured.second.as_ref().map(|timing| ("second", timing));

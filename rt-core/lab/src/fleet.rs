@@ -1,4 +1,5 @@
-//! `rt-core fleet`: one page over the latency reports of many PCs: who passes, how each PC changed, and what changed with it.
+//! `rt-core fleet`: one page over the latency reports of many PCs: who passes, how each PC changed, and what changed
+//! with it.
 
 mod change;
 mod entry;
@@ -38,7 +39,7 @@ pub enum FleetError {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// What the system reports.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// There is nothing to show.
@@ -122,7 +123,7 @@ fn exit_code(pcs: &[Pc], unread: &[Unread]) -> u8 {
     }
 }
 
-/// Every report below `folder`; links to folders are not followed, since they may lead in a circle.
+/// Returns every report below `folder`; links to folders are not followed, since they may lead in a circle.
 fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FleetError> {
     let failed = |source| FleetError::Folder {
         path: folder.to_owned(),

@@ -11,7 +11,8 @@ use stylet_runtime::rt::clock;
 
 const PERIOD_NS: u64 = 1_000_000;
 const SPIN_NS: u64 = 100_000;
-/// Away from the wake-ups that are measured: neither the force loop nor the tissue loop wakes while this spins, at 1 kHz.
+/// Away from the wake-ups that are measured: neither the force loop nor the tissue loop wakes while this spins, at 1
+/// kHz.
 const PHASE_NS: u64 = 800_000;
 /// Two reads of the clock are farther apart than this only when the thread was interrupted.
 const GAP_NS: u64 = 20_000;
@@ -20,14 +21,14 @@ const LATE_NS: u64 = 1_000_000;
 /// Gaps and late wake-ups that are kept one by one.
 const KEPT: usize = 4096;
 
-/// What was found.
+/// Result of the gap watch.
 pub struct GapReport {
     pub core: Option<usize>,
     /// Time that was watched.
     pub watched_ns: u64,
     /// Gaps longer than 20 us without a switch.
     pub gaps: Histogram<u64>,
-    /// How late the thread woke; nothing of normal priority can delay it.
+    /// Lateness of the thread's wake-ups; nothing of normal priority can delay it.
     pub wake: Histogram<u64>,
     /// Begin and length of the first gaps.
     pub found: Vec<(u64, u64)>,
@@ -36,12 +37,12 @@ pub struct GapReport {
 }
 
 impl GapReport {
-    /// The longest gap that overlaps `[from_ns, to_ns]`.
+    /// Returns the longest gap that overlaps `[from_ns, to_ns]`.
     pub fn gap_during(&self, from_ns: u64, to_ns: u64) -> Option<u64> {
         longest_overlap(&self.found, from_ns, to_ns)
     }
 
-    /// The latest wake-up of the watch that overlaps `[from_ns, to_ns]`.
+    /// Returns the latest wake-up of the watch that overlaps `[from_ns, to_ns]`.
     pub fn late_during(&self, from_ns: u64, to_ns: u64) -> Option<u64> {
         longest_overlap(&self.late, from_ns, to_ns)
     }

@@ -1,6 +1,6 @@
 //! The host of a measurement, at normal priority: it moves the hand, and records when it sees the tissue respond.
 //!
-//! What sees it is a process of its own, as every host is: the force process maps no memory that a host could write.
+//! The observer is a separate process, as every host is: the force process maps no memory that a host could write.
 
 use crate::sample::histogram;
 use hdrhistogram::Histogram;
@@ -26,15 +26,15 @@ const SECOND_SPEED_M_PER_S: f64 = 0.1;
 const ACCELERATION_M_PER_S2: f64 = 1.0;
 /// Seeds that the script leaves in the gland; they move with it and cost the tissue tick their share.
 const SEEDS: u64 = 32;
-/// How often the host looks; part of what it measures.
+/// Pause between two looks of the host; part of what it measures.
 pub const LOOK: Duration = stylet_wall::packet::LOOK_EVERY;
 /// Between two promises that the script still lives.
 const RENEW_NS: u64 = 50_000_000;
-/// Passes in which the core must be seen, 15 s on an idle PC. Passes, not time: where threads of real time leave nothing of the only core,
-/// run and host are both still starting.
+/// Passes in which the core must be seen, 15 s on an idle PC. Passes, not time: where threads of real time leave
+/// nothing of the only core, run and host are both still starting.
 const PATIENCE_PASSES: u32 = 14_000;
 
-/// What the host saw.
+/// Observations of the host.
 pub struct HostReport {
     /// Tip read by the haptic loop to snapshot seen here.
     pub tip_to_host: Histogram<u64>,
@@ -49,7 +49,7 @@ pub struct HostReport {
     pub insertions: u64,
 }
 
-/// Where the script takes the tip.
+/// Path on which the script takes the tip.
 #[derive(Clone, Copy, Debug)]
 pub struct Script {
     outside_m: [f64; 3],
@@ -60,8 +60,8 @@ pub struct Script {
 }
 
 impl Script {
-    /// Along the axis of the target, from 15 mm before the body to four fifths of the target. The other hand brings the probe into the rectum and presses it
-    /// against the target; in a scene without one it moves behind the needle.
+    /// Along the axis of the target, from 15 mm before the body to four fifths of the target. The other hand brings the
+    /// probe into the rectum and presses it against the target; in a scene without one it moves behind the needle.
     pub fn of(scene: &Scene) -> Self {
         let (lowest, _) = scene.lattice.bounds_m();
         let (lower, upper) = scene.target_bounds_m();
@@ -119,14 +119,14 @@ pub struct Host {
     warm_up_ticks: u64,
     step: u64,
     renewed_ns: u64,
-    /// The other hand moves beside the needle's.
+    /// Set where the other hand moves next to the needle's.
     moves_second: bool,
     report: HostReport,
 }
 
-/// How far behind the needle the other hand moves where there is no rectum, m.
+/// Distance behind the needle at which the other hand moves where there is no rectum, m.
 const BEHIND_M: f64 = 0.04;
-/// How far the probe is pressed from where it meets the wall, and how far its tip is beyond the target's middle, m.
+/// Distance that the probe is pressed from where it meets the wall, and that of its tip beyond the target's middle, m.
 const PRESSED_M: f64 = 5e-3;
 const BEYOND_TARGET_M: f64 = 35e-3;
 
@@ -173,7 +173,7 @@ impl Host {
         })
     }
 
-    /// Where the run has a second device, its hand moves beside the needle's.
+    /// Moves the hand of a second device next to the needle's, where the run has one.
     pub fn with_second(self, moves_second: bool) -> Self {
         Self { moves_second, ..self }
     }
@@ -253,7 +253,7 @@ impl Host {
             .push(format!("{whose}, tick {}: {fault}", event.tick));
     }
 
-    /// Half a cycle in, half a cycle out; engaging anew each time re-arms after a fault.
+    /// Half a cycle in, half a cycle out; engaging again each time re-arms after a fault.
     fn follow_script(&mut self, time_ns: u64) {
         let due = time_ns / (CYCLE_NS / 2) + 1;
         if self.step >= due {

@@ -13,7 +13,7 @@ use crate::verdict::Outcome;
 use maud::{Markup, PreEscaped, html};
 use stylet_report::parts::{Column, cards, cell, micro, num, or_na, table};
 
-/// The whole page; the report's digest stands in it as zeros, once.
+/// Returns the whole page; the report's digest stands in it as zeros, once.
 pub fn page(report: &Report, measured: &Measured) -> Result<String, DrawError> {
     let pictures = pictures(report, measured)?;
     let main = html! {

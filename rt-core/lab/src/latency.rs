@@ -33,7 +33,7 @@ pub enum LatencyError {
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// What the system reports.
+        /// Error of the system.
         why: io::Error,
     },
     /// Nothing was measured.

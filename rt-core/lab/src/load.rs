@@ -1,4 +1,4 @@
-//! Work of normal priority beside the loops: child processes of this program, so that none of their memory is locked.
+//! Load of normal priority next to the loops: child processes of this program, so that none of their memory is locked.
 
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use stylet_runtime::control;
 use stylet_shm_schema::Instance;
 use stylet_wall::packet::Socket;
 
-/// What runs beside the loops.
+/// Load that runs next to the loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Load {
@@ -46,8 +46,9 @@ pub enum LoadProcess {
 }
 
 impl LoadProcess {
-    /// Where the process runs that has `before` of its kind before it: one on each core. Left to itself the kernel gives a core another
-    /// mixture each time, and a wake-up that ends a stream through memory takes twice as long as one that ends a computation.
+    /// Returns the core for the process that has `before` of its kind before it: one on each core. Left to itself the
+    /// kernel gives a core another mixture each time, and a wake-up that ends a stream through memory takes twice as
+    /// long as one that ends a computation.
     fn core(self, before: usize) -> Option<usize> {
         let cores = core_affinity::get_core_ids()?;
         matches!(self, Self::Cpu | Self::Memory)
@@ -74,7 +75,7 @@ impl Load {
         }
     }
 
-    /// The load in words, for a machine with `cores` cores.
+    /// Returns the load in words, for a machine with `cores` cores.
     pub(crate) fn describe(self, cores: usize) -> String {
         if self == Self::Window {
             return "the operator's window, drawing without a pause".to_owned();
@@ -115,9 +116,9 @@ pub enum LoadError {
     /// The window's program.
     #[error("cannot start {}: {why}; build it: cargo build --release -p host-ui", .program.display())]
     Window {
-        /// Where it should lie.
+        /// Path at which it should lie.
         program: PathBuf,
-        /// What the system reports.
+        /// Error of the system.
         why: io::Error,
     },
     /// Without it nothing was measured under load.
@@ -128,7 +129,7 @@ pub enum LoadError {
     File {
         /// The file.
         file: PathBuf,
-        /// What the system reports.
+        /// Error of the system.
         why: io::Error,
     },
 }
@@ -196,7 +197,7 @@ impl Running {
     }
 }
 
-/// The window that lies beside this program.
+/// Returns the path of the window's program in the folder of this one.
 fn window(program: &Path, instance: &Instance) -> Result<Child, LoadError> {
     if std::env::var_os("DISPLAY").is_none() && std::env::var_os("WAYLAND_DISPLAY").is_none() {
         return Err(LoadError::NoDisplay);

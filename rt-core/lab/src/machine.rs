@@ -1,4 +1,4 @@
-//! What the kernel reports about this PC, read below a root path so that tests can show it another machine.
+//! Facts that the kernel reports about this PC, read below a root path so that tests can show it another machine.
 
 mod threads;
 
@@ -15,7 +15,7 @@ pub struct Machine {
     root: PathBuf,
 }
 
-/// How soon the kernel lets a woken real-time thread run.
+/// Preemption model: how soon the kernel lets a woken real-time thread run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preemption {
     RealTime,
@@ -37,7 +37,7 @@ impl Preemption {
         })
     }
 
-    /// A thread that works inside the kernel gives way to a real-time thread at once.
+    /// Returns whether a thread that works inside the kernel gives way to a real-time thread at once.
     pub fn gives_way(self) -> bool {
         matches!(self, Self::RealTime | Self::Full | Self::Lazy)
     }
@@ -58,12 +58,12 @@ impl Preemption {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Throttle {
     Off,
-    /// Of each second, or whatever the period is.
+    /// Share of each second, or of another period.
     Share(f64),
 }
 
 impl Machine {
-    /// The machine that this program runs on.
+    /// Returns the machine that this program runs on.
     pub fn this() -> Self {
         Self::at("/")
     }
@@ -103,7 +103,7 @@ impl Machine {
         value.filter(|(k, _)| *k == key).map(|(_, v)| v.to_owned()).next_back()
     }
 
-    /// The value of `CONFIG_<key>` with which the kernel was built.
+    /// Returns the value of `CONFIG_<key>` with which the kernel was built.
     pub fn build_option(&self, key: &str) -> Option<String> {
         let config = self.build_config()?;
         let start = format!("CONFIG_{key}=");
@@ -189,7 +189,7 @@ impl Machine {
         self.cpuinfo(core, "cpu MHz")?.parse().ok()
     }
 
-    /// A line of one core in `/proc/cpuinfo`.
+    /// Returns a line of one core in `/proc/cpuinfo`.
     pub fn cpuinfo(&self, core: usize, key: &str) -> Option<String> {
         let text = self.text("proc/cpuinfo")?;
         let block = text.split("\n\n").nth(core)?;
@@ -200,7 +200,7 @@ impl Machine {
             .map(|(_, v)| v.trim().to_owned())
     }
 
-    /// Name and microseconds to leave of each sleep state that is not disabled.
+    /// Returns the name and microseconds to leave of each sleep state that is not disabled.
     pub fn idle_states(&self, core: usize) -> Vec<(String, u64)> {
         let folder = format!("sys/devices/system/cpu/cpu{core}/cpuidle");
         let state = |name: &String| {
@@ -266,7 +266,7 @@ impl Machine {
         })
     }
 
-    /// The hypervisor by name, as far as it can be identified; `None` on bare metal.
+    /// Returns the hypervisor by name, as far as it can be identified; `None` on bare metal.
     pub fn hypervisor(&self) -> Option<String> {
         if let Some(kind) = self.text("sys/hypervisor/type").filter(|t| !t.is_empty()) {
             return Some(kind);
@@ -311,7 +311,7 @@ impl Machine {
         line.split_whitespace().next()?.parse().ok()
     }
 
-    /// Whether this process has the capability with number `bit`.
+    /// Returns whether this process has the capability with number `bit`.
     pub fn capable(&self, bit: u32) -> bool {
         let status = self.text("proc/self/status").unwrap_or_default();
         let mask = status.lines().find_map(|l| l.strip_prefix("CapEff:"));

@@ -29,16 +29,16 @@ const SHORTEST_WINDOW_NS: u64 = 100_000_000;
 /// Below both loops, above everything of normal priority.
 const WATCH_PRIORITY_BELOW_TISSUE: u32 = 10;
 
-/// What to run.
+/// Settings of a run.
 pub struct Setup<'a> {
     pub options: &'a Options,
     pub duration_ns: u64,
     pub load: Load,
-    /// Where the io load may write.
+    /// Folder that the io load may write to.
     pub folder: &'a Path,
     /// A trace of the kernel names the causes of ticks that are later than this.
     pub trace_over_ns: Option<u64>,
-    /// What was gathered is handed over while the run goes on.
+    /// Checkpoints that receive the samples gathered so far during the run.
     pub checkpoints: Option<&'a Checkpoints<'a>>,
     /// The force loop toggles it for an instrument.
     pub toggle: Option<Pin>,
@@ -115,7 +115,7 @@ fn plan(period_ns: u64, duration_ns: u64, window_ns: u64) -> Plan {
     }
 }
 
-/// A core for the gap watch: one that no loop uses, else that of the tissue loop.
+/// Returns a core for the gap watch: one that no loop uses, else that of the tissue loop.
 fn watch_core(options: &Options) -> Option<usize> {
     let cores = core_affinity::get_core_ids().unwrap_or_default();
     let free = cores.iter().map(|c| c.id).find(|&id| {
@@ -248,7 +248,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
     })
 }
 
-/// The period of a loop at `rate_hz`.
+/// Returns the period of a loop at `rate_hz`.
 pub fn period_ns(rate_hz: u32) -> u64 {
     HAPTIC_PERIOD_NS * 1_000 / u64::from(rate_hz)
 }

@@ -34,7 +34,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// A share of samples as a percentage or, when small, as one in so many.
+/// Returns a share of samples as a percentage or, when small, as one in so many.
 fn share(value: f64) -> String {
     if value >= 0.01 {
         format!("{} %", number(value * 100.0))
@@ -82,7 +82,7 @@ impl ValueFormatter<f64> for Decades {
     }
 }
 
-/// The next power of ten at or above.
+/// Returns the next power of ten at or above.
 fn decade_above(value: f64) -> f64 {
     10_f64.powi(value.max(1e-9).log10().ceil() as i32)
 }
@@ -94,10 +94,11 @@ pub struct Series<'a> {
     pub histogram: &'a Histogram<u64>,
 }
 
-/// Histogram of the wake-up latency: linear microseconds, logarithmic count. The legend has the number past the right edge.
+/// Histogram of the wake-up latency: linear microseconds, logarithmic count. The legend has the number past the right
+/// edge.
 pub fn wake_histogram(series: &[Series]) -> Result<String, DrawError> {
     picture(|root| {
-        // Wide enough for the body; a long tail would press it into a line, and has a picture of its own.
+        // Wide enough for the body; a long tail would press it into a line, and has another picture.
         let at = |s: &Series, q| s.histogram.value_at_quantile(q) as f64 / 1e3;
         let wide = |s: &Series| (at(s, 0.999) * 1.25).min(at(s, 0.99) * 4.0);
         let right = series.iter().map(wide).fold(1.0, f64::max);
@@ -151,7 +152,7 @@ fn beyond(series: &Series, right_us: f64) -> String {
     }
 }
 
-/// Where a tick's time goes: for each stage a bar from p50 to p99.9 and a point at the largest.
+/// Plots where a tick's time goes: for each stage a bar from p50 to p99.9 and a point at the largest.
 pub fn stages(timing: &LoopTiming) -> Result<String, DrawError> {
     let named = timing.stage_names.iter().copied().zip(&timing.stages);
     let rows: Vec<(&str, &Histogram<u64>)> = named.chain([("whole tick", &timing.work)]).collect();
@@ -189,7 +190,7 @@ pub fn stages(timing: &LoopTiming) -> Result<String, DrawError> {
     })
 }
 
-/// The worst wake-up and the longest tick of each window of the run.
+/// Returns the worst wake-up and the longest tick of each window of the run.
 pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, DrawError> {
     picture(|root| {
         let used: Vec<(f64, &Window)> = windows
@@ -229,7 +230,7 @@ pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, DrawError> 
     })
 }
 
-/// The share of ticks later than so many microseconds, both axes logarithmic.
+/// Returns the share of ticks later than so many microseconds, both axes logarithmic.
 pub fn tail(series: &[Series]) -> Result<String, DrawError> {
     picture(|root| {
         let longest = series.iter().map(|s| s.histogram.max()).max().unwrap_or(1) as f64 / 1e3;

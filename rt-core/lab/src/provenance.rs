@@ -1,4 +1,4 @@
-//! Where a measurement was made and with what: kernel, processor, program, settings as read back, dependencies.
+//! Provenance of a measurement: kernel, processor, program, settings as read back, dependencies.
 
 use crate::machine::{Machine, Throttle, core_list};
 use serde::Serialize;
@@ -20,7 +20,7 @@ pub struct ProgramDigest {
     pub sha256: String,
 }
 
-/// This program, and the window that is installed beside it.
+/// This program, and the window's in the same folder.
 pub fn programs() -> Vec<ProgramDigest> {
     let Ok(own) = std::env::current_exe() else {
         return Vec::new();
@@ -66,7 +66,7 @@ pub struct Dependency {
     pub known_anomalies: Vec<&'static str>,
 }
 
-/// What we know to be wrong with a dependency, and what keeps it from mattering here.
+/// Known anomalies of dependencies, with the reason why they do not matter here.
 const ANOMALIES: &[(&str, &str)] = &[
     (
         "iceoryx2",
@@ -86,7 +86,7 @@ const ANOMALIES: &[(&str, &str)] = &[
     ),
 ];
 
-/// What we know to be wrong with a package.
+/// Returns the known anomalies of a package.
 pub fn known_anomalies(package: &str) -> Vec<&'static str> {
     let known = ANOMALIES.iter().filter(|(of, _)| *of == package);
     known.map(|(_, what)| *what).collect()
@@ -126,7 +126,7 @@ fn or_not_reported(value: Option<String>) -> String {
         .unwrap_or_else(|| "not reported".to_owned())
 }
 
-/// What the firmware reports about the PC; a serial number is readable with root's rights alone.
+/// Fields that the firmware reports about the PC; a serial number is readable with root's rights alone.
 const DMI: [(&str, &str); 6] = [
     ("maker", "sys_vendor"),
     ("model", "product_name"),
@@ -256,7 +256,7 @@ fn policy_name(policy: u32) -> &'static str {
     }
 }
 
-/// Every real-time setting, asked against got.
+/// Returns every real-time setting, asked against got.
 pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Setting> {
     let mut settings = Vec::new();
     let mut add = |name: &str, asked: String, got: String, met: bool| {

@@ -25,7 +25,7 @@ pub const HISTOGRAMS: &str = "histograms.hlog";
 /// Stands where the digest will be while the digest is taken.
 pub const NO_DIGEST: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
-/// A file beside the report. The digest of the page is taken with the report's own digest in it as zeros.
+/// File in the report's folder. The digest of the page is taken with the report's own digest in it as zeros.
 #[derive(Clone, Debug, Serialize)]
 pub struct FileDigest {
     pub name: &'static str,
@@ -39,7 +39,7 @@ pub struct Protocol {
     pub load_is: String,
     pub rate_hz: f64,
     pub tissue_rate_hz: f64,
-    /// Of the second device's loop, in a run that has one.
+    /// Rate of the second device's loop, in a run that has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second_rate_hz: Option<f64>,
     pub duration_s: f64,
@@ -167,13 +167,14 @@ pub struct Report {
     /// Late ticks with their causes; only where a trace was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trace: Option<TraceSection>,
-    /// Wake-ups of the force loop in equal parts of the run. Reports of older versions have neither this nor `extremes`.
+    /// Wake-ups of the force loop in equal parts of the run. Reports of older versions have neither this nor
+    /// `extremes`.
     pub parts: Vec<Summary>,
     pub extremes: Extremes,
     pub gaps: GapSection,
     pub cores: Vec<CoreWatch>,
     pub comparison: Option<Comparison>,
-    /// How the spin was found; only with `--spin-us auto`.
+    /// Search for the spin; only with `--spin-us auto`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spin_search: Option<SpinSearch>,
     pub settings: Vec<Setting>,

@@ -1,4 +1,5 @@
-//! What is kept of a run beside its histograms, so that dependence, change and the far tail can be examined afterwards.
+//! Samples of a run that are kept with its histograms, so that dependence, change and the far tail can be examined
+//! afterwards.
 
 use hdrhistogram::Histogram;
 use std::cmp::Reverse;
@@ -15,7 +16,7 @@ pub const LARGEST: usize = 2_000;
 /// Wake-ups kept in the order of time; between half of them and all.
 const SERIES: usize = 16_384;
 
-/// A histogram of nanoseconds with fixed bounds.
+/// Returns a histogram of nanoseconds with fixed bounds.
 pub fn histogram() -> Histogram<u64> {
     Histogram::new_with_bounds(1, LONGEST_NS, DIGITS).expect("the bounds are constants that fit")
 }
@@ -82,7 +83,7 @@ impl Sample {
         self.stride *= 2;
     }
 
-    /// The latest wake-ups as (grid point, nanoseconds), in the order of time.
+    /// Returns the latest wake-ups as (grid point, nanoseconds), in the order of time.
     pub fn largest(&self) -> Vec<(u64, u64)> {
         let mut all: Vec<(u64, u64)> = self.largest.iter().map(|Reverse((ns, place))| (*place, *ns)).collect();
         all.sort_unstable();

@@ -1,10 +1,11 @@
-//! Detached signatures of reports, made and checked by OpenSSH's `ssh-keygen -Y`: the keys are those people have already.
+//! Detached signatures of reports, made and checked by OpenSSH's `ssh-keygen -Y`: the keys are those people have
+//! already.
 
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-/// What the signature is for; one made for another purpose with the same key does not pass.
+/// Purpose of the signature; one made for another purpose with the same key does not pass.
 const NAMESPACE: &str = "stylet-latency-report";
 const PROGRAM: &str = "ssh-keygen";
 
@@ -19,7 +20,7 @@ pub enum SignError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system reports.
+        /// Error of the system.
         source: io::Error,
     },
     /// `ssh-keygen` does not run.
@@ -41,7 +42,7 @@ pub enum SignError {
         /// First line of what `ssh-keygen` reports.
         said: String,
     },
-    /// The signature is good, but nobody who may sign has its key.
+    /// The signature is good, but its key belongs to no permitted signer.
     #[error("wrong key: signed with {key}, which {} does not list", .allowed.display())]
     WrongKey {
         /// Kind and fingerprint.
@@ -60,14 +61,14 @@ pub struct Signer {
     pub person: Option<String>,
 }
 
-/// The signature that belongs to a file: its name with `.sig`.
+/// Returns the signature that belongs to a file: its name with `.sig`.
 pub fn signature_of(file: &Path) -> PathBuf {
     let mut name = file.as_os_str().to_owned();
     name.push(".sig");
     name.into()
 }
 
-/// Whether signing will find what it needs, asked before a long measurement.
+/// Checks that signing will find what it needs, before a long measurement.
 pub fn ready(key: &Path) -> Result<(), SignError> {
     readable(key)?;
     let asked = Command::new(PROGRAM).arg("-?").stdin(Stdio::null()).output();

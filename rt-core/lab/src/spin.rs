@@ -9,7 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_runtime::process::Options;
 use stylet_runtime::rt::clock::Wait;
 
-/// The loop's p50 and p99 must be at most this share of cyclictest's: a third, so that half of it is kept on a day that is a little worse.
+/// The loop's p50 and p99 must be at most this share of cyclictest's: a third, so that half of it is kept on a day that
+/// is a little worse.
 const SHARE: f64 = 1.0 / 3.0;
 /// Trials in a row that must meet it: a percentile of three seconds may be low by chance.
 const TRIALS: usize = 2;
@@ -19,7 +20,7 @@ const FIRST_US: u64 = 10;
 /// The spin is known to this.
 const STEP_US: u64 = 5;
 
-/// `--spin-us` as it is given.
+/// `--spin-us` as given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spin {
     /// So many microseconds.
@@ -52,7 +53,7 @@ pub struct Trial {
     pub met: bool,
 }
 
-/// What was tried, and what was found.
+/// Spins that were tried, and the result.
 #[derive(Clone, Debug, Serialize)]
 pub struct SpinSearch {
     /// p50 and p99 that the loop must not exceed, microseconds.
@@ -66,7 +67,7 @@ pub struct SpinSearch {
 }
 
 impl SpinSearch {
-    /// What was found and what it costs.
+    /// Returns the result and its cost, in words.
     pub fn words(&self) -> String {
         let [p50, p99] = self.at_most_us;
         let share = 100.0 * self.core_share;
@@ -161,7 +162,8 @@ pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Resul
     })
 }
 
-/// The smallest spin for which `is_met`, if a longer one never does worse: doubled until it is met, then halved in between.
+/// Returns the smallest spin for which `is_met`, if a longer one never does worse: doubled until it is met, then halved
+/// in between.
 fn smallest(longest_us: u64, mut is_met: impl FnMut(u64) -> bool) -> Option<u64> {
     let (mut low, mut high) = (0, FIRST_US.min(longest_us));
     while !is_met(high) {

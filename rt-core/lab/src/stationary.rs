@@ -1,5 +1,5 @@
-//! Whether a run stayed the same from its first part to its last: Kolmogorov-Smirnov tests on wake-ups that were thinned until
-//! they no longer depend on each other.
+//! Tests whether a run stayed the same from its first part to its last: Kolmogorov-Smirnov tests on wake-ups that were
+//! thinned until they no longer depend on each other.
 
 use crate::sample::PARTS;
 use serde::Serialize;
@@ -36,13 +36,13 @@ impl TestResult {
     }
 }
 
-/// What the tests found.
+/// Result of the tests.
 #[derive(Clone, Debug, Serialize)]
 pub struct Stationarity {
     /// Ticks between the values that were compared.
     pub every: u64,
     pub values: usize,
-    /// Whether values so far apart no longer depend on each other.
+    /// Set where values so far apart no longer depend on each other.
     pub independent: bool,
     pub tests: Vec<TestResult>,
     /// Why the run does not count as stationary; empty where it does.
@@ -80,7 +80,7 @@ pub fn examine(series: &[u64], stride: u64) -> Stationarity {
     }
 }
 
-/// Whether a value and the next few are correlated in rank beyond what each part of the run has in common.
+/// Returns whether a value and the next few are correlated in rank beyond what each part of the run has in common.
 fn depends(values: &[f64]) -> bool {
     let mut ranks = ranks(values);
     for part in ranks.chunks_mut(values.len().div_ceil(PARTS)) {
@@ -100,7 +100,7 @@ fn depends(values: &[f64]) -> bool {
     })
 }
 
-/// Mean ranks; equal values share theirs.
+/// Returns the mean ranks; equal values share theirs.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_unstable_by(|&a, &b| values[a].total_cmp(&values[b]));
@@ -167,7 +167,7 @@ pub fn two_samples(name: &'static str, a: &[f64], b: &[f64]) -> TestResult {
     TestResult { name, distance, p }
 }
 
-/// The test of one sample in 0 to 1 against the uniform distribution.
+/// Returns the test of one sample in 0 to 1 against the uniform distribution.
 pub fn uniform(name: &'static str, values: &[f64]) -> TestResult {
     let mut sorted = values.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -253,7 +253,8 @@ mod tests {
 
     #[test]
     fn halves_of_different_scale_are_refused() {
-        // The power, measured: 4,096 wake-ups show a tenth more in the second half in some runs, a fifth more in nearly all.
+        // The power, measured: 4,096 wake-ups show a tenth more in the second half in some runs, a fifth more in nearly
+        // all.
         for (factor, least) in [(1.1, 35), (1.2, 95), (1.5, 100)] {
             let n = refused(factor);
             println!("scale {factor}: {n} of 100 refused");

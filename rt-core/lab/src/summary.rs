@@ -53,7 +53,7 @@ pub fn quantile_us(histogram: &Histogram<u64>, quantile: f64) -> Option<f64> {
     (histogram.len() >= needed(quantile)).then(|| histogram.value_at_quantile(quantile) as f64 / 1e3)
 }
 
-/// The 95 % interval of a percentile, widened to the bins in which its ends lie.
+/// Returns the 95 % interval of a percentile, widened to the bins in which its ends lie.
 pub fn interval_us(histogram: &Histogram<u64>, quantile: f64) -> Option<[f64; 2]> {
     let (low, high) = ranks_of_quantile(quantile, histogram.len())?;
     let (mut below, mut from_ns) = (0, None);
@@ -123,8 +123,9 @@ mod tests {
 
     #[test]
     fn interval_holds_the_percentile_in_95_of_100_runs() {
-        // Claim: of 400 seeded runs with a known p90 and p99, the intervals hold them as often as the binomial allows, at least
-        // 95 % less three deviations. Bins widen the intervals a little, so there is no bound from above but 400.
+        // Claim: of 400 seeded runs with a known p90 and p99, the intervals hold them as often as the binomial allows,
+        // at least 95 % less three deviations. Bins widen the intervals a little, so there is no bound from above but
+        // 400.
         for (name, q) in [("p90", 0.9), ("p99", 0.99)] {
             let mut held = 0;
             for seed in 0..400_u64 {

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use stylet_runtime::process::LoopReport;
 
-/// What a limit looks at.
+/// Reading that a limit applies to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Reading {
     Wake(f64),
@@ -88,12 +88,12 @@ impl LimitSpec {
         self.default * scale
     }
 
-    /// The one limit that is a lower bound.
+    /// Returns the one limit that is a lower bound.
     fn is_lower_bound(&self) -> bool {
         matches!(self.reading, Reading::StiffnessMargin(_))
     }
 
-    /// What a virtual machine, or time taken by firmware, decides more than this program does.
+    /// Returns whether a virtual machine, or time taken by firmware, decides the reading more than this program does.
     fn is_tail(&self) -> bool {
         match self.reading {
             Reading::Wake(q) | Reading::Work(q) | Reading::Path(q) | Reading::StiffnessMargin(q) => q > 0.995,
@@ -236,7 +236,7 @@ pub fn overall(results: &[LimitResult]) -> Outcome {
 
 type Read = (Option<f64>, String);
 
-/// A percentile with what it rests on; the largest value needs one sample.
+/// Returns a percentile with what it rests on; the largest value needs one sample.
 fn percentile(histogram: &Histogram<u64>, quantile: f64) -> Read {
     let count = histogram.len();
     if quantile >= MAX {

@@ -13,7 +13,8 @@ use stylet_text::printable;
 pub struct VerifyArgs {
     /// The folder of the report, or its report.json
     pub report: PathBuf,
-    /// Who may sign: OpenSSH's file of allowed signers, a line `NAME ssh-ed25519 KEY` for each. The report must then be signed
+    /// Who may sign: OpenSSH's file of allowed signers, a line `NAME ssh-ed25519 KEY` for each. The report must then be
+    /// signed
     #[arg(long, value_name = "FILE")]
     pub allowed_signers: Option<PathBuf>,
     /// Program that the report must be of, rt-core or host-ui; may be given for both
@@ -27,7 +28,7 @@ pub struct VerifyArgs {
 pub struct ReadError {
     /// `report.json`, or a program.
     pub path: PathBuf,
-    /// What the system reports.
+    /// Error of the system.
     pub source: std::io::Error,
 }
 
@@ -44,7 +45,7 @@ pub fn run(args: &VerifyArgs) -> Result<u8, ReadError> {
         args.report.clone()
     };
     let bytes = read(&file)?;
-    // Damage may leave what is not text; it then differs from its digest.
+    // Damage may leave bytes that are not text; the file then differs from its digest.
     let text = String::from_utf8_lossy(&bytes);
     let folder = file.parent().unwrap_or(Path::new("."));
     let mut problems = problems(&text, |name| std::fs::read(folder.join(name)).ok());
@@ -98,7 +99,7 @@ fn signature(file: &Path, allowed: Option<&Path>) -> Result<String, String> {
     }
 }
 
-/// What is wrong where the report is not of the program `binary`.
+/// Returns the discrepancy where the report is not of the program `binary`.
 fn other_program(report: &Value, binary: &Path, digest: &str) -> Option<String> {
     let programs = report["programs"].as_array().map_or(&[][..], Vec::as_slice);
     let text = |program: &Value, key: &str| program[key].as_str().unwrap_or_default().to_owned();
@@ -120,7 +121,7 @@ fn other_program(report: &Value, binary: &Path, digest: &str) -> Option<String> 
     ))
 }
 
-/// Everything that was altered; `read` returns the content of a file beside the report.
+/// Returns everything that was altered; `read` returns the content of a file in the report's folder.
 pub(crate) fn problems(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>) -> Vec<String> {
     let Ok(report) = serde_json::from_str::<Value>(text) else {
         return vec![format!("{JSON}: tampered with or damaged, it is not JSON")];

@@ -1,4 +1,4 @@
-//! What the kernel reports about the cores while a measurement runs: frequency, steal time, interrupts served.
+//! Counters that the kernel keeps of the cores while a measurement runs: frequency, steal time, interrupts served.
 
 use crate::machine::Machine;
 use serde::Serialize;

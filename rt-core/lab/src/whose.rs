@@ -25,7 +25,7 @@ pub struct WhoseArgs {
     sign: Option<PathBuf>,
 }
 
-/// The same in the report; what nobody named is missing.
+/// The same in the report; fields without a value are missing.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, PartialEq, Eq)]
 #[serde(deny_unknown_fields)]
 pub struct Whose {

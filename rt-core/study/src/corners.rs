@@ -10,7 +10,7 @@ use stylet_sim::scene::TissueKind;
 /// More parameters than this have too many corners.
 const MOST: usize = 12;
 
-/// What is wrong with one of the corners of what varies, if anything is.
+/// Returns the problem of one of the corners of what varies, if there is one.
 pub fn problem(parameters: &[(&'static ParameterSpec, Spread)], tissue: TissueKind) -> Option<String> {
     let varied: Vec<_> = parameters
         .iter()

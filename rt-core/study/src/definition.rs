@@ -27,7 +27,7 @@ pub struct Study {
     pub implants: u32,
     /// Tissue model.
     pub tissue: TissueKind,
-    /// What is implanted.
+    /// Glands to implant.
     pub glands: Vec<Gland>,
     /// In the order of `QUANTITIES`.
     pub quantities: Vec<Spread>,

@@ -1,4 +1,4 @@
-//! Random numbers of an insertion: each quantity has a stream of its own, which follows from the id alone.
+//! Random numbers of an insertion: each quantity has its own stream, which follows from the id alone.
 
 use crate::definition::{Gland, Study};
 use crate::quantity::{Id, QUANTITIES, Scope};
@@ -16,7 +16,7 @@ pub struct Implant {
 }
 
 impl Implant {
-    /// The implant with that place among all of a study, from 0.
+    /// Returns the implant with that place among all of a study, from 0.
     pub fn at(study: &Study, place: usize) -> Self {
         let each = study.implants as usize;
         Self {
@@ -36,13 +36,13 @@ impl Implant {
         format!("{}/{}/{}/{:06}", study.name, gland.scene, gland.plan_name, self.number)
     }
 
-    /// The id of one insertion; needles count from 0 here and from 1 in the id.
+    /// Returns the id of one insertion; needles count from 0 here and from 1 in the id.
     pub fn id_of_needle(&self, study: &Study, needle: usize) -> String {
         format!("{}/{:03}", self.id(study), needle + 1)
     }
 }
 
-/// What holds for one insertion.
+/// Values drawn for one insertion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
     /// In the order of [`QUANTITIES`], then the parameters of the study.
@@ -78,7 +78,7 @@ impl Drawn {
     }
 }
 
-/// A quantity that is added to a study moves no other one.
+/// Makes the stream of random numbers of a quantity, so that one added to a study changes no other.
 fn stream(seed: u64, id: &str, key: &str) -> ChaCha8Rng {
     let mut sum = Sha256::new();
     sum.update(seed.to_le_bytes());

@@ -11,7 +11,7 @@ use stylet_write::WriteError;
 #[error("{} found\n  {}", counted(.0.len()), .0.join("\n  "))]
 pub struct Problems(pub Vec<String>);
 
-/// What stops a study; an insertion that fails is a result and does not.
+/// Error that stops a study; an insertion that fails is a result and does not.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// The study file or a plan.
@@ -19,7 +19,7 @@ pub enum StudyError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system reported.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// Everything that is wrong with the study file and its plans.
@@ -35,7 +35,7 @@ pub enum StudyError {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// What the system reported.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// Results of another study, or of the same one before it was changed.
@@ -57,7 +57,7 @@ pub enum StudyError {
     /// A file of results.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// A file beside the results.
+    /// File in the folder of the results.
     #[error(transparent)]
     Write(#[from] WriteError),
     /// A scene cannot be built.
@@ -70,7 +70,7 @@ pub enum StudyError {
         scene: String,
         /// The factor.
         stiffness: f64,
-        /// What the solver or the tissue reported.
+        /// Error of the solver or the tissue.
         why: RehearseError,
     },
     /// No thread could be started.

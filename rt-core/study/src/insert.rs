@@ -94,7 +94,7 @@ pub fn implant(
     Ok(Some(rows))
 }
 
-/// The needle as it is really held: at the template's hole by what misses it, turned about its entry.
+/// Returns the needle as really held: at the template's hole by what misses it, turned about its entry.
 fn run(needle: &Needle, drawn: &Drawn) -> NeedleRun {
     let (right, anterior) = across(&needle.direction);
     let missed_mm = right * drawn.get(Id::EntryRight) + anterior * drawn.get(Id::EntryAnterior);
@@ -133,7 +133,7 @@ fn across(direction: &Unit<Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
     (anterior.cross(&along).normalize(), anterior)
 }
 
-/// What of a row follows from the outcome.
+/// Returns the part of a row that follows from the outcome.
 fn result(plan: &Plan, needle: &Needle, outcome: &Result<Rehearsed, RehearseError>) -> Insertion {
     let mm = |m: f64| m * 1e3;
     let motion = |done: &Rehearsed| Motion {

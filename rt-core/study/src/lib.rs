@@ -1,7 +1,8 @@
-//! Population studies: thousands of insertions by the two ticks of a run, divided into shards that know nothing of each other.
+//! Population studies: thousands of insertions by the two ticks of a run, divided into shards that know nothing of each
+//! other.
 //!
-//! A study file gives scenes, plans and how hands and tissue vary. Each insertion draws its numbers from its own id, so that
-//! the results do not depend on shards, threads or interruptions. Runs on threads of normal priority.
+//! A study file gives scenes, plans and how hands and tissue vary. Each insertion draws its numbers from its own id, so
+//! that the results do not depend on shards, threads or interruptions. Runs on threads of normal priority.
 
 #![warn(missing_docs)]
 

@@ -1,4 +1,4 @@
-//! What a shard has finished: a file for each implant while it is under way, one file when all are done.
+//! Finished parts of a shard: a file for each implant while it is under way, one file when all are done.
 
 use crate::definition::Study;
 use crate::error::StudyError;
@@ -46,7 +46,7 @@ impl Parts {
         })
     }
 
-    /// The finished shard, if it is.
+    /// Returns the finished shard, if it is.
     pub fn finished(&self) -> Result<Option<Table>, StudyError> {
         if !self.whole.exists() {
             return Ok(None);

@@ -33,7 +33,7 @@ struct NeedleFile {
     strength_u: Vec<f64>,
 }
 
-/// What is inserted.
+/// Needles to insert.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Model of the seeds.
@@ -49,11 +49,11 @@ pub struct Plan {
 pub struct Needle {
     /// Empty where the file names none.
     pub hole: String,
-    /// Where its tip starts.
+    /// Place where its tip starts.
     pub entry_mm: Vector3<f64>,
     /// Unit vector into the body.
     pub direction: Unit<Vector3<f64>>,
-    /// Where its tip is drawn back to, from the entry.
+    /// Place that its tip is drawn back to, from the entry.
     pub retract_to_mm: f64,
     /// From middle to middle of two seeds of a strand.
     pub strand_pitch_mm: Option<f64>,

@@ -1,4 +1,4 @@
-//! How far a shard is: a line that is written over in a terminal, a line every few seconds in a file.
+//! Progress of a shard: a line that is written over in a terminal, a line every few seconds in a file.
 
 use std::io::{IsTerminal, Write};
 use std::sync::Mutex;

@@ -1,14 +1,14 @@
-//! What may vary in a study: the table of quantities of hand, needle and tissue, and every parameter of the core.
+//! Quantities that may vary in a study: those of hand, needle and tissue, and every parameter of the core.
 
 use stylet_shm_schema::{PARAMETERS, ParameterSpec};
 use stylet_sim::scene::TissueKind;
 
-/// How often a quantity is drawn.
+/// Scope of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
     /// Once for all needles of an implant: the same patient and the same operator.
     Implant,
-    /// Anew for each needle.
+    /// Draw for each needle.
     Needle,
 }
 
@@ -17,11 +17,11 @@ pub enum Scope {
 pub struct Quantity {
     /// In the study file and as the column of the results; the unit stands at its end.
     pub key: &'static str,
-    /// How often it is drawn.
+    /// Scope in which it is drawn.
     pub scope: Scope,
     /// Least and largest value.
     pub limits: [f64; 2],
-    /// Where the study file does not have it.
+    /// Value where the study file has none.
     pub default: f64,
 }
 
@@ -49,7 +49,7 @@ quantities! {
     TiltAnterior "tilt_anterior_deg" Needle [-10.0, 10.0], 0.0;
 }
 
-/// The parameter of that key, such as `force.cutting`.
+/// Returns the parameter of that key, such as `force.cutting`.
 pub fn parameter(key: &str) -> Option<&'static ParameterSpec> {
     PARAMETERS.iter().find(|spec| spec.key == key)
 }
@@ -75,12 +75,12 @@ pub fn limits(spec: &ParameterSpec) -> [f64; 2] {
     [spec.min, spec.max].map(|si| si * spec.display_per_si)
 }
 
-/// Whether the parameter does nothing in that tissue, so that its variation would be an empty column.
+/// Returns whether the parameter does nothing in that tissue, so that its variation would be an empty column.
 pub fn has_no_part(spec: &ParameterSpec, tissue: TissueKind) -> bool {
     tissue.has_lines() && spec.help.contains("no part on a needle line")
 }
 
-/// Every key that may vary, for errors.
+/// Returns every key that may vary, for errors.
 pub fn keys() -> impl Iterator<Item = &'static str> {
     QUANTITIES.iter().map(|q| q.key).chain(PARAMETERS.iter().map(|p| p.key))
 }

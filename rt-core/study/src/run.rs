@@ -15,10 +15,10 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use stylet_insertions::{Insertion, Shard, Table, structures_file};
 use stylet_sim::scene::Scene;
 
-/// What is asked for.
+/// Order for a run.
 #[derive(Clone, Debug)]
 pub struct Order {
-    /// Which part of the study.
+    /// Part of the study.
     pub shard: Shard,
     /// Folder of the results.
     pub folder: PathBuf,
@@ -26,7 +26,7 @@ pub struct Order {
     pub jobs: NonZeroUsize,
 }
 
-/// How it ended.
+/// Ending of a run.
 #[derive(Debug)]
 pub enum Ended {
     /// The shard was finished before; nothing was run.
@@ -108,7 +108,7 @@ fn write_structures(study: &Study, order: &Order) -> Result<(), StudyError> {
     Ok(())
 }
 
-/// What all threads of a shard know.
+/// State that all threads of a shard share.
 struct Shared<'a> {
     study: &'a Study,
     /// Stiffness in bits, place in the study, implant.

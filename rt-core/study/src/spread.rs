@@ -1,4 +1,4 @@
-//! How a quantity varies: the forms that a study file has for it, and one value of it.
+//! Spread of a quantity: the forms that a study file has for it, and one value of it.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::Rng;
@@ -120,7 +120,7 @@ impl Spread {
     }
 }
 
-/// What is wrong with a distribution.
+/// Problem with a distribution.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SpreadProblem {
     /// None of the forms.

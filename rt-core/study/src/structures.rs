@@ -1,4 +1,5 @@
-//! The structures of a scene as a label volume with names (NRRD, as Slicer's segmentations), for dose and for other programs.
+//! The structures of a scene as a label volume with names (NRRD, as Slicer's segmentations), for dose and for other
+//! programs.
 
 use std::path::Path;
 use stylet_sim::scene::Scene;

@@ -1,4 +1,5 @@
-//! Claims of studies: results follow from ids alone, nothing is done twice, and a wrong study file is refused as a whole.
+//! Claims of studies: results follow from ids alone, nothing is done twice, and a wrong study file is refused as a
+//! whole.
 
 mod file;
 mod shards;
@@ -34,7 +35,7 @@ seed_along_mm = [45.0, 35.0]
 strength_u = [0.5, 0.5]
 "#;
 
-/// A study file of the plan above, with keys after the name.
+/// Returns a study file of the plan above, with keys after the name.
 pub fn text(keys: &str) -> String {
     format!("name = \"t\"\n{keys}\n[[gland]]\nscene = \"paper\"\nplan = \"plan.toml\"\n")
 }

@@ -1,8 +1,9 @@
 //! `rt-core campaign`: measurements of hours and nights, part after part, that continue after whatever ended them.
 //!
-//! The file of a campaign names its parts (`plan`). Each start of the program measures what is left of a part in a session
-//! of its own, and writes what it has gathered every minute (`session`). One report is made of all sessions (`report`,
-//! `page`). What was measured after the last checkpoint of a session that was killed is not counted, and measured again.
+//! The file of a campaign names its parts (`plan`). Each start of the program measures what is left of a part in a
+//! separate session, and writes what it has gathered every minute (`session`). One report is made of all sessions
+//! (`report`, `page`). What was measured after the last checkpoint of a session that was killed is not counted, and
+//! measured again.
 
 mod page;
 mod plan;
@@ -38,11 +39,11 @@ const PAGE: &str = "campaign.html";
 pub struct CampaignArgs {
     /// The campaign as a TOML file: a `part` for each load, one after the other
     ///
-    /// A part needs its duration ("8h"). Its load is one of those of `rt-core latency`, without one nothing; its rate is in Hz,
-    /// by default 1000; its spin_us is 0 by default. Before the parts, `repeat` measures the whole list so many times, `window`
-    /// is the time of which the worst is drawn, by default "5m", and `checkpoint` how often all that was measured is written, by
-    /// default "1m". The same command continues a campaign that was interrupted, killed, or ended by a restart of the PC; a line
-    /// `@reboot` in a crontab does so by itself.
+    /// A part needs its duration ("8h"). Its load is one of those of `rt-core latency`, without one nothing; its rate
+    /// is in Hz, by default 1000; its spin_us is 0 by default. Before the parts, `repeat` measures the whole list so
+    /// many times, `window` is the time of which the worst is drawn, by default "5m", and `checkpoint` how often all
+    /// that was measured is written, by default "1m". The same command continues a campaign that was interrupted,
+    /// killed, or ended by a restart of the PC; a line `@reboot` in a crontab does so by itself.
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// Folder of the campaign: its checkpoints, campaign.json and campaign.html
@@ -63,7 +64,7 @@ pub enum CampaignError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system reports.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// Everything that is wrong with the file, one a line.
@@ -85,7 +86,7 @@ pub enum CampaignError {
     Checkpoint {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Problem with it.
         why: String,
     },
     /// Options of the run.
@@ -163,7 +164,7 @@ fn read(path: &Path) -> Result<String, CampaignError> {
     })
 }
 
-/// Held until it is dropped, and by nobody once this process has ended.
+/// Held until it is dropped, or until this process ends.
 fn lock(folder: &Path) -> Result<File, CampaignError> {
     let path = folder.join(LOCK);
     let file = File::options().create(true).truncate(false).write(true).open(&path);

@@ -7,7 +7,7 @@ use crate::plots::{self, BLUE, DrawError, MaximaPart, ORANGE, Series};
 use maud::{Markup, PreEscaped, html};
 use stylet_report::parts::{Column, cell, num, or_na, table};
 
-/// The whole page, which needs nothing else.
+/// Returns the whole page, which needs nothing else.
 pub fn page(r: &CampaignReport) -> Result<String, DrawError> {
     let title = if r.name.is_empty() {
         "Latency campaign".to_owned()

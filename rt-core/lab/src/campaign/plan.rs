@@ -6,7 +6,7 @@ use crate::machine::Machine;
 use crate::measure::period_ns;
 use serde::{Deserialize, Serialize};
 
-/// Windows shorter than this are for nobody.
+/// Shortest useful window.
 const SHORTEST_WINDOW_NS: u64 = 1_000_000_000;
 
 /// One part: a load at a rate for a time.
@@ -79,7 +79,7 @@ fn kilohertz() -> u32 {
 pub struct PlanError(pub Vec<String>);
 
 impl Plan {
-    /// The plan, or every problem with the file.
+    /// Returns the plan, or every problem with the file.
     pub fn of(text: &str) -> Result<Self, PlanError> {
         let raw: RawPlan = toml::from_str(text).map_err(|e| PlanError(vec![e.to_string()]))?;
         let mut problems = Vec::new();

@@ -1,4 +1,4 @@
-//! How far a campaign is, on the terminal: a line every few seconds, with the time that is left.
+//! Progress of a campaign on the terminal: a line every few seconds, with the time that is left.
 
 use super::CampaignError;
 use super::plan::Plan;
@@ -37,7 +37,7 @@ impl Progress {
         })
     }
 
-    /// The line after `passed_s` of the session.
+    /// Returns the line after `passed_s` of the session.
     pub fn line(&self, passed_s: f64) -> String {
         let passed_s = passed_s.min(self.left_ns as f64 / 1e9);
         let done_s = self.before_s + passed_s;

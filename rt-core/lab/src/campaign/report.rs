@@ -47,7 +47,7 @@ pub struct SessionReport {
     pub part: usize,
     pub began_s: f64,
     pub measured_s: f64,
-    /// Which start of the PC.
+    /// Start of the PC.
     pub boot: String,
 }
 
@@ -64,7 +64,7 @@ pub struct CampaignReport {
     pub window_s: f64,
     pub parts: Vec<PartReport>,
     pub sessions: Vec<SessionReport>,
-    /// What is below the loops.
+    /// Hypervisor below the loops.
     pub hypervisor: Option<String>,
 }
 

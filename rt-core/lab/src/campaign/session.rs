@@ -1,4 +1,4 @@
-//! What a session has measured, as it is written at each checkpoint and read again.
+//! Measurements of a session, as they are written at each checkpoint and read again.
 
 use super::CampaignError;
 use super::plan::Part;
@@ -51,10 +51,10 @@ impl Bins {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SessionRecord {
     schema: String,
-    /// Which part, and the how manieth session of it, both from 0.
+    /// Part, and the number of its session, both from 0.
     pub part: usize,
     pub session: usize,
-    /// Which start of the PC; times below count from it.
+    /// Start of the PC; times below count from it.
     pub boot: String,
     /// Seconds since 1970.
     pub began_s: f64,
@@ -71,7 +71,7 @@ pub struct SessionRecord {
 }
 
 impl SessionRecord {
-    /// Whether both measured the same moment.
+    /// Returns whether both measured the same moment.
     pub fn overlaps(&self, other: &Self) -> bool {
         let end = |r: &Self| r.first_due_ns + r.measured_ns;
         self.boot == other.boot && self.first_due_ns < end(other) && other.first_due_ns < end(self)
@@ -134,7 +134,7 @@ impl Store {
         })
     }
 
-    /// Time of `part` that is still to be measured; 0 when it is complete.
+    /// Returns the time of `part` that is still to be measured; 0 when it is complete.
     pub fn left_ns(&self, number: usize, part: &Part) -> Result<u64, CampaignError> {
         let kept = self.records(FORCE)?;
         let of_part = kept.iter().filter(|k| k.record.part == number);
@@ -144,7 +144,7 @@ impl Store {
         Ok(if left_ns < COMPLETE_NS { 0 } else { left_ns })
     }
 
-    /// A writer of the next session of a part.
+    /// Returns a writer of the next session of a part.
     pub fn begin(&self, part: usize) -> Result<Writer, CampaignError> {
         let all = self.records(FORCE)?;
         let before = all
@@ -191,7 +191,7 @@ impl Writer {
             .join(format!("part-{:03}-session-{:03}-{name}.json", self.part, self.session));
         let text = serde_json::to_string(&record).unwrap_or_default();
         if let Err(why) = write_whole(&path, text.as_bytes()) {
-            // The measurement goes on: the next checkpoint may succeed.
+            // The measurement continues: the next checkpoint may succeed.
             *self.failure.lock().unwrap_or_else(|e| e.into_inner()) = Some(why.to_string());
         }
     }

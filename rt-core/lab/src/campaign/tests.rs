@@ -19,7 +19,8 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// What a loop has gathered in `seconds` from `first_ns` on: each tick wakes 10 us late, the last one 900.
+/// Returns the timing that a loop has gathered in `seconds` from `first_ns` on: each tick wakes 10 us late, the last
+/// one 900.
 fn gathered(first_ns: u64, seconds: u64) -> LoopTiming {
     let mut timing = LoopTiming::new(
         &[],
@@ -83,7 +84,7 @@ fn sessions_of_a_part_add_up_and_what_is_left_is_measured() {
     let left = |part: usize| store.left_ns(part, &plan.parts[part]).expect("readable") / 1_000_000_000;
     assert_eq!((left(0), left(1)), (10, 20));
     put(&store, 0, 1_000_000_000, 4);
-    // A later checkpoint of the same session takes the place of the one before: it was killed, and began anew.
+    // A later checkpoint of the same session takes the place of the one before: it was killed, and began again.
     put(&store, 0, 20_000_000_000, 6);
     put(&store, 1, 40_000_000_000, 20);
     assert_eq!((left(0), left(1), left(2)), (0, 0, 10));

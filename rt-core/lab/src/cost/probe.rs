@@ -1,4 +1,4 @@
-//! What the ultrasound probe costs in a tick of the tissue, in a scene with a rectum for it.
+//! Cost of the ultrasound probe in a tick of the tissue, in a scene with a rectum for it.
 
 use super::{CostError, TICK_S, TICKS};
 use std::time::Instant;

@@ -8,7 +8,7 @@ use serde::Serialize;
 pub struct Category {
     pub number: u32,
     pub name: &'static str,
-    /// What there is, each with its place in the repository.
+    /// Evidence, each with its place in the repository.
     pub there: &'static [(&'static str, &'static str)],
     /// Empty where nothing is known to be missing.
     pub missing: &'static str,

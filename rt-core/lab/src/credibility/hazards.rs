@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// What could harm, in the words of ISO 14971: hazard, situation, harm.
+/// Hazard in the words of ISO 14971: hazard, situation, harm.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Hazard {
     pub id: &'static str,

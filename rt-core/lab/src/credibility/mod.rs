@@ -1,5 +1,5 @@
-//! `rt-core credibility`: what an auditor asks for, in one file: what the simulator is for, what could harm, which test holds it
-//! off, and which run shows it.
+//! `rt-core credibility`: what an auditor asks for, in one file: what the simulator is for, what could harm, which test
+//! holds it off, and which run shows it.
 //!
 //! The tables are `context` (purpose and limits), `hazards`, `trace` (requirements) and `evidence` (the categories of
 //! the FDA's guidance, the factors of ASME V&V 40, with what is there and what is missing). Runs come from reports of
@@ -29,7 +29,7 @@ use trace::{REQUIREMENTS, Requirement};
 
 const JSON: &str = "credibility.json";
 const PAGE: &str = "credibility.html";
-/// What the file is not.
+/// Limits of the claim that the file makes.
 const CLAIM: &str = "This file is evidence for whoever assesses Stylet. It uses words of IEC 62304 (software life cycle), ISO 14971 (risk \
     management) and IEC 60601-1 (medical electrical equipment), of the FDA's guidance on the credibility of computational modelling \
     (November 2023) and of ASME V&V 40-2018, so that their readers find their way. It claims conformity with none of them: \
@@ -41,7 +41,8 @@ pub struct CredibilityArgs {
     /// Folder for credibility.html and credibility.json
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Folder of a report of `rt-core latency`: its outcome of each limit stands beside the requirement; may be given again
+    /// Folder of a report of `rt-core latency`: its outcome of each limit stands beside the requirement; may be given
+    /// again
     #[arg(long, value_name = "DIR")]
     pub run: Vec<PathBuf>,
 }
@@ -60,7 +61,7 @@ pub enum CredibilityError {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// What the system reports.
+        /// Error of the system.
         source: std::io::Error,
     },
 }

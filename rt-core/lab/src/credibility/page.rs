@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use std::collections::BTreeMap;
 use stylet_report::parts::{Column, cell, table};
 
-/// The whole page, which needs nothing else.
+/// Returns the whole page, which needs nothing else.
 pub fn page(c: &Credibility) -> String {
     let main = html! {
         header { h1 { "Credibility file of Stylet" } }
@@ -34,7 +34,7 @@ pub fn page(c: &Credibility) -> String {
     stylet_report::page("Credibility file of Stylet", "", &main)
 }
 
-/// A place with this id.
+/// Returns a place with this id.
 fn anchor(id: &str) -> Markup {
     html! { code id=(id) { (id) } }
 }

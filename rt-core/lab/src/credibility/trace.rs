@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// What the software must do about it.
+/// Requirement on the software.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Requirement {
     /// Those of limits are the ids of `rt-core latency`.
@@ -18,7 +18,7 @@ const LATENCY: &[(&str, &str)] = &[(
     "report_holds_the_whole_path_and_the_loops_stayed_clean",
 )];
 
-/// A limit of `rt-core latency`.
+/// Returns a limit of `rt-core latency`.
 const fn limit(id: &'static str, what: &'static str, hazards: &'static [&'static str]) -> Requirement {
     Requirement {
         id,

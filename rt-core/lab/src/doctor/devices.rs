@@ -31,7 +31,7 @@ fn connected(machine: &Machine) -> Vec<String> {
     found
 }
 
-/// Whether this process may read and write a device file.
+/// Returns whether this process may read and write a device file.
 pub fn may_use(path: &Path) -> bool {
     std::fs::File::options().read(true).write(true).open(path).is_ok()
 }
@@ -91,7 +91,7 @@ pub fn haptic(machine: &Machine) -> Finding {
     Finding::good("devices", found.join(", "))
 }
 
-/// What stands between a Phantom and `--device phantom`. It matters less where no device is connected.
+/// Returns the obstacles between a Phantom and `--device phantom`. They matter less where no device is connected.
 pub fn driver(machine: &Machine, here: &Surroundings) -> Vec<Finding> {
     let worst = if connected(machine).is_empty() {
         FindingLevel::Note

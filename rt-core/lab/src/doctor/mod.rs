@@ -21,7 +21,7 @@ use crate::machine::Machine;
 use serde::Serialize;
 use stylet_hw::libhd::diagnose::Surroundings;
 
-/// How much a finding matters, least first.
+/// Severity of a finding, least first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FindingLevel {
@@ -51,11 +51,11 @@ impl FindingLevel {
 pub struct Finding {
     /// Stable.
     pub check: &'static str,
-    /// How much it matters.
+    /// Severity.
     pub severity: FindingLevel,
-    /// What was found, for people.
+    /// Finding, for people.
     pub what: String,
-    /// What to type or do; empty when nothing is wrong.
+    /// Command or action that cures it; empty when nothing is wrong.
     pub cure: String,
 }
 

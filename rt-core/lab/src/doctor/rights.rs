@@ -9,7 +9,7 @@ const CAP_IPC_LOCK: u32 = 14;
 const CAP_SYS_NICE: u32 = 23;
 /// Priority of the force loop by default.
 const WANTED_PRIORITY: u64 = 80;
-/// What the process locks, with a margin: code, stacks, one scene, shared memory of a few hosts.
+/// Memory that the process locks, with a margin: code, stacks, one scene, shared memory of a few hosts.
 const WANTED_LOCK_BYTES: u64 = 512 << 20;
 
 pub fn priority(machine: &Machine) -> Finding {

@@ -7,7 +7,7 @@ use std::ffi::CString;
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 
-/// What one core with six hosts and a large scene uses, with a margin.
+/// Shared memory of one core with six hosts and a large scene, with a margin.
 const WANTED_BYTES: u64 = 256 << 20;
 
 /// Room that is left where `path` lies.

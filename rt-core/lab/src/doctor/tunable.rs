@@ -10,7 +10,7 @@ pub struct Tunable {
     pub check: &'static str,
     /// Without the leading slash.
     pub path: String,
-    /// Of the cores that a thread may run on: when it began ([`Machine::began`]).
+    /// Start time of a thread whose cores these are ([`Machine::began`]).
     pub began: Option<u64>,
     pub now: String,
     pub wanted: String,
@@ -22,7 +22,7 @@ impl Tunable {
     }
 }
 
-/// The value in force: of `a [b] c` the word in brackets, of a thread the cores that it may run on.
+/// Returns the value in force: of `a [b] c` the word in brackets, of a thread the cores that it may run on.
 pub fn value(machine: &Machine, path: &str) -> Option<String> {
     if let Some(allowed) = machine.allowed_cores(path) {
         return Some(allowed);
@@ -116,7 +116,7 @@ pub fn findings(machine: &Machine) -> Vec<Finding> {
         .collect()
 }
 
-/// An interval may be longer than the one wanted.
+/// Returns whether a value is the wanted one; an interval may be longer.
 fn met(q: &Quiet, now: &str) -> bool {
     let number = |text: &str| text.parse::<u64>().ok();
     match (q.wanted == STAT_INTERVAL, number(now), number(q.wanted)) {
@@ -125,7 +125,7 @@ fn met(q: &Quiet, now: &str) -> bool {
     }
 }
 
-/// Every setting of this PC that `rt-core doctor --apply` may change, met or not, in the order of its change.
+/// Returns every setting of this PC that `rt-core doctor --apply` may change, met or not, in the order of its change.
 pub fn all(machine: &Machine, core: usize) -> Vec<Tunable> {
     let mut all = Vec::new();
     let mut add = |check: &'static str, path: String, wanted: &str| {
@@ -202,7 +202,7 @@ pub fn as_kernel_prints(list: &str) -> String {
     words.collect::<Vec<String>>().join(",")
 }
 
-/// How the processor weighs speed against energy.
+/// Returns the finding on how the processor weighs speed against energy.
 pub fn energy_preference(machine: &Machine, core: usize) -> Finding {
     let path = format!("{CPU}/cpu{core}/cpufreq/energy_performance_preference");
     match machine.text(&path).as_deref() {
@@ -252,7 +252,7 @@ const FAST: [&str; 6] = [
     "network-latency",
 ];
 
-/// A daemon that sets the same things by a profile.
+/// Returns a daemon that sets the same things by a profile.
 pub fn tuned(machine: &Machine) -> Finding {
     let profile = machine.text("etc/tuned/active_profile").unwrap_or_default();
     let fast = profile.split_whitespace().any(|p| FAST.contains(&p));

@@ -1,4 +1,5 @@
-//! Which captured edge is which toggle of the loop: by the pattern of the times between them, then by a straight line.
+//! Alignment of captured edges with the loop's toggles: by the pattern of the times between them, then by a straight
+//! line.
 
 use super::capture::CaptureError;
 
@@ -13,7 +14,7 @@ pub struct Alignment {
     pub drift_u: f64,
     /// Instrument's seconds at our first toggle.
     pub at_first_s: f64,
-    /// What is left of each pair, seconds.
+    /// Residual of each pair, seconds.
     pub residuals_s: Vec<f64>,
 }
 

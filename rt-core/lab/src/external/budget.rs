@@ -46,7 +46,7 @@ pub struct Begins<'a> {
 }
 
 impl<'a> Begins<'a> {
-    /// The edges that are toggles of the run.
+    /// Returns the edges that are toggles of the run.
     pub fn at_pin(pin: &'a Channel, alignment: &Alignment) -> Self {
         Self {
             channel: pin,
@@ -54,7 +54,7 @@ impl<'a> Begins<'a> {
         }
     }
 
-    /// The first edge of each motion: a handle goes on, and an accelerometer rings.
+    /// Returns the first edge of each motion: a handle keeps moving, and an accelerometer rings.
     pub fn at_motion(channel: &'a Channel) -> Self {
         let mut last_s = f64::MIN;
         let begins = channel.edges_s.iter().copied().filter(|&edge_s| {

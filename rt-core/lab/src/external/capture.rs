@@ -8,7 +8,7 @@ pub struct Channel {
     pub name: String,
     /// Seconds of the instrument's clock at which the input changed, in the order of time.
     pub edges_s: Vec<f64>,
-    /// How long an edge takes, from a tenth to nine tenths; 0 for a logic input.
+    /// Rise time of an edge, from a tenth to nine tenths; 0 for a logic input.
     pub rise_s: f64,
 }
 
@@ -62,7 +62,7 @@ pub fn read(path: &Path) -> Result<Capture, CaptureError> {
     Ok(capture)
 }
 
-/// Rows of 0 and 1 at the rate of the comment `; Samplerate: 1 MHz`.
+/// Returns the rows of 0 and 1 at the rate of the comment `; Samplerate: 1 MHz`.
 pub fn csv(text: &str) -> Result<Capture, CaptureError> {
     let comments = text.lines().filter_map(|l| l.strip_prefix([';', '#']));
     let rate_hz = comments

@@ -1,8 +1,8 @@
 //! `rt-core latency --external FILE`: does an instrument outside this program agree with it?
 //!
-//! During a measurement with `--toggle` the force loop toggles a pin and notes when. A logic analyser or a sound card records
-//! the pin, and what answers to it. Afterwards the capture is read ([`capture`]), aligned with the notes by the pattern of the
-//! times between edges ([`align`]), and each delay is given with its uncertainty ([`budget`]).
+//! During a measurement with `--toggle` the force loop toggles a pin and notes when. A logic analyser or a sound card
+//! records the pin, and what answers to it. Afterwards the capture is read ([`capture`]), aligned with the notes by the
+//! pattern of the times between edges ([`align`]), and each delay is given with its uncertainty ([`budget`]).
 
 mod align;
 mod budget;
@@ -33,7 +33,7 @@ pub enum ExternalError {
     Toggles {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Problem with it.
         why: String,
     },
     /// The file of the instrument.
@@ -41,7 +41,7 @@ pub enum ExternalError {
     Capture {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Problem with it.
         why: CaptureError,
     },
     /// The results cannot be written.
@@ -49,7 +49,7 @@ pub enum ExternalError {
     Write(#[from] WriteError),
 }
 
-/// What the capture shows.
+/// Result of the capture.
 #[derive(Clone, Debug, Serialize)]
 pub struct External {
     schema: &'static str,
@@ -59,10 +59,11 @@ pub struct External {
     toggles: usize,
     edges: usize,
     pairs: usize,
-    /// The instrument's clock runs faster than ours by so many parts in a million, with its expanded uncertainty (k = 2).
+    /// The instrument's clock runs faster than ours by so many parts in a million, with its expanded uncertainty (k =
+    /// 2).
     drift_ppm: f64,
     drift_expanded_ppm: f64,
-    /// How far edges lie from our notes once drift and offset are taken out.
+    /// Deviation of edges from our notes once drift and offset are taken out.
     pin_deviation_us: f64,
     pin_worst_us: f64,
     /// Longest time that writing the pin took by our clock.
@@ -197,7 +198,8 @@ fn evaluate(
     })
 }
 
-/// From the pin to every other input, then from the motion to every input but the pin; and what has none, with the reason.
+/// From the pin to every other input, then from the motion to every input but the pin; and what has none, with the
+/// reason.
 fn delays(
     capture: &Capture,
     pin: usize,

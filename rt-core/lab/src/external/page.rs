@@ -5,7 +5,7 @@ use super::budget::Delay;
 use maud::{Markup, html};
 use stylet_report::parts::{Column, cell, micro, num, table};
 
-/// The whole page, which needs nothing else.
+/// Returns the whole page, which needs nothing else.
 pub fn page(e: &External) -> String {
     let [p50, p99, most] = e.due_to_pin_us;
     let rows = [

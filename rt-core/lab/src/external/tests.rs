@@ -1,4 +1,5 @@
-//! Synthetic captures: a known shift and drift are recovered within the stated uncertainty; a capture of something else is refused.
+//! Synthetic captures: a known shift and drift are recovered within the stated uncertainty; a capture of something else
+//! is refused.
 
 use super::capture::{self, Capture, Channel};
 use super::evaluate;
@@ -25,7 +26,7 @@ fn toggles(seed: u64, count: usize) -> Vec<ToggleTime> {
         .collect()
 }
 
-/// The instrument's time of each toggle, with drift, and of its answer `SHIFT_S` later with a little noise.
+/// Returns the instrument's time of each toggle, with drift, and of its answer `SHIFT_S` later with a little noise.
 fn edges(toggles: &[ToggleTime], seed: u64) -> [Vec<f64>; 2] {
     let mut random = SplitMix(seed);
     let at = |t: &ToggleTime| 0.3 + (t.before_ns as f64 + 500.0 - 5e9) / 1e9 * (1.0 + DRIFT);
@@ -146,7 +147,8 @@ fn a_capture_of_another_run_or_of_a_clock_is_refused() {
     }
 }
 
-/// A handle is struck each second and rings for 20 ms; the patch of the screen answers after 38 to 42 ms, and at no time of the pin.
+/// A handle is struck each second and rings for 20 ms; the patch of the screen answers after 38 to 42 ms, and at no
+/// time of the pin.
 #[test]
 fn motion_to_photon_is_measured_beside_the_pin() {
     let ours = toggles(3, 400);

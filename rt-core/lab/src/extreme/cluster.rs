@@ -1,6 +1,7 @@
 //! Late wake-ups that belong together: the intervals estimator of Ferro and Segers (2003).
 
-/// The latest of each cluster, in the order of time, and the extremal index; `over`: (grid point, value), in the order of time.
+/// Returns the latest of each cluster, in the order of time, and the extremal index; `over`: (grid point, value), in
+/// the order of time.
 pub fn decluster(over: &[(u64, u64)]) -> (Vec<(u64, u64)>, f64) {
     let gaps: Vec<u64> = over.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
     let index = extremal_index(&gaps);

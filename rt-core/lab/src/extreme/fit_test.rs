@@ -1,9 +1,9 @@
-//! Whether excesses follow the fitted Pareto distribution: the test of Anderson and Darling.
+//! Test of excesses against the fitted Pareto distribution, after Anderson and Darling.
 
 use super::pareto::Pareto;
 
-/// Upper 5 % points of the statistic where scale and shape are fitted, by shape (Choulakian and Stephens 2001, table 2; their k
-/// is minus the shape).
+/// Upper 5 % points of the statistic where scale and shape are fitted, by shape (Choulakian and Stephens 2001, table 2;
+/// their k is minus the shape).
 const FIVE_PERCENT: [(f64, f64); 10] = [
     (-0.5, 1.321),
     (-0.4, 1.221),
@@ -26,7 +26,7 @@ pub fn five_percent_point(shape: f64) -> Option<f64> {
     Some(pair[0].1 + share * (pair[1].1 - pair[0].1))
 }
 
-/// Distance of the excesses from the fitted distribution, with weight on the tails.
+/// Returns the distance of the excesses from the fitted distribution, with weight on the tails.
 pub fn anderson_darling(excesses: &[f64], fitted: &Pareto) -> f64 {
     let mut below: Vec<f64> = excesses
         .iter()

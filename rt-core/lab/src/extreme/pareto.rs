@@ -10,7 +10,7 @@ const SHAPES: (f64, f64) = (-0.95, 2.0);
 pub struct Pareto {
     pub scale: f64,
     pub shape: f64,
-    /// What it was fitted to.
+    /// Excesses that it was fitted to.
     pub excesses: Vec<f64>,
 }
 
@@ -92,10 +92,10 @@ fn reach(shape: f64, m: f64) -> f64 {
     }
 }
 
-/// The excess that one in `m` passes, with its 95 % interval; `None` where the interval has no upper end.
+/// Returns the excess that one in `m` passes, with its 95 % interval; `None` where the interval has no upper end.
 ///
-/// The rate of exceedances counts as known: over hundreds of clusters its share of the uncertainty is small beside that of the
-/// shape (Coles 2001, section 4.3.3).
+/// The rate of exceedances counts as known: over hundreds of clusters its share of the uncertainty is small against
+/// that of the shape (Coles 2001, section 4.3.3).
 pub fn interval(fitted: &Pareto, m: f64) -> Option<(f64, f64, f64)> {
     let y = &fitted.excesses;
     let at = fitted.scale * reach(fitted.shape, m);

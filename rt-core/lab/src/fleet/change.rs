@@ -1,4 +1,4 @@
-//! What changed from one report of a PC to the next, and what the PCs that pass have in common.
+//! Changes from one report of a PC to the next, and what the PCs that pass have in common.
 
 use super::Pc;
 use super::entry::{Entry, Percentile};
@@ -11,7 +11,7 @@ const GROWN: f64 = 1.25;
 pub struct Growth<'a> {
     pub before: &'a Entry,
     pub after: &'a Entry,
-    /// Which percentile grew.
+    /// Percentile that grew.
     pub percentile: &'static str,
     pub from_us: f64,
     pub to_us: f64,
@@ -26,7 +26,7 @@ pub struct Change {
     pub after: Option<String>,
 }
 
-/// Every growth between consecutive reports of the same protocol.
+/// Returns every growth between consecutive reports of the same protocol.
 pub fn growths(pc: &Pc) -> Vec<Growth<'_>> {
     let mut found = Vec::new();
     for (i, after) in pc.entries.iter().enumerate() {
@@ -36,7 +36,7 @@ pub fn growths(pc: &Pc) -> Vec<Growth<'_>> {
     found
 }
 
-/// The highest percentile that both reports have decides.
+/// Compares the highest percentile that both reports have.
 fn growth<'a>(before: &'a Entry, after: &'a Entry) -> Option<Growth<'a>> {
     let pairs = [("p99.9", before.p999, after.p999), ("p99", before.p99, after.p99)];
     let (percentile, from, to) = pairs
@@ -60,7 +60,7 @@ fn has_grown(from: Percentile, to: Percentile) -> bool {
     to.us > GROWN * from.us && apart
 }
 
-/// What the machine sections say differently. A fact that older versions did not write is no change.
+/// Returns the differences between the machine sections. A fact that older versions did not write is no change.
 fn changes(before: &Entry, after: &Entry) -> Vec<Change> {
     let mut names: Vec<&String> = before.machine.keys().chain(after.machine.keys()).collect();
     names.sort();

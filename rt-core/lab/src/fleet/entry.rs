@@ -1,4 +1,4 @@
-//! What the fleet needs of one report; reports of all versions of schema 1 are read.
+//! Part of a report that the fleet needs; reports of all versions of schema 1 are read.
 
 use crate::report::SCHEMA;
 use crate::verdict::Outcome;
@@ -34,7 +34,7 @@ pub struct Entry {
     pub max_us: Option<f64>,
     pub missed: u64,
     pub failed: Vec<String>,
-    /// What the report says about machine, settings and program.
+    /// Facts of the report about machine, settings and program.
     pub machine: BTreeMap<String, String>,
 }
 

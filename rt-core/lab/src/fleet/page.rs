@@ -9,7 +9,7 @@ use crate::verdict::Outcome;
 use maud::{Markup, PreEscaped, html};
 use stylet_report::parts::{Column, cards, cell, num, or_na, table};
 
-/// The whole page, which needs nothing else.
+/// Returns the whole page, which needs nothing else.
 pub fn page(pcs: &[Pc], unread: &[Unread]) -> Result<String, DrawError> {
     let trends = trends(pcs)?;
     let growths: Vec<(&Pc, Growth)> = pcs

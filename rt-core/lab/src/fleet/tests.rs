@@ -22,7 +22,8 @@ impl Drop for Folder {
     }
 }
 
-/// A report as a PC of that kernel and governor would write it on a day of March; `p999_us` with a tenth of uncertainty.
+/// Returns a report as a PC of that kernel and governor would write it on a day of March; `p999_us` with a tenth of
+/// uncertainty.
 fn report(pc: &str, day: u32, p999_us: f64, kernel: &str, governor: &str, verdict: &str) -> Value {
     let outcome = if verdict == "FAIL" { "FAIL" } else { "PASS" };
     let quantile =
@@ -102,7 +103,7 @@ fn fleet(folder: &Folder) -> (u8, String, String) {
     (code, read(PAGE), read(TABLE))
 }
 
-/// The page from one heading to the next.
+/// Returns the page from one heading to the next.
 fn section<'a>(page: &'a str, heading: &str) -> &'a str {
     let from = page
         .find(&format!("<h2>{heading}"))
@@ -223,8 +224,8 @@ fn nothing_found_is_an_error_that_says_what_was_expected() {
     assert!(run(&args(&folder.0.join("missing"))).is_err());
 }
 
-/// Writes the page of the twenty reports for whoever wants to look at it: STYLET_FLEET_OUT names the folder, and STYLET_FLEET_ALSO one
-/// with measured reports that join them.
+/// Writes the page of the twenty reports for whoever wants to look at it: STYLET_FLEET_OUT names the folder, and
+/// STYLET_FLEET_ALSO one with measured reports that join them.
 #[test]
 #[ignore = "for looking at the page"]
 fn page_to_look_at() {

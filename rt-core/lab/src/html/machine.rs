@@ -1,4 +1,4 @@
-//! What the figures come from: counters of the kernel, settings, machine, packages, method.
+//! Basis of the figures: counters of the kernel, settings, machine, packages, method.
 
 use crate::bound::MissBound;
 use crate::report::{LoopCounts, Report};

@@ -1,4 +1,4 @@
-//! Whether the run stayed the same, and how late a wake-up may become in a longer one.
+//! Steadiness of the run, and the lateness to expect in a longer one.
 
 use super::times::time_table;
 use crate::extreme::{Extremes, Tail};

@@ -1,4 +1,4 @@
-//! What took how long: loops, host, comparison, latest wake-ups.
+//! Durations: loops, host, comparison, latest wake-ups.
 
 use crate::compare::Against;
 use crate::report::{LoopSection, Report};
@@ -39,7 +39,7 @@ pub fn time_table(times: &[Summary]) -> Markup {
     }
 }
 
-/// A percentile with its interval below it.
+/// Returns a percentile with its interval below it.
 fn percentile(q: &Quantile) -> Markup {
     html! {
         (or_na(q.us))
@@ -104,7 +104,7 @@ pub fn comparison(r: &Report) -> Markup {
     }
 }
 
-/// How `--spin-us auto` came to its spin.
+/// Shows how `--spin-us auto` came to its spin.
 pub fn spin(r: &Report) -> Markup {
     let Some(s) = &r.spin_search else {
         return Markup::default();

@@ -28,12 +28,12 @@ impl Machine {
         ids.into_iter().filter_map(named).collect()
     }
 
-    /// Whether a program of this name runs.
+    /// Returns whether a program of this name runs.
     pub fn runs(&self, name: &str) -> bool {
         self.processes().iter().any(|process| process.name == name)
     }
 
-    /// The file of each thread that shows which cores it may run on.
+    /// Returns the file of each thread that shows which cores it may run on.
     pub fn threads(&self, process: u32) -> Vec<String> {
         let folder = format!("proc/{process}/task");
         let names = self.names(&folder);
@@ -41,7 +41,7 @@ impl Machine {
         names.iter().map(path).collect()
     }
 
-    /// The cores that a thread may run on, as the kernel prints them; `None` where `path` is no thread's.
+    /// Returns the cores that a thread may run on, as the kernel prints them; `None` where `path` is no thread's.
     pub fn allowed_cores(&self, path: &str) -> Option<String> {
         thread_of(path)?;
         let status = self.text(path)?;
@@ -79,7 +79,7 @@ impl Machine {
     }
 }
 
-/// The thread of `proc/PROCESS/task/THREAD/status`.
+/// Returns the thread of `proc/PROCESS/task/THREAD/status`.
 fn thread_of(path: &str) -> Option<libc::pid_t> {
     let (process, thread) = path.strip_prefix("proc/")?.split_once("/task/")?;
     process.parse::<u32>().ok()?;

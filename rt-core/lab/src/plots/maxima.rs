@@ -10,7 +10,7 @@ const SIZE: (u32, u32) = (1_120, 320);
 /// One part of a campaign.
 pub struct MaximaPart<'a> {
     pub name: &'a str,
-    /// How long each window was measured, s, its worst wake-up and longest tick in microseconds.
+    /// Duration of each window, s, with its worst wake-up and longest tick in microseconds.
     pub windows: Vec<(f64, f64, f64)>,
 }
 

@@ -32,7 +32,7 @@ pub fn trend_range_us<'a>(points: impl Iterator<Item = &'a TrendPoint>) -> [f64;
     [10_f64.powf(low.max(0.1).log10().floor()), decade_above(high * 1.8)]
 }
 
-/// The unit in which a length of time is a short number.
+/// Returns the unit in which a length of time is a short number.
 fn unit(seconds: f64) -> (f64, &'static str) {
     let units = [(86_400.0, "days"), (3_600.0, "hours"), (60.0, "minutes")];
     units
@@ -41,7 +41,8 @@ fn unit(seconds: f64) -> (f64, &'static str) {
         .unwrap_or((1.0, "seconds"))
 }
 
-/// p50 and the tail, whose name is `tail`, over the time; a bar is the 95 % interval, a full point a report that passed.
+/// p50 and the tail, whose name is `tail`, over the time; a bar is the 95 % interval, a full point a report that
+/// passed.
 pub fn trend(points: &[TrendPoint], tail: &str, range_us: [f64; 2]) -> Result<String, DrawError> {
     drawn(SIZE, |root| {
         let first_s = points.iter().map(|p| p.time_s).fold(f64::MAX, f64::min);

@@ -22,7 +22,7 @@ use crate::whose::Whose;
 use hdrhistogram::Histogram;
 use stylet_runtime::process::{LoopReport, Options};
 
-/// What a report is made of.
+/// Parts of a report.
 pub struct Parts<'a> {
     pub options: &'a Options,
     pub duration_ns: u64,
@@ -240,7 +240,7 @@ fn latest(measured: &Measured) -> Vec<Late> {
     .collect()
 }
 
-/// What the trace showed; where it does not cover the tick, what the gap watch saw.
+/// Returns the cause that the trace showed; where it does not cover the tick, that which the gap watch saw.
 fn cause(measured: &Measured, tick: &LateTick) -> String {
     let outliers = measured.trace.iter().flat_map(|t| &t.outliers);
     let traced = outliers.into_iter().find(|o| o.due_ns == tick.due_ns);
@@ -250,7 +250,7 @@ fn cause(measured: &Measured, tick: &LateTick) -> String {
     )
 }
 
-/// The trace, with times from the begin of the measurement.
+/// Returns the trace, with times from the begin of the measurement.
 fn traced(measured: &Measured) -> Option<TraceSection> {
     let mut section = measured.trace.clone()?;
     for outlier in &mut section.outliers {
@@ -259,7 +259,7 @@ fn traced(measured: &Measured) -> Option<TraceSection> {
     Some(section)
 }
 
-/// What the gap watch saw between two times.
+/// Returns what the gap watch saw between two times.
 fn seen_elsewhere(gaps: &GapReport, from_ns: u64, to_ns: u64) -> String {
     let core = gaps.core.map_or("another core".to_owned(), |c| format!("core {c}"));
     if let Some(ns) = gaps.gap_during(from_ns, to_ns) {

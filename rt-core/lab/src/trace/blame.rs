@@ -4,7 +4,7 @@ use super::event::{Interruption, Task};
 use super::timeline::{Holder, Loop, Piece};
 use serde::Serialize;
 
-/// What kept the loop from its tick.
+/// Cause that kept the loop from its tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
@@ -74,7 +74,7 @@ pub fn fifo(priority: i32) -> Option<i32> {
     (0..NORMAL - 1).contains(&priority).then_some(NORMAL - 1 - priority)
 }
 
-/// The causes, longest first; `woke_ns` is when the loop's clock was read after its sleep.
+/// Returns the causes, longest first; `woke_ns` is when the loop's clock was read after its sleep.
 pub fn causes(pieces: &[Piece], woke_ns: u64) -> Vec<Cause> {
     let late_us = pieces.iter().map(Piece::length_ns).sum::<u64>() as f64 / 1e3;
     let mut all: Vec<Cause> = Vec::new();

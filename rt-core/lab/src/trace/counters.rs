@@ -6,7 +6,7 @@ use std::os::unix::fs::FileExt;
 
 /// Counts of system management interrupts, Intel SDM volume 4: `MSR_SMI_COUNT`.
 const SMI_COUNT: u64 = 0x34;
-/// What is named at most.
+/// Largest number of counters that are named.
 const NAMED: usize = 5;
 
 /// All counters of one core at one time.
@@ -67,7 +67,7 @@ fn smi(machine: &Machine, core: usize) -> Option<u64> {
     Some(u64::from_ne_bytes(bytes))
 }
 
-/// The column of `core` in `/proc/interrupts`, by number and name.
+/// Returns the column of `core` in `/proc/interrupts`, by number and name.
 fn interrupts(table: &str, core: usize) -> BTreeMap<String, u64> {
     let mut lines = table.lines();
     let head: Vec<&str> = lines.next().unwrap_or_default().split_whitespace().collect();
@@ -93,7 +93,7 @@ impl Counters {
         Some(self.smi?.saturating_sub(before.smi?))
     }
 
-    /// What was counted since `before`, the most frequent first.
+    /// Returns the counts since `before`, the most frequent first.
     pub fn since(&self, before: &Self) -> Vec<(String, u64)> {
         let counted = |name: &String, now: &u64| now.saturating_sub(before.named.get(name).copied().unwrap_or(*now));
         let mut all: Vec<(String, u64)> = self

@@ -129,7 +129,8 @@ fn what(kind: &str, fields: &str) -> What {
     known.unwrap_or_else(|| by_ending(kind))
 }
 
-/// Vectors are `<name>_entry` and `<name>_exit`; system calls `sys_<name>(` and `sys_<name> -> 0x0`, printed in two ways.
+/// Vectors are `<name>_entry` and `<name>_exit`; system calls `sys_<name>(` and `sys_<name> -> 0x0`, printed in two
+/// ways.
 fn by_ending(kind: &str) -> What {
     if let Some(call) = kind.strip_prefix("sys_enter_").or_else(|| kind.strip_prefix("sys_")) {
         return if let Some((name, _)) = call.split_once('(') {
@@ -160,7 +161,7 @@ fn switch(fields: &str) -> Option<What> {
     })
 }
 
-/// The name of a thread may hold spaces, so that it ends where its number begins.
+/// Reads a thread, whose name may hold spaces: it ends where its number begins.
 fn task(fields: &str, prefix: &str) -> Option<Task> {
     let (begin, end) = (format!("{prefix}comm="), format!(" {prefix}pid="));
     let (name, _) = fields.split_once(&begin)?.1.split_once(&end)?;
@@ -172,14 +173,14 @@ fn task(fields: &str, prefix: &str) -> Option<Task> {
     })
 }
 
-/// The value of ` key=value`.
+/// Returns the value of ` key=value`.
 fn field<'a>(fields: &'a str, key: &str) -> Option<&'a str> {
     let words = fields.split_whitespace().filter_map(|w| w.split_once('='));
     let mut values = words.filter(|(k, _)| *k == key).map(|(_, v)| v);
     values.next_back()
 }
 
-/// The word behind `action=` in `vec=3 [action=NET_RX]`.
+/// Returns the word behind `action=` in `vec=3 [action=NET_RX]`.
 fn bracketed(fields: &str) -> Option<&str> {
     fields.split_once("[action=")?.1.split_once(']').map(|(a, _)| a)
 }

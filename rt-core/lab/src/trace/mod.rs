@@ -1,8 +1,8 @@
 //! The cause of each late tick, from the kernel's own trace.
 //!
-//! A trace instance runs in a bounded buffer ([`tracefs`]). After a late tick a thread of normal priority freezes it, reads
-//! it ([`witness`]), takes its lines as events ([`event`]), walks over them to see who had the core when ([`timeline`]),
-//! and names what stood between the tick's due time and its wake-up ([`blame`], [`words`]).
+//! A trace instance runs in a bounded buffer ([`tracefs`]). After a late tick a thread of normal priority freezes it,
+//! reads it ([`witness`]), takes its lines as events ([`event`]), walks over them to see who had the core when
+//! ([`timeline`]), and names what stood between the tick's due time and its wake-up ([`blame`], [`words`]).
 
 mod blame;
 mod counters;
@@ -23,7 +23,7 @@ use serde::Serialize;
 /// Late ticks that are kept with their trace; a later one takes the place of the least late.
 pub const KEPT: usize = 32;
 
-/// Which row of the picture a piece of time stands in.
+/// Row of the picture for a piece of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Lane {
@@ -42,7 +42,7 @@ pub struct TracePiece {
     pub who: String,
 }
 
-/// How often something was counted around a late tick.
+/// Count of something around a late tick.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Counted {
     pub what: String,
@@ -61,7 +61,7 @@ pub struct Outlier {
     /// All causes in words.
     pub cause: String,
     pub causes: Vec<Cause>,
-    /// What the machine counted on this core in the `counted_over_ms` around it, the most frequent first.
+    /// Counts of the machine on this core in the `counted_over_ms` around it, the most frequent first.
     pub counted: Vec<Counted>,
     pub counted_over_ms: f64,
     /// System management interrupts in the same time; absent where they cannot be counted.
@@ -71,7 +71,7 @@ pub struct Outlier {
     pub trace: Vec<TracePiece>,
 }
 
-/// What the trace of a run showed.
+/// Result of the trace of a run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct TraceSection {
     /// Why there is no trace.
@@ -91,7 +91,7 @@ pub struct TraceSection {
 }
 
 impl TraceSection {
-    /// A run that was to be traced and could not be.
+    /// Returns a run that was to be traced and could not be.
     pub fn absent(over_ns: u64, why: &TraceError) -> Self {
         Self {
             absent: Some(why.to_string()),

@@ -14,7 +14,7 @@ fn causes(text: &str, woke_us: u64) -> Vec<Cause> {
     blame::causes(&pieces, ns(woke_us))
 }
 
-/// A trace in which the loop went to sleep at 10.000020 and `lines` follow.
+/// Returns a trace in which the loop went to sleep at 10.000020 and `lines` follow.
 fn after_sleep(to: &str, lines: &[&str]) -> String {
     let mut text = format!(
         "          haptic-500     [001] d..2.  10.000020: sched_switch: prev_comm=haptic prev_pid=500 prev_prio=19 prev_state=S ==> {to}\n"
@@ -54,7 +54,8 @@ fn a_wake_up_in_time_has_no_cause() {
     assert_eq!(causes(&text, 1_012), []);
 }
 
-/// Some kernels record no switch away from the idle thread; then the name that stands before each event says who has the core.
+/// Some kernels record no switch away from the idle thread; then the name that stands before each event says who has
+/// the core.
 #[test]
 fn a_rival_is_named_where_the_kernel_records_no_switch_from_idle() {
     let text = after_sleep(
@@ -126,7 +127,7 @@ fn rivals_are_named_with_their_priority_and_waker() {
         "{higher:?}"
     );
     assert_eq!(first(&rival(19), 1_510).kind, Kind::SamePriority);
-    // A normal thread that goes on after the wake-up is inside the kernel.
+    // A normal thread that runs on after the wake-up is inside the kernel.
     assert_eq!(first(&rival(120), 1_510).kind, Kind::KernelWork);
 }
 

@@ -3,7 +3,7 @@
 use super::event::{Event, Interruption, Task, What};
 use std::collections::BTreeMap;
 
-/// How the loop's own thread stands.
+/// State of the loop's own thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loop {
     /// Waits for its time.
@@ -20,7 +20,7 @@ pub enum Loop {
 /// Who had the core.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Holder {
-    /// Nobody: the sleep state, where it is known.
+    /// No thread: the sleep state, where it is known.
     Idle(Option<u32>),
     OwnLoop,
     Thread {
@@ -52,7 +52,7 @@ impl Piece {
         self.to_ns - self.from_ns
     }
 
-    /// What of it lies before a moment, and what after.
+    /// Returns its parts before and after a moment.
     pub fn cut_at(&self, at_ns: u64) -> impl Iterator<Item = Self> + use<> {
         let at_ns = at_ns.clamp(self.from_ns, self.to_ns);
         let [mut before, mut after] = [self.clone(), self.clone()];
@@ -77,8 +77,8 @@ struct Walk {
     known: BTreeMap<i32, Task>,
 }
 
-/// The pieces of `[from_ns, to_ns]` on the core of `events`; `own_pid` is the loop's thread, `own_priority` the kernel's
-/// number of its priority. `None` where the events begin later.
+/// Returns the pieces of `[from_ns, to_ns]` on the core of `events`; `own_pid` is the loop's thread, `own_priority` the
+/// kernel's number of its priority. `None` where the events begin later.
 pub fn pieces(events: &[Event], own_pid: i32, own_priority: i32, from_ns: u64, to_ns: u64) -> Option<Vec<Piece>> {
     let first = events.first().filter(|e| e.at_ns <= from_ns)?;
     let mut walk = Walk::begin(first, events, own_pid, own_priority);

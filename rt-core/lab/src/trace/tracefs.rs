@@ -1,4 +1,5 @@
-//! A trace instance of its own in the kernel's tracefs: made, frozen, read, and removed whatever happens to this process.
+//! A separate trace instance in the kernel's tracefs: made, frozen, read, and removed whatever happens to this
+//! process.
 
 use crate::machine::Machine;
 use std::ffi::CString;
@@ -9,7 +10,8 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-/// Buffer of each core: a tenth of a second of a busy one. Nothing is recorded while it is read, so it is no longer than needed.
+/// Buffer of each core: a tenth of a second of a busy one. Nothing is recorded while it is read, so it is no longer
+/// than needed.
 pub const BUFFER_KIB: u64 = 256;
 /// Begin of the names of our instances; the number of the process follows.
 const NAME: &str = "stylet-";
@@ -63,7 +65,7 @@ pub enum TraceError {
     Keeper(io::Error),
 }
 
-/// The root of tracefs; a mount of our own ends with it and is in nobody's way.
+/// The root of tracefs; our own mount ends with it and disturbs no one.
 struct Root {
     path: PathBuf,
     _mount: Option<OwnedFd>,
@@ -94,14 +96,14 @@ impl Root {
     }
 }
 
-/// A mount of tracefs that has no place in any folder.
+/// Returns a mount of tracefs that has no place in any folder.
 fn mount() -> io::Result<OwnedFd> {
     const FSCONFIG_CMD_CREATE: libc::c_ulong = 6;
     let own = |result: libc::c_long| {
         if result < 0 {
             return Err(io::Error::last_os_error());
         }
-        // SAFETY: the call returned a descriptor that nobody else has.
+        // SAFETY: the call returned a descriptor with no other owner.
         Ok(unsafe { OwnedFd::from_raw_fd(result as libc::c_int) })
     };
     let kind = CString::new("tracefs")?;
@@ -202,14 +204,14 @@ impl Instance {
         self.put("tracing_on", "1")
     }
 
-    /// Everything in the buffer of `core`.
+    /// Returns everything in the buffer of `core`.
     pub fn read(&self, core: usize) -> Result<String, TraceError> {
         let path = self.path(&format!("per_cpu/cpu{core}/trace"));
         let bytes = fs::read(&path).map_err(|why| TraceError::File { path, why })?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
     }
 
-    /// Events that were overwritten or dropped in the buffer of `core` because nobody read them in time.
+    /// Events that were overwritten or dropped in the buffer of `core` because they were not read in time.
     pub fn dropped(&self, core: usize) -> u64 {
         let stats = fs::read_to_string(self.path(&format!("per_cpu/cpu{core}/stats"))).unwrap_or_default();
         let of = |key: &str| {
@@ -236,7 +238,7 @@ impl Drop for Instance {
 
 fn remove(root: &Root, name: &str) {
     let folder = root.instance(name);
-    // It is busy while somebody reads it.
+    // It is busy while it is read.
     for _ in 0..50 {
         match fs::remove_dir(&folder) {
             Err(e) if e.kind() == io::ErrorKind::ResourceBusy => {
@@ -258,7 +260,8 @@ fn remove_dead(root: &Root) {
     }
 }
 
-/// The keeper is this program; a program without the task (a test of this crate) has none and removes the instance itself.
+/// The keeper is this program; a program without the task (a test of this crate) has none and removes the instance
+/// itself.
 fn keeper(name: &str) -> Result<Option<Child>, TraceError> {
     let program = std::env::current_exe().map_err(TraceError::Keeper)?;
     if program.file_name().is_none_or(|n| n != "rt-core") {

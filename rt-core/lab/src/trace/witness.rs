@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 use stylet_runtime::rt::clock;
 
-/// What is watched.
+/// Threads and cores that are watched.
 pub struct Watched<'a> {
     pub machine: &'a Machine,
     /// Core of the loop, its thread's name, and the `SCHED_FIFO` priority that it was given.
@@ -22,7 +22,7 @@ pub struct Watched<'a> {
     pub over_ns: u64,
 }
 
-/// How often the counters are read between late ticks.
+/// Pause between two readings of the counters between late ticks.
 const LOOK: Duration = Duration::from_millis(250);
 /// Events so long before a late tick show who had the core when it was due.
 const BEFORE_NS: u64 = 200_000_000;
@@ -75,7 +75,7 @@ pub fn watch(instance: Instance, watched: &Watched, late: &Receiver<LateTick>) -
     witness.section
 }
 
-/// The number of this process's thread of this name.
+/// Returns the number of this process's thread of this name.
 fn thread_of(machine: &Machine, name: &str) -> Option<i32> {
     let threads = machine.names("proc/self/task");
     let of_name = |id: &&String| machine.text(&format!("proc/self/task/{id}/comm")).as_deref() == Some(name);
@@ -177,7 +177,7 @@ impl Witness<'_> {
     }
 }
 
-/// The pieces as they are drawn: neighbours with one name are one.
+/// Returns the pieces as they are drawn: neighbours with one name are one.
 pub(super) fn picture(pieces: &[Piece], due_ns: u64) -> Vec<TracePiece> {
     let mut drawn: Vec<TracePiece> = Vec::new();
     for piece in pieces {

@@ -4,7 +4,7 @@ use super::*;
 
 const RAW: &[u8] = b"raw data";
 
-/// A report with one page, digests and all.
+/// Returns a report with one page, digests and all.
 fn written() -> (String, Vec<u8>) {
     let page = format!("<p>{NO_DIGEST}</p>");
     let text = format!(
@@ -41,7 +41,7 @@ fn unaltered_report_passes_and_every_change_is_found() {
     assert!(check("{", None, b"")[0].contains("not JSON"));
 }
 
-/// A report in a folder of its own, with two keys: that of A. Meyer, who may sign, and another.
+/// A report in its own folder, with two keys: that of A. Meyer, who may sign, and another.
 struct Signed {
     folder: PathBuf,
 }

@@ -1,4 +1,5 @@
-//! An X server on the core of the force loop: named, moved and moved back; on kernels that give way it is left where it is.
+//! An X server on the core of the force loop: named, moved and moved back; on kernels that give way it is left where it
+//! is.
 
 use super::*;
 use crate::doctor::mend::file::{Changes, State};
@@ -6,7 +7,7 @@ use crate::doctor::tests::{Fake, expect};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command};
 
-/// A machine of three cores whose kernel works like this.
+/// Returns a machine of three cores whose kernel works like this.
 fn machine(preemption: &str) -> Fake {
     Fake::new()
         .with("sys/devices/system/cpu/online", "0-2\n")

@@ -1,4 +1,5 @@
-//! Settings that the doctor itself makes: the only ones that it undoes. An undo runs as root, and anybody may have written its list.
+//! Settings that the doctor itself makes: the only ones that it undoes. An undo runs as root, and anybody may have
+//! written its list.
 
 use super::file::{Change, State};
 use crate::doctor::{display, tunable};
@@ -25,7 +26,7 @@ enum Values {
 struct Setting {
     check: &'static str,
     values: Values,
-    /// What the doctor sets it to; `None` where it depends on the PC.
+    /// Value that the doctor sets it to; `None` where it depends on the PC.
     wanted: Option<&'static str>,
 }
 
@@ -111,7 +112,8 @@ pub fn refusal(change: &Change) -> Option<String> {
 /// Opens the file of a setting to write to it.
 ///
 /// # Errors
-/// Where it is missing, is reached through a link other than that of a core to its frequency policy, or is not the kernel's own.
+/// Where it is missing, is reached through a link other than that of a core to its frequency policy, or is not the
+/// kernel's own.
 pub fn open(machine: &Machine, path: &str) -> io::Result<File> {
     let (mount, rest) = path.split_once('/').ok_or(io::ErrorKind::NotFound)?;
     let flags = OFlags::PATH | OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
@@ -131,7 +133,7 @@ pub fn open(machine: &Machine, path: &str) -> io::Result<File> {
     Ok(file)
 }
 
-/// The same file in the folder of the frequency policy, to which the kernel links from the folder of a core.
+/// Returns the same file in the folder of the frequency policy, to which the kernel links from the folder of a core.
 fn of_policy(sys: &OwnedFd, path: &str) -> Option<String> {
     let (core, name) = path.split_once("/cpufreq/")?;
     let link = fs::readlinkat(sys, format!("{core}/cpufreq"), Vec::new()).ok()?;
@@ -139,7 +141,7 @@ fn of_policy(sys: &OwnedFd, path: &str) -> Option<String> {
     is_numbered(policy, "policy").then(|| format!("devices/system/cpu/cpufreq/{policy}/{name}"))
 }
 
-/// Whether a thread's process still draws: no other is moved.
+/// Returns whether a thread's process still draws: no other is moved.
 pub fn is_drawing(machine: &Machine, path: &str) -> bool {
     let process = path.split('/').nth(1).unwrap_or_default();
     let name = machine.text(&format!("proc/{process}/comm"));

@@ -13,7 +13,7 @@ const SCHEMA: &str = "stylet.settings/1";
 /// A PC of 1,000 cores takes a tenth of it.
 const MOST_BYTES: u64 = 4 << 20;
 
-/// How far a change is.
+/// State of a change.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
@@ -22,7 +22,7 @@ pub enum State {
     /// The kernel did not take it: its reason.
     Refused(String),
     Undone,
-    /// Somebody else has changed it since: its value; it was left alone.
+    /// Changed by others since: its value; it was left alone.
     Foreign(String),
 }
 
@@ -32,7 +32,7 @@ pub struct Change {
     pub check: String,
     /// Without the leading slash.
     pub path: String,
-    /// Of a thread's cores: when it began, so that they are not given to another of that number.
+    /// Start time of a thread whose cores were changed, so that another thread of that number does not get them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub began: Option<u64>,
     pub before: String,
@@ -45,13 +45,13 @@ pub struct Change {
 #[serde(deny_unknown_fields)]
 pub struct Changes {
     schema: String,
-    /// Which start of the PC: a restart undoes them by itself.
+    /// Start of the PC: a restart undoes the changes by itself.
     boot: String,
     pub changes: Vec<Change>,
 }
 
 impl Change {
-    /// Of a thread that is there no more, though its number may be another's.
+    /// Returns whether it changed a thread that has ended, though another may have its number now.
     fn has_ended(&self, machine: &Machine) -> bool {
         self.began.is_some() && machine.began(&self.path) != self.began
     }
@@ -82,12 +82,13 @@ impl Changes {
         }
     }
 
-    /// Reads a list. One that others can write is none that this program wrote, nor is one that names anything but its settings.
+    /// Reads a list. One that others can write is none that this program wrote, nor is one that names anything but its
+    /// settings.
     pub fn read(path: &Path) -> Result<Self, MendError> {
         Self::open(path, false).map(|(read, _)| read)
     }
 
-    /// The list and its file, into which the states of an undo go: its name may by then be another's.
+    /// Returns the list and its file, into which the states of an undo go: its name may by then be another's.
     pub fn open_to_undo(path: &Path) -> Result<(Self, File), MendError> {
         Self::open(path, true)
     }
@@ -137,7 +138,7 @@ impl Changes {
         }
     }
 
-    /// Gives each applied setting its value from before, unless somebody else has changed it since.
+    /// Gives each applied setting its value from before, unless others have changed it since.
     ///
     /// A change that is only planned may have been made: the program was killed between both writes of its file.
     pub fn undo(&mut self, machine: &Machine) {
@@ -174,7 +175,7 @@ impl Changes {
         self.boot != boot() || self.changes.iter().all(done)
     }
 
-    /// A line for each.
+    /// Returns a line for each.
     pub fn words(&self) -> String {
         let line = |c: &Change| {
             let state = match &c.state {
@@ -194,7 +195,7 @@ impl Changes {
     }
 }
 
-/// Text of a regular file that nobody else could have written, and the file.
+/// Text of a regular file that no other user could have written, and the file.
 fn own_text(path: &Path, is_written: bool) -> io::Result<(String, File)> {
     let flags = libc::O_NOFOLLOW | libc::O_NONBLOCK;
     let file = File::options()
@@ -216,7 +217,7 @@ fn own_text(path: &Path, is_written: bool) -> io::Result<(String, File)> {
     Ok((text, file))
 }
 
-/// Whether a setting may be written.
+/// Checks that a setting may be written.
 fn check(machine: &Machine, change: &Change) -> Result<(), String> {
     if change.began.is_none() {
         return allowed::open(machine, &change.path)

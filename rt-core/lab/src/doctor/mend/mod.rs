@@ -1,4 +1,5 @@
-//! `rt-core doctor --apply`: changes the settings that the doctor names, so that each can be undone, and measures before and after.
+//! `rt-core doctor --apply`: changes the settings that the doctor names, so that each can be undone, and measures
+//! before and after.
 
 mod allowed;
 pub(super) mod file;
@@ -37,8 +38,9 @@ pub struct DoctorArgs {
     haptic_core: Option<usize>,
     /// Show which settings of this PC --apply --yes would change, and change none
     ///
-    /// Only settings that can be changed while the PC runs are among them: governor, sleep states of the force loop's core,
-    /// interrupts on it, display servers that may run on it, watchdogs, statistics, huge pages, PCIe power. Nothing is kept over a restart.
+    /// Only settings that can be changed while the PC runs are among them: governor, sleep states of the force loop's
+    /// core, interrupts on it, display servers that may run on it, watchdogs, statistics, huge pages, PCIe power.
+    /// Nothing is kept over a restart.
     #[arg(long, conflicts_with = "undo")]
     apply: bool,
     /// With --apply: change them, measure before and after, and write DIR/undo.json, mend.json and mend.html
@@ -65,7 +67,7 @@ pub enum MendError {
     Undo {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Problem with it.
         why: String,
     },
     /// The folder holds what is needed to undo an earlier change.
@@ -85,7 +87,7 @@ pub enum MendError {
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// What the system reports.
+        /// Error of the system.
         why: std::io::Error,
     },
     /// A picture of the page.
@@ -128,7 +130,7 @@ pub fn run(args: &DoctorArgs, interrupted: &AtomicBool) -> Result<u8, MendError>
     }
 }
 
-/// What would be changed.
+/// Lists the changes that would be made.
 fn dry_run(tunables: &[Tunable]) -> String {
     let open: Vec<&Tunable> = tunables.iter().filter(|t| !t.is_met()).collect();
     if open.is_empty() {

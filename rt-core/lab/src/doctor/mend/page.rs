@@ -8,7 +8,7 @@ use crate::summary::Summary;
 use maud::{Markup, PreEscaped, html};
 use stylet_report::parts::{Column, cell, num, or_na, table};
 
-/// Name of each percentile, and after over before.
+/// Returns the name of each percentile, and after over before.
 pub fn ratios(before: &Summary, after: &Summary) -> Vec<(&'static str, String)> {
     let said = |ratio: Option<f64>| ratio.map_or("n/a".to_owned(), |r| format!("{r:.2}"));
     let of = |s: &Summary, name: &str| s.quantile(name).and_then(|q| q.us);
@@ -20,7 +20,7 @@ pub fn ratios(before: &Summary, after: &Summary) -> Vec<(&'static str, String)> 
     all
 }
 
-/// The whole page, which needs nothing else.
+/// Returns the whole page, which needs nothing else.
 pub fn page(r: &MendReport) -> Result<String, DrawError> {
     let series = |name, color, histogram| Series { name, color, histogram };
     let both = [

@@ -1,11 +1,11 @@
-//! Settings of a machine made of files: changed, undone, refused, changed by somebody else.
+//! Settings of a machine made of files: changed, undone, refused, changed by others.
 
 use super::file::{Changes, State};
 use super::{dry_run, tunable};
 use crate::machine::Machine;
 use std::path::PathBuf;
 
-/// The folders of a machine with two cores.
+/// Returns the folders of a machine with two cores.
 fn machine(name: &str, files: &[(&str, &str)]) -> (PathBuf, Machine) {
     let root = std::env::temp_dir().join(format!("stylet-mend-{name}-{}", std::process::id()));
     let _ = std::fs::remove_dir_all(&root);

@@ -11,7 +11,7 @@ const GOVERNOR: &str = "sys/devices/system/cpu/cpu1/cpufreq/scaling_governor";
 const INTERVAL: &str = "proc/sys/vm/stat_interval";
 const IRQ: &str = "proc/irq/36/smp_affinity_list";
 
-/// A machine of files, with files beside it that are no settings.
+/// A machine of files, with other files that are no settings.
 struct Fake {
     root: tempfile::TempDir,
     machine: Machine,
