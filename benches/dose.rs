@@ -1,6 +1,8 @@
-//! Dose of a whole implant: time as a ratio to the straightforward loop in the same run, with the error against it beside it.
+//! Dose of a whole implant: time as a ratio to the straightforward loop in the same run, with the error against it
+//! beside it.
 //!
-//! `cargo bench -p stylet-benches --bench dose`. Rounds are interleaved, so that a noisy machine disturbs all rows alike.
+//! `cargo bench -p stylet-benches --bench dose`. Rounds are interleaved, so that a noisy machine disturbs all rows
+//! alike.
 
 use rayon::prelude::*;
 use std::hint::black_box;
@@ -71,7 +73,7 @@ fn grid(high_m: [f64; 3]) -> DoseGrid {
     DoseGrid::covering([0.0; 3], high_m, SPACING_M).expect("a grid of a gland is not too large")
 }
 
-/// The formulae for each voxel and each seed, on all cores.
+/// Returns the formulae for each voxel and each seed, on all cores.
 fn straightforward(kernel: &DoseKernel, grid: &DoseGrid, seeds: &[Seed]) -> Vec<f64> {
     let [nx, ny, nz] = grid.dims();
     let dose = |i: usize| {

@@ -1,4 +1,4 @@
-//! The needle's line: what its columns cost beside how exact they are, and a tick of its stations beside sweeps alone.
+//! The needle's line: cost and error of its columns, and a tick of its stations against sweeps alone.
 //!
 //! `cargo bench -p stylet-benches --bench line`; after `--` the names of what to measure: `columns`, `pelvis`, `ticks`.
 
@@ -22,7 +22,7 @@ const GLAND: Material = Material {
     integration: Integration::MeanDilatation,
 };
 const FOUNDATION_PA_PER_M: f64 = 250e3;
-/// What counts as solved.
+/// Residual that counts as solved.
 const EXACT: f64 = 1e-6;
 /// Axial columns of the bar in issue 16.
 const COLUMNS: usize = 35;
@@ -85,7 +85,7 @@ fn solved(model: &BatchModel<f32>, stations: &Stations) -> Compliance {
     Compliance::of_columns(model, stations, queue.columns()).expect("all columns")
 }
 
-/// Time of this thread on a processor, whatever else the machine does.
+/// Returns the time of this thread on a processor, whatever else the machine does.
 fn processor_time_s() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
     let first = text.split_whitespace().next().and_then(|n| n.parse::<f64>().ok());
@@ -111,7 +111,7 @@ fn rms(a: &ElementField, b: &ElementField) -> f64 {
     (squares(&|a, b| a - b) / squares(&|_, b| b)).sqrt()
 }
 
-/// Time of columns beside the error of the compliance and of the fields against those that are solved.
+/// Time of columns with the error of the compliance and of the fields against those that are solved.
 fn columns(name: &str, model: &BatchModel<f32>, stations: &Stations) {
     println!(
         "{name}: {} elements, {} stations; ms of processor time, least of 5 rounds",
@@ -199,7 +199,7 @@ fn answers(model: &BatchModel<f32>, loads: &[Vec<NodeWeight>], to: f64) -> Answe
     }
 }
 
-/// A gland that moves as a whole and near the load.
+/// Returns a gland that moves as a whole and near the load.
 fn made_up(stations: usize) -> Compliance {
     let spacing_m = 1e-3;
     Compliance::from_rows(stations, spacing_m, 4e-3, |i, j| {

@@ -9,7 +9,7 @@ pub const PATCH_M: f64 = 7.5e-3;
 /// Spacings at which the patch is a whole, odd number of elements wide.
 pub const SPACINGS_M: [f64; 3] = [PATCH_M / 3.0, PATCH_M / 5.0, PATCH_M / 7.0];
 
-/// The paper's gland cut anew with elements of `spacing_m`.
+/// Returns the paper's gland cut again with elements of `spacing_m`.
 pub fn gland(spacing_m: f64) -> Scene {
     let paper = Scene::builtin("paper").expect("built in");
     let (low, high) = paper.lattice.bounds_m();
@@ -35,7 +35,7 @@ pub fn gland(spacing_m: f64) -> Scene {
 /// Edge of the cube of the reference problem.
 pub const CUBE_M: f64 = 60e-3;
 
-/// A cube of soft tissue on a fixed plate one element thick.
+/// Returns a cube of soft tissue on a fixed plate one element thick.
 pub fn cube(elements: usize) -> Scene {
     let dims = [elements, elements, elements + 1];
     let mut soft = Structure::soft("cube", 1);

@@ -1,4 +1,4 @@
-//! How far one model's tissue is from another's.
+//! Error of one model's tissue against another's.
 
 use stylet_sim::tissue::Deformed;
 
@@ -19,7 +19,7 @@ pub struct Error {
 /// Displacements of one tick, in metres.
 pub type Field = Vec<[f64; 3]>;
 
-/// The shift that comes nearest to a field where that moves, in metres: the mean there.
+/// Returns the shift that comes nearest to a field where that moves, in metres: the mean there.
 pub fn best_shift_m(field: &Field, travel_m: f64) -> [f64; 3] {
     let (mut sum, mut count) = ([0.0; 3], 0.0);
     for u in field.iter().filter(|&&u| norm(u) > MOVED * travel_m) {
@@ -36,14 +36,14 @@ pub fn field(body: &Deformed) -> Field {
 }
 
 impl Error {
-    /// Adds one tick: `reference` against the body as it is, where the reference has moved.
+    /// Adds one tick: `reference` against the deformed body, where the reference has moved.
     pub fn add(&mut self, reference: &Field, body: &Deformed, travel_m: f64, seeds: &[u32]) {
         let h = body.lattice.spacing_m;
         let moved_m = |e: usize| body.displacement(e as u32).map(|u| h * u);
         self.add_field(reference, moved_m, travel_m, seeds);
     }
 
-    /// The same of displacements in metres, by element.
+    /// Returns the same of displacements in metres, by element.
     pub fn add_field(&mut self, reference: &Field, moved_m: impl Fn(usize) -> [f64; 3], travel_m: f64, seeds: &[u32]) {
         let apart = |e: usize| {
             let u = moved_m(e);

@@ -13,7 +13,7 @@ pub const TICK_S: f64 = 5e-3;
 #[derive(Clone, Copy, Debug)]
 pub struct Insertion {
     pub name: &'static str,
-    /// Where the tip takes hold, from the middle of the body.
+    /// Place where the tip takes hold, from the middle of the body.
     pub start_mm: [f64; 3],
     pub direction: [f64; 3],
     pub travel_m: f64,
@@ -26,7 +26,7 @@ pub struct Insertion {
 
 const STRAIGHT: [f64; 3] = [0.0, 0.0, 1.0];
 
-/// What is measured in the gland.
+/// Insertions that are measured in the gland.
 pub const GLAND: [Insertion; 6] = [
     Insertion {
         name: "middle, 5 mm",
@@ -86,13 +86,13 @@ pub const GLAND: [Insertion; 6] = [
 
 /// Ticks of rest after the push and after the way back.
 const REST_TICKS: usize = 12;
-/// How much less far each element is carried once the tip passes on.
+/// Share by which elements are carried less once the tip passes on.
 const CARRIED: f64 = 0.8;
 /// Elements of the path that the tip passes.
 const PASSED_M: f64 = 12e-3;
 
 impl Insertion {
-    /// The held element of each tick, in `scene`.
+    /// Returns the held element of each tick, in `scene`.
     pub fn script(&self, scene: &Scene) -> Vec<Held> {
         let lattice = &scene.lattice;
         let first = self.element_along(lattice, 0.0);
@@ -133,7 +133,7 @@ impl Insertion {
         beside.collect()
     }
 
-    /// The element on the straight path so far from its start; the last one inside the body beyond its end.
+    /// Returns the element on the straight path so far from its start; the last one inside the body beyond its end.
     fn element_along(&self, lattice: &Lattice, along_m: f64) -> u32 {
         let place = |along_m: f64| [0, 1, 2].map(|a| self.start_mm[a] + along_m * 1e3 * self.direction[a]);
         let mut along_m = along_m;

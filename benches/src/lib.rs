@@ -1,4 +1,4 @@
-//! What the measurements share: bodies, insertions, solvers to compare with, and the error of one run against another.
+//! Fixtures of the measurements: bodies, insertions, solvers to compare with, and the error of one run against another.
 
 pub mod bodies;
 pub mod error;

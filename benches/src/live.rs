@@ -1,4 +1,4 @@
-//! The two loops through one insertion, as a scene ships, tick by tick beside the converged solution of the same tick.
+//! The two loops through one insertion, as a scene ships, tick by tick against the converged solution of the same tick.
 
 use crate::error::{Field, MOVED, best_shift_m, field, norm};
 use crate::own::{LATE, OwnTwin};
@@ -33,15 +33,15 @@ const WAIT_S: f64 = 0.6;
 pub struct LiveCase {
     /// Built-in scene.
     pub scene: &'static str,
-    /// So far beside the axis of the gland, along x.
+    /// Distance from the axis of the gland, along x.
     pub beside_m: f64,
-    /// How deep the tip goes.
+    /// Depth of the tip.
     pub depth_m: f64,
-    /// Of the hand, in and out.
+    /// Speed of the hand, in and out.
     pub speed_m_per_s: f64,
 }
 
-/// What one tick of the tissue loop was, beside the converged solution of the same tick.
+/// One tick of the tissue loop, against the converged solution of the same tick.
 #[derive(Clone, Copy, Debug)]
 pub struct LiveTick {
     /// Largest displacement of an element, converged.
@@ -54,16 +54,17 @@ pub struct LiveTick {
     pub tip_n: [f64; 2],
     /// Force of tip and shaft on the hand against the way in, as it ships and converged.
     pub hand_n: [f64; 2],
-    /// ChainMail beside its own converged answer.
+    /// Error of ChainMail against its own converged answer.
     pub own: Option<OwnTick>,
 }
 
-/// ChainMail in one tick beside what it would be with nothing left to do.
+/// Error of ChainMail in one tick against what it would be with nothing left to do.
 #[derive(Clone, Copy, Debug)]
 pub struct OwnTick {
     /// Largest displacement of an element, converged.
     pub largest_m: f64,
-    /// Distance of the elements that move from the converged ones of this tick and of those before it, RMS; of one tick alone in a large body.
+    /// Distance of the elements that move from the converged ones of this tick and of those before it, RMS; of one tick
+    /// alone in a large body.
     pub late_rms_m: [f64; LATE],
     /// The same of a converged body that was at rest before this tick.
     pub without_history_rms_m: f64,
@@ -71,12 +72,12 @@ pub struct OwnTick {
     pub tip_n: [f64; 2],
 }
 
-/// What a session is compared with.
+/// Twins that a session is compared with.
 pub struct Twins<'a> {
     /// Finite elements, and their tissue near the tip.
     pub fem: &'a mut Twin,
     pub near_tip: Unfolded,
-    /// ChainMail's own, beside ChainMail.
+    /// Converged answer of ChainMail itself.
     pub own: Option<OwnTwin>,
 }
 
@@ -84,7 +85,8 @@ pub struct Twins<'a> {
 pub struct Live {
     /// Ticks that were compared.
     pub ticks: Vec<LiveTick>,
-    /// Each tick of the force loop alone, and each together with a tick of the tissue loop, microseconds: the least of the rounds.
+    /// Each tick of the force loop alone, and each together with a tick of the tissue loop, microseconds: the least of
+    /// the rounds.
     pub haptic_us: Vec<f64>,
     pub tissue_us: Vec<f64>,
     /// Bytes of the columns that the tissue loop adds up.
@@ -112,7 +114,7 @@ impl Theatre {
         Self { case, source, start }
     }
 
-    /// The line as it ships in that tissue, and how long it took.
+    /// Returns the line as it ships in that tissue, and how long it took.
     ///
     /// # Panics
     ///
@@ -127,8 +129,8 @@ impl Theatre {
         (line, begun.elapsed().as_secs_f64())
     }
 
-    /// The converged line in the finite elements that the scene has with `--tissue fem`, beside `like` that ships there; to the first
-    /// residual in f64, or to the second in f32 where the body is large.
+    /// The converged line in the finite elements that the scene has with `--tissue fem`, beside `like` that ships
+    /// there; to the first residual in f64, or to the second in f32 where the body is large.
     ///
     /// # Panics
     ///
@@ -148,7 +150,7 @@ impl Theatre {
         }
     }
 
-    /// The body of the converged line, at rest.
+    /// Returns the body of the converged line, at rest.
     ///
     /// # Panics
     ///
@@ -167,7 +169,8 @@ impl Theatre {
         )
     }
 
-    /// The insertion: in, half a second of rest, half the way out, rest. The first round is compared with the twins.
+    /// Returns the insertion: in, half a second of rest, half the way out, rest. The first round is compared with the
+    /// twins.
     pub fn run(&self, tissue: TissueKind, line: &ReadyLine, twins: &mut Twins<'_>, rounds: usize) -> Live {
         let mut live = Live {
             ticks: Vec::new(),
@@ -290,7 +293,7 @@ impl<'a, 'b> Watch<'a, 'b> {
         }
     }
 
-    /// ChainMail beside its own answer.
+    /// Compares ChainMail with its own answer.
     fn compare_own(&mut self, shown: &Field) -> Option<OwnTick> {
         let own = self.twins.own.as_mut()?;
         let now = own.field();
@@ -354,7 +357,7 @@ impl<'a, 'b> Watch<'a, 'b> {
     }
 }
 
-/// Distance of two fields where the first moves, RMS.
+/// Returns the distance of two fields where the first moves, RMS.
 fn rms_m(of: &Field, shown: &Field, largest_m: f64) -> f64 {
     let (mut square, mut count) = (0.0, 0.0_f64);
     for (there, here) in of.iter().zip(shown).filter(|(u, _)| norm(**u) > MOVED * largest_m) {

@@ -1,9 +1,9 @@
-//! What a measurement was made on, and where it is kept.
+//! Machine of a measurement, and the folder where its results are kept.
 
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Name and value of what has a say in a time; what cannot be read says so.
+/// Returns the name and value of what has a say in a time; what cannot be read says so.
 pub fn describe() -> Vec<(String, String)> {
     let file = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
     let output = |program: &str, arguments: &[&str]| {

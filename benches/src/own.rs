@@ -1,5 +1,6 @@
-//! ChainMail on the path of a session with nothing left to do in any tick: the columns of its own coarser body solved to the end, and
-//! limits met as far as f32 has them. What ships is compared with that, beside the comparison with finite elements.
+//! ChainMail on the path of a session with nothing left to do in any tick: the columns of its own coarser body solved
+//! to the end, and limits met as far as f32 has them. Shipped models are compared with that, in addition to the
+//! comparison with finite elements.
 
 use crate::error::{Field, field};
 use crate::twin::{Twin, TwinSettings, default_forces};
@@ -32,7 +33,7 @@ pub struct OwnTwin {
 }
 
 impl OwnTwin {
-    /// Beside a line that ships.
+    /// Runs next to a line that ships.
     ///
     /// # Panics
     ///
@@ -64,7 +65,7 @@ impl OwnTwin {
         }
     }
 
-    /// One tick of the tissue loop, after the line has had those of the force loop.
+    /// Advances the tissue loop by one tick, after the line has had those of the force loop.
     pub fn step(&mut self) {
         let held = held(&self.tissue, &self.line.hand);
         self.steps = settle(&mut self.tissue, &self.line, held, self.period_s);
@@ -74,17 +75,17 @@ impl OwnTwin {
         }
     }
 
-    /// Displacements now, m.
+    /// Returns the displacements now, m.
     pub fn field(&self) -> Field {
         field(&self.tissue.deformed())
     }
 
-    /// Displacements so many ticks ago, m.
+    /// Returns the displacements so many ticks ago, m.
     pub fn field_before(&self, ticks: usize) -> Option<&Field> {
         self.before.get(ticks)
     }
 
-    /// Displacements of a body that was at rest before this tick, m.
+    /// Returns the displacements of a body that was at rest before this tick, m.
     pub fn field_without_history(&mut self) -> Field {
         let held = held(&self.tissue, &self.line.hand);
         self.fresh.return_to_rest();

@@ -15,14 +15,14 @@ pub struct Rig {
     pub tick: u64,
     pub period_s: f64,
     info: DeviceInfo,
-    /// Where each layer begins, outermost first.
+    /// Beginning of each layer, outermost first.
     layers: Vec<(f64, LayerKind)>,
     /// Innermost layer met, and the number it was given.
     met: Option<(usize, u64)>,
     numbers: u64,
 }
 
-/// What one tick was.
+/// Outcome of one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Tick {
     pub output: ChainOutput,
@@ -42,7 +42,7 @@ impl Rig {
         Self::over(config, faults, layers, period_s)
     }
 
-    /// A steady hand, a good link, and encoders of this step.
+    /// Returns a steady hand, a good link, and encoders of this step.
     pub fn with_position_step(step_m: f64, layers: &[(f64, LayerKind)]) -> Self {
         let mut config = SimulatedPhantomConfig::default();
         config.info.position_step_m = step_m;
@@ -73,7 +73,7 @@ impl Rig {
         }
     }
 
-    /// Energy is watched but not controlled, and a shake softens nothing.
+    /// Watches the energy without control, so that a shake softens nothing.
     pub fn uncontrolled(mut self) -> Self {
         self.parameters.force.gate.passivity = PassivityParameters::OFF;
         self
@@ -122,7 +122,7 @@ impl Rig {
     fn follow_layers(&mut self, z_m: f64) {
         let inside = self.layers.iter().rposition(|(begin_m, _)| z_m > *begin_m);
         let met = self.met.map(|(index, _)| index);
-        // What the chain has left is met anew.
+        // The chain meets again what it has left.
         if let Some((_, number)) = self.met
             && self.chain.path.innermost() < number
             && self.chain.path.seen() >= number
@@ -157,7 +157,7 @@ impl Rig {
     }
 }
 
-/// Every hand of the envelope: corners, and the geometric middle of each axis.
+/// Returns every hand of the envelope: corners, and the geometric middle of each axis.
 pub fn hand_envelope() -> impl Iterator<Item = Hand> {
     let masses = [0.1, 0.32, 1.0];
     let dampings = [2.0, 6.3, 20.0];

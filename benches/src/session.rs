@@ -62,7 +62,7 @@ impl Device for SharedPhantom {
 pub struct Session {
     loops: SteppedLoops,
     device: SharedPhantom,
-    /// Which way the hand holds the needle.
+    /// Direction in which the hand holds the needle.
     direction: Vector3<f64>,
 }
 
@@ -84,7 +84,7 @@ impl Session {
         Self::over_link(Box::new(world), start, (hand, faults), force, tissue_every)
     }
 
-    /// The same over a link with faults.
+    /// Returns the same over a link with faults.
     pub fn over_link(
         world: Box<World>,
         start: Vector3<f64>,
@@ -113,7 +113,7 @@ impl Session {
         Self::on_line_every(world, place, hand, force, HAPTIC_TICKS_PER_TISSUE_TICK)
     }
 
-    /// The same, where the tissue answers every `tissue_every`th tick.
+    /// Returns the same, where the tissue answers every `tissue_every`th tick.
     pub fn on_line_every(
         world: Box<World>,
         (start, line): (Vector3<f64>, ReadyLine),
@@ -138,7 +138,7 @@ impl Session {
         self.device.phantom().set_hand(hand);
     }
 
-    /// One tick, and what it did to the hand along z.
+    /// Advances by one tick; returns its effect on the hand along z.
     pub fn tick(&mut self) -> Tick {
         let output = self.step();
         let phantom = self.device.phantom();
@@ -150,7 +150,7 @@ impl Session {
         }
     }
 
-    /// The body, for another session.
+    /// Returns the body, for another session.
     pub fn into_world(self) -> Box<World> {
         self.loops.tissue.into_world()
     }
@@ -171,7 +171,7 @@ impl Session {
         let _ = self.loops.control.haptic_orders.push(order);
     }
 
-    /// One tick of the force loop, and one of the tissue loop where it is due.
+    /// Advances the force loop by one tick, and the tissue loop where a tick is due.
     ///
     /// # Panics
     /// When a fault turned the force off: what is measured then is no insertion.
@@ -181,7 +181,7 @@ impl Session {
         output
     }
 
-    /// The same, faults included.
+    /// Returns the same, faults included.
     pub fn step_in_any_state(&mut self) -> ChainOutput {
         let output = self.loops.step();
         let control = &mut self.loops.control;
@@ -191,12 +191,12 @@ impl Session {
         output
     }
 
-    /// Number of the fault that turned the force off; 0 for none.
+    /// Returns the number of the fault that turned the force off; 0 for none.
     pub fn fault(&self) -> u32 {
         self.loops.haptic.state.fault
     }
 
-    /// Where the body is solved to, relative to what the tip's patch needs: the largest so far.
+    /// Returns the largest residual so far, over what the tip's patch needs.
     pub fn worst_residual(&self) -> f64 {
         self.loops.tissue.response().worst_residual
     }
@@ -216,22 +216,22 @@ impl Session {
         (0..(seconds * 1e3).round() as u64).map(|_| self.step()).collect()
     }
 
-    /// What the force chain keeps from tick to tick.
+    /// Returns the state of the force chain.
     pub fn chain(&self) -> &ChainState {
         self.loops.haptic.chain()
     }
 
-    /// The newest answer of the tissue.
+    /// Returns the newest answer of the tissue.
     pub fn response(&self) -> &TissueResponse {
         self.loops.tissue.response()
     }
 
-    /// The body as it is deformed now.
+    /// Returns the deformed body.
     pub fn world(&self) -> &World {
         self.loops.tissue.world()
     }
 
-    /// Place of the tip, without the error of the encoders, m.
+    /// Returns the place of the tip, without the error of the encoders, m.
     pub fn true_tip_in_world(&self) -> Vector3<f64> {
         *self.device.phantom().true_tip_in_world()
     }
@@ -258,7 +258,7 @@ pub fn axis_start(world: &World) -> Vector3<f64> {
     start
 }
 
-/// How far the gland as a whole has moved along z.
+/// Returns the displacement of the gland as a whole along z.
 pub fn gland_shift_m(world: &World) -> f64 {
     let body = world.tissue.deformed();
     let gland = (0..body.lattice.element_count() as u32)

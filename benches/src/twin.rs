@@ -11,7 +11,7 @@ use stylet_sim::tissue::fem::Compiled;
 use stylet_sim::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight};
 use stylet_sim::tissue::{ElementField, FemTissue, PackedField};
 
-/// Nearly incompressible tissue beside bone takes hundreds.
+/// Nearly incompressible tissue next to bone takes hundreds.
 const MOST_ITERATIONS: u32 = 600;
 
 /// The same needle on the same way, with another answer of the body.
@@ -25,7 +25,7 @@ pub struct Twin {
     pub residual: f64,
 }
 
-/// Where the twin has its stations, and how far it is solved.
+/// Stations of the twin, and the residual that it is solved to.
 #[derive(Clone, Copy, Debug)]
 pub struct TwinSettings {
     /// Spacing of the stations, radii of needle and tip.
@@ -39,7 +39,7 @@ pub struct TwinSettings {
 }
 
 impl Twin {
-    /// Solves every column of `like`'s way in `scene` as it is.
+    /// Solves every column of `like`'s way in the unchanged `scene`.
     ///
     /// # Panics
     ///
@@ -65,24 +65,24 @@ impl Twin {
         }
     }
 
-    /// Displacement of every element by a newton on each shaft station, then on the tip at each, m/N.
+    /// Returns the displacement of every element by a newton on each shaft station, then on the tip at each, m/N.
     pub fn columns(&self) -> &[PackedField] {
         &self.columns
     }
 
-    /// Displacement of every element of the body by the loads of now, m.
+    /// Returns the displacement of every element of the body by the loads of now, m.
     pub fn field(&self) -> Field {
         self.field_of(&self.hand)
     }
 
-    /// The same by the loads of another line with these stations.
+    /// Returns the same by the loads of another line with these stations.
     pub fn field_of(&self, hand: &HandLine) -> Field {
         let axis = hand.line().axes[0];
         sum(&self.columns, hand.state().loads_n(), axis.map(|c| c * hand.whole_m()))
     }
 }
 
-/// Shaft, then tip of every station; the queue that ships gives up where a body is hard to solve, this one goes on.
+/// Shaft, then tip of every station; the queue that ships gives up where a body is hard to solve, this one does not.
 fn columns<T: Compiled>(batch: &BatchModel<T>, stations: &Stations, tolerance: f64) -> Vec<Column> {
     let shaft = stations.shaft.iter().enumerate().map(|(n, at)| (Load::Shaft(n), at));
     let tip = stations.tip.iter().enumerate().map(|(n, at)| (Load::Tip(n), at));
@@ -114,7 +114,7 @@ fn columns<T: Compiled>(batch: &BatchModel<T>, stations: &Stations, tolerance: f
     columns
 }
 
-/// Goes on to the tolerance, or as far as anybody waits; returns the residual.
+/// Solves to the tolerance, or up to a limit of work; returns the residual.
 fn solved<T: Compiled>(batch: &BatchModel<T>, state: &mut BatchState<T>, tolerance: f64) -> f64 {
     loop {
         let progress = state.advance(batch);
@@ -148,7 +148,7 @@ pub fn sum(columns: &[PackedField], loads_n: &[f64], whole_m: [f64; 3]) -> Field
     (0..elements as u32).map(at).collect()
 }
 
-/// How far a structure moves on average with a newton that is spread evenly over it.
+/// Returns the mean displacement of a structure by a newton that is spread evenly over it.
 fn whole_m_per_n<T: Compiled>(
     batch: &BatchModel<T>,
     body: &Lattice,
@@ -189,7 +189,7 @@ impl Mean {
         }
     }
 
-    /// The mean of each element; zero for one without a cell.
+    /// Returns the mean of each element; zero for one without a cell.
     pub fn of(&self, moved_m: impl Fn(u32) -> [f64; 3]) -> Field {
         let mut sums = vec![([0.0; 3], 0.0_f64); self.elements];
         for (cell, &element) in self.element_of.iter().enumerate() {

@@ -1,11 +1,12 @@
-//! A twin's answer with the tissue near the tip solved for large strain until it rests, where what ships has a few steps a tick.
+//! A twin's answer with the tissue near the tip solved for large strain until it rests, where what ships has a few
+//! steps a tick.
 
 use crate::error::{Field, norm};
 use crate::twin::Twin;
 use stylet_sim::scene::Scene;
 use stylet_sim::tissue::{FemTissue, MaterialPoint, TissueModel, least_corner};
 
-/// Calls at most: each goes on where the one before ended.
+/// Largest number of calls: each continues where the one before ended.
 const MOST_CALLS: usize = 400;
 /// It rests when no element moves farther in a call, in elements.
 const RESTS: f64 = 1e-4;
@@ -28,7 +29,7 @@ impl Unfolded {
         }
     }
 
-    /// Displacement of every element of the body by the twin's loads of now, m.
+    /// Returns the displacement of every element of the body by the twin's loads of now, m.
     pub fn field(&mut self, twin: &Twin) -> Field {
         let line = twin.hand.line();
         let tip_m = twin.hand.state().tip().material_m;

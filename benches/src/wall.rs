@@ -79,7 +79,7 @@ impl Wall {
         fastest > SINGING_M_PER_S
     }
 
-    /// The largest stiffness up to which nothing sings, on a grid of a twelfth of an octave; at most `most`.
+    /// Returns the largest stiffness up to which nothing sings, on a grid of a twelfth of an octave; at most `most`.
     pub fn stiffest(&self, hand: Hand, most_n_per_m: f64) -> f64 {
         let at = |n: i32| 100.0 * 2f64.powf(f64::from(n) / 12.0);
         let sings = |n: i32| {

@@ -25,14 +25,14 @@ const CASE: LiveCase = LiveCase {
     depth_m: 45e-3,
     speed_m_per_s: 0.05,
 };
-/// What springs of 250 kPa/m stand for.
+/// Thickness of fat that springs of 250 kPa/m stand for.
 const FAT_M: f64 = 20e-3;
 const FAT_PA: [f64; 2] = [5e3, 2e3];
 const TICK_S: f64 = 1e-3;
 /// Every so many ticks of the force loop are compared.
 const COMPARED: usize = 20;
 const EXACT: f64 = 1e-8;
-/// Of bodies with seven times as many elements, in f32.
+/// Tolerance for bodies with seven times as many elements, in f32.
 const LARGE: f64 = 1e-4;
 
 /// Linear and neo-Hookean, by CalculiX: `tests/oracles/gland_neo_hooke.py`.
@@ -103,7 +103,7 @@ pub fn causes() -> Vec<Cause> {
     causes
 }
 
-/// The shipped line and its columns, on the same path.
+/// Returns the shipped line and its columns, on the same path.
 fn ships(line: &ReadyLine) -> Path {
     let columns = line.body.answer.columns();
     let mut hand = line.hand.as_ref().clone();
@@ -172,7 +172,8 @@ fn cause(name: &'static str, between: String, of: &Path, reference: &Path) -> Ca
     }
 }
 
-/// RMS over the elements that the reference moves, of its largest displacement; nothing to compare below half a millimetre.
+/// RMS over the elements that the reference moves, of its largest displacement; nothing to compare below half a
+/// millimetre.
 fn distance_percent(field: &Field, reference: &Field) -> Option<f64> {
     let largest_m = reference.iter().map(|&u| norm(u)).fold(0.0, f64::max);
     if largest_m < 0.5e-3 {
@@ -188,7 +189,7 @@ fn distance_percent(field: &Field, reference: &Field) -> Option<f64> {
     Some(100.0 * (square / f64::max(count, 1.0)).sqrt() / largest_m)
 }
 
-/// The same cells, each divided into eight.
+/// Returns the same cells, each divided into eight.
 fn finer(lattice: &Lattice) -> Scene {
     let dims = lattice.dims.map(|n| 2 * n);
     let inside = |[i, j, k]: [usize; 3]| lattice.element_of_cell(i / 2, j / 2, k / 2).is_some();
@@ -201,7 +202,7 @@ fn finer(lattice: &Lattice) -> Scene {
     Scene::from_labels("gland, half the spacing", &labels).expect("as valid as the first")
 }
 
-/// The gland in fat, which ends on something fixed.
+/// Returns the gland in fat, which ends on something fixed.
 fn in_fat(lattice: &Arc<Lattice>, young_pa: f64) -> Scene {
     let mut gland = Structure::soft("gland", 1);
     gland.role = Role::Target;

@@ -1,4 +1,4 @@
-//! What a run of the report has found.
+//! Findings of a run of the report.
 
 use crate::budget::Cause;
 use crate::models::Fitted;
@@ -14,7 +14,7 @@ pub struct Findings<'a> {
     pub fitted: &'a Fitted,
     /// Spacing (mm) and how far its seeds are from those of the finest spacing (mm, RMS and largest).
     pub refinement: &'a [(f64, f64, f64)],
-    /// What ships, beside the converged solution of each tick.
+    /// Shipped models against the converged solution of each tick.
     pub ships: &'a [Ships],
     /// Causes of the error of a needle's line.
     pub causes: &'a [Cause],

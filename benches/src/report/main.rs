@@ -99,7 +99,7 @@ fn fit_at(spacing_m: f64) -> models::Fitted {
     fit::fit(&scene, &lessons.collect::<Vec<_>>())
 }
 
-/// Every model through one insertion, round by round, so that a noisy machine disturbs all alike.
+/// Runs every model through one insertion, round by round, so that a noisy machine disturbs all alike.
 fn measure(scene: &Scene, insertion: &Insertion, fitted: &models::Fitted, rounds: usize) -> Vec<Row> {
     let script: Vec<Held> = insertion.script(scene);
     let seeds = insertion.seeds(scene);
@@ -122,7 +122,7 @@ fn measure(scene: &Scene, insertion: &Insertion, fitted: &models::Fitted, rounds
         .collect()
 }
 
-/// What the lattice itself costs: seeds of the converged FEM at each spacing against those of the finest.
+/// Measures the error of the lattice itself: seeds of the converged FEM at each spacing against those of the finest.
 fn refinement() -> Vec<(f64, f64, f64)> {
     let ends: Vec<Vec<[f64; 3]>> = SPACINGS_M.map(|spacing_m| seeds_after_push(&gland(spacing_m))).into();
     let finest = ends.last().expect("spacings are given");
@@ -142,7 +142,7 @@ fn refinement() -> Vec<(f64, f64, f64)> {
     rows.collect()
 }
 
-/// How far the same places of the gland have moved at the end of the first insertion's push.
+/// Returns the displacement of the same places of the gland at the end of the first insertion's push.
 fn seeds_after_push(scene: &Scene) -> Vec<[f64; 3]> {
     let insertion = &GLAND[0];
     let push = (insertion.travel_m / (insertion.speed_m_per_s * TICK_S)).ceil() as usize;

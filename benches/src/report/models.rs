@@ -4,7 +4,7 @@ use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
 
-/// What the fit found.
+/// Result of the fit.
 #[derive(Clone, Debug)]
 pub struct Fitted {
     /// Limits and recovery, without relaxation.

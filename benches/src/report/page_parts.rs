@@ -5,7 +5,7 @@ use crate::findings::Findings;
 use crate::passes::Passes;
 use std::fmt::Write as _;
 
-/// What is asked of a tick: field, and force on the tip, in percent.
+/// Largest error of a tick that is accepted: field, and force on the tip, in percent.
 const FIELD_PERCENT: f64 = 1.0;
 const TIP_PERCENT: f64 = 3.0;
 

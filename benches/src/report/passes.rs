@@ -1,4 +1,4 @@
-//! What the textbook's single pass costs beside a step of ours, on a body in which everything moves.
+//! Cost of the textbook's single pass against a step of ours, on a body in which everything moves.
 
 use std::time::Instant;
 use stylet_benches::solvers::{Body, PlainQueue};

@@ -32,8 +32,8 @@ impl Reference {
         Reference { fields, tip_force_n }
     }
 
-    /// What is off without any model: where nothing moves, and where each tick shifts the body as one piece by what fits best,
-    /// which nobody knows beforehand.
+    /// Returns the errors without any model: where nothing moves, and where each tick shifts the body as one piece by
+    /// the best fit, which cannot be known beforehand.
     pub fn without_model(&self, travel_m: f64, seeds: &[u32]) -> [Error; 2] {
         let mut errors = [Error::default(), Error::default()];
         for field in &self.fields {
@@ -46,7 +46,7 @@ impl Reference {
     }
 }
 
-/// What one run cost and how far off it was.
+/// Cost and error of one run.
 pub struct Run {
     /// Microseconds of each tick.
     pub micros: Vec<f64>,
@@ -54,7 +54,8 @@ pub struct Run {
     /// Ticks that did not meet the model's own residual, and the largest residual.
     pub unconverged: usize,
     pub residual: f64,
-    /// Error of the force on the tip over the largest of the insertion, RMS and largest; `None` where the model knows no forces.
+    /// Error of the force on the tip over the largest of the insertion, RMS and largest; `None` where the model knows
+    /// no forces.
     pub tip_force: Option<[f64; 2]>,
 }
 

@@ -1,4 +1,4 @@
-//! What ships, through the real loops, beside the converged solution of each tick.
+//! Shipped models, through the real loops, against the converged solution of each tick.
 
 use serde::Serialize;
 use std::path::Path;
@@ -16,25 +16,27 @@ pub struct Ships {
     pub elements: usize,
     pub stations: usize,
     pub largest_mm: f64,
-    /// Of the largest displacement in each tick: mean, p99 and worst of the ticks' RMS, and the farthest element of all.
+    /// Error over the largest displacement in each tick: mean, p99 and worst of the ticks' RMS, and the farthest
+    /// element of all.
     pub field_percent: f64,
     pub field_p99_percent: f64,
     pub field_worst_percent: f64,
     pub farthest_mm: f64,
     pub nothing_moves_percent: f64,
     pub best_shift_percent: f64,
-    /// Of the largest force of the insertion: p99 and worst of the ticks.
+    /// Error over the largest force of the insertion: p99 and worst of the ticks.
     pub tip_p99_percent: f64,
     pub tip_worst_percent: f64,
     pub hand_p99_percent: f64,
     pub hand_worst_percent: f64,
-    /// Beside the model's own converged answer: as `field_*`, `tip_*`. Finite elements are their own.
+    /// Errors against the model's own converged answer: as `field_*`, `tip_*`. Finite elements are their own.
     pub own_field_percent: f64,
     pub own_field_p99_percent: f64,
     pub own_field_worst_percent: f64,
     pub own_tip_p99_percent: f64,
     pub own_tip_worst_percent: f64,
-    /// The mean beside its own converged answer of one, two and three ticks before; beside one without history: ChainMail alone.
+    /// Mean error against its own converged answer of one, two and three ticks before; against one without history:
+    /// ChainMail alone.
     pub own_late_1_percent: f64,
     pub own_late_2_percent: f64,
     pub own_late_3_percent: f64,
@@ -81,7 +83,7 @@ const CONVERGED: f64 = 1e-7;
 /// The same of a body that is solved in f32.
 const CONVERGED_SINGLE: f64 = 1e-5;
 
-/// Every case, FEM first: its line says where the twin's stations are.
+/// Returns every case, FEM first: its line says where the twin's stations are.
 pub fn measure(rounds: usize) -> Vec<Ships> {
     let mut rows = Vec::new();
     for case in CASES {

@@ -31,7 +31,7 @@ pub struct Row {
     pub seed_rms_mm: f64,
     pub seed_max_mm: f64,
     pub seed_rms_percent: f64,
-    /// Of the insertion's largest force on the tip, RMS and largest; empty where the model knows no forces.
+    /// Error over the insertion's largest force on the tip, RMS and largest; empty where the model knows no forces.
     pub tip_force_rms_percent: Option<f64>,
     pub tip_force_max_percent: Option<f64>,
     pub residual: f64,
@@ -166,7 +166,7 @@ pub fn points(rows: &[Row]) -> Vec<Point> {
     points
 }
 
-/// Points that no other beats in both time and error.
+/// Returns the points that no other beats in both time and error.
 pub fn pareto<'a>(points: &[&'a Point]) -> Vec<&'a Point> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.mean_us.total_cmp(&b.mean_us));

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use stylet_sim::limits::{Limits, LinkLimits};
 use stylet_sim::scene::{Lattice, Scene};
 
-/// Where every element is, and how far its links may go.
+/// Place of every element, and limits of its links.
 pub struct Body {
     /// Elements and their neighbours.
     pub lattice: Arc<Lattice>,
@@ -15,7 +15,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// The body of a scene at rest.
+    /// Returns the body of a scene at rest.
     ///
     /// # Panics
     ///
@@ -41,7 +41,7 @@ impl Body {
         }
     }
 
-    /// Largest violation of a limit over all links, in elements; zero if there is none.
+    /// Returns the largest violation of a limit over all links, in elements; zero if there is none.
     pub fn largest_violation(&self) -> f64 {
         let mut worst = 0.0_f64;
         for element in 0..self.lattice.element_count() as u32 {
@@ -63,8 +63,8 @@ impl Body {
     }
 }
 
-/// Where the outer end of a link along one axis goes, given both ends with that axis first, and whether it had to move;
-/// `UP`: the outer end is the upper one. A component that is within its limits keeps its bits.
+/// Returns where the outer end of a link along one axis goes, given both ends with that axis first, and whether it had
+/// to move; `UP`: the outer end is the upper one. A component that is within its limits keeps its bits.
 #[inline(always)]
 pub(super) fn outer_end<const UP: bool>(l: &LinkLimits, inner: [f32; 3], outer: [f32; 3]) -> ([f32; 3], bool) {
     let d = if UP { outer[0] - inner[0] } else { inner[0] - outer[0] };

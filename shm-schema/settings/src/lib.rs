@@ -1,5 +1,5 @@
-//! Settings of a run that simulation and hosts share: every parameter of tissue, needle and force with its validation, the
-//! built-in scenes by name, and the sizes that a scene may have.
+//! Settings of a run that simulation and hosts share: every parameter of tissue, needle and force with its validation,
+//! the built-in scenes by name, and the sizes that a scene may have.
 //!
 //! ```
 //! use stylet_settings::{ParameterId, ParameterSet};

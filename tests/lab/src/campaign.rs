@@ -32,7 +32,7 @@ fn measured_s(out: &Path) -> f64 {
     files.filter_map(|f| of(f.path())).sum::<f64>() / 1e9
 }
 
-/// What a process that was killed left in shared memory.
+/// Removes the files of a killed process from shared memory.
 fn sweep(process: u32) {
     let left = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
     for file in left.filter(|f| f.file_name().to_string_lossy().contains(&format!("_lab-{process}"))) {
@@ -86,8 +86,8 @@ fn a_campaign_killed_three_times_gives_one_report_and_counts_no_second_twice() {
         let force = &part["force"];
         let points = force["ticks"].as_f64().expect("a count") + force["missed_deadlines"].as_f64().expect("a count");
         let measured = part["measured_s"].as_f64().expect("a time");
-        // Each grid point was either served or missed, once. Those missed between the last tick of a session and its end, and
-        // those before its first, are at most a few.
+        // Each grid point was either served or missed, once. Those missed between the last tick of a session and its
+        // end, and those before its first, are at most a few.
         assert!(
             (points - measured * rate).abs() <= 0.02 * measured * rate,
             "{points} of {measured} s at {rate} Hz"

@@ -1,4 +1,4 @@
-//! What is injected is named, and nothing is named that was not injected.
+//! Every injected cause is named, and no other.
 
 use crate::inject::{ALL, Injection, NAME, Target};
 use serde_json::Value;
@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use stylet_test_kit::{program, scratch};
 
-/// Of ten injections, so many must be named.
+/// Injections of ten that must be named.
 const AT_LEAST: usize = 8;
 
 /// Why no trace can be had here; the tests then say so and end.
@@ -33,7 +33,7 @@ fn start(out: &Path, seconds: u32, over_us: u64) -> Child {
         .expect("rt-core starts")
 }
 
-/// The measurement, once its force loop runs.
+/// Returns the measurement, once its force loop runs.
 fn target(child: &Child) -> Target {
     let process = child.id() as i32;
     let begin = Instant::now();
@@ -75,7 +75,7 @@ fn folder(name: &str) -> PathBuf {
     ))
 }
 
-/// The causes of each late tick, longest first.
+/// Returns the causes of each late tick, longest first.
 fn causes(outliers: &[Value]) -> Vec<Vec<Value>> {
     outliers
         .iter()
@@ -92,7 +92,8 @@ fn instances_left(process: i32) -> bool {
     path.is_some_and(|p| Path::new(p).join(format!("instances/stylet-{process}")).exists())
 }
 
-/// `Ok(true)` when at least two late ticks have the injected cause as their first one; the words that the report has for them.
+/// `Ok(true)` when at least two late ticks have the injected cause as their first one; the words that the report has
+/// for them.
 fn run(injection: &Injection) -> Result<(bool, String), String> {
     let out = folder(injection.name);
     let mut child = start(&out, 4, injection.over_us);

@@ -25,7 +25,7 @@ pub struct Injection {
     pub over_us: u64,
     /// Injects until `end`; an error where this machine does not offer it.
     pub run: fn(Target, Instant) -> Result<(), String>,
-    /// Whether a cause of the report is the one that was injected.
+    /// Test whether a cause of the report is the injected one.
     pub is_named: fn(&Value) -> bool,
 }
 
@@ -156,7 +156,7 @@ fn schedule(thread: i32, policy: i32, priority: i32) -> Result<(), String> {
     }
 }
 
-/// The result of a thread of [`on_core`].
+/// Returns the result of a thread of [`on_core`].
 fn ended<T>(thread: std::thread::JoinHandle<Result<T, String>>) -> Result<T, String> {
     thread.join().map_err(|_| "the injection panicked".to_owned())?
 }

@@ -1,4 +1,5 @@
-//! The latency laboratory as a user runs it: causes that are injected into a measurement, and campaigns that are killed.
+//! The latency laboratory as a user runs it: causes that are injected into a measurement, and campaigns that are
+//! killed.
 
 #[cfg(test)]
 mod campaign;

@@ -1,4 +1,5 @@
-//! Finite elements as they run: one cycle a tick, a patch of 4 mm, work ahead, and lines in bodies that are hard to solve.
+//! Finite elements as they run: one cycle a tick, a patch of 4 mm, work ahead, and lines in bodies that are hard to
+//! solve.
 
 use crate::patch::{PATCH_M, PERIOD_S, PatchTick, STRAIGHT, Way, converged, insertion};
 use crate::rows::{Row, keep};
@@ -11,7 +12,7 @@ use stylet_sim::tissue::fem::batch::{BatchModel, BatchState, NodeWeight};
 use stylet_sim::tissue::fem::{FemModel, FemSettings, Integration, Material, SolveSettings, TipPatch};
 use stylet_sim::tissue::{FemTissue, Held, TissueModel};
 
-/// What is asked of a tick.
+/// Largest error of a tick that is accepted.
 const FIELD_PERCENT: f64 = 1.0;
 const TIP_PERCENT: f64 = 3.0;
 
@@ -25,8 +26,9 @@ fn held(patch: TipPatch) -> Held {
     }
 }
 
-/// A needle off its line: worst tick against the converged solution of the same tick, field in percent of the patch's travel and force
-/// on the tip in percent of the insertion's largest; ticks whose answer is not for a hand.
+/// Runs a needle off its line; returns the worst tick against the converged solution of the same tick, field in percent
+/// of the patch's travel and force on the tip in percent of the insertion's largest; ticks whose answer is not for a
+/// hand.
 fn off_its_line(nu: f64, way: Way, depth_m: f64) -> ([f64; 2], [f64; 2], usize, usize) {
     let mut scene = Scene::builtin("paper").expect("built in").with_tissue(TissueKind::Fem);
     scene.structures[0].material.poisson = nu;
@@ -147,7 +149,8 @@ fn newton(model: &BatchModel<f32>, lattice_middle_m: [f64; 3]) -> (f64, f64, u32
     )
 }
 
-/// Towards nothing the body moves as one piece, by what its springs say; towards a table it moves as one whose surface is fixed.
+/// Towards nothing the body moves as one piece, by what its springs say; towards a table it moves as one whose surface
+/// is fixed.
 #[test]
 fn a_foundation_goes_to_both_of_its_limits() {
     let lattice = Scene::from_labels("block", &block(|_| 1, BLOCK, Vec::new(), H))
@@ -242,8 +245,8 @@ fn a_part_that_one_corner_holds_is_refused_or_stays_in_reach() {
     }
 }
 
-/// 64,000 cells, so that finite elements take a coarser body: a capsule of one cell and three times the modulus, an inclusion of nu
-/// 0.499, bone that begins at an odd cell.
+/// 64,000 cells, so that finite elements take a coarser body: a capsule of one cell and three times the modulus, an
+/// inclusion of nu 0.499, bone that begins at an odd cell.
 fn hard_body() -> SceneSource {
     let structure = |name: &str, label: u8, role: Role| {
         let mut structure = Structure::soft(name, label);

@@ -24,7 +24,8 @@ fn world(fem: bool) -> World {
     World::new(scene, limits, 1).expect("the paper's gland can be solved")
 }
 
-/// Forces of the tissue along the path by tick: as the haptic loop has them, and as the body has just answered.
+/// Returns the forces of the tissue along the path by tick: as the haptic loop has them, and as the body has just
+/// answered.
 fn forces(fem: bool, tissue_every: u64, seconds: f64) -> Vec<(f64, f64, f64)> {
     let world = world(fem);
     let (start, stiffness) = (axis_start(&world), 700.0);

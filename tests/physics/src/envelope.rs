@@ -7,7 +7,7 @@ use stylet_benches::rig::{Rig, Tick, hand_envelope};
 use stylet_hw::{Hand, LinkFaults};
 use stylet_sim::needle::LayerKind;
 
-/// Where the needle is brought to rest.
+/// Place where the needle is brought to rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Place {
     /// Pressed 4 mm into the whole capsule.
@@ -20,10 +20,10 @@ enum Place {
 
 const PLACES: [Place; 3] = [Place::Contact, Place::InTissue, Place::AtMembrane];
 
-/// What one session was.
+/// Outcome of one session.
 struct Case {
     name: String,
-    /// How far the tip moves to and fro in the first and the second of two seconds at rest.
+    /// Motion of the tip to and fro in the first and the second of two seconds at rest.
     early_m: f64,
     late_m: f64,
     /// Largest excess of energy given over energy taken at any time, and what rounding explains of it then.
@@ -132,8 +132,8 @@ fn to_and_fro(ticks: &[Tick]) -> f64 {
     ticks.chunks(250).map(window).fold(0.0, f64::max)
 }
 
-/// Largest work done on the hand beyond `from_j` and beyond what rounding can hide at that time: half a step of each
-/// encoder times the way that the force went. Gives both.
+/// Returns the largest work done on the hand beyond `from_j` and beyond what rounding can hide at that time: half a
+/// step of each encoder times the way that the force went. Gives both.
 fn excess(ticks: &[Tick], from_j: f64) -> (f64, f64) {
     let mut before = ticks[0].output.wrench.force_n;
     let (mut hidden_j, mut worst) = (0.5 * STEP_M * before.abs().sum(), (0.0, 0.0));

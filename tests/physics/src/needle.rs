@@ -41,7 +41,7 @@ impl Theatre {
         Self::beside_axis(&SceneSource::Builtin(scene.to_owned()), tissue, 0.0)
     }
 
-    /// The needle goes in so far beside the axis of the gland, along x.
+    /// Distance of the needle from the axis of the gland, along x.
     fn beside_axis(source: &SceneSource, tissue: TissueKind, beside_m: f64) -> Self {
         let scene = source.build().expect("no problem with it").with_tissue(tissue);
         let limits = TissueParameters::default().validate().expect("defaults are valid");
@@ -88,7 +88,7 @@ impl Insertion {
         (0..(seconds * 1e3) as usize).map(|_| self.session.tick()).collect()
     }
 
-    /// Largest displacement of an element, m.
+    /// Returns the largest displacement of an element, m.
     fn displacement_m(&self) -> f64 {
         let body = self.session.world().tissue.deformed();
         let elements = 0..body.lattice.element_count() as u32;
@@ -99,7 +99,7 @@ impl Insertion {
     }
 }
 
-/// Largest force against the hand, N.
+/// Returns the largest force against the hand, N.
 fn peak_n(ticks: &[Tick]) -> f64 {
     ticks.iter().map(|t| -t.output.wrench.force_n.z).fold(0.0, f64::max)
 }
@@ -124,8 +124,8 @@ fn a_second_pass_on_one_track_meets_no_membrane() {
     }
 }
 
-/// ChainMail by eq. 6 had 37 % more displacement at 3 mm after 6 mm than on the way there. Friction has a memory too: what is asked is
-/// that it is the same after each further turn.
+/// ChainMail by eq. 6 had 37 % more displacement at 3 mm after 6 mm than on the way there. Friction has a memory too:
+/// what is asked is that it is the same after each further turn.
 #[test]
 fn turns_at_depth_come_back_to_the_same_force() {
     for kind in KINDS {
@@ -237,8 +237,8 @@ fn speeds_from_half_a_millimetre_to_123_in_a_second_end_alike() {
     }
 }
 
-/// Patients: 15 mm median at the base after 16 needles (PMID 15090279), 6.0 to 6.6 mm in biopsies (Schouten 2012). By eq. 6 the gland
-/// of `pelvis` moved by 0.4 mm.
+/// Patients: 15 mm median at the base after 16 needles (PMID 15090279), 6.0 to 6.6 mm in biopsies (Schouten 2012). By
+/// eq. 6 the gland of `pelvis` moved by 0.4 mm.
 #[test]
 fn the_gland_moves_by_millimetres_until_its_membrane_gives_way() {
     for (scene, kind) in [

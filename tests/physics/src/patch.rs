@@ -1,11 +1,12 @@
-//! A needle that holds a patch of tissue and slips by eq. 6, as it is off its line: what each tick holds, and the converged answer to it.
+//! A needle that holds a patch of tissue and slips by eq. 6, as off its line: what each tick holds, and the
+//! converged answer to it.
 
 use stylet_sim::needle::{NeedleParameters, Phase, transmission};
 use stylet_sim::scene::Lattice;
 use stylet_sim::tissue::fem::{self, FemModel, FemState, SolveSettings, TipPatch};
 use stylet_sim::tissue::{Carried, Deformed, element_ahead};
 
-/// Of the tissue loop.
+/// Period of the tissue loop.
 pub const PERIOD_S: f64 = 5e-3;
 /// As the loop holds with finite elements.
 pub const PATCH_M: f64 = 4e-3;
@@ -17,13 +18,13 @@ pub const STRAIGHT: Way = Way {
 /// Ticks in which the needle comes near before it meets the gland.
 const APPROACH: usize = 10;
 
-/// What one tick holds, and what the tip will come to if it goes on straight.
+/// Patch that one tick holds, and the one that the tip will come to on a straight way.
 pub struct PatchTick {
     /// Now.
     pub held: Option<TipPatch>,
-    /// What work ahead is for.
+    /// Patch that work ahead prepares.
     pub next: Option<TipPatch>,
-    /// How far the held patch is from rest.
+    /// Displacement of the held patch from rest.
     pub by_m: f64,
 }
 
@@ -55,7 +56,8 @@ pub fn insertion(lattice: &Lattice, way: Way, depth_m: f64) -> Vec<PatchTick> {
         position_m: at(by_m, lattice.rest_m(element)),
         edge_m: PATCH_M,
     };
-    // What the loop would see ahead, not what the script has later. The body moves with the patch: seen from it, at rest.
+    // What the loop would see ahead, not what the script has later. The body moves with the patch: seen from it, at
+    // rest.
     let still = vec![0.0; lattice.element_count()];
     let rest = Deformed {
         lattice,
@@ -103,15 +105,15 @@ fn element_at(lattice: &Lattice, place_m: [f64; 3]) -> Option<u32> {
     lattice.element_of_cell(i, j, k)
 }
 
-/// Where the converged body is after a tick.
+/// Converged body after a tick.
 pub struct Solved {
-    /// Of every element along x, y, z, in elements.
+    /// Displacement of every element along x, y, z, in elements.
     pub displacement: [Vec<f32>; 3],
-    /// Of the tip on the tissue.
+    /// Force of the tip on the tissue.
     pub tip_force_n: [f64; 3],
 }
 
-/// The body after each tick, solved to the end in f64.
+/// Solves the body after each tick to the end in f64.
 ///
 /// # Panics
 ///

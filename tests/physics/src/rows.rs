@@ -9,15 +9,15 @@ use std::sync::{Mutex, PoisonError};
 pub struct Row {
     /// Number in the list of hard cases.
     pub number: u32,
-    /// What is done.
+    /// Case.
     pub case: &'static str,
     /// In which tissue.
     pub model: &'static str,
-    /// What is asked.
+    /// Requirement.
     pub should: &'static str,
-    /// What came of it, with figures.
+    /// Outcome, with figures.
     pub happened: String,
-    /// Whether that is what is asked.
+    /// Set where the outcome meets the requirement.
     pub met: bool,
     /// For a case that is known to fall short: which live warning says so.
     pub warning: &'static str,
@@ -30,7 +30,7 @@ const BEGIN: &str = "<!-- rows that tests write -->\n";
 const END: &str = "<!-- end of the rows that tests write -->\n";
 const HEAD: &str = "| | case | model | should | happened | met |\n|---|---|---|---|---|---|\n";
 
-/// Nobody else rewrites the page meanwhile.
+/// No other test rewrites the page meanwhile.
 pub fn lock() -> std::sync::MutexGuard<'static, ()> {
     PAGE.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -33,10 +33,11 @@ fn wrists() -> impl Iterator<Item = Wrist> {
 const TICK_S: f64 = 1e-3;
 /// Steps of the wrist's own motion in a tick.
 const STEPS: usize = 50;
-/// Of a rotary encoder of a Phantom's gimbal, and more than half of its step is an oscillation.
+/// Step of a rotary encoder of a Phantom's gimbal; more than half of it is an oscillation.
 const SEEN_RAD: f64 = 2e-3;
 
-/// Turns the handle by 10 degrees with the tip 45 mm deep; swing in the first and the last half second of eight, and the largest torque.
+/// Turns the handle by 10 degrees with the tip 45 mm deep; swing in the first and the last half second of eight, and
+/// the largest torque.
 fn turn(wrist: Wrist, late_ticks: usize, gain: f64) -> (f64, f64, f64) {
     let info = DeviceInfo::phantom_premium_1_5();
     let force = ForceParameters {

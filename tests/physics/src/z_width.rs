@@ -1,4 +1,4 @@
-//! How stiff a wall the loop holds, against Colgate's bound.
+//! Stiffness of a wall that the loop holds, against Colgate's bound.
 
 use stylet_benches::wall::Wall;
 use stylet_hw::Hand;

@@ -43,7 +43,7 @@ fn raise_file_limit() {
     }
 }
 
-/// A socket that shares its port with the others.
+/// Returns a socket that shares its port with the others.
 fn shared_socket(port: u16) -> Option<UdpSocket> {
     let one: libc::c_int = 1;
     let address = libc::sockaddr_in {
@@ -83,7 +83,7 @@ impl Drop for Group {
     }
 }
 
-/// The force loop in a group that may use real time for 0.1 ms of each 30 ms.
+/// Returns the force loop in a group that may use real time for 0.1 ms of each 30 ms.
 pub fn throttled(target: Target, end: Instant) -> Result<(), String> {
     let root = PathBuf::from("/sys/fs/cgroup/cpu");
     if !root.join("cpu.rt_runtime_us").exists() {
@@ -111,7 +111,7 @@ fn scratch_file() -> PathBuf {
     stylet_test_kit::scratch("lab-inject").join("file")
 }
 
-/// Writes and syncs 96 MiB at a time, beside the loop on its core.
+/// Writes and syncs 96 MiB at a time, next to the loop on its core.
 pub fn large_fsync(target: Target, end: Instant) -> Result<(), String> {
     let path = scratch_file();
     ended(on_core("inj-fsync", target.core, 0, move || {

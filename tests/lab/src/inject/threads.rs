@@ -31,7 +31,7 @@ pub fn stopped(target: Target, end: Instant) -> Result<(), String> {
     Ok(())
 }
 
-/// Normal for 20 ms at a time, beside two threads that never sleep.
+/// Normal for 20 ms at a time, next to two threads that never sleep.
 pub fn demoted(target: Target, end: Instant) -> Result<(), String> {
     let hogs = [(); 2].map(|()| {
         on_core("inj-hog", target.core, 0, move || {

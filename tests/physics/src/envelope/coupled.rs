@@ -1,4 +1,5 @@
-//! The hands of the envelope in coupled mode, where the force is what the tissue answers at 200 Hz: a needle off its line, both models.
+//! The hands of the envelope in coupled mode, where the force is what the tissue answers at 200 Hz: a needle off its
+//! line, both models.
 
 use super::{Case, SINGING_M, excess, to_and_fro, worst};
 use crate::rows::{Row, keep};
@@ -46,11 +47,12 @@ fn run(session: &mut Session, seconds: f64) -> Vec<Tick> {
     (0..(seconds * 1e3) as usize).map(|_| session.tick()).collect()
 }
 
-/// Three quarters of a second each, from one second after the nudge on: those of a hand that still moves after two of them, which go on
-/// to the eighth second, as where a handle is turned.
+/// Three quarters of a second each, from one second after the nudge on: those of a hand that still moves after two of
+/// them, which go on to the eighth second, as where a handle is turned.
 const LOOKS: usize = 9;
 
-/// As `super::session`, with the tip brought to rest `rest_m` behind where the body begins; and how far it moves to and fro from look to look.
+/// As `super::session`, with the tip brought to rest `rest_m` behind where the body begins; and how far it moves to and
+/// fro from look to look.
 fn session(mut world: Box<World>, hand: Hand, late_ticks: usize, rest_m: f64) -> (Case, Vec<f64>, Box<World>) {
     world.tissue.return_to_rest();
     let start = axis_start(&world);
@@ -147,7 +149,8 @@ fn no_hand_sings_in_coupled_mode() {
     }
 }
 
-/// Creep in by 10 mm and pull back faster: by eq. 6 the tissue follows a slow needle, and let a fast one go. That gave the hand 24 mJ a cycle.
+/// Creep in by 10 mm and pull back faster: by eq. 6 the tissue follows a slow needle, and let a fast one go. That gave
+/// the hand 24 mJ a cycle.
 #[test]
 fn a_closed_cycle_in_coupled_mode_gives_the_hand_nothing() {
     for kind in [TissueKind::ChainMail, TissueKind::Fem] {

@@ -24,12 +24,12 @@ impl Theatre {
         Self::of_source(&SceneSource::Builtin(scene.to_owned()), tissue)
     }
 
-    /// A block of 60 mm on fat, with its membrane.
+    /// Returns a block of 60 mm on fat, with its membrane.
     fn of_stiffness(young_pa: f64) -> Self {
         Self::of_block(young_pa, usize::MAX)
     }
 
-    /// The same with bone from a layer of cells on, 2 mm each.
+    /// Returns the same with bone from a layer of cells on, 2 mm each.
     fn of_block(young_pa: f64, bone_from: usize) -> Self {
         let mut bone = Structure::soft("bone", 2);
         (bone.role, bone.material.fixed) = (Role::Tissue, true);
@@ -122,7 +122,8 @@ impl Theatre {
     }
 }
 
-/// Links that are so many ticks late, and every so many-th hand of the envelope: of every second one all corners are among them.
+/// Links that are so many ticks late, and every so many-th hand of the envelope: of every second one all corners are
+/// among them.
 #[derive(Clone, Copy)]
 struct Extent {
     lateness: &'static [usize],
@@ -216,8 +217,8 @@ fn without_control_a_link_eight_ticks_late_sings_on_a_line() {
     assert!(sing(8, false) > 0, "what sings is not seen");
 }
 
-/// A scene file may have structures of any modulus. In tissue ten times as stiff as a prostate 6 of 108 hands sang over a link that is
-/// three ticks late, and in stiffer tissue all were thrown out.
+/// A scene file may have structures of any modulus. In tissue ten times as stiff as a prostate 6 of 108 hands sang over
+/// a link that is three ticks late, and in stiffer tissue all were thrown out.
 #[test]
 fn no_hand_sings_on_a_line_in_tissue_of_any_stiffness() {
     no_hand_sings_in_stiff_tissue(LATE);

@@ -1,4 +1,5 @@
-//! A needle in tissue that is pushed aside, turned back, weighed and slowed: cases of a whole loop that write their own rows.
+//! A needle in tissue that is pushed aside, turned back, weighed and slowed: cases of a whole loop that write their own
+//! rows.
 
 use super::*;
 use crate::rows::{Row, keep};
@@ -159,7 +160,8 @@ fn the_rate_of_the_tissue_loop_is_not_felt() {
     }
 }
 
-/// F_G with 0.2 kg, as handles weigh: lifting the handle is paid by the spring that carries it in a real workshop, and is no debt.
+/// F_G with 0.2 kg, as handles weigh: lifting the handle is paid by the spring that carries it in a real workshop, and
+/// is no debt.
 #[test]
 fn a_handle_that_is_carried_may_be_lifted() {
     let weighed = ForceParameters {
@@ -222,7 +224,8 @@ const GUIDED: Hand = Hand {
     effort: None,
 };
 
-/// Tissue, membrane and friction together, in the whole loop: what the hand gets back is what it put in, less what was cut and slipped.
+/// Tissue, membrane and friction together, in the whole loop: what the hand gets back is what it put in, less what was
+/// cut and slipped.
 #[test]
 fn a_closed_insertion_gives_the_hand_no_more_than_it_took() {
     for kind in KINDS {

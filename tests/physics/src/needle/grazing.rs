@@ -5,9 +5,9 @@ use crate::rows::{Row, keep};
 use stylet_sim::scene::{Labels, Role, Structure};
 
 const SPEED_M_PER_S: f64 = 0.05;
-/// How far behind the entry the tip ends.
+/// Depth of the tip behind the entry at the end.
 const DEPTH_M: f64 = 30e-3;
-/// How far before it the needle begins.
+/// Distance before the entry at which the needle begins.
 const BEFORE_M: f64 = 10e-3;
 /// The gate's limit for each tick.
 const SLEW_N: f64 = 0.5 + 1e-9;
@@ -25,7 +25,7 @@ fn block() -> SceneSource {
     SceneSource::of_labels("block", &labels)
 }
 
-/// What an insertion did, forces against the hand.
+/// Outcome of an insertion, forces against the hand.
 struct Found {
     /// Largest before the membrane gave way, along the needle.
     held_n: f64,
@@ -110,8 +110,9 @@ fn tilted(degrees: f64) -> Vector3<f64> {
     Vector3::new(sine, 0.0, cosine)
 }
 
-/// The needle stopped within a nanometre before the face, as encoders have it where the entry lies on one of their steps, and
-/// met nothing from there on. Where it comes to rest in the tissue is decided by friction and cutting alone, whatever the angle is.
+/// The needle stopped within a nanometre before the face, as encoders have it where the entry lies on one of their
+/// steps, and met nothing from there on. Where it comes to rest in the tissue is decided by friction and cutting alone,
+/// whatever the angle is.
 #[test]
 fn a_face_met_at_an_angle_is_felt_as_one_met_squarely() {
     let gland = SceneSource::Builtin("paper".to_owned());

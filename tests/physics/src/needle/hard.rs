@@ -1,4 +1,4 @@
-//! What a needle meets that no plan foresees: busy machines, edges, bone, membranes close together, bodies that rest on nothing.
+//! Hard cases that no plan foresees: busy machines, edges, bone, membranes close together, bodies that rest on nothing.
 
 use super::*;
 use stylet_anatomy::{Beyond, Surroundings};

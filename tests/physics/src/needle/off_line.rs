@@ -1,12 +1,13 @@
-//! A needle that goes in off its line in finite elements: what the hand and the window have of it, in the scenes that ship.
+//! A needle that goes in off its line in finite elements: what the hand and the window have of it, in the scenes that
+//! ship.
 
 use super::*;
 use crate::rows::{Row, keep};
 
-/// How far behind the surface the tip ends.
+/// Depth of the tip behind the surface at the end.
 const DEPTH_M: f64 = 40e-3;
 
-/// What an insertion without a line was.
+/// Outcome of an insertion without a line.
 struct Found {
     fault: u32,
     residual: f64,
@@ -57,8 +58,8 @@ fn insert(scene: &str, degrees: f64, speed_m_per_s: f64, coupling: f64) -> Found
     found
 }
 
-/// The body is solved one cycle a tick there, and lags most where the patch is another in each tick. No force of eq. 8 to 10 goes by it;
-/// in coupled mode one does, and is turned off before it is wrong by more than a fifth.
+/// The body is solved one cycle a tick there, and lags most where the patch is another in each tick. No force of eq. 8
+/// to 10 goes by it; in coupled mode one does, and is turned off before it is wrong by more than a fifth.
 #[test]
 fn a_needle_off_its_line_in_finite_elements_keeps_its_force_unless_that_is_the_bodys() {
     for (case, coupling) in [

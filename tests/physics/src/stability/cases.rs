@@ -12,7 +12,7 @@ const TICK_S: f64 = 5e-3;
 /// The tolerance of both models.
 const TOLERANCE: f64 = 1.001e-3;
 
-/// What is known to fall short, and why; the page says so. A case that is met again must leave this list.
+/// Cases that are known to fall short, and why; the page says so. A case that is met again must leave this list.
 pub const SHORT: [(u32, Kind, &str); 4] = [
     (
         3,
@@ -172,7 +172,7 @@ fn middle(scene: &Scene) -> u32 {
     scene.lattice.element_of_cell(i, j, k).expect("the middle is tissue")
 }
 
-/// A way that turns and speeds up: up to `per_tick` elements a tick within `reach` elements.
+/// Returns a way that turns and speeds up: up to `per_tick` elements a tick within `reach` elements.
 fn turning(tick: u32, per_tick: f64, reach: f64) -> [f64; 3] {
     let t = f64::from(tick) * per_tick / reach;
     [
@@ -522,7 +522,7 @@ fn parts(kind: Kind) -> Option<(String, bool)> {
     ))
 }
 
-/// The same body near the origin and 1,000 elements from it.
+/// Returns the same body near the origin and 1,000 elements from it.
 fn far_from_origin() -> Vec<Row> {
     let ends = |kind: Kind, shift: usize| {
         let scene = body([shift + 8, 8, 8], Vec::new(), |[i, _, _]| u8::from(i >= shift));

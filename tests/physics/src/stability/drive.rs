@@ -2,7 +2,7 @@
 
 use stylet_sim::tissue::{Deformed, Held, HeldOutcome, TissueModel};
 
-/// What was seen over a whole run.
+/// Observations over a whole run.
 #[derive(Clone, Debug)]
 pub struct Seen {
     pub finite: bool,
@@ -61,7 +61,7 @@ pub fn drive(
     seen
 }
 
-/// Largest displacement of an element; infinite if one is not finite.
+/// Returns the largest displacement of an element; infinite if one is not finite.
 pub fn farthest(body: &Deformed) -> f64 {
     let elements = 0..body.lattice.element_count() as u32;
     let lengths = elements.map(|e| body.displacement(e).iter().map(|c| c * c).sum::<f64>().sqrt());
@@ -71,7 +71,8 @@ pub fn farthest(body: &Deformed) -> f64 {
     )
 }
 
-/// Smallest volume spanned by the links of an element to three neighbours, one along each axis, over all eight corners.
+/// Returns the smallest volume spanned by the links of an element to three neighbours, one along each axis, over all
+/// eight corners.
 fn least_corner(body: &Deformed) -> f64 {
     let mut least = f64::INFINITY;
     for element in 0..body.lattice.element_count() as u32 {
