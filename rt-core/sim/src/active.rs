@@ -1,4 +1,4 @@
-//! Parameters as the loops own them: the raw set of shared memory, validated as a whole.
+//! Active parameters of the loops: the raw set, validated as a whole.
 
 use crate::force::ForceParameters;
 use crate::limits::{Limits, TissueParameters};

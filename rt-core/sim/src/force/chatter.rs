@@ -1,4 +1,4 @@
-//! Sees a tip that shakes: turns that follow each other more quickly than a hand means to turn.
+//! Detection of a shaking tip: turns that follow each other faster than deliberate ones.
 //!
 //! A loop whose link is later than it should be shakes a stuck shaft between its limits. No energy account shows it
 //! at once, since the lateness is not known; the turns do.

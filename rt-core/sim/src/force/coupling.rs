@@ -1,4 +1,4 @@
-//! Coupled mode: the tissue's answer of 200 Hz, carried on at 1 kHz.
+//! Coupled mode: the tissue's answer at 200 Hz, extrapolated to 1 kHz.
 //!
 //! The tissue loop reports the force of its body, the travel of the held element that it answers to, and how
 //! stiffly it would answer more. The haptic loop knows that travel at 1 kHz, so the force between two answers

@@ -1,4 +1,4 @@
-//! The last thing before the device: nothing else may write a force.
+//! The safety gate, last before the device: nothing else may write a force.
 //!
 //! Order: finite → force scale and ramp → passivity → slew → magnitude → continuous (thermal) → the device's own
 //! limit. The slew limit comes before the magnitudes: each of those is a pull towards zero onto a ball that the

@@ -1,4 +1,4 @@
-//! The settings of the force law, and which of them can be used.
+//! Settings of the force law, with their validation.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

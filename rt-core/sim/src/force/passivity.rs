@@ -1,4 +1,4 @@
-//! Watches the energy that the simulator gives the hand, and damps away what it should not have given.
+//! Passivity control: accounts for the energy that the simulator gives the hand, and damps away any excess.
 //!
 //! Time-domain passivity (Hannaford and Ryu 2002). The force is held between ticks, so its work on the
 //! measured displacement is exact, if it is known when the force began to act. A link may be late by some

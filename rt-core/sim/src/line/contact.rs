@@ -177,7 +177,7 @@ fn slip(model: &LineModel, state: &mut LineState, tip_m: f64) {
 }
 
 /// Returns whether the needle is in the tissue or has come to its surface, which the past and other needles have moved.
-/// A tip outside is where the hand has it: one that stopped a hair before the surface is not held there.
+/// A tip outside is at the hand's place: one that stopped just before the surface is not held there.
 fn has_met(model: &LineModel, state: &mut LineState, tip_m: f64) -> bool {
     let is_out = state.in_contact == 0 && state.tip.force_n == 0.0 && state.tip.material_m <= 0.0;
     if !is_out {

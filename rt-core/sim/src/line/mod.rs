@@ -1,4 +1,4 @@
-//! The condensed needle line: what the needle does to the tissue along its way, and what the hand feels of it.
+//! The condensed needle line: forces between needle and tissue along its way, and on the hand.
 //!
 //! *Before the needle moves*: [`Line`] and [`Stations`] lie along the way; [`ColumnQueue`] solves for the body's answer
 //! to a unit force at each of them, in slices that fit into idle ticks; [`Compliance`] is how each station moves with

@@ -1,4 +1,4 @@
-//! A line that is ready to be used: its hand's half for the force loop, its body's half for the tissue loop.
+//! A line ready for use: the hand's half for the force loop, the body's half for the tissue loop.
 //!
 //! Made ahead of the needle on a thread of normal priority ([`ReadyLine::prepare`]); neither half allocates after that.
 
@@ -113,9 +113,9 @@ pub enum LineError {
 }
 
 impl ReadyLine {
-    /// Solves for a line of needle at rest; some seconds for a body of 20,000 elements. `layer_of` says what an element
-    /// of `lattice` is to a needle, and nothing of what no needle enters. `others` are the lines that the needle may
-    /// come close to. `report` is called between slices of work and ends it by returning false.
+    /// Solves for a line of needle at rest; some seconds for a body of 20,000 elements. `layer_of` tells what an
+    /// element of `lattice` is to a needle, and nothing of what no needle enters. `others` are the lines that the
+    /// needle may come close to. `report` is called between slices of work and ends it by returning false.
     #[expect(
         clippy::too_many_arguments,
         reason = "each says one thing of the line that is wanted"

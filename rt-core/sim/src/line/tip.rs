@@ -1,21 +1,21 @@
-//! The tip: what stops it, and where it is in the material.
+//! The tip: its place in the material, and what stops it.
 
 use super::model::{LineLayer, LineModel};
 use super::rows::dot;
 use super::state::{LineState, TipState};
 
-/// No membrane leaves less of a dent.
+/// Smallest share of a dent that a membrane leaves.
 const LEAST_KEPT: f64 = 0.02;
-/// Places closer than this are the same.
+/// Distance below which places are the same.
 const SAME_M: f64 = 1e-9;
-/// The tip's place is found to this.
+/// Tolerance of the tip's place.
 const PLACE_M: f64 = 1e-11;
 /// Largest factor by which a step through compressed tissue in front counts more than its length.
 const MOST_PRESSED: f64 = 10.0;
 /// Share of the way between two close places by which the gap closes at least.
 const LEAST_CLOSED: f64 = 0.25;
 const MOST_CLOSED: f64 = 3.0;
-/// Part of the gap that is left when the way to the second place was the right one.
+/// Share of the gap that remains when the way to the second place was right.
 const LEFT: f64 = 0.5;
 /// Stations around the tip that a pass can reach.
 const WINDOW: usize = 64;
@@ -95,7 +95,7 @@ impl LineModel {
     }
 }
 
-/// The displacement of the material around the tip under the present loads of the shaft; the tip's own goes with it.
+/// Displacement of the material around the tip under the present loads of the shaft; the tip's own part moves with it.
 struct Around<'a> {
     model: &'a LineModel,
     first: usize,
@@ -151,7 +151,7 @@ impl<'a> Around<'a> {
     }
 }
 
-/// A place of the tip that was tried, and how far the needle is beyond it then.
+/// Tried place of the tip, and how far the needle is beyond it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub material_m: f64,
@@ -166,7 +166,7 @@ fn onward_m(before: Place, now: Place) -> Option<f64> {
     is_plain.then(|| now.material_m + now.gap_m / closed)
 }
 
-/// Moves the tip through the material to where the world has it, but not past `to_m`; returns whether it moved.
+/// Moves the tip through the material to its place in the world, but not past `to_m`; returns whether it moved.
 /// `before` is the place that was tried before with the same front.
 pub(super) fn follow(
     model: &LineModel,

@@ -1,4 +1,4 @@
-//! The needle and what it does to the tissue it holds.
+//! The needle, and its grip on the tissue around the tip.
 
 // What the lists of clippy.toml name has no place in a tick; tests may.
 #![cfg_attr(

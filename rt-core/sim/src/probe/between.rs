@@ -1,4 +1,4 @@
-//! How points of the wall move with forces on points, by loads on the pads alone: `B = S C^-1 S'`.
+//! Displacement of the wall's points by forces on points, through loads on the pads alone: `B = S C^-1 S'`.
 //!
 //! `S` is how points move with a newton on each pad, `C` how pads do. A force on a point is put on the pads as `C^-1
 //! S'` says: of all loads on pads these move the points to where the force wants them with the least work. The points

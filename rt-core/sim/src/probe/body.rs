@@ -1,4 +1,4 @@
-//! A probe as the tissue loop has it: what it can press, what it has done, and its share of the body's displacement.
+//! A probe in the tissue loop: the wall that it presses, its state, and its share of the body's displacement.
 
 use super::beside::LinesBeside;
 use super::columns::ReadyProbe;

@@ -172,7 +172,7 @@ impl ProbeQueue {
         }
     }
 
-    /// Solves for one batch; `None` when `goes_on`, which is asked between slices of work, said no.
+    /// Solves for one batch; `None` when `goes_on`, called between slices of work, returned false.
     pub fn solve(
         &self,
         body: &BatchModel<f32>,

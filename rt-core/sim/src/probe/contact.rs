@@ -1,4 +1,4 @@
-//! One tick of the probe: forces between it and the wall, none of which pulls, and what they do to the body.
+//! One tick of the probe: pushing forces between it and the wall, and the displacement of the body by them.
 
 mod near;
 
@@ -11,26 +11,26 @@ use crate::tissue::ElementField;
 use nalgebra::Vector3;
 use near::{condense, left_over, list, measure, reach, turn};
 
-/// A pose farther from the one before is reached in steps, since the wall's way out of the probe is that to the nearest
-/// side.
+/// Largest motion in one step: a farther pose is reached in several, since the wall leaves the probe towards the
+/// nearest side.
 const STEP_M: f64 = 2e-3;
 const MOST_STEPS: usize = 8;
-/// Passes over the directions of the forces at the end of a tick, at most, and in a step on the way there.
+/// Largest number of passes over the directions of the forces at the end of a tick, and in a step on the way there.
 const PASSES: usize = 16;
 const PASSES_ON_THE_WAY: usize = 2;
-/// A pass that leaves no pad farther than that from the probe's surface, on the wrong side, and no force turned farther
-/// from it, is the last.
+/// Tolerances of the last pass: distance of a pad on the wrong side of the probe's surface, and angle of a force from
+/// its normal.
 const CLOSED_M: f64 = 4e-7;
 const TURNED: f64 = 2e-4;
 
 /// Outcome of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactReport {
-    /// Passes in all of its steps.
+    /// Number of passes in all of its steps.
     pub passes: u32,
-    /// Most rounds of active sets in a pass.
+    /// Largest number of rounds of active sets in a pass.
     pub rounds: u32,
-    /// Pads that are looked at.
+    /// Number of examined pads.
     pub near: u32,
     /// Deepest pad in the probe, and the largest gap under a force, m.
     pub open_m: f64,
@@ -47,12 +47,12 @@ pub struct ProbeState {
     /// Displacement of each point by them, and by others, m.
     moved_m: Vec<[f64; 3]>,
     beside_m: Vec<[f64; 3]>,
-    /// Room for how others displace the pads.
+    /// Work space for the displacement of the pads by others.
     pads_m: Vec<f64>,
     /// Force on each point, N, and its direction.
     pressed_n: Vec<f64>,
     pushed: Vec<[f64; 3]>,
-    /// Points that are looked at; how far each is from the probe, m, and where its surface faces there.
+    /// Examined points, with the distance of each from the probe, m, and the normal of its surface there.
     reach: Vec<u32>,
     gaps_m: Vec<f64>,
     surface: Vec<[f64; 3]>,
@@ -61,7 +61,7 @@ pub struct ProbeState {
     is_near: Vec<bool>,
     outward: Vec<[f64; 3]>,
     condensed: Vec<[f64; 3]>,
-    /// One that may not be in contact overlaps.
+    /// Set where a point overlaps that was taken to be out of contact.
     is_missed: bool,
     problem: Problem,
     /// Displacement of the body by the loads, m.
@@ -187,8 +187,7 @@ pub fn step(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside
     respond(state, probe, &pose)
 }
 
-/// Adds up what the loads do to the body; where they are others than before, which this does not look for. Does not
-/// allocate.
+/// Adds up the displacement of the body by the loads; to be called where they have changed. Does not allocate.
 pub fn displace(probe: &ReadyProbe, state: &mut ProbeState) {
     state.share.load(&probe.solved.columns, &state.loads_n);
 }
@@ -222,8 +221,7 @@ fn press(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, passes: u
         for (a, &point) in state.near.iter().enumerate() {
             state.problem.forces_n[a] = state.pressed_n[point as usize];
         }
-        // The problem may be that of directions which have turned a little since: what its forces close is taken from
-        // the gaps as they are.
+        // The directions may have turned a little since the problem was condensed: its forces close the present gaps.
         for (a, &point) in state.near.iter().enumerate() {
             state.problem.free_m[a] = state.gaps_m[point as usize] - state.problem.closes_m(a);
         }
@@ -237,7 +235,7 @@ fn press(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, passes: u
             break;
         }
     }
-    // A point that was not looked at may have got there.
+    // A point that was not examined may have come into contact.
     state.reach_all(probe);
     measure(probe, state, pose);
     state.report.open_m = left_over(probe, state)[0];
@@ -283,7 +281,7 @@ fn respond(state: &mut ProbeState, probe: &ReadyProbe, pose: &ProbePose) -> Prob
     if response.contacts == 0 {
         return response;
     }
-    // The room is taken out meanwhile, so that the factor next to it can be read.
+    // The work space is taken out meanwhile, so that the factor next to it can be read.
     let mut room = std::mem::take(&mut state.problem.work);
     let values = room.get_mut(..state.problem.set.len()).unwrap_or(&mut []);
     for motion in 0..6 {

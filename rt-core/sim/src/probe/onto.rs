@@ -1,4 +1,4 @@
-//! From the elements that are solved in to those that are displaced, which may be coarser.
+//! Map from the elements of the solution to the displaced elements, which may be coarser.
 
 use crate::scene::Lattice;
 use crate::tissue::ElementField;

@@ -1,4 +1,4 @@
-//! A displacement of the whole body that a model has on top of what its own steps do.
+//! Displacement of the whole body on top of a model's own steps.
 
 use super::field::{add_fields, add_up};
 use super::{ElementField, LargeStrain, PackedField, parts};
@@ -13,7 +13,7 @@ pub struct Carry<'a> {
     pub columns: &'a [PackedField],
     /// Loads, as many as there are columns; a column without a load counts as 0.
     pub loads_n: &'a [f64],
-    /// Displacements of that body besides, m.
+    /// Further displacements of that body, m.
     pub fields: &'a [&'a ElementField],
     /// Displacement of all of it on top, m.
     pub whole_m: [f64; 3],

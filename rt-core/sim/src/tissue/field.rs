@@ -1,4 +1,4 @@
-//! A displacement of every element, as a model answers a force with.
+//! Displacement of every element: a model's answer to a force.
 
 use crate::simd::{Simd, vectorised};
 use serde::{Deserialize, Serialize};

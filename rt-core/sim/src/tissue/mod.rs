@@ -1,4 +1,4 @@
-//! Tissue: where each element of a scene is after each tick.
+//! Tissue models: the place of each element of a scene after each tick.
 //!
 //! A model takes steps (`TissueModel`); everything else reads the `Deformed` body. A step does not allocate,
 //! lock or panic, and its work is bounded by the number of elements times a stated number of passes, never

@@ -1,4 +1,4 @@
-//! Why the force goes to zero, and how often each limit acted.
+//! Faults that bring the force to zero, and counts of each limit's interventions.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[repr(u32)]
 pub enum ForceFault {
-    /// The force law gave a force that is not a number.
+    /// The force law returned a force that is not a number.
     #[error("the force law gave a force that is not a number")]
     NonFiniteForce = 1,
     /// The device reported a fault.

@@ -1,4 +1,4 @@
-//! The settings of the gate.
+//! Settings of the gate.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! The forces of shaft and tip with the tip where it is: by sets of stations that stick, or by sweeps.
+//! Forces of shaft and tip for a given place of the tip: by sets of sticking stations, or by sweeps.
 
 use super::sets::{self, Tip};
 use super::{Scratch, Spring, limit_n, past_at_tip_m};

@@ -1,12 +1,11 @@
-//! A membrane that holds the tip: a spring between the tip and the body as a whole, and what it takes from the tissue
-//! around.
+//! A membrane that holds the tip: a spring between the tip and the body as a whole, which relieves the tissue around.
 
 use crate::line::model::LineModel;
 use crate::line::rows::dot;
 use crate::line::state::LineState;
 
-/// Meets a membrane where the tissue in front of it is by now: past loads and other needles may have moved it before
-/// the tip was there.
+/// Meets a membrane at the present place of the tissue: past loads and other needles may have moved it before the tip
+/// arrived.
 pub(in crate::line) fn meet(model: &LineModel, state: &mut LineState, membrane: Option<usize>) {
     let held_by = membrane.map_or(0, |n| n as u32 + 1);
     if held_by == state.tip.held_by || held_by == 0 {
@@ -50,7 +49,7 @@ pub(in crate::line) fn press(model: &LineModel, state: &mut LineState, membrane:
     }
     state.tip_offset_m = (1.0 - kept) * state.tip.met_dent_m;
     if state.memory.is_on() {
-        // Of the dent that the past leaves, the spring leaves that part as well.
+        // The spring leaves the same share of the dent by past loads.
         state.tip_offset_m -=
             (1.0 - kept) * (past_at_tip_m(model, state) - state.memory.whole_offset_m - state.outside.at_tip_m);
     }
@@ -128,14 +127,14 @@ impl Spring {
         self.n_per_m * self.kept / self.gain * (dent_m - past_m - state.tip.met_dent_m)
     }
 
-    /// Returns the work of the shaft over what the dent with which the membrane was met adds to its displacements.
+    /// Returns the work of the shaft over the displacements by the dent with which the membrane was met.
     pub fn relaxed_j(&self, state: &LineState) -> f64 {
         let shaft = state.shaft_n.iter().zip(&state.tip_column).take(state.in_contact);
         let dent_j: f64 = shaft.map(|(f, of_tip)| f * (of_tip - self.common_m_per_n)).sum();
         state.tip_offset_m / (state.tip_own - self.common_m_per_n) * dent_j
     }
 
-    /// Takes from the stations what the spring passes on.
+    /// Subtracts the spring's share from the stations.
     pub fn relieve(&self, state: &mut LineState, passed_n: f64) {
         let by = self.gain * passed_n / self.kept;
         for (u_m, of_tip) in state.u_m[..state.in_contact].iter_mut().zip(&state.tip_column) {

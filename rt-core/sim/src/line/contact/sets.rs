@@ -54,7 +54,7 @@ impl<const B: usize> Each<B> {
 pub(in crate::line) struct Tip {
     /// Displacement for each newton, without the gain.
     pub own_m_per_n: f64,
-    /// Displacement with which it is where the material has it, and the most force it has.
+    /// Displacement at which it is at the material's place, and its largest force.
     pub stuck_m: f64,
     pub limit_n: f64,
     pub force_n: f64,

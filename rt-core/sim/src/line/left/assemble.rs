@@ -1,4 +1,4 @@
-//! The compliance of all needles that stay in, and how it is joined with that of the one that moves.
+//! Assembly of the compliance of all needles that stay in, and its coupling with the moving one.
 
 use super::{LeftNeedle, LeftNeedles};
 use crate::line::cross::Cross;

@@ -1,9 +1,9 @@
 //! Needles that stay in: each is a line whose place along itself is held by the template, while another needle moves.
 //!
-//! A needle that is left keeps what its shaft and tip hold. Friction acts as before, implicit Coulomb with anchors in
-//! the tissue; its tip pushes up to the force at which it cuts, on the patch that it had when it was left. All needles
-//! together are one convex problem over the stations of all lines (`docs/physics.md`, *Several needles*), solved once a
-//! tick of the force loop in [`solve`]. A needle alone never comes here.
+//! A needle that is left keeps the forces of its shaft and tip. Friction acts as before, implicit Coulomb with anchors
+//! in the tissue; its tip pushes up to the force at which it cuts, on the patch that it had when it was left. All
+//! needles together are one convex problem over the stations of all lines (`docs/physics.md`, *Several needles*),
+//! solved once a tick of the force loop in [`solve`]. A needle alone does not use this module.
 
 mod assemble;
 mod by_sets;
@@ -77,18 +77,18 @@ pub struct LeftNeedles {
     /// Work space for the inversion.
     pivot: Vec<f64>,
     force_n: Vec<f64>,
-    /// Displacement along its own needle at which the element holds nothing, and that it has.
+    /// Displacement along its own needle at which the element has no force, and its present one.
     rest_m: Vec<f64>,
     u_m: Vec<f64>,
     /// Displacement of the tissue by the probe at the element, along its own needle: taken from `rest_m`.
     moved_m: Vec<f64>,
     low_n: Vec<f64>,
     high_n: Vec<f64>,
-    /// The line of the needle that moves, and how its rows move with a newton at each element.
+    /// Line of the moving needle, with the displacement of its rows by a newton at each element.
     moving: u64,
     moving_rows: usize,
     to_moving: Vec<f64>,
-    /// The same the other way round: elements by a newton at each row of that line, and by one at its tip.
+    /// Displacement of the elements by a newton at each row of that line, and by one at its tip.
     from_moving: Vec<f64>,
     by_tip: Vec<f64>,
     /// Force that dents take from each other where a membrane holds the moving tip; 0 where none does.
@@ -97,9 +97,9 @@ pub struct LeftNeedles {
     whole: Vec<f64>,
     /// Displacement added to the stations of the moving line, m.
     added_m: Vec<f64>,
-    /// Nothing has moved in the last tick.
+    /// Set while nothing has moved in the last tick.
     is_still: bool,
-    /// Corrections of an element by less are left out of sweeps, m.
+    /// Smallest correction of an element that sweeps make, m.
     skipped_m: f64,
     /// Compliance of all elements, then of the stations of the moving line, against each; their forces are found in it.
     all: Rows,
@@ -194,7 +194,7 @@ impl LeftNeedles {
             .all(|needle| assemble::pair_coupling(&needle.line, line).is_some())
     }
 
-    /// Leaves the needle of `line` where its tip is. It comes back where there is no room, and where it does not know
+    /// Leaves the needle of `line` in the tissue. Returns the line where there is no room, or where it does not know
     /// the others.
     ///
     /// # Errors
@@ -240,7 +240,7 @@ impl LeftNeedles {
         Some(line)
     }
 
-    /// Gives up all of them, one at each call.
+    /// Takes out all of them, one at each call.
     pub fn give_up(&mut self) -> Option<Box<HandLine>> {
         let mut line = self.needles.pop()?.line;
         line.state.clear_loads();
@@ -337,8 +337,7 @@ impl LeftNeedles {
         let mut needle = self.needles.remove(at);
         let (first, tip) = (needle.first, needle.first + needle.stations);
         let state = &mut needle.line.state;
-        // A needle in the hand is displaced by what the probe moves as well; here that was taken from where it is at
-        // rest.
+        // The probe displaces a needle in the hand as well; here that displacement was subtracted at rest.
         for (n, k) in (first..tip).enumerate() {
             let moved_m = state.outside.at_m(n);
             state.shaft_n[n] = self.force_n[k];
@@ -352,7 +351,7 @@ impl LeftNeedles {
         state.tip.track_m = state.tip.track_m.max(reached_m);
         state.tip.material_m = reached_m.min(needle.held_m - state.tip_u_m);
         state.in_contact = needle.stations;
-        // Those behind it move up.
+        // The later needles move up.
         let gap = needle.stations + 1;
         let end = self.count;
         for values in [&mut self.force_n, &mut self.rest_m, &mut self.u_m, &mut self.moved_m] {

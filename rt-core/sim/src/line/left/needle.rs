@@ -1,4 +1,4 @@
-//! One needle that stays in, as others see it.
+//! One needle that stays in, for readers outside the solver.
 
 use super::LeftNeedle;
 use crate::line::ready::HandLine;

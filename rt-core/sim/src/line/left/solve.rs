@@ -11,9 +11,9 @@ use crate::line::rows::{add_scaled, dot};
 use crate::line::state::{LineOutput, LineState};
 use crate::simd::{LANES, Simd, vectorised};
 
-/// A needle that far before its entry at rest meets nothing, wherever the others have moved its surface.
+/// Distance before the entry at rest at which a needle meets nothing, wherever the others have moved its surface.
 const BEFORE_M: f64 = 20e-3;
-/// Corrections of an element that stays in by less than that share of the tolerance are left out: most of them are.
+/// Share of the tolerance below which corrections of a left needle's element are skipped: most of them are.
 pub(super) const SKIPPED: f64 = 0.02;
 
 /// Advances the needle on `line`, and those that stay in, by one tick.
@@ -45,7 +45,7 @@ impl OtherNeedles for LeftNeedles {
         meet(model, state, membrane);
         let kept = press(model, state, membrane);
         if let Some(kept) = kept.filter(|_| state.memory.is_on()) {
-            // What the others add to the past's offset is no past.
+            // The offset by the others does not belong to the past.
             let m = model.compliance.stations;
             let weights = state.tip_range.clone().zip(state.tip_weights);
             let added: f64 = weights.map(|(n, w)| w * self.added_m[m + n]).sum();
@@ -159,8 +159,7 @@ impl LeftNeedles {
         }
     }
 
-    /// Takes from stations and elements what the spring of the membrane that holds the tip passes on; of the elements
-    /// `by_tip` has taken what it passes on of the tip's force.
+    /// Subtracts the membrane spring's share from stations and elements; `by_tip` already includes the tip's.
     fn relieve(&mut self, model: &LineModel, state: &mut LineState, spring: &Spring) {
         let count = self.count;
         self.taken_n_per_m = spring.n_per_m;
@@ -291,7 +290,7 @@ impl Neighbours for LeftNeedles {
 }
 
 vectorised! {
-    /// Adds up rows, that far apart, each times its factor.
+    /// Adds up rows with that stride, each times its factor.
     fn add_rows(factors: &[f64], rows: &[f64], stride: usize, sum: &mut [f64]) {
         let stride = stride.max(1);
         let (wide, rest) = sum.as_chunks_mut::<{ 4 * LANES }>();
@@ -327,7 +326,7 @@ fn add_parts<const N: usize>(factors: &[f64], rows: &[f64], stride: usize, from:
     *sum = held;
 }
 
-/// Corrects one element; returns the change of its force, and how far it moves the element itself.
+/// Corrects one element; returns the change of its force, and the displacement of the element by that.
 #[inline(always)]
 fn correct(left: &mut LeftNeedles, k: usize, skipped_m: f64) -> (f64, f64) {
     let dent = left.by_tip[k] - left.whole[k];
@@ -352,7 +351,7 @@ fn correct(left: &mut LeftNeedles, k: usize, skipped_m: f64) -> (f64, f64) {
     (change, moved_m)
 }
 
-/// Takes from the elements what the spring of a membrane does that is dented by so much more.
+/// Subtracts from the elements the spring's share of a change of dent.
 #[inline(always)]
 fn take(taken_n: f64, left: &mut LeftNeedles) {
     let count = left.count;

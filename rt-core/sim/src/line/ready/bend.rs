@@ -1,4 +1,4 @@
-//! The beam of a line: what the hand, the bevel and the template do to a needle that bends.
+//! The beam of a line: a needle bent by hand, bevel and template.
 
 use super::HandLine;
 use crate::line::beam::{self, BeamInput, BeamModel, BeamOutput, BeamScratch};

@@ -1,4 +1,4 @@
-//! The body's half of a line: what it answers to the needle's loads, for the tissue loop.
+//! The body's half of a line, for the tissue loop: the answer to the needle's loads.
 
 use crate::line::Line;
 use crate::tissue::{ElementField, PackedField};

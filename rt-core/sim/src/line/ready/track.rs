@@ -1,4 +1,4 @@
-//! A track that a needle cut stays open: what a later needle on another line, but in the same place, meets of it.
+//! Tracks that needles have cut: they stay open for a later needle on another line in the same place.
 
 use super::HandLine;
 use crate::line::Line;

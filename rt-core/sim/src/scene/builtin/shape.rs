@@ -1,4 +1,4 @@
-//! The few solids that anatomy is drawn with; metres from the middle of the grid.
+//! Solids that anatomy is drawn with; metres from the middle of the grid.
 
 /// Lowest and highest corner of the box around a solid, m.
 pub(super) type Bounds = [[f64; 3]; 2];

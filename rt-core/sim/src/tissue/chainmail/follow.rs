@@ -16,7 +16,7 @@ const SHORTER_TRIES: i32 = 3;
 /// The first of them goes half of what was asked, and no farther than this, in elements.
 const FIRST_SHORTER: f32 = 1.0;
 
-/// Moves what is held toward where it is asked to be, as far as sweeps can follow; `grip` says how far that was.
+/// Moves the held elements toward their target, as far as sweeps can follow; `grip` then has the distance.
 pub(super) fn follow<K: Loops>(
     model: &ChainMail,
     state: &mut TissueState,

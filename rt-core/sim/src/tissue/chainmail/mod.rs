@@ -43,7 +43,7 @@ use crate::limits::Limits;
 use crate::scene::Scene;
 use crate::tissue::{Carried, CarriedField, Carry, Deformed, Held, LargeStrain, StepReport, TissueModel};
 
-/// Runs that have moved by less besides what carries them are not looked at one by one, in elements.
+/// Motion of a run without the carrying field below which it is not examined alone, in elements.
 const SLIGHT: f32 = 0.05;
 
 /// Restricted ChainMail as a tissue model.

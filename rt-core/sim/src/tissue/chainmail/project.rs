@@ -1,4 +1,4 @@
-//! Ways back to a state without violations when outward sweeps alone do not get there.
+//! Projections that remove the violations which outward sweeps leave.
 
 use super::kernels::{self, Pin, Scaled, feasible_factor, ordered, projected};
 use super::spans::Span;

@@ -1,4 +1,4 @@
-//! Relaxation: elements go toward where their neighbours would have them (Gibson's elastic step).
+//! Relaxation: elements move toward the mean of their neighbours (Gibson's elastic step).
 //!
 //! The springs of a link pull its ends together in displacement, stiffer along the link than across it, and the
 //! foundation pulls every element to its place at rest; so the three components are three Laplace equations. They are

@@ -44,7 +44,7 @@ impl<T: Real> LineOp<T> for Answer<'_, T> {
     fn line(&mut self, at: Range<usize>, forces: [&[T]; 3], _: [&mut [T]; 3]) {
         let inverse = &self.inverse_diagonal[at.clone()];
         for (kept, force) in self.forces.iter_mut().zip(forces) {
-            // What is left on free nodes, by way of the line that the forces go to in the end.
+            // The residual on free nodes, in the line that the forces go to afterwards.
             let kept = &mut kept[at.clone()];
             keep_free(inverse, force, kept);
             self.square += dot(kept, kept);

@@ -1,4 +1,4 @@
-//! One held patch of tissue: its nodes, how the body answers when it is moved, and how far the solver is with that.
+//! One held patch of tissue: its nodes, the body's responses to its motion, and the progress of the solver.
 
 use super::model::FemModel;
 use super::multigrid::Multigrid;

@@ -1,4 +1,4 @@
-//! The first guess of a patch's response: what the last patch's answer says.
+//! First guess of a patch's response, from the last patch's answer.
 
 use super::grip::{Grip, PatchCells, Response, SAME_WAY, dot};
 use super::level::Level;

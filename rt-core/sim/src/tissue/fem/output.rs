@@ -1,4 +1,4 @@
-//! From responses of the nodes to displacements of the element centres, which is what everything else reads.
+//! Displacements of the element centres from responses of the nodes: everything else reads these.
 
 use super::hexahedron::CHUNK;
 use super::model::{CellRun, FemModel};

@@ -1,4 +1,4 @@
-//! The number types that the solver runs in: f32 live, f64 to see what f32 costs.
+//! Number types of the solver: f32 live, f64 to measure the error of f32.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 

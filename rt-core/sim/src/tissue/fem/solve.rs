@@ -1,4 +1,4 @@
-//! One step: take up the held patch, refine what it moves, superpose, report.
+//! One step: grip the held patch, refine the responses, superpose, report.
 
 use super::cg::Goal;
 use super::grip::{Grip, NEW_DIRECTION, dot};

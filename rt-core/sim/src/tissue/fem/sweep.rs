@@ -1,4 +1,4 @@
-//! One pass over a level: the forces of all elements on the nodes, plane by plane, and what is done with them.
+//! One pass over a level: the forces of all elements on the nodes, plane by plane, and the operation on them.
 //!
 //! A plane of nodes is handed on as soon as both planes of elements next to it are done. So forces need memory for two
 //! planes only, and what follows (a smoothing step, a residual, a dot product) finds them in the cache.

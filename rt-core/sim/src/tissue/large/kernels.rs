@@ -40,7 +40,7 @@ fn add(to: &mut Nodes, factor: f32, by: &Nodes) {
 }
 
 vectorised! {
-/// Adds, and says what the sum then is along `with`.
+/// Adds; returns the product of the sum with `with`.
 fn add_dot(to: &mut Nodes, factor: f32, by: &Nodes, with: &Nodes) -> f32 {
     let mut sum = [0.0_f32; ROW];
     for ((to, by), with) in to.iter_mut().zip(by).zip(with) {
@@ -57,7 +57,7 @@ fn add_dot(to: &mut Nodes, factor: f32, by: &Nodes, with: &Nodes) -> f32 {
 }
 
 vectorised! {
-/// Adds, and says how long the sum then is, squared.
+/// Adds; returns the square of the sum's length.
 fn add_square(to: &mut Nodes, factor: f32, by: &Nodes) -> f32 {
     let mut sum = [0.0_f32; ROW];
     for (to, by) in to.iter_mut().zip(by) {

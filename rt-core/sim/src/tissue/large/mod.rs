@@ -1,10 +1,9 @@
 //! Large strain near the tip: neo-Hookean tissue between element centres, in a window that the linear answer surrounds.
 //!
-//! A linear answer folds cells next to a tip that has moved by some of them. In a window of [`SIDE`] centres the loads
-//! are those that the linear answer stands for, the rim is where it has it, and so is the place of the loads: what it
-//! does not know is how the tissue between them gives way. Where strain is small this is the linear answer again. The
-//! solver starts from the window of the tick before, a fixed number of evaluations a tick
-//! (`docs/adr/0020-large-strain-near-the-tip.md`).
+//! A linear answer folds cells next to a tip that has moved by some of them. A window of [`SIDE`] centres keeps the
+//! loads of the linear answer, its rim, and the place of the loads, and solves again for the tissue between them. Where
+//! strain is small this is the linear answer again. The solver starts from the window of the tick before, a fixed
+//! number of evaluations a tick (`docs/adr/0020-large-strain-near-the-tip.md`).
 
 mod energy;
 mod grid;
@@ -22,19 +21,18 @@ use solve::Solver;
 const SIDE: usize = 13;
 /// Evaluations of the energy's gradient in a tick.
 const EVALUATIONS: usize = 12;
-/// The same in a tick whose window is folded even so.
+/// Evaluations in a tick whose window stays folded.
 const MOST_EVALUATIONS: usize = 24;
-/// Lambda over mu at most: that of a Poisson ratio of 0.45. What is nearer to incompressible takes more evaluations
-/// than a tick has.
+/// Largest lambda over mu: that of a Poisson ratio of 0.45. Tissue nearer to incompressible takes more evaluations than
+/// a tick has.
 const FIRMEST: f32 = 9.0;
-/// Smallest volume of a corner of the linear answer at which the window begins to count, and at which it counts in
-/// full.
+/// Smallest corner volume of the linear answer at which the window begins to count, and at which it counts in full.
 const BEGINS: f64 = 0.6;
 const IN_FULL: f64 = 0.3;
-/// No window.
+/// Element number without a window.
 const NOWHERE: u32 = u32::MAX;
 
-/// A window and what it is made of.
+/// Window near the tip, with its materials and state.
 #[derive(Clone, Debug)]
 pub struct LargeStrain {
     solver: Solver,
@@ -44,11 +42,11 @@ pub struct LargeStrain {
     around: u32,
     /// Distance of centres from where the linear answer had them, in elements.
     off: Nodes,
-    /// The same less what displaced them besides the linear answer.
+    /// That distance without the displacements on top of the linear answer.
     moved: Nodes,
     /// Share of that which counts, from 0 to 1.
     part: f32,
-    /// No centre is farther off along an axis.
+    /// Largest distance of a centre along an axis.
     farthest: f32,
     /// Elements at the window's nodes, [`NOWHERE`] where there is none.
     elements: Vec<u32>,
@@ -92,9 +90,9 @@ impl LargeStrain {
         self.part > 0.0
     }
 
-    /// Looks for where the centres around `element` are to be, if the smallest volume of a corner there is too small.
-    /// `linear` displaces elements by the linear answer, `besides` by what a model does on top of it: the rim keeps
-    /// both. In elements. Whether any is moved. Does not allocate.
+    /// Solves for the centres around `element` if the smallest corner volume there is too small; returns whether it
+    /// moved any. `linear` displaces elements by the linear answer, `besides` by what a model adds: the rim keeps both.
+    /// In elements. Does not allocate.
     pub fn unfold(
         &mut self,
         lattice: &Lattice,
@@ -170,7 +168,7 @@ impl LargeStrain {
                 *off = solver.free[n] * (solver.now[c][n] - solver.linear[c][n]);
                 let moved = *off - solver.free[n] * solver.besides[c][n];
                 self.moved[c][n] = moved;
-                // What is no number stays.
+                // NaN stays.
                 self.farthest = if moved.abs() <= self.farthest {
                     self.farthest
                 } else {
@@ -184,7 +182,7 @@ impl LargeStrain {
         self.part = ((BEGINS - least_corner) / (BEGINS - IN_FULL)).clamp(0.0, 1.0) as f32;
     }
 
-    /// Moves the window along with the tip: what is known of a centre stays with it.
+    /// Moves the window along with the tip; each centre keeps its state.
     fn follow(&mut self, lattice: &Lattice, element: u32) {
         if self.around != NOWHERE && self.around != element {
             let (from, to) = (lattice.cell(self.around), lattice.cell(element));
@@ -207,7 +205,7 @@ impl LargeStrain {
         self.around = element;
     }
 
-    /// Takes both and the material around an element.
+    /// Gathers both displacements and the material around an element.
     fn open(&mut self, lattice: &Lattice, [of_linear, of_besides]: [&dyn Fn(u32) -> [f32; 3]; 2], element: u32) {
         let Solver {
             grid,

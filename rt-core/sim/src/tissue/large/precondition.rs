@@ -1,4 +1,4 @@
-//! The inverse of the seven-point Laplacian with its rim held: what a solver's steps are measured with.
+//! Inverse of the seven-point Laplacian with its rim held: the metric of the solver's steps.
 
 use super::SIDE;
 use super::energy::Nodes;

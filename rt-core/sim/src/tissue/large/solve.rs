@@ -129,7 +129,7 @@ impl Solver {
         self.share = dot(self.simd, &self.along, &self.answer).max(f32::MIN_POSITIVE);
     }
 
-    /// Moves the place of the load to where the linear answer has it.
+    /// Moves the place of the load to that of the linear answer.
     pub fn meet(&mut self) {
         let short = dot(self.simd, &self.along, &self.linear) - dot(self.simd, &self.along, &self.now);
         add(self.simd, &mut self.now, short / self.share, &self.answer);

@@ -1,4 +1,4 @@
-//! The forces of all elements for eight loads at once, plane by plane, and what is done with them.
+//! Forces of all elements for eight loads at once, plane by plane, and the operations on them.
 //!
 //! The element is that of `hexahedron`: sums and differences of its corners, in which its stiffness falls into small
 //! blocks. Neighbours along x share a face, so each face is read, and each force written, once; what two elements do to
