@@ -15,7 +15,7 @@ use stylet_sim::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight, 
 use stylet_sim::tissue::fem::{FemModel, FemSettings, Integration, Material};
 use stylet_sim::tissue::{ElementField, FemTissue};
 
-/// As patients' tissue is nearly incompressible; a centimetre of fat around it.
+/// Gland as patients have it, nearly incompressible; a centimetre of fat around it.
 const GLAND: Material = Material {
     youngs_modulus_pa: 17e3,
     poisson_ratio: 0.49,
@@ -45,7 +45,7 @@ fn main() {
     }
 }
 
-/// Through the middle of the gland, from the apex in.
+/// Makes a line through the middle of the gland, from the apex in.
 fn paper() -> (BatchModel<f32>, Stations) {
     let lattice = Scene::builtin("paper").expect("built in").lattice;
     let fem = FemModel::<f32>::new(&lattice, &FemSettings::homogeneous(GLAND, FOUNDATION_PA_PER_M)).expect("valid");
@@ -62,7 +62,7 @@ fn paper() -> (BatchModel<f32>, Stations) {
     (model, stations)
 }
 
-/// Through the middle of the gland of the anatomical scene, on the body that its tissue is solved in.
+/// Makes a line through the middle of the gland of the anatomical scene, on the body that its tissue is solved in.
 fn pelvis() -> (BatchModel<f32>, Stations) {
     let scene = Scene::builtin("pelvis").expect("built in").with_tissue(TissueKind::Fem);
     let tissue = FemTissue::<f32>::new(&scene).expect("valid");
@@ -92,7 +92,7 @@ fn processor_time_s() -> f64 {
     first.expect("nanoseconds") * 1e-9
 }
 
-/// In slices, as the program does: those are compiled where the kernels are.
+/// Solves in slices, as the program does: those are compiled where the kernels are.
 fn solve(state: &mut BatchState, model: &BatchModel<f32>, tolerance: f64) -> Progress {
     loop {
         let progress = state.advance(model);
@@ -102,7 +102,7 @@ fn solve(state: &mut BatchState, model: &BatchModel<f32>, tolerance: f64) -> Pro
     }
 }
 
-/// Root of the mean square of `a - b`, over that of `b`.
+/// Returns the root of the mean square of `a - b`, over that of `b`.
 fn rms(a: &ElementField, b: &ElementField) -> f64 {
     let squares = |of: &dyn Fn(f32, f32) -> f32| -> f64 {
         let pairs = a.0.iter().flatten().zip(b.0.iter().flatten());
@@ -111,7 +111,7 @@ fn rms(a: &ElementField, b: &ElementField) -> f64 {
     (squares(&|a, b| a - b) / squares(&|_, b| b)).sqrt()
 }
 
-/// Time of columns with the error of the compliance and of the fields against those that are solved.
+/// Measures the time of columns, with the error of the compliance and of the fields against those that are solved.
 fn columns(name: &str, model: &BatchModel<f32>, stations: &Stations) {
     println!(
         "{name}: {} elements, {} stations; ms of processor time, least of 5 rounds",
@@ -235,7 +235,7 @@ struct Ticks {
     outputs: Vec<LineOutput>,
 }
 
-/// Ticks by sets alternating with the same by sweeps; the answers of both must agree.
+/// Measures ticks by sets alternating with the same by sweeps; the answers of both must agree.
 fn ticks(name: &str, compliance: &Compliance) {
     let layer = LineLayer {
         puncture_force_n: 5.6,
@@ -294,7 +294,7 @@ fn ticks(name: &str, compliance: &Compliance) {
     assert!(force_n < 1e-3 && place_m < 2e-6, "a wrong answer has no time");
 }
 
-/// p50, p99, p99.9 and the largest.
+/// Returns p50, p99, p99.9 and the largest.
 fn quantiles(values: &[f64]) -> [f64; 4] {
     [0.5, 0.99, 0.999, 1.0].map(|q| quantile(values, q))
 }

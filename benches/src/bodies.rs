@@ -58,7 +58,7 @@ pub fn cube(elements: usize) -> Scene {
     Scene::from_labels("cube", &labels).expect("a block")
 }
 
-/// All cells, x fastest.
+/// Iterates over all cells, x fastest.
 fn cells(dims: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
     let [nx, ny, nz] = dims;
     (0..nx * ny * nz).map(move |n| [n % nx, n / nx % ny, n / (nx * ny)])

@@ -18,7 +18,7 @@ pub struct Insertion {
     pub direction: [f64; 3],
     pub travel_m: f64,
     pub speed_m_per_s: f64,
-    /// After the push the tip passes from element to element, each carried less far.
+    /// Set where the tip passes from element to element after the push, each carried less far.
     pub passes_on: bool,
     /// Parameters are fitted to these; the others are held back.
     pub fitted: bool,
@@ -122,7 +122,7 @@ impl Insertion {
         script
     }
 
-    /// Five places around the path, where seeds would lie.
+    /// Returns five places around the path, where seeds would lie.
     pub fn seeds(&self, scene: &Scene) -> Vec<u32> {
         let aside = [[3.0, 0.0], [0.0, 5.0], [-8.0, 0.0], [0.0, -3.0], [5.0, 5.0]];
         let beside = aside.iter().enumerate().filter_map(|(n, [x, y])| {
@@ -147,7 +147,7 @@ impl Insertion {
     }
 }
 
-/// The element at a place given in mm from the middle of the body.
+/// Returns the element at a place given in mm from the middle of the body.
 fn element_at(lattice: &Lattice, from_middle_mm: [f64; 3]) -> Option<u32> {
     let (low, high) = lattice.bounds_m();
     let cell = [0, 1, 2].map(|a| (0.5 * (low[a] + high[a]) + 1e-3 * from_middle_mm[a]) / lattice.spacing_m);

@@ -129,8 +129,8 @@ impl Theatre {
         (line, begun.elapsed().as_secs_f64())
     }
 
-    /// The converged line in the finite elements that the scene has with `--tissue fem`, beside `like` that ships
-    /// there; to the first residual in f64, or to the second in f32 where the body is large.
+    /// Solves the converged line in the finite elements that the scene has with `--tissue fem`, against `like` that
+    /// ships there; to the first residual in f64, or to the second in f32 where the body is large.
     ///
     /// # Panics
     ///
@@ -159,7 +159,7 @@ impl Theatre {
         Unfolded::new(&self.source.build().expect("built in").with_tissue(TissueKind::Fem))
     }
 
-    /// ChainMail's own converged twin of the line that ships in it, to a residual of its columns.
+    /// Solves ChainMail's own converged twin of the line that ships in it, to a residual of its columns.
     pub fn own_twin(&self, like: &HandLine, tolerance: f64) -> OwnTwin {
         OwnTwin::of(
             &self.source,
@@ -267,7 +267,7 @@ impl<'a, 'b> Watch<'a, 'b> {
         }
     }
 
-    /// Both lines take the tip that the force loop has just had.
+    /// Moves both lines to the tip that the force loop has just had.
     fn step(&mut self, session: &Session, output: &ChainOutput) {
         let Some(tip) = session.chain().tip_in_world else {
             return;

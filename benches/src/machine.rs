@@ -30,7 +30,7 @@ pub fn describe() -> Vec<(String, String)> {
     pairs.map(|(name, value)| (name.to_owned(), value)).into()
 }
 
-/// `benches/runs/<date>-<host>`.
+/// Returns `benches/runs/<date>-<host>`.
 pub fn run_folder(machine: &[(String, String)]) -> PathBuf {
     let of = |name: &str| machine.iter().find(|(n, _)| n == name).map_or("", |(_, value)| value);
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -38,7 +38,7 @@ pub fn run_folder(machine: &[(String, String)]) -> PathBuf {
         .join(format!("{}-{}", of("date"), of("host")))
 }
 
-/// As typed, without the folder that the program happened to lie in.
+/// Returns the command as typed, without the folder of the program.
 fn command() -> String {
     let mut words = std::env::args();
     let program = words.next().unwrap_or_default();

@@ -119,7 +119,7 @@ fn settle(tissue: &mut ChainMailTissue, line: &Twin, held: Option<Held>, period_
     steps
 }
 
-/// As the tissue loop holds it: the material at the tip where the line has it.
+/// Returns what the tissue loop holds: the material at the tip, at its place on the line.
 fn held(tissue: &ChainMailTissue, hand: &HandLine) -> Option<Held> {
     let (line, along_m) = (hand.line(), hand.state().tip().material_m);
     if !hand.is_in_tissue() || !along_m.is_finite() {

@@ -28,12 +28,12 @@ pub struct Tick {
     pub output: ChainOutput,
     pub true_tip_m: f64,
     pub true_speed_m_per_s: f64,
-    /// Done by the device on the hand since the start.
+    /// Work of the device on the hand since the start.
     pub work_j: f64,
 }
 
 impl Rig {
-    /// Engaged, 5 mm before the first layer.
+    /// Makes a rig, engaged, 5 mm before the first layer.
     pub fn new(hand: Hand, faults: LinkFaults, layers: &[(f64, LayerKind)], period_s: f64) -> Self {
         let config = SimulatedPhantomConfig {
             hand,

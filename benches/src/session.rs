@@ -67,12 +67,13 @@ pub struct Session {
 }
 
 impl Session {
-    /// Engaged, the tip at `start`, the needle along +z; the tissue answers every `tissue_every`th tick.
+    /// Makes a session, engaged, the tip at `start`, the needle along +z; the tissue answers every `tissue_every`th
+    /// tick.
     pub fn new(world: World, start: Vector3<f64>, hand: Hand, tissue_every: u64) -> Self {
         Self::with_force(world, start, hand, tissue_every, ForceParameters::default())
     }
 
-    /// As [`new`](Self::new), with other parameters of the force.
+    /// Makes a session as [`new`](Self::new), with other parameters of the force.
     pub fn with_force(
         world: World,
         start: Vector3<f64>,
@@ -103,7 +104,7 @@ impl Session {
         }
     }
 
-    /// As [`new`](Self::new), on a needle line and over a link with faults.
+    /// Makes a session as [`new`](Self::new), on a needle line and over a link with faults.
     pub fn on_line(
         world: Box<World>,
         place: (Vector3<f64>, ReadyLine),
@@ -128,12 +129,12 @@ impl Session {
         session
     }
 
-    /// The hand turns the needle that way with its next goal.
+    /// Turns the needle that way with the hand's next goal.
     pub fn aim(&mut self, direction: Vector3<f64>) {
         self.direction = direction.normalize();
     }
 
-    /// Another hand takes over.
+    /// Replaces the hand.
     pub fn set_hand(&mut self, hand: Hand) {
         self.device.phantom().set_hand(hand);
     }
@@ -201,17 +202,17 @@ impl Session {
         self.loops.tissue.response().worst_residual
     }
 
-    /// No force of the device is larger, N.
+    /// Returns the largest force of the device, N.
     pub fn device_limit_n(&self) -> f64 {
         self.device.info().peak_force_n
     }
 
-    /// The next ticks of the tissue loop do not take place.
+    /// Skips the next ticks of the tissue loop.
     pub fn miss_tissue_ticks(&mut self, ticks: u32) {
         self.loops.miss_tissue_ticks(ticks);
     }
 
-    /// Ticks for so long.
+    /// Runs for so long.
     pub fn run(&mut self, seconds: f64) -> Vec<ChainOutput> {
         (0..(seconds * 1e3).round() as u64).map(|_| self.step()).collect()
     }
@@ -237,7 +238,7 @@ impl Session {
     }
 }
 
-/// 5 mm before the tissue, on the axis of the gland.
+/// Returns the place 5 mm before the tissue, on the axis of the gland.
 pub fn axis_start(world: &World) -> Vector3<f64> {
     let lattice = &world.scene.lattice;
     let elements = 0..lattice.element_count() as u32;

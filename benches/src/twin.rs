@@ -34,7 +34,7 @@ pub struct TwinSettings {
     pub most: usize,
     /// Residual over load of every column.
     pub tolerance: f64,
-    /// In a body that something holds: the structure that a membrane moves as a whole. `None`: the body on its springs.
+    /// Structure that a membrane moves as a whole, in a body that something holds. `None`: the body on its springs.
     pub whole_of: Option<u8>,
 }
 
@@ -124,7 +124,7 @@ fn solved<T: Compiled>(batch: &BatchModel<T>, state: &mut BatchState<T>, toleran
     }
 }
 
-/// Layers' forces of the default parameters, as a run sets them.
+/// Returns the layers' forces of the default parameters, as a run sets them.
 pub fn default_forces() -> LayerForces {
     let parameters = ChainParameters {
         needle: NeedleParameters::default(),
@@ -180,7 +180,7 @@ pub struct Mean {
 }
 
 impl Mean {
-    /// For cells of `fine` in the elements of `body`.
+    /// Averages cells of `fine` in the elements of `body`.
     pub fn over(fine: &Lattice, body: &Lattice) -> Self {
         let element = |cell: u32| body.element_at_rest(fine.rest_m(cell)).unwrap_or(u32::MAX);
         Self {

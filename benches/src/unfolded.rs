@@ -8,7 +8,7 @@ use stylet_sim::tissue::{FemTissue, MaterialPoint, TissueModel, least_corner};
 
 /// Largest number of calls: each continues where the one before ended.
 const MOST_CALLS: usize = 400;
-/// It rests when no element moves farther in a call, in elements.
+/// Motion in a call below which an element rests, in elements.
 const RESTS: f64 = 1e-4;
 
 /// The body of a scene, as the tissue loop has it.

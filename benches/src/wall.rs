@@ -18,7 +18,7 @@ pub struct Wall {
 const SINGING_M_PER_S: f64 = 5e-3;
 
 impl Wall {
-    /// `hand` presses 3 mm into it, and waits.
+    /// Presses 3 mm into it with `hand`, and waits; returns whether the wall sings.
     pub fn sings(&self, hand: Hand) -> bool {
         let faults = LinkFaults {
             late_ticks: self.late_ticks,

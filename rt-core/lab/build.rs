@@ -18,7 +18,7 @@ fn main() {
     }
 }
 
-/// From the environment, else from git, else `unknown`: a source archive has neither.
+/// Returns the commit from the environment, else from git, else `unknown`: a source archive has neither.
 fn commit() -> String {
     if let Ok(named) = std::env::var("STYLET_COMMIT") {
         return named;
@@ -39,7 +39,7 @@ fn commit() -> String {
     }
 }
 
-/// Version of the compiler, and the platform that it builds for.
+/// Returns the version of the compiler, and the platform that it builds for.
 fn toolchain() -> String {
     let compiler = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned());
     let output = Command::new(compiler).arg("--version").output().ok();
@@ -59,7 +59,7 @@ type Package = (String, String);
 /// The packages that each one names, as `name` or `name version`.
 type Needs = BTreeMap<Package, Vec<String>>;
 
-/// All packages as locked.
+/// Returns all locked packages.
 fn locked(lock: &Path) -> Option<Needs> {
     println!("cargo:rerun-if-changed={}", lock.display());
     let lock: toml::Table = std::fs::read_to_string(lock).ok()?.parse().ok()?;
@@ -101,7 +101,7 @@ fn core(needs: &Needs) -> BTreeSet<Package> {
     programs.into_iter().flatten().collect()
 }
 
-/// `name version` of each package that the core needs, one a line.
+/// Lists `name version` of each package that the core needs, one a line.
 fn dependencies(needs: &Needs) -> String {
     let all = core(needs);
     all.iter()
@@ -109,7 +109,7 @@ fn dependencies(needs: &Needs) -> String {
         .collect()
 }
 
-/// `name version programs licence` of each package of others in either program, one a line.
+/// Lists `name version programs licence` of each foreign package in either program, one a line.
 fn packages(needs: &Needs) -> String {
     let (core, host) = (core(needs), needed(needs, "host-ui"));
     let ours = |name: &str| name.starts_with("stylet-") || name == "rt-core" || name == "host-ui";
@@ -134,7 +134,7 @@ fn sources() -> Vec<PathBuf> {
     registries.into_iter().flatten().flatten().map(|e| e.path()).collect()
 }
 
-/// `package.license` of the manifest in the sources.
+/// Reads `package.license` of the manifest in the sources.
 fn licence(sources: &[PathBuf], (name, version): &Package) -> Option<String> {
     let manifest = |source: &PathBuf| std::fs::read_to_string(source.join(format!("{name}-{version}/Cargo.toml"))).ok();
     let text = sources.iter().find_map(manifest)?;

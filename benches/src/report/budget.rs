@@ -124,7 +124,7 @@ fn through(twin: &mut Twin, mean: Option<&Mean>) -> Path {
     })
 }
 
-/// In, and half the way out.
+/// Moves in, and half the way out.
 fn along(hand: &mut HandLine, field: impl Fn(&HandLine) -> Field) -> Path {
     hand.reset();
     hand.set_forces(&default_forces());
@@ -172,8 +172,8 @@ fn cause(name: &'static str, between: String, of: &Path, reference: &Path) -> Ca
     }
 }
 
-/// RMS over the elements that the reference moves, of its largest displacement; nothing to compare below half a
-/// millimetre.
+/// Returns the RMS over the elements that the reference moves, of its largest displacement; nothing to compare below
+/// half a millimetre.
 fn distance_percent(field: &Field, reference: &Field) -> Option<f64> {
     let largest_m = reference.iter().map(|&u| norm(u)).fold(0.0, f64::max);
     if largest_m < 0.5e-3 {
@@ -221,7 +221,7 @@ fn in_fat(lattice: &Arc<Lattice>, young_pa: f64) -> Scene {
     Scene::from_labels("gland in fat", &labels).expect("a gland in fat")
 }
 
-/// Label 1 for tissue, 2 for what is nearer than `reach_m` to its surface.
+/// Labels tissue 1, and 2 where it is nearer than `reach_m` to its surface.
 fn near(lattice: &Lattice, reach_m: f64) -> Vec<u8> {
     let [nx, ny, nz] = lattice.dims;
     let reach = reach_m / lattice.spacing_m;

@@ -49,7 +49,7 @@ const TOLERANCES: [f64; 5] = [1e-1, 3e-2, 1e-2, 1e-3, 1e-4];
 /// Tolerance of what counts as converged.
 const CONVERGED: f64 = 1e-9;
 
-/// FEM in f64, far beyond the accuracy of anything it is compared with.
+/// Makes FEM in f64, far beyond the accuracy of anything it is compared with.
 pub fn converged(scene: &Scene) -> FemTissue<f64> {
     let mut fem = FemTissue::<f64>::new(scene).expect("valid materials");
     (fem.settings.relative_tolerance, fem.settings.max_cycles) = (CONVERGED, 10_000);

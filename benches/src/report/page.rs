@@ -43,7 +43,7 @@ pub fn write(found: &Findings) -> Result<String, std::fmt::Error> {
     Ok(text)
 }
 
-/// At the finest spacing.
+/// Returns the points at the finest spacing.
 fn finest(points: &[Point]) -> Vec<&Point> {
     let least = points.iter().map(|p| p.spacing_mm).fold(f64::INFINITY, f64::min);
     points.iter().filter(|p| p.spacing_mm == least).collect()

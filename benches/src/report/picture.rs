@@ -16,7 +16,7 @@ const TEXT: RGBColor = RGBColor(40, 44, 52);
 const GRID: RGBColor = RGBColor(225, 228, 232);
 const FONT: &str = "sans-serif";
 
-/// Okabe and Ito's colours, which the colour-blind can distinguish; each with another shape.
+/// Returns Okabe and Ito's colours, which the colour-blind can distinguish; each with another shape.
 fn colour(family: Family) -> RGBColor {
     match family {
         Family::Sweeps => RGBColor(0, 114, 178),

@@ -49,7 +49,7 @@ pub struct Where {
     pub without_model: [Error; 2],
 }
 
-/// `rounds` are equal runs; each tick's time is the least of them, as the tissue does the same in each.
+/// Makes a row from equal runs `rounds`; each tick's time is the least of them, as the tissue does the same in each.
 pub fn row(place: &Where, insertion: &Insertion, family: Family, setting: &str, rounds: &[Run]) -> Row {
     let first = &rounds[0];
     let least = |tick: usize| rounds.iter().map(|r| r.micros[tick]).fold(f64::INFINITY, f64::min);

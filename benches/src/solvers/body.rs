@@ -29,7 +29,7 @@ impl Body {
         }
     }
 
-    /// Every element to its place at rest.
+    /// Returns every element to its place at rest.
     pub fn return_to_rest(&mut self) {
         self.u.iter_mut().for_each(|c| c.fill(0.0));
     }

@@ -8,7 +8,7 @@ const NONE: u32 = u32::MAX;
 
 /// Neighbour table and queue, allocated once.
 pub struct PlainQueue {
-    /// At -x, +x, -y, +y, -z, +z.
+    /// Neighbours at -x, +x, -y, +y, -z, +z.
     neighbours: Vec<[u32; 6]>,
     /// Elements in the order in which they moved; each enters at most once.
     queue: Vec<u32>,
@@ -16,7 +16,7 @@ pub struct PlainQueue {
 }
 
 impl PlainQueue {
-    /// For bodies of this lattice.
+    /// Makes a queue for bodies of this lattice.
     pub fn new(lattice: &Lattice) -> Self {
         let count = lattice.element_count();
         let around = |element: u32| lattice.neighbours(element).map(|n| n.unwrap_or(NONE));

@@ -85,7 +85,7 @@ pub struct LatencyArgs {
 /// Settings of the loops that this PC cannot have.
 #[derive(Debug, thiserror::Error)]
 pub enum ArgsError {
-    /// Those of every run.
+    /// Problems with the options of every run.
     #[error(transparent)]
     Options(#[from] OptionsError),
     /// The loop would take more of its core than the kernel gives to real-time threads.
@@ -93,7 +93,7 @@ pub enum ArgsError {
         "--spin-us {given_us}: at {rate_hz} Hz at most {longest_us}, or the kernel would stop the loop for its share of real-time work"
     )]
     Spin {
-        /// As given.
+        /// Value as given.
         given_us: u64,
         /// Rate of the loop.
         rate_hz: u32,
@@ -134,7 +134,7 @@ impl LatencyArgs {
 const LATE_SHARE: u64 = 5;
 
 impl LatencyArgs {
-    /// From when on the trace names the cause of a late tick; `None` without a trace.
+    /// Returns the lateness from which the trace names the cause of a tick; `None` without a trace.
     pub fn trace_over_ns(&self) -> Option<u64> {
         let default_ns = measure::period_ns(self.rate) / LATE_SHARE;
         self.trace

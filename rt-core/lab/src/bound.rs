@@ -13,7 +13,7 @@ pub struct MissBound {
     /// Grid points, served or missed.
     pub of: u64,
     pub confidence: f64,
-    /// With this confidence a grid point is missed with at most this probability.
+    /// Probability that a grid point is missed, at most, with this confidence.
     pub at_most: Option<f64>,
     /// The same as misses in an hour.
     pub at_most_per_hour: Option<f64>,
@@ -89,7 +89,7 @@ pub fn ranks_of_quantile(q: f64, n: u64) -> Option<(u64, u64)> {
     (below >= 1 && above <= n).then_some((below, above))
 }
 
-/// Probability of at most `k` successes in `n` trials of probability `p`.
+/// Returns the probability of at most `k` successes in `n` trials of probability `p`.
 pub fn binomial_cdf(k: u64, n: u64, p: f64) -> f64 {
     if k >= n {
         return 1.0;
@@ -133,7 +133,7 @@ fn fraction(a: f64, b: f64, x: f64) -> f64 {
     h
 }
 
-/// Stirling's series, after a shift to where it is exact in double precision.
+/// Computes Stirling's series, after a shift to where it is exact in double precision.
 fn ln_gamma(x: f64) -> f64 {
     let (mut x, mut shift) = (x, 0.0);
     while x < 15.0 {

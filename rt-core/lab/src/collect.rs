@@ -54,7 +54,7 @@ pub struct LoopTiming {
     pub stage_names: &'static [&'static str],
     pub wake: Histogram<u64>,
     pub stages: [Histogram<u64>; MAX_STAGES],
-    /// From wake-up to the end of the tick, without handing over what was measured.
+    /// Time from wake-up to the end of the tick, without the measurement itself.
     pub work: Histogram<u64>,
     /// Haptic: device read to force written. Tissue: tip read by the haptic loop to response published.
     pub path: Histogram<u64>,
@@ -76,7 +76,7 @@ pub struct LoopTiming {
     pub overruns: u64,
     /// Ticks that did not fit into the ring.
     pub lost: u64,
-    /// When the loop toggled its pin, warm-up included.
+    /// Times at which the loop toggled its pin, warm-up included.
     pub toggles: Vec<ToggleTime>,
     /// Channel for ticks that are late by so many nanoseconds, wake-up and work together.
     late: Option<(u64, Sender<LateTick>)>,

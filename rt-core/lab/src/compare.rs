@@ -95,7 +95,7 @@ pub enum CompareError {
 /// Why a program that measures the same has no histogram.
 #[derive(Debug, thiserror::Error)]
 pub enum ToolError {
-    /// It is not there.
+    /// Program that is missing.
     #[error("{program} is not installed: sudo apt-get install {package}")]
     Missing {
         /// The program.
@@ -103,7 +103,7 @@ pub enum ToolError {
         /// Its Debian package.
         package: &'static str,
     },
-    /// It does not start.
+    /// Program that does not start.
     #[error("{program} does not start: {why}")]
     Start {
         /// The program.
@@ -111,7 +111,7 @@ pub enum ToolError {
         /// Error of the system.
         why: io::Error,
     },
-    /// It cannot be waited for, or its file cannot be made.
+    /// Program that cannot be waited for, or whose file cannot be made.
     #[error("{program}: {why}")]
     Wait {
         /// The program.
@@ -119,7 +119,7 @@ pub enum ToolError {
         /// Error of the system.
         why: io::Error,
     },
-    /// It failed.
+    /// Program that failed.
     #[error("{program} failed: {said}")]
     Failed {
         /// The program.
@@ -127,7 +127,7 @@ pub enum ToolError {
         /// First line of what it printed.
         said: String,
     },
-    /// It ended well, and its file holds none.
+    /// Program that ended well without a histogram in its file.
     #[error("{0} wrote no histogram")]
     NoHistogram(&'static str),
     /// A signal asked this program to end.
@@ -209,7 +209,7 @@ pub fn compare(
     Ok(comparison)
 }
 
-/// Our loops under `load`, without a trace.
+/// Runs our loops under `load`, without a trace.
 fn without(setup: &Setup, load: Load, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
     let setup = Setup {
         load,
@@ -266,7 +266,7 @@ fn missing(program: &'static str, package: &'static str) -> ToolError {
     ToolError::Missing { program, package }
 }
 
-/// One turn of cyclictest.
+/// Runs one turn of cyclictest.
 pub fn cyclictest_turn(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
     version().ok_or(missing(CYCLICTEST, "rt-tests"))?;
     cyclictest(setup, interrupted)

@@ -217,7 +217,7 @@ impl Script {
     }
 }
 
-/// As the loop does: the first element is held until the membrane gives, then the one at the tip.
+/// Plays the insertion as the loop does: the first element is held until the membrane gives, then the one at the tip.
 fn play(
     Timed { model, kind, .. }: &mut Timed,
     script: &Script,

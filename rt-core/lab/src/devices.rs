@@ -16,7 +16,7 @@ const BOTH_HANDS: &str = "--device-2 takes the same names, for the other hand, w
 
 /// A driver that does not answer for this long is left alone.
 const TRIAL_LIMIT: Duration = Duration::from_secs(15);
-/// As many devices of one maker are asked.
+/// Largest number of devices of one maker that are asked.
 const MAX_DEVICES: u8 = 4;
 
 /// What the list is asked for.
@@ -132,7 +132,7 @@ fn force_dimension(root: &Path, library: Option<&Path>, try_it: bool) -> Vec<Fin
     findings
 }
 
-/// The service has the device, and nobody else sees it: to look at files and cables only says nothing.
+/// Examines the service, which has the device to itself: files and cables alone tell nothing.
 fn inverse3(libraries: &Libraries, try_it: bool) -> Vec<Finding> {
     match libraries.inverse_service() {
         Ok(service) if try_it => within_limit(move || haply::diagnose(&service)),

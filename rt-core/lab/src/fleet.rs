@@ -42,7 +42,7 @@ pub enum FleetError {
         /// Error of the system.
         source: std::io::Error,
     },
-    /// There is nothing to show.
+    /// Folder without a report.
     #[error(
         "no latency report found: expected report.json in a folder below the named ones, as `rt-core latency --out DIR` writes it{0}"
     )]

@@ -28,7 +28,7 @@ const ACCELERATION_M_PER_S2: f64 = 1.0;
 const SEEDS: u64 = 32;
 /// Pause between two looks of the host; part of what it measures.
 pub const LOOK: Duration = stylet_wall::packet::LOOK_EVERY;
-/// Between two promises that the script still lives.
+/// Pause between two promises that the script still lives.
 const RENEW_NS: u64 = 50_000_000;
 /// Passes in which the core must be seen, 15 s on an idle PC. Passes, not time: where threads of real time leave
 /// nothing of the only core, run and host are both still starting.
@@ -60,8 +60,9 @@ pub struct Script {
 }
 
 impl Script {
-    /// Along the axis of the target, from 15 mm before the body to four fifths of the target. The other hand brings the
-    /// probe into the rectum and presses it against the target; in a scene without one it moves behind the needle.
+    /// Makes a path along the axis of the target, from 15 mm before the body to four fifths of the target. The other
+    /// hand brings the probe into the rectum and presses it against the target; in a scene without one it moves behind
+    /// the needle.
     pub fn of(scene: &Scene) -> Self {
         let (lowest, _) = scene.lattice.bounds_m();
         let (lower, upper) = scene.target_bounds_m();
@@ -136,7 +137,7 @@ pub enum HostError {
     /// The process that looks was not started.
     #[error("stylet-bridge, which looks as a host does, cannot be started: {0}")]
     NotStarted(std::io::Error),
-    /// It ended by itself.
+    /// Host that ended by itself.
     #[error("stylet-bridge, which looks as a host does, ended")]
     Ended,
     /// No tick within so many seconds.
@@ -253,7 +254,7 @@ impl Host {
             .push(format!("{whose}, tick {}: {fault}", event.tick));
     }
 
-    /// Half a cycle in, half a cycle out; engaging again each time re-arms after a fault.
+    /// Follows the script, half a cycle in, half a cycle out; engaging again each time re-arms after a fault.
     fn follow_script(&mut self, time_ns: u64) {
         let due = time_ns / (CYCLE_NS / 2) + 1;
         if self.step >= due {
@@ -272,7 +273,7 @@ impl Host {
         }
     }
 
-    /// A hand that stops would be another measurement: it promises as much as it may.
+    /// Renews the promise as far ahead as allowed: a hand that stops would be another measurement.
     fn keep_moving(&mut self, now_ns: u64) {
         if now_ns - self.renewed_ns >= RENEW_NS {
             self.renewed_ns = now_ns;

@@ -71,7 +71,7 @@ fn header(r: &Report) -> Markup {
     }
 }
 
-/// Who measured, where, with which device; as far as it was named.
+/// Returns who measured, where, with which device, as far as it was named.
 fn whose(r: &Report) -> Option<String> {
     let w = &r.whose;
     let serial = w.device_serial.as_ref().map(|s| format!("device {s}"));
@@ -139,7 +139,7 @@ fn limits(r: &Report) -> Markup {
     }
 }
 
-/// The reasons why the environment does not qualify stand at the top of the page once.
+/// Shortens evidence: the reasons why the environment does not qualify stand at the top of the page once.
 fn short(evidence: &str) -> String {
     match (
         evidence.strip_prefix("environment not qualified"),

@@ -59,7 +59,7 @@ pub enum LatencyError {
     Sign(#[from] SignError),
 }
 
-/// The exit code is the verdict: 0 pass, 1 fail, 2 not measurable.
+/// Runs the measurement; the exit code is the verdict: 0 pass, 1 fail, 2 not measurable.
 pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyError> {
     if let Some(file) = &args.external {
         return Ok(external::run(&args.out, file, args.motion.as_deref())?);
@@ -143,7 +143,7 @@ fn setup_of<'a>(args: &'a LatencyArgs, options: &'a Options) -> Setup<'a> {
     }
 }
 
-/// The verdict on the terminal: one line for each limit, then all of them.
+/// Prints the verdict on the terminal: one line for each limit, then all of them.
 fn print_verdict(report: &Report) {
     for j in &report.verdict.limits {
         let value = j.value.map_or("n/a".to_owned(), |v| format!("{v:.1}"));

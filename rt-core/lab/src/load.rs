@@ -121,7 +121,7 @@ pub enum LoadError {
         /// Error of the system.
         why: io::Error,
     },
-    /// Without it nothing was measured under load.
+    /// Load that ended: nothing was measured under it.
     #[error("the load ended by itself ({0})")]
     Ended(std::process::ExitStatus),
     /// The file that the load writes.
@@ -142,7 +142,7 @@ pub(crate) struct Running {
 }
 
 impl Running {
-    /// `folder`: where the io load may write.
+    /// Starts the load; `folder` is where the io load may write.
     pub(crate) fn start(load: Load, instance: &Instance, folder: &Path) -> Result<Self, LoadError> {
         let program = std::env::current_exe().map_err(LoadError::Program)?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -258,7 +258,7 @@ fn compute(stopped: impl Fn() -> bool) {
     }
 }
 
-/// More than any cache holds.
+/// Size beyond that of any cache.
 const STREAMED_BYTES: usize = 64 << 20;
 
 fn stream(stopped: impl Fn() -> bool) {

@@ -72,12 +72,12 @@ impl Machine {
         Self { root: root.into() }
     }
 
-    /// Not one that is made of files.
+    /// Returns whether it is this machine, and not one made of files.
     pub fn is_this(&self) -> bool {
         self.root == Path::new("/")
     }
 
-    /// `path` without its leading slash.
+    /// Joins `path`, without its leading slash, to the root.
     pub fn path(&self, path: &str) -> PathBuf {
         self.root.join(path)
     }
@@ -96,7 +96,7 @@ impl Machine {
         names
     }
 
-    /// `value` of the word `key=value` on the kernel's command line.
+    /// Returns `value` of the word `key=value` on the kernel's command line.
     pub fn boot_option(&self, key: &str) -> Option<String> {
         let line = self.text("proc/cmdline")?;
         let value = line.split_whitespace().filter_map(|word| word.split_once('='));
@@ -168,7 +168,7 @@ impl Machine {
         cores(&list)
     }
 
-    /// Other threads of the same physical core.
+    /// Returns the other threads of the same physical core.
     pub fn siblings(&self, core: usize) -> BTreeSet<usize> {
         let path = format!("sys/devices/system/cpu/cpu{core}/topology/thread_siblings_list");
         let mut all = cores(&self.text(&path).unwrap_or_default());
@@ -180,7 +180,7 @@ impl Machine {
         self.text(&format!("sys/devices/system/cpu/cpu{core}/cpufreq/scaling_governor"))
     }
 
-    /// From cpufreq, else from `/proc/cpuinfo`, which does not change on many machines.
+    /// Reads the frequency from cpufreq, else from `/proc/cpuinfo`, which does not change on many machines.
     pub fn frequency_mhz(&self, core: usize) -> Option<f64> {
         let scaling = self.text(&format!("sys/devices/system/cpu/cpu{core}/cpufreq/scaling_cur_freq"));
         if let Some(khz) = scaling.and_then(|t| t.parse::<f64>().ok()) {
@@ -246,7 +246,8 @@ impl Machine {
         Some(lines.filter_map(count).sum())
     }
 
-    /// Steal time of `core` as the kernel reports it, in seconds: time in which the hypervisor ran something else.
+    /// Returns the steal time of `core` as the kernel reports it, in seconds: time in which the hypervisor ran
+    /// something else.
     pub fn steal_s(&self, core: usize) -> Option<f64> {
         let text = self.text("proc/stat")?;
         let start = format!("cpu{core} ");
@@ -304,7 +305,7 @@ impl Machine {
         self.text("sys/devices/system/clocksource/clocksource0/current_clocksource")
     }
 
-    /// Soft limit of this process from `/proc/self/limits`; `None` for unlimited or not reported.
+    /// Returns the soft limit of this process from `/proc/self/limits`; `None` for unlimited or not reported.
     pub fn limit(&self, name: &str) -> Option<u64> {
         let text = self.text("proc/self/limits")?;
         let line = text.lines().find_map(|l| l.strip_prefix(name))?;

@@ -92,7 +92,7 @@ pub struct Measured {
     pub window_ns: u64,
 }
 
-/// Voluntary switches beyond the one of each sleep.
+/// Returns the voluntary switches beyond the one of each sleep.
 pub fn switches_beyond_sleep(report: &LoopReport) -> i64 {
     (report.usage.voluntary_switches - report.sleeps as i64).max(0)
 }

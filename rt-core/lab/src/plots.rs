@@ -20,7 +20,7 @@ fn picture(draw: impl FnOnce(&Canvas) -> Drawn) -> Result<String, DrawError> {
     drawn(SIZE, draw)
 }
 
-/// Short, without trailing zeros: 0.1, 20, 5000.
+/// Writes a number short, without trailing zeros: 0.1, 20, 5000.
 fn number(value: f64) -> String {
     let text = if value >= 10.0 {
         format!("{value:.0}")
@@ -94,8 +94,8 @@ pub struct Series<'a> {
     pub histogram: &'a Histogram<u64>,
 }
 
-/// Histogram of the wake-up latency: linear microseconds, logarithmic count. The legend has the number past the right
-/// edge.
+/// Plots the histogram of the wake-up latency: linear microseconds, logarithmic count. The legend has the number past
+/// the right edge.
 pub fn wake_histogram(series: &[Series]) -> Result<String, DrawError> {
     picture(|root| {
         // Wide enough for the body; a long tail would press it into a line, and has another picture.

@@ -20,7 +20,7 @@ pub struct ProgramDigest {
     pub sha256: String,
 }
 
-/// This program, and the window's in the same folder.
+/// Returns the digests of this program, and of the window's in the same folder.
 pub fn programs() -> Vec<ProgramDigest> {
     let Ok(own) = std::env::current_exe() else {
         return Vec::new();
@@ -36,7 +36,7 @@ pub fn programs() -> Vec<ProgramDigest> {
     all.iter().filter_map(digest).collect()
 }
 
-/// SHA-256 of `bytes` as 64 lower-case hexadecimal digits.
+/// Returns SHA-256 of `bytes` as 64 lower-case hexadecimal digits.
 pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -105,13 +105,13 @@ pub fn dependencies() -> Vec<Dependency> {
     list.lines().filter_map(read).collect()
 }
 
-/// Damping of the hand and of the force law that the stiffness margin counts on, N s/m.
+/// Returns the damping of the hand and of the force law that the stiffness margin counts on, N s/m.
 pub fn dampings_n_s_per_m() -> (f64, f64) {
     let law = ParameterSet::default().get(ParameterId::Damping);
     (Hand::passive().damping_n_s_per_m, law)
 }
 
-/// K_max = (b + B) / (T/2 + t_d), the linear stability rule for a sampled wall with delay (Gil, Hulin).
+/// Returns K_max = (b + B) / (T/2 + t_d), the linear stability rule for a sampled wall with delay (Gil, Hulin).
 ///
 /// b: damping of a hand in the middle of the envelope; B: damping of the force law; t_d: due time to force written.
 /// The rule is for a constant delay; with jitter the value at a percentile is that of a loop which is always so late.
@@ -324,7 +324,8 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
     settings
 }
 
-/// Why the tail of a measurement says more about this environment than about the program; empty when it does not.
+/// Returns why the tail of a measurement tells more about this environment than about the program; empty when it does
+/// not.
 pub fn unqualified(machine: &Machine, run: &RunReport) -> Vec<String> {
     let mut reasons = Vec::new();
     if let Some(name) = machine.hypervisor() {

@@ -12,7 +12,7 @@ impl SplitMix {
         z ^ (z >> 31)
     }
 
-    /// Uniform in 0 to 1, 1 left out.
+    /// Draws uniformly from 0 to 1, 1 left out.
     pub fn unit(&mut self) -> f64 {
         (self.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }

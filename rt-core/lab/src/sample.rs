@@ -37,7 +37,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// `grid`: grid points of the run as planned.
+    /// Makes a sample of a run with `grid` planned grid points.
     pub fn new(grid: u64) -> Self {
         Self {
             parts: (0..PARTS).map(|_| histogram()).collect(),
@@ -50,7 +50,7 @@ impl Sample {
         }
     }
 
-    /// A tick at the grid point `place` that woke `wake_ns` late.
+    /// Takes a tick at the grid point `place` that woke `wake_ns` late.
     pub fn take(&mut self, place: u64, wake_ns: u64) {
         self.grid = place + 1;
         if let Some(part) = self.parts.get_mut((place / self.part_grid) as usize) {
@@ -74,7 +74,7 @@ impl Sample {
         }
     }
 
-    /// Every second entry stays.
+    /// Keeps every second entry.
     fn thin(&mut self) {
         for i in 0..SERIES / 2 {
             self.series[i] = self.series[2 * i];

@@ -57,7 +57,7 @@ pub enum SignError {
 pub struct Signer {
     /// Kind and fingerprint of the key.
     pub key: String,
-    /// As the file of those who may sign names them; `None` where no such file was given.
+    /// Name in the file of permitted signers; `None` without such a file.
     pub person: Option<String>,
 }
 
@@ -171,7 +171,7 @@ fn not_run(e: io::Error) -> SignError {
     }
 }
 
-/// `Good "namespace" signature with ED25519 key SHA256:...`
+/// Reads the key from `Good "namespace" signature with ED25519 key SHA256:...`
 fn key_of(output: &Output) -> Option<String> {
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     let (_, key) = text

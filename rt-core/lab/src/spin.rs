@@ -23,9 +23,9 @@ const STEP_US: u64 = 5;
 /// `--spin-us` as given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Spin {
-    /// So many microseconds.
+    /// Fixed number of microseconds.
     Fixed(u64),
-    /// To be found.
+    /// Number to be found.
     Auto,
 }
 
@@ -92,7 +92,7 @@ pub enum SpinError {
     /// A trial.
     #[error("--spin-us auto: {0}")]
     Measure(#[from] MeasureError),
-    /// There is nothing to compare with.
+    /// Too few values to compare.
     #[error("--spin-us auto: cyclictest gave too few samples")]
     TooFew,
 }

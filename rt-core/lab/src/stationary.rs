@@ -27,7 +27,7 @@ impl TestResult {
         self.p < LEVEL
     }
 
-    /// As a reason: what was found, and the limit.
+    /// Returns the result as a reason, with the limit.
     pub fn said(&self) -> String {
         format!(
             "{}: distance {:.3}, p {:.1e}, below {LEVEL}",
@@ -124,7 +124,8 @@ fn halves(values: &[f64]) -> TestResult {
     two_samples("first half against second half", first, second)
 }
 
-/// Each part against the rest of the run; the smallest probability, times the number of parts (Bonferroni).
+/// Tests each part against the rest of the run; returns the smallest probability, times the number of parts
+/// (Bonferroni).
 fn parts(values: &[f64]) -> TestResult {
     let length = values.len().div_ceil(PARTS);
     let against_rest = |i: usize| {
@@ -138,7 +139,7 @@ fn parts(values: &[f64]) -> TestResult {
     worst
 }
 
-/// Kolmogorov and Smirnov's test of two samples.
+/// Makes Kolmogorov and Smirnov's test of two samples.
 pub fn two_samples(name: &'static str, a: &[f64], b: &[f64]) -> TestResult {
     let sorted = |of: &[f64]| {
         let mut all = of.to_vec();
@@ -184,7 +185,8 @@ pub fn uniform(name: &'static str, values: &[f64]) -> TestResult {
     TestResult { name, distance, p }
 }
 
-/// Probability of a distance at least so large; `n` values, or n m / (n + m) of two samples (Stephens 1970).
+/// Returns the probability of a distance at least so large; `n` values, or n m / (n + m) of two samples (Stephens
+/// 1970).
 fn kolmogorov(distance: f64, n: f64) -> f64 {
     let x = (n.sqrt() + 0.12 + 0.11 / n.sqrt()) * distance;
     if x < 0.2 {
@@ -202,7 +204,7 @@ mod tests {
     use super::*;
     use crate::random::SplitMix;
 
-    /// Exponential wake-ups of mean 100 us; those of the second half are `factor` times as long.
+    /// Draws exponential wake-ups of mean 100 us; those of the second half are `factor` times as long.
     fn run(seed: u64, factor: f64) -> Vec<u64> {
         let mut random = SplitMix(seed);
         let n = 4_096;

@@ -22,7 +22,7 @@ pub struct Quantile {
     /// 95 % interval, from the order statistics of the samples; it holds for any distribution of independent samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval_us: Option<[f64; 2]>,
-    /// When there is no value: how long the run must be.
+    /// Length of the run that a value needs, where there is none.
     pub needs_s: Option<f64>,
 }
 
@@ -48,7 +48,7 @@ pub fn needed(quantile: f64) -> u64 {
     (BEYOND / (1.0 - quantile) - 1e-6).ceil() as u64
 }
 
-/// In microseconds, when enough samples lie beyond it.
+/// Returns a quantile in microseconds, when enough samples lie beyond it.
 pub fn quantile_us(histogram: &Histogram<u64>, quantile: f64) -> Option<f64> {
     (histogram.len() >= needed(quantile)).then(|| histogram.value_at_quantile(quantile) as f64 / 1e3)
 }
@@ -70,7 +70,7 @@ pub fn interval_us(histogram: &Histogram<u64>, quantile: f64) -> Option<[f64; 2]
     None
 }
 
-/// `rate_hz`: how many samples a second bring.
+/// Summarises a histogram of `rate_hz` samples a second.
 pub fn summary(name: &str, histogram: &Histogram<u64>, rate_hz: f64) -> Summary {
     let some = !histogram.is_empty();
     Summary {

@@ -36,7 +36,7 @@ pub struct LimitSpec {
     pub id: &'static str,
     pub name: &'static str,
     pub unit: &'static str,
-    /// For 1 kHz. Those that scale are multiplied by the period in milliseconds.
+    /// Default for 1 kHz. Limits that scale are multiplied by the period in milliseconds.
     default: f64,
     scales_with_period: bool,
     pub reason: &'static str,
@@ -165,7 +165,7 @@ impl Outcome {
         }
     }
 
-    /// For the shell: 0, 1, 2.
+    /// Returns the code for the shell: 0, 1, 2.
     pub fn exit_code(self) -> u8 {
         match self {
             Self::Pass => 0,
@@ -222,7 +222,7 @@ pub fn evaluate(limits: &Limits, measured: &Measured, period_ns: u64, unqualifie
     LIMITS.iter().map(evaluate_one).collect()
 }
 
-/// One failure fails all; else one that could not be measured leaves it open.
+/// Returns the overall outcome: one failure fails all; else one that could not be measured leaves it open.
 pub fn overall(results: &[LimitResult]) -> Outcome {
     let any = |outcome| results.iter().any(|j| j.outcome == outcome);
     if any(Outcome::Fail) {

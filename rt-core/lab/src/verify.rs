@@ -75,7 +75,7 @@ fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
     })
 }
 
-/// Who signed the report, or what is wrong with its signature.
+/// Returns who signed the report, or the problem with its signature.
 fn signature(file: &Path, allowed: Option<&Path>) -> Result<String, String> {
     let signature = sign::signature_of(file);
     let name = signature.file_name().unwrap_or_default().to_string_lossy().into_owned();

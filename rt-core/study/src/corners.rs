@@ -7,7 +7,7 @@ use stylet_shm_schema::{ParameterSet, ParameterSpec};
 use stylet_sim::active::activate;
 use stylet_sim::scene::TissueKind;
 
-/// More parameters than this have too many corners.
+/// Largest number of parameters whose corners are tried.
 const MOST: usize = 12;
 
 /// Returns the problem of one of the corners of what varies, if there is one.

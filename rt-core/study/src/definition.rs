@@ -29,7 +29,7 @@ pub struct Study {
     pub tissue: TissueKind,
     /// Glands to implant.
     pub glands: Vec<Gland>,
-    /// In the order of `QUANTITIES`.
+    /// Quantities in the order of `QUANTITIES`.
     pub quantities: Vec<Spread>,
     /// Parameters that differ from their defaults, in the unit of the table.
     pub parameters: Vec<(&'static ParameterSpec, Spread)>,
@@ -63,7 +63,7 @@ impl Study {
         })
     }
 
-    /// As [`read`](Self::read); `folder` is where the plans are looked for.
+    /// Reads a study as [`read`](Self::read) does; the plans are searched in `folder`.
     pub(crate) fn of_text(text: &str, folder: &Path) -> Result<Self, Problems> {
         let table: Table = text
             .parse()

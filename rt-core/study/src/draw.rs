@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 pub struct Implant {
     /// Place among the glands of the study.
     pub gland: usize,
-    /// From 1.
+    /// Number, from 1.
     pub number: u32,
 }
 
@@ -25,12 +25,12 @@ impl Implant {
         }
     }
 
-    /// Scene and plan.
+    /// Returns scene and plan.
     pub fn gland<'a>(&self, study: &'a Study) -> &'a Gland {
         &study.glands[self.gland]
     }
 
-    /// Beginning of the ids of its insertions.
+    /// Returns the beginning of the ids of its insertions.
     pub fn id(&self, study: &Study) -> String {
         let gland = self.gland(study);
         format!("{}/{}/{}/{:06}", study.name, gland.scene, gland.plan_name, self.number)
@@ -45,12 +45,12 @@ impl Implant {
 /// Values drawn for one insertion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
-    /// In the order of [`QUANTITIES`], then the parameters of the study.
+    /// Values in the order of [`QUANTITIES`], then the parameters of the study.
     pub values: Vec<f64>,
 }
 
 impl Drawn {
-    /// For one needle, from 0, of an implant.
+    /// Draws the values for one needle, from 0, of an implant.
     pub fn of(study: &Study, implant: Implant, needle: usize) -> Self {
         let (of_implant, of_needle) = (implant.id(study), implant.id_of_needle(study, needle));
         let quantities = QUANTITIES.iter().zip(&study.quantities).map(|(quantity, spread)| {
@@ -67,7 +67,7 @@ impl Drawn {
         }
     }
 
-    /// One quantity.
+    /// Returns the value of a quantity.
     pub fn get(&self, id: Id) -> f64 {
         self.values[id as usize]
     }

@@ -27,7 +27,7 @@ pub enum StudyError {
     Invalid {
         /// The study file.
         path: PathBuf,
-        /// They.
+        /// Problems of the file.
         problems: Problems,
     },
     /// The folder.

@@ -49,7 +49,7 @@ impl Body {
     }
 }
 
-/// All needles of an implant; `None` where `stop` ended it. `done` is called after each needle.
+/// Inserts all needles of an implant; `None` where `stop` ended it. `done` is called after each needle.
 pub fn implant(
     body: &mut Body,
     study: &Study,
@@ -122,7 +122,7 @@ fn run(needle: &Needle, drawn: &Drawn) -> NeedleRun {
     }
 }
 
-/// Unit vectors across a needle, as near to the patient's right and front as they can be.
+/// Returns unit vectors across a needle, as near to the patient's right and front as they can be.
 fn across(direction: &Unit<Vector3<f64>>) -> (Vector3<f64>, Vector3<f64>) {
     let along = direction.into_inner();
     let without = |axis: Vector3<f64>| axis - along * along.dot(&axis);

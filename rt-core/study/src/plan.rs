@@ -6,7 +6,7 @@ use serde::Deserialize;
 use stylet_shm_schema::MAX_SEEDS;
 
 const FORMAT: &str = "stylet plan, mm, RAS";
-/// From end to end of a seed; with a spacer the pitch of a strand.
+/// Length from end to end of a seed; with a spacer the pitch of a strand.
 const SEED_LENGTH_MM: f64 = 4.5;
 const FARTHEST_MM: f64 = 10_000.0;
 const LONGEST_MM: f64 = 500.0;
@@ -40,7 +40,7 @@ pub struct Plan {
     pub source: String,
     /// Prescribed dose.
     pub prescription_gy: f64,
-    /// In the order of the file.
+    /// Needles in the order of the file.
     pub needles: Vec<Needle>,
 }
 
@@ -55,7 +55,7 @@ pub struct Needle {
     pub direction: Unit<Vector3<f64>>,
     /// Place that its tip is drawn back to, from the entry.
     pub retract_to_mm: f64,
-    /// From middle to middle of two seeds of a strand.
+    /// Distance from middle to middle of two seeds of a strand.
     pub strand_pitch_mm: Option<f64>,
     /// Distance from the entry and strength of its seeds, deepest first.
     pub seeds: Vec<(f64, f64)>,

@@ -24,12 +24,12 @@ struct State {
 }
 
 impl Progress {
-    /// On the terminal, or in the file that stands for it.
+    /// Makes progress on the terminal, or in the file that stands for it.
     pub fn shown() -> Self {
         Self::new(false)
     }
 
-    /// For tests.
+    /// Makes progress that prints nothing, for tests.
     #[cfg(test)]
     pub fn silent() -> Self {
         Self::new(true)
@@ -50,14 +50,14 @@ impl Progress {
         }
     }
 
-    /// `kept` of `of` insertions were done before.
+    /// Begins; `kept` of `of` insertions were done before.
     pub fn begin(&self, kept: usize, of: usize) {
         self.change(|state| {
             (state.begun, state.kept, state.done, state.of) = (Instant::now(), kept, kept, of);
         });
     }
 
-    /// One more, and why it failed if it did.
+    /// Counts one more, and the reason if it failed.
     pub fn advance(&self, failure: Option<&String>) {
         let first = self.change(|state| {
             state.done += 1;
@@ -69,7 +69,7 @@ impl Progress {
         }
     }
 
-    /// The last line stays.
+    /// Ends; the last line stays.
     pub fn end(&self) {
         if !self.silent {
             self.change(|state| state.shown = None);
@@ -111,7 +111,7 @@ fn line(state: &State, seconds: f64) -> String {
     line
 }
 
-/// As `2 h 05 min`, `7 min 30 s` or `12 s`.
+/// Writes a duration as `2 h 05 min`, `7 min 30 s` or `12 s`.
 fn duration(seconds: f64) -> String {
     let s = seconds.round() as u64;
     match s {

@@ -15,7 +15,7 @@ pub enum Scope {
 /// A quantity that a study may vary.
 #[derive(Clone, Copy, Debug)]
 pub struct Quantity {
-    /// In the study file and as the column of the results; the unit stands at its end.
+    /// Key in the study file and as the column of the results; the unit stands at its end.
     pub key: &'static str,
     /// Scope in which it is drawn.
     pub scope: Scope,
@@ -31,7 +31,7 @@ macro_rules! quantities {
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Id { $( $id ),* }
 
-        /// In the order of [`Id`].
+        /// Quantities in the order of [`Id`].
         pub const QUANTITIES: &[Quantity] = &[ $( Quantity { key: $key, scope: Scope::$scope, limits: $limits, default: $default } ),* ];
     };
 }

@@ -152,7 +152,7 @@ impl Shared<'_> {
         }
     }
 
-    /// The first failure is reported; the others take no more implants.
+    /// Reports the first failure; the other threads take no more implants.
     fn fail(&self, why: StudyError) {
         // SYNC: as in `take_all`.
         self.next.store(self.queue.len(), Ordering::Relaxed);

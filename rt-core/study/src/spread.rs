@@ -15,7 +15,7 @@ const WIDEST: f64 = 20.0;
 /// A distribution with an end on both sides.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Spread {
-    /// Always this.
+    /// Constant value.
     Fixed(f64),
     /// Each value between the two is equally likely.
     Uniform([f64; 2]),
@@ -90,7 +90,7 @@ impl Spread {
         }
     }
 
-    /// No value is outside of these.
+    /// Returns the bounds of all values.
     pub fn bounds(&self) -> [f64; 2] {
         match self {
             Self::Fixed(value) => [*value; 2],
@@ -101,7 +101,7 @@ impl Spread {
         }
     }
 
-    /// One value.
+    /// Draws a value.
     pub fn draw(&self, random: &mut ChaCha8Rng) -> f64 {
         match self {
             Self::Fixed(value) => *value,
@@ -135,9 +135,9 @@ pub enum SpreadProblem {
     /// The ends are exchanged.
     #[error("[{least}, {most}]: the first must be the smaller one")]
     Empty {
-        /// As given.
+        /// Bound as given.
         least: f64,
-        /// As given.
+        /// Bound as given.
         most: f64,
     },
     /// A logarithm of that does not exist.
@@ -151,9 +151,9 @@ pub enum SpreadProblem {
     MiddleOutside {
         /// Mean or median.
         middle: f64,
-        /// As given.
+        /// Bound as given.
         least: f64,
-        /// As given.
+        /// Bound as given.
         most: f64,
     },
     /// Next to all draws would be thrown away.
@@ -189,7 +189,7 @@ fn check_width(deviation: f64, room: f64) -> Result<(), SpreadProblem> {
     }
 }
 
-/// 53 random bits, from 0 to just below 1.
+/// Draws 53 random bits, from 0 to just below 1.
 fn unit(random: &mut ChaCha8Rng) -> f64 {
     (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
 }

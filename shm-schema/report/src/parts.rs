@@ -7,7 +7,7 @@ use maud::{Markup, Render, html};
 pub enum Column {
     /// To the left.
     Text,
-    /// To the right, on one line.
+    /// Number, to the right on one line.
     Number,
     /// Text that may break anywhere.
     Wide,

@@ -10,7 +10,7 @@ use stylet_test_kit::{program, scratch};
 /// Injections of ten that must be named.
 const AT_LEAST: usize = 8;
 
-/// Why no trace can be had here; the tests then say so and end.
+/// Returns why no trace can be had here; the tests then report it and end.
 fn no_trace() -> Option<String> {
     // SAFETY: no preconditions.
     if unsafe { libc::geteuid() } != 0 {
@@ -83,7 +83,7 @@ fn causes(outliers: &[Value]) -> Vec<Vec<Value>> {
         .collect()
 }
 
-/// No instance of a measurement that has ended is left in the kernel.
+/// Returns whether no instance of an ended measurement is left in the kernel.
 fn instances_left(process: i32) -> bool {
     let mounts = std::fs::read_to_string("/proc/mounts").unwrap_or_default();
     let path = mounts
@@ -92,8 +92,8 @@ fn instances_left(process: i32) -> bool {
     path.is_some_and(|p| Path::new(p).join(format!("instances/stylet-{process}")).exists())
 }
 
-/// `Ok(true)` when at least two late ticks have the injected cause as their first one; the words that the report has
-/// for them.
+/// Returns `Ok(true)` when at least two late ticks have the injected cause as their first one; and the words of the
+/// report for them.
 fn run(injection: &Injection) -> Result<(bool, String), String> {
     let out = folder(injection.name);
     let mut child = start(&out, 4, injection.over_us);
@@ -122,7 +122,7 @@ fn run(injection: &Injection) -> Result<(bool, String), String> {
     ))
 }
 
-/// A measurement into which nothing is injected.
+/// Measures without an injection.
 fn undisturbed(seconds: u32) {
     let out = folder("undisturbed");
     let mut child = start(&out, seconds, 100);

@@ -104,7 +104,7 @@ pub const ALL: &[Injection] = &[
     },
 ];
 
-/// Ticks of the clock until `end`, `every` apart.
+/// Calls `each` until `end`, `every` apart.
 fn until(end: Instant, every: Duration, mut each: impl FnMut()) {
     while Instant::now() < end {
         each();

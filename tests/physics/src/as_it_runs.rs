@@ -130,7 +130,8 @@ fn block(label: impl Fn([usize; 3]) -> u8, dims: [usize; 3], structures: Vec<Str
     }
 }
 
-/// A newton in the middle of a block: how far its element and the body's corner move along z, and the iterations.
+/// Puts a newton in the middle of a block; returns how far its element and the body's corner move along z, and the
+/// iterations.
 fn newton(model: &BatchModel<f32>, lattice_middle_m: [f64; 3]) -> (f64, f64, u32, f64) {
     let along_z = |(node, weight): (u32, f64)| NodeWeight {
         node,
@@ -245,8 +246,8 @@ fn a_part_that_one_corner_holds_is_refused_or_stays_in_reach() {
     }
 }
 
-/// 64,000 cells, so that finite elements take a coarser body: a capsule of one cell and three times the modulus, an
-/// inclusion of nu 0.499, bone that begins at an odd cell.
+/// Makes 64,000 cells, so that finite elements take a coarser body: a capsule of one cell and three times the modulus,
+/// an inclusion of nu 0.499, bone that begins at an odd cell.
 fn hard_body() -> SceneSource {
     let structure = |name: &str, label: u8, role: Role| {
         let mut structure = Structure::soft(name, label);

@@ -14,7 +14,7 @@ enum Place {
     Contact,
     /// 45 mm deep in the gland, stuck.
     InTissue,
-    /// Behind the skin and some fat, half way to piercing the capsule.
+    /// Place behind the skin and some fat, half way to piercing the capsule.
     AtMembrane,
 }
 
@@ -120,7 +120,7 @@ fn session(hand: Hand, late_ticks: usize, place: Place, controlled: bool) -> Cas
     }
 }
 
-/// Widest swing of the tip about its mean way: a slow creep is no oscillation.
+/// Returns the widest swing of the tip about its mean way: a slow creep is no oscillation.
 fn to_and_fro(ticks: &[Tick]) -> f64 {
     let window = |part: &[Tick]| {
         let (low, high) = part.iter().fold((f64::MAX, f64::MIN), |(low, high), t| {

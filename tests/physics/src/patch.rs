@@ -8,9 +8,9 @@ use stylet_sim::tissue::{Carried, Deformed, element_ahead};
 
 /// Period of the tissue loop.
 pub const PERIOD_S: f64 = 5e-3;
-/// As the loop holds with finite elements.
+/// Edge of the patch that the loop holds with finite elements.
 pub const PATCH_M: f64 = 4e-3;
-/// As patients' needles go on average; 123 and 280 mm/s are the mean maximum and the maximum.
+/// Insertion at the average speed in patients; 123 and 280 mm/s are the mean maximum and the maximum.
 pub const STRAIGHT: Way = Way {
     direction: [0.0, 0.0, 1.0],
     speed_m_per_s: 0.05,
@@ -33,7 +33,7 @@ pub struct PatchTick {
 pub struct Way {
     /// Unit vector.
     pub direction: [f64; 3],
-    /// Along it.
+    /// Speed along it.
     pub speed_m_per_s: f64,
 }
 

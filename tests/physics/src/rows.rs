@@ -11,7 +11,7 @@ pub struct Row {
     pub number: u32,
     /// Case.
     pub case: &'static str,
-    /// In which tissue.
+    /// Tissue.
     pub model: &'static str,
     /// Requirement.
     pub should: &'static str,
@@ -19,7 +19,7 @@ pub struct Row {
     pub happened: String,
     /// Set where the outcome meets the requirement.
     pub met: bool,
-    /// For a case that is known to fall short: which live warning says so.
+    /// Live warning that reports a case that is known to fall short.
     pub warning: &'static str,
 }
 
@@ -30,7 +30,7 @@ const BEGIN: &str = "<!-- rows that tests write -->\n";
 const END: &str = "<!-- end of the rows that tests write -->\n";
 const HEAD: &str = "| | case | model | should | happened | met |\n|---|---|---|---|---|---|\n";
 
-/// No other test rewrites the page meanwhile.
+/// Locks the page, so that no other test rewrites it meanwhile.
 pub fn lock() -> std::sync::MutexGuard<'static, ()> {
     PAGE.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -164,7 +164,7 @@ fn read(path: &Path) -> Result<String, CampaignError> {
     })
 }
 
-/// Held until it is dropped, or until this process ends.
+/// Locks the folder until the lock is dropped, or until this process ends.
 fn lock(folder: &Path) -> Result<File, CampaignError> {
     let path = folder.join(LOCK);
     let file = File::options().create(true).truncate(false).write(true).open(&path);
@@ -195,7 +195,7 @@ fn measure_what_is_left(
     Ok(())
 }
 
-/// One session: what is left of one part.
+/// Runs one session: the rest of one part.
 fn session(
     plan: &Plan,
     number: usize,

@@ -12,7 +12,7 @@ use std::sync::Mutex;
 use stylet_write::write_whole;
 
 const SCHEMA: &str = "stylet.campaign-session/1";
-/// So much less than its duration still completes a part: the run ends between two ticks.
+/// Shortfall of time with which a part is still complete: the run ends between two ticks.
 const COMPLETE_NS: u64 = 500_000_000;
 /// Names of the loops, as they stand in the names of the files.
 pub const FORCE: &str = "force";
@@ -100,7 +100,7 @@ impl Store {
         Ok(store)
     }
 
-    /// Every session of one loop, in the order in which they were measured.
+    /// Returns every session of one loop, in the order in which they were measured.
     pub fn records(&self, name: &str) -> Result<Vec<Kept>, CampaignError> {
         let ending = format!("-{name}.json");
         let entries = std::fs::read_dir(&self.folder).map_err(|source| CampaignError::Read {
@@ -224,13 +224,13 @@ impl Writer {
         }
     }
 
-    /// Why the last checkpoint that failed could not be written.
+    /// Returns the reason why the last failed checkpoint could not be written.
     pub fn failed(&self) -> Option<String> {
         self.failure.lock().unwrap_or_else(|e| e.into_inner()).clone()
     }
 }
 
-/// All of `bins` as one histogram.
+/// Joins all of `bins` into one histogram.
 pub fn join<'a>(bins: impl Iterator<Item = &'a Bins>) -> Histogram<u64> {
     let mut joined = histogram();
     bins.for_each(|b| b.add_to(&mut joined));

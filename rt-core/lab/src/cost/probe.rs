@@ -20,7 +20,7 @@ pub struct Pressed {
 }
 
 impl Pressed {
-    /// Nothing in a scene in which a probe could not lie.
+    /// Makes the part; nothing in a scene in which a probe could not lie.
     pub fn of(scene: &Scene) -> Result<Option<Self>, CostError> {
         let Some(scene) = scene.clone().for_lines(TissueKind::ChainMail) else {
             return Ok(None);
@@ -49,7 +49,7 @@ impl Pressed {
         }))
     }
 
-    /// As the table calls it.
+    /// Returns its name in the table.
     pub fn name(&self) -> String {
         let pads = self.at_rest.ready().wall.pads.len();
         format!("ultrasound probe, pressed by 10 mm and back ({pads} pads)")

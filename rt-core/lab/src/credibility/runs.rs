@@ -17,7 +17,7 @@ pub struct Run {
     pub protocol: String,
     pub overall: String,
     pub qualified: bool,
-    /// By the id of the requirement.
+    /// Outcomes by the id of the requirement.
     pub outcomes: BTreeMap<String, String>,
 }
 

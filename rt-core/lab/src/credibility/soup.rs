@@ -8,7 +8,7 @@ use serde::Serialize;
 pub struct Package {
     pub name: String,
     pub version: String,
-    /// As its author declares it; `not known` where its sources were not there when this program was built.
+    /// Licence as its author declares it; `not known` where its sources were not there when this program was built.
     pub licence: String,
     pub of: &'static str,
     pub known_anomalies: Vec<&'static str>,
@@ -20,7 +20,7 @@ pub fn packages() -> Vec<Package> {
     list.lines().filter_map(package).collect()
 }
 
-/// `name version programs licence`.
+/// Reads a line `name version programs licence`.
 fn package(line: &str) -> Option<Package> {
     let mut words = line.splitn(4, ' ');
     let (name, version, of, licence) = (words.next()?, words.next()?, words.next()?, words.next()?);

@@ -5,7 +5,7 @@ use serde::Serialize;
 /// Requirement on the software.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Requirement {
-    /// Those of limits are the ids of `rt-core latency`.
+    /// Id; those of limits are the ids of `rt-core latency`.
     pub id: &'static str,
     pub what: &'static str,
     pub hazards: &'static [&'static str],

@@ -36,7 +36,8 @@ pub fn may_use(path: &Path) -> bool {
     std::fs::File::options().read(true).write(true).open(path).is_ok()
 }
 
-/// The newer Touch is a HID device: the driver speaks with it through `/dev/hidraw*`, which belongs to root at first.
+/// Examines the newer Touch, a HID device: the driver speaks with it through `/dev/hidraw*`, which belongs to root at
+/// first.
 pub fn hidraw(machine: &Machine, usable: impl Fn(&Path) -> bool) -> Finding {
     let folder = "sys/class/hidraw";
     let is_ours = |name: &&String| {

@@ -38,7 +38,7 @@ pub const DRAW: [&str; 27] = [
     "compton",
 ];
 
-/// Those that may run on the core of the force loop.
+/// Returns the drawing processes that may run on the core of the force loop.
 fn drawing(machine: &Machine, core: usize) -> Vec<Process> {
     let mut found = machine.processes();
     found.retain(|process| {
@@ -52,7 +52,7 @@ fn may_run(machine: &Machine, thread: &str, core: usize) -> bool {
     allowed.is_some_and(|list| cores(&list).contains(&core))
 }
 
-/// Display servers on the core of the force loop, where they can hold it.
+/// Finds display servers on the core of the force loop, where they can hold it.
 pub fn servers(machine: &Machine, core: usize) -> Finding {
     let found = drawing(machine, core);
     if found.is_empty() {

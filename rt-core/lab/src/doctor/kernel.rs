@@ -68,7 +68,7 @@ pub fn throttling(machine: &Machine) -> Finding {
     }
 }
 
-/// With CONFIG_RT_GROUP_SCHED a control group may have no real-time share at all.
+/// Examines control groups: with CONFIG_RT_GROUP_SCHED one may have no real-time share at all.
 pub fn groups(machine: &Machine) -> Finding {
     if machine.build_option("RT_GROUP_SCHED").as_deref() != Some("y") {
         return Finding::good(

@@ -74,7 +74,7 @@ impl Finding {
     }
 }
 
-/// All findings, in the order in which one would fix them.
+/// Returns all findings, in the order in which one would fix them.
 pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Vec<Finding> {
     let mut findings = vec![
         kernel::hypervisor(machine),
@@ -106,7 +106,7 @@ pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Ve
     findings
 }
 
-/// Summary of all findings.
+/// Returns the summary of all findings.
 fn verdict(findings: &[Finding]) -> &'static str {
     match findings.iter().map(|f| f.severity).max() {
         Some(FindingLevel::Blocker) => "not fit: fix the blockers first",

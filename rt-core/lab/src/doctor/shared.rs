@@ -10,7 +10,7 @@ use std::path::Path;
 /// Shared memory of one core with six hosts and a large scene, with a margin.
 const WANTED_BYTES: u64 = 256 << 20;
 
-/// Room that is left where `path` lies.
+/// Returns the free space where `path` lies.
 pub fn free_bytes(path: &Path) -> Option<u64> {
     let path = CString::new(path.as_os_str().as_bytes()).ok()?;
     // SAFETY: an all-zero statvfs is valid.
@@ -76,7 +76,7 @@ pub fn stale_services(machine: &Machine) -> Finding {
     )
 }
 
-/// `stylet_<user>_<instance>` of each file.
+/// Returns `stylet_<user>_<instance>` of each file.
 fn instances(names: &[String]) -> BTreeSet<String> {
     let instance = |name: &String| {
         let mut parts = name.splitn(4, '_');

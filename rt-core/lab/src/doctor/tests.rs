@@ -44,7 +44,7 @@ const CLOCKS: &str = "sys/devices/system/clocksource/clocksource0/available_cloc
 const CLOCK: &str = "sys/devices/system/clocksource/clocksource0/current_clocksource";
 const RELEASE: &str = "proc/sys/kernel/osrelease";
 
-/// FindingLevel as expected, and a cure exactly where something is to be done.
+/// Expects a level, and a cure exactly where there is something to do.
 #[track_caller]
 pub(super) fn expect(finding: &Finding, severity: FindingLevel, says: &str) {
     assert_eq!(finding.severity, severity, "{finding:?}");
@@ -182,7 +182,7 @@ fn slow_time_source_is_named() {
     );
 }
 
-/// `/proc/self/limits` with these values.
+/// Returns `/proc/self/limits` with these values.
 fn limits(priority: &str, lock: &str) -> String {
     format!(
         "Limit                     Soft Limit           Hard Limit           Units     \n\

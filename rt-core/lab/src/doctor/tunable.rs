@@ -8,7 +8,7 @@ use crate::machine::{Machine, Throttle, core_list, cores};
 pub struct Tunable {
     /// The check that looks at it.
     pub check: &'static str,
-    /// Without the leading slash.
+    /// Path without the leading slash.
     pub path: String,
     /// Start time of a thread whose cores these are ([`Machine::began`]).
     pub began: Option<u64>,
@@ -93,7 +93,7 @@ const QUIET: [Quiet; 5] = [
     },
 ];
 
-/// Check and wanted value of a setting that only this file knows.
+/// Returns check and wanted value of a setting that only this file knows.
 pub fn quiet(path: &str) -> Option<(&'static str, &'static str)> {
     let found = QUIET.iter().find(|q| q.path == path)?;
     Some((found.check, found.wanted))
@@ -186,7 +186,7 @@ pub fn all(machine: &Machine, core: usize) -> Vec<Tunable> {
     all
 }
 
-/// `0,1,2` as `0-2`, so that what is read back is what was written.
+/// Writes `0,1,2` as `0-2`, so that the text read back is the text written.
 pub fn as_kernel_prints(list: &str) -> String {
     let all: Vec<usize> = cores(list).into_iter().collect();
     let mut ranges: Vec<(usize, usize)> = Vec::new();
@@ -217,7 +217,7 @@ pub fn energy_preference(machine: &Machine, core: usize) -> Finding {
     }
 }
 
-/// Turbo: fast, but its speed depends on the heat and on what other cores do.
+/// Examines turbo: fast, but its speed depends on heat and on other cores.
 pub fn turbo(machine: &Machine) -> Finding {
     let off = "p50 is best with it, the same times again and again are had without it:";
     let no_turbo = machine.text(&format!("{CPU}/intel_pstate/no_turbo"));

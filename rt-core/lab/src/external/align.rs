@@ -23,7 +23,7 @@ const FEWEST: usize = 20;
 /// A gap between edges is that of two toggles when it differs by less: drift of any quartz, and jitter.
 const DRIFT: f64 = 5e-4;
 const JITTER_S: f64 = 4e-4;
-/// So many of the gaps in the overlap must agree.
+/// Share of the gaps in the overlap that must agree.
 const SHARE: f64 = 0.8;
 
 /// Aligns `edges_s` with `toggles_s`; the reason where they are not of one run.

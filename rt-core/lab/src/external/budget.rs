@@ -27,7 +27,7 @@ pub struct Delay {
     pub terms: Vec<Term>,
     /// Standard uncertainty of the mean, all terms together.
     pub combined_us: f64,
-    /// With a coverage factor of 2: about 95 %.
+    /// Expanded uncertainty with a coverage factor of 2: about 95 %.
     pub expanded_us: f64,
 }
 
@@ -69,7 +69,7 @@ impl<'a> Begins<'a> {
     }
 }
 
-/// From each edge of `from` to the next one of `channel`, in seconds of our clock.
+/// Returns the time from each edge of `from` to the next one of `channel`, in seconds of our clock.
 pub fn delay(
     capture: &Capture,
     from: &Begins<'_>,

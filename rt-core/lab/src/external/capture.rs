@@ -124,7 +124,7 @@ fn level(cell: &str) -> Option<bool> {
     }
 }
 
-/// `1 MHz`, `24MHz`, `500 kHz`, in hertz.
+/// Reads `1 MHz`, `24MHz`, `500 kHz`, in hertz.
 fn frequency(text: &str) -> Option<f64> {
     let end = text
         .find(|c: char| !c.is_ascii_digit() && c != '.')
@@ -140,7 +140,7 @@ fn frequency(text: &str) -> Option<f64> {
     (value > 0.0).then_some(value * factor)
 }
 
-/// Value change dump: `#time` and `0!` or `1!` for each wire.
+/// Reads a value change dump: `#time` and `0!` or `1!` for each wire.
 pub fn vcd(text: &str) -> Result<Capture, CaptureError> {
     let words: Vec<&str> = text.split_whitespace().collect();
     let place = words.iter().position(|w| *w == "$timescale").ok_or("no $timescale")?;
@@ -187,7 +187,7 @@ pub fn vcd(text: &str) -> Result<Capture, CaptureError> {
     Ok(capture)
 }
 
-/// `1us`, `10ns`, in seconds.
+/// Reads `1us`, `10ns`, in seconds.
 fn seconds(text: &str) -> Option<f64> {
     let end = text.find(|c: char| !c.is_ascii_digit())?;
     let value: f64 = text[..end].parse().ok()?;

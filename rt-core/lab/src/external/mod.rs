@@ -68,7 +68,7 @@ pub struct External {
     pin_worst_us: f64,
     /// Longest time that writing the pin took by our clock.
     pin_write_worst_us: f64,
-    /// From the time at which a tick was due until its pin had changed; by both clocks together.
+    /// Time from which a tick was due until its pin had changed; by both clocks together.
     due_to_pin_us: [f64; 3],
     delays: Vec<Delay>,
     /// Inputs without a delay, and why.
@@ -144,7 +144,8 @@ pub fn run(folder: &Path, file: &Path, motion: Option<&str>) -> Result<u8, Exter
     Ok(0)
 }
 
-/// The pin is the input that agrees best with the notes; `motion` is the input that shows when the handle moves.
+/// Evaluates a capture: the pin is the input that agrees best with the notes, `motion` the one that shows when the
+/// handle moves.
 fn evaluate(
     toggles: &[ToggleTime],
     capture: &Capture,
@@ -198,8 +199,8 @@ fn evaluate(
     })
 }
 
-/// From the pin to every other input, then from the motion to every input but the pin; and what has none, with the
-/// reason.
+/// Returns the delays from the pin to every other input, then from the motion to every input but the pin; and those
+/// missing, with the reason.
 fn delays(
     capture: &Capture,
     pin: usize,
@@ -234,7 +235,7 @@ fn delays(
     Ok((delays, without))
 }
 
-/// Standard deviation of what is left of the pairs.
+/// Returns the standard deviation of the pairs' residuals.
 fn deviation(a: &Alignment) -> f64 {
     (a.residuals_s.iter().map(|r| r * r).sum::<f64>() / a.residuals_s.len().max(1) as f64).sqrt()
 }

@@ -102,7 +102,7 @@ fn shift_and_drift_are_recovered_from_csv_vcd_and_wav() {
     recovered(&toggles, &capture::wav(&wav(&samples, 48_000)).expect("WAV"));
 }
 
-/// Two channels of 16 bits.
+/// Writes two channels of 16 bits.
 fn wav(samples: &[[bool; 2]], rate: u32) -> Vec<u8> {
     let mut bytes = b"RIFF\0\0\0\0WAVEfmt \x10\0\0\0\x01\0\x02\0".to_vec();
     bytes.extend(rate.to_le_bytes());

@@ -45,7 +45,7 @@ mod tests {
     use super::*;
     use crate::random::SplitMix;
 
-    /// Ticks over a threshold that one in 50 passes; each pulls the next few along with it.
+    /// Returns ticks over a threshold that one in 50 passes; each pulls the next few along with it.
     fn over(length: u64, seed: u64) -> Vec<(u64, u64)> {
         let mut random = SplitMix(seed);
         let n = 60_000;

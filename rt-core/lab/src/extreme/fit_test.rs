@@ -17,7 +17,7 @@ const FIVE_PERCENT: [(f64, f64); 10] = [
     (0.9, 0.771),
 ];
 
-/// `None` outside the table.
+/// Returns the point of 5 %; `None` outside the table.
 pub fn five_percent_point(shape: f64) -> Option<f64> {
     let pair = FIVE_PERCENT
         .windows(2)

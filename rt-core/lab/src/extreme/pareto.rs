@@ -15,7 +15,7 @@ pub struct Pareto {
 }
 
 impl Pareto {
-    /// Maximum likelihood (Grimshaw 1993): for each shape / scale the best shape is known in closed form.
+    /// Fits by maximum likelihood (Grimshaw 1993): for each shape / scale the best shape is known in closed form.
     pub fn fit(excesses: &[f64]) -> Self {
         let (mean, most) = (mean(excesses), largest(excesses));
         let shape_at = |rate: f64| excesses.iter().map(|y| (rate * y).ln_1p()).sum::<f64>() / excesses.len() as f64;
@@ -49,7 +49,7 @@ impl Pareto {
         }
     }
 
-    /// Probability of an excess of at most `y`.
+    /// Returns the probability of an excess of at most `y`.
     pub fn below(&self, y: f64) -> f64 {
         if self.shape.abs() < 1e-9 {
             return -(-y / self.scale).exp_m1();
@@ -67,7 +67,7 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
 }
 
-/// Logarithm of the likelihood.
+/// Returns the logarithm of the likelihood.
 fn ln_likelihood(excesses: &[f64], scale: f64, shape: f64) -> f64 {
     let n = excesses.len() as f64;
     if scale <= 0.0 {
@@ -127,7 +127,7 @@ pub fn interval(fitted: &Pareto, m: f64) -> Option<(f64, f64, f64)> {
     Some((at, edge(at, below), edge(at, above)))
 }
 
-/// Golden section search.
+/// Minimises by golden section search.
 fn lowest(mut a: f64, mut b: f64, cost: impl Fn(f64) -> f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let (mut c, mut d) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));

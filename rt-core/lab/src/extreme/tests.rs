@@ -8,7 +8,7 @@ const SCALE_NS: f64 = 2e4;
 const SHAPE: f64 = 0.1;
 const TICKS: u64 = 20_000;
 
-/// One value of a generalised Pareto distribution.
+/// Draws a value of a generalised Pareto distribution.
 pub fn draw(random: &mut SplitMix, scale: f64, shape: f64) -> f64 {
     let left = 1.0 - random.unit();
     if shape == 0.0 {

@@ -90,7 +90,7 @@ pub struct Common {
     pub others: Vec<(String, String)>,
 }
 
-/// By the latest reports; first what most of the other PCs have otherwise.
+/// Compares the latest reports; facts in which most other PCs differ come first.
 pub fn in_common(pcs: &[Pc]) -> Vec<Common> {
     let (good, others): (Vec<&Pc>, Vec<&Pc>) = pcs.iter().partition(|pc| pc.latest().outcome == Outcome::Pass);
     // What a single PC has in common with itself says nothing.

@@ -42,7 +42,7 @@ pub fn page(pcs: &[Pc], unread: &[Unread]) -> Result<String, DrawError> {
     Ok(stylet_report::page(&heading, "", &main))
 }
 
-/// A count with the noun that goes with it.
+/// Returns a count with its noun.
 pub(super) fn counted(count: usize, one: &str, more: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { more })
 }
@@ -103,12 +103,12 @@ fn overview(pcs: &[Pc]) -> Markup {
     )
 }
 
-/// `Linux version 6.1.0-rt (builder) ...`: what stands third.
+/// Returns the third word of `Linux version 6.1.0-rt (builder) ...`.
 fn kernel_release(version: &str) -> &str {
     version.split_whitespace().nth(2).unwrap_or(version)
 }
 
-/// One picture for each PC with two reports or more of one protocol.
+/// Draws one picture for each PC with two reports or more of one protocol.
 fn trends(pcs: &[Pc]) -> Result<Markup, DrawError> {
     let (mut lines, mut single) = (Vec::new(), Vec::new());
     for pc in pcs {

@@ -39,7 +39,7 @@ pub fn csv(entries: &[Entry]) -> String {
     all
 }
 
-/// In quotes where it must be.
+/// Quotes a cell where needed.
 fn quoted(cell: &str) -> String {
     let cell = stylet_text::cell(cell).into_owned();
     if cell.contains([',', '"', '\n', '\r']) {

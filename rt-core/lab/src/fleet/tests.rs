@@ -57,7 +57,8 @@ fn put(folder: &Path, name: &str, report: &Value) {
     std::fs::write(folder.join(REPORT), text.replacen(NO_DIGEST, &digest, 1)).expect("written");
 }
 
-/// Five PCs with four reports each. The tail of `bravo` grows with its kernel, that of `delta` with nothing recorded.
+/// Writes reports of five PCs, four each. The tail of `bravo` grows with its kernel, that of `delta` with nothing
+/// recorded.
 fn twenty(name: &str) -> Folder {
     let folder = Folder::new(name);
     for i in 0..4_u32 {

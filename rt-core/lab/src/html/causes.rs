@@ -55,7 +55,7 @@ fn summary(t: &TraceSection) -> String {
     )
 }
 
-/// All causes by kind and name, those that took most time first.
+/// Lists all causes by kind and name, those that took most time first.
 fn totals(outliers: &[Outlier]) -> Markup {
     let mut all: BTreeMap<(Kind, &str), (u32, f64, f64)> = BTreeMap::new();
     for c in outliers.iter().flat_map(|o| &o.causes) {

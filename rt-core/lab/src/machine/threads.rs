@@ -16,7 +16,7 @@ pub struct Process {
 const STATUS: &str = "status";
 
 impl Machine {
-    /// All that the kernel shows, in the order of their ids.
+    /// Returns all processes that the kernel shows, in the order of their ids.
     pub fn processes(&self) -> Vec<Process> {
         let ids = self.names("proc").into_iter().filter_map(|name| name.parse().ok());
         let mut ids: Vec<u32> = ids.collect();
@@ -49,7 +49,8 @@ impl Machine {
         Some(list.trim().to_owned())
     }
 
-    /// When the thread began, in ticks of the kernel's clock since the PC started: another with its number began later.
+    /// Returns when the thread began, in ticks of the kernel's clock since the PC started: another with its number
+    /// began later.
     pub fn began(&self, path: &str) -> Option<u64> {
         thread_of(path)?;
         let stat = self.text(&format!("{}stat", path.strip_suffix(STATUS)?))?;

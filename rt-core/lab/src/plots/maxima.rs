@@ -14,7 +14,7 @@ pub struct MaximaPart<'a> {
     pub windows: Vec<(f64, f64, f64)>,
 }
 
-/// Begin and end of each window in seconds of measurement: breaks between sessions are left out.
+/// Returns begin and end of each window in seconds of measurement, without breaks between sessions.
 fn places(parts: &[MaximaPart]) -> Vec<Vec<(f64, f64)>> {
     let mut at = 0.0;
     let mut place = |part: &MaximaPart| {

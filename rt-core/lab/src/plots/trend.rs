@@ -41,7 +41,7 @@ fn unit(seconds: f64) -> (f64, &'static str) {
         .unwrap_or((1.0, "seconds"))
 }
 
-/// p50 and the tail, whose name is `tail`, over the time; a bar is the 95 % interval, a full point a report that
+/// Plots p50 and the tail, whose name is `tail`, over the time; a bar is the 95 % interval, a full point a report that
 /// passed.
 pub fn trend(points: &[TrendPoint], tail: &str, range_us: [f64; 2]) -> Result<String, DrawError> {
     drawn(SIZE, |root| {

@@ -47,7 +47,7 @@ pub struct Cause {
     /// Number of the thread.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pid: Option<i32>,
-    /// `SCHED_FIFO` priority of the thread.
+    /// Returns the `SCHED_FIFO` priority behind the kernel's number; `None` for a normal thread.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub priority: Option<i32>,
     pub us: f64,
@@ -69,7 +69,7 @@ const MOST: usize = 4;
 /// Numbers of normal threads begin here.
 const NORMAL: i32 = 100;
 
-/// `SCHED_FIFO` priority behind the kernel's number; `None` for a normal thread.
+/// Returns the `SCHED_FIFO` priority behind the kernel's number; `None` for a normal thread.
 pub fn fifo(priority: i32) -> Option<i32> {
     (0..NORMAL - 1).contains(&priority).then_some(NORMAL - 1 - priority)
 }
@@ -185,7 +185,7 @@ fn interruption(i: &Interruption) -> Cause {
 }
 
 impl Kind {
-    /// Short, for a table.
+    /// Returns its short name for a table.
     pub fn name(self) -> &'static str {
         match self {
             Self::HigherPriority => "thread of higher priority",

@@ -88,7 +88,7 @@ fn interrupts(table: &str, core: usize) -> BTreeMap<String, u64> {
 }
 
 impl Counters {
-    /// System management interrupts since `before`.
+    /// Returns the system management interrupts since `before`.
     pub fn smi_since(&self, before: &Self) -> Option<u64> {
         Some(self.smi?.saturating_sub(before.smi?))
     }

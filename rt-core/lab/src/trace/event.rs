@@ -54,7 +54,7 @@ pub struct Event {
     pub what: What,
 }
 
-/// All events at or after `from_ns`, in the order of the text. Lines that are none are left out.
+/// Returns all events at or after `from_ns`, in the order of the text. Other lines are left out.
 pub fn events(text: &str, from_ns: u64) -> Vec<Event> {
     text.lines().filter_map(|line| event(line, from_ns)).collect()
 }

@@ -11,7 +11,7 @@ pub enum Loop {
     /// Could run, and does not.
     Runnable,
     Running,
-    /// By a signal or a debugger.
+    /// Thread stopped by a signal or a debugger.
     Stopped,
     /// Waits in the kernel for something else than its time.
     Blocked,

@@ -38,7 +38,7 @@ struct Witness<'a> {
     own_pid: Option<i32>,
     virtual_machine: bool,
     before: Counters,
-    /// From freezing to thawing.
+    /// Spans from freezing to thawing.
     blind: Vec<(u64, u64)>,
     section: TraceSection,
 }

@@ -5,7 +5,7 @@ use super::blame::{Cause, Kind};
 /// The surroundings that decide what it means that nothing ran.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Below {
-    /// This is a virtual machine.
+    /// Set on a virtual machine.
     pub virtual_machine: bool,
     /// System management interrupts around the tick; `None` where they cannot be counted.
     pub smi: Option<u64>,

@@ -47,7 +47,7 @@ struct Signed {
 }
 
 impl Signed {
-    /// `None` where ssh-keygen is not installed.
+    /// Makes a folder; `None` where ssh-keygen is not installed.
     fn new(name: &str) -> Option<Self> {
         let folder = std::env::temp_dir().join(format!("stylet-signed-{name}-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&folder);

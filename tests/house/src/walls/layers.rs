@@ -216,7 +216,13 @@ pub const LAYERS: &[Layer] = &[
     },
     Layer {
         folder: "host-ui/dose",
-        may_use: &["host-ui/base", "host-ui/files", "shm-schema", "shm-schema/anatomy", "shm-schema/report"],
+        may_use: &[
+            "host-ui/base",
+            "host-ui/files",
+            "shm-schema",
+            "shm-schema/anatomy",
+            "shm-schema/report",
+        ],
         never: &[WINDOW, DEVICES],
         not_itself: &[PORTS],
     },

@@ -9,7 +9,7 @@ use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Each datagram to the broadcast address of the loopback goes to every socket of its port, within one softirq.
+/// Sends datagrams to the broadcast address of the loopback: each goes to every socket of its port, within one softirq.
 pub fn softirqs(target: Target, end: Instant) -> Result<(), String> {
     const SOCKETS: usize = 3_000;
     const PORT: u16 = 47_613;
@@ -140,7 +140,7 @@ impl Drop for Moved {
     }
 }
 
-/// Many readers past the page cache, with the disk's interrupts on the core of the loop.
+/// Reads past the page cache in many threads, with the disk's interrupts on the core of the loop.
 pub fn disk_interrupt(target: Target, end: Instant) -> Result<(), String> {
     let numbers = disk_interrupts();
     if numbers.is_empty() {

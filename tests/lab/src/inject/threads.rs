@@ -13,7 +13,7 @@ pub fn same_priority(target: Target, end: Instant) -> Result<(), String> {
     rival("inj-same", target, 80, end)
 }
 
-/// Longer than a period, so that a tick is due in between.
+/// Runs longer than a period, so that a tick is due in between.
 fn rival(name: &'static str, target: Target, priority: i32, end: Instant) -> Result<(), String> {
     ended(on_core(name, target.core, priority, move || {
         until(end, EVERY, || spin(Duration::from_micros(1_400)));
@@ -31,7 +31,7 @@ pub fn stopped(target: Target, end: Instant) -> Result<(), String> {
     Ok(())
 }
 
-/// Normal for 20 ms at a time, next to two threads that never sleep.
+/// Turns the loop normal for 20 ms at a time, next to two threads that never sleep.
 pub fn demoted(target: Target, end: Instant) -> Result<(), String> {
     let hogs = [(); 2].map(|()| {
         on_core("inj-hog", target.core, 0, move || {

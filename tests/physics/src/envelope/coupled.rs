@@ -28,7 +28,7 @@ fn coupled() -> ForceParameters {
     }
 }
 
-/// 28 x 28 x 40 mm of gland in cells of 2 mm: small, so that a tick is soon solved.
+/// Makes 28 x 28 x 40 mm of gland in cells of 2 mm: small, so that a tick is soon solved.
 fn block(kind: TissueKind) -> Box<World> {
     let mut gland = Structure::soft("gland", 1);
     gland.role = Role::Target;
@@ -51,8 +51,8 @@ fn run(session: &mut Session, seconds: f64) -> Vec<Tick> {
 /// them, which go on to the eighth second, as where a handle is turned.
 const LOOKS: usize = 9;
 
-/// As `super::session`, with the tip brought to rest `rest_m` behind where the body begins; and how far it moves to and
-/// fro from look to look.
+/// Runs `super::session` with the tip brought to rest `rest_m` behind where the body begins; returns how far it moves
+/// to and fro.
 fn session(mut world: Box<World>, hand: Hand, late_ticks: usize, rest_m: f64) -> (Case, Vec<f64>, Box<World>) {
     world.tissue.return_to_rest();
     let start = axis_start(&world);

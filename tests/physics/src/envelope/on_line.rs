@@ -70,7 +70,7 @@ impl Theatre {
         }
     }
 
-    /// As in [`super::session`], with the tip brought to rest `rest_m` behind where the body begins.
+    /// Runs [`super::session`] with the tip brought to rest `rest_m` behind where the body begins.
     fn session(&mut self, (hand, late_ticks): (Hand, usize), (name, rest_m): (&str, f64), controlled: bool) -> Case {
         let faults = LinkFaults {
             late_ticks,
@@ -130,7 +130,7 @@ struct Extent {
     every: usize,
 }
 
-/// In the everyday tests; `make envelope` has all.
+/// Extent in the everyday tests; `make envelope` has all.
 const LATE: Extent = Extent {
     lateness: &[3],
     every: 2,

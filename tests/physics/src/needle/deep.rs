@@ -8,7 +8,7 @@ use stylet_benches::rig::hand_envelope;
 /// Two steps of the encoders: an oscillation that they can see.
 const SEEN_M: f64 = 6e-5;
 
-/// Widest swing of the tip along x within a quarter of a second, about its mean way.
+/// Returns the widest swing of the tip along x within a quarter of a second, about its mean way.
 fn to_and_fro_m(places: &[f64]) -> f64 {
     let swing = |part: &[f64]| {
         let (low, high) = part

@@ -12,7 +12,7 @@ const BEFORE_M: f64 = 10e-3;
 /// The gate's limit for each tick.
 const SLEW_N: f64 = 0.5 + 1e-9;
 
-/// 80 x 48 x 40 mm of gland.
+/// Makes 80 x 48 x 40 mm of gland.
 fn block() -> SceneSource {
     let mut gland = Structure::soft("gland", 1);
     gland.role = Role::Target;
@@ -29,7 +29,7 @@ fn block() -> SceneSource {
 struct Found {
     /// Largest before the membrane gave way, along the needle.
     held_n: f64,
-    /// At the end, along the needle.
+    /// Force at the end, along the needle.
     rest_n: f64,
     /// Largest across the needle, where the force is at least a newton, over that along it.
     across: f64,
@@ -40,7 +40,7 @@ struct Found {
     depth_m: f64,
 }
 
-/// Through `point` on the face, or close to it, in `direction`, and out again.
+/// Inserts through `point` on the face, or close to it, in `direction`, and out again.
 fn insert(
     source: &SceneSource,
     kind: TissueKind,

@@ -13,7 +13,7 @@ fn largest_step_n(ticks: &[Tick]) -> f64 {
     steps.fold(0.0, f64::max)
 }
 
-/// 56 x 56 x 80 mm of gland in cells of 2 mm; `label` names other structures by the depth of a cell.
+/// Makes 56 x 56 x 80 mm of gland in cells of 2 mm; `label` names other structures by the depth of a cell.
 fn block(label: impl Fn(usize) -> u8, others: Vec<Structure>, beyond: Beyond) -> SceneSource {
     let mut gland = Structure::soft("gland", 1);
     gland.role = Role::Target;

@@ -44,7 +44,7 @@ impl Kind {
     }
 }
 
-/// A body cut by formula; its label numbers the structure, 0 is no tissue.
+/// Cuts a body by formula; its label numbers the structure, 0 is no tissue.
 pub fn body(dims: [usize; 3], structures: Vec<Structure>, label: impl Fn([usize; 3]) -> u8) -> Scene {
     let [nx, ny, _] = dims;
     let cell = |n: usize| [n % nx, n / nx % ny, n / (nx * ny)];
@@ -61,7 +61,7 @@ pub fn block(dims: [usize; 3]) -> Scene {
     body(dims, Vec::new(), |_| 1)
 }
 
-/// A block whose lowest layer is fixed.
+/// Makes a block whose lowest layer is fixed.
 pub fn block_on_bone(dims: [usize; 3]) -> Scene {
     let mut bone = Structure::soft("bone", 2);
     bone.material.fixed = true;

@@ -55,7 +55,7 @@ pub fn write_or_compare(rows: &[Row]) {
     }
 }
 
-/// Why rows are not met.
+/// Lists the reasons why rows are not met.
 fn shortfalls(rows: &[Row]) -> String {
     let mut text = String::from("\nWhy some cases are not met:\n\n");
     for (number, kind, why) in SHORT {

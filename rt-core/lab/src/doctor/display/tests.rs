@@ -14,7 +14,7 @@ fn machine(preemption: &str) -> Fake {
         .with("sys/kernel/debug/sched/preempt", preemption)
 }
 
-/// A process with one more thread, and where each may run.
+/// Adds a process with one more thread, and the cores that each may run on.
 fn with(fake: Fake, id: u32, name: &str, allowed: [&str; 2]) -> Fake {
     let fake = fake.with(&format!("proc/{id}/comm"), &format!("{name}\n"));
     let thread = |fake: Fake, thread: u32, allowed: &str| {

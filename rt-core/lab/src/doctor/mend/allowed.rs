@@ -12,7 +12,7 @@ use std::os::unix::fs::MetadataExt;
 
 /// `f_type` of `statfs` for `/proc` and `/sys`.
 const FILE_SYSTEMS: [u32; 2] = [0x9fa0, 0x6265_6572];
-/// More text than the kernel's reason for a refusal has.
+/// Bound on the length of a state, longer than the kernel's reason for a refusal.
 const LONGEST_STATE: usize = 400;
 
 /// Values that a setting may have.
@@ -82,7 +82,7 @@ fn setting(path: &str) -> Option<Setting> {
     Some(Setting { check, values, wanted })
 }
 
-/// Why the doctor has not made this change; `None` where it may have.
+/// Returns why the doctor cannot have made this change; `None` where it may have.
 pub fn refusal(change: &Change) -> Option<String> {
     let named = change.path.escape_default();
     let Some(setting) = setting(&change.path) else {

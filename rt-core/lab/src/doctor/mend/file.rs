@@ -30,7 +30,7 @@ pub enum State {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Change {
     pub check: String,
-    /// Without the leading slash.
+    /// Path without the leading slash.
     pub path: String,
     /// Start time of a thread whose cores were changed, so that another thread of that number does not get them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -63,7 +63,7 @@ fn boot() -> String {
 }
 
 impl Changes {
-    /// Those that are not met, not applied yet.
+    /// Plans the settings that are not met; none is applied yet.
     pub fn planned(tunables: &[Tunable]) -> Self {
         let open = tunables.iter().filter(|t| !t.is_met());
         Self {
@@ -169,7 +169,7 @@ impl Changes {
         self.changes.iter().any(refused)
     }
 
-    /// Nothing of it is in force, or the PC was restarted since.
+    /// Returns whether nothing of it is in force, or the PC was restarted since.
     pub fn is_undone(&self) -> bool {
         let done = |c: &Change| matches!(c.state, State::Undone | State::Refused(_));
         self.boot != boot() || self.changes.iter().all(done)
@@ -195,7 +195,7 @@ impl Changes {
     }
 }
 
-/// Text of a regular file that no other user could have written, and the file.
+/// Reads the text of a regular file that no other user could have written, and returns both.
 fn own_text(path: &Path, is_written: bool) -> io::Result<(String, File)> {
     let flags = libc::O_NOFOLLOW | libc::O_NONBLOCK;
     let file = File::options()
