@@ -16,8 +16,8 @@ mod state;
 pub use on_line::step_on_line;
 pub use state::{ChainOutput, ChainParameters, ChainState, Touch};
 
-/// A stuck shaft is never softer than this, unless the operator set it so: the stiffest that every hand holds
-/// with three ticks of delay (`tests/force_envelope.rs`).
+/// Least stiffness of a stuck shaft, unless the operator set less: the stiffest that every hand holds with three ticks
+/// of delay (`tests/force_envelope.rs`).
 pub const SOFTEST_STICK_N_PER_M: f64 = 1500.0;
 
 /// The tip in one tick, against its path.

@@ -5,12 +5,12 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A turn counts when it follows the last one within this time: a swing of 9 Hz. The tremor of a hand lies at 8 to 12
-/// Hz, but its swings against a stuck shaft are shorter than what counts.
+/// Time within which a turn follows the last one to count: a swing of 9 Hz. The tremor of a hand lies at 8 to 12 Hz,
+/// but its swings against a stuck shaft are shorter than what counts.
 const QUICK_S: f64 = 0.055;
 /// Quick turns in a row that count as a shake: one and a half swings.
 const TURNS: u32 = 3;
-/// A turn is a way back of so many encoder steps.
+/// Encoder steps of the way back that makes a turn.
 const STEPS: f64 = 1.5;
 
 /// Turns of one tip along its path.

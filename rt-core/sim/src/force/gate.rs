@@ -52,8 +52,7 @@ pub struct GateState {
 pub struct GateInput {
     /// Wrench of the force law, before the force scale.
     pub wanted: Wrench,
-    /// The part of its force that is the same everywhere and at all times (`F_G`): what it gives on the way up it takes
-    /// on the way down.
+    /// Constant part of its force (`F_G`): what it gives on the way up it takes on the way down.
     pub constant_n: Vector3<f64>,
     /// Energy in the springs of the model.
     pub stored_j: f64,

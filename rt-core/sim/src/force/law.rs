@@ -33,9 +33,9 @@ pub struct ForceInput {
     pub shaft_friction_n: f64,
     /// Phase of eq. 6.
     pub phase: Phase,
-    /// The membrane in front is open.
+    /// Set while the membrane in front is open.
     pub punctured: bool,
-    /// The tip is in the tissue proper: some membrane is open, or there is none.
+    /// Set while the tip is in the tissue proper: some membrane is open, or there is none.
     pub guided: bool,
     /// Force of the deformed tissue at the tip; `None` where the model has none.
     pub answer: Option<TissueForce>,

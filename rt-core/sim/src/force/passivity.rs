@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::settings::{Problem, Problems};
 
-/// Latenesses that are booked: 0 to 3 ticks.
+/// Number of delays that are accounted for: 0 to 3 ticks.
 pub const DELAYS: usize = 4;
 
 /// Settings of the energy account.

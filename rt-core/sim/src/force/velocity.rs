@@ -81,8 +81,8 @@ impl VelocityEstimator {
     }
 }
 
-/// Roundings of a comparison with the band are at most so many of the positions' own. Each has three of its own, and
-/// each of the bounds below five.
+/// Largest rounding error of a comparison with the band, over the positions' own. Each has three of its own, and each
+/// of the bounds below five.
 const ROUNDINGS: f64 = 64.0 * f64::EPSILON;
 
 /// Slopes that pass each sample, so far, within a width.
@@ -92,7 +92,7 @@ struct Slopes {
 }
 
 impl Slopes {
-    /// One that is infinite passes nothing, not even the newest sample.
+    /// Range of all slopes. An infinite slope passes nothing, not even the newest sample.
     const ALL: Self = Slopes {
         least: f64::MIN,
         most: f64::MAX,

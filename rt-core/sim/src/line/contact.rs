@@ -27,9 +27,9 @@ pub(super) type Scratch = sets::Scratch<LINE_BLOCKS>;
 
 /// Solutions in one tick at most: the tip advances, a membrane gives way, the tip advances again.
 const MAX_PASSES: u32 = 12;
-/// A gap at the tip that another pass would be wasted on.
+/// Gap at the tip below which another pass would be wasted.
 const CLOSED_M: f64 = 1e-7;
-/// The line is not followed further than this from its entry.
+/// Largest distance from its entry to which a line is followed.
 const FURTHEST_M: f64 = 10.0;
 
 /// Position of the needle in one tick.
@@ -120,21 +120,21 @@ pub(super) fn advance(
     model: &LineModel,
     state: &mut LineState,
     input: &LineInput,
-    company: &mut impl OtherNeedles,
+    others: &mut impl OtherNeedles,
 ) -> LineOutput {
     let tip_m = input.tip_m.clamp(-FURTHEST_M, FURTHEST_M);
     let input = &LineInput { tip_m, ..*input };
     let mut output = LineOutput::default();
     if !has_met(model, state, tip_m) {
-        company.rest();
+        others.rest();
         stay_outside(model, state, &mut output);
         return output;
     }
     let mut before = None;
     for _ in 0..MAX_PASSES {
         let front = model.front(&state.tip);
-        company.begin(model, state, tip_m, front.membrane);
-        let gap_m = company.solve(model, state, input, front.limit_n, &mut output);
+        others.begin(model, state, tip_m, front.membrane);
+        let gap_m = others.solve(model, state, input, front.limit_n, &mut output);
         output.held_by = front.membrane;
         let is_pushed = state.tip.force_n >= front.limit_n;
         if let (Some(layer), true) = (front.membrane, state.tip.force_n > 0.0) {
@@ -162,7 +162,7 @@ pub(super) fn advance(
         before = (state.tip.material_m < front.to_m).then_some(place);
     }
     slip(model, state, tip_m);
-    company.end();
+    others.end();
     finish(model, state, &mut output);
     output
 }

@@ -20,7 +20,7 @@ pub(super) struct ExternalDisplacement {
     to_m: Vec<f64>,
     /// Within so many ticks.
     ticks: u32,
-    /// Some of it is not zero, or was in the last tick.
+    /// Set while some displacement is not zero, or was not in the last tick.
     is_on: bool,
     /// Displacement at the tip, m.
     pub at_tip_m: f64,

@@ -37,7 +37,7 @@ pub(super) struct Memory {
     whole_n: [f64; 2],
     /// Displacement of each row by what the past leaves.
     pub offset_m: Vec<f64>,
-    /// The part of that by which the body as a whole is displaced.
+    /// Part of that which displaces the body as a whole.
     pub whole_offset_m: f64,
     sum: Vec<f64>,
     whole_sum_n: f64,

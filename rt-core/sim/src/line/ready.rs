@@ -29,13 +29,13 @@ pub use source::LineSource;
 pub use track::Track;
 use way::{LineLayers, layer};
 
-/// The needle is on a line whose entry it would meet so far from it, and whose direction is that close to its own.
+/// Largest distance of a line's entry from the needle, and angle between both, at which the needle is on the line.
 const BESIDE_M: f64 = 1e-3;
 const TILT_RAD: f64 = 0.02;
-/// A stuck shaft is felt no stiffer: by trial with every hand of the envelope, links up to three ticks late, tissue up
-/// to 1.7 MPa (docs/stability.md, 19). The paper's gland has 0.42 N/mm.
+/// Largest stiffness of a stuck shaft on the hand: by trial with every hand of the envelope, links up to three ticks
+/// late, tissue up to 1.7 MPa (docs/stability.md, 19). The paper's gland has 0.42 N/mm.
 const STIFFEST_N_PER_M: f64 = 1000.0;
-/// Bone is felt like a spring of that: the stiffest that every hand of the envelope holds over a slow link.
+/// Stiffness of bone: the stiffest that every hand of the envelope holds over a slow link.
 const BONE_N_PER_M: f64 = STIFFEST_N_PER_M;
 /// Slices of work between two looks at whether the line is still wanted.
 const SLICES: usize = 8;

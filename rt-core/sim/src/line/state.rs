@@ -52,7 +52,7 @@ pub struct LineOutput {
     pub sweeps: u32,
     /// Largest correction that is left.
     pub residual_m: f64,
-    /// The input was not finite: the output before it is repeated.
+    /// Set where the input was not finite: the output before it is repeated.
     pub is_refused: bool,
 }
 

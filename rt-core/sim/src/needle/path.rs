@@ -3,7 +3,7 @@
 use super::layers::{Layer, LayerKind, Layers};
 use serde::{Deserialize, Serialize};
 
-/// Membranes and tissues that one path can pass. More are felt as part of the last.
+/// Largest number of membranes and tissues that one path can pass. More count as part of the last.
 pub const MAX_SECTIONS: usize = 8;
 
 /// A stretch of the path in one layer.
@@ -37,7 +37,7 @@ pub struct Front {
     pub membrane: Layer,
     /// The layer that the tip cuts.
     pub tissue: Layer,
-    /// The innermost membrane is open, or there is none.
+    /// Set while the innermost membrane is open, or where there is none.
     pub open: bool,
 }
 

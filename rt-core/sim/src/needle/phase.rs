@@ -18,7 +18,7 @@ pub struct NeedleParameters {
     pub static_speed_m_per_s: f64,
     /// `K_ret`: part of the tip's motion that the tissue follows on the way out.
     pub retraction_ratio: f64,
-    /// A punctured membrane closes when the tip is this far back before the place where contact began.
+    /// Distance of the tip before the place where contact began, at which a punctured membrane closes.
     pub hysteresis_m: f64,
     /// Slower than this along the path, the needle holds: `v.r = 0` for a velocity with noise. Above the
     /// noise of the estimator, or the noise is rectified into drift.
@@ -116,7 +116,7 @@ pub struct NeedleOutput {
 pub struct NeedleState {
     /// Phase of the last tick.
     pub phase: Phase,
-    /// The membrane is open.
+    /// Set while the membrane is open.
     pub punctured: bool,
     /// Number of membranes that gave way.
     pub punctures: u32,

@@ -8,7 +8,7 @@ use crate::line::MAX_STATIONS;
 use crate::line::beam::MAX_ACROSS;
 use crate::tissue::PackedField;
 
-/// The needle that moves, and those that stay in.
+/// Number of lines: the moving needle's, and those of the needles that stay in.
 const LINES: usize = 1 + MAX_LEFT;
 /// Rows of a line at most, in the order of the columns of its body.
 const ROWS: usize = 2 * (MAX_STATIONS + MAX_ACROSS);

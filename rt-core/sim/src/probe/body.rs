@@ -26,7 +26,7 @@ pub struct BodyProbe {
     parts: usize,
 }
 
-/// A body is added up over several ticks, so many elements in each where that takes no more ticks than this: the
+/// Elements of the body that are added up in each tick, where that takes no more ticks than the next constant: the
 /// picture is late by them, the force is not.
 const ELEMENTS_A_TICK: usize = 2_048;
 const MOST_PARTS: usize = 14;

@@ -9,7 +9,7 @@ const ROUNDS: usize = 6;
 /// Legs of the way downhill, at most, and sweeps in each.
 const LEGS: usize = 6;
 const SWEEPS: usize = 8;
-/// A gap that is deeper is not closed, m.
+/// Depth of a gap up to which it counts as closed, m.
 const CLOSED_M: f64 = 1e-10;
 /// Addition to the diagonal, over its mean: pads share nodes of a coarse body.
 const RIDGE: f64 = 1e-5;

@@ -6,19 +6,20 @@ use crate::scene::{Lattice, Scene};
 use crate::tissue::fem::batch::BatchModel;
 use stylet_anatomy::{Beyond, Organ};
 
-/// Faces of cells are staircases: each is moved to the mean of those that face the same way and lie so close, m.
+/// Radius for smoothing, m: faces of cells are staircases, so each is moved to the mean of those near it that face the
+/// same way.
 const SMOOTHED_M: f64 = 2.5e-3;
-/// The canal through which the probe comes in is closed in a scene, and wide enough in the patient: what is so close to
-/// that end of the hollow resists nothing.
+/// Length of the canal through which the probe comes in: closed in a scene, but wide enough in the patient, so that the
+/// wall this close to that end resists nothing.
 const CANAL_M: f64 = 12e-3;
-/// The probe gets so far beyond the target at either end, m.
+/// Reach of the probe beyond the target at either end, m.
 const BEYOND_TARGET_M: f64 = 20e-3;
 
-/// Pads are so far apart in a run.
+/// Distance between pads in a run.
 pub const PADS_APART_M: f64 = 5e-3;
 /// Points, at most: between two of them a flat wall is in a shaft of 10 mm by 0.07 mm.
 const POINTS_APART_M: f64 = 2.3e-3;
-/// A point is the mean of the faces so far around it, those close to it more than the others.
+/// Radius around a point, of whose faces it is the mean; those close to it count more than the others.
 const AROUND_M: f64 = 5.5e-3;
 
 /// Why a scene has no wall for the probe.

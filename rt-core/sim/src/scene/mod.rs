@@ -31,7 +31,7 @@ pub use tissue_kind::TissueKind;
 
 /// Most cells along one axis.
 pub const MAX_CELLS_PER_AXIS: usize = 1024;
-/// Elements that a probe is solved for in at most: a thread takes some hundred megabytes for so many.
+/// Largest number of elements that a probe is solved for in: a thread takes some hundred megabytes for so many.
 const MOST_CELLS: usize = 1_000_000;
 /// Most elements in a scene.
 pub const MAX_ELEMENTS: usize = 4_000_000;

@@ -1,6 +1,6 @@
 //! The smallest volume that three links of an element span, of displacements around a place.
 
-/// Elements to each side that are looked at: the patch that a tip presses, and what lies before it.
+/// Number of elements to each side that are examined: the patch that a tip presses, and those before it.
 pub(super) const REACH: usize = 4;
 const WIDTH: usize = 2 * REACH + 1;
 

@@ -14,7 +14,7 @@ pub struct Deformed<'a> {
     pub scale: f32,
     /// A displacement of the whole body, on top of that.
     pub carried: Carried<'a>,
-    /// No corner of an element is farther from the element's box at rest, in elements.
+    /// Largest distance of an element's corner from the element's box at rest, in elements.
     pub reach: f32,
 }
 

@@ -119,7 +119,7 @@ vectorised! {
     }
 }
 
-/// Elements that are added up at once: their sum stays in the first cache.
+/// Number of elements that are added up at once: their sum stays in the first cache.
 const BLOCK: usize = 2048;
 
 /// Replaces `sum` by the sum of factor times field for each factor other than zero.

@@ -5,7 +5,7 @@ use crate::limits::Limits;
 
 use serde::{Deserialize, Serialize};
 
-/// Farthest from rest that a held element is followed, in elements; f32 resolves the tolerance up to here.
+/// Largest distance from rest to which a held element is followed, in elements; f32 resolves the tolerance up to here.
 pub const REACH: f64 = 2048.0;
 
 /// An element kept at a position of the scene frame during a step.
@@ -57,9 +57,9 @@ pub struct StepReport {
     /// Elements that the solver moved, besides recovery; the held one counts. ChainMail counts whole stretches of a
     /// run, from the first that moved to the last.
     pub moved: u32,
-    /// The residual is within the model's tolerance.
+    /// Set where the residual is within the model's tolerance.
     pub converged: bool,
-    /// No element is farther from rest, in elements.
+    /// Largest distance of an element from rest, in elements.
     pub max_displacement: f32,
     /// Outcome for the held element.
     pub held: HeldOutcome,

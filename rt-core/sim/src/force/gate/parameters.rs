@@ -23,7 +23,7 @@ pub struct GateParameters {
     pub engage_below_n: f64,
     /// Ticks over which the force comes in.
     pub ramp_in_ticks: u32,
-    /// The ramp out keeps to its ticks even where that is steeper than the slew limit.
+    /// Ticks of the ramp out, also where that is steeper than the slew limit.
     pub ramp_out_ticks: u32,
     /// Time constant of the motors' warming, for the limit on continuous force.
     pub thermal_time_s: f64,

@@ -15,7 +15,7 @@ use stylet_settings::MAX_LEFT_NEEDLES;
 
 mod gradients;
 
-/// Sets that are tried before the sweeps take over.
+/// Number of sets that are tried before the sweeps take over.
 const MOST_SETS: u32 = 10;
 /// Products with the compliance for each set.
 const MOST_PRODUCTS: u32 = 60;

@@ -8,8 +8,8 @@ use crate::line::model::LineModel;
 use crate::line::rows::dot;
 use crate::line::state::{LineOutput, LineState};
 
-/// A tip that is so far from its place will be solved for at another: until then forces are found to so many times the
-/// tolerance.
+/// Distance of the tip from its place beyond which it will be solved for at another: until then forces are found to so
+/// many times the tolerance.
 const FAR_M: f64 = 1e-6;
 const FAR: f64 = 20.0;
 

@@ -4,7 +4,7 @@ use super::HandLine;
 use crate::line::Line;
 use serde::{Deserialize, Serialize};
 
-/// A needle within its own radius of a track is in it, m (18 G).
+/// Radius of a needle, m (18 G): within it of a track a needle is in it.
 const WITHIN_M: f64 = 0.635e-3;
 
 /// Track that a needle has cut, with the membranes that it went through.

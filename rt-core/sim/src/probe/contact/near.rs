@@ -6,10 +6,11 @@ use crate::probe::columns::ReadyProbe;
 use crate::probe::shape::ProbePose;
 use nalgebra::Vector3;
 
-/// Points farther from the probe than that are not looked at on the way to a pose, and in a pass.
+/// Distance from the probe up to which points are examined on the way to a pose, and in a pass.
 const REACH_M: f64 = 4e-3;
 const NEAR_M: f64 = 0.15e-3;
-/// A point is pressed from the side of the hollow: the probe's surface there faces into the wall.
+/// Least cosine between the probe's surface and the wall's normal at a pressed point: it is pressed from the side of
+/// the hollow.
 const FACING: f64 = 0.2;
 /// Angle by which a force may turn before the problem is condensed again.
 const OTHERWISE: f64 = 0.03;

@@ -13,7 +13,7 @@ use crate::tissue::{HeldOutcome, StepReport};
 
 /// Tries after the whole way; each a quarter of the one before.
 const SHORTER_TRIES: i32 = 3;
-/// The first of them goes half of what was asked, and no farther than this, in elements.
+/// Longest first step, in elements: half of the way that was asked, but no farther.
 const FIRST_SHORTER: f32 = 1.0;
 
 /// Moves the held elements toward their target, as far as sweeps can follow; `grip` then has the distance.

@@ -23,7 +23,7 @@ pub struct ChainMail {
     part_of_run: Vec<u32>,
     /// Each part, whether something in it is fixed.
     part_is_fixed: Vec<bool>,
-    /// The processor has AVX2.
+    /// Set where the processor has AVX2.
     pub(crate) vectors: bool,
 }
 

@@ -5,7 +5,7 @@ use super::loops::Loops;
 use super::spans::Span;
 use super::sweep::{Inner, Pass};
 
-/// Violations up to so many slacks count as none: the links' stretch and shear may each be off by one.
+/// Slacks up to which a violation counts as none: the links' stretch and shear may each be off by one.
 const CLEAN: f32 = 2.0;
 
 impl Pass<'_> {

@@ -95,7 +95,7 @@ fn advance_fields<T>(grid: &Grid, alpha: T, p: &Field<T>, q: &Field<T>, u: &mut 
 pub(super) struct Goal {
     /// Norm of the residual that is to be met.
     pub residual: f64,
-    /// The one at which no second cycle is begun.
+    /// Residual below which no second cycle is begun.
     pub rough: f64,
     pub cycles: u32,
     /// Cycles that a step may take at most.

@@ -5,11 +5,11 @@ use super::multigrid::Multigrid;
 use super::real::Real;
 use super::sweep::{Field, touched, zeros};
 
-/// Directions that a patch can be moved in and still answer by superposition.
+/// Number of directions that a patch can be moved in and still answer by superposition.
 pub(super) const DIRECTIONS: usize = 3;
-/// A direction is new if this part of the displacement is outside those known.
+/// Part of the displacement outside the known directions that makes a new one.
 pub(super) const NEW_DIRECTION: f64 = 1e-6;
-/// A patch is pushed the same way up to an angle of this cosine.
+/// Least cosine between two directions that count as the same.
 pub(super) const SAME_WAY: f64 = 0.9;
 
 /// Lowest and one past the highest cell of a patch in the finest grid, along each axis.

@@ -7,7 +7,7 @@ use super::real::Real;
 use super::sweep::Field;
 use crate::simd::{Simd, vectorised};
 
-/// A patch is the next one up to so many cells away.
+/// Largest distance of the next patch, in cells.
 const NEXT_PATCH: isize = 2;
 
 /// Guesses the next response: the displacement of `before`, per metre, moved along to the patch `cells`. Deep inside a

@@ -5,7 +5,7 @@
 
 use super::real::Real;
 
-/// Stretches of lines are multiples of this long, so that loops over them have no remainder.
+/// Length of which stretches of lines are multiples, so that loops over them have no remainder.
 pub(super) const LANES: usize = 16;
 
 pub(super) type Lane<T> = [T; LANES];

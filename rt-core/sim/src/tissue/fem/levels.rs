@@ -8,7 +8,7 @@ use super::real::Real;
 use super::sweep::{Field, LineOp, Planes, sweep, zeros};
 use crate::simd::Simd;
 
-/// Below so many free nodes the coarsest level is solved directly.
+/// Number of free nodes below which the coarsest level is solved directly.
 const DIRECT_NODES: usize = 30;
 
 /// Cells that a level is made from, in f64.

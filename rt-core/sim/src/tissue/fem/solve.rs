@@ -9,7 +9,7 @@ use super::real::Real;
 use super::state::FemState;
 use crate::tissue::{HeldOutcome, REACH};
 
-/// A direction that may come to be is prepared if this part of the displacement is outside those known.
+/// Part of the displacement outside the known directions, from which a direction to come is prepared.
 const EXPECTED_DIRECTION: f64 = 0.02;
 /// Tolerances of residual above which cycles after the first are done where few are allowed: the rest is then a few
 /// thousandths of the displacement, and can wait for the next ticks.

@@ -12,9 +12,9 @@ pub struct FemState<T = f32> {
     /// Displacement of the element centres, in elements.
     pub(super) displacement: [Vec<f32>; 3],
     pub(super) max_displacement: f32,
-    /// The patch that is held.
+    /// Grip on the held patch.
     pub(super) grip: Grip<T>,
-    /// The one that is prepared, or the one held before.
+    /// Grip on the patch that is prepared, or on the one held before.
     pub(super) next: Grip<T>,
     /// The last step took no cycle, and nothing has been prepared since.
     pub(super) has_time: bool,

@@ -1,6 +1,6 @@
 //! Layout of a window's nodes in memory.
 
-/// Numbers of a row that are worked on at once.
+/// Number of values of a row that are processed at once.
 pub(super) const ROW: usize = 8;
 
 /// Grid with as many nodes along each edge; rows along x are padded to whole [`ROW`]s.

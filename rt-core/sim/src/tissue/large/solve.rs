@@ -8,13 +8,13 @@ use super::precondition::Laplacian;
 use crate::simd::Simd;
 
 const KEPT: usize = 5;
-/// No centre moves farther in a step, in elements.
+/// Largest motion of a centre in a step, in elements.
 const FARTHEST: f32 = 0.3;
-/// A step is too long if it ends on a slope up that is that part of the one down, or if the gradient's square has grown
-/// so.
+/// Slope up at the end of a step, over that down at its start, or growth of the gradient's square, from which a step is
+/// too long.
 const OVERSHOT: f32 = 0.7;
 const GREW: f32 = 4.0;
-/// A window rests where the gradient is that part of the load: it is within about a thousandth of an element then.
+/// Gradient over load at which a window rests: it is within about a thousandth of an element then.
 const RESTS: f32 = 5e-4;
 
 #[derive(Clone, Debug)]

@@ -20,7 +20,7 @@ pub use solve::{BatchState, Progress};
 
 use crate::simd::{Eight, LANES};
 
-/// Loads that are solved at once.
+/// Number of loads that are solved at once.
 pub const LOADS: usize = LANES;
 
 /// x, y, z of a node, each for every load.

@@ -34,7 +34,8 @@ pub struct Progress {
 /// Eight answers in the making.
 #[derive(Clone, Debug)]
 pub struct BatchState<T = f32> {
-    /// The residual is the right-hand side of the finest, its preconditioned one the answer there.
+    /// Work space of each level: the residual is the right-hand side of the finest, its preconditioned one the answer
+    /// there.
     stages: Vec<Stage<T>>,
     work: TwoPlanes<T>,
     pub(super) u: Vec<Node<T>>,
@@ -217,7 +218,7 @@ impl<T: Real> PlaneOp<T> for Product<'_, T> {
     }
 }
 
-/// Nodes whose products are summed before the sum continues in f64.
+/// Number of nodes whose products are summed before the sum continues in f64.
 const SUMMED: usize = 256;
 
 #[inline(always)]
