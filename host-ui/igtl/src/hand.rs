@@ -86,14 +86,8 @@ impl Hand {
         self.options.as_ref().is_some_and(|options| options.device == device)
     }
 
-    /// Returns the request for a transform; `None` if the goal is unchanged.
-    pub fn take(
-        &mut self,
-        received: &Received,
-        patient: &PatientFrame,
-        now: Instant,
-    ) -> Result<Option<ProbeMove>, Refusal> {
-        let name = self.held.name();
+    /// Returns how a transform of this name moves the hand, or why it may not.
+    pub fn agreed(&self, device: &str) -> Result<&HandOptions, Refusal> {
         let options = self.options.as_ref().ok_or_else(|| Refusal {
             code: 5,
             name: "Access denied",
@@ -101,13 +95,26 @@ impl Hand {
                     to let one move the probe"
                 .to_owned(),
         })?;
-        if options.device != received.device {
+        if options.device != device {
+            let name = self.held.name();
             return Err(Refusal {
                 code: 4,
                 name: "Not found",
                 words: format!("the {name} is moved by the transform \"{}\" alone", options.device),
             });
         }
+        Ok(options)
+    }
+
+    /// Returns the request for a transform; `None` if the goal is unchanged.
+    pub fn take(
+        &mut self,
+        received: &Received,
+        patient: &PatientFrame,
+        now: Instant,
+    ) -> Result<Option<ProbeMove>, Refusal> {
+        let options = self.agreed(&received.device)?;
+        let name = self.held.name();
         let tool = frame::tool(patient, &received.columns).ok_or_else(|| Refusal {
             code: 10,
             name: "Configuration error",

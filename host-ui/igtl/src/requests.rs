@@ -60,18 +60,20 @@ impl Requests {
     }
 
     fn take(&mut self, link: &mut Link, server: &Server, received: &Received) -> Result<(), Refusal> {
-        let scene = match (link.scene(), link.status()) {
-            (Some(scene), LinkStatus::Live) => scene,
-            (_, LinkStatus::Absent { why }) => return Err(not_ready(why)),
-            _ => return Err(not_ready("rt-core is silent".to_owned())),
-        };
-        let patient = scene.header.patient();
         let [needle, probe] = &mut self.hands;
         let hand = if probe.is_moved_by(&received.device) {
             probe
         } else {
             needle
         };
+        // Whether or not a core answers at this moment.
+        hand.agreed(&received.device)?;
+        let scene = match (link.scene(), link.status()) {
+            (Some(scene), LinkStatus::Live) => scene,
+            (_, LinkStatus::Absent { why }) => return Err(not_ready(why)),
+            _ => return Err(not_ready("rt-core is silent".to_owned())),
+        };
+        let patient = scene.header.patient();
         if let Some(goal) = hand.take(received, &patient, Instant::now())? {
             server.has_moved(received.from);
             let sent = link.send(&hand.held().moved(goal));
