@@ -32,6 +32,8 @@ use stylet_shm_schema::*;
 const UNWATCHED: Patience = Patience::AtLeast(60.0);
 const POLL_EVERY: Duration = Duration::from_millis(5);
 const FIND_LIMIT: Duration = Duration::from_secs(3);
+/// A core that somebody starts at the same time is there by then.
+const APPEAR_LIMIT: Duration = Duration::from_secs(1);
 const START_LIMIT: Duration = Duration::from_secs(20);
 const LOAD_LIMIT: Duration = Duration::from_secs(60);
 
@@ -248,7 +250,10 @@ fn find_core(
     device: Option<&str>,
     interrupted: &Interrupt,
 ) -> Result<(), ProcedureError> {
-    if wait(link, interrupted, FIND_LIMIT, |link| Ok(is_ready(link)))? {
+    let begun = Instant::now();
+    let is_alone = |link: &Link| begun.elapsed() > APPEAR_LIMIT && link.instance().epoch().is_none();
+    let looked = |link: &mut Link| Ok(is_ready(link) || is_alone(link));
+    if wait(link, interrupted, FIND_LIMIT, looked)? && is_ready(link) {
         return Ok(());
     }
     let missing = match link.status() {
@@ -329,7 +334,7 @@ fn perform(
             };
             lines.say(format!("{seconds:7.2} s  {which}, step: {}", run.step().name()));
         }
-        seen.take(link, begun);
+        seen.take(link, begun, &lines);
         seen.most_left(link);
         // The first plan is published before stabilising needles move the target.
         if run.stabilising().is_none()
@@ -339,10 +344,8 @@ fn perform(
             seen.motion.take(run.needle(), scene, snapshot);
         }
         for number in run.lost().iter().skip(seen.lost.len()) {
-            lines.say(format!(
-                "note: seed {} is lost: the tip was outside the tissue",
-                number + 1
-            ));
+            let seed = number + 1;
+            lines.say(format!("note: seed {seed} is lost: the tip was outside the tissue"));
         }
         seen.lost = run.lost().to_vec();
         match status {
@@ -374,7 +377,7 @@ impl Seen {
         }
     }
 
-    fn take(&mut self, link: &mut Link, begun: Instant) {
+    fn take(&mut self, link: &mut Link, begun: Instant, lines: &Lines) {
         self.records.extend(link.take_records());
         for event in link
             .events()
@@ -385,15 +388,12 @@ impl Seen {
             let kind = EventKind::from_number(event.kind);
             self.punctured |= kind == Some(EventKind::Puncture);
             let what = kind.map_or_else(String::new, |k| format!("{k:?}"));
-            println!(
-                "{:7.2} s  {what} {}",
-                begun.elapsed().as_secs_f64(),
-                stylet_base::format::printable_line(&event.text.read())
-            );
+            let text = stylet_base::format::printable_line(&event.text.read());
+            let seconds = begun.elapsed().as_secs_f64();
+            lines.say(format!("{seconds:7.2} s  {what} {text}"));
         }
         self.last_event = link.events().back().map(|e| e.sequence).or(self.last_event);
-        let snapshot = link.snapshot().filter(|_| !self.punctured);
-        if let Some(s) = snapshot {
+        if let Some(s) = link.snapshot().filter(|_| !self.punctured) {
             self.displacement_before_puncture_m = self.displacement_before_puncture_m.max(s.header.max_displacement_m);
         }
     }
