@@ -35,6 +35,8 @@ use writer::{Item, Totals};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 const FIND_LIMIT: Duration = Duration::from_secs(3);
+/// A core that somebody starts at the same time is there by then.
+const APPEAR_LIMIT: Duration = Duration::from_secs(1);
 /// What is handed to the writer ahead of it, beyond which the link's memory is used.
 const ITEMS_AHEAD: usize = 32;
 /// Two snapshots that are kept and are farther apart than they should be by this have a gap between them, s.
@@ -98,6 +100,9 @@ fn find_core(link: &mut Link, stop: impl Fn() -> bool) -> Result<(), RecordError
             link.take_records();
             link.take_second_records();
             return Ok(());
+        }
+        if begun.elapsed() > APPEAR_LIMIT && link.instance().epoch().is_none() {
+            break;
         }
         std::thread::sleep(POLL_EVERY);
     }
