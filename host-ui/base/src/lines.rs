@@ -24,6 +24,11 @@ impl Lines {
         Self::to(std::io::stdout())
     }
 
+    /// To standard error.
+    pub fn to_stderr() -> Self {
+        Self::to(std::io::stderr())
+    }
+
     fn to(mut out: impl Write + Send + 'static) -> Self {
         let (lines, waiting) = sync_channel::<String>(WAITING);
         let write = move || {

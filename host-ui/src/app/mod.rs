@@ -35,6 +35,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use stylet_base::format;
 use stylet_base::job::Job;
+use stylet_base::lines::Lines;
 use stylet_controllers::{Controllers, ProbeWish, SLOW, System, Wish};
 use stylet_files::Image;
 use stylet_host::core_args::SceneChoice;
@@ -133,7 +134,7 @@ pub struct App {
     waiting: Vec<Waiting>,
     controllers: Controllers,
     pause: bool,
-    count_frames: bool,
+    frame_lines: Option<Lines>,
     patch: Option<patch::Patch>,
     frames: frames::Frames,
     /// Processor core that this program leaves to the force loop.
@@ -257,7 +258,7 @@ impl App {
                 Controllers::none()
             },
             pause: options.pause,
-            count_frames: options.count_frames,
+            frame_lines: options.count_frames.then(Lines::to_stderr),
             patch: options.patch.then(patch::Patch::default),
             frames: frames::Frames::new(Instant::now()),
             left_core: Left::default(),
@@ -373,9 +374,10 @@ impl eframe::App for App {
             uploaded_bytes: asked.uploaded_bytes - driver.uploaded_bytes,
         };
         let counted = self.frames.count(Instant::now(), &self.shown.cost);
-        if let Some((rate_hz, mean)) = counted.filter(|_| self.count_frames) {
+        if let (Some((rate_hz, mean)), Some(lines)) = (counted, &self.frame_lines) {
             let [ours_ms, driver_ms] = [mean.cpu_us, mean.driver_us].map(|us| us * 1e-3);
-            eprintln!("host-ui: {rate_hz:.1} frames/s, {ours_ms:.2} ms a frame, {driver_ms:.2} in the driver");
+            let words = format!("{rate_hz:.1} frames/s, {ours_ms:.2} ms a frame, {driver_ms:.2} in the driver");
+            lines.say(format!("host-ui: {words}"));
         }
         ctx.request_repaint_after(match self.shown.status {
             LinkStatus::Live if self.pause => LIVE_FRAME,
