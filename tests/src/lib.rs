@@ -2,6 +2,7 @@
 
 pub mod hand;
 pub mod phantom;
+pub mod random;
 pub mod rehearsal;
 pub mod stopped;
 pub mod window_process;
@@ -102,7 +103,7 @@ impl Core {
     /// Waits until it ends by itself.
     pub fn ended(&mut self, limit: Duration) -> Option<std::process::ExitStatus> {
         let mut status = None;
-        until(limit, || {
+        until(Duration::from_secs(5), || {
             status = self.child.try_wait().expect("ours");
             status.is_some()
         });
@@ -207,6 +208,20 @@ pub fn ask(link: &mut Link, request: &Request) -> Result<u64, String> {
     } else {
         Err(answer.text)
     }
+}
+
+/// The clock of the records.
+pub fn now_ns() -> u64 {
+    let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: the call only writes to `now`.
+    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &raw mut now) };
+    now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
+}
+
+/// A number of a variable of the environment, which makes a test longer, or the everyday one.
+pub fn repeats(variable: &str, everyday: u64) -> u64 {
+    let asked = std::env::var(variable).ok().and_then(|n| n.parse().ok());
+    asked.unwrap_or(everyday)
 }
 
 /// A display without a screen, for windows; closed when dropped.

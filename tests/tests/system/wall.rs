@@ -11,24 +11,17 @@ use stylet_host::link::LinkStatus;
 use stylet_ports::{self as service, Node};
 use stylet_shm_schema::{Instance, TickRecord};
 use stylet_tests::hand::{Insertion, assert_undisturbed, missed};
+use stylet_tests::random::Random;
 use stylet_tests::witness::where_the_machine_runs;
-use stylet_tests::{Core, left_behind, program, scratch, until};
+use stylet_tests::{Core, left_behind, program, repeats, scratch, until};
 
-/// More of the same: `make wall` sets them.
-fn repeats(variable: &str, everyday: u64) -> u64 {
-    std::env::var(variable)
-        .ok()
-        .and_then(|n| n.parse().ok())
-        .unwrap_or(everyday)
-}
-
-fn send(signal: libc::c_int, process: u32) {
+pub fn send(signal: libc::c_int, process: u32) {
     // SAFETY: plain numbers; the process is a child of a child of ours.
     unsafe { libc::kill(process as libc::pid_t, signal) };
 }
 
 /// The bridge of a core, once there is one other than `before`.
-fn bridge(core: u32, before: Option<u32>) -> Option<u32> {
+pub fn bridge(core: u32, before: Option<u32>) -> Option<u32> {
     let children = std::fs::read_to_string(format!("/proc/{core}/task/{core}/children")).ok()?;
     let mut children = children.split_whitespace().filter_map(|pid| pid.parse().ok());
     children.find(|&pid| {
@@ -159,32 +152,62 @@ impl Drop for Recorder {
     }
 }
 
-struct Random(u64);
+/// What a wild pointer of a host may damage.
+#[derive(Clone, Copy, Debug)]
+enum Damaged {
+    /// Mappings of which the names hold this.
+    Mapped(&'static str),
+    /// Every file that a host can open.
+    Opened,
+}
 
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+impl Damaged {
+    fn files(self, recorder: &Recorder, instance: &Instance) -> Vec<PathBuf> {
+        match self {
+            Self::Mapped(kind) => recorder.files(kind).into_iter().collect(),
+            Self::Opened => openable(instance),
+        }
     }
 }
 
-/// Writes eight random bytes at a time into what a host has mapped, as a wild pointer in it would, for `time`. How many.
-fn write_wildly(recorder: &Recorder, kind: &str, random: &mut Random, time: Duration) -> u64 {
+/// Files of the instance, in its folder and in shared memory.
+fn openable(instance: &Instance) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![instance.folder()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            match entry.file_type() {
+                Ok(kind) if kind.is_dir() => folders.push(entry.path()),
+                Ok(kind) if kind.is_file() => found.push(entry.path()),
+                _ => {}
+            }
+        }
+    }
+    let objects = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+    let own = objects.filter(|entry| entry.file_name().to_string_lossy().starts_with(&instance.prefix()));
+    found.extend(own.map(|entry| entry.path()).filter(|path| path.is_file()));
+    found
+}
+
+/// Writes eight random bytes at a time into what a host can damage, as a wild pointer in it would, for `time`. How many.
+fn write_wildly(
+    damaged: Damaged,
+    (recorder, instance): (&Recorder, &Instance),
+    random: &mut Random,
+    time: Duration,
+) -> u64 {
     let (begun, mut writes) = (Instant::now(), 0);
     while begun.elapsed() < time {
-        let files: Vec<PathBuf> = recorder.files(kind).into_iter().collect();
+        let files = damaged.files(recorder, instance);
         let looked = Instant::now();
         while !files.is_empty() && looked.elapsed() < Duration::from_millis(100) {
-            let path = &files[random.next() as usize % files.len()];
+            let path = &files[random.below(files.len())];
             let Ok(file) = File::options().write(true).open(path) else {
                 break;
             };
             let words = file.metadata().map_or(0, |about| about.len()) / 8;
-            if words > 0 {
-                let _ = file.write_at(&random.next().to_ne_bytes(), random.next() % words * 8);
+            if words > 0 || matches!(damaged, Damaged::Opened) {
+                let _ = file.write_at(&random.next().to_ne_bytes(), random.next() % words.max(1) * 8);
                 writes += 1;
             }
             std::thread::sleep(Duration::from_micros(500));
@@ -194,64 +217,81 @@ fn write_wildly(recorder: &Recorder, kind: &str, random: &mut Random, time: Dura
     writes
 }
 
+/// Damages what hosts share with a core; true where a bridge was replaced.
+fn assert_survives(damaged: Damaged, seed: u64) -> bool {
+    let mut core = Core::start();
+    drop(core.host());
+    let first = bridge(core.id(), None);
+    let recorder = Recorder::start(&core.instance);
+    let maps_all = until(Duration::from_secs(20), || {
+        damaged.files(&recorder, &core.instance).len() > 1 && recorder.files("").len() > 1
+    });
+    assert!(maps_all, "{:?}", recorder.files(""));
+    let mut random = Random(seed);
+    let time = Duration::from_millis(2500);
+    let writes = write_wildly(damaged, (&recorder, &core.instance), &mut random, time);
+    assert!(writes > 0, "{damaged:?} {seed}: nothing was written");
+    assert!(core.is_running(), "{damaged:?} {seed}: the core ended");
+    drop(recorder);
+    // A host finds its way by itself, and one that was there before gets the last 12 s again: the records are without a gap.
+    let mut link = core.host();
+    let has_state = until(Duration::from_secs(10), || {
+        link.poll();
+        link.state().is_some()
+    });
+    assert!(has_state, "{damaged:?} {seed}: no state");
+    let is_replaced = bridge(core.id(), None) != first;
+    let mut ticks: Vec<u64> = Vec::new();
+    let is_whole = until(Duration::from_secs(10), || {
+        let joined = Node::join_again(&core.instance).and_then(|node| Ok((service::records::subscriber(&node)?, node)));
+        let Ok((records, _node)) = joined.inspect_err(|why| println!("{why}")) else {
+            return false;
+        };
+        ticks.clear();
+        until(Duration::from_secs(2), || {
+            while let Some(batch) = records.receive() {
+                ticks.extend(batch.values().iter().map(|record: &TickRecord| record.tick));
+            }
+            ticks.len() > 2000
+        })
+    });
+    assert!(is_whole, "{damaged:?} {seed}: {} records", ticks.len());
+    let state = *link.state().expect("live");
+    let missing = ticks.windows(2).filter(|pair| pair[1] != pair[0] + 1).count();
+    assert_eq!(
+        (state.fault, state.records_lost, missing),
+        (0, 0, 0),
+        "{damaged:?} {seed}"
+    );
+    drop(link);
+    // SIGKILL: the next start finds everything that was damaged.
+    let instance = core.kill();
+    let mut next = Core::start_as(instance, &["--rt-if-allowed"]);
+    drop(next.host());
+    next.finish();
+    is_replaced
+}
+
+fn assert_all_survive(seeds: u64, all: &[Damaged]) {
+    let trials = (1..=seeds).flat_map(|seed| all.iter().map(move |damaged| (*damaged, seed)));
+    let replaced: Vec<bool> = trials.map(|(damaged, seed)| assert_survives(damaged, seed)).collect();
+    let (trials, replaced) = (replaced.len(), replaced.iter().filter(|is| **is).count());
+    println!(
+        "{trials} trials: no core ended, {replaced} bridges were replaced, 0 gaps in the records, {trials} next starts"
+    );
+}
+
 /// Between 27 and 272 random writes of eight bytes used to end the core, and the next starts as well.
 #[test]
 fn wild_writes_of_a_host_reach_neither_the_force_nor_the_next_start() {
-    let seeds = repeats("STYLET_WILD_SEEDS", 1);
-    let (mut trials, mut replaced, mut gaps) = (0, 0, 0);
-    for seed in 1..=seeds {
-        for kind in [".connection", ".dynamic", ".blackboard", ""] {
-            let mut core = Core::start();
-            drop(core.host());
-            let first = bridge(core.id(), None);
-            let recorder = Recorder::start(&core.instance);
-            let maps_all = until(Duration::from_secs(20), || recorder.files(kind).len() > 1);
-            assert!(maps_all, "{:?}", recorder.files(""));
-            let mut random = Random(seed);
-            let writes = write_wildly(&recorder, kind, &mut random, Duration::from_millis(2500));
-            assert!(writes > 0, "{kind} {seed}: nothing was written");
-            assert!(core.is_running(), "{kind} {seed}: the core ended");
-            drop(recorder);
-            // A host finds its way by itself, and one that was there before gets the last 12 s again: the records are without a gap.
-            let mut link = core.host();
-            let has_state = until(Duration::from_secs(10), || {
-                link.poll();
-                link.state().is_some()
-            });
-            assert!(has_state, "{kind} {seed}: no state");
-            replaced += u32::from(bridge(core.id(), None) != first);
-            let mut ticks: Vec<u64> = Vec::new();
-            let is_whole = until(Duration::from_secs(10), || {
-                let joined =
-                    Node::join_again(&core.instance).and_then(|node| Ok((service::records::subscriber(&node)?, node)));
-                let Ok((records, _node)) = joined.inspect_err(|why| println!("{why}")) else {
-                    return false;
-                };
-                ticks.clear();
-                until(Duration::from_secs(2), || {
-                    while let Some(batch) = records.receive() {
-                        ticks.extend(batch.values().iter().map(|record: &TickRecord| record.tick));
-                    }
-                    ticks.len() > 2000
-                })
-            });
-            assert!(is_whole, "{kind} {seed}: {} records", ticks.len());
-            let state = *link.state().expect("live");
-            let missing = ticks.windows(2).filter(|pair| pair[1] != pair[0] + 1).count();
-            gaps += missing;
-            assert_eq!((state.fault, state.records_lost, missing), (0, 0, 0), "{kind} {seed}");
-            drop(link);
-            // SIGKILL: the next start finds everything that was damaged.
-            let instance = core.kill();
-            let mut next = Core::start_as(instance, &["--rt-if-allowed"]);
-            drop(next.host());
-            next.finish();
-            trials += 1;
-        }
-    }
-    println!(
-        "{trials} trials: no core ended, {replaced} bridges were replaced, {gaps} gaps in the records, {trials} next starts"
-    );
+    let kinds = [".connection", ".dynamic", ".blackboard", ""].map(Damaged::Mapped);
+    assert_all_survive(repeats("STYLET_WILD_SEEDS", 1), &kinds);
+}
+
+/// A host that has a path wrong writes into what it never maps, such as the name of the present epoch.
+#[test]
+fn wild_writes_into_files_reach_neither_the_force_nor_the_next_start() {
+    assert_all_survive(repeats("STYLET_WILD_FILES", 1), &[Damaged::Opened]);
 }
 
 /// A user that is not this one; `None` where the test has no right to be another.
