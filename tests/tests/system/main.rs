@@ -1,5 +1,6 @@
 //! The whole system: processes, devices, faults, recordings, and implants carried out.
 
+mod bridge_force;
 mod device_abi;
 mod device_libhd;
 mod device_others;
