@@ -9,6 +9,7 @@ mod device_second;
 mod dose_cli;
 mod exercises;
 mod fault_rearm;
+mod floods;
 mod force_insertions;
 mod formats;
 mod igtl;
