@@ -5,7 +5,7 @@ CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: deny loom wall floods compensation envelope procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: deny loom wall senders floods compensation envelope procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -55,6 +55,10 @@ igtl-test: deps-test build ## Compare OpenIGTLink with libOpenIGTLink and pyigtl
 	$(CARGO) test --release -p stylet-igtl --lib library -- --ignored --nocapture
 	STYLET_PYIGTL=$(abspath $(BIN))/pyigtl/bin/python STYLET_IGTL_S=10 $(CARGO) test --release -p stylet-tests --test system igtl_python -- --ignored --nocapture --test-threads=1
 	STYLET_IGTL_S=$(or $(IGTL_SECONDS),600) $(CARGO) test --release -p stylet-tests --test system igtl::clients_that_hang -- --nocapture
+
+senders: deps-test build ## End what moves the hand in each way, SENDERS_TRIALS (50) times each: procedure, OpenIGTLink, window, gamepad (two hours)
+	SENDERS_TRIALS=$(or $(SENDERS_TRIALS),50) $(CARGO) test --release -p stylet-tests --test system motion_sender:: -- --nocapture --test-threads=1
+	SENDERS_TRIALS=$(or $(SENDERS_TRIALS),50) $(CARGO) test --release -p stylet-tests-window --lib senders:: -- --include-ignored --nocapture --test-threads=1
 
 floods: build ## Stop and release under three floods of requests, FLOODS_STOPS (1000) times each (three minutes)
 	FLOODS_STOPS=$(or $(FLOODS_STOPS),1000) $(CARGO) test --release -p stylet-tests --test system floods:: -- --nocapture --test-threads=1

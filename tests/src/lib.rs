@@ -2,8 +2,11 @@
 
 pub mod hand;
 pub mod phantom;
+pub mod pointer;
 pub mod random;
 pub mod rehearsal;
+pub mod sender;
+pub mod stage;
 pub mod stopped;
 pub mod window_process;
 

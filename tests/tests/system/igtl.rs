@@ -1,7 +1,7 @@
 //! `host-ui igtl`: what a client of OpenIGTLink gets is where the core has it, in RAS and mm; what a client sends moves the hand or is
 //! refused in words; and no client costs a frame or a tick.
 
-use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
@@ -80,7 +80,7 @@ fn receive_one<T>(stream: &mut TcpStream, wanted: impl Fn(Message) -> Option<T>)
     messages.find_map(wanted).expect("it comes")
 }
 
-fn needle_of(stream: &mut TcpStream) -> [[f32; 3]; 4] {
+pub fn needle_of(stream: &mut TcpStream) -> [[f32; 3]; 4] {
     receive_one(stream, |message| match (message.device.as_str(), message.body) {
         ("Needle", Body::Transform(columns)) => Some(columns),
         _ => None,
@@ -94,17 +94,17 @@ fn refusal(stream: &mut TcpStream) -> Status {
     })
 }
 
-fn send(stream: &mut TcpStream, device: &str, columns: [[f32; 3]; 4]) {
+pub fn send(stream: &mut TcpStream, device: &str, columns: [[f32; 3]; 4]) -> io::Result<()> {
     let message = Message {
         device: device.to_owned(),
         time: Timestamp::now(),
         body: Body::Transform(columns),
     };
-    stream.write_all(&message.encode().expect("fits")).expect("sent");
+    stream.write_all(&message.encode().expect("fits"))
 }
 
 /// The needle's transform, so many mm on along its own axis.
-fn further(mut columns: [[f32; 3]; 4], mm: f32) -> [[f32; 3]; 4] {
+pub fn further(mut columns: [[f32; 3]; 4], mm: f32) -> [[f32; 3]; 4] {
     (0..3).for_each(|a| columns[3][a] += mm * columns[2][a]);
     columns
 }
@@ -225,7 +225,7 @@ fn a_tracker_moves_the_needle_and_its_silence_stops_it() {
     let (rest_m, shown) = (tip_m(&mut link), needle_of(&mut stream));
     // 5 mm in its own frame, as a tracker sends it: again and again.
     let is_there = until(Duration::from_secs(20), || {
-        send(&mut stream, "Stylus", further(shown, 5.0));
+        send(&mut stream, "Stylus", further(shown, 5.0)).expect("sent");
         std::thread::sleep(Duration::from_millis(15));
         (distance_m(tip_m(&mut link), rest_m) - 5e-3).abs() < 1e-4
     });
@@ -240,7 +240,7 @@ fn a_tracker_moves_the_needle_and_its_silence_stops_it() {
 
     // 200 mm take 10 s: whoever asked for them falls silent after 6 mm.
     let there_m = tip_m(&mut link);
-    send(&mut stream, "Stylus", further(shown, -200.0));
+    send(&mut stream, "Stylus", further(shown, -200.0)).expect("sent");
     let moves = until(Duration::from_secs(10), || distance_m(tip_m(&mut link), there_m) > 1e-3);
     assert!(moves, "{}", served.log());
     let mut before = tip_m(&mut link);
@@ -263,18 +263,18 @@ fn a_transform_that_nobody_agreed_to_is_refused_in_words_and_moves_nothing() {
     let rest_m = tip_m(&mut link);
     let mut streams = [closed.connect(), open.connect()];
     let shown = needle_of(&mut streams[0]);
-    send(&mut streams[0], "Stylus", further(shown, 5.0));
+    send(&mut streams[0], "Stylus", further(shown, 5.0)).expect("sent");
     let status = refusal(&mut streams[0]);
     assert_eq!(
         (status.code, status.text.contains("--hand NAME")),
         (5, true),
         "{status:?}"
     );
-    send(&mut streams[1], "Probe", further(shown, 5.0));
+    send(&mut streams[1], "Probe", further(shown, 5.0)).expect("sent");
     assert!(refusal(&mut streams[1]).text.contains("\"Stylus\" alone"));
     // A place that no hand reaches is refused by the core, in its words.
     std::thread::sleep(Duration::from_millis(60));
-    send(&mut streams[1], "Stylus", further(shown, 1e7));
+    send(&mut streams[1], "Stylus", further(shown, 1e7)).expect("sent");
     let status = refusal(&mut streams[1]);
     assert_eq!(status.code, 13, "{status:?}");
     std::thread::sleep(Duration::from_millis(300));

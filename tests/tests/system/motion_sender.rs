@@ -1,165 +1,133 @@
-//! A procedure that is killed or stopped while its needle moves: the hand is at rest within 5 mm and 0.4 s. It went on for 55 mm and 5 s.
+//! Programs that end, hang or are read by nobody while they move the hand: it is at rest within 5 mm and 0.4 s of its owner's end, and
+//! goes on while it has one. A killed procedure used to leave a hand that went on for 55 mm and 5 s.
+//!
+//! The window and a gamepad are in `tests/window/src/senders.rs`; `make senders` makes fifty trials of each.
 
-use nalgebra::Vector3;
-use std::process::{Child, Command, Stdio};
+use crate::igtl::{further, needle_of, send};
+use std::io::Read;
+use std::net::{TcpListener, TcpStream};
+use std::process::Command;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
 use std::time::Duration;
-use stylet_host::link::Link;
-use stylet_shm_schema::{EventKind, TickRecord, flags};
+use stylet_tests::sender::{Place, Sender, Table, kinds, trial};
+use stylet_tests::stage::Stage;
 use stylet_tests::witness::where_the_machine_runs;
-use stylet_tests::{Core, program, scratch, until};
+use stylet_tests::{Core, program, repeats, scratch, until};
 
-/// Trials of each kind; `STYLET_TRIALS` makes more.
-const TRIALS: usize = 3;
 /// Speed of the insertion: the fastest of published ones, mm/s.
 const MM_PER_S: &str = "123";
-/// At rest is slower than 3 mm/s, as the core has it: over so many ticks less than this, m. Then the spring of the hand lets go of its
-/// last tenths of a millimetre, as after each stop.
-const REST_TICKS: usize = 50;
-const AT_REST_M: f64 = 1.5e-4;
-/// A motion that lapsed is given up after these.
-const GRACE_TICKS: usize = 300;
 
-/// A program of the test, ended with it.
-struct Program(Child);
-
-impl Program {
-    fn procedure(core: &Core) -> Self {
-        let child = Command::new(program("host-ui"))
-            .args([
-                "procedure",
-                "--instance",
-                core.instance.name(),
-                "--insert-speed",
-                MM_PER_S,
-            ])
-            .arg("--out")
-            .arg(scratch("motion-sender").join("out"))
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn();
-        Self(child.expect("host-ui starts"))
-    }
-
-    fn send(&self, signal: libc::c_int) {
-        // SAFETY: a child of ours that has not been waited for.
-        assert_eq!(unsafe { libc::kill(self.0.id() as libc::pid_t, signal) }, 0);
-    }
+#[test]
+fn a_hand_whose_procedure_ends_or_hangs_is_at_rest_within_5_mm_and_400_ticks() {
+    where_the_machine_runs(|| {
+        let mut stage = Stage::open();
+        let mut table = Table::begin("procedure");
+        for (place, ending) in kinds() {
+            let seen: Vec<_> = (0..repeats("SENDERS_TRIALS", 1))
+                .map(|_| {
+                    stage.draw_out();
+                    let mut sender = Sender::start(procedure(&stage.core), ending);
+                    // The way to the entry takes half a second, that in the tissue as long.
+                    let after = Duration::from_secs_f64(0.25 * stage.random.share());
+                    trial(&mut stage.observer, &mut sender, (place, ending), after, BEGINS_WITHIN)
+                })
+                .collect();
+            table.row((place, ending), &seen);
+        }
+        stage.close();
+        table.end();
+    });
 }
 
-impl Drop for Program {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
+const BEGINS_WITHIN: Duration = Duration::from_secs(20);
 
-/// What another host saw of the hand.
-#[derive(Debug)]
-struct Trial {
-    /// When its sender ended.
-    mm_per_s: f64,
-    /// From then on.
-    farthest_mm: f64,
-    /// Ticks until it was at rest.
-    ticks: usize,
-    /// It never reached its goal. One that brakes within reach of it arrives, and is not given up.
-    was_on_its_way: bool,
-}
-
-fn tip(record: &TickRecord) -> Vector3<f64> {
-    record.tip_in_scene_m.into()
-}
-
-fn now_ns() -> u64 {
-    let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: the call only writes to `now`.
-    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &raw mut now) };
-    now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
-}
-
-/// Ends the sender of a motion by a signal, so long after it is seen to move.
-fn trial(core: &Core, observer: &mut Link, signal: libc::c_int, after: Duration) -> Trial {
-    let sender = Program::procedure(core);
-    let mut records = Vec::new();
-    let mut watch = |limit, ready: &dyn Fn(&[TickRecord]) -> bool| {
-        until(limit, || {
-            observer.poll();
-            records.append(&mut observer.take_records());
-            ready(&records)
-        })
-    };
-    watch(Duration::ZERO, &|_| true);
-    let moves = |records: &[TickRecord]| {
-        let [.., before, _, _, _, _, _, _, _, _, last] = records else {
-            return false;
-        };
-        (tip(last) - tip(before)).norm() > 3e-4 && last.flags & flags::IN_MOTION != 0
-    };
-    assert!(watch(Duration::from_secs(20), &moves), "the needle does not move");
-    watch(after, &|_| false);
-    let ended_ns = now_ns();
-    sender.send(signal);
-    watch(Duration::from_millis(900), &|_| false);
-    let last_known = records
-        .iter()
-        .rposition(|record| record.due_ns <= ended_ns)
-        .expect("records");
-    let (before, silent) = (
-        &records[last_known.saturating_sub(10)..=last_known],
-        &records[last_known..],
-    );
-    let at = tip(&silent[0]);
-    Trial {
-        mm_per_s: (at - tip(&before[0])).norm() * 1e5,
-        farthest_mm: silent.iter().map(|r| (tip(r) - at).norm()).fold(0.0, f64::max) * 1e3,
-        was_on_its_way: silent.get(GRACE_TICKS).is_some_and(|r| r.flags & flags::IN_MOTION != 0),
-        ticks: silent
-            .windows(REST_TICKS)
-            .rposition(|w| (tip(&w[REST_TICKS - 1]) - tip(&w[0])).norm() > AT_REST_M)
-            .map_or(0, |begin| begin + 1),
-    }
-}
-
-fn given_up(observer: &Link) -> usize {
-    let kind = EventKind::MotionGivenUp as u32;
-    observer.events().iter().filter(|event| event.kind == kind).count()
+fn procedure(core: &Core) -> Command {
+    let mut command = Command::new(program("host-ui"));
+    command.args(["procedure", "--instance", core.instance.name()]);
+    command.args(["--insert-speed", MM_PER_S, "--out"]);
+    command.arg(scratch("motion-sender").join("out"));
+    command
 }
 
 #[test]
-fn a_hand_whose_sender_ends_or_hangs_is_at_rest_within_5_mm_and_400_ticks() {
-    let trials = std::env::var("STYLET_TRIALS")
-        .ok()
-        .and_then(|n| n.parse().ok())
-        .unwrap_or(TRIALS);
+fn a_hand_whose_openigtlink_server_ends_or_hangs_is_at_rest_within_5_mm_and_400_ticks() {
     where_the_machine_runs(|| {
-        let mut core = Core::start();
-        let mut observer = core.host();
-        let mut random = now_ns() | 1;
-        for (signal, name) in [(libc::SIGKILL, "killed"), (libc::SIGSTOP, "stopped")] {
-            let mut seen = Vec::new();
-            for _ in 0..trials {
-                random = random
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
-                let after = Duration::from_millis((random >> 33) % 700);
-                let known = given_up(&observer);
-                let trial = trial(&core, &mut observer, signal, after);
-                println!("{name} after {after:?}: {trial:?}");
-                assert!(trial.farthest_mm <= 5.0 && trial.ticks <= 400, "{trial:?}");
-                if trial.was_on_its_way {
-                    assert_eq!(given_up(&observer), known + 1, "hosts hear of it");
-                }
-                seen.push(trial);
-            }
-            seen.sort_by(|a, b| a.farthest_mm.total_cmp(&b.farthest_mm));
-            let fastest = seen.iter().map(|trial| trial.mm_per_s).fold(0.0, f64::max);
-            let ticks = seen.iter().map(|trial| trial.ticks).max();
-            let [least, middle, most] = [0, seen.len() / 2, seen.len() - 1].map(|n| seen[n].farthest_mm);
-            println!(
-                "{name}, {trials} trials: {least:.2} to {most:.2} mm, middle {middle:.2} mm, at most {ticks:?} ticks, from up to {fastest:.0} mm/s"
-            );
+        let mut stage = Stage::open();
+        let mut table = Table::begin("igtl");
+        for (place, ending) in kinds() {
+            let seen: Vec<_> = (0..repeats("SENDERS_TRIALS", 1))
+                .map(|_| {
+                    stage.draw_out();
+                    if place == Place::Tissue {
+                        stage.go_to_entry();
+                    }
+                    let port = free_port();
+                    let mut sender = Sender::start(igtl(&stage.core, port), ending);
+                    let by_mm = if place == Place::Air { -100.0 } else { 70.0 };
+                    let tracker = Tracker::begin(port, by_mm);
+                    let after = Duration::from_secs_f64(0.2 * stage.random.share());
+                    let trial = trial(&mut stage.observer, &mut sender, (place, ending), after, BEGINS_WITHIN);
+                    drop(tracker);
+                    trial
+                })
+                .collect();
+            table.row((place, ending), &seen);
         }
-        drop(observer);
-        core.finish();
+        stage.close();
+        table.end();
     });
+}
+
+fn igtl(core: &Core, port: u16) -> Command {
+    let mut command = Command::new(program("host-ui"));
+    command.args(["igtl", "--instance", core.instance.name(), "--hand", "Stylus"]);
+    command.args(["--hand-speed", MM_PER_S, "--listen", &format!("127.0.0.1:{port}")]);
+    command
+}
+
+/// Its output is not read: it cannot say where it listens.
+fn free_port() -> u16 {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    listener.local_addr().expect("bound").port()
+}
+
+/// A client that sends the needle elsewhere, again and again, until dropped.
+struct Tracker {
+    is_over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Tracker {
+    fn begin(port: u16, by_mm: f32) -> Self {
+        let is_over = Arc::new(AtomicBool::new(false));
+        let ends = Arc::clone(&is_over);
+        let thread = std::thread::spawn(move || {
+            let mut stream = None;
+            until(BEGINS_WITHIN, || {
+                stream = TcpStream::connect(("127.0.0.1", port)).ok();
+                stream.is_some()
+            });
+            let mut stream = stream.expect("it listens");
+            let goal = further(needle_of(&mut stream), by_mm);
+            let mut read = [0; 1 << 16];
+            while !ends.load(Ordering::Relaxed) && send(&mut stream, "Stylus", goal).is_ok() {
+                // A client that does not read is disconnected.
+                stream.set_nonblocking(true).expect("a socket");
+                while matches!(stream.read(&mut read), Ok(1..)) {}
+                stream.set_nonblocking(false).expect("a socket");
+                std::thread::sleep(Duration::from_millis(10));
+            }
+        });
+        let thread = Some(thread);
+        Self { is_over, thread }
+    }
+}
+
+impl Drop for Tracker {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Relaxed);
+        let _ = self.thread.take().map(JoinHandle::join);
+    }
 }

@@ -6,7 +6,7 @@ use egui_kittest::kittest::{NodeT, Queryable, by};
 use host_ui::app::{App, Options};
 use host_ui::view::orientation::Orientation;
 use std::time::{Duration, Instant};
-use stylet_shm_schema::flags;
+use stylet_shm_schema::{Instance, flags};
 use stylet_test_kit::scratch;
 use stylet_tests::Core;
 
@@ -30,7 +30,7 @@ impl Driven {
     }
 
     pub fn on(core: Core, size: [f32; 2]) -> Self {
-        let window = Self::window(&core, size);
+        let window = window_on(&core.instance, size);
         let mut driven = Self { window, core };
         driven.until_live();
         driven
@@ -38,32 +38,8 @@ impl Driven {
 
     /// Closes the window like a kill, and opens another.
     pub fn reopen(&mut self, size: [f32; 2]) {
-        self.window = Self::window(&self.core, size);
+        self.window = window_on(&self.core.instance, size);
         self.until_live();
-    }
-
-    fn window(core: &Core, size: [f32; 2]) -> Harness<'static, App> {
-        let options = Options {
-            instance: core.instance.clone(),
-            scene: None,
-            label: None,
-            image: None,
-            watch: None,
-            controllers: false,
-            pause: true,
-            count_frames: false,
-            patch: false,
-            trainees: Vec::new(),
-            class: None,
-            name: String::new(),
-        };
-        let window = Harness::builder()
-            .with_size(size)
-            .wgpu()
-            .build_eframe(|cc| App::new(cc, options));
-        // Steps without a picture draw nothing.
-        App::draw_changes_only(&window.ctx, false);
-        window
     }
 
     /// Runs some steps, the last ones drawn like in the shipped window. By then, parts that moved
@@ -201,6 +177,31 @@ impl Driven {
             self.drawn()
         });
     }
+}
+
+/// Returns the window on a core that runs.
+pub fn window_on(instance: &Instance, size: [f32; 2]) -> Harness<'static, App> {
+    let options = Options {
+        instance: instance.clone(),
+        scene: None,
+        label: None,
+        image: None,
+        watch: None,
+        controllers: false,
+        pause: true,
+        count_frames: false,
+        patch: false,
+        trainees: Vec::new(),
+        class: None,
+        name: String::new(),
+    };
+    let window = Harness::builder()
+        .with_size(size)
+        .wgpu()
+        .build_eframe(|cc| App::new(cc, options));
+    // Steps without a picture draw nothing.
+    App::draw_changes_only(&window.ctx, false);
+    window
 }
 
 /// Draws the last frame at once, and compares it with the result of its changes to the previous

@@ -19,6 +19,8 @@ mod plugged;
 #[cfg(test)]
 mod probe;
 #[cfg(test)]
+mod senders;
+#[cfg(test)]
 mod states;
 #[cfg(test)]
 mod terminal;

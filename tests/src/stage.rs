@@ -1,0 +1,64 @@
+//! A core for trials one after the other, with the needle at a known place before each.
+
+use crate::random::Random;
+use crate::{Core, ask, until};
+use std::time::Duration;
+use stylet_host::link::Link;
+use stylet_implant::workflow::{default_plan, move_request, plan_request};
+use stylet_shm_schema::{Request, flags};
+
+/// A core with a host that looks on, and takes the hand back between trials.
+pub struct Stage {
+    pub core: Core,
+    pub observer: Link,
+    pub random: Random,
+    home: ([f64; 3], [f64; 3]),
+}
+
+impl Stage {
+    /// A core whose needle is in the air.
+    pub fn open() -> Self {
+        let mut core = Core::start();
+        let observer = core.host();
+        let state = observer.state().expect("live");
+        let home = (state.tip_in_scene_m, state.needle_direction);
+        let random = Random::of_clock();
+        println!("seed of the moments: {:#x}", random.0);
+        Self {
+            core,
+            observer,
+            random,
+            home,
+        }
+    }
+
+    fn go(&mut self, to: [f64; 3], direction: [f64; 3]) {
+        ask(&mut self.observer, &move_request(to, direction, 0.2, 2.0)).expect("moved");
+        let is_there = until(Duration::from_secs(20), || {
+            self.observer.poll();
+            self.observer.take_records();
+            self.observer.state().is_some_and(|s| s.flags & flags::AT_GOAL != 0)
+        });
+        assert!(is_there, "the hand does not arrive: {:?}", self.observer.state());
+    }
+
+    /// Takes the needle to where it was at first.
+    pub fn draw_out(&mut self) {
+        let (tip_m, direction) = self.home;
+        self.go(tip_m, direction);
+    }
+
+    /// Plans a needle, turns the force on and takes the needle to the entry.
+    pub fn go_to_entry(&mut self) {
+        let plan = default_plan(&self.observer.scene().expect("live").header);
+        ask(&mut self.observer, &plan_request(&plan)).expect("planned");
+        ask(&mut self.observer, &Request::Engage).expect("engaged");
+        self.go(plan.entry_m, plan.direction);
+    }
+
+    /// Ends the core, which must end in order.
+    pub fn close(self) {
+        drop(self.observer);
+        self.core.finish();
+    }
+}
