@@ -5,7 +5,7 @@ CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: deny loom wall senders floods compensation envelope procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -62,6 +62,9 @@ senders: deps-test build ## End what moves the hand in each way, SENDERS_TRIALS 
 
 floods: build ## Stop and release under three floods of requests, FLOODS_STOPS (1000) times each (three minutes)
 	FLOODS_STOPS=$(or $(FLOODS_STOPS),1000) $(CARGO) test --release -p stylet-tests --test system floods:: -- --nocapture --test-threads=1
+
+hostile: build ## Send what is valid, stale and broken to a core and its OpenIGTLink for HOSTILE_SECONDS (600), by HOSTILE_SEED (1)
+	HOSTILE_SECONDS=$(or $(HOSTILE_SECONDS),600) HOSTILE_SEED=$(or $(HOSTILE_SEED),1) $(CARGO) test --release -p stylet-tests --test system hostile:: -- --nocapture --test-threads=1
 
 wall: build ## Damage what hosts share with WALL_SEEDS (50) seeds of each kind, kill and stop the bridge WALL_ROUNDS (100) times (about an hour)
 	STYLET_WILD_SEEDS=$(or $(WALL_SEEDS),50) STYLET_WILD_FILES=$(or $(WALL_SEEDS),50) STYLET_BRIDGE_ROUNDS=$(or $(WALL_ROUNDS),100) $(CARGO) test --release -p stylet-tests --test system wall:: -- --nocapture --test-threads=1

@@ -12,6 +12,7 @@ mod fault_rearm;
 mod floods;
 mod force_insertions;
 mod formats;
+mod hostile;
 mod igtl;
 mod igtl_python;
 mod insertion;
