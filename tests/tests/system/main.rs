@@ -19,6 +19,7 @@ mod insertion;
 mod kill;
 mod lab_latency;
 mod motion_sender;
+mod no_core;
 mod perturb_cli;
 mod plan_compensation;
 mod plan_optimised;
