@@ -106,7 +106,7 @@ impl Core {
     /// Waits until it ends by itself.
     pub fn ended(&mut self, limit: Duration) -> Option<std::process::ExitStatus> {
         let mut status = None;
-        until(Duration::from_secs(5), || {
+        until(limit, || {
             status = self.child.try_wait().expect("ours");
             status.is_some()
         });
@@ -198,9 +198,18 @@ pub fn left_behind(instance: &Instance) -> Vec<String> {
 
 /// Sends one command and waits for its answer: `Ok` with the first tick that knew it, or the reasons against it.
 pub fn ask(link: &mut Link, request: &Request) -> Result<u64, String> {
+    ask_within(link, request, Duration::from_secs(5))
+}
+
+/// Loads a built-in scene. The answer comes once the core has built it, which is ordinary work: on a busy machine it takes long.
+pub fn load_builtin(link: &mut Link, number: u32) -> Result<u64, String> {
+    ask_within(link, &Request::LoadBuiltinScene(number), Duration::from_secs(60))
+}
+
+fn ask_within(link: &mut Link, request: &Request, limit: Duration) -> Result<u64, String> {
     let id = link.send(request).map_err(|e| e.to_string())?;
     let mut answer = None;
-    until(Duration::from_secs(5), || {
+    until(limit, || {
         link.poll();
         answer = link.reply(id);
         answer.is_some()

@@ -1,8 +1,7 @@
 //! Memory of the core over changes of the scene.
 
 use std::time::Duration;
-use stylet_shm_schema::Request;
-use stylet_tests::{Core, ask, until};
+use stylet_tests::{Core, load_builtin, until};
 
 /// Resident memory of a process, MB.
 fn resident_mb(process: u32) -> f64 {
@@ -19,7 +18,7 @@ fn over_swaps(swaps: usize) -> Vec<f64> {
     let mut memory_mb = Vec::new();
     for swap in 0..swaps {
         let generation = link.scene().map_or(0, |scene| scene.header.generation);
-        ask(&mut link, &Request::LoadBuiltinScene((swap + 1) as u32 % 2)).expect("built in");
+        load_builtin(&mut link, (swap + 1) as u32 % 2).expect("built in");
         let runs = until(Duration::from_secs(20), || {
             link.poll();
             let scene = link.scene().map_or(0, |scene| scene.header.generation);

@@ -9,7 +9,7 @@ use stylet_ports as service;
 use stylet_shm_schema::*;
 use stylet_sim::scene::{Role, Scene};
 use stylet_tests::witness::where_the_machine_runs;
-use stylet_tests::{Core, ask, program, until};
+use stylet_tests::{Core, load_builtin, program, until};
 
 /// Waits until a host sees the scene and its surface move.
 fn wait_for(link: &mut Link, name: &str) {
@@ -26,7 +26,7 @@ fn every_built_in_scene_runs_by_its_number_and_says_what_it_is_made_of() {
         let mut core = Core::start();
         let mut link = core.host();
         for (number, name) in BUILTIN_SCENES.iter().enumerate() {
-            ask(&mut link, &Request::LoadBuiltinScene(number as u32)).expect("built in");
+            load_builtin(&mut link, number as u32).expect("built in");
             wait_for(&mut link, name);
             let expected = Scene::builtin(name).expect("built in");
             let scene = link.scene().expect("live").clone();
@@ -48,7 +48,7 @@ fn every_built_in_scene_runs_by_its_number_and_says_what_it_is_made_of() {
             });
             assert!(goes_on, "{name} does not run");
         }
-        let why = ask(&mut link, &Request::LoadBuiltinScene(3)).expect_err("no such scene");
+        let why = load_builtin(&mut link, 3).expect_err("no such scene");
         assert!(why.contains("paper, pelvis, full"), "{why}");
         drop(link);
         core.finish();
