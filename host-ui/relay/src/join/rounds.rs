@@ -11,9 +11,9 @@ use bytemuck::Zeroable;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
+use stylet_ports::StateWriter;
 use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::check::{self, Invalid};
-use stylet_ports::StateWriter;
 use stylet_shm_schema::{
     CommandKind, Event, EventKind, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, ReplyStatus,
     SCHEMA_VERSION, Session, Text,
@@ -292,9 +292,7 @@ impl Rounds {
     /// Under another number where a member that was killed has left its board, which nobody can write any more.
     fn open_board(&mut self, session_id: u64) {
         for _ in 0..3 {
-            if let Ok(board) =
-                StateWriter::create(&self.far.meeting.node, self.member.run(session_id))
-            {
+            if let Ok(board) = StateWriter::create(&self.far.meeting.node, self.member.run(session_id)) {
                 self.board = Some((session_id, board));
                 return;
             }

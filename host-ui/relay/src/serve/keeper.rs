@@ -12,9 +12,9 @@ use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use stylet_shm_schema::Request;
 use stylet_ports::{self as service, Node, ServiceError};
 use stylet_shm_schema::Instance;
+use stylet_shm_schema::Request;
 
 /// Exit code of a server that is to be started again at once.
 pub const AGAIN: u8 = 3;

@@ -10,8 +10,8 @@ use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::time::{Duration, Instant};
-use stylet_shm_schema::affinity::Left;
 use stylet_ports::{self as service, Node, SliceSubscriber, Subscriber};
+use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::{Instance, MAX_BATCH, Session, TickRecord, check};
 
 /// What the server sends to have them.

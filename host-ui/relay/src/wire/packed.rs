@@ -3,9 +3,9 @@
 
 use bytemuck::Zeroable;
 use lz4_flex::block;
+use stylet_shm_schema::MAX_BATCH;
 use stylet_shm_schema::TickRecord;
 use stylet_shm_schema::check::Invalid;
-use stylet_shm_schema::MAX_BATCH;
 
 const RECORD: usize = size_of::<TickRecord>();
 

@@ -1,6 +1,7 @@
 //! Records whole and in order, snapshots at the rate of a screen, and a recording on the far side that is that of the near one.
 
-use crate::fixture::{Host, Keys, Named, core, invitation, join, lease, program, scratch, until};
+use crate::fixture::{Keys, Named, core, invitation, join, lease, program, scratch, until};
+use crate::host::Host;
 use crate::proxy::Proxy;
 use crate::watch::{Beside, Seen, arrivals, quantile, seconds, settle, snapshots_lost, socket_ages_ms};
 use std::collections::BTreeMap;
@@ -9,8 +10,8 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity, write_invitation};
-use stylet_shm_schema::TickRecord;
 use stylet_shm_schema::Instance;
+use stylet_shm_schema::TickRecord;
 use stylet_test_kit::witness::where_the_machine_runs;
 
 #[test]

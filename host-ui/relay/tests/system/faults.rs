@@ -1,6 +1,7 @@
 //! A process that stands still, is killed or is cut off in an insertion: the core beside it loses nothing, and the far side is whole again.
 
-use crate::fixture::{Host, Keys, Named, Running, core, go, join, lease, until};
+use crate::fixture::{Keys, Named, Running, core, join, lease, until};
+use crate::host::{Host, go};
 use crate::proxy::Proxy;
 use crate::watch::quantile;
 use std::time::{Duration, Instant};

@@ -7,14 +7,11 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 use stylet_relay::keys::{Invitation, Lab, Role, Validity, write_invitation};
-use stylet_relay::ports::Near;
-use stylet_ports::{self as service, Node, SliceSubscriber, StateReader};
 use stylet_shm_schema::Instance;
-use stylet_shm_schema::{HapticState, PlanInForce, Reply, ReplyStatus, Request, SceneHeader, Session, TickRecord};
 pub use stylet_test_kit::{program, until};
 
 /// A number that no other test of this process has.
-fn fresh() -> u32 {
+pub fn fresh() -> u32 {
     static NEXT: AtomicU32 = AtomicU32::new(0);
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
@@ -197,139 +194,4 @@ pub fn lease(named: &Named, words: &[&str]) -> String {
 /// Reads an invitation again.
 pub fn invitation(path: &Path) -> Invitation {
     Invitation::read(path).expect("an invitation")
-}
-
-/// A host of the smallest kind: it asks, and takes what the core says.
-pub struct Host {
-    board: Option<StateReader>,
-    near: Near,
-    records: SliceSubscriber<TickRecord, u64>,
-    _node: Node,
-    pub session: Option<Session>,
-    pub scene: Option<SceneHeader>,
-    pub plan: Option<PlanInForce>,
-    pub taken: Vec<TickRecord>,
-    replies: Vec<Reply>,
-    id: u64,
-    next: u64,
-}
-
-impl Host {
-    pub fn new(named: &Named) -> Self {
-        let node = Node::join(&named.0).expect("shared memory");
-        let records = service::records::subscriber(&node).expect("a port");
-        // While another program makes a service it cannot be opened; on a busy machine that takes longer than an attempt does.
-        let mut near = Node::join(&named.0).and_then(Near::new);
-        until(Duration::from_secs(5), || {
-            if near.is_err() {
-                near = Node::join(&named.0).and_then(Near::new);
-            }
-            near.is_ok()
-        });
-        Self {
-            board: None,
-            near: near.expect("ports"),
-            records,
-            _node: node,
-            session: None,
-            scene: None,
-            plan: None,
-            taken: Vec::new(),
-            replies: Vec::new(),
-            id: 1000 + u64::from(fresh()),
-            next: 1,
-        }
-    }
-
-    pub fn poll(&mut self) {
-        while let Some(sample) = self.near.session.receive() {
-            let session = sample;
-            if self.session.is_none_or(|s| s.session_id != session.session_id) {
-                self.board = None;
-            }
-            self.session = Some(session);
-        }
-        while let Some(sample) = self.records.receive() {
-            self.taken.extend_from_slice(sample.values());
-        }
-        while let Some(sample) = self.near.scene.receive() {
-            self.scene = Some(*sample.header());
-        }
-        while let Some(sample) = self.near.plan.receive() {
-            self.plan = Some(sample);
-        }
-        while let Some(sample) = self.near.replies.receive() {
-            self.replies.push(sample);
-        }
-        if let (None, Some(session)) = (&self.board, &self.session) {
-            self.board = StateReader::open(&self.near.node, session.session_id).ok();
-        }
-    }
-
-    pub fn state(&mut self) -> Option<HapticState> {
-        self.poll();
-        self.board.as_ref().map(StateReader::read)
-    }
-
-    /// Waits until the core is seen with its scene.
-    pub fn sees_the_core(&mut self, limit: Duration) -> bool {
-        until(limit, || self.sees_it_now())
-    }
-
-    pub fn sees_it_now(&mut self) -> bool {
-        self.state().is_some_and(|s| s.tick > 0) && self.scene.is_some()
-    }
-
-    pub fn send(&mut self, request: &Request) -> u64 {
-        let id = self.next;
-        self.next += 1;
-        let command = request.encode(self.id, id).expect("fits");
-        self.near.ask(command).expect("sent");
-        id
-    }
-
-    /// The words of the refusal where it was refused.
-    pub fn ask(&mut self, request: &Request) -> Result<(), String> {
-        let id = self.send(request);
-        let mut answer = None;
-        until(Duration::from_secs(5), || {
-            self.poll();
-            answer = self
-                .replies
-                .iter()
-                .find(|r| (r.host_id, r.command_id) == (self.id, id))
-                .copied();
-            answer.is_some()
-        });
-        let answer = answer.ok_or("no answer")?;
-        match answer.status == ReplyStatus::Accepted as u32 {
-            true => Ok(()),
-            false => Err(answer.text.read()),
-        }
-    }
-}
-
-/// Where the hand rests before an insertion into the built-in scene, 20 mm before the tissue, and 60 mm on along z.
-pub fn way(scene: &SceneHeader, depth_m: f64) -> [f64; 3] {
-    let middle = |a: usize| 0.5 * (scene.lower_m[a] + scene.upper_m[a]);
-    [middle(0), middle(1), scene.lower_m[2] - 0.02 + depth_m]
-}
-
-/// The hand to a place on that way.
-pub fn go(scene: &SceneHeader, depth_m: f64, speed_m_per_s: f64) -> Request {
-    Request::MoveHand(stylet_shm_schema::HandMove {
-        tip_m: way(scene, depth_m),
-        direction: [0.0, 0.0, 1.0],
-        speed_m_per_s,
-        acceleration_m_per_s2: 2.0,
-    })
-}
-
-/// How far the hand still goes: its way in 150 ms.
-pub fn still_moving_m(host: &mut Host) -> f64 {
-    let place = |host: &mut Host| host.state().map_or([0.0; 3], |s| s.tip_in_scene_m);
-    let before = place(host);
-    std::thread::sleep(Duration::from_millis(150));
-    let after = place(host);
-    (0..3).map(|a| (after[a] - before[a]).powi(2)).sum::<f64>().sqrt()
 }

@@ -1,9 +1,10 @@
 //! The needle goes from hand to hand by what windows ask through their ports, and every window is shown who has it.
 
-use crate::fixture::{Host, Keys, Named, Running, core, go, join, still_moving_m, until};
+use crate::fixture::{Keys, Named, Running, core, join, until};
+use crate::host::{Host, go, node, still_moving_m};
 use std::time::Duration;
-use stylet_relay::keys::{Role, Validity};
 use stylet_ports::{self as service, Node, Publisher, Subscriber};
+use stylet_relay::keys::{Role, Validity};
 use stylet_shm_schema::{Class, LeaseOrder, LeaseRequest};
 
 /// A host with the ports by which a window knows the class and asks for the needle.
@@ -17,7 +18,7 @@ struct Window {
 
 impl Window {
     fn new(named: &Named) -> Self {
-        let node = Node::join(&named.0).expect("shared memory");
+        let node = node(named);
         Self {
             host: Host::new(named),
             class: service::class::subscriber(&node).expect("a port"),

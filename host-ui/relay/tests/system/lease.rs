@@ -1,6 +1,7 @@
 //! One hand holds the needle: the one beside the core first, one on the net while it is heard, and it is handed over.
 
-use crate::fixture::{Host, Keys, Named, Running, core, go, join, lease, still_moving_m, until};
+use crate::fixture::{Keys, Named, Running, core, join, lease, until};
+use crate::host::{Host, go, still_moving_m};
 use std::time::Duration;
 use stylet_relay::keys::{Role, Validity};
 use stylet_shm_schema::Request;

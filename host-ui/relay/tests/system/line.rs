@@ -1,6 +1,7 @@
 //! Members behind lines of their own, in network namespaces: a line of 100 Mbit/s, and a class of twenty. As root, by `make relay-class`.
 
-use crate::fixture::{Host, Keys, Named, Running, core, lease, scratch, until};
+use crate::fixture::{Keys, Named, Running, core, lease, scratch, until};
+use crate::host::Host;
 use crate::space::Line;
 use crate::watch::{Seen, gaps, quantile, seconds, settle};
 use std::collections::BTreeSet;

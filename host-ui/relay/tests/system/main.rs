@@ -4,6 +4,7 @@ mod carries;
 mod faults;
 mod fixture;
 mod hand_over;
+mod host;
 mod lease;
 mod line;
 mod outlines;

@@ -1,14 +1,15 @@
 //! Where a window on the far side draws the tissue while it moves fast, against where it was in that tissue tick.
 
-use crate::fixture::{Host, Keys, Named, core, go, join, still_moving_m, until};
+use crate::fixture::{Keys, Named, core, join, until};
+use crate::host::{Host, go, still_moving_m};
 use crate::watch::{quantile, settle};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
+use stylet_ports::{self as service, Node};
 use stylet_relay::keys::{Role, Validity};
 use stylet_relay::now_ns;
 use stylet_relay::wire::{Displacements, MAX_THIN_BYTES, Rest, Thin, decode_snapshot};
-use stylet_ports::{self as service, Node};
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::{SnapshotHeader, Vertex};
 use stylet_test_kit::witness::where_the_machine_runs;

@@ -6,10 +6,10 @@ use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::mpsc::{Receiver, Sender};
 use std::time::{Duration, Instant};
-use stylet_relay::now_ns;
 use stylet_ports::{self as service, Node};
-use stylet_shm_schema::Instance;
+use stylet_relay::now_ns;
 use stylet_shm_schema::BATCH_EVERY;
+use stylet_shm_schema::Instance;
 
 /// Of each measurement, s; `STYLET_RELAY_S` makes it longer for a figure.
 pub fn seconds(everyday: f64) -> f64 {
