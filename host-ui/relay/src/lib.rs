@@ -13,6 +13,7 @@ pub mod keys;
 #[cfg(feature = "net")]
 pub mod net;
 pub mod ports;
+pub mod say;
 #[cfg(feature = "net")]
 pub mod serve;
 pub mod slice;

@@ -10,7 +10,7 @@ use stylet_relay::control::{self, Order};
 use stylet_relay::keys::{Invitation, Lab, Role, Validity, write_invitation};
 use stylet_relay::net::PORT;
 use stylet_relay::serve::{self, End, keeper};
-use stylet_relay::{RelayError, join};
+use stylet_relay::{RelayError, join, say};
 use stylet_shm_schema::Instance;
 
 /// Carries a running Stylet to other machines: a class that watches, an instructor elsewhere, an operator at another screen.
@@ -122,21 +122,38 @@ enum LeaseTask {
 }
 
 fn main() -> ExitCode {
-    match run(Cli::parse().task) {
+    let code = match run(Cli::parse().task) {
         Ok(code) => code,
         Err(why) => {
-            eprintln!("relay: {why}");
+            say::complain(format!("relay: {why}"));
             ExitCode::from(keeper::CANNOT)
         }
-    }
+    };
+    say::flush();
+    code
 }
 
+/// Set by what ends a program: a person, another program, or a terminal that closes.
 fn on_signals() -> Result<Arc<AtomicBool>, RelayError> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    say::end_on_panic();
     let stop = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+    for signal in [SIGINT, SIGTERM, SIGHUP] {
+        if signal == SIGHUP && is_ignored(signal) {
+            continue;
+        }
         signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(|e| RelayError(format!("signals: {e}")))?;
     }
     Ok(stop)
+}
+
+/// As `nohup` leaves it: the program stays when its terminal closes.
+fn is_ignored(signal: libc::c_int) -> bool {
+    // SAFETY: numbers alone.
+    let mut action: libc::sigaction = unsafe { std::mem::zeroed() };
+    // SAFETY: only reads how the signal is handled, into `action`, which is valid for writes.
+    unsafe { libc::sigaction(signal, std::ptr::null(), &raw mut action) };
+    action.sa_sigaction == libc::SIG_IGN
 }
 
 /// An address with the usual port where it has none.

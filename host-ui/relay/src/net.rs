@@ -4,6 +4,7 @@ mod claimed;
 
 use crate::RelayError;
 use crate::keys::{Identity, SEATS, seat_name};
+use crate::say::say;
 use base64::Engine;
 use serde_json::{Value, json};
 use std::fmt;
@@ -298,7 +299,7 @@ impl Subscriber for Log {
         {
             return;
         }
-        println!("{why}");
+        say(format!("{why}"));
         *said = Some((why, Instant::now()));
     }
 

@@ -4,6 +4,7 @@ use super::{Member, Options, Queues};
 use crate::RelayError;
 use crate::keys::Identity;
 use crate::net::{self, Place, Session};
+use crate::say::say;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -74,10 +75,10 @@ impl Connection {
                     Ok(session) if member.has_server() => close_aside(session),
                     Ok(session) => {
                         listen(&session, member, queues)?;
-                        println!("connected anew: the session before brought nothing");
+                        say("connected anew: the session before brought nothing");
                         close_aside(member.session.replace(session));
                     }
-                    Err(why) => println!("not connected anew, which is tried again: {why}"),
+                    Err(why) => say(format!("not connected anew, which is tried again: {why}")),
                 }
             }
         }

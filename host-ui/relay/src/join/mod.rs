@@ -10,6 +10,7 @@ mod streams;
 
 use crate::keys::{Invitation, now_s};
 use crate::net::{self, Place, Priority};
+use crate::say::say;
 use crate::wire::{self, Kind, Stamp, encode};
 use crate::{RelayError, now_ns};
 use clock::Clock;
@@ -210,13 +211,13 @@ pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
         rest: to_rest,
     });
     connection::listen(&member.session.get(), &member, &queues)?;
-    println!(
+    say(format!(
         "joining {} as {} ({}); hosts here use instance \"{}\"",
         options.server,
         options.invitation.name,
         options.invitation.role,
         options.instance.name()
-    );
+    ));
     while !stop.load(Ordering::Relaxed) && !threads.iter().any(std::thread::JoinHandle::is_finished) {
         rounds.pass();
         connection.pass(&member, &queues)?;
@@ -229,7 +230,6 @@ pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
     member.end.store(true, Ordering::Relaxed);
     let mut ended = Ok(());
     for thread in threads {
-        // A panic there was reported when it happened.
         ended = thread.join().unwrap_or(Ok(())).and(ended);
     }
     drop(rounds);

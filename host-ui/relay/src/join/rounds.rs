@@ -5,6 +5,7 @@ use super::streams::Scenes;
 use super::{Member, Options, SILENCE};
 use crate::control::{Order, Orders};
 use crate::ports::Far;
+use crate::say::say;
 use crate::wire::{self, Hello, Kind, Rest, Who};
 use crate::{RelayError, now_ns};
 use bytemuck::Zeroable;
@@ -142,14 +143,14 @@ impl Rounds {
             if has_server {
                 self.ask_for_all();
             }
-            println!(
+            say(format!(
                 "{}",
                 if has_server {
                     "connected"
                 } else {
                     "the server is not heard; requests are refused"
                 }
-            );
+            ));
         }
         if has_server && self.awaited.is_due(self.scene != (0, 0)) {
             let patience = (2 * self.awaited.patience).min(GREETING_AFTER_AT_MOST);
@@ -267,7 +268,7 @@ impl Rounds {
             _ => Err(Invalid("kind of message")),
         };
         if let Err(invalid) = taken {
-            println!("dropped: {:?} of the server: {invalid}", message.kind);
+            say(format!("dropped: {:?} of the server: {invalid}", message.kind));
         }
     }
 

@@ -6,6 +6,7 @@ use super::rounds::{Presence, Rounds};
 use super::streams;
 use crate::control::Order;
 use crate::keys::{Member, Role, now_s};
+use crate::say::say;
 use crate::wire::{self, Hello, Kind, Message, Ticks, encode};
 use bytemuck::Zeroable;
 use std::time::Instant;
@@ -74,7 +75,7 @@ fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
     let known = rounds.present.get(&seat).map(|presence| presence.epoch);
     if known != Some(epoch) {
         if known.is_none() {
-            println!("connected: {}", rounds.name(seat));
+            say(format!("connected: {}", rounds.name(seat)));
         }
         rounds.announcements.greet(seat, &hello, &rounds.jobs);
         super::lock(&rounds.server.paces).entry(seat).or_default().forget();
@@ -146,7 +147,7 @@ fn allowed(rounds: &mut Rounds, seat: u16, member: &Member, right: Option<Right>
             let before = rounds.lease.holder();
             let taken = rounds.lease.take(seat, Instant::now());
             if taken.is_ok() && before != Holder::Seat(seat) {
-                println!("operates now: {}", rounds.name(seat));
+                say(format!("operates now: {}", rounds.name(seat)));
             }
             taken.map_err(|held| rounds.held_words(held))
         }

@@ -3,6 +3,7 @@
 
 use super::lease::SILENCE;
 use super::tape::{self, Tape};
+use crate::say::say;
 use crate::{RelayError, now_ns};
 use std::ffi::OsString;
 use std::io::{ErrorKind, Read, Write};
@@ -25,6 +26,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(20);
 /// A server that did not run for so long is started again after a pause.
 const SHORT: Duration = Duration::from_secs(1);
 const PAUSE: Duration = Duration::from_millis(100);
+/// A server that was asked to end is waited for no longer.
+const END_PATIENCE: Duration = Duration::from_secs(4);
 /// A server that takes none of what it asked for is not waited for longer.
 const WRITE_PATIENCE: Duration = Duration::from_millis(100);
 
@@ -84,7 +87,7 @@ pub fn keep(instance: &Instance, arguments: &[OsString], stop: &AtomicBool) -> R
                 return Err(RelayError("the server ended; what it printed says why".to_owned()));
             }
             _ => {
-                println!("the server ended with {status}; it is started again");
+                say(format!("the server ended with {status}; it is started again"));
                 if begun.elapsed() < SHORT {
                     std::thread::sleep(PAUSE);
                 }
@@ -115,7 +118,7 @@ fn end_with_keeper() -> std::io::Result<()> {
 
 /// Until the server has ended.
 fn watch(instance: &Instance, from_server: &mut UnixStream, tape: &mut Tape, child: &Child, stop: &AtomicBool) {
-    let (mut operated, mut is_stopped, mut heard, mut asked) = (false, false, Instant::now(), false);
+    let (mut operated, mut is_stopped, mut heard, mut asked) = (false, false, Instant::now(), None);
     let mut beats = [0; 64];
     loop {
         match from_server.read(&mut beats) {
@@ -141,13 +144,18 @@ fn watch(instance: &Instance, from_server: &mut UnixStream, tape: &mut Tape, chi
             stop_hand(instance, "the relay stands still");
         }
         // SYNC: as above.
-        if stop.load(Ordering::Relaxed) && !asked {
-            asked = true;
+        if stop.load(Ordering::Relaxed) {
+            let signal = match *asked.get_or_insert_with(Instant::now) {
+                since if since.elapsed() >= END_PATIENCE => libc::SIGKILL,
+                _ => libc::SIGTERM,
+            };
             // SAFETY: a signal to a child that was not waited for yet.
-            unsafe { libc::kill(child.id() as libc::pid_t, libc::SIGTERM) };
+            unsafe { libc::kill(child.id() as libc::pid_t, signal) };
         }
     }
-    if operated && !is_stopped && !asked {
+    // One that ends when it is asked to stops the hand itself.
+    let is_orderly = asked.is_some_and(|since| since.elapsed() < END_PATIENCE);
+    if operated && !is_stopped && !is_orderly {
         stop_hand(instance, "the relay was killed");
     }
 }
@@ -164,9 +172,8 @@ fn stop_hand(instance: &Instance, why: &str) {
         std::thread::sleep(Duration::from_millis(30));
         Ok(())
     };
-    // After it was sent, and whatever becomes of the words: an output may be full, or closed.
-    let _said = match send() {
-        Ok(()) => writeln!(std::io::stdout(), "the hand is stopped: {why}"),
-        Err(failed) => writeln!(std::io::stdout(), "the hand could not be stopped ({why}): {failed}"),
-    };
+    say(match send() {
+        Ok(()) => format!("the hand is stopped: {why}"),
+        Err(failed) => format!("the hand could not be stopped ({why}): {failed}"),
+    });
 }

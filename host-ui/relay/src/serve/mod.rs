@@ -14,6 +14,7 @@ mod watched;
 
 use crate::keys::{Lab, seat_of};
 use crate::net::{self, Session};
+use crate::say::say;
 use crate::wire::{Kind, Stamp, encode};
 use crate::{RelayError, now_ns};
 use keeper::Beat;
@@ -148,17 +149,16 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<End,
         spawn("again", &server, move |server| streams::again(server, &missed)),
         spawn("before", &server, move |server| tape::complete(server, keeper)),
     ];
-    println!(
+    say(format!(
         "serving instance \"{}\" on {}",
         options.instance.name(),
         options.listen.join(", ")
-    );
+    ));
     let rounds = Rounds::new(Arc::clone(&server), options.lab.clone(), members, jobs);
     let end = rounds.and_then(|rounds| serve(rounds, &asked, stop, beat));
     // SYNC: see the field.
     server.end.store(true, Ordering::Relaxed);
     for thread in threads {
-        // A panic there was reported when it happened.
         let _ = thread.map(std::thread::JoinHandle::join);
     }
     net::close(session);

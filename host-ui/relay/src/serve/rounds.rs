@@ -7,10 +7,10 @@ use super::streams::Jobs;
 use super::{Server, asked};
 use crate::control::{Order, Orders};
 use crate::keys::{Lab, Member, Members, Role};
+use crate::say::say;
 use crate::wire::{Present, Who};
 use crate::{RelayError, now_ns};
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_ports::SlicePublisher;
@@ -134,7 +134,7 @@ impl Rounds {
             local |= Request::decode(&command).is_ok_and(|request| operates(request.kind()));
         }
         if local && let Some(seat) = self.lease.local_operates(now) {
-            println!("{LOCAL} operates now, and {} no longer", self.name(seat));
+            say(format!("{LOCAL} operates now, and {} no longer", self.name(seat)));
         }
     }
 
@@ -155,8 +155,7 @@ impl Rounds {
         if let (Some(near), Ok(command)) = (self.announcements.near(), command) {
             let _ = near.ask(command);
         }
-        // Last, and whatever becomes of it: an output may be full, or closed.
-        let _said = writeln!(std::io::stdout(), "the hand is stopped: {why}");
+        say(format!("the hand is stopped: {why}"));
     }
 
     /// Name and role for the log.
@@ -176,7 +175,7 @@ impl Rounds {
         if is_greeting {
             self.refusals.insert(seat, Instant::now());
         }
-        println!("refused: {}: {what}: {why}", self.name(seat));
+        say(format!("refused: {}: {what}: {why}", self.name(seat)));
     }
 
     pub(super) fn take(&mut self, seat: u16, bytes: &[u8]) {
@@ -263,14 +262,14 @@ impl Rounds {
                 let name = self.name(seat);
                 self.stop_hand(&format!("{name} operates no longer"));
             }
-            println!(
+            say(format!(
                 "operates now: {}",
                 match to {
                     Holder::Nobody => "nobody".to_owned(),
                     Holder::Local => LOCAL.to_owned(),
                     Holder::Seat(seat) => self.name(seat),
                 }
-            );
+            ));
         }
     }
 }
