@@ -9,7 +9,7 @@ use stylet_manual::ManualArgs;
 use stylet_relay::control::{self, Order};
 use stylet_relay::keys::{Invitation, Lab, Role, Validity, write_invitation};
 use stylet_relay::net::PORT;
-use stylet_relay::serve::{self, End, keeper};
+use stylet_relay::serve::{self, keeper};
 use stylet_relay::{RelayError, join, say};
 use stylet_shm_schema::Instance;
 
@@ -97,7 +97,7 @@ enum KeysTask {
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
     },
-    /// Accept nothing from a person any more; everybody is connected anew, within a second
+    /// Accept nothing from a person any more, and send nothing, within a second
     Revoke {
         /// Name of the person
         name: String,
@@ -123,7 +123,7 @@ enum LeaseTask {
 
 fn main() -> ExitCode {
     let code = match run(Cli::parse().task) {
-        Ok(code) => code,
+        Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
             say::complain(format!("relay: {why}"));
             ExitCode::from(keeper::CANNOT)
@@ -167,7 +167,7 @@ fn with_port(host: &str) -> String {
     }
 }
 
-fn run(task: Task) -> Result<ExitCode, RelayError> {
+fn run(task: Task) -> Result<(), RelayError> {
     match task {
         Task::Serve {
             instance,
@@ -179,18 +179,14 @@ fn run(task: Task) -> Result<ExitCode, RelayError> {
             let stop = on_signals()?;
             if !kept {
                 let arguments: Vec<_> = std::env::args_os().skip(1).collect();
-                keeper::keep(&instance, &arguments, &stop)?;
-                return Ok(ExitCode::SUCCESS);
+                return keeper::keep(&instance, &arguments, &stop);
             }
             let options = serve::Options {
                 instance,
                 listen,
                 lab: Lab::new(&keys),
             };
-            match serve::run(&options, &stop, &mut keeper::Beat::of_stdin())? {
-                End::Stopped => Ok(ExitCode::SUCCESS),
-                End::Closed => Ok(ExitCode::from(keeper::AGAIN)),
-            }
+            serve::run(&options, &stop, &mut keeper::Beat::of_stdin())
         }
         Task::Join {
             host,
@@ -200,20 +196,18 @@ fn run(task: Task) -> Result<ExitCode, RelayError> {
             let invitation = Invitation::read(&invitation)?;
             let server = with_port(host.as_deref().unwrap_or(&invitation.server));
             let instance = Instance::new(&instance)?;
+            let identity = invitation.identity();
             let options = join::Options {
                 instance,
                 server,
                 invitation,
+                identity,
             };
             let stop = on_signals()?;
-            join::run(&options, &stop)?;
-            Ok(ExitCode::SUCCESS)
+            join::run(&options, &stop)
         }
-        Task::Manual(args) => {
-            args.run(Cli::command()).map_err(|e| RelayError(e.to_string()))?;
-            Ok(ExitCode::SUCCESS)
-        }
-        Task::Keys { task, keys } => keys_task(task, &Lab::new(&keys)).map(|()| ExitCode::SUCCESS),
+        Task::Manual(args) => args.run(Cli::command()).map_err(|e| RelayError(e.to_string())),
+        Task::Keys { task, keys } => keys_task(task, &Lab::new(&keys)),
         Task::Lease { task, instance } => {
             let order = match task {
                 LeaseTask::Take => Order::Take,
@@ -222,7 +216,7 @@ fn run(task: Task) -> Result<ExitCode, RelayError> {
                 LeaseTask::Status => Order::Status,
             };
             println!("{}", control::ask(&Instance::new(&instance)?, &order)?);
-            Ok(ExitCode::SUCCESS)
+            Ok(())
         }
     }
 }

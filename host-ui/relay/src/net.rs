@@ -1,10 +1,9 @@
 //! The session of zenoh: QUIC alone, certificates on both sides, no scouting, nothing allowed that is not listed.
 
-mod claimed;
-
 use crate::RelayError;
 use crate::keys::{Identity, SEATS, seat_name};
 use crate::say::say;
+use crate::wire::{MAX_PART_BYTES, MAX_SCENE_WORDS};
 use base64::Engine;
 use serde_json::{Value, json};
 use std::fmt;
@@ -15,6 +14,7 @@ use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
 use tracing::{Event, Level, Metadata, Subscriber};
 pub use zenoh::Session;
+pub use zenoh::bytes::ZBytes as Bytes;
 use zenoh::qos::Reliability;
 pub use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Config, Wait};
@@ -27,16 +27,14 @@ const LEASE_MS: u32 = 600;
 pub const PATIENCE_US: u64 = 10_000_000;
 /// A connection that is not made after so long is begun again: QUIC sends a first packet that was lost again after a second. Four round trips.
 const OPEN_MS: u32 = 700;
-/// A message of a volume of 64 million cells fits.
-const MAX_MESSAGE_BYTES: usize = 70 << 20;
+/// A member takes a scene.
+const MAX_OF_SERVER: usize = 4 * MAX_SCENE_WORDS + (1 << 20);
+/// A server puts no larger message of a member together, whoever sends it.
+const MAX_OF_MEMBER: usize = 2 * MAX_PART_BYTES;
 
 /// Where a message goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// Records, from the server to all.
-    Records,
-    /// Everything else, from the server to all.
-    Rest,
     /// From the server to one seat.
     To(u16),
     /// From one seat to the server.
@@ -48,8 +46,6 @@ impl Place {
     pub fn key(self) -> String {
         let root = format!("stylet/{SCHEMA_VERSION}");
         match self {
-            Self::Records => format!("{root}/all/records"),
-            Self::Rest => format!("{root}/all/rest"),
             Self::To(seat) => format!("{root}/to/{}", seat_name(seat)),
             Self::Ask(seat) => format!("{root}/ask/{}", seat_name(seat)),
         }
@@ -70,7 +66,7 @@ fn base64(text: &str) -> String {
     base64::engine::general_purpose::STANDARD.encode(text)
 }
 
-fn common(mode: &str, tls: Value) -> Value {
+fn common(mode: &str, tls: Value, max_message_bytes: usize) -> Value {
     json!({
         "mode": mode,
         // Without its delay a server sends as soon as it listens.
@@ -83,15 +79,15 @@ fn common(mode: &str, tls: Value) -> Value {
                     "lease": LEASE_MS, "keep_alive": 6,
                     "queue": { "size": { "data_low": 4 }, "congestion_control": { "drop": { "wait_before_drop": 1000 }, "block": { "wait_before_close": PATIENCE_US } } },
                 },
-                "rx": { "max_message_size": MAX_MESSAGE_BYTES },
+                "rx": { "max_message_size": max_message_bytes },
                 "tls": tls,
             },
         },
     })
 }
 
-/// What `serve` listens on: addresses with ports. Seats in `closed` hear nothing; what they ask is refused by name, by `serve::asked`.
-pub fn serve(listen: &[String], identity: &Identity, closed: &[u16]) -> Result<Session, RelayError> {
+/// What `serve` listens on: addresses with ports.
+pub fn serve(listen: &[String], identity: &Identity) -> Result<Session, RelayError> {
     let tls = json!({
         "root_ca_certificate_base64": base64(&identity.authority),
         "listen_private_key_base64": base64(&identity.key),
@@ -99,10 +95,10 @@ pub fn serve(listen: &[String], identity: &Identity, closed: &[u16]) -> Result<S
         "enable_mtls": true,
         "close_link_on_expiration": true,
     });
-    let mut config = common("router", tls);
+    let mut config = common("router", tls, MAX_OF_MEMBER);
     let endpoints: Vec<String> = listen.iter().map(|at| endpoint(at)).collect();
     config["listen"] = json!({ "endpoints": endpoints, "exit_on_failure": true });
-    config["access_control"] = access(closed);
+    config["access_control"] = access();
     open(&config).map_err(|e| {
         RelayError(format!(
             "cannot listen on {}: {e}. Is another relay running, or does 'relay keys new' still have to make this machine's certificate?",
@@ -121,7 +117,7 @@ pub fn join(server: &str, identity: &Identity) -> Result<Session, RelayError> {
         "verify_name_on_connect": true,
         "close_link_on_expiration": true,
     });
-    let mut config = common("client", tls);
+    let mut config = common("client", tls, MAX_OF_SERVER);
     config["connect"] = json!({
         "endpoints": [endpoint(server)], "timeout_ms": -1, "exit_on_failure": false,
         "retry": { "period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5 },
@@ -130,66 +126,44 @@ pub fn join(server: &str, identity: &Identity) -> Result<Session, RelayError> {
 }
 
 fn open(config: &Value) -> Result<Session, zenoh::Error> {
-    claimed::note_refused();
     // A second session of one program has the log already.
     let _ = tracing::subscriber::set_global_default(Log);
     zenoh::open(Config::from_json5(&config.to_string())?).wait()
 }
 
-/// Default deny; a seat may ask under its own name alone, and hear what is for all and for itself while it is open.
-fn access(closed: &[u16]) -> Value {
-    let open = || (1..=SEATS).filter(|seat| !closed.contains(seat));
+/// Default deny; a seat may ask and hear under its own name alone. Who of them is admitted the server decides, message by message.
+fn access() -> Value {
+    let server = "server";
     let mut rules = vec![json!({
-        "id": "all", "permission": "allow", "flows": ["ingress", "egress"], "messages": ["declare_subscriber"],
-        "key_exprs": [Place::Records.key(), Place::Rest.key()],
-    })];
-    rules.push(json!({
-        "id": "all-data", "permission": "allow", "flows": ["egress"], "messages": ["put"],
-        "key_exprs": [Place::Records.key(), Place::Rest.key()],
-    }));
-    rules.push(json!({
-        "id": "server", "permission": "allow", "flows": ["egress"], "messages": ["declare_subscriber"],
+        "id": server, "permission": "allow", "flows": ["egress"], "messages": ["declare_subscriber"],
         "key_exprs": [every_ask()],
-    }));
-    let names = |seats: &mut dyn Iterator<Item = u16>| seats.map(seat_name).collect::<Vec<_>>();
-    let mut subjects = vec![
-        json!({ "id": "members", "cert_common_names": names(&mut open()) }),
-        json!({ "id": "seats", "cert_common_names": names(&mut (1..=SEATS)) }),
-    ];
-    let mut policies = vec![
-        json!({ "rules": ["all", "all-data"], "subjects": ["members"] }),
-        json!({ "rules": ["server"], "subjects": ["seats"] }),
-    ];
+    })];
+    let names: Vec<String> = (1..=SEATS).map(seat_name).collect();
+    let mut subjects = vec![json!({ "id": "seats", "cert_common_names": names })];
+    let mut policies = vec![json!({ "rules": [server], "subjects": ["seats"] })];
     for seat in 1..=SEATS {
         let name = seat_name(seat);
-        rules.push(json!({
-            "id": format!("ask-{name}"), "permission": "allow", "flows": ["ingress"], "messages": ["put"],
-            "key_exprs": [Place::Ask(seat).key()],
-        }));
-        rules.push(json!({
-            "id": format!("hear-{name}"), "permission": "allow", "flows": ["ingress"], "messages": ["declare_subscriber"],
-            "key_exprs": [Place::To(seat).key()],
-        }));
-        rules.push(json!({
-            "id": format!("to-{name}"), "permission": "allow", "flows": ["egress"], "messages": ["put"],
-            "key_exprs": [Place::To(seat).key()],
+        let kinds = [
+            ("ask", "ingress", "put", Place::Ask(seat)),
+            ("hear", "ingress", "declare_subscriber", Place::To(seat)),
+            ("to", "egress", "put", Place::To(seat)),
+        ];
+        let id = |kind: &str| format!("{kind}-{name}");
+        rules.extend(kinds.map(|(kind, flow, message, place)| {
+            json!({
+                "id": id(kind), "permission": "allow", "flows": [flow], "messages": [message], "key_exprs": [place.key()],
+            })
         }));
         subjects.push(json!({ "id": name, "cert_common_names": [name] }));
-        let kinds: &[&str] = if closed.contains(&seat) {
-            &["ask"]
-        } else {
-            &["ask", "hear", "to"]
-        };
-        let of_seat: Vec<String> = kinds.iter().map(|kind| format!("{kind}-{name}")).collect();
-        policies.push(json!({ "rules": of_seat, "subjects": [name] }));
+        policies.push(json!({ "rules": kinds.map(|(kind, ..)| id(kind)), "subjects": [name] }));
     }
     json!({ "enabled": true, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies })
 }
 
 /// Sends a message; what congestion drops is sent again by whoever needs it.
-pub fn put(session: &Session, place: Place, priority: Priority, bytes: Vec<u8>) {
+pub fn put(session: &Session, place: Place, priority: Priority, bytes: impl Into<Bytes>) {
     let sent = session
-        .put(place.key(), bytes)
+        .put(place.key(), bytes.into())
         .congestion_control(CongestionControl::Drop)
         .priority(priority)
         .express(true)
@@ -199,9 +173,9 @@ pub fn put(session: &Session, place: Place, priority: Priority, bytes: Vec<u8>) 
 }
 
 /// The same in datagrams, which are never sent again: what is lost is not worth waiting for, and holds up nothing that comes after it.
-pub fn put_newest(session: &Session, place: Place, priority: Priority, bytes: Vec<u8>) {
+pub fn put_newest(session: &Session, place: Place, priority: Priority, bytes: impl Into<Bytes>) {
     let sent = session
-        .put(place.key(), bytes)
+        .put(place.key(), bytes.into())
         .congestion_control(CongestionControl::Drop)
         .reliability(Reliability::BestEffort)
         .priority(priority)
@@ -211,9 +185,9 @@ pub fn put_newest(session: &Session, place: Place, priority: Priority, bytes: Ve
 }
 
 /// The same, but waits for room: for the one member that asked for it, on a thread of its own.
-pub fn put_whole(session: &Session, place: Place, priority: Priority, bytes: Vec<u8>) {
+pub fn put_whole(session: &Session, place: Place, priority: Priority, bytes: impl Into<Bytes>) {
     let sent = session
-        .put(place.key(), bytes)
+        .put(place.key(), bytes.into())
         .congestion_control(CongestionControl::Block)
         .priority(priority)
         .wait();
@@ -245,19 +219,26 @@ pub fn close(session: Session) {
 }
 
 const SAY_EVERY: Duration = Duration::from_secs(10);
-static SAID: Mutex<Option<(String, Instant)>> = Mutex::new(None);
+/// Different reasons in that time.
+const SAY_AT_MOST: usize = 8;
+static SAID: Mutex<Vec<(String, Instant)>> = Mutex::new(Vec::new());
+
+/// zenoh warns that its access rules may not know a link's network interface; ours name none.
+const NO_CONCERN: &str = "Transport returned multiple network interfaces";
 
 /// What a person reads of a message of zenoh: of a handshake that failed, the reason that its library gives in quotation marks.
-fn reason(text: &str) -> String {
+fn reason(text: &str) -> Option<String> {
+    if text.starts_with(NO_CONCERN) {
+        return None;
+    }
     if !text.contains("QUIC acceptor failed") {
-        return format!("network: {text}");
+        return Some(format!("network: {text}"));
     }
     let quoted = text
         .split_once("reason: \"")
         .and_then(|(_, rest)| rest.split('"').next());
     let quoted = quoted.unwrap_or(text).split(" time ").next().unwrap_or(text);
-    let who = claimed::take().map_or_else(String::new, |name| format!(" that calls itself {name}"));
-    format!("refused: a connection{who}, in its handshake: {quoted}")
+    Some(format!("refused: a connection, in its handshake: {quoted}"))
 }
 
 /// Prints what zenoh reports as an error or a warning: a refused certificate is one.
@@ -290,17 +271,15 @@ impl Subscriber for Log {
         let mut text = Text(String::new());
         event.record(&mut text);
         // A peer that is refused tries again at once; the same reason is said once in a while.
+        let Some(why) = reason(&text.0) else { return };
         let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
+        said.retain(|(_, at)| at.elapsed() < SAY_EVERY);
         // A peer may have chosen some of it.
-        let why = reason(&text.0).replace(char::is_control, " ");
-        if said
-            .as_ref()
-            .is_some_and(|(last, at)| *last == why && at.elapsed() < SAY_EVERY)
-        {
-            return;
+        let why = why.replace(char::is_control, " ");
+        if said.len() < SAY_AT_MOST && said.iter().all(|(last, _)| *last != why) {
+            say(why.clone());
+            said.push((why, Instant::now()));
         }
-        say(format!("{why}"));
-        *said = Some((why, Instant::now()));
     }
 
     fn enter(&self, _: &Id) {}

@@ -29,7 +29,7 @@ impl Connection {
     pub fn new(options: &Options) -> Self {
         Self {
             server: options.server.clone(),
-            identity: options.invitation.identity(),
+            identity: options.identity.clone(),
             since: Instant::now(),
             opening: None,
         }
@@ -65,7 +65,7 @@ impl Connection {
     /// Calls the server anew where it is not heard; the new session takes the place of the old one unless that was heard meanwhile.
     pub fn pass(&mut self, member: &Arc<Member>, queues: &Arc<Queues>) -> Result<(), RelayError> {
         match self.opening.as_ref().map(Receiver::try_recv) {
-            None if self.since.elapsed() >= DEAF && !member.has_heard(DEAF) => self.opening = Some(self.open()),
+            None if self.since.elapsed() >= DEAF && !member.is_answered(DEAF) => self.opening = Some(self.open()),
             None | Some(Err(TryRecvError::Empty)) => {}
             Some(Err(TryRecvError::Disconnected)) => self.again(),
             Some(Ok(opened)) => {
@@ -97,11 +97,9 @@ fn close_aside(session: Session) {
 
 /// What the server sends to this member goes to its queues.
 pub(super) fn listen(session: &Session, member: &Arc<Member>, queues: &Arc<Queues>) -> Result<(), RelayError> {
-    for place in [Place::Records, Place::Rest, Place::To(member.seat)] {
-        let (queues, member) = (Arc::clone(queues), Arc::clone(member));
-        net::hear(session, &place.key(), move |_, bytes| queues.take(&member, bytes))?;
-    }
-    Ok(())
+    let (queues, place) = (Arc::clone(queues), Place::To(member.seat));
+    let member = Arc::clone(member);
+    net::hear(session, &place.key(), move |_, bytes| queues.take(&member, bytes))
 }
 
 /// The session in use, which may be another from one message to the next.

@@ -1,5 +1,6 @@
 //! On another machine: the services of the core as if it ran here, and the requests of hosts here to the server.
 
+mod awaited;
 mod clock;
 mod connection;
 mod last;
@@ -7,8 +8,9 @@ mod line;
 mod order;
 mod rounds;
 mod streams;
+mod volume;
 
-use crate::keys::{Invitation, now_s};
+use crate::keys::{Identity, Invitation};
 use crate::net::{self, Place, Priority};
 use crate::say::say;
 use crate::wire::{self, Kind, Stamp, encode};
@@ -36,6 +38,8 @@ pub struct Options {
     pub server: String,
     /// Who this is.
     pub invitation: Invitation,
+    /// The certificate and key of the invitation.
+    pub identity: Identity,
 }
 
 /// What the threads of a member share.
@@ -50,6 +54,8 @@ struct Member {
     heard_ns: AtomicU64,
     /// When the server was heard last, by this machine's clock.
     heard_at_ns: AtomicU64,
+    /// Why the server takes nothing of this member, and when it said so last, by this machine's clock.
+    refused: Mutex<Option<(String, u64)>>,
     /// Records lost for good.
     lost: AtomicU64,
     clock: Mutex<Clock>,
@@ -94,6 +100,21 @@ impl Member {
         at != 0 && u128::from(now_ns().saturating_sub(at)) < within.as_nanos()
     }
 
+    /// By records or by a refusal.
+    fn is_answered(&self, within: Duration) -> bool {
+        self.has_heard(within) || self.refusal(within).is_some()
+    }
+
+    /// Why the server takes nothing of this member.
+    fn refusal(&self, within: Duration) -> Option<String> {
+        let refused = self.refused.lock().unwrap_or_else(PoisonError::into_inner);
+        let recent = |at| u128::from(now_ns().saturating_sub(at)) < within.as_nanos();
+        refused
+            .as_ref()
+            .filter(|(_, at)| recent(*at))
+            .map(|(why, _)| why.clone())
+    }
+
     fn has_server(&self) -> bool {
         self.has_heard(SILENCE)
     }
@@ -120,13 +141,13 @@ impl Member {
 
     /// A message that is not to be lost while there is a connection.
     fn ask(&self, kind: Kind, parts: &[&[u8]]) {
+        // Behind all that a hand asks for.
+        let priority = match kind {
+            Kind::Upload => Priority::Data,
+            _ => Priority::InteractiveHigh,
+        };
         let bytes = encode(kind, self.stamp(0), parts);
-        net::put_whole(
-            &self.session.get(),
-            Place::Ask(self.seat),
-            Priority::InteractiveHigh,
-            bytes,
-        );
+        net::put_whole(&self.session.get(), Place::Ask(self.seat), priority, bytes);
     }
 }
 
@@ -143,6 +164,12 @@ struct Queues {
 impl Queues {
     fn take(&self, member: &Member, bytes: &[u8]) {
         let Ok(message) = wire::decode(bytes) else { return };
+        if message.kind == Kind::Refused {
+            if let Ok(why) = wire::words(message.body) {
+                *member.refused.lock().unwrap_or_else(PoisonError::into_inner) = Some((why, now_ns()));
+            }
+            return;
+        }
         member.heard(&message.stamp);
         if message.kind == Kind::Newest
             && let Ok((state, records)) = wire::state_and_records(message.body)
@@ -160,18 +187,8 @@ impl Queues {
     }
 }
 
-fn check_time(invitation: &Invitation) -> Result<(), RelayError> {
-    match now_s() > invitation.until_s {
-        true => Err(RelayError(
-            "the invitation has expired: ask the lab for another".to_owned(),
-        )),
-        false => Ok(()),
-    }
-}
-
 /// Joins until `stop`.
 pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
-    check_time(&options.invitation)?;
     // Before there are threads, of zenoh as well.
     crate::slice::shorten();
     let mut connection = Connection::new(options);
@@ -187,6 +204,7 @@ pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
         server_run: AtomicU64::new(0),
         heard_ns: AtomicU64::new(0),
         heard_at_ns: AtomicU64::new(0),
+        refused: Mutex::new(None),
         lost: AtomicU64::new(0),
         clock: Mutex::new(Clock::new()),
         snapshots_lost: AtomicU64::new(0),

@@ -1,7 +1,9 @@
 //! One pass of a member after the other: what is in force goes to hosts here, their requests go to the server.
 
+use super::awaited::Awaited;
 use super::line::Line;
 use super::streams::Scenes;
+use super::volume::Volume;
 use super::{Member, Options, SILENCE};
 use crate::control::{Order, Orders};
 use crate::ports::Far;
@@ -24,43 +26,15 @@ use stylet_shm_schema::{
 const PASS: Duration = Duration::from_millis(2);
 const QUIET_PASS: Duration = Duration::from_millis(10);
 const QUIET: Duration = Duration::from_secs(1);
+/// A server that refuses says so to each greeting.
+const REFUSED_FOR: Duration = Duration::from_secs(3);
 /// For hosts that come and orders of a terminal, which no operator waits for.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 const HELLO_EVERY: Duration = Duration::from_millis(50);
-/// A greeting that did not come whole is asked for again after so long, each time after twice as long as the time before.
-const GREETING_AFTER: Duration = Duration::from_millis(400);
-const GREETING_AFTER_AT_MOST: Duration = Duration::from_millis(3_200);
 /// For so long an event that was missed is waited for.
 const EVENT_PATIENCE: Duration = Duration::from_millis(500);
 /// Takes two milliseconds, in which records may wait.
 const CLEAN_EVERY: Duration = Duration::from_secs(10);
-
-/// What a greeting brings.
-struct Awaited {
-    session: bool,
-    parameters: bool,
-    plan: bool,
-    since: Instant,
-    patience: Duration,
-}
-
-impl Awaited {
-    fn now(patience: Duration) -> Self {
-        Self {
-            session: true,
-            parameters: true,
-            plan: true,
-            since: Instant::now(),
-            patience,
-        }
-    }
-
-    /// A greeting may be sent before the server knows that this member listens.
-    fn is_due(&self, has_scene: bool) -> bool {
-        let complete = has_scene && !self.session && !self.parameters && !self.plan;
-        !complete && self.since.elapsed() >= self.patience
-    }
-}
 
 /// All of a member but the threads of records and snapshots.
 pub(super) struct Rounds {
@@ -74,6 +48,10 @@ pub(super) struct Rounds {
     scene: (u64, u64),
     /// Run of the core and number of the last event that hosts here had.
     event: (u64, u64),
+    /// A volume that goes to the server.
+    volume: Option<Volume>,
+    /// Why the server takes nothing of this member, as it was said here last.
+    refused: Option<String>,
     /// Since when an event between that one and the next is missed.
     event_missed: Option<Instant>,
     who: Who,
@@ -102,12 +80,14 @@ impl Rounds {
             scenes: Arc::new(Mutex::new(Arc::new(Rest::default()))),
             scene: (0, 0),
             event: (0, 0),
+            volume: None,
+            refused: None,
             event_missed: None,
             who: Who::default(),
             line: Line::new(options),
             hello: now,
             epoch: 0,
-            awaited: Awaited::now(GREETING_AFTER),
+            awaited: Awaited::now(),
             has_server: false,
             round_trip_ns: 0,
             cleaned: now,
@@ -143,17 +123,22 @@ impl Rounds {
             if has_server {
                 self.ask_for_all();
             }
-            say(format!(
-                "{}",
-                if has_server {
-                    "connected"
-                } else {
-                    "the server is not heard; requests are refused"
-                }
-            ));
+            say(match has_server {
+                true => "connected",
+                false => "the server is not heard; requests are refused",
+            });
+        }
+        let refused = self.member.refusal(REFUSED_FOR).filter(|_| !has_server);
+        if refused != self.refused {
+            if let Some(why) = &refused {
+                say(format!(
+                    "the server refuses this member: {why}. It is asked again until it does not"
+                ));
+            }
+            self.refused = refused;
         }
         if has_server && self.awaited.is_due(self.scene != (0, 0)) {
-            let patience = (2 * self.awaited.patience).min(GREETING_AFTER_AT_MOST);
+            let patience = self.awaited.longer();
             self.ask_for_all();
             self.awaited.patience = patience;
         }
@@ -194,7 +179,7 @@ impl Rounds {
 
     fn ask_for_all(&mut self) {
         self.epoch += 1;
-        self.awaited = Awaited::now(GREETING_AFTER);
+        self.awaited = Awaited::now();
     }
 
     fn words(&self) -> String {
@@ -204,7 +189,7 @@ impl Rounds {
                 self.line.name(),
                 self.round_trip_ns as f64 * 1e-6
             ),
-            false => "the server is not heard".to_owned(),
+            false => self.why_not(),
         };
         let lost = self.member.lost.load(Ordering::Relaxed);
         let pictures = self.member.snapshots_lost.load(Ordering::Relaxed);
@@ -216,31 +201,47 @@ impl Rounds {
 
     /// Without a server each request is answered at once: none waits and is carried out later.
     fn take_requests(&mut self) {
+        let has_server = self.member.has_server();
         while let Some(command) = self.far.commands.receive() {
             self.asked = Instant::now();
-            match self.has_server {
+            match has_server {
                 true => self.member.ask(Kind::Command, &[bytemuck::bytes_of(&command)]),
                 // A motion whose promises do not arrive brakes.
                 false if command.kind == CommandKind::KeepMoving as u32 => {}
-                false => self.refuse((command.host_id, command.command_id)),
+                false => self.refuse((command.host_id, command.command_id), &self.why_not()),
             }
         }
         while let Some(sample) = self.far.uploads.receive() {
             let header = *sample.header();
-            match self.has_server {
-                true => self
-                    .member
-                    .ask(Kind::Upload, &[bytemuck::bytes_of(&header), sample.values()]),
-                false => self.refuse((header.host_id, header.command_id)),
+            let asker = (header.host_id, header.command_id);
+            self.asked = Instant::now();
+            match &self.volume {
+                _ if !has_server => self.refuse(asker, &self.why_not()),
+                Some(_) => self.refuse(asker, "another volume is on its way to rt-core; wait until it is there"),
+                None => self.volume = Some(Volume::new(header, sample.values())),
+            }
+        }
+        if let Some(volume) = &mut self.volume {
+            self.asked = Instant::now();
+            if !has_server || !volume.send_more(&self.member) {
+                self.volume = None;
             }
         }
     }
 
-    fn refuse(&self, (host_id, command_id): (u64, u64)) {
+    /// Why nothing goes to the server.
+    fn why_not(&self) -> String {
+        match &self.refused {
+            Some(why) => format!("the server refuses this member: {why}"),
+            None => "the machine with rt-core is not heard; wait until it is, and ask again".to_owned(),
+        }
+    }
+
+    fn refuse(&self, (host_id, command_id): (u64, u64), why: &str) {
         let mut reply = Reply::zeroed();
         (reply.session_id, reply.host_id, reply.command_id) = (self.member.run(self.event.0), host_id, command_id);
         reply.status = ReplyStatus::Refused as u32;
-        reply.text = Text::new("the machine with rt-core is not heard; wait until it is, and ask again");
+        reply.text = Text::new(why);
         let _ = self.far.replies.send(reply);
     }
 

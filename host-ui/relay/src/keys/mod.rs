@@ -106,13 +106,6 @@ impl Members {
     pub fn at(&self, seat: u16) -> Option<&Member> {
         self.members.iter().find(|member| member.seat == seat)
     }
-
-    /// Seats whose members are revoked, or whose time has ended.
-    pub fn closed(&self) -> Vec<u16> {
-        let now_s = now_s();
-        let closed = self.members.iter().filter(|m| m.why_closed(now_s).is_some());
-        closed.map(|m| m.seat).collect()
-    }
 }
 
 /// What a member gets, as one file: all that `relay join` needs.

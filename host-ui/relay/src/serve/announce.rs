@@ -1,9 +1,8 @@
 //! What the core publishes beside its state, records and snapshots: sent to all as it comes, and to one member all that is in force.
 
-use super::Server;
-use super::streams::{Jobs, Message};
+use super::{Server, lock};
 use crate::class::ClassPorts;
-use crate::net::{Place, Priority, put};
+use crate::net::Bytes;
 use crate::ports::Near;
 use crate::wire::{Hello, Kind, Who, encode};
 use std::collections::VecDeque;
@@ -32,8 +31,8 @@ pub struct Announcements {
     session: Option<Session>,
     parameters: Option<ParametersInForce>,
     plan: Option<PlanInForce>,
-    /// Identity and payload.
-    scene: Option<((u64, u64), Vec<u8>)>,
+    /// Identity and message.
+    scene: Option<((u64, u64), Bytes)>,
     events: VecDeque<Event>,
     replies: VecDeque<Reply>,
 }
@@ -88,11 +87,7 @@ impl Announcements {
 
     /// To everybody.
     pub fn send(&self, kind: Kind, parts: &[&[u8]]) {
-        let priority = match kind {
-            Kind::Scene => Priority::Data,
-            _ => Priority::InteractiveLow,
-        };
-        put(&self.server.session, Place::Rest, priority, self.message(kind, parts));
+        self.server.to_all(self.message(kind, parts));
     }
 
     pub fn pass(&mut self) {
@@ -151,9 +146,12 @@ impl Announcements {
         while let Some(sample) = near.scene.receive() {
             let header = *sample.header();
             if check::scene(&header, sample.values()).is_ok() {
-                let body = [bytemuck::bytes_of(&header), bytemuck::cast_slice(sample.values())].concat();
-                self.send(Kind::Scene, &[&body]);
-                self.scene = Some(((header.session_id, header.generation), body));
+                let parts = [bytemuck::bytes_of(&header), bytemuck::cast_slice(sample.values())];
+                let bytes = Bytes::from(self.message(Kind::Scene, &parts));
+                let id = (header.session_id, header.generation);
+                let now = Instant::now();
+                (lock(&self.server.outlets).values_mut()).for_each(|outlet| outlet.scene(id, &bytes, now));
+                self.scene = Some((id, bytes));
             }
         }
         while let Some(event) = near.events.receive() {
@@ -178,23 +176,20 @@ impl Announcements {
         self.scene.as_ref().is_none_or(|(id, _)| *id == theirs)
     }
 
-    /// All that is in force, to a member that has just come or was cut off.
-    pub fn greet(&self, seat: u16, hello: &Hello, jobs: &Jobs) {
-        let send = |kind, parts: &[&[u8]]| {
-            // A full queue is one of a member that asks again.
-            let _ = jobs.messages.try_send(Message(seat, self.message(kind, parts)));
-        };
+    /// The scene that is in force, to a member that says that it has another.
+    pub fn send_scene(&self, seat: u16, now: Instant) {
+        if let (Some((id, bytes)), Some(outlet)) = (&self.scene, lock(&self.server.outlets).get_mut(&seat)) {
+            outlet.scene(*id, bytes, now);
+        }
+    }
+
+    /// All that is in force but the scene, to a member that has just come or was cut off.
+    pub fn greet(&self, seat: u16) {
+        let outlets = lock(&self.server.outlets);
+        let Some(outlet) = outlets.get(&seat) else { return };
+        let send = |kind, parts: &[&[u8]]| outlet.message(self.message(kind, parts).into());
         if let Some(session) = &self.session {
             send(Kind::Session, &[bytemuck::bytes_of(session)]);
-        }
-        if let Some((_, body)) = &self.scene
-            && !self.has_scene(hello)
-            && super::lock(&self.server.scenes_away).insert(seat)
-        {
-            let message = Message(seat, self.message(Kind::Scene, &[body]));
-            if jobs.scenes.try_send(message).is_err() {
-                super::lock(&self.server.scenes_away).remove(&seat);
-            }
         }
         if let Some(parameters) = &self.parameters {
             send(Kind::Parameters, &[bytemuck::bytes_of(parameters)]);

@@ -3,10 +3,9 @@
 use super::lease::Holder;
 use super::rights::{Right, right, right_to_upload};
 use super::rounds::{Presence, Rounds};
-use super::streams;
+use super::volume::Volume;
 use crate::control::Order;
-use crate::keys::{Member, Role, now_s};
-use crate::say::say;
+use crate::keys::{Member, Role};
 use crate::wire::{self, Hello, Kind, Message, Ticks, encode};
 use bytemuck::Zeroable;
 use std::time::Instant;
@@ -15,20 +14,27 @@ use stylet_shm_schema::{Command, CommandKind, Reply, ReplyStatus, Request, Text}
 /// A request that left its member so long ago, by what the member had heard of the server, is not carried out: the
 /// hand that made it does not know what happened since.
 const LATE_NS: u64 = 500_000_000;
+/// A promise to go on with a motion, which holds for 0.3 s at most, is worth nothing after so long: its hand may be gone.
+const PROMISE_LATE_NS: u64 = 250_000_000;
+
+const LATE: &str = "it was made before the connection was lost, or arrives late: look, and ask again";
 
 pub(super) fn take(rounds: &mut Rounds, seat: u16, bytes: &[u8], now_ns: u64) {
     let message = match wire::decode(bytes) {
         Ok(message) => message,
-        Err(why) => return rounds.refuse(seat, "a message", &why.to_string(), false),
+        Err(why) => return rounds.refuse(seat, "a message", &why.to_string()),
     };
     rounds.read_members_for(seat);
-    let is_greeting = message.kind == Kind::Hello;
-    let member = match valid(rounds, seat) {
+    let member = match rounds.valid(seat) {
         Ok(member) => member,
-        Err(why) => return refuse(rounds, seat, &message, &why, is_greeting),
+        Err(why) => return rounds.refuse_greeting(seat, &why),
+    };
+    let limit_ns = match is_promise(&message) {
+        true => PROMISE_LATE_NS,
+        false => LATE_NS,
     };
     // A clock that another start of this machine had may be ahead.
-    let late = message.stamp.heard_ns > now_ns || now_ns - message.stamp.heard_ns > LATE_NS;
+    let late = message.stamp.heard_ns > now_ns || now_ns - message.stamp.heard_ns > limit_ns;
     match message.kind {
         Kind::Hello => greeting(rounds, seat, &message, late),
         Kind::Seen => {
@@ -39,52 +45,67 @@ pub(super) fn take(rounds: &mut Rounds, seat: u16, bytes: &[u8], now_ns: u64) {
         Kind::Again => {
             if let Ok(ticks) = wire::one::<Ticks>(message.body)
                 && ticks.from <= ticks.to
+                && let Some(outlet) = super::lock(&rounds.server.outlets).get(&seat)
             {
-                // A full queue is one of members that ask again.
-                let _ = rounds.jobs.again.try_send(streams::Missed(seat, ticks));
+                outlet.again(ticks);
             }
         }
-        Kind::Command | Kind::Upload | Kind::Lease if late => {
-            let why = "it was made before the connection was lost, or arrives late: look, and ask again";
-            refuse(rounds, seat, &message, why, false);
-        }
+        Kind::Command | Kind::Lease if late => refuse(rounds, seat, &message, LATE),
         Kind::Command => command(rounds, seat, &member, &message),
-        Kind::Upload => upload(rounds, seat, &member, &message),
+        Kind::Upload => upload(rounds, seat, &member, &message, late),
         Kind::Lease => lease(rounds, seat, &member, &message),
-        _ => rounds.refuse(seat, "a message", "members do not send this kind", false),
+        _ => rounds.refuse(seat, "a message", "members do not send this kind"),
     }
 }
 
-/// The member, while its place in the list and its time last.
-fn valid(rounds: &Rounds, seat: u16) -> Result<Member, String> {
-    let member = rounds.members.at(seat).ok_or("nobody was given this seat")?;
-    match member.why_closed(now_s()) {
-        Some(why) => Err(why.to_owned()),
-        None => Ok(member.clone()),
-    }
+/// Renews a motion; many of these come in a second.
+fn is_promise(message: &Message<'_>) -> bool {
+    let promises = |command: Command| command.kind == CommandKind::KeepMoving as u32;
+    message.kind == Kind::Command && wire::one::<Command>(message.body).is_ok_and(promises)
 }
 
 fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
     let Ok(hello) = wire::one::<Hello>(message.body) else {
-        return rounds.refuse(seat, "a greeting", "length of a payload", true);
+        return rounds.refuse(seat, "a greeting", "length of a payload");
     };
     let (now, epoch) = (Instant::now(), (message.stamp.number, hello.epoch));
     if !late {
         rounds.lease.heard(seat, now);
     }
     let known = rounds.present.get(&seat).map(|presence| presence.epoch);
-    if known != Some(epoch) {
-        if known.is_none() {
-            say(format!("connected: {}", rounds.name(seat)));
+    if known.is_none() {
+        rounds.admit(seat);
+        let line = format!("connected: {}", rounds.name(seat));
+        rounds.log(seat, line);
+    }
+    let is_new = known != Some(epoch);
+    // One that asks for all again and again waits: what it says next time is new as well.
+    let greets = is_new && rounds.greets(seat);
+    if greets {
+        rounds.announcements.greet(seat);
+        if let Some(pace) = super::lock(&rounds.server.paces).get_mut(&seat) {
+            pace.forget();
         }
-        rounds.announcements.greet(seat, &hello, &rounds.jobs);
-        super::lock(&rounds.server.paces).entry(seat).or_default().forget();
+    }
+    if greets
+        && known.is_none_or(|(process, _)| process != epoch.0)
+        && let Some(outlet) = super::lock(&rounds.server.outlets).get_mut(&seat)
+    {
+        outlet.forget_scene();
+    }
+    let has_scene = rounds.announcements.has_scene(&hello);
+    if !has_scene {
+        rounds.announcements.send_scene(seat, now);
     }
     if let Some(pace) = super::lock(&rounds.server.paces).get_mut(&seat) {
-        pace.note_scene(rounds.announcements.has_scene(&hello));
+        pace.note_scene(has_scene);
     }
     let presence = Presence {
-        epoch,
+        epoch: if is_new && !greets {
+            known.unwrap_or_default()
+        } else {
+            epoch
+        },
         heard: now,
         round_trip_ns: hello.round_trip_ns,
         lost: hello.lost,
@@ -94,15 +115,14 @@ fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
 }
 
 fn answer(rounds: &Rounds, seat: u16, kind: Kind, body: &[u8]) {
-    // A full queue is one of a member that asks again.
-    let message = encode(kind, rounds.server.stamp(), &[body]);
-    let _ = rounds.jobs.messages.try_send(streams::Message(seat, message));
+    if let Some(outlet) = super::lock(&rounds.server.outlets).get(&seat) {
+        outlet.message(encode(kind, rounds.server.stamp(), &[body]).into());
+    }
 }
 
-/// Says so here, and to the host that asked; of a promise, of which many come in a second, to nobody.
-fn refuse(rounds: &mut Rounds, seat: u16, message: &Message<'_>, why: &str, is_greeting: bool) {
-    let is_promise = |command: Command| command.kind == CommandKind::KeepMoving as u32;
-    if message.kind == Kind::Command && wire::one::<Command>(message.body).is_ok_and(is_promise) {
+/// Says so here, and to the host that asked; of a promise to nobody.
+fn refuse(rounds: &mut Rounds, seat: u16, message: &Message<'_>, why: &str) {
+    if is_promise(message) {
         return;
     }
     let (what, asker) = match message.kind {
@@ -124,11 +144,10 @@ fn refuse(rounds: &mut Rounds, seat: u16, message: &Message<'_>, why: &str, is_g
                 header.map(|[host_id, command_id]| (host_id, command_id)),
             )
         }
-        Kind::Hello => ("to connect".to_owned(), None),
         Kind::Lease => ("the needle".to_owned(), None),
         _ => ("a message".to_owned(), None),
     };
-    rounds.refuse(seat, &what, why, is_greeting);
+    rounds.refuse(seat, &what, why);
     if let Some((host_id, command_id)) = asker {
         let mut reply = Reply::zeroed();
         (reply.session_id, reply.host_id, reply.command_id) = (rounds.announcements.session_id(), host_id, command_id);
@@ -147,7 +166,8 @@ fn allowed(rounds: &mut Rounds, seat: u16, member: &Member, right: Option<Right>
             let before = rounds.lease.holder();
             let taken = rounds.lease.take(seat, Instant::now());
             if taken.is_ok() && before != Holder::Seat(seat) {
-                say(format!("operates now: {}", rounds.name(seat)));
+                let line = format!("operates now: {}", rounds.name(seat));
+                rounds.log(seat, line);
             }
             taken.map_err(|held| rounds.held_words(held))
         }
@@ -172,21 +192,47 @@ fn command(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_
         near.ask(command).map_err(|e| e.to_string())
     });
     if let Err(why) = passed {
-        refuse(rounds, seat, message, &why, false);
+        refuse(rounds, seat, message, &why);
     }
 }
 
-fn upload(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>) {
-    let passed = allowed(rounds, seat, member, right_to_upload(member.role)).and_then(|()| {
-        let (header, cells) = wire::upload(message.body).map_err(|invalid| invalid.to_string())?;
-        rounds.upload = None;
-        let near = rounds.announcements.near().ok_or("no core runs there")?;
-        rounds.upload = Some(near.upload(&header, &cells).map_err(|e| e.to_string())?);
-        Ok(())
-    });
-    if let Err(why) = passed {
-        refuse(rounds, seat, message, &why, false);
+/// The right is looked at before the first part is kept, and once more when the volume is whole.
+fn upload(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>, late: bool) {
+    if let Err(why) = part(rounds, seat, member, message, late) {
+        refuse(rounds, seat, message, &why);
     }
+}
+
+fn part(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>, late: bool) -> Result<(), String> {
+    let now = Instant::now();
+    let (header, at, cells) = wire::part(message.body).map_err(|invalid| invalid.to_string())?;
+    if at == 0 {
+        if late {
+            return Err(LATE.to_owned());
+        }
+        allowed(rounds, seat, member, right_to_upload(member.role))?;
+        if rounds.volume.as_ref().is_some_and(|volume| volume.keeps_out(seat, now)) {
+            return Err("the volume of another member is on its way; ask again".to_owned());
+        }
+        rounds.volume = Some(Volume::begin(seat, header, now));
+    }
+    // The parts of one that was refused are on their way.
+    let Some(volume) = rounds.volume.as_mut().filter(|volume| volume.seat == seat) else {
+        return Ok(());
+    };
+    if !volume.goes_on(seat, &header, at, &cells, now) {
+        rounds.volume = None;
+        return Err("a part of the volume was lost: send it again".to_owned());
+    }
+    if volume.cells.len() < wire::cells(&header) {
+        return Ok(());
+    }
+    allowed(rounds, seat, member, right_to_upload(member.role))?;
+    let volume = rounds.volume.take().ok_or("no volume")?;
+    rounds.upload = None;
+    let near = rounds.announcements.near().ok_or("no core runs there")?;
+    rounds.upload = Some(near.upload(&volume.header, &volume.cells).map_err(|e| e.to_string())?);
+    Ok(())
 }
 
 /// To operate, to stop operating, or to hand over to somebody else.
@@ -205,7 +251,7 @@ fn lease(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>)
         _ => Err("an unknown word".to_owned()),
     };
     if let Err(why) = passed {
-        refuse(rounds, seat, message, &why, false);
+        refuse(rounds, seat, message, &why);
     }
 }
 

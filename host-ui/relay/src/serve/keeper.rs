@@ -17,8 +17,6 @@ use stylet_ports::{self as service, Node, ServiceError};
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::Request;
 
-/// Exit code of a server that is to be started again at once.
-pub const AGAIN: u8 = 3;
 /// Exit code of a server that says itself why it cannot serve.
 pub const CANNOT: u8 = 1;
 const BEAT_EVERY: Duration = Duration::from_millis(50);
@@ -82,7 +80,6 @@ pub fn keep(instance: &Instance, arguments: &[OsString], stop: &AtomicBool) -> R
         // SYNC: set by a signal; nothing but the flag is carried.
         match (stop.load(Ordering::Relaxed), status.code()) {
             (true, _) | (_, Some(0)) => return Ok(()),
-            (_, Some(code)) if code == i32::from(AGAIN) => {}
             (_, Some(code)) if code == i32::from(CANNOT) => {
                 return Err(RelayError("the server ended; what it printed says why".to_owned()));
             }

@@ -1,38 +1,40 @@
 //! Beside the core: one more host of normal priority, which sends what the core publishes and checks what members ask.
 
+mod allowance;
 mod announce;
 mod asked;
+mod door;
 pub mod keeper;
 mod kept;
 pub mod lease;
+mod outlet;
 mod pace;
 pub mod rights;
 mod rounds;
 mod streams;
 mod tape;
+mod volume;
 mod watched;
 
 use crate::keys::{Lab, seat_of};
-use crate::net::{self, Session};
+use crate::net::{self, Bytes, Session};
 use crate::say::say;
 use crate::wire::{Kind, Stamp, encode};
 use crate::{RelayError, now_ns};
+use door::Door;
 use keeper::Beat;
 use kept::Kept;
+use outlet::Outlet;
 use pace::Pace;
 use rounds::Rounds;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
-use streams::Jobs;
+use std::time::{Duration, Instant};
 use stylet_shm_schema::HapticState;
 use stylet_shm_schema::Instance;
 
-/// Requests that may wait; more are dropped and counted.
-const ASKED: usize = 512;
-const JOBS: usize = 1024;
 const PASS: Duration = Duration::from_millis(2);
 
 /// How to serve.
@@ -54,10 +56,11 @@ pub struct Server {
     // SYNC: a flag alone, no data is published by it.
     end: AtomicBool,
     kept: Mutex<Kept>,
-    /// Of each member that is connected.
+    door: Door,
+    /// The seats that hear the core: their members are in the list, and are heard. Nothing goes to any other.
+    outlets: Mutex<BTreeMap<u16, Outlet>>,
+    /// Of each of them.
     paces: Mutex<BTreeMap<u16, Pace>>,
-    /// Seats to which a scene is on its way: whoever asks again has one coming.
-    scenes_away: Mutex<BTreeSet<u16>>,
 }
 
 /// What one request came as.
@@ -75,6 +78,18 @@ impl Server {
     fn ends(&self) -> bool {
         // SYNC: see the field.
         self.end.load(Ordering::Relaxed)
+    }
+
+    fn hears(&self, seat: u16) -> bool {
+        lock(&self.outlets).contains_key(&seat)
+    }
+
+    /// To every seat that hears the core.
+    fn to_all(&self, bytes: Vec<u8>) {
+        let bytes = Bytes::from(bytes);
+        lock(&self.outlets)
+            .values()
+            .for_each(|outlet| outlet.message(bytes.clone()));
     }
 
     fn stamp(&self) -> Stamp {
@@ -98,55 +113,41 @@ impl Server {
     }
 }
 
-/// Why serving ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
-    /// It was asked to.
-    Stopped,
-    /// Somebody was revoked, or somebody's time has ended: the next session shuts that seat out.
-    Closed,
-}
-
 /// Serves until `stop`; `beat` has with each pass whether somebody on the net operates.
-pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<End, RelayError> {
+pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<(), RelayError> {
     // Before there are threads, of zenoh as well.
     crate::slice::shorten();
     let members = options.lab.members()?;
-    let session = net::serve(&options.listen, &options.lab.identity()?, &members.closed())?;
+    let session = net::serve(&options.listen, &options.lab.identity()?)?;
     let server = Arc::new(Server {
         session: session.clone(),
         instance: options.instance.clone(),
         run: now_ns(),
         end: AtomicBool::new(false),
         kept: Mutex::new(Kept::default()),
+        door: Door::default(),
+        outlets: Mutex::new(BTreeMap::new()),
         paces: Mutex::new(BTreeMap::new()),
-        scenes_away: Mutex::new(BTreeSet::new()),
     });
-    let (to_asked, asked) = sync_channel(ASKED);
+    server.door.admit(&members);
+    // The door bounds what waits, for each seat by itself.
+    let (to_asked, asked) = channel();
+    let doorkeeper = Arc::clone(&server);
     net::hear(&session, &net::every_ask(), move |key, bytes| {
         // The access rules let a certificate put under its own seat alone.
-        if let Some(seat) = key.rsplit('/').next().and_then(seat_of) {
-            let _ = to_asked.try_send(Asked {
+        if let Some(seat) = key.rsplit('/').next().and_then(seat_of)
+            && doorkeeper.door.lets_in(seat, bytes, Instant::now())
+        {
+            let _ = to_asked.send(Asked {
                 seat,
                 bytes: bytes.to_vec(),
             });
         }
     })?;
-    let (to_messages, messages) = sync_channel(JOBS);
-    let (to_scenes, scenes) = sync_channel(JOBS);
-    let (to_again, missed) = sync_channel(JOBS);
-    let jobs = Jobs {
-        messages: to_messages,
-        scenes: to_scenes,
-        again: to_again,
-    };
     let keeper = beat.keeper();
     let threads = [
         spawn("records", &server, streams::records),
         spawn("snapshots", &server, streams::snapshots),
-        spawn("messages", &server, move |server| streams::messages(server, &messages)),
-        spawn("scenes", &server, move |server| streams::scenes(server, &scenes)),
-        spawn("again", &server, move |server| streams::again(server, &missed)),
         spawn("before", &server, move |server| tape::complete(server, keeper)),
     ];
     say(format!(
@@ -154,10 +155,11 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<End,
         options.instance.name(),
         options.listen.join(", ")
     ));
-    let rounds = Rounds::new(Arc::clone(&server), options.lab.clone(), members, jobs);
-    let end = rounds.and_then(|rounds| serve(rounds, &asked, stop, beat));
+    let rounds = Rounds::new(Arc::clone(&server), options.lab.clone(), members);
+    let end = rounds.map(|rounds| serve(rounds, &asked, stop, beat));
     // SYNC: see the field.
     server.end.store(true, Ordering::Relaxed);
+    lock(&server.outlets).clear();
     for thread in threads {
         let _ = thread.map(std::thread::JoinHandle::join);
     }
@@ -165,25 +167,23 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<End,
     end
 }
 
-fn serve(mut rounds: Rounds, asked: &Receiver<Asked>, stop: &AtomicBool, beat: &mut Beat) -> Result<End, RelayError> {
-    let end = loop {
-        // SYNC: set by a signal; nothing but the flag is carried.
-        if stop.load(Ordering::Relaxed) {
-            break End::Stopped;
-        }
-        if rounds.pass() {
-            break End::Closed;
-        }
-        for request in asked.try_iter().take(ASKED) {
+fn serve(mut rounds: Rounds, asked: &Receiver<Asked>, stop: &AtomicBool, beat: &mut Beat) {
+    // SYNC: set by a signal; nothing but the flag is carried.
+    while !stop.load(Ordering::Relaxed) {
+        rounds.pass();
+        beat.pass(rounds.is_operated_from_the_net());
+        // A promise of an operator does not wait for the next pass, and no flood keeps that waiting.
+        let next = Instant::now() + PASS;
+        while let Some(left) = next.checked_duration_since(Instant::now())
+            && let Ok(request) = asked.recv_timeout(left)
+        {
+            rounds.server.door.took(request.seat);
             rounds.take(request.seat, &request.bytes);
         }
-        beat.pass(rounds.is_operated_from_the_net());
-        std::thread::sleep(PASS);
-    };
+    }
     rounds.stop_hand_of_the_net("the relay ends");
     // The core looks every 2 ms; the ports go with this thread's end.
     std::thread::sleep(10 * PASS);
-    Ok(end)
 }
 
 fn spawn(

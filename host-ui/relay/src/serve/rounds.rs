@@ -1,14 +1,17 @@
 //! One pass of the server after the other: what the core says, who is alive, who operates, and the hand that is stopped.
 
+use super::allowance::Allowance;
 use super::announce::Announcements;
 use super::lease::{Held, Holder, Lease};
+use super::outlet::Outlet;
 use super::rights::operates;
-use super::streams::Jobs;
-use super::{Server, asked};
+use super::volume::Volume;
+use super::{Server, asked, lock};
 use crate::control::{Order, Orders};
-use crate::keys::{Lab, Member, Members, Role};
+use crate::keys::{Lab, Member, Members, Role, now_s};
+use crate::net::{Place, Priority, put};
 use crate::say::say;
-use crate::wire::{Present, Who};
+use crate::wire::{Kind, Present, Who, encode};
 use crate::{RelayError, now_ns};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,10 +25,31 @@ const MEMBERS_EVERY: Duration = Duration::from_millis(500);
 const UNKNOWN_EVERY: Duration = Duration::from_millis(20);
 /// A member that was silent for so long has left.
 const LEFT_AFTER: Duration = Duration::from_secs(2);
-/// The same refusal of a greeting is printed once in this time.
-const REFUSAL_EVERY: Duration = Duration::from_secs(10);
+/// A list that cannot be read for so long admits nobody: an editor may be writing it.
+const LIST_PATIENCE: Duration = Duration::from_secs(2);
+/// What was turned away at the door is said so often.
+const TURNED_AWAY_EVERY: Duration = Duration::from_secs(10);
 /// What the server calls a host beside the core.
 const LOCAL: &str = "a window beside the core";
+
+/// What a seat may have of the server's log and of greetings, however often it connects.
+struct Patience {
+    lines: Allowance,
+    unsaid: u64,
+    refusals: Allowance,
+    greetings: Allowance,
+}
+
+impl Patience {
+    fn new(now: Instant) -> Self {
+        Self {
+            lines: Allowance::new(20.0, 1.0, now),
+            unsaid: 0,
+            refusals: Allowance::new(1.0, 0.1, now),
+            greetings: Allowance::new(4.0, 0.5, now),
+        }
+    }
+}
 
 /// A member that is connected.
 pub(super) struct Presence {
@@ -43,47 +67,50 @@ pub(super) struct Rounds {
     pub(super) lease: Lease,
     pub(super) present: BTreeMap<u16, Presence>,
     pub(super) members: Members,
-    pub(super) jobs: Jobs,
     pub(super) upload: Option<SlicePublisher<u8, UploadHeader>>,
-    closed_at_start: Vec<u16>,
-    refusals: BTreeMap<u16, Instant>,
+    /// The volume that comes in parts.
+    pub(super) volume: Option<Volume>,
+    patience: BTreeMap<u16, Patience>,
     orders: Orders,
     lab: Lab,
     host_id: u64,
     stops: u64,
     who_sent: Instant,
     members_read: Instant,
+    /// When the list was read last without an error.
+    members_known: Instant,
     members_due: bool,
+    turned_away: Instant,
     passed: Instant,
 }
 
 impl Rounds {
-    pub(super) fn new(server: Arc<Server>, lab: Lab, members: Members, jobs: Jobs) -> Result<Self, RelayError> {
+    pub(super) fn new(server: Arc<Server>, lab: Lab, members: Members) -> Result<Self, RelayError> {
         let now = Instant::now();
         Ok(Self {
             announcements: Announcements::new(Arc::clone(&server)),
             orders: Orders::listen(&server.instance)?,
             lease: Lease::new(now),
             present: BTreeMap::new(),
-            closed_at_start: members.closed(),
-            refusals: BTreeMap::new(),
             members,
-            jobs,
             upload: None,
+            volume: None,
+            patience: BTreeMap::new(),
             lab,
             // No host takes the answers to the server's own requests.
             host_id: server.run ^ 0x5354_5954_4c45_5400,
             stops: 0,
             who_sent: now,
             members_read: now,
+            members_known: now,
             members_due: false,
+            turned_away: now,
             passed: now,
             server,
         })
     }
 
-    /// True when another seat has been closed since the session began.
-    pub(super) fn pass(&mut self) -> bool {
+    pub(super) fn pass(&mut self) {
         let now = Instant::now();
         if now - self.passed >= super::lease::SILENCE {
             // This process stood still itself: whoever operated could not be heard.
@@ -96,14 +123,42 @@ impl Rounds {
             let name = self.name(seat);
             self.stop_hand(&format!("{name} operated and is silent"));
         }
-        self.present.retain(|_, presence| now - presence.heard < LEFT_AFTER);
-        super::lock(&self.server.paces).retain(|seat, _| self.present.contains_key(seat));
+        self.read_members();
+        let silent = self
+            .present
+            .iter()
+            .filter(|(_, presence)| now - presence.heard >= LEFT_AFTER);
+        for seat in silent.map(|(seat, _)| *seat).collect::<Vec<_>>() {
+            self.forget(seat);
+        }
         if self.who_sent.elapsed() >= WHO_EVERY {
             self.who_sent = now;
             self.announcements.show(&self.who());
         }
         self.take_orders(now);
-        self.read_members()
+        if self.turned_away.elapsed() >= TURNED_AWAY_EVERY {
+            self.turned_away = now;
+            for (seat, count) in self.server.door.turned_away() {
+                say(format!(
+                    "turned away: {count} messages of {}, more than a seat may send",
+                    self.name(seat)
+                ));
+            }
+        }
+    }
+
+    /// Nothing goes to the seat any more.
+    fn forget(&mut self, seat: u16) {
+        lock(&self.server.outlets).remove(&seat);
+        lock(&self.server.paces).remove(&seat);
+        self.present.remove(&seat);
+    }
+
+    /// The seat hears the core from now on.
+    pub(super) fn admit(&self, seat: u16) {
+        let new = || Outlet::new(&self.server, seat);
+        lock(&self.server.outlets).entry(seat).or_insert_with(new);
+        lock(&self.server.paces).entry(seat).or_default();
     }
 
     /// At once where a seat is not in the list: it may have been given a moment ago.
@@ -114,16 +169,67 @@ impl Rounds {
         }
     }
 
-    /// A list that cannot be read leaves the one before in force.
-    fn read_members(&mut self) -> bool {
-        if self.members_due || self.members_read.elapsed() >= MEMBERS_EVERY {
-            self.members_due = false;
-            self.members_read = Instant::now();
-            if let Ok(members) = self.lab.members() {
-                self.members = members;
+    fn read_members(&mut self) {
+        if !self.members_due && self.members_read.elapsed() < MEMBERS_EVERY {
+            return;
+        }
+        self.members_due = false;
+        self.members_read = Instant::now();
+        match self.lab.members() {
+            Ok(members) => (self.members, self.members_known) = (members, self.members_read),
+            Err(why) if self.members_known.elapsed() >= LIST_PATIENCE && !self.members.members.is_empty() => {
+                self.members = Members::default();
+                say(format!("nobody is admitted: the list of members cannot be read: {why}"));
+            }
+            Err(_) => {}
+        }
+        self.server.door.admit(&self.members);
+        self.dismiss();
+    }
+
+    /// Whoever is in the list no more, or may do something else now.
+    fn dismiss(&mut self) {
+        if let Holder::Seat(seat) = self.lease.holder()
+            && self.valid(seat).map(|member| member.role) != Ok(Role::Operator)
+        {
+            self.stop_hand_of_the_net("whoever operated is no operator any more");
+        }
+        for seat in self.present.keys().copied().collect::<Vec<_>>() {
+            if let Err(why) = self.valid(seat) {
+                self.forget(seat);
+                say(format!("dismissed: {}: {why}", self.name(seat)));
+                self.tell_refused(seat, &why);
             }
         }
-        self.members.closed() != self.closed_at_start
+    }
+
+    /// The member, while its place in the list and its time last.
+    pub(super) fn valid(&self, seat: u16) -> Result<Member, String> {
+        let member = self
+            .members
+            .at(seat)
+            .ok_or("nobody has this seat in the list of the lab")?;
+        match member.why_closed(now_s()) {
+            Some(why) => Err(why.to_owned()),
+            None => Ok(member.clone()),
+        }
+    }
+
+    /// Whoever shows a certificate of the lab may know why it does not count.
+    fn tell_refused(&self, seat: u16, why: &str) {
+        let bytes = encode(Kind::Refused, self.server.stamp(), &[why.as_bytes()]);
+        put(&self.server.session, Place::To(seat), Priority::InteractiveLow, bytes);
+    }
+
+    fn patience(&mut self, seat: u16) -> &mut Patience {
+        self.patience
+            .entry(seat)
+            .or_insert_with(|| Patience::new(Instant::now()))
+    }
+
+    /// Whether the seat is greeted again now.
+    pub(super) fn greets(&mut self, seat: u16) -> bool {
+        self.patience(seat).greetings.take(1.0, Instant::now())
     }
 
     /// A hand beside the core goes before any on the net.
@@ -166,16 +272,31 @@ impl Rounds {
         }
     }
 
-    /// Says who was refused what and why; greetings come twenty times a second and are said once in a while.
-    pub(super) fn refuse(&mut self, seat: u16, what: &str, why: &str, is_greeting: bool) {
-        let last = self.refusals.get(&seat).copied();
-        if is_greeting && last.is_some_and(|last| last.elapsed() < REFUSAL_EVERY) {
+    /// Says who was refused what and why, as often as a seat may have it said.
+    pub(super) fn refuse(&mut self, seat: u16, what: &str, why: &str) {
+        let name = self.name(seat);
+        self.log(seat, format!("refused: {name}: {what}: {why}"));
+    }
+
+    /// Greetings come twenty times a second: who may not connect is told each time, and it is said here once in a while.
+    pub(super) fn refuse_greeting(&mut self, seat: u16, why: &str) {
+        self.tell_refused(seat, why);
+        if self.patience(seat).refusals.take(1.0, Instant::now()) {
+            say(format!("refused: {}: to connect: {why}", self.name(seat)));
+        }
+    }
+
+    /// A line on behalf of a seat.
+    pub(super) fn log(&mut self, seat: u16, line: String) {
+        let patience = self.patience(seat);
+        if !patience.lines.take(1.0, Instant::now()) {
+            patience.unsaid += 1;
             return;
         }
-        if is_greeting {
-            self.refusals.insert(seat, Instant::now());
-        }
-        say(format!("refused: {}: {what}: {why}", self.name(seat)));
+        say(match std::mem::take(&mut patience.unsaid) {
+            0 => line,
+            unsaid => format!("{line} ({unsaid} lines of this seat were left out before)"),
+        });
     }
 
     pub(super) fn take(&mut self, seat: u16, bytes: &[u8]) {

@@ -1,12 +1,11 @@
-//! The threads of the streams: state and records as they come, snapshots thinned, and what one member asks for again.
+//! The threads of the streams: state and records as they come, and snapshots thinned.
 
 use super::pace::Places;
 use super::tape::Newest;
 use super::watched::Watched;
 use super::{Server, lock};
-use crate::net::{Place, Priority, put, put_newest, put_whole};
-use crate::wire::{self, Kind, Rest, Stamp, Thin, Ticks, encode};
-use std::sync::mpsc::{Receiver, SyncSender};
+use crate::net::{Bytes, Place, Priority, put, put_newest};
+use crate::wire::{self, Kind, Rest, Stamp, Thin, encode};
 use std::time::{Duration, Instant};
 use stylet_ports::{self as service, Node, ServiceError, SliceSubscriber, StateReader};
 use stylet_shm_schema::{HapticState, Instance, SceneHeader, SnapshotHeader, TickRecord, Vertex};
@@ -65,7 +64,7 @@ pub fn records(server: &Server) {
                     None => kept.clone(),
                 };
                 lock(&server.kept).keep(&values, kept);
-                put(&server.session, Place::Records, Priority::RealTime, newest);
+                send_records(server, newest);
             }
         }
         let mut pause = RECORDS_EVERY;
@@ -74,6 +73,14 @@ pub fn records(server: &Server) {
             last = Instant::now();
         }
         std::thread::sleep(pause);
+    }
+}
+
+fn send_records(server: &Server, newest: Vec<u8>) {
+    let seats: Vec<u16> = lock(&server.outlets).keys().copied().collect();
+    let bytes = Bytes::from(newest);
+    for seat in seats {
+        put(&server.session, Place::To(seat), Priority::RealTime, bytes.clone());
     }
 }
 
@@ -134,57 +141,5 @@ fn send_snapshot(server: &Server, rest: &Rest, header: &SnapshotHeader, vertices
     // Without the lock: this may wait for a line.
     for (seat, bytes) in messages {
         put_newest(&server.session, Place::To(seat), Priority::DataLow, bytes);
-    }
-}
-
-/// A message to one seat.
-pub struct Message(pub u16, pub Vec<u8>);
-
-/// Records that a seat has missed.
-pub struct Missed(pub u16, pub Ticks);
-
-/// The queues of what is sent to one member, each with a thread that may wait for it: a scene that takes seconds on a slow line does not hold up records.
-#[derive(Clone)]
-pub struct Jobs {
-    pub messages: SyncSender<Message>,
-    pub scenes: SyncSender<Message>,
-    pub again: SyncSender<Missed>,
-}
-
-const LOOK_EVERY: Duration = Duration::from_millis(50);
-
-/// Sends messages; a member that does not take its own keeps the others waiting that have just come, for [`crate::net::PATIENCE_US`] at most.
-pub fn messages(server: &Server, jobs: &Receiver<Message>) {
-    while !server.ends() {
-        if let Ok(Message(seat, bytes)) = jobs.recv_timeout(LOOK_EVERY) {
-            put_whole(&server.session, Place::To(seat), Priority::InteractiveLow, bytes);
-        }
-    }
-}
-
-/// Sends scenes, each of which may take seconds, behind records that are sent again.
-pub fn scenes(server: &Server, jobs: &Receiver<Message>) {
-    while !server.ends() {
-        if let Ok(Message(seat, bytes)) = jobs.recv_timeout(LOOK_EVERY) {
-            put_whole(&server.session, Place::To(seat), Priority::Data, bytes);
-            lock(&server.scenes_away).remove(&seat);
-        }
-    }
-}
-
-/// Sends what members ask for; a member that does not take it keeps nobody else waiting but those that ask too.
-pub fn again(server: &Server, jobs: &Receiver<Missed>) {
-    while !server.ends() {
-        let Ok(Missed(seat, ticks)) = jobs.recv_timeout(LOOK_EVERY) else {
-            continue;
-        };
-        let again = lock(&server.kept).again(ticks);
-        if let Some(lost) = again.lost {
-            let bytes = encode(Kind::Missing, server.stamp(), &[bytemuck::bytes_of(&lost)]);
-            put_whole(&server.session, Place::To(seat), Priority::DataHigh, bytes);
-        }
-        for bytes in again.batches {
-            put_whole(&server.session, Place::To(seat), Priority::DataHigh, bytes.to_vec());
-        }
     }
 }

@@ -15,7 +15,7 @@ use stylet_shm_schema::check::Invalid;
 use stylet_shm_schema::{HapticState, SCHEMA_VERSION, SceneHeader, UploadHeader};
 
 /// First word of every message: rises with the form of messages and with the schema.
-const MAGIC: u32 = u32::from_le_bytes(*b"st5\0") ^ (SCHEMA_VERSION << 24);
+const MAGIC: u32 = u32::from_le_bytes(*b"st6\0") ^ (SCHEMA_VERSION << 24);
 
 /// What a message holds, by stable number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, TryFromPrimitive)]
@@ -49,11 +49,13 @@ pub enum Kind {
     Missing = 13,
     /// A `HapticState` and the newest batch of `TickRecord`s, packed, in one message: each of them costs either side as much as its bytes do.
     Newest = 14,
+    /// Why the server takes nothing of a member, in words.
+    Refused = 15,
     /// A member is alive; `number` is its process.
     Hello = 20,
     /// A `Command` of a member's host.
     Command = 21,
-    /// An `UploadHeader` and its cells.
+    /// An `UploadHeader`, the number of the first cell, and the cells from there on: a part of a volume.
     Upload = 22,
     /// `Ticks` whose records are to be sent again.
     Again = 23,
@@ -182,13 +184,38 @@ pub fn scene(body: &[u8]) -> Result<(SceneHeader, Vec<u32>), Invalid> {
     Ok((header, words))
 }
 
-/// A volume with its cells; the core checks what they mean.
-pub fn upload(body: &[u8]) -> Result<(UploadHeader, Vec<u8>), Invalid> {
-    let (header, cells) = headed::<UploadHeader, u8>(body, MAX_UPLOAD_CELLS)?;
-    let expected = header.dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(u64::from(d)));
-    match expected == Some(cells.len() as u64) && !cells.is_empty() {
-        true => Ok((header, cells)),
+/// Cells that a part of a volume has, but for the last.
+pub const PART_BYTES: usize = 32 << 10;
+/// A message with a part is no longer.
+pub const MAX_PART_BYTES: usize = PART_BYTES + size_of::<Head>() + size_of::<UploadHeader>() + size_of::<u64>();
+
+/// Cells of a volume; more than any where they cannot be counted.
+pub fn cells(header: &UploadHeader) -> usize {
+    let count = header.dims.iter().try_fold(1_usize, |n, &d| n.checked_mul(d as usize));
+    count.unwrap_or(usize::MAX)
+}
+
+/// A part of a volume: which volume, the number of its first cell, and its cells. The core checks what they mean.
+pub fn part(body: &[u8]) -> Result<(UploadHeader, usize, Vec<u8>), Invalid> {
+    let (header, rest) = body
+        .split_at_checked(size_of::<UploadHeader>())
+        .ok_or(Invalid("payload without its header"))?;
+    let header: UploadHeader = bytemuck::pod_read_unaligned(header);
+    let (at, part) = headed::<u64, u8>(rest, PART_BYTES)?;
+    let end = at.checked_add(part.len() as u64);
+    let total = cells(&header);
+    match total <= MAX_UPLOAD_CELLS && !part.is_empty() && end.is_some_and(|end| end <= total as u64) {
+        true => Ok((header, at as usize, part)),
         false => Err(Invalid("cells of a volume")),
+    }
+}
+
+/// Words of a refusal, without what a terminal would take for an order.
+pub fn words(body: &[u8]) -> Result<String, Invalid> {
+    const MOST: usize = 300;
+    match std::str::from_utf8(body) {
+        Ok(words) if body.len() <= MOST => Ok(words.replace(char::is_control, " ")),
+        _ => Err(Invalid("words")),
     }
 }
 

@@ -230,5 +230,24 @@ fn a_message_survives_and_bytes_of_others_are_refused() {
     assert_eq!(decode(&unknown).unwrap_err(), Invalid("kind of message"));
     assert!(one::<u64>(&[0; 7]).is_err());
     assert!(many::<u64>(&[0; 24], 2).is_err() && many::<u64>(&[0; 25], 9).is_err());
-    assert!(upload(&[0xff; 8000]).is_err() && super::scene(&[0xff; 40_000]).is_err());
+    assert!(part(&[0xff; 8000]).is_err() && super::scene(&[0xff; 40_000]).is_err());
+}
+
+#[test]
+fn a_part_of_a_volume_lies_within_it_and_is_no_larger_than_one_may_be() {
+    let mut header = UploadHeader::zeroed();
+    header.dims = [100, 100, 10];
+    let taken = |header: &UploadHeader, at: u64, count: usize| {
+        let body = [bytemuck::bytes_of(header), &at.to_le_bytes(), &vec![7; count]].concat();
+        part(&body).map(|(_, at, cells)| (at, cells.len())).ok()
+    };
+    assert_eq!(taken(&header, 0, PART_BYTES), Some((0, PART_BYTES)));
+    assert_eq!(taken(&header, 99_999, 1), Some((99_999, 1)));
+    for (at, count) in [(99_999, 2), (0, 0), (0, PART_BYTES + 1), (u64::MAX, 1)] {
+        assert_eq!(taken(&header, at, count), None, "{at} {count}");
+    }
+    for dims in [[0, 9, 9], [u32::MAX; 3], [4096, 4096, 5]] {
+        header.dims = dims;
+        assert_eq!(taken(&header, 0, 1), None, "{dims:?}");
+    }
 }

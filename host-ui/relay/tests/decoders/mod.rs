@@ -35,8 +35,9 @@ pub fn take(bytes: &[u8]) -> bool {
         Kind::Missing | Kind::Again => wire::one::<Ticks>(body).is_ok(),
         Kind::Hello => wire::one::<Hello>(body).is_ok(),
         Kind::Command => wire::one::<Command>(body).is_ok_and(|command| Request::decode(&command).is_ok()),
-        Kind::Upload => wire::upload(body).is_ok(),
+        Kind::Upload => wire::part(body).is_ok(),
         Kind::Lease => std::str::from_utf8(body).ok().and_then(Order::of_line).is_some(),
+        Kind::Refused => wire::words(body).is_ok(),
         Kind::Seen => true,
     }
 }
