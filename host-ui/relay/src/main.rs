@@ -1,6 +1,7 @@
 //! The command line of `relay`.
 
 use clap::{CommandFactory, Parser, Subcommand};
+use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -41,7 +42,7 @@ enum Task {
         #[arg(long, hide = true)]
         kept: bool,
     },
-    /// Show the core of another machine here, as if it ran here
+    /// Show the core of another machine here, as if it ran here; asks for the code of the invitation, or takes it from the standard input
     Join {
         /// Address of the machine that serves, with or without a port [default: that of the invitation]
         host: Option<String>,
@@ -80,7 +81,7 @@ enum KeysTask {
         #[arg(long, value_name = "ADDRESS", required = true)]
         host: Vec<String>,
     },
-    /// Make a member's key and write it as an invitation: whoever has that file is the member
+    /// Make a member's key, write it as an invitation and print the code that opens it: whoever has both is the member
     Invite {
         /// Name of the person
         name: String,
@@ -156,6 +157,39 @@ fn is_ignored(signal: libc::c_int) -> bool {
     action.sa_sigaction == libc::SIG_IGN
 }
 
+/// The code of an invitation: a line of the standard input, which a person types unseen.
+fn code() -> Result<String, RelayError> {
+    let is_typed = std::io::stdin().is_terminal();
+    let shown = is_typed.then(hide_typing).flatten();
+    if is_typed {
+        let _ = write!(std::io::stderr(), "code of the invitation: ");
+    }
+    let mut line = String::new();
+    let read = std::io::stdin().read_line(&mut line);
+    if let Some(shown) = shown {
+        // SAFETY: settings that were read from this terminal.
+        unsafe { libc::tcsetattr(libc::STDIN_FILENO, libc::TCSANOW, &raw const shown) };
+        let _ = writeln!(std::io::stderr());
+    }
+    read.map_err(|e| RelayError(format!("the code of the invitation cannot be read: {e}")))?;
+    Ok(line)
+}
+
+/// The settings of the terminal before.
+fn hide_typing() -> Option<libc::termios> {
+    // SAFETY: numbers alone.
+    let mut settings: libc::termios = unsafe { std::mem::zeroed() };
+    // SAFETY: `settings` is valid for writes.
+    if unsafe { libc::tcgetattr(libc::STDIN_FILENO, &raw mut settings) } != 0 {
+        return None;
+    }
+    let shown = settings;
+    settings.c_lflag &= !libc::ECHO;
+    // SAFETY: settings of this terminal, changed in one flag.
+    unsafe { libc::tcsetattr(libc::STDIN_FILENO, libc::TCSANOW, &raw const settings) };
+    Some(shown)
+}
+
 /// An address with the usual port where it has none.
 fn with_port(host: &str) -> String {
     let has_port = host
@@ -196,7 +230,7 @@ fn run(task: Task) -> Result<(), RelayError> {
             let invitation = Invitation::read(&invitation)?;
             let server = with_port(host.as_deref().unwrap_or(&invitation.server));
             let instance = Instance::new(&instance)?;
-            let identity = invitation.identity();
+            let identity = invitation.identity(&code()?)?;
             let options = join::Options {
                 instance,
                 server,
@@ -234,11 +268,11 @@ fn keys_task(task: KeysTask, lab: &Lab) -> Result<(), RelayError> {
             days,
             out,
         } => {
-            let invitation = lab.invite(&name, role, &server, Validity::days(days))?;
+            let (invitation, code) = lab.invite(&name, role, &server, Validity::days(days))?;
             let out = out.unwrap_or_else(|| PathBuf::from(format!("{}.invitation", name.replace(['/', ' '], "-"))));
             write_invitation(&out, &invitation)?;
             println!(
-                "{}: {name} may join as {role}; send it as you would send a password",
+                "{}: {name} may join as {role}. Tell {name} the code by another way than the file goes:\n{code}",
                 out.display()
             );
         }

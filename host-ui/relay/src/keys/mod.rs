@@ -4,6 +4,7 @@
 //! `members.json` beside the authority's key. So a role is what the lab says now, and not what a certificate said when it was made.
 
 mod certificate;
+mod code;
 
 use crate::RelayError;
 pub use certificate::Validity;
@@ -125,8 +126,8 @@ pub struct Invitation {
     pub authority: String,
     /// Certificate of the member, PEM.
     pub certificate: String,
-    /// Key of the member, PEM: who has it is the member.
-    pub key: String,
+    /// Key of the member, PEM, sealed with the code of the invitation: who has both is the member.
+    pub sealed_key: String,
 }
 
 impl Invitation {
@@ -149,13 +150,13 @@ impl Invitation {
         }
     }
 
-    /// Certificate, key and authority.
-    pub fn identity(&self) -> Identity {
-        Identity {
+    /// Certificate, key and authority, opened with the code.
+    pub fn identity(&self, code: &str) -> Result<Identity, RelayError> {
+        Ok(Identity {
             authority: self.authority.clone(),
             certificate: self.certificate.clone(),
-            key: self.key.clone(),
-        }
+            key: code::open(&self.sealed_key, code)?,
+        })
     }
 }
 
@@ -237,8 +238,14 @@ impl Lab {
         write(&self.file("members.json"), &text)
     }
 
-    /// Makes a member's key and certificate. Names are used once, as seats are.
-    pub fn invite(&self, name: &str, role: Role, server: &str, validity: Validity) -> Result<Invitation, RelayError> {
+    /// Makes a member's key and certificate, and the code that opens the key. Names are used once, as seats are.
+    pub fn invite(
+        &self,
+        name: &str,
+        role: Role,
+        server: &str,
+        validity: Validity,
+    ) -> Result<(Invitation, String), RelayError> {
         let mut members = self.members()?;
         if name.is_empty() || name.chars().count() > 40 || name.chars().any(char::is_control) {
             return Err(RelayError("a name has 1 to 40 characters".to_owned()));
@@ -258,6 +265,8 @@ impl Lab {
             key,
         };
         let (certificate, key) = signer.sign(&Subject::Seat(seat), validity)?;
+        let code = code::make()?;
+        let sealed_key = code::seal(&key, &code)?;
         let until_s = validity.until_s();
         members.members.push(Member {
             seat,
@@ -267,7 +276,7 @@ impl Lab {
             revoked: false,
         });
         self.keep(&members)?;
-        Ok(Invitation {
+        let invitation = Invitation {
             server: server.to_owned(),
             name: name.to_owned(),
             role,
@@ -275,8 +284,9 @@ impl Lab {
             until_s,
             authority: signer.certificate,
             certificate,
-            key,
-        })
+            sealed_key,
+        };
+        Ok((invitation, code))
     }
 
     /// Revokes everybody of that name; how many there were.

@@ -23,11 +23,12 @@ fn a_lab_is_made_once_and_its_seats_are_never_given_twice() {
     lab.make(&["127.0.0.1".to_owned()]).expect("made");
     assert!(lab.make(&[]).is_err(), "a second authority would shut everybody out");
     let invite = |name| lab.invite(name, Role::Observer, "127.0.0.1", Validity::days(1));
-    let first = invite("Anna").expect("invited");
+    let (first, code) = invite("Anna").expect("invited");
     assert!(invite("Anna").is_err(), "the name is in use");
     assert_eq!(lab.revoke("Anna").expect("revoked"), 1);
     assert!(lab.revoke("Anna").is_err());
-    let second = invite("Anna").expect("invited again");
+    let (second, other) = invite("Anna").expect("invited again");
+    assert!(first.identity(&code).is_ok() && first.identity(&other).is_err());
     assert_eq!((first.seat, second.seat), (1, 2));
     lab.invite("Ede", Role::Observer, "127.0.0.1", Validity::ended())
         .expect("invited");
@@ -41,6 +42,7 @@ fn a_lab_is_made_once_and_its_seats_are_never_given_twice() {
     let file = folder.join("anna.invitation");
     write_invitation(&file, &second).expect("written");
     assert_eq!(Invitation::read(&file).expect("read").seat, 2);
+    assert!(!fs::read_to_string(&file).expect("written").contains("PRIVATE KEY"));
     use std::os::unix::fs::PermissionsExt;
     for name in ["anna.invitation", "authority.key", "relay.key"] {
         let mode = fs::metadata(folder.join(name)).expect("there").permissions().mode();

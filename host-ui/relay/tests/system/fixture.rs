@@ -47,12 +47,16 @@ pub struct Running {
 
 impl Running {
     pub fn start(command: &mut Command, log: PathBuf) -> Self {
+        Self::start_with(command, Stdio::null(), log)
+    }
+
+    pub fn start_with(command: &mut Command, input: Stdio, log: PathBuf) -> Self {
         let out = File::create(&log).expect("the log can be written");
         let err = out.try_clone().expect("a second handle");
         // SAFETY: between fork and exec it only makes a system call.
         unsafe { command.pre_exec(end_with_the_test) };
         let child = command
-            .stdin(Stdio::null())
+            .stdin(input)
             .stdout(out)
             .stderr(err)
             .spawn()
@@ -140,10 +144,19 @@ impl Keys {
 
     pub fn invite_to(&self, name: &str, role: Role, validity: Validity, host: &str) -> PathBuf {
         let server = format!("{host}:{}", self.port);
-        let invitation = self.lab.invite(name, role, &server, validity).expect("invited");
+        let invited = self.lab.invite(name, role, &server, validity).expect("invited");
         let path = self.folder.join(format!("{name}.invitation"));
-        write_invitation(&path, &invitation).expect("written");
+        keep(&path, &invited);
         path
+    }
+
+    pub fn serving(&self, named: &Named, host: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_relay"));
+        let listen = format!("{host}:{}", self.port);
+        command
+            .args(["serve", "--instance", named.0.name(), "--listen", &listen, "--keys"])
+            .arg(&self.folder);
+        command
     }
 
     pub fn serve(&self, named: &Named) -> Running {
@@ -151,18 +164,7 @@ impl Keys {
     }
 
     pub fn serve_on(&self, named: &Named, host: &str) -> Running {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_relay"));
-        command
-            .args([
-                "serve",
-                "--instance",
-                named.0.name(),
-                "--listen",
-                &format!("{host}:{}", self.port),
-                "--keys",
-            ])
-            .arg(&self.folder);
-        let served = Running::start(&mut command, scratch("serve").join("log"));
+        let served = Running::start(&mut self.serving(named, host), scratch("serve").join("log"));
         assert!(
             served.says("serving instance", Duration::from_secs(10)),
             "{}",
@@ -172,12 +174,28 @@ impl Keys {
     }
 }
 
+/// An invitation, with its code beside it.
+pub fn keep(path: &Path, (invitation, code): &(Invitation, String)) {
+    write_invitation(path, invitation).expect("written");
+    std::fs::write(path.with_extension("code"), code).expect("written");
+}
+
+/// As the person who got the file and the code types it.
+pub fn code(invitation: &Path) -> File {
+    File::open(invitation.with_extension("code")).expect("kept beside the invitation")
+}
+
 pub fn join(invitation: &Path, named: &Named) -> Running {
+    let mut command = joining(invitation, named);
+    Running::start_with(&mut command, code(invitation).into(), scratch("join").join("log"))
+}
+
+pub fn joining(invitation: &Path, named: &Named) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_relay"));
     command
         .args(["join", "--instance", named.0.name(), "--invitation"])
         .arg(invitation);
-    Running::start(&mut command, scratch("join").join("log"))
+    command
 }
 
 /// What `relay lease` prints.

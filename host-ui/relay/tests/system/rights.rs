@@ -1,10 +1,10 @@
 //! No command passes without the right to it, and each refusal says who asked what.
 
-use crate::fixture::{Keys, Named, core, join, until};
+use crate::fixture::{Keys, Named, core, join, keep, until};
 use crate::host::{Host, go, node, still_moving_m};
 use std::time::Duration;
 use stylet_ports as service;
-use stylet_relay::keys::{Lab, Role, Validity, write_invitation};
+use stylet_relay::keys::{Lab, Role, Validity};
 use stylet_shm_schema::{EventKind, Exercise, Mark, Request};
 
 fn marked() -> Request {
@@ -147,10 +147,10 @@ fn is_shut_out(validity: Validity, of_another_lab: bool) -> String {
         let folder = keys.folder.join("of-eve");
         let own = Lab::new(&folder);
         own.make(&["127.0.0.1".to_owned()]).expect("made");
-        let mut forged = own.invite("eve", Role::Operator, "127.0.0.1", validity).expect("made");
+        let (mut forged, code) = own.invite("eve", Role::Operator, "127.0.0.1", validity).expect("made");
         let invitation = crate::fixture::invitation(&path);
         (forged.server, forged.authority) = (invitation.server, invitation.authority);
-        write_invitation(&path, &forged).expect("written");
+        keep(&path, &(forged, code));
     }
     let joined = join(&path, &far);
     let mut host = Host::new(&far);

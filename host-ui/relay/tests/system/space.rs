@@ -1,7 +1,7 @@
 //! Network namespaces with a cable each, which no test leaves behind: not where it is ended by a signal, and not beyond the next start where
 //! it is killed.
 
-use crate::fixture::{Named, Running, scratch};
+use crate::fixture::{Named, Running, code, scratch};
 use std::path::Path;
 use std::process::Command;
 use std::sync::Once;
@@ -78,7 +78,7 @@ impl Line {
                 "--invitation",
             ])
             .arg(invitation);
-        Running::start(&mut command, scratch("join").join("log"))
+        Running::start_with(&mut command, code(invitation).into(), scratch("join").join("log"))
     }
 }
 
