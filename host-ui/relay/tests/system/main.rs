@@ -3,12 +3,16 @@
 mod carries;
 mod faults;
 mod fixture;
+mod floods;
 mod hand_over;
 mod host;
 mod lease;
 mod line;
+mod motion;
 mod outlines;
+mod panics;
 mod proxy;
 mod rights;
+mod seats;
 mod space;
 mod watch;
