@@ -261,7 +261,7 @@ pub fn trial(
     };
     let (shown, alone) = (since(shown_from_ns), way_and_ticks(&records[since(owned_until_ns)..]));
     let (farthest_mm, ticks) = way_and_ticks(&records[shown..]);
-    let trial = Trial {
+    Trial {
         mm_per_s: (tip(&records[shown]) - tip(&records[shown.saturating_sub(10)])).norm() * 1e5,
         farthest_mm,
         ticks,
@@ -271,8 +271,7 @@ pub fn trial(
             .is_some_and(|r| r.flags & flags::IN_MOTION != 0),
         went_on,
         given_up: given_up_since(observer, records[shown].tick),
-    };
-    trial
+    }
 }
 
 fn stands_still(ending: Ending) -> bool {

@@ -93,10 +93,10 @@ fn broken(random: &mut Random, good: &Command) -> Command {
         }
         1 => bytemuck::cast_slice_mut::<u8, u64>(bytemuck::bytes_of_mut(&mut command))
             .iter_mut()
-            .for_each(|word| *word = random.next()),
+            .for_each(|word| *word = random.draw()),
         _ => {
             command.values[random.below(8)] = [f64::NAN, f64::INFINITY, -1e300, 0.0][random.below(4)];
-            command.value_count = random.next() as u32;
+            command.value_count = random.draw() as u32;
         }
     }
     if command.kind == CommandKind::Shutdown as u32 {
@@ -128,7 +128,7 @@ fn host(instance: &Instance, seed: u64, is_over: &AtomicBool, sent: &Sent) {
             if is_over.load(Ordering::Relaxed) || !node.is_current() {
                 break;
             }
-            let id = random.next() % 1000;
+            let id = random.draw() % 1000;
             let good = request(&mut random).encode(seed, id).expect("fits");
             let (kind, command) = match random.below(8) {
                 0 => (2, broken(&mut random, &good)),
@@ -148,12 +148,12 @@ fn host(instance: &Instance, seed: u64, is_over: &AtomicBool, sent: &Sent) {
                 let mut header = UploadHeader::zeroed();
                 bytemuck::bytes_of_mut(&mut header)
                     .iter_mut()
-                    .for_each(|byte| *byte = random.next() as u8);
-                let cells: Vec<u8> = (0..random.below(4096)).map(|_| random.next() as u8).collect();
+                    .for_each(|byte| *byte = random.draw() as u8);
+                let cells: Vec<u8> = (0..random.below(4096)).map(|_| random.draw() as u8).collect();
                 let _ = uploads.send(&header, &cells);
                 count(2);
             }
-            std::thread::sleep(Duration::from_micros(200 + random.next() % 3000));
+            std::thread::sleep(Duration::from_micros(200 + random.draw() % 3000));
         }
     }
 }
@@ -187,7 +187,7 @@ fn client(address: &str, seed: u64, is_over: &AtomicBool, sent: &Sent) {
                         bytes[at] ^= 1 << random.below(8);
                     }
                     1 => bytes.truncate(random.below(bytes.len())),
-                    _ => bytes.iter_mut().for_each(|byte| *byte = random.next() as u8),
+                    _ => bytes.iter_mut().for_each(|byte| *byte = random.draw() as u8),
                 },
                 _ => stale.push(bytes.clone()),
             }
@@ -199,7 +199,7 @@ fn client(address: &str, seed: u64, is_over: &AtomicBool, sent: &Sent) {
                 break;
             }
             let _ = stream.read(&mut drained);
-            std::thread::sleep(Duration::from_millis(random.next() % 15));
+            std::thread::sleep(Duration::from_millis(random.draw() % 15));
         }
     }
 }

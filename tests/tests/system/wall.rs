@@ -207,7 +207,7 @@ fn write_wildly(
             };
             let words = file.metadata().map_or(0, |about| about.len()) / 8;
             if words > 0 || matches!(damaged, Damaged::Opened) {
-                let _ = file.write_at(&random.next().to_ne_bytes(), random.next() % words.max(1) * 8);
+                let _ = file.write_at(&random.draw().to_ne_bytes(), random.draw() % words.max(1) * 8);
                 writes += 1;
             }
             std::thread::sleep(Duration::from_micros(500));
