@@ -87,7 +87,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
                 level: BannerLevel::Bad,
                 title: "rt-core is silent",
                 text: format!(
-                    "No data for {:.1} s. The display is out of date. If this persists, check the terminal where rt-core runs.",
+                    "No data from the core for {:.1} s; showing the last state.",
                     since.as_secs_f64()
                 ),
                 remedy: None,
@@ -266,8 +266,7 @@ fn absent(shown: &Shown, why: &str) -> Banner {
     } else {
         format!("{}{}", what_ended(shown), sentence(why))
     };
-    let has_ended = shown.session.is_some() && shown.relayed.is_none();
-    let remedy = match has_ended {
+    let remedy = match shown.session.is_some() && shown.relayed.is_none() {
         true => ("Start it again", Action::StartCore),
         false => ("Watch an example", Action::Watch(WatchAction::Example)),
     };
@@ -279,8 +278,7 @@ fn absent(shown: &Shown, why: &str) -> Banner {
     }
 }
 
-/// Explains why the last core ended, as far as it reported, and what is kept. Empty before one was
-/// shown.
+/// Explains why the last core ended, as far as it reported, and what is kept.
 fn what_ended(shown: &Shown) -> String {
     if shown.session.is_none() {
         return String::new();

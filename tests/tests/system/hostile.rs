@@ -95,8 +95,12 @@ fn broken(random: &mut Random, good: &Command) -> Command {
             .iter_mut()
             .for_each(|word| *word = random.draw()),
         _ => {
-            command.values[random.below(8)] = [f64::NAN, f64::INFINITY, -1e300, 0.0][random.below(4)];
-            command.value_count = random.draw() as u32;
+            let value = [f64::NAN, f64::INFINITY, -1e300, 0.0][random.below(4)];
+            let at = 1 + 8 * random.below(8);
+            command.payload[at..at + 8].copy_from_slice(&value.to_ne_bytes());
+            if random.below(2) == 0 {
+                command.length = random.draw() as u32;
+            }
         }
     }
     if command.kind == CommandKind::Shutdown as u32 {

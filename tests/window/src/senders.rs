@@ -10,7 +10,7 @@ use std::time::Duration;
 use stylet_controllers::{Controllers, Kind};
 use stylet_shm_schema::{Instance, flags};
 use stylet_tests::pointer::Pointer;
-use stylet_tests::sender::{Ending, Place, Sender, Table, kinds, trial};
+use stylet_tests::sender::{Place, Sender, Table, kinds, trial};
 use stylet_tests::stage::Stage;
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Display, program, repeats, until};
@@ -43,7 +43,7 @@ fn window(stage: &Stage, display: &Display) -> Command {
 
 /// Clicks until the hand moves.
 fn begin_run(stage: &mut Stage, pointer: &mut Pointer, button: [f32; 2]) {
-    let mut moves = |stage: &mut Stage, limit| {
+    let moves = |stage: &mut Stage, limit| {
         until(limit, || {
             stage.observer.poll();
             stage.observer.state().is_some_and(|s| s.flags & flags::IN_MOTION != 0)

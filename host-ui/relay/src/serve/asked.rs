@@ -27,7 +27,7 @@ pub(super) fn take(rounds: &mut Rounds, seat: u16, bytes: &[u8], now_ns: u64) {
     rounds.read_members_for(seat);
     let member = match rounds.valid(seat) {
         Ok(member) => member,
-        Err(why) => return rounds.refuse_greeting(seat, &why),
+        Err(why) => return rounds.refuse_greeting(seat, why),
     };
     let limit_ns = match is_promise(&message) {
         true => PROMISE_LATE_NS,

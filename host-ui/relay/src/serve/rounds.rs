@@ -198,19 +198,19 @@ impl Rounds {
             if let Err(why) = self.valid(seat) {
                 self.forget(seat);
                 say(format!("dismissed: {}: {why}", self.name(seat)));
-                self.tell_refused(seat, &why);
+                self.tell_refused(seat, why);
             }
         }
     }
 
     /// The member, while its place in the list and its time last.
-    pub(super) fn valid(&self, seat: u16) -> Result<Member, String> {
+    pub(super) fn valid(&self, seat: u16) -> Result<Member, &'static str> {
         let member = self
             .members
             .at(seat)
             .ok_or("nobody has this seat in the list of the lab")?;
         match member.why_closed(now_s()) {
-            Some(why) => Err(why.to_owned()),
+            Some(why) => Err(why),
             None => Ok(member.clone()),
         }
     }

@@ -27,7 +27,7 @@ const AROUND_M: f64 = 5.5e-3;
 pub enum NoWall {
     /// No structure is the rectum's wall, or nothing in it is free.
     #[error(
-        "the scene has no rectum that a probe could lie in: it needs a structure \"rectal wall\" around a hollow, with nothing (\"free\") beyond its inner faces"
+        "the scene has no rectum for a probe: it needs a structure \"rectal wall\" around a hollow that is \"free\""
     )]
     NoRectum,
     /// Wall of which nothing is next to the target.
