@@ -38,6 +38,21 @@ impl Explained for egui::Response {
     }
 }
 
+/// Returns the text as a sentence.
+pub fn sentence(text: &str) -> String {
+    match text {
+        "" => String::new(),
+        text => format!("{}.", capital(text)),
+    }
+}
+
+/// Returns the text with a capital at its start.
+pub fn capital(text: &str) -> String {
+    let mut chars = text.chars();
+    let first = chars.next().map(|first| first.to_uppercase().to_string());
+    first.unwrap_or_default() + chars.as_str()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

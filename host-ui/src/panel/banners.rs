@@ -6,6 +6,7 @@ use crate::shown::{NeedleLine, SecondHand, Shown, Watched};
 use crate::theme;
 use crate::theme::Tokens;
 use crate::view::free::BANNERS;
+use crate::words::{capital, sentence};
 use egui::{Color32, Rect, RichText};
 use stylet_host::link::LinkStatus;
 use stylet_shm_schema::{Exercise, Fault, Relayed, Request};
@@ -311,19 +312,6 @@ fn not_real_time(shown: &Shown) -> Banner {
         text,
         remedy: None,
     }
-}
-
-fn sentence(text: &str) -> String {
-    match text {
-        "" => String::new(),
-        text => format!("{}.", capital(text)),
-    }
-}
-
-fn capital(text: &str) -> String {
-    let mut chars = text.chars();
-    let first = chars.next().map(|first| first.to_uppercase().to_string());
-    first.unwrap_or_default() + chars.as_str()
 }
 
 /// Largest share of the pictures under banners.

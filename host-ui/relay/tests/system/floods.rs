@@ -3,7 +3,7 @@
 use crate::fixture::{Keys, Named, Running, core, invitation, join, until};
 use crate::host::{Host, go};
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -75,7 +75,7 @@ struct Eve {
 }
 
 impl Eve {
-    fn new(path: &PathBuf) -> Self {
+    fn new(path: &Path) -> Self {
         let invited = invitation(path);
         let code = std::fs::read_to_string(path.with_extension("code")).expect("kept");
         let identity = invited.identity(&code).expect("its code");

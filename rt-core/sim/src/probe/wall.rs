@@ -26,9 +26,7 @@ const AROUND_M: f64 = 5.5e-3;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NoWall {
     /// No structure is the rectum's wall, or nothing in it is free.
-    #[error(
-        "the scene has no rectum for a probe: it needs a structure \"rectal wall\" around a hollow that is \"free\""
-    )]
+    #[error("no rectum for a probe: the scene needs a structure \"rectal wall\" around a hollow that is \"free\"")]
     NoRectum,
     /// Wall of which nothing is next to the target.
     #[error("the rectum of the scene is not beside the target: a probe in it would reach nothing")]
