@@ -3,7 +3,7 @@
 use crate::fixture::{Keys, Named, Running, core, invitation, join, until};
 use crate::host::{Host, go};
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
