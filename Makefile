@@ -3,9 +3,10 @@
 SHELL := /bin/bash
 CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
-BIN := $(or $(CARGO_TARGET_DIR),target)/release
+BIN := $(or $(CARGO_TARGET_DIR),target)/quick
+SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test build package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test build build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -15,22 +16,25 @@ run: deps-run build ## Build, start rt-core and open the window; without a displ
 
 build: ## Build both programs
 # The workspace chooses the features, as for the tests, or both build every dependency for themselves.
-	$(CARGO) build --release --workspace --bin rt-core --bin stylet-bridge --bin host-ui
+	$(CARGO) build --profile quick --workspace --bin rt-core --bin stylet-bridge --bin host-ui
 
 test: deps-test ## Install what the tests need, build everything, run all tests
 # Both commands take the same packages: otherwise features differ and everything is built twice. Tests of what runs in real
 # time run one at a time.
-	$(CARGO) build --release --workspace --all-targets
-	$(CARGO) test --release --workspace --config 'target."cfg(all())".runner=["$(abspath docs/tools/test-program)"]'
+	$(CARGO) build --profile quick --workspace --all-targets
+	$(CARGO) test --profile quick --workspace --config 'target."cfg(all())".runner=["$(abspath docs/tools/test-program)"]'
 
-package: deps-package build ## Build the Debian packages of both programs, into target/package
-	docs/tools/package "$(BIN)"
+build-release: ## Build the programs as the packages hold them, with every dependency optimised
+	$(CARGO) build --release --workspace --bin rt-core --bin stylet-bridge --bin host-ui
+
+package: deps-package build-release ## Build the Debian packages of both programs, into target/package
+	docs/tools/package "$(SHIPPED)"
 
 package-test: deps-package-test package ## Install both packages in a fresh Debian root, run them, purge them, list what remains
 	docs/tools/package-test
 
 picture: deps-test build ## Redraw the pictures of the README and the tour
-	UPDATE_SNAPSHOTS=1 $(CARGO) test --release -p stylet-tests-window -- --test-threads=1
+	UPDATE_SNAPSHOTS=1 $(CARGO) test --profile quick -p stylet-tests-window -- --test-threads=1
 
 example: build ## Record the example session of the window again
 	docs/tools/example "$(BIN)"
@@ -39,58 +43,58 @@ report: ## Measure speed against error of every tissue model; writes benches/run
 	$(CARGO) run --release -p stylet-benches --bin report
 
 causes: ## Inject ten causes of late ticks into measurements, and see which of them the trace names (as root, about a minute)
-	$(CARGO) build --release --workspace --bin rt-core --bin stylet-bridge
-	$(CARGO) test --release -p stylet-tests-lab -- eight_of_ten --ignored --nocapture --test-threads=1
+	$(CARGO) build --profile quick --workspace --bin rt-core --bin stylet-bridge
+	$(CARGO) test --profile quick -p stylet-tests-lab -- eight_of_ten --ignored --nocapture --test-threads=1
 
-ratios: build ## Measure the force loop beside cyclictest in alternating rounds and print the ratios, RATIOS_SECONDS (30) each (as root, quiet machine)
+ratios: build-release ## Measure the force loop beside cyclictest in alternating rounds and print the ratios, RATIOS_SECONDS (30) each (as root, quiet machine)
 	@docs/tools/need rt-tests python3
-	docs/tools/ratios "$(BIN)"
+	docs/tools/ratios "$(SHIPPED)"
 
 procedure-test: deps-test build ## Drive a whole procedure with probe, contour, update of the plan and debrief through the window (three minutes)
-	$(CARGO) test --release -p stylet-tests-window --lib update:: -- --ignored --nocapture
+	$(CARGO) test --profile quick -p stylet-tests-window --lib update:: -- --ignored --nocapture
 
 igtl-test: deps-test build ## Compare OpenIGTLink with libOpenIGTLink and pyigtl, then serve IGTL_SECONDS (600) beside clients that hang (11 minutes)
 	@docs/tools/need g++ libopenigtlink-dev python3-venv
 	python3 -m venv $(BIN)/pyigtl && $(BIN)/pyigtl/bin/pip install -q pyigtl==0.3.4
-	$(CARGO) test --release -p stylet-igtl --lib library -- --ignored --nocapture
-	STYLET_PYIGTL=$(abspath $(BIN))/pyigtl/bin/python STYLET_IGTL_S=10 $(CARGO) test --release -p stylet-tests --test system igtl_python -- --ignored --nocapture --test-threads=1
-	STYLET_IGTL_S=$(or $(IGTL_SECONDS),600) $(CARGO) test --release -p stylet-tests --test system igtl::clients_that_hang -- --nocapture
+	$(CARGO) test --profile quick -p stylet-igtl --lib library -- --ignored --nocapture
+	STYLET_PYIGTL=$(abspath $(BIN))/pyigtl/bin/python STYLET_IGTL_S=10 $(CARGO) test --profile quick -p stylet-tests --test system igtl_python -- --ignored --nocapture --test-threads=1
+	STYLET_IGTL_S=$(or $(IGTL_SECONDS),600) $(CARGO) test --profile quick -p stylet-tests --test system igtl::clients_that_hang -- --nocapture
 
 senders: deps-test build ## End what moves the hand in each way, SENDERS_TRIALS (50) times each: procedure, OpenIGTLink, window, gamepad (two hours)
-	SENDERS_TRIALS=$(or $(SENDERS_TRIALS),50) $(CARGO) test --release -p stylet-tests --test system motion_sender:: -- --nocapture --test-threads=1
-	SENDERS_TRIALS=$(or $(SENDERS_TRIALS),50) $(CARGO) test --release -p stylet-tests-window --lib senders:: -- --include-ignored --nocapture --test-threads=1
+	SENDERS_TRIALS=$(or $(SENDERS_TRIALS),50) $(CARGO) test --profile quick -p stylet-tests --test system motion_sender:: -- --nocapture --test-threads=1
+	SENDERS_TRIALS=$(or $(SENDERS_TRIALS),50) $(CARGO) test --profile quick -p stylet-tests-window --lib senders:: -- --include-ignored --nocapture --test-threads=1
 
 floods: build ## Stop and release under three floods of requests, FLOODS_STOPS (1000) times each (three minutes)
-	FLOODS_STOPS=$(or $(FLOODS_STOPS),1000) $(CARGO) test --release -p stylet-tests --test system floods:: -- --nocapture --test-threads=1
+	FLOODS_STOPS=$(or $(FLOODS_STOPS),1000) $(CARGO) test --profile quick -p stylet-tests --test system floods:: -- --nocapture --test-threads=1
 
 hostile: build ## Send what is valid, stale and broken to a core and its OpenIGTLink for HOSTILE_SECONDS (600), by HOSTILE_SEED (1)
-	HOSTILE_SECONDS=$(or $(HOSTILE_SECONDS),600) HOSTILE_SEED=$(or $(HOSTILE_SEED),1) $(CARGO) test --release -p stylet-tests --test system hostile:: -- --nocapture --test-threads=1
+	HOSTILE_SECONDS=$(or $(HOSTILE_SECONDS),600) HOSTILE_SEED=$(or $(HOSTILE_SEED),1) $(CARGO) test --profile quick -p stylet-tests --test system hostile:: -- --nocapture --test-threads=1
 
 wall: build ## Damage what hosts share with WALL_SEEDS (50) seeds of each kind, kill and stop the bridge WALL_ROUNDS (100) times (about an hour)
-	STYLET_WILD_SEEDS=$(or $(WALL_SEEDS),50) STYLET_WILD_FILES=$(or $(WALL_SEEDS),50) STYLET_BRIDGE_ROUNDS=$(or $(WALL_ROUNDS),100) $(CARGO) test --release -p stylet-tests --test system wall:: -- --nocapture --test-threads=1
-	STYLET_BRIDGE_FORCE_ROUNDS=10 $(CARGO) test --release -p stylet-tests --test system bridge_force:: -- --nocapture --test-threads=1
+	STYLET_WILD_SEEDS=$(or $(WALL_SEEDS),50) STYLET_WILD_FILES=$(or $(WALL_SEEDS),50) STYLET_BRIDGE_ROUNDS=$(or $(WALL_ROUNDS),100) $(CARGO) test --profile quick -p stylet-tests --test system wall:: -- --nocapture --test-threads=1
+	STYLET_BRIDGE_FORCE_ROUNDS=10 $(CARGO) test --profile quick -p stylet-tests --test system bridge_force:: -- --nocapture --test-threads=1
 
 loom: ## Try every order in which the force process and its bridge can meet on a board (some minutes)
 	cd shm-schema/wall/loom && RUSTFLAGS="--cfg loom" $(CARGO) test --release --target-dir $(abspath $(BIN))/../loom
 
 relay: ## Build the relay, which carries a core to other machines; the other targets neither need nor build it
-	$(RELAY) build --release --bin relay
+	$(RELAY) build --profile quick --bin relay
 
 relay-test: deps-test build ## Test the relay with whole processes (about three minutes)
-	$(RELAY) test --release -- --test-threads=1
+	$(RELAY) test --profile quick -- --test-threads=1
 
 relay-class: deps-test build ## Measure the relay over a line of 100 Mbit/s and with 20 observers in network namespaces (as root, two minutes)
 	@docs/tools/need iproute2
-	$(RELAY) test --release --test system -- --test-threads=1 --nocapture --ignored line
+	$(RELAY) test --profile quick --test system -- --test-threads=1 --nocapture --ignored line
 
 relay-faults: deps-test build ## Stop, kill and cut off server, observer and operator, 100 times each in an insertion (some 20 minutes)
-	export STYLET_RELAY_FAULTS=100; $(RELAY) test --release --test system -- --test-threads=1 --nocapture faults
+	export STYLET_RELAY_FAULTS=100; $(RELAY) test --profile quick --test system -- --test-threads=1 --nocapture faults
 
 compensation: deps-test build ## Compensate every needle of every plan of docs/compensation.md, and write that page (four minutes)
-	UPDATE_DOCS=1 $(CARGO) test --release --workspace --test system -- --ignored --nocapture compensation_of_every
+	UPDATE_DOCS=1 $(CARGO) test --profile quick --workspace --test system -- --ignored --nocapture compensation_of_every
 
 envelope: deps-test ## Hold needles on lines with every hand over links of every lateness (20 minutes)
-	$(CARGO) test --release --workspace --lib -- --ignored --nocapture no_hand_sings_on_a_line_at_any
+	$(CARGO) test --profile quick --workspace --lib -- --ignored --nocapture no_hand_sings_on_a_line_at_any
 
 live: ## Build stylet-live, which 'host-ui record --live' needs to serve Foxglove's app; the other targets neither need nor build it
 	cd host-ui/live && CARGO_TARGET_DIR=$(abspath $(BIN))/../live $(CARGO) build --release

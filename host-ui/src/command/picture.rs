@@ -30,7 +30,7 @@ angles towards his head. The dose that is printed is air kerma 15 cm before the 
 stands in docs/imaging.md.
 
 Examples:
-  host-ui picture --core target/release/rt-core --scene pelvis --view transverse --template --out prostate.png
+  host-ui picture --core target/quick/rt-core --scene pelvis --view transverse --template --out prostate.png
   host-ui picture --view sagittal --turn 10 --out side.png
   host-ui picture --view fluoroscopy --orbital 30 --out seeds.png";
 

@@ -40,7 +40,7 @@ is known the plan is modified peripheral loading, and says so. With --seeds the 
 Units: mm, patient frame (RAS); strength in U (1 U = 1 cGy cm2/h).
 
 Examples:
-  host-ui plan --core target/release/rt-core --source sources/i125_6711.toml --out plan.toml --csv seeds.csv
+  host-ui plan --core target/quick/rt-core --source sources/i125_6711.toml --out plan.toml --csv seeds.csv
   host-ui plan --source sources/i125_6711.toml --robust p10 --errors-of out/paper --needles 20 --out plan.toml
   host-ui plan --source sources/i125_6711.toml --compare fewer-needles --out plan.toml
   host-ui plan --source sources/i125_6711.toml --seeds seeds.csv --strength-u 0.5 --out plan.toml

@@ -75,7 +75,7 @@ pub fn library(name: &str) -> PathBuf {
     let found = folders.into_iter().flatten().map(|folder| folder.join(name));
     let age = |path: &PathBuf| path.metadata().and_then(|m| m.modified()).ok();
     let newest = found.filter(|path| path.exists()).max_by_key(age);
-    newest.unwrap_or_else(|| panic!("{name} is missing: run `cargo build --release --workspace` first"))
+    newest.unwrap_or_else(|| panic!("{name} is missing: run `cargo build --profile quick --workspace` first"))
 }
 
 /// The block of the fake at `path`, which stays loaded.

@@ -32,7 +32,7 @@ pub fn program(name: &str) -> PathBuf {
     let path = folder.join(name);
     assert!(
         path.exists(),
-        "{} is missing: run `cargo build --release --workspace` first",
+        "{} is missing: run `make build` first",
         path.display()
     );
     path

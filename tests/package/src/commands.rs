@@ -9,7 +9,7 @@ const HEAD: &str = "\
 # Commands
 
 The test that checks this page also writes it, from the help of both programs:
-`UPDATE_DOCS=1 cargo test --release -p stylet-tests-package commands`. `COMMAND --help` explains each option.
+`UPDATE_DOCS=1 cargo test --profile quick -p stylet-tests-package commands`. `COMMAND --help` explains each option.
 The packages install man pages and completions for bash, zsh and fish; `rt-core manual` and `host-ui manual` write them.
 [A class over the network](network.md) lists the commands of `relay`.
 ";

@@ -46,7 +46,7 @@ fn memory_stays_over_changes_of_the_scene() {
     assert!(late < early * 1.15, "{memory_mb:.1?}");
 }
 
-/// `cargo test --release -p stylet-tests --test system four_hundred -- --ignored --nocapture`
+/// `cargo test --profile quick -p stylet-tests --test system four_hundred -- --ignored --nocapture`
 #[test]
 #[ignore = "a measurement of some minutes"]
 fn memory_over_four_hundred_changes() {

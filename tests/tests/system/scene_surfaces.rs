@@ -257,7 +257,7 @@ fn a_ball_is_drawn_as_a_ball() {
     assert!(after.0.abs() < 0.02 && after.1 < 0.06 && after.2 < 0.3, "{after:?}");
 }
 
-/// `cargo test --release -p stylet-tests --test system scene_surfaces::time -- --ignored --nocapture`
+/// `cargo test --profile quick -p stylet-tests --test system scene_surfaces::time -- --ignored --nocapture`
 #[test]
 #[ignore = "a measurement"]
 fn time_to_make_and_to_move_them() {

@@ -416,7 +416,7 @@ fn a_plan_of_twenty_needles_is_in_place_and_as_it_was() {
     }
 }
 
-/// Run with `cargo test --release -p stylet-tests-window plan -- --ignored --nocapture`.
+/// Run with `cargo test --profile quick -p stylet-tests-window plan -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn cost_of_a_frame_with_a_hundred_seeds() {

@@ -229,7 +229,7 @@ fn words_can_be_made_larger_and_stay_in_place() {
     driven.picture("larger");
 }
 
-/// Run with `cargo test --release -p stylet-tests-window states -- --ignored --nocapture`.
+/// Run with `cargo test --profile quick -p stylet-tests-window states -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement"]
 fn cost_of_a_frame() {

@@ -1,6 +1,6 @@
 //! Pictures of every state of the window in all its sizes, for inspection:
 //!
-//! `cargo test --release -p host-ui --lib pictures -- --ignored`, with `STYLET_PICTURES=1280x720`
+//! `cargo test --profile quick -p host-ui --lib pictures -- --ignored`, with `STYLET_PICTURES=1280x720`
 //! for those whose name contains that.
 
 use super::fixture::options;

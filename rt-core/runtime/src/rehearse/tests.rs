@@ -317,7 +317,7 @@ fn a_reset_with_the_needle_in_tissue_leaves_no_force_on_a_line_either() {
 }
 
 /// What ChainMail's lines are worth, beside those of finite elements at full resolution:
-/// `cargo test --release -p stylet-runtime --lib seeds_of_chainmail -- --ignored --nocapture`
+/// `cargo test --profile quick -p stylet-runtime --lib seeds_of_chainmail -- --ignored --nocapture`
 #[test]
 #[ignore = "a measurement of some minutes"]
 fn seeds_of_chainmail_beside_those_of_finite_elements() {

@@ -184,7 +184,7 @@ mod tests {
         assert!(displacements_m.iter().any(|u| u[2] > 4e-3), "the body has moved");
     }
 
-    /// `cargo test --release -p stylet-sim --lib time_to_write_displacements -- --ignored --nocapture`
+    /// `cargo test --profile quick -p stylet-sim --lib time_to_write_displacements -- --ignored --nocapture`
     #[test]
     #[ignore = "a measurement"]
     fn time_to_write_displacements() {

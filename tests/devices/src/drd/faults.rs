@@ -213,7 +213,7 @@ fn a_random_fault_zeroes_the_force_in_time_and_is_named() {
     faults(1, 60);
 }
 
-/// Run with `cargo test --release -p stylet-tests-devices -- --ignored --nocapture thousand`.
+/// Run with `cargo test --profile quick -p stylet-tests-devices -- --ignored --nocapture thousand`.
 #[test]
 #[ignore = "a thousand of them: half a minute"]
 fn a_thousand_faults_drawn_at_random() {

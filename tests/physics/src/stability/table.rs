@@ -20,7 +20,7 @@ const HEAD: &str = "\
 # Numerical stability
 
 How every tissue model handles the hard cases: what should happen and what happened, with figures. The suite that runs the cases
-writes this page: `UPDATE_DOCS=1 cargo test --release -p stylet-tests-physics stability`. Without `UPDATE_DOCS` it runs the
+writes this page: `UPDATE_DOCS=1 cargo test --profile quick -p stylet-tests-physics stability`. Without `UPDATE_DOCS` it runs the
 same cases and fails if one is not met or is missing here.
 
 Lengths are in elements. *Corner* is the smallest volume that three links of an element span, relative to that at rest; a cell folds

@@ -359,7 +359,7 @@ fn pulses_count_by_the_inverse_square_law() {
 }
 
 #[test]
-#[ignore = "a measurement, not a claim: cargo test --release -p stylet-imaging pulses_a_second -- --ignored --nocapture"]
+#[ignore = "a measurement, not a claim: cargo test --profile quick -p stylet-imaging pulses_a_second -- --ignored --nocapture"]
 fn pulses_a_second() {
     let (body, mut scope) = (body(), fluoroscope());
     let moved = field(|p| Vector3::new(0.0, 0.1 * p.x, 1e-3));

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use std::time::Instant;
 
 #[test]
-#[ignore = "a measurement, not a claim: cargo test --release -p stylet-imaging pictures_a_second -- --ignored --nocapture"]
+#[ignore = "a measurement, not a claim: cargo test --profile quick -p stylet-imaging pictures_a_second -- --ignored --nocapture"]
 fn pictures_a_second() {
     let mut scanner = scanner();
     let body = block([Tissue::COUPLING, Tissue::SOFT, Tissue::GAS], |_| 1);

@@ -96,7 +96,7 @@ fn what_is_left_out_of_a_tick_in_which_nothing_changed_changes_no_bit() {
     assert!(as_it_is[0] != as_it_is[as_it_is.len() - 3]);
 }
 
-/// `cargo test --release -p stylet-runtime --lib carrying -- --ignored --nocapture`; the least of some rounds, each tick by itself.
+/// `cargo test --profile quick -p stylet-runtime --lib carrying -- --ignored --nocapture`; the least of some rounds, each tick by itself.
 #[test]
 #[ignore = "times"]
 fn times_of_a_tick_that_carries() {

@@ -246,7 +246,7 @@ fn needle_in_pelvis() -> NeedleRun {
     }
 }
 
-/// `cargo test --release -p stylet-runtime --lib folds -- --ignored --nocapture`; each tick the least of the rounds.
+/// `cargo test --profile quick -p stylet-runtime --lib folds -- --ignored --nocapture`; each tick the least of the rounds.
 #[test]
 #[ignore = "times"]
 fn times_and_folds_of_chainmail_in_both_scenes() {

@@ -269,7 +269,7 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
     assert_eq!((out_n, out_m), (Vector3::zeros(), Vector3::zeros()));
 }
 
-/// `cargo test --release -p stylet-runtime --lib tests::probe -- --ignored --nocapture`
+/// `cargo test --profile quick -p stylet-runtime --lib tests::probe -- --ignored --nocapture`
 #[test]
 #[ignore = "a measurement"]
 fn times_of_a_tick_with_probe_and_needle() {

@@ -171,7 +171,7 @@ fn needles_beside_those_that_stay_in_leave_their_seeds_where_they_were_rehearsed
     check(TissueKind::ChainMail, &[2], 3);
 }
 
-/// `cargo test --release -p stylet-runtime --lib eight_needles -- --ignored --nocapture`; `three_needles` for finite elements as above.
+/// `cargo test --profile quick -p stylet-runtime --lib eight_needles -- --ignored --nocapture`; `three_needles` for finite elements as above.
 #[test]
 #[ignore = "finite elements: half a minute"]
 fn three_needles_in_finite_elements_leave_their_seeds_where_they_were_rehearsed() {

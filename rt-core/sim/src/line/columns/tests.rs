@@ -80,7 +80,7 @@ fn conditioning(compliance: &Compliance) -> f64 {
     eigenvalues.min() / eigenvalues.max()
 }
 
-/// `cargo test --release -p rt-core --lib times_of_columns -- --ignored --nocapture`
+/// `cargo test --profile quick -p rt-core --lib times_of_columns -- --ignored --nocapture`
 #[test]
 #[ignore = "a measurement"]
 fn times_of_columns() {

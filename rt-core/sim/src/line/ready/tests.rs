@@ -143,7 +143,7 @@ fn a_reset_line_answers_like_a_new_one() {
     }
 }
 
-/// Measures the coarser body of the pelvis: `cargo test --release -p stylet-sim --lib a_coarser_pelvis -- --ignored
+/// Measures the coarser body of the pelvis: `cargo test --profile quick -p stylet-sim --lib a_coarser_pelvis -- --ignored
 /// --nocapture`
 ///
 /// The same forces, 2 N of shaft friction along 50 mm and 1.5 N at the tip, act on the body as it ships and on one of

@@ -34,7 +34,7 @@ fn pelvis() -> &'static Fixture {
     })
 }
 
-/// `cargo test --release -p stylet-sim --lib probe::tests::pelvis -- --ignored --nocapture`
+/// `cargo test --profile quick -p stylet-sim --lib probe::tests::pelvis -- --ignored --nocapture`
 #[test]
 #[ignore = "takes minutes"]
 fn the_gland_moves_as_with_the_contact_solved_in_full() {

@@ -53,7 +53,7 @@ mod times {
     use crate::scene::{Lattice, Scene, Surface};
     use std::time::Instant;
 
-    /// `cargo test --release -p stylet-sim --lib time_to_cut -- --ignored --nocapture`
+    /// `cargo test --profile quick -p stylet-sim --lib time_to_cut -- --ignored --nocapture`
     #[test]
     #[ignore = "a measurement"]
     fn time_to_cut() {

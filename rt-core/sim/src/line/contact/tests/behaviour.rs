@@ -150,7 +150,7 @@ fn every_finite_input_gives_finite_forces_and_no_heap_call() {
     assert_eq!(heap::calls_of_this_thread(), before);
 }
 
-/// `cargo test --release -p rt-core --lib times_of_a_tick -- --ignored --nocapture`
+/// `cargo test --profile quick -p rt-core --lib times_of_a_tick -- --ignored --nocapture`
 #[test]
 #[ignore = "a measurement"]
 fn times_of_a_tick() {

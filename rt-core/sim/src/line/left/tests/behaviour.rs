@@ -167,7 +167,7 @@ fn as_many_as_there_is_room_for_move_together_without_the_heap() {
 }
 
 /// Time of a tick by how many needles are left, stations as in the paper's gland; the least of some rounds, each tick
-/// by itself: `cargo test --release -p stylet-sim --lib times_beside -- --ignored --nocapture`.
+/// by itself: `cargo test --profile quick -p stylet-sim --lib times_beside -- --ignored --nocapture`.
 #[test]
 #[ignore = "times"]
 fn times_beside() {

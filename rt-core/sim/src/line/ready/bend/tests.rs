@@ -106,7 +106,7 @@ fn a_straight_track_does_not_bend_the_needle() {
     assert!(line.across_loads_n(0).iter().all(|f| *f == 0.0));
 }
 
-/// `cargo test --release -p stylet-sim --lib times_of_a_bent_needle -- --ignored --nocapture`
+/// `cargo test --profile quick -p stylet-sim --lib times_of_a_bent_needle -- --ignored --nocapture`
 #[test]
 #[ignore = "a measurement"]
 fn times_of_a_bent_needle() {
