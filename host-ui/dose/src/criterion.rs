@@ -15,7 +15,7 @@ pub struct Criterion {
 
 /// Number of trials that met a criterion.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Kept {
+pub struct CriterionCount {
     /// Criterion to meet.
     pub criterion: Criterion,
     /// Trials that met it.
@@ -81,10 +81,14 @@ impl Criterion {
     }
 
     /// Returns how many trials meet it; `None` where `measures` has no such measure.
-    pub fn kept(&self, measures: &[(String, Option<f64>)], trials: &[(usize, Vec<Option<f64>>)]) -> Option<Kept> {
+    pub fn kept(
+        &self,
+        measures: &[(String, Option<f64>)],
+        trials: &[(usize, Vec<Option<f64>>)],
+    ) -> Option<CriterionCount> {
         let column = measures.iter().position(|(name, _)| *name == self.measure)?;
         let values = || trials.iter().filter_map(|(_, row)| row[column]);
-        Some(Kept {
+        Some(CriterionCount {
             criterion: self.clone(),
             met: values().filter(|v| self.limit.is_met(*v)).count(),
             of: values().count(),
@@ -101,7 +105,7 @@ impl std::fmt::Display for Criterion {
     }
 }
 
-impl Kept {
+impl CriterionCount {
     /// Returns the share of the trials with its 95 % interval (Wilson, J. Am. Stat. Assoc. 22, 209,
     /// 1927); `None` without a trial.
     pub fn share(&self) -> Option<[f64; 3]> {
@@ -131,7 +135,7 @@ mod tests {
     fn the_interval_of_a_share_ends_where_the_score_test_does() {
         for (met, of) in [(0, 10), (3, 10), (95, 100), (1000, 1000)] {
             let criterion = Criterion::new("a", Metric::Mean, Limit::AtLeast(0.0));
-            let [p, low, high] = Kept { criterion, met, of }.share().unwrap();
+            let [p, low, high] = CriterionCount { criterion, met, of }.share().unwrap();
             for q in [low, high].into_iter().filter(|q| (1e-9..1.0 - 1e-9).contains(q)) {
                 let score = (p - q).powi(2) / (q * (1.0 - q) / of as f64);
                 assert!((score.sqrt() - 1.959_964).abs() < 1e-5, "{met} of {of}: {score}");

@@ -19,7 +19,7 @@ const MARGIN_M: f64 = 0.03;
 pub struct Judge {
     structures: Vec<Judged>,
     target: usize,
-    around: Around,
+    around: SearchBox,
     prescription_gy: f64,
 }
 
@@ -31,7 +31,7 @@ struct Judged {
 }
 
 /// Box around the whole region where the dose may reach the prescription.
-struct Around {
+struct SearchBox {
     points: DosePoints,
     point_m3: f64,
     /// Points next to a face of the box.
@@ -75,7 +75,7 @@ impl Judge {
         let target = choose_target(&names, target)?;
         let mut corners: Vec<[f64; 3]> = seeds.iter().map(|s| s.position_m).collect();
         corners.extend(<[[f64; 3]; 2]>::from(structures[target].bounds_m()));
-        let around = Around::new(&corners, most_points);
+        let around = SearchBox::new(&corners, most_points);
         let structures = structures
             .into_iter()
             .enumerate()
@@ -235,7 +235,7 @@ impl Judge {
     }
 }
 
-impl Around {
+impl SearchBox {
     fn new(corners_m: &[[f64; 3]], most_points: usize) -> Self {
         let (low, high) = bounds(corners_m);
         let (low, high) = (low.map(|v| v - MARGIN_M), high.map(|v| v + MARGIN_M));

@@ -51,7 +51,7 @@ pub fn start(path: &Path, count: u64) -> Option<Vec<u8>> {
 
 /// Reads the data file that a header names; a header from elsewhere must not reach outside of its
 /// folder.
-pub fn beside(header: &Path, name: &str, progress: &Progress) -> Result<Vec<u8>, ContentError> {
+pub fn data_file(header: &Path, name: &str, progress: &Progress) -> Result<Vec<u8>, ContentError> {
     let mut parts = Path::new(name).components();
     let inside = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
     if !inside {

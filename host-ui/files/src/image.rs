@@ -1,6 +1,6 @@
 //! The image under a segmentation, or another of the same patient: greys for the slices.
 
-use super::bytes::{beside, file_name, whole};
+use super::bytes::{data_file, file_name, whole};
 use super::dicom::series;
 use super::element::Sink;
 use super::error::{ContentError, FileError};
@@ -102,7 +102,7 @@ pub fn read_values(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>,
     let refused = |why: ContentError| FileError::of(path, why);
     let bytes = whole(path, progress).map_err(refused)?;
     let sink = Sink::greys(progress);
-    let data = |name: &str| beside(path, name, progress);
+    let data = |name: &str| data_file(path, name, progress);
     let values = match Format::of(&bytes) {
         Some(Format::Nrrd) => nrrd::read_image(&bytes, &data, sink),
         Some(Format::Nifti) => nifti::read(&bytes, sink),

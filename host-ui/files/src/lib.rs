@@ -32,4 +32,4 @@ pub use volume::{LabelVolume, Tissue, VoxelValues, Voxels};
 pub use watched::watched;
 
 /// Reader of the data file that a header names.
-pub type Beside<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, ContentError>;
+pub type DataReader<'a> = &'a dyn Fn(&str) -> Result<Vec<u8>, ContentError>;

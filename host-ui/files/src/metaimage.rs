@@ -3,7 +3,7 @@
 mod header;
 pub mod write;
 
-use super::Beside;
+use super::DataReader;
 use super::element::{Sink, must_hold, read_values, values_from_text, voxel_count};
 use super::frame::VoxelFrame;
 use super::nrrd::nothing_left;
@@ -35,8 +35,8 @@ pub fn is_metaimage(bytes: &[u8]) -> bool {
     line.split_once('=').is_some_and(|(key, _)| FIRST.contains(&key.trim()))
 }
 
-/// Reads the whole file; `beside` reads the data of a detached header.
-pub fn read<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<VoxelValues<V>, ContentError> {
+/// Reads the whole file; `data_file` reads the data of a detached header.
+pub fn read<V>(bytes: &[u8], data_file: DataReader, sink: Sink<V>) -> Result<VoxelValues<V>, ContentError> {
     let (header, rest) = Header::parse(bytes)?;
     let frame = frame(&header)?;
     let count = voxel_count(&header.sizes)?;
@@ -44,7 +44,7 @@ pub fn read<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<VoxelValue
     let data = if header.data_file.eq_ignore_ascii_case("LOCAL") {
         rest
     } else {
-        detached = beside(&header.data_file)?;
+        detached = data_file(&header.data_file)?;
         &detached
     };
     Ok(VoxelValues {

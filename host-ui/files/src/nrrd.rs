@@ -4,7 +4,7 @@ mod header;
 pub mod segments;
 pub mod write;
 
-use super::Beside;
+use super::DataReader;
 use super::element::{Element, Endian, Sink, must_hold, read_values, values_from_text, voxel_count};
 use super::frame::VoxelFrame;
 use super::volume::{VoxelValues, Voxels};
@@ -23,9 +23,9 @@ pub fn is_nrrd(bytes: &[u8]) -> bool {
     bytes.starts_with(b"NRRD000")
 }
 
-/// Reads a file as labels; `beside` reads the data of a detached header.
-pub fn read(bytes: &[u8], beside: Beside, sink: Sink<u8>) -> Result<Voxels, ContentError> {
-    let (header, voxels) = open(bytes, beside, sink)?;
+/// Reads a file as labels; `data_file` reads the data of a detached header.
+pub fn read(bytes: &[u8], data_file: DataReader, sink: Sink<u8>) -> Result<Voxels, ContentError> {
+    let (header, voxels) = open(bytes, data_file, sink)?;
     match list_axis(&header)? {
         None => Ok(voxels.named(segments::names(&header.pairs)?)),
         Some(list) => segments::flatten(&header, &voxels.values, list, voxels.frame, voxels.dims),
@@ -33,8 +33,8 @@ pub fn read(bytes: &[u8], beside: Beside, sink: Sink<u8>) -> Result<Voxels, Cont
 }
 
 /// Reads a file as an image.
-pub fn read_image(bytes: &[u8], beside: Beside, sink: Sink<f32>) -> Result<VoxelValues<f32>, ContentError> {
-    let (header, voxels) = open(bytes, beside, sink)?;
+pub fn read_image(bytes: &[u8], data_file: DataReader, sink: Sink<f32>) -> Result<VoxelValues<f32>, ContentError> {
+    let (header, voxels) = open(bytes, data_file, sink)?;
     match list_axis(&header)? {
         None => Ok(voxels),
         Some(list) => Err(ContentError::Invalid(format!(
@@ -52,7 +52,7 @@ fn list_axis(h: &Header) -> Result<Option<usize>, ContentError> {
 }
 
 /// Reads the whole file, all values of all voxels.
-fn open<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<(Header, VoxelValues<V>), ContentError> {
+fn open<V>(bytes: &[u8], data_file: DataReader, sink: Sink<V>) -> Result<(Header, VoxelValues<V>), ContentError> {
     let (header, rest) = Header::parse(bytes)?;
     let space = header.space_axes()?;
     let frame = frame(&header, space)?;
@@ -61,7 +61,7 @@ fn open<V>(bytes: &[u8], beside: Beside, sink: Sink<V>) -> Result<(Header, Voxel
     let data = match &header.data_file {
         None => rest,
         Some(name) => {
-            detached = beside(name)?;
+            detached = data_file(name)?;
             &detached
         }
     };

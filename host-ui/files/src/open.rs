@@ -1,6 +1,6 @@
 //! The format of a file, by its content; the formats' own readers do the rest.
 
-use super::bytes::{beside, whole};
+use super::bytes::{data_file, whole};
 use super::element::Sink;
 use super::error::{ContentError, FileError};
 use super::progress::Progress;
@@ -45,7 +45,7 @@ pub fn read_voxels(path: &Path, progress: &Progress) -> Result<Voxels, FileError
     let refused = |why: ContentError| FileError::of(path, why);
     let bytes = whole(path, progress).map_err(refused)?;
     let sink = Sink::labels(progress);
-    let data = |name: &str| beside(path, name, progress);
+    let data = |name: &str| data_file(path, name, progress);
     let voxels = match Format::of(&bytes) {
         Some(Format::Dicom) => dicom::read(&bytes).and_then(|object| dicom::structures::read(&object, path.parent())),
         Some(Format::Nrrd) => nrrd::read(&bytes, &data, sink),

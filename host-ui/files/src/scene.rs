@@ -90,8 +90,8 @@ pub fn read(path: &Path) -> Result<SceneFile, FileError> {
 /// Loads the volume of a scene file, with the structures that the file defines.
 pub fn load(path: &Path, progress: &Progress) -> Result<(SceneFile, LabelVolume), FileError> {
     let scene = read(path)?;
-    let beside = path.parent().unwrap_or(Path::new("")).join(&scene.volume);
-    let voxels = read_voxels(&beside, progress)?;
+    let path_of_volume = path.parent().unwrap_or(Path::new("")).join(&scene.volume);
+    let voxels = read_voxels(&path_of_volume, progress)?;
     let name = scene.name.clone().unwrap_or_else(|| file_name(path));
     let refused = |why: ContentError| FileError::of(path, why);
     let tissues = scene.tissues(&voxels).map_err(refused)?;

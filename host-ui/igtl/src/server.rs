@@ -5,12 +5,12 @@
 //! received transform of each device; newer ones replace them. So memory is bounded, and a slow
 //! client sees the newest data.
 
-mod door;
+mod admission;
 mod incoming;
 mod outgoing;
 
 use crate::codec::Status;
-use door::{Door, Limits};
+use admission::{Admission, Limits};
 use outgoing::Client;
 use std::collections::BTreeMap;
 use std::io;
@@ -124,7 +124,7 @@ impl Server {
         let log: Log = Arc::new(move |line| log(printable_line(&line)));
         std::thread::Builder::new()
             .name("igtl-accept".to_owned())
-            .spawn(move || accept(&listener, Door::new(limits), &shared, &ended, &log))
+            .spawn(move || accept(&listener, Admission::new(limits), &shared, &ended, &log))
             .map_err(ServerError::Thread)?;
         Ok(server)
     }
@@ -182,7 +182,13 @@ impl Drop for Server {
     }
 }
 
-fn accept(listener: &TcpListener, mut door: Door, shared: &Arc<Mutex<Shared>>, ended: &Arc<AtomicBool>, log: &Log) {
+fn accept(
+    listener: &TcpListener,
+    mut admission: Admission,
+    shared: &Arc<Mutex<Shared>>,
+    ended: &Arc<AtomicBool>,
+    log: &Log,
+) {
     while !ended.load(Ordering::Relaxed) {
         let Ok((stream, from)) = listener.accept() else {
             std::thread::sleep(LOOK_EVERY);
@@ -191,7 +197,7 @@ fn accept(listener: &TcpListener, mut door: Door, shared: &Arc<Mutex<Shared>>, e
         let client = Arc::new(Client::new(from, log.clone()));
         let admitted = {
             let mut shared = lock(shared);
-            let admitted = door.admit(from, &shared.clients);
+            let admitted = admission.admit(from, &shared.clients);
             if let Ok(displaced) = &admitted {
                 shared
                     .clients
@@ -206,7 +212,7 @@ fn accept(listener: &TcpListener, mut door: Door, shared: &Arc<Mutex<Shared>>, e
                 .into_iter()
                 .for_each(|d| d.end("another client has taken its place")),
             Err(refused) => {
-                door::answer(&stream, &refused.words);
+                admission::answer(&stream, &refused.words);
                 if refused.is_said {
                     log(format!("{from}: refused, {}", refused.words));
                 }

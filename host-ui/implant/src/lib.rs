@@ -4,7 +4,6 @@
 
 pub mod class;
 pub mod finder;
-pub mod heard;
 pub mod intraoperative;
 pub mod linked;
 pub mod pairing;
@@ -13,6 +12,7 @@ pub mod plan;
 pub mod procedure;
 pub mod provenance;
 pub mod readers;
+pub mod received;
 pub mod registration;
 pub mod score;
 pub mod sheet;

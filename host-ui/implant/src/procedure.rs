@@ -127,7 +127,7 @@ pub struct Options {
 }
 
 /// Observations while the script ran.
-struct Seen {
+struct Observations {
     motion: TargetMotion,
     records: Vec<TickRecord>,
     punctured: bool,
@@ -197,7 +197,7 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
     if options.compensate {
         job.compensate(&mut link, &pace, &interrupted)?;
     }
-    let mut seen = Seen::of(&scene);
+    let mut seen = Observations::of(&scene);
     let run = Run::of_needles(job.tasks.clone(), pace)
         .stabilised(&job.stabilising)
         .with_patience(UNWATCHED);
@@ -310,7 +310,7 @@ fn perform(
     job: &Job,
     mut run: Run,
     interrupted: &Interrupt,
-    seen: &mut Seen,
+    seen: &mut Observations,
 ) -> Result<(), ProcedureError> {
     // A terminal that is closed or stopped must not delay a needle.
     let lines = Lines::to_stdout();
@@ -357,7 +357,7 @@ fn perform(
     }
 }
 
-impl Seen {
+impl Observations {
     fn of(scene: &SceneModel) -> Self {
         Self {
             motion: TargetMotion::of(scene),

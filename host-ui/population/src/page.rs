@@ -4,7 +4,7 @@ use crate::dose::Scored;
 use crate::error::PopulationError;
 use crate::figures::{Distribution, influences};
 use crate::picture;
-use crate::published::{PUBLISHED, Published, beside};
+use crate::published::{PUBLISHED, Published, published_in};
 use crate::shards::Population;
 use maud::{Markup, PreEscaped, html};
 use stylet_base::format::printable;
@@ -127,7 +127,7 @@ fn warnings(p: &Population, scored: &Scored) -> Markup {
 }
 
 fn plot(d: &Distribution) -> Result<Markup, PopulationError> {
-    let published: Vec<&Published> = beside(d.name).collect();
+    let published: Vec<&Published> = published_in(d.name).collect();
     let (svg, beyond) = picture::histogram(d, &published)?;
     Ok(html! {
         figure {

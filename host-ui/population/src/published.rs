@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Published {
     /// Distribution of the page in which it is drawn; if empty, it is in the table only.
-    pub beside: &'static str,
+    pub shown_in: &'static str,
     /// Measured quantity.
     pub what: &'static str,
     /// Mean or median, as `how` states.
@@ -46,7 +46,7 @@ impl Use {
 /// Values with their sources. Those marked as unverified were not compared with the publication.
 pub const PUBLISHED: &[Published] = &[
     Published {
-        beside: "Seed misplacement",
+        shown_in: "Seed misplacement",
         what: "seed misplacement",
         value: 4.9,
         unit: "mm",
@@ -56,7 +56,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "patients; all causes together, swelling and needle deflection among them. Mean speed had no significant effect (p = .47).",
     },
     Published {
-        beside: "Seed misplacement",
+        shown_in: "Seed misplacement",
         what: "targeting error, transperineal in MRI",
         value: 6.3,
         unit: "mm",
@@ -66,7 +66,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "patients; biopsy needles, skin contact was the main cause.",
     },
     Published {
-        beside: "Shift of the gland",
+        shown_in: "Shift of the gland",
         what: "shift of the base",
         value: 15.0,
         unit: "mm",
@@ -76,7 +76,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "patients; with all 16 needles in. Here each needle begins with tissue at rest.",
     },
     Published {
-        beside: "",
+        shown_in: "",
         what: "deformation in the plane, all needles in",
         value: 6.8,
         unit: "mm",
@@ -86,7 +86,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "patients; across the needles, and with all of them in.",
     },
     Published {
-        beside: "Shift of the gland",
+        shown_in: "Shift of the gland",
         what: "shift, needle pushed by hand",
         value: 5.6,
         unit: "mm",
@@ -96,7 +96,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "unverified: not compared with the publication. A tapped needle is not simulated. Here the largest shift of the middle of the gland in an insertion; what surrounds the body has no spread.",
     },
     Published {
-        beside: "",
+        shown_in: "",
         what: "shift, pushed and by a fast pneumatic tool",
         value: 20.0,
         unit: "mm",
@@ -106,7 +106,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "phantom.",
     },
     Published {
-        beside: "",
+        shown_in: "",
         what: "rotation of the gland",
         value: 14.0,
         unit: "degrees",
@@ -116,7 +116,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "unverified: not compared with the publication. The study keeps no rotation.",
     },
     Published {
-        beside: "Largest displacement of tissue",
+        shown_in: "Largest displacement of tissue",
         what: "displacement of the target, biopsy",
         value: 6.3,
         unit: "mm",
@@ -126,7 +126,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "patients; one needle.",
     },
     Published {
-        beside: "Peak force on the hand",
+        shown_in: "Peak force on the hand",
         what: "force of an 18 G needle",
         value: 8.9,
         unit: "N",
@@ -136,7 +136,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "patients; unverified: the layer it belongs to was not compared with the publication. The skin of `pelvis` gives way at 9 N by it, and `paper` has no skin. A hand feels 0.9 of the needle's force (force.scale).",
     },
     Published {
-        beside: "",
+        shown_in: "",
         what: "force of a 17 G needle",
         value: 15.6,
         unit: "N",
@@ -146,7 +146,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "patients; a thicker needle than the simulator's. Unverified as the one of 18 G.",
     },
     Published {
-        beside: "",
+        shown_in: "",
         what: "friction of a shaft in liver",
         value: 14.0,
         unit: "N/m",
@@ -156,7 +156,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "another organ, without a capsule; unverified. The gland of the simulator has 80 N/m.",
     },
     Published {
-        beside: "",
+        shown_in: "",
         what: "odds that a deviation goes with anatomy",
         value: 10.9,
         unit: "(ratio)",
@@ -166,7 +166,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "patients.",
     },
     Published {
-        beside: "",
+        shown_in: "",
         what: "swelling in the theatre",
         value: 4.5,
         unit: "cc",
@@ -176,7 +176,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "patients; not simulated: volumes stay as they are.",
     },
     Published {
-        beside: "",
+        shown_in: "",
         what: "seeds that migrate away",
         value: 0.47,
         unit: "%",
@@ -186,7 +186,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "patients; over weeks, not during the insertion.",
     },
     Published {
-        beside: "",
+        shown_in: "",
         what: "finite elements against a phantom",
         value: 0.36,
         unit: "mm",
@@ -196,7 +196,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "phantom; what a model with known materials can reach.",
     },
     Published {
-        beside: "",
+        shown_in: "",
         what: "deflection of the tip, transrectal",
         value: 1.77,
         unit: "mm",
@@ -206,7 +206,7 @@ pub const PUBLISHED: &[Published] = &[
         note: "not simulated: the needle of the simulator is straight.",
     },
     Published {
-        beside: "",
+        shown_in: "",
         what: "18 G needle in gelatin",
         value: 0.9,
         unit: "mm",
@@ -218,6 +218,6 @@ pub const PUBLISHED: &[Published] = &[
 ];
 
 /// Returns the values that are drawn in one distribution.
-pub fn beside(name: &str) -> impl Iterator<Item = &'static Published> {
-    PUBLISHED.iter().filter(move |p| p.beside == name)
+pub fn published_in(name: &str) -> impl Iterator<Item = &'static Published> {
+    PUBLISHED.iter().filter(move |p| p.shown_in == name)
 }

@@ -46,19 +46,19 @@ impl App {
     /// Sends the hand to a depth along the planned path, or along the parallel line on which the
     /// needle is.
     fn move_to(&mut self, what: &'static str, depth_m: f64, speed_m_per_s: f64) {
-        let beside_m = self.drive.beside_m();
+        let offset_m = self.drive.offset_m();
         self.move_hand(
             what,
             Goal {
                 depth_m,
-                beside_m,
+                offset_m,
                 speed_m_per_s,
             },
         );
     }
 
     fn move_hand(&mut self, what: &'static str, to: Goal) {
-        let goal = self.shown.beside_path_m(to.depth_m, to.beside_m);
+        let goal = self.shown.place_near_path_m(to.depth_m, to.offset_m);
         let (Some(plan), Some(goal)) = (self.shown.plan, goal) else {
             self.shown.note = Some(refusal(format!("{what}: plan the seeds first")));
             return;

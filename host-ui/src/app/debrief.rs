@@ -11,10 +11,10 @@ use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::{Link, SceneModel};
 use stylet_host::moments::Moment;
-use stylet_implant::heard::Heard;
 use stylet_implant::intraoperative::Reviewed;
 use stylet_implant::plan::{Anatomy, ImplantPlan, exchange, file};
 use stylet_implant::provenance;
+use stylet_implant::received::ReceivedProcedure;
 use stylet_implant::score::{self, Implant, Motion, Score, SeedPair};
 use stylet_shm_schema::{Prescribed, SeedPose, TickRecord};
 
@@ -181,7 +181,7 @@ impl Delivered {
     /// seeds if its plan does not.
     pub(super) fn of_heard(
         link: &Link,
-        heard: &Heard,
+        heard: &ReceivedProcedure,
         planned: Prescribed,
         trainee: Option<&str>,
     ) -> Result<Self, Failure> {

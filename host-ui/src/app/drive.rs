@@ -28,7 +28,7 @@ const OUTSIDE_M: f64 = 1e-3;
 pub struct Goal {
     pub depth_m: f64,
     /// Offset from the planned path.
-    pub beside_m: [f64; 2],
+    pub offset_m: [f64; 2],
     pub speed_m_per_s: f64,
 }
 
@@ -40,7 +40,7 @@ pub struct Drive {
     /// Offset of the line on which all goals of the window lie, so that a needle in the tissue is
     /// not pulled aside. `None` until this window has chosen a line or found a needle in the
     /// tissue.
-    beside_m: Option<[f64; 2]>,
+    offset_m: Option<[f64; 2]>,
     unsent_s: f64,
     /// Time for which the hand continues after the last goal.
     hold_s: f64,
@@ -86,19 +86,19 @@ impl Drive {
     }
 
     /// Returns the offset of the needle's line from the planned path.
-    pub fn beside_m(&self) -> [f64; 2] {
-        self.beside_m.unwrap_or_default()
+    pub fn offset_m(&self) -> [f64; 2] {
+        self.offset_m.unwrap_or_default()
     }
 
     /// Puts the needle back on the planned path.
     pub fn keep_to_path(&mut self) {
-        self.beside_m = Some([0.0; 2]);
+        self.offset_m = Some([0.0; 2]);
     }
 
     /// Takes over the line of a needle that another window left in the tissue.
     pub fn find(&mut self, tip: &TipOnPath) {
-        if self.beside_m.is_none() && !is_outside(tip) {
-            self.beside_m = Some(tip.beside_m);
+        if self.offset_m.is_none() && !is_outside(tip) {
+            self.offset_m = Some(tip.offset_m);
         }
     }
 
@@ -135,24 +135,24 @@ impl Drive {
         let went_m = self.at_m.unwrap_or(tip.depth_m) + along * went_s;
         let at_m = on_path(went_m.clamp(tip.depth_m - LEAD_M, tip.depth_m + LEAD_M));
         self.at_m = Some(at_m);
-        let mut beside_m = self.beside_m();
+        let mut offset_m = self.offset_m();
         let across = wish.across_m_per_s;
         if across != [0.0; 2] && is_outside(tip) {
-            let mut goes_on_m = beside_m;
+            let mut goes_on_m = offset_m;
             for (axis, across) in across.into_iter().enumerate() {
                 let [low, high] = tip.room_m[axis];
                 let in_room = |m: f64| m.clamp(low.min(high), high.max(low));
-                let went_m = beside_m[axis] + across * went_s;
-                beside_m[axis] = in_room(went_m.clamp(tip.beside_m[axis] - LEAD_M, tip.beside_m[axis] + LEAD_M));
-                goes_on_m[axis] = in_room(beside_m[axis] + across * hold_s);
+                let went_m = offset_m[axis] + across * went_s;
+                offset_m[axis] = in_room(went_m.clamp(tip.offset_m[axis] - LEAD_M, tip.offset_m[axis] + LEAD_M));
+                goes_on_m[axis] = in_room(offset_m[axis] + across * hold_s);
             }
-            self.beside_m = Some(beside_m);
-            beside_m = goes_on_m;
+            self.offset_m = Some(offset_m);
+            offset_m = goes_on_m;
         }
         let speed = along.abs().max(across[0].hypot(across[1]));
         Some(Goal {
             depth_m: on_path(at_m + along * hold_s),
-            beside_m,
+            offset_m,
             speed_m_per_s: speed.max(SLOWEST_M_PER_S),
         })
     }
@@ -162,7 +162,7 @@ impl Drive {
     pub fn stop(&mut self, tip: &TipOnPath) -> bool {
         let was_on = self.at_m.take().is_some();
         if was_on && is_outside(tip) {
-            self.beside_m = Some(tip.beside_m);
+            self.offset_m = Some(tip.offset_m);
         }
         was_on
     }
@@ -179,7 +179,7 @@ mod tests {
     const OUTSIDE: TipOnPath = TipOnPath {
         depth_m: 0.0,
         length_m: 0.08,
-        beside_m: [0.0; 2],
+        offset_m: [0.0; 2],
         room_m: [[-0.03, 0.03], [-0.03, 0.03]],
         is_free: true,
     };
@@ -287,21 +287,21 @@ mod tests {
     fn a_needle_that_another_window_left_in_the_tissue_stays_on_its_line() {
         let tip = TipOnPath {
             depth_m: 0.03,
-            beside_m: [0.005, -0.002],
+            offset_m: [0.005, -0.002],
             is_free: false,
             ..OUTSIDE
         };
         let mut drive = Drive::default();
         drive.find(&tip);
-        assert_eq!(drive.beside_m(), tip.beside_m);
+        assert_eq!(drive.offset_m(), tip.offset_m);
         let goal = drive.step(&along(0.02), &tip, 0.016).expect("a goal");
-        assert_eq!(goal.beside_m, tip.beside_m);
+        assert_eq!(goal.offset_m, tip.offset_m);
         // Tissue that bends the tip does not move the line.
         drive.find(&TipOnPath {
-            beside_m: [0.006, 0.0],
+            offset_m: [0.006, 0.0],
             ..tip
         });
-        assert_eq!(drive.beside_m(), tip.beside_m);
+        assert_eq!(drive.offset_m(), tip.offset_m);
         // Outside it may return to the path.
         let mut drive = Drive::default();
         drive.find(&TipOnPath {
@@ -309,7 +309,7 @@ mod tests {
             is_free: true,
             ..tip
         });
-        assert_eq!(drive.beside_m(), [0.0; 2]);
+        assert_eq!(drive.offset_m(), [0.0; 2]);
     }
 
     #[test]
@@ -360,7 +360,7 @@ mod tests {
         ] {
             assert!(!Drive::follows(&wish, &inside));
             let mut drive = Drive {
-                beside_m: Some([0.005, 0.0]),
+                offset_m: Some([0.005, 0.0]),
                 ..Drive::default()
             };
             drive.step(
@@ -371,17 +371,17 @@ mod tests {
                 &inside,
                 0.016,
             );
-            assert_eq!(drive.beside_m(), [0.005, 0.0], "a needle in the tissue keeps its line");
+            assert_eq!(drive.offset_m(), [0.005, 0.0], "a needle in the tissue keeps its line");
             drive.stop(&inside);
-            assert_eq!(drive.beside_m(), [0.005, 0.0]);
+            assert_eq!(drive.offset_m(), [0.005, 0.0]);
         }
         let (mut drive, mut tip) = (Drive::default(), OUTSIDE);
         for _ in 0..1000 {
             let goal = drive.step(&wish, &tip, 0.016).expect("a goal");
-            assert!((goal.beside_m[0] - tip.beside_m[0]).abs() <= LEAD_M + 0.01 * HOLD_S[1] + 1e-12);
-            tip.beside_m = drive.beside_m();
+            assert!((goal.offset_m[0] - tip.offset_m[0]).abs() <= LEAD_M + 0.01 * HOLD_S[1] + 1e-12);
+            tip.offset_m = drive.offset_m();
         }
-        assert_eq!(drive.beside_m(), [0.03, -0.03]);
+        assert_eq!(drive.offset_m(), [0.03, -0.03]);
     }
 
     #[test]

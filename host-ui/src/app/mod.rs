@@ -41,7 +41,7 @@ use stylet_files::Image;
 use stylet_host::core_args::SceneChoice;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_host::roster::Trainee;
-use stylet_implant::heard::Heard;
+use stylet_implant::received::ReceivedProcedure;
 use stylet_implant::workflow::{NeedleTask, Pace, Placed, Run};
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::affinity::Left;
@@ -104,7 +104,7 @@ pub struct App {
     applied: Option<Settings>,
     history: History,
     /// Procedure as any host receives it.
-    heard: Heard,
+    heard: ReceivedProcedure,
     debrief: Option<Job<debrief::Saved>>,
     summed_up: Instant,
     loader: Loader,
@@ -232,7 +232,7 @@ impl App {
             pictures: Pictures::default(),
             applied: None,
             history: History::default(),
-            heard: Heard::default(),
+            heard: ReceivedProcedure::default(),
             debrief: None,
             summed_up: Instant::now(),
             loader: Loader::default(),

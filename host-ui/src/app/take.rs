@@ -37,7 +37,7 @@ impl App {
         let direction = self.shown.state.map_or([0.0, 0.0, 1.0], |s| s.needle_direction);
         let records = self.link.take_records();
         self.history.take(&records, direction);
-        self.workflow.guide.felt.take(&records);
+        self.workflow.guide.membranes.take(&records);
         // The window shows only the state of the second hand, not its records.
         let _second = self.link.take_second_records();
         self.heard.take(&self.link, &records);

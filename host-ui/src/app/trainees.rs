@@ -14,7 +14,7 @@ use stylet_host::link::{Link, LinkStatus};
 use stylet_host::moments::STOPPED;
 use stylet_host::roster::{Glance, Roster, Trainee};
 use stylet_implant::class;
-use stylet_implant::heard::Heard;
+use stylet_implant::received::ReceivedProcedure;
 use stylet_shm_schema::{Mark, Request, flags};
 
 /// Time for which seeds still move with the tissue after the needle is out.
@@ -49,7 +49,7 @@ impl Ending {
 /// State of one trainee in this window.
 struct Seat {
     link: Link,
-    heard: Heard,
+    heard: ReceivedProcedure,
     ending: Ending,
 }
 
@@ -101,7 +101,7 @@ impl Seat {
     fn new(trainee: &Trainee) -> Self {
         Self {
             link: Link::with_snapshots_every(trainee.instance.clone(), SEEDS_EVERY),
-            heard: Heard::default(),
+            heard: ReceivedProcedure::default(),
             ending: Ending::default(),
         }
     }

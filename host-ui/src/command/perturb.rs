@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use stylet_base::interrupt::Interrupt;
 use stylet_base::output::new_folder;
 use stylet_base::progress_bar::LongTask;
-use stylet_dose::criterion::{Criterion, Kept};
+use stylet_dose::criterion::{Criterion, CriterionCount};
 use stylet_dose::edema::{Edema, Swelling};
 use stylet_dose::perturb::{self, Errors};
 use stylet_dose::report::Judge;
@@ -144,7 +144,7 @@ impl PerturbArgs {
             return Err("stopped before the first trial was done; nothing is written".into());
         }
         let spreads = perturb::spreads(&planned, &trials);
-        let kept: Vec<Kept> = criteria.iter().filter_map(|c| c.kept(&planned, &trials)).collect();
+        let kept: Vec<CriterionCount> = criteria.iter().filter_map(|c| c.kept(&planned, &trials)).collect();
         write::trials(&c.out.join("trials.csv"), &planned, &trials)?;
         write::distribution(&c.out.join("distribution.csv"), &spreads)?;
         write::criteria(&c.out.join("criteria.csv"), &kept)?;

@@ -14,7 +14,7 @@ use stylet_shm_schema::SceneId;
 const MOST_BYTES: u64 = 4 << 20;
 
 /// Plan, and the compensation of its needles.
-pub struct Kept {
+pub struct KeptPlan {
     /// The plan.
     pub plan: ImplantPlan,
     /// Rehearsed needles with their compensation.
@@ -33,7 +33,7 @@ pub fn path_of(folder: &Path, scene: SceneId) -> PathBuf {
     folder.join(format!("plan-{:016x}-{}.json", scene.session_id, scene.generation))
 }
 
-impl Kept {
+impl KeptPlan {
     /// Writes the copy. If that fails, the plan is only not found again; nothing else is lost.
     pub fn write(&self, path: &Path, frames: &PatientFrame) {
         let Ok(plan) = file::to_text(&self.plan, frames) else {
@@ -79,7 +79,7 @@ impl Planner {
         if self.looked.as_ref().is_none_or(|(scene, _)| *scene != outlines.scene) {
             let (path, frames) = (path_of(folder, outlines.scene), outlines.frames);
             let job = Job::begin("kept plan", move |messages, _| {
-                if let Some(kept) = Kept::read(&path, &frames) {
+                if let Some(kept) = KeptPlan::read(&path, &frames) {
                     let _ = messages.send(kept);
                 }
             });
@@ -99,7 +99,7 @@ impl Planner {
     pub(super) fn keep(&self) {
         if let (Some(folder), Some(outlines), Some(plan)) = (&self.kept_in, &self.outlines, self.plan()) {
             let (path, frames) = (path_of(folder, outlines.scene), outlines.frames);
-            let kept = Kept {
+            let kept = KeptPlan {
                 plan: plan.clone(),
                 compensated: self.compensated.clone(),
             };
@@ -139,17 +139,20 @@ mod tests {
             generation: 2,
         };
         let path = path_of(&std::env::temp_dir(), scene).with_extension(std::process::id().to_string());
-        let kept = Kept {
+        let kept = KeptPlan {
             compensated: vec![(plan.needles[1].clone(), done.clone())],
             plan: plan.clone(),
         };
         kept.write(&path, &frames);
-        let found = Kept::read(&path, &frames).expect("found");
+        let found = KeptPlan::read(&path, &frames).expect("found");
         assert_eq!(found.plan.needles.len(), plan.needles.len());
         assert_eq!(found.compensated.len(), 1);
         assert_eq!(found.compensated[0].1, done);
         std::fs::write(&path, b"{}").expect("written");
-        assert!(Kept::read(&path, &frames).is_none(), "what is not whole is not used");
+        assert!(
+            KeptPlan::read(&path, &frames).is_none(),
+            "what is not whole is not used"
+        );
         let _removed = std::fs::remove_file(&path);
     }
 }

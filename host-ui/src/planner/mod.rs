@@ -15,7 +15,7 @@ mod shown;
 
 use jobs::JobMessage;
 pub(crate) use jobs::JobProgress;
-use kept::Kept;
+use kept::KeptPlan;
 pub(crate) use needles::NeedleProgress;
 pub use needles::NeedleState;
 pub(crate) use outlines::{AnatomyOutlines, Outline};
@@ -69,7 +69,7 @@ pub struct Planner {
     /// Folder in which the plan is kept for another window; none if not given.
     kept_in: Option<PathBuf>,
     /// Scene for which a kept plan was looked for, and the search.
-    looked: Option<(SceneId, Job<Kept>)>,
+    looked: Option<(SceneId, Job<KeptPlan>)>,
     /// Needles at their rehearsal, with their compensation.
     compensated: Vec<(Needle, Compensation)>,
     /// Proposals of the last automatic plan.

@@ -21,7 +21,7 @@ pub(crate) struct Redraw {
     is_on: bool,
     state: RenderState,
     paste: Paste,
-    kept: Option<Kept>,
+    kept: Option<LastFrame>,
     cost: RedrawCost,
     driver: DriverCost,
 }
@@ -35,7 +35,7 @@ pub(crate) struct RedrawCost {
 }
 
 /// Window as it was last drawn.
-struct Kept {
+struct LastFrame {
     size: [u32; 2],
     pixels_per_point: f32,
     background: Color32,
@@ -89,8 +89,9 @@ impl Redraw {
         }
     }
 
-    fn kept(&mut self, size: [u32; 2], pixels_per_point: f32, background: Color32) -> Kept {
-        let same = |k: &Kept| k.size == size && k.pixels_per_point == pixels_per_point && k.background == background;
+    fn kept(&mut self, size: [u32; 2], pixels_per_point: f32, background: Color32) -> LastFrame {
+        let same =
+            |k: &LastFrame| k.size == size && k.pixels_per_point == pixels_per_point && k.background == background;
         if let Some(kept) = self.kept.take().filter(same) {
             return kept;
         }
@@ -111,7 +112,7 @@ impl Redraw {
         let texture = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let whole = window(size, pixels_per_point);
         let nothing = ClippedShape::new(Rect::EVERYTHING, Shape::Noop);
-        Kept {
+        LastFrame {
             size,
             pixels_per_point,
             background,
@@ -123,7 +124,7 @@ impl Redraw {
     }
 
     /// Draws the damaged rectangles of `kept` from its shapes.
-    fn draw(&mut self, ctx: &Context, kept: &Kept, damaged: &[Rect]) {
+    fn draw(&mut self, ctx: &Context, kept: &LastFrame, damaged: &[Rect]) {
         let mut shapes = Vec::new();
         for rect in damaged {
             let hidden = kept.shapes.iter().rposition(|drawn| drawn.hides_below(*rect));
@@ -145,7 +146,7 @@ impl Redraw {
         self.driver = driver;
     }
 
-    fn send(&self, kept: &Kept, primitives: &[ClippedPrimitive]) {
+    fn send(&self, kept: &LastFrame, primitives: &[ClippedPrimitive]) {
         let screen = ScreenDescriptor {
             size_in_pixels: kept.size,
             pixels_per_point: kept.pixels_per_point,

@@ -18,8 +18,8 @@ pub use seeds::{SeedError, all_errors, own_errors};
 use std::sync::Arc;
 use stylet_controllers::Latest;
 use stylet_host::link::{Link, LinkStatus};
-use stylet_implant::heard::HeardSeed;
 use stylet_implant::plan::{HOLES, Template};
+use stylet_implant::received::ReceivedSeed;
 use stylet_implant::workflow::{Step, Waiting};
 use stylet_shm_schema::{
     Class, EventKind, Fault, HapticState, LeftNeedlePose, ParametersInForce, Phase, PlanInForce, PlannedSeed, Relayed,
@@ -48,7 +48,7 @@ pub struct Shown {
     pub parameters: Option<ParametersInForce>,
     pub seeds: Vec<SeedPose>,
     /// Planned seeds, from the plans in force that were received.
-    pub heard: Vec<HeardSeed>,
+    pub heard: Vec<ReceivedSeed>,
     /// Displacement of the body, and of its seeds, by an exercise.
     pub body_moved_m: [f64; 3],
     /// Bend of the needle in the last snapshot.
@@ -313,12 +313,12 @@ impl Shown {
 
     /// Returns the place at a depth along the planned path and an offset to the right and up, as
     /// seen from the perineum.
-    pub fn beside_path_m(&self, depth_m: f64, beside_m: [f64; 2]) -> Option<[f64; 3]> {
+    pub fn place_near_path_m(&self, depth_m: f64, offset_m: [f64; 2]) -> Option<[f64; 3]> {
         let on_path = self.on_path_m(depth_m)?;
         let Some((_, axes)) = self.across() else {
             return Some(on_path);
         };
-        Some([0, 1, 2].map(|a| on_path[a] + axes[0][a] * beside_m[0] + axes[1][a] * beside_m[1]))
+        Some([0, 1, 2].map(|a| on_path[a] + axes[0][a] * offset_m[0] + axes[1][a] * offset_m[1]))
     }
 
     /// Returns the template, and its columns and rows projected perpendicular to the planned path.
@@ -333,7 +333,7 @@ impl Shown {
     pub fn tip_on_path(&self) -> Option<TipOnPath> {
         let (plan, tip) = (self.plan.as_ref()?, self.tip_m()?);
         let off = |from: [f64; 3], to: [f64; 3]| Vector3::from(to) - Vector3::from(from);
-        let (beside_m, room_m) = self.across().map_or(([0.0; 2], [[0.0; 2]; 2]), |(template, axes)| {
+        let (offset_m, room_m) = self.across().map_or(([0.0; 2], [[0.0; 2]; 2]), |(template, axes)| {
             let half_m = f64::from(HOLES / 2) * template.pitch_m;
             let to_middle = off(plan.entry_m, template.middle_m);
             (
@@ -344,7 +344,7 @@ impl Shown {
         Some(TipOnPath {
             depth_m: along(plan, tip),
             length_m: self.path_length_m()?,
-            beside_m,
+            offset_m,
             room_m,
             is_free: !self.is_in_tissue(),
         })

@@ -24,7 +24,7 @@ pub struct TipOnPath {
     pub depth_m: f64,
     pub length_m: f64,
     /// Offset from the path: to the right and up, as seen from the perineum.
-    pub beside_m: [f64; 2],
+    pub offset_m: [f64; 2],
     /// Range of the holes around the path.
     pub room_m: [[f64; 2]; 2],
     /// True if the tip touches nothing.

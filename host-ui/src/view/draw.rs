@@ -125,7 +125,7 @@ impl Over<'_> {
     fn marks_here(&self) -> impl Iterator<Item = (usize, Pos2)> + '_ {
         let marks = self.review.drawn.marks_m.iter().enumerate();
         let here = marks.map(|(n, place_m)| (n, Vector3::from(*place_m)));
-        here.filter(|(_, place_m)| self.picture.beside_m(*place_m).abs() < SLAB_M)
+        here.filter(|(_, place_m)| self.picture.distance_m(*place_m).abs() < SLAB_M)
             .map(|(n, place_m)| (n, self.picture.at(place_m)))
     }
 

@@ -33,7 +33,7 @@ const POINTS_PER_MM: f64 = 4.0;
 const POINTS_PER_DEG: f64 = 3.0;
 
 /// Scene data of one frame.
-pub(super) type Seen<'a> = (&'a Shown, &'a ShownBody, &'a Field);
+pub(super) type SceneData<'a> = (&'a Shown, &'a ShownBody, &'a Field);
 
 /// Picture of one plane, and its inputs.
 struct Pane {
@@ -55,7 +55,7 @@ pub(super) struct ProbeView {
 
 /// Pose of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Stand {
+pub(super) struct ProbeStand {
     pub pose: Pose,
     /// True in the hand that holds the second device, false on the window's own stepper.
     pub is_in_hand: bool,
@@ -103,17 +103,17 @@ impl ProbeView {
 
     /// Returns the pose of the probe: in the hand that holds the second device, or on the stepper
     /// without one.
-    pub fn stand(&self, shown: &Shown, scene: &SceneHeader) -> Stand {
+    pub fn stand(&self, shown: &Shown, scene: &SceneHeader) -> ProbeStand {
         let on_stepper = || self.knobs.stepper(&Pose::of_scene(scene));
         let in_hand = shown.probe_pose();
-        Stand {
+        ProbeStand {
             pose: in_hand.unwrap_or_else(on_stepper),
             is_in_hand: in_hand.is_some(),
         }
     }
 
     /// Draws one plane; returns the requests of the pointer.
-    pub fn picture_ui(&mut self, ui: &mut egui::Ui, rect: Rect, view: View, seen: Seen<'_>) -> Option<Action> {
+    pub fn picture_ui(&mut self, ui: &mut egui::Ui, rect: Rect, view: View, seen: SceneData<'_>) -> Option<Action> {
         let (shown, body, field) = seen;
         let response = ui.interact(rect, ui.scope_id().with(view.name()), Sense::click_and_drag());
         let name = format!("{} ultrasound", view.name());
@@ -191,7 +191,7 @@ impl ProbeView {
     }
 
     /// Draws title, depths and template.
-    fn over(&self, painter: &egui::Painter, picture: &ProbePicture, stand: Stand, scene: &SceneHeader) {
+    fn over(&self, painter: &egui::Painter, picture: &ProbePicture, stand: ProbeStand, scene: &SceneHeader) {
         let (plane, rect) = (picture.plane(), picture.rect());
         if self.knobs.template && plane.view == View::Transverse {
             let template = Template::before(scene);

@@ -39,12 +39,12 @@ pub struct Surface {
     /// Unit normals before the smoothing, and after each pass but the last, which are those of the
     /// vertices.
     normals: [Vec<[f32; 3]>; SMOOTHINGS],
-    near: Near,
+    near: VertexSet,
 }
 
 /// Set of vertices.
 #[derive(Debug, Default)]
-struct Near {
+struct VertexSet {
     vertices: Vec<u32>,
     has: Vec<bool>,
 }
@@ -80,7 +80,7 @@ impl Surface {
             first_of,
             triangles_of,
             normals: std::array::from_fn(|_| vec![[0.0; 3]; count]),
-            near: Near {
+            near: VertexSet {
                 vertices: (0..count as u32).collect(),
                 has: vec![false; count],
             },
@@ -139,7 +139,7 @@ impl Surface {
 
     /// Extends the set to the vertices of all adjacent triangles.
     fn spread(&mut self) {
-        let Near { vertices, has } = &mut self.near;
+        let VertexSet { vertices, has } = &mut self.near;
         for &v in vertices.iter() {
             has[v as usize] = true;
         }
@@ -183,7 +183,7 @@ impl Surface {
     }
 }
 
-impl Near {
+impl VertexSet {
     fn runs(&mut self) -> Vec<Range<usize>> {
         self.vertices.sort_unstable();
         let mut runs: Vec<Range<usize>> = Vec::new();

@@ -67,7 +67,7 @@ pub struct Servo {
     sequence: u64,
     served: bool,
     link: Option<Link>,
-    grip: Turned,
+    grip: HandleOrientation,
     arrived: String,
     out: String,
 }
@@ -93,7 +93,7 @@ struct Link {
 /// Orientation of the handle relative to the first opening of the device, when it is assumed to
 /// point straight ahead.
 #[derive(Default)]
-struct Turned {
+struct HandleOrientation {
     straight: Option<UnitQuaternion<f64>>,
     now: UnitQuaternion<f64>,
     buttons: u32,
@@ -110,7 +110,7 @@ impl Servo {
             sequence: 0,
             served: false,
             link: None,
-            grip: Turned::default(),
+            grip: HandleOrientation::default(),
             arrived: String::with_capacity(16 * 1024),
             out: String::with_capacity(1024),
         }
@@ -300,7 +300,7 @@ impl Servo {
     }
 }
 
-impl Turned {
+impl HandleOrientation {
     /// Takes the orientation of the handle; without one, the last one holds.
     fn follow(&mut self, grip: Option<&Grip<'_>>) -> Result<(), DeviceFault> {
         let Some(grip) = grip else { return Ok(()) };

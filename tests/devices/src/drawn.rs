@@ -7,18 +7,18 @@ use std::fmt::Debug;
 use stylet_shm_schema::Fault;
 use stylet_sim::force::gate::GateParameters;
 
-use crate::rig::{Led, Rig};
+use crate::rig::{FakeDevice, Rig};
 
 /// Fault of a fake device.
-pub trait Drawn: Copy + Debug {
+pub trait RandomFault: Copy + Debug {
     /// The fake.
-    type Fake: Led;
+    type Fake: FakeDevice;
     /// Draws one of the faults.
     fn draw(random: &mut ChaCha8Rng) -> Self;
     /// Begins the fault.
     fn begin(self, fake: &Self::Fake);
     /// Advances the fault while it lasts.
-    fn go_on(self, tick: usize, fake: &Self::Fake);
+    fn advance(self, tick: usize, fake: &Self::Fake);
     /// Ends the fault.
     fn end(self, fake: &Self::Fake);
     /// Returns the names that the screen may show, and the most ticks until the motors are without
@@ -42,7 +42,7 @@ struct Worst {
     named_ticks: usize,
 }
 
-fn one<W: Drawn>(rig: &mut Rig<W::Fake>, random: &mut ChaCha8Rng, number: usize) -> (W, usize, usize) {
+fn one<W: RandomFault>(rig: &mut Rig<W::Fake>, random: &mut ChaCha8Rng, number: usize) -> (W, usize, usize) {
     let wrong = W::draw(random);
     assert!(rig.press(), "{number}: before {wrong:?} the membrane resists");
     for _ in 0..below(random, 50) {
@@ -54,7 +54,7 @@ fn one<W: Drawn>(rig: &mut Rig<W::Fake>, random: &mut ChaCha8Rng, number: usize)
     let (names, bound) = wrong.bound();
     let (mut last_force, mut named) = (0, None);
     for tick in 1..=wrong.lasts() {
-        wrong.go_on(tick, &rig.fake);
+        wrong.advance(tick, &rig.fake);
         let seen = rig.tick();
         assert!(
             seen.motors_n <= limit_n.min(before_n + 0.05),
@@ -83,7 +83,7 @@ fn one<W: Drawn>(rig: &mut Rig<W::Fake>, random: &mut ChaCha8Rng, number: usize)
 }
 
 /// Draws `count` of them; all `kinds` must come up.
-pub fn campaign<W: Drawn>(mut rig: Rig<W::Fake>, seed: u64, count: usize, kinds: usize) -> Rig<W::Fake> {
+pub fn campaign<W: RandomFault>(mut rig: Rig<W::Fake>, seed: u64, count: usize, kinds: usize) -> Rig<W::Fake> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut table = BTreeMap::<String, Worst>::new();
     for number in 0..count {

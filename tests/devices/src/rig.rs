@@ -17,7 +17,7 @@ const PRESSED_M: f64 = 0.006;
 const SPEED_M_PER_TICK: f64 = 4e-5;
 
 /// A fake device that a test leads.
-pub trait Led {
+pub trait FakeDevice {
     /// Sets the time of the fake.
     fn at(&self, now_ns: u64);
     /// Holds the tip at this depth along world z.
@@ -26,7 +26,7 @@ pub trait Led {
     fn motors_n(&self) -> f64;
 }
 
-pub struct Rig<F: Led> {
+pub struct Rig<F: FakeDevice> {
     pub fake: F,
     haptic: HapticLoop,
     tissue: TissueResponse,
@@ -50,7 +50,7 @@ impl Seen {
     }
 }
 
-impl<F: Led> Rig<F> {
+impl<F: FakeDevice> Rig<F> {
     /// Creates a rig over the device that `open` gives for this fake.
     pub fn over(fake: F, open: impl FnOnce(&F) -> Box<dyn Device>) -> Self {
         let now_ns = 1_000_000_000;

@@ -39,7 +39,7 @@ fn of_path(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, Content
             let (object, pixels, endian) = opened(&file)?;
             match is_enhanced(&object) {
                 true => enhanced(&object, pixels, endian, progress)?,
-                false => beside(path, &object, progress)?,
+                false => rest_of_series(path, &object, progress)?,
             }
         }
     };
@@ -125,7 +125,7 @@ fn one_of_several(paths: &[PathBuf], about: &str) -> String {
 }
 
 /// Returns the files of the same series in the folder of a file.
-fn beside(path: &Path, object: &Object, progress: &Progress) -> Result<Vec<Frame>, ContentError> {
+fn rest_of_series(path: &Path, object: &Object, progress: &Progress) -> Result<Vec<Frame>, ContentError> {
     if object.data.get(tags::IMAGE_POSITION_PATIENT).is_none() {
         return Err(unplaced(object));
     }

@@ -3,8 +3,8 @@
 use super::*;
 use crate::Progress;
 
-fn read(bytes: &[u8], beside: Beside) -> Result<VoxelValues<u8>, ContentError> {
-    super::read(bytes, beside, Sink::labels(&Progress::default()))
+fn read(bytes: &[u8], data_file: DataReader) -> Result<VoxelValues<u8>, ContentError> {
+    super::read(bytes, data_file, Sink::labels(&Progress::default()))
 }
 
 fn no_file(name: &str) -> Result<Vec<u8>, ContentError> {

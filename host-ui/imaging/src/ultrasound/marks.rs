@@ -78,7 +78,7 @@ impl Marks {
     fn point(&mut self, plane: &Plane, grid: Grid, place_m: Vector3<f64>, along: Vector3<f64>, wall: &Wall) {
         let at = plane.in_beams(place_m);
         let surface_m = at.depth_m - wall.radius_m;
-        let seen = seen(&plane.probe, at.beside_m, at.depth_m);
+        let seen = seen(&plane.probe, at.off_plane_m, at.depth_m);
         if seen < LEAST || surface_m < 0.0 || surface_m >= plane.depth_m {
             return;
         }
@@ -121,6 +121,6 @@ impl Marks {
 }
 
 /// Returns the share of an echo from outside the plane.
-fn seen(probe: &Probe, beside_m: f64, depth_m: f64) -> f64 {
-    (-0.5 * (beside_m / probe.thickness_at_m(depth_m)).powi(2)).exp()
+fn seen(probe: &Probe, off_plane_m: f64, depth_m: f64) -> f64 {
+    (-0.5 * (off_plane_m / probe.thickness_at_m(depth_m)).powi(2)).exp()
 }

@@ -206,7 +206,7 @@ pub struct InBeams {
     /// Depth from the surface of the probe, m.
     pub depth_m: f64,
     /// Distance before or behind the plane, m.
-    pub beside_m: f64,
+    pub off_plane_m: f64,
 }
 
 impl Plane {
@@ -243,7 +243,7 @@ impl Plane {
         InBeams {
             across,
             depth_m: r - self.probe.radius_m,
-            beside_m: from.dot(&self.normal()),
+            off_plane_m: from.dot(&self.normal()),
         }
     }
 
@@ -305,8 +305,8 @@ impl Plane {
     /// Returns where a straight line through a place crosses the plane, scene frame, m; `None` if
     /// it runs along it. The holes of a template are drawn so.
     pub fn crossing_m(&self, place_m: Vector3<f64>, direction: Vector3<f64>) -> Option<Vector3<f64>> {
-        let (beside_m, per) = (self.in_beams(place_m).beside_m, direction.dot(&self.normal()));
-        (per.abs() > 0.2).then(|| place_m - direction * (beside_m / per))
+        let (off_plane_m, per) = (self.in_beams(place_m).off_plane_m, direction.dot(&self.normal()));
+        (per.abs() > 0.2).then(|| place_m - direction * (off_plane_m / per))
     }
 
     /// Returns the pixel of that crossing.

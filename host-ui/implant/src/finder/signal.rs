@@ -33,7 +33,7 @@ impl Fitter<'_> {
     /// Returns the value of the tissue around a component above that of the volume. It is the
     /// median of what its dim voxels have beyond the seeds so far; without seeds, or with few dim
     /// voxels, that of the voxels around it.
-    pub fn tissue_beside(&self, component: &Component, lines: &[Line], others: &[f64]) -> f64 {
+    pub fn tissue_near(&self, component: &Component, lines: &[Line], others: &[f64]) -> f64 {
         if lines.is_empty() {
             return component.tissue;
         }

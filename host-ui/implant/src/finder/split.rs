@@ -159,7 +159,7 @@ impl<'a> Fitter<'a> {
                     continue;
                 }
                 self.spread(component, &lines[n], -1.0, &mut field);
-                tissue[n] = self.tissue_beside(component, &lines[n], &field);
+                tissue[n] = self.tissue_near(component, &lines[n], &field);
                 let task = self.task(component, Some(&field), tissue[n]);
                 if lines[n].len() != counts.seeds[n] {
                     lines[n] = self.starts(&task, component, counts.seeds[n]);

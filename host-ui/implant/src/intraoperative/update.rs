@@ -168,7 +168,7 @@ impl Situation<'_> {
         let needles = USUAL_NEEDLES.max(plan.needles.len()).saturating_sub(begun.len()).max(1);
         let objectives = Objectives {
             needles,
-            ..Objectives::beside(present, strength_u, self.source, plan.prescription_gy)
+            ..Objectives::around_present(present, strength_u, self.source, plan.prescription_gy)
         };
         let search = Search::new(
             plan.template,

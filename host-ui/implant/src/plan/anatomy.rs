@@ -17,7 +17,7 @@ const STEP_M: f64 = 0.5e-3;
 
 /// Small offset at which a place is tested. Lines of a template run along the planes on which
 /// corners of a mesh lie, where inside and outside are ambiguous.
-const BESIDE_M: [f64; 3] = [0.0, 1.37e-8, 2.71e-8];
+const EDGE_REACH_M: [f64; 3] = [0.0, 1.37e-8, 2.71e-8];
 
 /// Closed structure.
 pub struct Body {
@@ -83,7 +83,7 @@ impl Body {
 
     /// Returns whether a point, scene frame, m, lies inside.
     pub fn contains(&self, point_m: [f64; 3]) -> bool {
-        self.mesh.contains([0, 1, 2].map(|a| point_m[a] + BESIDE_M[a]))
+        self.mesh.contains([0, 1, 2].map(|a| point_m[a] + EDGE_REACH_M[a]))
     }
 
     /// Returns the bounding box: smallest and largest corner, m.

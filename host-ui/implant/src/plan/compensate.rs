@@ -10,17 +10,17 @@
 //! rehearsed with stops near every drop (`edges`).
 
 pub mod edges;
+mod rehearsals;
 mod search;
-mod tried;
 
 use super::rehearse::{Drops, RehearsalError, Rehearser};
 use super::{Loading, Needle};
 use edges::{Sensitive, keep_clear};
 use nalgebra::Vector3;
+use rehearsals::{Rehearsals, RehearsedDrops, aside};
 use search::{DEEPER_M, seek};
 use serde::{Deserialize, Serialize};
 use stylet_procedure::Pace;
-use tried::{Rehearsals, Tried, aside};
 
 /// Limits of compensation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,7 +115,7 @@ pub fn compensate(
     let best = seek(&mut rehearsals, 0, best, last, most);
     let sought = rehearsals.count;
     let (best, sensitive) = keep_clear(&mut rehearsals, best)?;
-    let vectors = |t: &Tried| t.error_m.iter().map(|e| (*e).into()).collect();
+    let vectors = |t: &RehearsedDrops| t.error_m.iter().map(|e| (*e).into()).collect();
     Ok(Compensation {
         before_m: is_as_planned.then(|| vectors(&start)),
         after_m: vectors(&best),
@@ -128,7 +128,7 @@ pub fn compensate(
 
 /// Rehearses the planned drops, and returns whether they are possible; else shifts them deeper
 /// until they are.
-fn start(rehearsals: &mut Rehearsals) -> Result<(Tried, bool), RehearsalError> {
+fn start(rehearsals: &mut Rehearsals) -> Result<(RehearsedDrops, bool), RehearsalError> {
     let (needle, limits) = (rehearsals.needle, rehearsals.limits);
     let planned = Drops::as_planned(needle);
     let why = match rehearsals.try_it(planned.clone()) {

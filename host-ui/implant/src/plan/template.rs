@@ -33,7 +33,7 @@ impl Hole {
     }
 
     /// Returns the hole offset by columns and rows; `None` beyond the edge.
-    pub fn beside(self, [columns, rows]: [i8; 2]) -> Option<Self> {
+    pub fn offset_by(self, [columns, rows]: [i8; 2]) -> Option<Self> {
         let column = self.column.checked_add_signed(columns)?;
         let row = self.row.checked_add_signed(rows)?;
         Self::new(column, row)

@@ -1,6 +1,6 @@
 //! The score after the last needle, written next to the other results.
 
-use super::Seen;
+use super::Observations;
 use super::error::ProcedureError;
 use super::job::{self, Job, PlannedDrop};
 use crate::plan::{Anatomy, ImplantPlan};
@@ -21,7 +21,7 @@ pub fn write(
     link: &Link,
     scene: &SceneModel,
     job: &Job,
-    seen: &Seen,
+    seen: &Observations,
     source: Option<&Path>,
     made: Value,
 ) -> Result<(), ProcedureError> {

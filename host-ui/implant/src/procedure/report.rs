@@ -1,11 +1,11 @@
 //! result.json, force.csv and the table on the terminal.
 
-use super::Seen;
+use super::Observations;
 use super::error::ProcedureError;
 use super::gland::Largest;
 use super::job::{Job, PlannedDrop, placed};
 use crate::pairing::SeedOffset;
-use crate::plan::compensate::edges::BESIDE_M;
+use crate::plan::compensate::edges::EDGE_REACH_M;
 use crate::plan::compensate::summary_m;
 use crate::workflow::{NeedleTask, Pace};
 use nalgebra::Vector3;
@@ -21,7 +21,7 @@ pub fn write(
     link: &Link,
     job: &Job,
     pace: &Pace,
-    seen: &Seen,
+    seen: &Observations,
     failure: Option<&String>,
     made: Value,
 ) -> Result<(), ProcedureError> {
@@ -106,7 +106,7 @@ fn seeds(link: &Link, planned: &[PlannedDrop], lost: &[usize]) -> Vec<Value> {
         .collect()
 }
 
-fn needles(job: &Job, seen: &Seen) -> Vec<Value> {
+fn needles(job: &Job, seen: &Observations) -> Vec<Value> {
     let deflections_m = deflections_m(job, &seen.records);
     let of_task = |(number, (task, deflection_m)): (usize, (&NeedleTask, f64))| {
         let motion = seen.motion.of_needle(number);
@@ -151,7 +151,7 @@ fn deflections_m(job: &Job, records: &[TickRecord]) -> Vec<f64> {
 
 /// Returns the requested stabilising needles, each with its tip when it stayed in; `null` if it did
 /// not.
-fn stabilising(job: &Job, seen: &Seen) -> Vec<Value> {
+fn stabilising(job: &Job, seen: &Observations) -> Vec<Value> {
     let each = job.stabilising.iter().enumerate();
     each.map(|(number, of_plan)| {
         json!({
@@ -186,7 +186,7 @@ fn sensitive(job: &Job) -> Vec<Value> {
         .map(|(needle, found)| {
             json!({
                 "needle": needle + 1, "seed_of_needle": found.seed + 1, "moves_mm": found.moves_m.map(|m| m * 1e3),
-                "beside_mm": BESIDE_M * 1e3,
+                "beside_mm": EDGE_REACH_M * 1e3,
             })
         })
         .collect()
@@ -196,7 +196,7 @@ fn along(direction: [f64; 3], r: &TickRecord) -> f64 {
     Vector3::from(r.force_on_hand_n).dot(&Vector3::from(direction))
 }
 
-fn force(link: &Link, direction: [f64; 3], seen: &Seen) -> Value {
+fn force(link: &Link, direction: [f64; 3], seen: &Observations) -> Value {
     let puncture = seen
         .events
         .iter()
@@ -223,7 +223,7 @@ fn folded_from_mm(records: &[TickRecord]) -> Option<f64> {
     folded.min().map(|um| f64::from(um) * 1e-3)
 }
 
-fn timing(link: &Link, seen: &Seen) -> Value {
+fn timing(link: &Link, seen: &Observations) -> Value {
     let advice = link.session().map(|s| s.advice.read()).filter(|a| !a.is_empty());
     let span = match (seen.records.first(), seen.records.last()) {
         (Some(first), Some(last)) => last.tick.saturating_sub(first.tick) + 1,
@@ -275,7 +275,7 @@ fn session(s: &Session) -> Value {
     })
 }
 
-fn force_csv(file: &mut impl Write, direction: [f64; 3], seen: &Seen) -> std::io::Result<()> {
+fn force_csv(file: &mut impl Write, direction: [f64; 3], seen: &Observations) -> std::io::Result<()> {
     writeln!(file, "time_s,tick,depth_mm,speed_mm_s,force_n,phase,tissue_tick")?;
     let begin = seen.records.first().map_or(0, |r| r.due_ns);
     for r in &seen.records {

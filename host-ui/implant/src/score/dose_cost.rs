@@ -36,7 +36,7 @@ impl<'a> Field<'a> {
     }
 
     /// Returns the doses with one seed moved to its planned place.
-    fn mended(&self, kernel: &DoseKernel, planned: &Seed, delivered: &Seed) -> Option<Dvh> {
+    fn with_seed_on_plan(&self, kernel: &DoseKernel, planned: &Seed, delivered: &Seed) -> Option<Dvh> {
         let there = self.points.of_seeds_gy(kernel, std::slice::from_ref(planned));
         let here = self.points.of_seeds_gy(kernel, std::slice::from_ref(delivered));
         let moved = self.dose_gy.iter().zip(there.iter().zip(&here));
@@ -70,7 +70,7 @@ pub fn costs(
         .iter()
         .zip(delivered)
         .map(|(there, here)| {
-            let then = |f: &Option<Field>| f.as_ref().and_then(|f| f.mended(kernel, there, here));
+            let then = |f: &Option<Field>| f.as_ref().and_then(|f| f.with_seed_on_plan(kernel, there, here));
             let (target, urethra) = (then(&target), then(&urethra));
             let gain = |after: &Option<Dvh>, before: &Option<Dvh>, metric| {
                 Some(value(after, metric)? - value(before, metric)?)

@@ -69,14 +69,14 @@ pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> NeedlePlan {
     let (first, last) = SEEDED_SHARE;
     let deepest_m = half * (2.0 * last - 1.0);
     let out_m = body.way_out_m(target.middle(), -direction) + ENTRY_CLEARANCE_M;
-    let beside = beside(scene, &target, direction);
+    let candidates = candidate_centres(scene, &target, direction);
     let is_clear = |through: &Vector3<f64>| {
         let spared = scene.structures().iter().filter(|s| s.role & role::SPARE != 0);
         spared
             .map(Box3::around)
             .all(|b| !b.is_met(*through, direction, [-out_m, deepest_m]))
     };
-    let centre = beside.into_iter().find(is_clear).unwrap_or(target.middle());
+    let centre = candidates.into_iter().find(is_clear).unwrap_or(target.middle());
     let seeds = seeds.clamp(1, MAX_SEEDS);
     let seeds_m = (0..seeds)
         .map(|i| {
@@ -98,7 +98,7 @@ pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> NeedlePlan {
 
 /// Returns the centre of the target, then places to its left and right, the nearest first, to
 /// half-way to its side.
-fn beside(scene: &SceneHeader, target: &Box3, direction: Vector3<f64>) -> Vec<Vector3<f64>> {
+fn candidate_centres(scene: &SceneHeader, target: &Box3, direction: Vector3<f64>) -> Vec<Vector3<f64>> {
     let right = patient_axis(scene, 0, Vector3::x());
     let Some(aside) = (right - direction * right.dot(&direction)).try_normalize(1e-3) else {
         return vec![target.middle()];

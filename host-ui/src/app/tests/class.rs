@@ -9,7 +9,7 @@ use stylet_shm_schema::Instance;
 use stylet_shm_schema::{Exercise, Relayed, Session, Text};
 
 /// Shows every exercise at once, with the longest texts.
-pub fn put_in(app: &mut App) {
+pub fn inject_exercises(app: &mut App) {
     let mut session = app.shown.session.unwrap_or_else(Session::zeroed);
     let by_m = [-0.0057, -0.0057, -0.0057];
     for exercise in [

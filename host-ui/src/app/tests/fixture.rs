@@ -53,13 +53,13 @@ pub struct Drawn {
     size: Vec2,
     scale: f32,
     time: f64,
-    _swept: Swept,
+    _swept: SharedMemoryCleanup,
 }
 
 /// Instance whose shared memory is removed after the window.
-struct Swept(Instance);
+struct SharedMemoryCleanup(Instance);
 
-impl Drop for Swept {
+impl Drop for SharedMemoryCleanup {
     fn drop(&mut self) {
         self.0.sweep();
     }
@@ -71,7 +71,7 @@ impl Drawn {
         let ctx = egui::Context::default();
         ctx.enable_accesskit();
         let options = options();
-        let swept = Swept(options.instance.clone());
+        let swept = SharedMemoryCleanup(options.instance.clone());
         let app = App::new(&eframe::CreationContext::_new_kittest(ctx.clone()), options);
         ctx.all_styles_mut(|style| style.interaction.tooltip_delay = 1e9);
         Self {

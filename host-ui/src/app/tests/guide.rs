@@ -1,19 +1,19 @@
 //! The guide against the state machine of the procedure, and its figures against their state.
 
 use super::fixture::{live, one_needle};
-use crate::panel::workflow::{Felt, lesson};
+use crate::panel::workflow::{MetMembranes, lesson};
 use crate::shown::Shown;
 use bytemuck::Zeroable;
 use stylet_shm_schema::{TickRecord, flags};
 
-fn what(shown: &Shown, felt: &Felt) -> String {
-    lesson(shown, felt).what
+fn what(shown: &Shown, membranes: &MetMembranes) -> String {
+    lesson(shown, membranes).what
 }
 
 #[test]
 fn the_guide_says_what_the_state_machine_says_comes_next() {
-    let felt = Felt::default();
-    assert!(what(&Shown::empty("lab"), &felt).contains("rt-core"));
+    let membranes = MetMembranes::default();
+    assert!(what(&Shown::empty("lab"), &membranes).contains("rt-core"));
     for (shown, word) in [
         (live(), "Plan five seeds"),
         (one_needle(-0.05, 0), "Bring the tip to the entry"),
@@ -28,7 +28,7 @@ fn the_guide_says_what_the_state_machine_says_comes_next() {
             state.flags &= !flags::LINE_NEEDED;
             state.speed_m_per_s = 0.0;
         }
-        let what = what(&shown, &felt);
+        let what = what(&shown, &membranes);
         assert!(what.contains(word), "{word:?} is not in {what:?}");
     }
 }
@@ -42,16 +42,20 @@ fn the_force_is_turned_on_before_the_needle_moves() {
         state.flags &= !(flags::ENGAGED | flags::LINE_NEEDED);
         state.speed_m_per_s = 0.0;
     }
-    let felt = Felt::default();
-    assert!(what(&shown, &felt).contains("Press E"), "{}", what(&shown, &felt));
-    let mut felt = Felt::default();
+    let membranes = MetMembranes::default();
+    assert!(
+        what(&shown, &membranes).contains("Press E"),
+        "{}",
+        what(&shown, &membranes)
+    );
+    let mut membranes = MetMembranes::default();
     let tick = |flags| {
         let mut record = TickRecord::zeroed();
         (record.depth_m, record.flags) = (8e-3, flags);
         record
     };
-    felt.take(&[tick(flags::IN_CONTACT), tick(flags::IN_CONTACT | flags::PUNCTURED)]);
-    let notes = lesson(&one_needle(0.0, 5), &felt).notes.join("\n");
+    membranes.take(&[tick(flags::IN_CONTACT), tick(flags::IN_CONTACT | flags::PUNCTURED)]);
+    let notes = lesson(&one_needle(0.0, 5), &membranes).notes.join("\n");
     assert!(
         notes.contains("The force was off") && !notes.contains("0.00 N"),
         "{notes}"
@@ -60,23 +64,23 @@ fn the_force_is_turned_on_before_the_needle_moves() {
 
 #[test]
 fn the_debrief_has_the_figures_of_the_seeds_and_of_the_membrane() {
-    let mut felt = Felt::default();
+    let mut membranes = MetMembranes::default();
     let tick = |depth_m, force_n, flags| {
         let mut record = TickRecord::zeroed();
         (record.depth_m, record.flags, record.force_on_hand_n[2]) = (depth_m, flags, force_n);
         record
     };
     let through = flags::IN_CONTACT | flags::PUNCTURED;
-    felt.take(&[
+    membranes.take(&[
         tick(0.0, 0.0, 0),
         tick(4e-3, -1.0, flags::IN_CONTACT),
         tick(8e-3, -2.5, flags::IN_CONTACT),
         tick(9e-3, -0.5, through),
         tick(0.0, 0.0, 0),
     ]);
-    assert_eq!(felt.punctures().len(), 1);
+    assert_eq!(membranes.punctures().len(), 1);
     // Seeds left in place that rest 2 mm deeper and 1 mm aside.
-    let lesson = lesson(&one_needle(0.0, 5), &felt);
+    let lesson = lesson(&one_needle(0.0, 5), &membranes);
     assert!(lesson.what.contains("+2.00 mm"), "{}", lesson.what);
     let notes = lesson.notes.join("\n");
     for word in [
@@ -91,6 +95,6 @@ fn the_debrief_has_the_figures_of_the_seeds_and_of_the_membrane() {
     }
     assert!(notes.contains("Most of it is the tissue"));
     // The next insertion starts from zero.
-    felt.take(&[tick(1e-3, 0.0, flags::IN_CONTACT)]);
-    assert!(felt.punctures().is_empty());
+    membranes.take(&[tick(1e-3, 0.0, flags::IN_CONTACT)]);
+    assert!(membranes.punctures().is_empty());
 }

@@ -1,6 +1,6 @@
 //! Every state of the window in all its sizes, with the longest possible texts.
 
-use super::class::{line_to_a_core, put_in, trainees, whole_class};
+use super::class::{inject_exercises, line_to_a_core, trainees, whole_class};
 use super::fixture::{Drawn, LONG_PATH, dose, live, many_needles, one_needle, proposals};
 use super::text::misplaced;
 use super::update::{deciding, drawing, searching};
@@ -64,12 +64,12 @@ pub const STATES: &[State] = &[
     }),
     ("instructor with every exercise", |app| {
         app.shown = one_needle(0.03, 2);
-        put_in(app);
+        inject_exercises(app);
         app.instructor.toggle();
     }),
     ("list of trainees", |app| {
         app.shown = one_needle(0.03, 2);
-        put_in(app);
+        inject_exercises(app);
         trainees(app);
     }),
     ("over a relay that is not heard", |app| {
@@ -229,7 +229,7 @@ fn guided(app: &mut App, shown: Shown) {
         (record.depth_m, record.flags, record.force_on_hand_n) = (depth_m, flags, [0.0, 0.0, -12.345]);
         record
     };
-    app.workflow.guide.felt.take(&[
+    app.workflow.guide.membranes.take(&[
         tick(0.0123, flags::IN_CONTACT),
         tick(0.0123, flags::IN_CONTACT | flags::PUNCTURED),
     ]);

@@ -6,7 +6,7 @@ use std::path::Path;
 use stylet_base::format::cell;
 use stylet_base::{write_streamed, write_whole};
 use stylet_dose::Dvh;
-use stylet_dose::criterion::Kept;
+use stylet_dose::criterion::CriterionCount;
 use stylet_dose::perturb::{PERCENTILES, Spread};
 use stylet_implant::finder::FoundSeed;
 use stylet_implant::readers::seeds::{AXIS, FOUND, PLACE};
@@ -196,7 +196,7 @@ pub fn spread_table(spreads: &[Spread]) -> String {
 }
 
 /// Writes the share of the trials that meet each criterion, with its 95 % interval.
-pub fn criteria(path: &Path, kept: &[Kept]) -> Result<(), CommandError> {
+pub fn criteria(path: &Path, kept: &[CriterionCount]) -> Result<(), CommandError> {
     let header = owned(&["criterion", "met", "trials", "percent", "percent_low", "percent_high"]);
     let rows = kept.iter().map(|k| {
         let percent = |i: usize| k.share().map_or_else(String::new, |s| format!("{:.4}", s[i] * 100.0));
@@ -206,8 +206,8 @@ pub fn criteria(path: &Path, kept: &[Kept]) -> Result<(), CommandError> {
     csv(path, &header, rows)
 }
 
-pub fn criteria_json(kept: &[Kept]) -> Value {
-    let of = |k: &Kept| {
+pub fn criteria_json(kept: &[CriterionCount]) -> Value {
+    let of = |k: &CriterionCount| {
         let percent = k.share().map(|s| s.map(|share| share * 100.0));
         json!({
             "criterion": k.criterion.to_string(), "met": k.met, "trials": k.of,
@@ -217,7 +217,7 @@ pub fn criteria_json(kept: &[Kept]) -> Value {
     kept.iter().map(of).collect()
 }
 
-pub fn criteria_table(kept: &[Kept]) -> String {
+pub fn criteria_table(kept: &[CriterionCount]) -> String {
     let mut text = String::new();
     for k in kept {
         let share = k.share().map_or_else(

@@ -3,14 +3,14 @@
 //!
 //! The state machine of the procedure decides the next step; this module holds only the texts.
 
-mod felt;
 mod lesson;
+mod membranes;
 
 use crate::shown::Shown;
 use crate::theme;
 use egui::Stroke;
-pub use felt::Felt;
 pub use lesson::lesson;
+pub use membranes::MetMembranes;
 
 /// State of the guide: open or not, and the membranes that the needle has met.
 #[derive(Default)]
@@ -18,7 +18,7 @@ pub struct Guide {
     /// True while it is shown above the steps.
     pub open: bool,
     /// Membranes of the last insertion.
-    pub felt: Felt,
+    pub membranes: MetMembranes,
 }
 
 /// Draws the guide above the steps, in the panel that scrolls: it covers nothing and can be closed
@@ -28,7 +28,7 @@ pub fn guide_ui(ui: &mut egui::Ui, shown: &Shown, guide: &mut Guide) {
         return;
     }
     let tokens = theme::of(ui);
-    let lesson = lesson(shown, &guide.felt);
+    let lesson = lesson(shown, &guide.membranes);
     theme::card(ui).stroke(Stroke::new(1.0, tokens.accent)).show(ui, |ui| {
         ui.set_min_width(ui.available_width());
         ui.horizontal(|ui| {

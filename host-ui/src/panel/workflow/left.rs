@@ -34,7 +34,7 @@ pub(super) fn left_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action
             if take.on_hover_text(help).on_disabled_hover_text(help).clicked() {
                 actions.extend(of(left).map(|number| Action::Send(Request::TakeNeedle(number))));
             }
-            let (to, tip_m) = match is_beside(shown, left) {
+            let (to, tip_m) = match is_at_rest_nearby(shown, left) {
                 true => ("To its entry", left.entry_m),
                 false => ("To its tip", left.tip_m),
             };
@@ -75,7 +75,7 @@ fn is_at(shown: &Shown, left: &LeftNeedlePose) -> bool {
 }
 
 /// Returns whether the hand is at rest next to it, not on its way.
-fn is_beside(shown: &Shown, left: &LeftNeedlePose) -> bool {
+fn is_at_rest_nearby(shown: &Shown, left: &LeftNeedlePose) -> bool {
     const WITHIN_M: f64 = 0.8e-3;
     let Some(tip_m) = shown.tip_m() else { return true };
     let from_m = [0, 1, 2].map(|a| tip_m[a] - left.entry_m[a]);

@@ -18,7 +18,7 @@ use egui::text::LayoutJob;
 use egui::{Align2, Button, FontId, RichText, Sense, Stroke, TextStyle, Vec2};
 pub use guide::Guide;
 #[cfg(test)]
-pub use guide::{Felt, lesson};
+pub use guide::{MetMembranes, lesson};
 pub use plan::{PlanState, editor_ui};
 pub use progress::{Progress, Undo, is_at_next_seed, is_needle_done, missing, next_action, progress, undo_action};
 pub use run::{SCRIPTED_STEPS, run_ui};

@@ -58,8 +58,8 @@ impl ProbePicture {
     }
 
     /// Returns the distance of a scene point from the plane, m: positive along the plane's normal.
-    pub fn beside_m(&self, place_m: Vector3<f64>) -> f64 {
-        self.plane.in_beams(place_m).beside_m
+    pub fn distance_m(&self, place_m: Vector3<f64>) -> f64 {
+        self.plane.in_beams(place_m).off_plane_m
     }
 
     /// Returns whether the beams reach a scene point, projected onto the plane.
@@ -106,7 +106,7 @@ mod tests {
                 let Some(place_m) = picture.place_m(at) else { continue };
                 seen += 1;
                 assert!((picture.at(place_m) - at).length() < 1e-3, "{view:?} {at}");
-                assert!(picture.beside_m(place_m).abs() < 1e-12);
+                assert!(picture.distance_m(place_m).abs() < 1e-12);
             }
             assert!(seen > 1, "{view:?}");
             assert_eq!(picture.place_m(Pos2::new(200.0, 300.0)), None, "beside the picture");
@@ -123,6 +123,6 @@ mod tests {
         assert!(!picture.sees(pose.middle_m + pose.up * 5e-3), "in the probe");
         assert!(!picture.sees(pose.middle_m + pose.up * 71e-3), "too deep");
         let before = pose.middle_m + pose.axis * 3e-3;
-        assert!((picture.beside_m(before).abs() - 3e-3).abs() < 1e-12);
+        assert!((picture.distance_m(before).abs() - 3e-3).abs() < 1e-12);
     }
 }

@@ -14,8 +14,8 @@ use stylet_shm_schema::Fault;
 use stylet_sim::force::gate::RAMP_OUT_TICKS;
 
 use super::fake::{Fake, api, config};
-use crate::drawn::{Drawn, below, campaign};
-use crate::rig::{Led, Rig};
+use crate::drawn::{RandomFault, below, campaign};
+use crate::rig::{FakeDevice, Rig};
 
 /// Ticks after which the device drops a force that is not renewed.
 const WATCHDOG_TICKS: usize = 20;
@@ -24,7 +24,7 @@ const CHECK_TICKS: usize = 10;
 
 /// Faults of the device.
 #[derive(Clone, Copy, Debug)]
-enum Wrong {
+enum Misbehaviour {
     /// Calls of a function fail with an error of the interface.
     Fails(&'static str, u32),
     /// As many calls of a function fail, and no more.
@@ -46,7 +46,7 @@ enum Wrong {
     OldPose,
 }
 
-impl Drawn for Wrong {
+impl RandomFault for Misbehaviour {
     type Fake = Fake;
 
     fn draw(random: &mut ChaCha8Rng) -> Self {
@@ -65,9 +65,9 @@ impl Drawn for Wrong {
         let call = CALLS[below(random, CALLS.len())];
         let code = below(random, ERRORS.len() + 3) as u32;
         match below(random, 9) {
-            0 => Wrong::Fails(call, code),
-            1 => Wrong::FailsTimes(call, code, 1 + below(random, 50) as u32),
-            2 => Wrong::Unplugged {
+            0 => Misbehaviour::Fails(call, code),
+            1 => Misbehaviour::FailsTimes(call, code, 1 + below(random, 50) as u32),
+            2 => Misbehaviour::Unplugged {
                 in_use: below(random, 2) == 0,
                 other: below(random, 2) == 0,
             },
@@ -75,16 +75,16 @@ impl Drawn for Wrong {
                 let place = PLACES[below(random, PLACES.len())];
                 let good = i32::from([status::POWER, status::CONNECTED, status::FORCE].contains(&place));
                 let numbers = [1 - good, -1, 2, random.next_u64() as i32 | 4];
-                Wrong::Status(place, numbers[below(random, numbers.len())])
+                Misbehaviour::Status(place, numbers[below(random, numbers.len())])
             }
-            4 => Wrong::TurnsOff {
+            4 => Misbehaviour::TurnsOff {
                 cause: 1 + below(random, 7) as u32,
                 stays: below(random, 2) == 0,
             },
-            5 => Wrong::BadPose(1 + below(random, 3) as u32),
-            6 => Wrong::Frozen,
-            7 => Wrong::Hangs(SILENT_SAMPLES as usize + 5 + below(random, 400)),
-            _ => Wrong::OldPose,
+            5 => Misbehaviour::BadPose(1 + below(random, 3) as u32),
+            6 => Misbehaviour::Frozen,
+            7 => Misbehaviour::Hangs(SILENT_SAMPLES as usize + 5 + below(random, 400)),
+            _ => Misbehaviour::OldPose,
         }
     }
 
@@ -106,7 +106,7 @@ impl Drawn for Wrong {
         }
     }
 
-    fn go_on(self, tick: usize, fake: &Fake) {
+    fn advance(self, tick: usize, fake: &Fake) {
         let control = fake.control;
         match self {
             Self::Hangs(ticks) if tick == ticks => control.hang.store(0, Relaxed),
@@ -181,7 +181,7 @@ impl Drawn for Wrong {
     }
 }
 
-impl Led for Fake {
+impl FakeDevice for Fake {
     fn at(&self, now_ns: u64) {
         self.control.now_us.store(now_ns / 1000, Relaxed);
     }
@@ -204,7 +204,7 @@ fn faults(seed: u64, count: usize) {
     let rig = Rig::over(Fake::new(), |fake| {
         Box::new(Stepped::open(api(), &config(), runs(fake)).expect("a healthy device"))
     });
-    let rig = campaign::<Wrong>(rig, seed, count, 9);
+    let rig = campaign::<Misbehaviour>(rig, seed, count, 9);
     assert_eq!(rig.fake.control.non_finite_forces.load(Relaxed), 0);
 }
 

@@ -9,8 +9,8 @@ use stylet_hw::{Axes, Placement};
 use stylet_runtime::rt::watchdog::SILENT_SAMPLES;
 use stylet_shm_schema::Fault as Named;
 
-use crate::drawn::{Drawn, below, campaign};
-use crate::rig::{Led, Rig};
+use crate::drawn::{RandomFault, below, campaign};
+use crate::rig::{FakeDevice, Rig};
 
 /// Ticks after which an answer is late.
 const LATE_TICKS: usize = 20;
@@ -33,7 +33,7 @@ impl fmt::Debug for Fault {
     }
 }
 
-impl Drawn for Fault {
+impl RandomFault for Fault {
     type Fake = Service;
 
     fn draw(random: &mut ChaCha8Rng) -> Self {
@@ -68,7 +68,7 @@ impl Drawn for Fault {
         fake.state().wrong = self.wrong;
     }
 
-    fn go_on(self, tick: usize, fake: &Service) {
+    fn advance(self, tick: usize, fake: &Service) {
         let mut state = fake.state();
         match self.wrong {
             Wrong::Hangs if tick == self.then => state.wrong = Wrong::Nothing,
@@ -113,7 +113,7 @@ impl Drawn for Fault {
     }
 }
 
-impl Led for Service {
+impl FakeDevice for Service {
     fn at(&self, now_ns: u64) {
         self.state().now_ms = Some(now_ns / 1_000_000);
     }

@@ -49,7 +49,7 @@ fn edge(driven: &Driven) -> Vec<Pos2> {
     let (low, high) = target.bounds_m();
     let middle = (Vector3::from(low) + Vector3::from(high)) / 2.0;
     let plane = picture.plane();
-    let middle = middle - plane.normal() * plane.in_beams(middle).beside_m;
+    let middle = middle - plane.normal() * plane.in_beams(middle).distance_m;
     let on_edge = |n: usize| {
         let (sine, cosine) = ((n as f64 + 0.25) / CLICKS as f64 * std::f64::consts::TAU).sin_cos();
         let out = plane.right() * cosine + plane.pose.up * sine;
@@ -129,7 +129,7 @@ pub(super) fn mark(driven: &mut Driven) {
         let header = driven.window.state().link().snapshot().expect("a snapshot").header;
         for (n, seed) in header.seeds[..header.seed_count as usize].iter().enumerate() {
             let place = Vector3::from(seed.position_m);
-            if picture.beside_m(place).abs() <= 2.5e-3 && !marked.contains(&n) {
+            if picture.distance_m(place).abs() <= 2.5e-3 && !marked.contains(&n) {
                 marked.push(n);
                 click_at(driven, picture.at(place));
             }

@@ -130,12 +130,12 @@ fn the_echo_outside_the_plane_falls_with_the_beam() {
     let middle_db = peak_db(&mut scanner, &plane, &at(0.0));
     // 2 mm at half maximum where the lens has its focus, 25 mm deep.
     let spread_m = 2e-3 / 2.354_82;
-    for beside_m in [0.3e-3, 0.8e-3, 1.5e-3, 2.5e-3_f64] {
-        let expected_db = -4.342_94 * (beside_m / spread_m).powi(2);
-        let found_db = peak_db(&mut scanner, &plane, &at(beside_m)) - middle_db;
+    for off_plane_m in [0.3e-3, 0.8e-3, 1.5e-3, 2.5e-3_f64] {
+        let expected_db = -4.342_94 * (off_plane_m / spread_m).powi(2);
+        let found_db = peak_db(&mut scanner, &plane, &at(off_plane_m)) - middle_db;
         println!(
             "{:.1} mm: {found_db:.2} dB, {expected_db:.2} by the beam",
-            beside_m * 1e3
+            off_plane_m * 1e3
         );
         assert!((found_db - expected_db).abs() < 0.3, "{found_db} against {expected_db}");
     }

@@ -186,7 +186,7 @@ fn the_dose_of_placed_seeds_counts_once() {
         seeds: present.seeds(),
         holes: vec!["F7".parse().unwrap()],
     };
-    let objectives = Objectives::beside(present.clone(), 0.5, &source, 145.0);
+    let objectives = Objectives::around_present(present.clone(), 0.5, &source, 145.0);
     let found = first_plan(
         TEMPLATE,
         &anatomy,

@@ -4,8 +4,8 @@
 //! A membrane that gives way, or a layer that ends in front of the tip, moves the tissue by
 //! millimetres at one place of the tip. A rehearsal stops at one place; a live hand stops near it.
 
+use super::rehearsals::{Rehearsals, RehearsedDrops, SeedAtRest, keep_within};
 use super::search::seek;
-use super::tried::{Left, Rehearsals, Tried, keep_within};
 use crate::plan::Loading;
 use crate::plan::rehearse::{Drops, RehearsalError};
 use nalgebra::Vector3;
@@ -15,10 +15,10 @@ use stylet_shm_schema::MAX_SEEDS;
 /// Distance from a drop, deeper or shallower, within which edges are searched. A live hand counts
 /// as arrived within that distance of its goal (`stylet_procedure::tolerance`). It stops within 0.1
 /// mm of the rehearsed one, steps of the encoder and late ticks included.
-pub const BESIDE_M: f64 = stylet_procedure::tolerance::AT_TARGET_M;
+pub const EDGE_REACH_M: f64 = stylet_procedure::tolerance::AT_TARGET_M;
 /// Distance between stops near a drop.
-const STEP_M: f64 = 0.5 * BESIDE_M;
-/// Number of stops on either side: a hand that sticks arrives up to [`BESIDE_M`] before its goal,
+const STEP_M: f64 = 0.5 * EDGE_REACH_M;
+/// Number of stops on either side: a hand that sticks arrives up to [`EDGE_REACH_M`] before its goal,
 /// so they extend twice as far.
 const STOPS: i8 = 4;
 /// Largest ratio by which a seed follows its drop between two stops, with a small allowance; beyond
@@ -35,7 +35,7 @@ const STEPS_ASIDE: usize = 3;
 /// Most rehearsals that search the drops of the seeds after one that was moved.
 const SEEK_AGAIN: usize = 12;
 
-/// Seed on an edge: it rests elsewhere if the tip stops up to [`BESIDE_M`] deeper or shallower.
+/// Seed on an edge: it rests elsewhere if the tip stops up to [`EDGE_REACH_M`] deeper or shallower.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensitive {
     /// Number of the seed, deepest first.
@@ -46,7 +46,7 @@ pub struct Sensitive {
 
 impl std::fmt::Display for Sensitive {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (number, beside_mm) = (self.seed + 1, BESIDE_M * 1e3);
+        let (number, beside_mm) = (self.seed + 1, EDGE_REACH_M * 1e3);
         match self.moves_m {
             Some(m) => write!(
                 f,
@@ -66,24 +66,24 @@ type Edge = Option<[f64; 2]>;
 
 /// Response of one seed to shallower and deeper stops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Beside {
+struct EdgeResponse {
     /// Nearest edge on each side.
     edges: [Edge; 2],
     /// Largest displacement beyond an edge, m; infinite for a lost seed.
     moves_m: f64,
 }
 
-impl Beside {
+impl EdgeResponse {
     /// Evaluates a seed that is dropped with the tip at `tip_m`, by its places for the stops
     /// around.
-    fn of(tip_m: f64, mut stops: Vec<Left>) -> Self {
+    fn of(tip_m: f64, mut stops: Vec<SeedAtRest>) -> Self {
         stops.sort_by(|a, b| a.tip_m.total_cmp(&b.tip_m));
         let mut beside = Self::default();
         for pair in stops.windows(2) {
             let [from, to] = [pair[0], pair[1]];
             let moved_m = (to.rest_m - from.rest_m).norm();
             let [low_m, high_m] = [from.tip_m - tip_m, to.tip_m - tip_m];
-            let is_near = low_m < BESIDE_M - SAME_M && high_m > SAME_M - BESIDE_M;
+            let is_near = low_m < EDGE_REACH_M - SAME_M && high_m > SAME_M - EDGE_REACH_M;
             if is_near && moved_m > STEADY * (high_m - low_m) + UNSTEADY_M {
                 beside.moves_m = beside.moves_m.max(moved_m);
                 // Of several on one side the nearest counts.
@@ -107,7 +107,7 @@ impl Beside {
 
     /// Marks the seed as left outside the tissue.
     fn lose(&mut self, side: usize) {
-        (self.edges[side], self.moves_m) = (Some([0.0, BESIDE_M]), f64::INFINITY);
+        (self.edges[side], self.moves_m) = (Some([0.0, EDGE_REACH_M]), f64::INFINITY);
     }
 
     fn is_on_edge(&self) -> bool {
@@ -115,14 +115,14 @@ impl Beside {
     }
 
     /// Returns the shift to that side at which the drop is clear of the nearest edge by
-    /// [`BESIDE_M`]; `None` if there is none.
+    /// [`EDGE_REACH_M`]; `None` if there is none.
     fn way_m(&self, side: usize) -> Option<f64> {
         let sign = if side == 0 { -1.0 } else { 1.0 };
         let clear_m = match (self.edges[side], self.edges[1 - side]) {
             // Beyond the edge on that side.
-            (Some([_, far_m]), _) => far_m + BESIDE_M,
+            (Some([_, far_m]), _) => far_m + EDGE_REACH_M,
             // Away from the one on the other side.
-            (None, Some([near_m, _])) => BESIDE_M - near_m,
+            (None, Some([near_m, _])) => EDGE_REACH_M - near_m,
             (None, None) => return None,
         };
         Some(sign * clear_m)
@@ -131,12 +131,12 @@ impl Beside {
 
 /// Response of every seed of a needle.
 #[derive(Clone, Debug, PartialEq)]
-struct Moves(Vec<Beside>);
+struct EdgeResponses(Vec<EdgeResponse>);
 
-impl Moves {
+impl EdgeResponses {
     /// Returns the deepest seed on an edge.
     fn first(&self) -> Option<usize> {
-        self.0.iter().position(Beside::is_on_edge)
+        self.0.iter().position(EdgeResponse::is_on_edge)
     }
 
     fn sensitive(&self) -> Vec<Sensitive> {
@@ -150,9 +150,9 @@ impl Moves {
     }
 
     /// Returns the mean error of the seeds if every edge is on the wrong side, m.
-    fn worst_mean_m(&self, tried: &Tried) -> f64 {
+    fn worst_mean_m(&self, tried: &RehearsedDrops) -> f64 {
         let each = tried.error_m.iter().zip(&self.0);
-        let off = |(error, beside): (&Vector3<f64>, &Beside)| {
+        let off = |(error, beside): (&Vector3<f64>, &EdgeResponse)| {
             error.norm() + if beside.is_on_edge() { beside.moves_m } else { 0.0 }
         };
         each.map(off).sum::<f64>() / tried.error_m.len().max(1) as f64
@@ -190,7 +190,11 @@ fn stops(drops: &Drops, steps: &[i8]) -> Vec<Stop> {
 
 /// Rehearses with a loose seed at every drop and at every stop around it, by these numbers of steps
 /// shallower and deeper.
-fn at_stops(rehearsals: &mut Rehearsals, at: &Tried, [shallower, deeper]: [i8; 2]) -> Result<Moves, RehearsalError> {
+fn at_stops(
+    rehearsals: &mut Rehearsals,
+    at: &RehearsedDrops,
+    [shallower, deeper]: [i8; 2],
+) -> Result<EdgeResponses, RehearsalError> {
     let steps: Vec<i8> = (-shallower..=deeper).collect();
     let mut stops = stops(&at.drops, &steps);
     stops.truncate(MAX_SEEDS);
@@ -208,20 +212,20 @@ fn at_stops(rehearsals: &mut Rehearsals, at: &Tried, [shallower, deeper]: [i8; 2
             .filter(move |(stop, _)| stop.seed == seed)
             .map(|(_, left)| *left)
     };
-    let look = |(seed, here): (usize, &Left)| Beside::of(here.tip_m, of(seed).collect());
-    Ok(Moves(at.left.iter().enumerate().map(look).collect()))
+    let look = |(seed, here): (usize, &SeedAtRest)| EdgeResponse::of(here.tip_m, of(seed).collect());
+    Ok(EdgeResponses(at.left.iter().enumerate().map(look).collect()))
 }
 
 /// Rehearses all seeds at once; if one of them would be left outside the tissue, with fewer stops,
 /// then shallower and deeper separately.
-fn look(rehearsals: &mut Rehearsals, at: &Tried) -> Result<Moves, RehearsalError> {
+fn look(rehearsals: &mut Rehearsals, at: &RehearsedDrops) -> Result<EdgeResponses, RehearsalError> {
     for steps in [STOPS, STOPS / 2] {
         match at_stops(rehearsals, at, [steps; 2]) {
             Err(RehearsalError::Refused { .. }) => {}
             looked => return looked,
         }
     }
-    let mut moves = Moves(vec![Beside::default(); at.error_m.len()]);
+    let mut moves = EdgeResponses(vec![EdgeResponse::default(); at.error_m.len()]);
     // A shallower last seed may be before the tissue, a deeper first one beyond it.
     let last = at.error_m.len().saturating_sub(1);
     for (side, steps, lost) in [(0, [STOPS / 2, 0], last), (1, [0, STOPS / 2], 0)] {
@@ -240,7 +244,7 @@ fn look(rehearsals: &mut Rehearsals, at: &Tried) -> Result<Moves, RehearsalError
 
 /// Returns the same drops with that seed shifted, and later ones searched again; `None` if it
 /// cannot be dropped there.
-fn moved_along(rehearsals: &mut Rehearsals, from: &Tried, seed: usize, by_m: f64) -> Option<Tried> {
+fn moved_along(rehearsals: &mut Rehearsals, from: &RehearsedDrops, seed: usize, by_m: f64) -> Option<RehearsedDrops> {
     let mut drops = from.drops.clone();
     match rehearsals.needle.loading {
         Loading::Loose => drops.along_m[seed] += by_m,
@@ -255,12 +259,12 @@ fn moved_along(rehearsals: &mut Rehearsals, from: &Tried, seed: usize, by_m: f64
 /// stops at its old place, so one step may not be enough.
 fn to_side(
     rehearsals: &mut Rehearsals,
-    from: &Tried,
-    moves: &Moves,
+    from: &RehearsedDrops,
+    moves: &EdgeResponses,
     (seed, side): (usize, usize),
-) -> Result<Option<(Tried, Moves)>, RehearsalError> {
+) -> Result<Option<(RehearsedDrops, EdgeResponses)>, RehearsalError> {
     let mut by_m = 0.0;
-    let mut at: Option<(Tried, Moves)> = None;
+    let mut at: Option<(RehearsedDrops, EdgeResponses)> = None;
     for _ in 0..STEPS_ASIDE {
         let beside = at.as_ref().map_or(&moves.0[seed], |(_, moves)| &moves.0[seed]);
         let Some(more_m) = beside.way_m(side) else { break };
@@ -279,7 +283,10 @@ fn to_side(
 
 /// Returns drops clear of edges, as far as possible, moved to the side with the smaller loss; and
 /// the seeds that are still on an edge.
-pub(super) fn keep_clear(rehearsals: &mut Rehearsals, found: Tried) -> Result<(Tried, Vec<Sensitive>), RehearsalError> {
+pub(super) fn keep_clear(
+    rehearsals: &mut Rehearsals,
+    found: RehearsedDrops,
+) -> Result<(RehearsedDrops, Vec<Sensitive>), RehearsalError> {
     let mut moves = look(rehearsals, &found)?;
     let mut best = found;
     for _ in 0..ROUNDS {

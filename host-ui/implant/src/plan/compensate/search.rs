@@ -1,7 +1,7 @@
 //! The search for drops that leave seeds on plan, one seed after the other, deepest first.
 
 use super::Limits;
-use super::tried::{Rehearsals, Tried, aside, keep_within};
+use super::rehearsals::{Rehearsals, RehearsedDrops, aside, keep_within};
 use crate::plan::rehearse::{Drops, RehearsalError};
 use crate::plan::{Loading, Needle};
 
@@ -18,7 +18,13 @@ pub(super) const DEEPER_M: f64 = 1e-3;
 
 /// Searches the drops of the seeds from that number on; earlier ones stay as in `last`. Returns the
 /// best rehearsal, `best` included, after a limited number.
-pub(super) fn seek(rehearsals: &mut Rehearsals, from: usize, mut best: Tried, mut last: Tried, most: usize) -> Tried {
+pub(super) fn seek(
+    rehearsals: &mut Rehearsals,
+    from: usize,
+    mut best: RehearsedDrops,
+    mut last: RehearsedDrops,
+    most: usize,
+) -> RehearsedDrops {
     let (needle, limits) = (rehearsals.needle, rehearsals.limits);
     let sought = match needle.loading {
         Loading::Loose => best.error_m.len(),
@@ -91,13 +97,13 @@ struct Search {
     short: Option<(f64, Option<f64>)>,
     beyond: Option<(f64, Option<f64>)>,
     /// Rehearsal with the smallest error.
-    nearest: Tried,
+    nearest: RehearsedDrops,
     step_m: f64,
     tries: usize,
 }
 
 impl Search {
-    fn begin(seed: usize, needle: &Needle, from: Tried) -> Self {
+    fn begin(seed: usize, needle: &Needle, from: RehearsedDrops) -> Self {
         let mut search = Self {
             seed,
             short: None,
@@ -110,7 +116,7 @@ impl Search {
         search
     }
 
-    fn take(&mut self, needle: &Needle, tried: &Tried) {
+    fn take(&mut self, needle: &Needle, tried: &RehearsedDrops) {
         let (drop_m, off_m) = (tried.drops.along_m[self.seed], tried.off_m(needle, self.seed));
         if off_m.abs() < self.nearest.off_m(needle, self.seed).abs() {
             self.nearest = tried.clone();
@@ -169,7 +175,14 @@ impl Search {
 
 /// Returns the drops of the best rehearsal with that of this seed at `drop_m`; later ones shift by
 /// their last error.
-fn moved(needle: &Needle, search: &Search, last: &Tried, drop_m: f64, others_move: bool, limits: &Limits) -> Drops {
+fn moved(
+    needle: &Needle,
+    search: &Search,
+    last: &RehearsedDrops,
+    drop_m: f64,
+    others_move: bool,
+    limits: &Limits,
+) -> Drops {
     let mut drops = search.nearest.drops.clone();
     let by_m = drop_m - drops.along_m[search.seed];
     let after = search.seed + 1..drops.along_m.len();

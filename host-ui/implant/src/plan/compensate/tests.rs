@@ -196,10 +196,10 @@ fn a_seed_near_an_edge_is_dropped_clear_of_it() {
         let mut known = tissue(ahead_m);
         let done = run(&needle(Loading::Loose), &mut known);
         let clear_m = (done.drops.along_m[0] - edge_m).abs();
-        assert!(clear_m >= edges::BESIDE_M, "{clear_m} m from the edge");
+        assert!(clear_m >= edges::EDGE_REACH_M, "{clear_m} m from the edge");
         assert!(done.sensitive.is_empty(), "{:?}", done.sensitive);
         let errors: Vec<f64> = done.errors_after_m().collect();
-        assert!(errors.iter().all(|e| *e < 1.5 * edges::BESIDE_M), "{errors:?}");
+        assert!(errors.iter().all(|e| *e < 1.5 * edges::EDGE_REACH_M), "{errors:?}");
     }
 }
 
@@ -210,7 +210,7 @@ fn a_seed_behind_the_first_is_moved_from_its_edge_alone() {
     let done = run(&needle(Loading::Loose), &mut known);
     assert!(done.sensitive.is_empty(), "{:?}", done.sensitive);
     let [first, second, third] = [0, 1, 2].map(|n| done.drops.along_m[n]);
-    assert!((second - 0.0419).abs() >= edges::BESIDE_M, "{second}");
+    assert!((second - 0.0419).abs() >= edges::EDGE_REACH_M, "{second}");
     assert!(
         (first - 0.052).abs() < 0.1e-3 && (third - 0.035).abs() < 0.1e-3,
         "{first} {third}"
@@ -222,7 +222,7 @@ fn a_strand_is_moved_from_an_edge_as_a_whole() {
     let mut known = tissue(|z| if z < 0.05205 { 2e-3 } else { -5e-3 });
     let done = run(&needle(Loading::Stranded { spacer_m: 5.5e-3 }), &mut known);
     assert!(done.sensitive.is_empty(), "{:?}", done.sensitive);
-    assert!(done.drops.along_m[0] <= 0.05205 - edges::BESIDE_M);
+    assert!(done.drops.along_m[0] <= 0.05205 - edges::EDGE_REACH_M);
     assert!((done.drops.along_m[0] - done.drops.along_m[1] - 0.01).abs() < 1e-12);
 }
 
@@ -253,7 +253,7 @@ fn a_drop_beyond_the_tissue_is_shifted_into_it() {
     known.tissue_from_m = 0.0319;
     let done = run(&needle(Loading::Loose), &mut known);
     assert!(
-        done.drops.along_m[2] >= 0.0319 + edges::BESIDE_M,
+        done.drops.along_m[2] >= 0.0319 + edges::EDGE_REACH_M,
         "{:?}",
         done.drops.along_m
     );
@@ -301,7 +301,7 @@ fn a_sticking_hand_is_moved_until_its_tip_is_clear() {
     assert!(done.sensitive.is_empty(), "{:?}", done.sensitive);
     let rest_m = 0.05 + done.after_m[0][2];
     let tip_m = rest_m + 2e-3;
-    assert!(tip_m <= 0.05205 - edges::BESIDE_M && tip_m > 0.051, "{tip_m}");
+    assert!(tip_m <= 0.05205 - edges::EDGE_REACH_M && tip_m > 0.051, "{tip_m}");
 }
 
 /// Guards against refusals attributed to the first seed. The deeper it is dropped, the deeper the

@@ -129,7 +129,7 @@ fn needle_aside(state: &State, random: &mut ChaCha8Rng) -> Option<Move> {
     let from = candidates.places[any_seed(state, random)?].way;
     let step = [-1, 0, 1].map(|s: i8| s);
     let beside = [step[below(random, 3)?], step[below(random, 3)?]];
-    let hole = candidates.ways[from].hole.beside(beside)?;
+    let hole = candidates.ways[from].hole.offset_by(beside)?;
     let to = candidates.ways.iter().position(|way| way.hole == hole)?;
     if state.of_way[to] > 0 {
         return None;

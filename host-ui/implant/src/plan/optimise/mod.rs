@@ -96,7 +96,7 @@ impl Objectives {
 
     /// Returns the usual objectives with seeds in the tissue already; those to be added have this
     /// strength, U.
-    pub fn beside(present: Present, strength_u: f64, source: &Source, prescription_gy: f64) -> Self {
+    pub fn around_present(present: Present, strength_u: f64, source: &Source, prescription_gy: f64) -> Self {
         Self {
             strengths_u: vec![strength_u],
             present,

@@ -1,6 +1,6 @@
 //! The texts of the guide for the next step.
 
-use super::felt::{Felt, Puncture};
+use super::membranes::{MetMembranes, Puncture};
 use crate::panel::workflow::progress::{Progress, needle_at_hand, progress};
 use crate::shown::{NeedleLine, SeedError, Shown, all_errors};
 use stylet_base::format;
@@ -28,8 +28,8 @@ fn of(what: impl Into<String>, notes: &[&str]) -> Lesson {
 }
 
 /// Returns the next lesson, by the state of the core.
-pub fn lesson(shown: &Shown, felt: &Felt) -> Lesson {
-    let lesson = next_lesson(shown, felt);
+pub fn lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
+    let lesson = next_lesson(shown, membranes);
     match &shown.watched {
         // A recording is described, not instructed.
         Some(_) if progress(shown) != Progress::Debrief => Lesson {
@@ -43,7 +43,7 @@ pub fn lesson(shown: &Shown, felt: &Felt) -> Lesson {
     }
 }
 
-fn next_lesson(shown: &Shown, felt: &Felt) -> Lesson {
+fn next_lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
     if !shown.is_live() {
         let why =
             "The window shows what the core computes; it may be closed and opened again without the core noticing.";
@@ -65,16 +65,16 @@ fn next_lesson(shown: &Shown, felt: &Felt) -> Lesson {
             "Press \"Plan five seeds\" in step 2, or Enter. Enter always does what comes next.",
             &["Rings in the pictures show where the seeds should come to rest."],
         ),
-        (Progress::Debrief, _) => debrief(shown, felt),
-        (_, Some((needle, operation))) => operation_lesson(shown, felt, &needle, operation),
+        (Progress::Debrief, _) => debrief(shown, membranes),
+        (_, Some((needle, operation))) => operation_lesson(shown, membranes, &needle, operation),
         (_, None) => of("Press Enter for the next needle.", &[]),
     }
 }
 
-fn operation_lesson(shown: &Shown, felt: &Felt, needle: &AtHand, operation: Operation) -> Lesson {
+fn operation_lesson(shown: &Shown, membranes: &MetMembranes, needle: &AtHand, operation: Operation) -> Lesson {
     match operation {
         Operation::Place => place(shown),
-        Operation::Insert | Operation::InsertTo(_) => insert(shown, felt, needle),
+        Operation::Insert | Operation::InsertTo(_) => insert(shown, membranes, needle),
         Operation::Drop(_) => of(
             "The tip is at the next planned place. Press Space: the seed leaves the needle here.",
             &["It lies in tissue that the needle still holds out of its place."],
@@ -105,7 +105,7 @@ fn operation_lesson(shown: &Shown, felt: &Felt, needle: &AtHand, operation: Oper
 fn place(shown: &Shown) -> Lesson {
     if !shown.is_engaged() {
         return of(
-            "Press E: it turns the force on. Without it nothing is felt, and every force reads 0.",
+            "Press E: it turns the force on. Without it nothing is membranes, and every force reads 0.",
             &["A device pushes back from now on. With keys or mouse, watch the force at the upper right."],
         );
     }
@@ -115,7 +115,7 @@ fn place(shown: &Shown) -> Lesson {
     )
 }
 
-fn insert(shown: &Shown, felt: &Felt, needle: &AtHand) -> Lesson {
+fn insert(shown: &Shown, membranes: &MetMembranes, needle: &AtHand) -> Lesson {
     if shown.needle_line() == Some(NeedleLine::Preparing) {
         return of("Wait here until LINE READY stands in the bar at the top.", &[]);
     }
@@ -135,7 +135,7 @@ fn insert(shown: &Shown, felt: &Felt, needle: &AtHand) -> Lesson {
         .deepest_drop_m
         .map_or(0.0, |deepest_m| deepest_m - needle.depth_m);
     let left = format::length(left_m.max(0.0));
-    match felt.punctures().last().filter(|_| shown.has_punctured()) {
+    match membranes.punctures().last().filter(|_| shown.has_punctured()) {
         Some(puncture) => Lesson {
             what: format!("It gave way. Go on to the deepest seed, {left} ahead: hold W, or press Enter."),
             notes: vec![
@@ -189,7 +189,7 @@ fn depths(shown: &Shown) -> Vec<Depths> {
 }
 
 /// Explains why the seeds missed, in figures of this insertion.
-fn debrief(shown: &Shown, felt: &Felt) -> Lesson {
+fn debrief(shown: &Shown, membranes: &MetMembranes) -> Lesson {
     let seeds = depths(shown);
     if seeds.is_empty() {
         return of(
@@ -200,7 +200,7 @@ fn debrief(shown: &Shown, felt: &Felt) -> Lesson {
     let mean_m = |of: &dyn Fn(&Depths) -> f64| seeds.iter().map(of).sum::<f64>() / seeds.len() as f64;
     let by_hand_m = mean_m(&|seed| seed.left_m - seed.planned_m);
     let by_tissue_m = mean_m(&|seed| seed.rests_m - seed.left_m);
-    let mut notes: Vec<String> = felt.punctures().iter().map(pressed).collect();
+    let mut notes: Vec<String> = membranes.punctures().iter().map(pressed).collect();
     notes.extend(seeds.iter().take(SEEDS).map(|seed| {
         format!(
             "Seed {}: planned {} deep, left at {}, rests at {}, {} beside the path.",

@@ -158,7 +158,7 @@ fn move_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, state: &mut Plan
         ];
         ui.spacing_mut().item_spacing.x = 4.0;
         for (name, by) in ways {
-            let to = hole.beside(by);
+            let to = hole.offset_by(by);
             let is_free = to.is_some_and(|to| implant.plan.needles.iter().all(|n| n.hole != Some(to)));
             let button = ui.add_enabled(is_free, Button::new(name));
             let hint = "One hole, by the sides of the patient; Shift and an arrow in the template";

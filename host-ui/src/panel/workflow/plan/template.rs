@@ -116,7 +116,7 @@ fn steer(ui: &egui::Ui, response: &Response, implant: &Implant, state: &mut Plan
         if !with_needle && !pressed(Modifiers::NONE, key) {
             continue;
         }
-        let Some(to) = state.hole.beside(by) else { continue };
+        let Some(to) = state.hole.offset_by(by) else { continue };
         if with_needle && let Some(number) = state.needle(&implant.plan) {
             move_needle(implant, number, to, state, actions);
         } else {

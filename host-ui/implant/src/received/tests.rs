@@ -33,14 +33,14 @@ fn seed(number: u32, z: f64) -> SeedPose {
     }
 }
 
-impl Heard {
+impl ReceivedProcedure {
     fn hear(&mut self, plan: &PlanInForce, seeds: &[SeedPose]) {
         self.seeds = seeds.to_vec();
         self.take_plan(Some(plan), None);
     }
 }
 
-fn placed(heard: &Heard) -> Vec<(usize, Option<usize>)> {
+fn placed(heard: &ReceivedProcedure) -> Vec<(usize, Option<usize>)> {
     heard
         .planned(0.5)
         .iter()
@@ -50,7 +50,7 @@ fn placed(heard: &Heard) -> Vec<(usize, Option<usize>)> {
 
 #[test]
 fn each_needle_has_the_seeds_that_came_after_its_plan() {
-    let mut heard = Heard::default();
+    let mut heard = ReceivedProcedure::default();
     let seeds = [seed(1, 0.05), seed(1, 0.04), seed(3, 0.05), seed(3, 0.04)];
     heard.hear(&plan(1, 1), &[]);
     heard.hear(&plan(1, 1), &seeds[..2]);
@@ -83,7 +83,7 @@ fn each_needle_has_the_seeds_that_came_after_its_plan() {
 
 #[test]
 fn a_reset_starts_a_new_implant() {
-    let mut heard = Heard::default();
+    let mut heard = ReceivedProcedure::default();
     let seeds = [seed(1, 0.05), seed(1, 0.04), seed(2, 0.05), seed(2, 0.04)];
     heard.hear(&plan(1, 1), &[]);
     heard.hear(&plan(2, 2), &seeds[..2]);
@@ -98,7 +98,7 @@ fn a_reset_starts_a_new_implant() {
 
 #[test]
 fn a_late_host_attributes_seeds_on_its_needle() {
-    let mut heard = Heard::default();
+    let mut heard = ReceivedProcedure::default();
     let seeds = [seed(1, 0.05), seed(1, 0.04), seed(2, 0.05)];
     heard.hear(&plan(7, 2), &seeds);
     assert_eq!(heard.seeds_before(), 2);

@@ -36,16 +36,16 @@ impl Default for Limits {
 }
 
 /// Connections of one address since a time.
-struct Seen {
+struct RecentConnections {
     since: Instant,
     connections: u32,
     was_refused: bool,
 }
 
 /// Admission of clients.
-pub struct Door {
+pub struct Admission {
     limits: Limits,
-    seen: BTreeMap<IpAddr, Seen>,
+    seen: BTreeMap<IpAddr, RecentConnections>,
 }
 
 /// Reason why a client is refused.
@@ -56,7 +56,7 @@ pub struct Refused {
     pub is_said: bool,
 }
 
-impl Door {
+impl Admission {
     pub fn new(limits: Limits) -> Self {
         let seen = BTreeMap::new();
         Self { limits, seen }
@@ -77,7 +77,7 @@ impl Door {
         if self.seen.len() >= ADDRESSES_AT_MOST {
             self.seen.pop_first();
         }
-        let seen = self.seen.entry(place).or_insert(Seen {
+        let seen = self.seen.entry(place).or_insert(RecentConnections {
             since: now,
             connections: 0,
             was_refused: false,
@@ -155,8 +155,8 @@ mod tests {
         Arc::new(Client::new(address.parse().expect("an address"), Arc::new(|_| ())))
     }
 
-    fn door(place_for: Duration) -> Door {
-        Door::new(Limits {
+    fn admission(place_for: Duration) -> Admission {
+        Admission::new(Limits {
             place_for,
             ..Limits::default()
         })
@@ -165,26 +165,31 @@ mod tests {
     /// Guards against sixteen clients that only read and kept all others out.
     #[test]
     fn clients_of_one_address_leave_room_for_others() {
-        let mut door = door(Duration::from_secs(3600));
+        let mut admission = admission(Duration::from_secs(3600));
         let mut clients = Vec::new();
         for port in 1..=16 {
             let from = format!("10.0.0.1:{port}");
-            if door.admit(from.parse().unwrap(), &clients).is_ok() {
+            if admission.admit(from.parse().unwrap(), &clients).is_ok() {
                 clients.push(client(&from));
             }
         }
         assert_eq!(clients.len(), 8);
-        assert!(door.admit("10.0.0.2:1".parse().unwrap(), &clients).unwrap().is_none());
+        assert!(
+            admission
+                .admit("10.0.0.2:1".parse().unwrap(), &clients)
+                .unwrap()
+                .is_none()
+        );
         // One network of IPv6 is one address.
         for port in 1..=8 {
             clients.push(client(&format!("[2001:db8::{port}]:1")));
         }
-        let refused = door
+        let refused = admission
             .admit("[2001:db8::ffff]:1".parse().unwrap(), &clients)
             .err()
             .expect("no room");
         assert!(refused.words.contains("8 clients of its address"), "{}", refused.words);
-        let refused = door
+        let refused = admission
             .admit("10.0.0.2:2".parse().unwrap(), &clients)
             .err()
             .expect("no room");
@@ -194,28 +199,28 @@ mod tests {
     #[test]
     fn clients_that_move_a_hand_keep_their_place() {
         let wait = Duration::from_millis(200);
-        let mut door = door(wait);
+        let mut admission = admission(wait);
         let clients: Vec<_> = (1..=16).map(|n| client(&format!("10.0.0.{n}:1"))).collect();
         std::thread::sleep(wait);
         for moves in &clients[..15] {
             moves.has_moved();
         }
         let from = "10.0.1.1:1".parse().unwrap();
-        let displaced = door.admit(from, &clients).unwrap().expect("one that only reads");
+        let displaced = admission.admit(from, &clients).unwrap().expect("one that only reads");
         assert_eq!(displaced.address, clients[15].address);
         clients[15].has_moved();
-        assert!(door.admit(from, &clients).is_err());
+        assert!(admission.admit(from, &clients).is_err());
     }
 
     #[test]
     fn a_repeated_address_is_refused_and_logged_once() {
-        let mut door = door(Duration::ZERO);
+        let mut admission = admission(Duration::ZERO);
         let said = (0..1000).filter(|n| {
-            let admitted = door.admit(format!("10.0.0.1:{}", n + 1).parse().unwrap(), &[]);
+            let admitted = admission.admit(format!("10.0.0.1:{}", n + 1).parse().unwrap(), &[]);
             admitted.as_ref().is_err_and(|refused| refused.is_said)
         });
         assert_eq!(said.count(), 1);
-        assert!(door.admit("10.0.0.1:9".parse().unwrap(), &[]).is_err());
-        assert!(door.admit("10.0.0.2:9".parse().unwrap(), &[]).is_ok());
+        assert!(admission.admit("10.0.0.1:9".parse().unwrap(), &[]).is_err());
+        assert!(admission.admit("10.0.0.2:9".parse().unwrap(), &[]).is_ok());
     }
 }

@@ -18,18 +18,18 @@ const BESIDE_HOLE_M: f64 = 0.5e-3;
 
 /// Plan that was in force, and the number of seeds in the tissue when it came.
 #[derive(Clone, Debug)]
-struct HeardNeedle {
+struct ReceivedNeedle {
     plan: PlanInForce,
     first_seed: usize,
 }
 
 /// Procedure, from when this host began to listen.
 #[derive(Clone, Debug, Default)]
-pub struct Heard {
+pub struct ReceivedProcedure {
     trace: Trace,
     moments: Moments,
     scene: Option<SceneHeader>,
-    needles: Vec<HeardNeedle>,
+    needles: Vec<ReceivedNeedle>,
     /// Generation of the plan that was checked last.
     generation: Option<(u64, u64)>,
     seeds: Vec<SeedPose>,
@@ -37,7 +37,7 @@ pub struct Heard {
 
 /// Planned seed and the one that was dropped for it, by its index among those in the tissue.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HeardSeed {
+pub struct ReceivedSeed {
     /// Needle that it was planned for, counted from 0.
     pub needle: usize,
     /// Planned seed.
@@ -46,7 +46,7 @@ pub struct HeardSeed {
     pub placed: Option<usize>,
 }
 
-impl Heard {
+impl ReceivedProcedure {
     /// Takes the data that arrived since the last call; `records` are those from the link.
     pub fn take(&mut self, link: &Link, records: &[TickRecord]) {
         // A reset begins a new procedure.
@@ -106,7 +106,7 @@ impl Heard {
         // A needle that is planned again, or one by hand, replaces the received one.
         let goes_on = |of: &Prescribed| number > of.needle && of.needle > 0;
         self.needles.retain(|heard| goes_on(&heard.plan.prescribed));
-        self.needles.push(HeardNeedle {
+        self.needles.push(ReceivedNeedle {
             plan: *plan,
             first_seed,
         });
@@ -139,8 +139,8 @@ impl Heard {
 
     /// Returns every planned seed of the received needles; `strength_u` is that of seeds by hand,
     /// and of plans without a strength.
-    pub fn planned(&self, strength_u: f64) -> Vec<HeardSeed> {
-        let of_needle = |(number, heard): (usize, &HeardNeedle)| {
+    pub fn planned(&self, strength_u: f64) -> Vec<ReceivedSeed> {
+        let of_needle = |(number, heard): (usize, &ReceivedNeedle)| {
             let (plan, count) = (&heard.plan, self.seeds.len());
             let next = self.needles.get(number + 1).map_or(count, |next| next.first_seed);
             let from = heard.first_seed.min(count);
@@ -155,7 +155,7 @@ impl Heard {
                 }
                 _ => pairing::in_order(planned_m.len(), &[], own.len()),
             };
-            let seed = move |(position_m, placed): ([f64; 3], Option<usize>)| HeardSeed {
+            let seed = move |(position_m, placed): ([f64; 3], Option<usize>)| ReceivedSeed {
                 needle: plan.prescribed.needle.saturating_sub(1) as usize,
                 planned: Seed {
                     position_m,

@@ -13,7 +13,7 @@ pub struct Puncture {
 
 /// Punctures of the last insertion, in their order.
 #[derive(Clone, Debug, Default)]
-pub struct Felt {
+pub struct MetMembranes {
     punctures: Vec<Puncture>,
     pressed: Option<Puncture>,
     was_in_contact: bool,
@@ -23,7 +23,7 @@ pub struct Felt {
 /// Most membranes on a path, more than any body has.
 const MOST: usize = 16;
 
-impl Felt {
+impl MetMembranes {
     /// Takes records in their order.
     pub fn take(&mut self, records: &[TickRecord]) {
         for record in records {

@@ -21,7 +21,7 @@ pub(super) struct Rehearsals<'a> {
 
 /// Place of a seed when it was left, and at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Left {
+pub(super) struct SeedAtRest {
     /// Place of the tip, from the entry along the needle, m.
     pub tip_m: f64,
     /// Place at rest, m.
@@ -29,10 +29,10 @@ pub(super) struct Left {
 }
 
 impl Rehearsals<'_> {
-    pub fn try_it(&mut self, drops: Drops) -> Result<Tried, RehearsalError> {
+    pub fn try_it(&mut self, drops: Drops) -> Result<RehearsedDrops, RehearsalError> {
         let left = self.left(&drops)?;
-        let off = |(left, planned): (&Left, [f64; 3])| left.rest_m - Vector3::from(planned);
-        Ok(Tried {
+        let off = |(left, planned): (&SeedAtRest, [f64; 3])| left.rest_m - Vector3::from(planned);
+        Ok(RehearsedDrops {
             error_m: left.iter().zip(self.needle.seeds_m()).map(off).collect(),
             left,
             drops,
@@ -40,7 +40,7 @@ impl Rehearsals<'_> {
     }
 
     /// Returns the places of the seeds, in the order of the drops.
-    pub fn left(&mut self, drops: &Drops) -> Result<Vec<Left>, RehearsalError> {
+    pub fn left(&mut self, drops: &Drops) -> Result<Vec<SeedAtRest>, RehearsalError> {
         self.count += 1;
         let Rest {
             seeds_m, dropped_at_m, ..
@@ -48,7 +48,7 @@ impl Rehearsals<'_> {
         let (entry_m, direction) = (Vector3::from(drops.entry_m), Vector3::from(drops.direction));
         let each = seeds_m.into_iter().zip(dropped_at_m);
         Ok(each
-            .map(|(rest_m, tip_m)| Left {
+            .map(|(rest_m, tip_m)| SeedAtRest {
                 tip_m: (Vector3::from(tip_m) - entry_m).dot(&direction),
                 rest_m: rest_m.into(),
             })
@@ -58,14 +58,14 @@ impl Rehearsals<'_> {
 
 /// Rehearsed drops, and the errors of their seeds.
 #[derive(Clone)]
-pub(super) struct Tried {
+pub(super) struct RehearsedDrops {
     pub drops: Drops,
-    pub left: Vec<Left>,
+    pub left: Vec<SeedAtRest>,
     /// Rest minus plan.
     pub error_m: Vec<Vector3<f64>>,
 }
 
-impl Tried {
+impl RehearsedDrops {
     pub fn mean_m(&self) -> f64 {
         self.error_m.iter().map(Vector3::norm).sum::<f64>() / self.error_m.len().max(1) as f64
     }
@@ -110,7 +110,7 @@ pub(super) fn keep_within(needle: &Needle, limits: &Limits, drops: &mut Drops) {
 
 /// Shifts the needle across by the mean error of its seeds; for a negligible one it stays in place,
 /// where the tissue is prepared.
-pub(super) fn aside(needle: &Needle, last: &Tried, limits: &Limits, drops: &mut Drops) {
+pub(super) fn aside(needle: &Needle, last: &RehearsedDrops, limits: &Limits, drops: &mut Drops) {
     let direction = Vector3::from(needle.direction);
     let sum = last.error_m.iter().fold(Vector3::zeros(), |sum, e| sum + e);
     let mean = sum / last.error_m.len().max(1) as f64;
