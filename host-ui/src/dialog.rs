@@ -1,4 +1,4 @@
-//! Native file dialogs, through the desktop's portal, on a thread of their own: a frame never waits
+//! Native file dialogs, through the desktop's portal, on a separate thread: a frame never waits
 //! for one.
 
 use std::path::{Path, PathBuf};
@@ -114,7 +114,7 @@ impl Dialogs {
         }
         let folder = Path::new(beside.trim()).parent().map(Path::to_owned);
         let job = Job::begin("file dialog", move |answer, _| {
-            // The window may have closed, so nobody reads the answer.
+            // The window may have closed; the answer is then dropped.
             let _ = answer.send(pick(purpose, folder));
         });
         self.open = Some((purpose, job));
@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_a_desktop_the_failure_says_what_to_do_and_no_dialog_is_tried() {
+    fn without_a_desktop_no_dialog_is_tried() {
         assert!(!is_possible(|_| None));
         assert!(!is_possible(|name| (name == "DISPLAY").then(|| PathBuf::from(":99"))));
         assert!(is_possible(

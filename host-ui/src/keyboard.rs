@@ -13,9 +13,9 @@ pub const KEYS: [(&str, &str); 26] = [
     ),
     (
         "Alt with W, S, arrows",
-        "move the other hand, where rt-core has --device-2",
+        "move the second hand, if rt-core has --device-2",
     ),
-    ("B", "brake of the probe's stepper, likewise"),
+    ("B", "brake of the probe's stepper, with --device-2"),
     ("Enter", "the main action of the present step"),
     ("Space", "drop a seed at the tip"),
     ("Ctrl+Z", "undo the last seed or plan change; with Shift redo it"),
@@ -24,8 +24,8 @@ pub const KEYS: [(&str, &str); 26] = [
         "in the template: choose a hole, add or show its needle",
     ),
     ("Shift+arrows, Del", "in the template: move the needle, remove it"),
-    ("E,  D", "force on, after a fault again; force off"),
-    ("P,  K", "parameters; mark this moment, put in exercises"),
+    ("E,  D", "force on, or re-arm after a fault; force off"),
+    ("P,  K", "parameters; mark this moment, inject faults"),
     (
         "1 to 5",
         "look obliquely, from the perineum, the side, above, along the needle",
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn alt_that_is_released_before_the_other_key_does_not_move_the_needle() {
+    fn releasing_alt_first_does_not_move_the_needle() {
         let ctx = egui::Context::default();
         let w = |pressed| Event::Key {
             key: Key::W,

@@ -1,4 +1,4 @@
-//! Reads scenes and images on a thread of its own, so that a large or broken file never delays a
+//! Reads scenes and images on a separate thread, so that a large or broken file never delays a
 //! frame.
 
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ impl Loader {
         let (owned, reported) = (path.to_owned(), progress.clone());
         let job = Job::begin("file reader", move |answer, interrupt| {
             let outcome = read(&owned, &reported.ended_by(interrupt.clone()));
-            // The window may have closed, so nobody reads the answer.
+            // The window may have closed; the answer is then dropped.
             let _ = answer.send(outcome.map_err(LoadError::from));
         });
         let path = path.to_owned();

@@ -45,14 +45,14 @@ impl Default for Pictures {
 }
 
 impl Pictures {
-    /// Requests the next frame, which a thread of its own writes.
+    /// Requests the next frame, which a separate thread writes.
     pub fn request(&self, ctx: &egui::Context) {
         let done = self.done.clone();
         ctx.request_screenshot(move |image| {
             let writer = std::thread::Builder::new().name("picture".to_owned());
             let failed = done.clone();
             let spawned = writer.spawn(move || {
-                // The window may have closed, so nobody reads the answer.
+                // The window may have closed; the answer is then dropped.
                 let _ = done.send(save(&image, Path::new(FOLDER)));
             });
             if let Err(e) = spawned {

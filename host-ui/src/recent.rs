@@ -39,7 +39,7 @@ pub fn checked(mut list: Vec<Recent>) -> Vec<Recent> {
     list
 }
 
-/// Search for missing files, on a thread of its own, because they may lie on a share that does not
+/// Search for missing files, on a separate thread, because they may lie on a share that does not
 /// answer.
 #[derive(Default)]
 pub struct Missing {
@@ -53,7 +53,7 @@ impl Missing {
         let list = list.to_vec();
         self.looking = Some(Job::begin("recent files", move |answer, _| {
             let missing = list.into_iter().filter(|one| !std::path::Path::new(&one.path).exists());
-            // The window may have closed, so nobody reads the answer.
+            // The window may have closed; the answer is then dropped.
             let _ = answer.send(missing.collect());
         }));
     }

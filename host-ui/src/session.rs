@@ -28,7 +28,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_session_keeps_its_folder_and_without_one_it_is_where_sessions_have_it() {
+    fn a_missing_runtime_folder_gets_the_session_default() {
         assert_eq!(missing_runtime_folder(Some(OsStr::new("/run/user/1000"))), None);
         for none in [None, Some(OsStr::new("")), Some(OsStr::new("run"))] {
             let folder = missing_runtime_folder(none).expect("a folder");

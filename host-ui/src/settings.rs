@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_or_hostile_file_gives_settings_that_can_be_used() {
+    fn a_damaged_settings_file_gives_usable_settings() {
         let mut kept = Kept::default();
         for text in [
             "",

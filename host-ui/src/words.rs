@@ -73,7 +73,7 @@ mod tests {
 
     /// Guards against a term that the page lacks, which would show nothing.
     #[test]
-    fn every_word_that_the_window_explains_has_its_row_on_the_page() {
+    fn every_explained_term_has_a_row_on_the_page() {
         let mut files = Vec::new();
         sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/panel"), &mut files);
         let mut asked = Vec::new();
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn the_measures_of_the_dose_are_on_the_page_by_the_names_that_are_shown() {
+    fn the_page_explains_every_dose_measure() {
         let dvh = Dvh::new(&[145.0; 10], &[1e-6; 10]).expect("a histogram");
         for structure in [DoseStructure::Target, DoseStructure::Urethra, DoseStructure::Rectum] {
             let figures = structure.figures(&dvh, 145.0);

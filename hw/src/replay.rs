@@ -15,8 +15,8 @@ pub struct ReplayDevice {
 }
 
 impl ReplayDevice {
-    /// `samples` were taken `period_s` apart; their sequence numbers are replaced. `None` if there is no sample, one
-    /// is not finite, or the period is not above zero.
+    /// Creates a device from `samples` taken `period_s` apart, whose sequence numbers are replaced.
+    /// Returns `None` without a sample, if one is not finite, or if the period is not above zero.
     ///
     /// ```
     /// use stylet_hw::{Device, DeviceInfo, ReplayDevice, SimulatedPhantom, SimulatedPhantomConfig};

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 pub enum OutputError {
     /// It contains earlier files.
     #[error(
-        "{} already contains {count} files, and results are not mixed; choose another folder, or delete it",
+        "{} holds {count} files already, and results are not mixed; choose another folder, or delete it",
         .folder.display()
     )]
     NotEmpty {

@@ -102,7 +102,7 @@ pub fn voxel_count(dims: &[u64]) -> Result<usize, ContentError> {
     }
 }
 
-/// Returns whether data of this many bytes can hold the volume that the header claims, before it is
+/// Checks that data of this many bytes can hold the volume that the header claims, before it is
 /// allocated.
 pub fn must_hold(needed: u64, have: u64, packed: bool) -> Result<(), ContentError> {
     let most = if packed {

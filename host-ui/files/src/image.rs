@@ -69,7 +69,7 @@ impl Image {
         })
     }
 
-    /// Returns whether the centre of the gland (scene, m) lies in the image; the error gives its
+    /// Checks that the centre of the gland (scene, m) lies in the image; the error gives its
     /// distance from it.
     pub fn covers(&self, patient: &PatientFrame, middle_m: [f64; 3]) -> Result<(), ContentError> {
         let beside_m = self.distance_m(patient, middle_m);

@@ -95,7 +95,7 @@ pub struct Server {
     address: SocketAddr,
 }
 
-/// Locks; a thread that panicked leaves only whole maps behind.
+/// Locks the mutex; a thread that panicked leaves only whole maps behind.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

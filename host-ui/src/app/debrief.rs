@@ -82,7 +82,7 @@ impl App {
         match delivered {
             Ok(delivered) => {
                 self.debrief = Some(Job::begin("debrief", move |messages, _| {
-                    // The window may have closed, so nobody reads the answer.
+                    // The window may have closed; the answer is then dropped.
                     let _ = messages.send(write(&delivered, folder));
                 }));
             }
@@ -172,7 +172,7 @@ fn source_of(model: &str, prescription_gy: f64) -> Result<(Source, f64), Failure
     if model.is_empty() {
         return Ok(exchange::usual()?);
     }
-    let source = Source::known(model).ok_or_else(|| format!("no source is known as \"{model}\""))?;
+    let source = Source::known(model).ok_or_else(|| format!("unknown source \"{model}\""))?;
     Ok((source, prescription_gy))
 }
 

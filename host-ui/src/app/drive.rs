@@ -207,7 +207,7 @@ mod tests {
     /// Guards against two faults: a frame of more than 100 ms stopped the needle, and a sequence of
     /// slow frames slowed it.
     #[test]
-    fn the_needle_goes_as_fast_as_it_is_wished_whatever_the_frames_and_goals_are_bounded() {
+    fn the_needle_moves_at_its_wished_speed_at_any_frame_rate() {
         for frame_s in [0.001, 0.004, 0.016, 0.040, 0.111, 0.200, 0.240] {
             let (mut drive, mut tip, mut goals, mut time_s) = (Drive::default(), OUTSIDE, 0, 0.0);
             let mut last = None;
@@ -232,7 +232,7 @@ mod tests {
     /// Guards against a hand that continued for 0.5 s, 20 mm at the speed of the keys, however fast
     /// the frames had been.
     #[test]
-    fn a_window_that_hangs_stops_the_needle_after_a_tenth_of_a_second_or_one_and_a_half_frames() {
+    fn a_hung_window_stops_the_needle_in_time() {
         for (frame_s, goes_on_s) in [
             (0.004, 0.1),
             (0.016, 0.1),
@@ -257,7 +257,7 @@ mod tests {
     /// Checks one slow frame among fast ones: the needle waits for the window, and continues from
     /// where it is.
     #[test]
-    fn a_frame_that_nobody_foresaw_holds_the_needle_until_the_window_is_back() {
+    fn one_slow_frame_pauses_the_needle() {
         let (mut drive, mut tip) = (Drive::default(), OUTSIDE);
         let mut goal = drive.step(&along(0.04), &tip, 0.016).expect("a goal");
         for frame_s in [0.016; 20].into_iter().chain([0.3]).chain([0.016; 20]) {
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_needle_that_is_held_back_or_a_frame_that_hangs_is_no_jump() {
+    fn a_held_needle_and_a_hung_frame_cause_no_jump() {
         let mut drive = Drive::default();
         for frame_s in [0.016, 100.0] {
             for _ in 0..1000 {
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn a_release_is_reported_once_and_the_next_drive_begins_at_the_tip() {
+    fn a_release_is_reported_once() {
         let mut drive = Drive::default();
         assert!(!drive.stop(&OUTSIDE), "nothing was driven");
         drive.step(&along(0.04), &OUTSIDE, 0.016);
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn across_the_template_only_outside_and_only_where_there_are_holes() {
+    fn the_needle_moves_across_only_outside_and_over_holes() {
         let wish = across(0.01, -0.01);
         assert!(Drive::follows(&wish, &OUTSIDE));
         for inside in [
@@ -385,7 +385,7 @@ mod tests {
     }
 
     #[test]
-    fn no_goal_is_slower_than_the_core_takes() {
+    fn no_goal_is_slower_than_the_core_s_limit() {
         let goal = Drive::default().step(&along(1e-9), &OUTSIDE, 0.016).expect("a goal");
         assert_eq!(goal.speed_m_per_s, SLOWEST_M_PER_S);
     }

@@ -51,7 +51,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_interval_gives_its_rate_and_the_means_and_the_next_begins_at_zero() {
+    fn an_interval_gives_its_rate_and_mean_costs() {
         let begun = Instant::now();
         let mut frames = Frames::new(begun);
         let cost = |cpu_us| FrameCost {

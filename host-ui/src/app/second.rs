@@ -113,7 +113,7 @@ impl App {
         };
         if wish == Speed::default() {
             if self.second_drive.stop() {
-                self.send("Stop other hand", &Request::StopSecondHand);
+                self.send("Stop second hand", &Request::StopSecondHand);
             }
         } else if self.second_drive.is_locked {
             self.refuse_locked();
@@ -130,7 +130,7 @@ impl App {
             ProbeAction::ToggleBrake => {
                 self.second_drive.is_locked = !self.second_drive.is_locked;
                 if self.second_drive.is_locked && self.second_drive.stop() {
-                    self.send("Stop other hand", &Request::StopSecondHand);
+                    self.send("Stop second hand", &Request::StopSecondHand);
                 }
             }
             ProbeAction::Drag { .. } if self.second_drive.is_locked => self.refuse_locked(),
@@ -157,7 +157,7 @@ impl App {
             acceleration_m_per_s2: ACCELERATION_M_PER_S2,
         };
         let up = Some(goal.up.into());
-        self.send("Other hand", &Request::MoveSecondHand(ProbeMove { hand, up }));
+        self.send("Second hand", &Request::MoveSecondHand(ProbeMove { hand, up }));
     }
 }
 
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn the_hand_goes_as_fast_as_it_is_wished_and_no_goal_runs_away_from_one_that_is_held_back() {
+    fn the_probe_s_hand_moves_at_its_wished_speed() {
         let wish = Speed {
             m_per_s: Vector3::new(0.0, 0.03, 0.04),
             rad_per_s: 0.5,

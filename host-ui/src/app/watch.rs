@@ -53,7 +53,7 @@ impl Recording {
             .map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         let path = path.to_owned();
         let job = Job::begin("recording", move |answer, interrupt| {
-            // The window may have closed, so nobody reads the answer. The same holds below.
+            // The window may have closed; the answer is then dropped. The same holds below.
             let _ = answer.send(record::played(&path, interrupt).map_err(WatchError::from));
         });
         self.reading = Some((name, job));
@@ -76,11 +76,11 @@ impl App {
     pub(super) fn act_on_recording(&mut self, action: WatchAction) {
         match action {
             WatchAction::Example | WatchAction::File(_) if self.run.is_some() => {
-                self.shown.note = Some(refusal("Stop the needles first, then look at a recording.".to_owned()));
+                self.shown.note = Some(refusal("Stop the needles first, then open a recording.".to_owned()));
             }
             // Its keys would no longer reach the core.
             WatchAction::Example | WatchAction::File(_) if self.shown.is_engaged() && !self.watches() => {
-                let why = "Turn the force off first (key D), then look at a recording.";
+                let why = "Turn the force off first (key D), then open a recording.";
                 self.shown.note = Some(refusal(why.to_owned()));
             }
             WatchAction::Example => self.recording.read_example(),
@@ -112,7 +112,7 @@ impl App {
     fn open_recording(&mut self, name: String, played: Played) {
         self.shown.note = played.cut_off.as_ref().map(|why| Note {
             refused: false,
-            text: format!("{name} is shown up to here: {why}"),
+            text: format!("{name} is shown up to its first error: {why}"),
         });
         self.change_link(|instance| Link::playing(instance, Arc::new(played)));
         self.recording.name = name;

@@ -8,10 +8,10 @@ use stylet_base::{write_streamed, write_whole};
 use stylet_implant::class::{self, Class};
 
 const HELP: &str = "\
-Reads DIR/NAME/DATE/score.json, as 'host-ui --class DIR --name NAME' writes one at the end of each procedure; folders of several rooms or
-days may be given together, and a NAME in two of them is one trainee. A file that is no debrief is left out, and the page names it.
+Reads DIR/NAME/DATE/score.json, which 'host-ui --class DIR --name NAME' writes at the end of each procedure. Folders of several rooms
+or days may be given together; a NAME in two of them is one trainee. A file that is not a debrief is left out and named on the page.
 
-Written to --out, a new or empty folder: class.html (stands by itself) and class.csv.
+Written to --out, a new or empty folder: class.html (self-contained) and class.csv.
 
 Example:
   host-ui class monday tuesday --out class-page";

@@ -12,12 +12,12 @@ use stylet_implant::readers::{DoseFile, read_any_dose};
 const USUAL_THRESHOLD_PERCENT: f64 = 10.0;
 
 const HELP: &str = "\
-Doses are RT Dose (.dcm) or dose_grid.csv of host-ui dose. The second one is taken at every voxel of the first, linearly between its
-own; voxels outside of it are counted and left out.
+Doses are RT Dose (.dcm) or dose_grid.csv of host-ui dose. The second one is interpolated linearly at every voxel of the first;
+voxels outside of it are counted and left out.
 
-With --gamma the share of voxels whose gamma index is at most 1 is given as well (Low et al. 1998): dose difference in percent and
-distance in mm, searched in three dimensions to a gamma of 2 and between voxels. The percents are of --of-gy (global), or with
---local of the dose at each voxel.
+With --gamma the share of voxels whose gamma index is at most 1 is reported too (Low et al. 1998). It takes a dose difference in
+percent and a distance in mm, and searches in three dimensions, between voxels, up to a gamma of 2. The percents refer to --of-gy
+(global), or with --local to the dose at each voxel.
 
 Examples:
   host-ui compare study/dose.dcm other/dose.dcm --json difference.json
@@ -86,7 +86,7 @@ impl CompareArgs {
             println!("{name:<17} {gy:>14.6} Gy {:>12.6} % of {of_gy:.3} Gy", percent(gy));
         }
         let [x, y, z] = found.largest_at_mm;
-        println!("the largest lies at {x:.2}, {y:.2}, {z:.2} mm");
+        println!("the largest is at {x:.2}, {y:.2}, {z:.2} mm");
         let gamma = self.criterion(of_gy)?.map(|criterion| {
             let agreement = agreement(&one, &other, self.threshold / 100.0 * of_gy, &criterion);
             (criterion, agreement)

@@ -23,17 +23,17 @@ use stylet_implant::readers::{DayOfImplant, DoseFile, Mapped, SeedDefaults, Seed
 const MAX_PLAN_BYTES: u64 = 4 << 20;
 
 const HELP: &str = "\
-What is converted into what:
-  label volume   .nii .nii.gz .nrrd .nhdr .seg.nrrd .mha .mhd, .dcm (RT Structure Set, with its images beside it)
+Conversions:
+  label volume   .nii .nii.gz .nrrd .nhdr .seg.nrrd .mha .mhd, .dcm (RT Structure Set, with its images in the same folder)
                  into .nrrd .seg.nrrd .mha .nii.gz, .dcm (RT Structure Set)
   seed plan      .csv (columns as for host-ui dose) into .dcm (RT Plan; needs --source), and back;
                  .toml (plan of host-ui) into .dcm or .csv; .dcm into .dcm
   dose           .csv (dose_grid.csv of host-ui dose) into .dcm (RT Dose; needs --plan) or .nrrd;
                  .dcm (RT Dose) into .csv, .nrrd or .dcm
 
-Patient, study and frame of reference of a DICOM file are kept, and a table of seeds keeps them in columns. Formats that have
-no place for them lose them: give --like FILE, a DICOM file of the same patient, when you come back to DICOM. Files that belong
-together (structure set, plan and dose of one study) are written by host-ui dicom.
+Patient, study and frame of reference of a DICOM file are kept, and a table of seeds keeps them in columns. Other formats lose
+them: give --like FILE, a DICOM file of the same patient, when you convert back to DICOM. Use host-ui dicom to write files that
+belong together (structure set, plan and dose of one study).
 
 Orientation and spacing are kept: NIfTI is in RAS, DICOM and MetaImage in LPS, NRRD names its own.
 Losses (overlaps, structures without volume) are reported.
@@ -179,7 +179,7 @@ impl ConvertArgs {
             return Ok(of_file.unwrap_or_default());
         };
         let identity = Identity::of_file(like)?;
-        Ok(identity.ok_or_else(|| format!("{}: it is no DICOM file; --like needs one", like.display()))?)
+        Ok(identity.ok_or_else(|| format!("{}: it is not a DICOM file; --like needs one", like.display()))?)
     }
 
     fn seeds_to_plan(&self) -> Result<(), CommandError> {

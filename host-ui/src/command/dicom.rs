@@ -28,8 +28,8 @@ const HELP: &str = "\
 Writes three files that belong together into --out, a new or empty folder: structure_set.dcm, plan.dcm and dose.dcm; and study.json
 with their UIDs, the inputs with their SHA-256, the version and the time.
 
-Patient, study and frame of reference are those of --like, or else of the structure set, or of the plan of the seeds, or of the
-images; where none of them is DICOM they are made, once for all three. Files of another patient or of another frame of reference are
+Patient, study and frame of reference are those of --like, or else of the structure set, of the plan of the seeds, or of the images.
+If none of them is DICOM, they are created once for all three files. Files of another patient or of another frame of reference are
 refused.
 
   structure_set.dcm  the contours as drawn, or outlines of a label volume; each names its image, and all name their series
@@ -171,7 +171,7 @@ impl DicomArgs {
         let mut all: Vec<(PathBuf, Identity)> = Vec::new();
         if let Some(like) = &self.like {
             let identity = Identity::of_file(like)?;
-            let identity = identity.ok_or_else(|| format!("{}: it is no DICOM file", like.display()))?;
+            let identity = identity.ok_or_else(|| format!("{}: it is not a DICOM file", like.display()))?;
             all.push((like.clone(), identity));
         }
         all.extend(
@@ -217,12 +217,16 @@ struct Drawn {
 fn one_series(folder: &Path) -> Result<Vec<Slice>, CommandError> {
     let slices = images::all_in(folder).map_err(|why| FileError::of(folder, why))?;
     let Some(first) = slices.first() else {
-        return Err(format!("{}: it holds no image series; choose another folder", folder.display()).into());
+        return Err(format!(
+            "{}: it contains no image series; choose another folder",
+            folder.display()
+        )
+        .into());
     };
     let other = slices.iter().find(|slice| slice.series != first.series);
     if other.is_some() {
         return Err(format!(
-            "{}: it holds images of several series; leave those of one there",
+            "{}: it contains images of several series; keep those of one",
             folder.display()
         )
         .into());

@@ -28,11 +28,11 @@ Units: positions in mm (any frame, the same for all files; structures are in pat
 
 Seeds are CSV with a header; the columns in brackets may be left out, and lines that begin with # are skipped:
   x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u or activity_mci][,strength_date][,needle][,hole]
-A table of another program may have semicolons or tabs, and headers that state quantity and unit, such as Pos X (cm). Any other header
-is named by --column: --column x_mm=-Lateral:cm takes the column Lateral, in cm and with the other sign; columns that nobody names are
-then passed over. How each column was taken is reported.
-A plan says itself which isotope its seeds are of, how strong they are on which day, and what is prescribed: seeds of another
-isotope than the source are refused, strengths decay to --implant-date, and its prescription counts unless another is asked for.
+A table of another program may have semicolons or tabs, and headers that state quantity and unit, such as Pos X (cm). Map any other
+header with --column: --column x_mm=-Lateral:cm takes the column Lateral, in cm and with the opposite sign; unmapped columns are then
+skipped. The meaning of each column is reported.
+A plan declares the isotope of its seeds, their strength on a given day, and the prescription. Seeds of another isotope than the
+source are refused, strengths decay to --implant-date, and the plan's prescription applies unless --prescription-gy is given.
 A seed with an axis gets the 2D formalism, a seed without one the 1D formalism (averaged over directions).
 
 Examples:

@@ -19,10 +19,10 @@ const MOST_SEEDS: u64 = 400;
 const START_BYTES: u64 = 160;
 
 const HELP: &str = "\
-Voxels from a threshold on are joined to components; each is fitted by as many seeds as its signal (the sum of what it has above the
-tissue) holds, so that seeds that touch are split. With --count the sum of all is the number that was implanted. Every seed gets a
-place (mm, RAS), an axis, a confidence (probability of the count of its component times the share of the signal that the fit explains)
-and the standard deviation of its place. What is doubtful is listed with its signal in seeds.
+Voxels above a threshold are joined into components. Each is fitted by as many seeds as its signal (the sum of its excess over the
+tissue) indicates, so that seeds that touch are split. With --count the total is the number that was implanted. Every seed gets a
+position (mm, RAS), an axis, a confidence (probability of the count of its component times the share of the signal that the fit
+explains) and the standard deviation of its position. Doubtful components are listed with their signal in seeds.
 
 The CT is a DICOM series (its folder, or one of its files), NIfTI-1, NRRD or MetaImage in HU; crop it to the gland and its surroundings. Written to --out, a new or empty folder:
 seeds.csv, which `host-ui dose --seeds` and `host-ui post-implant` read, and found.json.
@@ -109,7 +109,7 @@ impl FindSeedsArgs {
         }
         if let Some(count) = self.count.filter(|n| *n != found.seeds.len() as u64) {
             eprintln!(
-                "note: {} seeds are asked for and the signal holds {}; look at what is doubtful, or choose another --threshold",
+                "note: {} seeds are requested and the signal indicates {}; check the doubtful ones, or choose another --threshold",
                 count,
                 found.seeds.len()
             );

@@ -21,20 +21,20 @@ const MAX_TRIALS: u64 = 1_000_000;
 
 const HELP: &str = "\
 Every trial moves each seed by a normal error, keeps its axis and strength, and computes all metrics again. The same --seed gives the
-same trials on any number of cores. Ctrl-C ends early and writes the trials done so far. What may happen to the seeds:
+same trials on any number of cores. Ctrl-C ends early and writes the trials done so far. Possible errors of the seeds:
   an error of each seed (--sigma-mm); along the needle, the axis of the seed, it may have another deviation (--sigma-along-mm)
-  seeds of one needle share their errors (--strand-correlation): 0 not at all, 1 they move as one
+  errors common to the seeds of one needle (--strand-correlation): 0 for none, 1 for seeds that move as one
   an error of the whole implant: the same in every trial (--shift-mm), or drawn for each (--shift-sigma-mm)
-  seeds that are lost, each by itself (--loss)
-  a gland that swells at the implant and shrinks, with its seeds (--edema, --edema-half-life); the plan lies in the gland without
+  loss of single seeds (--loss)
+  a gland that swells at the implant and shrinks, with its seeds (--edema, --edema-half-life); the plan applies to the gland without
   edema, and a trial takes about twelve times as long
   instead of those of each seed, the errors that a study of rt-core found: shift, deviations, correlation on a needle (--errors-of)
-What one of them draws does not change when another is added. The planned figures are those without any of them.
+The random numbers of one error do not change when another is added. The planned figures are those without any error.
 
 Criteria are the limits of ABS and AAPM TG-137 for target (D90, V100, V150), urethra (D10, D30) and rectum (D2cc), and
 those of --criterion. The share of trials that meet each has its 95 % interval by Wilson, the mean of each measure by Student's t.
 
-Examples; the first has the settings of published studies (4 mm, 1000 trials), its figures are those of your plan:
+Examples (the first has the settings of published studies, 4 mm and 1000 trials):
   host-ui perturb --source sources/i125_6711.toml --plan seeds.csv --strength-u 0.5 --structures gland.nii.gz \\
       --name 1=Prostate --name 2=Urethra --name 3=Rectum --sigma-mm 4 --trials 1000 --out perturb
   host-ui perturb --source sources/i125_6711.toml --plan plan.toml --structures gland.nii.gz --name 1=Prostate --sigma-mm 2 \\

@@ -23,11 +23,10 @@ use stylet_surfaces::field::Field;
 const SNAPSHOT_WITHIN: Duration = Duration::from_secs(3);
 
 const HELP: &str = "\
-The picture shows the tissue as it lies now, with the needle and the seeds where they are. Ultrasound: the probe lies in the rectum,
-or behind the target where the scene has none; its array stands at the middle of the target. Fluoroscopy: the C-arm turns about the
-middle of the target; 0 degrees looks from behind the patient, positive orbital angles move the detector to his left, positive cranial
-angles towards his head. The dose that is printed is air kerma 15 cm before the isocentre. What is simulated and what is left out
-stands in docs/imaging.md.
+The picture shows the present state of tissue, needle and seeds. Ultrasound: the probe is in the rectum, or behind the target if the
+scene has none; its array is at the centre of the target. Fluoroscopy: the C-arm turns about the centre of the target; 0 degrees looks
+from behind the patient, positive orbital angles move the detector to his left, positive cranial angles towards his head. The printed
+dose is the air kerma 15 cm before the isocentre. docs/imaging.md describes the simulation and its limits.
 
 Examples:
   host-ui picture --core target/quick/rt-core --scene pelvis --view transverse --template --out prostate.png

@@ -28,14 +28,14 @@ const DOSE_PITCH_M: f64 = 1e-3;
 const POINTS: usize = 100_000;
 
 const HELP: &str = "\
-Without --seeds needles, seeds and one strength are searched for that keep the limits: target V100 at least 95 %, D90 100 to 125 %,
+Without --seeds the command searches needles, seeds and one strength that meet the limits: target V100 at least 95 %, D90 100 to 125 %,
 V150 at most 60 %; urethra D10 at most 150 %, D30 130 %; rectum D2cc at most 100 %; at most 25 needles, none through bone. A limit
-that cannot be kept is reported. Within the limits the plan is robust: 95 % of 300 trials in which every seed misses its place by
-4 mm along each axis (standard deviation) keep a D90 of 90 % of the prescription. The option --robust asks for their mean or another
-percentile, --misplacement-mm for another deviation, and --errors-of takes shift, deviations and correlation from the seeds of a
-study. With --compare three plans are searched for: what each keeps and costs is printed, and one of them is written. Where no urethra
-is known the plan is modified peripheral loading, and says so. With --seeds the plan is the seeds of a table (columns as in
-'host-ui dose --help'), put on needles by their numbers, or by their lines where it has none.
+that cannot be met is reported. Within the limits the plan is robust: 95 % of 300 trials in which every seed is misplaced by 4 mm
+along each axis (standard deviation) meet a D90 of 90 % of the prescription. --robust selects their mean or another percentile,
+--misplacement-mm another deviation, and --errors-of takes shift, deviations and correlation from the seeds of a study. --compare
+searches three plans, prints the robustness and the cost of each, and writes one of them. Without a known urethra the plan is modified
+peripheral loading, with a note. With --seeds the plan consists of the seeds of a table (columns as in 'host-ui dose --help'), assigned
+to needles by their numbers, or by their lines if there are none.
 
 Units: mm, patient frame (RAS); strength in U (1 U = 1 cGy cm2/h).
 
@@ -129,7 +129,8 @@ enum Wanted {
     /// The one with the fewest needles
     FewerNeedles,
     /// The one with the smallest V150
-    Cooler,
+    #[value(alias = "cooler")]
+    LowerV150,
 }
 
 impl PlanArgs {
@@ -242,7 +243,7 @@ impl PlanArgs {
 fn comparison(found: &[FirstPlan]) -> String {
     let mut text = format!(
         "{:14} {:>6} {:>6} {:>6} {:>7} {:>5} {:>8} {:>10} {:>8} {:>7}\n",
-        "plan", "V100", "D90", "V150", "needles", "seeds", "keep D90", "mean D90", "D90 p10", "limits"
+        "plan", "V100", "D90", "V150", "needles", "seeds", "meet D90", "mean D90", "D90 p10", "limits"
     );
     for plan in found {
         let Some(m) = &plan.measures else { continue };

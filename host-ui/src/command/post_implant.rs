@@ -17,12 +17,13 @@ use stylet_implant::sheet::{self, Column, Implant, State};
 
 const HELP: &str = "\
 Seeds are those of `host-ui dose --seeds`; those of a CT come from `host-ui find-seeds`. A state with structures of its own
-(--day0-structures, --day30-structures) is judged in its own frame. Without them its seeds are fitted to those of the plan (a turn and a
-shift, seeds paired one to one) and judged in the structures of the plan, and the page says so; the residuals are reported.
+(--day0-structures, --day30-structures) is evaluated in its own frame. Without them its seeds are fitted to those of the plan (a
+rotation and a shift, seeds paired one to one) and evaluated in the structures of the plan, with a note on the page; the residuals are
+reported.
 
 With --edema every state gets a second column: the dose in a gland that swells by that share of its volume at the implant and shrinks
-with --edema-half-life, with the seeds that move with it. Planned and delivered seeds lie as in the gland without edema, those of day 0 and
-day 30 as on that day.
+with --edema-half-life, together with its seeds. Planned and delivered seeds have their positions in the gland without edema, those of
+day 0 and day 30 their positions on that day.
 
 Written to --out, a new or empty folder: post_implant.html (one page, A4), post_implant.csv, post_implant.json.
 

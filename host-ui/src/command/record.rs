@@ -37,7 +37,7 @@ impl RecordArgs {
         let to = match (self.out, self.live) {
             (Some(file), _) => To::File(file),
             (None, Some(address)) => To::Viewers(address),
-            (None, None) => return Err("--out or --live says where the session goes".into()),
+            (None, None) => return Err("give --out or --live for the session".into()),
         };
         let ended = record::run(&record::Options {
             instance: self.instance.clone(),

@@ -14,10 +14,10 @@ use stylet_population as population;
 
 const HELP: &str = "\
 Reads every finished shard of a study (shard-*.parquet). Dose is that of the whole implant: D90 and V100 of the target as planned and
-with the seeds where they came to rest, in the structures that the study wrote beside its shards. An implant with a needle that failed
-has no dose, and the page says how many there are.
+with the seeds at rest, in the structures that the study wrote next to its shards. An implant with a failed needle has no dose; the
+page counts them.
 
-Written to --out, a new or empty folder: study.html (stands by itself), insertions.csv, implants.csv, distributions.csv;
+Written to --out, a new or empty folder: study.html (self-contained), insertions.csv, implants.csv, distributions.csv;
 made.json names the shards with their SHA-256, version and time. Programs that read Parquet query the shards themselves; docs/study.md
 has examples for DuckDB and polars.
 

@@ -1,4 +1,4 @@
-//! Dose of the placed or planned seeds, computed on a thread of its own whenever they change.
+//! Dose of the placed or planned seeds, computed on a separate thread whenever they change.
 
 mod figures;
 

@@ -76,7 +76,7 @@ fn the_shell_of_a_seed_lies_where_the_formula_gives_that_dose() {
 }
 
 #[test]
-fn it_is_computed_again_only_when_a_seed_was_moved_added_or_removed() {
+fn dose_is_recomputed_only_when_seeds_change() {
     let scene = scene();
     let mut worker = DoseWorker::new();
     let first = wait(&mut worker, &scene, &[pose(0.02)]).number;

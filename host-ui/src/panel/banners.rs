@@ -53,8 +53,8 @@ fn of_recording(watched: &Watched) -> Banner {
         level: BannerLevel::Info,
         title: "A recording",
         text: match watched.has_ended {
-            true => "This is its end. Close it, start rt-core, and insert a needle yourself.".to_owned(),
-            false => "Needle, force and tissue are as they were; nothing can be moved.".to_owned(),
+            true => "End of recording. Close it, start rt-core, and insert a needle yourself.".to_owned(),
+            false => "Needle, force and tissue are shown as recorded; nothing can be moved.".to_owned(),
         },
         remedy: Some(("Close", Action::Watch(WatchAction::Close))),
     }
@@ -73,7 +73,7 @@ fn of_controllers(shown: &Shown) -> Vec<Banner> {
         banner("Unplugged", text, Some(("Dismiss", Action::DismissDisconnected)))
     });
     let denied = shown.controllers.denied.iter();
-    let denied = denied.map(|why| banner("A controller is not read", why.clone(), None));
+    let denied = denied.map(|why| banner("A controller cannot be read", why.clone(), None));
     unplugged.into_iter().chain(denied).collect()
 }
 
@@ -86,7 +86,7 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
         LinkStatus::Silent { since } => {
             return vec![Banner {
                 level: BannerLevel::Bad,
-                title: "rt-core is silent",
+                title: "The core is silent",
                 text: format!(
                     "No data from the core for {:.1} s; showing the last state.",
                     since.as_secs_f64()
@@ -132,7 +132,7 @@ fn of_second(shown: &Shown) -> Option<Banner> {
     };
     let text = match fault {
         Some(Fault::LoopStopped) => {
-            "Its loop in rt-core stands still, so its force is off. The needle goes on; restart rt-core when you are done.".to_owned()
+            "Its loop in rt-core has stopped, so its force is off. The needle continues; restart rt-core when you are done.".to_owned()
         }
         fault => format!(
             "{} The needle's force is not affected.",
@@ -154,10 +154,10 @@ fn of_line(line: &Relayed) -> Banner {
     if line.is_heard == 0 {
         return Banner {
             level: BannerLevel::Bad,
-            title: "The relay is not heard",
+            title: "No data from the relay",
             text: format!(
-                "{server} has sent {name} nothing for {age_s:.1} s: what is shown is out of date, and requests are refused. The window goes \
-                 on by itself when the line is back."
+                "{server} has sent no data of {name} for {age_s:.1} s: the display is out of date, and requests are refused. The window continues \
+                 when the connection is restored."
             ),
             remedy: None,
         };
@@ -169,7 +169,7 @@ fn of_line(line: &Relayed) -> Banner {
     };
     Banner {
         level: BannerLevel::Info,
-        title: "Over a relay",
+        title: "Connected over a relay",
         text: format!(
             "{name}, {}, at {server}. {operator}. Shown {:.0} ms late, round trip {:.0} ms; {} records and {} snapshots lost.",
             line.role.read(),
@@ -178,7 +178,7 @@ fn of_line(line: &Relayed) -> Banner {
             line.records_lost,
             line.snapshots_lost
         ),
-        remedy: Some(("Who is there", Action::ToggleClass)),
+        remedy: Some(("Members", Action::ToggleClass)),
     }
 }
 
@@ -187,14 +187,15 @@ fn force_is_off(shown: &Shown) -> Option<Banner> {
         return Some(Banner {
             level: BannerLevel::Warn,
             title: "The force is off",
-            text: "The device is moved but not felt. Key E turns it on.".to_owned(),
+            text: "Motion is tracked, but no force is rendered. Key E turns it on.".to_owned(),
             remedy: Some(("Turn it on", Action::Send(Request::Engage))),
         });
     }
     shown.is_waiting().then(|| Banner {
         level: BannerLevel::Warn,
-        title: "The force waits",
-        text: "It would begin with a jump. Move the needle until it is small, best outside the tissue.".to_owned(),
+        title: "The force is held back",
+        text: "It would start with a jump. Move the needle until the force is small, preferably outside the tissue."
+            .to_owned(),
         remedy: None,
     })
 }
@@ -205,7 +206,7 @@ fn exercises(shown: &Shown) -> Vec<Banner> {
     let banner = |exercise: Exercise| Banner {
         level: BannerLevel::Warn,
         title: "Exercise",
-        text: format!("{}. An instructor put it in.", capital(&exercise.to_string())),
+        text: format!("{}. Injected by the instructor.", capital(&exercise.to_string())),
         remedy: None,
     };
     in_force.all().map(banner).collect()
@@ -217,16 +218,16 @@ fn without_line(shown: &Shown) -> Option<Banner> {
     let is_missing = shown.needle_line() == Some(NeedleLine::Missing);
     is_missing.then(|| Banner {
         level: BannerLevel::Warn,
-        title: "No line",
+        title: "No needle line",
         text: match shown.lag() {
             Some((lag_s, lag_m)) => format!(
-                "The tissue was not prepared for this needle, and its answer is {:.0} ms and {} behind: neither force nor seeds are to be \
-                 relied on. Take the needle out, and wait for LINE READY.",
+                "The tissue was not prepared for this needle, and its answer is {:.0} ms and {} behind: neither force nor seed positions are \
+                 reliable. Withdraw the needle, and wait for LINE READY.",
                 lag_s * 1e3,
                 stylet_base::format::length(lag_m)
             ),
             None => "The tissue was not prepared for this needle: its force follows the paper's law, and its seeds may rest up to 2 cm \
-                     from where they should. Take it out, and wait for LINE READY."
+                     from plan. Withdraw it, and wait for LINE READY."
                 .to_owned(),
         },
         remedy: None,
@@ -240,8 +241,8 @@ fn folded(shown: &Shown) -> Option<Banner> {
         level: BannerLevel::Warn,
         title: "Tissue folded",
         text: format!(
-            "The linear answer of the tissue at the tip is folded from {:.1} mm of displacement on. Until that eases, force and places \
-             there are not those of tissue.",
+            "The linear tissue model at the tip is folded beyond {:.1} mm of displacement. Until the load eases, force and positions \
+             there are not realistic.",
             stylet_base::format::mm(folded_from_m)
         ),
         remedy: None,
@@ -252,7 +253,7 @@ fn folded(shown: &Shown) -> Option<Banner> {
 fn refused(shown: &Shown) -> Option<Banner> {
     (shown.refusals > 0).then(|| Banner {
         level: BannerLevel::Info,
-        title: "rt-core refused",
+        title: "Request refused",
         text: match shown.last_refusal.as_str() {
             "" => format!("{} requests", shown.refusals),
             why => format!("{} requests; the last: {}", shown.refusals, why.replace('\n', "; ")),
@@ -273,7 +274,7 @@ fn absent(shown: &Shown, why: &str) -> Banner {
     };
     Banner {
         level: BannerLevel::Bad,
-        title: "rt-core is absent",
+        title: "The simulator core is not running",
         text,
         remedy: (!shown.reads_recording).then_some(remedy),
     }
@@ -290,8 +291,8 @@ fn what_ended(shown: &Shown) -> String {
     };
     let kept = match shown.seeds.len() {
         0 => String::new(),
-        1 => "The plan and 1 seed stay shown. ".to_owned(),
-        n => format!("The plan and {n} seeds stay shown. "),
+        1 => "The plan and 1 seed remain on display. ".to_owned(),
+        n => format!("The plan and {n} seeds remain on display. "),
     };
     fault + &kept
 }
@@ -300,10 +301,8 @@ fn not_real_time(shown: &Shown) -> Banner {
     let advice = shown.session.map(|s| s.advice.read()).unwrap_or_default();
     let asked = shown.session.is_some_and(|s| s.no_rt_asked != 0);
     let text = match (advice.trim(), asked) {
-        ("", true) => {
-            "rt-core was started with --no-rt: timing measured here is not that of a real-time run.".to_owned()
-        }
-        ("", false) => "Run rt-core doctor: it shows what is missing and what to do.".to_owned(),
+        ("", true) => "Started with --no-rt. Restart without it for real-time forces.".to_owned(),
+        ("", false) => "Run rt-core doctor: it lists the problems and their remedies.".to_owned(),
         (advice, _) => advice.replace('\n', "  "),
     };
     Banner {

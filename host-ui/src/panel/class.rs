@@ -50,7 +50,7 @@ pub fn banners(shown: &Shown) -> Vec<Banner> {
     if hand(shown, class) == Hand::Held && !asked.is_empty() {
         list.push(Banner {
             level: BannerLevel::Warn,
-            title: "The needle is asked for",
+            title: "Request for the needle",
             text: format!("{asked} asks to operate. The hand stops when you hand over."),
             remedy: Some(("Hand over", Action::Lease(LeaseRequest::Give(asked)))),
         });
@@ -58,13 +58,13 @@ pub fn banners(shown: &Shown) -> Vec<Banner> {
     if shown.relayed.is_none() {
         list.push(Banner {
             level: BannerLevel::Info,
-            title: "A class watches",
+            title: "A class is watching",
             text: format!(
                 "{} connected over the relay. {}",
                 members(class),
                 operates(shown, class)
             ),
-            remedy: Some(("Who is there", Action::ToggleClass)),
+            remedy: Some(("Members", Action::ToggleClass)),
         });
     }
     list
@@ -87,7 +87,7 @@ fn operates(shown: &Shown, class: &Class) -> String {
 
 /// Draws the list of members while it is open.
 pub fn class_ui(ctx: &egui::Context, shown: &Shown, open: &mut bool) -> Option<Action> {
-    let window = egui::Window::new("Who is there")
+    let window = egui::Window::new("Members")
         .open(open)
         .collapsible(false)
         .resizable(false)
@@ -104,7 +104,7 @@ pub fn class_ui(ctx: &egui::Context, shown: &Shown, open: &mut bool) -> Option<A
 fn list_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
     let Some(class) = &shown.class else {
         ui.label(
-            "No relay of this machine says who is there. Start 'relay serve' beside the core, or 'relay join' here.",
+            "No relay on this machine reports members. Start 'relay serve' on the core's machine, or 'relay join' here.",
         );
         return None;
     };
@@ -112,7 +112,7 @@ fn list_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
     if let Some(line) = &shown.relayed {
         let age_ms = line.snapshot_age_ns as f64 * 1e-6;
         ui.label(theme::weak(format!(
-            "{} shows what was {age_ms:.0} ms ago here.",
+            "{} shows the state of {age_ms:.0} ms ago.",
             line.server.read()
         )));
     }
@@ -140,7 +140,7 @@ fn list_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
         .striped(true)
         .spacing([14.0, 6.0]);
     rows.show(ui, |ui| {
-        for head in ["who", "role", "round trip", "lost", "heard"] {
+        for head in ["name", "role", "round trip", "lost", "last heard"] {
             ui.label(theme::small(head));
         }
         ui.end_row();

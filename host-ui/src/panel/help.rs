@@ -64,7 +64,7 @@ fn controllers_ui(ui: &mut egui::Ui, shown: &Shown) {
         "Devices may be plugged in at any time.",
         "The one that was moved last controls the needle.",
         "It must be released once before the needle follows it.",
-        "Beside a simulated --device-2, another one controls the probe.",
+        "With a simulated --device-2, another one controls the probe.",
     ] {
         ui.label(theme::small(words));
     }

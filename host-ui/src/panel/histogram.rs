@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bin_shows_how_many_ticks_took_how_long() {
+    fn bins_count_ticks_by_duration() {
         let mut timing = Timing::default();
         timing.wake_histogram[5] = 1_234;
         timing.work_histogram[5] = 1;

@@ -273,7 +273,7 @@ mod tests {
 
     /// Compares with a sort of the whole last minute.
     #[test]
-    fn percentiles_and_histogram_are_those_of_what_is_kept() {
+    fn percentiles_and_histogram_match_the_kept_ticks() {
         let mut history = History::default();
         let mut given = Vec::new();
         let mut wake_ns = 12_345_u64;
@@ -328,7 +328,7 @@ mod tests {
 
     /// Guards against a last minute of 60 000 records, however many ticks had run between them.
     #[test]
-    fn the_last_minute_is_one_of_ticks_and_says_how_many_of_them_were_seen() {
+    fn the_last_minute_counts_seen_and_unseen_ticks() {
         let mut history = History::default();
         // Of every 128 ticks 64 are seen.
         for block in 0..1_000 {

@@ -113,7 +113,7 @@ fn mark_ui(ui: &mut egui::Ui, state: &mut InstructorState) -> Option<Request> {
         ui.button("Mark").clicked() || entered
     });
     ui.label(theme::small(
-        "Of the moment at which you opened this or began the words. It goes into recordings, curves and debrief.",
+        "Time-stamped when you opened this window or started typing. Appears in recordings, curves and debrief.",
     ));
     row.inner.then(|| state.mark())
 }
@@ -125,7 +125,7 @@ fn exercises_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut InstructorState) -
             request = Some(Request::BeginExercise(exercise));
         }
     };
-    ui.label(theme::strong("Put a fault in, as an exercise"));
+    ui.label(theme::strong("Inject a fault as an exercise"));
     ui.horizontal(|ui| {
         begin(ui, "Lose the device", Exercise::DeviceLost);
         ui.label(theme::small("the force goes off until Re-arm"));
@@ -135,7 +135,7 @@ fn exercises_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut InstructorState) -
         let [low, high] = EXERCISE_STIFFNESS_RANGE;
         let drag = DragValue::new(&mut state.factor).range(low..=high).speed(0.05);
         ui.add(drag.max_decimals(1).suffix(" times"));
-        ui.label(theme::small("for needles that go in from now on"));
+        ui.label(theme::small("for needles inserted from now on"));
     });
     ui.horizontal(|ui| {
         let by_m = state.moved_mm.map(|mm| mm * 1e-3);
@@ -152,7 +152,7 @@ fn exercises_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut InstructorState) -
         ui.label(RichText::new(format!("Exercise: {exercise}")).color(theme::of(ui).warn));
     }
     let end = ui.add_enabled(!in_force.is_empty(), egui::Button::new("End all exercises"));
-    if end.on_hover_text("So does a reset").clicked() {
+    if end.on_hover_text("A reset ends them too").clicked() {
         request = Some(Request::EndExercises);
     }
     request
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_mark_of_any_length_is_one_that_the_core_takes() {
+    fn long_marks_are_shortened_to_the_core_s_limit() {
         for words in ["", "  apex ", &"é".repeat(90)] {
             let mut state = InstructorState::default();
             state.toggle();

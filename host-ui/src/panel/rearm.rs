@@ -44,7 +44,7 @@ mod tests {
     use egui::{Event, RawInput};
 
     #[test]
-    fn keys_answer_and_nothing_else_does() {
+    fn only_its_keys_answer_the_question() {
         let answer = |key: Option<Key>, asks: Option<Begin>| {
             let ctx = egui::Context::default();
             let event = |key| Event::Key {

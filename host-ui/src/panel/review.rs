@@ -45,7 +45,7 @@ fn head_ui(ui: &mut egui::Ui, tool: &mut Option<Tool>, review: &ReviewShown, act
     ui.horizontal(|ui| {
         ui.heading("Update the plan");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            if ui.button("Close").on_hover_text("What is drawn stays").clicked() {
+            if ui.button("Close").on_hover_text("The drawing is kept").clicked() {
                 *tool = None;
             }
         });
@@ -82,8 +82,8 @@ fn contour_ui(ui: &mut egui::Ui, review: &ReviewShown, at_m: Option<f64>, action
     ui.horizontal(|ui| {
         ui.label(format!("This plane: {}", counted(here, "point")));
         let proposed = at_m.filter(|at_m| here == 0 && review.outline_at(*at_m).is_some());
-        let take = ui.add_enabled(proposed.is_some(), Button::new("Take over"));
-        let hint = "The dashed outline as points of this plane, to be dragged";
+        let take = ui.add_enabled(proposed.is_some(), Button::new("Accept the proposal"));
+        let hint = "Converts the dashed outline into points of this plane that can be dragged";
         if let (true, Some(at_m)) = (take.on_hover_text(hint).clicked(), proposed) {
             actions.push(Action::Plan(PlanAction::Draw(Edit::TakeOver { at_m })));
         }
@@ -128,7 +128,7 @@ fn marks_ui(ui: &mut egui::Ui, shown: &Shown) {
     let of_none = review.marks.without_seed.len();
     if without_mark + of_none > 0 {
         let text = format!(
-            "{} without a mark, {} of no seed",
+            "{} without a mark, {} without a seed",
             counted(without_mark, "seed"),
             counted(of_none, "mark")
         );
@@ -160,7 +160,7 @@ fn dose_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         let why = review
             .trouble
             .as_deref()
-            .unwrap_or("Known once the gland is contoured and a seed lies in it.");
+            .unwrap_or("Available once the gland is contoured and a seed lies in it.");
         ui.label(theme::small(why));
         return;
     };
@@ -170,7 +170,7 @@ fn dose_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         .striped(true)
         .spacing([10.0, 3.0])
         .show(ui, |ui| {
-            for head in ["%", "now", "carried on", "updated"] {
+            for head in ["%", "now", "if continued", "updated"] {
                 ui.label(theme::small(head));
             }
             ui.end_row();
@@ -208,13 +208,13 @@ fn rehearsed(implant: &Implant, begun: usize) -> Option<String> {
     );
     match (needles, rehearsed) {
         (0, _) => None,
-        (_, 0) => Some("Carried on: seeds as planned. Compensate rehearses where they come to rest.".to_owned()),
+        (_, 0) => Some("If continued: seeds as planned. Compensate predicts where they come to rest.".to_owned()),
         (n, m) if n == m => Some(format!(
-            "Carried on: seeds of {} where they rest when rehearsed.",
+            "If continued: seeds of {} at their rehearsed positions.",
             counted(n, "needle")
         )),
         (n, m) => Some(format!(
-            "Carried on: seeds of {m} of {n} needles where they rest when rehearsed, others as planned."
+            "If continued: seeds of {m} of {n} needles at their rehearsed positions, others as planned."
         )),
     }
 }
@@ -249,7 +249,7 @@ fn missing(shown: &Shown) -> Option<String> {
         return Some(format!("an outline of the gland in {PLANES} planes; {planes} so far"));
     }
     (planning.review.seeds_from == SeedsFrom::Marks && planning.review.drawn.marks_m.is_empty())
-        .then(|| "a mark of a seed, or the seeds as they lie".to_owned())
+        .then(|| "a mark of a seed, or the actual positions".to_owned())
 }
 
 fn update_ui(ui: &mut egui::Ui, shown: &Shown, missing: Option<String>, actions: &mut Vec<Action>) {
@@ -258,21 +258,20 @@ fn update_ui(ui: &mut egui::Ui, shown: &Shown, missing: Option<String>, actions:
     }
     let free = shown.is_live() && !shown.running && missing.is_none();
     ui.horizontal_wrapped(|ui| {
-        let plan = ui.add_enabled(free, Button::new("Plan the rest anew"));
-        let hint = "Needles that are not inserted yet, through free holes, beside the dose of what lies there";
+        let plan = ui.add_enabled(free, Button::new("Replan the remaining needles"));
+        let hint = "Needles that are not inserted yet, through free holes, given the dose of the placed seeds";
         if plan.on_hover_text(hint).clicked() {
             actions.push(Action::Plan(PlanAction::Update));
         }
         let can_rehearse = shown.is_live() && !shown.running && shown.planning.next_needle().is_some();
         let compensate = ui.add_enabled(can_rehearse, Button::new("Compensate"));
-        let hint =
-            "Rehearses the needles that are left and moves their drops so that seeds rest where they are planned";
+        let hint = "Rehearses the remaining needles and shifts their drops so that seeds rest where they are planned";
         if compensate.on_hover_text(hint).clicked() {
             actions.push(Action::Plan(PlanAction::Compensate));
         }
         if shown.planning.review.can_withdraw {
             let withdraw = ui.add_enabled(!shown.running, Button::new("Withdraw the update"));
-            if withdraw.on_hover_text("The plan as it was before").clicked() {
+            if withdraw.on_hover_text("Restores the plan before the update").clicked() {
                 actions.push(Action::Plan(PlanAction::WithdrawUpdate));
             }
         }
@@ -282,24 +281,24 @@ fn update_ui(ui: &mut egui::Ui, shown: &Shown, missing: Option<String>, actions:
 fn decision_ui(ui: &mut egui::Ui, proposed: &Proposed, actions: &mut Vec<Action>) {
     let [[needles, seeds], [new_needles, new_seeds]] = proposed.reviewed.left;
     ui.label(format!(
-        "{} with {} were left; the update has {new_needles} with {new_seeds}.",
+        "{} with {} remained; the update has {new_needles} with {new_seeds}.",
         counted(needles, "needle"),
         counted(seeds, "seed")
     ));
     let tokens = theme::of(ui);
     match proposed.update.improves() {
-        true => ui.label(RichText::new("The update keeps the limits better.").color(tokens.good)),
-        false => ui.label(RichText::new("The update is no better than the plan carried on.").color(tokens.warn)),
+        true => ui.label(RichText::new("The update meets the limits better.").color(tokens.good)),
+        false => ui.label(RichText::new("The update is no better than continuing the plan.").color(tokens.warn)),
     };
     ui.horizontal(|ui| {
         if ui
             .button("Accept")
-            .on_hover_text("The plan of the needles that are left")
+            .on_hover_text("The plan of the remaining needles")
             .clicked()
         {
             actions.push(Action::Plan(PlanAction::Decide(true)));
         }
-        if ui.button("Keep the plan").on_hover_text("Carry on as before").clicked() {
+        if ui.button("Keep the plan").on_hover_text("Continue as before").clicked() {
             actions.push(Action::Plan(PlanAction::Decide(false)));
         }
     });

@@ -77,12 +77,12 @@ fn controller(shown: &Shown) -> (String, bool) {
     let Some(device) = &shown.controllers.holder else {
         return match shown.controllers.denied.is_empty() {
             true => ("n/a".to_owned(), true),
-            false => ("may not be read".to_owned(), false),
+            false => ("cannot be read".to_owned(), false),
         };
     };
     let name: String = device.name.chars().take(LONGEST_CONTROLLER).collect();
     if !shown.has_focus {
-        (format!("{name}: not the focus"), false)
+        (format!("{name}: window not focused"), false)
     } else if !device.was_released {
         (format!("{name}: release it first"), false)
     } else {
@@ -111,13 +111,13 @@ mod tests {
     use stylet_controllers::{Device, Kind};
 
     #[test]
-    fn the_controller_is_named_with_its_axes_and_why_it_does_not_move_the_needle() {
+    fn the_controller_is_shown_with_axes_and_state() {
         let mut shown = Shown::empty("lab");
         assert_eq!(
             (controller(&shown), axes(&shown)),
             (("n/a".to_owned(), true), "n/a".to_owned())
         );
-        shown.controllers.denied.push("Pad may not be read".to_owned());
+        shown.controllers.denied.push("Pad cannot be read".to_owned());
         assert!(!controller(&shown).1);
         let holder = |was_released| Device {
             name: "A gamepad with a name that is long".to_owned(),
@@ -130,11 +130,11 @@ mod tests {
         shown.controllers.holder = Some(holder(false));
         assert!(controller(&shown).0.ends_with("release it first"));
         shown.has_focus = false;
-        assert!(controller(&shown).0.ends_with("not the focus"));
+        assert!(controller(&shown).0.ends_with("window not focused"));
     }
 
     #[test]
-    fn a_thread_says_what_it_got_and_what_it_asked_for() {
+    fn threads_show_granted_and_requested_settings() {
         let mut report = ThreadReport {
             policy: 1,
             priority: 80,

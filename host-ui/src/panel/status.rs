@@ -15,7 +15,7 @@ use stylet_shm_schema::ParameterId;
 const ONE_ROW: f32 = 1240.0;
 const TWO_ROWS: f32 = 780.0;
 
-/// Height of the bar without its margins.
+/// Returns the height of the bar without its margins.
 pub fn status_height(ui: &egui::Ui, width: f32) -> f32 {
     let rows = 1.0 + f32::from(u8::from(width < ONE_ROW)) + f32::from(u8::from(width < TWO_ROWS));
     rows * ui.spacing().interact_size.y + (rows - 1.0) * ui.spacing().item_spacing.y
@@ -175,7 +175,7 @@ fn line_ui(ui: &mut egui::Ui, shown: &Shown) {
             "NO LINE",
             tokens.bad,
             "The needle went in before the tissue was prepared for it: it is felt by the paper's force law, and its seeds \
-             may rest up to 2 cm from where they should. Take it out, and wait for LINE READY.",
+             may rest up to 2 cm from plan. Withdraw it, and wait for LINE READY.",
         ),
     };
     badge(ui, word, color)

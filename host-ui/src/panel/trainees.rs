@@ -53,14 +53,14 @@ impl Line {
         };
         let heard = format!("{:.1} s ago", since.as_secs_f64());
         if since > SILENT_AFTER {
-            let words = format!("silent for {:.0} s: ended, or the line is down", since.as_secs_f64());
+            let words = format!("silent for {:.0} s: ended, or disconnected", since.as_secs_f64());
             return nothing(Level::Bad, words, heard);
         }
         if let Some(line) = glance.relayed.filter(|line| line.is_heard == 0) {
             let age_s = line.snapshot_age_ns as f64 * 1e-9;
             return nothing(
                 Level::Bad,
-                format!("relay not heard for {age_s:.0} s"),
+                format!("no data from the relay for {age_s:.0} s"),
                 format!("{age_s:.1} s ago"),
             );
         }
@@ -204,7 +204,7 @@ fn row_ui(
     let debrief = ui
         .add_enabled(has_seeds, egui::Button::new("Debrief"))
         .on_hover_text(format!(
-            "Writes the debrief of {} from what this window has heard: debrief.html and score.json",
+            "Writes the debrief of {} from this window's data: debrief.html and score.json",
             glance.trainee.name
         ))
         .on_disabled_hover_text("No seed lies in the tissue yet");
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_says_where_the_needle_is_and_what_is_wrong() {
+    fn a_line_shows_needle_and_problem() {
         let mut one = glance();
         let line = Line::of(&one);
         assert_eq!(
@@ -280,7 +280,7 @@ mod tests {
             snapshot_age_ns: 7_000_000_000,
             ..Relayed::zeroed()
         });
-        assert_eq!(Line::of(&one).state, "relay not heard for 7 s");
+        assert_eq!(Line::of(&one).state, "no data from the relay for 7 s");
         one.heard = Instant::now().checked_sub(Duration::from_secs(12));
         assert!(
             Line::of(&one).state.starts_with("silent for 12 s"),

@@ -29,7 +29,7 @@ impl Planner {
     ) {
         let job = match (&self.outlines, self.is_busy()) {
             (_, true) => return,
-            (None, _) => Err("the scene's anatomy is not known yet; try again in a moment".into()),
+            (None, _) => Err("the scene's anatomy is not ready yet; try again in a moment".into()),
             (Some(outlines), false) => begin(self, outlines.clone()),
         };
         match job {

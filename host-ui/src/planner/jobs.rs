@@ -75,7 +75,7 @@ pub(super) fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
                 report,
             )?)
         };
-        // The window may have closed, so nobody reads the answer.
+        // The window may have closed; the answer is then dropped.
         let _ = messages.send(match plan() {
             Ok(found) => JobMessage::First(found),
             Err(why) => JobMessage::Plan(Err(why)),
@@ -88,7 +88,7 @@ pub(super) fn strength(outlines: Arc<AnatomyOutlines>, plan: Arc<ImplantPlan>) -
     Job::begin("strength", move |messages, _| {
         let scaled = || -> Result<ImplantPlan, Failure> {
             let source = Source::known(&plan.source)
-                .ok_or_else(|| format!("source {} is not known; set the strength by hand", plan.source))?;
+                .ok_or_else(|| format!("source {} is unknown; set the strength by hand", plan.source))?;
             let kernel = DoseKernel::new(&source, Interval::ALL);
             let aims = Aims::new(plan.prescription_gy);
             let strength_u = automatic::strength_u(&plan, &outlines.anatomy, &kernel, &aims)?;

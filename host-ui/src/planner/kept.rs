@@ -91,11 +91,11 @@ impl Planner {
         {
             self.put(kept.plan);
             self.compensated = kept.compensated;
-            self.message = Some(Message::Done("The plan of this implant was found again.".to_owned()));
+            self.message = Some(Message::Done("The plan of this implant was restored.".to_owned()));
         }
     }
 
-    /// Writes the plan for another window, on a thread of its own.
+    /// Writes the plan for another window, on a separate thread.
     pub(super) fn keep(&self) {
         if let (Some(folder), Some(outlines), Some(plan)) = (&self.kept_in, &self.outlines, self.plan()) {
             let (path, frames) = (path_of(folder, outlines.scene), outlines.frames);
@@ -151,7 +151,7 @@ mod tests {
         std::fs::write(&path, b"{}").expect("written");
         assert!(
             KeptPlan::read(&path, &frames).is_none(),
-            "what is not whole is not used"
+            "an incomplete plan is not used"
         );
         let _removed = std::fs::remove_file(&path);
     }

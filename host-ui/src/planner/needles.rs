@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn needles_are_inserted_one_after_the_other_and_each_has_its_own_seeds() {
+    fn each_needle_has_its_own_seeds() {
         let mut progress = NeedleProgress::default();
         assert_eq!((progress.own_seeds(3), progress.done()), (0..3, 0));
         progress.begin(0, 0);

@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hole_leads_through_the_piece_of_the_target_behind_it_or_none() {
+    fn each_hole_maps_to_the_target_behind_it() {
         let outlines = outlines();
         let piece = |name: &str| outlines.piece_m(name.parse().expect("a hole"));
         for (name, across_m) in [("G7", 0.0), ("J7", 0.015), ("E7", 0.010)] {

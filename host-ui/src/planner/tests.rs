@@ -43,7 +43,7 @@ pub(crate) fn planning(planner: &mut Planner) -> Planning {
 }
 
 #[test]
-fn a_needle_that_was_inserted_stays_and_those_after_it_can_be_changed() {
+fn only_needles_not_yet_inserted_can_be_changed() {
     let mut planner = planner();
     planner.edit(|plan| plan.with_needle_at(0, hole("F7")));
     planner.begin_needle(0, 0);
@@ -88,7 +88,7 @@ fn more_seeds_than_the_core_can_hold_are_refused() {
 }
 
 #[test]
-fn what_was_rehearsed_for_a_needle_holds_until_the_needle_is_changed() {
+fn a_rehearsal_holds_until_its_needle_changes() {
     let mut planner = planner();
     let needle = planned().needles[0].clone();
     let mut drops = Drops::as_planned(&needle);

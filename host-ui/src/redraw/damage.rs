@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_inserted_damages_only_its_own_place() {
+    fn an_inserted_shape_damages_only_its_place() {
         let before: Vec<Drawn> = (0..50).map(|i| square(7.0 * i as f32, 20.0, 5.0, i)).collect();
         let mut now = before.clone();
         now.insert(10, square(200.0, 200.0, 10.0, 255));

@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bent_one_is_drawn_through_its_places_as_long_as_a_straight_one() {
+    fn a_bent_needle_is_as_long_as_a_straight_one() {
         let mut header = SnapshotHeader::zeroed();
         (header.bend_count, header.bend_spacing_m) = (MAX_BEND_POINTS as u32, 0.2 / 15.0);
         for (n, bend_m) in header.bend_m.iter_mut().enumerate() {

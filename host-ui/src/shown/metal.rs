@@ -35,7 +35,7 @@ mod tests {
     /// Guards against seeds that stayed at the scene's place of the body while the tissue around
     /// them moved.
     #[test]
-    fn seeds_are_seen_in_the_body_where_an_exercise_has_moved_it() {
+    fn seeds_follow_a_body_moved_by_an_exercise() {
         let mut shown = Shown::empty("lab");
         shown.seeds = vec![SeedPose {
             position_m: [0.01, 0.02, 0.03],

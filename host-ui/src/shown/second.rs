@@ -111,7 +111,7 @@ mod tests {
     use stylet_shm_schema::SecondState;
 
     #[test]
-    fn the_probe_stands_as_its_tool_does_and_only_after_a_tick() {
+    fn the_probe_has_the_pose_of_its_tool() {
         let mut shown = Shown::empty("lab");
         assert_eq!(shown.probe_pose(), None);
         let mut second = SecondState::zeroed();

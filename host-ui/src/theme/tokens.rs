@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn every_word_can_be_read_on_what_it_stands_on() {
+    fn every_text_is_legible_on_its_background() {
         for t in [&DARK, &LIGHT] {
             let words = [t.text, t.weak, t.accent, t.good, t.warn, t.bad];
             let plots = [t.force, t.depth, t.wake, t.work];

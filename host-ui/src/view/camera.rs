@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn no_amount_of_dragging_leaves_the_numbers() {
+    fn dragging_never_gives_nan() {
         let mut camera = Camera::default();
         for _ in 0..1000 {
             camera.orbit([3.0, 3.0]);

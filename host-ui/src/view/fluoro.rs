@@ -1,6 +1,6 @@
 //! Fluoroscopy: a C-arm that turns, its beam on request, the last image held, and the dose spent.
 //!
-//! A pulse is computed on a thread of its own, so that no frame waits for it.
+//! A pulse is computed on a separate thread, so that no frame waits for it.
 
 mod tools;
 mod words;

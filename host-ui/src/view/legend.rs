@@ -211,7 +211,7 @@ mod tests {
     /// "body", "entry" under "gland". No test saw it, because without a graphics device there is no
     /// picture and no label.
     #[test]
-    fn no_word_of_the_picture_lies_over_its_legend_however_it_is_turned() {
+    fn no_label_of_the_picture_overlaps_its_legend() {
         let mut shown = Shown::empty("lab");
         let mut plan = PlanInForce::zeroed();
         plan.entry_m = [0.03, 0.03, -0.02];

@@ -202,7 +202,7 @@ impl Middle {
             actions.extend(self.probe.tools_ui(ui, shown));
             let mut draws = self.view.tool.is_some();
             let toggle = ui.toggle_value(&mut draws, "Update plan");
-            let hint = "Contour the gland and mark seeds on the live picture, and plan the needles that are left anew";
+            let hint = "Contour the gland and mark seeds on the live picture, and replan the remaining needles";
             if toggle.on_hover_text(hint).clicked() {
                 self.view.tool = draws.then_some(Tool::Contour);
             }
@@ -222,8 +222,9 @@ impl Middle {
         {
             actions.push(Action::ToggleMeasure);
         }
-        ui.toggle_value(&mut self.view.isodose, "Isodose")
-            .on_hover_text("Key I: 50, 100, 150 and 200 % of the prescription, from the seeds as they lie now");
+        ui.toggle_value(&mut self.view.isodose, "Isodose").on_hover_text(
+            "Key I: 50, 100, 150 and 200 % of the prescription, from the seeds at their present positions",
+        );
         if let Some(name) = self.slices.image_name() {
             ui.toggle_value(&mut self.view.image, "Image")
                 .on_hover_text(format!("Key G: {name} in the slices, or simulated ultrasound"));
@@ -259,7 +260,7 @@ impl Middle {
             look.transparency = percent / 100.0;
         }
         ui.checkbox(&mut look.rest_shape, "Rest shape")
-            .on_hover_text("Shows where the gland was before the needle moved it");
+            .on_hover_text("Shows the gland before the needle moved it");
         ui.checkbox(&mut look.force, "Force on the hand");
         ui.checkbox(&mut look.template, "Template")
             .on_hover_text("13 by 13 holes, 5 mm apart, about the planned path");

@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nearest_of_two_walls_is_met_where_the_ray_goes() {
+    fn a_ray_meets_the_nearest_of_two_walls() {
         let at = |x: f32, y: f32, z: f32| SurfaceVertex {
             place_m: [x, y, z],
             normal: [0.0; 3],

@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_shifted_is_seen_and_cut_where_it_stands() {
+    fn shifted_surfaces_are_cut_in_place() {
         let camera = Camera::looking_at([0.03, 0.04, 0.05], 0.05);
         let whole = tint(uniform(&camera, 1.5), Color32::RED, 0.5, [0.6, 0.0, 0.8, 0.05]);
         let moved = shifted(whole, [0.003, -0.002, 0.004]);

@@ -48,10 +48,10 @@ pub mod loss {
     /// Returns the reason in words, with the remedy.
     pub fn text(code: u32) -> &'static str {
         match code {
-            CLOSED => "the service closed the connection; it is opened again automatically",
-            SILENT => "the service does not answer: restart it; it is connected again automatically",
-            UNPLUGGED => "it is unplugged or switched off; it is connected again automatically",
-            FLOOD => "the service sends more than it is asked for: restart it; it is connected again automatically",
+            CLOSED => "the service closed the connection; it is reopened automatically",
+            SILENT => "the service does not answer: restart it; it is reconnected automatically",
+            UNPLUGGED => "it is unplugged or switched off; it is reconnected automatically",
+            FLOOD => "the service sends unsolicited messages: restart it; it is reconnected automatically",
             _ => "an error in rt-core: report it",
         }
     }

@@ -75,11 +75,11 @@ pub enum ConnectionError {
     #[error("what answers there does not send {0}: another program, or another version of the Inverse service")]
     OtherProgram(&'static str),
     /// The connection ended in its first messages.
-    #[error("{0}: it is connected again automatically")]
+    #[error("{0}: it is reconnected automatically")]
     Wire(#[from] WireError),
     /// The requested device is missing.
     #[error(
-        "the service has {wanted}, only {}: plug it in and switch it on; rt-core devices lists what is there",
+        "the service has {wanted}, only {}: plug it in and switch it on; rt-core devices lists the present ones",
         listed(found)
     )]
     NoDevice {

@@ -9,7 +9,7 @@ pub enum WireError {
     #[error("the service has closed the connection")]
     Closed,
     /// A message arrived that is not text.
-    #[error("the service sent what is no text")]
+    #[error("the service sent a message that is not text")]
     NoText,
 }
 

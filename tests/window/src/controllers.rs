@@ -57,7 +57,7 @@ fn assert_stays(driven: &mut Driven, what: &str) {
 }
 
 #[test]
-fn a_stick_moves_the_needle_while_it_is_held_and_no_longer() {
+fn a_stick_moves_the_needle_only_while_held() {
     let (mut driven, pad) = with(Kind::Gamepad);
     driven.window.get_by_label_contains("left stick");
     let start = tip(driven.window.state())[2];
@@ -79,7 +79,7 @@ fn a_stick_moves_the_needle_while_it_is_held_and_no_longer() {
 }
 
 #[test]
-fn a_stick_that_is_unplugged_while_it_is_pushed_leaves_the_needle_where_it_is_and_is_reported() {
+fn an_unplugged_stick_leaves_the_needle_in_place() {
     let (mut driven, pad) = with(Kind::Gamepad);
     let start = tip(driven.window.state())[2];
     pad.axis(AbsoluteAxisCode::ABS_Y, -1.0);
@@ -95,7 +95,7 @@ fn a_stick_that_is_unplugged_while_it_is_pushed_leaves_the_needle_where_it_is_an
 }
 
 #[test]
-fn a_cap_moves_the_needle_across_outside_only_and_it_keeps_its_line_in_the_tissue() {
+fn a_cap_moves_the_needle_across_only_outside_tissue() {
     let (mut driven, cap) = with(Kind::Mouse3d);
     let start = tip(driven.window.state());
     let side = |app: &App| (0..2).map(|a| (tip(app)[a] - start[a]).powi(2)).sum::<f64>().sqrt();

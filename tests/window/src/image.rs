@@ -200,7 +200,7 @@ fn an_image_lies_where_its_file_says_and_moves_with_the_tissue() {
 }
 
 #[test]
-fn an_image_of_elsewhere_and_a_file_that_is_none_are_refused_with_words() {
+fn foreign_images_and_other_files_are_refused_with_a_reason() {
     let mut driven = Driven::open_plain([1280.0, 800.0]);
     let path = in_scratch("ui-image-elsewhere");
     write_image(&driven, &path, 0.3);
@@ -208,7 +208,7 @@ fn an_image_of_elsewhere_and_a_file_that_is_none_are_refused_with_words() {
     wait_for(&mut driven, "is it of this patient");
     std::fs::write(&path, b"no image").expect("written");
     load(&mut driven, &path);
-    wait_for(&mut driven, "it is none of the formats");
+    wait_for(&mut driven, "its format is not supported");
     assert!(driven.window.query_by_label("Image").is_none());
 }
 

@@ -106,7 +106,7 @@ fn differing(place: &str, one: &Value, other: &Value, off: f64) -> Vec<String> {
 /// Guards against a debrief of the last needle alone, with a strength of its own, in the
 /// instructor's window.
 #[test]
-fn the_instructor_makes_the_debrief_that_the_trainee_makes() {
+fn instructor_and_trainee_write_the_same_debrief() {
     let mut driven = open(SMALL);
     let class = scratch("ui-instructor-class");
     let mut other = instructor(&driven.core.instance, Some(class.clone()));
@@ -237,7 +237,7 @@ fn exercises_are_shown_to_both_while_they_run_and_after() {
 
 /// Checks the list of hosts; the relay is a package of its own, so its state is published here.
 #[test]
-fn who_is_there_is_a_list_with_a_needle_to_hand_over() {
+fn members_are_listed_and_the_needle_can_be_handed_over() {
     let mut driven = Driven::open_plain(SMALL);
     let node = service::Node::join(&driven.core.instance).expect("a node");
     let (class, relayed) = (
@@ -288,8 +288,8 @@ fn who_is_there_is_a_list_with_a_needle_to_hand_over() {
             std::thread::sleep(Duration::from_millis(20));
         }
     };
-    shown(&mut driven, "Who is there");
-    driven.click("Who is there");
+    shown(&mut driven, "Members");
+    driven.click("Members");
     shown(&mut driven, "Hand the needle to Olga");
     publish();
     compare(&mut driven.window, "who_is_there");

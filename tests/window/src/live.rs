@@ -67,7 +67,7 @@ fn four_steps_by_label_move_the_gland_and_drop_a_seed() {
 }
 
 #[test]
-fn a_window_that_comes_moves_nothing_by_itself() {
+fn a_new_window_moves_nothing() {
     let mut driven = Driven::open([1280.0, 800.0]);
     driven.plan_and_place();
     let tip = |app: &App| app.link().state().map(|s| s.tip_in_scene_m).expect("live");
@@ -126,11 +126,11 @@ fn a_core_that_was_killed_is_started_again_by_a_click() {
     driven.until("another run", |app| {
         run(app).is_some_and(|id| Some(id) != first) && app.link().state().is_some()
     });
-    assert!(driven.window.query_by_label("rt-core is absent").is_none());
+    assert!(driven.window.query_by_label("The simulator core is not running").is_none());
 }
 
 #[test]
-fn keys_drive_the_needle_and_letting_go_stops_it() {
+fn keys_drive_the_needle_and_releasing_stops_it() {
     let mut driven = Driven::open([1280.0, 800.0]);
     driven.plan_and_place();
     let z = |app: &App| app.link().state().map_or(0.0, |s| s.tip_in_scene_m[2]);

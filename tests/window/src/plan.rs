@@ -114,7 +114,7 @@ fn until_checked(driven: &mut Driven) {
 }
 
 #[test]
-fn needles_are_added_moved_and_taken_away_and_each_step_can_be_taken_back() {
+fn adding_moving_and_removing_needles_can_be_undone() {
     let mut driven = open(SMALL);
     driven.click("Empty plan");
     driven.click("G7: no needle");
@@ -162,7 +162,7 @@ fn needles_are_added_moved_and_taken_away_and_each_step_can_be_taken_back() {
 }
 
 #[test]
-fn a_plan_goes_to_a_file_and_comes_back_and_a_wrong_file_is_reported_in_one_message() {
+fn a_plan_survives_a_file_round_trip() {
     let mut driven = open(SMALL);
     let folder = scratch("ui-plan-files");
     let planned = plan_through(&header(&driven), &["F6", "G8", "H6"], 3);
@@ -246,7 +246,7 @@ fn needles_go_in_one_after_the_other_by_one_key() {
 /// Guards against a stopped script, or one in a reopened window, that removed the seeds and
 /// restarted at its first needle.
 #[test]
-fn a_script_that_was_stopped_goes_on_in_this_window_and_in_the_next() {
+fn a_stopped_script_continues_in_this_window_and_the_next() {
     let mut driven = open(SMALL);
     let planned = plan_through(&header(&driven), &["F7", "H7"], 2);
     put(&mut driven, "ui-plan-go-on", &planned);
@@ -315,7 +315,7 @@ fn problems_of_needles(driven: &Driven) -> Vec<String> {
 }
 
 #[test]
-fn an_automatic_plan_covers_the_target_and_nothing_is_wrong_with_its_needles() {
+fn an_automatic_plan_covers_the_target_without_problems() {
     let mut driven = open(SMALL);
     driven.click("Automatic plan");
     wait_long(&mut driven, "the plan", |app| app.planner().plan().is_some());
@@ -340,7 +340,7 @@ fn an_automatic_plan_covers_the_target_and_nothing_is_wrong_with_its_needles() {
 }
 
 #[test]
-fn compensation_reports_how_far_it_is_and_can_be_ended() {
+fn compensation_reports_progress_and_can_be_cancelled() {
     let mut driven = open(SMALL);
     let planned = plan_through(&header(&driven), &["F7", "H7", "G8"], 1);
     put(&mut driven, "ui-plan-compensate", &planned);
@@ -384,7 +384,7 @@ fn twenty() -> Vec<String> {
 }
 
 #[test]
-fn a_plan_of_twenty_needles_is_in_place_and_as_it_was() {
+fn a_plan_of_twenty_needles_matches_its_picture() {
     for (size, light, name) in [(SMALL, false, "plan_dark_small"), (LARGE, true, "plan_light_large")] {
         let mut driven = open(size);
         if light {

@@ -53,7 +53,7 @@ fn until_at(driven: &mut Driven, what: &str, goal: Pose) {
 }
 
 #[test]
-fn the_picture_is_of_the_probe_in_the_hand_which_stepper_and_pointer_move_until_the_brake_holds_it() {
+fn stepper_and_pointer_move_the_probe_unless_braked() {
     let mut driven = open("Probe", &["--device-2", "simulated"]);
     driven.until("the probe", |app| in_hand(app).is_some() && seen(app).is_some());
     wait(&mut driven, 10);
@@ -123,7 +123,7 @@ fn hold_alt_w(driven: &Driven, pressed: bool) {
 /// Guards against marks of seeds that stayed at the scene's place of the body while the rest of the
 /// picture moved.
 #[test]
-fn a_patient_who_moves_is_seen_by_a_probe_that_does_not() {
+fn a_moved_patient_is_seen_by_a_fixed_probe() {
     let mut driven = open("Probe", &[]);
     driven.until("a picture", |app| seen(app).is_some());
     let before = seen(driven.window.state()).expect("a picture");
@@ -146,7 +146,7 @@ fn a_patient_who_moves_is_seen_by_a_probe_that_does_not() {
 }
 
 #[test]
-fn the_beam_is_on_while_it_is_asked_for_the_last_image_is_held_and_the_dose_is_counted() {
+fn the_beam_follows_its_switch_and_the_dose_is_counted() {
     let mut driven = open("Fluoroscopy", &[]);
     let pulses = |app: &App| app.middle().spent().pulses;
     driven.until("a patient", |app| app.link().scene().is_some());

@@ -53,7 +53,7 @@ fn procedure_by_enter(driven: &mut Driven) {
 }
 
 #[test]
-fn planned_state_is_in_place_and_as_it_was() {
+fn a_planned_state_matches_its_pictures() {
     for (size, name) in [(SMALL, "small"), (LARGE, "large")] {
         let mut driven = Driven::open_plain(size);
         assert_in_place(&mut driven, &format!("scene, {name}"));
@@ -89,7 +89,7 @@ fn planned_state_is_in_place_and_as_it_was() {
 
 /// Checks an insertion, in which the membrane is pressed in and gives way a little farther on.
 #[test]
-fn insertion_is_in_place_and_as_it_was() {
+fn an_insertion_matches_its_pictures() {
     for (size, theme) in [(SMALL, "dark_small"), (LARGE, "light_large")] {
         let mut driven = Driven::open_plain(size);
         driven.press(Key::E);
@@ -215,7 +215,7 @@ fn a_hand_on_the_tip_in_a_slice_draws_the_needle() {
 }
 
 #[test]
-fn words_can_be_made_larger_and_stay_in_place() {
+fn text_can_be_enlarged() {
     let mut driven = Driven::open_plain(LARGE);
     driven.plan_and_place();
     driven.window.key_press_modifiers(egui::Modifiers::COMMAND, Key::Plus);

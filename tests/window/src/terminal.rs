@@ -26,7 +26,7 @@ fn written(window: &mut Child) -> String {
 /// Guards against four lines "error: XDG_RUNTIME_DIR is invalid or not set in the environment."
 /// from the graphics driver, in a shell without a desktop session.
 #[test]
-fn a_window_outside_of_a_session_writes_no_errors_of_a_library() {
+fn without_a_session_no_library_errors_are_printed() {
     let alone = Alone(fresh_instance());
     let display = Display::open();
     let mut window = started(&alone, &display.name());
@@ -45,7 +45,7 @@ fn a_window_outside_of_a_session_writes_no_errors_of_a_library() {
 /// Guards against a message with a source file of the library and a folder of the machine that had
 /// built it.
 #[test]
-fn without_a_display_the_reason_is_in_our_words() {
+fn without_a_display_the_error_is_readable() {
     let alone = Alone(fresh_instance());
     let mut window = started(&alone, ":4711");
     let written = written(&mut window);

@@ -102,7 +102,7 @@ fn by_enter_until(driven: &mut Driven, done: usize) {
 /// Run with `make procedure-test`.
 #[test]
 #[ignore = "a whole procedure, two and a half minutes"]
-fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
+fn an_update_on_the_live_picture_is_in_the_debrief() {
     let begun = Instant::now();
     let mut driven = Driven::open_plain(SIZE);
     driven.until("the anatomy", |app| app.planner().planning().outlines.is_some());
@@ -150,9 +150,9 @@ fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
     });
     driven.window.get_by_label_contains("Marks off their seeds, mm");
     driven.click("as marked");
-    driven.click("as they lie");
+    driven.click("actual positions");
 
-    driven.click("Plan the rest anew");
+    driven.click("Replan the remaining needles");
     wait_long(&mut driven, "the update", |app| !app.planner().is_busy());
     let update = driven
         .window
@@ -176,7 +176,7 @@ fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
     );
     assert!(agreement.dice > 0.9, "{agreement:?}");
     assert!(update.update.improves());
-    driven.window.get_by_label("The update keeps the limits better.");
+    driven.window.get_by_label("The update meets the limits better.");
     let problems = misplaced(&driven.window);
     assert!(problems.is_empty(), "{}", problems.join("\n"));
     driven.picture("update-decision");
@@ -188,7 +188,7 @@ fn a_plan_is_updated_on_the_live_picture_and_the_debrief_says_so() {
     driven.click("Compensate");
     wait_long(&mut driven, "the rehearsals", |app| !app.planner().is_busy());
     let left = after.needles.len() - BEFORE;
-    driven.window.get_by_label_contains("where they rest when rehearsed");
+    driven.window.get_by_label_contains("rehearsed positions");
     wait_long(&mut driven, "the dose as rehearsed", |app| {
         !app.planner().planning().review.is_assessing
     });

@@ -46,10 +46,10 @@ fn the_example_opens_with_one_click_without_a_core_and_shows_an_insertion() {
     });
     let seeds = |window: &Harness<'_, App>| window.state().link().snapshot().map_or(0, |s| s.header.seed_count);
     until(&mut window, "the first seed", |window| seeds(window) == 1);
-    assert!(window.query_by_label("rt-core is absent").is_none());
+    assert!(window.query_by_label("The simulator core is not running").is_none());
     assert_eq!(misplaced(&window), Vec::<String>::new());
     // It is paused, and keys move nothing.
-    window.get_by_label("Hold").click();
+    window.get_by_label("Pause").click();
     window.run_steps(3);
     let depth = |window: &Harness<'_, App>| window.state().link().state().map(|s| s.tip_in_scene_m);
     let before = depth(&window);
@@ -60,7 +60,7 @@ fn the_example_opens_with_one_click_without_a_core_and_shows_an_insertion() {
     }
     assert_eq!(depth(&window), before, "it went on");
     window.get_by_label_contains("This is a recording");
-    window.get_by_label("Go on").click();
+    window.get_by_label("Resume").click();
     until(&mut window, "the debrief", |window| {
         window.query_by_label("Seed error, mm").is_some() && window.query_by_label("Again").is_some()
     });
@@ -70,7 +70,7 @@ fn the_example_opens_with_one_click_without_a_core_and_shows_an_insertion() {
     until(&mut window, "its beginning", |window| seeds(window) == 0);
     window.get_all_by_label("Close").next().expect("a way back").click();
     until(&mut window, "no core", |window| {
-        window.query_by_label("rt-core is absent").is_some()
+        window.query_by_label("The simulator core is not running").is_some()
     });
     assert!(window.query_by_label("RECORDING").is_none());
     drop(window);

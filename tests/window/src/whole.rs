@@ -65,10 +65,10 @@ fn settle(window: &mut Harness<'_, App>) {
 }
 
 #[test]
-fn without_a_core_the_window_says_what_to_type() {
+fn without_a_core_the_window_shows_the_command() {
     let mut window = window("ui-window-absent");
     settle(&mut window);
-    window.get_by_label("rt-core is absent");
+    window.get_by_label("The simulator core is not running");
     window.get_by_label_contains("rt-core --instance ui-window-absent");
     assert!(
         window.query_by_label("The force is off").is_none(),
@@ -147,7 +147,7 @@ fn help_lists_every_key() {
 }
 
 #[test]
-fn a_search_leaves_only_what_was_asked_for() {
+fn a_search_shows_only_matching_rows() {
     let mut window = window("ui-window-search");
     settle(&mut window);
     window.get_by_label("Parameters").click();

@@ -52,7 +52,7 @@ impl<'a> Reader<'a> {
         Self { root, problems }
     }
 
-    /// Returns one message with all problems.
+    /// Fails with one message that lists all problems, if there are any.
     pub fn finish(self) -> Result<(), DoseError> {
         match self.problems.as_slice() {
             [] => Ok(()),

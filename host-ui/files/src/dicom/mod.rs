@@ -21,8 +21,8 @@ pub const RT_DOSE: &str = dicom_dictionary_std::uids::RT_DOSE_STORAGE;
 /// SOP class of an RT Plan.
 pub const RT_PLAN: &str = dicom_dictionary_std::uids::RT_PLAN_STORAGE;
 
-/// Returns the frame of an image series made of one file twice, one slice apart, to check the
-/// reader alone.
+/// Checks the frame of an image series made of one file twice, one slice apart, to test the reader
+/// alone.
 pub fn image_geometry(bytes: &[u8]) -> Result<(), ContentError> {
     let Some(read) = images::slice(bytes) else {
         return Ok(());

@@ -95,7 +95,7 @@ fn every_broken_file_is_refused_with_its_reason() {
     );
     refused("nifti2.nii", &540_i32.to_le_bytes(), "NIfTI-2");
     refused("packed.nii", &[0x1f, 0x8b, 8, 0], "cannot be unpacked");
-    refused("letter.nii", b"Dear colleague, enclosed", "none of the formats");
+    refused("letter.nii", b"Dear colleague, enclosed", "format is not supported");
     refused("broken.nii.gz", &[0x1f, 0x8b, 8, 0, 1, 2, 3], "gz");
     let mut image = header([2, 1, 1], 16, IDENTITY);
     image.extend([1.0_f32, 17.25].iter().flat_map(|v| v.to_le_bytes()));

@@ -127,7 +127,7 @@ fn seed_alone(found: &mut Found, needle: &Needle, seed: usize, place_m: [f64; 3]
     if !along_m.is_finite() || along_m < 0.0 || along_m > needle.depth_m + SAME_M {
         let (along, depth) = (along_m * 1e3, needle.depth_m * 1e3);
         found.add(&format!(
-            "it lies {along:.1} mm along its needle, which goes from 0 to {depth:.1} mm"
+            "it is {along:.1} mm along its needle, which extends from 0 to {depth:.1} mm"
         ));
     } else if !is_in_target(anatomy, place_m, needle.direction) {
         found.add(&format!("it lies outside {}", anatomy.target.name));
@@ -145,7 +145,7 @@ fn seed_alone(found: &mut Found, needle: &Needle, seed: usize, place_m: [f64; 3]
         let apart = (deeper_m - along_m) * 1e3;
         let length = SEED_LENGTH_M * 1e3;
         found.add(&format!(
-            "it lies {apart:.1} mm behind the one before, nearer than its length of {length} mm"
+            "it is {apart:.1} mm behind the previous one, closer than its length of {length} mm"
         ));
     }
 }
@@ -190,7 +190,7 @@ fn too_close(found: &mut Found, plan: &ImplantPlan) {
             if apart_m < SEED_LENGTH_M / 2.0 {
                 (found.needle, found.seed) = (Some(*needle), Some(*seed));
                 found.add(&format!(
-                    "it lies {:.1} mm from seed {} of needle {}",
+                    "it is {:.1} mm from seed {} of needle {}",
                     apart_m * 1e3,
                     other_seed + 1,
                     other + 1

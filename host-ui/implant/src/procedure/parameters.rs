@@ -111,8 +111,8 @@ mod tests {
         assert!(parameter("needle.template_gap=3").is_ok(), "the limit itself");
         for (text, says) in [
             ("needle.template_gap", "KEY=VALUE"),
-            ("needle.gap=1", "there are tissue.min_stretch"),
-            ("needle.template_gap=wide", "no number"),
+            ("needle.gap=1", "valid keys are tissue.min_stretch"),
+            ("needle.template_gap=wide", "not a number"),
             ("needle.template_gap=9", "0 to 3 mm"),
             ("needle.template_gap=NaN", "outside"),
         ] {

@@ -150,7 +150,7 @@ pub(super) fn of_header(
     for wanted in mapped {
         if !known.contains(&wanted.known.as_str()) {
             problems.push(format!(
-                "there is no column {} to give; there are {}",
+                "no column {} to map; valid are {}",
                 shown(&wanted.known),
                 known.join(",")
             ));

@@ -145,9 +145,7 @@ fn prescription(asked_gy: Option<f64>, declared: Option<&Declared>, source: &Sou
     };
     let differs = |gy: &f64| (gy - of_plan).abs() > SAME_GY;
     let note = match (asked_gy.filter(differs), source.prescription_gy.filter(differs)) {
-        (Some(asked), _) => Some(format!(
-            "it prescribes {of_plan} Gy; the {asked} Gy that were asked for count"
-        )),
+        (Some(asked), _) => Some(format!("it prescribes {of_plan} Gy; the requested {asked} Gy apply")),
         (None, Some(usual)) => Some(format!(
             "it prescribes {of_plan} Gy, which counts; the source file names {usual} Gy"
         )),
@@ -174,7 +172,7 @@ impl DayOfImplant {
         let (Some(&first), Some(&last)) = (days.first(), days.last()) else {
             let note = self.0.filter(|_| !rows.is_empty());
             return Ok(note.map(|day| {
-                format!("it gives no day for the strengths, so they are taken as those of the implant on {day}")
+                format!("it gives no day for the strengths, so they are assumed for the implant on {day}")
             }));
         };
         let when = match first == last {

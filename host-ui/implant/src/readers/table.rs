@@ -229,7 +229,7 @@ fn notes(headers: &[String], columns: &[Column], passed_over: &[String]) -> Vec<
         notes.push(format!("columns are taken: {}", renamed.join(", ")));
     }
     if !passed_over.is_empty() {
-        notes.push(format!("columns are passed over: {}", passed_over.join(", ")));
+        notes.push(format!("columns are skipped: {}", passed_over.join(", ")));
     }
     notes
 }

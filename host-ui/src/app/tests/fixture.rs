@@ -270,7 +270,7 @@ pub fn many_needles(count: usize, begun: usize) -> Shown {
 pub fn proposals(plan: &ImplantPlan) -> Arc<Vec<FirstPlan>> {
     let proposal = |(name, v150, robust, strength_u): (&'static str, f64, f64, Option<f64>)| FirstPlan {
         name,
-        why: "Most trials with misplaced seeds keep a D90 of 90 % of the prescription.",
+        why: "Most trials with misplaced seeds meet a D90 of 90 % of the prescription.",
         plan: strength_u.map_or_else(|| plan.clone(), |u| plan.with_strength(u)),
         measures: Some(Measures {
             figures: Figures {
@@ -286,7 +286,7 @@ pub fn proposals(plan: &ImplantPlan) -> Arc<Vec<FirstPlan>> {
     let all = [
         ("Robust", 58.7, 0.997, Some(0.4)),
         ("Fewer needles", 52.3, 0.961, None),
-        ("Cooler", 31.2, 0.424, Some(0.6)),
+        ("Lower V150", 31.2, 0.424, Some(0.6)),
     ];
     Arc::new(all.into_iter().map(proposal).collect())
 }

@@ -11,7 +11,7 @@ fn what(shown: &Shown, membranes: &MetMembranes) -> String {
 }
 
 #[test]
-fn the_guide_says_what_the_state_machine_says_comes_next() {
+fn the_guide_follows_the_state_machine() {
     let membranes = MetMembranes::default();
     assert!(what(&Shown::empty("lab"), &membranes).contains("rt-core"));
     for (shown, word) in [
@@ -87,9 +87,9 @@ fn the_debrief_has_the_figures_of_the_seeds_and_of_the_membrane() {
         "pressed in by 8.0 mm",
         "2.50 N",
         "planned 70.0 mm deep",
-        "left at 70.0 mm",
-        "rests at 72.0 mm",
-        "1.0 mm beside",
+        "dropped at 70.0 mm",
+        "came to rest at 72.0 mm",
+        "1.0 mm off axis",
     ] {
         assert!(notes.contains(word), "{word:?} is not in {notes}");
     }

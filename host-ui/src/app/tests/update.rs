@@ -59,7 +59,7 @@ pub fn drawing(app: &mut App, tool: Tool) {
 pub fn searching(app: &mut App) {
     drawing(app, Tool::Contour);
     app.shown.planning.job = Some(JobProgress {
-        what: "Planning the needles that are left".to_owned(),
+        what: "Replanning the remaining needles".to_owned(),
         share: Some(0.45),
     });
 }

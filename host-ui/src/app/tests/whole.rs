@@ -276,7 +276,7 @@ fn every_banner(shown: &mut Shown) {
     (shown.refusals, shown.last_refusal) = (12_345, "needle.puncture_depth = 1000 mm\n".repeat(8));
     shown.disconnected = Some("3Dconnexion SpaceMouse Pro Wireless (cabled), with a long name".to_owned());
     shown.controllers.denied = vec![format!(
-        "/dev/input/event17 may not be read; run: sudo usermod -aG input $USER, {LONG_PATH}"
+        "/dev/input/event17 cannot be read; run: sudo usermod -aG input $USER, {LONG_PATH}"
     )];
 }
 
@@ -306,36 +306,36 @@ fn assert_in_place(pixels: [f32; 2], scales: &[f32]) {
 
 /// Tests the smallest window.
 #[test]
-fn no_text_is_cut_off_or_lies_over_another_at_960_x_600() {
+fn no_text_is_clipped_or_overlaps_at_960_x_600() {
     assert_in_place([960.0, 600.0], &[1.0, 1.5]);
 }
 
 #[test]
-fn no_text_is_cut_off_or_lies_over_another_at_1280_x_720() {
+fn no_text_is_clipped_or_overlaps_at_1280_x_720() {
     assert_in_place([1280.0, 720.0], &[1.0, 1.5, 2.0]);
 }
 
 /// Tests one scale; larger ones leave as few points as 1280 x 720.
 #[test]
-fn no_text_is_cut_off_or_lies_over_another_at_1366_x_768() {
+fn no_text_is_clipped_or_overlaps_at_1366_x_768() {
     assert_in_place([1366.0, 768.0], &[1.0]);
 }
 
 /// Tests scales whose points include those of 1280 x 720, at 150 %.
 #[test]
-fn no_text_is_cut_off_or_lies_over_another_at_1920_x_1080() {
+fn no_text_is_clipped_or_overlaps_at_1920_x_1080() {
     assert_in_place([1920.0, 1080.0], &[1.0, 2.0]);
 }
 
 /// Tests scales whose points include those of 1920 x 1080, at 200 %.
 #[test]
-fn no_text_is_cut_off_or_lies_over_another_at_3840_x_2160() {
+fn no_text_is_clipped_or_overlaps_at_3840_x_2160() {
     assert_in_place([3840.0, 2160.0], &[1.0, 1.5]);
 }
 
 /// Tests steps that are opened by hand.
 #[test]
-fn no_text_is_cut_off_in_a_step_that_was_opened_by_hand() {
+fn no_text_is_clipped_in_a_step_opened_by_hand() {
     let mut problems = Vec::new();
     for (pixels, scale) in [([1280.0, 720.0], 1.0), ([1280.0, 720.0], 2.0)] {
         for step in Progress::ALL {

@@ -23,7 +23,7 @@ fn no_banner_without_a_problem_and_absence_shows_what_to_type() {
 
 /// Guards against a core that ended without a reason, and placed seeds without a message.
 #[test]
-fn a_core_that_ended_says_why_and_what_is_kept() {
+fn an_ended_core_is_reported_with_reason_and_kept_seeds() {
     let mut shown = live();
     shown.session = Some(stylet_shm_schema::Session::zeroed());
     shown.status = LinkStatus::Absent {
@@ -47,18 +47,18 @@ fn a_force_that_is_off_or_waits_and_a_refusal_each_have_their_banner() {
     if let Some(state) = &mut shown.state {
         state.flags |= flags::WAITING;
     }
-    assert_eq!(titles(&shown), ["The force waits"]);
+    assert_eq!(titles(&shown), ["The force is held back"]);
     if let Some(state) = &mut shown.state {
         state.flags = flags::REAL_TIME;
     }
     shown.refusals = 2;
     shown.last_refusal = "needle.puncture_depth = 1000 mm".to_owned();
-    assert_eq!(titles(&shown), ["The force is off", "rt-core refused"]);
+    assert_eq!(titles(&shown), ["The force is off", "Request refused"]);
     assert!(banners(&shown)[1].text.contains("puncture_depth"));
 }
 
 #[test]
-fn an_exercise_has_its_banner_and_a_lost_device_both() {
+fn an_exercise_has_its_own_banner() {
     let mut shown = live();
     let mut session = stylet_shm_schema::Session::zeroed();
     session.exercises.put(Exercise::DeviceLost);
@@ -80,7 +80,7 @@ fn an_exercise_has_its_banner_and_a_lost_device_both() {
 }
 
 #[test]
-fn a_window_over_a_relay_says_who_sits_there_who_operates_and_what_the_line_costs() {
+fn a_relay_banner_shows_trainee_operator_and_delay() {
     let mut shown = live();
     let mut line = stylet_shm_schema::Relayed {
         is_heard: 1,
@@ -111,11 +111,11 @@ fn a_window_over_a_relay_says_who_sits_there_who_operates_and_what_the_line_cost
     };
     let list = banners(&shown);
     assert_eq!(list.len(), 1, "one cause, one banner");
-    assert!(list[0].text.contains("nothing for 2.5 s"), "{}", list[0].text);
+    assert!(list[0].text.contains("for 2.5 s"), "{}", list[0].text);
 }
 
 #[test]
-fn folded_tissue_has_a_banner_while_it_is_folded_that_says_from_where_on() {
+fn folded_tissue_has_a_banner_while_folded() {
     let mut shown = live();
     if let Some(state) = &mut shown.state {
         state.folded_from_m = 7.93e-3;
@@ -127,12 +127,12 @@ fn folded_tissue_has_a_banner_while_it_is_folded_that_says_from_where_on() {
     }
     let list = banners(&shown);
     assert_eq!(list.len(), 1);
-    assert!(list[0].text.contains("folded from 7.9 mm"), "{}", list[0].text);
+    assert!(list[0].text.contains("folded beyond 7.9 mm"), "{}", list[0].text);
 }
 
 /// Checks that each row of docs/stability.md that says no names a warning which the window shows.
 #[test]
-fn what_the_page_of_stability_says_no_to_is_warned_of_while_it_is_so() {
+fn unstable_cases_are_warned_of_while_they_last() {
     let page = include_str!("../../../../docs/stability.md");
     let not_met = page
         .lines()
@@ -196,14 +196,14 @@ fn what_the_page_of_stability_says_no_to_is_warned_of_while_it_is_so() {
 }
 
 #[test]
-fn an_unplugged_controller_and_one_without_rights_are_shown_with_or_without_a_core() {
+fn controller_problems_are_shown_without_a_core_too() {
     for mut shown in [live(), Shown::empty("lab")] {
         let before = banners(&shown).len();
         shown.disconnected = Some("Pad".to_owned());
         shown
             .controllers
             .denied
-            .push("Cap may not be read. Run: that".to_owned());
+            .push("Cap cannot be read. Run: that".to_owned());
         let list = banners(&shown);
         assert_eq!(list.len(), before + 2);
         assert!(list[before].text.contains("Pad. The needle stays where it is"));
@@ -224,7 +224,7 @@ fn fault_comes_first_and_an_unknown_one_is_a_fault() {
 }
 
 #[test]
-fn a_second_device_that_is_lost_or_stands_still_has_a_banner_of_its_own() {
+fn a_lost_second_device_has_its_own_banner() {
     let mut shown = live();
     let mut session = stylet_shm_schema::Session::zeroed();
     session.second_period_ns = 1_000_000;
@@ -251,7 +251,7 @@ fn a_second_device_that_is_lost_or_stands_still_has_a_banner_of_its_own() {
     }
     let list = banners(&shown);
     assert!(
-        list.len() == 1 && list[0].text.contains("stands still") && list[0].remedy.is_none(),
+        list.len() == 1 && list[0].text.contains("has stopped") && list[0].remedy.is_none(),
         "{list:?}"
     );
     // A run without a second device has no such banner.
@@ -262,7 +262,7 @@ fn a_second_device_that_is_lost_or_stands_still_has_a_banner_of_its_own() {
 /// Checks that the title of a picture stays legible under banners. If they all but cover the
 /// picture, titles stay in place.
 #[test]
-fn words_of_a_picture_stand_below_banners() {
+fn labels_of_a_picture_stand_below_banners() {
     use crate::view::free::free_of_banners;
     use std::cell::Cell;
     let pictures = Rect::from_min_size(egui::pos2(20.0, 30.0), egui::vec2(700.0, 400.0));

@@ -52,7 +52,7 @@ fn buttons(shown: &Shown) -> Vec<String> {
 }
 
 #[test]
-fn whoever_has_the_needle_is_shown_who_asks_and_hands_it_over_with_one_click() {
+fn the_holder_sees_requests_and_hands_over_with_one_click() {
     let list = banners(&sits("Otto", OPERATOR, 1));
     assert_eq!(list.len(), 1, "the line has its own banner");
     assert!(list[0].text.contains("Olga asks"), "{}", list[0].text);
@@ -62,7 +62,7 @@ fn whoever_has_the_needle_is_shown_who_asks_and_hands_it_over_with_one_click() {
 }
 
 #[test]
-fn only_an_operator_asks_only_who_has_it_gives_and_only_to_operators() {
+fn only_operators_ask_for_and_get_the_needle() {
     assert_eq!(
         buttons(&sits("Otto", OPERATOR, 1)),
         ["Release the needle", "Hand the needle to Olga"]
@@ -72,7 +72,7 @@ fn only_an_operator_asks_only_who_has_it_gives_and_only_to_operators() {
 }
 
 #[test]
-fn beside_the_core_a_window_says_who_watches_and_decides_who_operates() {
+fn the_core_s_window_shows_watchers_and_decides_who_operates() {
     let mut shown = live();
     shown.class = Some(class());
     assert_eq!(buttons(&shown), [""; 0], "a list of another machine");

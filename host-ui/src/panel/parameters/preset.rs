@@ -92,7 +92,7 @@ fn read(text: &str) -> Result<Vec<(usize, f64)>, String> {
     let (mut values, mut problems) = (Vec::new(), Vec::new());
     take("", &table, &mut values, &mut problems);
     if values.is_empty() && problems.is_empty() {
-        problems.push("it holds no parameter".to_owned());
+        problems.push("it contains no parameter".to_owned());
     }
     if problems.is_empty() {
         Ok(values)
@@ -113,7 +113,7 @@ fn take(prefix: &str, table: &toml::Table, values: &mut Vec<(usize, f64)>, probl
             continue;
         }
         let Some(index) = PARAMETERS.iter().position(|p| p.key == key) else {
-            problems.push(format!("{key} is no parameter"));
+            problems.push(format!("{key} is not a parameter"));
             continue;
         };
         let number = match value {
@@ -139,7 +139,7 @@ mod tests {
     use stylet_shm_schema::ParameterId;
 
     #[test]
-    fn what_was_saved_is_loaded_again() {
+    fn saved_presets_load_equal() {
         let mut set = ParameterSet::default();
         set.set(ParameterId::PunctureDepth, 6.5e-3);
         set.set(ParameterId::ShearHorizontal, 20.0_f64.to_radians());
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_file_gives_every_problem_and_no_value() {
+    fn a_bad_preset_lists_every_problem() {
         let why = read("needle.puncture_depth = 1000.0\nneedle.nothing = 1\nforce.scale = \"much\"").expect_err("bad");
         assert_eq!(why.lines().count(), 3, "{why}");
         for part in [

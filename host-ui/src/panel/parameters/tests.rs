@@ -23,7 +23,7 @@ fn refused(reasons: &[(RefusalCode, ParameterId)]) -> Answer {
 }
 
 #[test]
-fn a_search_finds_by_name_key_and_source_and_all_words_count() {
+fn a_search_matches_all_words_in_name_key_and_source() {
     assert_eq!(found("").len(), PARAMETER_COUNT);
     let keys = |search| found(search).iter().map(|&i| PARAMETERS[i].key).collect::<Vec<_>>();
     assert_eq!(keys("PUNCTURE depth u_cri"), ["needle.puncture_depth"]);
@@ -32,7 +32,7 @@ fn a_search_finds_by_name_key_and_source_and_all_words_count() {
 }
 
 #[test]
-fn edits_made_while_a_change_is_on_its_way_are_sent_after_it() {
+fn edits_made_during_a_change_are_sent_after_it() {
     let mut state = ParametersState::default();
     state.edit(0, 0.6);
     let pairs = state.request().expect("something to send");
@@ -44,7 +44,7 @@ fn edits_made_while_a_change_is_on_its_way_are_sent_after_it() {
 }
 
 #[test]
-fn a_refusal_stands_at_its_row_and_the_draft_is_cleared() {
+fn a_refusal_is_shown_at_its_row() {
     let mut state = ParametersState::default();
     state.edit(6, 0.01);
     let pairs = state.request().expect("something to send");

@@ -19,7 +19,7 @@ pub fn debrief_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     dose_ui(ui, shown, 60.0, "The dose is computed once seeds lie in the tissue.");
     let save = ui.add_enabled(!shown.seeds.is_empty(), egui::Button::new("Save the debrief"));
     if save
-        .on_hover_text("A page and its figures: debrief.html and score.json, in a folder of its own under out/")
+        .on_hover_text("A page and its figures: debrief.html and score.json, in a new folder under out/")
         .clicked()
     {
         actions.push(Action::SaveDebrief);
@@ -35,7 +35,7 @@ fn updates_ui(ui: &mut egui::Ui, shown: &Shown) {
         });
         let text = format!("Plan {what} after needle {}{contour}", update.begun);
         let label = ui.add(egui::Label::new(theme::small(text)).truncate());
-        label.on_hover_text("The gland as it was contoured on the live picture, against the true gland at that moment");
+        label.on_hover_text("The gland contoured on the live picture, against the true gland at that moment");
     }
 }
 
@@ -133,7 +133,7 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
     ui.horizontal(|ui| {
         ui.label(theme::strong("Seed error, mm"))
             .explained("error of a seed")
-            .on_hover_text("Where the seed lies now against where it was planned; along is positive inwards");
+            .on_hover_text("Present position of the seed relative to plan; along is positive inwards");
         let placed = rows.iter().map(|(_, row)| row).filter(|r| r.placed.is_some());
         let placed: Vec<f64> = placed.map(total_m).collect();
         if let Some(text) = mean_and_worst(&placed) {

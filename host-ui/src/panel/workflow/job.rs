@@ -1,4 +1,4 @@
-//! Work on a thread of its own: its name, its progress if known, and a button to cancel it.
+//! Work on a separate thread: its name, its progress if known, and a button to cancel it.
 
 use crate::theme;
 

@@ -13,7 +13,7 @@ pub(super) fn leave_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Actio
     let may = shown.is_live() && !shown.running && is_in && shown.left.len() < MAX_LEFT_NEEDLES;
     let button = ui.add_enabled(may, Button::new("Leave in"));
     let help =
-        "The needle stays where it is and holds the gland; bring the hand out and take up another. At most 4 stay in.";
+        "The needle stays in place and holds the gland; move the hand out and take another one. At most 4 stay in.";
     if button.on_hover_text(help).on_disabled_hover_text(help).clicked() {
         actions.push(Action::Send(Request::LeaveNeedle));
     }
@@ -23,13 +23,13 @@ pub(super) fn leave_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Actio
 pub(super) fn left_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     let may = shown.is_live() && !shown.running;
     if !shown.left.is_empty() {
-        ui.label(theme::small("Needles that stay in"));
+        ui.label(theme::small("Needles left in"));
     }
     for (number, left) in shown.left.iter().enumerate() {
         // Larger text needs a second line.
         ui.horizontal_wrapped(|ui| {
             ui.label(theme::small(format!("{}", number + 1)));
-            let take = ui.add_enabled(may && is_at(shown, left), Button::new("Take up").small());
+            let take = ui.add_enabled(may && is_at(shown, left), Button::new("Resume").small());
             let help = "Bring the hand along this needle to its tip first";
             if take.on_hover_text(help).on_disabled_hover_text(help).clicked() {
                 actions.extend(of(left).map(|number| Action::Send(Request::TakeNeedle(number))));
@@ -40,7 +40,7 @@ pub(super) fn left_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action
             };
             let hand = ui.add_enabled(may && !shown.has_flag(flags::IN_CONTACT), Button::new(to).small());
             if hand
-                .on_hover_text("Moves the hand, which is empty on the way of a needle that stays in")
+                .on_hover_text("Moves the empty hand along the path of a needle left in")
                 .clicked()
             {
                 let pace = Pace::default();
@@ -51,8 +51,8 @@ pub(super) fn left_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action
                     acceleration_m_per_s2: pace.acceleration_m_per_s2,
                 })));
             }
-            let draw = ui.add_enabled(may, Button::new("Draw out").small());
-            if draw.on_hover_text("Draws this needle out without the hand").clicked() {
+            let draw = ui.add_enabled(may, Button::new("Withdraw").small());
+            if draw.on_hover_text("Withdraws this needle without the hand").clicked() {
                 let speed_m_per_s = Pace::default().retract_m_per_s;
                 actions.extend(of(left).map(|number| Action::Send(Request::DrawNeedle { number, speed_m_per_s })));
             }

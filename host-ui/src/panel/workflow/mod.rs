@@ -212,7 +212,7 @@ fn what(step: Progress, shown: &Shown) -> String {
         Progress::Insert => "To the deepest planned seed: the button, W and S, or drag the tip in a slice.".to_owned(),
         Progress::Drop => {
             let (dropped, planned) = (shown.own_seeds().len(), shown.planned().len());
-            format!("{dropped} of {planned} seeds dropped. Drop one at each place on the way out.")
+            format!("{dropped} of {planned} seeds dropped. Drop one at each place while retracting.")
         }
         Progress::Retract => "All seeds are dropped. Take the needle out.".to_owned(),
         Progress::Debrief => String::new(),
@@ -326,7 +326,7 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         }
         let reset = ui.add_enabled(live, Button::new("Reset"));
         if reset
-            .on_hover_text("Tissue to rest, seeds removed, peaks and worst cases forgotten")
+            .on_hover_text("Returns the tissue to rest, removes the seeds, and clears peaks and worst cases")
             .clicked()
         {
             actions.push(Action::Send(Request::Reset));

@@ -113,7 +113,7 @@ pub fn can_leave_needle(shown: &Shown) -> bool {
 /// Returns the missing precondition of `step`; `None` if there is none.
 pub fn missing(shown: &Shown, step: Progress) -> Option<String> {
     if !shown.is_live() {
-        return Some("rt-core must run".to_owned());
+        return Some("the simulator core is not running".to_owned());
     }
     if step == Progress::Scene {
         return None;
@@ -129,7 +129,7 @@ pub fn missing(shown: &Shown, step: Progress) -> Option<String> {
     }
     match (step, needle_at_hand(shown)) {
         (Progress::Insert, Some(needle)) if !needle.is_on_path() => Some(format!(
-            "place the needle first: it is {} beside the path",
+            "place the needle first: it is {} off the path",
             format::length(needle.beside_m)
         )),
         (Progress::Drop, _) if !shown.has_punctured() && shown.seeds.is_empty() => {
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn undo_takes_back_a_seed_then_the_plan_and_never_with_the_needle_inside() {
+    fn undo_removes_a_seed_then_the_plan() {
         assert_eq!(undo_action(&shown(0.02, &[0.03])), Some(Undo::Seed));
         assert_eq!(undo_action(&shown(0.0, &[])), Some(Undo::Plan));
         assert_eq!(undo_action(&shown(0.02, &[])), None);
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_last_needle_that_has_lost_a_seed_is_done_until_one_is_taken_back() {
+    fn a_last_needle_with_a_lost_seed_is_done() {
         let mut shown = shown(-0.05, &[0.03]);
         assert_eq!(progress(&shown), Progress::Drop);
         shown.planning.progress.begin(0, 0);
@@ -268,9 +268,12 @@ mod tests {
     }
 
     #[test]
-    fn without_a_core_every_step_says_what_is_missing() {
+    fn without_a_core_every_step_names_its_precondition() {
         for step in Progress::ALL {
-            assert_eq!(missing(&Shown::empty("lab"), step).as_deref(), Some("rt-core must run"));
+            assert_eq!(
+                missing(&Shown::empty("lab"), step).as_deref(),
+                Some("the simulator core is not running")
+            );
         }
         let mut live = Shown::empty("lab");
         live.status = LinkStatus::Live;

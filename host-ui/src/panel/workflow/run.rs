@@ -70,8 +70,8 @@ fn watched_ui(ui: &mut egui::Ui, watched: &Watched, actions: &mut Vec<Action>) {
         ui.set_min_height(RUN_BUTTON);
         let (name, action) = match (watched.has_ended, watched.is_held) {
             (true, _) => ("Again", WatchAction::Again),
-            (false, true) => ("Go on", WatchAction::Hold(false)),
-            (false, false) => ("Hold", WatchAction::Hold(true)),
+            (false, true) => ("Resume", WatchAction::Hold(false)),
+            (false, false) => ("Pause", WatchAction::Hold(true)),
         };
         if ui.button(name).clicked() {
             asked(action);
@@ -104,7 +104,7 @@ fn begin_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         return;
     }
     let anew = ui.add_enabled(shown.is_live(), Button::new("Start over"));
-    let help = "Takes all seeds out of the tissue and begins at the first needle";
+    let help = "Removes all seeds from the tissue and begins at the first needle";
     if anew.on_hover_text(help).clicked() {
         actions.push(Action::StartOver);
     }
@@ -128,7 +128,7 @@ pub(super) fn run_name(shown: &Shown) -> String {
 
 fn run_help(shown: &Shown) -> &'static str {
     if shown.continues_at.is_some() {
-        return "The seeds in the tissue stay; the scripted hand goes on with the first seed that is missing";
+        return "The seeds in the tissue stay; the scripted hand continues with the first missing seed";
     }
     match needle_count(shown) {
         0 => "A scripted hand plans five seeds, places the needle, inserts it, drops the seeds and retracts it",

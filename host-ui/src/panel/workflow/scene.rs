@@ -31,11 +31,11 @@ fn probe_solved_in(scene: &SceneHeader, edge_um: u32) -> Option<(String, String)
         let solved = format!("Probe solved in {} of {edge_mm:.1} mm", if is_coarse { "elements" } else { "cells" });
         let why = if is_coarse {
             format!(
-                "What the probe presses was solved for in larger elements than the scene's cells of {cell_mm:.1} mm: in \"pelvis\" its press is \
-                 10 to 15 % too strong. \"rt-core probe\" solves for it in the cells once, for minutes; the next run uses that."
+                "The pressure of the probe was solved in larger elements than the scene's cells of {cell_mm:.1} mm: in \"pelvis\" it is \
+                 10 to 15 % too strong. \"rt-core probe\" solves it in the cells once, for minutes; the next run uses that."
             )
         } else {
-            "What the probe presses is solved for in the scene's own cells.".to_owned()
+            "The pressure of the probe is solved in the scene's own cells.".to_owned()
         };
         (solved, why)
     })
@@ -93,8 +93,8 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
     ui.horizontal(|ui| {
         ui.label(theme::small("Recorded"));
         let example = ui.add_enabled(can_watch, Button::new("example"));
-        let example = example
-            .on_hover_text("A recorded insertion to look at: needle, force, tissue and seeds. It needs no rt-core.");
+        let example =
+            example.on_hover_text("A recorded insertion: needle, force, tissue and seeds. It needs no rt-core.");
         if example.clicked() {
             actions.push(Action::Watch(WatchAction::Example));
         }

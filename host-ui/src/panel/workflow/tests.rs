@@ -46,7 +46,7 @@ fn shown(planner: &mut Planner, depth_m: f64, dropped_m: &[f64]) -> Shown {
 }
 
 #[test]
-fn the_next_needle_is_the_thing_to_do_once_one_is_outside_and_its_seeds_are_dropped() {
+fn the_next_needle_follows_a_finished_one() {
     let mut planner = planner();
     let next = Some(Action::Plan(PlanAction::NextNeedle));
     let before = shown(&mut planner, 0.0, &[]);
@@ -76,7 +76,7 @@ fn the_next_needle_is_the_thing_to_do_once_one_is_outside_and_its_seeds_are_drop
 /// Guards against a window that was opened while the tip stood before the next hole and asked to
 /// withdraw the needle.
 #[test]
-fn a_tip_before_another_hole_is_outside_however_deep_it_is_along_the_path_before() {
+fn a_tip_before_another_hole_is_outside() {
     let mut planner = planner();
     planner.begin_needle(0, 0);
     let mut elsewhere = shown(&mut planner, 5e-3, &[0.08, 0.07]);
@@ -92,7 +92,7 @@ fn a_tip_before_another_hole_is_outside_however_deep_it_is_along_the_path_before
 
 /// Guards against a button that said "all four steps" over a list of seven.
 #[test]
-fn the_button_names_the_steps_of_the_panel_that_the_script_does() {
+fn the_button_names_the_scripted_steps() {
     let [first, last] = [Progress::Plan, Progress::Retract].map(Progress::number);
     assert_eq!(SCRIPTED_STEPS, format!("steps {first} to {last}"));
     assert_eq!(run_name(&Shown::empty("lab")), format!("Run {SCRIPTED_STEPS}"));
@@ -103,7 +103,7 @@ fn the_button_names_the_steps_of_the_panel_that_the_script_does() {
 /// Guards against a row that put needle and step on one line, so that the panel widened and "Stop"
 /// was cut off.
 #[test]
-fn the_button_says_where_it_goes_on_and_the_row_what_is_waited_for() {
+fn the_run_row_shows_its_start_and_its_wait() {
     let mut shown = Shown::empty("lab");
     shown.continues_at = Some((2, 19));
     assert_eq!(run_name(&shown), "Continue at needle 3 of 19");

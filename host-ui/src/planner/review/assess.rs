@@ -1,4 +1,4 @@
-//! The assessment of a moment of the procedure, on threads of its own.
+//! The assessment of a moment of the procedure, on separate threads.
 
 use super::super::Failure;
 use super::super::needles::{NeedleProgress, NeedleState};
@@ -122,7 +122,8 @@ impl Moment {
     /// Returns the contoured gland, the spared structures as displaced by the tissue, and the true
     /// gland of the moment.
     fn anatomy(&self, rest: &Anatomy, scene: &SceneModel, snapshot: &Snapshot) -> Result<[Anatomy; 2], Failure> {
-        let field = Field::of(scene.header.nodes, &snapshot.displacements_m).ok_or("the tissue is not known")?;
+        let field =
+            Field::of(scene.header.nodes, &snapshot.displacements_m).ok_or("the state of the tissue is unknown")?;
         let to_m = |p: [f64; 3]| {
             let rest = Vector3::from(p);
             <[f64; 3]>::from(rest + field.displacement_m(rest))
@@ -136,7 +137,7 @@ impl Moment {
 
     fn source(&self) -> Result<Source, Failure> {
         let model = &self.plan.source;
-        Source::known(model).ok_or_else(|| format!("source {model} is not known").into())
+        Source::known(model).ok_or_else(|| format!("source {model} is unknown").into())
     }
 
     /// Computes the dose of the placed seeds, now and with the plan continued.

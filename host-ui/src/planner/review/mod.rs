@@ -18,7 +18,7 @@ use stylet_shm_schema::SceneId;
 
 /// Distance within which a click selects a mark, m.
 const SAME_PLACE_M: f64 = 0.2e-3;
-pub(super) const UPDATE: &str = "Planning the needles that are left";
+pub(super) const UPDATE: &str = "Replanning the remaining needles";
 
 /// Drawing on the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -330,7 +330,7 @@ impl Planner {
     pub(super) fn take_update(&mut self, found: Proposed) {
         // Needles may have been inserted since.
         if found.update.begun != self.progress.begun() {
-            let why = "A needle went in while the others were planned; update the plan again.";
+            let why = "A needle was inserted during planning; update the plan again.";
             self.message = Some(Message::Refused(why.to_owned()));
             return;
         }

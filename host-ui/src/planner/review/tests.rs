@@ -89,7 +89,7 @@ fn proposed(begun: usize) -> Proposed {
 }
 
 #[test]
-fn an_update_is_taken_as_one_step_and_either_decision_is_kept() {
+fn an_accepted_update_is_one_undo_step() {
     let mut planner = planner();
     planner.begin_needle(0, 0);
     planner.take_update(proposed(1));
@@ -113,7 +113,7 @@ fn an_update_is_taken_as_one_step_and_either_decision_is_kept() {
 
 /// Guards against an update that would undo an inserted needle.
 #[test]
-fn an_update_for_fewer_needles_than_are_in_is_refused() {
+fn an_update_that_undoes_an_inserted_needle_is_refused() {
     let mut planner = planner();
     planner.begin_needle(0, 0);
     planner.finish_needle(2);

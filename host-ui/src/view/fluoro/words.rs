@@ -30,7 +30,7 @@ impl FluoroView {
                 };
                 (format!("Last image held\n{age} old{from}"), IMAGE.text)
             }
-            None => ("No image yet: X".to_owned(), IMAGE.text),
+            None => ("No image yet. Hold X to expose.".to_owned(), IMAGE.text),
         };
         text(
             inside(rect.right_bottom(), [-9.0, -6.0]),
@@ -100,7 +100,7 @@ mod tests {
     use stylet_imaging::fluoroscopy::Exposure;
 
     #[test]
-    fn ten_seconds_of_the_beam_are_said_in_the_units_of_the_trade() {
+    fn ten_seconds_of_beam_are_shown_in_clinical_units() {
         let arm = CArm::about(nalgebra::Vector3::zeros(), nalgebra::Matrix3::identity());
         let mut dose = DoseCounter::default();
         for _ in 0..80 {

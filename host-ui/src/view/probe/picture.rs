@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn a_click_is_the_place_that_is_drawn_under_it() {
+    fn a_click_maps_to_the_place_under_it() {
         for view in View::ALL {
             let picture = picture(view);
             let mut seen = 0;

@@ -61,7 +61,7 @@ mod tests {
     use stylet_imaging::ultrasound::{Plane, Pose, Probe, View};
 
     #[test]
-    fn ticks_stand_at_their_depth_from_the_surface_to_the_last_that_is_seen() {
+    fn the_scale_s_ticks_are_at_their_depths() {
         for view in View::ALL {
             let probe = Probe::default();
             let plane = Plane {

@@ -59,9 +59,9 @@ impl ProbeView {
     pub fn tools_ui(&mut self, ui: &mut egui::Ui, shown: &Shown) -> Vec<Action> {
         let mut actions = self.stepper_ui(ui, shown);
         let knobs = &mut self.knobs;
-        let depth = Knob("Depth", [30.0, 100.0], " mm", "From the probe's surface");
+        let depth = Knob("Depth", [30.0, 100.0], " mm", "Depth from the probe's surface");
         depth.ui(ui, &mut knobs.depth_mm, true);
-        let gain = Knob("Gain", [-30.0, 30.0], " dB", "Of the whole picture");
+        let gain = Knob("Gain", [-30.0, 30.0], " dB", "Gain of the whole picture");
         gain.ui(ui, &mut knobs.gain_db, true);
         ui.toggle_value(&mut knobs.template, "Grid")
             .on_hover_text("Holes of the template in the transverse picture");
@@ -82,7 +82,7 @@ impl ProbeView {
         let may_step = in_hand.is_none() || shown.is_second_simulated();
         let hint = "Keys PgUp, PgDn: 5 mm. 0 is the middle of the target, positive into the patient";
         Knob("Way", [-WAY_MM, WAY_MM], " mm", hint).ui(ui, &mut way_mm, may_step);
-        let hint = "Keys Home, End: 5°. About the probe's axis";
+        let hint = "Keys Home, End: 5°. Turn about the probe's axis";
         Knob("Turn", [-TURN_DEG, TURN_DEG], "°", hint).ui(ui, &mut turn_deg, may_step);
         let by = [way_mm - before[0], turn_deg - before[1]];
         if may_step && by != [0.0; 2] {

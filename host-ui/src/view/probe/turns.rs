@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn planes_that_are_never_done_take_turns_and_one_alone_takes_all() {
+    fn unfinished_planes_alternate() {
         assert_eq!(computed(100, |_| View::ALL.to_vec()), [50, 50]);
         assert_eq!(computed(100, |_| vec![View::Transverse]), [100, 0]);
         let both_for_a_while = computed(100, |pass| match pass {

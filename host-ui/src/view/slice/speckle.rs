@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_land_where_their_labels_are_inside_a_border_of_nothing() {
+    fn cells_keep_their_place_inside_an_empty_border() {
         let mut scene = SceneHeader::zeroed();
         (scene.labels.dims, scene.labels.spacing_m) = ([2, 1, 2], 1e-3);
         scene.structure_count = 2;
@@ -177,7 +177,7 @@ mod tests {
     /// Guards against a bright band: a gland that touches the faces of its grid made the last cell
     /// of the volume shine, and the card repeated it to the edge of the picture.
     #[test]
-    fn the_faces_of_the_volume_are_dark_however_the_beam_goes() {
+    fn the_faces_of_the_volume_are_dark_for_any_beam() {
         let mut scene = SceneHeader::zeroed();
         scene.labels.dims = [9, 10, 11];
         scene.structure_count = 1;

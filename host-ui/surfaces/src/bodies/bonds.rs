@@ -57,7 +57,7 @@ impl Bonds {
         (self.bonds.len() > start).then_some(())
     }
 
-    /// Returns the places of the vertices while the elements are at `now_m`.
+    /// Writes the places of the vertices while the elements are at `now_m`.
     pub fn moved(&self, vertices_m: &[[f32; 3]], rest_m: &[[f32; 3]], now_m: &[[f32; 3]], out: &mut Vec<[f32; 3]>) {
         let off = |(now, rest): (&[f32; 3], &[f32; 3])| [now[0] - rest[0], now[1] - rest[1], now[2] - rest[2]];
         let moved_m: Vec<[f32; 3]> = now_m.iter().zip(rest_m).map(off).collect();

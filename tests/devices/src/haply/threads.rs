@@ -188,7 +188,7 @@ fn a_flooding_service_is_disconnected_and_named() {
     assert!(drive(&mut device, &push(), |s| s.is_ok() && feels(&service, 1.0)));
     service.state().wrong = Wrong::Floods;
     assert!(drive(&mut device, &push(), |s| s.is_err()));
-    assert!(until(LONG, || named("sends more than it is asked for")
+    assert!(until(LONG, || named("sends unsolicited messages")
         && service.state().force_n == [0.0; 3]));
     service.state().wrong = Wrong::Nothing;
     assert!(drive(&mut device, &Wrench::zero(), Result::is_ok));

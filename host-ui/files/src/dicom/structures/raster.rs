@@ -326,7 +326,7 @@ impl Coverage {
         }
     }
 
-    /// Returns the runs of a row with coverage of at least half, and resets for the next row.
+    /// Appends the runs of a row with coverage of at least half, and resets for the next row.
     fn take_row(&mut self, row: u32, runs: &mut Vec<Run>) {
         let (mut through, mut begun) = (0.0, None);
         let touched = std::mem::take(&mut self.touched);

@@ -70,7 +70,7 @@ fn each_fault_is_reported_once_and_all_together() {
         assert!(found[0].to_string().contains(words), "{words}: {}", found[0]);
     };
     one(empty(), "no needle");
-    one(good().with_seed(1, 0.0575, 0.5).unwrap(), "nearer than its length");
+    one(good().with_seed(1, 0.0575, 0.5).unwrap(), "closer than its length");
     one(good().with_seed(1, 0.04, 0.5).unwrap(), "outside gland");
     one(good().with_seed(1, 0.065, 20.0).unwrap(), "20 U");
     one(good().with_needle(hole("E8"), 0.05).unwrap(), "no seed");

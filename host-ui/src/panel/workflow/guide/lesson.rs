@@ -34,7 +34,7 @@ pub fn lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
         // A recording is described, not instructed.
         Some(_) if progress(shown) != Progress::Debrief => Lesson {
             what: format!(
-                "A recorded insertion: look on. Whoever moves the needle reads here: \u{201c}{}\u{201d}",
+                "This is a recording. During your own insertion you would read here: \u{201c}{}\u{201d}",
                 lesson.what
             ),
             notes: lesson.notes,
@@ -51,14 +51,14 @@ fn next_lesson(shown: &Shown, membranes: &MetMembranes) -> Lesson {
     }
     if shown.running && shown.watched.is_none() {
         return of(
-            "The script moves the needle now. Watch it, or press Stop to go on by hand.",
+            "The script moves the needle now. Watch it, or press Stop to continue by hand.",
             &[],
         );
     }
     let next = needle_at_hand(shown).and_then(|needle| needle.next().map(|operation| (needle, operation)));
     match (progress(shown), next) {
         (Progress::Scene, _) => of(
-            "Choose a scene: press \"paper\" in step 1. It is a gland by itself.",
+            "Choose a scene: press \"paper\" in step 1. It is a gland without other organs.",
             &[],
         ),
         (Progress::Plan, _) => of(
@@ -77,7 +77,7 @@ fn operation_lesson(shown: &Shown, membranes: &MetMembranes, needle: &AtHand, op
         Operation::Insert | Operation::InsertTo(_) => insert(shown, membranes, needle),
         Operation::Drop(_) => of(
             "The tip is at the next planned place. Press Space: the seed leaves the needle here.",
-            &["It lies in tissue that the needle still holds out of its place."],
+            &["The tissue is still displaced by the needle."],
         ),
         Operation::DrawBack(_) => {
             let back_m = needle.next_drop_m.map_or(0.0, |next_m| needle.depth_m - next_m);
@@ -91,7 +91,7 @@ fn operation_lesson(shown: &Shown, membranes: &MetMembranes, needle: &AtHand, op
         }
         Operation::Retract | Operation::TakeOut => of(
             "All seeds are dropped. Take the needle out: hold S, or press Enter.",
-            &["Watch the seeds as the tissue goes back to where it was."],
+            &["Watch the seeds as the tissue returns to its place."],
         ),
         Operation::Reset
         | Operation::PublishPlan
@@ -105,7 +105,7 @@ fn operation_lesson(shown: &Shown, membranes: &MetMembranes, needle: &AtHand, op
 fn place(shown: &Shown) -> Lesson {
     if !shown.is_engaged() {
         return of(
-            "Press E: it turns the force on. Without it nothing is membranes, and every force reads 0.",
+            "Press E to turn the force on. Without it no force is rendered, and every force reads 0.",
             &["A device pushes back from now on. With keys or mouse, watch the force at the upper right."],
         );
     }
@@ -126,8 +126,7 @@ fn insert(shown: &Shown, membranes: &MetMembranes, needle: &AtHand) -> Lesson {
                 share * 100.0
             ),
             notes: vec![
-                "The force rises, and the gland moves away before the needle: follow the outlines in the slices."
-                    .to_owned(),
+                "The force rises, and the needle pushes the gland ahead: follow the outlines in the slices.".to_owned(),
             ],
         };
     }
@@ -137,7 +136,7 @@ fn insert(shown: &Shown, membranes: &MetMembranes, needle: &AtHand) -> Lesson {
     let left = format::length(left_m.max(0.0));
     match membranes.punctures().last().filter(|_| shown.has_punctured()) {
         Some(puncture) => Lesson {
-            what: format!("It gave way. Go on to the deepest seed, {left} ahead: hold W, or press Enter."),
+            what: format!("The membrane gave way. Continue to the deepest seed, {left} ahead: hold W, or press Enter."),
             notes: vec![
                 pressed(puncture),
                 "What you feel now is friction along the shaft; it grows with the depth.".to_owned(),
@@ -203,7 +202,7 @@ fn debrief(shown: &Shown, membranes: &MetMembranes) -> Lesson {
     let mut notes: Vec<String> = membranes.punctures().iter().map(pressed).collect();
     notes.extend(seeds.iter().take(SEEDS).map(|seed| {
         format!(
-            "Seed {}: planned {} deep, left at {}, rests at {}, {} beside the path.",
+            "Seed {}: planned {} deep, dropped at {}, came to rest at {}, {} off axis.",
             seed.number,
             format::length(seed.planned_m),
             format::length(seed.left_m),
@@ -225,10 +224,10 @@ fn debrief(shown: &Shown, membranes: &MetMembranes) -> Lesson {
             format::signed_mm(by_tissue_m)
         ),
     });
-    notes.push("\"Compensate\" in a plan of many needles moves the drops ahead of this.".to_owned());
+    notes.push("\"Compensate\" in a plan of many needles shifts the drop positions to compensate.".to_owned());
     Lesson {
         what: format!(
-            "The seeds rest {} mm from where they were planned, on average along the needle. Inwards is positive.",
+            "On average the seeds rest {} mm from plan along the needle. Inwards is positive.",
             format::signed_mm(by_hand_m + by_tissue_m)
         ),
         notes,

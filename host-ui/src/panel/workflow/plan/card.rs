@@ -100,7 +100,7 @@ fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, a
             free && shown.planning.next_needle().is_some(),
             Button::new("Compensate"),
         );
-        let hint = "Rehearses each needle and moves its drops so that the seeds rest where they are planned";
+        let hint = "Rehearses each needle and shifts its drops so that the seeds rest where they are planned";
         let compensate = compensate.on_hover_text(hint).explained("rehearsal");
         if compensate.explained("compensation").clicked() {
             actions.push(Action::Plan(PlanAction::Compensate));
@@ -154,7 +154,7 @@ fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut V
         }
         let fit = ui.add_enabled(free, Button::new("Fit dose"));
         if fit
-            .on_hover_text("The strength with which 96 % of the target gets the prescription")
+            .on_hover_text("The strength at which 96 % of the target gets the prescription")
             .clicked()
         {
             actions.push(Action::Plan(PlanAction::FitStrength));
@@ -199,7 +199,7 @@ fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bo
             actions.push(Action::Plan(PlanAction::Import(PathBuf::from(path))));
         }
         let export = ui.add_enabled(has_name && shown.planning.implant.is_some(), Button::new("Save"));
-        if export.on_hover_text("To the file named at the left").clicked() {
+        if export.on_hover_text("Writes to the file named at the left").clicked() {
             actions.push(Action::Plan(PlanAction::Export(PathBuf::from(path))));
         }
         ui.add_enabled_ui(free, |ui| dialogs_ui(ui, shown, actions));

@@ -100,7 +100,7 @@ fn head_ui(ui: &mut egui::Ui, implant: &Implant, actions: &mut Vec<Action>) {
             }
             if ui
                 .button("Perineum view")
-                .on_hover_text("The 3D view looks through the template, as this panel does")
+                .on_hover_text("Turns the 3D view to look through the template, like this panel")
                 .clicked()
             {
                 actions.push(Action::LookFrom(Viewpoint::Perineum));

@@ -105,7 +105,7 @@ fn row_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, actions: &mut Vec
             row.pitch_m = format::metres(pitch_mm);
         }
         ui.checkbox(&mut row.stranded, "Strand")
-            .on_hover_text("In one strand with spacers between the seeds, or each by itself")
+            .on_hover_text("In one strand with spacers between the seeds, or loose")
             .explained("strand")
             .explained("spacer");
     });

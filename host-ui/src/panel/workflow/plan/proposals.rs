@@ -37,7 +37,7 @@ pub fn proposals_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut 
     picture_ui(ui, proposals, chosen);
     let text = match chosen.and_then(|number| proposals.get(number)) {
         Some(proposal) => words(proposal),
-        None => "Changed since; a button takes one back.".to_owned(),
+        None => "Changed since; a button restores a proposal.".to_owned(),
     };
     super::weak_line(ui, text);
 }
@@ -46,7 +46,11 @@ pub fn proposals_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut 
 fn picture_ui(ui: &mut egui::Ui, proposals: &[FirstPlan], chosen: Option<usize>) {
     let tokens = theme::of(ui);
     ui.horizontal(|ui| {
-        ui.label(RichText::new("Trials that keep D90, %").color(tokens.depth).size(11.5));
+        ui.label(
+            RichText::new("Robustness (% of trials meeting D90)")
+                .color(tokens.depth)
+                .size(11.5),
+        );
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             ui.label(RichText::new("over V150, %").color(tokens.weak).size(11.5));
         });
@@ -98,7 +102,7 @@ fn words(proposal: &FirstPlan) -> String {
         return format!("{needles} needles");
     };
     format!(
-        "{needles} needles, V150 {:.0} %, {:.0} % keep D90",
+        "{needles} needles, V150 {:.0} %, {:.0} % meet D90",
         figures.v150,
         robust * 100.0
     )
