@@ -6,23 +6,23 @@ use std::time::Instant;
 use stylet_ports::{self as service, Meeting, StateWriter};
 
 /// A name that leaves nothing in shared memory; to be dropped last.
-struct SharedMemoryCleanup(Instance);
+struct Swept(Instance);
 
-impl std::ops::Deref for SharedMemoryCleanup {
+impl std::ops::Deref for Swept {
     type Target = Instance;
     fn deref(&self) -> &Instance {
         &self.0
     }
 }
 
-impl Drop for SharedMemoryCleanup {
+impl Drop for Swept {
     fn drop(&mut self) {
         self.0.sweep();
     }
 }
 
-fn instance(name: &str) -> SharedMemoryCleanup {
-    SharedMemoryCleanup(Instance::new(&format!("{name}-{}", std::process::id())).unwrap())
+fn instance(name: &str) -> Swept {
+    Swept(Instance::new(&format!("{name}-{}", std::process::id())).unwrap())
 }
 
 /// Polls as a frame would until it holds.
