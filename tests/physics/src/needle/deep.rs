@@ -77,7 +77,7 @@ fn no_hand_sings_that_pushes_a_deep_needle_aside() {
 
 /// With eq. 6 ChainMail had 37 % more displacement at 3 mm after 6 mm than on the way there.
 #[test]
-fn a_needle_that_comes_back_before_its_membrane_gave_way_finds_the_tissue_as_on_the_way_in() {
+fn an_unfinished_puncture_is_reversible() {
     for kind in KINDS {
         let mut theatre = Theatre::of(kind);
         let mut at = |turn_m: Option<f64>| {

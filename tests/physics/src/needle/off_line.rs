@@ -61,7 +61,7 @@ fn insert(scene: &str, degrees: f64, speed_m_per_s: f64, coupling: f64) -> Found
 /// The body is solved one cycle a tick there, and lags most where the patch is another in each tick. No force of eq. 8
 /// to 10 goes by it; in coupled mode one does, and is turned off before it is wrong by more than a fifth.
 #[test]
-fn a_needle_off_its_line_in_finite_elements_keeps_its_force_unless_that_is_the_bodys() {
+fn an_off_line_needle_keeps_its_own_force() {
     for (case, coupling) in [
         ("off the line, 0, 20 and 45 degrees, 10 to 123 mm/s, 40 mm deep", 0.0),
         ("the same in coupled mode", 1.0),
