@@ -126,7 +126,12 @@ fn a_core_that_was_killed_is_started_again_by_a_click() {
     driven.until("another run", |app| {
         run(app).is_some_and(|id| Some(id) != first) && app.link().state().is_some()
     });
-    assert!(driven.window.query_by_label("The simulator core is not running").is_none());
+    assert!(
+        driven
+            .window
+            .query_by_label("The simulator core is not running")
+            .is_none()
+    );
 }
 
 #[test]
