@@ -141,7 +141,7 @@ fn a_table_whose_needles_contradict_its_places_is_refused() {
     for (from, to, reported) in [
         (",2,I9", ",1,E7", "needle 1: its seeds are not on one line"),
         (",2,I9", ",2,J9", "needle 2: its seeds are 5.0 mm off hole J9"),
-        (",2,I9", ",2,Z9", "needle 2: \"Z9\" is no hole"),
+        (",2,I9", ",2,Z9", "needle 2: \"Z9\" is not a hole"),
         (",2,I9", ",0,I9", "needle is \"0\", not a whole number from 1"),
         (",2,I9", ",two,I9", "needle is \"two\""),
     ] {
