@@ -39,3 +39,4 @@ mod scenes;
 mod shm_invalid;
 mod volume;
 mod wall;
+mod wall_wild;
