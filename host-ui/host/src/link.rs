@@ -139,11 +139,9 @@ impl Link {
         self.motions.longest_pause()
     }
 
-    /// Without it the hand brakes: a full queue is no error.
     fn promise(&self, valid_s: f64) {
-        if let Ok(command) = (Request::KeepMoving { valid_s }).encode(self.host_id, UNANSWERED) {
-            let _sent = self.receiver.send(Outgoing::Command(Box::new(command)));
-        }
+        let until = Instant::now() + Duration::from_secs_f64(valid_s);
+        let _sent = self.receiver.send(Outgoing::Promise(until));
     }
 
     /// The instance that this link is for.

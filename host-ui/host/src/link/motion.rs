@@ -14,6 +14,9 @@ const FORESEEN: usize = 2;
 /// A promise is for so many pauses, and is renewed so often while it lasts.
 const PAUSES: f64 = 1.5;
 const RENEWALS: u32 = 3;
+/// How often a promise is passed on while the program's own lasts, and for how long each time, s.
+const RENEW_EVERY: Duration = Duration::from_millis(8);
+const LONGEST_RENEWAL_S: f64 = 0.03;
 /// No needle lies deeper than this, m.
 const LONGEST_DRAW_M: f64 = 0.5;
 
@@ -136,6 +139,33 @@ impl Motions {
     }
 }
 
+/// The program's promise, passed on in short ones by the thread that owns the ports: a process that is killed or stopped leaves no long
+/// one behind.
+#[derive(Default)]
+pub struct Renewals {
+    /// End of the program's promise.
+    until: Option<Instant>,
+    renewed: Option<Instant>,
+}
+
+impl Renewals {
+    /// Takes a promise of the program.
+    pub fn promise(&mut self, until: Instant) {
+        (self.until, self.renewed) = (Some(until), None);
+    }
+
+    /// Returns the renewal that is due.
+    pub fn due(&mut self, now: Instant) -> Option<Request> {
+        let left = self.until?.checked_duration_since(now)?;
+        if self.renewed.is_some_and(|at| now - at < RENEW_EVERY) {
+            return None;
+        }
+        self.renewed = Some(now);
+        let valid_s = left.as_secs_f64().clamp(VALID_RANGE_S[0], LONGEST_RENEWAL_S);
+        Some(Request::KeepMoving { valid_s })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -205,6 +235,22 @@ mod tests {
             assert!((last[1].1 - valid_s).abs() < 1e-9, "{pause_ms} ms: {last:?}");
             assert_eq!(last[1].0 - last[0].0, every, "{pause_ms} ms");
         }
+    }
+
+    /// A window whose frames took 150 ms promised 225, and its hand went on for 8 mm after it was killed.
+    #[test]
+    fn a_long_promise_is_passed_on_in_short_ones_and_ends() {
+        let (mut renewals, now) = (Renewals::default(), Instant::now());
+        assert_eq!(renewals.due(now), None, "nothing was promised");
+        renewals.promise(now + Duration::from_millis(225));
+        let mut sent = Vec::new();
+        for ms in 0..400 {
+            if let Some(Request::KeepMoving { valid_s }) = renewals.due(now + Duration::from_millis(ms)) {
+                assert!((0.02..=0.03).contains(&valid_s), "{valid_s}");
+                sent.push(ms);
+            }
+        }
+        assert_eq!((sent.len(), sent[1], sent.last()), (29, 8, Some(&224)));
     }
 
     #[test]

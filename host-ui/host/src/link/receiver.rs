@@ -4,10 +4,11 @@
 //! this thread looks every two milliseconds.
 
 use super::inbox::Inbox;
+use super::motion::Renewals;
 use super::ports::Ports;
 use super::second::SecondEnds;
 use super::thread::lock;
-use super::{ABSENT_AFTER, SceneModel, Snapshot};
+use super::{ABSENT_AFTER, SceneModel, Snapshot, UNANSWERED};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 use stylet_ports::{self as service, Node, ServiceError, SlicePublisher, StateReader};
@@ -25,6 +26,8 @@ const OPEN_BOARD_EVERY: Duration = Duration::from_millis(20);
 /// What the host asks the core for.
 pub enum Outgoing {
     Command(Box<Command>),
+    /// What this host moves goes on until then, as long as this process runs.
+    Promise(Instant),
     Upload(Box<UploadHeader>, Vec<u8>),
     Lease(LeaseOrder),
 }
@@ -40,6 +43,7 @@ pub struct Passes {
     host_id: u64,
     inbox: Arc<Mutex<Inbox>>,
     asked: mpsc::Receiver<Outgoing>,
+    renewals: Renewals,
     session: Option<Session>,
     tick: u64,
     /// The newest record: what a bridge that was started anew sends again is older.
@@ -69,6 +73,7 @@ impl Passes {
             host_id,
             inbox,
             asked,
+            renewals: Renewals::default(),
             session: None,
             tick: 0,
             record_tick: 0,
@@ -163,6 +168,10 @@ impl Passes {
             let (id, sent) = match outgoing {
                 Outgoing::Command(command) => (command.command_id, self.send_command(&command)),
                 Outgoing::Upload(header, cells) => (header.command_id, self.send_volume(&header, &cells)),
+                Outgoing::Promise(until) => {
+                    self.renewals.promise(until);
+                    continue;
+                }
                 Outgoing::Lease(order) => {
                     // The list shows what came of it, and goes where there is no relay.
                     let _ = self.ports.as_ref().map(|ports| ports.lease.send(order));
@@ -172,6 +181,11 @@ impl Passes {
             if let Err(why) = sent {
                 lock(&self.inbox).put_unsent(id, why);
             }
+        }
+        let renewal = self.renewals.due(Instant::now());
+        if let Some(Ok(command)) = renewal.map(|request| request.encode(self.host_id, UNANSWERED)) {
+            // Without it the hand brakes: a full queue is no error.
+            let _sent = self.send_command(&command);
         }
     }
 

@@ -49,7 +49,7 @@ fn edge(driven: &Driven) -> Vec<Pos2> {
     let (low, high) = target.bounds_m();
     let middle = (Vector3::from(low) + Vector3::from(high)) / 2.0;
     let plane = picture.plane();
-    let middle = middle - plane.normal() * plane.in_beams(middle).distance_m;
+    let middle = middle - plane.normal() * plane.in_beams(middle).off_plane_m;
     let on_edge = |n: usize| {
         let (sine, cosine) = ((n as f64 + 0.25) / CLICKS as f64 * std::f64::consts::TAU).sin_cos();
         let out = plane.right() * cosine + plane.pose.up * sine;

@@ -15,8 +15,12 @@ impl HapticLoop {
         self.motions.hand = MotionLease::begin(promise, self.period_s);
     }
 
+    /// Stops as hard as a motion that nobody answers for.
     pub(super) fn stop_motion(&mut self) {
-        self.device.stop_hand();
+        match self.goal {
+            Some(_) => self.brake(),
+            None => self.device.stop_hand(),
+        }
         self.goal = None;
         self.motions.hand = MotionLease::Free;
     }

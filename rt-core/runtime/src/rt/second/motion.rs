@@ -16,8 +16,12 @@ impl SecondLoop {
         self.memory.motion = MotionLease::begin(promise, self.period_s);
     }
 
+    /// Stops as hard as a motion that nobody answers for.
     pub(super) fn stop_motion(&mut self) {
-        self.device.stop_hand();
+        match self.memory.goal {
+            Some(_) => self.brake(),
+            None => self.device.stop_hand(),
+        }
         self.memory.goal = None;
         self.memory.motion = MotionLease::Free;
     }
@@ -40,13 +44,7 @@ impl SecondLoop {
     pub(super) fn watch_motion(&mut self) {
         let has_arrived = self.has_arrived();
         match self.memory.motion.tick(has_arrived, self.period_s) {
-            Some(Lapse::Brake) => {
-                let memory = &self.memory;
-                if let Some(goal) = &memory.goal {
-                    let velocity = memory.estimator.velocity_m_per_s();
-                    motion_lease::brake(self.device.as_mut(), goal, memory.sample, velocity);
-                }
-            }
+            Some(Lapse::Brake) => self.brake(),
             Some(Lapse::GiveUp) => {
                 self.memory.goal = None;
                 let (tick, time_ns) = (self.memory.state.tick + 1, self.memory.state.time_ns);
@@ -54,6 +52,14 @@ impl SecondLoop {
                 self.notify(Notice::MotionGivenUp { tick, time_ns, what });
             }
             None => {}
+        }
+    }
+
+    fn brake(&mut self) {
+        let memory = &self.memory;
+        if let Some(goal) = &memory.goal {
+            let velocity = memory.estimator.velocity_m_per_s();
+            motion_lease::brake(self.device.as_mut(), goal, memory.sample, velocity);
         }
     }
 
