@@ -202,3 +202,18 @@ fn full_shared_memory_is_reported_in_words_and_who_runs_already_goes_on() {
         assert!(text.contains("/dev/shm needs room"), "{words}: {text}");
     }
 }
+
+/// A wild write of a host there made the core unfindable for as long as it ran.
+#[test]
+fn a_core_announces_itself_again_where_a_host_has_overwritten_that() {
+    let mut core = Core::start();
+    let (announced, epoch) = (core.instance.folder().join("current"), core.instance.epoch());
+    assert!(epoch.is_some());
+    for damage in [&b"0123456789abcdef"[..], b"", b"\xff\xff"] {
+        std::fs::write(&announced, damage).expect("ours");
+        let is_found = until(Duration::from_secs(2), || core.instance.epoch() == epoch);
+        assert!(is_found, "{damage:?}");
+    }
+    drop(core.host());
+    core.finish();
+}

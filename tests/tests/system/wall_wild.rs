@@ -109,17 +109,8 @@ fn write_wildly(
     writes
 }
 
-/// What a core that was damaged had to do.
-#[derive(Debug, PartialEq)]
-enum Survived {
-    Unmoved,
-    WithAnotherBridge,
-    /// Hosts do not find it any more: what says which epoch they are to join was overwritten.
-    Unheard,
-}
-
-/// Damages what hosts share with a core.
-fn assert_survives(damaged: Damaged, seed: u64) -> Survived {
+/// Damages what hosts share with a core. Returns whether its bridge was replaced.
+fn assert_survives(damaged: Damaged, seed: u64) -> bool {
     let mut core = Core::start();
     drop(core.host());
     let first = bridge(core.id(), None);
@@ -134,16 +125,6 @@ fn assert_survives(damaged: Damaged, seed: u64) -> Survived {
     assert!(writes > 0, "{damaged:?} {seed}: nothing was written");
     assert!(core.is_running(), "{damaged:?} {seed}: the core ended");
     drop(recorder);
-    if matches!(damaged, Damaged::Opened) && core.instance.epoch().is_none() {
-        let instance = core.instance.clone();
-        let report = core.finish();
-        let ticks = report["haptic"]["ticks"].as_u64();
-        assert!(ticks.is_some_and(|ticks| ticks > 2000), "{damaged:?} {seed}: {report}");
-        let mut next = Core::start_as(instance, &["--rt-if-allowed"]);
-        drop(next.host());
-        next.finish();
-        return Survived::Unheard;
-    }
     // A host finds its way by itself, and one that was there before gets the last 12 s again: the records are without a gap.
     let mut link = core.host();
     let has_state = until(Duration::from_secs(10), || {
@@ -180,21 +161,16 @@ fn assert_survives(damaged: Damaged, seed: u64) -> Survived {
     let mut next = Core::start_as(instance, &["--rt-if-allowed"]);
     drop(next.host());
     next.finish();
-    match is_replaced {
-        true => Survived::WithAnotherBridge,
-        false => Survived::Unmoved,
-    }
+    is_replaced
 }
 
 fn assert_all_survive(seeds: u64, all: &[Damaged]) {
     let trials = (1..=seeds).flat_map(|seed| all.iter().map(move |damaged| (*damaged, seed)));
-    let ended: Vec<Survived> = trials.map(|(damaged, seed)| assert_survives(damaged, seed)).collect();
-    let count = |how: &Survived| ended.iter().filter(|ended| *ended == how).count();
+    let replaced: Vec<bool> = trials.map(|(damaged, seed)| assert_survives(damaged, seed)).collect();
     println!(
-        "{} trials: no core ended, {} bridges were replaced, {} cores were found by no host any more, 0 gaps in the records, all next starts",
-        ended.len(),
-        count(&Survived::WithAnotherBridge),
-        count(&Survived::Unheard)
+        "{} trials: no core ended, {} bridges were replaced, 0 gaps in the records, all next starts",
+        replaced.len(),
+        replaced.iter().filter(|is_replaced| **is_replaced).count(),
     );
 }
 

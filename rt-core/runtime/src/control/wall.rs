@@ -334,6 +334,10 @@ impl Wall {
         }
         if self.looked.elapsed() >= COMPLAINTS_EVERY {
             self.looked = Instant::now();
+            // A host that writes wildly may have written here: then no other would find the core.
+            if running.is_ready && self.owned.instance().epoch().as_ref() != Some(&running.epoch) {
+                let _ = self.owned.announce(&running.epoch);
+            }
             if self.tried.elapsed() >= SHORTEST_EPOCH && self.owned.hears_complaint(&running.epoch) {
                 return Some("a host cannot use the shared memory, which some host has damaged".to_owned());
             }
