@@ -201,7 +201,7 @@ fn a_plan_survives_a_file_round_trip() {
     driven.window.key_press_modifiers(Modifiers::COMMAND, Key::A);
     driven.window.run_steps(1);
     import(&mut driven, &wrong);
-    driven.window.get_by_label_contains("wrong.toml: it is no plan");
+    driven.window.get_by_label_contains("wrong.toml: it is not a plan");
     assert_eq!(plan(&driven), before);
 }
 
