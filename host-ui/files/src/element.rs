@@ -188,7 +188,7 @@ pub fn read_values<V>(
         sink.progress.report(Stage::Voxels, values.len(), count)?;
         let part = &mut chunk[..((count - values.len()) * size).min(CHUNK_BYTES)];
         from.read_exact(part)
-            .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
+            .map_err(|e| format!("it is truncated or damaged ({e}); copy or export it again"))?;
         for bytes in part.chunks_exact(size) {
             values.push((sink.made_of)(element.value(bytes, endian) * slope + intercept)?);
         }
@@ -221,7 +221,7 @@ pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<V
         return Ok(values);
     }
     Err(ContentError::Invalid(format!(
-        "it is cut off: {} of {count} values are there; copy or export it again",
+        "it is truncated: {} of {count} values are there; copy or export it again",
         values.len()
     )))
 }

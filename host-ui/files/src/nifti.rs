@@ -42,7 +42,7 @@ pub fn read<V>(bytes: &[u8], sink: Sink<V>) -> Result<VoxelValues<V>, ContentErr
     let frame = voxel_frame(&header)?;
     let skipped = (data_at - HEADER_BYTES) as u64;
     std::io::copy(&mut from.by_ref().take(skipped), &mut std::io::sink())
-        .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
+        .map_err(|e| format!("it is truncated or damaged ({e}); copy or export it again"))?;
     let endian = if header.endianness == Endianness::Big {
         Endian::Big
     } else {
@@ -62,7 +62,7 @@ fn read_header(from: &mut dyn Read, file_bytes: usize) -> Result<NiftiHeader, Co
     }
     if start.len() < HEADER_BYTES {
         return Err(ContentError::Invalid(format!(
-            "it is cut off: {file_bytes} bytes, and the header alone needs {HEADER_BYTES}; copy or export it again"
+            "it is truncated: {file_bytes} bytes, and the header alone needs {HEADER_BYTES}; copy or export it again"
         )));
     }
     if start.ends_with(b"ni1\0") {

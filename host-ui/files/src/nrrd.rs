@@ -97,7 +97,7 @@ fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<
             must_hold(size.saturating_add(h.byte_skip as u64), skipped.len() as u64, true)?;
             let mut from = MultiGzDecoder::new(skipped);
             std::io::copy(&mut from.by_ref().take(h.byte_skip as u64), &mut std::io::sink())
-                .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
+                .map_err(|e| format!("it is truncated or damaged ({e}); copy or export it again"))?;
             let values = read_values(&mut from, h.element, endian, count, identity, sink)?;
             nothing_left(from)?;
             Ok(values)
@@ -128,7 +128,7 @@ fn unpacked_end(packed: &[u8], size: u64) -> Result<Vec<u8>, ContentError> {
     MultiGzDecoder::new(packed)
         .take(size + MAX_BEFORE_END + 1)
         .read_to_end(&mut all)
-        .map_err(|e| format!("it is cut off or damaged ({e}); copy or export it again"))?;
+        .map_err(|e| format!("it is truncated or damaged ({e}); copy or export it again"))?;
     let before = (all.len() as u64).checked_sub(size);
     match before {
         Some(before) if before <= MAX_BEFORE_END => Ok(all.split_off(before as usize)),
@@ -136,7 +136,7 @@ fn unpacked_end(packed: &[u8], size: u64) -> Result<Vec<u8>, ContentError> {
             "its data have more than {MAX_BEFORE_END} bytes before those that its size requires"
         ))),
         None => Err(ContentError::Invalid(format!(
-            "it is cut off: {} of {size} bytes are there; copy or export it again",
+            "it is truncated: {} of {size} bytes are there; copy or export it again",
             all.len()
         ))),
     }

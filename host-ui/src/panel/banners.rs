@@ -270,7 +270,7 @@ fn absent(shown: &Shown, why: &str) -> Banner {
     };
     let remedy = match shown.session.is_some() && shown.relayed.is_none() {
         true => ("Start it again", Action::StartCore),
-        false => ("Watch an example", Action::Watch(WatchAction::Example)),
+        false => ("Watch example", Action::Watch(WatchAction::Example)),
     };
     Banner {
         level: BannerLevel::Bad,

@@ -328,7 +328,7 @@ impl<'a> Walk<'a> {
             .get(self.at..self.at + N)
             .and_then(|p| <[u8; N]>::try_from(p).ok());
         self.at += N;
-        part.ok_or_else(|| "it is cut off in the middle of an element".to_owned())
+        part.ok_or_else(|| "it is truncated in the middle of an element".to_owned())
     }
 
     fn u16(&mut self) -> Result<u16, ContentError> {

@@ -42,7 +42,7 @@ impl Header {
                 .trim();
             let Some((key, value)) = line.split_once('=') else {
                 return Err(if line.is_empty() && after.is_empty() {
-                    "it is cut off: its header has no ElementDataFile; copy or export it again".into()
+                    "it is truncated: its header has no ElementDataFile; copy or export it again".into()
                 } else {
                     format!("the line \"{}\" of its header has no \"=\"", short(line)).into()
                 });

@@ -51,7 +51,7 @@ fn letters_give_the_axes_where_there_is_no_matrix() {
         lettered("???")
             .warning
             .unwrap()
-            .contains("nothing of the patient's orientation")
+            .contains("does not give the patient's orientation")
     );
     let both = read(&with("Offset", "AnatomicalOrientation = RAI\nOffset"), &no_file).unwrap();
     assert!(both.frame.warning.unwrap().contains("contradicts"));
@@ -77,7 +77,7 @@ fn each_wrong_header_is_refused_with_its_reason() {
         (
             "BinaryData = False",
             "BinaryData = True\nCompressedData = True",
-            "cut off or damaged",
+            "truncated or damaged",
         ),
         ("0 -1 0 0 0 0 1", "0 -1 0 0 0 0", "9 numbers"),
         ("0 -1 0 0 0 0 1", "0 -1 0 0 0 0 2", "scales as well"),

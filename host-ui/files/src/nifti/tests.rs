@@ -68,8 +68,8 @@ fn every_broken_file_is_refused_with_its_reason() {
         b
     };
     refused("empty.nii", &[], "it is empty");
-    refused("short.nii", &small()[..100], "cut off");
-    refused("cut.nii", &small()[..400], "cut off");
+    refused("short.nii", &small()[..100], "truncated");
+    refused("cut.nii", &small()[..400], "truncated");
     refused("magic.nii", &with(344, b"nope"), "magic");
     refused("pair.nii", &with(344, b"ni1\0"), ".hdr/.img");
     refused("type.nii", &with(70, &128_i16.to_le_bytes()), "data type is number 128");

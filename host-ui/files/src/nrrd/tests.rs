@@ -145,7 +145,7 @@ fn packed_data_are_unpacked_no_further_than_the_header_asks() {
         read(&to_end("1000 1000 49"), &no_file).unwrap().labels.len(),
         49_000_000
     );
-    assert!(why(&to_end("1000 1000 51")).contains("it is cut off"));
+    assert!(why(&to_end("1000 1000 51")).contains("it is truncated"));
     assert!(why(&file("1000 1000 200")).contains("the header requires 200000000 bytes"));
     assert_eq!(read(&file("1000 1000 50"), &no_file).unwrap().labels.len(), 50_000_000);
 }

@@ -326,7 +326,7 @@ mod tests {
         assert_eq!(found.unwrap().0, expected);
         for headers in [&["x", "y_mm", "z_mm"][..], &["x_mm", "y_mm", "z_mm", "strength_q"]] {
             let why = columns(headers, &[]).unwrap_err();
-            assert!(why.contains("is not known") && why.contains("--column"), "{why}");
+            assert!(why.contains("is unknown") && why.contains("--column"), "{why}");
         }
         let why = columns(&["x_mm", "X (cm)", "y_mm", "z_mm"], &[]).unwrap_err();
         assert!(why.contains("x_mm is there twice"), "{why}");

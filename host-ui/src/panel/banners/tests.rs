@@ -160,11 +160,11 @@ fn unstable_cases_are_warned_of_while_they_last() {
             7 => {
                 state.flags |= flags::LINE_NEEDED | flags::IN_CONTACT;
                 (state.lag_ns, state.lag_m) = (15_000_000, 1.5e-3);
-                "No line: The tissue was not prepared for this needle, and its answer is 15 ms"
+                "No needle line: The tissue was not prepared for this needle, and its answer is 15 ms"
             }
             32 | 42 | 48 => {
                 state.flags |= flags::LINE_NEEDED | flags::IN_CONTACT;
-                "No line: "
+                "No needle line: "
             }
             // This one belongs to the scene, as long as it is loaded, and is not a banner.
             35 => {

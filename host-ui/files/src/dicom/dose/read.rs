@@ -229,7 +229,7 @@ fn values(data: &InMemDicomObject, pixels: &[u8], is_big_endian: bool, count: us
     let size = bits as usize / 8;
     if pixels.len() < count * size {
         return Err(ContentError::Invalid(format!(
-            "it is cut off: {count} voxels need {} bytes, and {} are there; copy or export it again",
+            "it is truncated: {count} voxels need {} bytes, and {} are there; copy or export it again",
             count * size,
             pixels.len()
         )));

@@ -226,5 +226,5 @@ fn unreadable_files_are_refused_with_a_reason() {
     assert!(why.contains("is 0"), "{why}");
     let nothing = tempfile::tempdir().unwrap();
     let why = read(nothing.path(), &Progress::default()).unwrap_err().to_string();
-    assert!(why.contains("no image series"), "{why}");
+    assert!(why.contains("no DICOM image series"), "{why}");
 }

@@ -46,11 +46,7 @@ pub fn proposals_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut 
 fn picture_ui(ui: &mut egui::Ui, proposals: &[FirstPlan], chosen: Option<usize>) {
     let tokens = theme::of(ui);
     ui.horizontal(|ui| {
-        ui.label(
-            RichText::new("Robustness (% of trials meeting D90)")
-                .color(tokens.depth)
-                .size(11.5),
-        );
+        ui.label(RichText::new("% of trials meeting D90").color(tokens.depth).size(11.5));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             ui.label(RichText::new("over V150, %").color(tokens.weak).size(11.5));
         });
