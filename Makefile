@@ -65,7 +65,7 @@ senders: deps-test build ## End what moves the hand in each way, SENDERS_TRIALS 
 	SENDERS_TRIALS=$(or $(SENDERS_TRIALS),50) $(CARGO) test --profile quick -p stylet-tests-window --lib senders:: -- --include-ignored --nocapture --test-threads=1
 
 floods: build ## Stop and release under three floods of requests, FLOODS_STOPS (1000) times each (three minutes)
-	FLOODS_STOPS=$(or $(FLOODS_STOPS),1000) $(CARGO) test --profile quick -p stylet-tests --test system floods:: -- --nocapture --test-threads=1
+	FLOODS_STOPS=$(or $(FLOODS_STOPS),1000) $(CARGO) test --profile quick -p stylet-tests --test system floods::a_stop -- --include-ignored --nocapture --test-threads=1
 
 hostile: build ## Send what is valid, stale and broken to a core and its OpenIGTLink for HOSTILE_SECONDS (600), by HOSTILE_SEED (1)
 	HOSTILE_SECONDS=$(or $(HOSTILE_SECONDS),600) HOSTILE_SEED=$(or $(HOSTILE_SEED),1) $(CARGO) test --profile quick -p stylet-tests --test system hostile:: -- --nocapture --test-threads=1

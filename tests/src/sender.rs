@@ -301,7 +301,10 @@ impl Trial {
         let must_be_said = stands_still(ending) && self.was_on_its_way;
         match self.went_on {
             true if self.given_up > 0 => Some("the motion lapsed although its program goes on"),
-            true if self.farthest_mm <= GOES_ON_MM => Some("the motion ended although its program goes on"),
+            // One that reaches its goal meanwhile moves on for a while.
+            true if self.farthest_mm <= GOES_ON_MM && self.ticks <= LONGEST_TICKS => {
+                Some("the motion ended although its program goes on")
+            }
             false if is_alone_too_long => Some("the hand went on without an owner"),
             false if must_be_said && self.given_up != 1 => Some("hosts do not hear of it"),
             _ => None,

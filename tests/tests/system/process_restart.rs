@@ -207,6 +207,7 @@ fn full_shared_memory_is_reported_in_words_and_who_runs_already_goes_on() {
 #[test]
 fn a_core_announces_itself_again_where_a_host_has_overwritten_that() {
     let mut core = Core::start();
+    drop(core.host());
     let (announced, epoch) = (core.instance.folder().join("current"), core.instance.epoch());
     assert!(epoch.is_some());
     for damage in [&b"0123456789abcdef"[..], b"", b"\xff\xff"] {
