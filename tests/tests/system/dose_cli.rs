@@ -269,7 +269,7 @@ fn what_is_wrong_is_reported_once_with_its_file_and_line() {
         (
             good,
             &["--structures", "/nowhere.nii", "--metric", "Q5"],
-            "\"Q5\" is no metric",
+            "\"Q5\" is not a metric",
         ),
         (
             good,

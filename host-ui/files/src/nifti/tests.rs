@@ -83,7 +83,7 @@ fn every_broken_file_is_refused_with_its_reason() {
         &with(42, &[0xff, 0x7f, 0xff, 0x7f, 0xff, 0x7f]),
         "claims 32767",
     );
-    refused("large.nii", &with(42, &[0, 1, 0, 1, 0, 1]), "asks for 16777568 bytes");
+    refused("large.nii", &with(42, &[0, 1, 0, 1, 0, 1]), "requires 16777568 bytes");
     refused("offset.nii", &with(108, &f32::NAN.to_le_bytes()), "begin at byte NaN");
     refused(
         "none.nii",
