@@ -28,7 +28,7 @@
 //! | [`scene`] | labels and materials, elements, surfaces |
 //! | [`tissue`] | models of the body: ChainMail (paper eq. 1 to 5), linear finite elements, large strain near the tip |
 //! | [`needle`] | layers, membranes and the tissue that the needle carries along (eq. 6) |
-//! | [`line`] | compliance of the tissue along a needle, solved before the needle moves |
+//! | [`line`](mod@line) | compliance of the tissue along a needle, solved before the needle moves |
 //! | [`probe`] | ultrasound probe against the wall of the rectum |
 //! | [`force`] | force law (eq. 8 to 10), passivity, and the safety gate before the device |
 //! | [`active`] | parameters validated for one device |
