@@ -57,16 +57,17 @@ fn step_until(window: &mut Harness<'static, App>, what: &str, holds: impl Fn(&Ha
     }
 }
 
-/// Returns the folder that the window reports as written.
-fn saved(window: &mut Harness<'static, App>) -> PathBuf {
-    let words = |window: &Harness<'static, App>| {
+/// Returns the folder that the window reports as written, once that is another than `before`.
+fn saved(window: &mut Harness<'static, App>, before: Option<&Path>) -> PathBuf {
+    let reported = |window: &Harness<'static, App>| {
         let node = window.query_by_label_contains("Debrief saved as")?;
         let inner = node.accesskit_node();
-        inner.label().or(inner.value())
+        let words = inner.label().or(inner.value())?;
+        let folder = PathBuf::from(words.trim_start_matches("Debrief saved as "));
+        (Some(folder.as_path()) != before).then_some(folder)
     };
-    step_until(window, "a debrief", |window| words(window).is_some());
-    let words = words(window).expect("just seen");
-    PathBuf::from(words.trim_start_matches("Debrief saved as "))
+    step_until(window, "a debrief", |window| reported(window).is_some());
+    reported(window).expect("just seen")
 }
 
 fn score(folder: &Path) -> Value {
@@ -126,21 +127,18 @@ fn instructor_and_trainee_write_the_same_debrief() {
         std::thread::sleep(Duration::from_millis(5));
     }
     // It is written automatically once the seeds rest, and again on request.
-    let by_itself = saved(&mut other);
+    let by_itself = saved(&mut other, None);
     assert_eq!(by_itself.parent(), Some(class.join("Otto").as_path()));
     for _ in 0..60 {
         driven.window.run_steps(1);
         std::thread::sleep(Duration::from_millis(20));
     }
     driven.click("Save the debrief");
-    let own = saved(&mut driven.window);
+    let own = saved(&mut driven.window, None);
     std::thread::sleep(Duration::from_millis(1100));
     other.get_by_label("Debrief").click();
     other.run_steps(3);
-    step_until(&mut other, "another", |_| {
-        std::fs::read_dir(class.join("Otto")).is_ok_and(|all| all.count() == 2)
-    });
-    let asked = saved(&mut other);
+    let asked = saved(&mut other, Some(&by_itself));
     let [mut own_score, mut heard] = [&own, &asked].map(|folder| score(folder));
     assert_eq!(heard["title"], "Scene paper, Otto");
     assert_eq!(heard["seeds"].as_array().map(Vec::len), Some(4));
