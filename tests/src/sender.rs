@@ -134,6 +134,8 @@ impl Sender {
         // SAFETY: between fork and exec it only makes system calls.
         unsafe {
             command.pre_exec(|| {
+                // A parent that ignores SIGHUP, such as `nohup`, would pass that on.
+                libc::signal(libc::SIGHUP, libc::SIG_DFL);
                 // The terminal of a session of its own, or closing it would signal nobody.
                 match libc::setsid() >= 0 && libc::ioctl(0, libc::TIOCSCTTY, 0) == 0 {
                     true => Ok(()),

@@ -194,7 +194,10 @@ fn stops_under(flood: Flood, count: u64) {
                 (flags::ENGAGED, Request::Disengage)
             }
             _ => {
-                let by_m = if number % 4 == 1 { 0.03 } else { 0.0 };
+                // Each stop comes after a millimetre or so: a goal that near would be reached before anybody sees a motion.
+                let now_m = operator.link.state().expect("live").tip_in_scene_m;
+                let back_m: f64 = (0..3).map(|a| (home_m[a] - now_m[a]) * direction[a]).sum();
+                let by_m = if back_m < 0.015 { 0.03 } else { 0.0 };
                 let to_m = std::array::from_fn(|a| home_m[a] - by_m * direction[a]);
                 operator.set(flags::IN_MOTION, &move_request(to_m, direction, 0.1, 2.0));
                 (flags::IN_MOTION, Request::StopHand)
@@ -238,9 +241,7 @@ fn stops_under(flood: Flood, count: u64) {
     core.finish();
 }
 
-/// Not in the everyday suite: under new identities a `MoveHand` between two stops was once not carried out, for a reason not yet known.
 #[test]
-#[ignore = "a measurement: make floods"]
 fn a_stop_or_release_is_in_force_within_20_ticks_under_every_flood() {
     let count = repeats("FLOODS_STOPS", 40);
     println!("| flood | request | asked | middle (ticks) | p99 | most | later than {MOST_TICKS} |");
