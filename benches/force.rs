@@ -12,7 +12,7 @@ use stylet_hw::Hand;
 use stylet_runtime::rt::world::World;
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::needle::Phase;
-use stylet_sim::scene::Scene;
+use stylet_sim::scene::{Scene, TissueKind};
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 
@@ -117,7 +117,7 @@ struct Sample {
 fn insertion(speed_m_per_s: f64) -> Vec<Sample> {
     let scene = Scene::builtin("pelvis").expect("built in");
     let limits = TissueParameters::default().validate().expect("the defaults are valid");
-    let world = World::new(scene, limits, 1).expect("ChainMail takes every scene");
+    let world = World::new(scene, TissueKind::default(), limits, 1).expect("ChainMail takes every scene");
     let start = axis_start(&world);
     let mut session = Session::new(world, start, Hand::steady(), 5);
     session.go_to(start + Vector3::z() * 0.085, speed_m_per_s);

@@ -64,7 +64,7 @@ fn paper() -> (BatchModel<f32>, Stations) {
 
 /// Makes a line through the middle of the gland of the anatomical scene, on the body that its tissue is solved in.
 fn pelvis() -> (BatchModel<f32>, Stations) {
-    let scene = Scene::builtin("pelvis").expect("built in").with_tissue(TissueKind::Fem);
+    let scene = Scene::builtin("pelvis").expect("built in").for_tissue(TissueKind::Fem);
     let tissue = FemTissue::<f32>::new(&scene).expect("valid");
     let model = BatchModel::new(&tissue.model);
     let (low, high) = scene.target_bounds_m();

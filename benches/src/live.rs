@@ -136,7 +136,7 @@ impl Theatre {
     ///
     /// If the scene has no finite elements.
     pub fn twin(&self, like: &HandLine, [double, single]: [f64; 2]) -> Twin {
-        let scene = self.source.build().expect("built in").with_tissue(TissueKind::Fem);
+        let scene = self.source.build().expect("built in").for_tissue(TissueKind::Fem);
         let settings = |tolerance: f64| TwinSettings {
             stations: StationSettings::of_lattice(scene.body.spacing_m),
             most: like.source().stations(),
@@ -156,7 +156,7 @@ impl Theatre {
     ///
     /// If the scene has no finite elements.
     pub fn near_tip(&self) -> Unfolded {
-        Unfolded::new(&self.source.build().expect("built in").with_tissue(TissueKind::Fem))
+        Unfolded::new(&self.source.build().expect("built in").for_tissue(TissueKind::Fem))
     }
 
     /// Solves ChainMail's own converged twin of the line that ships in it, to a residual of its columns.
@@ -241,9 +241,9 @@ fn keep_least(list: &mut Vec<f64>, at: usize, us: f64, round: usize) {
 }
 
 fn world(source: &SceneSource, tissue: TissueKind) -> World {
-    let scene = source.build().expect("built in").with_tissue(tissue);
+    let scene = source.build().expect("built in");
     let limits = TissueParameters::default().validate().expect("defaults are valid");
-    World::new(scene, limits, 1).expect("can be used")
+    World::new(scene, tissue, limits, 1).expect("can be used")
 }
 
 /// Follows the needle of a session with a copy of its line, and with the twins.

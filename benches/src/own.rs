@@ -7,7 +7,7 @@ use crate::twin::{Twin, TwinSettings, default_forces};
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::line::{HandLine, StationSettings};
 use stylet_sim::scene::{SceneSource, TissueKind};
-use stylet_sim::tissue::{Carry, ChainMailTissue, Held, MaterialPoint, TissueModel, least_corner};
+use stylet_sim::tissue::{Carry, ChainMailTissue, Held, MaterialPoint, TissueModel, TissueSpec, least_corner};
 
 /// Steps of one tick at most, each as many passes as what ships has for a tick.
 const MOST_STEPS: u32 = 20;
@@ -39,7 +39,7 @@ impl OwnTwin {
     ///
     /// If the scene's ChainMail has no lines.
     pub fn of(source: &SceneSource, like: &HandLine, tolerance: f64, period_s: f64) -> Self {
-        let scene = source.build().expect("built in").with_tissue(TissueKind::ChainMail);
+        let scene = source.build().expect("built in").for_tissue(TissueKind::ChainMail);
         let coarse = scene.clone().for_lines(TissueKind::ChainMail).expect("has lines");
         let settings = TwinSettings {
             stations: StationSettings::of_lattice(coarse.body.spacing_m),
@@ -131,6 +131,6 @@ fn held(tissue: &ChainMailTissue, hand: &HandLine) -> Option<Held> {
     Some(Held {
         element,
         position_m: [0, 1, 2].map(|a| rest_m[a] + by_m * line.axes[0][a]),
-        patch_m: TissueKind::ChainMail.tip_patch_m(),
+        patch_m: TissueSpec::from(TissueKind::ChainMail).tip_patch_m,
     })
 }

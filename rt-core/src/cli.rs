@@ -131,7 +131,7 @@ impl RunArgs {
     /// The settings of the run, or every problem with them.
     pub fn options(&self) -> Result<Options, OptionsError> {
         let mut options = self.real_time.options(&self.instance)?;
-        options.tissue = self.tissue;
+        options.tissue = self.tissue.into();
         options.device = self.device.clone();
         self.second.add_to(&mut options)?;
         options.libraries =

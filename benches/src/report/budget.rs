@@ -48,7 +48,7 @@ struct Path {
 pub fn causes() -> Vec<Cause> {
     let theatre = Theatre::new(CASE);
     let (line, _) = theatre.line(TissueKind::Fem);
-    let scene = Scene::builtin("paper").expect("built in").with_tissue(TissueKind::Fem);
+    let scene = Scene::builtin("paper").expect("built in").for_tissue(TissueKind::Fem);
     let settings = |tolerance: f64| TwinSettings {
         stations: StationSettings::of_lattice(scene.body.spacing_m),
         most: line.hand.source().stations(),

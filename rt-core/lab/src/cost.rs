@@ -9,11 +9,10 @@ use probe::Pressed;
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 use stylet_sim::limits::TissueParameters;
-use stylet_sim::scene::Scene;
-use stylet_sim::scene::TissueKind;
+use stylet_sim::scene::{Scene, TissueKind};
 use stylet_sim::settings::Problem;
 use stylet_sim::tissue::fem::FemProblem;
-use stylet_sim::tissue::{ChainMailTissue, FemTissue, Held, MaterialPoint, TissueModel, element_ahead};
+use stylet_sim::tissue::{ChainMailTissue, FemTissue, Held, MaterialPoint, TissueModel, TissueSpec, element_ahead};
 
 /// Tissue ticks of one insertion: 50 mm/s at 200 Hz over 40 mm and back.
 const TICKS: usize = 320;
@@ -155,7 +154,7 @@ fn keep_least(part: &mut Part) {
 struct Timed {
     name: String,
     model: Box<dyn TissueModel>,
-    kind: TissueKind,
+    spec: TissueSpec,
 }
 
 /// Returns the whole scene, and what single parts of it add.
@@ -165,7 +164,7 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, CostError> {
         Ok(Timed {
             name,
             model: Box::new(ChainMailTissue::new(scene, limits)),
-            kind: TissueKind::ChainMail,
+            spec: TissueKind::ChainMail.into(),
         })
     };
     let plain = TissueParameters::default();
@@ -182,13 +181,13 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, CostError> {
     let name = format!("  with relaxation, {RELAXATION} iterations (off by default)");
     models.push(chainmail(name, scene, &relaxed)?);
     // In a coarser body the ticks below, in elements of the scene, would be others.
-    let elastic = scene.clone().with_tissue(TissueKind::Fem);
+    let elastic = scene.clone().for_tissue(TissueKind::Fem);
     if elastic.coarseness() == 1 {
         let fem = FemTissue::<f32>::new(&elastic).map_err(CostError::FiniteElements)?;
         models.push(Timed {
             name: "  FEM in its place (--tissue fem)".to_owned(),
             model: Box::new(fem),
-            kind: TissueKind::Fem,
+            spec: TissueKind::Fem.into(),
         });
     }
     Ok(models)
@@ -219,7 +218,7 @@ impl Script {
 
 /// Plays the insertion as the loop does: the first element is held until the membrane gives, then the one at the tip.
 fn play(
-    Timed { model, kind, .. }: &mut Timed,
+    Timed { model, spec, .. }: &mut Timed,
     script: &Script,
     micros: &mut Vec<f64>,
     mut look: impl FnMut(&dyn TissueModel, [f64; 3]),
@@ -244,16 +243,16 @@ fn play(
         let now = Held {
             element: held,
             position_m: grip_m,
-            patch_m: kind.tip_patch_m(),
+            patch_m: spec.tip_patch_m,
         };
         let start = Instant::now();
         std::hint::black_box(model.step(Some(now), TICK_S));
-        if kind.prepares() {
+        if spec.prepares {
             let body = model.deformed();
             let next = element_ahead(&body, Some(held), tip, step_m).map(|element| Held {
                 element,
                 position_m: [0, 1, 2].map(|a| body.position_m(element)[a] + 0.5 * step_m[a]),
-                patch_m: kind.tip_patch_m(),
+                patch_m: spec.tip_patch_m,
             });
             model.prepare(next);
         }

@@ -168,7 +168,7 @@ impl RealTimeArgs {
                 wait: Wait::at_period(HAPTIC_PERIOD_NS),
                 flight_folder: replay::file::default_folder(),
                 probe_folder: kept_probe::default_folder(),
-                tissue: TissueKind::default(),
+                tissue: TissueKind::default().into(),
                 device: DeviceChoice::default(),
                 second: None,
                 libraries: Libraries::default(),

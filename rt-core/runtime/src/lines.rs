@@ -1,7 +1,6 @@
 //! Lines for needles: the body at rest that they are solved in, apart from the one that moves.
 
 use crate::kept_probe::{self, KeptError};
-use crate::rt::world::WorldError;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -9,9 +8,9 @@ use std::sync::{Mutex, PoisonError};
 use stylet_sim::line::{Line, LineError, LineStations, QueueProgress, ReadyLine};
 use stylet_sim::needle::LayerKind;
 use stylet_sim::probe::{BodyProbe, NoWall, PADS_APART_M, ProbePose, ProbeQueue, ProbeShape, ReadyProbe, Wall};
-use stylet_sim::scene::{Scene, SceneError, SceneSource, TissueKind};
+use stylet_sim::scene::{Scene, SceneError, SceneSource};
 use stylet_sim::tissue::fem::batch::BatchModel;
-use stylet_sim::tissue::{FemTissue, MaterialPoint};
+use stylet_sim::tissue::{FemTissue, MaterialPoint, TissueError, TissueSpec};
 
 /// Why there is no line; the text is for people.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -21,7 +20,7 @@ pub enum NoLine {
     Scene(#[from] SceneError),
     /// Its materials cannot be used.
     #[error(transparent)]
-    World(#[from] WorldError),
+    World(#[from] TissueError),
     /// The line itself.
     #[error(transparent)]
     Line(#[from] LineError),
@@ -45,7 +44,7 @@ pub enum NoProbe {
 
 /// A body at rest with its solver for eight loads at once.
 pub struct LineBody {
-    tissue: TissueKind,
+    adds_columns: bool,
     scene: Scene,
     /// By structure; bone is none.
     layers: Vec<Option<LayerKind>>,
@@ -56,14 +55,15 @@ pub struct LineBody {
 
 impl LineBody {
     /// Builds the scene anew, for needles in that tissue; `None` where they slip by speed.
-    pub fn of_source(source: &SceneSource, tissue: TissueKind) -> Result<Option<Self>, NoLine> {
+    pub fn of_source(source: &SceneSource, tissue: impl Into<TissueSpec>) -> Result<Option<Self>, NoLine> {
+        let tissue = tissue.into();
         let Some(scene) = source.build()?.for_lines(tissue) else {
             return Ok(None);
         };
         let body = FemTissue::<f32>::new(&scene)
-            .map_err(|problems| WorldError(problems.iter().map(ToString::to_string).collect()))?;
+            .map_err(|problems| TissueError(problems.iter().map(ToString::to_string).collect()))?;
         Ok(Some(Self {
-            tissue,
+            adds_columns: tissue.adds_columns,
             layers: scene
                 .structures
                 .iter()
@@ -76,7 +76,11 @@ impl LineBody {
     }
 
     /// The same with tissue that is so many times as stiff as that of the scene.
-    pub fn of_stiffened(source: &SceneSource, factor: f64, tissue: TissueKind) -> Result<Option<Self>, NoLine> {
+    pub fn of_stiffened(
+        source: &SceneSource,
+        factor: f64,
+        tissue: impl Into<TissueSpec>,
+    ) -> Result<Option<Self>, NoLine> {
         Self::of_source(&source.stiffened(factor)?, tissue)
     }
 
@@ -142,7 +146,7 @@ impl LineBody {
         let rows = 3 * wall.loads();
         let body = FemTissue::<f32>::new(&self.scene.clone().in_cells())
             .map(|fem| BatchModel::new(&fem.model))
-            .map_err(|problems| NoLine::World(WorldError(problems.iter().map(ToString::to_string).collect())))?;
+            .map_err(|problems| NoLine::World(TissueError(problems.iter().map(ToString::to_string).collect())))?;
         let queue = ProbeQueue::new(&body, &self.scene.body, wall, shape)?;
         let (next, is_stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         let solved = Mutex::new(Vec::new());
@@ -226,7 +230,7 @@ impl LineBody {
                 .unwrap_or(Some(LayerKind::default()))
         };
         let mut ready = ReadyLine::prepare(generation, &self.batch, lattice, &layer_of, line, bends, others, report)?;
-        if !self.tissue.adds_columns() {
+        if !self.adds_columns {
             ready.body.answer.carry();
         }
         Ok(ready)

@@ -8,7 +8,7 @@
 use std::error::Error;
 
 use stylet_sim::scene::{Scene, TissueKind};
-use stylet_sim::tissue::{FemTissue, Held, MaterialPoint, TissueModel};
+use stylet_sim::tissue::{FemTissue, Held, MaterialPoint, TissueModel, TissueSpec};
 
 const DT_S: f64 = 5e-3;
 /// Ticks in which the tip moves.
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut held = Held {
             element,
             position_m: scene.lattice.rest_m(element),
-            patch_m: TissueKind::Fem.tip_patch_m(),
+            patch_m: TissueSpec::from(TissueKind::Fem).tip_patch_m,
         };
         // The solver does a few cycles in each tick, so the tip moves over several.
         let mut report = tissue.step(Some(held), DT_S);

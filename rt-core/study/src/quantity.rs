@@ -2,6 +2,7 @@
 
 use stylet_shm_schema::{PARAMETERS, ParameterSpec};
 use stylet_sim::scene::TissueKind;
+use stylet_sim::tissue::TissueSpec;
 
 /// Scope of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +78,7 @@ pub fn limits(spec: &ParameterSpec) -> [f64; 2] {
 
 /// Returns whether the parameter does nothing in that tissue, so that its variation would be an empty column.
 pub fn has_no_part(spec: &ParameterSpec, tissue: TissueKind) -> bool {
-    tissue.has_lines() && spec.help.contains("no part on a needle line")
+    TissueSpec::from(tissue).has_lines() && spec.help.contains("no part on a needle line")
 }
 
 /// Returns every key that may vary, for errors.

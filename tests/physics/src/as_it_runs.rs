@@ -30,7 +30,7 @@ fn held(patch: TipPatch) -> Held {
 /// of the patch's travel and force on the tip in percent of the insertion's largest; ticks whose answer is not for a
 /// hand.
 fn off_its_line(nu: f64, way: Way, depth_m: f64) -> ([f64; 2], [f64; 2], usize, usize) {
-    let mut scene = Scene::builtin("paper").expect("built in").with_tissue(TissueKind::Fem);
+    let mut scene = Scene::builtin("paper").expect("built in").for_tissue(TissueKind::Fem);
     scene.structures[0].material.poisson = nu;
     let ticks: Vec<PatchTick> = insertion(&scene.lattice, way, depth_m);
     let exact = SolveSettings {
@@ -278,7 +278,7 @@ fn hard_body() -> SceneSource {
 #[test]
 fn a_line_through_a_hard_body_is_near_the_converged_one() {
     let source = hard_body();
-    let scene = source.build().expect("valid").with_tissue(TissueKind::Fem);
+    let scene = source.build().expect("valid").for_tissue(TissueKind::Fem);
     assert_eq!(scene.coarseness(), 2, "{} cells", scene.lattice.element_count());
     let body = LineBody::of_source(&source, TissueKind::Fem)
         .expect("can be solved")

@@ -19,9 +19,9 @@ const GUIDED: Hand = Hand {
 
 fn world(fem: bool) -> World {
     let kind = if fem { TissueKind::Fem } else { TissueKind::ChainMail };
-    let scene = Scene::builtin("paper").expect("built in").with_tissue(kind);
+    let scene = Scene::builtin("paper").expect("built in");
     let limits = TissueParameters::default().validate().expect("defaults are valid");
-    World::new(scene, limits, 1).expect("the paper's gland can be solved")
+    World::new(scene, kind, limits, 1).expect("the paper's gland can be solved")
 }
 
 /// Returns the forces of the tissue along the path by tick: as the haptic loop has them, and as the body has just

@@ -13,6 +13,8 @@ mod hard_cases;
 #[cfg(test)]
 mod needle;
 #[cfg(test)]
+mod outside;
+#[cfg(test)]
 mod patch;
 #[cfg(test)]
 mod rows;

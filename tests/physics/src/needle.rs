@@ -43,9 +43,9 @@ impl Theatre {
 
     /// Distance of the needle from the axis of the gland, along x.
     fn beside_axis(source: &SceneSource, tissue: TissueKind, beside_m: f64) -> Self {
-        let scene = source.build().expect("no problem with it").with_tissue(tissue);
+        let scene = source.build().expect("no problem with it");
         let limits = TissueParameters::default().validate().expect("defaults are valid");
-        let world = World::new(scene, limits, 1).expect("can be used");
+        let world = World::new(scene, tissue, limits, 1).expect("can be used");
         let start = axis_start(&world) + Vector3::x() * beside_m;
         let body = LineBody::of_source(source, tissue).expect("can be solved");
         let line = body

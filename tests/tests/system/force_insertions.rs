@@ -7,7 +7,7 @@ use stylet_implant::workflow::default_plan;
 use stylet_runtime::rt::world::World;
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::needle::{LayerKind, Layers, Phase};
-use stylet_sim::scene::Scene;
+use stylet_sim::scene::{Scene, TissueKind};
 use stylet_sim::tissue::MaterialPoint;
 use stylet_tests::rehearsal::Theatre;
 
@@ -22,7 +22,7 @@ struct Insertion {
 fn world(scene: &str) -> World {
     let scene = Scene::builtin(scene).expect("built in");
     let limits = TissueParameters::default().validate().expect("defaults are valid");
-    World::new(scene, limits, 1).expect("ChainMail takes every scene")
+    World::new(scene, TissueKind::default(), limits, 1).expect("ChainMail takes every scene")
 }
 
 fn insertion(scene: &str, depth_m: f64, speed_m_per_s: f64) -> Insertion {

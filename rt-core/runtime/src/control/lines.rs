@@ -15,7 +15,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::{TickRecord, flags};
 use stylet_sim::line::{HandLine, Line, ReadyLine, Track};
-use stylet_sim::scene::{SceneSource, TissueKind};
+use stylet_sim::scene::SceneSource;
+use stylet_sim::tissue::TissueSpec;
 
 /// So long the needle keeps its axis before a line is begun.
 const STEADY: Duration = Duration::from_millis(60);
@@ -63,7 +64,7 @@ pub struct LinePreparer {
     /// Of those that are expected.
     kept: Vec<Kept>,
     generation: u64,
-    tissue: TissueKind,
+    tissue: TissueSpec,
     /// Of an exercise: Young's modulus over that of the scene, and how far the body is moved.
     stiffness: f64,
     body_moved_m: [f64; 3],
@@ -75,7 +76,7 @@ pub struct LinePreparer {
 }
 
 impl LinePreparer {
-    pub fn new(source: Arc<SceneSource>, tissue: TissueKind) -> Self {
+    pub fn new(source: Arc<SceneSource>, tissue: impl Into<TissueSpec>) -> Self {
         Self {
             source,
             body: None,
@@ -86,7 +87,7 @@ impl LinePreparer {
             expected: Vec::new(),
             kept: Vec::new(),
             generation: 0,
-            tissue,
+            tissue: tissue.into(),
             stiffness: 1.0,
             body_moved_m: [0.0; 3],
             bends: false,

@@ -42,7 +42,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{EventKind, PlanInForce, Refusal, RefusalCode, Rehearsal, Session};
-use stylet_sim::scene::{SceneSource, TissueKind};
+use stylet_sim::scene::SceneSource;
+use stylet_sim::tissue::TissueSpec;
 pub(crate) use supervisor::LOOP_ENDED;
 use supervisor::Supervisor;
 pub use wall::{Boards, BridgeError, Wall, program};
@@ -65,7 +66,7 @@ pub struct ControlSetup {
     /// Where its snapshots can be read.
     pub snapshots: SnapshotBoard,
     /// Tissue model of every scene.
-    pub tissue: TissueKind,
+    pub tissue: TissueSpec,
     /// What the first scene was built from.
     pub source: Arc<SceneSource>,
     /// The second device, where the run has one.
@@ -92,7 +93,7 @@ pub struct Control {
     flights: FlightKeeper,
     device: DeviceInfo,
     /// Tissue model of every scene of the run.
-    tissue: TissueKind,
+    tissue: TissueSpec,
     parameters: ParameterChanges,
     plan: PlanInForce,
     scene: RunningScene,

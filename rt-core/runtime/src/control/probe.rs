@@ -10,7 +10,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use stylet_sim::probe::{BodyProbe, NoWall, ProbeShape};
-use stylet_sim::scene::{SceneSource, TissueKind};
+use stylet_sim::scene::SceneSource;
+use stylet_sim::tissue::TissueSpec;
 
 /// A probe, and what is to be said of it.
 struct Found {
@@ -27,7 +28,7 @@ struct Task {
 /// The control thread's side of the probe.
 pub struct ProbePreparer {
     source: Arc<SceneSource>,
-    tissue: TissueKind,
+    tissue: TissueSpec,
     /// Answers that took minutes.
     kept_in: Option<PathBuf>,
     under_way: Option<Task>,
@@ -38,7 +39,7 @@ pub struct ProbePreparer {
 }
 
 impl ProbePreparer {
-    pub fn new(source: Arc<SceneSource>, tissue: TissueKind, kept_in: Option<PathBuf>) -> Self {
+    pub fn new(source: Arc<SceneSource>, tissue: TissueSpec, kept_in: Option<PathBuf>) -> Self {
         Self {
             source,
             tissue,

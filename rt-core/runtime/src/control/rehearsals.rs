@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{MAX_SEEDS, ParameterSet, Refusal, RefusalCode, Rehearsal};
 use stylet_sim::scene::SceneSource;
-use stylet_sim::scene::TissueKind;
+use stylet_sim::tissue::TissueSpec;
 
 const PANICKED: &str = "the rehearsal stopped with an internal fault; the output of rt-core says where. The next one starts with a new state";
 
@@ -30,7 +30,7 @@ pub struct Ended {
 /// The control thread's side of rehearsals.
 pub struct RehearsalRunner {
     source: Arc<SceneSource>,
-    tissue: TissueKind,
+    tissue: TissueSpec,
     device: DeviceInfo,
     /// Body of the scene that runs; `None` until the first rehearsal in it, and while one is under way.
     stage: Option<(u64, Stage)>,
@@ -39,7 +39,7 @@ pub struct RehearsalRunner {
 }
 
 impl RehearsalRunner {
-    pub fn new(source: Arc<SceneSource>, tissue: TissueKind, device: DeviceInfo) -> Self {
+    pub fn new(source: Arc<SceneSource>, tissue: TissueSpec, device: DeviceInfo) -> Self {
         Self {
             source,
             tissue,

@@ -87,14 +87,13 @@ impl Control {
     /// Sends a scene that has been built to the tissue loop.
     fn order_scene(&mut self, Loaded { wanted, scene }: Loaded) -> Result<(), Refusal> {
         let (scene, source) = scene?;
-        let scene = scene.with_tissue(self.tissue);
         // Changes on their way to the tissue loop reach it before the scene does.
         let active = activate(&self.parameters.with(&[]), &self.device)?;
         let (generation, session_id) = (self.scene.generation() + 1, self.link.session.session_id);
-        let mut picture = ScenePicture::of(&scene, session_id, generation, wanted.patient);
-        picture.header.name = Text::new(&wanted.name);
-        let mut world = World::new(scene, active.limits, generation)
+        let mut world = World::new(*scene, self.tissue, active.limits, generation)
             .map_err(|why| Refusal::new(RefusalCode::SceneNotBuilt, why.to_string()))?;
+        let mut picture = ScenePicture::of(&world.scene, session_id, generation, wanted.patient);
+        picture.header.name = Text::new(&wanted.name);
         world.migration = active.migration;
         let (writer, snapshots) = snapshot_board(&world.scene)
             .map_err(|why| Refusal::new(RefusalCode::SceneNotBuilt, format!("no memory to show it: {why}")))?;

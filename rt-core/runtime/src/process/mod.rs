@@ -10,14 +10,13 @@ use crate::device::{DeviceChoice, DeviceError, Libraries};
 use crate::rt::arm::{Refused, Usage};
 use crate::rt::clock::Wait;
 use crate::rt::timing::Probes;
-use crate::rt::world::WorldError;
 use setup::Setup;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use stylet_shm_schema::{DeadlineTotals, Instance, InstanceError, ParameterProblems, ThreadReport, affinity};
-use stylet_sim::scene::TissueKind;
+use stylet_sim::tissue::{TissueError, TissueSpec};
 use threads::Threads;
 
 /// Settings of a run.
@@ -50,7 +49,7 @@ pub struct Options {
     /// Folder of the answers to the probe that were kept.
     pub probe_folder: Option<PathBuf>,
     /// Tissue model of every scene of the run.
-    pub tissue: TissueKind,
+    pub tissue: TissueSpec,
     /// Haptic device.
     pub device: DeviceChoice,
     /// The device of the other hand.
@@ -128,7 +127,7 @@ pub enum RunError {
     Parameters(#[from] ParameterProblems),
     /// The tissue model could not be set up.
     #[error(transparent)]
-    World(#[from] WorldError),
+    World(#[from] TissueError),
     /// A limit of the PC is too low.
     #[error(transparent)]
     Limit(#[from] limits::LimitError),

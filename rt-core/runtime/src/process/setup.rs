@@ -85,7 +85,6 @@ pub(super) struct KernelGrants {
 impl Setup {
     pub fn new(options: &Options) -> Result<Self, RunError> {
         let scene = Scene::builtin(&options.scene).map_err(|e| RunError::Scene(e.to_string()))?;
-        let scene = scene.with_tissue(options.tissue);
         let force_loop = Ask {
             priority: (!options.no_rt).then_some(options.haptic_priority),
             core: options.haptic_core,
@@ -106,8 +105,8 @@ impl Setup {
         let info = device.info();
         let active = activate(&ParameterSet::default(), &info)?;
         let session_id = clock::now_ns() ^ (u64::from(std::process::id()) << 40);
-        let picture = ScenePicture::first(&scene, session_id);
-        let mut world = Box::new(World::new(scene, active.limits.clone(), 1)?);
+        let mut world = Box::new(World::new(scene, options.tissue, active.limits.clone(), 1)?);
+        let picture = ScenePicture::first(&world.scene, session_id);
         let (writer, snapshots) = snapshot_board(&world.scene).map_err(RunError::Board)?;
         world.shown = Some(writer);
         Ok(Self {

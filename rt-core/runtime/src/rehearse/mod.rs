@@ -11,7 +11,7 @@ mod script;
 mod standing;
 
 use crate::lines::{LineBody, NoLine};
-use crate::rt::world::{World, WorldError};
+use crate::rt::world::World;
 use motion::{Motion, TargetElements};
 use nalgebra::Vector3;
 use rig::Rig;
@@ -28,7 +28,8 @@ use stylet_shm_schema::{
 };
 use stylet_sim::active::{Active, activate};
 use stylet_sim::line::{LineError, LineStations, ReadyLine};
-use stylet_sim::scene::{SceneSource, TissueKind};
+use stylet_sim::scene::SceneSource;
+use stylet_sim::tissue::{TissueError, TissueSpec};
 
 /// A rehearsal that takes longer than this, in its own time, has failed.
 const LONGEST_S: f64 = 900.0;
@@ -41,7 +42,7 @@ pub enum RehearseError {
     Scene(String),
     /// Its tissue cannot be set up.
     #[error(transparent)]
-    World(#[from] WorldError),
+    World(#[from] TissueError),
     /// The needle's line cannot be prepared.
     #[error(transparent)]
     Line(#[from] NoLine),
@@ -156,21 +157,24 @@ pub struct Stage {
 
 impl Stage {
     /// Builds the scene anew, apart from the one that runs.
-    pub fn build(source: &SceneSource, tissue: TissueKind, device: DeviceInfo) -> Result<Self, RehearseError> {
+    pub fn build(
+        source: &SceneSource,
+        tissue: impl Into<TissueSpec>,
+        device: DeviceInfo,
+    ) -> Result<Self, RehearseError> {
+        let tissue = tissue.into();
         let scene = source.build().map_err(|e| RehearseError::Scene(e.to_string()))?;
-        let scene = scene.with_tissue(tissue);
         let lines = LineBody::of_source(source, tissue)?;
         let active = activate(&ParameterSet::default(), &device)?;
-        let target = TargetElements::of(&scene);
-        let world = World::new(scene, active.limits, 1)?;
+        let world = World::new(scene, tissue, active.limits, 1)?;
         Ok(Self {
+            target: TargetElements::of(&world.scene),
             world: Some(Box::new(world)),
             lines,
             kept: Vec::new(),
             standing: None,
             device,
             hand: Hand::steady(),
-            target,
         })
     }
 

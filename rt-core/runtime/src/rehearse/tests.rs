@@ -4,6 +4,7 @@ use super::*;
 use std::sync::atomic::AtomicBool;
 use stylet_shm_schema::ParameterId;
 use stylet_sim::limits::Limits;
+use stylet_sim::scene::TissueKind;
 use stylet_sim::tissue::{Deformed, Held, StepReport, TissueModel};
 
 mod bending;

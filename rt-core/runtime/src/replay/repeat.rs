@@ -12,11 +12,12 @@ use crate::rt::response::TissueResponse;
 use crate::rt::tissue::TissueLoop;
 use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueFlight, TissueMemory, TissueTape};
 use crate::rt::wiring::{Capacities, Wiring};
-use crate::rt::world::{World, WorldError};
+use crate::rt::world::World;
 use std::sync::Arc;
 use stylet_hw::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
 use stylet_shm_schema::TickRecord;
 use stylet_sim::line::LeftNeedles;
+use stylet_sim::tissue::TissueError;
 
 /// The result of repeating one loop.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -178,7 +179,7 @@ pub enum RepeatError {
     Scene(String),
     /// Its tissue cannot be set up.
     #[error(transparent)]
-    World(#[from] WorldError),
+    World(#[from] TissueError),
     /// The recorded body has another size than the scene gives.
     #[error("the recorded tissue is not that of its scene: another version recorded it")]
     OtherBody,
@@ -206,8 +207,7 @@ pub enum RepeatError {
 /// those of [`solve_again`](super::lines::solve_again).
 pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -> Result<Repeated, RepeatError> {
     let scene = recorded.scene.build().map_err(|e| RepeatError::Scene(e.to_string()))?;
-    let scene = scene.with_tissue(recorded.tissue);
-    let world = || World::new(scene.clone(), recorded.memory.limits.clone(), 1).map(Box::new);
+    let world = || World::new(scene.clone(), recorded.tissue, recorded.memory.limits.clone(), 1).map(Box::new);
     let reference = world()?;
     if reference.tissue.memory_len() != recorded.memory.body.len() {
         return Err(RepeatError::OtherBody);

@@ -53,13 +53,13 @@ impl Recorded {
 
     /// With a needle that goes in so far above the middle.
     fn of(source: SceneSource, tissue: TissueKind, force: &ForceParameters, above_m: f64) -> Self {
-        let scene = source.build().expect("valid").with_tissue(tissue);
+        let scene = source.build().expect("valid");
         let (low, high) = scene.lattice.bounds_m();
         let entry_m = Vector3::new((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0 + above_m, low[2]);
         let body = LineBody::of_source(&source, tissue).expect("valid").expect("has lines");
         let line = body.prepare(1, entry_m.into(), [0.0, 0.0, 1.0], force.bending.is_on(), &mut || true);
         let limits = TissueParameters::default().validate().expect("valid");
-        let world = Box::new(World::new(scene, limits, 1).expect("valid"));
+        let world = Box::new(World::new(scene, tissue, limits, 1).expect("valid"));
         let device = SimulatedPhantom::new(SimulatedPhantomConfig {
             start_tip_in_world: entry_m - Vector3::z() * 0.008,
             ..SimulatedPhantomConfig::default()

@@ -129,9 +129,9 @@ pub struct TissueTape {
     /// Checkpoints so far, and the tick from which on the next is due.
     points: usize,
     next_due: u64,
-    tissue: TissueKind,
+    tissue: Option<TissueKind>,
     end: TissueMemory,
-    /// The body is too large to be recorded, or its model cannot be saved.
+    /// The body is too large to be recorded, or its model cannot be saved, or built again.
     not_kept: bool,
 }
 
@@ -139,7 +139,8 @@ impl TissueTape {
     /// For the body of `world`, built from `scene`.
     pub fn new(world: &World, scene: Arc<SceneSource>) -> Self {
         let body_len = world.tissue.memory_len();
-        let not_kept = body_len == 0 || body_len > MAX_BODY_BYTES;
+        let tissue = world.spec.built_in;
+        let not_kept = body_len == 0 || body_len > MAX_BODY_BYTES || tissue.is_none();
         let memory = || TissueMemory {
             seeds: Vec::with_capacity(MAX_SEEDS),
             contact: None,
@@ -166,14 +167,13 @@ impl TissueTape {
             residual: 0.0,
             response: TissueResponse::default(),
         };
-        let tissue = world.scene.tissue();
         let room = |is_needed: bool| if is_needed { TAPE_TICKS } else { 1 };
         Self {
             scene_generation: world.generation,
             scene,
             ticks: Last::new(&blank, room(!not_kept)),
             orders: Last::new(&(0, TapedOrder::Step(TissueStep::Reset)), ORDERS),
-            loads: Last::new(&(0, LineLoads::default()), room(!not_kept && tissue.has_lines())),
+            loads: Last::new(&(0, LineLoads::default()), room(!not_kept && world.spec.has_lines())),
             left: None,
             probe: None,
             checkpoints: [(0, memory()), (0, memory())],
@@ -280,7 +280,7 @@ impl TissueTape {
         let before = before.last().map(|(_, loads)| (0, *loads));
         Some(TissueFlight {
             scene: (*self.scene).clone(),
-            tissue: self.tissue,
+            tissue: self.tissue?,
             memory: memory.clone(),
             middle: points.get(1).map(|(tick, memory)| (tick - first, memory.clone())),
             end: self.end.clone(),

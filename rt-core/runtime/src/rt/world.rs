@@ -4,14 +4,9 @@ use stylet_shm_schema::{SnapshotHeader, Vertex};
 use stylet_sim::limits::Limits;
 use stylet_sim::migration::Migration;
 use stylet_sim::needle::LayerKind;
-use stylet_sim::scene::{Scene, TissueKind};
-use stylet_sim::tissue::{ChainMailTissue, FemTissue, MaterialPoint, TissueModel};
+use stylet_sim::scene::Scene;
+use stylet_sim::tissue::{MaterialPoint, TissueError, TissueModel, TissueSpec};
 use stylet_wall::board::Writer;
-
-/// Why a tissue model cannot be set up: every problem, one a line.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}", .0.join("\n"))]
-pub struct WorldError(pub Vec<String>);
 
 /// Body, tissue and surface of one scene.
 pub struct World {
@@ -21,6 +16,8 @@ pub struct World {
     pub scene: Scene,
     /// What each structure of the scene is to the needle.
     pub layers: Vec<LayerKind>,
+    /// What is known of the tissue model.
+    pub spec: TissueSpec,
     /// The body as it deforms.
     pub tissue: Box<dyn TissueModel>,
     /// Limits that the tissue keeps now.
@@ -34,19 +31,20 @@ pub struct World {
 }
 
 impl World {
-    /// Sets up the tissue model that `scene` asks for, at rest.
-    pub fn new(scene: Scene, limits: Limits, generation: u64) -> Result<Self, WorldError> {
-        let tissue: Box<dyn TissueModel> = match scene.tissue() {
-            TissueKind::ChainMail | TissueKind::Paper => Box::new(ChainMailTissue::new(&scene, limits.clone())),
-            TissueKind::Fem => {
-                let texts = |problems: Vec<_>| problems.iter().map(ToString::to_string).collect();
-                Box::new(FemTissue::<f32>::new(&scene).map_err(|p| WorldError(texts(p)))?)
-            }
-        };
+    /// Sets up the tissue model of a scene, at rest.
+    pub fn new(
+        scene: Scene,
+        tissue: impl Into<TissueSpec>,
+        limits: Limits,
+        generation: u64,
+    ) -> Result<Self, TissueError> {
+        let spec = tissue.into();
+        let scene = scene.for_tissue(spec);
         Ok(Self {
             generation,
             layers: scene.structures.iter().map(LayerKind::of_structure).collect(),
-            tissue,
+            tissue: (spec.build)(&scene, &limits)?,
+            spec,
             scene,
             limits,
             migration: Migration::default(),

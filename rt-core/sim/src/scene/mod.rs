@@ -67,8 +67,6 @@ pub struct Scene {
     pub surface: Surface,
     /// Nodes at which hosts get its displacements.
     pub nodes: NodeGrid,
-    /// Changed by [`Scene::with_tissue`] alone, which makes the body for it.
-    tissue: TissueKind,
 }
 
 impl Scene {
@@ -99,33 +97,17 @@ impl Scene {
             body: Arc::clone(&lattice),
             lattice,
             surface,
-            tissue: TissueKind::default(),
         })
-    }
-
-    /// Returns the same scene with another tissue model, and as coarse a body as that needs.
-    pub fn with_tissue(self, tissue: TissueKind) -> Scene {
-        self.with_body(tissue, tissue.most_elements())
-    }
-
-    /// Returns the same scene with the finite elements that needles' lines are solved for in, where `tissue` has lines.
-    pub fn for_lines(self, tissue: TissueKind) -> Option<Scene> {
-        let most = tissue.most_line_elements()?;
-        Some(self.with_body(TissueKind::Fem, most))
     }
 
     /// Returns the same scene with the finite elements whose solution for a probe may take minutes: its own cells, or
     /// larger ones where those are too many.
     pub fn in_cells(self) -> Scene {
-        self.with_body(TissueKind::Fem, MOST_CELLS)
+        self.with_body(MOST_CELLS)
     }
 
-    /// Returns the lattice of those finite elements, for the tissue of this scene.
-    pub fn body_of_lines(&self) -> Option<Arc<Lattice>> {
-        self.tissue.most_line_elements().map(|most| self.coarser_body(most))
-    }
-
-    fn coarser_body(&self, most_elements: usize) -> Arc<Lattice> {
+    /// Returns the lattice in at most so many elements.
+    pub(crate) fn coarser_body(&self, most_elements: usize) -> Arc<Lattice> {
         let mut body = Arc::clone(&self.lattice);
         while body.element_count() > most_elements {
             body = Arc::new(body.coarser());
@@ -133,8 +115,7 @@ impl Scene {
         body
     }
 
-    pub(crate) fn with_body(mut self, tissue: TissueKind, most_elements: usize) -> Scene {
-        self.tissue = tissue;
+    pub(crate) fn with_body(mut self, most_elements: usize) -> Scene {
         self.body = self.coarser_body(most_elements);
         self.nodes = NodeGrid::of(&self.body);
         self.surface.move_with(&self.lattice, &self.body);
@@ -152,12 +133,7 @@ impl Scene {
             lattice,
             ..self.clone()
         }
-        .with_tissue(self.tissue)
-    }
-
-    /// Returns the tissue model of the scene.
-    pub fn tissue(&self) -> TissueKind {
-        self.tissue
+        .with_body(usize::MAX)
     }
 
     /// Returns how many cells of the lattice lie along the edge of an element of the body.

@@ -47,47 +47,4 @@ impl TissueKind {
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
-
-    /// Returns the number of elements above which a body is made coarser. FEM: a tick of 200 Hz and some seconds for a
-    /// needle's line allow no more.
-    pub fn most_elements(self) -> usize {
-        match self {
-            TissueKind::ChainMail | TissueKind::Paper => usize::MAX,
-            TissueKind::Fem => 60_000,
-        }
-    }
-
-    /// Needles go along lines, which are solved for in a body of at most so many elements; `None` where they slip by
-    /// speed. ChainMail takes no more of the answer than how the line moves, and how the body is carried by it.
-    pub fn most_line_elements(self) -> Option<usize> {
-        match self {
-            TissueKind::ChainMail => Some(8_000),
-            TissueKind::Fem => Some(self.most_elements()),
-            TissueKind::Paper => None,
-        }
-    }
-
-    /// Returns whether needles go along lines.
-    pub fn has_lines(self) -> bool {
-        self.most_line_elements().is_some()
-    }
-
-    /// Returns whether the tissue answers a line's loads by the sum of its columns.
-    pub fn adds_columns(self) -> bool {
-        self == TissueKind::Fem
-    }
-
-    /// Returns the edge of the tissue that moves as one piece with the tip. FEM needs one: the force on a single node
-    /// goes to zero with the spacing.
-    pub fn tip_patch_m(self) -> f64 {
-        match self {
-            TissueKind::ChainMail | TissueKind::Paper => 0.0,
-            TissueKind::Fem => 4e-3,
-        }
-    }
-
-    /// Returns whether `TissueModel::prepare` does anything: only then need the loop predict where the tip goes.
-    pub fn prepares(self) -> bool {
-        self == TissueKind::Fem
-    }
 }

@@ -39,6 +39,7 @@ mod large;
 mod model;
 mod parts;
 mod point;
+mod spec;
 mod violation;
 
 pub use ahead::element_ahead;
@@ -52,4 +53,5 @@ pub use fold::least_corner;
 pub use large::LargeStrain;
 pub use model::{Held, HeldOutcome, REACH, Solve, StepReport, TissueModel};
 pub use point::MaterialPoint;
+pub use spec::{BuildTissue, TissueError, TissueSpec};
 pub use violation::largest_violation;

@@ -74,7 +74,7 @@ pub struct StepReport {
 /// Obligations: `step` does not allocate, lock or panic, whatever it is given; its work is bounded by a number
 /// of passes; the same calls give the same bytes; a held element that is `Followed` is where it was asked to
 /// be; positions stay finite. One suite holds every model to
-/// them: `tests/tests/physics_stability.rs`.
+/// them: `tests/physics/src/stability`.
 pub trait TissueModel: Send {
     /// Advances by `dt_s` with `held` in place; a `dt_s` that is not above zero recovers nothing.
     fn step(&mut self, held: Option<Held>, dt_s: f64) -> StepReport;
@@ -121,7 +121,7 @@ pub trait TissueModel: Send {
     fn return_to_rest(&mut self);
 
     /// Takes new limits, where the model has such; without allocating.
-    fn set_limits(&mut self, limits: Limits);
+    fn set_limits(&mut self, _limits: Limits) {}
 
     /// Returns the size of all that one step leaves to the next, in bytes; constant for the life of the model. 0: it
     /// cannot be saved.

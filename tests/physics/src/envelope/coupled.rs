@@ -38,9 +38,9 @@ fn block(kind: TissueKind) -> Box<World> {
         cells: vec![1; 14 * 14 * 20],
         structures: vec![gland],
     };
-    let scene = Scene::from_labels("block", &labels).expect("valid").with_tissue(kind);
+    let scene = Scene::from_labels("block", &labels).expect("valid");
     let limits = TissueParameters::default().validate().expect("defaults are valid");
-    Box::new(World::new(scene, limits, 1).expect("can be used"))
+    Box::new(World::new(scene, kind, limits, 1).expect("can be used"))
 }
 
 fn run(session: &mut Session, seconds: f64) -> Vec<Tick> {

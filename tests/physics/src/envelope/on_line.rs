@@ -46,9 +46,9 @@ impl Theatre {
     }
 
     fn of_source(source: &SceneSource, tissue: TissueKind) -> Self {
-        let built = source.build().expect("built in").with_tissue(TissueKind::ChainMail);
+        let built = source.build().expect("built in");
         let limits = TissueParameters::default().validate().expect("defaults are valid");
-        let world = World::new(built, limits, 1).expect("can be used");
+        let world = World::new(built, TissueKind::ChainMail, limits, 1).expect("can be used");
         let start = axis_start(&world);
         let body = LineBody::of_source(source, tissue)
             .expect("can be solved")

@@ -48,9 +48,9 @@ fn insert(
     direction: Vector3<f64>,
     on_line: bool,
 ) -> Found {
-    let scene = source.build().expect("valid").with_tissue(kind);
+    let scene = source.build().expect("valid");
     let limits = TissueParameters::default().validate().expect("defaults are valid");
-    let world = Box::new(World::new(scene, limits, 1).expect("can be used"));
+    let world = Box::new(World::new(scene, kind, limits, 1).expect("can be used"));
     let body = LineBody::of_source(source, kind)
         .expect("can be solved")
         .expect("has lines");

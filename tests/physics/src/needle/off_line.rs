@@ -18,9 +18,9 @@ struct Found {
 
 fn insert(scene: &str, degrees: f64, speed_m_per_s: f64, coupling: f64) -> Found {
     let source = SceneSource::Builtin(scene.to_owned());
-    let built = source.build().expect("built in").with_tissue(TissueKind::Fem);
+    let built = source.build().expect("built in");
     let limits = TissueParameters::default().validate().expect("defaults are valid");
-    let world = Box::new(World::new(built, limits, 1).expect("can be used"));
+    let world = Box::new(World::new(built, TissueKind::Fem, limits, 1).expect("can be used"));
     let start = axis_start(&world);
     let (sine, cosine) = degrees.to_radians().sin_cos();
     let direction = Vector3::new(sine, 0.0, cosine);

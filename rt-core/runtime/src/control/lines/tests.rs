@@ -3,7 +3,7 @@
 use super::*;
 use crate::rt::wiring::{Capacities, HapticPorts, TissuePorts, Wiring};
 use bytemuck::Zeroable;
-use stylet_sim::scene::Labels;
+use stylet_sim::scene::{Labels, TissueKind};
 
 /// Rings as in a run; nothing ticks at their other ends.
 fn rings() -> (LoopRings, HapticPorts, TissuePorts) {

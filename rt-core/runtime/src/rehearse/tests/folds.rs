@@ -4,7 +4,7 @@ use super::*;
 use std::time::Instant;
 use stylet_shm_schema::HandMove;
 use stylet_sim::scene::Role;
-use stylet_sim::tissue::{Carry, ChainMailTissue, ElementField, FemTissue, PackedField, least_corner};
+use stylet_sim::tissue::{Carry, ElementField, PackedField, least_corner};
 
 /// A model as it was: nothing is corrected.
 struct Linear(Box<dyn TissueModel>);
@@ -45,10 +45,7 @@ impl TissueModel for Linear {
 
 /// A scene's tissue, at rest.
 fn tissue_of(world: &World) -> Box<dyn TissueModel> {
-    match world.scene.tissue() {
-        TissueKind::Fem => Box::new(FemTissue::<f32>::new(&world.scene).expect("valid")),
-        _ => Box::new(ChainMailTissue::new(&world.scene, world.limits.clone())),
-    }
+    (world.spec.build)(&world.scene, &world.limits).expect("valid")
 }
 
 /// What came of one insertion.

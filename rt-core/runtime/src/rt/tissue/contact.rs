@@ -85,7 +85,7 @@ impl TissueLoop {
         self.held = Some(Held {
             element,
             position_m: self.world.tissue.deformed().position_m(element),
-            patch_m: self.world.scene.tissue().tip_patch_m(),
+            patch_m: self.world.spec.tip_patch_m,
         });
     }
 
@@ -121,7 +121,7 @@ impl TissueLoop {
             next = Held {
                 element: at_tip.element,
                 position_m,
-                patch_m: self.world.scene.tissue().tip_patch_m(),
+                patch_m: self.world.spec.tip_patch_m,
             };
         }
         for (coordinate, by) in next.position_m.iter_mut().zip(travel.iter()) {
@@ -132,7 +132,7 @@ impl TissueLoop {
 
     /// The response has been sent: the rest of the tick prepares what the tip holds next if the needle keeps its speed.
     pub(super) fn look_ahead(&mut self, travel: Vector3<f64>) {
-        if self.world.scene.tissue().prepares() {
+        if self.world.spec.prepares {
             let next = self.next_held(travel);
             self.world.tissue.prepare(next);
         }
@@ -157,7 +157,7 @@ impl TissueLoop {
         Some(Held {
             element,
             position_m: (now_m + by_m).into(),
-            patch_m: self.world.scene.tissue().tip_patch_m(),
+            patch_m: self.world.spec.tip_patch_m,
         })
     }
 }

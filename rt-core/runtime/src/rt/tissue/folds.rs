@@ -1,7 +1,6 @@
 //! Whether the tissue near the tip is folded: after the response is out, for the next one.
 
 use super::TissueLoop;
-use stylet_sim::scene::TissueKind;
 use stylet_sim::tissue::{Carried, MaterialPoint, least_corner};
 
 impl TissueLoop {
@@ -11,7 +10,7 @@ impl TissueLoop {
             return;
         }
         let body = self.world.tissue.deformed();
-        let is_linear = self.world.scene.tissue() == TissueKind::Fem || !matches!(body.carried, Carried::Not);
+        let is_linear = self.world.spec.adds_columns || !matches!(body.carried, Carried::Not);
         let at_tip = if is_linear { self.element_at_tip() } else { None };
         let Some(element) = at_tip else {
             (self.response.least_corner, self.response.folded_from_m) = (1.0, 0.0);

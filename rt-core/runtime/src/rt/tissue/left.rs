@@ -190,7 +190,7 @@ impl TissueLoop {
     /// Whether needles that stay in, or the probe, displace the body besides the needle that moves, and how.
     pub(super) fn besides(&self) -> Option<Besides> {
         let of_probe = self.pressed.as_ref().filter(|p| p.displaces());
-        let of_probe = of_probe.map(|_| self.world.scene.tissue().adds_columns());
+        let of_probe = of_probe.map(|_| self.world.spec.adds_columns);
         let of_left = self.left.first();
         let is_added = of_left.map(|left| matches!(left.line.answer, BodyAnswer::Columns(_)));
         Some(match is_added.or(of_probe)? {

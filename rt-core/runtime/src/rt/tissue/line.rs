@@ -118,7 +118,7 @@ impl TissueLoop {
         Some(Held {
             element,
             position_m,
-            patch_m: self.world.scene.tissue().tip_patch_m(),
+            patch_m: self.world.spec.tip_patch_m,
         })
     }
 

@@ -151,7 +151,7 @@ fn a_reset_line_answers_like_a_new_one() {
 #[test]
 #[ignore = "a measurement of some minutes"]
 fn a_coarser_pelvis_beside_one_of_all_cells() {
-    let coarse = Scene::builtin("pelvis").unwrap().with_tissue(TissueKind::Fem);
+    let coarse = Scene::builtin("pelvis").unwrap().for_tissue(TissueKind::Fem);
     let full = Scene::builtin("pelvis").unwrap();
     for across_m in [[0.0, 0.0], [0.012, -0.008]] {
         let (low, high) = coarse.target_bounds_m();

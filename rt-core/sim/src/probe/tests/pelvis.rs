@@ -144,8 +144,8 @@ fn halving_the_cells_does_not_change_the_press() {
     let bodies = [
         scene.clone().for_lines(TissueKind::ChainMail).expect("has lines"),
         scene.clone().for_lines(TissueKind::Fem).expect("has lines"),
-        scene.clone().with_body(TissueKind::Fem, usize::MAX),
-        halved(&scene).with_body(TissueKind::Fem, usize::MAX),
+        scene.clone().with_body(usize::MAX),
+        halved(&scene).with_body(usize::MAX),
     ];
     let mut pressed: Vec<_> = bodies.iter().map(|body| pressed_in(body, Some(PADS_APART_M))).collect();
     let converged = pressed.pop().expect("four");
@@ -159,9 +159,7 @@ fn halving_the_cells_does_not_change_the_press() {
 #[test]
 #[ignore = "a measurement, twelve minutes"]
 fn what_pads_leave_out() {
-    let cells = Scene::builtin("pelvis")
-        .expect("built in")
-        .with_body(TissueKind::Fem, usize::MAX);
+    let cells = Scene::builtin("pelvis").expect("built in").with_body(usize::MAX);
     let points = pressed_in(&cells, None);
     off_by(&pressed_in(&cells, Some(PADS_APART_M)), &points);
     for tissue in [TissueKind::ChainMail, TissueKind::Fem] {

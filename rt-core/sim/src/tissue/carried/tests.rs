@@ -157,7 +157,7 @@ fn a_carried_surface_goes_with_what_carries_it() {
 fn a_surface_goes_with_the_coarser_element_around_it() {
     let fine = held_scene().0;
     let mut scene = fine.clone();
-    scene = scene.with_body(crate::scene::TissueKind::Fem, fine.lattice.element_count() / 2);
+    scene = scene.with_body(fine.lattice.element_count() / 2);
     assert_eq!(scene.coarseness(), 2);
     let u: Vec<f32> = (0..scene.body.element_count()).map(|e| e as f32 * 1e-3).collect();
     let body = Deformed {

@@ -60,16 +60,28 @@ pub struct ChainMailTissue {
 }
 
 impl ChainMailTissue {
-    /// Returns the body of a scene at rest.
+    /// Number of elements at most of the body whose answer carries this one: of it no more is taken than how a line
+    /// moves.
+    pub(crate) const MOST_LINE_ELEMENTS: usize = 8_000;
+
+    /// Returns the body of a scene at rest, which the loads of needles on lines carry.
     pub fn new(scene: &Scene, limits: Limits) -> Self {
-        let model = ChainMail::new(scene, limits);
-        let state = TissueState::at_rest(&model);
-        let field = scene.body_of_lines().map(|coarse| CarriedField::new(scene, coarse));
+        let coarse = scene.coarser_body(Self::MOST_LINE_ELEMENTS);
         ChainMailTissue {
+            field: Some(CarriedField::new(scene, coarse)),
+            near_tip: Some(LargeStrain::new(scene)),
+            ..Self::as_printed(scene, limits)
+        }
+    }
+
+    /// Returns the body of a scene at rest, without needles on lines: the paper as printed.
+    pub fn as_printed(scene: &Scene, limits: Limits) -> Self {
+        let model = ChainMail::new(scene, limits);
+        ChainMailTissue {
+            state: TissueState::at_rest(&model),
             model,
-            state,
-            near_tip: field.as_ref().map(|_| LargeStrain::new(scene)),
-            field,
+            field: None,
+            near_tip: None,
         }
     }
 

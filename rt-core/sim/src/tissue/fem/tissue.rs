@@ -5,7 +5,6 @@ use super::material::{FemProblem, FemSettings, Integration, Material, Structure}
 use super::model::FemModel;
 use super::solve::{SolveSettings, TipPatch};
 use super::state::FemState;
-use crate::limits::Limits;
 use crate::scene::Scene;
 use crate::tissue::{
     Carried, Deformed, ElementField, Held, HeldOutcome, LargeStrain, PackedField, Solve, StepReport, TissueModel,
@@ -185,7 +184,4 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
             self.large.load(large);
         }
     }
-
-    /// Does nothing: elasticity has no limits.
-    fn set_limits(&mut self, _limits: Limits) {}
 }

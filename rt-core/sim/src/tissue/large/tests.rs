@@ -19,7 +19,7 @@ struct Pushed {
 
 impl Pushed {
     fn new(depth: usize) -> Self {
-        let scene = Scene::builtin("paper").expect("built in").with_tissue(TissueKind::Fem);
+        let scene = Scene::builtin("paper").expect("built in").for_tissue(TissueKind::Fem);
         let lattice = scene.body.clone();
         let settings = FemSettings::homogeneous(Material::PROSTATE, 2.5e5);
         let model = FemModel::<f32>::new(&lattice, &settings).expect("valid");

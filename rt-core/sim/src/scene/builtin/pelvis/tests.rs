@@ -225,7 +225,7 @@ fn full_is_every_cell() {
 /// In elements of twice the edge the capsule, one cell thick, would be lost: what is where is still asked of the cells.
 #[test]
 fn a_coarser_body_keeps_what_is_where() {
-    let scene = Scene::builtin("pelvis").unwrap().with_tissue(TissueKind::Fem);
+    let scene = Scene::builtin("pelvis").unwrap().for_tissue(TissueKind::Fem);
     assert_eq!((scene.coarseness(), scene.body.element_count()), (2, 53_951));
     assert_eq!(scene.surface.moved_by.len(), scene.surface.vertex_elements.len());
     for element in 0..scene.lattice.element_count() as u32 {
@@ -238,6 +238,6 @@ fn a_coarser_body_keeps_what_is_where() {
         let local = [0, 1, 2].map(|a| ((place_m[a] - middle_m[a]) / scene.body.spacing_m) as f32);
         assert_eq!(scene.structure_at(around, local), scene.lattice.structure(element));
     }
-    let again = scene.with_tissue(TissueKind::ChainMail);
+    let again = scene.for_tissue(TissueKind::ChainMail);
     assert!(again.coarseness() == 1 && again.surface.moved_by.is_empty());
 }

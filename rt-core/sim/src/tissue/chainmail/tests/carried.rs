@@ -33,7 +33,7 @@ fn column(coarse: &Lattice) -> PackedField {
 #[test]
 fn a_carried_body_follows_its_field_and_its_held_element() {
     let (scene, mut tissue) = tissue();
-    let coarse = scene.body_of_lines().expect("has lines");
+    let coarse = scene.coarser_body(ChainMailTissue::MOST_LINE_ELEMENTS);
     let element = scene.lattice.element_of_cell(53, 31, 80).unwrap();
     let mut position_m = scene.lattice.rest_m(element);
     position_m[2] += 6e-3;
@@ -80,7 +80,7 @@ fn a_carried_body_follows_its_field_and_its_held_element() {
 #[test]
 fn how_a_body_is_carried_is_part_of_its_memory() {
     let (scene, mut tissue) = tissue();
-    let columns = [column(&scene.body_of_lines().expect("has lines"))];
+    let columns = [column(&scene.coarser_body(ChainMailTissue::MOST_LINE_ELEMENTS))];
     tissue.carry(Carry {
         columns: &columns,
         loads_n: &[-1.5],
@@ -100,7 +100,7 @@ fn how_a_body_is_carried_is_part_of_its_memory() {
 #[test]
 fn a_body_carried_too_far_is_corrected_until_the_next_step() {
     let (scene, mut tissue) = tissue();
-    let coarse = scene.body_of_lines().expect("has lines");
+    let coarse = scene.coarser_body(ChainMailTissue::MOST_LINE_ELEMENTS);
     let element = scene.lattice.element_of_cell(53, 31, 80).unwrap();
     let middle_m = scene.lattice.rest_m(element);
     let mut by = ElementField::zeros(coarse.element_count());
@@ -169,9 +169,9 @@ fn chainmail_lines_are_solved_in_a_coarser_body() {
 #[test]
 fn nothing_carries_the_body_of_the_mode_paper() {
     let scene = Scene::builtin("paper").unwrap();
-    let columns = [column(&scene.body_of_lines().expect("has lines"))];
+    let columns = [column(&scene.coarser_body(ChainMailTissue::MOST_LINE_ELEMENTS))];
     let limits = TissueParameters::default().validate().unwrap();
-    let mut tissue = ChainMailTissue::new(&scene.with_tissue(TissueKind::Paper), limits);
+    let mut tissue = ChainMailTissue::as_printed(&scene, limits);
     tissue.carry(Carry {
         columns: &columns,
         loads_n: &[1.0],
@@ -186,7 +186,7 @@ fn nothing_carries_the_body_of_the_mode_paper() {
 fn what_is_fixed_is_not_carried() {
     let scene = Scene::builtin("pelvis").unwrap();
     let limits = TissueParameters::default().validate().unwrap();
-    let coarse = scene.body_of_lines().expect("has lines");
+    let coarse = scene.coarser_body(ChainMailTissue::MOST_LINE_ELEMENTS);
     let mut by = ElementField::zeros(coarse.element_count());
     by.0[2].fill(1e-3);
     let mut column = PackedField::zeros(coarse.element_count());
