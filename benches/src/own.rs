@@ -7,7 +7,7 @@ use crate::twin::{Twin, TwinSettings, default_forces};
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::line::{HandLine, StationSettings};
 use stylet_sim::scene::{SceneSource, TissueKind};
-use stylet_sim::tissue::{Carry, ChainMailTissue, Held, MaterialPoint, TissueModel, TissueSpec, least_corner};
+use stylet_sim::tissue::{Carry, ChainMailTissue, Held, MaterialPoint, Shift, TissueModel, TissueSpec, least_corner};
 
 /// Steps of one tick at most, each as many passes as what ships has for a tick.
 const MOST_STEPS: u32 = 20;
@@ -100,7 +100,7 @@ fn settle(tissue: &mut ChainMailTissue, line: &Twin, held: Option<Held>, period_
     tissue.carry(Carry {
         columns: line.columns(),
         loads_n: line.hand.state().loads_n(),
-        whole_m: axis.map(|c| c * line.hand.whole_m()),
+        shift: Shift::of_all(axis.map(|c| c * line.hand.whole_m())),
         fields: &[],
     });
     let mut is_left = |step: &u32| {

@@ -4,7 +4,7 @@
 use crate::error::{Field, norm};
 use crate::twin::Twin;
 use stylet_sim::scene::Scene;
-use stylet_sim::tissue::{FemTissue, MaterialPoint, TissueModel, least_corner};
+use stylet_sim::tissue::{FemTissue, MaterialPoint, Shift, TissueModel, least_corner};
 
 /// Largest number of calls: each continues where the one before ended.
 const MOST_CALLS: usize = 400;
@@ -45,7 +45,7 @@ impl Unfolded {
         let (mut last, mut farthest_m) = (linear, 0.0);
         for _ in 0..MOST_CALLS {
             self.tissue
-                .displace(twin.columns(), twin.hand.state().loads_n(), whole_m);
+                .displace(twin.columns(), twin.hand.state().loads_n(), Shift::of_all(whole_m));
             let least = least_corner(&self.tissue.deformed(), element);
             self.tissue.unfold(element, least);
             let body = self.tissue.deformed();

@@ -249,7 +249,8 @@ pub fn trial(
     } else if matches!(ending, Ending::OutputFull | Ending::OutputClosed) && !sender.is_running() {
         watch(sender, WATCHED, &|_, _| false);
     }
-    let went_on = ending != Ending::Stopped && gone_ns.is_none();
+    // One that is killed may take a while to be gone.
+    let went_on = !stands_still(ending) && gone_ns.is_none();
     let gone_ns = gone_ns.unwrap_or(asked_ns);
     let owned_until_ns = if stands_still(ending) { asked_ns } else { gone_ns };
     let shown_from_ns = if ending == Ending::HungUp {

@@ -46,7 +46,9 @@ fn begin_run(stage: &mut Stage, pointer: &mut Pointer, button: [f32; 2]) {
     let moves = |stage: &mut Stage, limit| {
         until(limit, || {
             stage.observer.poll();
-            stage.observer.state().is_some_and(|s| s.flags & flags::IN_MOTION != 0)
+            // The motion by which the needle was drawn out is at its goal.
+            let state = stage.observer.state();
+            state.is_some_and(|s| s.flags & (flags::IN_MOTION | flags::AT_GOAL) == flags::IN_MOTION)
         })
     };
     let begins = (0..10).any(|_| {

@@ -7,6 +7,7 @@ use crate::rt::tissue_tape::TissueFlight;
 use std::path::Path;
 use stylet_sim::line::{BodyAnswer, BodyLine, HandLine, LineSource};
 use stylet_sim::probe::{BodyProbe, NoWall, ProbeShape};
+use stylet_sim::tissue::fem::batch::Part;
 
 /// How far the columns of one line are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +53,9 @@ pub fn solve_again(
         if !recorded.is_pushed_by(generation) {
             // Its columns do not count.
             let nothing = BodyAnswer::Columns(Vec::new());
-            again.bodies.push(BodyLine::new(generation, source.line, 0.0, nothing));
+            again
+                .bodies
+                .push(BodyLine::new(generation, source.line, Part::default(), nothing));
             continue;
         }
         let stiffness = source.stiffness();

@@ -18,7 +18,8 @@ pub struct Compliance {
     pub spacing_m: f64,
     /// Length over which the tip's load is spread along the line.
     pub tip_length_m: f64,
-    /// Compliance of the body as a whole on its foundation, m/N; 0 where something holds it.
+    /// Compliance of the part of the body that the line enters, as one piece on its foundation, m/N; 0 where something
+    /// holds it.
     pub whole_m_per_n: f64,
     /// Compliance of the needle itself, between hand and tissue, m/N; see [`behind_needle`](Self::behind_needle).
     pub needle_m_per_n: f64,
@@ -67,7 +68,7 @@ impl Compliance {
             stations: m,
             spacing_m: stations.settings.spacing_m,
             tip_length_m: stations.patch_edge_m(model.spacing_m()),
-            whole_m_per_n: model.whole_m_per_n(),
+            whole_m_per_n: stations.part(model).m_per_n,
             needle_m_per_n: 0.0,
             across_spacing_m: stations.group() as f64 * stations.settings.spacing_m,
             rows,

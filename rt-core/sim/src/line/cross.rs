@@ -5,7 +5,8 @@
 
 use super::columns::Column;
 use super::stations::Stations;
-use crate::tissue::fem::batch::NodeWeight;
+use crate::tissue::fem::Compiled;
+use crate::tissue::fem::batch::{BatchModel, NodeWeight, Part};
 use serde::{Deserialize, Serialize};
 
 /// Places where a line loads its body: shaft of each station along the line, then tip at each. Kept while other lines
@@ -27,6 +28,11 @@ impl LineStations {
             direction: [0.0, 0.0, 1.0],
             loads: Vec::new(),
         }
+    }
+
+    /// Returns the part of the body that the line enters.
+    fn part<'a, T: Compiled>(&self, body: &'a BatchModel<T>) -> Option<&'a Part> {
+        body.part_of(self.loads.first()?.first()?.node)
     }
 
     pub(super) fn of(generation: u64, stations: &Stations) -> Self {
@@ -70,14 +76,15 @@ impl Cross {
         }
     }
 
-    /// Makes one for each of `others`, from columns that were read there; `whole_m_per_n` is that of the body.
-    pub(super) fn of_columns(
+    /// Makes one for each of `others`, from columns of `stations` that were read there. Lines in different parts of the
+    /// body do not move each other.
+    pub(super) fn of_columns<T: Compiled>(
         columns: &[Column],
         direction: [f64; 3],
-        whole_m_per_n: f64,
+        (body, stations): (&BatchModel<T>, &Stations),
         others: &[std::sync::Arc<LineStations>],
     ) -> Vec<Self> {
-        let mut first = 0;
+        let (mut first, part) = (0, stations.part(body));
         let mut all = Vec::with_capacity(others.len());
         for other in others {
             let rows = other.loads.len();
@@ -86,7 +93,11 @@ impl Cross {
                 |own: usize, of_other: usize| columns[own].beside_m.get(first + of_other).copied().unwrap_or(0.0);
             all.push(Self::from_rows(
                 other.generation,
-                cosine * whole_m_per_n,
+                if other.part(body) == Some(&part) {
+                    cosine * part.m_per_n
+                } else {
+                    0.0
+                },
                 [columns.len(), rows],
                 entry,
             ));

@@ -147,9 +147,9 @@ impl ReadyLine {
         }
         let compliance = Compliance::of_columns(body, &stations, queue.columns()).ok_or(LineError::NoTissue)?;
         let compliance = compliance.behind_needle(STIFFEST_N_PER_M);
-        let whole_m_per_n = compliance.whole_m_per_n;
+        let part = stations.part(body);
         let axial = queue.columns().get(..2 * stations.count()).unwrap_or(&[]);
-        let beside = Cross::of_columns(axial, line.axes[0], whole_m_per_n, others);
+        let beside = Cross::of_columns(axial, line.axes[0], (body, &stations), others);
         Ok(ReadyLine {
             stations: Arc::new(LineStations::of(generation, &stations)),
             hand: Box::new(HandLine {
@@ -159,7 +159,7 @@ impl ReadyLine {
             body: Box::new(BodyLine::new(
                 generation,
                 line,
-                whole_m_per_n,
+                part,
                 BodyAnswer::Columns(queue.into_fields()),
             )),
         })

@@ -1,7 +1,7 @@
 //! Stations along the needle's way through the tissue at rest, and where each of them loads the lattice.
 
 use crate::tissue::fem::Compiled;
-use crate::tissue::fem::batch::{BatchModel, NodeWeight};
+use crate::tissue::fem::batch::{BatchModel, NodeWeight, Part};
 use serde::{Deserialize, Serialize};
 
 /// Spread of a patch by the lattice, in squares of its spacing: 2 by the variance of trilinear weights, less by
@@ -115,6 +115,14 @@ impl Stations {
             stations.tip.push(tip);
         }
         stations
+    }
+
+    /// Returns the part of the body that the line enters.
+    pub fn part<T: Compiled>(&self, model: &BatchModel<T>) -> Part {
+        let node = self.shaft.first().and_then(|weights| weights.first());
+        node.and_then(|(node, _)| model.part_of(*node))
+            .cloned()
+            .unwrap_or_default()
     }
 
     /// Returns the number of stations.

@@ -4,7 +4,40 @@ use super::field::{add_fields, add_up};
 use super::{ElementField, LargeStrain, PackedField, parts};
 use crate::scene::{Lattice, Scene};
 use crate::simd::Simd;
+use std::ops::Range;
 use std::sync::Arc;
+
+/// Displacement of a part of a body as one piece, on its foundation.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Shift<'a> {
+    /// Displacement, m.
+    pub by_m: [f64; 3],
+    /// Elements of the part.
+    pub elements: &'a [Range<u32>],
+}
+
+impl Shift<'_> {
+    /// Makes a displacement of a body that is all of one piece.
+    pub fn of_all(by_m: [f64; 3]) -> Self {
+        const ALL: &[Range<u32>] = &[0..u32::MAX];
+        Shift { by_m, elements: ALL }
+    }
+
+    /// Adds it to a field in units of so many per metre.
+    pub(super) fn add_to(&self, per_m: f64, field: &mut [Vec<f32>; 3]) {
+        for (axis, by_m) in field.iter_mut().zip(self.by_m) {
+            // Most often there is none.
+            if by_m != 0.0 {
+                let by = (by_m * per_m) as f32;
+                for elements in self.elements {
+                    let (first, end) = (elements.start as usize, axis.len().min(elements.end as usize));
+                    let part = axis.get_mut(first..end);
+                    part.into_iter().flatten().for_each(|u| *u += by);
+                }
+            }
+        }
+    }
+}
 
 /// Motion that carries a body from now on: the answer of a coarser body to the loads of needles.
 #[derive(Clone, Copy, Debug, Default)]
@@ -15,8 +48,8 @@ pub struct Carry<'a> {
     pub loads_n: &'a [f64],
     /// Further displacements of that body, m.
     pub fields: &'a [&'a ElementField],
-    /// Displacement of all of it on top, m.
-    pub whole_m: [f64; 3],
+    /// Displacement of the part that is loaded, on top.
+    pub shift: Shift<'a>,
 }
 
 impl Carry<'_> {
@@ -25,12 +58,15 @@ impl Carry<'_> {
         columns: &[],
         loads_n: &[],
         fields: &[],
-        whole_m: [0.0; 3],
+        shift: Shift {
+            by_m: [0.0; 3],
+            elements: &[],
+        },
     };
 
     fn is_at_rest(&self) -> bool {
         let is_loaded = !self.columns.is_empty() && self.loads_n.iter().any(|n| *n != 0.0);
-        !is_loaded && self.fields.is_empty() && self.whole_m == [0.0; 3]
+        !is_loaded && self.fields.is_empty() && self.shift.by_m == [0.0; 3]
     }
 }
 
@@ -121,12 +157,7 @@ impl CarriedField {
         }
         add_up(self.simd, by.columns, by.loads_n, 1.0, &mut self.of_element);
         add_fields(by.fields, 1.0, &mut self.of_element);
-        for (axis, whole_m) in self.of_element.iter_mut().zip(by.whole_m) {
-            // Most often there is none.
-            if whole_m != 0.0 {
-                axis.iter_mut().for_each(|u| *u += whole_m as f32);
-            }
-        }
+        by.shift.add_to(1.0, &mut self.of_element);
         self.spread();
     }
 

@@ -43,7 +43,7 @@ mod spec;
 mod violation;
 
 pub use ahead::element_ahead;
-pub use carried::{Carried, CarriedField, Carry};
+pub use carried::{Carried, CarriedField, Carry, Shift};
 pub use chainmail::{ChainMail, ChainMailTissue, TissueState, step};
 pub use deformed::Deformed;
 pub use fem::FemTissue;

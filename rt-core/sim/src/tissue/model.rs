@@ -1,6 +1,6 @@
 //! Trait of tissue models: a body that takes steps and can be read.
 
-use super::{Carry, Deformed, ElementField, PackedField};
+use super::{Carry, Deformed, ElementField, PackedField, Shift};
 use crate::limits::Limits;
 
 use serde::{Deserialize, Serialize};
@@ -84,10 +84,10 @@ pub trait TissueModel: Send {
     /// and no more; answers stay the same within the model's tolerance.
     fn prepare(&mut self, _next: Option<Held>) {}
 
-    /// Sets the displacement to the sum of `columns` (m/N) times `loads_n` plus `whole_m`, instead of a step; releases
+    /// Sets the displacement to the sum of `columns` (m/N) times `loads_n` plus `shift`, instead of a step; releases
     /// the held element and clears its solver state. Obligations as for `step`. `None` from a model whose answers do
     /// not add up.
-    fn displace(&mut self, _columns: &[PackedField], _loads_n: &[f64], _whole_m: [f64; 3]) -> Option<StepReport> {
+    fn displace(&mut self, _columns: &[PackedField], _loads_n: &[f64], _shift: Shift<'_>) -> Option<StepReport> {
         None
     }
 

@@ -4,7 +4,7 @@ use super::*;
 use std::time::Instant;
 use stylet_shm_schema::HandMove;
 use stylet_sim::scene::Role;
-use stylet_sim::tissue::{Carry, ElementField, PackedField, least_corner};
+use stylet_sim::tissue::{Carry, ElementField, PackedField, Shift, least_corner};
 
 /// A model as it was: nothing is corrected.
 struct Linear(Box<dyn TissueModel>);
@@ -14,8 +14,8 @@ impl TissueModel for Linear {
         self.0.step(held, dt_s)
     }
 
-    fn displace(&mut self, columns: &[PackedField], loads_n: &[f64], whole_m: [f64; 3]) -> Option<StepReport> {
-        self.0.displace(columns, loads_n, whole_m)
+    fn displace(&mut self, columns: &[PackedField], loads_n: &[f64], shift: Shift<'_>) -> Option<StepReport> {
+        self.0.displace(columns, loads_n, shift)
     }
 
     fn add(&mut self, fields: &[&ElementField]) -> Option<StepReport> {

@@ -3,7 +3,7 @@
 use super::TissueLoop;
 use crate::rt::left_loads::{LeftLoads, NeedleLoads};
 use stylet_sim::line::{BodyAnswer, BodyLine, MAX_LEFT};
-use stylet_sim::tissue::{Carry, ElementField, StepReport};
+use stylet_sim::tissue::{Carry, ElementField, Shift, StepReport};
 
 /// One that stays in: its columns, and the loads that its share of the body's displacement was made from.
 pub(super) struct LeftBody {
@@ -169,7 +169,7 @@ impl TissueLoop {
             None => self.world.tissue.step(self.held, self.period_s),
             Some(Besides::Added) => self.with_left(|this, fields| {
                 let tissue = &mut this.world.tissue;
-                tissue.displace(&[], &[], [0.0; 3]);
+                tissue.displace(&[], &[], Shift::default());
                 let report = tissue.add(fields);
                 report.unwrap_or_else(|| tissue.step(None, this.period_s))
             }),

@@ -6,7 +6,7 @@ use crate::rt::exchange::Notice;
 use crate::rt::line_loads::{BentTip, LineLoads};
 use nalgebra::Vector3;
 use stylet_sim::line::{BodyAnswer, BodyLine, Line};
-use stylet_sim::tissue::{Carry, Held, MaterialPoint, StepReport};
+use stylet_sim::tissue::{Carry, Held, MaterialPoint, Shift, StepReport};
 
 impl TissueLoop {
     /// Takes up the columns of a new line; the old ones go back to be freed.
@@ -52,11 +52,15 @@ impl TissueLoop {
         let axis = line.line;
         let mut whole_m = axis.axes[0].map(|c| c * loads.whole_m);
         if let Some(bent) = loads.bent {
-            add_bevel(&mut whole_m, &axis, &bent, line.whole_m_per_n);
+            add_bevel(&mut whole_m, &axis, &bent, line.part.m_per_n);
         }
+        let shift = Shift {
+            by_m: whole_m,
+            elements: &line.part.elements,
+        };
         let report = match &line.answer {
             BodyAnswer::Columns(columns) => {
-                let alone = self.world.tissue.displace(columns, loads.loads_n(), whole_m);
+                let alone = self.world.tissue.displace(columns, loads.loads_n(), shift);
                 match self.besides() {
                     None => alone,
                     Some(_) => self.with_left(|this, fields| this.world.tissue.add(fields)),
@@ -73,7 +77,7 @@ impl TissueLoop {
                 let by = Carry {
                     columns,
                     loads_n,
-                    whole_m,
+                    shift,
                     fields: &[],
                 };
                 // A hand that rests loads the line in every tick as in the one before.

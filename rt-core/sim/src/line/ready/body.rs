@@ -1,6 +1,7 @@
 //! The body's half of a line, for the tissue loop: the answer to the needle's loads.
 
 use crate::line::Line;
+use crate::tissue::fem::batch::Part;
 use crate::tissue::{ElementField, PackedField};
 
 /// Half of a line for the tissue loop: the body's answer to a newton at each station.
@@ -10,8 +11,8 @@ pub struct BodyLine {
     pub generation: u64,
     /// Line at rest.
     pub line: Line,
-    /// Displacement of the body as a whole on its foundation by a newton, m; 0 where something holds it.
-    pub whole_m_per_n: f64,
+    /// Part of the body that the line enters.
+    pub part: Part,
     /// Answer to each newton: shaft of each station, then tip at each, then stations across along each direction.
     pub answer: BodyAnswer,
     /// Displacement of the body by a needle that stays in on it, m: see [`stay`](Self::stay).
@@ -20,12 +21,12 @@ pub struct BodyLine {
 
 impl BodyLine {
     /// Makes the tissue loop's half, with room for the displacement by a needle that stays in.
-    pub fn new(generation: u64, line: Line, whole_m_per_n: f64, answer: BodyAnswer) -> Self {
+    pub fn new(generation: u64, line: Line, part: Part, answer: BodyAnswer) -> Self {
         let elements = answer.columns().first().map_or(0, PackedField::elements);
         BodyLine {
             generation,
             line,
-            whole_m_per_n,
+            part,
             answer,
             share: ElementField::with_room(elements),
         }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::scene::{Scene, TissueKind};
 use crate::tissue::fem::{FemModel, FemTissue};
-use crate::tissue::{ElementField, TissueModel};
+use crate::tissue::{ElementField, Shift, TissueModel};
 
 fn paper() -> (Scene, BatchModel<f32>, FemModel<f32>) {
     let scene = Scene::builtin("paper").unwrap();
@@ -24,8 +24,8 @@ fn block() -> (Scene, BatchModel<f32>) {
 }
 
 /// Returns the displacement of the body as a whole by the membrane.
-fn whole_m(hand: &HandLine) -> [f64; 3] {
-    [0.0, 0.0, hand.whole_m()]
+fn shift(hand: &HandLine) -> Shift<'static> {
+    Shift::of_all([0.0, 0.0, hand.whole_m()])
 }
 
 /// Returns a line through the middle of the gland, along its axis.
@@ -92,7 +92,7 @@ fn the_body_follows_the_loads_of_the_line() {
         assert!(answer.punctured.is_none(), "5 of 8 mm");
     }
     let report = tissue
-        .displace(columns.answer.columns(), hand.state().loads_n(), whole_m(&hand))
+        .displace(columns.answer.columns(), hand.state().loads_n(), shift(&hand))
         .unwrap();
     assert!(report.converged && report.moved > 19_000, "{report:?}");
     // The tip presses as a patch: at its middle the lattice moves a little more than on the mean over the patch.
@@ -112,7 +112,7 @@ fn the_body_follows_the_loads_of_the_line() {
     }
     assert!(!hand.is_in_tissue());
     let report = tissue
-        .displace(columns.answer.columns(), hand.state().loads_n(), whole_m(&hand))
+        .displace(columns.answer.columns(), hand.state().loads_n(), shift(&hand))
         .unwrap();
     assert_eq!((report.moved, report.max_displacement), (0, 0.0));
 }
@@ -285,7 +285,9 @@ fn a_coarser_pelvis_beside_one_of_all_cells() {
     let mut times_us: Vec<f64> = (0..200)
         .map(|_| {
             let begun = std::time::Instant::now();
-            tissue.displace(ready.body.answer.columns(), &loads, [0.0; 3]).unwrap();
+            tissue
+                .displace(ready.body.answer.columns(), &loads, Shift::default())
+                .unwrap();
             begun.elapsed().as_secs_f64() * 1e6
         })
         .collect();

@@ -49,6 +49,7 @@ fn off(a: [f64; 3], b: [f64; 3]) -> f64 {
 fn an_affine_field_is_interpolated_exactly() {
     let (scene, coarse) = held_scene();
     let half = packed(&coarse, |place_m| affine(place_m).map(|c| 0.5 * c));
+    let elements = coarse.element_count() as u32;
     let mut field = CarriedField::new(&scene, coarse);
     assert!(field.is_at_rest());
     field.set(Carry {
@@ -77,11 +78,14 @@ fn an_affine_field_is_interpolated_exactly() {
         assert!(size_m <= Carried::Field(&field).largest_m(scene.lattice.spacing_m) * (1.0 + 1e-6));
     }
     assert!(seen[0] > 2000 && seen[1] > 1000, "{seen:?}");
-    field.set(Carry {
-        whole_m: [1e-3, 0.0, -2e-3],
-        ..Carry::NOT
-    });
-    assert!(off(field.at_m(&scene.lattice, 3000), [1e-3, 0.0, -2e-3]) < 1e-9);
+    let by_m = [1e-3, 0.0, -2e-3];
+    let part = [0..elements / 2];
+    let shift = Shift { by_m, elements: &part };
+    field.set(Carry { shift, ..Carry::NOT });
+    let moved = |element: u32| field.at_m(&scene.lattice, element);
+    assert!(off(moved(1500), by_m) < 1e-9, "{:?}", moved(1500));
+    let last = scene.lattice.element_count() as u32 - 1;
+    assert_eq!(moved(last), [0.0; 3], "another part");
     field.set(Carry::NOT);
     assert!(field.is_at_rest() && field.at_m(&scene.lattice, 3000) == [0.0; 3]);
 }

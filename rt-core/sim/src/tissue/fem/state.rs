@@ -4,7 +4,7 @@ use super::grip::Grip;
 use super::model::FemModel;
 use super::real::Real;
 use super::sweep::touched;
-use crate::tissue::{ElementField, PackedField, add_fields, add_up};
+use crate::tissue::{ElementField, PackedField, Shift, add_fields, add_up};
 
 /// Displacements of all elements, and what the solver keeps from tick to tick.
 #[derive(Clone, Debug)]
@@ -69,14 +69,8 @@ impl<T: Real> FemState<T> {
     }
 
     /// Lets loose and forgets what is held, and displaces every element by the sum of loads times answers (m/N) and by
-    /// `whole_m`; how many moved.
-    pub fn displace(
-        &mut self,
-        model: &FemModel<T>,
-        columns: &[PackedField],
-        loads_n: &[f64],
-        whole_m: [f64; 3],
-    ) -> u32 {
+    /// `shift`; how many moved.
+    pub fn displace(&mut self, model: &FemModel<T>, columns: &[PackedField], loads_n: &[f64], shift: Shift<'_>) -> u32 {
         if !self.fits(model) {
             return 0;
         }
@@ -85,12 +79,7 @@ impl<T: Real> FemState<T> {
         self.has_time = false;
         let (simd, per_element) = (model.levels[0].simd, 1.0 / model.lattice.spacing_m);
         add_up(simd, columns, loads_n, per_element, &mut self.displacement);
-        for (u, whole_m) in self.displacement.iter_mut().zip(whole_m) {
-            if whole_m != 0.0 {
-                let by = (whole_m * per_element) as f32;
-                u.iter_mut().for_each(|u| *u += by);
-            }
-        }
+        shift.add_to(per_element, &mut self.displacement);
         self.measure()
     }
 

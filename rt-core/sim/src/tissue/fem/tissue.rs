@@ -7,7 +7,7 @@ use super::solve::{SolveSettings, TipPatch};
 use super::state::FemState;
 use crate::scene::Scene;
 use crate::tissue::{
-    Carried, Deformed, ElementField, Held, HeldOutcome, LargeStrain, PackedField, Solve, StepReport, TissueModel,
+    Carried, Deformed, ElementField, Held, HeldOutcome, LargeStrain, PackedField, Shift, Solve, StepReport, TissueModel,
 };
 
 /// Stiffness of the surroundings of a body: 20 mm of fat of 5 kPa, per surface area (assumed).
@@ -111,8 +111,8 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
         prepare(&self.model, &mut self.state, next.map(patch), &self.settings);
     }
 
-    fn displace(&mut self, columns: &[PackedField], loads_n: &[f64], whole_m: [f64; 3]) -> Option<StepReport> {
-        let moved = self.state.displace(&self.model, columns, loads_n, whole_m);
+    fn displace(&mut self, columns: &[PackedField], loads_n: &[f64], shift: Shift<'_>) -> Option<StepReport> {
+        let moved = self.state.displace(&self.model, columns, loads_n, shift);
         Some(self.displaced(moved))
     }
 

@@ -19,7 +19,7 @@ fn either_line_of_a_pair_may_be_the_one_that_is_solved_for() {
     let cross = |stations: &Stations, others: &[Arc<LineStations>; 1], tolerance: f64| {
         let mut queue = ColumnQueue::new(&model, stations, false, tolerance).read_beside(others);
         queue.prepare_all(&model);
-        Cross::of_columns(queue.columns(), stations.line.axes[0], model.whole_m_per_n(), others).remove(0)
+        Cross::of_columns(queue.columns(), stations.line.axes[0], (&model, stations), others).remove(0)
     };
     let mut worst = Vec::new();
     for tolerance in [TOLERANCE, 1e-4] {

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::scene::{Lattice, Scene, TissueKind};
-use crate::tissue::{Carry, ElementField, MaterialPoint, PackedField, TissueModel, least_corner};
+use crate::tissue::{Carry, ElementField, MaterialPoint, PackedField, Shift, TissueModel, least_corner};
 
 fn tissue() -> (Scene, ChainMailTissue) {
     let scene = Scene::builtin("paper").unwrap();
@@ -41,7 +41,7 @@ fn a_carried_body_follows_its_field_and_its_held_element() {
     tissue.carry(Carry {
         columns: &columns,
         loads_n: &[2.0],
-        whole_m: [0.0, 0.0, 5e-4],
+        shift: Shift::of_all([0.0, 0.0, 5e-4]),
         ..Carry::NOT
     });
     let held = Held {
@@ -175,7 +175,7 @@ fn nothing_carries_the_body_of_the_mode_paper() {
     tissue.carry(Carry {
         columns: &columns,
         loads_n: &[1.0],
-        whole_m: [1e-3; 3],
+        shift: Shift::of_all([1e-3; 3]),
         ..Carry::NOT
     });
     tissue.step(None, 5e-3);

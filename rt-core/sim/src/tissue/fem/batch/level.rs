@@ -7,6 +7,7 @@ use crate::simd::Simd;
 use crate::tissue::fem::level::Level;
 use crate::tissue::fem::model::FemModel;
 use crate::tissue::fem::real::Real;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// A grid place that no element touches.
@@ -55,7 +56,16 @@ pub(super) struct BatchLevel<T> {
     pub parents: Vec<u32>,
     pub simd: Simd,
     /// Node at each place of the level's grid.
-    node_at: Vec<u32>,
+    pub(super) node_at: Vec<u32>,
+}
+
+/// Part of a body that no element joins to the rest of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Part {
+    /// Elements of it.
+    pub elements: Vec<Range<u32>>,
+    /// Displacement as one piece for each newton, on its springs to rest, m/N; 0 where something in it is fixed.
+    pub m_per_n: f64,
 }
 
 /// Body on which eight loads are solved: built once from a model, never changed.
@@ -69,6 +79,9 @@ pub struct BatchModel<T = f32> {
     /// The lowest corner node of each element of the lattice, by line as in [`Run`].
     pub(super) corners: Vec<[u32; 4]>,
     lattice: Arc<Lattice>,
+    /// Number of the part of each node of the finest level.
+    pub(super) part_of_node: Vec<u32>,
+    pub(super) parts: Vec<Part>,
     /// Shear modulus and Poisson's ratio of each element; zero where it is rigid.
     materials: Vec<[f32; 2]>,
     low_m: [f64; 3],
@@ -116,6 +129,8 @@ impl<T: Real> BatchModel<T> {
                 .flat_map(|run| (run.cell..run.cell + run.len).map(corner))
                 .collect(),
             lattice: model.lattice.clone(),
+            part_of_node: Vec::new(),
+            parts: Vec::new(),
             materials: model
                 .runs
                 .iter()
@@ -130,6 +145,7 @@ impl<T: Real> BatchModel<T> {
             levels,
         };
         batch.invert_coarsest();
+        batch.find_parts(model);
         batch
     }
 

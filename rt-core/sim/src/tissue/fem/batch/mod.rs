@@ -15,7 +15,7 @@ mod level;
 mod output;
 mod solve;
 
-pub use level::{BatchModel, NodeWeight};
+pub use level::{BatchModel, NodeWeight, Part};
 pub use solve::{BatchState, Progress};
 
 use crate::simd::{Eight, LANES};

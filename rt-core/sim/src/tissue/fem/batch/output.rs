@@ -1,21 +1,48 @@
 //! Output of an answer: displacements of element centres, values under weights, and the force of the foundation.
 
-use super::level::{BatchModel, NodeWeight};
+use super::level::{BatchModel, NodeWeight, Part};
 use super::solve::{BatchState, finest};
 use crate::tissue::ElementField;
+use crate::tissue::fem::model::FemModel;
 use crate::tissue::fem::real::Real;
 
 impl<T: Real> BatchModel<T> {
-    /// Returns the displacement of the body as a whole for each newton, on the springs to rest, m/N; 0 where part of it
-    /// is fixed.
-    pub fn whole_m_per_n(&self) -> f64 {
-        let level = finest(self);
-        let springs_n_per_m: f64 = level.springs.iter().map(|spring| spring.to_f64()).sum();
-        let is_held = level.inverse_diagonal.contains(&T::ZERO);
-        if is_held || springs_n_per_m <= 0.0 {
-            0.0
-        } else {
-            1.0 / springs_n_per_m
+    /// Returns the part of the body that a node belongs to.
+    pub fn part_of(&self, node: u32) -> Option<&Part> {
+        let part = *self.part_of_node.get(node as usize)?;
+        self.parts.get(part as usize)
+    }
+
+    pub(super) fn find_parts(&mut self, model: &FemModel<T>) {
+        let level = &self.levels[0];
+        let numbers = model.part.iter().filter(|&&part| part != u32::MAX).max();
+        let count = numbers.map_or(0, |&last| last as usize + 1);
+        let (mut springs_n_per_m, mut is_held) = (vec![0.0; count], vec![false; count]);
+        self.part_of_node = vec![u32::MAX; level.node_count];
+        let used = level
+            .node_at
+            .iter()
+            .zip(&model.part)
+            .filter(|(node, _)| **node != u32::MAX);
+        for (&node, &part) in used {
+            let (node, number) = (node as usize, part as usize);
+            self.part_of_node[node] = part;
+            springs_n_per_m[number] += level.springs[node].to_f64();
+            is_held[number] |= level.inverse_diagonal[node] == T::ZERO;
+        }
+        self.parts = vec![Part::default(); count];
+        for run in &model.runs {
+            let elements = &mut self.parts[model.part[run.cell] as usize].elements;
+            let (first, end) = (run.first as u32, (run.first + run.len) as u32);
+            match elements.last_mut() {
+                Some(last) if last.end == first => last.end = end,
+                _ => elements.push(first..end),
+            }
+        }
+        for (part, (springs_n_per_m, is_held)) in self.parts.iter_mut().zip(springs_n_per_m.into_iter().zip(is_held)) {
+            if !is_held && springs_n_per_m > 0.0 {
+                part.m_per_n = 1.0 / springs_n_per_m;
+            }
         }
     }
 }

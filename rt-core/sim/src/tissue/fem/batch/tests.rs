@@ -54,6 +54,28 @@ fn answers_are_reciprocal_and_balance_their_loads() {
     }
 }
 
+/// Springs of all parts together used to hold the one that is loaded, and the other parts went with it.
+#[test]
+fn a_part_is_held_by_its_own_springs() {
+    let lattice = lattice_of(&test_bodies::two_parts());
+    let settings = FemSettings::homogeneous(material(0.45), 1e5);
+    let model = BatchModel::new(&FemModel::<f64>::new(&lattice, &settings).expect("valid"));
+    let faces = f64::from(2 * (8 * 8 + 7 * 8 + 7 * 8));
+    let alone_m_per_n = 1.0 / (1e5 * faces * lattice.spacing_m.powi(2));
+    let parts = [0, model.node_count() as u32 - 1].map(|node| model.part_of(node).expect("a node in use"));
+    assert_ne!(parts[0], parts[1]);
+    for part in parts {
+        assert!(
+            (part.m_per_n / alone_m_per_n - 1.0).abs() < 1e-12,
+            "{} {alone_m_per_n}",
+            part.m_per_n
+        );
+        assert_eq!(part.elements.iter().map(|e| e.len()).sum::<usize>(), 7 * 8 * 8);
+        let is_left = |element: u32| lattice.cell(element)[0] < lattice.cell(part.elements[0].start)[0] + 7;
+        assert!(part.elements.iter().cloned().flatten().all(is_left), "one block");
+    }
+}
+
 /// A gland on its foundation under a point load, on the same mesh: CalculiX (`tests/oracles/gland_ccx.py`), whose C3D8
 /// is fully integrated, and B-bar elements assembled and factored by SciPy (`gland_bbar.py`).
 #[test]

@@ -1,7 +1,7 @@
 //! Claims about what a flight recording keeps of an elastic body: on a needle line its displacements are all of it.
 
 use super::*;
-use crate::tissue::{ElementField, Held, PackedField, TissueModel};
+use crate::tissue::{ElementField, Held, PackedField, Shift, TissueModel};
 use stylet_heap as heap;
 
 fn body() -> (Scene, FemTissue<f32>) {
@@ -47,7 +47,7 @@ fn a_body_on_a_line_continues_from_its_memory_in_every_bit() {
         first.prepare(Some(held(&scene, 2e-4 * f64::from(n + 1))));
     }
     assert!(!first.is_all_saved(), "the solver is in the middle of it");
-    first.displace(&columns(&scene), &[2.0], [0.0, 0.0, 1e-3]);
+    first.displace(&columns(&scene), &[2.0], Shift::of_all([0.0, 0.0, 1e-3]));
     assert!(first.is_all_saved());
     let mut memory = vec![0; first.memory_len()];
     let calls = heap::calls_of_this_thread();
