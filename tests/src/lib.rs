@@ -3,7 +3,6 @@
 pub mod hand;
 pub mod phantom;
 pub mod pointer;
-pub mod random;
 pub mod rehearsal;
 pub mod sender;
 pub mod stage;

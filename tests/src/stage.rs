@@ -1,10 +1,10 @@
 //! A core for trials one after the other, with the needle at a known place before each.
 
-use crate::random::Random;
 use crate::{Core, ask, until};
 use std::time::Duration;
 use stylet_host::link::Link;
 use stylet_implant::workflow::{default_plan, move_request, plan_request};
+use stylet_random::Random;
 use stylet_shm_schema::{Request, flags};
 
 /// A core with a host that looks on, and takes the hand back between trials.
@@ -22,7 +22,7 @@ impl Stage {
         let observer = core.host();
         let state = observer.state().expect("live");
         let home = (state.tip_in_scene_m, state.needle_direction);
-        let random = Random::of_clock();
+        let random = Random(crate::now_ns());
         println!("seed of the moments: {:#x}", random.0);
         Self {
             core,

@@ -5,6 +5,7 @@
 //! level at once.
 
 use rayon::prelude::*;
+use stylet_random::Random;
 
 /// Body in space.
 pub trait Region: Sync {
@@ -120,34 +121,23 @@ fn probe(region: &dyn Region, corner: [f64; 3], pitch: f64, random: &mut Scatter
     (count > 0).then(|| (inside[chosen.min(count - 1)], pitch.powi(3) * count as f64 / 8.0))
 }
 
-/// Numbers from 0 to 1 that depend on the cell alone (splitmix64).
-pub struct Scatter(u64);
+/// Numbers from 0 to 1 that depend on the cell alone.
+pub struct Scatter(Random);
 
 impl Scatter {
     /// Returns the numbers of one cell, always the same.
     pub fn of_cell(at: [usize; 3]) -> Self {
-        let mut seed = Self(0);
-        for index in at {
-            seed = Self(seed.next() ^ index as u64);
-        }
-        seed
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        let of_index = |mut random: Random, index: usize| Random(random.draw() ^ index as u64);
+        Self(at.into_iter().fold(Random(0), of_index))
     }
 
     /// Returns the next number, from 0 to 1.
     pub fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+        self.0.unit()
     }
 
     /// Returns the next three numbers, from 0 to 1.
     pub fn point(&mut self) -> [f64; 3] {
-        [self.unit(), self.unit(), self.unit()]
+        [(); 3].map(|()| self.unit())
     }
 }

@@ -276,15 +276,13 @@ mod tests {
     fn percentiles_and_histogram_match_the_kept_ticks() {
         let mut history = History::default();
         let mut given = Vec::new();
-        let mut wake_ns = 12_345_u64;
+        let mut random = stylet_random::Random(1);
         for count in [7, 1_500, 58_000, 30_000] {
             let first = given.len() as u64;
             let mut some = records(first..first + count);
             for r in &mut some {
-                wake_ns = wake_ns
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
-                r.wake_latency_ns = (wake_ns >> 33) % [900, 80_000, 40_000_000][(wake_ns >> 20) as usize % 3];
+                let most_ns = [900, 80_000, 40_000_000][random.below(3)];
+                r.wake_latency_ns = random.below(most_ns) as u64;
                 given.push(r.wake_latency_ns);
             }
             history.take(&some, [0.0; 3]);

@@ -178,13 +178,8 @@ mod tests {
 
     #[test]
     fn frames_look_alike_outside_the_damage() {
-        let mut seed = 7_u64;
-        let mut random = move |below: usize| {
-            seed = seed
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            ((seed >> 33) as usize) % below
-        };
+        let mut generator = stylet_random::Random(7);
+        let mut random = move |below: usize| generator.below(below);
         let any = |random: &mut dyn FnMut(usize) -> usize| {
             let [x, y, side, red] = [380, 280, 60, 256].map(&mut *random);
             square(x as f32, y as f32, side as f32 + 1.0, red as u8)

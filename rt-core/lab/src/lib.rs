@@ -29,8 +29,6 @@ mod machine;
 mod measure;
 mod plots;
 mod provenance;
-#[cfg(test)]
-mod random;
 mod report;
 mod sample;
 mod sign;

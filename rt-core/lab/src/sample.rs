@@ -94,12 +94,12 @@ impl Sample {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::SplitMix;
+    use stylet_random::Random;
 
     #[test]
     fn series_is_every_so_manieth_tick_and_the_largest_are_those_of_a_sort() {
-        let mut random = SplitMix(7);
-        let all: Vec<u64> = (0..100_000).map(|_| random.next_u64() % 1_000_003).collect();
+        let mut random = Random(7);
+        let all: Vec<u64> = (0..100_000).map(|_| random.draw() % 1_000_003).collect();
         let mut sample = Sample::new(100_000);
         for (i, &ns) in all.iter().enumerate() {
             sample.take(i as u64, ns);

@@ -202,11 +202,11 @@ fn kolmogorov(distance: f64, n: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::SplitMix;
+    use stylet_random::Random;
 
     /// Draws exponential wake-ups of mean 100 us; those of the second half are `factor` times as long.
     fn run(seed: u64, factor: f64) -> Vec<u64> {
-        let mut random = SplitMix(seed);
+        let mut random = Random(seed);
         let n = 4_096;
         let draw = |i: usize| {
             let mean = if i < n / 2 { 1e5 } else { factor * 1e5 };
@@ -233,7 +233,7 @@ mod tests {
     #[test]
     fn distances_are_those_of_the_definition() {
         // Oracle: both distribution functions at every value.
-        let mut random = SplitMix(3);
+        let mut random = Random(3);
         let a: Vec<f64> = (0..57).map(|_| (random.unit() * 20.0).floor()).collect();
         let b: Vec<f64> = (0..83).map(|_| (random.unit() * 25.0).floor()).collect();
         let below = |of: &[f64], v: f64| of.iter().filter(|x| **x <= v).count() as f64 / of.len() as f64;
@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn dependent_wake_ups_are_thinned_and_an_unending_dependence_is_refused() {
-        let mut random = SplitMix(11);
+        let mut random = Random(11);
         let mut walk = |memory: f64| -> Vec<u64> {
             let mut x = 0.0;
             let next = |_| {

@@ -129,7 +129,7 @@ mod tests {
         for (name, q) in [("p90", 0.9), ("p99", 0.99)] {
             let mut held = 0;
             for seed in 0..400_u64 {
-                let mut random = crate::random::SplitMix(seed);
+                let mut random = stylet_random::Random(seed);
                 let mut h = histogram();
                 for _ in 0..2_000 {
                     // Exponential of mean 100 us.

@@ -217,15 +217,12 @@ mod tests {
                 usable(&set);
             }
         }
-        // Ends and inner values of all at once, by a small generator.
-        let (mut seed, mut accepted) = (0x9e37_79b9_7f4a_7c15_u64, 0);
+        // Ends and inner values of all at once.
+        let (mut random, mut accepted) = (stylet_random::Random(1), 0);
         for _ in 0..20_000 {
             let mut set = ParameterSet::default();
             for p in &PARAMETERS {
-                seed ^= seed << 13;
-                seed ^= seed >> 7;
-                seed ^= seed << 17;
-                let share = (seed % 5) as f64 / 4.0;
+                let share = random.below(5) as f64 / 4.0;
                 set.set(p.id, p.min + share * (p.max - p.min));
             }
             accepted += u32::from(usable(&set));

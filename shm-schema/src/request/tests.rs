@@ -165,23 +165,17 @@ fn damaged_records_never_panic_and_what_is_accepted_survives() {
         .iter()
         .map(|request| request.encode(1, 1).expect("fits"))
         .collect();
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut random = || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        state
-    };
+    let mut random = stylet_random::Random(1);
     let (mut accepted, mut refused) = (0, 0);
     for round in 0..20_000 {
         let mut command = originals[round % originals.len()];
-        for _ in 0..1 + random() % 4 {
-            let at = (random() as usize) % (command.length as usize + 8).min(COMMAND_BYTES);
-            command.payload[at] = random() as u8;
+        for _ in 0..1 + random.draw() % 4 {
+            let at = (random.draw() as usize) % (command.length as usize + 8).min(COMMAND_BYTES);
+            command.payload[at] = random.draw() as u8;
         }
-        match random() % 4 {
-            0 => command.length = random() as u32,
-            1 => command.length = (random() % COMMAND_BYTES as u64) as u32,
+        match random.draw() % 4 {
+            0 => command.length = random.draw() as u32,
+            1 => command.length = (random.draw() % COMMAND_BYTES as u64) as u32,
             _ => {}
         }
         match Request::decode(&command) {

@@ -12,9 +12,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 use stylet_igtl::codec::{Body, Message, Timestamp};
 use stylet_ports::{self as service, Node};
+use stylet_random::Random;
 use stylet_shm_schema::*;
 use stylet_tests::hand::force_n;
-use stylet_tests::random::Random;
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, repeats, until};
 
@@ -29,11 +29,11 @@ const STALE: usize = 64;
 type Sent = [AtomicU64; 3];
 
 fn place(random: &mut Random) -> [f64; 3] {
-    std::array::from_fn(|_| 0.3 * (random.share() - 0.5))
+    std::array::from_fn(|_| 0.3 * (random.unit() - 0.5))
 }
 
 fn direction(random: &mut Random) -> [f64; 3] {
-    let [x, y] = [0.2 * (random.share() - 0.5), 0.2 * (random.share() - 0.5)];
+    let [x, y] = [0.2 * (random.unit() - 0.5), 0.2 * (random.unit() - 0.5)];
     [x, y, (1.0 - x * x - y * y).sqrt()]
 }
 
@@ -42,8 +42,8 @@ fn request(random: &mut Random) -> Request {
     let hand = HandMove {
         tip_m: place(random),
         direction: direction(random),
-        speed_m_per_s: 0.01 + 0.3 * random.share(),
-        acceleration_m_per_s2: 0.5 + 3.0 * random.share(),
+        speed_m_per_s: 0.01 + 0.3 * random.unit(),
+        acceleration_m_per_s2: 0.5 + 3.0 * random.unit(),
     };
     match random.below(24) {
         0..6 => Request::MoveHand(hand),
@@ -78,7 +78,7 @@ fn request(random: &mut Random) -> Request {
         21 => Request::BeginExercise(Exercise::StiffTissue { factor: 2.0 }),
         22 => Request::EndExercises,
         _ => Request::KeepMoving {
-            valid_s: 0.02 + 0.28 * random.share(),
+            valid_s: 0.02 + 0.28 * random.unit(),
         },
     }
 }

@@ -30,7 +30,7 @@ fn a_hand_whose_procedure_ends_or_hangs_is_at_rest_within_5_mm_and_400_ticks() {
                     stage.draw_out();
                     let mut sender = Sender::start(procedure(&stage.core), ending);
                     // The way to the entry takes half a second, that in the tissue as long.
-                    let after = Duration::from_secs_f64(0.25 * stage.random.share());
+                    let after = Duration::from_secs_f64(0.25 * stage.random.unit());
                     trial(&mut stage.observer, &mut sender, (place, ending), after, BEGINS_WITHIN)
                 })
                 .collect();
@@ -67,7 +67,7 @@ fn a_hand_whose_openigtlink_server_ends_or_hangs_is_at_rest_within_5_mm_and_400_
                     let mut sender = Sender::start(igtl(&stage.core, port), ending);
                     let by_mm = if place == Place::Air { -100.0 } else { 70.0 };
                     let tracker = Tracker::begin(port, by_mm);
-                    let after = Duration::from_secs_f64(0.2 * stage.random.share());
+                    let after = Duration::from_secs_f64(0.2 * stage.random.unit());
                     let trial = trial(&mut stage.observer, &mut sender, (place, ending), after, BEGINS_WITHIN);
                     drop(tracker);
                     trial

@@ -251,25 +251,19 @@ fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
         let parameters = hand.link.parameters().expect("live").generation;
         let node = Node::join(&core.instance).expect("same user");
         let port = service::commands::publisher(&node).expect("a free place");
-        let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
-        let mut random = move || {
-            seed ^= seed << 13;
-            seed ^= seed >> 7;
-            seed ^= seed << 17;
-            seed
-        };
+        let mut random = stylet_random::Random(1);
         for n in 0..COUNT {
             let mut command = Command::zeroed();
             for word in bytemuck::cast_slice_mut::<u8, u64>(bytemuck::bytes_of_mut(&mut command)) {
-                *word = random();
+                *word = random.draw();
             }
             // Half of them with a kind that exists, and values that are what is wrong.
             if n % 2 == 0 {
-                let value = f64::from_bits(random() | 0x7ff0_0000_0000_0000);
+                let value = f64::from_bits(random.draw() | 0x7ff0_0000_0000_0000);
                 let id = ParameterId::ForceScale;
                 let change = ParameterChange { id, value };
                 command = Request::SetParameters(vec![change])
-                    .encode(random(), random())
+                    .encode(random.draw(), random.draw())
                     .expect("fits");
             } else {
                 command.kind |= 1 << 31;

@@ -10,16 +10,10 @@ use stylet_tests::{Alone, Core, ask, fresh_instance, until};
 
 /// All ones, zeros, random bytes and huge counts, of any type.
 fn invalid<T: Pod>() -> Vec<T> {
-    let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut random = move || {
-        seed ^= seed << 13;
-        seed ^= seed >> 7;
-        seed ^= seed << 17;
-        seed as u8
-    };
+    let mut random = stylet_random::Random(1);
     let mut all = vec![pod_read_unaligned(&vec![0xff; size_of::<T>()]), T::zeroed()];
     for _ in 0..200 {
-        let bytes: Vec<u8> = (0..size_of::<T>()).map(|_| random()).collect();
+        let bytes: Vec<u8> = (0..size_of::<T>()).map(|_| random.draw() as u8).collect();
         all.push(pod_read_unaligned(&bytes));
     }
     // Doubles that are not numbers, in every place.

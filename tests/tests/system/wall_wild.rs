@@ -9,8 +9,8 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use stylet_host::link::Link;
 use stylet_ports::{self as service, Node};
+use stylet_random::Random;
 use stylet_shm_schema::{Instance, TickRecord};
-use stylet_tests::random::Random;
 use stylet_tests::{Core, program, repeats, scratch, until};
 
 /// Tells the program of a test which core to look at.

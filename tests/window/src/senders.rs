@@ -75,7 +75,7 @@ fn a_hand_whose_window_ends_or_hangs_is_at_rest_within_5_mm_and_400_ticks() {
                     stage.draw_out();
                     let mut sender = Sender::start(window(&stage, &display), ending);
                     begin_run(&mut stage, &mut pointer, button);
-                    let after = Duration::from_secs_f64(0.25 * stage.random.share());
+                    let after = Duration::from_secs_f64(0.25 * stage.random.unit());
                     trial(&mut stage.observer, &mut sender, (place, ending), after, BEGINS_WITHIN)
                 })
                 .collect();
@@ -98,7 +98,7 @@ fn a_hand_whose_gamepad_is_of_a_window_that_ends_or_hangs_is_at_rest_within_5_mm
                     stage.draw_out();
                     stage.go_to_entry();
                     let mut sender = Sender::start(with_gamepad(&stage, place), ending);
-                    let after = Duration::from_secs_f64(0.15 * stage.random.share());
+                    let after = Duration::from_secs_f64(0.15 * stage.random.unit());
                     trial(&mut stage.observer, &mut sender, (place, ending), after, BEGINS_WITHIN)
                 })
                 .collect();

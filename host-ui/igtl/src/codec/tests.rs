@@ -1,6 +1,7 @@
 //! Messages against the bytes of the C++ library, and the decoder against invalid bytes.
 
 use super::*;
+use stylet_random::Random;
 
 mod library;
 
@@ -96,18 +97,6 @@ fn an_extended_message_of_the_library_says_the_same() {
 #[test]
 fn the_checksum_has_its_published_check_value() {
     assert_eq!(crc64(b"123456789"), 0x6c40_df5f_0b49_7347);
-}
-
-/// Generator xorshift64*, so that a failure repeats.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, limit: usize) -> usize {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 33) as usize % limit
-    }
 }
 
 /// Tests mutations with a valid checksum, so that they reach the decoder of the body.

@@ -72,16 +72,10 @@ mod tests {
 
     #[test]
     fn no_other_pairs_cost_less() {
-        let mut state = 12345_u64;
+        let mut random = stylet_random::Random(1);
         for rows in 1..=5 {
             for _ in 0..40 {
-                let mut random = || {
-                    state = state
-                        .wrapping_mul(6_364_136_223_846_793_005)
-                        .wrapping_add(1_442_695_040_888_963_407);
-                    (state >> 40) as f64
-                };
-                let costs: Vec<[f64; 5]> = (0..rows).map(|_| std::array::from_fn(|_| random())).collect();
+                let costs: Vec<[f64; 5]> = (0..rows).map(|_| std::array::from_fn(|_| random.unit())).collect();
                 let found = least_cost(rows, 5, &|r, c| costs[r][c]);
                 let sum: f64 = found.iter().enumerate().map(|(r, c)| costs[r][c.unwrap()]).sum();
                 assert!((sum - by_trial(&costs, 0, 0)).abs() < 1e-6);

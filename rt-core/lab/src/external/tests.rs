@@ -4,19 +4,19 @@
 use super::capture::{self, Capture, Channel};
 use super::evaluate;
 use crate::collect::ToggleTime;
-use crate::random::SplitMix;
+use stylet_random::Random;
 
 const SHIFT_S: f64 = 500e-6;
 const DRIFT: f64 = 20e-6;
 
 /// Toggles with the pattern of the loop: 20 to 83 ms apart, each some microseconds late.
 fn toggles(seed: u64, count: usize) -> Vec<ToggleTime> {
-    let mut random = SplitMix(seed);
+    let mut random = Random(seed);
     let mut due_ns = 5_000_000_000;
     (0..count)
         .map(|_| {
-            due_ns += (20 + random.next_u64() % 64) * 1_000_000;
-            let before_ns = due_ns + 15_000 + random.next_u64() % 20_000;
+            due_ns += (20 + random.draw() % 64) * 1_000_000;
+            let before_ns = due_ns + 15_000 + random.draw() % 20_000;
             ToggleTime {
                 due_ns,
                 before_ns,
@@ -28,9 +28,9 @@ fn toggles(seed: u64, count: usize) -> Vec<ToggleTime> {
 
 /// Returns the instrument's time of each toggle, with drift, and of its answer `SHIFT_S` later with a little noise.
 fn edges(toggles: &[ToggleTime], seed: u64) -> [Vec<f64>; 2] {
-    let mut random = SplitMix(seed);
+    let mut random = Random(seed);
     let at = |t: &ToggleTime| 0.3 + (t.before_ns as f64 + 500.0 - 5e9) / 1e9 * (1.0 + DRIFT);
-    let noise = |random: &mut SplitMix| (random.next_u64() % 10_000) as f64 / 1e4 * 40e-6 - 20e-6;
+    let noise = |random: &mut Random| (random.draw() % 10_000) as f64 / 1e4 * 40e-6 - 20e-6;
     let pin: Vec<f64> = toggles.iter().map(at).collect();
     let answer = pin
         .iter()
@@ -153,12 +153,12 @@ fn a_capture_of_another_run_or_of_a_clock_is_refused() {
 fn motion_to_photon_is_measured_beside_the_pin() {
     let ours = toggles(3, 400);
     let [pin, _] = edges(&ours, 4);
-    let mut random = SplitMix(5);
+    let mut random = Random(5);
     let (mut handle, mut patch) = (Vec::new(), Vec::new());
     for strike in 0..20 {
-        let at_s = 0.6 + f64::from(strike) + (random.next_u64() % 1_000) as f64 * 1e-4;
+        let at_s = 0.6 + f64::from(strike) + (random.draw() % 1_000) as f64 * 1e-4;
         handle.extend((0..5).map(|ring| at_s + f64::from(ring) * 0.004));
-        patch.push(at_s + (0.038 + (random.next_u64() % 4_000) as f64 * 1e-6) * (1.0 + DRIFT));
+        patch.push(at_s + (0.038 + (random.draw() % 4_000) as f64 * 1e-6) * (1.0 + DRIFT));
     }
     let channel = |name: &str, edges_s, rise_s| Channel {
         name: name.to_owned(),

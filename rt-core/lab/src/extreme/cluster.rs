@@ -43,18 +43,18 @@ fn extremal_index(gaps: &[u64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::SplitMix;
+    use stylet_random::Random;
 
     /// Returns ticks over a threshold that one in 50 passes; each pulls the next few along with it.
     fn over(length: u64, seed: u64) -> Vec<(u64, u64)> {
-        let mut random = SplitMix(seed);
+        let mut random = Random(seed);
         let n = 60_000;
         let chance = 0.02 / length as f64;
         let mut all = Vec::new();
         let mut place = 0;
         while place < n {
             if random.unit() < chance {
-                let size = 1 + random.next_u64() % 1_000_000;
+                let size = 1 + random.draw() % 1_000_000;
                 all.extend((0..length).map(|i| (place + i, size + i % 2)));
                 place += length;
             } else {

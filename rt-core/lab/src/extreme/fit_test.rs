@@ -42,15 +42,15 @@ pub fn anderson_darling(excesses: &[f64], fitted: &Pareto) -> f64 {
 mod tests {
     use super::*;
     use crate::extreme::tests::draw;
-    use crate::random::SplitMix;
+    use stylet_random::Random;
 
     #[test]
     fn five_of_a_hundred_true_samples_are_refused() {
         // Oracle of the table, and of the sign of its shape: samples of known distributions.
         for shape in [-0.3, 0.0, 0.4] {
-            let refused = |of: &dyn Fn(&mut SplitMix) -> f64| {
+            let refused = |of: &dyn Fn(&mut Random) -> f64| {
                 let is_refused = |seed: u64| {
-                    let mut random = SplitMix(seed);
+                    let mut random = Random(seed);
                     let y: Vec<f64> = (0..200).map(|_| of(&mut random)).collect();
                     let p = Pareto::fit(&y);
                     five_percent_point(p.shape).is_none_or(|limit| anderson_darling(&y, &p) > limit)
@@ -66,7 +66,7 @@ mod tests {
 
     #[test]
     fn two_heaps_of_late_wake_ups_are_no_pareto_distribution() {
-        let mut random = SplitMix(9);
+        let mut random = Random(9);
         let y: Vec<f64> = (0..400)
             .map(|i| draw(&mut random, 1.0, 0.0) + if i % 4 == 0 { 6.0 } else { 0.0 })
             .collect();

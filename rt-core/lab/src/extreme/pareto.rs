@@ -150,10 +150,10 @@ fn lowest(mut a: f64, mut b: f64, cost: impl Fn(f64) -> f64) -> f64 {
 mod tests {
     use super::*;
     use crate::extreme::tests::draw;
-    use crate::random::SplitMix;
+    use stylet_random::Random;
 
     fn drawn(seed: u64, shape: f64, n: usize) -> Vec<f64> {
-        let mut random = SplitMix(seed);
+        let mut random = Random(seed);
         (0..n).map(|_| draw(&mut random, 3e4, shape)).collect()
     }
 

@@ -2,14 +2,14 @@
 
 use super::*;
 use crate::bound::binomial_cdf;
-use crate::random::SplitMix;
+use stylet_random::Random;
 
 const SCALE_NS: f64 = 2e4;
 const SHAPE: f64 = 0.1;
 const TICKS: u64 = 20_000;
 
 /// Draws a value of a generalised Pareto distribution.
-pub fn draw(random: &mut SplitMix, scale: f64, shape: f64) -> f64 {
+pub fn draw(random: &mut Random, scale: f64, shape: f64) -> f64 {
     let left = 1.0 - random.unit();
     if shape == 0.0 {
         -left.ln() * scale
@@ -20,7 +20,7 @@ pub fn draw(random: &mut SplitMix, scale: f64, shape: f64) -> f64 {
 
 /// Wake-ups of a run; `scale`: of each tick, for a scale of one.
 fn run(seed: u64, scale: impl Fn(u64) -> f64) -> Sample {
-    let mut random = SplitMix(seed);
+    let mut random = Random(seed);
     let mut sample = Sample::new(TICKS);
     for i in 0..TICKS {
         sample.take(i, (5_000.0 + draw(&mut random, SCALE_NS, SHAPE) * scale(i)) as u64);
@@ -80,7 +80,7 @@ fn runs_that_change_are_refused_with_the_figure() {
 fn a_tail_that_changes_under_a_body_that_does_not_is_refused() {
     // Only one in a hundred is late at all, and in the second half three times as late: the body shows nothing of it.
     let refused = |seed: u64| {
-        let mut random = SplitMix(seed);
+        let mut random = Random(seed);
         let mut sample = Sample::new(TICKS);
         for i in 0..TICKS {
             let body = 5_000.0 + 1_000.0 * random.unit();
@@ -101,7 +101,7 @@ fn a_tail_that_changes_under_a_body_that_does_not_is_refused() {
 
 #[test]
 fn short_runs_and_bursts_are_refused_with_their_numbers() {
-    let mut random = SplitMix(1);
+    let mut random = Random(1);
     let mut short = Sample::new(3_000);
     for i in 0..3_000 {
         short.take(i, (1e4 * (1.0 + random.unit())) as u64);

@@ -5,6 +5,7 @@
 
 use std::path::Path;
 use std::str::FromStr;
+use stylet_random::Random;
 
 /// A register with its two values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,7 +103,7 @@ impl Pin {
             pin: self,
             level: 0,
             left: FEWEST_TICKS,
-            random: 1,
+            random: Random(1),
         })
     }
 
@@ -119,16 +120,16 @@ impl Pin {
 }
 
 /// A pin that may be written, and when its next edge is due.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Toggle {
     pin: Pin,
     level: usize,
     left: u32,
-    random: u32,
+    random: Random,
 }
 
 impl Toggle {
-    /// Counts a tick; true when the pin was toggled in it. The times between edges are a pattern that repeats after hours,
+    /// Counts a tick; true when the pin was toggled in it. The times between edges are a pattern that does not repeat,
     /// so that a capture can be aligned with the record.
     pub fn tick(&mut self) -> bool {
         self.left -= 1;
@@ -137,11 +138,7 @@ impl Toggle {
         }
         self.level ^= 1;
         self.write();
-        // xorshift32 (Marsaglia 2003).
-        self.random ^= self.random << 13;
-        self.random ^= self.random >> 17;
-        self.random ^= self.random << 5;
-        self.left = FEWEST_TICKS + self.random % 64;
+        self.left = FEWEST_TICKS + self.random.below(64) as u32;
         true
     }
 

@@ -264,11 +264,8 @@ mod tests {
     /// Bit by bit, on paths that lie on the edge of the band or off it by roundings.
     #[test]
     fn bounds_of_slopes_give_what_comparing_every_sample_gives() {
-        let mut drawn = 1_u64;
-        let mut draw = |of: u64| {
-            drawn = drawn.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-            (drawn >> 33) % of
-        };
+        let mut random = stylet_random::Random(1);
+        let mut draw = |of: usize| random.below(of);
         let exact = STEP_M * (1.0 + 1e-6) + 1e-12;
         for path in 0..400 {
             let dt_s = [1e-3, 1e-4, 0.8e-3][path % 3];

@@ -44,7 +44,7 @@ fn every_problem_is_listed_at_once() {
 #[test]
 fn folding_is_the_sign_of_the_smallest_corner() {
     // Oracle: the least determinant over all signs of all six shears.
-    let mut random = crate::scene::test_bodies::Random(5);
+    let mut random = stylet_random::Random(5);
     for _ in 0..2000 {
         let angles = [(); 3].map(|()| 60.0 * random.unit());
         let t = angles.map(|angle: f64| angle.to_radians().tan());

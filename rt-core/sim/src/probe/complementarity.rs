@@ -257,18 +257,14 @@ mod tests {
     fn problem(turn: u32) -> Problem {
         let mut problem = Problem::with_room(N);
         problem.count = N;
-        let mut seed = 12_345 + turn;
-        let mut random = || {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(seed >> 8) / f64::from(1_u32 << 23) - 1.0
-        };
+        let mut random = stylet_random::Random(u64::from(turn));
         for i in 0..N {
             for j in 0..N {
                 let apart = (i as f64 - j as f64) / 6.0;
                 problem.matrix[i * N + j] = 1e-3 * (-apart * apart).exp();
             }
             problem.matrix[i * N + i] *= 1.0 + 1e-4;
-            problem.free_m[i] = 1e-3 * random();
+            problem.free_m[i] = 1e-3 * random.signed();
         }
         problem
     }

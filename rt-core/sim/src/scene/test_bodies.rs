@@ -2,6 +2,7 @@
 
 use super::{Labels, Structure};
 use crate::limits::AxisLimits;
+use stylet_random::Random;
 
 fn labels(dims: [usize; 3], is_tissue: impl Fn([usize; 3]) -> bool) -> Labels {
     let [nx, ny, _] = dims;
@@ -74,23 +75,4 @@ pub fn bone() -> Labels {
     labels.structures = vec![Structure::soft("soft", 1), Structure::soft("bone", 2)];
     labels.structures[1].material.fixed = true;
     labels
-}
-
-/// Numbers that look random and are the same on every run (splitmix64).
-pub struct Random(pub u64);
-
-impl Random {
-    /// Draws a number in [0, 1).
-    pub fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Draws a number in [-1, 1).
-    pub fn signed(&mut self) -> f64 {
-        2.0 * self.unit() - 1.0
-    }
 }

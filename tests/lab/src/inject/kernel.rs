@@ -189,10 +189,9 @@ fn read_directly(path: &PathBuf, seed: u64, end: Instant) -> Result<(), String> 
     // O_DIRECT wants an address that is a multiple of a block.
     let mut room = vec![0_u8; 8_192];
     let offset = room.as_ptr().align_offset(4_096);
-    let mut place = seed + 1;
+    let mut random = stylet_random::Random(seed);
     while Instant::now() < end {
-        place = place.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        let at = (place >> 33) % (64 << 8) * 4_096;
+        let at = random.draw() % (64 << 8) * 4_096;
         file.read_at(&mut room[offset..offset + 4_096], at)
             .map_err(|e| e.to_string())?;
     }

@@ -175,13 +175,8 @@ fn planes_farther_apart_than_slices_fill_the_slices_between_but_not_a_gap() {
 fn outlined_voxels_rasterise_back_equal() {
     let grid = grid([23, 19, 6], [0.7, 0.9, 2.0]);
     let count = 23 * 19 * 6;
-    let mut state = 7_u32;
-    let labels: Vec<u8> = (0..count)
-        .map(|_| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            [0, 0, 1, 1, 3][(state >> 16) as usize % 5]
-        })
-        .collect();
+    let mut random = stylet_random::Random(7);
+    let labels: Vec<u8> = (0..count).map(|_| [0, 0, 1, 1, 3][random.below(5)]).collect();
     let v = Voxels {
         dims: grid.dims,
         labels,

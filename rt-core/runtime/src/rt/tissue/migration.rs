@@ -2,21 +2,18 @@
 
 use super::TissueLoop;
 use crate::rt::seed::Seed;
+use stylet_random::Random;
 use stylet_sim::migration::Migration;
 use stylet_sim::tissue::MaterialPoint;
 
 impl Seed {
     /// Whether it is one of the share that migrates: by its place, so that the same seeds do in each run.
     fn migrates(&self, index: usize, share: f64) -> bool {
-        let mut mixed = 0x9e37_79b9_7f4a_7c15_u64.wrapping_add(index as u64);
-        for c in self.dropped_at_m {
-            // SplitMix64.
-            mixed = mixed.wrapping_add(c.to_bits()).wrapping_add(0x9e37_79b9_7f4a_7c15);
-            mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            mixed ^= mixed >> 31;
-        }
-        ((mixed >> 11) as f64 / (1_u64 << 53) as f64) < share
+        let mixed_with = |seed: u64, c: f64| Random(seed.wrapping_add(c.to_bits()));
+        let [x, y, z] = self.dropped_at_m;
+        let seed = 0x9e37_79b9_7f4a_7c15_u64.wrapping_add(index as u64);
+        let seed = [x, y].into_iter().fold(seed, |seed, c| mixed_with(seed, c).draw());
+        mixed_with(seed, z).unit() < share
     }
 }
 

@@ -1,6 +1,7 @@
 //! Beams with closed forms.
 
 use super::*;
+use stylet_random::Random;
 
 const EI: f64 = 0.016;
 
@@ -229,20 +230,6 @@ fn how_far_a_bevel_steers_does_not_depend_on_speed() {
     }
 }
 
-/// Numbers that look random and are the same on every run.
-struct Random(u64);
-
-impl Random {
-    /// Draws a number from -1 to 1.
-    fn both(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f64 / (1 << 23) as f64 - 1.0
-    }
-}
-
 /// Moves hand, its slope and depth to and fro at random, while the bevel's force comes and goes. The work of hand and
 /// bevel is at least what is stored, up to `1 uJ`.
 fn worst_excess_j(model: BeamModel, depth_by_m: f64, ticks: u32) -> f64 {
@@ -261,7 +248,7 @@ fn worst_excess_j(model: BeamModel, depth_by_m: f64, ticks: u32) -> f64 {
     for tick in 0..ticks {
         if tick % 400 == 0 {
             let size = [2e-3, 2e-3, 0.02, 0.02, depth_by_m, 0.2, 0.2];
-            goal = std::array::from_fn(|n| size[n] * random.both());
+            goal = std::array::from_fn(|n| size[n] * random.signed());
         }
         let from = place;
         place = std::array::from_fn(|n| place[n] + 0.01 * (goal[n] - place[n]));

@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 use std::time::Instant;
+use stylet_random::Random;
 
 use super::*;
 use crate::line::columns::{ColumnQueue, TOLERANCE, tests::paper};
@@ -321,19 +322,5 @@ fn random_hand(cycles: u32, mut tick: impl FnMut(bool, f64, f64)) {
                 }
             }
         }
-    }
-}
-
-/// Numbers that look random and are the same on every run (splitmix64).
-struct Random(u64);
-
-impl Random {
-    /// Draws a number in [0, 1).
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 }

@@ -1,6 +1,7 @@
 //! Creep and relaxation of one station against their closed forms.
 
 use super::*;
+use stylet_random::Random;
 
 const TERMS: [PronyTerm; 2] = [
     PronyTerm {
@@ -53,11 +54,10 @@ fn no_terms_cost_nothing_and_change_nothing() {
 fn the_chain_makes_no_energy() {
     let rows = Rows::new(1, |_, _| 0.01);
     let mut memory = Memory::new(1);
-    let (mut seed, mut before_m, mut work_j, mut least_j) = (7_u64, 0.0, 0.0, 0.0_f64);
+    let (mut random, mut before_m, mut work_j, mut least_j) = (Random(7), 0.0, 0.0, 0.0_f64);
     let mut force = 0.0_f64;
     for _ in 0..200_000 {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        force += (seed >> 40) as f64 / (1 << 24) as f64 - 0.5 - 0.01 * force;
+        force += 0.5 * random.signed() - 0.01 * force;
         memory.begin(&rows, 0.0, &TERMS, 0.01);
         let u = memory.gain * 0.01 * force + memory.offset_m[0];
         memory.finish(&mut [force], 0.0);

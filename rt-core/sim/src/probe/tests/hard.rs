@@ -63,24 +63,18 @@ fn nothing_sinks_in_or_pulls_whatever_the_hand_does() {
     let middle = fixture.pose(0.0, 20e-3).tip_m;
     let (mut worst_m, mut passes) = (0.0_f64, Vec::new());
     // A hand that presses obliquely, slides, jumps by 5 mm in a tick, lifts and comes back: drawn by a fixed rule.
-    let mut seed = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut random = || {
-        seed = seed
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (seed >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
-    };
+    let mut random = stylet_random::Random(1);
     let mut at = Vector3::from(middle);
     let mut axis = Vector3::new(0.0, 0.0, 1.0);
     for tick in 0..1500 {
         let size_m = if tick % 50 == 0 { 5e-3 } else { 0.5e-3 };
-        at += Vector3::new(random(), random(), random()) * size_m;
+        at += Vector3::new(random.signed(), random.signed(), random.signed()) * size_m;
         at.x = at.x.clamp(middle[0] - 4e-3, middle[0] + 4e-3);
         at.y = at.y.clamp(middle[1] - 4e-3, middle[1] + 9e-3);
         at.z = at.z.clamp(middle[2] - 30e-3, middle[2] + 10e-3);
         axis = Vector3::new(
-            (axis.x + 0.02 * random()).clamp(-0.25, 0.25),
-            (axis.y + 0.02 * random()).clamp(-0.25, 0.25),
+            (axis.x + 0.02 * random.signed()).clamp(-0.25, 0.25),
+            (axis.y + 0.02 * random.signed()).clamp(-0.25, 0.25),
             1.0,
         );
         let calls = heap::calls_of_this_thread();

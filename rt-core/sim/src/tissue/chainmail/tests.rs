@@ -11,8 +11,9 @@ mod wander;
 use super::*;
 use crate::limits::TissueParameters;
 use crate::scene::Labels;
-use crate::scene::test_bodies::{self, Random};
+use crate::scene::test_bodies;
 use crate::tissue::{Held, HeldOutcome, Solve, largest_violation};
+use stylet_random::Random;
 use wander::{held_at, model_of, model_with, oracle_violation, paper, smallest_corner, wander};
 
 #[test]

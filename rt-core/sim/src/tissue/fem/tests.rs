@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::solve::hold_cells;
 use super::*;
-use crate::scene::test_bodies::Random;
+use stylet_random::Random;
 
 use crate::scene::{Labels, Lattice, Scene, test_bodies};
 use crate::tissue::HeldOutcome;

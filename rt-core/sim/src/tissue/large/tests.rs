@@ -202,7 +202,7 @@ fn a_window_under_the_same_loads_goes_on_until_it_rests() {
 }
 
 fn random(solver: &Solver, size: f32) -> Nodes {
-    let mut random = crate::scene::test_bodies::Random(3);
+    let mut random = stylet_random::Random(3);
     std::array::from_fn(|_| (0..solver.grid.len()).map(|_| size * random.signed() as f32).collect())
 }
 

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::limits::TissueParameters;
-use crate::scene::test_bodies::Random;
 use crate::scene::{Scene, test_bodies};
 use crate::tissue::{ChainMail, Held, TissueState, step};
+use stylet_random::Random;
 
 fn model_of(scene: &Scene) -> ChainMail {
     let limits = TissueParameters::default().validate().expect("valid");

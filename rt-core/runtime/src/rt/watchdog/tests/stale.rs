@@ -2,18 +2,11 @@
 
 use super::*;
 use stylet_hw::{DeviceInfo, Wrench};
+use stylet_random::Random;
 use stylet_sim::force::gate::{self, GateInput, GateParameters, GateState};
 use stylet_sim::force::passivity::Motion;
 
 const CASES: u64 = 20_000;
-
-/// SplitMix64 (Steele, Lea, Flood 2014).
-fn next(seed: &mut u64) -> u64 {
-    *seed = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (*seed ^ (*seed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
 
 fn force_n(gate: &mut GateState, wanted_n: f64) -> f64 {
     let parameters = GateParameters {
@@ -38,11 +31,11 @@ fn force_n(gate: &mut GateState, wanted_n: f64) -> f64 {
 #[test]
 fn the_force_is_zero_once_device_or_tissue_is_stale() {
     for case in 0..CASES {
-        let mut seed = case;
+        let mut random = Random(case);
         let (mut watchdog, mut gate) = (Watchdog::default(), GateState::default());
         gate.engage();
-        let begins = 3 + next(&mut seed) % 20;
-        let is_device = next(&mut seed).is_multiple_of(2);
+        let begins = 3 + random.draw() % 20;
+        let is_device = random.draw().is_multiple_of(2);
         let (after, off_at) = match is_device {
             true => (
                 u64::from(SILENT_SAMPLES),
@@ -54,9 +47,9 @@ fn the_force_is_zero_once_device_or_tissue_is_stale() {
         for tick in 0..=off_at + 4 {
             let is_stale = tick >= begins;
             // However far the clock is, and however long ago the tissue answered.
-            let tissue_ns = next(&mut seed) >> (1 + next(&mut seed) % 62);
-            let fresh_ns = tissue_ns.saturating_add(next(&mut seed) % STALE_TISSUE_NS);
-            let stale_ns = tissue_ns + STALE_TISSUE_NS + 1 + (next(&mut seed) >> 2);
+            let tissue_ns = random.draw() >> (1 + random.draw() % 62);
+            let fresh_ns = tissue_ns.saturating_add(random.draw() % STALE_TISSUE_NS);
+            let stale_ns = tissue_ns + STALE_TISSUE_NS + 1 + (random.draw() >> 2);
             let woke_ns = if is_stale && !is_device { stale_ns } else { fresh_ns };
             let of_device = watchdog.sample(is_stale && is_device);
             let of_tissue = watchdog.tick(&Watched {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::force::passivity::PassivityParameters;
+use stylet_random::Random;
 
 /// Number of sequences; the environment variable of this name sets another.
 const CASES: &str = "STYLET_GATE_CASES";
@@ -35,19 +36,12 @@ const FAULTS: [ForceFault; 6] = [
     ForceFault::Stopped,
 ];
 
-/// SplitMix64 (Steele, Lea, Flood 2014): every seed gives another sequence.
-struct Bits(u64);
+/// Floats of every kind: every seed gives another sequence.
+struct Bits(Random);
 
 impl Bits {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
     fn below(&mut self, n: u64) -> u64 {
-        self.next() % n
+        self.0.draw() % n
     }
 
     fn one_in(&mut self, n: u64) -> bool {
@@ -55,15 +49,14 @@ impl Bits {
     }
 
     fn within(&mut self, low: f64, high: f64) -> f64 {
-        let share = (self.next() >> 11) as f64 / (1_u64 << 53) as f64;
-        low + (high - low) * share
+        low + (high - low) * self.0.unit()
     }
 
     fn any(&mut self) -> f64 {
         match self.below(4) {
             0 => SPECIAL[self.below(SPECIAL.len() as u64) as usize],
-            1 => f64::from_bits(self.next() & 0x800f_ffff_ffff_ffff),
-            _ => f64::from_bits(self.next()),
+            1 => f64::from_bits(self.0.draw() & 0x800f_ffff_ffff_ffff),
+            _ => f64::from_bits(self.0.draw()),
         }
     }
 
@@ -130,7 +123,7 @@ impl Bits {
 
 /// Runs one sequence; an error names the tick and the claim that does not hold.
 fn sequence(seed: u64) -> Result<(), String> {
-    let bits = &mut Bits(seed);
+    let bits = &mut Bits(Random(seed));
     let parameters = bits.parameters();
     let device = device();
     let period_s = PERIODS_S.start() + (PERIODS_S.end() - PERIODS_S.start()) * bits.within(0.0, 1.0);

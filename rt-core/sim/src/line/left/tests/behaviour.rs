@@ -2,14 +2,7 @@
 
 use super::*;
 use stylet_heap as heap;
-
-/// Draws a number from 0 to 1.
-fn random(seed: &mut u64) -> f64 {
-    *seed ^= *seed << 13;
-    *seed ^= *seed >> 7;
-    *seed ^= *seed << 17;
-    (*seed >> 11) as f64 / (1u64 << 53) as f64
-}
+use stylet_random::Random;
 
 fn stored_j(line: &HandLine, left: &LeftNeedles) -> f64 {
     line.elastic_j() + left.elastic_j()
@@ -19,21 +12,21 @@ fn stored_j(line: &HandLine, left: &LeftNeedles) -> f64 {
 /// motion gets more than `E` out. Tissue is new after each round, for the membranes' sake.
 #[test]
 fn no_cycle_beside_a_left_needle_gains_energy() {
-    let mut seed = 0x9e37_79b9_7f4a_7c15;
+    let mut random = Random(1);
     let (mut worst_j, mut cycles, mut most_n) = (0.0_f64, 0, 0.0_f64);
     for _ in 0..60 {
-        let (mut left, mut needle) = one_left(3e-3 + 9e-3 * random(&mut seed), WHOLE);
+        let (mut left, mut needle) = one_left(3e-3 + 9e-3 * random.unit(), WHOLE);
         let mut tip_m = -1e-3;
         left.step_beside(&mut needle, tip_m, DT_S);
         let mut spent_j = 0.0;
         let mut least_j = spent_j - stored_j(&needle, &left);
         for _ in 0..25 {
-            for goal_m in [30e-3 * random(&mut seed), -1e-3 + 24e-3 * random(&mut seed)] {
+            for goal_m in [30e-3 * random.unit(), -1e-3 + 24e-3 * random.unit()] {
                 while (goal_m - tip_m).abs() > 1e-9 {
                     let by_m = (goal_m - tip_m)
                         .clamp(-1.0, 1.0_f64)
                         .abs()
-                        .min(1e-3 * random(&mut seed) + 1e-6);
+                        .min(1e-3 * random.unit() + 1e-6);
                     let by_m = by_m.copysign(goal_m - tip_m);
                     tip_m += by_m;
                     let output = left.step_beside(&mut needle, tip_m, DT_S);

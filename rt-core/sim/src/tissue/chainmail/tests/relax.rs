@@ -118,7 +118,7 @@ fn size_after(weight: f32, passes: u32) -> f32 {
     limits.relaxation = Some(relaxation);
     model.set_limits(limits);
     let mut state = TissueState::at_rest(&model);
-    let mut random = test_bodies::Random(4);
+    let mut random = stylet_random::Random(4);
     for e in 0..model.element_count() {
         // Along x every other element the other way: the fastest mode of a row.
         let sign = if e % 2 == 0 { 1.0 } else { -1.0 };

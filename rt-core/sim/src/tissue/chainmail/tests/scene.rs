@@ -3,9 +3,10 @@
 use super::state::Walk;
 use super::{held_at, model_of, model_with, smallest_corner};
 use crate::limits::{AxisLimits, TissueParameters, folding};
-use crate::scene::test_bodies::{self, Random};
+use crate::scene::test_bodies;
 use crate::tissue::chainmail::*;
 use crate::tissue::{HeldOutcome, largest_violation};
+use stylet_random::Random;
 
 fn positions(model: &ChainMail, state: &TissueState) -> Vec<[f64; 3]> {
     let elements = 0..model.element_count() as u32;

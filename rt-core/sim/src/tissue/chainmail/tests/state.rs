@@ -2,10 +2,11 @@
 
 use super::{held_at, model_of, model_with, paper, reference::Reference};
 use crate::limits::TissueParameters;
-use crate::scene::test_bodies::{self, Random};
+use crate::scene::test_bodies;
 use crate::tissue::chainmail::*;
 use crate::tissue::{HeldOutcome, largest_violation};
 use stylet_heap as heap;
+use stylet_random::Random;
 
 /// A random walk of one element after the other.
 pub(super) struct Walk {

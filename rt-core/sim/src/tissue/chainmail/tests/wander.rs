@@ -1,10 +1,10 @@
 //! Fixtures of the claims: bodies, a needle that wanders, and oracles that share no code with the step.
 
 use crate::limits::TissueParameters;
-use crate::scene::test_bodies::Random;
 use crate::scene::{Labels, Scene};
 use crate::tissue::chainmail::{ChainMail, TissueState, step};
 use crate::tissue::{Held, HeldOutcome, Solve, largest_violation};
+use stylet_random::Random;
 
 pub(super) fn model_with(labels: &Labels, parameters: &TissueParameters) -> ChainMail {
     let scene = Scene::from_labels("test", labels).expect("valid labels");
