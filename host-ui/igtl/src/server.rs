@@ -134,11 +134,6 @@ impl Server {
         self.address
     }
 
-    /// Returns the number of connected clients.
-    pub fn clients(&self) -> usize {
-        lock(&self.shared).clients.len()
-    }
-
     /// Queues a message for every client, replacing an older one of this device. Never waits for a
     /// client.
     pub fn publish(&self, device: &str, bytes: Vec<u8>) {

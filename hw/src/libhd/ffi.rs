@@ -97,8 +97,6 @@ pub mod calibration {
     pub const OK: u32 = 0x5000;
     /// `hdUpdateCalibration` completes the calibration.
     pub const NEEDS_UPDATE: u32 = 0x5001;
-    /// The operator has to act first.
-    pub const NEEDS_MANUAL_INPUT: u32 = 0x5002;
 }
 
 /// Calibration styles of a device, a bit each.

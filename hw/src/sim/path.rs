@@ -59,11 +59,6 @@ impl HandPath {
         &self.goal
     }
 
-    /// Returns whether the path is at rest at its goal.
-    pub fn arrived(&self) -> bool {
-        self.velocity_m_per_s == Vector3::zeros() && self.position_m == self.goal.tip_in_world
-    }
-
     /// Advances by `dt_s`, which the caller has checked to be positive.
     pub fn step(&mut self, dt_s: f64) {
         let to_goal = self.goal.tip_in_world - self.position_m;
@@ -165,12 +160,5 @@ impl ScriptedPath {
     /// Returns whether the script has ended.
     pub fn finished(&self) -> bool {
         self.index >= self.waypoints.len()
-    }
-
-    /// Returns to the first waypoint.
-    pub fn restart(&mut self) {
-        self.index = 0;
-        self.announced = false;
-        (self.elapsed_s, self.dwelt_s) = (0.0, 0.0);
     }
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use stylet_sim::line::{Line, LineError, LineStations, QueueProgress, ReadyLine};
 use stylet_sim::needle::LayerKind;
-use stylet_sim::probe::{BodyProbe, NoWall, PADS_APART_M, ProbePose, ProbeQueue, ProbeShape, ReadyProbe, Wall};
+use stylet_sim::probe::{BodyProbe, NoWall, PADS_APART_M, ProbeQueue, ProbeShape, ReadyProbe, Wall};
 use stylet_sim::scene::{Scene, SceneError, SceneSource};
 use stylet_sim::tissue::fem::batch::BatchModel;
 use stylet_sim::tissue::{FemTissue, MaterialPoint, TissueError, TissueSpec};
@@ -45,7 +45,7 @@ pub enum NoProbe {
 /// A body at rest with its solver for eight loads at once.
 pub struct LineBody {
     adds_columns: bool,
-    scene: Scene,
+    pub(crate) scene: Scene,
     /// By structure; bone is none.
     layers: Vec<Option<LayerKind>>,
     batch: BatchModel<f32>,
@@ -195,14 +195,6 @@ impl LineBody {
     /// Edge of the elements that a probe is solved for in within seconds, and of those in which it takes minutes, m.
     pub fn probe_edges_m(&self) -> [f64; 2] {
         [self.scene.body.spacing_m, self.scene.clone().in_cells().body.spacing_m]
-    }
-
-    /// Where a probe lies below the target, pressed so far above where it meets the wall.
-    pub fn probe_below_target(&self, probe: &BodyProbe, pressed_m: f64, beyond_m: f64) -> ProbePose {
-        let ready = probe.ready();
-        ready
-            .wall
-            .pose_below_target(&self.scene, &ready.shape, pressed_m, beyond_m)
     }
 
     /// Solves for a line that enters the body where it says. `report` is called between slices of work and ends it by

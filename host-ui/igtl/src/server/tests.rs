@@ -46,7 +46,7 @@ fn a_hung_client_is_disconnected_and_others_get_the_newest() {
     }
     let line = disconnected.expect("the client that hangs stays connected");
     assert!(line.contains("did not take a message for 3 s"), "{line}");
-    assert_eq!(server.clients(), 1);
+    assert_eq!(lock(&server.shared).clients.len(), 1);
 }
 
 const COLUMNS: [[f32; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 2.0, 3.0]];
@@ -192,5 +192,5 @@ fn a_reader_is_replaced_by_a_newcomer_with_a_reason() {
     let mut others = [0, 1].map(|_| TcpStream::connect(server.address()).unwrap());
     assert_eq!(others.each_mut().map(|other| next(other).device), ["State", "State"]);
     assert_eq!(first.read(&mut [0]).unwrap(), 0, "the connection ends");
-    assert_eq!(server.clients(), 2);
+    assert_eq!(lock(&server.shared).clients.len(), 2);
 }

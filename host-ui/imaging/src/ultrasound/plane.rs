@@ -1,6 +1,6 @@
 //! Geometry of a probe: direction and width of its beams, and projection into the picture.
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{UnitQuaternion, Vector2, Vector3};
 use std::f64::consts::FRAC_PI_2;
 use stylet_anatomy::Organ;
 use stylet_shm_schema::SceneHeader;
@@ -68,12 +68,6 @@ impl Pose {
     /// Returns the foremost point of the probe, m.
     pub fn tip_m(&self, probe: &Probe) -> Vector3<f64> {
         self.middle_m + self.axis * probe.behind_tip_m
-    }
-
-    /// Returns the frame of the tool, as in [`Pose::of_tool`].
-    pub fn scene_from_tool(&self) -> UnitQuaternion<f64> {
-        let columns = Matrix3::from_columns(&[self.up.cross(&self.axis), self.up, self.axis]);
-        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(columns))
     }
 
     /// Returns the move along the axis of another pose (m), and the turn about it (rad): the

@@ -113,15 +113,6 @@ impl ImplantPlan {
         })
     }
 
-    /// Returns the plan with one more loose seed; a strand becomes loose.
-    pub fn with_seed(&self, needle: usize, along_m: f64, strength_u: f64) -> Result<Self, PlanError> {
-        self.change(needle, |n| {
-            n.loading = Loading::Loose;
-            n.seeds.push(NeedleSeed { along_m, strength_u });
-            Ok(())
-        })
-    }
-
     /// Returns the plan without a seed; a strand loses seeds at its ends only.
     pub fn without_seed(&self, needle: usize, seed: usize) -> Result<Self, PlanError> {
         self.change(needle, |n| {

@@ -173,13 +173,6 @@ impl<T: Compiled> ColumnQueue<T> {
         self.progress()
     }
 
-    /// Does all of the remaining work.
-    pub fn prepare_all(&mut self, model: &BatchModel<T>) {
-        while !self.progress().is_done() {
-            self.slice(model);
-        }
-    }
-
     fn slice(&mut self, model: &BatchModel<T>) {
         let columns = self.columns.len().min(self.ready + LOADS) - self.ready;
         self.next = match self.next {

@@ -141,11 +141,6 @@ impl Layers {
         }
         problems.finish()
     }
-
-    /// Returns the largest force that any membrane gives, which a force scale has to fit to the device.
-    pub fn largest_puncture_force_n(&self) -> f64 {
-        self.0.iter().map(|layer| layer.puncture_force_n).fold(0.0, f64::max)
-    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::plane;
 use crate::ultrasound::{Plane, Pose, Probe, View};
 use bytemuck::Zeroable;
-use nalgebra::{UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 use stylet_shm_schema::{SceneHeader, Text};
 
 #[test]
@@ -79,7 +79,9 @@ fn a_probe_in_the_hand_looks_where_its_tool_says() {
         };
         let before = pose.middle_m + pose.up * 30e-3;
         assert!((plane.in_beams(before).depth_m - 20e-3).abs() < 1e-12 && plane.in_beams(before).across.abs() < 1e-12);
-        let again = Pose::of_tool(pose.tip_m(&probe), &pose.scene_from_tool(), &probe);
+        let columns = Matrix3::from_columns(&[pose.up.cross(&pose.axis), pose.up, pose.axis]);
+        let scene_from_tool = UnitQuaternion::from_matrix(&columns);
+        let again = Pose::of_tool(pose.tip_m(&probe), &scene_from_tool, &probe);
         assert!((again.up - pose.up).norm() < 1e-12 && (again.middle_m - pose.middle_m).norm() < 1e-12);
     }
 }

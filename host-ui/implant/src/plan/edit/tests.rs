@@ -35,6 +35,17 @@ fn empty() -> ImplantPlan {
     }
 }
 
+impl ImplantPlan {
+    /// Returns the plan with one more loose seed; a strand becomes loose.
+    pub(in crate::plan) fn with_seed(&self, needle: usize, along_m: f64, strength_u: f64) -> Result<Self, PlanError> {
+        self.change(needle, |n| {
+            n.loading = Loading::Loose;
+            n.seeds.push(NeedleSeed { along_m, strength_u });
+            Ok(())
+        })
+    }
+}
+
 fn hole(name: &str) -> Hole {
     name.parse().expect("a hole")
 }

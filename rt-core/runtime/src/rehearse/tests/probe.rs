@@ -75,7 +75,10 @@ impl Theatre {
 
     fn pose(&self, pressed_m: f64, beyond_m: f64) -> ProbePose {
         let body = self.stage.lines.as_ref().expect("it has lines");
-        body.probe_below_target(&self.probe, pressed_m, beyond_m)
+        let ready = self.probe.ready();
+        ready
+            .wall
+            .pose_below_target(&body.scene, &ready.shape, pressed_m, beyond_m)
     }
 }
 

@@ -38,7 +38,8 @@ fn defaults_can_be_rendered_by_the_phantom_and_their_scale_fits() {
     let defaults = ForceParameters::default();
     assert_eq!(defaults.validate(), Ok(()));
     // 8.5 N of the device for the 9 N of the skin.
-    let fitting = device.peak_force_n / (defaults.layers.largest_puncture_force_n() * defaults.membrane_gain);
+    let puncture_forces_n = defaults.layers.0.iter().map(|layer| layer.puncture_force_n);
+    let fitting = device.peak_force_n / (puncture_forces_n.fold(0.0, f64::max) * defaults.membrane_gain);
     assert!((fitting - 8.5 / 9.0).abs() < 1e-12 && defaults.gate.force_scale <= fitting);
     assert_eq!(ParameterSet::default().problems_on(device.max_stiffness_n_per_m), []);
     let broken = ForceParameters {

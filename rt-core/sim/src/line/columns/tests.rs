@@ -56,7 +56,7 @@ fn slices_give_what_all_at_once_gives() {
     let stations = Stations::along(&model, line, StationSettings::of_lattice(1.5e-3), 20);
     assert!(stations.count() >= 9, "{}", stations.count());
     let mut all = ColumnQueue::new(&model, &stations, true, TOLERANCE);
-    all.prepare_all(&model);
+    all.prepare(&model, usize::MAX);
     let mut sliced = ColumnQueue::new(&model, &stations, true, TOLERANCE);
     let mut calls = 0;
     while !sliced.prepare(&model, 3).is_done() {
@@ -112,7 +112,7 @@ fn times_of_columns() {
     [1, 8, 35].into_iter().for_each(solve);
     let start = processor_time_s();
     let mut queue = ColumnQueue::new(&model, &stations, false, TOLERANCE);
-    queue.prepare_all(&model);
+    queue.prepare(&model, usize::MAX);
     let [columns, state] = queue.bytes();
     println!(
         "queue of {} axial columns (shaft and tip): {:.0} ms, {:.1} MB and {:.1} MB to solve in",

@@ -192,7 +192,7 @@ fn lines_that_leave_the_body_or_the_numbers_have_no_stations() {
     }
     let stations = Stations::along(&model, outside, given, 10);
     let mut queue = ColumnQueue::new(&model, &stations, true, 1e-2);
-    queue.prepare_all(&model);
+    queue.prepare(&model, usize::MAX);
     assert!(queue.columns().is_empty());
 }
 

@@ -49,7 +49,7 @@ fn solved(halves: bool) -> &'static LineModel {
     let build = || {
         let (model, stations) = paper(if halves { 0.5 } else { 1.0 });
         let mut queue = ColumnQueue::new(&model, &stations, false, TOLERANCE);
-        queue.prepare_all(&model);
+        queue.prepare(&model, usize::MAX);
         let compliance = Compliance::of_columns(&model, &stations, queue.columns()).expect("all");
         LineModel::new(compliance, &[GLAND], LineSettings::default()).expect("valid")
     };

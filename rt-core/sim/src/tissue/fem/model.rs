@@ -100,11 +100,6 @@ impl<T: Real> FemModel<T> {
     pub fn node_count(&self) -> usize {
         self.part.iter().filter(|&&part| part != NO_PART).count()
     }
-
-    /// Levels of the multigrid.
-    pub fn level_count(&self) -> usize {
-        self.levels.len()
-    }
 }
 
 struct Body {

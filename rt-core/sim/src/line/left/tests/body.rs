@@ -18,7 +18,7 @@ fn either_line_of_a_pair_may_be_the_one_that_is_solved_for() {
     let [of_first, of_second] = [(1, &first), (2, &second)].map(|(n, s)| [Arc::new(LineStations::of(n, s))]);
     let cross = |stations: &Stations, others: &[Arc<LineStations>; 1], tolerance: f64| {
         let mut queue = ColumnQueue::new(&model, stations, false, tolerance).read_beside(others);
-        queue.prepare_all(&model);
+        queue.prepare(&model, usize::MAX);
         Cross::of_columns(queue.columns(), stations.line.axes[0], (&model, stations), others).remove(0)
     };
     let mut worst = Vec::new();

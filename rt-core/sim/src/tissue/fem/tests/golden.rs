@@ -90,7 +90,7 @@ fn cycles_do_not_grow_with_the_mesh() {
         let factor = report.relative_residual.powf(1.0 / f64::from(report.cycles));
         println!(
             "{n}^3, {} levels: {} cycles, {factor:.2} a cycle",
-            model.level_count(),
+            model.levels.len(),
             report.cycles
         );
         assert!(report.converged && report.cycles <= 17);
