@@ -4,8 +4,8 @@ mod circles;
 mod crates;
 mod imports;
 mod layers;
-mod lexer;
 mod shape;
+mod syntax;
 mod tree;
 
 fn assert_none(found: &[String]) {

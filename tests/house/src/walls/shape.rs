@@ -1,6 +1,7 @@
 //! Layout of tests, size of files, errors as prose, paths of a developer's machine.
 
-use super::lexer::{Token, closing, product_tokens, tokens};
+use super::syntax::{self, is_test};
+use syn::visit::{self, Visit};
 
 /// Lines that a source file may have.
 pub const LINES: usize = 400;
@@ -36,14 +37,12 @@ pub fn test_layout(path: &str, source: &str) -> Vec<String> {
             "{path}: tests of `name.rs` stand in `name/tests.rs` or below `name/tests/`"
         ));
     }
-    let tokens = tokens(source);
-    let paths = tokens
-        .windows(3)
-        .filter(|w| w[0].is("#") && w[1].is("[") && w[2].is("path"));
-    found.extend(paths.map(|w| {
+    let lines = source.lines().enumerate();
+    let paths = lines.filter(|(_, line)| line.trim_start().starts_with("#[path"));
+    found.extend(paths.map(|(row, _)| {
         format!(
             "{path}:{}: a module stands where its name says, without #[path]",
-            w[0].line
+            row + 1
         )
     }));
     found
@@ -60,42 +59,65 @@ pub fn too_long(path: &str, lines: usize, longer: &[(&str, &str)]) -> Option<Str
 
 /// Public functions whose error is a `String` or several: `file:line name`.
 pub fn prose_errors(path: &str, source: &str) -> Vec<String> {
-    let tokens = product_tokens(source);
-    let mut found = Vec::new();
-    for at in (0..tokens.len()).filter(|&at| tokens[at].is("pub")) {
-        let mut name = at + 1;
-        if tokens.get(name).is_some_and(|token| token.is("(")) {
-            name = closing(&tokens, name) + 1;
-        }
-        while tokens
-            .get(name)
-            .is_some_and(|token| matches!(token.text.as_str(), "const" | "async" | "unsafe" | "extern" | "\""))
-        {
-            name += 1;
-        }
-        if tokens.get(name).is_some_and(|token| token.is("fn")) && returns_prose(&tokens[name..]) {
-            found.push(format!("{path}:{} {}", tokens[name].line, tokens[name + 1].text));
-        }
-    }
-    found
+    let mut found = ProseErrors(Vec::new());
+    found.visit_file(&syntax::parse(path, source));
+    found.0.iter().map(|error| format!("{path}:{error}")).collect()
 }
 
-/// Whether the signature that begins here returns `Result<_, String>` or `Result<_, Vec<String>>`.
-fn returns_prose(signature: &[Token]) -> bool {
-    let mut at = 0;
-    while at < signature.len() && !signature[at].is("->") {
-        match signature[at].text.as_str() {
-            "(" | "[" => at = closing(signature, at) + 1,
-            "{" | ";" => return false,
-            _ => at += 1,
+struct ProseErrors(Vec<String>);
+
+impl ProseErrors {
+    fn look_at(&mut self, visibility: &syn::Visibility, signature: &syn::Signature) {
+        let is_public = !matches!(visibility, syn::Visibility::Inherited);
+        if is_public && returns_prose(&signature.output) {
+            let name = &signature.ident;
+            self.0.push(format!("{} {name}", name.span().start().line));
         }
     }
-    let returned = signature[at..]
-        .iter()
-        .take_while(|token| !matches!(token.text.as_str(), "{" | ";" | "where"));
-    let text: Vec<&str> = returned.map(|token| token.text.as_str()).collect();
-    let ends = text.ends_with(&[",", "String", ">"]) || text.ends_with(&[",", "Vec", "<", "String", ">", ">"]);
-    ends && text.get(1) == Some(&"Result")
+}
+
+impl<'ast> Visit<'ast> for ProseErrors {
+    fn visit_item_mod(&mut self, item: &'ast syn::ItemMod) {
+        if !is_test(&item.attrs) {
+            visit::visit_item_mod(self, item);
+        }
+    }
+
+    fn visit_item_impl(&mut self, item: &'ast syn::ItemImpl) {
+        if !is_test(&item.attrs) {
+            visit::visit_item_impl(self, item);
+        }
+    }
+
+    fn visit_item_fn(&mut self, item: &'ast syn::ItemFn) {
+        if !is_test(&item.attrs) {
+            self.look_at(&item.vis, &item.sig);
+        }
+    }
+
+    fn visit_impl_item_fn(&mut self, item: &'ast syn::ImplItemFn) {
+        if !is_test(&item.attrs) {
+            self.look_at(&item.vis, &item.sig);
+        }
+    }
+}
+
+/// Whether a function returns `Result<_, String>` or `Result<_, Vec<String>>`.
+fn returns_prose(output: &syn::ReturnType) -> bool {
+    let prose: [syn::ReturnType; 2] = [
+        syn::parse_quote!(-> Result<_, String>),
+        syn::parse_quote!(-> Result<_, Vec<String>>),
+    ];
+    let mut output = output.clone();
+    if let syn::ReturnType::Type(_, returned) = &mut output
+        && let syn::Type::Path(result) = &mut **returned
+        && let Some(last) = result.path.segments.last_mut()
+        && let syn::PathArguments::AngleBracketed(arguments) = &mut last.arguments
+        && let Some(value) = arguments.args.first_mut()
+    {
+        *value = syn::parse_quote!(_);
+    }
+    prose.contains(&output)
 }
 
 /// Lines that name a folder of somebody's machine.
