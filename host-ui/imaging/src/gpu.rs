@@ -260,3 +260,60 @@ const fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
         min_binding_size: None,
     }
 }
+
+/// Entry point of a shader, with the values of its constants.
+pub type Stage<'a> = (&'a str, &'a [(&'a str, f64)]);
+
+/// Pipeline whose vertices are made by its own shader.
+pub struct Drawing<'a> {
+    /// Name in messages of the driver.
+    pub label: &'a str,
+    /// Source of both shaders.
+    pub wgsl: &'a str,
+    /// Vertex shader.
+    pub vertex: Stage<'a>,
+    /// Fragment shader.
+    pub fragment: Stage<'a>,
+    /// Format of the picture.
+    pub target: wgpu::TextureFormat,
+}
+
+impl Drawing<'_> {
+    /// Creates the pipeline for bindings of this layout.
+    pub fn pipeline(&self, device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(self.label),
+            source: wgpu::ShaderSource::Wgsl(self.wgsl.into()),
+        });
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(self.label),
+            bind_group_layouts: &[Some(layout)],
+            immediate_size: 0,
+        });
+        let options = |(_, constants)| wgpu::PipelineCompilationOptions {
+            constants,
+            ..Default::default()
+        };
+        device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(self.label),
+            layout: Some(&layout),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some(self.vertex.0),
+                compilation_options: options(self.vertex),
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: None,
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some(self.fragment.0),
+                compilation_options: options(self.fragment),
+                targets: &[Some(self.target.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+    }
+}

@@ -14,5 +14,5 @@ pub mod ultrasound;
 pub mod xray;
 
 pub use body::{Body, Metal, NEEDLE_RADIUS_M, Needle, SEED_LENGTH_M, SEED_RADIUS_M, Seed};
-pub use gpu::{Gpu, NoGpu};
+pub use gpu::{Drawing, Gpu, NoGpu};
 pub use tissue::{OUTSIDE, Tissue, brightness};

@@ -7,6 +7,7 @@ use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, RenderState}
 use eframe::wgpu;
 use egui::epaint::PaintCallback;
 use egui::{PaintCallbackInfo, Painter, Rect, Shape};
+use stylet_imaging::Drawing;
 
 /// Pipelines that put pictures into the window.
 pub struct Paste {
@@ -145,40 +146,18 @@ fn pipeline(
     window: wgpu::TextureFormat,
     [to_light, enlarges]: [bool; 2],
 ) -> wgpu::RenderPipeline {
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("stylet paste"),
-        source: wgpu::ShaderSource::Wgsl(include_str!("paste.wgsl").into()),
-    });
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("stylet paste"),
-        bind_group_layouts: &[Some(layout)],
-        immediate_size: 0,
-    });
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("stylet paste"),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("paste_vertex"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: None,
-        multisample: wgpu::MultisampleState::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("paste_fragment"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[
-                    ("TAKES_LIGHT", f64::from(u8::from(to_light))),
-                    ("ENLARGES", f64::from(u8::from(enlarges))),
-                ],
-                ..Default::default()
-            },
-            targets: &[Some(window.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+    Drawing {
+        label: "stylet paste",
+        wgsl: include_str!("paste.wgsl"),
+        vertex: ("paste_vertex", &[]),
+        fragment: (
+            "paste_fragment",
+            &[
+                ("TAKES_LIGHT", f64::from(u8::from(to_light))),
+                ("ENLARGES", f64::from(u8::from(enlarges))),
+            ],
+        ),
+        target: window,
+    }
+    .pipeline(device, layout)
 }

@@ -7,7 +7,7 @@ use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::tissue::TissueLoop;
 use crate::rt::tissue_tape::TissueTape;
-use crate::rt::wiring::{Capacities, ControlPorts, Wiring};
+use crate::rt::wiring::{Capacities, ControlPorts, TapePorts, Wiring};
 use crate::rt::world::World;
 use stylet_hw::Device;
 use stylet_sim::force::chain::ChainOutput;
@@ -23,6 +23,8 @@ pub struct SteppedLoops {
     pub tissue: TissueLoop,
     /// Orders go in here, notices come out. Records are dropped after each step.
     pub control: ControlPorts,
+    /// Flight recordings of loops that have a tape.
+    pub tapes: TapePorts,
     tissue_period_ns: u64,
     now_ns: u64,
     missed: u32,
@@ -52,6 +54,7 @@ impl SteppedLoops {
             haptic,
             tissue,
             control,
+            tapes,
         } = Wiring::new(Capacities::STEPPED, haptic_tape, tissue_tape);
         let tissue_period_ns = haptic_ticks_per_tissue_tick.max(1) * HAPTIC_PERIOD_NS;
         let seconds = |ns: u64| ns as f64 / 1e9;
@@ -59,6 +62,7 @@ impl SteppedLoops {
             haptic: HapticLoop::new(0, device, haptic, memory, seconds(HAPTIC_PERIOD_NS)),
             tissue: TissueLoop::new(0, tissue, world, seconds(tissue_period_ns)),
             control,
+            tapes,
             tissue_period_ns,
             now_ns: 0,
             missed: 0,

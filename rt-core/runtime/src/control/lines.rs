@@ -5,9 +5,9 @@
 //! are prepared ahead, and kept until a needle stands there.
 
 use super::line_archive::{Half, LineArchive};
-use super::notices::LoopRings;
 use crate::lines::{LineBody, NoLine};
 use crate::rt::exchange::TissueOrder;
+use crate::rt::wiring::ControlPorts;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -178,7 +178,7 @@ impl LinePreparer {
     }
 
     /// Hands over a line that is ready, and begins one where the needle needs another.
-    pub(super) fn pass(&mut self, newest: Option<&TickRecord>, scene_generation: u64, loops: &mut LoopRings) {
+    pub(super) fn pass(&mut self, newest: Option<&TickRecord>, scene_generation: u64, loops: &mut ControlPorts) {
         while let Ok(line) = loops.old_hand_lines.pop() {
             self.archive.returned(line.generation, Half::Hand);
             self.keep_track(&line);
@@ -307,7 +307,7 @@ impl LinePreparer {
         }
     }
 
-    fn take(&mut self, scene_generation: u64, loops: &mut LoopRings) {
+    fn take(&mut self, scene_generation: u64, loops: &mut ControlPorts) {
         let Some(work) = self.under_way.take_if(|work| work.thread.is_finished()) else {
             return;
         };
@@ -333,7 +333,7 @@ impl LinePreparer {
         }
     }
 
-    fn hand_over(&mut self, axis: Line, line: ReadyLine, loops: &mut LoopRings) {
+    fn hand_over(&mut self, axis: Line, line: ReadyLine, loops: &mut ControlPorts) {
         let ReadyLine {
             mut hand,
             body,

@@ -24,13 +24,12 @@ mod upload;
 mod wall;
 
 use crate::replay::file::Flight;
-use crate::rt::wiring::ControlPorts;
+use crate::rt::wiring::{ControlPorts, TapePorts};
 pub use flight::SaveError;
 use flight::{FlightKeeper, Orders};
 use lines::LinePreparer;
 use link::{EventDetails, Link};
 use loader::SceneLoader;
-use notices::LoopRings;
 use parameters::ParameterChanges;
 pub use picture::{ScenePicture, SnapshotBoard, snapshot_board};
 use probe::ProbePreparer;
@@ -89,7 +88,7 @@ struct RunningScene {
 /// Everything that the control thread owns.
 pub struct Control {
     link: Link,
-    loops: LoopRings,
+    loops: ControlPorts,
     flights: FlightKeeper,
     device: DeviceInfo,
     /// Tissue model of every scene of the run.
@@ -111,7 +110,7 @@ pub struct Control {
 
 impl Control {
     /// Announces parameters and plan; everything else follows in [`run`](Self::run).
-    pub fn new(wall: Wall, loops: ControlPorts, setup: ControlSetup) -> Self {
+    pub fn new(wall: Wall, loops: ControlPorts, (haptic, tissue): TapePorts, setup: ControlSetup) -> Self {
         let session_id = setup.session.session_id;
         let is_real_time = setup.session.haptic.is_fifo();
         let mut plan: PlanInForce = bytemuck::Zeroable::zeroed();
@@ -122,24 +121,11 @@ impl Control {
         link.wall.plan(plan);
         setup.picture.show(&mut link.wall, Some(setup.snapshots));
         let (second, second_tapes) = setup.second.map(|second| Second::new(second, is_real_time)).unzip();
-        let tapes = (loops.haptic_tapes, loops.tissue_tapes, second_tapes);
+        let tapes = (haptic, tissue, second_tapes);
         Self {
             link,
             flights: FlightKeeper::new(tapes, setup.flight_folder, setup.flight),
-            loops: LoopRings {
-                records: loops.records,
-                haptic_orders: loops.haptic_orders,
-                haptic_notices: loops.haptic_notices,
-                tissue_orders: loops.tissue_orders,
-                tissue_notices: loops.tissue_notices,
-                old_worlds: loops.old_worlds,
-                lines: loops.lines,
-                rooms: loops.rooms,
-                old_hand_lines: loops.old_hand_lines,
-                old_body_lines: loops.old_body_lines,
-                outside_rooms: loops.outside_rooms,
-                old_probes: loops.old_probes,
-            },
+            loops,
             device: setup.device,
             tissue: setup.tissue,
             parameters,

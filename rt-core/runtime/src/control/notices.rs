@@ -2,28 +2,8 @@
 
 use super::Control;
 use super::link::EventDetails;
-use crate::rt::exchange::{HapticOrder, Moved, Notice, TissueOrder};
-use crate::rt::outside::OutsideTape;
-use crate::rt::world::World;
-use stylet_shm_schema::{EventKind, Fault, TickRecord};
-use stylet_sim::line::{BodyLine, HandLine, LeftNeedles};
-use stylet_sim::probe::BodyProbe;
-
-/// Ends of the rings to and from both loops.
-pub(super) struct LoopRings {
-    pub records: rtrb::Consumer<TickRecord>,
-    pub haptic_orders: rtrb::Producer<HapticOrder>,
-    pub haptic_notices: rtrb::Consumer<Notice>,
-    pub tissue_orders: rtrb::Producer<TissueOrder>,
-    pub tissue_notices: rtrb::Consumer<Notice>,
-    pub old_worlds: rtrb::Consumer<Box<World>>,
-    pub lines: rtrb::Producer<Box<HandLine>>,
-    pub rooms: rtrb::Producer<Box<LeftNeedles>>,
-    pub outside_rooms: rtrb::Producer<Box<OutsideTape>>,
-    pub old_hand_lines: rtrb::Consumer<Box<HandLine>>,
-    pub old_body_lines: rtrb::Consumer<Box<BodyLine>>,
-    pub old_probes: rtrb::Consumer<Box<BodyProbe>>,
-}
+use crate::rt::exchange::{Moved, Notice};
+use stylet_shm_schema::{EventKind, Fault};
 
 impl Control {
     pub(super) fn take_notices(&mut self) {

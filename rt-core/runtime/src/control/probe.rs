@@ -1,10 +1,10 @@
 //! What the ultrasound probe can press is solved for beside the loops, once for each scene of a run whose second hand holds it.
 
-use super::notices::LoopRings;
 use crate::lines::{LineBody, NoProbe};
 use crate::rt::exchange::TissueOrder;
 use crate::rt::outside::OutsideTape;
 use crate::rt::probe_tape::ProbeTape;
+use crate::rt::wiring::ControlPorts;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -58,7 +58,7 @@ impl ProbePreparer {
     }
 
     /// Frees what came back, hands over what is ready, and begins what is missing. What there is to say of it, once.
-    pub(super) fn pass(&mut self, scene_generation: u64, loops: &mut LoopRings) -> Option<String> {
+    pub(super) fn pass(&mut self, scene_generation: u64, loops: &mut ControlPorts) -> Option<String> {
         while loops.old_probes.pop().is_ok() {}
         if self.is_settled {
             return None;

@@ -196,6 +196,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     let mut control = Control::new(
         shown.wall,
         loops.control,
+        loops.tapes,
         ControlSetup {
             device: info,
             session,

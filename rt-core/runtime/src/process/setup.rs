@@ -11,7 +11,7 @@ use crate::rt::second::{self, SecondControlPorts, SecondLoop, SecondMemory, Seco
 use crate::rt::timing::Probes;
 use crate::rt::tissue::TissueLoop;
 use crate::rt::tissue_tape::TissueTape;
-use crate::rt::wiring::{Capacities, ControlPorts, Wiring};
+use crate::rt::wiring::{Capacities, ControlPorts, TapePorts, Wiring};
 use crate::rt::world::World;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -46,6 +46,7 @@ pub(super) struct Loops {
     pub haptic: HapticLoop,
     pub tissue: TissueLoop,
     pub control: ControlPorts,
+    pub tapes: TapePorts,
     pub second: Option<SecondLoops>,
 }
 
@@ -212,6 +213,7 @@ impl Body {
             haptic,
             tissue,
             control: wiring.control,
+            tapes: wiring.tapes,
             second,
         }
     }

@@ -107,6 +107,7 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
         haptic: ports,
         mut tissue,
         mut control,
+        ..
     } = Wiring::new(capacities(recorded.orders.len()), Some(tape), None);
     let answers = recorded.ticks.iter().map(|e| (e.read, e.write_failed)).collect();
     let device = RecordedDevice::new(flight.device.info(), answers);
@@ -217,6 +218,7 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
         mut haptic,
         tissue: ports,
         mut control,
+        ..
     } = Wiring::new(capacities(recorded.orders.len()), None, Some(tape));
     let mut again = TissueLoop::new(flight.session_id, ports, world()?, flight.tissue_period_s);
     let before = match recorded.memory.response.line {

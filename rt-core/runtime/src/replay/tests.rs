@@ -164,9 +164,9 @@ impl Recorded {
         let order = TissueOrder::HandOverTape;
         self.loops.control.tissue_orders.push(order).expect("room");
         self.run(0.005);
-        let control = &mut self.loops.control;
-        let haptic = control.haptic_tapes.taken.pop().expect("handed over");
-        let tissue = control.tissue_tapes.taken.pop().expect("handed over");
+        let (haptic_tapes, tissue_tapes) = &mut self.loops.tapes;
+        let haptic = haptic_tapes.taken.pop().expect("handed over");
+        let tissue = tissue_tapes.taken.pop().expect("handed over");
         let flight = Flight {
             version: String::new(),
             session_id: 0,
@@ -181,8 +181,8 @@ impl Recorded {
             haptic: haptic.flight(),
             tissue: tissue.flight(),
         };
-        control.haptic_tapes.back.push(haptic).expect("room");
-        control.tissue_tapes.back.push(tissue).expect("room");
+        haptic_tapes.back.push(haptic).expect("room");
+        tissue_tapes.back.push(tissue).expect("room");
         flight
     }
 }

@@ -108,11 +108,10 @@ pub struct ControlPorts {
     pub old_body_lines: rtrb::Consumer<Box<BodyLine>>,
     /// Probes to be freed.
     pub old_probes: rtrb::Consumer<Box<BodyProbe>>,
-    /// The force loop's tapes.
-    pub haptic_tapes: TapePort<HapticTape>,
-    /// The tissue loop's tapes.
-    pub tissue_tapes: TapePort<TissueTape>,
 }
+
+/// Ends for the tapes of the force loop and of the tissue loop, which the control thread owns too.
+pub type TapePorts = (TapePort<HapticTape>, TapePort<TissueTape>);
 
 /// All ends of one wiring; each side takes its own.
 pub struct Wiring {
@@ -122,6 +121,8 @@ pub struct Wiring {
     pub tissue: TissuePorts,
     /// For the control thread.
     pub control: ControlPorts,
+    /// For what writes flight recordings.
+    pub tapes: TapePorts,
 }
 
 impl Wiring {
@@ -192,9 +193,8 @@ impl Wiring {
                 old_hand_lines,
                 old_body_lines,
                 old_probes,
-                haptic_tapes,
-                tissue_tapes,
             },
+            tapes: (haptic_tapes, tissue_tapes),
         }
     }
 }

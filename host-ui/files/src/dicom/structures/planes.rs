@@ -76,15 +76,20 @@ fn shape(contour: &[Vector3<f64>]) -> Vec<[i64; 3]> {
     corners.min(reversed)
 }
 
-/// Returns the contours plane by plane, as polygons in their plane.
-pub fn flat(contours: &[Vec<Vector3<f64>>], normal: Vector3<f64>) -> Vec<Vec<Vec<[f64; 2]>>> {
+/// Returns two axes within planes of this normal, and the normal.
+pub fn axes_of(normal: Vector3<f64>) -> Matrix3<f64> {
     let aside = if normal.x.abs() < 0.9 {
         Vector3::x()
     } else {
         Vector3::y()
     };
     let across = (aside - normal * aside.dot(&normal)).normalize();
-    let axes = Matrix3::from_columns(&[across, normal.cross(&across), normal]);
+    Matrix3::from_columns(&[across, normal.cross(&across), normal])
+}
+
+/// Returns the contours plane by plane, as polygons in their plane.
+pub fn flat(contours: &[Vec<Vector3<f64>>], normal: Vector3<f64>) -> Vec<Vec<Vec<[f64; 2]>>> {
+    let axes = axes_of(normal);
     let mut by_height: Vec<&Vec<Vector3<f64>>> = contours.iter().filter(|c| !c.is_empty()).collect();
     let height = |c: &Vec<Vector3<f64>>| c[0].dot(&normal);
     by_height.sort_by(|a, b| height(a).total_cmp(&height(b)));
@@ -99,13 +104,7 @@ fn planes(structure: &Contoured, normal: Vector3<f64>) -> Vec<Plane> {
     let mut contours: Vec<(f64, &Vec<Vector3<f64>>)> =
         structure.contours.iter().map(|c| (c[0].dot(&normal), c)).collect();
     contours.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let aside = if normal.x.abs() < 0.9 {
-        Vector3::x()
-    } else {
-        Vector3::y()
-    };
-    let across = (aside - normal * aside.dot(&normal)).normalize();
-    let axes = Matrix3::from_columns(&[across, normal.cross(&across), normal]);
+    let axes = axes_of(normal);
     contours
         .chunk_by(|a, b| b.0 - a.0 < SAME_PLANE_M)
         .map(|of_plane| {

@@ -2,6 +2,7 @@
 //! drawn, independent of overlaps.
 
 use super::super::super::element::short;
+use super::planes::axes_of;
 use super::raster::slabs;
 use super::{Contoured, SAME_PLANE_M, StructureSet};
 use crate::error::ContentError;
@@ -41,13 +42,7 @@ impl Solid {
     /// thickness of a single plane.
     pub fn of(structure: &Contoured, usual_m: f64) -> Result<Self, ContentError> {
         let normal = structure.normal()?;
-        let aside = if normal.x.abs() < 0.9 {
-            Vector3::x()
-        } else {
-            Vector3::y()
-        };
-        let across = (aside - normal * aside.dot(&normal)).normalize();
-        let axes = Matrix3::from_columns(&[across, normal.cross(&across), normal]);
+        let axes = axes_of(normal);
         let mut drawn: Vec<(f64, Vec<[f64; 2]>)> = Vec::new();
         for contour in &structure.contours {
             let corners: Vec<Vector3<f64>> = contour.iter().map(|p| axes.transpose() * p).collect();

@@ -2,7 +2,7 @@
 
 use super::{LARGEST_IMPEDANCE, LARGEST_LOSS, PATCH_M, RANGE_DB, SCAN_BYTES, SHOT_BYTES, ZERO_BRIGHTNESS};
 use crate::Tissue;
-use crate::gpu::{GRID, Gpu, READ, SAMPLER, UNIFORM, VOLUME};
+use crate::gpu::{Drawing, GRID, Gpu, READ, SAMPLER, UNIFORM, VOLUME};
 use crate::ultrasound::beams::Grid;
 use std::mem::size_of;
 use stylet_surfaces::field::{SEEN_M, STEPS};
@@ -202,34 +202,12 @@ fn written(format: wgpu::TextureFormat) -> wgpu::BindingType {
 }
 
 fn scan_pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("stylet ultrasound"),
-        bind_group_layouts: &[Some(layout)],
-        immediate_size: 0,
-    });
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("stylet ultrasound"),
-        source: wgpu::ShaderSource::Wgsl(include_str!("../scan.wgsl").into()),
-    });
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("stylet ultrasound"),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("scan_vertex"),
-            compilation_options: Default::default(),
-            buffers: &[],
-        },
-        primitive: Default::default(),
-        depth_stencil: None,
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some("scan_fragment"),
-            compilation_options: Default::default(),
-            targets: &[Some(COLOR.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+    Drawing {
+        label: "stylet ultrasound",
+        wgsl: include_str!("../scan.wgsl"),
+        vertex: ("scan_vertex", &[]),
+        fragment: ("scan_fragment", &[]),
+        target: COLOR,
+    }
+    .pipeline(device, layout)
 }

@@ -2,6 +2,7 @@
 
 use super::COLOR;
 use eframe::wgpu;
+use stylet_imaging::Drawing;
 use stylet_surfaces::field::{SEEN_M, STEPS};
 
 /// Creates the layout: uniform, four volumes and two samplers.
@@ -35,37 +36,15 @@ pub fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
 
 /// Creates the pipeline of the fragment shader with this name.
 pub fn pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, shader: &str) -> wgpu::RenderPipeline {
-    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("stylet slice"),
-        source: wgpu::ShaderSource::Wgsl(include_str!("../slice.wgsl").into()),
-    });
-    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("stylet slice"),
-        bind_group_layouts: &[Some(layout)],
-        immediate_size: 0,
-    });
-    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some("stylet slice"),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: &module,
-            entry_point: Some("slice_vertex"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &[("STEPS", f64::from(STEPS)), ("SEEN_M", f64::from(SEEN_M))],
-                ..Default::default()
-            },
-            buffers: &[],
-        },
-        primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: None,
-        multisample: wgpu::MultisampleState::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: &module,
-            entry_point: Some(shader),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
-            targets: &[Some(COLOR.into())],
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
+    Drawing {
+        label: "stylet slice",
+        wgsl: include_str!("../slice.wgsl"),
+        vertex: (
+            "slice_vertex",
+            &[("STEPS", f64::from(STEPS)), ("SEEN_M", f64::from(SEEN_M))],
+        ),
+        fragment: (shader, &[]),
+        target: COLOR,
+    }
+    .pipeline(device, layout)
 }

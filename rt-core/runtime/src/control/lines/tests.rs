@@ -6,27 +6,9 @@ use bytemuck::Zeroable;
 use stylet_sim::scene::{Labels, TissueKind};
 
 /// Rings as in a run; nothing ticks at their other ends.
-fn rings() -> (LoopRings, HapticPorts, TissuePorts) {
-    let Wiring {
-        haptic,
-        tissue,
-        control,
-    } = Wiring::new(Capacities::RUN, None, None);
-    let rings = LoopRings {
-        records: control.records,
-        haptic_orders: control.haptic_orders,
-        haptic_notices: control.haptic_notices,
-        tissue_orders: control.tissue_orders,
-        tissue_notices: control.tissue_notices,
-        old_worlds: control.old_worlds,
-        lines: control.lines,
-        rooms: control.rooms,
-        old_hand_lines: control.old_hand_lines,
-        old_body_lines: control.old_body_lines,
-        outside_rooms: control.outside_rooms,
-        old_probes: control.old_probes,
-    };
-    (rings, haptic, tissue)
+fn rings() -> (ControlPorts, HapticPorts, TissuePorts) {
+    let wiring = Wiring::new(Capacities::RUN, None, None);
+    (wiring.control, wiring.haptic, wiring.tissue)
 }
 
 /// A needle along z.
