@@ -1,6 +1,6 @@
 //! Edits of a plan: each returns a new one, so that undo is a stack of values.
 
-use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, PlanError, SEED_LENGTH_M, SPACER_M};
+use super::{Hole, ImplantPlan, Loading, Needle, PlanError, SEED_LENGTH_M, SPACER_M};
 
 /// Largest number of steps that can be undone.
 const STEPS: usize = 100;

@@ -4,7 +4,7 @@
 use super::*;
 use crate::plan::anatomy::ball;
 use crate::plan::check::problems;
-use crate::plan::{Anatomy, Template};
+use crate::plan::{Anatomy, NeedleSeed, Template};
 use stylet_anatomy::PatientFrame;
 
 const GLAND_M: [f64; 3] = [0.05, 0.05, 0.06];
