@@ -180,13 +180,13 @@ impl RealTimeArgs {
     }
 }
 
-/// Tries real-time scheduling in a thread of its own, which then ends; the error explains how to grant what is missing.
+/// Tries real-time scheduling in a short-lived thread; the error explains how to grant what is missing.
 fn try_real_time() -> Result<(), Refused> {
     let ask = arm::Ask {
         priority: Some(1),
         core: None,
     };
-    // Otherwise this thread would leave a heap of its own to threads that come later.
+    // Otherwise this thread would leave its own heap to later threads.
     arm::keep_one_heap();
     let armed = std::thread::spawn(move || arm::arm(ask).map(drop)).join();
     armed.unwrap_or_else(|_| Err(Refused("the trial of real-time scheduling ended by itself".to_owned())))?;

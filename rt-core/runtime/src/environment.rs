@@ -1,4 +1,4 @@
-//! The environment of a program that has more rights than its user: no variable of the user names a file in it.
+//! Hardens the environment of a program with more rights than its user: no variable of the user names a file in it.
 
 use std::ffi::{CStr, OsStr, OsString};
 use std::os::unix::ffi::OsStrExt;
@@ -16,7 +16,8 @@ const KEPT: [&str; 7] = [
 ];
 const RUNTIME_FOLDER: &str = "XDG_RUNTIME_DIR";
 
-/// Removes the user's variables where the kernel gave this program rights that its user lacks (`setcap`). Call it first in `main`.
+/// Removes the user's variables if the kernel gave this program rights that its user lacks (`setcap`). Call it first in
+/// `main`.
 ///
 /// Paths then come from the system: the home folder from its list of users, programs from `/usr/bin`.
 pub fn cleanse() {
@@ -41,7 +42,7 @@ pub fn cleanse() {
 
 fn is_kept(name: &OsStr, value: &OsStr, user: libc::uid_t) -> bool {
     if value.as_bytes().contains(&b'/') {
-        // The folder in which hosts meet the core: that of the system for this user, and no other.
+        // The folder in which hosts meet the core: only the system's own for this user.
         return name == RUNTIME_FOLDER && value.as_bytes() == format!("/run/user/{user}").as_bytes();
     }
     KEPT.iter().any(|kept| name == *kept) || name.as_bytes().starts_with(b"LC_")

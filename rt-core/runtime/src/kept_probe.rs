@@ -1,7 +1,7 @@
-//! Answers to the probe that took minutes to solve for, kept for later runs: one file for each scene and tissue.
+//! Saved probe answers that took minutes to solve: one file per scene and tissue.
 //!
-//! `MAGIC`, SHA-256 of scene and answers, answers (postcard). Nothing of a file is used before that digest is right, and nothing that is of
-//! another wall or no number.
+//! Layout: `MAGIC`, SHA-256 of scene and answers, answers (postcard). Nothing is used before the digest is verified;
+//! answers of another wall and non-finite numbers are refused.
 
 use crate::pieces;
 use sha2::{Digest, Sha256};
@@ -11,13 +11,13 @@ use std::path::{Path, PathBuf};
 use stylet_sim::probe::{PADS_APART_M, ProbeShape, SolvedProbe};
 use stylet_sim::scene::Scene;
 
-/// Ends in the version of the layout, and of how answers are solved for.
+/// Ends in the version of the layout and of the solution method.
 const MAGIC: [u8; 8] = *b"STYLPRB2";
 const DIGEST: usize = 32;
 /// In finite elements of 2.7 mm the answers of `pelvis` take 380 MB.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// Why a file is not used.
+/// Reason why a file is not used.
 #[derive(Debug, thiserror::Error)]
 pub enum KeptError {
     /// It could not be read or written.
@@ -25,15 +25,15 @@ pub enum KeptError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         why: io::Error,
     },
-    /// It is not what was written for this scene.
+    /// The file was written for another scene, or is damaged.
     #[error("{0}: damaged, or of another scene or version: solve again ('rt-core probe --again'), or remove it")]
     Other(PathBuf),
 }
 
-/// `$XDG_CACHE_HOME/stylet/probes`, by default under `~/.cache`; nothing for a user without a home.
+/// Returns `$XDG_CACHE_HOME/stylet/probes`, by default under `~/.cache`; `None` for a user without a home.
 pub fn default_folder() -> Option<PathBuf> {
     let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let cache = from("XDG_CACHE_HOME").filter(|p| p.is_absolute());
@@ -41,14 +41,14 @@ pub fn default_folder() -> Option<PathBuf> {
     cache.map(|cache| cache.join("stylet/probes"))
 }
 
-/// The file of a scene, whose elements are those that are displaced.
+/// Returns the file of a scene and its probe.
 pub fn path(folder: &Path, scene: &Scene, shape: &ProbeShape) -> PathBuf {
     let digest = digest_of(scene, shape);
     let number = digest[..8].iter().map(|byte| format!("{byte:02x}")).collect::<String>();
     folder.join(format!("{number}.probe"))
 }
 
-/// The answers of that scene; `None` where none are kept.
+/// Reads the scene's answers; `None` if none are saved.
 pub fn read(path: &Path, scene: &Scene, shape: &ProbeShape) -> Result<Option<SolvedProbe>, KeptError> {
     let other = || KeptError::Other(path.to_owned());
     let io = |why| KeptError::Io {
@@ -70,7 +70,7 @@ pub fn read(path: &Path, scene: &Scene, shape: &ProbeShape) -> Result<Option<Sol
     postcard::from_bytes(answers).map(Some).map_err(|_| other())
 }
 
-/// Keeps them; a reader sees all of the file or nothing of it.
+/// Saves the answers atomically.
 pub fn write(path: &Path, scene: &Scene, shape: &ProbeShape, solved: &SolvedProbe) -> Result<(), KeptError> {
     let io = |why| KeptError::Io {
         path: path.to_owned(),
@@ -101,7 +101,7 @@ fn joined(scene: &Scene, shape: &ProbeShape, answers: &[u8]) -> [u8; DIGEST] {
         .into()
 }
 
-/// Of all that answers follow from.
+/// Digest of everything that the answers follow from.
 fn digest_of(scene: &Scene, shape: &ProbeShape) -> [u8; DIGEST] {
     let mut digest = Sha256::new()
         .chain_update(MAGIC)
@@ -116,7 +116,7 @@ fn digest_of(scene: &Scene, shape: &ProbeShape) -> [u8; DIGEST] {
         }
         digest.update([scene.lattice.structure(element)]);
     }
-    // Names and materials; what cannot be written is in no scene.
+    // Names and materials; no scene holds any that cannot be serialised.
     digest.update(postcard::to_allocvec(&scene.structures).unwrap_or_default());
     digest.finalize().into()
 }

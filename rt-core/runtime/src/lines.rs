@@ -1,4 +1,4 @@
-//! Lines for needles: the body at rest that they are solved in, apart from the one that moves.
+//! Solves needle lines in a body at rest, apart from the moving one.
 
 use crate::kept_probe::{self, KeptError};
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use stylet_sim::scene::{Scene, SceneError, SceneSource};
 use stylet_sim::tissue::fem::batch::BatchModel;
 use stylet_sim::tissue::{FemTissue, MaterialPoint, TissueError, TissueSpec};
 
-/// Why there is no line; the text is for people.
+/// Reason why there is no line; the text is for people.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoLine {
     /// The scene cannot be built again.
@@ -21,23 +21,23 @@ pub enum NoLine {
     /// Its materials cannot be used.
     #[error(transparent)]
     World(#[from] TissueError),
-    /// The line itself.
+    /// The line cannot be solved.
     #[error(transparent)]
     Line(#[from] LineError),
-    /// A part that would fly off at the first newton.
+    /// A part that the first newton would accelerate without limit.
     #[error(
         "nothing holds the part of the body that the needle enters: let fat or something fixed lie beyond one of its faces (surroundings)"
     )]
     NothingHolds,
 }
 
-/// Why there is no probe; the text is for people.
+/// Reason why there is no probe; the text is for people.
 #[derive(Debug, thiserror::Error)]
 pub enum NoProbe {
-    /// The body that it would be solved for in.
+    /// The body cannot be solved in.
     #[error(transparent)]
     Body(#[from] NoLine),
-    /// What it could press.
+    /// There is no wall that the probe could press.
     #[error(transparent)]
     Wall(#[from] NoWall),
 }
@@ -46,15 +46,15 @@ pub enum NoProbe {
 pub struct LineBody {
     adds_columns: bool,
     pub(crate) scene: Scene,
-    /// By structure; bone is none.
+    /// Layer of each structure; bone has none.
     layers: Vec<Option<LayerKind>>,
     batch: BatchModel<f32>,
-    /// By element; empty where everything is held.
+    /// Elements that nothing holds; empty where everything is held.
     is_loose: Vec<bool>,
 }
 
 impl LineBody {
-    /// Builds the scene anew, for needles in that tissue; `None` where they slip by speed.
+    /// Builds the scene for needles in that tissue; `None` for a tissue model whose needles slip by speed.
     pub fn of_source(source: &SceneSource, tissue: impl Into<TissueSpec>) -> Result<Option<Self>, NoLine> {
         let tissue = tissue.into();
         let Some(scene) = source.build()?.for_lines(tissue) else {
@@ -75,7 +75,7 @@ impl LineBody {
         }))
     }
 
-    /// The same with tissue that is so many times as stiff as that of the scene.
+    /// As [`of_source`](Self::of_source), with the stiffness multiplied by `factor`.
     pub fn of_stiffened(
         source: &SceneSource,
         factor: f64,
@@ -84,7 +84,8 @@ impl LineBody {
         Self::of_source(&source.stiffened(factor)?, tissue)
     }
 
-    /// Solves for the line of a needle held like this, scene frame, across it as well where the needle `bends`. `goes_on` is asked between slices of work.
+    /// Solves for the line of a needle on this axis in the scene frame, and across it if the needle `bends`. `goes_on`
+    /// is polled between slices of work.
     pub fn prepare(
         &self,
         generation: u64,
@@ -96,7 +97,7 @@ impl LineBody {
         self.prepare_beside(generation, tip_m, direction, bends, &[], goes_on)
     }
 
-    /// The same for a needle that may come beside those of `others`.
+    /// Solves for a line that may come into use beside those of `others`.
     pub fn prepare_beside(
         &self,
         generation: u64,
@@ -110,7 +111,8 @@ impl LineBody {
         self.prepare_along(generation, line, bends, others, &mut |_| goes_on())
     }
 
-    /// Solves for what an ultrasound probe in the rectum can press. `goes_on` is given how many columns are ready, and of how many.
+    /// Solves for the answers of an ultrasound probe in the rectum. `goes_on` gets the number of finished columns and
+    /// of all.
     pub fn prepare_probe(
         &self,
         shape: ProbeShape,
@@ -121,7 +123,7 @@ impl LineBody {
         Ok(BodyProbe::new(queue.prepare(&self.batch, goes_on)?))
     }
 
-    /// The same from answers that were kept, as [`solve_in_cells`](Self::solve_in_cells) had them; `None` where there are none.
+    /// Restores the answers of [`solve_in_cells`](Self::solve_in_cells) from a file; `None` if none are saved.
     pub fn kept_probe(&self, shape: ProbeShape, folder: &Path) -> Result<Option<BodyProbe>, KeptError> {
         let path = self.probe_file(&shape, folder);
         let Some(solved) = kept_probe::read(&path, &self.scene, &shape)? else {
@@ -134,8 +136,9 @@ impl LineBody {
             .ok_or(KeptError::Other(path))
     }
 
-    /// Solves in the scene's own cells for what a probe can press, loaded at the points at which it is touched: on so many threads, for minutes. `goes_on` is given how many columns are ready,
-    /// and of how many; the answers do not depend on the number of threads.
+    /// Solves in the scene's own cells for the answers of a probe, loaded at its contact points; takes minutes on that
+    /// many threads. `goes_on` gets the number of finished columns and of all. The answers do not depend on the number
+    /// of threads.
     pub fn solve_in_cells(
         &self,
         shape: ProbeShape,
@@ -181,18 +184,18 @@ impl LineBody {
         Ok(queue.finish(solved)?)
     }
 
-    /// Where it is kept.
+    /// Returns the file of saved answers.
     pub fn probe_file(&self, shape: &ProbeShape, folder: &Path) -> PathBuf {
         kept_probe::path(folder, &self.scene, shape)
     }
 
-    /// Keeps what was solved for.
+    /// Saves solved answers.
     pub fn keep_probe(&self, ready: &ReadyProbe, folder: &Path) -> Result<(), KeptError> {
         let path = self.probe_file(&ready.shape, folder);
         kept_probe::write(&path, &self.scene, &ready.shape, &ready.solved)
     }
 
-    /// Edge of the elements that a probe is solved for in within seconds, and of those in which it takes minutes, m.
+    /// Element edges for a probe solved within seconds and for one that takes minutes, m.
     pub fn probe_edges_m(&self) -> [f64; 2] {
         [self.scene.body.spacing_m, self.scene.clone().in_cells().body.spacing_m]
     }

@@ -1,15 +1,15 @@
-//! Large files beside a force loop, a piece at a time.
+//! Reads and writes large files in pieces, to spare a force loop.
 //!
-//! A kernel that does not preempt itself keeps the processor for as long as it copies: 20 MB in one call for 5 ms.
+//! A non-preemptible kernel keeps the processor for a whole copy: 20 MB in one call take 5 ms.
 
 use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::Path;
 
-/// In one call, bytes: some 20 us.
+/// Bytes in one call: some 20 µs.
 const PIECE: usize = 1 << 16;
 
-/// All of a file.
+/// Reads a whole file.
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut file = File::open(path)?;
     let mut bytes = Vec::with_capacity(file.metadata()?.len() as usize);
@@ -24,7 +24,7 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     }
 }
 
-/// As `write_all`.
+/// Writes everything, as `write_all` does.
 pub fn write(file: &mut File, bytes: &[u8]) -> io::Result<()> {
     bytes.chunks(PIECE).try_for_each(|piece| file.write_all(piece))
 }

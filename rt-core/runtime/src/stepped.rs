@@ -21,7 +21,7 @@ pub struct SteppedLoops {
     pub haptic: HapticLoop,
     /// The tissue loop.
     pub tissue: TissueLoop,
-    /// Orders go in here, notices come out. Records are dropped after each step.
+    /// Takes orders and gives notices. Records are dropped after each step.
     pub control: ControlPorts,
     /// Flight recordings of loops that have a tape.
     pub tapes: TapePorts,
@@ -31,8 +31,8 @@ pub struct SteppedLoops {
 }
 
 impl SteppedLoops {
-    /// Begins at time 0 with `memory`. The tissue loop ticks after every `haptic_ticks_per_tissue_tick`-th tick of the
-    /// force loop, at least one. Nothing is recorded.
+    /// Begins at time 0 with `memory`. The tissue loop ticks after every `haptic_ticks_per_tissue_tick`-th force-loop
+    /// tick, at least one. Nothing is recorded.
     pub fn new(
         world: Box<World>,
         device: Box<dyn Device>,
@@ -69,7 +69,7 @@ impl SteppedLoops {
         }
     }
 
-    /// One tick of the force loop, and the tissue loop's where one is due. Returns what the force chain gave.
+    /// Runs one tick of the force loop, and one of the tissue loop when due. Returns the output of the force chain.
     pub fn step(&mut self) -> ChainOutput {
         self.now_ns += HAPTIC_PERIOD_NS;
         let output = self.haptic.tick(self.now_ns, self.now_ns, 0);
@@ -83,7 +83,7 @@ impl SteppedLoops {
         output
     }
 
-    /// The next ticks of the tissue loop do not take place, as where a machine is busy.
+    /// Skips the tissue loop's next ticks, as on a busy machine.
     pub fn miss_tissue_ticks(&mut self, ticks: u32) {
         self.missed = ticks;
     }

@@ -1,13 +1,13 @@
-//! Priorities that let a loop wait for one that can wait itself.
+//! Checks that no loop's priority can starve another loop on the same core.
 
 use super::OptionsError;
 use crate::process::Options;
 
-/// A loop as it was asked for: its name, its core, its priority with the option that sets it.
+/// A loop as requested: its name, core and priority, and the option that sets the priority.
 type Asked = (&'static str, Option<usize>, u32, &'static str);
 
-/// Refuses a priority that keeps a loop from a core which it shares: force loop before second device before tissue. Without real time
-/// there are none.
+/// Refuses priorities that let a loop starve another on a shared core. Order: force loop, second device, tissue.
+/// Without real-time scheduling every priority passes.
 pub(super) fn check(options: &Options) -> Result<(), OptionsError> {
     if options.no_rt {
         return Ok(());
@@ -48,7 +48,7 @@ pub(super) fn check(options: &Options) -> Result<(), OptionsError> {
     }
 }
 
-/// `other` must not keep `first` from the core.
+/// Returns the problem if `other` can keep `first` from their shared core.
 fn problem(first: Asked, other: Asked) -> Option<String> {
     let (name, core, priority, option) = first;
     let (other_name, other_core, other_priority, other_option) = other;
@@ -68,7 +68,7 @@ mod tests {
     use crate::device::DeviceChoice;
     use crate::process::SecondOptions;
 
-    /// All loops on one core, with the priorities of force, second device and tissue.
+    /// Returns the refusal for three loops on one core, with the priorities of force, second device and tissue.
     fn refused([force, second, tissue]: [u32; 3], no_rt: bool) -> Vec<String> {
         let mut args = RealTimeArgs::for_measurement(super::super::cores()[0]);
         args.rt_if_allowed = false;

@@ -1,13 +1,13 @@
-//! Hosts that wait for answers, and the loops that each answer waits for.
+//! Requests that await an answer, and the loops that each answer depends on.
 
 use crate::rt::exchange::Ticket;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-/// Numbers of a host and of its command.
+/// Host id and command id of a request.
 pub type Asker = (u64, u64);
 
-/// Requests that are not answered yet.
+/// Requests not yet answered.
 #[derive(Default)]
 pub struct Answers {
     waiting: HashMap<Ticket, Waiting>,
@@ -16,14 +16,14 @@ pub struct Answers {
 
 struct Waiting {
     asker: Asker,
-    /// Loops that have not yet carried the request out.
+    /// Loops that have not yet carried out the request.
     loops: usize,
     /// First tick of the force loop with the change, once it is known.
     tick: Option<u64>,
 }
 
 impl Answers {
-    /// Returns the ticket under which `asker` waits for one loop.
+    /// Issues the ticket under which `asker` waits for one loop.
     pub fn ticket(&mut self, asker: Asker) -> Ticket {
         self.tickets += 1;
         let waiting = Waiting {
@@ -35,27 +35,27 @@ impl Answers {
         self.tickets
     }
 
-    /// Makes `ticket` wait for so many loops.
+    /// Makes `ticket` wait for that many loops.
     pub fn await_loops(&mut self, ticket: Ticket, loops: usize) {
         if let Some(waiting) = self.waiting.get_mut(&ticket) {
             waiting.loops = loops;
         }
     }
 
-    /// Returns who waits behind `ticket`.
+    /// Returns the asker behind `ticket`.
     pub fn asker(&self, ticket: Ticket) -> Option<Asker> {
         self.waiting.get(&ticket).map(|waiting| waiting.asker)
     }
 
-    /// Takes the tick of the force loop that a change is reported to hold from.
+    /// Records the force-loop tick from which a change holds.
     pub fn holds_from(&mut self, ticket: Ticket, tick: u64) {
         if let Some(waiting) = self.waiting.get_mut(&ticket) {
             waiting.tick = Some(tick);
         }
     }
 
-    /// Takes word of one loop that it carried a request out. After the last of them returns whom to answer, and with which tick: that of
-    /// the force loop, or of this loop where the force loop has no part in the request.
+    /// Records that one loop carried out a request. After the last loop, returns the asker and the tick to report: the
+    /// force loop's, or this loop's if the force loop has no part in the request.
     pub fn carried_out(&mut self, ticket: Ticket, tick: u64) -> Option<(Asker, u64)> {
         let Entry::Occupied(mut entry) = self.waiting.entry(ticket) else {
             return None;
@@ -67,7 +67,7 @@ impl Answers {
         })
     }
 
-    /// Returns whom to tell of a refusal.
+    /// Drops a refused request and returns the asker to notify.
     pub fn refused(&mut self, ticket: Ticket) -> Option<Asker> {
         self.waiting.remove(&ticket).map(|waiting| waiting.asker)
     }
@@ -77,7 +77,7 @@ impl Answers {
 mod tests {
     use super::*;
 
-    /// The reply used to come once the force loop had a change, whether or not the tissue loop and the second device had it.
+    /// Replies used to be sent once the force loop had a change, even if the tissue loop and the second device did not.
     #[test]
     fn a_change_is_answered_once_every_loop_has_it() {
         for order in [[0, 1, 2], [2, 1, 0], [1, 0, 2]] {

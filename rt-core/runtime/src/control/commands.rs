@@ -1,4 +1,4 @@
-//! Requests of hosts, carried out: an order for a loop, or work beside it.
+//! Carries out the requests of hosts: as orders to the loops or as background work.
 
 use super::Control;
 use super::link::EventDetails;
@@ -14,11 +14,11 @@ use stylet_shm_schema::{
 use stylet_sim::active::activate;
 use stylet_sim::line::LeftNeedles;
 
-/// Places of the force loop's ring that only requests take which end a motion or a force.
+/// Slots of the force loop's ring reserved for requests that end a motion or a force.
 const KEPT_FOR_STOPS: usize = 16;
 
 impl Control {
-    /// True when a host asked to end.
+    /// Takes all waiting commands; returns true when a host asked to end the run.
     pub(super) fn take_commands(&mut self) -> bool {
         let ends = self.take_each_command();
         self.renew_motions();
@@ -39,7 +39,7 @@ impl Control {
     fn take_command(&mut self, command: &Command) -> bool {
         let asker = (command.host_id, command.command_id);
         match Request::decode(command) {
-            // Never answered: it is sent many times a second.
+            // Never answered: hosts send it many times a second.
             Ok(Request::KeepMoving { valid_s }) => self.movers.keep(command.host_id, valid_s),
             Ok(Request::Shutdown) => {
                 self.link.reply(asker, Ok(0));
@@ -57,7 +57,7 @@ impl Control {
         false
     }
 
-    /// What fails later is answered later.
+    /// Carries out one request; later failures are answered later.
     fn carry_out(&mut self, ticket: Ticket, request: Request) -> Result<(), Refusal> {
         match request {
             Request::SetParameters(changes) => self.change_parameters(ticket, &changes),
@@ -132,7 +132,7 @@ impl Control {
         }
     }
 
-    /// Work beside the loops that is busy refuses without counting as a refused request of the session.
+    /// Refuses because background work is busy; the session does not count it as a refused request.
     fn refuse_uncounted(
         &mut self,
         ticket: Ticket,
@@ -158,7 +158,7 @@ impl Control {
         pushed.map_err(|_| RefusalCode::TooManyRequests.into())
     }
 
-    /// Orders a change from every loop, or from none. It is answered once all have carried it out.
+    /// Orders a change from every loop, or from none. The request is answered once all have carried it out.
     fn order_all(
         &mut self,
         ticket: Ticket,
@@ -168,7 +168,7 @@ impl Control {
     ) -> Result<(), Refusal> {
         let loops = &mut self.loops;
         let has_room = |second: &Second| second.orders.slots() > 0;
-        // The loops only take orders out, so no room is lost after this.
+        // Only the loops take orders out, so the rings keep this room.
         let room = loops.haptic_orders.slots() > KEPT_FOR_STOPS
             && loops.tissue_orders.slots() > 0
             && self.second.as_ref().is_none_or(has_room);
@@ -183,7 +183,7 @@ impl Control {
         Ok(())
     }
 
-    /// Verifies the changes as a whole, then orders them from every loop or from none.
+    /// Validates the changes together, then orders them from every loop or from none.
     fn change_parameters(&mut self, ticket: Ticket, changes: &[ParameterChange]) -> Result<(), Refusal> {
         let set = self.parameters.with(changes);
         let active = activate(&set, &self.device).map_err(|problems| {
@@ -222,7 +222,7 @@ impl Control {
             .expect_planned(plan.map(|plan| (plan.entry_m, plan.direction)));
     }
 
-    /// Neither loop allocates: what they keep needles in that stay is made here, with the first.
+    /// Allocates the loops' room for needles that stay in, when the first is left: neither loop allocates.
     fn make_room_for_left(&mut self) {
         if !std::mem::replace(&mut self.left_rooms.0, true) {
             let _ = self.loops.rooms.push(LeftNeedles::with_room());

@@ -1,4 +1,4 @@
-//! Marks, and faults that an instructor puts in, from the request to the event that everybody sees.
+//! Marks and instructor-injected faults, from the request to the broadcast event.
 
 use super::Control;
 use super::link::EventDetails;
@@ -9,7 +9,7 @@ use stylet_shm_schema::{EventKind, Exercise, ExercisesInForce, Mark, Refusal, Re
 impl Control {
     pub(super) fn mark(&mut self, ticket: Ticket, mark: &Mark) {
         let before_ns = (mark.before_s * 1e9) as u64;
-        // Whoever marks has seen the loop's own state, which is newer than the records of the last pass.
+        // A host that marks has seen the loop's live state, which is newer than the records of the last pass.
         self.link.send_records(&mut self.loops.records);
         let newest = self.newest_tick().unwrap_or(0);
         let tick = newest.saturating_sub(before_ns / self.link.session.period_ns.max(1));
@@ -51,7 +51,7 @@ impl Control {
     }
 
     pub(super) fn end_exercises(&mut self, ticket: Ticket) -> Result<(), Refusal> {
-        // Both or none: the answer comes with the second.
+        // Both or neither: the answer follows the second.
         if self.loops.haptic_orders.slots() < 2 {
             return Err(RefusalCode::TooManyRequests.into());
         }
@@ -61,7 +61,7 @@ impl Control {
         Ok(())
     }
 
-    /// The loops have none any more.
+    /// Drops all exercises; the loops have none left.
     pub(super) fn forget_exercises(&mut self) {
         self.lines.move_body([0.0; 3]);
         self.lines.stiffen(1.0);

@@ -12,17 +12,17 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-/// The recording goes on for this time after a fault, so that it shows how the force ramps out.
+/// Time recorded after a fault, to show how the force ramps out.
 const AFTER_FAULT: Duration = Duration::from_millis(300);
-/// A loop that does not hand its tape over in this time is left out.
+/// A loop that hands over no tape within this time is left out.
 const GATHER_LIMIT: Duration = Duration::from_secs(1);
-/// Requests that wait at once; more are refused.
+/// Most requests queued at once; more are refused.
 const QUEUE: usize = 4;
-/// Recordings of each kind that are kept in the folder: the newest.
+/// Newest recordings of each kind kept in the folder.
 const KEPT_EXITS: usize = 20;
 const KEPT_OTHERS: usize = 100;
 
-/// Why a recording was not saved; the text says what to do.
+/// Failure to save a recording; the text says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
     /// The folder cannot be made.
@@ -30,30 +30,30 @@ pub enum SaveError {
     Folder {
         /// The folder of the recordings.
         folder: PathBuf,
-        /// What the system reports.
+        /// Error of the operating system.
         why: std::io::Error,
     },
     /// The file cannot be written.
     #[error(transparent)]
     File(#[from] FlightError),
-    /// There is no thread to write it.
+    /// The writer thread could not be started.
     #[error("no thread could be started to write it: {0}")]
     Thread(std::io::Error),
-    /// The force loop handed nothing over.
+    /// The force loop handed over no tape.
     #[error("the force loop left no recording")]
     NothingRecorded,
 }
 
-/// The result of one request.
+/// Result of one request.
 pub struct Saved {
-    /// The request of a host, where it was one.
+    /// Ticket of the host's request, if a host asked.
     pub ticket: Option<Ticket>,
-    /// The file.
+    /// The written file.
     pub result: Result<PathBuf, SaveError>,
 }
 
 struct Wanted {
-    /// Part of the name of the file.
+    /// Kind of recording, part of the file name.
     kind: &'static str,
     reason: String,
     due: Instant,
@@ -65,27 +65,27 @@ struct Gathering {
     since: Instant,
     haptic: Option<Option<HapticFlight>>,
     tissue: Option<Option<TissueFlight>>,
-    /// There is nothing to wait for without a second device.
+    /// Without a second device there is no tape to wait for.
     second: Option<Option<SecondFlight>>,
 }
 
-/// The second device's loop has its tapes apart from the others.
+/// Port of the second device's tapes.
 pub type SecondTapes = TapePort<SecondTape>;
 
-/// Ends of the rings of orders to every loop that is recorded.
+/// Order rings of every recorded loop.
 pub struct Orders<'a> {
     pub haptic: &'a mut rtrb::Producer<HapticOrder>,
     pub tissue: &'a mut rtrb::Producer<TissueOrder>,
     pub second: Option<&'a mut rtrb::Producer<SecondOrder>>,
 }
 
-/// Everything that the control thread needs for flight recordings.
+/// The control thread's side of flight recordings.
 pub struct FlightKeeper {
     haptic: TapePort<HapticTape>,
     tissue: TapePort<TissueTape>,
     second: Option<SecondTapes>,
     folder: PathBuf,
-    /// What is the same in every recording of this run.
+    /// Part common to every recording of this run.
     common: Flight,
     queue: VecDeque<Wanted>,
     gathering: Option<Gathering>,
@@ -112,7 +112,7 @@ impl FlightKeeper {
         }
     }
 
-    /// A host asks; false when too many wait already.
+    /// Queues a host's request; false when the queue is full.
     pub fn request(&mut self, ticket: Ticket) -> bool {
         self.want(
             "request",
@@ -122,9 +122,9 @@ impl FlightKeeper {
         )
     }
 
-    /// A loop has raised a fault.
+    /// Queues a recording of a fault.
     pub fn fault(&mut self, message: &str) {
-        // One that is waiting for its time shows this fault as well.
+        // A recording already queued covers this fault as well.
         if !self.queue.iter().any(|w| w.kind == "fault") {
             self.want("fault", message.to_owned(), Instant::now() + AFTER_FAULT, None);
         }
@@ -143,7 +143,7 @@ impl FlightKeeper {
         room
     }
 
-    /// One pass of the control thread; returns what was written since the last.
+    /// Runs one pass of the control thread; returns the recordings written since the last.
     pub fn pass(&mut self, scene_generation: u64, orders: Orders<'_>, lines: &LineArchive) -> Option<Saved> {
         self.take_tapes(scene_generation);
         if let Some(gathering) = self
@@ -200,7 +200,7 @@ impl FlightKeeper {
             .name("flight-writer".to_owned())
             .spawn(move || {
                 let result = save(&flight, &path);
-                // Nobody waits for it once the control thread has ended.
+                // The receiver is gone once the control thread has ended.
                 let _ = sender.send(Saved { ticket, result });
             });
         if let Err(why) = spawned {
@@ -209,7 +209,7 @@ impl FlightKeeper {
         }
     }
 
-    /// After both loops have ended and handed their tapes over.
+    /// Saves the last recording, after both loops have ended and handed over their tapes.
     pub fn save_at_end(&mut self, scene_generation: u64, lines: &LineArchive) -> Result<PathBuf, SaveError> {
         let reason = "rt-core ended".to_owned();
         let wanted = Wanted {
@@ -227,7 +227,8 @@ impl FlightKeeper {
         }
     }
 
-    /// While the force loop stands still: what the other loops hand over within `limit`, or its own tape if it comes back.
+    /// Saves a recording while the force loop is stopped: the tapes that the other loops hand over within `limit`, and
+    /// the force loop's own if it resumes.
     pub fn save_stopped(
         &mut self,
         scene_generation: u64,
@@ -312,7 +313,7 @@ fn save(flight: &Flight, path: &Path) -> Result<PathBuf, SaveError> {
     Ok(path.to_owned())
 }
 
-/// Names begin with the time, so their order is that of time.
+/// Names begin with the time, so they sort by age.
 fn remove_oldest(folder: &Path, of_kind: impl Fn(&str) -> bool, kept: usize) {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let names = entries.map(|e| e.file_name().to_string_lossy().into_owned());

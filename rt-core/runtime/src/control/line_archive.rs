@@ -1,4 +1,4 @@
-//! What lines were made from, for as long as a flight recording may need it: once per line, beside the loops.
+//! Sources of needle lines, kept while a flight recording may need them.
 
 use crate::rt::haptic_tape::HapticFlight;
 use crate::rt::tissue_tape::TissueFlight;
@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_sim::line::{LineSource, LineStations};
 
-/// No tape reaches back so far: the tissue loop's has room for 10 s.
+/// Longer than any tape: the tissue loop's holds 10 s.
 const KEPT: Duration = Duration::from_secs(15);
 
-/// The loop that had a half of a line.
+/// Half of a line, by the loop that uses it.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Half {
     Hand,
@@ -19,18 +19,18 @@ pub(super) enum Half {
 struct KeptLine {
     source: LineSource,
     stations: Arc<LineStations>,
-    /// When each half came back; `None` while a loop has it.
+    /// When each loop returned its half; `None` while it is in use.
     returned: [Option<Instant>; 2],
 }
 
-/// Lines that are in use, and those that were until lately.
+/// Lines in use, and recently used ones.
 #[derive(Default)]
 pub(super) struct LineArchive {
     lines: Vec<KeptLine>,
 }
 
 impl LineArchive {
-    /// Both halves go to their loops.
+    /// Archives a line whose halves go to the loops.
     pub fn keep(&mut self, source: LineSource, stations: Arc<LineStations>) {
         self.drop_old(Instant::now());
         self.lines.push(KeptLine {
@@ -40,7 +40,7 @@ impl LineArchive {
         });
     }
 
-    /// A loop has another line instead.
+    /// Records that a loop replaced its half of the line.
     pub fn returned(&mut self, generation: u64, half: Half) {
         for line in self.lines.iter_mut().filter(|l| l.source.generation == generation) {
             line.returned[half as usize] = Some(Instant::now());
@@ -52,13 +52,13 @@ impl LineArchive {
         self.lines.retain(|line| !line.returned.iter().all(is_old));
     }
 
-    /// Where those load the body that a loop has: a needle may stay in on any of them.
+    /// Returns the lines in use: a needle may stay in on any of them.
     pub fn in_use(&self) -> impl Iterator<Item = &Arc<LineStations>> {
         let is_in_use = |line: &&KeptLine| line.returned.iter().any(Option::is_none);
         self.lines.iter().filter(is_in_use).map(|line| &line.stations)
     }
 
-    /// Those that a recording names.
+    /// Returns the lines that a recording names.
     pub fn of(&self, haptic: Option<&HapticFlight>, tissue: Option<&TissueFlight>) -> Vec<LineSource> {
         let of_haptic = haptic.into_iter().flat_map(HapticFlight::line_numbers);
         let of_tissue = tissue.into_iter().flat_map(TissueFlight::line_numbers);
@@ -79,7 +79,7 @@ mod tests {
             .source()
     }
 
-    /// A line in use may be far older than a tape, and the one before it may be on the tape still.
+    /// A line in use may be far older than a tape, and the line before it may still be on the tape.
     #[test]
     fn a_line_is_kept_while_a_loop_has_it_and_for_a_tape_after_that() {
         let mut archive = LineArchive::default();

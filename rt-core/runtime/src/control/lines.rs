@@ -1,8 +1,8 @@
-//! Lines are prepared while the needle is outside: on a thread of normal priority, for where it would go in.
+//! Prepares needle lines in the background while the needle is outside the tissue.
 //!
-//! A needle that stands still on an axis for [`STEADY`] is taken to go in along it. What a loop has is replaced only when the
-//! needle has moved off it, and while it is in no tissue. Between times the lines of the planned needle and of the one after it
-//! are prepared ahead, and kept until a needle stands there.
+//! A needle that stays on an axis for [`STEADY`] is expected to enter along it. The loops' line is replaced only once
+//! the needle has left its axis, and only while it is outside the tissue. In idle time the lines of the planned needle
+//! and of the one after it are solved ahead and kept until a needle arrives.
 
 use super::line_archive::{Half, LineArchive};
 use crate::lines::{LineBody, NoLine};
@@ -18,15 +18,15 @@ use stylet_sim::line::{HandLine, Line, ReadyLine, Track};
 use stylet_sim::scene::SceneSource;
 use stylet_sim::tissue::TissueSpec;
 
-/// So long the needle keeps its axis before a line is begun.
+/// Time for which the needle must keep its axis before its line is solved.
 const STEADY: Duration = Duration::from_millis(60);
-/// So far an axis may be off what was asked for, at its entry and in direction, and count as the same.
+/// Largest deviation of an axis, at its entry and in direction, that counts as the same.
 const SAME_M: f64 = 3e-4;
 const SAME_RAD: f64 = 5e-3;
-/// A line that both loops were given is in use by then, if the needle is on it.
+/// After this time a line that both loops have counts as in use, if the needle is on it.
 const IN_USE_AFTER: Duration = Duration::from_secs(1);
 
-/// What the thread returns.
+/// Result of the solver thread.
 struct Finished {
     scene_generation: u64,
     stiffness: f64,
@@ -35,7 +35,7 @@ struct Finished {
     line: Result<ReadyLine, NoLine>,
 }
 
-/// A line that waits for its needle.
+/// A line that awaits its needle.
 struct Kept {
     axis: Line,
     line: ReadyLine,
@@ -50,28 +50,28 @@ struct LineTask {
 /// The control thread's side of lines.
 pub struct LinePreparer {
     source: Arc<SceneSource>,
-    /// Body of the scene that runs; `None` until the first line in it, and while one is under way.
+    /// Body of the running scene; `None` before the first line in it, and while a line is being solved.
     body: Option<(u64, LineBody)>,
-    /// Where the needle is, and since when.
+    /// Axis of the needle, and since when.
     steady: Option<(Line, Instant)>,
     under_way: Option<LineTask>,
-    /// The axis of the line that the loops were given last, and when.
+    /// Axis of the line handed over last, and when.
     handed_over: Option<(Line, Instant)>,
-    /// Axes that cannot have one: no tissue there, or none that can be solved for.
+    /// Axes without a line: no tissue there, or none that can be solved for.
     without: Vec<Line>,
     /// The planned needle and the one after it.
     expected: Vec<Line>,
-    /// Of those that are expected.
+    /// Solved lines of the expected needles.
     kept: Vec<Kept>,
     generation: u64,
     tissue: TissueSpec,
-    /// Of an exercise: Young's modulus over that of the scene, and how far the body is moved.
+    /// Stiffness factor of an exercise relative to the scene, and displacement of the body.
     stiffness: f64,
     body_moved_m: [f64; 3],
-    /// The needle bends: lines are solved for across as well.
+    /// The needle bends, so lines are solved across the axis as well.
     bends: bool,
     archive: LineArchive,
-    /// Tracks that needles have cut since the tissue was new, the newest last.
+    /// Tracks cut since the tissue was reset, oldest first.
     tracks: Vec<Track>,
 }
 
@@ -96,12 +96,12 @@ impl LinePreparer {
         }
     }
 
-    /// What the lines of the run were made from, for flight recordings.
+    /// Returns the sources of the run's lines, for flight recordings.
     pub(super) fn archive(&self) -> &LineArchive {
         &self.archive
     }
 
-    /// Another scene runs.
+    /// Switches to another scene.
     pub fn change_scene(&mut self, source: Arc<SceneSource>) {
         self.source = source;
         self.body = None;
@@ -113,7 +113,7 @@ impl LinePreparer {
         self.give_up();
     }
 
-    /// Of tissue that is so many times as stiff from now on: lines are solved for anew.
+    /// Scales the tissue stiffness by `factor` and solves the lines again.
     pub(super) fn stiffen(&mut self, factor: f64) {
         if self.stiffness == factor {
             return;
@@ -126,7 +126,7 @@ impl LinePreparer {
         self.give_up();
     }
 
-    /// The body is there from now on, from where the scene has it: planned needles enter it elsewhere.
+    /// Moves the body from its place in the scene: planned needles enter it elsewhere.
     pub(super) fn move_body(&mut self, by_m: [f64; 3]) {
         let from_m = std::mem::replace(&mut self.body_moved_m, by_m);
         for axis in &mut self.expected {
@@ -135,12 +135,12 @@ impl LinePreparer {
         self.forget_unexpected();
     }
 
-    /// The axis in the body as the scene has it.
+    /// Returns the axis in the scene's own body frame.
     fn in_body(&self, entry_m: [f64; 3], direction: [f64; 3]) -> Option<Line> {
         Line::new([0, 1, 2].map(|a| entry_m[a] - self.body_moved_m[a]), direction)
     }
 
-    /// The needle bends from now on, or no longer. A line for one that does not is of no use to one that does.
+    /// Sets whether the needle bends. A line solved for one case is useless in the other.
     pub(super) fn take_bending(&mut self, bends: bool) {
         if bends && !self.bends {
             self.handed_over = None;
@@ -150,12 +150,12 @@ impl LinePreparer {
         self.bends = bends;
     }
 
-    /// The tissue is new: no needle has been in it.
+    /// Forgets the tracks: the tissue was reset.
     pub fn forget_tracks(&mut self) {
         self.tracks.clear();
     }
 
-    /// The needle of a plan that has come, entry and direction; `None` where it was withdrawn.
+    /// Sets the entry and direction of the plan's current needle; `None` withdraws it.
     pub(super) fn expect_planned(&mut self, needle: Option<([f64; 3], [f64; 3])>) {
         self.expected.clear();
         let axis = needle.and_then(|(entry_m, direction)| self.in_body(entry_m, direction));
@@ -163,7 +163,7 @@ impl LinePreparer {
         self.forget_unexpected();
     }
 
-    /// The needle after the planned one.
+    /// Sets the needle after the planned one.
     pub(super) fn expect_next(&mut self, entry_m: [f64; 3], direction: [f64; 3]) {
         self.expected.truncate(1);
         let axis = self.in_body(entry_m, direction);
@@ -177,7 +177,7 @@ impl LinePreparer {
             .retain(|kept| expected.iter().any(|axis| same(&kept.axis, axis)));
     }
 
-    /// Hands over a line that is ready, and begins one where the needle needs another.
+    /// Hands over a finished line, and begins one for a needle that has none.
     pub(super) fn pass(&mut self, newest: Option<&TickRecord>, scene_generation: u64, loops: &mut ControlPorts) {
         while let Ok(line) = loops.old_hand_lines.pop() {
             self.archive.returned(line.generation, Half::Hand);
@@ -215,7 +215,7 @@ impl LinePreparer {
         }
     }
 
-    /// The axis that a needle outside of the tissue stands on, where the loops have no line for it.
+    /// Returns the axis of a steady needle outside the tissue for which the loops have no line.
     fn axis_without_line(&mut self, record: &TickRecord) -> Option<Line> {
         if record.flags & (flags::IN_CONTACT | flags::HAND_EMPTY) != 0 {
             self.steady = None;
@@ -248,14 +248,14 @@ impl LinePreparer {
         self.without.iter().any(|without| same(without, axis))
     }
 
-    /// The needle there is felt as without a line, until the scene changes.
+    /// Marks an axis as having no line until the scene changes.
     fn do_without(&mut self, axis: Line) {
         const MOST: usize = 64;
         self.without.truncate(MOST - 1);
         self.without.insert(0, axis);
     }
 
-    /// Begins once the thread has ended that is at work on another axis.
+    /// Begins a line once the thread has finished with any other.
     fn begin(&mut self, axis: Line, scene_generation: u64) {
         if self.under_way.is_some() {
             self.give_up();
@@ -294,7 +294,7 @@ impl LinePreparer {
                 line,
             }
         };
-        // Without a thread there is no line; it is tried again at the next pass.
+        // The thread could not be started; the next pass tries again.
         if let Ok(thread) = std::thread::Builder::new().name("needle-line".to_owned()).spawn(work) {
             self.under_way = Some(LineTask { axis, thread, stop });
         }
@@ -344,7 +344,7 @@ impl LinePreparer {
         }
         let source = hand.source().in_tissue_as_stiff(self.stiffness);
         self.archive.keep(source, stations);
-        // Both rings are emptied at every tick: one that is full belongs to a loop that has ended.
+        // The loops empty both rings every tick: a full ring belongs to a loop that has ended.
         let _ = loops.tissue_orders.push(TissueOrder::Line(body));
         let _ = loops.lines.push(hand);
         self.handed_over = Some((axis, Instant::now()));
@@ -357,12 +357,12 @@ impl Drop for LinePreparer {
     }
 }
 
-/// Whether a needle on `axis` counts as one on `of`.
+/// True if a needle on `axis` counts as being on `of`.
 fn same(of: &Line, axis: &Line) -> bool {
     of.is_met_by(&axis.entry_m.into(), &axis.axes[0].into(), SAME_M, SAME_RAD)
 }
 
-/// That of the needle, from hub to tip.
+/// Direction of the needle, from hub to tip.
 fn direction(record: &TickRecord) -> Option<[f64; 3]> {
     let [x, y, z, w] = record.world_from_tool;
     let world_from_tool = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9)?;

@@ -8,14 +8,14 @@ use stylet_shm_schema::{Event, EventKind, Refusal, Reply, Session, Text, TickRec
 
 const ANNOUNCE_NS: u64 = 200_000_000;
 
-/// Everything that hosts hear.
+/// Everything sent to the hosts.
 pub struct Link {
     pub wall: Wall,
     pub session: Session,
     pub answers: Answers,
     events: u64,
     announced_ns: u64,
-    /// Why the bridge was lost last, until another is there.
+    /// Why the bridge was last lost, until it is replaced.
     bridge_lost: Option<String>,
 }
 
@@ -30,12 +30,12 @@ pub struct EventDetails<'a> {
 }
 
 impl EventDetails<'_> {
-    /// Nothing but the time; seen by the control thread.
+    /// Details of an event that the control thread saw just now.
     pub fn now() -> Self {
         Self::at(0, clock::now_ns())
     }
 
-    /// Nothing but the tick of the loop that saw it, and its time.
+    /// Details of an event that a loop saw at `tick`.
     pub fn at(tick: u64, time_ns: u64) -> Self {
         Self {
             code: 0,
@@ -63,7 +63,7 @@ impl Link {
     /// Serves the control thread and sends the heartbeat.
     pub fn announce(&mut self) {
         self.wall.pass();
-        // A bridge that fails again and again for one reason is reported once, or it would drive out all other events.
+        // A bridge that keeps failing for one reason is reported once: otherwise it would displace all other events.
         let lost = self.wall.take_lost();
         if let Some(why) = lost.filter(|why| self.bridge_lost.as_ref() != Some(why)) {
             self.bridge_lost = Some(why.clone());
@@ -85,7 +85,7 @@ impl Link {
         }
     }
 
-    /// Hosts count requests that the bridge has refused with those that were refused here.
+    /// Sends the session. Its count of refusals includes those of the bridge.
     fn send_session(&mut self) {
         let refused = self.session.refused + self.wall.refused();
         self.wall.session(Session {
@@ -94,12 +94,12 @@ impl Link {
         });
     }
 
-    /// The newest record of the force loop.
+    /// Returns the newest record of the force loop.
     pub fn newest_record(&self) -> Option<&TickRecord> {
         self.wall.records.newest()
     }
 
-    /// Takes what the force loop has made and sends it in batches.
+    /// Takes the force loop's records and sends them in batches.
     pub fn send_records(&mut self, records: &mut rtrb::Consumer<TickRecord>) {
         self.wall.records.take(records);
         self.wall.send_records(false);
@@ -120,7 +120,7 @@ impl Link {
         });
     }
 
-    /// Answers a request: with the first tick of the force loop that ran with the change, or a refusal.
+    /// Answers a request with the first force-loop tick that used the change, or with a refusal.
     pub fn answer(&mut self, ticket: Ticket, result: Result<u64, &Refusal>) {
         match result {
             Ok(tick) => {
@@ -135,7 +135,7 @@ impl Link {
         }
     }
 
-    /// Takes word of the tissue loop or the second device's loop that it carried a request out.
+    /// Records that the tissue loop or the second device's loop carried out a request.
     pub fn carried_out(&mut self, ticket: Ticket, tick: u64) {
         if let Some((asker, tick)) = self.answers.carried_out(ticket, tick) {
             self.reply(asker, Ok(tick));
@@ -147,13 +147,13 @@ impl Link {
         self.wall.reply(reply);
     }
 
-    /// A refusal before there was a ticket.
+    /// Refuses a request that has no ticket yet.
     pub fn refuse(&mut self, asker: Asker, refusal: &Refusal) {
         self.session.refused += 1;
         self.reply(asker, Err(refusal));
     }
 
-    /// A refusal of a message that is invalid, which every host learns.
+    /// Refuses an invalid message and reports it to every host.
     pub fn refuse_invalid(&mut self, asker: Asker, refusal: &Refusal) {
         self.report_invalid(refusal);
         self.refuse(asker, refusal);

@@ -6,20 +6,20 @@ use stylet_anatomy::PatientFrame;
 use stylet_shm_schema::{Refusal, RefusalCode};
 use stylet_sim::scene::{Scene, SceneSource};
 
-/// A scene that has been asked for.
+/// A requested scene.
 pub struct Wanted {
     pub ticket: Ticket,
     pub name: String,
     pub patient: PatientFrame,
 }
 
-/// A scene that the thread has built, or why it could not.
+/// A scene that the thread has built, or the error.
 pub struct Loaded {
     pub wanted: Wanted,
     pub scene: Result<(Box<Scene>, SceneSource), Refusal>,
 }
 
-/// One scene at a time.
+/// Builds one scene at a time.
 pub struct SceneLoader {
     busy: bool,
     sender: mpsc::Sender<Loaded>,
@@ -58,7 +58,7 @@ impl SceneLoader {
         Ok(())
     }
 
-    /// A scene that was built since the last call.
+    /// Returns a scene finished since the last call.
     pub fn take(&mut self) -> Option<Loaded> {
         let loaded = self.loaded.try_recv().ok()?;
         self.busy = false;

@@ -1,6 +1,6 @@
-//! The normal-priority thread of the force process: carries out what hosts ask for, and says what the loops have done.
+//! The normal-priority thread of the force process: carries out the requests of hosts and reports what the loops do.
 //!
-//! It meets no host itself: that is for another process behind a [`Wall`].
+//! Hosts are served by another process, behind a [`Wall`].
 
 mod answers;
 mod commands;
@@ -49,43 +49,43 @@ pub use wall::{Boards, BridgeError, Wall, program};
 
 const PASS: Duration = Duration::from_millis(2);
 
-/// The force loop has stopped by itself.
+/// The force loop has stopped unasked.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", LOOP_ENDED)]
 pub struct LoopStopped;
 
-/// What a control thread must know of its run.
+/// Settings of a control thread.
 pub struct ControlSetup {
     /// The haptic device.
     pub device: DeviceInfo,
-    /// What hosts learn about the run.
+    /// Announcement of the run.
     pub session: Session,
-    /// The first scene, as hosts get it.
+    /// First scene, as sent to hosts.
     pub picture: ScenePicture,
-    /// Where its snapshots can be read.
+    /// Board of the first scene's snapshots.
     pub snapshots: SnapshotBoard,
     /// Tissue model of every scene.
     pub tissue: TissueSpec,
-    /// What the first scene was built from.
+    /// Source of the first scene.
     pub source: Arc<SceneSource>,
-    /// The second device, where the run has one.
+    /// Second device, if the run has one.
     pub second: Option<SecondSetup>,
     /// Folder of the flight recordings.
     pub flight_folder: PathBuf,
-    /// Folder of the answers to the probe that were kept.
+    /// Folder of the saved probe answers.
     pub probe_folder: Option<PathBuf>,
-    /// The part that is the same in every flight recording.
+    /// Part common to every flight recording.
     pub flight: Flight,
 }
 
-/// The scene that runs, as hosts get it.
+/// The running scene, as sent to hosts.
 struct RunningScene {
     picture: ScenePicture,
-    /// The next scene, from when the tissue loop is asked for it until it runs.
+    /// The next scene, from the order to the tissue loop until it runs.
     next: Option<(ScenePicture, Arc<SceneSource>, SnapshotBoard)>,
 }
 
-/// Everything that the control thread owns.
+/// State of the control thread.
 pub struct Control {
     link: Link,
     loops: ControlPorts,
@@ -99,9 +99,9 @@ pub struct Control {
     loader: SceneLoader,
     rehearsals: RehearsalRunner,
     lines: LinePreparer,
-    /// Of a run whose second hand holds the probe.
+    /// Present in a run whose second hand holds the probe.
     probe: Option<ProbePreparer>,
-    /// The loops have room for needles that stay in: the force loop, and the tissue loop's tape of that scene.
+    /// Room for needles that stay in was sent: to the force loop, and to the tissue loop's tape of that scene.
     left_rooms: (bool, Option<u64>),
     supervisor: Supervisor,
     second: Option<Second>,
@@ -109,7 +109,7 @@ pub struct Control {
 }
 
 impl Control {
-    /// Announces parameters and plan; everything else follows in [`run`](Self::run).
+    /// Announces parameters and plan; the rest follows in [`run`](Self::run).
     pub fn new(wall: Wall, loops: ControlPorts, (haptic, tissue): TapePorts, setup: ControlSetup) -> Self {
         let session_id = setup.session.session_id;
         let is_real_time = setup.session.haptic.is_fifo();
@@ -147,11 +147,12 @@ impl Control {
         }
     }
 
-    /// Serves hosts until `stopped` or a host asks to end. An error when the force loop has stopped by itself: then
-    /// neither loop must be waited for.
+    /// Serves hosts until `stopped` or a host asks to end. Fails when the force loop has stopped unasked: the loops
+    /// must not be waited for then.
     pub fn run(&mut self, stopped: impl Fn() -> bool) -> Result<(), LoopStopped> {
         while !stopped() && !self.pass()? {
-            // A request is taken as soon as it comes; a pass is never shorter, since the supervisor counts passes.
+            // A request is taken as soon as it arrives; a pass keeps a minimum length because the supervisor counts
+            // passes.
             let begun = Instant::now();
             self.link.wall.wait(PASS);
             if let Some(rest) = PASS.checked_sub(begun.elapsed()) {
@@ -165,20 +166,20 @@ impl Control {
         Ok(())
     }
 
-    /// After the force loop has stopped: gives the others `limit` to hand over what they recorded, and writes it. The force loop's own
-    /// tape is missing unless it comes back meanwhile.
+    /// Saves a recording after the force loop has stopped: gives the other loops `limit` to hand over their tapes. The
+    /// force loop's own tape is missing unless the loop resumes in time.
     pub fn save_flight_of_stopped(&mut self, limit: Duration) -> Result<PathBuf, SaveError> {
         let generation = self.scene.generation();
         self.flights
             .save_stopped(generation, self.lines.archive(), LOOP_ENDED, limit)
     }
 
-    /// After both loops have ended: writes what they recorded last.
+    /// Writes the last recording, after both loops have ended.
     pub fn save_last_flight(&mut self) -> Result<PathBuf, SaveError> {
         self.flights.save_at_end(self.scene.generation(), self.lines.archive())
     }
 
-    /// One pass; true when a host asked to end.
+    /// Runs one pass; true when a host asked to end.
     fn pass(&mut self) -> Result<bool, LoopStopped> {
         self.link.announce();
         let before = self.newest_tick();
@@ -238,7 +239,7 @@ impl Control {
         }
     }
 
-    /// The result is sent before the reply, so that a host that has its reply has everything.
+    /// Sends the result before the reply, so that a host with its reply has everything.
     fn take_rehearsed(&mut self) {
         let Some(ended) = self.rehearsals.take(self.scene.generation()) else {
             return;

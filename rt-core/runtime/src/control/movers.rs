@@ -1,21 +1,21 @@
-//! Hosts that order motions, and what they promise: at most one renewal for each in a pass, however often it is sent.
+//! Hosts that order motions, and their keep-alive promises: at most one renewal per motion in a pass.
 
 use super::Control;
 use crate::rt::exchange::{HapticOrder, Moved, Ticket};
 use crate::rt::motion_lease::Promise;
 use crate::rt::second::SecondOrder;
 
-/// Of each of what is [`Moved`].
+/// State for each kind of [`Moved`].
 #[derive(Default)]
 pub(super) struct Movers {
-    /// Who moves it.
+    /// Host that moves each.
     hosts: [Option<u64>; 3],
-    /// What was promised in this pass.
+    /// Promises received in this pass.
     promises: [Option<Promise>; 3],
 }
 
 impl Movers {
-    /// Takes a promise; one of a host that moves nothing is of no use.
+    /// Takes a promise; ignores one from a host that moves nothing.
     pub fn keep(&mut self, host_id: u64, valid_s: f64) {
         for (promise, mover) in self.promises.iter_mut().zip(self.hosts) {
             if mover == Some(host_id) {
@@ -26,14 +26,14 @@ impl Movers {
 }
 
 impl Control {
-    /// The promise with which a request begins a motion.
+    /// Returns the promise with which a request begins a motion.
     pub(super) fn first_promise(&mut self, ticket: Ticket, what: Moved) -> Option<Promise> {
         let (host_id, _) = self.link.answers.asker(ticket)?;
         self.movers.hosts[what as usize] = Some(host_id);
         Some(Promise::first(host_id))
     }
 
-    /// Hands on what was promised in this pass.
+    /// Passes this pass's promises on to the loops.
     pub(super) fn renew_motions(&mut self) {
         let [needle, second, drawn] = std::mem::take(&mut self.movers.promises);
         // One order renews both motions of the needle's loop.

@@ -1,4 +1,4 @@
-//! What the loops report, as answers and events for hosts.
+//! Turns notices of the loops into answers and events for hosts.
 
 use super::Control;
 use super::link::EventDetails;
@@ -42,7 +42,7 @@ impl Control {
             }
             Notice::Fault { fault, .. } => {
                 self.flights.fault(fault.message());
-                // The supervisor has reported that one when it found it.
+                // The supervisor has already reported this fault.
                 if fault != Fault::LoopStopped {
                     self.report(&notice);
                 }
@@ -51,7 +51,7 @@ impl Control {
         }
     }
 
-    /// Notices that are events and nothing else.
+    /// Reports notices that are only events.
     pub(super) fn report(&mut self, notice: &Notice) {
         let (kind, details) = match *notice {
             Notice::Contact {

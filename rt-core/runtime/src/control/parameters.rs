@@ -1,4 +1,4 @@
-//! Changes of parameters on their way to the loops: each starts from the one before it, and reaches both loops or none.
+//! Parameter changes on their way to the loops: each builds on the one before it, and reaches both loops or neither.
 
 use std::collections::BTreeMap;
 use stylet_shm_schema::{ParameterChange, ParameterSet, ParametersInForce};
@@ -6,7 +6,7 @@ use stylet_shm_schema::{ParameterChange, ParameterSet, ParametersInForce};
 /// The set in force, and those ordered after it.
 pub struct ParameterChanges {
     pub in_force: ParametersInForce,
-    /// By generation.
+    /// Ordered sets by generation.
     ordered: BTreeMap<u64, ParameterSet>,
 }
 
@@ -24,7 +24,7 @@ impl ParameterChanges {
         }
     }
 
-    /// What will be in force once every change has arrived, with `changes` made to it.
+    /// Returns the set that follows all ordered changes, with `changes` applied.
     pub fn with(&self, changes: &[ParameterChange]) -> ParameterSet {
         let mut set = self.ordered.values().next_back().copied().unwrap_or(self.in_force.set);
         for change in changes {
@@ -42,12 +42,12 @@ impl ParameterChanges {
             + 1
     }
 
-    /// A change was ordered from the loops.
+    /// Records that a change was ordered from the loops.
     pub fn ordered(&mut self, generation: u64, set: ParameterSet) {
         self.ordered.insert(generation, set);
     }
 
-    /// The force loop has taken a change up; true when it was one of these.
+    /// Records that the force loop applied a generation; true if it was an ordered change.
     pub fn take_effect(&mut self, generation: u64, tick: u64) -> bool {
         let Some(set) = self.ordered.remove(&generation) else {
             return false;
@@ -71,7 +71,8 @@ mod tests {
         [ParameterChange { id, value }]
     }
 
-    /// A change that came before the last one was in force used to start from the set in force, and undid the last one.
+    /// A change that arrived before the last one was in force used to start from the set in force, and undid the last
+    /// one.
     #[test]
     fn a_second_change_in_flight_keeps_the_first() {
         let mut changes = ParameterChanges::new(7);

@@ -1,4 +1,4 @@
-//! What hosts need to draw a scene and to plan in it.
+//! Geometry that hosts need to draw a scene and to plan in it.
 
 use super::wall::Wall;
 use std::os::fd::OwnedFd;
@@ -8,10 +8,10 @@ use stylet_sim::scene::{Role, Scene, Structure, label_grid};
 use stylet_wall::board::Writer;
 use stylet_wall::packet::{BoardSize, sealed};
 
-/// Where the snapshots of a scene can be read.
+/// Board of a scene's snapshots.
 pub type SnapshotBoard = (BoardSize, OwnedFd);
 
-/// A board for the snapshots of `scene`: one end for its tissue loop, one for the control thread.
+/// Makes a board for the snapshots of `scene`: one end for its tissue loop, one for the control thread.
 pub fn snapshot_board(scene: &Scene) -> std::io::Result<(Writer<SnapshotHeader, Vertex>, SnapshotBoard)> {
     let len = scene.surface.vertex_elements.len() + scene.nodes.elements.len();
     let (writer, memory) = Writer::new("stylet-snapshots", len)?;
@@ -25,22 +25,22 @@ pub struct ScenePicture {
 }
 
 impl ScenePicture {
-    /// The first scene of a run, which is built in.
+    /// Returns the picture of a run's first, built-in scene.
     pub fn first(scene: &Scene, session_id: u64) -> Self {
         Self::of(scene, session_id, 1, PatientFrame::default())
     }
 
-    /// As it is sent: rest positions and triangles behind the header.
+    /// Returns the header, and the rest positions and triangles behind it.
     pub fn parts(&self) -> (&SceneHeader, &[u32]) {
         (&self.header, &self.words)
     }
 
-    /// Words behind the header.
+    /// Number of words behind the header.
     pub fn word_count(&self) -> usize {
         self.words.len()
     }
 
-    /// Shows it to hosts, with the board of its snapshots where that is new.
+    /// Shows the picture to hosts, with the board of its snapshots if that is new.
     pub(super) fn show(&self, wall: &mut Wall, snapshots: Option<SnapshotBoard>) {
         match sealed("stylet-scene", &self.words) {
             Ok(words) => wall.scene(self.header, words, snapshots),
@@ -89,7 +89,7 @@ impl ScenePicture {
     }
 }
 
-/// Four cells in a word, lowest byte first; no tissue where there are fewer.
+/// Packs four cells into a word, lowest byte first; missing cells count as no tissue.
 fn packed(cells: &[u8]) -> u32 {
     let mut bytes = [0; 4];
     bytes[..cells.len()].copy_from_slice(cells);

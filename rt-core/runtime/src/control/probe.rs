@@ -1,4 +1,5 @@
-//! What the ultrasound probe can press is solved for beside the loops, once for each scene of a run whose second hand holds it.
+//! Solves in the background for the answers of the ultrasound probe, once per scene of a run whose second hand holds
+//! it.
 
 use crate::lines::{LineBody, NoProbe};
 use crate::rt::exchange::TissueOrder;
@@ -13,7 +14,7 @@ use stylet_sim::probe::{BodyProbe, NoWall, ProbeShape};
 use stylet_sim::scene::SceneSource;
 use stylet_sim::tissue::TissueSpec;
 
-/// A probe, and what is to be said of it.
+/// A probe, and its report to the user.
 struct Found {
     probe: BodyProbe,
     said: Option<String>,
@@ -29,12 +30,12 @@ struct Task {
 pub struct ProbePreparer {
     source: Arc<SceneSource>,
     tissue: TissueSpec,
-    /// Answers that took minutes.
+    /// Folder of saved answers, which took minutes to solve.
     kept_in: Option<PathBuf>,
     under_way: Option<Task>,
-    /// The scene has its probe, or has none.
+    /// The scene has its probe, or cannot have one.
     is_settled: bool,
-    /// The force loop has room to record what probes do to its line.
+    /// The force loop has room to record the probe's effect on its line.
     has_sent_room: bool,
 }
 
@@ -50,14 +51,14 @@ impl ProbePreparer {
         }
     }
 
-    /// Another scene runs.
+    /// Switches to another scene.
     pub fn change_scene(&mut self, source: Arc<SceneSource>) {
         self.source = source;
         self.is_settled = false;
         self.give_up();
     }
 
-    /// Frees what came back, hands over what is ready, and begins what is missing. What there is to say of it, once.
+    /// Frees returned memory, hands over a finished probe, and begins a missing one. Returns its report once.
     pub(super) fn pass(&mut self, scene_generation: u64, loops: &mut ControlPorts) -> Option<String> {
         while loops.old_probes.pop().is_ok() {}
         if self.is_settled {
@@ -101,7 +102,7 @@ impl ProbePreparer {
                 !stopped.load(Ordering::Relaxed)
             })
         };
-        // Without a thread there is no probe; it is tried again at the next pass.
+        // The thread could not be started; the next pass tries again.
         if let Ok(thread) = std::thread::Builder::new().name("probe".to_owned()).spawn(work) {
             self.under_way = Some(Task {
                 scene_generation,
@@ -119,7 +120,7 @@ impl ProbePreparer {
     }
 }
 
-/// What was kept for this scene, or what is solved for within seconds.
+/// Returns the scene's saved answers, or solves the coarse ones within seconds.
 fn find(
     body: &LineBody,
     source: &SceneSource,
@@ -148,7 +149,7 @@ fn find(
     Ok(Found { probe, said })
 }
 
-/// What to type for a scene.
+/// Command line that solves for a scene's probe.
 fn command_for(source: &SceneSource) -> String {
     match source {
         SceneSource::Builtin(name) => format!("'rt-core probe --scene {name}'"),

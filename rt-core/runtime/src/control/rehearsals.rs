@@ -1,4 +1,4 @@
-//! Rehearsals that hosts ask for: one at a time, on a thread of normal priority, beside the running scene.
+//! Runs rehearsals for hosts: one at a time, in the background, while the scene keeps running.
 
 use crate::rehearse::{NeedleRun, RehearseError, Rehearsed, Stage, timed};
 use crate::rt::exchange::Ticket;
@@ -12,16 +12,16 @@ use stylet_sim::tissue::TissueSpec;
 
 const PANICKED: &str = "the rehearsal stopped with an internal fault; the output of rt-core says where. The next one starts with a new state";
 
-/// What the thread returns.
+/// Result of the thread.
 struct Finished {
     scene_generation: u64,
     wall_ns: u64,
     outcome: Result<Rehearsed, RehearseError>,
-    /// Kept for the next rehearsal.
+    /// Stage kept for the next rehearsal.
     stage: Option<Stage>,
 }
 
-/// A rehearsal that has ended.
+/// A finished rehearsal.
 pub struct Ended {
     pub ticket: Ticket,
     pub outcome: Result<Box<Rehearsal>, Refusal>,
@@ -32,7 +32,7 @@ pub struct RehearsalRunner {
     source: Arc<SceneSource>,
     tissue: TissueSpec,
     device: DeviceInfo,
-    /// Body of the scene that runs; `None` until the first rehearsal in it, and while one is under way.
+    /// Body of the running scene; `None` before its first rehearsal, and while one runs.
     stage: Option<(u64, Stage)>,
     under_way: Option<(Ticket, JoinHandle<Finished>)>,
     stop: Arc<AtomicBool>,
@@ -50,13 +50,13 @@ impl RehearsalRunner {
         }
     }
 
-    /// Another scene runs; a rehearsal under way ends in the one that it began in.
+    /// Switches to another scene; a running rehearsal ends in the scene that it began in.
     pub fn change_scene(&mut self, source: Arc<SceneSource>) {
         self.source = source;
         self.stage = None;
     }
 
-    /// Begins one, unless another is under way.
+    /// Begins a rehearsal, unless another runs.
     pub fn begin(
         &mut self,
         ticket: Ticket,
@@ -96,7 +96,7 @@ impl RehearsalRunner {
         Ok(())
     }
 
-    /// One that has ended since the last call.
+    /// Returns a rehearsal that has ended since the last call.
     pub fn take(&mut self, scene_generation: u64) -> Option<Ended> {
         let (ticket, thread) = self.under_way.take_if(|(_, thread)| thread.is_finished())?;
         let Ok(finished) = thread.join() else {

@@ -1,4 +1,4 @@
-//! Payloads of requests as the loops take them.
+//! Payloads of requests, converted for the loops.
 
 use crate::rehearse::NeedleRun;
 use stylet_hw::HandGoal;

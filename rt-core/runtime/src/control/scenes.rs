@@ -1,4 +1,4 @@
-//! From a scene that a host asks for to the scene that runs.
+//! Takes a scene from the host's request until it runs.
 
 use super::answers::Asker;
 use super::link::EventDetails;
@@ -84,10 +84,10 @@ impl Control {
         }
     }
 
-    /// Sends a scene that has been built to the tissue loop.
+    /// Orders a built scene from the tissue loop.
     fn order_scene(&mut self, Loaded { wanted, scene }: Loaded) -> Result<(), Refusal> {
         let (scene, source) = scene?;
-        // Changes on their way to the tissue loop reach it before the scene does.
+        // Changes already ordered reach the tissue loop before the scene does.
         let active = activate(&self.parameters.with(&[]), &self.device)?;
         let (generation, session_id) = (self.scene.generation() + 1, self.link.session.session_id);
         let mut world = World::new(*scene, self.tissue, active.limits, generation)
@@ -112,7 +112,7 @@ impl Control {
         Ok(())
     }
 
-    /// The tissue loop runs the next scene, from `tick` on.
+    /// Records that the tissue loop runs the next scene from `tick` on.
     pub(super) fn scene_taken_up(&mut self, generation: u64, tick: u64) {
         if let Some((picture, source, snapshots)) = self.scene.next.take() {
             self.scene.picture = picture;

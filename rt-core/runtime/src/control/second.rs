@@ -1,4 +1,4 @@
-//! The control thread's part for the second device: orders to its loop, records and faults of it to the hosts.
+//! The control thread's side of the second device: orders to its loop, records and faults to the hosts.
 
 use super::Control;
 use super::link::{EventDetails, Link};
@@ -11,27 +11,27 @@ use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{EventKind, Fault, ProbeMove, Refusal, RefusalCode, SecondRecord};
 use stylet_sim::force::GateParameters;
 
-/// What a control thread must know of the second device.
+/// Settings of the second device for a control thread.
 pub struct SecondSetup {
-    /// Its figures.
+    /// Properties of the device.
     pub device: DeviceInfo,
-    /// The control thread's ends of its rings, less the tapes.
+    /// The control thread's ends of its rings, except the tapes.
     pub ports: SecondControlPorts,
 }
 
-/// Of a run with a second device.
+/// Present in a run with a second device.
 pub(super) struct Second {
     device: DeviceInfo,
     pub(super) orders: rtrb::Producer<SecondOrder>,
     notices: rtrb::Consumer<Notice>,
     records: rtrb::Consumer<SecondRecord>,
     supervisor: Supervisor,
-    /// Its loop stands still, and hosts know it.
+    /// The loop has stopped, and hosts have been notified.
     has_stopped: bool,
 }
 
 impl Second {
-    /// Beside its tapes, which go to the keeper of flight recordings.
+    /// Also returns the tapes, which go to the keeper of flight recordings.
     pub fn new(setup: SecondSetup, is_real_time: bool) -> (Self, super::flight::SecondTapes) {
         let SecondSetup { device, ports } = setup;
         let second = Self {
@@ -45,18 +45,19 @@ impl Second {
         (second, ports.tapes)
     }
 
-    /// An order whose loss its loop survives: one that stands still has no room for it, and takes nothing from the needle's.
+    /// Sends an order that the loop can afford to lose. A stopped loop has no room for it, and the needle's loop is not
+    /// affected.
     pub fn order(&mut self, order: SecondOrder) {
         let _ = self.orders.push(order);
     }
 
-    /// Returns the ticket that its loop answers a change under that all loops share. One that stands still answers none: it takes the
-    /// change up before its next tick.
+    /// Returns the ticket under which its loop answers a change that all loops share. A stopped loop does not answer:
+    /// it applies the change before its next tick.
     pub fn shared(&self, ticket: Ticket) -> Ticket {
         if self.has_stopped { 0 } else { ticket }
     }
 
-    /// Returns the order for the gate within the limits of this device.
+    /// Returns the gate order within the limits of this device.
     pub fn gate_order(&self, ticket: Ticket, generation: u64, run: &GateParameters) -> SecondOrder {
         SecondOrder::Gate {
             ticket: self.shared(ticket),
@@ -70,7 +71,7 @@ impl Second {
         pushed.map_err(|_| RefusalCode::TooManyRequests.into())
     }
 
-    /// Records to the hosts, and a word where the loop has stopped. The needle's loop goes on.
+    /// Sends records to the hosts, and reports a stopped loop. The needle's loop continues.
     fn pass(&mut self, link: &mut Link) {
         let made_a_tick = link.wall.second_records.take(&mut self.records);
         let stands_still = self.supervisor.pass(made_a_tick);
@@ -90,7 +91,7 @@ impl Second {
 }
 
 impl Control {
-    /// Records, notices and the state of the second device's loop.
+    /// Serves records, notices and the state of the second device's loop.
     pub(super) fn pass_second(&mut self) {
         while let Some(Ok(notice)) = self.second.as_mut().map(|second| second.notices.pop()) {
             self.take_second_notice(&notice);
@@ -124,7 +125,7 @@ impl Control {
         }
     }
 
-    /// What both hands are ordered alike; nothing without a second device.
+    /// Sends an order that applies to both hands; does nothing without a second device.
     pub(super) fn order_second(&mut self, order: SecondOrder) {
         if let Some(second) = &mut self.second {
             second.order(order);

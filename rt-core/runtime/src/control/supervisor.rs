@@ -1,8 +1,8 @@
 //! Detects that the haptic loop itself has stopped: the one fault that the loop cannot detect.
 //!
-//! It runs in the control thread, at normal priority. A loop that stands still leaves its last force on the device. Over real motors
-//! the process ends, and the device's own watchdog, or the closing of its port, takes the force away. A simulated device has
-//! no motors: the fault is reported, and the run goes on with the force off when the loop comes back.
+//! It runs in the control thread, at normal priority. A stopped loop leaves its last force on the device. With real
+//! motors the process ends, and the device's own watchdog, or the closing of its port, removes the force. A simulated
+//! device has no motors: the fault is reported, and the run continues with the force off when the loop resumes.
 
 use super::link::EventDetails;
 use super::{Control, LoopStopped};
@@ -13,23 +13,23 @@ use stylet_shm_schema::{EventKind, Fault};
 ///
 /// Passes, not time: while the whole process is stopped, neither advances.
 const PATIENCE_PASSES: u32 = 125;
-/// The same for a loop of normal priority that moves no motors: a busy machine keeps it from its processor for longer than that, and what
-/// is late there is not dead.
+/// Patience for a loop of normal priority that moves no motors: a busy machine keeps it off its core for longer, and a
+/// late loop is not a dead one.
 const PATIENCE_PASSES_UNHURRIED: u32 = 1000;
 
-/// One for a control thread.
+/// Counts passes without a tick, for one loop.
 pub struct Supervisor {
     patience_passes: u32,
     without_tick: u32,
     is_simulated: bool,
-    /// Hosts know that the loop stands still.
+    /// Hosts have been notified that the loop is stopped.
     is_reported: bool,
-    /// The loop still has to get its order, which had no room for it.
+    /// The loop's order is still to be sent: its ring was full.
     owes_order: bool,
 }
 
 impl Supervisor {
-    /// Of a loop that runs in real time or not, over a device that is simulated or not.
+    /// Returns a supervisor with the patience for this scheduling and device.
     pub fn new(is_real_time: bool, is_simulated: bool) -> Self {
         Self {
             patience_passes: match is_simulated && !is_real_time {
@@ -43,13 +43,13 @@ impl Supervisor {
         }
     }
 
-    /// One pass; true when the loop must be taken for dead.
+    /// Counts one pass; true while the loop counts as dead.
     pub fn pass(&mut self, made_a_tick: bool) -> bool {
         self.without_tick = if made_a_tick { 0 } else { self.without_tick + 1 };
         self.without_tick >= self.patience_passes
     }
 
-    /// One pass; true when it is the first since the last tick that takes the loop for dead.
+    /// Counts one pass; true on the first pass since the last tick at which the loop counts as dead.
     fn finds_stopped(&mut self, made_a_tick: bool) -> bool {
         let stands_still = self.pass(made_a_tick);
         let was_reported = std::mem::replace(&mut self.is_reported, stands_still);
@@ -58,7 +58,7 @@ impl Supervisor {
 }
 
 impl Control {
-    /// One pass. An error when the run must end, so that a real device is released.
+    /// Runs one pass. Fails when the run must end, to release a real device.
     pub(super) fn supervise(&mut self, made_a_tick: bool) -> Result<(), LoopStopped> {
         if self.supervisor.finds_stopped(made_a_tick) {
             let text = match self.supervisor.is_simulated {
@@ -86,7 +86,7 @@ impl Control {
     }
 }
 
-/// What hosts and the terminal read when the run ends.
+/// Message to hosts and the terminal when the run ends.
 pub(crate) const LOOP_ENDED: &str =
     "the force loop has stopped; rt-core ended, so that the device is released: start it again";
 
@@ -105,7 +105,8 @@ mod tests {
         assert!(supervisor.pass(false));
     }
 
-    /// On two cores that built other programs a core without real time ended itself while a client watched, after 9, 13 and 410 s.
+    /// On two cores that compiled other programs, a core without real time ended itself while a client was connected,
+    /// after 9, 13 and 410 s.
     #[test]
     fn only_a_loop_of_normal_priority_without_motors_is_waited_for_longer() {
         let passes = |is_real_time, is_simulated| {

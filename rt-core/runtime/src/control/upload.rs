@@ -1,15 +1,15 @@
-//! A volume that a host sends: its header, validated, as labels for a scene.
+//! Validates the header of a volume that a host sends, and makes labels for a scene.
 
 use stylet_shm_schema::{MAX_STRUCTURES, UploadHeader, UploadStructure, check, role};
 use stylet_sim::limits::AxisLimits;
 use stylet_sim::scene::{Labels, Material, Role, Structure, Surroundings};
 
-/// Every problem with the header of an upload, one a line.
+/// Every problem with the header of an upload, one per line.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.join("\n"))]
 pub struct InvalidUpload(Vec<String>);
 
-/// Lists every problem with the header. Labels, materials and how they go together are checked by the scene.
+/// Lists every problem with the header. The scene checks labels, materials and their combination.
 pub fn labels(header: &UploadHeader, cells: &[u8]) -> Result<Labels, InvalidUpload> {
     let mut problems = Vec::new();
     let expected = header.dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(u64::from(d)));

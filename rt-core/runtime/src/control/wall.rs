@@ -1,7 +1,8 @@
-//! The force process's side of the wall: starts the bridge, says to it what hosts hear, and starts it anew where it fails.
+//! The force process's side of the wall: starts the bridge, sends it everything for hosts, and restarts it when it
+//! fails.
 //!
-//! What comes from the bridge is input from outside. What a new bridge needs is kept here: the newest of each state, the last
-//! events and answers, and 12 s of records.
+//! Input from the bridge is untrusted. State for a new bridge is kept here: the newest of each state, the last events
+//! and answers, and 12 s of records.
 
 mod child;
 mod journal;
@@ -25,9 +26,9 @@ use std::time::{Duration, Instant};
 use stylet_shm_schema::*;
 use stylet_wall::packet::{Alive, BoardSize, Kind, Socket, Start, unsealed};
 
-/// Packets of the bridge that are taken in one pass; the others wait in its socket.
+/// Most packets of the bridge taken in one pass; the rest wait in its socket.
 const MOST_PACKETS: usize = 256;
-/// How often it is looked whether a host complains, and how long an epoch lasts at least.
+/// Interval between checks for complaints of hosts, and shortest life of an epoch.
 const COMPLAINTS_EVERY: Duration = Duration::from_millis(100);
 const SHORTEST_EPOCH: Duration = Duration::from_secs(2);
 const FIRST_START: Duration = Duration::from_secs(20);
@@ -38,7 +39,7 @@ const REHEARSALS_KEPT: usize = 8;
 /// Largest volume that a host may send, in cells.
 const MOST_CELLS: usize = 64 << 20;
 
-/// Why there is no bridge at the start of a run.
+/// Failure to start the bridge at the beginning of a run.
 #[derive(Debug, thiserror::Error)]
 pub enum BridgeError {
     /// The folder of the instance cannot be used.
@@ -47,33 +48,33 @@ pub enum BridgeError {
     /// The program cannot be started.
     #[error("cannot start {program}: {why}. It comes with rt-core: build or install both")]
     Spawn {
-        /// Where it was looked for.
+        /// Path of the program.
         program: String,
-        /// What the system reports.
+        /// Error of the operating system.
         why: std::io::Error,
     },
-    /// It was started and ended.
+    /// The bridge started and then ended.
     #[error("{0}")]
     Failed(String),
 }
 
 /// Boards of the loops, for each new bridge.
 pub struct Boards {
-    /// Of the force loop.
+    /// Board of the force loop.
     pub state: OwnedFd,
-    /// Of the second device's loop.
+    /// Board of the second device's loop.
     pub second_state: Option<OwnedFd>,
 }
 
-/// What hosts ask for.
+/// A request of a host.
 pub enum Asked {
     /// A request as plain data.
     Command(Box<Command>),
-    /// A volume, and its cells.
+    /// A volume and its cells.
     Volume(Box<UploadHeader>, Vec<u8>),
 }
 
-/// One for a run.
+/// The force process's connection to its bridge; one per run.
 pub struct Wall {
     running: Option<Running>,
     outbox: Outbox,
@@ -85,23 +86,23 @@ pub struct Wall {
     /// Records of the second device's loop.
     pub second_records: Journal<SecondRecord>,
     asked: VecDeque<Asked>,
-    /// Somebody takes snapshots: read by the tissue loop.
+    /// A host takes snapshots: read by the tissue loop.
     is_watched: Arc<AtomicBool>,
-    /// Requests that bridges of this run have refused by themselves.
+    /// Requests refused by the bridges of this run.
     refused: u64,
     tried: Instant,
-    /// When complaints were looked for.
+    /// Time of the last check for complaints.
     looked: Instant,
-    /// Why the last bridge is gone, until somebody takes it.
+    /// Why the last bridge ended, until it is taken.
     lost: Option<String>,
-    /// Killed, and not gone yet.
+    /// Killed, but not reaped yet.
     dying: Vec<Child>,
-    /// Goes last: with it go the files of the instance.
+    /// Last field, so dropped last: dropping it removes the instance's files.
     owned: Owned,
 }
 
 impl Wall {
-    /// Starts the first bridge and waits until its ports are there.
+    /// Starts the first bridge and waits until its ports are open.
     pub fn new(owned: Owned, start: Start, boards: Boards, is_watched: Arc<AtomicBool>) -> Result<Self, BridgeError> {
         let mut wall = Self {
             running: None,
@@ -149,7 +150,7 @@ impl Wall {
         self.running.as_ref().is_some_and(|running| running.is_ready)
     }
 
-    /// Until the bridge says something, and no longer than that.
+    /// Waits for the bridge, at most `longest`.
     pub fn wait(&self, longest: Duration) {
         match &self.outbox.socket {
             Some(socket) => {
@@ -163,7 +164,7 @@ impl Wall {
         }
     }
 
-    /// One pass: sends what waits, takes what the bridge says, and looks whether it lives.
+    /// Runs one pass: sends queued packets, takes the bridge's packets, and checks that it lives.
     pub fn pass(&mut self) {
         self.outbox.flush();
         self.receive();
@@ -180,46 +181,46 @@ impl Wall {
         }
     }
 
-    /// Why the last bridge went, once.
+    /// Returns once why the last bridge was lost.
     pub fn take_lost(&mut self) -> Option<String> {
         self.lost.take()
     }
 
-    /// What hosts have asked for, in order.
+    /// Returns the next request of a host, in order.
     pub fn take_asked(&mut self) -> Option<Asked> {
         self.asked.pop_front()
     }
 
-    /// Requests that bridges have refused by themselves.
+    /// Number of requests refused by the bridges.
     pub fn refused(&self) -> u64 {
         self.refused + self.running.as_ref().map_or(0, |running| running.refused)
     }
 
-    /// Sends records that are due; all of them where `at_once`.
+    /// Sends records that are due, or all if `at_once`.
     pub fn send_records(&mut self, at_once: bool) {
         self.records.send(&mut self.outbox, at_once);
         self.second_records.send(&mut self.outbox, at_once);
     }
 
-    /// Says which run this is.
+    /// Announces the session.
     pub fn session(&mut self, session: Session) {
         self.kept.session = Some(session);
         self.outbox.put(Kind::Session, bytemuck::bytes_of(&session), None);
     }
 
-    /// Says which parameters are in force.
+    /// Announces the parameters in force.
     pub fn parameters(&mut self, parameters: ParametersInForce) {
         self.kept.parameters = Some(parameters);
         self.outbox.put(Kind::Parameters, bytemuck::bytes_of(&parameters), None);
     }
 
-    /// Says which plan is in force.
+    /// Announces the plan in force.
     pub fn plan(&mut self, plan: PlanInForce) {
         self.kept.plan = Some(plan);
         self.outbox.put(Kind::Plan, bytemuck::bytes_of(&plan), None);
     }
 
-    /// Says what happened.
+    /// Sends an event.
     pub fn event(&mut self, event: Event) {
         keep(&mut self.kept.events, event, EVENTS_KEPT);
         self.outbox.put(Kind::Event, bytemuck::bytes_of(&event), None);
@@ -231,7 +232,7 @@ impl Wall {
         self.outbox.put(Kind::Reply, bytemuck::bytes_of(&reply), None);
     }
 
-    /// Says where seeds would end.
+    /// Sends the result of a rehearsal.
     pub fn rehearsal(&mut self, rehearsal: Rehearsal) {
         self.outbox.put(Kind::Rehearsal, bytemuck::bytes_of(&rehearsal), None);
         keep(&mut self.kept.rehearsals, Box::new(rehearsal), REHEARSALS_KEPT);
@@ -255,7 +256,8 @@ impl Wall {
             why,
         };
         let (socket, end) = Socket::pair().map_err(failed)?;
-        // No `pre_exec`: then the child is made without a copy of this process's page tables, which would cost its loops page faults.
+        // No `pre_exec`: then the child is made without a copy of this process's page tables, which would cost its
+        // loops page faults.
         let child = Process::new(&self.program)
             .arg(epoch.instance().name())
             .arg(epoch.folder())
@@ -284,7 +286,7 @@ impl Wall {
             let _ = running.child.kill();
             self.dying.push(running.child);
             if running.is_ready {
-                // The next one at once; one that never came up is waited with.
+                // Retry at once; a bridge that never came up is retried after a pause.
                 self.tried = self.tried.checked_sub(RETRY_EVERY).unwrap_or(self.tried);
             }
         }
@@ -320,13 +322,13 @@ impl Wall {
                         .map(|(header, cells)| Asked::Volume(Box::new(header), cells));
                     self.asked.extend(volume);
                 }
-                // What only this side says, or says again.
+                // Kinds that only this side sends, or duplicates.
                 _ => {}
             }
         }
     }
 
-    /// Why the bridge must be started anew.
+    /// Returns why the bridge must be restarted.
     fn trouble(&mut self) -> Option<String> {
         let running = self.running.as_mut()?;
         if let Some(why) = running.end(self.outbox.is_closed) {
@@ -334,7 +336,7 @@ impl Wall {
         }
         if self.looked.elapsed() >= COMPLAINTS_EVERY {
             self.looked = Instant::now();
-            // A host that writes wildly may have written here: then no other would find the core.
+            // A host that writes out of bounds may have written here: no other host would then find the core.
             if running.is_ready && self.owned.instance().epoch().as_ref() != Some(&running.epoch) {
                 let _ = self.owned.announce(&running.epoch);
             }
@@ -356,7 +358,7 @@ impl Drop for Wall {
             self.outbox.flush();
             self.send_records(true);
         }
-        // What was said last is read before the other end sees that this one is closed.
+        // Reads the last packets before the other end sees that this one is closed.
         self.outbox = Outbox::default();
         if let Some(mut running) = self.running.take() {
             let ended = Instant::now();

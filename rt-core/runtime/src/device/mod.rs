@@ -1,4 +1,4 @@
-//! Which haptic device a run uses: from the name that the operator gives to a device that is open.
+//! Opens the haptic device that the operator named.
 
 mod motion;
 
@@ -15,13 +15,13 @@ use stylet_hw::{
 use stylet_shm_schema::ThreadReport;
 use stylet_sim::scene::Scene;
 
-/// Rate of a servo loop beside the force loop.
+/// Rate of a driver's servo loop.
 const SERVO_HZ: u32 = 1000;
-/// The servo thread has priority over the force loop, which waits for its samples.
+/// Priority of the servo thread over the force loop, which waits for its samples.
 const SERVO_AHEAD: u32 = 5;
 
-/// A back end of [`backend::BACKENDS`] as the operator named it, with what followed the colon: the name of a Phantom in the
-/// driver's set-up, or the file of a recorded motion.
+/// A back end of [`backend::BACKENDS`] as the operator named it, with the text after the colon: the name of a Phantom
+/// in the driver's configuration, or the file of a recorded motion.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeviceChoice {
     kind: BackendKind,
@@ -38,8 +38,8 @@ impl Default for DeviceChoice {
 }
 
 impl DeviceChoice {
-    /// Both hands cannot hold one device; a recorded motion or a simulation can be had twice. OpenHaptics serves all its devices in one
-    /// loop, which is not built here for two.
+    /// True if both hands cannot use these two. A recorded motion or a simulation can be used twice. OpenHaptics serves
+    /// all its devices in one loop, which this program does not support for two.
     pub fn excludes(&self, other: &Self) -> bool {
         let is_hardware = !matches!(self.kind, BackendKind::Simulated | BackendKind::Replay);
         is_hardware && self.kind == other.kind && (self == other || self.kind == BackendKind::Phantom)
@@ -56,12 +56,12 @@ impl FromStr for DeviceChoice {
     }
 }
 
-/// Every name that [`DeviceChoice`] accepts, with its help.
+/// Lists every name that [`DeviceChoice`] accepts, with its help.
 pub fn help() -> String {
     backend::help()
 }
 
-/// Libraries of makers and addresses of their services, where they are not the usual ones.
+/// Vendor libraries and addresses of their services, if not the defaults.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Libraries {
     /// OpenHaptics.
@@ -73,7 +73,8 @@ pub struct Libraries {
 }
 
 impl Libraries {
-    /// What the command line names, else what the environment does: `STYLET_LIBHD`, `STYLET_LIBDRD`, `STYLET_HAPLY_URL`.
+    /// Returns the command line's values, else those of the environment: `STYLET_LIBHD`, `STYLET_LIBDRD`,
+    /// `STYLET_HAPLY_URL`.
     pub fn or_of_environment(libhd: Option<&Path>, libdrd: Option<&Path>, haply_url: Option<&str>) -> Self {
         let or = |named: Option<&Path>, variable| {
             let from_environment = || std::env::var_os(variable).map(PathBuf::from);
@@ -88,7 +89,7 @@ impl Libraries {
         }
     }
 
-    /// The Inverse service that is named, or the usual one.
+    /// Returns the named Inverse service, or the default.
     pub fn inverse_service(&self) -> Result<haply::Service, haply::BadAddress> {
         self.haply_url
             .as_deref()
@@ -96,7 +97,7 @@ impl Libraries {
     }
 }
 
-/// Why a device could not be opened; the text says what to do.
+/// Failure to open a device; the text says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
     /// The Phantom.
@@ -108,10 +109,10 @@ pub enum DeviceError {
     /// The device of Haply.
     #[error("{0}\nOr start with --device simulated.")]
     Haply(#[from] haply::OpenError),
-    /// What `--haply-url` or its variable names.
+    /// The address in `--haply-url` or its variable is invalid.
     #[error("--haply-url: {0}")]
     Service(#[from] haply::BadAddress),
-    /// What followed the colon is not the number of a device.
+    /// The text after the colon is not a device number.
     #[error("--device force-dimension:{0}: give the number of a device, from 0; rt-core devices lists them")]
     Number(String),
     /// The recorded motion.
@@ -119,10 +120,10 @@ pub enum DeviceError {
     Motion(#[from] motion::MotionError),
 }
 
-/// How far outside the body a hand begins, m.
+/// Distance outside the body at which a hand begins, m.
 const BEFORE_BODY_M: f64 = 0.03;
 
-/// Where the hand with the needle begins: outside the body and below the target.
+/// Start of the hand with the needle: outside the body and below the target.
 pub fn needle_start(scene: &Scene) -> Vector3<f64> {
     let (lower, upper) = scene.target_bounds_m();
     Vector3::new(
@@ -132,7 +133,7 @@ pub fn needle_start(scene: &Scene) -> Vector3<f64> {
     )
 }
 
-/// Where the other hand begins: outside the body and below the rectum; in a scene without one, behind the target.
+/// Start of the other hand: outside the body and below the rectum; in a scene without one, behind the target.
 pub fn second_start(scene: &Scene) -> Vector3<f64> {
     let is_rectum = |name: &str| matches!(Organ::of_name(name), Some(Organ::Rectum | Organ::RectalWall));
     let extents = scene.lattice.extents(scene.structures.len());
@@ -151,8 +152,8 @@ fn before_body(scene: &Scene) -> f64 {
     lowest[2] - BEFORE_BODY_M
 }
 
-/// Opens the device with its tip, or the origin of its frame, at `start`. `force_loop` is what the thread of its loop asks for,
-/// `servo_core` the processor of the driver's own thread.
+/// Opens the device with its tip, or the origin of its frame, at `start`. `force_loop` is the loop's scheduling
+/// request, `servo_core` the processor of the driver's own thread.
 pub fn open(
     choice: &DeviceChoice,
     libraries: &Libraries,
@@ -222,7 +223,7 @@ fn report() -> Report {
     Box::new(|text| eprintln!("rt-core: device: {text}"))
 }
 
-/// What a thread was granted.
+/// Describes the grants of a thread.
 fn granted_text(granted: &ThreadReport) -> String {
     let policy = if granted.is_fifo() {
         format!("SCHED_FIFO {}", granted.priority)

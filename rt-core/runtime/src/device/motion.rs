@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use stylet_hw::{DeviceInfo, ReplayDevice, Sample};
 use stylet_shm_schema::motion::{Motion, MotionSample};
 
-/// Why a motion cannot be played; the text names the file and says how to make one.
+/// Failure to play a motion; the text names the file and says how to make one.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}. Make one with: host-ui export RECORDING.mcap --motion FILE", path.display())]
 pub struct MotionError {
@@ -13,7 +13,7 @@ pub struct MotionError {
     problem: String,
 }
 
-/// The device that plays the motion in `path`.
+/// Returns the device that plays the motion in `path`.
 pub fn device(path: &Path) -> Result<ReplayDevice, MotionError> {
     let failed = |problem: &dyn std::fmt::Display| MotionError {
         path: path.to_owned(),
@@ -30,7 +30,7 @@ fn sample(recorded: &MotionSample) -> Sample {
     let [i, j, k, w] = recorded.world_from_tool;
     Sample {
         tip_in_world: Vector3::from(recorded.tip_in_scene_m),
-        // Kept as recorded: normalising it again would change its last bits.
+        // Kept as recorded: normalising again would change its last bits.
         world_from_tool: Unit::new_unchecked(Quaternion::new(w, i, j, k)),
         buttons: recorded.buttons,
         sequence: 0,

@@ -1,32 +1,32 @@
-//! Limits of the PC: raised where this process may raise them, named where they are too low for a run.
+//! Resource limits: raised as far as this process may, reported if too low for a run.
 
 use std::ffi::CStr;
 
-/// Files of a run at once: 70 with a second device, 11 more for each host.
+/// Open files of a run: 70 with a second device, 11 more for each host.
 const FILES: libc::rlim_t = 192;
-/// Length of the largest object in shared memory: that of a large scene takes up to this.
+/// Largest object in shared memory: a large scene needs up to this.
 const LARGEST_FILE: libc::rlim_t = 256 << 20;
 const SHARED_MEMORY: &CStr = c"/dev/shm";
 
-/// A limit that keeps the run from starting; the text says what to change.
+/// A limit that prevents the run; the text says what to change.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct LimitError(String);
 
-/// Raises the soft limits of this process to the hard ones, and has a write beyond the limit of a file's length fail instead of
-/// ending the program by SIGXFSZ. Files that cannot be written are then named by who writes them.
+/// Raises the soft limits of this process to the hard ones, and ignores SIGXFSZ: a write beyond the file-size limit
+/// then fails, and its writer reports the file.
 pub fn raise() {
     // SAFETY: SIG_IGN needs no handler.
     unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_IGN) };
     for resource in [libc::RLIMIT_NOFILE, libc::RLIMIT_FSIZE] {
         let mut limit = of(resource);
         limit.rlim_cur = limit.rlim_max;
-        // SAFETY: `limit` is valid for reads. What is refused stays as it is, and is named by `check`.
+        // SAFETY: `limit` is valid for reads. A refusal changes nothing and is reported by `check`.
         unsafe { libc::setrlimit(resource, &limit) };
     }
 }
 
-/// Names the first limit that is too low for a run.
+/// Reports the first limit that is too low for a run.
 pub fn check() -> Result<(), LimitError> {
     enough(of(libc::RLIMIT_NOFILE).rlim_cur, of(libc::RLIMIT_FSIZE).rlim_cur)?;
     shared_memory(SHARED_MEMORY)
@@ -101,7 +101,7 @@ mod tests {
     fn shared_memory_that_is_missing_or_read_only_is_named() {
         let said = |folder| shared_memory(folder).expect_err("of no use").to_string();
         assert!(said(c"/nowhere/shm").starts_with("there is no shared memory at /nowhere/shm"));
-        // Read-only in every container and to everybody but root; where it is not, there is nothing to see.
+        // Read-only in every container and for everyone but root; elsewhere this test sees nothing.
         if let Err(why) = shared_memory(c"/sys") {
             assert!(why.to_string().contains("/sys"), "{why}");
         }

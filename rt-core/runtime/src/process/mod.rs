@@ -1,4 +1,5 @@
-//! Puts the process together: scene and device, shared memory, two armed threads, and the control thread on the calling thread.
+//! Assembles the process: scene and device, shared memory, two armed threads, and the control thread on the calling
+//! thread.
 
 pub mod limits;
 mod session;
@@ -30,7 +31,7 @@ pub struct Options {
     pub no_rt: bool,
     /// The operator asked for `no_rt`.
     pub no_rt_asked: bool,
-    /// Why real time was tried and not granted, and how to grant it.
+    /// Why real time was not granted, and how to grant it.
     pub rights_missing: Option<String>,
     /// Processor of the force loop; `None` for any.
     pub haptic_core: Option<usize>,
@@ -42,11 +43,11 @@ pub struct Options {
     pub tissue_priority: u32,
     /// Time between two ticks of the force loop, ns.
     pub haptic_period_ns: u64,
-    /// How the force loop waits for each deadline.
+    /// Wait of the force loop for each deadline.
     pub wait: Wait,
     /// Folder of the flight recordings.
     pub flight_folder: PathBuf,
-    /// Folder of the answers to the probe that were kept.
+    /// Folder of the saved probe answers.
     pub probe_folder: Option<PathBuf>,
     /// Tissue model of every scene of the run.
     pub tissue: TissueSpec,
@@ -54,7 +55,7 @@ pub struct Options {
     pub device: DeviceChoice,
     /// The device of the other hand.
     pub second: Option<SecondOptions>,
-    /// Libraries of makers.
+    /// Vendor libraries.
     pub libraries: Libraries,
 }
 
@@ -71,7 +72,7 @@ pub struct SecondOptions {
     pub priority: u32,
 }
 
-/// What a run cost.
+/// Cost of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RunReport {
     /// The force loop.
@@ -82,29 +83,29 @@ pub struct RunReport {
     pub second: Option<LoopReport>,
     /// All memory of the process was locked.
     pub memory_locked: bool,
-    /// Longest exit from a core's sleep state that the kernel allowed, as read back, µs; `None` when it was not asked or
+    /// Longest exit from a core's sleep state that the kernel allows, as read back, µs; `None` if not requested or
     /// refused.
     pub exit_latency_us: Option<i32>,
 }
 
-/// What one loop cost, from arming to its end.
+/// Cost of one loop, from arming to its end.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LoopReport {
-    /// What the kernel granted the thread.
+    /// Grants of the kernel to the thread.
     pub thread: ThreadReport,
     /// Ticks made.
     pub ticks: u64,
     /// Deadlines missed and worst wake-up.
     pub since_start: DeadlineTotals,
-    /// Those since the force was last turned on.
+    /// Deadlines since the force was last turned on.
     pub since_armed: DeadlineTotals,
-    /// Sleeps there was reason for: each costs a switch.
+    /// Justified sleeps: each costs a context switch.
     pub sleeps: u64,
     /// Page faults, context switches and heap calls.
     pub usage: Usage,
 }
 
-/// Why a run did not start, or ended by itself. The texts are for people: they say what to do.
+/// Failure to start a run, or unexpected end of one. The texts are for people: they say what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// There is no such scene.
@@ -122,7 +123,7 @@ pub enum RunError {
          --device-2, such as simulated"
     )]
     OneDeviceForBoth,
-    /// Every parameter that does not suit the device, one a line.
+    /// Parameters that do not suit the device, one per line.
     #[error(transparent)]
     Parameters(#[from] ParameterProblems),
     /// The tissue model could not be set up.
@@ -134,21 +135,21 @@ pub enum RunError {
     /// The folder in which hosts find the run cannot be used.
     #[error(transparent)]
     Instance(#[from] InstanceError),
-    /// The process that meets hosts did not come up.
+    /// The bridge did not start.
     #[error("the bridge to the hosts: {0}")]
     Bridge(#[from] BridgeError),
-    /// There is no memory in which the loops show what they do.
+    /// Memory for the boards could not be allocated.
     #[error("no memory to show the run in: {0}")]
     Board(std::io::Error),
-    /// Real time was asked for and not granted.
+    /// Real time was requested and not granted.
     #[error("{0}\nOr start with --no-rt to run without real-time scheduling.")]
     NotGranted(#[from] Refused),
-    /// The operating system started no thread.
+    /// The operating system could not start a thread.
     #[error("cannot start the {name} thread: {why}")]
     Spawn {
-        /// Which loop.
+        /// Name of the loop.
         name: &'static str,
-        /// What the system reports.
+        /// Error of the operating system.
         why: std::io::Error,
     },
     /// A thread ended before its loop began.
@@ -157,13 +158,13 @@ pub enum RunError {
     /// The force loop stopped making ticks.
     #[error("{LOOP_ENDED}")]
     LoopStopped,
-    /// A loop's thread ended before it was asked to.
+    /// A loop's thread ended unasked.
     #[error("a real-time thread ended by itself")]
     ThreadEnded,
 }
 
-/// The loops that run have this long to hand over what they recorded when the force loop stands still: the device keeps its
-/// last force until the process ends, or until its own watchdog acts.
+/// Time for the running loops to hand over their tapes when the force loop has stopped: the device keeps its last force
+/// until the process ends, or until its own watchdog acts.
 const HAND_OVER_LIMIT: Duration = Duration::from_millis(100);
 
 /// Runs until `stop` is set by a signal, or a host asks to end.
@@ -171,13 +172,13 @@ pub fn run(options: &Options, stop: &Arc<AtomicBool>) -> Result<RunReport, RunEr
     run_with(options, None, stop)
 }
 
-/// The same run, with a probe in each loop.
+/// As [`run`], with a probe in each loop.
 pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool>) -> Result<RunReport, RunError> {
     limits::check()?;
     options.instance.sweep_dead();
     let owned = options.instance.own()?;
     if let Some(core) = options.haptic_core {
-        // What this thread starts from now on stays off the core as well: the bridge, and all work beside the loops.
+        // Later threads and processes stay off the core as well: the bridge and all background work.
         affinity::keep_off(core);
     }
     let setup = Setup::new(options)?;
@@ -214,7 +215,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     let served = control.run(|| stop.load(Ordering::Acquire));
     threads.end();
     if served.is_err() {
-        // Not joined: a loop that stands still would be waited for in vain.
+        // Not joined: a stopped loop would never be joined.
         match control.save_flight_of_stopped(HAND_OVER_LIMIT) {
             Ok(path) => eprintln!("rt-core: flight recording {}", path.display()),
             Err(why) => eprintln!("rt-core: the flight recording was not saved: {why}"),

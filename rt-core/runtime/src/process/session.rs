@@ -1,4 +1,4 @@
-//! What hosts and flight recordings learn about the run.
+//! Description of the run for hosts and flight recordings.
 
 use super::Options;
 use super::threads::Threads;
@@ -7,7 +7,7 @@ use crate::rt::clock::{self, TISSUE_PERIOD_NS};
 use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{Session, Text};
 
-/// The announcement of the run.
+/// Returns the announcement of the run.
 pub(super) fn session(
     options: &Options,
     session_id: u64,
@@ -38,7 +38,7 @@ pub(super) fn session(
     }
 }
 
-/// The part that is the same in every flight recording of the run.
+/// Returns the part common to every flight recording of the run.
 pub(super) fn flight(
     options: &Options,
     session_id: u64,

@@ -1,4 +1,4 @@
-//! What a run needs before its threads start: scene, device, shared memory, locked memory, and both loops.
+//! Prepares a run before its threads start: scene, device, shared memory, locked memory, and both loops.
 
 use super::{Options, RunError, SecondOptions};
 use crate::control::{Boards, ScenePicture, SecondSetup, SnapshotBoard, Wall, snapshot_board};
@@ -22,7 +22,7 @@ use stylet_sim::scene::{Scene, SceneSource};
 use stylet_wall::board::Writer;
 use stylet_wall::packet::Start;
 
-/// Scene, device and their figures.
+/// Scene and device with their properties.
 pub(super) struct Setup {
     pub session_id: u64,
     pub info: DeviceInfo,
@@ -33,7 +33,7 @@ pub(super) struct Setup {
     pub body: Body,
 }
 
-/// What the loops will own.
+/// Bodies that the loops will own.
 pub(super) struct Body {
     device: Box<dyn Device>,
     second: Option<Box<dyn Device>>,
@@ -41,7 +41,7 @@ pub(super) struct Body {
     world: Box<World>,
 }
 
-/// Both loops and the control thread's ends of their rings.
+/// Both loops, and the control thread's ends of their rings.
 pub(super) struct Loops {
     pub haptic: HapticLoop,
     pub tissue: TissueLoop,
@@ -50,7 +50,7 @@ pub(super) struct Loops {
     pub second: Option<SecondLoops>,
 }
 
-/// The second device's loop and the control thread's ends of its rings.
+/// The second device's loop, and the control thread's ends of its rings.
 pub(super) struct SecondLoops {
     own: SecondLoop,
     info: DeviceInfo,
@@ -58,7 +58,7 @@ pub(super) struct SecondLoops {
 }
 
 impl SecondLoops {
-    /// What its thread needs, and what the control thread needs.
+    /// Splits into the part for its thread and the part for the control thread.
     pub fn join((loops, board): (Self, Writer<SecondState>)) -> ((SecondLoop, Writer<SecondState>), SecondSetup) {
         let setup = SecondSetup {
             device: loops.info,
@@ -75,11 +75,11 @@ pub(super) struct Shown {
     pub second_state: Option<Writer<SecondState>>,
 }
 
-/// What the kernel granted the whole process.
+/// Grants of the kernel to the whole process.
 pub(super) struct KernelGrants {
     /// Why memory is not locked; `None` when it is.
     pub unlocked: Option<String>,
-    /// In force while it is kept.
+    /// In force while it is held.
     pub awake: Option<CoresAwake>,
 }
 
@@ -90,7 +90,7 @@ impl Setup {
             priority: (!options.no_rt).then_some(options.haptic_priority),
             core: options.haptic_core,
         };
-        // The driver's servo thread goes to the core of the tissue loop, which can wait for it longer than the force loop.
+        // The driver's servo thread shares the tissue loop's core: the tissue loop can wait longer than the force loop.
         let device = device::open(
             &options.device,
             &options.libraries,
@@ -149,7 +149,7 @@ impl Setup {
     }
 }
 
-/// The device of the other hand, which may not be that of the needle.
+/// Opens the other hand's device, which may not be the needle's.
 fn open_second(options: &Options, second: &SecondOptions, scene: &Scene) -> Result<Box<dyn Device>, RunError> {
     if second.device.excludes(&options.device) {
         return Err(RunError::OneDeviceForBoth);
@@ -164,7 +164,7 @@ fn open_second(options: &Options, second: &SecondOptions, scene: &Scene) -> Resu
 }
 
 impl Body {
-    /// `source` is what the scene was built from.
+    /// `source` is the source of the scene.
     pub fn into_loops(
         self,
         options: &Options,
@@ -219,7 +219,7 @@ impl Body {
     }
 }
 
-/// Locks the memory of the process and keeps its cores out of deep sleep; only `--no-rt` runs without locked memory.
+/// Locks the memory of the process and keeps its cores out of deep sleep. Only `--no-rt` permits unlocked memory.
 pub(super) fn lock_memory(options: &Options) -> Result<KernelGrants, RunError> {
     let unlocked = match arm::lock_memory() {
         Ok(()) => None,

@@ -1,4 +1,4 @@
-//! The real-time threads: started, armed, ended.
+//! Starts, arms and joins the real-time threads.
 
 use super::{LoopReport, Options, RunError, RunReport};
 use crate::rt::arm::{self, Armed, Ask, Usage};
@@ -13,13 +13,14 @@ use std::thread::JoinHandle;
 use stylet_shm_schema::{HapticState, SecondState, ThreadReport};
 use stylet_wall::board::Writer;
 
-/// A loop's thread, and what the kernel granted it.
+/// A loop's thread, and its grants from the kernel.
 struct Started {
     thread: JoinHandle<LoopReport>,
     granted: ThreadReport,
 }
 
-/// All threads. The loops have a flag of their own: the control thread must be able to end them when a host asks.
+/// All real-time threads. The loops have their own end flag: the control thread must be able to end them on a host's
+/// request.
 pub(super) struct Threads {
     haptic: Started,
     tissue: Started,
@@ -28,7 +29,7 @@ pub(super) struct Threads {
 }
 
 impl Threads {
-    /// Starts and arms all; none runs when one is refused.
+    /// Starts and arms all threads; none runs if one is refused.
     pub fn start(
         options: &Options,
         (haptic, board): (HapticLoop, Writer<HapticState>),
@@ -41,7 +42,7 @@ impl Threads {
         };
         let end = Arc::new(AtomicBool::new(false));
         let ended_by = |why: RunError| {
-            // SYNC: pairs with the acquire load in the loops that run.
+            // SYNC: pairs with the acquire load in the running loops.
             end.store(true, Ordering::Release);
             why
         };
@@ -66,17 +67,17 @@ impl Threads {
         })
     }
 
-    /// What the kernel granted the force loop.
+    /// Grants of the force loop's thread.
     pub fn haptic_grant(&self) -> ThreadReport {
         self.haptic.granted
     }
 
-    /// What the kernel granted the tissue loop.
+    /// Grants of the tissue loop's thread.
     pub fn tissue_grant(&self) -> ThreadReport {
         self.tissue.granted
     }
 
-    /// What the kernel granted the second device's loop.
+    /// Grants of the second device's thread.
     pub fn second_grant(&self) -> Option<ThreadReport> {
         self.second.as_ref().map(|second| second.granted)
     }
@@ -87,7 +88,7 @@ impl Threads {
         self.end.store(true, Ordering::Release);
     }
 
-    /// Waits for all loops; what each cost.
+    /// Waits for all loops and returns their cost.
     pub fn join(self) -> Result<RunReport, RunError> {
         let join = |started: Started| started.thread.join().map_err(|_| RunError::ThreadEnded);
         Ok(RunReport {
@@ -136,7 +137,7 @@ fn run_with_device<L: DeviceLoop>(
     }
 }
 
-/// Starts a thread, arms it, and waits for what the kernel granted.
+/// Starts and arms a thread, and waits for its grants.
 fn spawn(
     name: &'static str,
     ask: Ask,

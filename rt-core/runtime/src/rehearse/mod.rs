@@ -1,8 +1,8 @@
-//! Rehearsals: one needle ahead of time, by the two loops of the run, in a body of their own, as fast as they can.
+//! Rehearses one needle ahead of time: the two loops of the run, in a separate body, as fast as they can.
 //!
-//! Nothing is modelled anew: the simulated hand and device, `HapticLoop::tick` and `TissueLoop::tick` are those of the live
-//! run, fed with a time that does not wait. Each rehearsal begins with tissue at rest, and the same needle gives the same bytes.
-//! Runs on a thread of normal priority (`control/rehearsals.rs`).
+//! The model is the live one: the simulated hand and device, `HapticLoop::tick` and `TissueLoop::tick`, fed with a
+//! simulated clock. Each rehearsal begins with tissue at rest, and the same needle gives the same bytes. Runs on a
+//! thread of normal priority (`control/rehearsals.rs`).
 
 mod motion;
 mod rig;
@@ -31,10 +31,10 @@ use stylet_sim::line::{LineError, LineStations, ReadyLine};
 use stylet_sim::scene::SceneSource;
 use stylet_sim::tissue::{TissueError, TissueSpec};
 
-/// A rehearsal that takes longer than this, in its own time, has failed.
+/// Longest rehearsal in simulated time; a longer one has failed.
 const LONGEST_S: f64 = 900.0;
 
-/// Why there is no result; the text is for people.
+/// Failure of a rehearsal; the text is for people.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RehearseError {
     /// The scene cannot be built again.
@@ -46,7 +46,7 @@ pub enum RehearseError {
     /// The needle's line cannot be prepared.
     #[error(transparent)]
     Line(#[from] NoLine),
-    /// Every parameter that is out of its range, one a line.
+    /// Parameters out of range, one per line.
     #[error(transparent)]
     Parameters(#[from] ParameterProblems),
     /// More drops than there are seeds.
@@ -55,7 +55,7 @@ pub enum RehearseError {
     /// More needles than may stay in.
     #[error("{0} needles that stay in; at most {MAX_LEFT_NEEDLES}")]
     TooManyLeft(usize),
-    /// Eq. 6 knows no needle that stays in.
+    /// Eq. 6 has no needle that stays in.
     #[error("with --tissue paper no needle can stay in: it has no lines")]
     NoneStaysIn,
     /// An earlier rehearsal ended without returning its body.
@@ -69,10 +69,10 @@ pub enum RehearseError {
     Refused {
         /// The loop's reason.
         why: RefusalCode,
-        /// Number of the drop, from 0, that was refused or was due next.
+        /// Number of the drop, from 0, that was refused or due next.
         drop: u32,
     },
-    /// The procedure could not go on.
+    /// The procedure could not continue.
     #[error("in the rehearsal: {0}")]
     Procedure(#[from] stylet_procedure::StepFailure),
     /// The script did not end.
@@ -93,30 +93,30 @@ impl From<RehearseError> for Refusal {
     }
 }
 
-/// One needle, scene frame, checked.
+/// One validated needle in the scene frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeedleRun {
-    /// Where the needle enters the body, m.
+    /// Entry of the needle into the body, m.
     pub entry_m: Vector3<f64>,
     /// Direction of the needle, unit vector.
     pub direction: Vector3<f64>,
     /// Speed of the hand to the first drop, m/s.
     pub insert_m_per_s: f64,
-    /// Speed of the hand after it, m/s.
+    /// Speed of the hand after the first drop, m/s.
     pub retract_m_per_s: f64,
     /// Speed of the hand to the entry, m/s.
     pub approach_m_per_s: f64,
     /// Acceleration of the hand, m/s².
     pub acceleration_m_per_s2: f64,
-    /// Where the tip is drawn back to, from the entry along the needle, m.
+    /// Depth to which the tip is drawn back, from the entry along the needle, m.
     pub retract_to_m: f64,
-    /// From middle to middle of two seeds, m, where they are one strand.
+    /// Pitch between seed centres, m, if they form one strand.
     pub strand_pitch_m: Option<f64>,
-    /// Needles that go in before it and stay.
+    /// Needles that go in first and stay in.
     pub stabilising: Vec<StabilisingNeedle>,
-    /// Needles that came and went beside those before it.
+    /// Needles that came and went before this one.
     pub earlier: Vec<StabilisingNeedle>,
-    /// Places of the drops in their order, m.
+    /// Positions of the drops in their order, m.
     pub drops_m: Vec<Vector3<f64>>,
 }
 
@@ -125,7 +125,7 @@ pub struct NeedleRun {
 pub struct Rehearsed {
     /// Seeds in the order of the drops, after the tissue has come to rest.
     pub seeds: Vec<SeedPose>,
-    /// When each was dropped, after the tip's first contact with tissue, s.
+    /// Times of the drops after the tip's first contact with tissue, s.
     pub dropped_after_s: Vec<f64>,
     /// Largest force on the hand, N.
     pub peak_force_n: f64,
@@ -133,22 +133,23 @@ pub struct Rehearsed {
     pub displacement_before_puncture_m: f64,
     /// Largest displacement of tissue during the whole insertion, m.
     pub largest_displacement_m: f64,
-    /// Largest shift of the middle of the target during the whole insertion, m; of the whole body where it has none.
+    /// Largest shift of the target's centre during the whole insertion, m; of the whole body if there is no target.
     pub target_shift_m: f64,
-    /// Largest deflection of the tip from where a rigid needle would have it, m.
+    /// Largest deflection of the tip from a rigid needle's, m.
     pub deflection_m: f64,
-    /// Time of the rehearsal on its own clock, s.
+    /// Simulated time of the rehearsal, s.
     pub simulated_s: f64,
 }
 
-/// A body to rehearse in; kept from one rehearsal to the next.
+/// A body to rehearse in, reused between rehearsals.
 pub struct Stage {
     world: Option<Box<World>>,
-    /// Where needles have lines.
+    /// Body for lines, if the needles have lines.
     lines: Option<LineBody>,
-    /// The lines of the last rehearsal, those of needles that stay in first: compensation rehearses the same needle several times.
+    /// Lines of the last rehearsal, those of needles that stay in first: compensation rehearses the same needle several
+    /// times.
     kept: Vec<(NeedleAxis, bool, ReadyLine)>,
-    /// How needles that stay in stand after earlier ones.
+    /// State of the needles that stay in after earlier ones.
     standing: Option<Standing>,
     device: DeviceInfo,
     hand: Hand,
@@ -156,7 +157,7 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Builds the scene anew, apart from the one that runs.
+    /// Builds a copy of the scene, apart from the running one.
     pub fn build(
         source: &SceneSource,
         tissue: impl Into<TissueSpec>,
@@ -178,20 +179,20 @@ impl Stage {
         })
     }
 
-    /// Another hand for the rehearsals from now on; the first is [`Hand::steady`].
+    /// Replaces the hand of later rehearsals; the first is [`Hand::steady`].
     pub fn take_hand(&mut self, hand: Hand) {
         self.hand = hand;
     }
 
-    /// What the rehearsals from now on are for is seeds and forces. Tissue near the tip is left as the linear answer has it, which
-    /// changes neither, and the shift of the target is that of this answer; a rehearsal takes a fifth of the time.
+    /// Limits later rehearsals to seeds and forces, in a fifth of the time. Tissue near the tip stays linear, which
+    /// changes neither; the shift of the target is then the linear one.
     pub fn seeds_and_forces_alone(&mut self) {
         if let Some(world) = &mut self.world {
             world.looks_near_tip = false;
         }
     }
 
-    /// A line for each needle, at rest, the one that leaves seeds last; none in tissue that needs none.
+    /// Solves a line at rest for each needle, the one that leaves seeds last; none if the tissue needs none.
     fn lines(&mut self, run: &NeedleRun, bends: bool, stop: &AtomicBool) -> Result<Vec<ReadyLine>, RehearseError> {
         let Some(body) = &self.lines else {
             return match run.stabilising.is_empty() {
@@ -226,7 +227,7 @@ impl Stage {
         Ok(self.kept.iter().map(|(.., line)| line.clone()).collect())
     }
 
-    /// A line for one more needle, which is not kept.
+    /// Solves a line for one more needle, without keeping it.
     fn line_beside(
         &self,
         generation: u64,
@@ -243,7 +244,7 @@ impl Stage {
         line.map_err(stopped)
     }
 
-    /// From rest, under these parameters; ends early, with an error, when `stop` is set.
+    /// Rehearses from rest under these parameters; fails early when `stop` is set.
     pub fn rehearse(
         &mut self,
         run: &NeedleRun,
@@ -270,7 +271,7 @@ impl Stage {
         outcome
     }
 
-    /// Loops over the body at rest; the body comes back by [`Rig::into_world`].
+    /// Returns loops over the body at rest; [`Rig::into_world`] returns the body.
     fn rig(&mut self, run: &NeedleRun, active: &Active) -> Result<Rig, RehearseError> {
         let mut world = self.world.take().ok_or(RehearseError::BodyLost)?;
         world.tissue.return_to_rest();
@@ -333,7 +334,8 @@ fn perform(
         if script.advance(rig)? {
             let simulated_s = rig.seconds();
             return Ok(Rehearsed {
-                // Needles that stay in hold the tissue elsewhere until they are drawn out, and seeds are planned in tissue at rest.
+                // Needles that stay in displace the tissue until they are drawn out, and seeds are planned in tissue at
+                // rest.
                 seeds: match run.stabilising.is_empty() {
                     true => rig.seeds(),
                     false => rig.seeds_at_rest(),
@@ -351,7 +353,7 @@ fn perform(
     Err(RehearseError::TooLong)
 }
 
-/// Wall-clock beside the result, for the host.
+/// Measures the wall-clock time of `work`, for the host.
 pub fn timed<T>(work: impl FnOnce() -> T) -> (T, u64) {
     let begun = Instant::now();
     let done = work();

@@ -1,13 +1,13 @@
-//! How far hand and needle move the body: the farthest element, and the middle of the target.
+//! Motion of the body under hand and needle: the farthest element, and the target's centre.
 
 use nalgebra::Vector3;
 use stylet_sim::scene::{Role, Scene};
 use stylet_sim::tissue::Deformed;
 
-/// The middle of the target is that of at most so many of its elements.
+/// Most elements that the target's centre is averaged over.
 const MOST_ELEMENTS: usize = 500;
 
-/// Elements of the target, evenly among all of it; of the whole body where it has none.
+/// Elements spread evenly over the target, or over the whole body if it has none.
 pub struct TargetElements(Vec<u32>);
 
 impl TargetElements {
@@ -39,7 +39,7 @@ impl TargetElements {
 pub struct Motion<'a> {
     elements: &'a [u32],
     displacements_m: Vec<[f32; 3]>,
-    /// Sum over the target before the needle came: needles that stay in have moved it.
+    /// Sum over the target before the needle: needles that stay in have moved it.
     before_m: Vector3<f64>,
     pub largest_m: f64,
     pub target_m: f64,
@@ -56,14 +56,14 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// After a tick of the tissue.
+    /// Takes the displacements after a tissue tick.
     pub fn look(&mut self, displacement_m: f64, body: Deformed<'_>) {
         self.largest_m = self.largest_m.max(displacement_m);
         let sum = self.sum_m(body) - self.before_m;
         self.target_m = self.target_m.max(sum.norm() / self.elements.len().max(1) as f64);
     }
 
-    /// What is measured from: the body as it is before the needle.
+    /// Sets the reference: the body before the needle.
     pub fn begin(&mut self, body: Deformed<'_>) {
         self.before_m = self.sum_m(body);
     }

@@ -1,4 +1,4 @@
-//! The stepped loops as a rehearsal drives them: a simulated device, orders, and what the loops refuse.
+//! Drives the stepped loops in a rehearsal: a simulated device, orders, and refusals.
 
 use super::NeedleRun;
 use crate::rt::exchange::{HapticOrder, Notice, TissueOrder, TissueStep};
@@ -11,7 +11,7 @@ use stylet_sim::active::Active;
 use stylet_sim::line::{LeftNeedles, LeftRecord, ReadyLine};
 use stylet_sim::tissue::Deformed;
 
-/// The tip begins at this distance before the entry, and comes to it as in a run.
+/// Distance before the entry at which the tip begins, and from which it approaches as in a run.
 const RUN_UP_M: f64 = 0.01;
 
 pub struct Rig {
@@ -41,7 +41,7 @@ impl Rig {
         }
     }
 
-    /// In the order of the needles; the first is taken up at once.
+    /// Takes lines in the order of the needles; the first is applied at once.
     pub fn take_lines(&mut self, mut lines: Vec<ReadyLine>) {
         if lines.len() > 1 {
             self.take_lines_of_many(lines);
@@ -50,14 +50,14 @@ impl Rig {
         }
     }
 
-    /// In the order of the needles, some of which stay in; each is taken up by [`next_line`](Self::next_line).
+    /// Takes lines in the order of the needles, some of which stay in; [`next_line`](Self::next_line) applies each.
     pub fn take_lines_of_many(&mut self, mut lines: Vec<ReadyLine>) {
         lines.reverse();
         self.lines = lines;
         let _ = self.loops.control.rooms.push(LeftNeedles::with_room());
     }
 
-    /// Before the first tick: needles that stay in stand as `record` has them, on those of `lines` that it names.
+    /// Places needles that stay in as in `record`, on those of `lines` that it names. Call before the first tick.
     pub fn stand(&mut self, lines: &[ReadyLine], record: &LeftRecord) -> bool {
         let of = |generation: u64| lines.iter().find(|line| line.hand.generation == generation);
         let fits = self
@@ -73,26 +73,26 @@ impl Rig {
         fits
     }
 
-    /// How needles that stay in stand now.
+    /// Returns the state of the needles that stay in.
     pub fn standing(&self) -> LeftRecord {
         self.loops.haptic.left_record()
     }
 
-    /// The next needle has its line from now on.
+    /// Applies the next needle's line.
     pub fn next_line(&mut self) {
         if let Some(line) = self.lines.pop() {
             self.take_line(line);
         }
     }
 
-    /// Before the needle begins.
+    /// Applies a line before the needle begins.
     pub fn take_line(&mut self, line: ReadyLine) {
         // Both rings are empty.
         let _ = self.loops.control.lines.push(line.hand);
         let _ = self.loops.control.tissue_orders.push(TissueOrder::Line(line.body));
     }
 
-    /// One tick of the force loop, and of the tissue loop where one is due: then true.
+    /// Runs one tick of the force loop, and one of the tissue loop when due, in which case it returns true.
     pub fn tick(&mut self) -> bool {
         let tissue_tick = self.loops.tissue.response().tick;
         self.loops.step();
@@ -108,13 +108,13 @@ impl Rig {
         self.loops.tissue.response().tick != tissue_tick
     }
 
-    /// What a loop refused since the last call.
+    /// Returns a refusal since the last call.
     pub fn refusal(&mut self) -> Option<RefusalCode> {
         self.refusal.take()
     }
 
     pub fn engage(&mut self) {
-        // Both rings are emptied before the script goes on, and are never full.
+        // Both rings are emptied before the script continues, and are never full.
         let _ = self.loops.control.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
     }
 
@@ -136,7 +136,7 @@ impl Rig {
             .push(HapticOrder::LeaveNeedle { ticket: 0 });
     }
 
-    /// What stabilising needles took to go in is not the needle's.
+    /// Forgets the peaks of stabilising needles, which do not count for this needle.
     pub fn forget_peaks(&mut self) {
         self.loops.haptic.state.peak_force_n = 0.0;
     }
@@ -168,7 +168,7 @@ impl Rig {
         self.loops.tissue.seeds().collect()
     }
 
-    /// As they will be without a needle in the tissue.
+    /// Returns the seeds as they will be without a needle in the tissue.
     pub fn seeds_at_rest(&self) -> Vec<SeedPose> {
         self.loops.tissue.seeds_at_rest().collect()
     }

@@ -1,4 +1,5 @@
-//! How a needle misses where the plan has it before it meets tissue: it enters beside its hole, and template and skin turn it.
+//! Scatter of a needle about its planned axis before it meets tissue: offset at the hole, and deflection by template
+//! and skin.
 
 use super::NeedleRun;
 use nalgebra::Vector3;
@@ -14,7 +15,7 @@ pub struct Scatter {
 }
 
 impl Scatter {
-    /// `None` where it is off.
+    /// Returns the scatter of a parameter set; `None` if it is off.
     pub fn of(set: &ParameterSet) -> Option<Self> {
         let scatter = Scatter {
             entry_m: set.get(ParameterId::EntryScatter),
@@ -24,8 +25,8 @@ impl Scatter {
         (scatter.entry_m > 0.0 || scatter.deflection_rad > 0.0).then_some(scatter)
     }
 
-    /// The needle as it goes in. The numbers follow from the seed and from where the plan has the needle alone, so that neither the
-    /// order of needles nor what was rehearsed before counts.
+    /// Returns the needle as it goes in. The numbers depend only on the seed and on the planned axis, so neither the
+    /// order of needles nor earlier rehearsals matter.
     pub fn apply(&self, run: &NeedleRun) -> NeedleRun {
         let along = run.direction;
         let least = along.iamin();
@@ -48,7 +49,7 @@ impl Scatter {
         }
     }
 
-    /// Four numbers with a normal distribution.
+    /// Draws four normally distributed numbers.
     fn normals(&self, run: &NeedleRun) -> [f64; 4] {
         let mut hash = Sha256::new();
         hash.update(self.seed.to_le_bytes());
@@ -114,7 +115,7 @@ mod tests {
         );
     }
 
-    /// Moreira 2018: 6.3 mm in the median of 188 insertions; the depth of 80 mm is ours.
+    /// Moreira 2018: 6.3 mm median over 188 insertions; the depth of 80 mm is assumed here.
     #[test]
     fn the_two_causes_give_what_was_measured_in_patients() {
         let mut beside_mm: Vec<f64> = (0..20_000)

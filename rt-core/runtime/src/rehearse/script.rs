@@ -1,4 +1,4 @@
-//! The procedure driven over the two ticks of a rehearsal, in its own time.
+//! Drives the procedure over the ticks of a rehearsal, in simulated time.
 
 use super::rig::Rig;
 use super::{NeedleRun, RehearseError};
@@ -40,7 +40,7 @@ impl Script {
         Self(Procedure::rehearsal_beside(way, pace, stabilising.collect()))
     }
 
-    /// Of a needle beside those that stay in by now.
+    /// Script of a needle, given those that already stay in.
     pub fn beside(run: &NeedleRun) -> Self {
         let alone = NeedleRun {
             stabilising: Vec::new(),
@@ -49,18 +49,18 @@ impl Script {
         Self::new(&alone)
     }
 
-    /// Of a needle that comes and goes beside them, without a seed.
+    /// Script of a needle that comes and goes without dropping a seed.
     pub fn pass(run: &NeedleRun) -> Self {
         let (way, pace) = Self::way(run);
         Self(Procedure::pass(way, pace))
     }
 
-    /// Every needle that stays in does: the one that leaves seeds is at work.
+    /// True once all needles that stay in are in and the needle that drops seeds is at work.
     pub fn is_at_needle(&self) -> bool {
         self.0.stabilising().is_none()
     }
 
-    /// After each tick of the force; true when all is done. A drop that is refused ends a rehearsal, since its seeds are
+    /// Advances after each force-loop tick; true when finished. A refused drop ends a rehearsal, since its seeds are
     /// compared one by one.
     pub fn advance(&mut self, rig: &mut Rig) -> Result<bool, RehearseError> {
         if let Some(why) = rig.refusal() {
@@ -77,10 +77,10 @@ impl Script {
             Next::Send(HandRequest::Engage) => rig.engage(),
             Next::Send(HandRequest::MoveHand(goal)) => rig.move_hand(&goal),
             Next::Send(HandRequest::DropSeed { strand_pitch_m }) => rig.drop_seed(strand_pitch_m),
-            // A rehearsal begins from rest and shows its plan to nobody.
+            // A rehearsal begins from rest and publishes no plan.
             Next::Send(HandRequest::ExpectStabilising { .. } | HandRequest::PublishPlan { .. }) => rig.next_line(),
             Next::Send(HandRequest::LeaveNeedle) => rig.leave_needle(),
-            // A rehearsal begins from rest, and ends with the needles in that stay.
+            // A rehearsal begins from rest, and ends with the needles that stay in still in place.
             Next::Send(HandRequest::Reset | HandRequest::DrawFirstLeft { .. }) => {}
             Next::Wait | Next::Continue | Next::Done => {}
         }

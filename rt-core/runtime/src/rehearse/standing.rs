@@ -1,4 +1,5 @@
-//! Needles that stay in, as needles before have left them: each that comes and goes drags at them, and they hold the tissue elsewhere from then on.
+//! State of needles that stay in after earlier needles: each needle that comes and goes drags them, and they hold the
+//! tissue elsewhere from then on.
 
 use super::rig::Rig;
 use super::script::Script;
@@ -10,19 +11,19 @@ use stylet_shm_schema::{ParameterSet, StabilisingNeedle};
 use stylet_sim::active::Active;
 use stylet_sim::line::{LeftRecord, ReadyLine};
 
-/// Ticks of the force loop until the body is where needles that stay in hold it.
+/// Ticks of the force loop until the body rests where needles that stay in hold it.
 const HELD_TICKS: usize = 20;
 
-/// Kept from one rehearsal to the next, as far as the needles before are the same.
+/// Reused between rehearsals, as far as the earlier needles are the same.
 pub(super) struct Standing {
     of: Of,
-    /// Once they are in, before any other.
+    /// State once they are in, before any other needle.
     first: LeftRecord,
-    /// After each that came and went.
+    /// State after each needle that came and went.
     after: Vec<(StabilisingNeedle, LeftRecord)>,
 }
 
-/// What a record of them depends on.
+/// Inputs that such a state depends on.
 #[derive(Clone, PartialEq)]
 struct Of {
     stabilising: Vec<StabilisingNeedle>,
@@ -33,7 +34,8 @@ struct Of {
 }
 
 impl Stage {
-    /// As [`rehearse`](Stage::rehearse), beside needles that stay in and after `run.earlier`; `lines` are theirs and the needle's.
+    /// Rehearses as [`rehearse`](Stage::rehearse) does, with needles that stay in and after `run.earlier`; `lines` are
+    /// theirs and the needle's.
     pub(super) fn rehearse_after(
         &mut self,
         run: &NeedleRun,
@@ -58,7 +60,7 @@ impl Stage {
         outcome
     }
 
-    /// How they stand after all that were there before.
+    /// Returns their state after all earlier needles.
     fn standing(
         &mut self,
         run: &NeedleRun,
@@ -108,7 +110,7 @@ impl Stage {
         Ok(record)
     }
 
-    /// Those that stay in go in, and the hand is out again.
+    /// Inserts the needles that stay in, and takes the hand out again.
     fn put_in(
         &mut self,
         run: &NeedleRun,
@@ -128,7 +130,7 @@ impl Stage {
         done.map(|()| record)
     }
 
-    /// One needle goes to its depth and out again, beside them.
+    /// Moves one needle to its depth and out again, with those that stay in place.
     fn come_and_go(
         &mut self,
         (run, needle): (&NeedleRun, &StabilisingNeedle),
@@ -168,7 +170,7 @@ impl Stage {
     }
 }
 
-/// Ticks until `advance` says that it is enough.
+/// Ticks until `advance` returns true.
 fn drive(
     rig: &mut Rig,
     stop: &AtomicBool,

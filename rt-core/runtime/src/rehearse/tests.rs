@@ -1,4 +1,4 @@
-//! What holds for rehearsals: the same bytes twice, seeds at rest where the tissue was, and typed errors.
+//! Properties of rehearsals: the same bytes twice, seeds at rest where the tissue was, and typed errors.
 
 use super::*;
 use std::sync::atomic::AtomicBool;
@@ -26,7 +26,7 @@ fn stage() -> Stage {
     stage_of(TissueKind::ChainMail)
 }
 
-/// Along the middle of the paper's gland.
+/// A needle through the centre of the paper's gland.
 fn needle() -> NeedleRun {
     let scene = stylet_sim::scene::Scene::builtin("paper").unwrap();
     let (low, high) = scene.lattice.bounds_m();
@@ -70,7 +70,8 @@ fn a_rehearsal_leaves_its_seeds_off_plan_and_repeats_bit_by_bit() {
     }
 }
 
-/// Loose seeds show where the tissue has each; a strand was pulled to 17 mm between seeds that a spacer holds 10 mm apart.
+/// Loose seeds rest with the tissue around each; a strand used to be stretched to 17 mm between seeds that a spacer
+/// holds 10 mm apart.
 #[test]
 fn a_strand_keeps_its_pitch_and_rests_where_the_tissue_at_its_seeds_balances() {
     let (mut stage, mut run, stop) = (stage(), needle(), AtomicBool::new(false));
@@ -96,7 +97,7 @@ fn a_strand_keeps_its_pitch_and_rests_where_the_tissue_at_its_seeds_balances() {
         );
         assert_eq!(alone.axis, joined.axis);
     }
-    // At another pitch than they were dropped at: each by itself.
+    // At a pitch other than the drops', each seed is loose.
     run.strand_pitch_m = Some(2.5 * pitch_m);
     let other = stage.rehearse(&run, &set, &stop).expect("goes through");
     assert_eq!(along(&other), apart);
@@ -140,7 +141,7 @@ fn a_drop_outside_the_tissue_and_a_stop_are_reported_and_leave_the_stage_usable(
     assert!(stage.rehearse(&needle(), &set, &stop).is_ok());
 }
 
-/// FEM keeps answers from tick to tick and works ahead: a body at rest must have forgotten both.
+/// The finite-element solver keeps answers between ticks and works ahead: a body reset to rest must forget both.
 #[test]
 fn a_rehearsal_with_finite_elements_repeats_bit_by_bit() {
     let (mut stage, run, stop) = (fem_stage(), shallow(), AtomicBool::new(false));
@@ -162,7 +163,7 @@ fn shallow() -> NeedleRun {
     }
 }
 
-/// What the loop asks of its tissue model.
+/// Calls of the loop to its tissue model.
 enum Asked {
     Held(Option<u32>),
     Prepared(Option<u32>),
@@ -205,7 +206,7 @@ impl TissueModel for Watched {
     }
 }
 
-/// On a straight way, in and out, the loop knows in the tick before which element a needle without a line will hold.
+/// On a straight path, in and out, the loop knows one tick ahead which element a needle without a line will hold.
 #[test]
 fn the_loop_prepares_what_it_holds_next() {
     let (mut stage, run, stop) = (fem_stage(), shallow(), AtomicBool::new(false));
@@ -237,8 +238,8 @@ fn the_loop_prepares_what_it_holds_next() {
     assert!(changes > 8 && foreseen == changes);
 }
 
-/// In patients speed had next to no effect. By eq. 6 a seed of a needle at 1.9 mm/s came to rest 8 to 25 mm from that of one
-/// at 123 mm/s.
+/// In patients speed had next to no effect. By eq. 6 a seed of a needle at 1.9 mm/s came to rest 8 to 25 mm from that
+/// of one at 123 mm/s.
 #[test]
 fn on_a_line_seeds_rest_where_they_do_at_any_speed_and_near_their_plan() {
     seeds_rest_at_any_speed(TissueKind::Fem);
@@ -276,7 +277,7 @@ fn seeds_rest_at_any_speed(tissue: TissueKind) {
             assert!(off.norm() < 15e-3, "{off:?}");
         }
     }
-    // The hand stops within 0.3 mm of its goal, before or behind it, which the seed of a tissue under tension follows.
+    // The hand stops within 0.3 mm of its goal, before or behind it; a seed in stretched tissue follows that.
     let apart_m = |a: &Rehearsed, b: &Rehearsed| {
         let pairs = a.seeds.iter().zip(&b.seeds);
         let apart = pairs.map(|(a, b)| (Vector3::from(a.position_m) - Vector3::from(b.position_m)).norm());
@@ -287,7 +288,7 @@ fn seeds_rest_at_any_speed(tissue: TissueKind) {
     assert!(apart_m(usual, slow) < 1.5e-3, "{} m", apart_m(usual, slow));
 }
 
-/// The line began anew at the tip's depth, and pushed the needle out at once.
+/// The line restarted at the tip's depth and pushed the needle out at once.
 #[test]
 fn a_reset_with_the_needle_in_tissue_leaves_no_force_on_a_line_either() {
     let (mut stage, run) = (fem_stage(), needle());
@@ -317,8 +318,8 @@ fn a_reset_with_the_needle_in_tissue_leaves_no_force_on_a_line_either() {
     assert!(rig.displacement_m() < 1e-9, "{} m", rig.displacement_m());
 }
 
-/// What ChainMail's lines are worth, beside those of finite elements at full resolution:
-/// `cargo test --profile quick -p stylet-runtime --lib seeds_of_chainmail -- --ignored --nocapture`
+/// Accuracy of ChainMail's lines against finite elements at full resolution: `cargo test --profile quick -p
+/// stylet-runtime --lib seeds_of_chainmail -- --ignored --nocapture`
 #[test]
 #[ignore = "a measurement of some minutes"]
 fn seeds_of_chainmail_beside_those_of_finite_elements() {

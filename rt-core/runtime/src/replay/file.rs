@@ -13,13 +13,13 @@ use stylet_sim::line::LineSource;
 
 /// Ends in the version of the layout.
 const MAGIC: &[u8; 8] = b"STYFLT\0\x10";
-/// Where the version stands.
+/// Position of the version.
 const VERSION_AT: usize = MAGIC.len() - 1;
 const DIGEST: usize = 32;
-/// No recording is larger: two bodies of 8 MiB and the ticks.
+/// Largest recording: two bodies of 8 MiB and the ticks.
 const MAX_BYTES: u64 = 256 << 20;
 
-/// A flight recording that cannot be written or read; the text names the file.
+/// Failure to read or write a flight recording; the text names the file.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {problem}", path.display())]
 pub struct FlightError {
@@ -60,18 +60,18 @@ enum Problem {
     Decoding(postcard::Error),
 }
 
-/// Figures of the device that the gate and the estimator use; fields as in [`DeviceInfo`].
+/// Properties of the device that the gate and the estimator use; fields as in [`DeviceInfo`].
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct DeviceFigures {
     /// Largest force, N.
     pub peak_force_n: f64,
-    /// Force that can be held for ever, N.
+    /// Largest force that can be held indefinitely, N.
     pub continuous_force_n: f64,
     /// Largest torque, N m.
     pub peak_torque_nm: f64,
     /// Stiffness up to which the device is stable, N/m.
     pub max_stiffness_n_per_m: f64,
-    /// Step of the position sensors at the tip, m.
+    /// Resolution of the position sensors at the tip, m.
     pub position_step_m: f64,
     /// No hardware.
     pub simulated: bool,
@@ -91,7 +91,7 @@ impl From<&DeviceInfo> for DeviceFigures {
 }
 
 impl DeviceFigures {
-    /// The device's properties as the loops use them.
+    /// Returns the device's properties as the loops use them.
     pub fn info(&self) -> DeviceInfo {
         DeviceInfo {
             name: "device of the recording",
@@ -116,18 +116,18 @@ pub struct Flight {
     pub reason: String,
     /// Name of the device.
     pub device_name: String,
-    /// Its figures.
+    /// Properties of the device.
     pub device: DeviceFigures,
     /// Time between two ticks of the force loop, s.
     pub haptic_period_s: f64,
     /// Time between two ticks of the tissue loop, s.
     pub tissue_period_s: f64,
-    /// The needle lines that either loop had, each once.
+    /// Needle lines that either loop had, each once.
     pub lines: Vec<LineSource>,
     /// The force loop. `None`: it did not hand its tape over in time.
     pub haptic: Option<HapticFlight>,
-    /// The tissue loop. `None`: as above, the body is too large to be recorded, or an elastic body was held without a needle
-    /// line for as long as the tape reaches back: its solver's state is not recorded.
+    /// The tissue loop. `None`: as above, or the body is too large to be recorded, or an elastic body was held without
+    /// a needle line over the whole tape, in which case its solver's state is not recorded.
     pub tissue: Option<TissueFlight>,
     /// The second device; `None` in a run without one.
     pub second_device: Option<SecondFigures>,
@@ -135,19 +135,19 @@ pub struct Flight {
     pub second: Option<SecondFlight>,
 }
 
-/// What the second device's loop was.
+/// Description of the second device.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SecondFigures {
     /// Name of the device.
     pub device_name: String,
-    /// Its figures.
+    /// Properties of the device.
     pub device: DeviceFigures,
     /// Time between two ticks of its loop, s.
     pub period_s: f64,
 }
 
 impl Flight {
-    /// Writes to a file of that name, whole or not at all.
+    /// Writes the file atomically.
     pub fn write(&self, path: &Path) -> Result<(), FlightError> {
         let failed = |e: std::io::Error| FlightError::new(path, Problem::Io(e));
         let body = postcard::to_stdvec(self).map_err(|e| FlightError::new(path, Problem::Encoding(e)))?;
@@ -166,7 +166,7 @@ impl Flight {
         std::fs::rename(&unfinished, path).map_err(failed)
     }
 
-    /// Reads what [`Flight::write`] wrote; anything else is refused with a reason.
+    /// Reads a file of [`Flight::write`]; anything else is refused with a reason.
     pub fn read(path: &Path) -> Result<Self, FlightError> {
         let failed = |problem| FlightError::new(path, problem);
         let io = |e| failed(Problem::Io(e));
@@ -186,7 +186,7 @@ impl Flight {
     }
 }
 
-/// Why bytes that do not begin with [`MAGIC`] are refused.
+/// Returns why bytes that do not begin with [`MAGIC`] are refused.
 fn other_format(bytes: &[u8]) -> Problem {
     let is_ours = bytes.starts_with(&MAGIC[..VERSION_AT]);
     match bytes.get(VERSION_AT) {
@@ -195,7 +195,7 @@ fn other_format(bytes: &[u8]) -> Problem {
     }
 }
 
-/// Default folder of the recordings: `$XDG_STATE_HOME/stylet/flights`, by default under `~/.local/state`.
+/// Returns the default folder of the recordings: `$XDG_STATE_HOME/stylet/flights`, by default under `~/.local/state`.
 pub fn default_folder() -> PathBuf {
     let from = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let state = from("XDG_STATE_HOME")

@@ -1,4 +1,4 @@
-//! The needle lines of a recording: the force loop's half from the file, the tissue loop's columns solved again.
+//! Needle lines of a recording: the force loop's half from the file, the tissue loop's columns solved again.
 
 use super::file::Flight;
 use super::repeat::RepeatError;
@@ -9,12 +9,12 @@ use stylet_sim::line::{BodyAnswer, BodyLine, HandLine, LineSource};
 use stylet_sim::probe::{BodyProbe, NoWall, ProbeShape};
 use stylet_sim::tissue::fem::batch::Part;
 
-/// How far the columns of one line are.
+/// Progress of solving one line's columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineProgress {
     /// Number of the line.
     pub generation: u64,
-    /// Columns that are solved.
+    /// Columns solved so far.
     pub ready: usize,
     /// Columns in all.
     pub of: usize,
@@ -24,19 +24,19 @@ pub struct LineProgress {
 #[derive(Debug, Default)]
 pub struct LinesAgain {
     bodies: Vec<BodyLine>,
-    /// The probe, where there was one.
+    /// The probe, if there was one.
     pub(super) probe: Option<BodyProbe>,
     /// Lines whose columns were solved again.
     pub solved: usize,
-    /// How many of them are not the recorded ones in every bit.
+    /// Number of them that differ from the recorded ones in any bit.
     pub different: usize,
 }
 
-/// Solves for the columns of every line that the recorded tissue was pushed by, and for its probe: some seconds each for a body of 20,000
-/// elements, minutes for a probe in the scene's own cells that is not kept in `kept_in`. No recording holds them; they follow from the scene and the
-/// line.
+/// Solves for the columns of every line that loaded the recorded tissue, and for its probe: some seconds each for a
+/// body of 20,000 elements, minutes for a probe in the scene's own cells that is not saved in `kept_in`. No recording
+/// holds them; they follow from the scene and the line.
 ///
-/// To be called before this thread turns denormal numbers off as the loops do: the thread that prepared the lines did not.
+/// Call before this thread turns denormal numbers off as the loops do: the thread that prepared the lines did not.
 pub fn solve_again(
     flight: &Flight,
     recorded: &TissueFlight,
@@ -51,7 +51,7 @@ pub fn solve_again(
         }
         let source = source_of(flight, generation)?;
         if !recorded.is_pushed_by(generation) {
-            // Its columns do not count.
+            // Its columns do not matter.
             let nothing = BodyAnswer::Columns(Vec::new());
             again
                 .bodies
@@ -86,7 +86,7 @@ pub fn solve_again(
     Ok(again)
 }
 
-/// In the elements that it was solved for in: from what was kept, where it is of those.
+/// Restores the probe in the recorded elements: from saved answers, if they are of those.
 fn probe_again(body: &LineBody, edge_m: f64, kept_in: Option<&Path>) -> Result<BodyProbe, RepeatError> {
     let shape = ProbeShape::default();
     let [quick_m, fine_m] = body.probe_edges_m();
@@ -116,7 +116,7 @@ fn source_of(flight: &Flight, generation: u64) -> Result<&LineSource, RepeatErro
     found.ok_or(RepeatError::NoLine(generation))
 }
 
-/// The force loop's half of that line, in tissue at rest.
+/// Returns the force loop's half of that line, in tissue at rest.
 pub(super) fn hand_line(flight: &Flight, generation: u64) -> Result<Box<HandLine>, RepeatError> {
     let source = source_of(flight, generation)?.clone();
     let line = HandLine::of_source(source).map_err(crate::lines::NoLine::from)?;

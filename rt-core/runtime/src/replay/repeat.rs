@@ -1,4 +1,4 @@
-//! Runs both loops again from a recording, and reports where their outputs differ.
+//! Runs both loops again from a recording, and reports differences in their outputs.
 
 use super::file::Flight;
 use super::lines::{LinesAgain, hand_line};
@@ -26,20 +26,20 @@ pub struct Repeated {
     pub ticks: usize,
     /// Ticks whose output differs in any bit.
     pub different: usize,
-    /// The first of them, counted from the start of the recording.
+    /// First differing tick, counted from the start of the recording.
     pub first_different: Option<usize>,
     /// Positions compared: each element at each checkpoint and at the end.
     pub positions: usize,
-    /// How many of `positions` differ.
+    /// Number of `positions` that differ.
     pub different_positions: usize,
     /// Needle lines whose columns were solved again.
     pub lines: usize,
-    /// How many of `lines` are not the recorded ones in every bit.
+    /// Number of `lines` that differ from the recorded ones in any bit.
     pub different_lines: usize,
 }
 
 impl Repeated {
-    /// Something was repeated and every bit is the same.
+    /// True if something was repeated and every bit is the same.
     pub fn is_identical(&self) -> bool {
         self.ticks > 0 && self.different == 0 && self.different_positions == 0 && self.different_lines == 0
     }
@@ -53,7 +53,7 @@ impl Repeated {
     }
 }
 
-/// A device that gives the recorded answers.
+/// A device that returns the recorded answers.
 pub(super) struct RecordedDevice {
     info: DeviceInfo,
     answers: std::vec::IntoIter<(Result<Sample, DeviceFault>, bool)>,
@@ -61,7 +61,7 @@ pub(super) struct RecordedDevice {
 }
 
 impl RecordedDevice {
-    /// Each answer with whether the force was refused after it.
+    /// Pairs each answer with whether the force was refused after it.
     pub fn new(info: DeviceInfo, answers: Vec<(Result<Sample, DeviceFault>, bool)>) -> Self {
         Self {
             info,
@@ -91,7 +91,7 @@ impl Device for RecordedDevice {
     }
 }
 
-/// All of a record but how long the tick took.
+/// Returns the record with the times of its tick cleared.
 fn without_times(record: &TickRecord) -> TickRecord {
     TickRecord {
         force_written_ns: 0,
@@ -100,7 +100,7 @@ fn without_times(record: &TickRecord) -> TickRecord {
     }
 }
 
-/// The haptic chain: forces, phases, faults and flags of each tick, on needle lines as well.
+/// Repeats the haptic chain: forces, phases, faults and flags of each tick, on needle lines as well.
 pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, RepeatError> {
     let tape = Box::new(HapticTape::new(&recorded.memory));
     let Wiring {
@@ -136,12 +136,12 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
             let _ = control.lines.push(hand_line(flight, *line)?);
         }
         while let Some((_, order)) = orders.next_if(|(tick, _)| *tick == index as u64) {
-            // A tape that is handed over changes nothing of what the loop does.
+            // Handing over a tape does not affect the loop.
             if !matches!(order, HapticOrder::HandOverTape) {
                 let _ = control.haptic_orders.push(*order);
             }
         }
-        // Where the probe did nothing to a line, or there was none, the loop is to find none: it would meet what an older tick left.
+        // Without a probe on a line, the loop must find no input here rather than that of an older tick.
         let of_lines = tissue.outside.input_buffer_mut();
         of_lines.clear();
         while let Some((_, of_line)) = outside.next_if(|(tick, _)| *tick == index as u64) {
@@ -159,7 +159,7 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
     Ok(found)
 }
 
-/// All orders of the recording may come in one tick.
+/// Returns capacities with room for all orders of the recording in one tick.
 pub(super) fn capacities(orders: usize) -> Capacities {
     Capacities {
         orders: orders.max(1),
@@ -172,7 +172,7 @@ fn is_same(record: &TickRecord, entry: &HapticEntry) -> bool {
     bytemuck::bytes_of(&without_times(record)) == bytemuck::bytes_of(&without_times(&entry.record))
 }
 
-/// Why a recording cannot be repeated.
+/// Reason why a recording cannot be repeated.
 #[derive(Debug, thiserror::Error)]
 pub enum RepeatError {
     /// The scene of the recording cannot be built again.
@@ -196,7 +196,7 @@ pub enum RepeatError {
     /// A line cannot be used, or its columns cannot be solved again.
     #[error(transparent)]
     Line(#[from] NoLine),
-    /// What its probe can press cannot be solved for again.
+    /// The answers of its probe cannot be solved again.
     #[error("the recording has an ultrasound probe, which its scene does not give: {0}")]
     NoProbe(#[from] NoProbe),
     /// The wall of the recorded probe is not that of the scene.
@@ -204,8 +204,8 @@ pub enum RepeatError {
     OtherProbe,
 }
 
-/// The tissue chain: response and held element of each tick, and every element's position at each checkpoint. `lines` are
-/// those of [`solve_again`](super::lines::solve_again).
+/// Repeats the tissue chain: response and held element of each tick, and every element's position at each checkpoint.
+/// `lines` comes from [`solve_again`](super::lines::solve_again).
 pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -> Result<Repeated, RepeatError> {
     let scene = recorded.scene.build().map_err(|e| RepeatError::Scene(e.to_string()))?;
     let world = || World::new(scene.clone(), recorded.tissue, recorded.memory.limits.clone(), 1).map(Box::new);
@@ -305,7 +305,7 @@ fn order_of(order: &TapedOrder, lines: &mut LinesAgain) -> Result<TissueOrder, R
     })
 }
 
-/// The same in every bit, except the times that work took.
+/// True if every bit is the same, except the durations of work.
 fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
     let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     let response = |r: &TissueResponse| {
@@ -330,7 +330,7 @@ fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
         && residual.to_bits() == entry.residual.to_bits()
 }
 
-/// The probe pushes the hand with the same bits.
+/// True if the probe pushes the hand with the same bits.
 fn is_pressed_so(again: &TissueLoop, entry: Option<&ProbeEntry>) -> bool {
     let bits = |wrench: &[f64; 6]| wrench.map(f64::to_bits);
     let now = again.probe_response().map(|response| bits(&response.wrench.0));

@@ -5,7 +5,7 @@ use super::repeat::{RecordedDevice, Repeated, capacities};
 use crate::rt::second::{SecondFlight, SecondLoop, SecondOrder, SecondTape, wire};
 use stylet_shm_schema::SecondRecord;
 
-/// Forces, faults and flags of each tick. Nothing was repeated where the recording does not say which device it was.
+/// Repeats forces, faults and flags of each tick. Repeats nothing if the recording does not name the device.
 pub fn second(flight: &Flight, recorded: &SecondFlight) -> Repeated {
     let mut found = Repeated::default();
     let Some(figures) = &flight.second_device else {
@@ -19,7 +19,7 @@ pub fn second(flight: &Flight, recorded: &SecondFlight) -> Repeated {
     let mut orders = recorded.orders.iter().peekable();
     for (index, entry) in recorded.ticks.iter().enumerate() {
         while let Some((_, order)) = orders.next_if(|(tick, _)| *tick == index as u64) {
-            // A tape that is handed over changes nothing of what the loop does.
+            // Handing over a tape does not affect the loop.
             if *order != SecondOrder::HandOverTape {
                 let _ = control.orders.push(*order);
             }
@@ -33,7 +33,7 @@ pub fn second(flight: &Flight, recorded: &SecondFlight) -> Repeated {
     found
 }
 
-/// In every bit, except the times that work took.
+/// True if every bit is the same, except the durations of work.
 fn is_same(a: &SecondRecord, b: &SecondRecord) -> bool {
     let [a, b] = [a, b].map(|record| SecondRecord {
         force_written_ns: 0,

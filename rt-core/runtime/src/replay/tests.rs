@@ -23,7 +23,7 @@ mod left;
 mod motion;
 mod probe;
 
-/// The loops with their tapes, and what the control thread would keep beside them.
+/// The loops with their tapes, and the archive of the control thread.
 struct Recorded {
     loops: SteppedLoops,
     entry_m: Vector3<f64>,
@@ -51,7 +51,7 @@ impl Recorded {
         Self::of(block(), tissue, force, 0.0)
     }
 
-    /// With a needle that goes in so far above the middle.
+    /// Records a needle inserted that far above the centre.
     fn of(source: SceneSource, tissue: TissueKind, force: &ForceParameters, above_m: f64) -> Self {
         let scene = source.build().expect("valid");
         let (low, high) = scene.lattice.bounds_m();
@@ -87,7 +87,7 @@ impl Recorded {
         self.loops.control.haptic_orders.push(order).expect("room");
     }
 
-    /// The line under that number, to both loops.
+    /// Gives both loops the line under that number.
     fn give_line(&mut self, generation: u64) {
         let (mut hand, mut body) = (self.line.hand.clone(), self.line.body.clone());
         (hand.generation, body.generation) = (generation, generation);
@@ -122,7 +122,8 @@ impl Recorded {
         }
     }
 
-    /// Two lines, one after the other; parameters, a seed and turns on the way. Ends with the needle in tissue.
+    /// Two lines, one after the other, with changes of parameters, a seed and turns between. Ends with the needle in
+    /// tissue.
     fn insert(&mut self) {
         self.haptic(HapticOrder::Engage { ticket: 0 });
         self.give_line(1);
@@ -134,7 +135,7 @@ impl Recorded {
             generation: 2,
             needle: NeedleParameters::default(),
             force: ForceParameters {
-                // So small a body would be pushed along whole.
+                // So small a body would be pushed along as a whole.
                 membrane_gain: 0.05,
                 cutting_gain: 0.1,
                 shaft_gain: 0.2,
@@ -158,7 +159,7 @@ impl Recorded {
         self.run(0.8);
     }
 
-    /// Hands both tapes over, and gives them back blank.
+    /// Takes both tapes and returns blank ones.
     fn flight(&mut self) -> Flight {
         self.haptic(HapticOrder::HandOverTape);
         let order = TissueOrder::HandOverTape;
@@ -188,7 +189,7 @@ impl Recorded {
 }
 
 fn through_a_file(flight: &Flight) -> Flight {
-    // Tests of one process run beside each other; no other memory depends on the number.
+    // Tests of one process run in parallel; no other memory depends on the number.
     static FILES: AtomicU64 = AtomicU64::new(0);
     let number = FILES.fetch_add(1, Ordering::Relaxed);
     let path = std::env::temp_dir().join(format!("stylet-line-{}-{number}.flight", std::process::id()));
@@ -226,13 +227,13 @@ fn assert_identical(flight: &Flight) {
     assert!(found.is_identical() && found.positions > 0, "tissue: {found:?}");
 }
 
-/// The recorder left lines out, so that forces on one were not repeated and an elastic body was in no recording.
+/// The recorder left lines out: forces on one were not repeated, and no recording held an elastic body.
 #[test]
 fn a_recorded_insertion_on_a_needle_line_repeats_in_every_bit() {
     repeats_in_every_bit(TissueKind::Fem, &ForceParameters::default());
 }
 
-/// What tissue that creeps remembers of past loads is part of what a recording begins with.
+/// A recording begins with the load history of creeping tissue.
 #[test]
 fn a_recorded_insertion_into_tissue_that_creeps_repeats_in_every_bit() {
     let creep = [(0.6, 0.5), (1.0, 5.0)].map(|(strength, time_s)| PronyTerm { strength, time_s });
@@ -243,7 +244,7 @@ fn a_recorded_insertion_into_tissue_that_creeps_repeats_in_every_bit() {
     repeats_in_every_bit(TissueKind::Fem, &force);
 }
 
-/// Forces and track across the line are part of it as well, and loads across go to the tissue.
+/// A recording includes forces and track across the line, and loads across the line reach the tissue.
 #[test]
 fn a_recorded_insertion_of_a_needle_that_bends_repeats_in_every_bit() {
     let force = ForceParameters {
@@ -273,7 +274,7 @@ fn a_recorded_insertion_of_a_needle_that_bends_repeats_in_every_bit() {
     }
 }
 
-/// ChainMail's line moves the body as a whole, which its own memory did not hold.
+/// ChainMail's line moves the body as a whole, which its own state did not include.
 #[test]
 fn a_recorded_insertion_in_chainmail_repeats_in_every_bit() {
     repeats_in_every_bit(TissueKind::ChainMail, &ForceParameters::default());

@@ -1,9 +1,9 @@
-//! Asks the kernel for what a real-time thread needs, and reads back what it granted.
+//! Requests real-time properties from the kernel for a thread, and reads back what was granted.
 
 use std::marker::PhantomData;
 use stylet_shm_schema::ThreadReport;
 
-/// What a thread asks for.
+/// Real-time properties to request.
 #[derive(Clone, Copy, Debug)]
 pub struct Ask {
     /// `SCHED_FIFO` priority; `None` under `--no-rt`.
@@ -14,17 +14,17 @@ pub struct Ask {
 
 /// Proof that this thread is armed; cannot leave it.
 pub struct Armed {
-    /// What the kernel granted, as read back.
+    /// Granted properties, as read back.
     pub report: ThreadReport,
     not_send: PhantomData<*const ()>,
 }
 
-/// The right that is missing, and how to grant it.
+/// The missing right, and how to grant it.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Refused(pub String);
 
-/// How to grant real-time rights: the commands to type.
+/// Returns the commands that grant real-time rights.
 pub fn advice(missing: &str) -> String {
     let program = std::env::current_exe().map_or_else(|_| "rt-core".into(), |p| p.display().to_string());
     format!(
@@ -33,7 +33,7 @@ pub fn advice(missing: &str) -> String {
     )
 }
 
-/// Arms the calling thread: core, policy, stack. Fails only when a priority was asked for and not granted.
+/// Arms the calling thread: core, policy, stack. Fails only when a priority was requested and not granted.
 pub fn arm(ask: Ask) -> Result<Armed, Refused> {
     if let Some(core) = ask.core {
         core_affinity::set_for_current(core_affinity::CoreId { id: core });
@@ -60,8 +60,8 @@ pub fn arm(ask: Ask) -> Result<Armed, Refused> {
     })
 }
 
-/// One heap for all threads, which keeps what it has; a heap that a thread was given before this was called stays. Large
-/// blocks are not in it ([`stylet_heap`]).
+/// Keeps all threads on one heap that returns no memory. Call it before other threads exist: a thread keeps a heap it
+/// already has. Large blocks are separate ([`stylet_heap`]).
 pub fn keep_one_heap() {
     // SAFETY: the options take any value.
     unsafe {
@@ -81,15 +81,15 @@ pub fn lock_memory() -> Result<(), Refused> {
     Err(Refused(advice(&format!("the kernel does not lock memory ({why})"))))
 }
 
-/// A request to the kernel, in force while it is kept.
+/// A request to the kernel, in force until dropped.
 pub struct CoresAwake {
-    /// The longest exit from a sleep state that the kernel now allows, as read back, microseconds.
+    /// Longest exit from a sleep state that the kernel now allows, as read back, µs.
     pub exit_latency_us: i32,
     _request: std::fs::File,
 }
 
-/// Asks the kernel to keep the cores out of sleep states that take long to leave.
-/// `None` where the machine does not offer it or the right is missing.
+/// Asks the kernel to keep the cores out of deep sleep states. `None` where the machine does not offer it or the right
+/// is missing.
 pub fn keep_cores_awake() -> Option<CoresAwake> {
     use std::os::unix::fs::FileExt;
     let request = std::fs::File::options()
@@ -97,7 +97,7 @@ pub fn keep_cores_awake() -> Option<CoresAwake> {
         .write(true)
         .open("/dev/cpu_dma_latency")
         .ok()?;
-    // The kernel takes and gives microseconds as a C int.
+    // The kernel reads and writes microseconds as a C int.
     request.write_all_at(&0_i32.to_ne_bytes(), 0).ok()?;
     let mut in_force = [0; 4];
     request.read_exact_at(&mut in_force, 0).ok()?;
@@ -107,7 +107,7 @@ pub fn keep_cores_awake() -> Option<CoresAwake> {
     })
 }
 
-/// What was asked for must be what the kernel says that the thread has: [`stylet_shm_schema::flags::REAL_TIME`] rests on it.
+/// Checks that the kernel reports what was requested: [`stylet_shm_schema::flags::REAL_TIME`] relies on it.
 fn confirm(report: &ThreadReport) -> Result<(), String> {
     let asked = report.asked_priority;
     if asked == 0 || (report.is_fifo() && report.priority == asked) {
@@ -136,7 +136,7 @@ fn read_back(ask: Ask) -> ThreadReport {
     }
 }
 
-/// The core, when the kernel leaves this thread exactly one.
+/// Returns the core, if the kernel leaves this thread exactly one.
 fn only_core() -> Option<u32> {
     // SAFETY: an all-zero set is valid.
     let mut set: libc::cpu_set_t = unsafe { std::mem::zeroed() };
@@ -162,7 +162,7 @@ fn touch_stack() {
     std::hint::black_box(&stack);
 }
 
-/// Denormal numbers cost a hundred cycles each; the tissue's tail is full of them.
+/// Turns denormal numbers off: each costs a hundred cycles, and the tail of the tissue is full of them.
 fn flush_denormals() {
     #[cfg(target_arch = "x86_64")]
     {
@@ -176,7 +176,7 @@ fn flush_denormals() {
     }
 }
 
-/// What a thread cost since it was armed.
+/// Cost of a thread since it was armed.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Usage {
     /// Page faults without a disk.
@@ -192,7 +192,7 @@ pub struct Usage {
 }
 
 impl Usage {
-    /// Of the calling thread, since it began.
+    /// Usage of the calling thread since it began.
     pub fn now() -> Self {
         // SAFETY: an all-zero rusage is valid.
         let mut usage: libc::rusage = unsafe { std::mem::zeroed() };
@@ -207,7 +207,7 @@ impl Usage {
         }
     }
 
-    /// The cost since `start`.
+    /// Cost since `start`.
     pub fn since(self, start: Self) -> Self {
         Self {
             minor_faults: self.minor_faults - start.minor_faults,
@@ -223,7 +223,7 @@ impl Usage {
 mod tests {
     use super::*;
 
-    /// The state used to report what was asked for as what the kernel had granted.
+    /// The state used to report the request as if the kernel had granted it.
     #[test]
     fn a_thread_that_the_kernel_does_not_confirm_is_not_armed() {
         let report = |policy, priority, asked_priority| ThreadReport {

@@ -1,11 +1,11 @@
-//! A device of tests that breaks on command, for every loop that owns one.
+//! A test device that fails on command, for every loop that owns a device.
 
 use nalgebra::Vector3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use stylet_hw::{Device, DeviceFault, DeviceInfo, HandGoal, Sample, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
 
-/// What goes wrong.
+/// Kind of failure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cause {
     Nothing,
@@ -20,7 +20,7 @@ pub enum Cause {
     Lost,
 }
 
-/// A simulated hand on a device that breaks on command.
+/// A simulated hand on a device that fails on command.
 pub struct BreakingDevice {
     hand: SimulatedPhantom,
     cause: Arc<AtomicU32>,
@@ -28,7 +28,7 @@ pub struct BreakingDevice {
 }
 
 impl BreakingDevice {
-    /// With its tip there, and the cause that a test sets.
+    /// Returns the device with its tip at the start, and the switch for its failure.
     pub fn at(start_tip_in_world: Vector3<f64>) -> (Self, Arc<AtomicU32>) {
         let cause = Arc::new(AtomicU32::new(Cause::Nothing as u32));
         let hand = SimulatedPhantom::new(SimulatedPhantomConfig {

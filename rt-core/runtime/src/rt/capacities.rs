@@ -1,6 +1,6 @@
-//! How much each ring between the loops and the control thread holds.
+//! Capacities of the rings between the loops and the control thread.
 
-/// Places in each ring, all at least one.
+/// Slots in each ring, all at least one.
 #[derive(Clone, Copy, Debug)]
 pub struct Capacities {
     /// Records of the force loop.
@@ -14,14 +14,14 @@ pub struct Capacities {
 }
 
 impl Capacities {
-    /// A run: the control thread may be late by four seconds of records.
+    /// For a run: the control thread may lag by four seconds of records.
     pub const RUN: Self = Self {
         records: 4096,
         orders: 256,
         notices: 1024,
         old_worlds: 8,
     };
-    /// Loops that are stepped on one thread: whoever steps them empties the rings after each tick.
+    /// For loops stepped on one thread: the stepper empties the rings after each tick.
     pub const STEPPED: Self = Self {
         records: 16,
         orders: 16,

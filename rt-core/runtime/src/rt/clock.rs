@@ -5,14 +5,15 @@ pub const HAPTIC_PERIOD_NS: u64 = 1_000_000;
 /// Period of the tissue loop: 200 Hz.
 pub const TISSUE_PERIOD_NS: u64 = 5_000_000;
 
-/// Where the force loop wakes within its period of the clock: the kernel's own tick comes at whole ones, and would be run first.
+/// Phase of the force loop within its period: clear of the kernel's own tick, which comes at whole periods and would
+/// run first.
 pub const HAPTIC_PHASE: f64 = 0.25;
-/// The tissue loop's place in the force loop's period: the force is out by then and the pose there, and the two do not wake against each other.
+/// Phase of the tissue loop: the force is out by then, the pose available, and the two loops do not wake together.
 pub const TISSUE_PHASE: f64 = 0.5;
-/// Where the loop of a second device wakes within its own period: clear of both at the same rate.
+/// Phase of the second device's loop: clear of both at the same rate.
 pub const SECOND_PHASE: f64 = 0.75;
 
-/// A place within a period in nanoseconds.
+/// Converts a phase to nanoseconds.
 pub fn phase_ns(phase: f64, period_ns: u64) -> u64 {
     (phase * period_ns as f64) as u64
 }
@@ -37,20 +38,20 @@ pub fn sleep_until(time_ns: u64) {
     {}
 }
 
-/// How a loop waits for its deadline.
+/// Method of waiting for a deadline.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Wait {
-    /// It wakes once so long before, and sleeps again: the core is awake by then, and the way out of the kernel in its caches. 0 for not.
+    /// Time before the deadline of one early wake-up: it wakes the core and warms the kernel's return path. 0 for none.
     pub early_ns: u64,
-    /// It spins so long before; 0 for not.
+    /// Time before the deadline spent spinning; 0 for none.
     pub spin_ns: u64,
 }
 
-/// The early wake-up, where there is time for one.
+/// Lead of the early wake-up.
 pub const EARLY_NS: u64 = 100_000;
 
 impl Wait {
-    /// Without a spin, at a period: with the early wake-up where that takes up to a fifth of it.
+    /// Returns the wait for a period: no spin, and the early wake-up if it takes at most a fifth of the period.
     pub fn at_period(period_ns: u64) -> Self {
         Self {
             early_ns: if period_ns >= 5 * EARLY_NS { EARLY_NS } else { 0 },
@@ -58,7 +59,7 @@ impl Wait {
         }
     }
 
-    /// Waits until `time_ns`; how many sleeps there was reason for.
+    /// Waits until `time_ns`; returns the number of justified sleeps.
     pub fn until(self, time_ns: u64) -> u64 {
         let awake_ns = time_ns.saturating_sub(self.spin_ns);
         let mut sleeps = 0;
@@ -75,18 +76,18 @@ impl Wait {
     }
 }
 
-/// The ideal grid of a periodic loop: late wake-ups skip grid points and count them, none is made up for.
+/// The ideal grid of a periodic loop: late wake-ups skip grid points and count them; none is made up for.
 #[derive(Clone, Copy, Debug)]
 pub struct Grid {
     /// Time between two points, ns.
     pub period_ns: u64,
-    /// The point that comes next, `CLOCK_MONOTONIC`, ns.
+    /// The next point, `CLOCK_MONOTONIC`, ns.
     pub due_ns: u64,
 }
 
 impl Grid {
-    /// Points at `phase_ns` after whole periods of the clock, so that loops keep clear of each other on purpose and not by chance;
-    /// the first one is more than half a period after `start_ns`.
+    /// Returns a grid at `phase_ns` after whole periods of the clock, which keeps the loops apart by design; the first
+    /// point is more than half a period after `start_ns`.
     pub fn at_phase(start_ns: u64, period_ns: u64, phase_ns: u64) -> Self {
         let period_ns = period_ns.max(1);
         let phase_ns = phase_ns % period_ns;
@@ -98,7 +99,7 @@ impl Grid {
         }
     }
 
-    /// Moves to the first point that lies after `now_ns`; returns how many were missed on the way.
+    /// Moves to the first point after `now_ns`; returns how many were missed.
     pub fn advance(&mut self, now_ns: u64) -> u32 {
         self.due_ns += self.period_ns;
         if self.due_ns > now_ns {
@@ -147,7 +148,7 @@ mod tests {
             (5_000_000, 500_000, 1),
         ] {
             let due = now_ns() + 2_000_000;
-            // A machine that stood still meanwhile leaves less to sleep for.
+            // A machine that was suspended meanwhile leaves less to sleep for.
             assert!(Wait { early_ns, spin_ns }.until(due) <= most);
             assert!(now_ns() >= due);
         }

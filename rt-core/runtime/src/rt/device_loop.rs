@@ -1,4 +1,4 @@
-//! What every loop that owns a device does alike: its ticks on the ideal grid, the newest sample, and the end at zero force.
+//! Common part of every loop that owns a device: ticks on the ideal grid, the newest sample, and the end at zero force.
 
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid, Wait};
@@ -9,11 +9,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_hw::{DeviceFault, HandGoal, Sample};
 use stylet_shm_schema::{DeadlineTotals, Fault};
 
-/// The hand is at its goal within this distance, at rest.
+/// Largest distance from its goal at which a resting hand has arrived.
 const AT_GOAL_M: f64 = 4e-4;
 const AT_REST_M_PER_S: f64 = 3e-3;
 
-/// Ticks of a loop, and how late they were.
+/// Ticks of a loop, and their lateness.
 #[derive(Clone, Copy, Debug)]
 pub struct Counts {
     /// Ticks made.
@@ -26,31 +26,31 @@ pub struct Counts {
 
 /// A loop that owns a device.
 pub trait DeviceLoop {
-    /// What hosts see of it.
+    /// State shown to hosts.
     type State: bytemuck::Pod + Send;
-    /// What hosts see of it, after the newest tick.
+    /// Returns the state shown to hosts, after the newest tick.
     fn state(&self) -> &Self::State;
-    /// Since the loop began; a reset does not clear them.
+    /// Returns the counts since the loop began; a reset does not clear them.
     fn counts(&self) -> Counts;
     /// Time between two ticks, s.
     fn period_s(&self) -> f64;
-    /// How it waits for each deadline.
+    /// Returns how it waits for each deadline.
     fn wait(&self) -> Wait;
-    /// Where it wakes within its period of the clock.
+    /// Returns its phase within a period of the clock.
     fn phase(&self) -> f64;
-    /// Ticks of the ramp to zero force.
+    /// Number of ticks of the ramp to zero force.
     fn ramp_out_ticks(&self) -> u32;
     /// Begins the ramp to zero force.
     fn release_for_the_end(&mut self);
-    /// One tick.
+    /// Runs one tick.
     fn step(&mut self, due_ns: u64, woke_ns: u64, missed: u32);
-    /// Present in a measurement.
+    /// Returns the probe of a measurement.
     fn probe(&mut self) -> Option<&mut Probe>;
-    /// Leaves zero force.
+    /// Sets zero force.
     fn end(&mut self);
 }
 
-/// Runs on the ideal grid until `stop`, then ramps the force to zero and ends. Returns how often it slept.
+/// Runs on the ideal grid until `stop`, then ramps the force to zero and ends. Returns the number of sleeps.
 pub fn run<L: DeviceLoop>(
     device_loop: &mut L,
     _armed: &Armed,
@@ -81,17 +81,17 @@ pub fn run<L: DeviceLoop>(
     sleeps
 }
 
-/// What a read of a device is worth.
+/// Result of reading a device.
 pub struct Reading {
     /// The newest sample; the last good one when the device has a fault.
     pub sample: Sample,
-    /// What is wrong with it.
+    /// The fault, if any.
     pub fault: Option<Fault>,
-    /// It is the last one again.
+    /// The sample repeats the last one.
     pub is_repeated: bool,
 }
 
-/// Judges the answer of a device whose last good sample is `before`.
+/// Evaluates the answer of a device whose last good sample is `before`.
 pub fn judge(answer: Result<Sample, DeviceFault>, before: Option<Sample>) -> Reading {
     let last = before.unwrap_or(Sample {
         tip_in_world: Vector3::zeros(),
@@ -111,7 +111,7 @@ pub fn judge(answer: Result<Sample, DeviceFault>, before: Option<Sample>) -> Rea
     }
 }
 
-/// Whether a simulated hand is at rest at its goal.
+/// True if a simulated hand rests at its goal.
 pub fn is_at_goal(goal: Option<HandGoal>, tip: &Vector3<f64>, speed_m_per_s: f64) -> bool {
     goal.is_some_and(|goal| (tip - goal.tip_in_world).norm() < AT_GOAL_M && speed_m_per_s < AT_REST_M_PER_S)
 }

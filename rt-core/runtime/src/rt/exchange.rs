@@ -1,4 +1,4 @@
-//! What the control thread and the loops hand each other: orders and notices, through wait-free rings.
+//! Orders and notices between the control thread and the loops, through wait-free rings.
 
 use crate::rt::motion_lease::Promise;
 use crate::rt::probe_tape::ProbeTape;
@@ -15,10 +15,10 @@ use stylet_sim::migration::Migration;
 use stylet_sim::needle::NeedleParameters;
 use stylet_sim::probe::BodyProbe;
 
-/// Number that joins an order to the host's request; 0 when nobody waits for an answer.
+/// Number that links an order to the host's request; 0 if no answer is expected.
 pub type Ticket = u64;
 
-/// Control thread to haptic.
+/// Orders from the control thread to the haptic loop.
 // Copied through a ring: a box would be freed in the loop.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -29,18 +29,18 @@ pub enum HapticOrder {
         ticket: Ticket,
         /// Rises with each change of a run.
         generation: u64,
-        /// The needle and what it does to tissue.
+        /// The needle and its effect on tissue.
         needle: NeedleParameters,
         /// The terms of the force.
         force: ForceParameters,
     },
-    /// Bring the simulated hand to a goal.
+    /// Move the simulated hand to a goal.
     Hand {
         /// Number of the request.
         ticket: Ticket,
         /// Place, direction, speed and acceleration.
         goal: HandGoal,
-        /// Of the host; without one nobody has to renew it.
+        /// Promise of the host; without one the motion needs no renewal.
         promise: Option<Promise>,
     },
     /// Turn the force on; re-arms after a fault.
@@ -53,21 +53,21 @@ pub enum HapticOrder {
         /// Number of the request.
         ticket: Ticket,
     },
-    /// An exercise: the device counts as lost, or no longer.
+    /// An exercise: treat the device as lost, or restore it.
     LoseDevice {
         /// Number of the request.
         ticket: Ticket,
-        /// From this tick on.
+        /// Lost from this tick on.
         lost: bool,
     },
-    /// An exercise: the body moves there, from where the scene has it, scene frame, m.
+    /// An exercise: move the body to this offset from its place in the scene, scene frame, m.
     MoveBody {
         /// Number of the request.
         ticket: Ticket,
-        /// At the pace of a patient.
+        /// Reached at the pace of a patient.
         to_m: [f64; 3],
     },
-    /// End the contact and clear peaks and counters, and take out what exercises put in.
+    /// End the contact, clear peaks and counters, and undo exercises.
     Reset {
         /// Number of the request.
         ticket: Ticket,
@@ -77,7 +77,7 @@ pub enum HapticOrder {
         /// Number of the request.
         ticket: Ticket,
     },
-    /// Take up a needle that stays in.
+    /// Take a needle that stays in.
     TakeNeedle {
         /// Number of the request.
         ticket: Ticket,
@@ -90,16 +90,16 @@ pub enum HapticOrder {
         ticket: Ticket,
         /// Number of its line.
         number: u64,
-        /// How fast.
+        /// Speed of the needle.
         speed_m_per_s: f64,
-        /// As of a goal.
+        /// As for a goal.
         promise: Option<Promise>,
     },
-    /// What this host moves goes on.
+    /// Renew what this host moves.
     KeepMoving(Promise),
-    /// The loop made no tick for longer than the supervisor waits: the force stays off until somebody re-arms.
+    /// The loop made no tick within the supervisor's patience: the force stays off until the operator re-arms.
     StoodStill,
-    /// Hand the flight recording over; the loop records anew once it has it back.
+    /// Hand the flight recording over; a new one begins once the tape is back.
     HandOverTape,
     /// Hold the simulated hand where it is.
     StopHand {
@@ -108,7 +108,7 @@ pub enum HapticOrder {
     },
 }
 
-/// Orders to the tissue loop that a flight recording repeats as they were.
+/// Orders to the tissue loop that a flight recording repeats unchanged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TissueStep {
     /// Use these parameters from this tick on.
@@ -129,7 +129,7 @@ pub enum TissueStep {
     Reset,
 }
 
-/// Control thread to tissue.
+/// Orders from the control thread to the tissue loop.
 pub enum TissueOrder {
     /// Carry out one step; answered under the ticket.
     Step(Ticket, TissueStep),
@@ -142,26 +142,26 @@ pub enum TissueOrder {
         /// A blank flight recording for it.
         tape: Box<TissueTape>,
     },
-    /// The force was turned on: totals since then begin anew.
+    /// The force was turned on: restart the totals since then.
     Armed,
-    /// Hand the flight recording over; the loop records anew once it has it back.
+    /// Hand the flight recording over; a new one begins once the tape is back.
     HandOverTape,
-    /// Room to record what needles that stay in do to the body.
+    /// Room to record the loads of needles that stay in.
     LeftRoom(Box<LeftTape>),
-    /// Columns for a needle that goes in where they were made; the force loop gets its half beside them.
+    /// Columns for a needle that enters along their line; the force loop gets its half separately.
     Line(Box<BodyLine>),
-    /// The ultrasound probe of a scene: of no use to another.
+    /// The ultrasound probe of a scene; ignored in another.
     Probe {
-        /// Of the scene.
+        /// Generation of the scene.
         generation: u64,
-        /// What it can press.
+        /// Its answers.
         probe: Box<BodyProbe>,
         /// Room to record it.
         room: Box<ProbeTape>,
     },
 }
 
-/// Either loop to the control thread: what happened, once each.
+/// Events that either loop reports to the control thread, once each.
 #[derive(Clone, Copy, Debug)]
 pub enum Notice {
     /// An order was carried out.
@@ -241,13 +241,13 @@ pub enum Notice {
         /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
     },
-    /// Whoever ordered a motion fell silent, and the motion was given up.
+    /// The host that ordered a motion fell silent, and the motion was given up.
     MotionGivenUp {
         /// Tick of the loop, from 1.
         tick: u64,
         /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
-        /// What moved.
+        /// The moving object.
         what: Moved,
     },
     /// Another scene runs.
@@ -261,12 +261,12 @@ pub enum Notice {
     },
 }
 
-/// What hosts move, by stable number.
+/// Objects that hosts move, by stable number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moved {
     /// The hand that holds the needle.
     Needle = 0,
-    /// That of the second device.
+    /// The hand of the second device.
     SecondHand = 1,
     /// A needle that stayed in.
     DrawnNeedle = 2,

@@ -26,7 +26,7 @@ mod orders;
 mod put_in;
 mod record;
 
-/// Everything that the haptic thread owns.
+/// State of the haptic thread.
 pub struct HapticLoop {
     session_id: u64,
     device: Box<dyn Device>,
@@ -39,24 +39,24 @@ pub struct HapticLoop {
     pose: TipPose,
     goal: Option<HandGoal>,
     motions: Motions,
-    /// Ready for a needle that goes in where it lies.
+    /// Line of a needle that goes in along it.
     line: Option<Box<HandLine>>,
-    /// Number of what the probe does to it, as it was last taken up.
+    /// Generation of the probe displacement last applied to the line.
     outside: u64,
-    /// The last tick was one on it.
+    /// The last tick was on the line.
     on_line: bool,
     /// Needles that stay in.
     left: left::Left,
     watchdog: Watchdog,
-    /// Faults that an instructor put in.
+    /// Instructor-injected faults.
     put_in: PutIn,
-    /// What the device answered in this tick, for the recording.
+    /// The device's answer in this tick, for the recording.
     answer: DeviceAnswer,
-    /// What hosts see; also holds the counters.
+    /// State shown to hosts; also holds the counters.
     pub state: HapticState,
     /// Present in a measurement.
     pub probe: Option<Box<Probe>>,
-    /// How it waits for each deadline.
+    /// Wait of the loop for each deadline.
     pub wait: Wait,
     period_s: f64,
 }
@@ -66,7 +66,7 @@ pub const HAPTIC_STAGES: &[&str] = &["orders", "device read", "force chain", "wr
 /// The mark at which the device read begins.
 const READ_MARK: usize = 0;
 
-/// What the device answered to the last read and the last write.
+/// The device's answers to the last read and the last write.
 struct DeviceAnswer {
     read: Result<Sample, DeviceFault>,
     write_failed: bool,
@@ -82,7 +82,7 @@ impl Default for DeviceAnswer {
 }
 
 impl HapticLoop {
-    /// Begins with `memory`, which names every field; its line comes by [`resume_line`](Self::resume_line).
+    /// Begins with `memory`, which names every field; [`resume_line`](Self::resume_line) restores its line.
     pub fn new(
         session_id: u64,
         device: Box<dyn Device>,
@@ -126,7 +126,7 @@ impl HapticLoop {
         }
     }
 
-    /// One tick; in the order of the data. Returns what the force chain gave.
+    /// Runs one tick, in the order of the data. Returns the output of the force chain.
     pub fn tick(&mut self, due_ns: u64, woke_ns: u64, missed: u32) -> ChainOutput {
         self.checkpoint();
         self.take_orders();
@@ -156,17 +156,17 @@ impl HapticLoop {
         response
     }
 
-    /// Everything that the force chain keeps from tick to tick.
+    /// Returns all state of the force chain.
     pub fn chain(&self) -> &ChainState {
         &self.chain
     }
 
     fn notify(&mut self, notice: Notice) {
-        // A full ring means that the control thread has ended: nobody reads notices any more.
+        // A full ring means that the control thread has ended: its notices are not needed.
         let _ = self.ports.notices.push(notice);
     }
 
-    /// The newest sample; the last good one when the device has a fault.
+    /// Returns the newest sample; the last good one when the device has a fault.
     fn read(&mut self) -> Sample {
         self.answer.read = self.put_in.answer(self.device.read(self.period_s));
         let in_body = self.answer.read.map(|sample| self.put_in.in_body(sample));
@@ -188,13 +188,13 @@ impl HapticLoop {
         }
     }
 
-    /// Watchdog over the other thread and over this one.
+    /// Runs the watchdog over both threads.
     fn watch(&mut self, woke_ns: u64, missed: u32, tissue: &TissueResponse) {
         let fault = self.watchdog.tick(&Watched {
             woke_ns,
             missed,
             tissue_ns: tissue.time_ns,
-            // Without coupling no force goes by the tissue's answer: one that lags is seen, not felt.
+            // Without coupling, no force depends on the tissue's answer: its lag is visible but not felt.
             tissue_unsolved: tissue.unsolved
                 && (self.parameters.force.coupling > 0.0 || !tissue.local.displacement_m.iter().all(|u| u.is_finite())),
             engaged: self.chain.gate.engaged(),
@@ -214,7 +214,7 @@ impl HapticLoop {
         self.leave_line();
     }
 
-    /// Where the tip meets tissue, unless this loop has ended that contact already.
+    /// Returns where the tip meets tissue, unless this loop has already ended that contact.
     fn touch(&mut self, tissue: &TissueResponse) -> Option<Touch> {
         if tissue.contact <= self.pose.released_contact || self.left.is_hand_empty {
             return None;
@@ -223,7 +223,7 @@ impl HapticLoop {
         Some(tissue.touch())
     }
 
-    /// Eq. 6-10 for this sample, and the gate.
+    /// Computes eq. 6-10 for this sample, and applies the gate.
     fn respond(&mut self, sample: &Sample, tissue: &TissueResponse) -> ChainOutput {
         let output = self.respond_to_needle(sample, tissue);
         if output.puncture {
@@ -245,7 +245,7 @@ impl HapticLoop {
         output
     }
 
-    /// On its line where there is one, else against what the tissue loop has met.
+    /// Computes the force on the needle's line, if any, else against the contact of the tissue loop.
     fn respond_to_needle(&mut self, sample: &Sample, tissue: &TissueResponse) -> ChainOutput {
         if self.is_on_line(sample, tissue)
             && let Some(output) = self.respond_on_line(sample)

@@ -1,4 +1,4 @@
-//! What the haptic loop writes to its flight recording, each tick.
+//! The haptic loop's flight recording, written each tick.
 
 use crate::rt::exchange::HapticOrder;
 use crate::rt::motion_lease::Motions;
@@ -21,10 +21,10 @@ use stylet_sim::needle::NeedleParameters;
 const CHECKPOINT_EVERY: u64 = 256;
 const CHECKPOINTS: usize = FLIGHT_TICKS / CHECKPOINT_EVERY as usize + 2;
 const ORDERS: usize = 4096;
-/// Lines taken up. Each is one that the needle stood before for a while: fewer than one in 60 ms.
+/// Most line changes on a tape. Each needle stood before its line for a while: fewer than one in 60 ms.
 const LINES: usize = 128;
 
-/// Everything that one tick of the haptic loop leaves to the next.
+/// All state of the haptic loop between ticks.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct HapticMemory {
     /// Parameters of the force chain.
@@ -33,33 +33,33 @@ pub struct HapticMemory {
     pub chain: ChainState,
     /// Last good sample of the device.
     pub sample: Option<Sample>,
-    /// Number of the contact that the loop has taken up.
+    /// Number of the contact in use.
     pub contact: u64,
     /// Last pose handed to the tissue loop.
     pub pose: TipPose,
     /// Goal of the simulated hand.
     pub goal: Option<HandGoal>,
-    /// Leases of what hosts move.
+    /// Leases of motions ordered by hosts.
     pub motions: Motions,
-    /// Number of the needle line that the loop has; 0 for none. Its state stands beside the memory.
+    /// Number of the needle line in use; 0 for none. Its state is kept separately.
     pub line: u64,
-    /// Number of what the probe does to it, as it was last taken up.
+    /// Generation of the probe displacement last applied to the line.
     pub outside: u64,
-    /// The last tick was one on it.
+    /// The last tick was on the line.
     pub on_line: bool,
-    /// The hand holds no needle. The record of those that stay in stands beside the memory.
+    /// The hand holds no needle. The record of those that stay in is kept separately.
     pub is_hand_empty: bool,
-    /// Watchdog with the fault that it keeps.
+    /// Watchdog with its latched fault.
     pub watchdog: Watchdog,
-    /// Faults that an instructor put in.
+    /// Instructor-injected faults.
     pub put_in: PutIn,
-    /// State as hosts see it.
+    /// State shown to hosts.
     #[serde(with = "pod")]
     pub state: HapticState,
 }
 
 impl HapticMemory {
-    /// Before the first tick.
+    /// Returns the memory before the first tick.
     pub fn new(info: &DeviceInfo, (needle, force): (NeedleParameters, ForceParameters), base_flags: u32) -> Self {
         let mut state: HapticState = bytemuck::Zeroable::zeroed();
         state.flags = base_flags | if info.simulated { flags::SIMULATED_DEVICE } else { 0 };
@@ -89,9 +89,9 @@ impl HapticMemory {
 pub struct HapticEntry {
     /// When the tick began, `CLOCK_MONOTONIC`, ns.
     pub woke_ns: u64,
-    /// What the device answered to the read.
+    /// The device's answer to the read.
     pub read: Result<Sample, DeviceFault>,
-    /// The device did not take the force.
+    /// The device rejected the force.
     pub write_failed: bool,
     /// Response of the tissue loop that the tick used.
     pub tissue: TissueResponse,
@@ -104,17 +104,17 @@ pub struct HapticEntry {
 pub struct HapticTape {
     /// The last ticks.
     pub ticks: Last<HapticEntry>,
-    /// Orders, each with the number of the tick that took it up.
+    /// Orders, each with the number of the tick that applied it.
     pub orders: Last<(u64, HapticOrder)>,
-    /// Numbers of needle lines, each with the number of the tick that took it up.
+    /// Numbers of needle lines, each with the number of the tick that applied it.
     pub lines: Last<(u64, u64)>,
-    /// Checkpoints, each with the number of the tick that it comes before.
+    /// Checkpoints, each with the number of the tick that follows it.
     pub checkpoints: Last<(u64, HapticMemory)>,
-    /// State of the line beside each checkpoint; without stations where there was none.
+    /// State of the line at each checkpoint; without stations if there was none.
     line_states: Last<LineState>,
-    /// The needles that stay in, beside each checkpoint.
+    /// The needles that stay in, at each checkpoint.
     left: Last<LeftRecord>,
-    /// What the probe does to the line; room from when there is one on.
+    /// The probe's displacement of the line; allocated once there is a probe.
     outside: Option<Box<OutsideTape>>,
 }
 
@@ -139,13 +139,12 @@ impl HapticTape {
         }
     }
 
-    /// Whether the tick that begins now needs a checkpoint.
+    /// True if the next tick needs a checkpoint.
     pub fn is_checkpoint_due(&self) -> bool {
         self.ticks.next().is_multiple_of(CHECKPOINT_EVERY)
     }
 
-    /// Keeps what the tick that begins now starts from: with the state of the line, where the loop has one, and with needles that stay
-    /// in.
+    /// Saves the state before the next tick, with that of the line, if any, and of needles that stay in.
     pub fn checkpoint(&mut self, memory: HapticMemory, line: Option<&LineState>, left: Option<&LeftNeedles>) {
         self.checkpoints.push((self.ticks.next(), memory));
         if let Some(slot) = self.line_states.advance() {
@@ -162,22 +161,22 @@ impl HapticTape {
         }
     }
 
-    /// Keeps that the tick that runs takes up a line.
+    /// Records that the current tick changes the line.
     pub fn line(&mut self, generation: u64) {
         self.lines.push((self.ticks.next(), generation));
     }
 
-    /// Whether there is no room yet for what the probe does to the line.
+    /// True if there is no room yet for the probe's displacement of the line.
     pub fn lacks_outside_room(&self) -> bool {
         self.outside.is_none()
     }
 
-    /// From now on there is.
+    /// Takes room for it.
     pub fn take_outside_room(&mut self, room: Box<OutsideTape>) {
         self.outside.get_or_insert(room);
     }
 
-    /// Keeps what the probe does to a line from the tick that runs on.
+    /// Records the probe's displacement of a line from the current tick on.
     pub fn outside(&mut self, outside: &LineOutside) {
         let tick = self.ticks.next();
         if let Some(tape) = &mut self.outside {
@@ -185,12 +184,12 @@ impl HapticTape {
         }
     }
 
-    /// Keeps an order of the tick that runs.
+    /// Records an order of the current tick.
     pub fn order(&mut self, order: HapticOrder) {
         self.orders.push((self.ticks.next(), order));
     }
 
-    /// The longest stretch that can be repeated: from the oldest checkpoint after which nothing was overwritten.
+    /// Returns the longest repeatable stretch: from the oldest checkpoint after which nothing was overwritten.
     pub fn flight(&self) -> Option<HapticFlight> {
         let complete = complete_from(&self.orders).max(complete_from(&self.lines));
         let complete = complete.max(self.outside.as_ref().map_or(0, |outside| complete_from(&outside.0)));
@@ -236,34 +235,34 @@ impl Tape for HapticTape {
     }
 }
 
-/// A stretch of the haptic loop that can be repeated.
+/// A repeatable stretch of the haptic loop.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct HapticFlight {
     /// Before the first of `ticks`.
     pub memory: HapticMemory,
     /// The ticks.
     pub ticks: Vec<HapticEntry>,
-    /// Each with the index of the tick that took it up.
+    /// Orders, each with the index of the tick that applied it.
     pub orders: Vec<(u64, HapticOrder)>,
-    /// State of the line of `memory`, where there is one.
+    /// State of the line of `memory`, if it has one.
     pub line_state: Option<LineState>,
     /// Needles that stay in.
     pub left: LeftRecord,
-    /// Numbers of lines, each with the index of the tick that took it up.
+    /// Numbers of lines, each with the index of the tick that applied it.
     pub lines: Vec<(u64, u64)>,
-    /// What the probe does to each line, with the index of the tick that took it up.
+    /// The probe's displacement of each line, with the index of the tick that applied it.
     pub outside: Vec<(u64, LineOutside)>,
 }
 
 impl HapticFlight {
-    /// Numbers of the lines that the loop had, in their order.
+    /// Numbers of the loop's lines, in order.
     pub fn line_numbers(&self) -> impl Iterator<Item = u64> {
         let first = (self.memory.line != 0).then_some(self.memory.line);
         let first = first.into_iter().chain(self.left.line_numbers());
         first.chain(self.lines.iter().map(|(_, line)| *line))
     }
 
-    /// Ticks in which the needle was on a prepared line.
+    /// Number of ticks with the needle on a prepared line.
     pub fn ticks_on_line(&self) -> usize {
         let is_on_line = |entry: &&HapticEntry| entry.record.flags & flags::LINE_READY != 0;
         self.ticks.iter().filter(is_on_line).count()

@@ -1,4 +1,4 @@
-//! Which layers the tip has met on its way in: the tissue loop's half of `needle::path`.
+//! Layers that the tip has met on its way in: the tissue loop's half of `needle::path`.
 
 use crate::rt::pose::TipPose;
 use serde::{Deserialize, Serialize};
@@ -11,27 +11,27 @@ pub struct LayersMet {
     stack: [(LayerKind, u64); MAX_SECTIONS],
     count: usize,
     announced: u64,
-    /// Where the tip was in the last tick.
+    /// Layer of the tip in the last tick.
     before: Option<LayerKind>,
 }
 
 impl LayersMet {
-    /// Contact with the outermost layer; its number.
+    /// Begins contact with the outermost layer; returns its number.
     pub fn begin(&mut self, kind: LayerKind) -> u64 {
         self.end();
         self.before = Some(kind);
         self.announce(kind)
     }
 
-    /// The contact has ended.
+    /// Ends the contact.
     pub fn end(&mut self) {
         self.count = 0;
         self.before = None;
     }
 
-    /// The tip is in `kind` now. `Some(number)` when that is a layer newly met: the one before is open, the tip came
-    /// in from another kind, and this kind is not on the path yet. Tissue met a second time on one path is
-    /// felt as the layer between.
+    /// Takes the tip's layer. Returns its number if the layer is newly met: the layer before it is open, the tip came
+    /// inwards from another kind, and the kind is not on the path yet. Tissue met twice on one path is felt as the
+    /// layer between.
     pub fn enter(&mut self, kind: LayerKind, inwards: bool, pose: &TipPose) -> Option<u64> {
         self.forget_what_was_left(pose);
         let came_from_elsewhere = self.before.replace(kind).is_some_and(|before| before != kind);
@@ -81,7 +81,7 @@ mod tests {
         met.enter(Perineum, true, &pose(true, 1, 1));
         assert_eq!(met.enter(Surroundings, true, &pose(true, 1, 1)), Some(2));
         assert_eq!(met.enter(Gland, true, &pose(true, 2, 2)), Some(3));
-        // The edge flickers as tissue moves.
+        // The boundary flickers as the tissue moves.
         assert_eq!(met.enter(Surroundings, true, &pose(true, 3, 3)), None);
         assert_eq!(met.enter(Gland, true, &pose(true, 3, 3)), None);
     }

@@ -1,19 +1,19 @@
-//! What needles that stay in do to the body, for the tissue loop.
+//! Loads of needles that stay in on the body, for the tissue loop.
 
 use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
 use stylet_sim::line::{LeftNeedle, LeftShare, MAX_LEFT, MAX_LEFT_LOADS, MAX_STATIONS};
 
-/// Forces of one of them.
+/// Forces of one needle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NeedleLoads {
     /// Number of its line.
     pub generation: u64,
-    /// Where its tip is along the line in the world, m.
+    /// Tip along the line in the world, m.
     pub tip_m: f64,
     /// Stations of its line.
     of_line: u32,
-    /// Stations of the shaft that are loaded, and those of the tip with the first of them.
+    /// Loaded stations of the shaft, and those of the tip with their first index.
     stations: u32,
     tip_first: u32,
     tip_count: u32,
@@ -54,7 +54,7 @@ impl NeedleLoads {
         }
     }
 
-    /// In the order of the columns of its line: shaft of each station, then tip at each.
+    /// Returns the loads in the order of the line's columns: shaft of each station, then tip at each.
     pub fn of_columns(&self) -> [f64; 2 * MAX_STATIONS] {
         let mut all = [0.0; 2 * MAX_STATIONS];
         let m = self.of_line as usize;
@@ -73,7 +73,7 @@ impl NeedleLoads {
         all
     }
 
-    /// Some tissue is pushed.
+    /// True if some tissue is loaded.
     pub fn is_any(&self) -> bool {
         let count = (self.stations + self.tip_count) as usize;
         self.loads_n.iter().take(count).any(|load_n| *load_n != 0.0)
@@ -104,17 +104,17 @@ pub struct LeftLoads {
 }
 
 impl LeftLoads {
-    /// Those that there are, in the order in which they were left.
+    /// Returns the needles in the order in which they were left.
     pub fn needles(&self) -> &[NeedleLoads] {
         self.needles.get(..self.count as usize).unwrap_or(&[])
     }
 
-    /// None.
+    /// Clears all loads.
     pub fn clear(&mut self) {
         self.count = 0;
     }
 
-    /// Of these needles.
+    /// Sets the loads of these needles.
     pub fn set<'a>(&mut self, needles: impl Iterator<Item = (&'a LeftNeedle, LeftShare<'a>)>) {
         self.count = 0;
         for (slot, (needle, share)) in self.needles.iter_mut().zip(needles) {
@@ -123,7 +123,7 @@ impl LeftLoads {
         }
     }
 
-    /// Copies those that there are.
+    /// Copies the loads in use.
     pub fn copy_from(&mut self, other: &Self) {
         self.count = other.count;
         for (slot, needle) in self.needles.iter_mut().zip(other.needles()) {
@@ -131,7 +131,7 @@ impl LeftLoads {
         }
     }
 
-    /// The same in every bit.
+    /// True if every bit is the same.
     pub fn is_same(&self, other: &Self) -> bool {
         self.count == other.count && self.needles().iter().zip(other.needles()).all(|(a, b)| a.is_same(b))
     }

@@ -1,4 +1,4 @@
-//! What the force loop does to the body on a prepared line: forces for the tissue loop's columns.
+//! Forces on a prepared line, for the tissue loop's columns.
 
 use crate::rt::left_loads::LeftLoads;
 use serde::{Deserialize, Serialize};
@@ -11,9 +11,9 @@ pub(crate) const MOST: usize = 2 * MAX_STATIONS + 2 * MAX_ACROSS;
 /// Forces of all needles in the newest tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AllLoads {
-    /// Of the needle that moves.
+    /// Loads of the moving needle.
     pub line: LineLoads,
-    /// Of those that stay in.
+    /// Loads of needles that stay in.
     pub left: LeftLoads,
 }
 
@@ -21,23 +21,23 @@ pub struct AllLoads {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(into = "TapedLoads", from = "TapedLoads")]
 pub struct LineLoads {
-    /// Of the line that they are for; 0: the needle is on none.
+    /// Generation of their line; 0 if the needle is on none.
     pub generation: u64,
     /// The tip presses on tissue or is in it.
     pub in_tissue: bool,
-    /// Place at rest of the material that the tip is in, from the entry along the line, m.
+    /// Rest position of the material at the tip, from the entry along the line, m.
     pub tip_material_m: f64,
     /// Displacement of that material along the line, m.
     pub tip_displacement_m: f64,
-    /// How far the body is moved as a whole besides, along the line, m.
+    /// Additional displacement of the whole body along the line, m.
     pub whole_m: f64,
-    /// The needle, where it bends.
+    /// The needle, if it bends.
     pub bent: Option<BentTip>,
-    /// Stations across; none of a needle that does not bend.
+    /// Stations across; none for a needle that does not bend.
     pub across: usize,
-    /// How many of `loads_n` there are.
+    /// Number of `loads_n` in use.
     pub count: usize,
-    /// Shaft of each station, then tip at each, then stations across along each direction.
+    /// Shaft of each station, then tip at each, then stations across in each direction.
     pub loads_n: [f64; MOST],
 }
 
@@ -48,12 +48,12 @@ pub struct BentTip {
     pub needle: BentNeedle,
     /// Tip across the line, in the world, m.
     pub across_m: [f64; 2],
-    /// How far the tissue at the tip is displaced across the line, m.
+    /// Displacement of the tissue at the tip across the line, m.
     pub displacement_m: [f64; 2],
 }
 
 impl BentTip {
-    /// Place at rest of the material that the tip is in, across the line, m.
+    /// Rest position of the material at the tip, across the line, m.
     pub fn material_m(&self) -> [f64; 2] {
         [0, 1].map(|side| self.across_m[side] - self.displacement_m[side])
     }
@@ -87,12 +87,12 @@ impl BentTip {
 }
 
 impl LineLoads {
-    /// The forces that there are.
+    /// Returns the forces in use.
     pub fn loads_n(&self) -> &[f64] {
         self.loads_n.get(..self.count).unwrap_or(&[])
     }
 
-    /// Forces across the line on each station across, along both directions.
+    /// Returns the forces across the line on each station across, in both directions.
     pub fn across_n(&self) -> [&[f64]; 2] {
         let loads_n = self.loads_n();
         let (_, across) = loads_n.split_at(loads_n.len().saturating_sub(2 * self.across));
@@ -101,7 +101,7 @@ impl LineLoads {
             .map_or([&[], &[]], |(first, second)| [first, second])
     }
 
-    /// How far a place of the needle is off where a rigid one would be, along both directions across, m; 0 without a beam.
+    /// Deflection of a point of the needle from a rigid one, in both directions across, m; 0 without a beam.
     pub fn deflection_m(&self, behind_tip_m: f64) -> [f64; 2] {
         self.bent.map_or([0.0; 2], |bent| {
             bent.needle
@@ -109,12 +109,12 @@ impl LineLoads {
         })
     }
 
-    /// Some tissue is pushed.
+    /// True if some tissue is loaded.
     pub fn is_any(&self) -> bool {
         self.loads_n().iter().any(|load_n| *load_n != 0.0)
     }
 
-    /// The same in every bit.
+    /// True if every bit is the same.
     pub fn is_same(&self, other: &Self) -> bool {
         let bits = |loads: &Self| {
             (
@@ -149,7 +149,7 @@ impl Default for LineLoads {
     }
 }
 
-/// Loads as a flight recording holds them: few stations are in contact.
+/// Loads as stored in a flight recording: few stations are in contact.
 #[derive(Serialize, Deserialize)]
 struct TapedLoads {
     generation: u64,
@@ -160,7 +160,7 @@ struct TapedLoads {
     bent: Option<BentTip>,
     across: usize,
     count: usize,
-    /// Those that are not zero, each with its place.
+    /// Nonzero loads, each with its index.
     loads_n: Vec<(u16, f64)>,
 }
 
@@ -182,7 +182,7 @@ impl From<LineLoads> for TapedLoads {
 }
 
 impl From<TapedLoads> for LineLoads {
-    /// Places that no line has are left out.
+    /// Indices outside any line are dropped.
     fn from(taped: TapedLoads) -> Self {
         let mut loads = Self {
             generation: taped.generation,

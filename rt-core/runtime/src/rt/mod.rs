@@ -1,12 +1,12 @@
 //! The top of every real-time stack.
 //!
-//! Contract: once a thread holds [`arm::Armed`], until its loop ends, it does not allocate, lock, log, panic or
-//! fault a page, and makes no system call but device I/O and the clock sleep. The force goes out before
-//! anything else that a tick does. Everything that enters or leaves passes through wait-free rings and triple buffers
-//! ([`wiring`]), and through the one blackboard entry that each thread with a device owns.
-//! `tests/tests/system/rt_contract.rs` holds this over 10,000 ticks.
+//! Contract: from the moment a thread holds [`arm::Armed`] until its loop ends, it does not allocate, lock, log, panic
+//! or fault a page, and makes no system call but device I/O and the clock sleep. The force goes out before anything
+//! else in a tick. All input and output passes through wait-free rings and triple buffers ([`wiring`]), and through the
+//! one blackboard entry of each thread with a device. `tests/tests/system/rt_contract.rs` checks this over 10,000
+//! ticks.
 
-// What the lists of clippy.toml name has no place in a tick; tests may.
+// Ticks must not use what clippy.toml lists; tests may.
 #![cfg_attr(
     not(test),
     deny(clippy::disallowed_macros, clippy::disallowed_methods, clippy::disallowed_types)

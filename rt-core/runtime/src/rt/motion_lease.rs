@@ -1,31 +1,31 @@
-//! The lease of a motion: a goal that a host set is followed while that host says that it still lives.
+//! The lease of a motion: the hand follows a host's goal only while that host renews it.
 //!
-//! Judged in ticks of the loop that moves the hand, so that a control thread that hangs stops the hand as well.
+//! The lease is counted in ticks of the loop that moves the hand, so a hung control thread stops the hand as well.
 
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use stylet_hw::{Device, HandGoal, Sample};
 
-/// What a request that begins a motion promises.
+/// Initial lease of a request that begins a motion.
 const FIRST_VALID_S: f64 = 0.02;
-/// A host that is heard again within this time after the hand began to brake goes on.
+/// Grace after braking begins: a host heard again within it resumes the motion.
 const GRACE_S: f64 = 0.3;
-/// So hard that the mass of the hand, not its path, decides how far it goes on: 1.6 mm from 123 mm/s.
+/// Deceleration so hard that the mass of the hand, not its path, decides the stopping distance: 1.6 mm from 123 mm/s.
 const BRAKE_M_PER_S2: f64 = 20.0;
-/// Cosine of the angle within which a tool is turned as its goal says: 1.4 mrad.
+/// Cosine of the angle within which a tool's orientation matches its goal: 1.4 mrad.
 const TURNED: f64 = 1.0 - 1e-6;
 
-/// A host's promise to be heard again in time.
+/// A host's promise to renew in time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Promise {
     /// The host.
     pub host_id: u64,
-    /// For how long the motion goes on without another promise.
+    /// Time for which the motion continues without another promise.
     pub valid_s: f64,
 }
 
 impl Promise {
-    /// Of a request that begins a motion.
+    /// Returns the promise of a request that begins a motion.
     pub fn first(host_id: u64) -> Self {
         Self {
             host_id,
@@ -34,24 +34,24 @@ impl Promise {
     }
 }
 
-/// Whether a motion may go on.
+/// Right of a motion to continue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum MotionLease {
-    /// Nothing moves, or nobody has to renew it: rehearsals and steppers have no host.
+    /// Nothing moves, or no renewal is needed: rehearsals and steppers have no host.
     #[default]
     Free,
-    /// The motion goes on.
+    /// The motion continues.
     Valid {
-        /// Whose it is.
+        /// Owner of the motion.
         host_id: u64,
-        /// Without another promise.
+        /// Ticks left without another promise.
         ticks_left: u32,
     },
-    /// The hand brakes, or rests.
+    /// The hand brakes or rests.
     Lapsed {
-        /// Whose it is.
+        /// Owner of the motion.
         host_id: u64,
-        /// Until it is given up.
+        /// Ticks left until it is given up.
         ticks_left: u32,
     },
 }
@@ -59,23 +59,23 @@ pub enum MotionLease {
 /// Leases of the force loop's motions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Motions {
-    /// Of the hand.
+    /// Lease of the hand.
     pub hand: MotionLease,
-    /// Of all needles that are drawn out.
+    /// Lease of all needles being drawn out.
     pub drawing: MotionLease,
 }
 
-/// What a loop has to do in the tick in which a lease changes.
+/// Action required in the tick in which a lease changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lapse {
-    /// Brake, and keep the goal.
+    /// Brake and keep the goal.
     Brake,
-    /// Forget the goal.
+    /// Drop the goal.
     GiveUp,
 }
 
 impl MotionLease {
-    /// Of a motion that begins; nobody has to renew it where nobody promised.
+    /// Returns the lease of a new motion; no renewal is needed without a promise.
     pub fn begin(promise: Option<Promise>, period_s: f64) -> Self {
         promise.map_or(Self::Free, |promise| Self::Valid {
             host_id: promise.host_id,
@@ -83,7 +83,7 @@ impl MotionLease {
         })
     }
 
-    /// Takes a promise. True where a motion that had lapsed goes on.
+    /// Takes a promise. True if it resumes a lapsed motion.
     pub fn renew(&mut self, promise: &Promise, period_s: f64) -> bool {
         let was_lapsed = match *self {
             Self::Valid { host_id, .. } if host_id == promise.host_id => false,
@@ -94,7 +94,7 @@ impl MotionLease {
         was_lapsed
     }
 
-    /// One tick. A motion that has ended needs no lease.
+    /// Counts one tick. A finished motion needs no lease.
     pub fn tick(&mut self, has_ended: bool, period_s: f64) -> Option<Lapse> {
         if has_ended {
             *self = Self::Free;
@@ -124,8 +124,8 @@ fn ticks(time_s: f64, period_s: f64) -> u32 {
     (time_s / period_s).round() as u32
 }
 
-/// Brakes a simulated hand at its tip, and ends its turn. The spring of the hand must not draw the tip on: one that pushes against a
-/// membrane is ahead of it.
+/// Brakes a simulated hand at its tip, and ends its rotation. The spring of the hand must not pull the tip on: a hand
+/// that pushes against a membrane is ahead of the tip.
 pub fn brake(device: &mut dyn Device, goal: &HandGoal, sample: Option<Sample>, velocity_m_per_s: &Vector3<f64>) {
     let Some(sample) = sample else {
         return device.stop_hand();
@@ -141,7 +141,7 @@ pub fn brake(device: &mut dyn Device, goal: &HandGoal, sample: Option<Sample>, v
     });
 }
 
-/// Whether a tool points, and is turned about its axis, as its goal says.
+/// True if a tool's direction and roll match its goal.
 pub fn is_turned(goal: &HandGoal, up: Option<Vector3<f64>>, world_from_tool: &UnitQuaternion<f64>) -> bool {
     let is_along = |of_tool: Vector3<f64>, wanted: Vector3<f64>| {
         let wanted = wanted.try_normalize(1e-9);
@@ -162,7 +162,7 @@ mod tests {
         Promise { host_id, valid_s }
     }
 
-    /// Ticks until it lapses and until it is given up.
+    /// Ticks until the lease lapses and until the motion is given up.
     fn ends(mut lease: MotionLease) -> Vec<(u32, Lapse)> {
         let lapse = |n: u32| Some((n, lease.tick(false, 1e-3)?));
         (0..1000).filter_map(lapse).collect()

@@ -1,4 +1,5 @@
-//! What the probe does to the tissue along the lines of needles, of the one that moves and those that stay in: from the tissue loop, which has the probe, to the force loop, which has the needle.
+//! The probe's displacement of tissue along needle lines, of the moving needle and of those that stay in: from the
+//! tissue loop, which has the probe, to the force loop, which has the needle.
 
 use crate::rt::line_loads::MOST;
 use crate::rt::recorder::{FLIGHT_TICKS, Last};
@@ -16,7 +17,7 @@ pub struct LineOutside {
 }
 
 impl Default for LineOutside {
-    /// Of no line.
+    /// Displacement of no line.
     fn default() -> Self {
         Self {
             generation: 0,
@@ -27,19 +28,19 @@ impl Default for LineOutside {
 }
 
 impl LineOutside {
-    /// In the order of the line's columns.
+    /// Rows in the order of the line's columns.
     pub fn rows_m(&self) -> &[f64] {
         self.rows_m.get(..self.count).unwrap_or(&[])
     }
 
-    /// Of that line, as `write` says, which returns how many rows there are.
+    /// Sets the displacement of that line by `write`, which returns the number of rows.
     pub fn set(&mut self, generation: u64, write: impl FnOnce(&mut [f64]) -> usize) {
         self.generation = generation;
         self.count = write(&mut self.rows_m).min(MOST);
     }
 }
 
-/// Of all lines.
+/// Displacement of all lines.
 #[derive(Clone, Copy, Debug)]
 pub struct Outside {
     count: usize,
@@ -47,7 +48,7 @@ pub struct Outside {
 }
 
 impl Default for Outside {
-    /// Of none.
+    /// Displacement of none.
     fn default() -> Self {
         Self {
             count: 0,
@@ -57,17 +58,17 @@ impl Default for Outside {
 }
 
 impl Outside {
-    /// Those that it is known of.
+    /// Lines with a displacement.
     pub fn lines(&self) -> &[LineOutside] {
         self.lines.get(..self.count).unwrap_or(&[])
     }
 
-    /// Of none.
+    /// Removes all lines.
     pub fn clear(&mut self) {
         self.count = 0;
     }
 
-    /// Room for one more; `None` where there are as many as there may be.
+    /// Adds a line; `None` if there are already the most allowed.
     pub fn add(&mut self) -> Option<&mut LineOutside> {
         let line = self.lines.get_mut(self.count)?;
         self.count += 1;
@@ -75,7 +76,7 @@ impl Outside {
     }
 }
 
-/// As a flight recording holds it.
+/// Displacement as stored in a flight recording.
 #[derive(Serialize, Deserialize)]
 struct TapedOutside {
     generation: u64,
@@ -92,7 +93,7 @@ impl From<LineOutside> for TapedOutside {
 }
 
 impl From<TapedOutside> for LineOutside {
-    /// Rows that no line has are left out.
+    /// Rows outside any line are dropped.
     fn from(taped: TapedOutside) -> Self {
         let mut outside = Self::default();
         outside.set(taped.generation, |rows_m| {
@@ -105,11 +106,11 @@ impl From<TapedOutside> for LineOutside {
     }
 }
 
-/// Room for it in the force loop's recording: one for each line in each tick of the tissue, for as long as the tape reaches back.
+/// Room for it in the force loop's recording: one entry for each line in each tissue tick over the length of the tape.
 pub struct OutsideTape(pub Last<(u64, LineOutside)>);
 
 impl OutsideTape {
-    /// Blank.
+    /// Returns a blank tape.
     pub fn new() -> Box<Self> {
         Box::new(Self(Last::new(
             &(0, LineOutside::default()),

@@ -1,7 +1,7 @@
-//! A pin that the force loop toggles for an instrument outside: a register of a serial or parallel port.
+//! A pin that the force loop toggles for an external instrument: a register of a serial or parallel port.
 //!
-//! One instruction writes it, without a system call, so that the contract of the loops holds. The right to the register is
-//! taken before the threads start, which inherit it.
+//! One instruction writes it, without a system call, so the contract of the loops holds. The right to the register is
+//! acquired before the threads start, and they inherit it.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -18,12 +18,12 @@ pub struct Pin {
 const MODEM_CONTROL: u16 = 4;
 const DTR: u8 = 1;
 const RTS: u8 = 2;
-/// Connects the interrupt of a serial port; its driver has set it.
+/// Enables the interrupt of a serial port; its driver has set it.
 const OUT2: u8 = 8;
-/// Ticks between two edges are this and up to 63 more.
+/// Shortest time between two edges in ticks; up to 63 more are added.
 const FEWEST_TICKS: u32 = 20;
 
-/// Why a pin cannot be toggled; for people.
+/// Reason why a pin cannot be toggled; for people.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct PinError(String);
@@ -31,8 +31,8 @@ pub struct PinError(String);
 impl FromStr for Pin {
     type Err = String;
 
-    /// `serial:0x3F8:rts`, `serial:0x3F8:dtr`, `/dev/ttyS0:rts`, which is the same by its name, or `parallel:0x378`, which
-    /// toggles pin 2.
+    /// Parses `serial:0x3F8:rts`, `serial:0x3F8:dtr`, `/dev/ttyS0:rts`, which names the same port, or `parallel:0x378`,
+    /// which toggles pin 2.
     fn from_str(text: &str) -> Result<Self, String> {
         let expected =
             || format!("{text:?}: expected serial:0x3F8:rts, serial:0x3F8:dtr, /dev/ttyS0:rts or parallel:0x378");
@@ -42,7 +42,7 @@ impl FromStr for Pin {
                 .or(word.strip_prefix("0X"))
                 .ok_or_else(expected)?;
             let port = u16::from_str_radix(digits, 16).map_err(|_| expected())?;
-            // Below are the controllers of the board: nothing there is a serial or parallel port.
+            // Below are the board's controllers: no serial or parallel port is there.
             (0x100..0xfff0).contains(&port).then_some(port).ok_or_else(expected)
         };
         let words: Vec<&str> = text.split(':').collect();
@@ -60,7 +60,7 @@ impl FromStr for Pin {
     }
 }
 
-/// The port of a serial device, as its driver has it.
+/// Returns the port of a serial device, as its driver reports it. Read with the command line, before any loop.
 // Read with the command line, before any loop.
 #[allow(clippy::disallowed_methods)]
 fn register_of(device: &Path) -> Result<String, String> {
@@ -85,7 +85,7 @@ impl Pin {
         }
     }
 
-    /// Takes the right to the register for this thread and those that it starts; needs root.
+    /// Acquires the right to the register for this thread and those that it starts; needs root.
     ///
     /// # Errors
     /// The kernel refuses, or the processor has no such registers.
@@ -107,7 +107,7 @@ impl Pin {
         })
     }
 
-    /// Takes the right to the register for this thread and those that it starts; needs root.
+    /// Acquires the right to the register for this thread and those that it starts; needs root.
     ///
     /// # Errors
     /// The processor has no such registers.
@@ -119,7 +119,7 @@ impl Pin {
     }
 }
 
-/// A pin that may be written, and when its next edge is due.
+/// A writable pin, and the time of its next edge.
 #[derive(Clone, Debug)]
 pub struct Toggle {
     pin: Pin,
@@ -129,8 +129,8 @@ pub struct Toggle {
 }
 
 impl Toggle {
-    /// Counts a tick; true when the pin was toggled in it. The times between edges are a pattern that does not repeat,
-    /// so that a capture can be aligned with the record.
+    /// Counts a tick; true if the pin was toggled in it. The times between edges form a pattern that repeats only after
+    /// hours, so a capture can be aligned with the record.
     pub fn tick(&mut self) -> bool {
         self.left -= 1;
         if self.left > 0 {
@@ -202,8 +202,8 @@ mod tests {
         }
     }
 
-    /// The emulated serial port of a virtual machine, where we may write it: what was written is read back. On another machine
-    /// something may be connected.
+    /// Runs on the emulated serial port of a virtual machine, if writable: the written value is read back. On another
+    /// machine something may be connected.
     #[cfg(target_arch = "x86_64")]
     #[test]
     fn a_serial_port_takes_both_levels_in_a_pattern_without_equal_neighbours() {
@@ -247,7 +247,7 @@ mod tests {
                 .map(<[i32]>::to_vec)
                 .collect::<std::collections::BTreeSet<_>>()
         };
-        // Three gaps in sequence occur once.
+        // Each sequence of three gaps occurs once.
         assert_eq!(runs(3).len(), edges.len() - 2);
     }
 }

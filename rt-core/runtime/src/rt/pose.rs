@@ -1,4 +1,4 @@
-//! What the force loop hands to the tissue loop.
+//! The newest pose of the needle, from the force loop to the tissue loop.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,8 @@ use stylet_sim::needle::Phase;
 pub struct TipPose {
     /// When the pose was read, `CLOCK_MONOTONIC`, ns; 0 for no pose yet.
     pub time_ns: u64,
-    /// How far the body is from where the scene has it, m. All else of the pose is in the body as the scene has it.
+    /// Displacement of the body from its place in the scene, m. The rest of the pose is relative to the body's place in
+    /// the scene.
     pub body_moved_m: Vector3<f64>,
     /// Place of the tip, scene frame, m.
     pub tip_in_scene: Vector3<f64>,
@@ -27,9 +28,9 @@ pub struct TipPose {
     pub released_contact: u64,
     /// Number of the innermost layer that the shaft is in.
     pub innermost_layer: u64,
-    /// Largest number of a layer that the force loop has taken up so far.
+    /// Largest layer number that the force loop has seen.
     pub seen_layer: u64,
-    /// The hand holds no needle: it meets nothing.
+    /// The hand holds no needle: contact is disabled.
     pub hand_is_empty: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What the tissue loop writes of the probe to its flight recording: where the second hand had it in each tick, and what it did to the hand.
+//! The probe in the tissue loop's flight recording: its pose in each tick, and its force on the hand.
 
 use crate::rt::recorder::Last;
 use crate::rt::tissue_tape::TAPE_TICKS;
@@ -8,22 +8,22 @@ use stylet_sim::probe::{BodyProbe, ProbeMemory, ProbePose};
 /// Input and output of one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProbeEntry {
-    /// Where it was.
+    /// Pose of the probe.
     pub pose: ProbePose,
     /// Force and torque of the tissue on it.
     pub wrench: [f64; 6],
 }
 
-/// Room for one probe, made with it.
+/// Room for one probe, allocated with it.
 pub struct ProbeTape {
-    /// Each with the number of its tick.
+    /// Entries, each with the number of its tick.
     pub entries: Last<(u64, ProbeEntry)>,
-    /// For both checkpoints and the end.
+    /// State at both checkpoints and at the end.
     pub memories: [ProbeMemory; 3],
 }
 
 impl ProbeTape {
-    /// Blank, for that probe.
+    /// Returns a blank tape for that probe.
     pub fn new(probe: &BodyProbe) -> Box<Self> {
         let pose = ProbePose {
             tip_m: [0.0; 3],

@@ -1,32 +1,32 @@
-//! The flight recorder: the last ticks of a loop with everything that a bit-identical repetition needs.
+//! The flight recorder: the last ticks of a loop, with everything needed for a bit-identical repetition.
 //!
-//! A loop writes to a tape that it owns: no lock, no heap call, no system call. A tape holds the inputs and outputs of
-//! each tick, the orders taken, and now and then a checkpoint of all that one tick leaves to the next. When asked, the
-//! loop hands the whole tape to the control thread through a ring, continues without one, and records again when it returns.
+//! A loop writes to its own tape without locks, heap calls or system calls. A tape holds the inputs and outputs of each
+//! tick, the orders, and periodic checkpoints of all state between ticks. On request the loop hands the whole tape to
+//! the control thread through a ring, continues without one, and records again when it returns.
 
-/// Ticks of the haptic loop that a recording reaches back, at least.
+/// Shortest length of a haptic recording, in ticks.
 pub const FLIGHT_TICKS: usize = 4000;
 
-/// The last values of a series numbered from 0, in memory that is written to once before it is used.
+/// The last values of a series numbered from 0, in memory that is touched before use.
 pub struct Last<T> {
     slots: Vec<T>,
     next: u64,
 }
 
 impl<T> Last<T> {
-    /// Into these slots.
+    /// Uses these slots.
     pub fn of_slots(slots: Vec<T>) -> Self {
         Self { slots, next: 0 }
     }
 
-    /// The slot of the next value, to be written in place.
+    /// Returns the slot of the next value, to be written in place.
     pub fn advance(&mut self) -> Option<&mut T> {
         let at = self.place(self.next);
         self.next += 1;
         self.slots.get_mut(at)
     }
 
-    /// Room for `capacity` values, at least one.
+    /// Allocates room for `capacity` values, at least one.
     pub fn new(blank: &T, capacity: usize) -> Self
     where
         T: Clone,
@@ -34,30 +34,30 @@ impl<T> Last<T> {
         Self::of_slots(vec![blank.clone(); capacity.max(1)])
     }
 
-    /// Keeps `value`; the oldest one is dropped when there is no room.
+    /// Adds `value`, dropping the oldest if there is no room.
     pub fn push(&mut self, value: T) {
-        // There is a slot at every place; a loop has no room for a panic all the same.
+        // Every index has a slot, but a loop must not be able to panic.
         if let Some(slot) = self.advance() {
             *slot = value;
         }
     }
 
-    /// Forgets every value; the next number is 0.
+    /// Removes all values; the next number is 0.
     pub fn clear(&mut self) {
         self.next = 0;
     }
 
-    /// The number that the next value will have.
+    /// Number of the next value.
     pub fn next(&self) -> u64 {
         self.next
     }
 
-    /// The number of the oldest value still held.
+    /// Number of the oldest value still held.
     pub fn first(&self) -> u64 {
         self.next.saturating_sub(self.slots.len() as u64)
     }
 
-    /// The value of that number, while it is held.
+    /// Returns the value of that number while it is held.
     pub fn get(&self, number: u64) -> Option<&T> {
         let held = (self.first()..self.next).contains(&number);
         held.then(|| self.slots.get(self.place(number))).flatten()
@@ -72,13 +72,13 @@ impl<T> Last<T> {
         self.get(self.next.checked_sub(1)?)
     }
 
-    /// Those held from `number` on, oldest first.
+    /// Returns the values from `number` on, oldest first.
     pub fn since(&self, number: u64) -> impl Iterator<Item = &T> {
         (number.max(self.first())..self.next).filter_map(|n| self.get(n))
     }
 }
 
-/// The first tick from which on every order is held; each stands beside the number of its tick.
+/// Returns the first tick from which every order is held; each order is paired with its tick number.
 pub fn complete_from<T>(orders: &Last<(u64, T)>) -> u64 {
     if orders.first() == 0 {
         return 0;
@@ -87,15 +87,15 @@ pub fn complete_from<T>(orders: &Last<(u64, T)>) -> u64 {
     orders.get(orders.first()).map_or(0, |(tick, _)| tick + 1)
 }
 
-/// A tape that a loop and the control thread pass to each other.
+/// A tape that a loop and the control thread exchange.
 pub trait Tape {
-    /// Forgets what it holds. Allocates nothing.
+    /// Clears the tape without allocating.
     fn clear(&mut self);
-    /// Whether it was made for this scene of a run.
+    /// True if the tape was made for this scene of a run.
     fn is_for(&self, scene_generation: u64) -> bool;
 }
 
-/// The loop's end: the tape while the loop has it, and the two rings on which it travels.
+/// The loop's end: its current tape, and the two rings on which tapes travel.
 pub struct Recorder<T> {
     tape: Option<Box<T>>,
     out: rtrb::Producer<Box<T>>,
@@ -104,16 +104,16 @@ pub struct Recorder<T> {
 
 /// The control thread's end.
 pub struct TapePort<T> {
-    /// Tapes that the loop has handed over.
+    /// Tapes handed over by the loop.
     pub taken: rtrb::Consumer<Box<T>>,
-    /// Tapes that go back to the loop.
+    /// Tapes on their way back to the loop.
     pub back: rtrb::Producer<Box<T>>,
 }
 
-/// Tapes that can be under way at once.
+/// Most tapes on their way at once.
 const UNDER_WAY: usize = 8;
 
-/// Both ends of one loop's recorder, with its first tape; without one the loop is not recorded.
+/// Returns both ends of one loop's recorder, with its first tape; without one the loop is not recorded.
 pub fn recorder<T>(tape: Option<Box<T>>) -> (Recorder<T>, TapePort<T>) {
     let (out, taken) = rtrb::RingBuffer::new(UNDER_WAY);
     let (give_back, back) = rtrb::RingBuffer::new(UNDER_WAY);
@@ -121,8 +121,8 @@ pub fn recorder<T>(tape: Option<Box<T>>) -> (Recorder<T>, TapePort<T>) {
 }
 
 impl<T: Tape> Recorder<T> {
-    /// The tape for the tick that begins now. A returned tape is cleared and begins with a whole tick; one of an earlier
-    /// scene is sent to the control thread again, which returned it before it knew of the present one.
+    /// Returns the tape for the next tick. A returned tape is cleared and begins with a whole tick; a tape of an
+    /// earlier scene, returned before the control thread knew of the new one, is sent back.
     pub fn begin_tick(&mut self, scene_generation: u64) -> Option<&mut T> {
         if let Ok(mut tape) = self.back.pop() {
             if self.tape.is_none() && tape.is_for(scene_generation) {
@@ -135,17 +135,17 @@ impl<T: Tape> Recorder<T> {
         self.tape()
     }
 
-    /// The tape of the tick that runs.
+    /// Returns the tape of the current tick.
     pub fn tape(&mut self) -> Option<&mut T> {
         self.tape.as_deref_mut()
     }
 
-    /// Takes the tape out, to be written to from elsewhere; to be put back in the same tick.
+    /// Takes the tape out, to write to it from elsewhere; put it back in the same tick.
     pub fn take(&mut self) -> Option<Box<T>> {
         self.tape.take()
     }
 
-    /// Puts back what was taken.
+    /// Puts the tape back.
     pub fn put(&mut self, tape: Box<T>) {
         self.tape = Some(tape);
     }
@@ -157,14 +157,14 @@ impl<T: Tape> Recorder<T> {
         }
     }
 
-    /// The tape of a new scene.
+    /// Replaces the tape for a new scene.
     pub fn replace(&mut self, tape: Box<T>) {
         self.hand_over();
         self.tape = Some(tape);
     }
 
     fn send(&mut self, tape: Box<T>) {
-        // The ring has room for every tape that can be under way; else leak it rather than free it here.
+        // The ring has room for every tape on its way; if not, leak it rather than free it here.
         if let Err(rtrb::PushError::Full(tape)) = self.out.push(tape) {
             std::mem::forget(tape);
         }
@@ -215,7 +215,8 @@ mod tests {
         recorder.replace(Box::new(Blank(2, false)));
         port.back.push(port.taken.pop().unwrap()).ok().unwrap();
         assert_eq!(recorder.begin_tick(2).unwrap().0, 2);
-        // It used to stay in the ring as long as the loop had another: 7 MB for each change of the scene that the control thread knew late.
+        // It used to stay in the ring while the loop had another: 7 MB for each change of scene that the control thread
+        // learned of late.
         assert_eq!(port.taken.pop().expect("out again at once").0, 1);
         recorder.hand_over();
         assert!(recorder.begin_tick(2).is_none());

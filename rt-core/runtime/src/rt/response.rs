@@ -1,4 +1,4 @@
-//! What the tissue loop hands to the force loop.
+//! The tissue loop's response to the force loop.
 
 use crate::rt::taped::pod;
 use nalgebra::Vector3;
@@ -9,7 +9,7 @@ use stylet_sim::force::chain::Touch;
 use stylet_sim::line::MAX_LEFT;
 use stylet_sim::needle::LayerKind;
 
-/// Where the tip meets tissue and what the body answers, once in each tick of the tissue loop.
+/// Contact of the tip and response of the body, once in each tissue tick.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct TissueResponse {
     /// When the tick began, `CLOCK_MONOTONIC`, ns.
@@ -18,7 +18,7 @@ pub struct TissueResponse {
     pub tick: u64,
     /// Number of the present contact; 0 for none.
     pub contact: u64,
-    /// Where the tip entered the body, scene frame, m.
+    /// Entry of the tip into the body, scene frame, m.
     pub contact_in_scene: Vector3<f64>,
     /// r of eq. 6, kept for the whole contact; unit vector.
     pub path_direction: Vector3<f64>,
@@ -26,16 +26,16 @@ pub struct TissueResponse {
     pub layer: LayerKind,
     /// Number of that layer; rises over the run.
     pub layer_number: u64,
-    /// Where its membrane was met, scene frame, m.
+    /// Place at which its membrane was met, scene frame, m.
     pub layer_in_scene: Vector3<f64>,
-    /// What the body answers at the tip.
+    /// Response of the body at the tip.
     pub local: LocalResponse,
     /// Largest violation of a limit so far, in elements.
     pub worst_residual: f64,
-    /// Smallest volume that three links of an element near the tip span, over that at rest, as the tick before had it; 1 where the
-    /// tissue's answer is not linear.
+    /// Smallest corner volume of an element near the tip, relative to rest, from the last tick; 1 where the tissue's
+    /// answer is not linear.
     pub least_corner: f64,
-    /// How far the tissue at the tip was displaced when its linear answer folded, m; 0 while it has not since the needle went in.
+    /// Displacement of the tissue at the tip when its linear answer folded, m; 0 if it has not since the insertion.
     pub folded_from_m: f64,
     /// Longest tick so far, ns.
     pub worst_work_ns: u64,
@@ -53,20 +53,20 @@ pub struct TissueResponse {
     pub seed_count: u32,
     /// Generation of the line whose columns the tissue loop has; 0 for none.
     pub line: u64,
-    /// When the pose was read that the tissue has last answered to within its tolerance, `CLOCK_MONOTONIC`, ns.
+    /// Read time of the pose that the tissue last answered within its tolerance, `CLOCK_MONOTONIC`, ns.
     pub solved_ns: u64,
-    /// The tip of that pose, scene frame, m.
+    /// Tip of that pose, scene frame, m.
     pub solved_tip_in_scene: Vector3<f64>,
-    /// Those of needles that stay in, whose columns it has; 0 for none.
+    /// Generations of the lines of needles that stay in whose columns it has; 0 for none.
     pub left: [u64; MAX_LEFT],
-    /// Number of what the probe does to the line, which rises with each that is shown; 0 where there was none yet.
+    /// Generation of the probe's displacement of the line; 0 if there was none yet.
     pub outside: u64,
-    /// The step has not converged and the needle would feel it.
+    /// The step has not converged, and the needle would feel it.
     pub unsolved: bool,
 }
 
 impl TissueResponse {
-    /// Where the tip meets tissue; valid while there is contact.
+    /// Returns where the tip meets tissue; valid during contact.
     pub fn touch(&self) -> Touch {
         Touch {
             contact_in_world: self.contact_in_scene,

@@ -1,4 +1,4 @@
-//! Seeds in the tissue: material points that move with the body, and strands of them, which do not stretch.
+//! Seeds in the tissue: material points that move with the body, and inextensible strands of them.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -8,24 +8,24 @@ use stylet_sim::tissue::{Deformed, MaterialPoint};
 /// A seed left in the tissue.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Seed {
-    /// Where the tip of the needle was.
+    /// Tip of the needle at the drop.
     pub tip: MaterialPoint,
-    /// The other end; `None` where that was outside the tissue.
+    /// The other end; `None` if it was outside the tissue.
     pub tail: Option<MaterialPoint>,
-    /// Direction of the needle at the drop, unit vector; the axis where the tail is unknown.
+    /// Direction of the needle at the drop, unit vector; the axis if the tail is unknown.
     pub axis: [f64; 3],
     /// Place of the tip at the drop, scene frame, m.
     pub dropped_at_m: [f64; 3],
-    /// From middle to middle to the seed before it, m, where a spacer joins them.
+    /// Pitch to the seed before it, centre to centre, m, if a spacer joins them.
     pub strand_pitch_m: Option<f64>,
-    /// Along the open track that it lies in towards the entry, unit vector at rest; `None` where there is none.
+    /// Direction towards the entry along the open track that it lies in, unit vector at rest; `None` if there is none.
     pub track_to_entry: Option<[f64; 3]>,
 }
 
-/// Places and axes in the deformed body, scene frame, in the order of the drops.
+/// Returns positions and axes in the deformed body, scene frame, in the order of the drops.
 ///
-/// A strand bends and does not stretch: along it each seed keeps its pitch, where springs of one stiffness between each seed and its
-/// own place in the tissue balance (docs/physics.md, Strands). What that does to the tissue is left out.
+/// A strand bends and does not stretch: along it each seed keeps its pitch, at the balance of equal springs between
+/// each seed and its own place in the tissue (docs/physics.md, Strands). The effect on the tissue is neglected.
 pub fn poses<'a>(seeds: &'a [Seed], body: Deformed<'a>) -> impl Iterator<Item = SeedPose> + 'a {
     let strands = seeds.chunk_by(|_, next| next.strand_pitch_m.is_some());
     strands.flat_map(move |strand| {
@@ -47,7 +47,7 @@ pub fn poses<'a>(seeds: &'a [Seed], body: Deformed<'a>) -> impl Iterator<Item = 
 }
 
 impl Seed {
-    /// Place and axis in the deformed body, scene frame, as if by itself.
+    /// Position and axis of a single seed in the deformed body, scene frame.
     fn pose(&self, body: &Deformed<'_>) -> SeedPose {
         let position_m = self.tip.position_m(body);
         let along = self

@@ -1,4 +1,4 @@
-//! How types of the shared memory are written to a flight recording: their bytes, or their stable number.
+//! Serialises types of the shared memory for a flight recording: as bytes, or as stable numbers.
 
 /// Plain old data as its bytes, bit for bit.
 pub mod pod {
@@ -11,7 +11,7 @@ pub mod pod {
         to.serialize_bytes(bytemuck::bytes_of(value))
     }
 
-    /// Fails where the number of bytes is another.
+    /// Fails if the number of bytes differs.
     pub fn deserialize<'de, T: Pod, D: Deserializer<'de>>(from: D) -> Result<T, D::Error> {
         let bytes = <&[u8]>::deserialize(from)?;
         bytemuck::try_pod_read_unaligned(bytes)
@@ -30,7 +30,7 @@ pub mod fault_code {
         (*fault as u32).serialize(to)
     }
 
-    /// Fails where the number is not known.
+    /// Fails for an unknown number.
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Fault, D::Error> {
         let number = u32::deserialize(from)?;
         Fault::from_number(number).ok_or_else(|| D::Error::custom("a fault that is not known"))

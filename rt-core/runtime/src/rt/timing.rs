@@ -1,4 +1,4 @@
-//! What each tick of a loop cost, sent through a ring to a measurement; a loop that is not measured has no probe.
+//! Times of each tick of a loop, sent through a ring to a measurement; a loop that is not measured has no probe.
 
 use crate::rt::clock;
 use crate::rt::pin::Toggle;
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Stages of a tick at most.
 pub const MAX_STAGES: usize = 6;
 
-/// When one tick did what, `CLOCK_MONOTONIC`, ns.
+/// Times of one tick, `CLOCK_MONOTONIC`, ns.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TickTimes {
     /// When the tick was due.
@@ -17,17 +17,17 @@ pub struct TickTimes {
     pub woke_ns: u64,
     marks: [u64; MAX_STAGES],
     marked: usize,
-    /// From input to output; `None` where there was no input yet.
+    /// From input to output; `None` if there was no input yet.
     pub path_ns: Option<u64>,
-    /// When the output had left.
+    /// Time at which the output had left.
     pub output_ns: Option<u64>,
     /// Before and after a pin was toggled in this tick.
     pub toggled_ns: Option<[u64; 2]>,
-    /// What handing over the tick before cost.
+    /// Cost of handing over the tick before.
     pub recording_ns: u64,
     /// Deadlines skipped just before this tick.
     pub missed: u32,
-    /// Ticks so far that the ring had no room for.
+    /// Ticks so far for which the ring had no room.
     pub lost: u32,
 }
 
@@ -37,12 +37,12 @@ impl TickTimes {
         self.marks.get(..self.marked).unwrap_or_default()
     }
 
-    /// End of the last stage, or the wake-up where none has ended.
+    /// End of the last stage, or the wake-up if none has ended.
     pub fn done_ns(&self) -> u64 {
         self.marks().last().copied().unwrap_or(self.woke_ns)
     }
 
-    /// Marks past [`MAX_STAGES`] are left out.
+    /// Adds a mark; those past [`MAX_STAGES`] are dropped.
     pub fn push_mark(&mut self, time_ns: u64) {
         if let Some(mark) = self.marks.get_mut(self.marked) {
             *mark = time_ns;
@@ -51,14 +51,14 @@ impl TickTimes {
     }
 }
 
-/// When the pose that each of the last tissue ticks used was read; written by the tissue thread, read by a host thread.
+/// Read times of the poses used by the last tissue ticks; written by the tissue thread, read by a host thread.
 #[derive(Debug)]
 pub struct PoseTimes([(AtomicU64, AtomicU64); PoseTimes::KEPT]);
 
 impl PoseTimes {
     const KEPT: usize = 1024;
 
-    /// Nothing known yet.
+    /// Returns an empty table.
     pub fn new() -> Self {
         Self(std::array::from_fn(|_| (AtomicU64::new(0), AtomicU64::new(0))))
     }
@@ -70,7 +70,7 @@ impl PoseTimes {
         slot_tick.store(tick, Ordering::Release);
     }
 
-    /// When the tip pose behind tissue tick `tick` was read; `None` once it is forgotten.
+    /// Returns when the tip pose behind tissue tick `tick` was read; `None` once it is forgotten.
     pub fn of(&self, tick: u64) -> Option<u64> {
         let (slot_tick, slot_time) = &self.0[tick as usize % Self::KEPT];
         // SYNC: pairs with the release store in `note`.
@@ -104,7 +104,7 @@ impl Probe {
         }
     }
 
-    /// The pin that the loop toggles once its output has left.
+    /// Adds a pin that the loop toggles once its output has left.
     pub fn with_toggle(self, toggle: Option<Toggle>) -> Self {
         Self { toggle, ..self }
     }
@@ -114,7 +114,7 @@ impl Probe {
         self.tick.push_mark(clock::now_ns());
     }
 
-    /// The tick's output left at the last mark; the way to it began at mark number `from`.
+    /// Records that the tick's output left at the last mark; the path to it began at mark number `from`.
     pub fn output_since_mark(&mut self, from: usize) {
         let done_ns = self.tick.done_ns();
         self.tick.output_ns = Some(done_ns);
@@ -127,7 +127,8 @@ impl Probe {
         }
     }
 
-    /// The output of tissue tick `tick` left at the last mark, and answers the tip read at `pose_ns`; 0 for no tip yet.
+    /// Records that the output of tissue tick `tick` left at the last mark, in answer to the tip read at `pose_ns`; 0
+    /// for no tip yet.
     pub fn output_for_pose(&mut self, tick: u64, pose_ns: u64) {
         let done_ns = self.tick.done_ns();
         self.tick.output_ns = Some(done_ns);
@@ -135,7 +136,7 @@ impl Probe {
         self.pose_times.note(tick, pose_ns);
     }
 
-    /// Ends the last stage and hands the tick over.
+    /// Ends the last stage and hands over the tick.
     pub fn finish(&mut self, due_ns: u64, woke_ns: u64, missed: u32) {
         self.mark();
         let done_ns = self.tick.done_ns();
@@ -152,9 +153,9 @@ impl Probe {
     }
 }
 
-/// Every loop's probe.
+/// Probes of all loops.
 pub struct Probes {
-    /// For the loop of the second device, where the run has one.
+    /// For the loop of the second device, if the run has one.
     pub second: Option<Probe>,
     /// For the force loop.
     pub haptic: Probe,

@@ -1,4 +1,5 @@
-//! The tissue tick, 200 Hz: newest pose → contact → held element → constraints → seeds → response → work ahead → snapshot.
+//! The tissue tick, 200 Hz: newest pose → contact → held element → constraints → seeds → response → look-ahead →
+//! snapshot.
 
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid, Wait};
@@ -36,7 +37,7 @@ mod second;
 mod seeds;
 mod snapshot;
 
-/// Everything that the tissue thread owns.
+/// State of the tissue thread.
 pub struct TissueLoop {
     session_id: u64,
     ports: TissuePorts,
@@ -44,25 +45,25 @@ pub struct TissueLoop {
     seeds: Vec<Seed>,
     contact: Option<Contact>,
     contacts: u64,
-    /// Columns for a needle that goes in where they were made.
+    /// Columns of the prepared line.
     line: Option<Box<BodyLine>>,
-    /// The needle is in tissue by them.
+    /// The needle is in tissue along the line.
     in_by_line: bool,
     /// Forces on the line that the last tick used.
     loads: LineLoads,
     /// Columns of needles that stay in, and all of their loads in this tick.
     left: Vec<left::LeftBody>,
     left_loads: LeftLoads,
-    /// Room to record those, until the tape is there.
+    /// Room to record them, until the tape is there.
     left_room: Option<Box<LeftTape>>,
     last_carry: LastCarry,
-    /// The ultrasound probe in this scene, and where it is.
+    /// The ultrasound probe in this scene, and its pose.
     pressed: Option<Box<BodyProbe>>,
     probe_pose: Option<ProbePose>,
     answered: second::Answered,
     /// Room to record it, until the tape is there.
     probe_room: Option<Box<ProbeTape>>,
-    /// What it does to the line was shown to the force loop.
+    /// Its displacement of the line was shown to the force loop.
     is_outside_shown: bool,
     layers: LayersMet,
     /// The tip has been outside since the last contact.
@@ -75,7 +76,7 @@ pub struct TissueLoop {
     /// Present in a measurement.
     pub probe: Option<Box<Probe>>,
     period_s: f64,
-    /// When it wakes after whole periods of the clock.
+    /// Wake-up time after whole periods of the clock.
     pub phase_ns: u64,
 }
 
@@ -136,17 +137,17 @@ impl TissueLoop {
         &self.response
     }
 
-    /// The scene that the loop works on.
+    /// The loop's scene.
     pub fn world(&self) -> &World {
         &self.world
     }
 
-    /// Places of the seeds now, scene frame, in the order of the drops.
+    /// Returns the present positions of the seeds, scene frame, in the order of the drops.
     pub fn seeds(&self) -> impl Iterator<Item = SeedPose> {
         seed::poses(&self.seeds, self.world.tissue.deformed())
     }
 
-    /// Where they will be once nothing moves the tissue any more, scene frame, in the order of the drops.
+    /// Returns their positions once nothing moves the tissue, scene frame, in the order of the drops.
     pub fn seeds_at_rest(&self) -> impl Iterator<Item = SeedPose> {
         let at_rest = Deformed {
             scale: 0.0,
@@ -162,12 +163,12 @@ impl TissueLoop {
         f64::from(elements) * self.world.scene.body.spacing_m
     }
 
-    /// Ends the loop and returns its scene, deformed as it is.
+    /// Ends the loop and returns its scene, as deformed.
     pub fn into_world(self) -> Box<World> {
         self.world
     }
 
-    /// Runs on the ideal grid until `stop`. Returns how often it slept.
+    /// Runs on the ideal grid until `stop`. Returns the number of sleeps.
     pub fn run(&mut self, _armed: &Armed, stop: &AtomicBool) -> u64 {
         let mut grid = Grid::at_phase(clock::now_ns(), (self.period_s * 1e9).round() as u64, self.phase_ns);
         let (mut missed, mut sleeps) = (0, 0);
@@ -194,7 +195,7 @@ impl TissueLoop {
         response.since_armed.add(missed, wake_latency_ns);
     }
 
-    /// One tick; in the order of the data.
+    /// Runs one tick, in the order of the data.
     pub fn tick(&mut self, woke_ns: u64) {
         self.checkpoint();
         self.follow_left();
@@ -279,7 +280,7 @@ impl TissueLoop {
     }
 
     fn notify(&mut self, notice: Notice) {
-        // A full ring means that the control thread has ended: nobody reads notices any more.
+        // A full ring means that the control thread has ended: its notices are not needed.
         let _ = self.ports.notices.push(notice);
     }
 
@@ -307,7 +308,7 @@ impl TissueLoop {
     fn swap(&mut self, ticket: Ticket, world: Box<World>) {
         let old = std::mem::replace(&mut self.world, world);
         self.last_carry.forget();
-        // The ring has room for every world that can be under way; else leak it rather than free it here.
+        // The ring has room for every world on its way; if not, leak it rather than free it here.
         if let Err(rtrb::PushError::Full(old)) = self.ports.old_worlds.push(old) {
             std::mem::forget(old);
         }
@@ -344,16 +345,16 @@ impl TissueLoop {
             response.solved_tip_in_scene = self.pose.tip_in_scene;
         }
         response.worst_residual = response.worst_residual.max(report.residual);
-        // Limits tightened over tissue that nothing holds are met as it recovers; no force depends on it.
+        // Limits tightened over free tissue are met as it recovers; no force depends on it.
         response.unsolved = !may_be_felt && held;
         self.ports.response.write(*response);
     }
 
-    /// Displacement of the tissue that answers, m. A membrane holds one element. Behind it the tip goes from element to element, and
-    /// an answer that was one element's jumped there: what is between them is that of the tissue between them.
+    /// Displacement of the tissue that responds, m. A membrane holds one element. Behind it the tip passes from element
+    /// to element, where the displacement of a single element would jump: it is interpolated between the elements.
     fn displacement_at_tip_m(&self, held: u32, report: &StepReport) -> Vector3<f64> {
         let body = self.world.tissue.deformed();
-        // A body that knows forces answers with that of what it holds.
+        // A body that computes forces answers with the displacement of its held element.
         let is_between = self.pose.punctured && report.tip_force_n.is_none();
         let at_tip = is_between
             .then(|| self.locate(&self.pose.tip_in_scene, Some(held)))
@@ -362,7 +363,7 @@ impl TissueLoop {
         point.displacement_m(&body).into()
     }
 
-    /// What the haptic loop carries on at its own rate; no answer while nothing is held.
+    /// Returns the local response that the haptic loop extrapolates at its own rate; none while nothing is held.
     fn local_response(&self, report: &StepReport) -> LocalResponse {
         let Some(held) = self.held else {
             return LocalResponse::default();

@@ -1,4 +1,4 @@
-//! What the tissue loop writes to its flight recording, each tick.
+//! The tissue loop's flight recording, written each tick.
 
 use crate::rt::contact::Contact;
 use crate::rt::exchange::TissueStep;
@@ -23,16 +23,16 @@ use stylet_sim::tissue::Held;
 
 /// Ticks between two checkpoints: 5 s at 200 Hz. Two are kept, so that a tape reaches back at least 5 s.
 const CHECKPOINT_EVERY: u64 = 1000;
-/// Of a tape.
+/// Ticks on a tape.
 pub const TAPE_TICKS: usize = 2 * CHECKPOINT_EVERY as usize;
 const ORDERS: usize = 1024;
-/// Larger bodies are not recorded: a copy of one would take too much of a tick.
+/// Largest body that is recorded: copying a larger one would take too much of a tick.
 pub const MAX_BODY_BYTES: usize = 8 << 20;
 
-/// An order to the tissue loop, as far as it can be written down. A new scene begins a new tape instead.
+/// A recorded order to the tissue loop. A new scene begins a new tape instead.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum TapedOrder {
-    /// A step, as it was ordered.
+    /// A step, as ordered.
     Step(TissueStep),
     /// Another line of the needle.
     Line {
@@ -41,12 +41,12 @@ pub enum TapedOrder {
     },
     /// Another ultrasound probe.
     Probe {
-        /// Edge of the elements that it was solved for in, m.
+        /// Edge of the elements that it was solved in, m.
         edge_m: f64,
     },
 }
 
-/// Everything that one tick of the tissue loop leaves to the next.
+/// All state of the tissue loop between ticks.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TissueMemory {
     /// Seeds in the tissue.
@@ -55,17 +55,17 @@ pub struct TissueMemory {
     pub contact: Option<Contact>,
     /// Contacts so far.
     pub contacts: u64,
-    /// The needle is in tissue by the line that `response` names.
+    /// The needle is in tissue along the line that `response` names.
     pub in_by_line: bool,
-    /// Forces on it that the last tick used.
+    /// Forces on the line in the last tick.
     pub loads: LineLoads,
-    /// Needles that stay in: the loads that the body's share of each was made from.
+    /// Needles that stay in: the loads behind each one's share of the body.
     pub left: Vec<NeedleLoads>,
     /// The probe.
     pub probe: ProbeMemory,
-    /// Where the second hand had it.
+    /// Pose of the second hand's probe.
     pub probe_pose: Option<ProbePose>,
-    /// What it does to the line was shown to the force loop.
+    /// Its displacement of the line was shown to the force loop.
     pub is_outside_shown: bool,
     /// Layers on the path of the needle.
     pub layers: LayersMet,
@@ -79,9 +79,9 @@ pub struct TissueMemory {
     pub response: TissueResponse,
     /// Limits in use.
     pub limits: Limits,
-    /// How seeds migrate.
+    /// Migration of seeds.
     pub migration: Migration,
-    /// As the tissue model saves it.
+    /// State saved by the tissue model.
     pub body: Vec<u8>,
 }
 
@@ -100,11 +100,11 @@ pub struct TissueEntry {
     pub response: TissueResponse,
 }
 
-/// Room for what needles that stay in do to the body; made when the first is left, for as many ticks as a tape has.
+/// Room for the loads of needles that stay in; allocated when the first is left, for as many ticks as a tape has.
 pub struct LeftTape(Last<(u64, LeftLoads)>);
 
 impl LeftTape {
-    /// Blank.
+    /// Returns a blank tape.
     pub fn new() -> Box<Self> {
         Box::new(Self(Last::new(&(0, LeftLoads::default()), TAPE_TICKS)))
     }
@@ -116,17 +116,17 @@ pub struct TissueTape {
     scene: Arc<SceneSource>,
     /// The last ticks.
     pub ticks: Last<TissueEntry>,
-    /// Orders, each with the number of the tick that took it up.
+    /// Orders, each with the number of the tick that applied it.
     pub orders: Last<(u64, TapedOrder)>,
     /// Forces on a needle line, each with the number of the first tick that used them.
     loads: Last<(u64, LineLoads)>,
-    /// Those of needles that stay in; room from when the first is left on.
+    /// Those of needles that stay in; allocated when the first is left.
     left: Option<Box<LeftTape>>,
-    /// Where the probe was; room from when there is one on.
+    /// Poses of the probe; allocated once there is one.
     probe: Option<Box<ProbeTape>>,
-    /// Written alternately, each with the tick that it comes before.
+    /// Written alternately, each with the tick that follows it.
     checkpoints: [(u64, TissueMemory); 2],
-    /// Checkpoints so far, and the tick from which on the next is due.
+    /// Number of checkpoints, and the tick from which the next is due.
     points: usize,
     next_due: u64,
     tissue: Option<TissueKind>,
@@ -136,7 +136,7 @@ pub struct TissueTape {
 }
 
 impl TissueTape {
-    /// For the body of `world`, built from `scene`.
+    /// Returns a tape for the body of `world`, built from `scene`.
     pub fn new(world: &World, scene: Arc<SceneSource>) -> Self {
         let body_len = world.tissue.memory_len();
         let tissue = world.spec.built_in;
@@ -185,8 +185,8 @@ impl TissueTape {
         }
     }
 
-    /// Where to copy all that the tick that begins now starts from, when it is time to and `is_all_saved`, which
-    /// [`TissueModel`](stylet_sim::tissue::TissueModel) says.
+    /// Returns where to copy the state before the next tick, if a checkpoint is due and `is_all_saved`, which
+    /// [`TissueModel`](stylet_sim::tissue::TissueModel) reports.
     pub fn checkpoint_due(&mut self, is_all_saved: bool) -> Option<&mut TissueMemory> {
         let tick = self.ticks.next();
         if self.not_kept || !is_all_saved || tick < self.next_due {
@@ -200,21 +200,21 @@ impl TissueTape {
         Some(&mut slot.1)
     }
 
-    /// Keeps the forces on a needle line that the tick that runs has used, where they are others than before.
+    /// Records the forces on a needle line in the current tick, if they have changed.
     pub fn loads(&mut self, loads: &LineLoads) {
         if !self.loads.newest().is_some_and(|(_, newest)| newest.is_same(loads)) {
             self.loads.push((self.ticks.next(), *loads));
         }
     }
 
-    /// From now on there is room for what needles that stay in do.
+    /// Takes room for the loads of needles that stay in.
     pub fn take_left_room(&mut self, room: &mut Option<Box<LeftTape>>) {
         if self.left.is_none() {
             self.left = room.take();
         }
     }
 
-    /// Keeps what needles that stay in did to the body in the tick that runs, where it is other than before.
+    /// Records the loads of needles that stay in on the body in the current tick, if they have changed.
     pub fn left_loads(&mut self, loads: &LeftLoads) {
         let tick = self.ticks.next();
         if let Some(left) = &mut self.left
@@ -226,7 +226,7 @@ impl TissueTape {
         }
     }
 
-    /// From now on there is room for the probe.
+    /// Takes room for the probe.
     pub fn take_probe_room(&mut self, room: &mut Option<Box<ProbeTape>>) {
         if let Some(mut room) = room.take() {
             let [even, odd, end] = &mut room.memories;
@@ -238,7 +238,7 @@ impl TissueTape {
         }
     }
 
-    /// Keeps where the probe was in the tick that runs, and what it did to the hand.
+    /// Records the probe's pose in the current tick, and its force on the hand.
     pub fn probe(&mut self, entry: ProbeEntry) {
         let tick = self.ticks.next();
         if let Some(room) = &mut self.probe {
@@ -246,17 +246,17 @@ impl TissueTape {
         }
     }
 
-    /// Keeps an order of the tick that runs.
+    /// Records an order of the current tick.
     pub fn order(&mut self, order: TapedOrder) {
         self.orders.push((self.ticks.next(), order));
     }
 
-    /// Where to copy what the last tick left, before the tape is handed over.
+    /// Returns where to copy the state after the last tick, before the tape is handed over.
     pub fn end(&mut self) -> Option<&mut TissueMemory> {
         (!self.not_kept).then_some(&mut self.end)
     }
 
-    /// The stretch from the older checkpoint that can be repeated.
+    /// Returns the repeatable stretch from the older checkpoint.
     pub fn flight(&self) -> Option<TissueFlight> {
         let next = self.ticks.next();
         if self.not_kept || next == 0 {
@@ -275,7 +275,7 @@ impl TissueTape {
         let probe = self.probe.iter().flat_map(|probe| probe.entries.since(0));
         let probe = probe.filter(|(tick, _)| tick >= first);
         let left = self.left.iter().flat_map(|left| left.0.since(0)).copied();
-        // What was so before the stretch holds on in it.
+        // Values from before the stretch persist in it.
         let (before, left): (Vec<_>, Vec<_>) = left.partition(|(tick, _)| tick < first);
         let before = before.last().map(|(_, loads)| (0, *loads));
         Some(TissueFlight {
@@ -316,33 +316,33 @@ impl Tape for TissueTape {
     }
 }
 
-/// A stretch of the tissue loop that can be repeated.
+/// A repeatable stretch of the tissue loop.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TissueFlight {
-    /// What the scene was built from.
+    /// Source of the scene.
     pub scene: SceneSource,
     /// Its tissue model.
     pub tissue: TissueKind,
     /// Before the first of `ticks`.
     pub memory: TissueMemory,
-    /// A later checkpoint, with the index of the tick that it comes before.
+    /// A later checkpoint, with the index of the tick that follows it.
     pub middle: Option<(u64, TissueMemory)>,
     /// After the last of `ticks`.
     pub end: TissueMemory,
     /// The ticks.
     pub ticks: Vec<TissueEntry>,
-    /// Each with the index of the tick that took it up.
+    /// Orders, each with the index of the tick that applied it.
     pub orders: Vec<(u64, TapedOrder)>,
     /// Forces on a needle line, each with the index of the first tick that used them.
     pub loads: Vec<(u64, LineLoads)>,
     /// Those of needles that stay in, likewise.
     pub left: Vec<(u64, LeftLoads)>,
-    /// Where the probe was, with the index of each tick.
+    /// Poses of the probe, with the index of each tick.
     pub probe: Vec<(u64, ProbeEntry)>,
 }
 
 impl TissueFlight {
-    /// Numbers of the lines that the loop had, in their order.
+    /// Numbers of the loop's lines, in order.
     pub fn line_numbers(&self) -> impl Iterator<Item = u64> {
         let before = self.memory.response.line;
         let first = (before != 0).then_some(before);
@@ -354,7 +354,7 @@ impl TissueFlight {
         first.into_iter().chain(left).chain(taken)
     }
 
-    /// Edge of the elements that its probe was solved for in, m; `None` where the loop had no probe.
+    /// Edge of the elements that its probe was solved in, m; `None` if the loop had no probe.
     pub fn probe_edge_m(&self) -> Option<f64> {
         let taken = self.orders.iter().find_map(|(_, order)| match order {
             TapedOrder::Probe { edge_m } => Some(*edge_m),
@@ -364,7 +364,7 @@ impl TissueFlight {
         before.is_there.then_some(before.edge_m).or(taken)
     }
 
-    /// Whether a needle on that line pushed tissue, so that its columns count.
+    /// True if a needle on that line loaded tissue, so that its columns matter.
     pub fn is_pushed_by(&self, generation: u64) -> bool {
         let left = self.left.iter().flat_map(|(_, left)| left.needles());
         if left

@@ -1,8 +1,8 @@
-//! Watches the device and both loops: decides which tick begins to ramp the force out, and why.
+//! Watches the device and both loops: decides in which tick the force begins to ramp out, and why.
 //!
-//! [`RAMP_OUT_TICKS`](stylet_sim::force::gate::RAMP_OUT_TICKS) ticks after the one that raises a fault the force is zero, on a straight ramp. The first
-//! fault is kept until the operator re-arms. A haptic loop that stops altogether cannot watch itself: that is seen
-//! by `control/supervisor.rs`.
+//! The force is zero [`RAMP_OUT_TICKS`](stylet_sim::force::gate::RAMP_OUT_TICKS) ticks after the one that raises a
+//! fault, on a linear ramp. The first fault is kept until the operator re-arms. A haptic loop that stops altogether
+//! cannot watch itself: `control/supervisor.rs` detects it.
 
 use crate::rt::taped::fault_code;
 use serde::{Deserialize, Serialize};
@@ -10,14 +10,14 @@ use stylet_hw::DeviceFault;
 use stylet_shm_schema::Fault;
 use stylet_sim::force::ForceFault;
 
-/// Tissue older than this turns the force off.
+/// Age of the tissue's answer that turns the force off.
 pub const STALE_TISSUE_NS: u64 = 100_000_000;
-/// This number of ticks in a row with a missed deadline turn the force off.
+/// Consecutive ticks with a missed deadline that turn the force off.
 pub const OVERRUN_STREAK: u32 = 20;
-/// This number of repeated samples in a row turn the force off.
+/// Consecutive repeated samples that turn the force off.
 pub const SILENT_SAMPLES: u32 = 20;
 
-/// What a tick knows about the other thread and about its own deadlines.
+/// A tick's view of the other thread and of its deadlines.
 #[derive(Clone, Copy, Debug)]
 pub struct Watched {
     /// When the tick began, `CLOCK_MONOTONIC`, ns.
@@ -26,13 +26,13 @@ pub struct Watched {
     pub missed: u32,
     /// When the newest tissue response was made.
     pub tissue_ns: u64,
-    /// The newest tissue response did not converge, and the force goes by it.
+    /// The newest tissue response did not converge, and the force depends on it.
     pub tissue_unsolved: bool,
-    /// The force is on: only then do late tissue and late ticks matter.
+    /// The force is on: late tissue and late ticks matter only then.
     pub engaged: bool,
 }
 
-/// One for a haptic loop.
+/// Watchdog of a haptic loop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Watchdog {
     #[serde(with = "fault_code")]
@@ -52,7 +52,7 @@ impl Default for Watchdog {
 }
 
 impl Watchdog {
-    /// The first fault since the last re-arming.
+    /// Returns the first fault since the last re-arming.
     pub fn fault(&self) -> Fault {
         self.fault
     }
@@ -66,7 +66,7 @@ impl Watchdog {
         first
     }
 
-    /// Forgets the fault and what led to it; true if there was one.
+    /// Clears the fault and its causes; true if there was one.
     pub fn rearm(&mut self) -> bool {
         let had_fault = self.fault != Fault::None;
         if had_fault {
@@ -75,13 +75,13 @@ impl Watchdog {
         had_fault
     }
 
-    /// One sample of the device; `repeated` when it is the last one again.
+    /// Takes one sample of the device; `repeated` if it equals the last.
     pub fn sample(&mut self, repeated: bool) -> Option<Fault> {
         self.silent = if repeated { self.silent.saturating_add(1) } else { 0 };
         (self.silent >= SILENT_SAMPLES).then_some(Fault::DeviceSilent)
     }
 
-    /// Both loops, once a tick.
+    /// Checks both loops, once a tick.
     pub fn tick(&mut self, seen: &Watched) -> Option<Fault> {
         self.streak = if seen.missed > 0 {
             self.streak.saturating_add(1)
@@ -102,7 +102,7 @@ impl Watchdog {
     }
 }
 
-/// The fault of a run that a fault of the device is.
+/// Converts a fault of the device to a fault of the run.
 pub fn device_fault(fault: DeviceFault) -> Fault {
     match fault {
         DeviceFault::NotConnected => Fault::DeviceLost,
@@ -116,7 +116,7 @@ pub fn device_fault(fault: DeviceFault) -> Fault {
     }
 }
 
-/// The gate's name for a fault.
+/// Converts a fault to the gate's.
 pub fn at_gate(fault: Fault) -> ForceFault {
     match fault {
         Fault::None => ForceFault::Stopped,

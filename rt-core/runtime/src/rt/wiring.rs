@@ -1,4 +1,4 @@
-//! Every ring and triple buffer between the two loops and the control thread: made here, in one call, and nowhere else.
+//! Every ring and triple buffer between the two loops and the control thread, all made here in one call.
 
 pub use crate::rt::capacities::Capacities;
 use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
@@ -17,34 +17,34 @@ use stylet_shm_schema::TickRecord;
 use stylet_sim::line::{BodyLine, HandLine, LeftNeedles, MAX_LEFT};
 use stylet_sim::probe::BodyProbe;
 
-/// Lines on their way in each direction; the control thread frees what has come back before it sends another.
+/// Lines in transit in each direction; the control thread frees returned lines before it sends another.
 const LINES: usize = 2;
-/// Lines on their way back: those that stay in may all come at once.
+/// Lines on their way back: all needles that stay in may return at once.
 const OLD_LINES: usize = LINES + 2 * MAX_LEFT;
 /// Room for needles that stay in, sent once.
 const ROOMS: usize = 2;
-/// Probes on their way back: one of each scene.
+/// Probes on their way back, one per scene.
 const OLD_PROBES: usize = 4;
 
-/// Ends that the force loop owns.
+/// Ends of the force loop.
 pub struct HapticPorts {
     /// Newest pose, to the tissue loop.
     pub pose: triple_buffer::Input<TipPose>,
     /// Newest response of the tissue loop.
     pub response: triple_buffer::Output<TissueResponse>,
-    /// What the probe does to the line.
+    /// The probe's displacement of the line.
     pub outside: triple_buffer::Output<Outside>,
     /// Room to record it.
     pub outside_rooms: rtrb::Consumer<Box<OutsideTape>>,
     /// Orders of the control thread.
     pub orders: rtrb::Consumer<HapticOrder>,
-    /// What happened, to the control thread.
+    /// Notices to the control thread.
     pub notices: rtrb::Producer<Notice>,
     /// One record for each tick, to the control thread.
     pub records: rtrb::Producer<TickRecord>,
-    /// Lines that are ready for the needle.
+    /// Lines ready for the needle.
     pub lines: rtrb::Consumer<Box<HandLine>>,
-    /// Replaced ones, to the control thread, which frees them.
+    /// Replaced lines, to the control thread, which frees them.
     pub old_lines: rtrb::Producer<Box<HandLine>>,
     /// Room for needles that stay in.
     pub rooms: rtrb::Consumer<Box<LeftNeedles>>,
@@ -54,17 +54,17 @@ pub struct HapticPorts {
     pub flight: Recorder<HapticTape>,
 }
 
-/// Ends that the tissue loop owns.
+/// Ends of the tissue loop.
 pub struct TissuePorts {
     /// Newest pose of the force loop.
     pub pose: triple_buffer::Output<TipPose>,
     /// Newest response, to the force loop.
     pub response: triple_buffer::Input<TissueResponse>,
-    /// What the probe does to the line, to the force loop.
+    /// The probe's displacement of the line, to the force loop.
     pub outside: triple_buffer::Input<Outside>,
     /// Orders of the control thread.
     pub orders: rtrb::Consumer<TissueOrder>,
-    /// What happened, to the control thread.
+    /// Notices to the control thread.
     pub notices: rtrb::Producer<Notice>,
     /// Replaced scenes, to the control thread, which frees them.
     pub old_worlds: rtrb::Producer<Box<World>>,
@@ -74,7 +74,7 @@ pub struct TissuePorts {
     pub old_probes: rtrb::Producer<Box<BodyProbe>>,
     /// Forces on the line, of the force loop.
     pub loads: triple_buffer::Output<AllLoads>,
-    /// Somebody takes snapshots; without, none is made.
+    /// A host takes snapshots; none is made otherwise.
     pub is_watched: Arc<AtomicBool>,
     /// Pose and contact of the second device, in a run that has one.
     pub second: Option<SecondTissuePorts>,
@@ -82,31 +82,31 @@ pub struct TissuePorts {
     pub flight: Recorder<TissueTape>,
 }
 
-/// Ends that the control thread owns, or whoever steps the loops in its place.
+/// Ends of the control thread, or of a stepper in its role.
 pub struct ControlPorts {
     /// Records of the force loop.
     pub records: rtrb::Consumer<TickRecord>,
     /// Orders to the force loop.
     pub haptic_orders: rtrb::Producer<HapticOrder>,
-    /// What the force loop reports.
+    /// Notices of the force loop.
     pub haptic_notices: rtrb::Consumer<Notice>,
     /// Orders to the tissue loop.
     pub tissue_orders: rtrb::Producer<TissueOrder>,
-    /// What the tissue loop reports.
+    /// Notices of the tissue loop.
     pub tissue_notices: rtrb::Consumer<Notice>,
-    /// Scenes to be freed.
+    /// Scenes to free.
     pub old_worlds: rtrb::Consumer<Box<World>>,
-    /// Lines that are ready, to the force loop; their columns go with an order to the tissue loop.
+    /// Finished lines, to the force loop; an order takes their columns to the tissue loop.
     pub lines: rtrb::Producer<Box<HandLine>>,
     /// Room for needles that stay in, to the force loop.
     pub rooms: rtrb::Producer<Box<LeftNeedles>>,
-    /// Room to record what the probe does to the line, to the force loop.
+    /// Room to record the probe's displacement of the line, to the force loop.
     pub outside_rooms: rtrb::Producer<Box<OutsideTape>>,
-    /// Lines to be freed.
+    /// Lines to free.
     pub old_hand_lines: rtrb::Consumer<Box<HandLine>>,
-    /// Columns to be freed.
+    /// Columns to free.
     pub old_body_lines: rtrb::Consumer<Box<BodyLine>>,
-    /// Probes to be freed.
+    /// Probes to free.
     pub old_probes: rtrb::Consumer<Box<BodyProbe>>,
 }
 
@@ -126,7 +126,7 @@ pub struct Wiring {
 }
 
 impl Wiring {
-    /// Joins two loops and a control thread. A loop without a tape is not recorded.
+    /// Connects two loops and a control thread. A loop without a tape is not recorded.
     // SYNC: every ring and triple buffer is single-producer single-consumer; their crates pair release with acquire.
     pub fn new(
         capacities: Capacities,

@@ -1,4 +1,4 @@
-//! The scene as the tissue loop owns it: built by another thread, swapped in whole.
+//! The tissue loop's scene: built by another thread, swapped in as a whole.
 
 use stylet_shm_schema::{SnapshotHeader, Vertex};
 use stylet_sim::limits::Limits;
@@ -14,24 +14,25 @@ pub struct World {
     pub generation: u64,
     /// Lattice, surface and structures.
     pub scene: Scene,
-    /// What each structure of the scene is to the needle.
+    /// Layer of each structure of the scene.
     pub layers: Vec<LayerKind>,
     /// What is known of the tissue model.
     pub spec: TissueSpec,
     /// The body as it deforms.
     pub tissue: Box<dyn TissueModel>,
-    /// Limits that the tissue keeps now.
+    /// Current limits of the tissue.
     pub limits: Limits,
-    /// What seeds do after they were dropped; off in a new world.
+    /// Migration of dropped seeds; off in a new world.
     pub migration: Migration,
-    /// Tissue near the tip is looked at and opened where it folds. Seeds and forces are the same without, and the tissue loop is faster.
+    /// Detects and corrects folds near the tip. Seeds and forces are the same without it, and the tissue loop is
+    /// faster.
     pub looks_near_tip: bool,
-    /// Where snapshots go, in a run that shows any.
+    /// Destination of snapshots, in a run that shows any.
     pub shown: Option<Writer<SnapshotHeader, Vertex>>,
 }
 
 impl World {
-    /// Sets up the tissue model of a scene, at rest.
+    /// Sets up the tissue model of `scene`, at rest.
     pub fn new(
         scene: Scene,
         tissue: impl Into<TissueSpec>,
@@ -53,13 +54,13 @@ impl World {
         })
     }
 
-    /// Limits from the next step on.
+    /// Sets the limits from the next step on.
     pub fn set_limits(&mut self, limits: Limits) {
         self.limits.clone_from(&limits);
         self.tissue.set_limits(limits);
     }
 
-    /// The layer that a point of the body belongs to.
+    /// Returns the layer of a point of the body.
     pub fn layer(&self, point: &MaterialPoint) -> LayerKind {
         let structure = usize::from(self.scene.structure_at(point.element, point.local));
         self.layers.get(structure).copied().unwrap_or_default()

@@ -1,17 +1,17 @@
-//! Which lines are prepared, and when a needle gets one.
+//! Lines that are prepared, and when a needle gets one.
 
 use super::*;
 use crate::rt::wiring::{Capacities, HapticPorts, TissuePorts, Wiring};
 use bytemuck::Zeroable;
 use stylet_sim::scene::{Labels, TissueKind};
 
-/// Rings as in a run; nothing ticks at their other ends.
+/// Rings as in a run, with no loop at the other ends.
 fn rings() -> (ControlPorts, HapticPorts, TissuePorts) {
     let wiring = Wiring::new(Capacities::RUN, None, None);
     (wiring.control, wiring.haptic, wiring.tissue)
 }
 
-/// A needle along z.
+/// Returns a record of a needle along z.
 fn needle_at(tip_in_scene_m: [f64; 3], flags: u32) -> TickRecord {
     TickRecord {
         tip_in_scene_m,
@@ -21,7 +21,7 @@ fn needle_at(tip_in_scene_m: [f64; 3], flags: u32) -> TickRecord {
     }
 }
 
-/// A cube of elements of 2 mm.
+/// Builds a cube of 2 mm elements.
 fn cube(edge: usize) -> SceneSource {
     let labels = Labels {
         dims: [edge; 3],
@@ -34,7 +34,7 @@ fn cube(edge: usize) -> SceneSource {
 
 const INTO_BODY: [f64; 3] = [0.0, 0.0, 1.0];
 
-/// A second needle waited for its line as the first had, though the plan had named both.
+/// A second needle had to wait for its line as the first had, though the plan named both.
 #[test]
 fn the_lines_of_both_planned_needles_are_there_when_they_come() {
     let mut lines = LinePreparer::new(Arc::new(cube(6)), TissueKind::Fem);
@@ -64,7 +64,7 @@ fn the_lines_of_both_planned_needles_are_there_when_they_come() {
     assert_eq!(lines.generation, 2, "none was solved for twice");
 }
 
-/// A plan whose needle misses the body is no reason to try for ever, nor to forget the line that is in use.
+/// A plan whose needle misses the body must not cause endless retries, nor drop the line in use.
 #[test]
 fn an_axis_without_tissue_is_tried_once() {
     let mut lines = LinePreparer::new(Arc::new(cube(4)), TissueKind::Fem);

@@ -1,4 +1,4 @@
-//! The bridge as a process: where its program is, and whether it lives.
+//! The bridge as a process: its program, and whether it is alive.
 
 use std::os::unix::process::ExitStatusExt;
 use std::path::PathBuf;
@@ -6,31 +6,31 @@ use std::process::Child;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::Epoch;
 
-/// The bridge says that it lives twenty times a second.
+/// Longest silence: the bridge reports twenty times a second.
 pub const SILENT_AFTER: Duration = Duration::from_millis(400);
-/// Between the end of its socket and its own.
+/// Time between the end of its socket and its own end.
 const LAST_MOMENT: Duration = Duration::from_millis(50);
-/// While it makes its ports it says nothing.
+/// Longest silence while the bridge opens its ports.
 const SILENT_AT_START: Duration = Duration::from_secs(2);
-/// One that a busy machine gives no processor is waited for: another would have none either.
+/// Longest silence without processor time: on a busy machine another bridge would starve too.
 const SILENT_WITHOUT_PROCESSOR: Duration = Duration::from_secs(5);
-/// Processor time that a bridge may use without a word: one that uses more goes round in circles.
+/// Processor time that a bridge may use in silence; one that uses more is stuck in a loop.
 const MOST_BUSY: Duration = Duration::from_millis(200);
 
-/// The process that runs now.
+/// The running process.
 pub struct Running {
     pub child: Child,
     pub epoch: Epoch,
     pub is_ready: bool,
     heard: Instant,
-    /// Processor time that it had used then.
+    /// Processor time used by then.
     busy: Duration,
     /// Requests that it has refused.
     pub refused: u64,
 }
 
 impl Running {
-    /// Started a moment ago.
+    /// Wraps a process just started.
     pub fn new(child: Child, epoch: Epoch) -> Self {
         Self {
             child,
@@ -42,13 +42,13 @@ impl Running {
         }
     }
 
-    /// Takes its word that it lives.
+    /// Records its sign of life.
     pub fn hear(&mut self, refused: u64) {
         (self.heard, self.refused) = (Instant::now(), refused.max(self.refused));
         self.busy = processor_time(self.child.id()).map_or(self.busy, |(_, busy)| busy);
     }
 
-    /// How it has ended, where it has; one that closed its socket is about to.
+    /// Returns how it ended, if it did. A bridge that closed its socket is about to end.
     pub fn end(&mut self, has_closed: bool) -> Option<String> {
         let begun = Instant::now();
         loop {
@@ -64,7 +64,7 @@ impl Running {
         }
     }
 
-    /// For how long it has said nothing, where that is too long.
+    /// Returns how long it has been silent, if too long.
     pub fn is_silent(&self) -> Option<Duration> {
         let silent = self.heard.elapsed();
         let patience = match self.is_ready {
@@ -80,7 +80,7 @@ impl Running {
     }
 }
 
-/// The bridge's program, which is installed beside this one; a test's is a folder below.
+/// Path of the bridge's program, installed in the folder of this one; a test runs from a folder below.
 pub fn program() -> PathBuf {
     let own = std::env::current_exe().unwrap_or_default();
     let places = own
@@ -96,10 +96,10 @@ pub fn program() -> PathBuf {
     }
 }
 
-/// Whether a process wants the processor, and how much of it it has had.
+/// Returns whether a process wants the processor, and the time that it has used.
 fn processor_time(pid: u32) -> Option<(bool, Duration)> {
     let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // Behind the name, which may hold anything: the state, and from the 12th field on the times in hundredths of a second.
+    // The name may hold anything. After it: the state, and from the 12th field on the times in hundredths of a second.
     let mut fields = stat.rsplit_once(')')?.1.split_whitespace();
     let is_runnable = fields.next()? == "R";
     let mut ticks = fields.skip(10).take(2).filter_map(|field| field.parse::<u64>().ok());

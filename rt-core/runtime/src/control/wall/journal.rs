@@ -1,4 +1,4 @@
-//! The last records of a loop, kept for a bridge that is started anew, and sent in batches.
+//! The last records of a loop, kept for a restarted bridge and sent in batches.
 
 use super::outbox::Outbox;
 use crate::rt::clock;
@@ -6,22 +6,22 @@ use std::collections::VecDeque;
 use stylet_shm_schema::{BATCH_EVERY, MAX_BATCH, RECORD_BUFFER};
 use stylet_wall::packet::Kind;
 
-/// As many as the queue of a host holds: 12 s at 1 kHz in the smallest batches.
+/// As many as a host's queue holds: 12 s at 1 kHz in the smallest batches.
 const KEPT: usize = RECORD_BUFFER * BATCH_EVERY.as_millis() as usize;
 
-/// Of one loop.
+/// Journal of one loop.
 pub struct Journal<T> {
     kind: Kind,
     records: VecDeque<T>,
-    /// Number of the first that is kept.
+    /// Number of the oldest kept record.
     first: u64,
-    /// Number of the next that is sent.
+    /// Number of the next record to send.
     next: u64,
     sent_ns: u64,
 }
 
 impl<T: bytemuck::Pod> Journal<T> {
-    /// Empty, of records that are sent as `kind`.
+    /// Returns an empty journal of records sent as `kind`.
     pub fn new(kind: Kind) -> Self {
         Self {
             kind,
@@ -32,12 +32,12 @@ impl<T: bytemuck::Pod> Journal<T> {
         }
     }
 
-    /// The newest record.
+    /// Returns the newest record.
     pub fn newest(&self) -> Option<&T> {
         self.records.back()
     }
 
-    /// Takes what the loop has made; whether it has made a tick.
+    /// Takes the loop's new records; returns whether it made a tick.
     pub fn take(&mut self, records: &mut rtrb::Consumer<T>) -> bool {
         let mut any = false;
         while let Ok(record) = records.pop() {
@@ -51,12 +51,12 @@ impl<T: bytemuck::Pod> Journal<T> {
         any
     }
 
-    /// Sends all that is kept again, to another bridge.
+    /// Sends everything kept again, to a new bridge.
     pub fn rewind(&mut self) {
         self.next = self.first;
     }
 
-    /// Sends full batches, and one that is not full where the last was sent long enough ago, or where `at_once`.
+    /// Sends full batches, and a partial one if the last is old enough or `at_once`.
     pub fn send(&mut self, outbox: &mut Outbox, at_once: bool) {
         self.next = self.next.max(self.first);
         loop {

@@ -1,4 +1,4 @@
-//! What each new bridge is told: the newest of each state, and the last events and answers.
+//! State replayed to each new bridge: the newest of each state, and the last events and answers.
 
 use super::outbox::Outbox;
 use std::collections::VecDeque;
@@ -7,7 +7,7 @@ use std::rc::Rc;
 use stylet_shm_schema::*;
 use stylet_wall::packet::{BoardSize, Kind};
 
-/// What each new bridge is told.
+/// State replayed to each new bridge.
 pub struct Kept {
     pub state: Rc<OwnedFd>,
     pub second_state: Option<Rc<OwnedFd>>,
@@ -22,7 +22,7 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// Says all of it to a new bridge.
+    /// Sends everything to a new bridge.
     pub fn tell(&self, outbox: &mut Outbox) {
         outbox.put(Kind::State, &[], Some(&self.state));
         if let Some(board) = &self.second_state {
@@ -49,7 +49,7 @@ impl Kept {
         }
     }
 
-    /// Says which scene runs, and where its snapshots are.
+    /// Sends the running scene and its snapshot board.
     pub fn tell_scene(&self, outbox: &mut Outbox) {
         if let Some((size, board)) = &self.snapshots {
             outbox.put(Kind::Snapshots, bytemuck::bytes_of(size), Some(board));

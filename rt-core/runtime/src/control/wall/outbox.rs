@@ -1,11 +1,11 @@
-//! What waits to be said to the bridge.
+//! Queue of packets for the bridge.
 
 use std::collections::VecDeque;
 use std::os::fd::{AsFd, OwnedFd};
 use std::rc::Rc;
 use stylet_wall::packet::{Kind, Packet, Socket};
 
-/// Packets that the bridge has not taken yet.
+/// Packets that the bridge has not yet taken.
 #[derive(Default)]
 pub struct Outbox {
     pub(super) waiting: VecDeque<(Kind, Vec<u8>, Option<Rc<OwnedFd>>)>,
@@ -15,7 +15,7 @@ pub struct Outbox {
 }
 
 impl Outbox {
-    /// Sends, or keeps until there is room; nothing without a bridge, since a new one is told everything.
+    /// Sends, or queues until there is room. Does nothing without a bridge: a new one gets the whole state.
     pub fn put(&mut self, kind: Kind, bytes: &[u8], memory: Option<&Rc<OwnedFd>>) {
         if self.socket.is_some() {
             self.waiting.push_back((kind, bytes.to_vec(), memory.map(Rc::clone)));
@@ -23,7 +23,7 @@ impl Outbox {
         }
     }
 
-    /// Something could not be sent yet.
+    /// True while packets are queued.
     pub fn is_waiting(&self) -> bool {
         !self.waiting.is_empty() || self.socket.is_none()
     }

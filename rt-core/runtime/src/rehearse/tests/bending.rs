@@ -1,8 +1,8 @@
-//! Rehearsals of needles that bend, in tissue that creeps, and of needles that miss their holes.
+//! Rehearsals of needles that bend, of creeping tissue, and of needles that miss their holes.
 
 use super::*;
 
-/// Tissue that creeps goes on after a needle that stands still, and its seeds rest where it then is.
+/// Creeping tissue keeps moving after the needle stops, and its seeds rest where it ends up.
 #[test]
 fn tissue_that_creeps_repeats_bit_by_bit_and_moves_seeds() {
     let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
@@ -28,7 +28,7 @@ fn tissue_that_creeps_repeats_bit_by_bit_and_moves_seeds() {
         .map(|(a, b)| (a - b).abs())
         .fold(0.0, f64::max);
     assert!(moved > 0.1 && moved < 10.0, "{moved} mm");
-    // Terms that are off leave nothing behind.
+    // Terms that are off have no effect.
     assert_eq!(
         elastic,
         stage
@@ -37,8 +37,8 @@ fn tissue_that_creeps_repeats_bit_by_bit_and_moves_seeds() {
     );
 }
 
-/// A needle that bends leaves its seeds beside the straight way, to the side of its bevel, at every speed alike; a rigid one rests as
-/// before.
+/// A bending needle drops its seeds off the straight path, towards its bevel side, at every speed alike; a rigid one
+/// does not.
 #[test]
 fn a_needle_that_bends_leaves_its_seeds_to_the_side_of_its_bevel() {
     let (mut stage, mut run, stop) = (stage(), needle(), AtomicBool::new(false));

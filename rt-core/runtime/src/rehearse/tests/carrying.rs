@@ -1,10 +1,10 @@
-//! ChainMail carried by the columns of its line's coarser body: what is left out where nothing changed, and what it costs.
+//! ChainMail carried by the columns of its line's coarser body: work skipped when nothing changed, and its cost.
 
 use super::*;
 use std::time::Instant;
 use stylet_sim::line::BodyAnswer;
 
-/// A body, a needle into it, and ticks of the force loop until it is in at 50 mm/s. Then it rests.
+/// A body, a needle into it, and the force-loop ticks until it is in at 50 mm/s. Then it rests.
 struct Theatre {
     stage: Stage,
     run: NeedleRun,
@@ -24,7 +24,7 @@ impl Theatre {
         }
     }
 
-    /// From before the skin on the same way to the same depth in the gland.
+    /// A needle from before the skin to the same depth in the gland.
     fn pelvis() -> Self {
         let paper = Self::paper();
         let source = SceneSource::Builtin("pelvis".to_owned());
@@ -47,13 +47,13 @@ const RESTING: usize = 1_500;
 #[derive(Clone, Copy, PartialEq)]
 enum Way {
     AsItIs,
-    /// Added up in every tick.
+    /// Summed in every tick.
     Always,
     /// No columns.
     Never,
 }
 
-/// Time of each tick of the force loop with one of the tissue loop's, and displacements after it.
+/// Returns the time of each force-loop tick with one tissue tick, and the displacements after it.
 fn session(theatre: &mut Theatre, way: Way) -> (Vec<(usize, f64)>, Vec<[u64; 3]>) {
     let Theatre { stage, run, going } = theatre;
     let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
@@ -96,7 +96,8 @@ fn what_is_left_out_of_a_tick_in_which_nothing_changed_changes_no_bit() {
     assert!(as_it_is[0] != as_it_is[as_it_is.len() - 3]);
 }
 
-/// `cargo test --profile quick -p stylet-runtime --lib carrying -- --ignored --nocapture`; the least of some rounds, each tick by itself.
+/// `cargo test --profile quick -p stylet-runtime --lib carrying -- --ignored --nocapture`; the minimum over some rounds
+/// for each tick.
 #[test]
 #[ignore = "times"]
 fn times_of_a_tick_that_carries() {

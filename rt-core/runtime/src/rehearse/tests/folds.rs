@@ -1,4 +1,4 @@
-//! Tissue on a line with and without large strain near the tip: whether a cell folds, what moves, and what a tick costs.
+//! Tissue on a line with and without large strain near the tip: folded cells, motion, and the cost of a tick.
 
 use super::*;
 use std::time::Instant;
@@ -6,7 +6,7 @@ use stylet_shm_schema::HandMove;
 use stylet_sim::scene::Role;
 use stylet_sim::tissue::{Carry, ElementField, PackedField, Shift, least_corner};
 
-/// A model as it was: nothing is corrected.
+/// The linear model, without the correction.
 struct Linear(Box<dyn TissueModel>);
 
 impl TissueModel for Linear {
@@ -48,17 +48,17 @@ fn tissue_of(world: &World) -> Box<dyn TissueModel> {
     (world.spec.build)(&world.scene, &world.limits).expect("valid")
 }
 
-/// What came of one insertion.
+/// Measurements of one insertion.
 struct Insertion {
-    /// Of each tick with one of the tissue loop's, the least of the rounds.
+    /// Time of each tick with one tissue tick, minimum over the rounds.
     times_us: Vec<f64>,
-    /// Smallest volume of a corner in each tick, and how far the material at the tip is displaced, m.
+    /// Smallest corner volume in each tick, and displacement of the material at the tip, m.
     corners: Vec<f64>,
     moved_m: Vec<f64>,
     peak_n: f64,
-    /// The same over all of the needle's way.
+    /// Smallest corner volume along the whole needle.
     around: f64,
-    /// The farthest that one of a hundred elements went in a tick, m.
+    /// Largest displacement of one of a hundred elements in a tick, m.
     widest_m: f64,
 }
 
@@ -78,7 +78,7 @@ fn insertion(stage: &mut Stage, run: &NeedleRun, set: &ParameterSet) -> Insertio
         widest_m: 0.0,
     };
     let mut before: Vec<[f64; 3]> = Vec::new();
-    // In to the first drop, at rest, and some of the way out.
+    // In to the first drop, at rest, and part of the way out.
     let way_m = (run.drops_m[0] - run.entry_m).norm();
     let inwards = (1e3 * way_m / run.insert_m_per_s) as usize + 400;
     for n in 0..inwards + 800 {
@@ -123,7 +123,7 @@ fn most(of: &[f64]) -> f64 {
     of.iter().copied().fold(0.0, f64::max)
 }
 
-/// Linear and corrected by turns.
+/// Runs linear and corrected alternately.
 fn both(scene: &str, kind: TissueKind, run: &NeedleRun, set: &ParameterSet, rounds: usize) -> [Insertion; 2] {
     let source = SceneSource::Builtin(scene.to_owned());
     let mut stage = Stage::build(&source, kind, DeviceInfo::phantom_premium_1_5()).expect("built in");
@@ -170,7 +170,7 @@ fn both(scene: &str, kind: TissueKind, run: &NeedleRun, set: &ParameterSet, roun
     found.map(|one| one.expect("a round"))
 }
 
-/// A membrane that holds until it is pushed in by 12 mm: what a tip does to tissue at most.
+/// A membrane that holds until 12 mm of indentation: the most that a tip does to tissue.
 fn pushed_far() -> ParameterSet {
     let mut set = ParameterSet::default();
     set.set(ParameterId::PunctureDepth, 12e-3);
@@ -180,11 +180,11 @@ fn pushed_far() -> ParameterSet {
 fn no_cell_folds(scene: &str, kind: TissueKind, run: &NeedleRun, rounds: usize) {
     for set in [ParameterSet::default(), pushed_far()] {
         let [linear, large] = both(scene, kind, run, &set, rounds);
-        // The force is that of the linear body.
+        // The force is the linear body's.
         assert_eq!(linear.peak_n, large.peak_n);
         assert!(least(&large.corners) > -1e-3 && large.around > -1e-3);
         assert!(large.widest_m < 2.0 * linear.widest_m);
-        // In each tick in which it counts in full, whether loads have changed or the hand rests.
+        // In each tick where the correction is in full effect, whether loads have changed or the hand rests.
         let pairs = || linear.corners.iter().zip(&large.corners);
         assert!(pairs().all(|(linear, large)| *linear > 0.1 || large > linear));
         let above = |of: &Insertion| -> f64 {
@@ -205,7 +205,7 @@ fn no_cell_folds_beside_a_tip_on_a_line() {
     no_cell_folds("paper", TissueKind::ChainMail, &needle(), 1);
 }
 
-/// No force and no seed knows of the window near the tip; the shift of the target does.
+/// The window near the tip affects no force and no seed, only the shift of the target.
 #[test]
 fn seeds_and_forces_of_a_rehearsal_are_those_of_the_body_that_is_not_corrected() {
     let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
@@ -225,7 +225,7 @@ fn seeds_and_forces_of_a_rehearsal_are_those_of_the_body_that_is_not_corrected()
     assert_eq!(alone.expect("goes through"), linear);
 }
 
-/// Into the gland of `pelvis`, beside its middle.
+/// A needle into the gland of `pelvis`, off its centre.
 fn needle_in_pelvis() -> NeedleRun {
     let pelvis = stylet_sim::scene::Scene::builtin("pelvis").expect("built in");
     let is_target = |e: &u32| {
@@ -243,7 +243,8 @@ fn needle_in_pelvis() -> NeedleRun {
     }
 }
 
-/// `cargo test --profile quick -p stylet-runtime --lib folds -- --ignored --nocapture`; each tick the least of the rounds.
+/// `cargo test --profile quick -p stylet-runtime --lib folds -- --ignored --nocapture`; each tick is the minimum over
+/// the rounds.
 #[test]
 #[ignore = "times"]
 fn times_and_folds_of_chainmail_in_both_scenes() {
@@ -259,7 +260,8 @@ fn times_and_folds_of_finite_elements_in_both_scenes() {
     no_cell_folds("pelvis", TissueKind::Fem, &needle_in_pelvis(), 6);
 }
 
-/// Beside the middle and near the far side of the gland, where the linear answer is at its worst: twelve evaluations left cells folded.
+/// Off the centre and near the far side of the gland, where the linear answer is worst: twelve evaluations left cells
+/// folded.
 #[test]
 fn no_cell_folds_before_the_far_side_of_a_body_of_finite_elements() {
     let entry_m = Vector3::new(73e-3, 54.3e-3, 86.9e-3);

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Four about the middle, 40 mm deep.
+/// Four needles about the centre, 40 mm deep.
 pub(super) fn stabilised(count: usize) -> NeedleRun {
     let run = needle();
     let at = |n: usize| {
@@ -19,8 +19,8 @@ pub(super) fn stabilised(count: usize) -> NeedleRun {
     }
 }
 
-/// Mean displacement of the target along the needle in each tick of the tissue, from when the needle that leaves seeds begins, m; the first is
-/// what the others have moved it by.
+/// Mean displacement of the target along the needle in each tissue tick, m, from the start of the needle that drops
+/// seeds; the first is due to the others.
 fn shifts_m(stage: &mut Stage, run: &NeedleRun) -> (Vec<f64>, Rehearsed) {
     let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
     let rehearsed = stage.rehearse(run, &set, &stop).expect("goes through");
@@ -72,7 +72,7 @@ fn the_gland_moves_less_between_four_stabilising_needles() {
         assert!(beside_in_m < 0.7 * in_m, "{beside_in_m} {in_m}");
         assert!(beside_out_m.abs() < out_m.abs(), "{beside_out_m} {out_m}");
         assert_eq!(beside.seeds.len(), 3);
-        // The same bytes again, and nothing is left of the others for a needle alone.
+        // The same bytes again; the others leave no trace for a needle alone.
         let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
         assert_eq!(
             stage.rehearse(&stabilised(4), &set, &stop).expect("goes through"),
@@ -98,7 +98,8 @@ fn more_needles_than_may_stay_and_tissue_without_lines_are_refused() {
     assert_eq!(refused.expect_err("no lines"), RehearseError::NoneStaysIn);
 }
 
-/// Lines that cross load the same elements: the joint problem is as definite as each by what a station lacks for its radius.
+/// Crossing lines load the same elements: the joint problem stays definite because each station adds the compliance of
+/// its radius.
 #[test]
 fn a_needle_goes_in_across_the_way_of_one_that_stays_in() {
     let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
@@ -128,7 +129,8 @@ fn a_needle_goes_in_across_the_way_of_one_that_stays_in() {
     }
 }
 
-/// Seeds were reported where the needles that stay in held them, millimetres from where they rest once those are out.
+/// Seeds used to be reported where the needles that stay in held them, millimetres from where they rest once those are
+/// out.
 #[test]
 fn seeds_rest_where_they_are_once_the_needles_that_stay_in_are_drawn_out() {
     let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));

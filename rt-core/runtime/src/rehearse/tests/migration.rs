@@ -1,4 +1,4 @@
-//! Seeds that go back along their track once the needle is out.
+//! Seeds that migrate back along their track once the needle is out.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! What a needle does on a stage that others were on before: the same, bit by bit.
+//! A needle on a reused stage gives the same result, bit by bit.
 
 use super::{needle, stage_of};
 use crate::rehearse::Stage;
@@ -8,7 +8,7 @@ use stylet_hw::Hand;
 use stylet_shm_schema::ParameterSet;
 use stylet_sim::scene::TissueKind;
 
-/// A study groups its needles as suits it: what a needle does must not depend on those before it, nor on their hands.
+/// A study groups its needles freely: a needle's result must not depend on those before it, nor on their hands.
 fn needles_do_not_know_each_other(tissue: TissueKind) {
     let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
     let needles = [[0.0, 0.0], [0.006, -0.004], [-0.009, 0.002]].map(|[x, y]| {

@@ -1,4 +1,4 @@
-//! The mode `paper` keeps its bits: eight scripted procedures, stepped without a clock, and one number over all of their ticks.
+//! The mode `paper` keeps its bits: eight scripted procedures, stepped without a clock, digested over all ticks.
 
 use super::script::Script;
 use super::*;
@@ -14,7 +14,7 @@ impl Digest {
     }
 }
 
-/// Tip, force, torque, depth, speed and displacement of every tick, then the seeds and the largest force.
+/// Digests tip, force, torque, depth, speed and displacement of every tick, then the seeds and the largest force.
 fn digest(stage: &mut Stage, run: &NeedleRun) -> u64 {
     let active = activate(&ParameterSet::default(), &stage.device).expect("valid");
     let mut world = stage.world.take().expect("given back");
@@ -41,7 +41,7 @@ fn digest(stage: &mut Stage, run: &NeedleRun) -> u64 {
     all.0
 }
 
-/// Through the target of a scene, so far beside its middle, with three drops.
+/// A needle through a scene's target, that far off its centre, with three drops.
 fn through(scene: &str, speed_m_per_s: f64, beside_m: f64) -> (Stage, NeedleRun) {
     let source = SceneSource::Builtin(scene.to_owned());
     let stage = Stage::build(&source, TissueKind::Paper, DeviceInfo::phantom_premium_1_5()).expect("built in");
@@ -60,7 +60,7 @@ fn through(scene: &str, speed_m_per_s: f64, beside_m: f64) -> (Stage, NeedleRun)
     (stage, run)
 }
 
-/// As the last commit before the needle line has them (097ef98).
+/// Digests of the last commit before the needle line (097ef98).
 const KEPT: [u64; 8] = [
     0x77dc_8ed7_802c_7a90,
     0x4f92_e141_4347_4a35,

@@ -1,4 +1,4 @@
-//! The ultrasound probe in both loops: it moves the gland, the needle and the seeds, and lets them go.
+//! The ultrasound probe in both loops: it moves the gland, the needle and the seeds, and releases them.
 
 use super::*;
 use crate::rt::exchange::TissueOrder;
@@ -11,7 +11,7 @@ use stylet_hw::{HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_sim::probe::{BodyProbe, ProbePose};
 
 const BEYOND_M: f64 = 35e-3;
-/// There the wall on either side pushes the probe alike.
+/// Depth at which the wall on either side pushes the probe equally.
 const BALANCED_M: f64 = 7e-3;
 
 struct Theatre {
@@ -27,7 +27,7 @@ impl Theatre {
         let stage = Stage::build(&source, tissue, DeviceInfo::phantom_premium_1_5()).expect("built in");
         let begun = Instant::now();
         let body = stage.lines.as_ref().expect("it has lines");
-        // What `rt-core probe` has kept in a folder, for a measurement.
+        // Folder of answers that `rt-core probe` has saved, for a measurement.
         let kept = std::env::var_os("PROBE_KEPT");
         let kept = kept.and_then(|folder| body.kept_probe(Default::default(), folder.as_ref()).expect("sound"));
         let probe = kept.unwrap_or_else(|| body.prepare_probe(Default::default(), &mut |_| true).expect("a rectum"));
@@ -63,7 +63,7 @@ impl Theatre {
         rig
     }
 
-    /// The hand goes to the place of the first drop.
+    /// Moves the hand to the first drop.
     fn insert(&self, rig: &mut Rig) {
         rig.move_hand(&stylet_shm_schema::HandMove {
             tip_m: self.run.drops_m[0].into(),
@@ -82,7 +82,7 @@ impl Theatre {
     }
 }
 
-/// Mean displacement of the target and every element's, m.
+/// Mean displacement of the target, and every element's, m.
 fn moved(rig: &Rig, theatre: &Theatre) -> (Vector3<f64>, Vec<[f64; 3]>) {
     let body = rig.deformed();
     let of: Vec<[f64; 3]> = (0..body.lattice.element_count() as u32)
@@ -133,7 +133,7 @@ fn a_probe_presses_the_gland_and_lets_it_go() {
     theatre.stage.world = Some(rig.into_world());
 }
 
-/// Tissue that the probe moves past a needle which the hand holds still pulls at it the way that it goes.
+/// Tissue that the probe moves past a needle held still pulls the needle in the same direction.
 #[test]
 fn a_needle_in_the_gland_feels_the_probe() {
     let mut theatre = Theatre::new(TissueKind::ChainMail);
@@ -180,7 +180,7 @@ fn a_needle_in_the_gland_feels_the_probe() {
     theatre.stage.world = Some(rig.into_world());
 }
 
-/// The second device's own loop, five ticks for each of the tissue's, on the ports of a run.
+/// The second device's own loop, five ticks for each tissue tick, on the ports of a run.
 #[test]
 fn the_second_hand_presses_the_gland_and_feels_it() {
     let mut theatre = Theatre::new(TissueKind::ChainMail);
@@ -204,7 +204,7 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
     let mut tissue = TissueLoop::new(0, wiring.tissue, world, 5e-3);
     let mut second = SecondLoop::new(0, Box::new(device), ports, &memory, 1e-3);
     let probe = Box::new(theatre.probe.clone());
-    // One of another scene is of no use.
+    // A probe of another scene is ignored.
     for (generation, probe) in [(1, probe.clone()), (2, probe)] {
         let room = crate::rt::probe_tape::ProbeTape::new(&probe);
         let order = TissueOrder::Probe {
@@ -257,7 +257,7 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
         "{pressed_n} {lies_n}"
     );
     assert!(pressed_m.y > lies_m.y + 1e-3);
-    // The patient moves away from the probe, which goes after him.
+    // The patient moves away from the probe, which follows.
     let by_m = Vector3::new(0.0, 2e-3, 0.0);
     wiring.haptic.pose.write(TipPose {
         body_moved_m: by_m,
@@ -309,7 +309,7 @@ fn times_of_a_tick_with_probe_and_needle() {
     }
 }
 
-/// A needle goes in through the skin at 50 mm/s while the probe is pressed in and out by 10 mm at 20 mm/s.
+/// Inserts a needle through the skin at 50 mm/s while the probe is pressed in and out by 10 mm at 20 mm/s.
 fn session(theatre: &mut Theatre, with_probe: bool) -> Vec<f64> {
     let mut rig = theatre.rig(true);
     if with_probe {
@@ -317,7 +317,7 @@ fn session(theatre: &mut Theatre, with_probe: bool) -> Vec<f64> {
     }
     theatre.insert(&mut rig);
     let mut times = Vec::new();
-    // Beforehand: a pose below the target is looked for in all of the scene.
+    // Poses are computed beforehand: each searches the whole scene.
     let poses: Vec<ProbePose> = (0..200)
         .map(|tick| {
             let phase = f64::from(tick) / 100.0;

@@ -1,10 +1,11 @@
-//! Needles one after the other beside those that stay in, stepped without a clock, against the rehearsal of each.
+//! Needles inserted one after the other among those that stay in, stepped without a clock, against the rehearsal of
+//! each.
 
 use super::left::stabilised;
 use super::*;
 use stylet_procedure::{HandRequest, NeedleWay, Next, Observed, Pace, Procedure, Reply};
 
-/// Off the middle of the gland, m: in the order of a plan, from hole to hole.
+/// Offsets from the gland's centre, m: in the order of a plan, from hole to hole.
 const OFF_M: [[f64; 2]; 8] = [
     [-5e-3, 0.0],
     [0.0, 5e-3],
@@ -26,7 +27,7 @@ fn way(run: &NeedleRun) -> NeedleWay {
     }
 }
 
-/// Seeds of all needles once those that stayed in are out.
+/// Seeds of all needles, once those that stayed in are out.
 fn carried_out(stage: &mut Stage, runs: &[NeedleRun]) -> Vec<SeedPose> {
     let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
     let stabilising = runs[0].stabilising.clone();
@@ -100,7 +101,7 @@ fn carried_out(stage: &mut Stage, runs: &[NeedleRun]) -> Vec<SeedPose> {
     seeds
 }
 
-/// How far the seeds rest from where they were rehearsed, mm.
+/// Distances between executed and rehearsed seeds, mm.
 fn off_mm(rehearsed: &[Rehearsed], done: &[SeedPose]) -> Vec<f64> {
     let pairs = rehearsed.iter().flat_map(|r| &r.seeds).zip(done);
     let off = |(a, b): (&SeedPose, &SeedPose)| (Vector3::from(a.position_m) - Vector3::from(b.position_m)).norm();
@@ -117,7 +118,7 @@ fn runs(count: usize, needles: usize) -> Vec<NeedleRun> {
         let off = Vector3::new(*x, *y, 0.0);
         NeedleRun {
             entry_m: run.entry_m + off,
-            // The shallowest is outside of a gland that others hold.
+            // The shallowest lies outside a gland that other needles hold.
             drops_m: run.drops_m.iter().take(2).map(|d| d + off).collect(),
             ..run.clone()
         }
@@ -125,7 +126,7 @@ fn runs(count: usize, needles: usize) -> Vec<NeedleRun> {
     OFF_M.iter().take(needles).map(beside).collect()
 }
 
-/// As a needle that comes and goes.
+/// The needle as one that comes and goes.
 fn pass(run: &NeedleRun) -> StabilisingNeedle {
     StabilisingNeedle {
         entry_m: run.entry_m.into(),
@@ -134,8 +135,8 @@ fn pass(run: &NeedleRun) -> StabilisingNeedle {
     }
 }
 
-/// Each needle drags at those that stay in, and leaves them, and what they hold, elsewhere: rehearsed beside needles that were just put in, seeds
-/// were up to half a millimetre off.
+/// Each needle drags those that stay in, and leaves them and their tissue displaced: rehearsed beside freshly inserted
+/// needles, seeds were up to half a millimetre off.
 fn check(kind: TissueKind, counts: &[usize], needles: usize) {
     let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
     for &count in counts {
@@ -171,7 +172,8 @@ fn needles_beside_those_that_stay_in_leave_their_seeds_where_they_were_rehearsed
     check(TissueKind::ChainMail, &[2], 3);
 }
 
-/// `cargo test --profile quick -p stylet-runtime --lib eight_needles -- --ignored --nocapture`; `three_needles` for finite elements as above.
+/// `cargo test --profile quick -p stylet-runtime --lib eight_needles -- --ignored --nocapture`; `three_needles` for
+/// finite elements as above.
 #[test]
 #[ignore = "finite elements: half a minute"]
 fn three_needles_in_finite_elements_leave_their_seeds_where_they_were_rehearsed() {

@@ -1,15 +1,15 @@
-//! Needles that stay in, by both loops: left, taken up again, drawn out, and in a recording that repeats in every bit.
+//! Needles that stay in, in both loops: left, taken again, drawn out, and in a recording that repeats in every bit.
 
 use super::*;
 use crate::rt::motion_lease::Promise;
 use stylet_shm_schema::{RefusalCode, flags};
 use stylet_sim::line::LeftNeedles;
 
-/// Of the second needle from the first, across.
+/// Distance of the second needle from the first, across.
 pub(super) const APART_M: f64 = 4e-3;
 
 impl Recorded {
-    /// In tissue that does not move whole, with room for needles that stay in.
+    /// Tissue that does not move as a whole, with room for needles that stay in.
     fn with_left(kind: TissueKind) -> Self {
         let mut run = Self::new(kind, &ForceParameters::default());
         run.make_room_to_leave();
@@ -35,7 +35,7 @@ impl Recorded {
         assert!(control.tissue_orders.push(room).is_ok());
     }
 
-    /// A line beside the first one, which knows it.
+    /// A line next to the first one, which includes it.
     fn beside(&self, kind: TissueKind, generation: u64, apart_m: f64) -> ReadyLine {
         self.beside_in(&block(), kind, generation, apart_m)
     }
@@ -58,7 +58,7 @@ impl Recorded {
         control.tissue_orders.push(order).expect("room");
     }
 
-    /// The hand on the axis that far beside the first needle's.
+    /// Moves the hand on the axis at that distance from the first needle's.
     pub(super) fn go_beside(&mut self, apart_m: f64, depth_m: f64) {
         let entry_m = self.entry_m;
         self.entry_m += Vector3::x() * apart_m;
@@ -74,7 +74,7 @@ impl Recorded {
         self.loops.haptic.state.left_count
     }
 
-    /// Runs so long, and returns what was refused.
+    /// Runs for that time and returns the refusals.
     fn refusals(&mut self, seconds: f64) -> Vec<RefusalCode> {
         let mut refused = Vec::new();
         for _ in 0..(1e3 * seconds) as u64 {
@@ -91,7 +91,7 @@ impl Recorded {
         refused
     }
 
-    /// The first needle goes in and is left; the hand comes out.
+    /// Inserts and leaves the first needle; the hand comes out.
     fn leave_first(&mut self) {
         self.give_line(1);
         self.run(0.1);
@@ -116,7 +116,7 @@ fn a_recording_with_a_needle_that_stays_in_repeats_in_every_bit() {
         run.run(0.6);
         run.give(&second);
         run.run(0.1);
-        // From before the second needle goes in to after the first was drawn out.
+        // From before the second insertion to after the first needle was drawn out.
         run.go_beside(APART_M, 10e-3);
         run.run(2.0);
         assert!(
@@ -169,14 +169,14 @@ fn a_needle_is_taken_up_again_where_it_was_left_and_comes_out_by_hand() {
         let take = HapticOrder::TakeNeedle { ticket: 0, number: 1 };
         run.haptic(take);
         assert_eq!(run.refusals(0.01), [RefusalCode::NotAtNeedle]);
-        // The hand is empty on its way: no contact, no force.
+        // The hand returns empty: no contact, no force.
         run.go(11e-3);
         for _ in 0..1600 {
             let output = run.loops.step();
             assert!(output.wrench.force_n.norm() < 1e-9 && !run.has(flags::IN_CONTACT));
             while run.loops.control.haptic_notices.pop().is_ok() || run.loops.control.tissue_notices.pop().is_ok() {}
         }
-        // ChainMail recovers where its tip held it; finite elements stay as they are.
+        // ChainMail recovers where its tip held it; finite elements do not move.
         let now = run.loops.tissue.displacement_m();
         assert!(
             now < held + 1e-9 && (kind != TissueKind::Fem || held - now < 0.02e-3),
@@ -224,7 +224,7 @@ fn a_needle_is_taken_up_again_where_it_was_left_and_comes_out_by_hand() {
     }
 }
 
-/// The second meets the track of the first within its radius, though a third went in between.
+/// The second needle meets the track of the first within its radius, although a third went in between.
 #[test]
 fn a_track_is_met_again_after_another_needle() {
     let kind = TissueKind::ChainMail;
@@ -247,7 +247,7 @@ fn a_track_is_met_again_after_another_needle() {
     run.run(1.5);
     run.go_beside(APART_M, -8e-3);
     run.run(1.2);
-    // The control thread gives what it has of earlier needles to each line.
+    // The control thread adds its tracks of earlier needles to each line.
     let mut again = run.beside(kind, 3, 0.4e-3);
     again.hand.open_track(&track);
     run.go_beside(0.4e-3, -8e-3);
@@ -272,7 +272,7 @@ impl Recorded {
     }
 }
 
-/// It went on to the end when the host that had asked for it had ended.
+/// The needle was drawn to the end even after the host that had asked for it ended.
 #[test]
 fn a_needle_that_is_drawn_waits_for_its_host() {
     let mut run = Recorded::with_left(TissueKind::ChainMail);

@@ -1,4 +1,4 @@
-//! Motions that lapse, go on and are given up are repeated as they were.
+//! Motions that lapse, continue or are given up are repeated as recorded.
 
 use super::*;
 use crate::rt::motion_lease::Promise;
@@ -24,7 +24,7 @@ fn a_flight_in_which_hosts_fall_silent_repeats_bit_by_bit() {
     run.give_line(1);
     run.run(0.1);
     to(&mut run, 5e-3);
-    // Lapses, goes on in the last tick of the grace or later, and is given up.
+    // Lapses, resumes in the last tick of the grace or later, and is given up.
     for pause_s in [0.01, 0.02, 0.1, 0.3, 0.03, 0.4] {
         run.haptic(HapticOrder::KeepMoving(promise));
         run.run(pause_s);
@@ -43,7 +43,7 @@ fn a_flight_in_which_hosts_fall_silent_repeats_bit_by_bit() {
         .filter(|(_, order)| matches!(order, HapticOrder::KeepMoving(_)));
     assert!(renewed.count() > 60);
     assert_identical(&flight);
-    // Without the renewals it is another motion, and the recorded device answers otherwise than the leases say.
+    // Without the renewals the motion differs, and the recorded device disagrees with the leases.
     let mut other = flight.clone();
     let haptic = other.haptic.as_mut().expect("recorded");
     haptic

@@ -1,4 +1,4 @@
-//! A probe that presses beside a needle, in a recording that repeats in every bit, in both loops.
+//! A probe pressed beside a needle, in a recording that repeats in every bit, in both loops.
 
 use super::left::APART_M;
 use super::*;
@@ -12,7 +12,7 @@ use stylet_shm_schema::flags;
 use stylet_sim::probe::{BodyProbe, NoWall, ProbePose, ProbeShape};
 use stylet_sim::scene::{Material, Role, Structure, Surroundings};
 
-/// Of the needle above the middle of the block.
+/// Height of the needle above the centre of the block.
 const ABOVE_M: f64 = 8e-3;
 
 /// A gland with a hollow of 24 x 16 mm in rectal wall below it.
@@ -20,7 +20,7 @@ fn hollow() -> SceneSource {
     hollow_in(1)
 }
 
-/// In so many cells for each 4 mm.
+/// The same with `times` cells for each 4 mm.
 fn hollow_in(times: usize) -> SceneSource {
     let dims = [12, 14, 12].map(|n| n * times);
     let mut cells = Vec::new();
@@ -65,7 +65,7 @@ fn hollow_in(times: usize) -> SceneSource {
 }
 
 impl Recorded {
-    /// With a probe in the hollow.
+    /// Puts a probe into the hollow.
     fn with_probe(kind: TissueKind) -> Self {
         let body = LineBody::of_source(&hollow(), kind).expect("valid").expect("has lines");
         let probe = body.prepare_probe(ProbeShape::default(), &mut |_| true);
@@ -85,7 +85,7 @@ impl Recorded {
         run
     }
 
-    /// The probe goes on from one height of its axis to another.
+    /// Moves the probe's axis from one height to the other.
     fn press(&mut self, [from_m, to_m]: [f64; 2], seconds: f64) {
         let ticks = (200.0 * seconds) as u32;
         for n in 1..=ticks {
@@ -121,7 +121,7 @@ fn a_recording_with_a_probe_repeats_in_every_bit() {
         let moved = haptic.outside.iter().flat_map(|(_, outside)| outside.rows_m());
         assert!(haptic.ticks_on_line() > 3000 && moved.fold(0.0, |most: f64, m| most.max(m.abs())) > 1e-5);
         assert_repeats(&flight, true);
-        // Where the probe was counts, and what it did to the line.
+        // The recorded pose of the probe and its effect on the line matter.
         let mut other = flight.clone();
         other.tissue.as_mut().expect("recorded").probe[300].1.pose.tip_m[1] += 1e-5;
         other.haptic.as_mut().expect("recorded").outside.clear();
@@ -129,7 +129,8 @@ fn a_recording_with_a_probe_repeats_in_every_bit() {
     }
 }
 
-/// The probe presses while one needle stays in and another goes in beside it; what it does to both lines is recorded, and counts.
+/// The probe presses while one needle stays in and another goes in beside it; its effect on both lines is recorded, and
+/// matters.
 #[test]
 fn a_recording_with_a_probe_and_a_needle_that_stays_in_repeats_in_every_bit() {
     for kind in [TissueKind::Fem, TissueKind::ChainMail] {
@@ -172,7 +173,7 @@ fn a_recording_with_a_probe_and_a_needle_that_stays_in_repeats_in_every_bit() {
     }
 }
 
-/// A probe that was solved for in the scene's own cells and kept: the run with it repeats with what was kept, and solved again without.
+/// A saved probe, solved in the scene's own cells: a run with it repeats from the saved answers, and when solved again.
 #[test]
 fn a_recording_with_a_probe_that_was_kept_repeats_in_every_bit() {
     let (source, kind, shape) = (hollow_in(2), TissueKind::ChainMail, ProbeShape::default());
@@ -208,7 +209,7 @@ fn a_recording_with_a_probe_that_was_kept_repeats_in_every_bit() {
             .expect("can be run")
             .is_identical()
     );
-    // Of other elements it is another probe, and of none an error.
+    // Other elements give another probe; unknown ones are an error.
     for (edge_m, is_known) in [(4e-3, true), (3e-3, false)] {
         let mut other = tissue.clone();
         other.memory.probe.edge_m = edge_m;
@@ -228,7 +229,7 @@ fn a_recording_with_a_probe_that_was_kept_repeats_in_every_bit() {
         }
     }
 
-    // What is not what was written is not used.
+    // A damaged file is not used.
     let path = body.probe_file(&shape, &folder);
     let bytes = std::fs::read(&path).expect("kept");
     let stiffer = LineBody::of_stiffened(&hollow_in(2), 2.0, kind)

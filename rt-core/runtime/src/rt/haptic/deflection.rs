@@ -1,4 +1,4 @@
-//! Where a bent needle's tip is, and how far a tissue that is not on a line lags.
+//! Tip deflection of a bent needle, and the lag of tissue without a line.
 
 use super::HapticLoop;
 use crate::rt::response::TissueResponse;
@@ -6,13 +6,13 @@ use stylet_sim::force::chain::ChainOutput;
 use stylet_sim::needle::Phase;
 
 impl HapticLoop {
-    /// The needle bends, and its line was prepared for one that does not.
+    /// True if the needle bends but its line was prepared for a rigid one.
     pub(super) fn lacks_beam(&self) -> bool {
         let bends = self.parameters.force.bending.is_on();
         bends && self.line.as_ref().is_some_and(|line| !line.can_bend())
     }
 
-    /// Tip of the needle less where a rigid one in the same hand has it, scene frame, m.
+    /// Displacement of the tip from a rigid needle's in the same hand, scene frame, m.
     pub(super) fn tip_deflection_m(&self, response: &ChainOutput) -> [f64; 3] {
         let (Some(bent), Some(line)) = (&response.bent, &self.line) else {
             return [0.0; 3];
@@ -22,8 +22,8 @@ impl HapticLoop {
         (first * off_m[0] + second * off_m[1]).into()
     }
 
-    /// How old the pose is that the tissue has answered, in ns, and how far the tip has come since: in contact without a line. On one
-    /// the force is that of this tick.
+    /// Returns the age in ns of the pose that the tissue has answered, and the travel of the tip since, in contact
+    /// without a line. On a line the force belongs to this tick.
     pub(super) fn lag(&self, woke_ns: u64, tissue: &TissueResponse, phase: Phase) -> (u64, f64) {
         if self.on_line || phase == Phase::Outside || tissue.solved_ns == 0 {
             return (0, 0.0);

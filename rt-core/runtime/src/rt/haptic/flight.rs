@@ -1,4 +1,4 @@
-//! The haptic loop's side of the flight recorder: all that one tick leaves to the next, out and in.
+//! The haptic loop's side of the flight recorder: saves and restores all state between ticks.
 
 use super::HapticLoop;
 use crate::rt::exchange::HapticOrder;
@@ -9,7 +9,7 @@ use stylet_shm_schema::TickRecord;
 use stylet_sim::line::{HandLine, LeftNeedles, LeftRecord};
 
 impl HapticLoop {
-    /// Names every field, so that a new one is not forgotten.
+    /// Names every field, so that no new one is forgotten.
     pub fn memory(&self) -> HapticMemory {
         let Self {
             session_id: _,
@@ -26,7 +26,7 @@ impl HapticLoop {
             line,
             outside,
             on_line,
-            // Their record stands beside the memory.
+            // Its record is kept separately.
             left,
             watchdog,
             put_in,
@@ -54,13 +54,14 @@ impl HapticLoop {
         }
     }
 
-    /// Goes on with the line of the memory that the loop began with, before its first tick.
+    /// Restores the line of the initial memory. Call before the first tick.
     pub fn resume_line(&mut self, mut line: Box<HandLine>) {
         line.set_forces(&self.parameters.layer_forces());
         self.line = Some(line);
     }
 
-    /// Goes on with the needles that stayed in, by their record, after [`resume_line`](Self::resume_line). False where they do not fit it.
+    /// Restores the needles that stay in from their record, after [`resume_line`](Self::resume_line). False if they do
+    /// not match it.
     pub fn resume_left(&mut self, record: &LeftRecord, line: impl FnMut(u64) -> Option<Box<HandLine>>) -> bool {
         let mut needles = LeftNeedles::with_room();
         let forces = self.parameters.layer_forces();
@@ -75,7 +76,7 @@ impl HapticLoop {
         fits
     }
 
-    /// How the needles that stay in stand after the last tick.
+    /// Returns the state of needles that stay in after the last tick.
     pub fn left_record(&self) -> LeftRecord {
         let mut record = LeftRecord::default();
         if let Some(needles) = self.left.needles.as_deref() {
@@ -84,7 +85,7 @@ impl HapticLoop {
         record
     }
 
-    /// What they do to the body.
+    /// Returns their loads on the body.
     pub fn left_loads(&self) -> LeftLoads {
         let mut loads = LeftLoads::default();
         if let Some(needles) = self.left.needles.as_deref() {
@@ -93,7 +94,7 @@ impl HapticLoop {
         loads
     }
 
-    /// The end counts as an order, so that its ramp can be repeated.
+    /// Records the end as an order, so that its ramp can be repeated.
     pub(super) fn release_with_tape(&mut self) {
         self.chain.gate.release();
         if let Some(tape) = self.ports.flight.tape() {
@@ -102,7 +103,7 @@ impl HapticLoop {
     }
 
     pub(super) fn checkpoint(&mut self) {
-        // The haptic loop's tape serves every scene.
+        // One haptic tape serves every scene.
         let due = self
             .ports
             .flight

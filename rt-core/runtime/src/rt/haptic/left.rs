@@ -1,4 +1,4 @@
-//! Needles that stay in: leaving one, taking it up again, drawing it out, and the ticks of those that are left.
+//! Needles that stay in: leaves them, takes them again, draws them out, and ticks those left.
 
 use super::HapticLoop;
 use crate::rt::exchange::{Notice, Ticket};
@@ -10,19 +10,19 @@ use stylet_hw::Sample;
 use stylet_shm_schema::RefusalCode;
 use stylet_sim::line::{HandLine, LeftNeedles};
 
-/// The hand is at the tip of a needle that stays in, as near to it along the needle, m.
+/// Largest distance along the needle at which the hand is at its tip, m.
 const AT_NEEDLE_M: f64 = 2e-3;
-/// A hand is out again where it is that far before the entry, at most, m.
+/// A hand counts as out at this distance before the entry or farther, m.
 const OUT_WITHIN_M: f64 = 1e-3;
 
-/// What the force loop has of needles that stay in.
+/// The force loop's state of needles that stay in.
 #[derive(Default)]
 pub(super) struct Left {
-    /// Room for them; from when the first is left on.
+    /// Room for them, once the first is left.
     pub needles: Option<Box<LeftNeedles>>,
     /// The hand holds no needle.
     pub is_hand_empty: bool,
-    /// The tissue loop was last shown some.
+    /// The tissue loop was last shown some loads.
     pub is_shown: bool,
 }
 
@@ -31,24 +31,24 @@ impl Left {
         self.needles.as_ref().map_or(0, |needles| needles.len())
     }
 
-    /// Those that are left, where there are any.
+    /// Returns the needles, if any are left.
     pub fn any_mut(&mut self) -> Option<&mut LeftNeedles> {
         self.needles.as_deref_mut().filter(|needles| !needles.is_empty())
     }
 
-    /// Whether one is being drawn out, or held on its way.
+    /// True if one is being drawn out or is held on its way.
     pub fn is_drawing(&self) -> bool {
         self.needles.as_ref().is_some_and(|needles| needles.is_drawing())
     }
 
-    /// Each stays where it is.
+    /// Stops the drawing of all needles where they are.
     pub fn end_drawing(&mut self) {
         if let Some(needles) = self.any_mut() {
             needles.end_drawing();
         }
     }
 
-    /// What they do to the body.
+    /// Shows their loads on the body.
     pub fn show(&mut self, loads: &mut LeftLoads) {
         loads.clear();
         if let Some(needles) = &self.needles {
@@ -57,7 +57,7 @@ impl Left {
         self.is_shown = !loads.needles().is_empty();
     }
 
-    /// Goes beside them on that line, where it knows them.
+    /// Couples them with that line, if it includes them.
     pub fn pair(&mut self, line: Option<&HandLine>) {
         if let Some(needles) = self.any_mut() {
             needles.beside(line);
@@ -104,7 +104,7 @@ impl HapticLoop {
         Ok(())
     }
 
-    /// The hand takes up a needle where its tip is, and holds it as it was held.
+    /// Takes the needle at whose tip the hand is, as it was held.
     pub(super) fn take_needle(&mut self, ticket: Ticket, generation: u64) {
         let notice = match self.try_to_take(generation) {
             Ok(()) => self.done(ticket),
@@ -135,7 +135,7 @@ impl HapticLoop {
         let mut line = needles.take(generation).ok_or(RefusalCode::NoLeftNeedle)?;
         line.grip_ahead(ahead_m);
         if let Some(old) = self.line.replace(line) {
-            // There is room: it was looked at above.
+            // There is room: checked above.
             let _ = self.ports.old_lines.push(old);
         }
         self.left.pair(self.line.as_deref());
@@ -170,10 +170,10 @@ impl HapticLoop {
         Notice::Done { ticket, tick }
     }
 
-    /// Those that are out, and those that the tissue loop has no columns for, go back to be freed.
+    /// Returns needles that are out, and those whose columns the tissue loop lacks, to be freed.
     pub(super) fn look_after_left(&mut self, sample: &Sample, tissue: &TissueResponse) {
         let Some(needles) = self.left.any_mut() else {
-            // A tip that is in tissue without a contact meets it once it has been out.
+            // A tip in tissue without a contact must come out before it meets tissue.
             self.left.is_hand_empty = false;
             return;
         };
@@ -196,7 +196,7 @@ impl HapticLoop {
         self.left.is_hand_empty = self.is_hand_empty(sample);
     }
 
-    /// On the way of a needle that stays in, or not out yet since one was left.
+    /// True on the way of a needle that stays in, and until the hand is out after one was left.
     fn is_hand_empty(&self, sample: &Sample) -> bool {
         if self.on_line && self.line.as_ref().is_some_and(|line| line.is_in_tissue()) {
             return false;
@@ -211,7 +211,7 @@ impl HapticLoop {
             || (self.left.is_hand_empty && needles.needles().iter().any(|needle| is_in(needle.line())))
     }
 
-    /// What they do to the body goes out with the loads of the needle that moves; without one, here.
+    /// Steps them. Their loads go out with those of the moving needle, or from here if there is none.
     pub(super) fn step_left(&mut self) {
         let period_s = self.period_s;
         if let Some(needles) = self.left.any_mut() {
@@ -229,7 +229,7 @@ impl HapticLoop {
         self.ports.loads.publish();
     }
 
-    /// New tissue: every one of them is given up, as far as there is room to give it back.
+    /// Gives up all of them because the tissue is new, as far as the return ring has room.
     pub(super) fn give_up_left(&mut self) {
         if let Some(needles) = &mut self.left.needles {
             while !needles.is_empty() && !self.ports.old_lines.is_full() {

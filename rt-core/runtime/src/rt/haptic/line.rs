@@ -1,4 +1,4 @@
-//! The needle on a prepared line: taking lines up, one tick on one, and the forces that the tissue loop hears of.
+//! The needle on a prepared line: changes of line, the tick on one, and its forces for the tissue loop.
 
 use super::HapticLoop;
 use crate::rt::clock::TISSUE_PERIOD_NS;
@@ -9,22 +9,23 @@ use stylet_sim::force::chain::{ChainOutput, step_on_line};
 use stylet_sim::line::Track;
 use stylet_sim::line::beam::BeamOutput;
 
-/// A needle is taken for one outside up to so far behind the entry: plans name entries on the surface, which is one of cells.
+/// A needle up to this far behind the entry counts as outside: plans name entries on the surface, which is made of
+/// cells.
 const BEGINS_WITHIN_M: f64 = 1e-3;
 
-/// What the probe does to the line is reached within a tick of the tissue.
+/// A displacement by the probe is reached within one tissue tick.
 const TISSUE_PERIOD_S: f64 = TISSUE_PERIOD_NS as f64 * 1e-9;
 
-/// A needle that was taken up again is released that far before the entry, m.
+/// A needle that was taken again is released at this distance before the entry, m.
 const OUT_M: f64 = 4e-3;
 
 impl HapticLoop {
-    /// The track that the needle on the present line has cut.
+    /// Returns the track that the needle on the present line has cut.
     pub fn line_track(&self) -> Option<Track> {
         self.line.as_ref()?.track()
     }
 
-    /// What the probe does to the lines in this tick of the tissue. One comparison without a probe.
+    /// Follows the probe's displacement of the lines in this tissue tick. Costs one comparison without a probe.
     pub(super) fn follow_outside(&mut self, tissue: &TissueResponse) {
         if tissue.outside == self.outside {
             return;
@@ -53,7 +54,7 @@ impl HapticLoop {
         }
     }
 
-    /// A line is changed only while the needle is out of the tissue; the old one goes back to be freed.
+    /// Changes the line, only while the needle is out of the tissue; the old one is returned to be freed.
     pub(super) fn take_line(&mut self) {
         let in_tissue = self.line.as_ref().is_some_and(|line| line.is_in_tissue());
         if in_tissue || self.ports.old_lines.is_full() {
@@ -68,16 +69,16 @@ impl HapticLoop {
                 if let (Some(track), Some(line)) = (old.track(), &mut self.line) {
                     line.open_track(&track);
                 }
-                // There is room: it was looked at above, and this thread alone fills the ring.
+                // There is room: checked above, and only this thread fills the ring.
                 let _ = self.ports.old_lines.push(old);
             }
             self.left.pair(self.line.as_deref());
         }
     }
 
-    /// Whether this tick is one on the line: the needle is in tissue by it, or comes to it outside of any other contact.
-    /// It comes to it from outside: a tip that stands in tissue without a contact, as after a reset, is felt once it has been
-    /// out. A line that the tissue loop has no columns for is none; what held the needle by it lets go.
+    /// True if this tick is on the line: the needle is in tissue along it, or reaches it without any other contact. It
+    /// must come from outside: a tip in tissue without a contact, as after a reset, is not felt until it has been out.
+    /// A line without columns in the tissue loop does not count; a needle held by it is released.
     pub(super) fn is_on_line(&mut self, sample: &Sample, tissue: &TissueResponse) -> bool {
         let in_other_contact = tissue.contact > self.pose.released_contact;
         let was_on_line = self.on_line;
@@ -88,7 +89,7 @@ impl HapticLoop {
         let moving = others.map(|others| others.moving());
         self.line.as_mut().is_some_and(|line| {
             let is_known = line.generation == tissue.line || tissue.left.contains(&line.generation);
-            // Beside needles that it does not know it is none, either.
+            // A line that does not include the needles that stay in does not count either.
             if !is_known || moving.is_some_and(|moving| moving != line.generation) {
                 line.reset();
                 return false;
@@ -102,7 +103,7 @@ impl HapticLoop {
         })
     }
 
-    /// One tick on the line; `None` without one.
+    /// Runs one tick on the line; `None` without one.
     pub(super) fn respond_on_line(&mut self, sample: &Sample) -> Option<ChainOutput> {
         let line = self.line.as_mut()?;
         let output = step_on_line(
@@ -140,7 +141,7 @@ impl HapticLoop {
         Some(output)
     }
 
-    /// The needle is on no line from now on.
+    /// Takes the needle off its line.
     pub(super) fn leave_line(&mut self) {
         if std::mem::take(&mut self.on_line) {
             let buffer = self.ports.loads.input_buffer_mut();

@@ -1,4 +1,4 @@
-//! Motions that hosts order of the force loop, each with its lease: of the hand, and of needles that are drawn out.
+//! Motions that hosts order from the force loop, each with its lease: of the hand, and of needles drawn out.
 
 use super::HapticLoop;
 use crate::rt::device_loop::is_at_goal;
@@ -7,7 +7,7 @@ use crate::rt::motion_lease::{self, Lapse, MotionLease, Promise};
 use stylet_hw::{HandGoal, Sample};
 
 impl HapticLoop {
-    /// A real hand follows no goal, and needs no lease.
+    /// Begins a motion. A real hand follows no goal, and needs no lease.
     pub(super) fn begin_motion(&mut self, goal: HandGoal, promise: Option<Promise>) {
         self.device.set_hand_goal(&goal);
         self.goal = Some(goal);
@@ -15,7 +15,7 @@ impl HapticLoop {
         self.motions.hand = MotionLease::begin(promise, self.period_s);
     }
 
-    /// Stops as hard as a motion that nobody answers for.
+    /// Stops the motion as hard as when its lease lapses.
     pub(super) fn stop_motion(&mut self) {
         match self.goal {
             Some(_) => self.brake(),
@@ -41,7 +41,7 @@ impl HapticLoop {
         }
     }
 
-    /// Brakes what nobody answers for any longer.
+    /// Brakes motions whose lease has lapsed.
     pub(super) fn watch_motions(&mut self) {
         let (has_arrived, is_drawing) = (self.has_arrived(), self.left.is_drawing());
         match self.motions.hand.tick(has_arrived, self.period_s) {
@@ -62,7 +62,7 @@ impl HapticLoop {
         }
     }
 
-    /// Where the device has the needle, wherever the body has moved.
+    /// Returns the sample in device coordinates, however the body has moved.
     fn sample_of_device(&self) -> Option<Sample> {
         let in_scene = |sample: Sample| Sample {
             tip_in_world: self.put_in.in_scene(sample.tip_in_world),

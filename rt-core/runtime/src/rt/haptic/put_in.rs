@@ -1,4 +1,4 @@
-//! Faults that an instructor puts into the force loop, and takes out again.
+//! Applies and removes instructor-injected faults in the force loop.
 
 use super::HapticLoop;
 use crate::rt::exchange::{Notice, Ticket};
@@ -20,7 +20,7 @@ impl HapticLoop {
         self.notify(Notice::Done { ticket, tick });
     }
 
-    /// A reset: no needle is in tissue by then, so the body need not go back slowly.
+    /// Removes all faults on a reset: no needle is in tissue then, so the body may jump back.
     pub(super) fn take_faults_out(&mut self) {
         self.put_in = PutIn::default();
     }

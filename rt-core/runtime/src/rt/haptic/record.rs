@@ -1,4 +1,4 @@
-//! What a tick of the force loop leaves: the state that hosts see, and its record.
+//! Output of a force-loop tick: the state shown to hosts, and its record.
 
 use super::HapticLoop;
 use crate::rt::clock;

@@ -1,7 +1,7 @@
 //! The tick of the second device, 1 kHz: read → contact → gate → write → pose → record.
 //!
-//! The other hand's loop has a thread, a rate, a watchdog, a gate and limits of its own, under the contract of every loop here. It
-//! shares nothing with the needle's loop: whatever stops one leaves the other alone.
+//! The other hand's loop has its own thread, rate, watchdog, gate and limits, under the contract of every loop here. It
+//! shares nothing with the needle's loop: a failure of one leaves the other running.
 
 mod motion;
 mod orders;
@@ -35,32 +35,32 @@ pub const SECOND_STAGES: &[&str] = &[
 /// The mark at which the device read begins.
 const READ_MARK: usize = 0;
 
-/// Everything that the second device's thread owns.
+/// State of the second device's thread.
 pub struct SecondLoop {
     session_id: u64,
     device: Box<dyn Device>,
     info: DeviceInfo,
     ports: SecondPorts,
-    /// Also what hosts see, with the counters.
+    /// Includes the state shown to hosts, with the counters.
     memory: SecondMemory,
     /// Present in a measurement.
     pub probe: Option<Box<Probe>>,
-    /// How it waits for each deadline.
+    /// Wait of the loop for each deadline.
     pub wait: Wait,
     period_s: f64,
 }
 
-/// What one tick gave.
+/// Output of one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct SecondOutput {
-    /// To the device.
+    /// Wrench on the device.
     pub wrench: Wrench,
-    /// What the contact asked for.
+    /// Requested force of the contact.
     pub felt: Felt,
     velocity_m_per_s: Vector3<f64>,
 }
 
-/// The gate of the second device: settings of the run within the limits of this device.
+/// Returns the gate of the second device: the run's settings within this device's limits.
 pub fn gate_of(run: &GateParameters, info: &DeviceInfo) -> GateParameters {
     GateParameters {
         max_force_n: info.peak_force_n,
@@ -95,7 +95,7 @@ impl SecondLoop {
         }
     }
 
-    /// One tick; in the order of the data.
+    /// Runs one tick, in the order of the data.
     pub fn tick(&mut self, due_ns: u64, woke_ns: u64, missed: u32) -> SecondOutput {
         if let Some(tape) = self.ports.flight.begin_tick(0) {
             tape.begin_tick(&self.memory);
@@ -133,7 +133,7 @@ impl SecondLoop {
     }
 
     fn notify(&mut self, notice: Notice) {
-        // A full ring means that the control thread has ended: nobody reads notices any more.
+        // A full ring means that the control thread has ended: its notices are not needed.
         let _ = self.ports.notices.push(notice);
     }
 
@@ -157,7 +157,7 @@ impl SecondLoop {
         }
     }
 
-    /// Watchdog over the tissue loop and over this one.
+    /// Runs the watchdog over the tissue loop and this one.
     fn watch(&mut self, woke_ns: u64, missed: u32, response: &ProbeResponse) {
         let fault = self.memory.watchdog.tick(&Watched {
             woke_ns,
@@ -171,7 +171,7 @@ impl SecondLoop {
         }
     }
 
-    /// The contact at this sample, and the gate.
+    /// Computes the contact for this sample, and applies the gate.
     fn respond(&mut self, sample: &Sample, response: &ProbeResponse) -> SecondOutput {
         let memory = &mut self.memory;
         let tip = sample.tip_in_world;
@@ -179,7 +179,7 @@ impl SecondLoop {
             .sample
             .map_or(Vector3::zeros(), |before| tip - before.tip_in_world);
         let velocity_m_per_s = memory.estimator.update(&tip, self.period_s);
-        // The scale of the force is also that of the spring.
+        // The scale of the force also scales the spring.
         let most = self.info.max_stiffness_n_per_m / memory.gate_parameters.force_scale.max(1e-3);
         let felt = response.at(&tip, &sample.world_from_tool, most);
         let input = GateInput {

@@ -1,4 +1,4 @@
-//! Motions that hosts order of the second device's hand, and their lease.
+//! Motions that hosts order from the second device's hand, and their lease.
 
 use super::SecondLoop;
 use crate::rt::device_loop::is_at_goal;
@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use stylet_hw::HandGoal;
 
 impl SecondLoop {
-    /// A real hand follows no goal, and needs no lease.
+    /// Begins a motion. A real hand follows no goal, and needs no lease.
     pub(super) fn begin_motion(&mut self, goal: HandGoal, promise: Option<Promise>) {
         self.device.set_hand_goal(&goal);
         self.memory.goal = Some(goal);
@@ -16,7 +16,7 @@ impl SecondLoop {
         self.memory.motion = MotionLease::begin(promise, self.period_s);
     }
 
-    /// Stops as hard as a motion that nobody answers for.
+    /// Stops the motion as hard as when its lease lapses.
     pub(super) fn stop_motion(&mut self) {
         match self.memory.goal {
             Some(_) => self.brake(),
@@ -40,7 +40,7 @@ impl SecondLoop {
         }
     }
 
-    /// Brakes what nobody answers for any longer.
+    /// Brakes a motion whose lease has lapsed.
     pub(super) fn watch_motion(&mut self) {
         let has_arrived = self.has_arrived();
         match self.memory.motion.tick(has_arrived, self.period_s) {

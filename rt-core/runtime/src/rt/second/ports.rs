@@ -17,11 +17,11 @@ use stylet_sim::force::GateParameters;
 pub struct SecondPose {
     /// When the pose was read, `CLOCK_MONOTONIC`, ns; 0 for no pose yet.
     pub time_ns: u64,
-    /// Tip of what the hand holds, scene frame, m.
+    /// Tip of the held tool, scene frame, m.
     pub tip_in_scene: Vector3<f64>,
-    /// What the hand holds lies along +z of its own frame, towards its tip.
+    /// Orientation of the tool, which lies along its +z towards its tip.
     pub world_from_tool: UnitQuaternion<f64>,
-    /// Of the tip, filtered.
+    /// Filtered velocity of the tip.
     pub velocity_m_per_s: Vector3<f64>,
 }
 
@@ -36,7 +36,7 @@ impl Default for SecondPose {
     }
 }
 
-/// Control thread to the second device's loop.
+/// Orders from the control thread to the second device's loop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SecondOrder {
     /// Use these settings of the gate from this tick on.
@@ -48,13 +48,13 @@ pub enum SecondOrder {
         /// The settings.
         gate: GateParameters,
     },
-    /// Bring the simulated hand to a goal.
+    /// Move the simulated hand to a goal.
     Hand {
         /// Number of the request.
         ticket: Ticket,
         /// Place, direction, speed and acceleration.
         goal: HandGoal,
-        /// Of the host; without one nobody has to renew it.
+        /// Promise of the host; without one the motion needs no renewal.
         promise: Option<Promise>,
     },
     /// Hold the simulated hand where it is.
@@ -62,7 +62,7 @@ pub enum SecondOrder {
         /// Number of the request.
         ticket: Ticket,
     },
-    /// What this host moves goes on.
+    /// Renew what this host moves.
     KeepMoving(Promise),
     /// Turn the force on; re-arms after a fault.
     Engage,
@@ -73,13 +73,13 @@ pub enum SecondOrder {
         /// Number of the request.
         ticket: Ticket,
     },
-    /// Hand the flight recording over; the loop records anew once it has it back.
+    /// Hand the flight recording over; a new one begins once the tape is back.
     HandOverTape,
-    /// Where +y of the tool goes with the next goal; without it the simulated hand does not turn it about its axis.
+    /// Direction of the tool's +y with the next goal; `None`: the simulated hand does not roll it.
     Up(Option<Vector3<f64>>),
 }
 
-/// Ends that the second device's loop owns.
+/// Ends of the second device's loop.
 pub struct SecondPorts {
     /// Newest pose, to the tissue loop.
     pub pose: triple_buffer::Input<SecondPose>,
@@ -87,7 +87,7 @@ pub struct SecondPorts {
     pub response: triple_buffer::Output<ProbeResponse>,
     /// Orders of the control thread.
     pub orders: rtrb::Consumer<SecondOrder>,
-    /// What happened, to the control thread.
+    /// Notices to the control thread.
     pub notices: rtrb::Producer<Notice>,
     /// One record for each tick, to the control thread.
     pub records: rtrb::Producer<SecondRecord>,
@@ -95,7 +95,7 @@ pub struct SecondPorts {
     pub flight: Recorder<SecondTape>,
 }
 
-/// Ends that the tissue loop owns.
+/// Ends of the tissue loop.
 pub struct SecondTissuePorts {
     /// Newest pose of the second device's loop.
     pub pose: triple_buffer::Output<SecondPose>,
@@ -103,11 +103,11 @@ pub struct SecondTissuePorts {
     pub response: triple_buffer::Input<ProbeResponse>,
 }
 
-/// Ends that the control thread owns.
+/// Ends of the control thread.
 pub struct SecondControlPorts {
     /// Orders to the loop.
     pub orders: rtrb::Producer<SecondOrder>,
-    /// What the loop reports.
+    /// Notices of the loop.
     pub notices: rtrb::Consumer<Notice>,
     /// Records of the loop.
     pub records: rtrb::Consumer<SecondRecord>,
@@ -115,7 +115,7 @@ pub struct SecondControlPorts {
     pub tapes: TapePort<SecondTape>,
 }
 
-/// Joins the loop with the tissue loop and the control thread. A loop without a tape is not recorded.
+/// Connects the loop with the tissue loop and the control thread. A loop without a tape is not recorded.
 // SYNC: every ring and triple buffer is single-producer single-consumer; their crates pair release with acquire.
 pub fn wire(
     capacities: Capacities,

@@ -1,4 +1,4 @@
-//! What a tick of the second device's loop leaves: the state that hosts see, and its record.
+//! Output of a tick of the second device's loop: the state shown to hosts, and its record.
 
 use super::{ProbeResponse, SecondLoop, SecondOutput};
 use crate::rt::clock;
@@ -6,7 +6,7 @@ use crate::rt::device_loop::is_at_goal;
 use crate::rt::motion_lease::MotionLease;
 use stylet_shm_schema::{SecondRecord, flags};
 
-/// A force that is no number trips the gate; its record is one all the same.
+/// A force that is not a number trips the gate; its record still holds a number.
 fn finite(size: f64) -> f64 {
     if size.is_finite() { size.min(1e4) } else { 0.0 }
 }

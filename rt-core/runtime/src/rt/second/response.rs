@@ -1,34 +1,35 @@
-//! What the tissue loop hands to the second device's loop: the contact near one pose, for a loop that is faster than the tissue.
+//! The tissue loop's response to the second device: the contact near one pose, for a loop faster than the tissue.
 
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use stylet_hw::Wrench;
 
-/// The contact is carried on no farther than this from the pose that it was solved at, m: 1 m/s for one tissue tick.
+/// Largest distance from the solved pose at which the contact is extrapolated, m: 1 m/s for one tissue tick.
 const FARTHEST_M: f64 = 5e-3;
-/// Likewise, as a turn.
+/// Largest rotation, likewise.
 const FARTHEST_RAD: f64 = 0.2;
 
-/// A contact and how it changes near one pose, once in each tick of the tissue loop.
+/// A contact and its derivative at one pose, once in each tissue tick.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct ProbeResponse {
     /// When the tissue tick began, `CLOCK_MONOTONIC`, ns.
     pub time_ns: u64,
     /// Tissue ticks made so far.
     pub tick: u64,
-    /// Edge of the elements that the contact was solved for in, um; 0 without a probe in the body.
+    /// Edge of the elements that the contact was solved in, µm; 0 without a probe in the body.
     pub edge_um: u32,
-    /// What the hand holds touches tissue.
+    /// The held tool touches tissue.
     pub touches: bool,
-    /// The step has not converged and the hand would feel it.
+    /// The step has not converged, and the hand would feel it.
     pub unsolved: bool,
-    /// Tip of the pose that was solved, scene frame, m.
+    /// Tip of the solved pose, scene frame, m.
     pub tip_in_scene: Vector3<f64>,
     /// Its orientation.
     pub world_from_tool: UnitQuaternion<f64>,
     /// Force and torque about the tip on the hand at that pose.
     pub wrench: Wrench,
-    /// How much the wrench (force, then torque) falls with a motion of the tip (m, then turn about the scene's axes, rad).
+    /// Decrease of the wrench (force, then torque) with a motion of the tip (m, then rotation about the scene's axes,
+    /// rad).
     pub stiffness: SMatrix<f64, 6, 6>,
 }
 
@@ -49,10 +50,10 @@ impl Default for ProbeResponse {
     }
 }
 
-/// The contact at another pose.
+/// The contact extrapolated to another pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Felt {
-    /// On the hand.
+    /// Wrench on the hand.
     pub wrench: Wrench,
     /// Energy in the springs of the contact.
     pub stored_j: f64,
@@ -70,7 +71,8 @@ impl Felt {
 }
 
 impl ProbeResponse {
-    /// At the pose of the device. The contact pushes and never pulls; it is no stiffer than the device can render.
+    /// Extrapolates to the device's pose. The contact pushes and never pulls, and is no stiffer than the device can
+    /// render.
     pub fn at(&self, tip: &Vector3<f64>, world_from_tool: &UnitQuaternion<f64>, max_stiffness_n_per_m: f64) -> Felt {
         if !self.touches {
             return Felt::NOTHING;
@@ -94,7 +96,7 @@ impl ProbeResponse {
         let Some(outward) = self.wrench.force_n.try_normalize(1e-9) else {
             return Felt::NOTHING;
         };
-        // What is not a number goes on to the gate, which turns the force off.
+        // Values that are not numbers reach the gate, which turns the force off.
         if force_n.dot(&outward) <= 0.0 {
             return Felt::NOTHING;
         }
@@ -105,7 +107,7 @@ impl ProbeResponse {
     }
 }
 
-/// Of a spring that is as stiff as the contact is along its force.
+/// Energy of a spring as stiff as the contact along its force.
 fn stored_j(stiffness: &Matrix3<f64>, outward: &Vector3<f64>, force_n: &Vector3<f64>) -> f64 {
     let along = outward.dot(&(stiffness * outward));
     if along > 0.0 {
@@ -151,7 +153,7 @@ mod tests {
         for out_m in [5e-3, 6e-3, 0.1] {
             assert_eq!(force(&pressed, Vector3::new(0.0, out_m, 0.0), 1e4), Vector3::zeros());
         }
-        // Where nothing presses yet there is no direction that the contact could push in.
+        // Before anything presses, there is no direction for the contact to push in.
         let begun = ProbeResponse {
             wrench: Wrench::zero(),
             ..pressed

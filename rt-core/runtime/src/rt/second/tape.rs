@@ -1,4 +1,4 @@
-//! What the second device's loop writes to its flight recording, each tick.
+//! The second device's flight recording, written each tick.
 
 use super::ports::SecondOrder;
 use super::response::ProbeResponse;
@@ -17,12 +17,12 @@ const CHECKPOINT_EVERY: u64 = 256;
 const CHECKPOINTS: usize = FLIGHT_TICKS / CHECKPOINT_EVERY as usize + 2;
 const ORDERS: usize = 4096;
 
-/// Everything that one tick of the loop leaves to the next.
+/// All state of the loop between ticks.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct SecondMemory {
     /// Settings of the gate.
     pub gate_parameters: GateParameters,
-    /// The last limits before the device.
+    /// State of the last limits before the device.
     pub gate: GateState,
     /// Tip velocity from positions.
     pub estimator: VelocityEstimator,
@@ -30,19 +30,19 @@ pub struct SecondMemory {
     pub sample: Option<Sample>,
     /// Goal of the simulated hand.
     pub goal: Option<HandGoal>,
-    /// Where +y of the tool goes with it.
+    /// Direction of the tool's +y for the goal.
     pub up: Option<Vector3<f64>>,
-    /// Lease of what a host moves.
+    /// Lease of the motion that a host ordered.
     pub motion: MotionLease,
-    /// Watchdog with the fault that it keeps.
+    /// Watchdog with its latched fault.
     pub watchdog: Watchdog,
-    /// State as hosts see it.
+    /// State shown to hosts.
     #[serde(with = "pod")]
     pub state: SecondState,
 }
 
 impl SecondMemory {
-    /// Before the first tick.
+    /// Returns the memory before the first tick.
     pub fn new(info: &DeviceInfo, gate_parameters: GateParameters, is_real_time: bool) -> Self {
         let mut state: SecondState = bytemuck::Zeroable::zeroed();
         let bit = |set: bool, flag: u32| if set { flag } else { 0 };
@@ -68,9 +68,9 @@ impl SecondMemory {
 pub struct SecondEntry {
     /// When the tick began, `CLOCK_MONOTONIC`, ns.
     pub woke_ns: u64,
-    /// What the device answered to the read.
+    /// The device's answer to the read.
     pub read: Result<Sample, DeviceFault>,
-    /// The device did not take the force.
+    /// The device rejected the force.
     pub write_failed: bool,
     /// Response of the tissue loop that the tick used.
     pub response: ProbeResponse,
@@ -83,9 +83,9 @@ pub struct SecondEntry {
 pub struct SecondTape {
     /// The last ticks.
     pub ticks: Last<SecondEntry>,
-    /// Orders, each with the number of the tick that took it up.
+    /// Orders, each with the number of the tick that applied it.
     pub orders: Last<(u64, SecondOrder)>,
-    /// Checkpoints, each with the number of the tick that it comes before.
+    /// Checkpoints, each with the number of the tick that follows it.
     pub checkpoints: Last<(u64, SecondMemory)>,
 }
 
@@ -106,19 +106,19 @@ impl SecondTape {
         }
     }
 
-    /// Keeps what the tick that begins now starts from, where it is time for it.
+    /// Saves the state before the next tick if a checkpoint is due.
     pub fn begin_tick(&mut self, memory: &SecondMemory) {
         if self.ticks.next().is_multiple_of(CHECKPOINT_EVERY) {
             self.checkpoints.push((self.ticks.next(), *memory));
         }
     }
 
-    /// Keeps an order of the tick that runs.
+    /// Records an order of the current tick.
     pub fn order(&mut self, order: SecondOrder) {
         self.orders.push((self.ticks.next(), order));
     }
 
-    /// The longest stretch that can be repeated: from the oldest checkpoint after which nothing was overwritten.
+    /// Returns the longest repeatable stretch: from the oldest checkpoint after which nothing was overwritten.
     pub fn flight(&self) -> Option<SecondFlight> {
         let possible = self.ticks.first().max(complete_from(&self.orders))..self.ticks.next();
         let (first, memory) = self.checkpoints.since(0).find(|(tick, _)| possible.contains(tick))?;
@@ -143,13 +143,13 @@ impl Tape for SecondTape {
     }
 }
 
-/// A stretch of the loop that can be repeated.
+/// A repeatable stretch of the loop.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SecondFlight {
     /// Before the first of `ticks`.
     pub memory: SecondMemory,
     /// The ticks.
     pub ticks: Vec<SecondEntry>,
-    /// Each with the index of the tick that took it up.
+    /// Orders, each with the index of the tick that applied it.
     pub orders: Vec<(u64, SecondOrder)>,
 }

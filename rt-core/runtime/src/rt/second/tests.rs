@@ -1,4 +1,5 @@
-//! Every cause against the force record of the whole loop: the force ramps out in time, stays out, and returns after re-arming.
+//! Every cause, checked against the force record of the whole loop: the force ramps out in time, stays out, and returns
+//! after re-arming.
 
 use super::*;
 use crate::replay;
@@ -16,12 +17,12 @@ use stylet_shm_schema::{SecondRecord, flags};
 use stylet_sim::force::gate::RAMP_OUT_TICKS;
 
 const TICK_NS: u64 = 1_000_000;
-/// Of the contact.
+/// Stiffness of the contact.
 const STIFFNESS_N_PER_M: f64 = 400.0;
-/// Ticks of this loop for one of the tissue.
+/// Ticks of this loop per tissue tick.
 const TISSUE_TICKS: u64 = 5;
 
-/// The whole loop against a wall at z = 0 that a tissue loop answers with at its own rate, ticked by hand.
+/// The whole loop against a wall at z = 0, answered by a tissue loop at its own rate, ticked by hand.
 struct Rig {
     second: SecondLoop,
     cause: Arc<AtomicU32>,
@@ -148,14 +149,14 @@ fn the_hand_feels_the_contact_smoothly_between_two_steps_of_the_tissue() {
     );
     assert!(record.flags & flags::IN_CONTACT != 0 && record.flags & flags::ENGAGED != 0);
     assert!(rig.faults().is_empty(), "{:?}", rig.faults());
-    // Drawn out: every tick as its own pose says, not as that of the tissue's last step.
+    // Withdrawal: every tick follows its own pose, not that of the last tissue step.
     rig.order(to_depth(-0.003));
     let out = rig.run(400);
     let jump = out
         .windows(2)
         .map(|w| (force_n(&w[1]) - force_n(&w[0])).abs())
         .fold(0.0, f64::max);
-    // The gate may add the whole of its damping where the contact has given back all that it took.
+    // The gate may add its full damping where the contact has returned all the energy that it took.
     let damping = GateParameters::default().passivity.max_damping_n_s_per_m;
     let most = 0.02 * (damping + STIFFNESS_N_PER_M * 1e-3) + STIFFNESS_N_PER_M * rig.second.info.position_step_m;
     assert!(jump < most, "{jump} N in a tick, of {most} N");
@@ -196,7 +197,7 @@ fn whatever_fails_the_force_is_zero_in_time_and_comes_back_with_the_operator_alo
     }
 }
 
-/// The first ramp would be another if a field of the memory were forgotten.
+/// The first ramp would differ if a field of the memory were forgotten.
 #[test]
 fn a_recorded_flight_repeats_bit_by_bit() {
     let mut rig = Rig::new();
@@ -264,7 +265,7 @@ const SIMULATED: DeviceInfo = DeviceInfo {
     ..DeviceInfo::phantom_premium_1_5()
 };
 
-/// The probe went on and turned on after its host had died.
+/// The probe continued to move and turn after its host had died.
 #[test]
 fn a_hand_whose_host_falls_silent_is_at_rest_within_5_mm_and_goes_on_when_it_is_heard() {
     let promise = Promise::first(7);

@@ -1,4 +1,4 @@
-//! Where the needle meets tissue: contact, layers, and the element that the tip holds.
+//! Contact of the needle with tissue: layers, and the element that the tip holds.
 
 use super::TissueLoop;
 use crate::rt::contact::Contact;
@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use stylet_sim::needle::LayerKind;
 use stylet_sim::tissue::{Held, MaterialPoint, element_ahead};
 
-/// The needle must move inwards at least this fast to meet a membrane.
+/// Smallest inward speed at which the needle meets a membrane.
 const CONTACT_SPEED_M_PER_S: f64 = 1e-3;
 
 impl TissueLoop {
@@ -26,7 +26,7 @@ impl TissueLoop {
         }
     }
 
-    /// The membrane is met where the tip's way since the last tick enters the deformed body.
+    /// Begins contact if the tip's path since the last tick enters the deformed body.
     pub(super) fn begin_contact_if_met(&mut self, before: &TipPose) {
         if self.contact.is_some() || self.pose.time_ns == 0 {
             return;
@@ -61,7 +61,7 @@ impl TissueLoop {
         });
     }
 
-    /// The tip has moved from one layer into another: a membrane of its own, and a new held element.
+    /// Handles the tip's step into another layer: a new membrane and a new held element.
     pub(super) fn meet_next_layer(&mut self, before: &TipPose) {
         let (Some(_), Some(held)) = (self.contact, self.held) else {
             return;
@@ -89,7 +89,7 @@ impl TissueLoop {
         });
     }
 
-    /// Bisection between a place outside and one inside; the inner one where even the start is inside.
+    /// Bisects between a point outside and one inside; returns the inner one if even the start is inside.
     fn entry_between(
         &self,
         mut outside: Vector3<f64>,
@@ -108,11 +108,11 @@ impl TissueLoop {
         inside
     }
 
-    /// The held element is the one at the tip, found by walking from the last one; it takes the eq. 6 step.
+    /// Holds the element at the tip, found by walking from the last one, and applies the eq. 6 step.
     pub(super) fn hold(&mut self, travel: Vector3<f64>) {
         let Some(held) = self.held else { return };
         let mut next = held;
-        // Before puncture the membrane keeps its element; after it the tip passes from one to the next.
+        // Before puncture the membrane keeps its element; afterwards the tip passes from one to the next.
         if self.pose.punctured
             && let Some(at_tip) = self.locate(&self.pose.tip_in_scene, Some(held.element))
             && at_tip.element != held.element
@@ -130,7 +130,8 @@ impl TissueLoop {
         self.held = Some(next);
     }
 
-    /// The response has been sent: the rest of the tick prepares what the tip holds next if the needle keeps its speed.
+    /// Prepares the element that the tip holds next if the needle keeps its speed. Runs after the response has been
+    /// sent.
     pub(super) fn look_ahead(&mut self, travel: Vector3<f64>) {
         if self.world.spec.prepares {
             let next = self.next_held(travel);
@@ -151,7 +152,7 @@ impl TissueLoop {
             self.pose.tip_in_scene.into(),
             step_m.into(),
         )?;
-        // At the first contact there is no travel yet that shows how tissue follows.
+        // At the first contact no travel yet shows how the tissue follows.
         let by_m = if held.is_some() { travel } else { step_m };
         let now_m = Vector3::from(body.position_m(element));
         Some(Held {

@@ -1,4 +1,4 @@
-//! The tissue loop's side of the flight recorder: all that one tick leaves to the next, out and in.
+//! The tissue loop's side of the flight recorder: saves and restores all state between ticks.
 
 use super::TissueLoop;
 use super::left::LeftBody;
@@ -9,7 +9,7 @@ use stylet_sim::probe::{BodyProbe, ProbeMemory};
 use stylet_sim::tissue::{Deformed, Held};
 
 impl TissueLoop {
-    /// Names every field, so that a new one is not forgotten. Allocates nothing: `to` was made for this body.
+    /// Names every field, so that no new one is forgotten. Allocates nothing: `to` was made for this body.
     fn copy_memory(&self, to: &mut TissueMemory) {
         let Self {
             session_id: _,
@@ -18,18 +18,18 @@ impl TissueLoop {
             seeds,
             contact,
             contacts,
-            // By its number, which the response holds.
+            // Stored by number, in the response.
             line: _,
             in_by_line,
             loads,
             left,
             left_loads: _,
             left_room: _,
-            // What it leaves out has the same bits.
+            // Skipping it gives the same bits.
             last_carry: _,
             pressed,
             probe_pose,
-            // What the second hand was given is in the tape of its own loop.
+            // The second hand's response is on its loop's tape.
             answered: _,
             probe_room: _,
             is_outside_shown,
@@ -38,7 +38,7 @@ impl TissueLoop {
             held,
             pose,
             report: _,
-            // No force depends on what hosts were shown.
+            // No force depends on the last snapshot.
             shown: _,
             response,
             probe: _,
@@ -69,7 +69,7 @@ impl TissueLoop {
         world.tissue.save(&mut to.body);
     }
 
-    /// Continues from the memory of another loop, with the line that it had, and those of needles that stayed in.
+    /// Continues from the memory of another loop, with its line and those of needles that stayed in.
     pub fn remember(&mut self, memory: &TissueMemory, line: Option<Box<BodyLine>>, left: Vec<Box<BodyLine>>) {
         self.last_carry.forget();
         self.left.clear();
@@ -97,14 +97,14 @@ impl TissueLoop {
         self.world.tissue.load(&memory.body);
     }
 
-    /// Goes on with the probe of that memory; false where it is of another wall.
+    /// Restores the probe from that memory; false if it belongs to another wall.
     pub fn resume_probe(&mut self, mut probe: Box<BodyProbe>, memory: &TissueMemory) -> bool {
         let fits = probe.load(&memory.probe);
         self.pressed = Some(probe);
         fits
     }
 
-    /// What the probe leaves to the next tick.
+    /// State of the probe between ticks.
     pub fn probe_memory(&self) -> ProbeMemory {
         let mut memory = ProbeMemory::default();
         if let Some(pressed) = &self.pressed {
@@ -119,7 +119,7 @@ impl TissueLoop {
         self.world.tissue.deformed()
     }
 
-    /// What the last tick left to be compared: the held element and the residual.
+    /// Results of the last tick to compare: the held element and the residual.
     pub fn last_step(&self) -> (Option<Held>, f64) {
         (self.held, self.report.map_or(0.0, |r| r.residual))
     }
@@ -189,7 +189,7 @@ impl TissueLoop {
         self.ports.flight.hand_over();
     }
 
-    /// The tape is taken out meanwhile, so that it can be written to from this loop's own memory.
+    /// Writes to the tape from this loop's own memory; the tape is taken out meanwhile.
     fn with_tape(&mut self, write: impl FnOnce(&Self, &mut TissueTape)) {
         if let Some(mut tape) = self.ports.flight.take() {
             write(self, &mut tape);

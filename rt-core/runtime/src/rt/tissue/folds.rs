@@ -1,10 +1,11 @@
-//! Whether the tissue near the tip is folded: after the response is out, for the next one.
+//! Detects folded tissue near the tip: after the response is out, for the next one.
 
 use super::TissueLoop;
 use stylet_sim::tissue::{Carried, MaterialPoint, least_corner};
 
 impl TissueLoop {
-    /// Limits keep ChainMail's cells open; a linear answer, of the body or of what carries it, is looked at.
+    /// Checks for folds. Limits keep ChainMail's cells open; only a linear answer, of the body or of its carrier, is
+    /// checked.
     pub(super) fn look_for_folds(&mut self) {
         if !self.world.looks_near_tip {
             return;
@@ -17,7 +18,7 @@ impl TissueLoop {
             return;
         };
         let mut least = least_corner(&body, element);
-        // Off the line the model keeps what it adds up; on it each tick adds up anew.
+        // Off the line the model keeps its sums; on it each tick sums again.
         if self.in_by_line && self.world.tissue.unfold(element, least) {
             least = least_corner(&self.world.tissue.deformed(), element);
         }
@@ -30,7 +31,7 @@ impl TissueLoop {
         }
     }
 
-    /// The element that the tip is in or presses on, by the line or as the contact holds it.
+    /// Returns the element that the tip is in or presses on, from the line or the contact.
     fn element_at_tip(&self) -> Option<u32> {
         if let Some(held) = self.held {
             return Some(held.element);

@@ -1,12 +1,12 @@
-//! What carried the body in the tick before: where that is the same again, nothing has to be added up.
+//! Loads that carried the body in the last tick: if they repeat, nothing has to be summed.
 
 use stylet_sim::line::MAX_STATIONS;
 
-/// Loads of the line that the needle is on, and what moves the whole body besides.
+/// Loads of the needle's line, and the displacement of the whole body.
 pub(super) struct LastCarry {
-    /// Line, how many loads, and where all of it was moved; `None` where the next tick has to look at everything.
+    /// Line, number of loads, and displacement of the whole; `None` if the next tick must sum everything.
     of: Option<(u64, usize, [f64; 3])>,
-    /// With a rigid needle's loads; one that bends is never the same.
+    /// Loads of a rigid needle; a bending one never counts as unchanged.
     loads_n: [f64; 2 * MAX_STATIONS],
 }
 
@@ -18,12 +18,12 @@ impl LastCarry {
         }
     }
 
-    /// Something else has moved the body, or a field of needles that stay in is another.
+    /// Forgets the loads: something else has moved the body, or the field of needles that stay in has changed.
     pub fn forget(&mut self) {
         self.of = None;
     }
 
-    /// Whether the tick before had the same; this one's are kept.
+    /// Returns whether the last tick had the same loads; keeps this tick's.
     pub fn is_again(&mut self, line: u64, loads_n: &[f64], whole_m: [f64; 3]) -> bool {
         let now = (line, loads_n.len(), whole_m);
         let Some(kept) = self.loads_n.get_mut(..loads_n.len()) else {
@@ -57,7 +57,7 @@ mod tests {
         assert!(last.is_again(4, &[1.0, 2.0, 0.6], [0.0; 3]));
         last.forget();
         assert!(!last.is_again(4, &[1.0, 2.0, 0.6], [0.0; 3]));
-        // What is no number is never the same, so that it is not kept.
+        // Values that are not numbers never count as unchanged, so they are not kept.
         assert!(!last.is_again(4, &[f64::NAN], [0.0; 3]) && !last.is_again(4, &[f64::NAN], [0.0; 3]));
         assert!(!last.is_again(4, &[0.0; 3 * MAX_STATIONS], [0.0; 3]));
     }

@@ -1,33 +1,33 @@
-//! The body under needles that stay in: which of their columns this loop has, and what they add to each tick.
+//! The body under needles that stay in: their columns in this loop, and their part in each tick.
 
 use super::TissueLoop;
 use crate::rt::left_loads::{LeftLoads, NeedleLoads};
 use stylet_sim::line::{BodyAnswer, BodyLine, MAX_LEFT};
 use stylet_sim::tissue::{Carry, ElementField, Shift, StepReport};
 
-/// One that stays in: its columns, and the loads that its share of the body's displacement was made from.
+/// A needle that stays in: its columns, and the loads behind its share of the body's displacement.
 pub(super) struct LeftBody {
     pub line: Box<BodyLine>,
     pub used: NeedleLoads,
 }
 
-/// How the body takes what displaces it besides the needle that moves.
+/// Treatment of displacements not caused by the moving needle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Besides {
-    /// It adds it up.
+    /// The displacements are added.
     Added,
-    /// It is carried by it.
+    /// The displacements carry the body.
     Carrying,
 }
 
 impl LeftBody {
-    /// Loads the body anew.
+    /// Recomputes the share of the body's displacement.
     pub fn stay(&mut self, loads: &NeedleLoads) {
         self.used = *loads;
         self.line.stay(&loads.of_columns());
     }
 
-    /// The same where its loads are others than before; then true.
+    /// Recomputes it if the loads have changed; true then.
     fn follow(&mut self, loads: &NeedleLoads) -> bool {
         let is_other = self.used.of_columns() != loads.of_columns();
         if is_other {
@@ -38,8 +38,8 @@ impl LeftBody {
 }
 
 impl TissueLoop {
-    /// Which needles stay in is the force loop's to say, by the loads of this tick: one that was left takes its columns along, one that is
-    /// taken up again gets them back.
+    /// Follows the force loop, which decides by this tick's loads which needles stay in: a needle left keeps its
+    /// columns here, and one taken again gets them back.
     pub(super) fn follow_left(&mut self) {
         let loads = self.ports.loads.read();
         self.loads = loads.line;
@@ -58,7 +58,7 @@ impl TissueLoop {
         for needle in loads.left.needles() {
             self.take_to_left(needle);
         }
-        // A body moves little in one tick by a needle that stays in: one of them is added up in each.
+        // A needle that stays in moves the body little in one tick: one of them is summed in each.
         let count = self.left.len().max(1) as u64;
         let due = (self.response.tick % count) as usize;
         for (n, left) in self.left.iter_mut().enumerate() {
@@ -78,7 +78,7 @@ impl TissueLoop {
         self.left_loads.copy_from(&loads.left);
     }
 
-    /// Before the first tick: needles stay in with these loads, each by its columns.
+    /// Begins with needles that stay in under these loads, each with its columns. Call before the first tick.
     pub fn begin_beside(&mut self, lines: Vec<Box<BodyLine>>, loads: &LeftLoads) {
         for line in lines.into_iter().take(MAX_LEFT) {
             if let Some(of_line) = loads.needles().iter().find(|n| n.generation == line.generation) {
@@ -137,7 +137,7 @@ impl TissueLoop {
         }
     }
 
-    /// New tissue: their columns are of no use any more.
+    /// Drops their columns: the tissue is new.
     pub(super) fn drop_left(&mut self) {
         while let Some(LeftBody { line, .. }) = self.left.pop() {
             self.free(line);
@@ -147,7 +147,7 @@ impl TissueLoop {
         self.left_loads.clear();
     }
 
-    /// What they do to a body whose columns are added up.
+    /// Applies their displacement to a body that sums columns.
     pub(super) fn with_left<R>(&mut self, then: impl FnOnce(&mut Self, &[&ElementField]) -> R) -> R {
         // Taken out meanwhile, so that the body can be moved.
         let left = std::mem::take(&mut self.left);
@@ -163,7 +163,7 @@ impl TissueLoop {
         result
     }
 
-    /// The step of a tick in which no needle moves on a line.
+    /// Steps a tick in which no needle moves on a line.
     pub(super) fn step_off_line(&mut self) -> StepReport {
         match self.besides() {
             None => self.world.tissue.step(self.held, self.period_s),
@@ -182,12 +182,13 @@ impl TissueLoop {
         }
     }
 
-    /// Whether a needle without a line meets nothing: the body has no answer for one beside needles that stay in.
+    /// True if a needle without a line must not meet tissue: the body has no answer for one next to needles that stay
+    /// in.
     pub(super) fn has_no_answer_off_line(&self) -> bool {
         self.besides() == Some(Besides::Added)
     }
 
-    /// Whether needles that stay in, or the probe, displace the body besides the needle that moves, and how.
+    /// Returns how needles that stay in, or the probe, displace the body besides the moving needle, if they do.
     pub(super) fn besides(&self) -> Option<Besides> {
         let of_probe = self.pressed.as_ref().filter(|p| p.displaces());
         let of_probe = of_probe.map(|_| self.world.spec.adds_columns);

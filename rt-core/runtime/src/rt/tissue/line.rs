@@ -1,5 +1,5 @@
-//! The tissue tick while the needle is on a prepared line: the body is the sum of the line's loads times its columns, or is carried
-//! by that of a coarser body while the tip holds what it presses on.
+//! The tissue tick on a prepared line: the body is the sum of the line's loads times its columns, or is carried by that
+//! of a coarser body while the tip holds the element that it presses on.
 
 use super::TissueLoop;
 use crate::rt::exchange::Notice;
@@ -9,27 +9,28 @@ use stylet_sim::line::{BodyAnswer, BodyLine, Line};
 use stylet_sim::tissue::{Carry, Held, MaterialPoint, Shift, StepReport};
 
 impl TissueLoop {
-    /// Takes up the columns of a new line; the old ones go back to be freed.
+    /// Takes the columns of a new line; the old ones are returned to be freed.
     pub(super) fn take_line(&mut self, line: Box<BodyLine>) {
         if self.in_by_line {
-            // The force loop keeps the line that it is on; the control thread sends another when it sees that this one is not in use.
+            // The force loop keeps the line that it is on; the control thread sends another when it sees that this one
+            // is unused.
             self.free(line);
             return;
         }
         self.drop_line();
         self.response.line = line.generation;
         self.line = Some(line);
-        // Its number may have been another's.
+        // Its number may have belonged to another line.
         self.last_carry.forget();
     }
 
-    /// The next tick adds up what carries the body, whatever the one before did.
+    /// Makes the next tick sum everything that carries the body.
     #[cfg(test)]
     pub fn forget_carry(&mut self) {
         self.last_carry.forget();
     }
 
-    /// The body that they were solved for is replaced.
+    /// Drops the line: its body is replaced.
     pub(super) fn drop_line(&mut self) {
         self.response.line = 0;
         if let Some(old) = self.line.take() {
@@ -37,17 +38,18 @@ impl TissueLoop {
         }
     }
 
-    /// By the control thread: freeing has no place in a tick. The control thread empties the ring before it sends another line.
+    /// Returns columns to the control thread, since a tick must not free. The control thread empties the ring before it
+    /// sends another line.
     pub(super) fn free(&mut self, line: Box<BodyLine>) {
         if let Err(rtrb::PushError::Full(line)) = self.ports.old_lines.push(line) {
             std::mem::forget(line);
         }
     }
 
-    /// The step of a tick on the line; `None` where the needle is on none that this loop has.
+    /// Steps a tick on the line; `None` if the needle is on none that this loop has.
     pub(super) fn step_on_line(&mut self) -> Option<StepReport> {
         let loads = self.loads;
-        // Taken out meanwhile, so that the body can be moved by it.
+        // Taken out meanwhile, so that it can move the body.
         let line = self.line.take_if(|line| line.generation == loads.generation)?;
         let axis = line.line;
         let mut whole_m = axis.axes[0].map(|c| c * loads.whole_m);
@@ -68,7 +70,8 @@ impl TissueLoop {
             }
             BodyAnswer::Carrying(columns) => {
                 let held = self.held_on_line(&axis, &loads);
-                // A tip that has come out on the far side is in no element: what the line's end still has of its load moves nothing.
+                // A tip that has come out on the far side is in no element: the remaining load at the line's end moves
+                // nothing.
                 let stations = loads.loads_n().len().saturating_sub(2 * loads.across) / 2;
                 let loads_n = match held {
                     Some(_) => loads.loads_n(),
@@ -80,7 +83,7 @@ impl TissueLoop {
                     shift,
                     fields: &[],
                 };
-                // A hand that rests loads the line in every tick as in the one before.
+                // A resting hand loads the line in every tick as in the one before.
                 if !self.last_carry.is_again(line.generation, loads_n, whole_m) {
                     match self.besides() {
                         None => self.world.tissue.carry(by),
@@ -101,7 +104,7 @@ impl TissueLoop {
         Some(report)
     }
 
-    /// The material at the tip, where the line has it.
+    /// Returns the material at the tip, if it is on the line.
     fn held_on_line(&self, axis: &Line, loads: &LineLoads) -> Option<Held> {
         let along_m = loads.tip_material_m;
         if !loads.in_tissue || !along_m.is_finite() {
@@ -126,10 +129,10 @@ impl TissueLoop {
         })
     }
 
-    /// The needle is on no line: a contact that was reported ends.
+    /// Takes the needle off its line: a reported contact ends.
     pub(super) fn leave_line(&mut self) {
         if std::mem::take(&mut self.in_by_line) {
-            // Those that stay in go on carrying the body, and so does the probe.
+            // Needles that stay in keep carrying the body, and so does the probe.
             if self.besides().is_none() {
                 self.world.tissue.carry(Carry::NOT);
             }
@@ -155,7 +158,8 @@ impl TissueLoop {
         }
     }
 
-    /// The material at the tip of the last pose and `behind_m` behind it, by the line; `None` where the needle is in no tissue by one.
+    /// Returns the material at the tip of the last pose and `behind_m` behind it, along the line; `None` if the needle
+    /// is in no tissue along one.
     pub(super) fn material_on_line(&self, behind_m: f64) -> Option<[Option<MaterialPoint>; 2]> {
         let loads = &self.loads;
         let line = self.line.as_ref().filter(|line| line.generation == loads.generation)?;
@@ -180,7 +184,7 @@ impl TissueLoop {
     }
 }
 
-/// The body as a whole takes what the bevel pushes it back with.
+/// Adds the reaction of the bevel to the displacement of the whole body.
 fn add_bevel(whole_m: &mut [f64; 3], axis: &Line, bent: &BentTip, whole_m_per_n: f64) {
     for (side, tip_n) in bent.needle.tip_n.into_iter().enumerate() {
         for (sum, direction) in whole_m.iter_mut().zip(axis.axes[1 + side]) {

@@ -1,4 +1,4 @@
-//! Seeds that move away along the open track that they lie in (docs/physics.md, *Seeds that migrate*).
+//! Seeds that migrate along the open track that they lie in (docs/physics.md, *Seeds that migrate*).
 
 use super::TissueLoop;
 use crate::rt::seed::Seed;
@@ -7,7 +7,8 @@ use stylet_sim::migration::Migration;
 use stylet_sim::tissue::MaterialPoint;
 
 impl Seed {
-    /// Whether it is one of the share that migrates: by its place, so that the same seeds do in each run.
+    /// True if the seed belongs to the share that migrates: chosen by its position, so that each run moves the same
+    /// seeds.
     fn migrates(&self, index: usize, share: f64) -> bool {
         let mixed_with = |seed: u64, c: f64| Random(seed.wrapping_add(c.to_bits()));
         let [x, y, z] = self.dropped_at_m;
@@ -18,7 +19,7 @@ impl Seed {
 }
 
 impl TissueLoop {
-    /// With every needle that moves out of the tissue, loose seeds that migrate go back along their tracks.
+    /// Moves loose migrating seeds back along their tracks with every needle that leaves the tissue.
     pub(super) fn migrate(&mut self) {
         let Migration { share, speed_m_per_s } = self.world.migration;
         if share <= 0.0 || self.in_by_line {
@@ -47,7 +48,7 @@ impl TissueLoop {
                 let place_m = point.rest_m(body);
                 MaterialPoint::at_rest(body, [0, 1, 2].map(|a| place_m[a] + along[a] * by_m))
             };
-            // At the end of the track it stays, where the body ends.
+            // At the end of the track, where the body ends, it stays.
             match (moved(&seed.tip), seed.tail.as_ref().map(moved)) {
                 (Some(tip), tail) => (seed.tip, seed.tail) = (tip, tail.flatten()),
                 (None, _) => seed.track_to_entry = None,
@@ -60,7 +61,7 @@ impl TissueLoop {
 mod tests {
     use super::*;
 
-    /// As many as in patients: 0.47 % of 19,236, where chance has 90 and their root in it.
+    /// As many as in patients: 0.47 % of 19,236. Chance expects 90, with its square root as the deviation.
     #[test]
     fn the_share_of_seeds_that_migrates_is_the_one_asked_for() {
         let seed = |n: usize| Seed {

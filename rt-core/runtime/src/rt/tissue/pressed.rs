@@ -1,4 +1,4 @@
-//! The body under the ultrasound probe: where it is in this tick, what it presses, and what else displaces the wall.
+//! The body under the ultrasound probe: its pose in this tick, its contact, and other displacements of the wall.
 
 use super::TissueLoop;
 use crate::rt::probe_tape::ProbeTape;
@@ -7,12 +7,12 @@ use stylet_sim::probe::{BodyProbe, ProbePose, ProbeResponse};
 use stylet_sim::tissue::Carry;
 
 impl TissueLoop {
-    /// The probe is there from the next tick on.
+    /// Sets the probe's pose from the next tick on.
     pub fn move_probe(&mut self, pose: ProbePose) {
         self.probe_pose = Some(pose);
     }
 
-    /// What the probe answered in the last tick; `None` in a scene without one.
+    /// Response to the probe in the last tick; `None` in a scene without one.
     pub fn probe_response(&self) -> Option<&ProbeResponse> {
         self.pressed.as_ref().map(|pressed| pressed.response())
     }
@@ -22,9 +22,9 @@ impl TissueLoop {
         self.pressed.as_deref()
     }
 
-    /// One of a scene that was replaced meanwhile goes back.
+    /// Takes a probe; one of a replaced scene is returned.
     pub(super) fn take_probe(&mut self, generation: u64, probe: Box<BodyProbe>, room: Box<ProbeTape>) {
-        // Freeing has no place in a tick: room that finds no tape is kept for good.
+        // A tick must not free: room without a tape is kept for good.
         if let Some(unused) = self.probe_room.replace(room) {
             std::mem::forget(unused);
         }
@@ -37,7 +37,7 @@ impl TissueLoop {
         self.pressed = Some(probe);
     }
 
-    /// It was solved for in a body that is replaced. By the control thread: freeing has no place in a tick.
+    /// Drops the probe, whose body is replaced, by way of the control thread: a tick must not free.
     pub(super) fn drop_probe(&mut self) {
         if let Some(old) = self.pressed.take() {
             self.last_carry.forget();
@@ -57,8 +57,8 @@ impl TissueLoop {
         }
     }
 
-    /// The contact of this tick. Needles displace the wall as well, and the probe what is around them: with the loads of this tick, by one
-    /// table for both.
+    /// Solves the contact of this tick. Needles displace the wall as well, and the probe their surroundings: one table
+    /// with this tick's loads serves both.
     pub(super) fn follow_probe(&mut self) {
         let (Some(pressed), Some(pose)) = (&mut self.pressed, self.probe_pose) else {
             return;
@@ -91,8 +91,7 @@ impl TissueLoop {
         self.show_outside();
     }
 
-    /// What the probe does to the lines of the needle that moves and of those that stay in, as long as it does something, and once more when it no
-    /// longer does.
+    /// Shows the probe's displacement of the lines of all needles while there is any, and once more when it ends.
     fn show_outside(&mut self) {
         let Some(pressed) = &self.pressed else { return };
         let is_pressed = pressed.response().contacts > 0;

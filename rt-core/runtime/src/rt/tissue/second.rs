@@ -1,4 +1,4 @@
-//! The tissue loop's answer to the second device: what the probe that its hand holds presses.
+//! The tissue loop's response to the second device: the contact of the probe in that hand.
 
 use super::TissueLoop;
 use crate::rt::put_in::moved;
@@ -7,12 +7,12 @@ use nalgebra::{SMatrix, Vector3};
 use stylet_hw::Wrench;
 use stylet_sim::probe::ProbePose;
 
-/// A pad that is farther on the wrong side of the probe's surface than that after a tick is not to be felt, m.
+/// Largest penetration of a pad after a tick that is not felt, m.
 const FELT_M: f64 = 1e-4;
-/// A contact that is not solved in one tick goes on in the next; for so many ticks the hand has the last one that was. Longer, and its force is off.
+/// Most ticks for which the hand keeps the last solved contact while a new one converges. Beyond that its force is off.
 const MOST_HELD: u32 = 4;
 
-/// The last contact that was solved, and for how many ticks the hand has had it since.
+/// The last solved contact, and the ticks for which the hand has had it since.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Answered {
     solved: ProbeResponse,
@@ -20,7 +20,7 @@ pub(super) struct Answered {
 }
 
 impl Answered {
-    /// What the hand gets in place of `response`.
+    /// Returns the response for the hand, given this tick's `response`.
     fn next(&mut self, response: ProbeResponse) -> ProbeResponse {
         if !response.unsolved {
             *self = Answered {
@@ -42,7 +42,7 @@ impl Answered {
 }
 
 impl TissueLoop {
-    /// Where the second hand has the probe: in the body as the scene has it, from which an exercise may have moved it.
+    /// Follows the second hand's probe in the scene's body frame, from which an exercise may have moved the body.
     pub(super) fn follow_second(&mut self) {
         let Some(second) = &mut self.ports.second else { return };
         let pose = second.pose.read();
@@ -53,11 +53,12 @@ impl TissueLoop {
         }
     }
 
-    /// Stamped in every tick, so that a loop whose tissue is late knows it. Nothing without a second device.
+    /// Answers the second device. Stamped in every tick, so that its loop detects late tissue. Does nothing without a
+    /// second device.
     pub(super) fn answer_second(&mut self, woke_ns: u64) {
         let tick = self.response.tick;
         let Some(second) = &mut self.ports.second else { return };
-        // The pose that this tick has used: the buffer is not asked again.
+        // The pose that this tick has used: the buffer is not read again.
         let pose = second.pose.output_buffer();
         let mut response = ProbeResponse {
             time_ns: woke_ns,
@@ -102,7 +103,7 @@ mod tests {
             wrench: Wrench::from_force(Vector3::y() * 9.0),
             ..ProbeResponse::default()
         };
-        // Nothing was solved yet: nothing is felt.
+        // Nothing is felt before the first solution.
         assert!(!answered.next(unsolved(0)).touches);
         answered.next(solved);
         for tick in 2..2 + u64::from(MOST_HELD) {

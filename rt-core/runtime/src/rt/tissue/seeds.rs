@@ -6,9 +6,9 @@ use crate::rt::seed::Seed;
 use nalgebra::Vector3;
 use stylet_shm_schema::{MAX_SEEDS, RefusalCode};
 
-/// A seed is 4.5 mm long; its tail shows where its axis points.
+/// Length of a seed; its tail shows where its axis points.
 const SEED_LENGTH_M: f64 = 4.5e-3;
-/// Two seeds of one needle are no further off its line, and were dropped in one direction (cosine of 5 degrees).
+/// Largest offset between two seeds of one needle, which also share a direction (cosine of 5 degrees).
 const ON_NEEDLE_M: f64 = 2e-3;
 const PARALLEL: f64 = 0.996;
 
@@ -58,7 +58,7 @@ impl TissueLoop {
         self.notify(notice);
     }
 
-    /// Tip of the needle less where a rigid one has it.
+    /// Displacement of the needle's tip from a rigid one's.
     fn deflection(&self) -> Vector3<f64> {
         let Some(line) = self.line.as_ref().filter(|_| self.loads.bent.is_some()) else {
             return Vector3::zeros();
@@ -68,7 +68,7 @@ impl TissueLoop {
         first * off_m[0] + second * off_m[1]
     }
 
-    /// Whether the tip is where the next seed of the last one's strand leaves the needle, within half a pitch.
+    /// True if the tip is where the next seed of the last strand leaves the needle, within half a pitch.
     fn is_behind_the_last(&self, pitch_m: f64) -> bool {
         let direction = self.pose.direction;
         self.seeds.last().is_some_and(|last| {

@@ -9,13 +9,13 @@ use stylet_shm_schema::{LeftNeedlePose, MAX_BEND_POINTS, MAX_SEEDS, SnapshotHead
 use stylet_sim::line::MAX_LEFT;
 use stylet_sim::tissue::StepReport;
 
-/// Ticks from one snapshot to the next while the needle moves: 67 Hz, above the rate of most screens. What moves by itself,
-/// with the needle at rest, is seen at 33 Hz, and a body that nothing displaces at 17 Hz: there each snapshot shows the same.
+/// Ticks between snapshots while the needle moves: 67 Hz, above the rate of most screens. Motion with the needle at
+/// rest is shown at 33 Hz, and an undisplaced body at 17 Hz, where each snapshot is the same.
 const TICKS_MOVING: u64 = 3;
 const TICKS_AT_REST: u64 = 6;
 const TICKS_UNDISPLACED: u64 = 12;
 
-/// What the last snapshot showed.
+/// State shown by the last snapshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Shown {
     tick: u64,
@@ -25,12 +25,12 @@ pub struct Shown {
     seeds: usize,
     left: usize,
     scene_generation: u64,
-    /// Some part of the body is not where it is at rest.
+    /// Some part of the body is displaced.
     is_displaced: bool,
 }
 
 impl TissueLoop {
-    /// The next snapshot is due: sooner where the needle has moved or a seed was dropped since the last one.
+    /// True if the next snapshot is due: sooner after the needle has moved or a seed was dropped.
     fn is_snapshot_due(&self, now: &Shown) -> bool {
         let same = Shown {
             tick: now.tick,
@@ -64,7 +64,7 @@ impl TissueLoop {
         if !self.ports.is_watched.load(Ordering::Relaxed) {
             return;
         }
-        // Taken out for the while, since it is filled from the rest of the world.
+        // Taken out meanwhile, since it is filled from the rest of the world.
         let Some(mut board) = self.world.shown.take() else {
             return;
         };
@@ -73,7 +73,7 @@ impl TissueLoop {
         self.shown = now;
     }
 
-    /// Also where that is no number.
+    /// True also for a displacement that is not a number.
     fn is_displaced(&self, report: &StepReport) -> bool {
         let body = self.world.tissue.deformed();
         report.max_displacement != 0.0 || body.carried.largest_m(body.lattice.spacing_m) != 0.0
@@ -149,7 +149,7 @@ impl TissueLoop {
         }
     }
 
-    /// Where a place of the body is, which an exercise may have moved.
+    /// Converts a point of the body, which an exercise may have moved, to the scene frame.
     fn in_scene(&self, place_m: [f64; 3]) -> [f64; 3] {
         let by_m = self.pose.body_moved_m;
         [0, 1, 2].map(|a| {
@@ -171,7 +171,7 @@ impl TissueLoop {
         }
     }
 
-    /// Places along a needle that bends.
+    /// Fills in points along a bent needle.
     fn fill_bend(&self, header: &mut SnapshotHeader) {
         let (Some(bent), Some(line)) = (self.loads.bent, &self.line) else {
             return;

@@ -1,4 +1,5 @@
-//! Every cause against the force record of the whole loop: the force ramps out, smoothly and in time, and returns after re-arming.
+//! Every cause, checked against the force record of the whole loop: the force ramps out smoothly and in time, and
+//! returns after re-arming.
 
 use super::*;
 use crate::rt::breaking::{BreakingDevice, Cause};
@@ -62,7 +63,7 @@ impl Rig {
         self.tissue.unsolved = cause == Cause::TissueUnsolved;
         let force = ForceParameters {
             membrane_gain: if cause == Cause::ForceNotANumber { f64::NAN } else { 1.0 },
-            // Tissue that gives no answer leaves the membrane its part.
+            // Tissue that does not answer leaves the membrane its share.
             coupling: if cause == Cause::TissueUnsolved { 1.0 } else { 0.0 },
             ..ForceParameters::default()
         };
@@ -90,7 +91,7 @@ impl Rig {
             self.seen.push(notice);
         }
         let record = self.control.records.pop().expect("a record for each tick");
-        // The membrane is met where the tip passes it, and left where it is well outside.
+        // The membrane is met where the tip crosses it, and left well outside.
         let depth_m = record.tip_in_scene_m[2];
         if depth_m > 0.0 && self.tissue.contact == 0 {
             self.contacts += 1;
@@ -146,7 +147,7 @@ fn assert_no_step(records: &[TickRecord], what: &str) {
     }
 }
 
-/// Ticks from the cause until its fault is raised, at most.
+/// Most ticks from the cause until its fault is raised.
 fn detected_within(cause: Cause) -> usize {
     match cause {
         Cause::Silent => SILENT_SAMPLES as usize,
@@ -212,7 +213,7 @@ fn every_cause_ramps_the_force_out_in_time_and_the_operator_can_rearm() {
             Some(fault as u32),
             "{cause:?}: the fault is kept until re-armed"
         );
-        // Out of the tissue, where the model asks for nothing; re-armed; and in again.
+        // Out of the tissue, where the model requests no force; re-armed; and in again.
         rig.order(to_depth(-0.01));
         record.extend(rig.run(2500));
         rig.order(HapticOrder::Engage { ticket: 3 });
@@ -245,7 +246,7 @@ fn what_stays_under_its_limit_raises_nothing() {
     }
 }
 
-/// A needle off its line in finite elements met this fault at 45 degrees, though its force is that of eq. 8 to 10.
+/// A needle off its line in finite elements raised this fault at 45 degrees, though its force follows eq. 8 to 10.
 #[test]
 fn unsolved_tissue_is_no_fault_where_no_force_goes_by_it() {
     let mut rig = Rig::new();
@@ -255,7 +256,7 @@ fn unsolved_tissue_is_no_fault_where_no_force_goes_by_it() {
     assert!(after.iter().all(|r| r.fault == 0));
     let last = |records: &[TickRecord]| force_n(records.last().expect("ticks"));
     assert!((last(&after) - last(&pressed)).abs() < 0.2);
-    // What is no number is a fault whoever uses it.
+    // A value that is not a number is a fault, whether used or not.
     rig.tissue.local.displacement_m.x = f64::NAN;
     let after = rig.run(50);
     assert_eq!(after.last().expect("ticks").fault, Fault::TissueUnsolved as u32);

@@ -1,8 +1,8 @@
-//! Faults that an instructor puts in, in the force loop.
+//! Instructor-injected faults in the force loop.
 
 use super::*;
 
-/// A device that an instructor takes away: every force and every fault as if its cable were out.
+/// A device taken away by the instructor causes every force and fault of an unplugged one.
 #[test]
 fn a_device_that_counts_as_lost_is_felt_as_one_that_is() {
     let felt = |record: &TickRecord| {
@@ -27,7 +27,7 @@ fn a_device_that_counts_as_lost_is_felt_as_one_that_is() {
     assert_eq!(differs, None, "the first tick that differs");
     let zero = exercise.iter().position(|r| force_n(r) == 0.0).expect("zero at last");
     assert!(zero <= RAMP_OUT_TICKS as usize, "{zero} ticks to zero");
-    // Armed again while it is lost, it is lost again.
+    // Re-armed while lost, it is lost again.
     for rig in &mut runs {
         rig.order(HapticOrder::Engage { ticket: 3 });
         let last = *rig.run(50).last().expect("ticks");
@@ -41,7 +41,7 @@ fn a_device_that_counts_as_lost_is_felt_as_one_that_is() {
     }
 }
 
-/// The device and what it does stay where they are; the needle is elsewhere in the body, as fast as a patient moves.
+/// The device and its motion stay in place; the needle moves within the body at a patient's pace.
 #[test]
 fn a_body_that_moves_leaves_hand_and_goal_where_they_are_and_the_needle_elsewhere_in_it() {
     let mut rig = Rig::new();

@@ -1,4 +1,4 @@
-//! A hand whose host falls silent, in the whole loop: it went on for 55 mm and more after its host was killed.
+//! A hand whose host falls silent, in the whole loop: it used to move on for 55 mm and more after its host was killed.
 
 use super::*;
 use crate::rt::exchange::Moved;
@@ -23,7 +23,7 @@ fn away(promise: Promise) -> HapticOrder {
 }
 
 impl Rig {
-    /// Moves for so long, with a promise each 8 ms.
+    /// Moves for that many ticks, with a promise every 8 ms.
     fn move_on(&mut self, promise: Promise, ticks: usize) -> Vec<TickRecord> {
         let each = |tick: usize| {
             if tick.is_multiple_of(8) {
@@ -48,7 +48,7 @@ fn way_m(records: &[TickRecord]) -> f64 {
     (to - from).norm()
 }
 
-/// A hand at 123 mm/s whose host was heard last in the tick before.
+/// A hand at 123 mm/s whose host was last heard in the tick before.
 fn moving() -> Rig {
     let mut rig = Rig::new();
     rig.order(away(MINE));
@@ -108,7 +108,7 @@ fn a_hand_at_its_goal_needs_no_host() {
     assert_eq!(rig.given_up(), []);
 }
 
-/// The spring of the hand went on with the goal that lay behind the membrane.
+/// The spring of the hand kept pushing towards the goal behind the membrane.
 #[test]
 fn a_needle_that_presses_on_a_membrane_stays_where_it_is() {
     let mut rig = Rig::new();

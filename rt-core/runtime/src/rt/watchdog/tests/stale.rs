@@ -1,4 +1,4 @@
-//! Input that grows stale, at any reading of the clock: the force is zero once the ramp is over.
+//! Input that grows stale, at any clock reading: the force is zero once the ramp is over.
 
 use super::*;
 use stylet_hw::{DeviceInfo, Wrench};
@@ -46,7 +46,7 @@ fn the_force_is_zero_once_device_or_tissue_is_stale() {
         let mut largest_n: f64 = 0.0;
         for tick in 0..=off_at + 4 {
             let is_stale = tick >= begins;
-            // However far the clock is, and however long ago the tissue answered.
+            // At any clock reading, and at any age of the tissue's answer.
             let tissue_ns = random.draw() >> (1 + random.draw() % 62);
             let fresh_ns = tissue_ns.saturating_add(random.draw() % STALE_TISSUE_NS);
             let stale_ns = tissue_ns + STALE_TISSUE_NS + 1 + (random.draw() >> 2);

@@ -1,4 +1,4 @@
-//! Totals of a loop: a reset and a re-arm used to clear what a report at the end should know.
+//! Totals of a loop: a reset and a re-arm used to clear values that the final report needs.
 
 use super::*;
 
