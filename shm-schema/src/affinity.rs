@@ -1,9 +1,9 @@
-//! Keeps the threads of a host off the core of the force loop, which would wake up later on a core that draws or sends.
+//! Keeps the threads of a host off the force loop's core, where drawing or sending would delay its wake-up.
 
 use crate::Session;
 use std::mem::size_of;
 
-/// An announcement is at most so old where it is made on this machine; times since boot of two machines differ by more.
+/// Largest age of an announcement made on this machine; the boot times of two machines differ by more.
 const FRESH_NS: u64 = 2_000_000_000;
 
 /// The core that a host has left to the force loop.
@@ -13,8 +13,8 @@ pub struct Left {
 }
 
 impl Left {
-    /// Leaves the core of the force loop that made this announcement, once. Nothing where that loop has no core of its own, or
-    /// runs on another machine, as for a host behind a relay.
+    /// Leaves the core of the force loop that made this announcement, once. Does nothing if that loop has no core of
+    /// its own or runs on another machine, as for a host behind a relay.
     pub fn leave(&mut self, session: &Session) {
         if let Some(core) = self.due(session, now_ns()) {
             keep_off(core);
@@ -36,8 +36,8 @@ pub fn now_ns() -> u64 {
     time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
 }
 
-/// Takes the core from all threads of this program; those that they start from now on stay off it too. Nothing where it is
-/// their only one, or where the system does not let us.
+/// Takes the core from all threads of this program and those that they start later. Does nothing if it is their only
+/// core, or if the system refuses.
 pub fn keep_off(core: usize) {
     let Ok(tasks) = std::fs::read_dir("/proc/self/task") else {
         return;
@@ -105,7 +105,7 @@ mod tests {
         assert_eq!(left.due(&session, now_ns), None, "not in real time");
     }
 
-    /// In a thread of its own, so that no other test loses a core.
+    /// Runs in a separate thread, so that no other test loses a core.
     #[test]
     fn a_thread_and_those_that_it_starts_stay_off_a_core_but_never_off_their_last() {
         let test = std::thread::spawn(|| {

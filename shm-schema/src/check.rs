@@ -1,4 +1,4 @@
-//! What a reader verifies before it uses a value that came out of shared memory.
+//! Validates values from shared memory before they are used.
 
 use crate::{
     GridInfo, HapticState, MAX_LABEL_CELLS, MAX_NODES, MAX_SEEDS, MAX_STRUCTURES, MOST_MOVED_M, MOST_PLANNED_NEEDLES,
@@ -6,12 +6,12 @@ use crate::{
     SecondState, SeedPose, SnapshotHeader, TickRecord, Vertex,
 };
 
-/// What is invalid in a value.
+/// Reason why a value is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("invalid: {0}")]
 pub struct Invalid(pub &'static str);
 
-/// No scene is larger than this, so no coordinate is.
+/// Largest coordinate: no scene is larger.
 pub const MAX_COORDINATE_M: f64 = 20.0;
 const MAX_FORCE_N: f64 = 100.0;
 const MAX_SPEED_M_PER_S: f64 = 100.0;
@@ -25,7 +25,7 @@ fn ensure(holds: bool, what: &'static str) -> Result<(), Invalid> {
     if holds { Ok(()) } else { Err(Invalid(what)) }
 }
 
-/// Verifies a state read from the board.
+/// Validates a state read from the board.
 pub fn state(s: &HapticState) -> Result<(), Invalid> {
     ensure(within(&s.tip_in_scene_m, MAX_COORDINATE_M), "tip position")?;
     ensure(within(&s.contact_in_scene_m, MAX_COORDINATE_M), "contact position")?;
@@ -49,7 +49,7 @@ pub fn state(s: &HapticState) -> Result<(), Invalid> {
     ensure(s.seed_count as usize <= MAX_SEEDS, "seed count")
 }
 
-/// Verifies one record of a tick.
+/// Validates one record of a tick.
 pub fn record(r: &TickRecord) -> Result<(), Invalid> {
     ensure(within(&r.tip_in_scene_m, MAX_COORDINATE_M), "tip position")?;
     ensure(within(&r.force_on_hand_n, MAX_FORCE_N), "force")?;
@@ -60,7 +60,7 @@ pub fn record(r: &TickRecord) -> Result<(), Invalid> {
     took(r.wake_latency_ns, r.work_ns)
 }
 
-/// Verifies a state of the second device.
+/// Validates a state of the second device.
 pub fn second_state(s: &SecondState) -> Result<(), Invalid> {
     second_motion(
         &s.tip_in_scene_m,
@@ -75,7 +75,7 @@ pub fn second_state(s: &SecondState) -> Result<(), Invalid> {
     ensure(within(&[s.energy_j, s.warmth_n], 1e4), "gate figures")
 }
 
-/// Verifies one record of a tick of the second device.
+/// Validates one record of a tick of the second device.
 pub fn second_record(r: &SecondRecord) -> Result<(), Invalid> {
     second_motion(
         &r.tip_in_scene_m,
@@ -106,7 +106,7 @@ fn took(wake_latency_ns: u64, work_ns: u64) -> Result<(), Invalid> {
     )
 }
 
-/// `vertices` are those that came with the header, displacements of nodes included.
+/// Validates a snapshot; `vertices` are those that came with the header, displacements of nodes included.
 pub fn snapshot(h: &SnapshotHeader, vertices: &[Vertex]) -> Result<(), Invalid> {
     let sent = u64::from(h.vertex_count) + u64::from(h.node_count);
     ensure(sent == vertices.len() as u64, "vertex or node count")?;
@@ -124,7 +124,7 @@ pub fn snapshot(h: &SnapshotHeader, vertices: &[Vertex]) -> Result<(), Invalid> 
     )
 }
 
-/// `words` are those that came with the header.
+/// Validates a scene; `words` are those that came with the header.
 pub fn scene(h: &SceneHeader, words: &[u32]) -> Result<(), Invalid> {
     ensure(h.word_count() == Some(words.len()), "vertex or triangle count")?;
     ensure(h.spacing_m > 0.0 && h.spacing_m < 1.0, "spacing")?;
@@ -172,12 +172,12 @@ fn grid(g: &GridInfo, most: usize, what: &'static str) -> Result<(), Invalid> {
     ensure(g.dims == [0; 3] || (g.spacing_m > 0.0 && g.spacing_m < 1.0), what)
 }
 
-/// Verifies the parameters in force: the limits of the table, and eq. 1.
+/// Validates the parameters in force: the limits of the table, and eq. 1.
 pub fn parameters(p: &ParametersInForce) -> Result<(), Invalid> {
     ensure(p.set.problems().is_empty(), "parameters")
 }
 
-/// Verifies the plan in force.
+/// Validates the plan in force.
 pub fn plan(p: &PlanInForce) -> Result<(), Invalid> {
     ensure(p.seed_count as usize <= MAX_SEEDS, "seed count")?;
     ensure(within(&p.entry_m, MAX_COORDINATE_M), "entry")?;
@@ -199,7 +199,7 @@ pub fn plan(p: &PlanInForce) -> Result<(), Invalid> {
     )
 }
 
-/// Verifies the result of a rehearsal.
+/// Validates the result of a rehearsal.
 pub fn rehearsal(r: &Rehearsal) -> Result<(), Invalid> {
     ensure(r.seed_count as usize <= MAX_SEEDS, "seed count")?;
     ensure(within(&[r.peak_force_n], MAX_FORCE_N), "peak force")?;
@@ -219,7 +219,7 @@ fn seeds(seeds: &[SeedPose]) -> Result<(), Invalid> {
     Ok(())
 }
 
-/// Whether the length of `v` is 1 within 0.0005.
+/// True if the length of `v` is 1 within 0.0005.
 pub fn is_unit(v: &[f64; 3]) -> bool {
     let norm2 = v.iter().map(|c| c * c).sum::<f64>();
     (norm2 - 1.0).abs() < 1e-3

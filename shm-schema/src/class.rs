@@ -1,69 +1,70 @@
-//! Who is connected to a core over its relay, and what a host asks of the needle's lease.
+//! Members connected to a core through its relay, and requests of hosts for the needle's lease.
 
 use crate::Text;
 use crate::check::Invalid;
 use bytemuck::{Pod, Zeroable};
 
-/// Members that are listed at most.
+/// Most members listed.
 pub const MAX_CLASS: usize = 32;
 
-/// One member that is connected.
+/// One connected member.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct ClassMember {
     /// Name for people.
     pub name: Text<64>,
-    /// What the member may do, in one word; empty for one who was revoked.
+    /// Role of the member, in one word; empty for a revoked member.
     pub role: Text<16>,
     /// Round trip to the server.
     pub round_trip_ns: u64,
     /// Records that the member lost for good.
     pub records_lost: u64,
-    /// Since the server heard the member last.
+    /// Time since the server last heard the member.
     pub silent_ns: u64,
 }
 
-/// The class, published five times a second by a relay, beside a core as well as in place of one.
+/// The class, published five times a second by a relay, whether it runs next to a core or replaces one.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Class {
-    /// The run of the core, as it is announced here.
+    /// The run of the core, as announced here.
     pub session_id: u64,
     /// Members in `members`.
     pub count: u32,
-    /// Members beyond those.
+    /// Members beyond those listed.
     pub unlisted: u32,
-    /// 1 where a host beside the core operates.
+    /// 1 if a host on the core's machine operates.
     pub local_operates: u32,
-    /// 1 where this list is that of the machine with the core.
+    /// 1 if this list is that of the machine with the core.
     pub is_beside_core: u32,
-    /// Name of who operates; empty for nobody.
+    /// Name of the operator; empty for none.
     pub operator: Text<64>,
-    /// Name of who asked to operate and does not; empty for nobody.
+    /// Name of the member who asked to operate and does not; empty for none.
     pub asked: Text<64>,
-    /// Those who are connected.
+    /// Connected members.
     pub members: [ClassMember; MAX_CLASS],
 }
 
 impl Class {
-    /// Those who are connected.
+    /// Returns the connected members.
     pub fn members(&self) -> &[ClassMember] {
         &self.members[..MAX_CLASS.min(self.count as usize)]
     }
 }
 
-/// What a host asks of the lease.
+/// A host's request for the lease.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LeaseRequest {
     /// To operate from here.
     Take,
-    /// Not to operate from here any more.
+    /// To stop operating from here.
     Release,
-    /// That the member of this name operates.
+    /// To let the member of this name operate.
     Give(String),
 }
 
-/// A [`LeaseRequest`] as plain old data, from a host to the relay of its machine. It has no reply: [`Class`] shows what came of it.
+/// A [`LeaseRequest`] as plain old data, from a host to the relay of its machine. It has no reply: [`Class`] shows the
+/// result.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct LeaseOrder {
@@ -72,7 +73,7 @@ pub struct LeaseOrder {
 }
 
 impl LeaseRequest {
-    /// As plain old data; a name is cut to what fits.
+    /// Encodes as plain old data; a name is truncated to fit.
     pub fn encode(&self) -> LeaseOrder {
         let (kind, name) = match self {
             Self::Take => (1, ""),
@@ -85,7 +86,7 @@ impl LeaseRequest {
         }
     }
 
-    /// What a host asked.
+    /// Decodes the request of a host.
     pub fn decode(order: &LeaseOrder) -> Result<Self, Invalid> {
         match order.kind {
             1 => Ok(Self::Take),

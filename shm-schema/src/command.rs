@@ -1,13 +1,13 @@
-//! The records of a request and of its answer, as they lie in shared memory.
+//! The records of a request and of its answer in shared memory.
 
 use crate::{Reason, Refusal, Text};
 use bytemuck::{Pod, Zeroable};
 use num_enum::TryFromPrimitive;
 
-/// Size of the payload of a command, bytes. The longest is a rehearsal with every needle and seed that it may name.
+/// Size of the payload of a command, bytes. The longest is a rehearsal with the most needles and seeds.
 pub const COMMAND_BYTES: usize = 5760;
 
-/// Bytes of the text of a mark at most.
+/// Longest text of a mark, bytes.
 pub const MARK_BYTES: usize = 96;
 
 /// A [`crate::Request`] as plain old data, written by a host. Answered by one [`Reply`] with the same `host_id` and
@@ -15,46 +15,46 @@ pub const MARK_BYTES: usize = 96;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Command {
-    /// The host that asks.
+    /// The requesting host.
     pub host_id: u64,
-    /// Number of the command, given by the host.
+    /// Number of the command, assigned by the host.
     pub command_id: u64,
     /// [`crate::CommandKind`] by number.
     pub kind: u32,
     /// Bytes of `payload` in use.
     pub length: u32,
-    /// The request, packed by `postcard`.
+    /// The request, encoded by `postcard`.
     pub payload: [u8; COMMAND_BYTES],
 }
 
-/// Reasons in one reply at most; a refusal with more names the others in its text only.
+/// Most reasons in one reply; a refusal with more names the rest in its text only.
 pub const MAX_REASONS: usize = 48;
 
 /// The answer to a command or an upload, written by the bridge.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Reply {
-    /// The run of the core that answers.
+    /// The run of the answering core.
     pub session_id: u64,
-    /// The host that asked.
+    /// The requesting host.
     pub host_id: u64,
     /// Its number for the command.
     pub command_id: u64,
-    /// First tick of the force loop that ran with the change. Of parameters it holds for needle and force; the limits of
-    /// the tissue were ordered together with them and hold from the next tick of the tissue loop on.
+    /// First tick of the force loop that ran with the change. For parameters, this holds for needle and force; the
+    /// limits of the tissue were ordered together with them and hold from the next tick of the tissue loop on.
     pub effective_tick: u64,
     /// [`ReplyStatus`] by number.
     pub status: u32,
-    /// How many of `reasons` count; 0 when accepted.
+    /// Number of `reasons` in use; 0 if accepted.
     pub reason_count: u32,
-    /// Why it was refused, for programs.
+    /// Reasons of the refusal, for programs.
     pub reasons: [Reason; MAX_REASONS],
-    /// Every reason for a refusal, for people, one a line; empty when accepted.
+    /// All reasons of the refusal, for people, one per line; empty if accepted.
     pub text: Text<1024>,
 }
 
 impl Reply {
-    /// The answer to command `command_id` of host `host_id`.
+    /// Returns an answer to command `command_id` of host `host_id`.
     pub fn new(session_id: u64, (host_id, command_id): (u64, u64), result: Result<u64, &Refusal>) -> Self {
         let mut reply = Self::zeroed();
         (reply.session_id, reply.host_id, reply.command_id) = (session_id, host_id, command_id);
@@ -72,13 +72,13 @@ impl Reply {
         reply
     }
 
-    /// Those that count.
+    /// Returns the reasons in use.
     pub fn reasons(&self) -> &[Reason] {
         &self.reasons[..(self.reason_count as usize).min(MAX_REASONS)]
     }
 }
 
-/// What came of a request, by stable number.
+/// Result of a request, by stable number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
 #[repr(u32)]
 pub enum ReplyStatus {
@@ -89,7 +89,7 @@ pub enum ReplyStatus {
 }
 
 impl ReplyStatus {
-    /// `None` when this build does not know the number.
+    /// Returns the status; `None` if this build does not know the number.
     pub fn from_number(number: u32) -> Option<Self> {
         Self::try_from(number).ok()
     }

@@ -1,4 +1,4 @@
-//! Deadlines of a loop that were missed, and its worst wake-up, since a moment that a reset does not move.
+//! Missed deadlines of a loop and its worst wake-up, since a moment that a reset does not move.
 
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};

@@ -1,10 +1,10 @@
-//! What happened, once each: contact, puncture, seeds, faults.
+//! Events of a run, once each: contact, puncture, seeds, faults.
 
 use crate::Text;
 use bytemuck::{Pod, Zeroable};
 use num_enum::TryFromPrimitive;
 
-/// One thing that happened, written by the bridge.
+/// One event, written by the bridge.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Event {
@@ -12,33 +12,33 @@ pub struct Event {
     pub session_id: u64,
     /// Rises by one with each event of a run.
     pub sequence: u64,
-    /// `CLOCK_MONOTONIC` when it happened.
+    /// Time of the event, `CLOCK_MONOTONIC`.
     pub time_ns: u64,
-    /// Tick of the loop that saw it; 0 when it was the bridge.
+    /// Tick of the loop that saw it; 0 if the bridge did.
     pub tick: u64,
     /// [`EventKind`] by number.
     pub kind: u32,
-    /// Seed index, fault number, 1 for a flight that was not saved, or nothing, by kind.
+    /// Seed index, fault number, 1 for a flight that was not saved, or unused, by kind.
     pub code: u32,
-    /// Depth, force, or nothing, by kind.
+    /// Depth, force, or unused, by kind.
     pub value: f64,
-    /// Where it happened, scene frame, m; zero for kinds without a place.
+    /// Position of the event, scene frame, m; zero for kinds without one.
     pub position_m: [f64; 3],
-    /// What a person reads; empty for most kinds.
+    /// Text for people; empty for most kinds.
     pub text: Text<128>,
 }
 
-/// By stable number.
+/// Kind of event by stable number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
 #[repr(u32)]
 pub enum EventKind {
-    /// `value`: nothing.
+    /// `value`: unused.
     Contact = 1,
     /// `value`: depth in m.
     Puncture = 2,
     /// `code`: seed index.
     SeedDropped = 3,
-    /// `value`: nothing.
+    /// `value`: unused.
     LeftTissue = 4,
     /// `code`: fault number.
     FaultRaised = 5,
@@ -52,25 +52,26 @@ pub enum EventKind {
     InvalidRefused = 9,
     /// `text`: the file, or why none could be written.
     FlightSaved = 10,
-    /// A moment that somebody marked, at its time. `text`: the words.
+    /// A moment that was marked, at its time. `text`: the words.
     Mark = 11,
-    /// An instructor put a fault in. `code`: number of the [`crate::Exercise`]; `value`: factor or distance; `text`: its words.
+    /// An instructor injected a fault. `code`: number of the [`crate::Exercise`]; `value`: factor or distance; `text`:
+    /// its words.
     ExerciseBegun = 12,
-    /// No fault of an instructor's is in force any more.
+    /// No instructor-injected fault is in force any longer.
     ExercisesEnded = 13,
-    /// The process that meets hosts was started anew. `text`: why.
+    /// The bridge was restarted. `text`: why.
     BridgeRestarted = 15,
-    /// Whoever ordered a motion fell silent, and the motion was given up. `code`: 0 the needle's hand, 1 the second device's, 2 a
-    /// needle that was drawn out; `text` says so.
+    /// The host that ordered a motion fell silent, and the motion was given up. `code`: 0 the needle's hand, 1 the
+    /// second device's, 2 a needle that was drawn out; `text` says so.
     MotionGivenUp = 14,
-    /// As [`FaultRaised`](Self::FaultRaised), of the second device; the needle's goes on.
+    /// As [`FaultRaised`](Self::FaultRaised), for the second device; the needle's continues.
     SecondFaultRaised = 20,
     /// The force of the second device was armed again after a fault.
     SecondRearmed = 21,
 }
 
 impl EventKind {
-    /// `None` when this build does not know the number.
+    /// Returns the kind; `None` if this build does not know the number.
     pub fn from_number(number: u32) -> Option<Self> {
         Self::try_from(number).ok()
     }

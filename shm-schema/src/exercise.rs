@@ -1,12 +1,12 @@
-//! Faults that an instructor puts in, to see what a trainee does.
+//! Instructor-injected faults, to see how a trainee reacts.
 
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 use strum::EnumDiscriminants;
 
-/// How many times as stiff an exercise may make tissue.
+/// Range of the stiffness factor of an exercise.
 pub const EXERCISE_STIFFNESS_RANGE: [f64; 2] = [1.0, 5.0];
-/// How far an exercise may move the body, m.
+/// Largest displacement of the body by an exercise, m.
 pub const MOST_MOVED_M: f64 = 0.01;
 
 /// One fault. The numbers are stable: requests and events carry them.
@@ -16,20 +16,21 @@ pub const MOST_MOVED_M: f64 = 0.01;
 pub enum Exercise {
     /// The device counts as disconnected: the force goes off as at a real loss.
     DeviceLost = 1,
-    /// Young's modulus of all tissue is so many times that of the scene, for needles that go in from now on.
+    /// Young's modulus of all tissue is multiplied by this factor, for needles that go in from now on.
     StiffTissue {
         /// Within [`EXERCISE_STIFFNESS_RANGE`].
         factor: f64,
     } = 2,
     /// The patient has moved against the template.
     BodyMoved {
-        /// From where the body lay when its scene was loaded, scene frame, m; at most [`MOST_MOVED_M`] long.
+        /// Displacement of the body from its place when the scene was loaded, scene frame, m; at most [`MOST_MOVED_M`]
+        /// long.
         by_m: [f64; 3],
     } = 3,
 }
 
 impl Exercise {
-    /// As requests and events carry it.
+    /// Number in requests and events.
     pub fn number(self) -> u32 {
         ExerciseNumber::from(self) as u32
     }
@@ -44,7 +45,7 @@ impl Exercise {
     }
 }
 
-/// What an operator reads.
+/// Text shown to an operator.
 impl std::fmt::Display for Exercise {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
@@ -73,12 +74,12 @@ pub struct ExercisesInForce {
     pub reserved: u32,
     /// Factor on Young's modulus; 0 for none.
     pub stiffness: f64,
-    /// Where the body is or goes, from where it lay, scene frame, m.
+    /// Displacement or target displacement of the body from its original place, scene frame, m.
     pub body_moved_m: [f64; 3],
 }
 
 impl ExercisesInForce {
-    /// One more, or another value of one.
+    /// Adds a fault, or changes its value.
     pub fn put(&mut self, exercise: Exercise) {
         match exercise {
             Exercise::DeviceLost => self.device_lost = 1,
@@ -87,7 +88,7 @@ impl ExercisesInForce {
         }
     }
 
-    /// Those in force, in the order of their numbers.
+    /// Returns the faults in force, in the order of their numbers.
     pub fn all(&self) -> impl Iterator<Item = Exercise> {
         let lost = (self.device_lost != 0).then_some(Exercise::DeviceLost);
         let factor = self.stiffness;

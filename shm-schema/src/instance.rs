@@ -1,4 +1,4 @@
-//! Where programs meet: the folder of an instance, the one program that owns it, and the epoch that hosts join.
+//! The folder of an instance, the one program that owns it, and the epoch that hosts join.
 //!
 //! | in the folder of an instance, mode 0700 | holds |
 //! |---|---|
@@ -8,8 +8,8 @@
 //! | `deaf` | token of an epoch whose shared memory a host cannot use: the owner begins another |
 //! | `<token>/` | management files of iceoryx2 for that epoch |
 //!
-//! An epoch is one life of the process that holds the ports. Its token is random and is part of every name in `/dev/shm`, so nobody
-//! can leave a file in its way beforehand, and files that were damaged are never opened again.
+//! An epoch is one life of the process that holds the ports. Its random token is part of every name in `/dev/shm`:
+//! other programs cannot place a file in its way beforehand, and damaged files are never opened again.
 
 mod files;
 mod owned;
@@ -23,13 +23,13 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
-/// Tries to own an instance while another program sweeps it.
+/// Attempts to own an instance while another program sweeps it.
 const TRIES: u32 = 40;
 
-/// Why an instance cannot be used; the text names the file and says what to do.
+/// Reason why an instance cannot be used; the text names the file and says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum InstanceError {
-    /// Not a name.
+    /// Invalid name.
     #[error("instance name {0:?}: use 1 to 24 letters, digits or '-'")]
     Name(String),
     /// Another program owns the instance.
@@ -39,10 +39,10 @@ pub enum InstanceError {
     Owned {
         /// Name of the instance.
         instance: String,
-        /// What the owner wrote into its lock.
+        /// Contents of the owner's lock.
         process: String,
     },
-    /// Something of another user is in the way.
+    /// A file of another user is in the way.
     #[error("{path} belongs to {owner}, not to you. Have its owner or an administrator remove it")]
     Foreign {
         /// The file or folder.
@@ -50,10 +50,10 @@ pub enum InstanceError {
         /// Name and number of the user.
         owner: String,
     },
-    /// Something is in the way that is no folder.
+    /// The path is not a folder.
     #[error("{0} is not a folder. Remove it")]
     NoFolder(String),
-    /// There is no memory for the file.
+    /// No memory is left for the file.
     #[error("{0}: no space left. /dev/shm needs room (df -h /dev/shm)")]
     Full(String),
     /// The system refuses.
@@ -61,12 +61,12 @@ pub enum InstanceError {
     Io {
         /// The file or folder.
         path: String,
-        /// What the system reports.
+        /// Error of the operating system.
         why: io::Error,
     },
 }
 
-/// Where two programs meet: the same user and the same instance name.
+/// Meeting point of two programs: the same user and the same instance name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Instance(String);
 
@@ -77,7 +77,7 @@ impl Default for Instance {
 }
 
 impl Instance {
-    /// Letters, digits and `-`, 1 to 24 of them.
+    /// Checks a name: letters, digits and `-`, 1 to 24 of them.
     pub fn new(name: &str) -> Result<Self, InstanceError> {
         let fits = (1..=24).contains(&name.len()) && name.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-');
         fits.then(|| Self(name.to_owned()))
@@ -97,7 +97,7 @@ impl Instance {
         found.unwrap_or_else(|| base().join(&self.0))
     }
 
-    /// The same, made where it does not exist; an error names what is in the way.
+    /// Returns the folder, which is made if missing; an error names the obstacle.
     pub fn make_folder(&self) -> Result<PathBuf, InstanceError> {
         let folder = self.folder();
         if let Some(base) = folder.parent() {
@@ -107,15 +107,15 @@ impl Instance {
         Ok(folder)
     }
 
-    /// Begins the name of every shared-memory object of the instance, in any epoch.
+    /// Returns the prefix of every shared-memory object of the instance, in any epoch.
     pub fn prefix(&self) -> String {
         format!("stylet_{}_{}_", user(), self.0)
     }
 
-    /// The epoch that hosts join; `None` while no core runs.
+    /// Returns the epoch that hosts join; `None` while no core runs.
     pub fn epoch(&self) -> Option<Epoch> {
         let folder = self.folder();
-        // What a killed owner has left is joined by nobody.
+        // Hosts must not join the remains of a killed owner.
         if !is_locked(&folder.join("lock")) {
             return None;
         }
@@ -129,16 +129,16 @@ impl Instance {
         })
     }
 
-    /// A lock that says that a host uses the instance.
+    /// Takes a lock that marks the instance as used by a host.
     pub fn attend(&self) -> Result<Attendance, InstanceError> {
         let path = self.make_folder()?.join("hosts");
         let file = open(OpenOptions::new().read(true).write(true).create(true), &path).map_err(failed(&path))?;
-        // Where somebody sweeps at this moment, the next try finds the folder made anew.
+        // If another program is sweeping, the next attempt finds the folder recreated.
         let _ = file.try_lock_shared();
         Ok(Attendance { _lock: file })
     }
 
-    /// Makes this program the owner, and removes what a killed one left.
+    /// Makes this program the owner, and removes the remains of a killed one.
     pub fn own(&self) -> Result<Owned, InstanceError> {
         for _ in 0..TRIES {
             let folder = self.make_folder()?;
@@ -181,7 +181,7 @@ impl Instance {
         Err(failed(&self.folder())(io::ErrorKind::ResourceBusy.into()))
     }
 
-    /// Removes every file of this instance, unless a program owns or uses it. For the program that ends last.
+    /// Removes every file of this instance, unless a program owns or uses it. The last program to end calls it.
     pub fn sweep(&self) {
         for base in bases() {
             self.sweep_in(&base);
@@ -223,7 +223,7 @@ impl Instance {
     }
 }
 
-/// A host's word that it uses an instance, for as long as it is kept.
+/// A host's lock on an instance, held until dropped.
 pub struct Attendance {
     _lock: File,
 }

@@ -1,29 +1,30 @@
-//! The contract between `rt-core` and `host-ui`: what may lie in shared memory, who writes it, who reads it.
+//! The contract between `rt-core` and `host-ui`: the contents of shared memory, their writers and their readers.
 //!
 //! | service | form | written by | read by | holds |
 //! |---|---|---|---|---|
-//! | `session` | publish-subscribe, newest one kept | bridge | hosts | [`Session`]: which run this is, what the kernel granted |
+//! | `session` | newest kept | bridge | hosts | [`Session`]: the run, and the kernel's grants |
 //! | `state/<session>` | blackboard, one per run | bridge | hosts | [`HapticState`]: the latest tick |
 //! | `records` | slices of [`TickRecord`] | bridge | hosts | every tick of the force loop |
-//! | `second/<session>` | blackboard, in a run with a second device | bridge | hosts | [`SecondState`]: its latest tick |
-//! | `second_records` | slices of [`SecondRecord`], likewise | bridge | hosts | every tick of the second device's loop |
-//! | `snapshots` | slices of [`Vertex`] under a [`SnapshotHeader`] | tissue thread, sent by the bridge | hosts | the deformed surface, displacements inside, needle and seeds |
-//! | `scene` | words under a [`SceneHeader`], newest one kept | bridge | hosts | rest surface, triangles, structures, labels of the cells |
-//! | `events` | [`Event`], last 64 kept | bridge | hosts | what happened, once each |
-//! | `parameters` | [`ParametersInForce`], newest one kept | bridge | hosts | the parameters that took effect, and when |
-//! | `plan` | [`PlanInForce`], newest one kept | bridge | hosts | planned seeds and needle path |
+//! | `second/<session>` | blackboard, if the run has a second device | bridge | hosts | [`SecondState`]: latest tick |
+//! | `second_records` | slices of [`SecondRecord`] | bridge | hosts | every tick of the second device's loop |
+//! | `snapshots` | slices of [`Vertex`] under a [`SnapshotHeader`] | tissue thread | hosts | deformed surface and displacements |
+//! | `scene` | words under a [`SceneHeader`], newest kept | bridge | hosts | rest surface, structures, labels |
+//! | `events` | [`Event`], last 64 kept | bridge | hosts | events, once each |
+//! | `parameters` | [`ParametersInForce`], newest kept | bridge | hosts | parameters in force |
+//! | `plan` | [`PlanInForce`], newest kept | bridge | hosts | planned seeds and needle path |
 //! | `commands` | [`Command`] | hosts | bridge | a [`Request`] as plain data |
-//! | `stops` | [`Command`] that takes force or motion away | hosts | bridge | the same as in `commands`, past every flood |
-//! | `replies` | [`Reply`] | bridge | hosts | accepted, or refused and why |
-//! | `rehearsals` | [`Rehearsal`] | bridge | hosts | where the seeds of a needle would end |
-//! | `relayed` | [`Relayed`], newest one kept | a relay in place of the core | hosts | server, role, round trip, age and losses |
-//! | `class` | [`Class`], newest one kept | a relay | hosts | who is connected, who operates, who asks to |
+//! | `stops` | [`Command`] that removes force or motion | hosts | bridge | as `commands`, past every flood |
+//! | `replies` | [`Reply`] | bridge | hosts | acceptance, or reasons of refusal |
+//! | `rehearsals` | [`Rehearsal`] | bridge | hosts | predicted seed positions |
+//! | `relayed` | [`Relayed`], newest kept | a relay without a core | hosts | server, role, round trip, losses |
+//! | `class` | [`Class`], newest kept | a relay | hosts | members, operator, applicant |
 //! | `lease` | [`LeaseOrder`] | hosts | a relay | a [`LeaseRequest`] as plain data |
 //! | `uploads` | label cells under an [`UploadHeader`] | hosts | bridge | a segmented volume |
 //!
-//! Every type is plain old data, valid for every bit pattern: no `bool`, `enum` or `char`, no padding, no pointer.
-//! A reader verifies everything: [`check`] before a value is used, [`Request::decode`] before a request is carried out.
-//! Quantities are SI (m, s, N, rad) in the *scene frame*: origin at the corner of the lattice, axes along it, needle along +z by default.
+//! Every type is plain old data, valid for every bit pattern: no `bool`, `enum` or `char`, no padding, no pointer. A
+//! reader verifies everything: [`check`] before a value is used, [`Request::decode`] before a request is carried out.
+//! Quantities are SI (m, s, N, rad) in the *scene frame*: origin at the corner of the lattice, axes along it, needle
+//! along +z by default.
 
 #![warn(missing_docs)]
 
@@ -86,11 +87,12 @@ pub use text::Text;
 /// Both programs must agree on this; it is part of every service name.
 pub const SCHEMA_VERSION: u32 = 17;
 
-/// Records in one batch at most.
+/// Most records in one batch.
 pub const MAX_BATCH: usize = 32;
-/// A batch that is not full is sent after this time, so that the queue of batches holds a known time.
+/// A partial batch is sent after this time, so that the queue of batches spans a known time.
 pub const BATCH_EVERY: Duration = Duration::from_millis(20);
-/// Batches that a slow host may be behind before the oldest is dropped: 12 s. The memory for all hosts is 40 MB in `/dev/shm`.
+/// Batches that a slow host may lag before the oldest is dropped: 12 s. The memory for all hosts is 40 MB in
+/// `/dev/shm`.
 pub const RECORD_BUFFER: usize = 600;
-/// Hosts at once.
+/// Most hosts at once.
 pub const MAX_HOSTS: usize = 6;

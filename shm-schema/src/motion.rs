@@ -1,4 +1,4 @@
-//! A recorded motion of the hand: written by the host from a recording, played by the core's replay device.
+//! A recorded motion of the hand: exported by the host from a recording, played by the core's replay device.
 //!
 //! Layout, little-endian: 8 bytes of magic, period in ns and number of samples as `u64`, then the samples as
 //! [`MotionSample`]. The host makes it, so that the core need not read a foreign file.
@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 const MAGIC: &[u8; 8] = b"STYMOT\0\x01";
 const HEADER: usize = 24;
 
-/// Everything that a device reports for one period.
+/// Report of a device for one period.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct MotionSample {
@@ -18,23 +18,23 @@ pub struct MotionSample {
     pub tip_in_scene_m: [f64; 3],
     /// Quaternion i, j, k, w.
     pub world_from_tool: [f64; 4],
-    /// Bits of the buttons that are pressed.
+    /// Bits of the pressed buttons.
     pub buttons: u32,
     /// Zero.
     pub reserved: u32,
 }
 
-/// Samples that were taken one period apart.
+/// Samples taken one period apart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
     /// Time from one sample to the next, ns.
     pub period_ns: u64,
-    /// In the order of time; at least one.
+    /// Samples in time order; at least one.
     pub samples: Vec<MotionSample>,
 }
 
 impl Motion {
-    /// The whole file.
+    /// Encodes the whole file.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         bytes.extend(self.period_ns.to_le_bytes());
@@ -43,7 +43,7 @@ impl Motion {
         bytes
     }
 
-    /// Verifies sizes, positions and orientations.
+    /// Decodes and validates sizes, positions and orientations.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Invalid> {
         let (header, body) = bytes
             .split_at_checked(HEADER)

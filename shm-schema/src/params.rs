@@ -1,4 +1,4 @@
-//! The parameters in force as the core announces them, and a refusal of parameters in reason codes.
+//! The parameters in force as announced by the core, and a refusal of parameters in reason codes.
 
 use crate::{ParameterId, ParameterProblem, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode};
 use bytemuck::{Pod, Zeroable};
@@ -43,7 +43,7 @@ impl From<ParameterProblems> for Refusal {
 }
 
 impl Reason {
-    /// Returns the parameter that it is about.
+    /// Returns the parameter concerned.
     pub fn parameter(&self) -> Option<ParameterId> {
         let of_parameter = [
             RefusalCode::ParameterOutOfLimits,

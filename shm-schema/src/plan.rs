@@ -1,13 +1,13 @@
-//! The plan that `rt-core` keeps, whichever hosts are connected.
+//! The plan kept by `rt-core`, independent of the connected hosts.
 
 use crate::Text;
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
-/// Seeds planned or placed at most.
+/// Most seeds, planned or placed.
 pub const MAX_SEEDS: usize = 128;
 
-/// Needles, at most, that a rehearsal beside those that stay in may name as having been there before.
+/// Most earlier needles that a rehearsal with stabilising needles may name.
 pub const MAX_EARLIER_NEEDLES: usize = 40;
 
 /// One seed of a plan.
@@ -18,22 +18,22 @@ pub struct PlannedSeed {
     pub position_m: [f64; 3],
 }
 
-/// Strength of a planned seed, U.
+/// Range of the strength of a planned seed, U.
 pub const SEED_STRENGTH_RANGE_U: [f64; 2] = [0.0, 1e5];
-/// Prescribed dose, Gy.
+/// Range of the prescribed dose, Gy.
 pub const PRESCRIPTION_RANGE_GY: [f64; 2] = [0.0, 1e4];
-/// Bytes of the model of a source.
+/// Bytes of a source model's name.
 pub const SOURCE_BYTES: usize = 32;
-/// Needles of a plan of many.
+/// Most needles in a plan.
 pub const MOST_PLANNED_NEEDLES: u32 = 1000;
 
-/// What the seeds of a planned needle are, for other hosts that count their dose; the core passes it on. All zero where it is not known.
+/// Seed data of a planned needle, for other hosts that compute dose; the core passes it on. All zero if unknown.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
 pub struct Prescribed {
-    /// Which needle of a plan of many it is, counted from 1, and its seeds are dropped in their order; 0 for one by hand.
+    /// Number of the needle in its plan, from 1, whose seeds are dropped in order; 0 for a manual plan.
     pub needle: u32,
-    /// The last needle of that plan that has seeds; 0 for one by hand.
+    /// The last needle of that plan that has seeds; 0 for a manual plan.
     pub last_needle: u32,
     /// Strength of each seed, U.
     pub strength_u: f64,
@@ -52,13 +52,13 @@ impl Default for Prescribed {
 /// A needle and the seeds along it, scene frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedNeedle {
-    /// Where the needle enters, m.
+    /// Entry of the needle, m.
     pub entry_m: [f64; 3],
     /// Unit vector from the entry into the body.
     pub direction: [f64; 3],
     /// Positions of at most [`MAX_SEEDS`] seeds, m.
     pub seeds_m: Vec<[f64; 3]>,
-    /// What the seeds are.
+    /// Seed data.
     #[serde(default)]
     pub prescribed: Prescribed,
 }
@@ -71,22 +71,22 @@ pub struct PlanInForce {
     pub session_id: u64,
     /// Rises with each change; 0 means that there is no plan.
     pub generation: u64,
-    /// The scene that was running when the plan came.
+    /// The scene that was running when the plan arrived.
     pub scene_generation: u64,
-    /// Where the needle starts, outside the gland.
+    /// Start of the needle, outside the gland.
     pub entry_m: [f64; 3],
     /// Unit vector of the trajectory (r of paper eq. 6).
     pub direction: [f64; 3],
-    /// How many of `seeds` count.
+    /// Number of `seeds` in use.
     pub seed_count: u64,
-    /// What they are.
+    /// Seed data.
     pub prescribed: Prescribed,
-    /// In the order in which the host sent them.
+    /// Seeds in the order in which the host sent them.
     pub seeds: [PlannedSeed; MAX_SEEDS],
 }
 
 impl PlanInForce {
-    /// Returns the plan that hosts get, without its session and generations; all zero for no plan.
+    /// Returns the plan for hosts, without its session and generations; all zero for no plan.
     pub fn of(plan: Option<&PlannedNeedle>) -> Self {
         let mut sent = Self::zeroed();
         let Some(plan) = plan else { return sent };

@@ -11,9 +11,9 @@ pub struct TickRecord {
     pub session_id: u64,
     /// Number of the tick.
     pub tick: u64,
-    /// When the tick was due on the ideal grid, `CLOCK_MONOTONIC`.
+    /// Deadline of the tick on the ideal grid, `CLOCK_MONOTONIC`.
     pub due_ns: u64,
-    /// From the time at which the tick was due until the thread ran.
+    /// From the deadline until the thread ran.
     pub wake_latency_ns: u64,
     /// From wake-up until the force was written.
     pub force_written_ns: u64,
@@ -37,14 +37,14 @@ pub struct TickRecord {
     pub speed_m_per_s: f64,
     /// F_R, guide, damping, shaft friction, F_G before the gate.
     pub force_terms_n: [f64; 5],
-    /// The tissue tick whose answer was used.
+    /// The tissue tick whose response was used.
     pub tissue_tick: u64,
-    /// Quaternion i, j, k, w; with the tip all that the device said.
+    /// Quaternion i, j, k, w; with the tip, the full report of the device.
     pub world_from_tool: [f64; 4],
-    /// Tip of the needle less where a rigid one in the same hand would have it, scene frame, m.
+    /// Displacement of the tip from that of a rigid needle in the same hand, scene frame, m.
     #[serde(default)]
     pub tip_deflection_m: [f64; 3],
-    /// Bits of the buttons that are pressed.
+    /// Bits of the pressed buttons.
     pub buttons: u32,
     /// [`crate::HapticState::folded_from_m`] in micrometres, rounded up.
     #[serde(default)]

@@ -1,27 +1,27 @@
-//! Why a request is refused: reason codes for programs, a text for people.
+//! Reasons of a refusal: codes for programs, text for people.
 
 use bytemuck::{Pod, Zeroable};
 use num_enum::TryFromPrimitive;
 
-/// Why a request was refused, by stable number. Where nothing is said of it, the subject is [`Reason::NO_SUBJECT`].
+/// Reason of a refusal, by stable number. The subject is [`Reason::NO_SUBJECT`] unless stated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
 #[repr(u32)]
 pub enum RefusalCode {
-    /// The number of the command is not known. Subject: that number.
+    /// The number of the command is unknown. Subject: that number.
     UnknownCommand = 1,
-    /// The payload is no request of that number.
+    /// The payload is not a request of that number.
     Malformed = 2,
-    /// There are too many or too few needles, seeds or changes. Subject: how many came.
+    /// There are too many or too few needles, seeds or changes. Subject: the number received.
     WrongCount = 3,
-    /// A place is too far from the origin, or no number.
+    /// A position is too far from the origin, or not a number.
     PlaceTooFar = 5,
     /// A direction is not a unit vector.
     NotUnitDirection = 6,
-    /// A speed, an acceleration, a distance or a parameter is outside its limits, or no number.
+    /// A speed, acceleration, distance or parameter is outside its limits, or not a number.
     ValueOutOfLimits = 7,
     /// There is no built-in scene of that number.
     UnknownScene = 8,
-    /// The words are no UTF-8 of one line, or there are none.
+    /// The words are not UTF-8 of one line, or empty.
     InvalidText = 9,
     /// A parameter is outside its limits. Subject: the parameter.
     ParameterOutOfLimits = 20,
@@ -43,19 +43,19 @@ pub enum RefusalCode {
     NeedleInTissue = 44,
     /// The simulated hand cannot reach the goal.
     BadGoal = 45,
-    /// There is no needle in the tissue that could be left there.
+    /// No needle in the tissue could be left there.
     NoNeedleToLeave = 46,
-    /// The tip presses on a membrane, which would go on giving way under it.
+    /// The tip presses on a membrane, which would keep yielding under it.
     TipAtMembrane = 47,
-    /// As many needles stay in as may.
+    /// The maximum number of needles already stays in.
     NoRoomToLeave = 48,
     /// No needle of that number stays in. Subject: the number.
     NoLeftNeedle = 49,
     /// The hand is not at the tip of that needle.
     NotAtNeedle = 50,
-    /// The needle is on no line, and only one on a line may stay in.
+    /// The needle is on no line, which a needle needs to stay in.
     NeedleWithoutLine = 51,
-    /// The tissue model of the run answers no force.
+    /// The run's tissue model computes no forces.
     TissueWithoutStiffness = 52,
     /// The run has no second device.
     NoSecondDevice = 55,
@@ -67,7 +67,7 @@ pub enum RefusalCode {
     SceneNotBuilt = 62,
     /// Another rehearsal is running.
     RehearsalRunning = 70,
-    /// The rehearsal did not come to its end.
+    /// The rehearsal did not finish.
     RehearsalFailed = 71,
     /// The flight recording was not written.
     FlightNotSaved = 80,
@@ -76,12 +76,12 @@ pub enum RefusalCode {
 }
 
 impl RefusalCode {
-    /// `None` when this build does not know the number.
+    /// Returns the code; `None` if this build does not know the number.
     pub fn from_number(number: u32) -> Option<Self> {
         Self::try_from(number).ok()
     }
 
-    /// What a person reads where nothing more is known.
+    /// Returns the default text for people.
     pub fn message(self) -> &'static str {
         match self {
             Self::UnknownCommand => "the command is not known; host and core differ",
@@ -129,44 +129,44 @@ impl RefusalCode {
     }
 }
 
-/// One reason of a refusal, as a [`crate::Reply`] carries it.
+/// One reason of a refusal, as in a [`crate::Reply`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct Reason {
     /// [`RefusalCode`] by number.
     pub code: u32,
-    /// What it is about; its meaning depends on the code.
+    /// Subject of the reason; its meaning depends on the code.
     pub subject: u32,
 }
 
 impl Reason {
-    /// The subject of a reason that has none.
+    /// Subject of a reason without one.
     pub const NO_SUBJECT: u32 = u32::MAX;
 
-    /// A reason with its subject.
+    /// Returns a reason with its subject.
     pub fn new(code: RefusalCode, subject: u32) -> Self {
         let code = code as u32;
         Self { code, subject }
     }
 
-    /// `None` when this build does not know the number.
+    /// Returns the code; `None` if this build does not know the number.
     pub fn code(&self) -> Option<RefusalCode> {
         RefusalCode::from_number(self.code)
     }
 }
 
-/// A refusal as the core makes it.
+/// A refusal by the core.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{text}")]
 pub struct Refusal {
-    /// At least one.
+    /// Reasons; at least one.
     pub reasons: Vec<Reason>,
-    /// Every reason in words, one a line.
+    /// All reasons as text, one per line.
     pub text: String,
 }
 
 impl Refusal {
-    /// A reason without a subject, explained by `text`.
+    /// Returns a refusal for a reason without a subject, explained by `text`.
     pub fn new(code: RefusalCode, text: impl Into<String>) -> Self {
         Self {
             reasons: vec![Reason::new(code, Reason::NO_SUBJECT)],

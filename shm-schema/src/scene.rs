@@ -1,22 +1,22 @@
-//! The scene both ways: what runs (core to host) and a volume of the user's own (host to core).
+//! Scenes in both directions: the running one (core to host) and a user's volume (host to core).
 
 use crate::{GridInfo, MAX_STRUCTURES, Text};
 use bytemuck::{Pod, Zeroable};
 use stylet_anatomy::PatientFrame;
 
-/// What a structure is, as bits of [`StructureInfo::role`] and [`UploadStructure::role`].
+/// Role of a structure, as bits of [`StructureInfo::role`] and [`UploadStructure::role`].
 pub mod role {
-    /// What seeds are planned in.
+    /// Seeds are planned in the structure.
     pub const TARGET: u32 = 1;
     /// To be kept from needles and dose.
     pub const SPARE: u32 = 2;
     /// Never moves.
     pub const FIXED: u32 = 4;
-    /// All that are known.
+    /// All known bits.
     pub const ALL: u32 = TARGET | SPARE | FIXED;
 }
 
-/// One structure of the scene that runs.
+/// One structure of the running scene.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct StructureInfo {
@@ -26,10 +26,10 @@ pub struct StructureInfo {
     pub role: u32,
     /// Elements that belong to it.
     pub element_count: u32,
-    /// The triangles of its own surface; none where it is not drawn by itself. The targets together are drawn under the
-    /// first of them.
+    /// First triangle of its surface; none if it is not drawn separately. All targets are drawn together as the first
+    /// of them.
     pub first_triangle: u32,
-    /// Number of triangles of its own surface.
+    /// Number of triangles of its surface.
     pub triangle_count: u32,
     /// Zero.
     pub reserved: u32,
@@ -41,8 +41,9 @@ pub struct StructureInfo {
     pub name: Text<32>,
 }
 
-/// Goes with `3 * vertex_count` words of rest positions (`f32` bits, m), `3 * triangle_count` words of indices, and the cells
-/// of `labels`, four to a word, lowest byte first: 0 where there is no tissue, else one more than the place in `structures`.
+/// Precedes `3 * vertex_count` words of rest positions (`f32` bits, m), `3 * triangle_count` words of indices, and the
+/// cells of `labels`, four to a word, lowest byte first: 0 where there is no tissue, else one more than the index in
+/// `structures`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct SceneHeader {
@@ -60,12 +61,11 @@ pub struct SceneHeader {
     pub vertex_count: u32,
     /// Triangles of all surfaces.
     pub triangle_count: u32,
-    /// The first triangles are the body's; after them come those of the structures in it.
+    /// The body's triangles come first; those of its structures follow.
     pub body_triangle_count: u32,
-    /// How many of `structures` count; at least one.
+    /// Number of `structures` in use; at least one.
     pub structure_count: u32,
-    /// Edge of the elements that the tissue model solves for, in edges of the elements here: 1, or more where those are too
-    /// many for it.
+    /// Edge of the tissue model's elements, in edges of the elements here: 1, or more if those are too many for it.
     pub body_edge: u32,
     /// Edge of an element, m.
     pub spacing_m: f64,
@@ -75,23 +75,23 @@ pub struct SceneHeader {
     pub lower_m: [f64; 3],
     /// Largest corner of that box, m.
     pub upper_m: [f64; 3],
-    /// Bounding box of the targets: what a plan aims at.
+    /// Bounding box of the targets, at which a plan aims.
     pub target_lower_m: [f64; 3],
     /// Largest corner of that box, m.
     pub target_upper_m: [f64; 3],
     /// Patient (RAS, m) from scene: row-major rotation, then translation. Identity for built-in scenes.
     pub patient_from_scene: [f64; 12],
-    /// What is where in the body at rest.
+    /// Grid of the labels of the body at rest.
     pub labels: GridInfo,
-    /// Where each snapshot gives displacements.
+    /// Grid of the displacements in each snapshot.
     pub nodes: GridInfo,
     /// Name of the scene.
     pub name: Text<64>,
-    /// The first `structure_count` of them count.
+    /// The first `structure_count` are in use.
     pub structures: [StructureInfo; MAX_STRUCTURES],
 }
 
-/// Identity of a scene: which run of the core, and which scene in it.
+/// Identity of a scene: the run of the core, and the scene in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SceneId {
     /// The run of the core.
@@ -101,7 +101,7 @@ pub struct SceneId {
 }
 
 impl SceneHeader {
-    /// Where the patient lies in the scene: the only reader of `patient_from_scene`.
+    /// Returns the patient's placement in the scene: the only reader of `patient_from_scene`.
     pub fn patient(&self) -> PatientFrame {
         PatientFrame::of_wire(&self.patient_from_scene)
     }
@@ -114,17 +114,17 @@ impl SceneHeader {
         }
     }
 
-    /// Edge of the elements that the tissue model solves for, m.
+    /// Edge of the tissue model's elements, m.
     pub fn body_spacing_m(&self) -> f64 {
         f64::from(self.body_edge) * self.spacing_m
     }
 
-    /// Those that count.
+    /// Returns the structures in use.
     pub fn structures(&self) -> &[StructureInfo] {
         &self.structures[..(self.structure_count as usize).min(MAX_STRUCTURES)]
     }
 
-    /// Words that must follow the header; `None` when the counts are absurd.
+    /// Number of words that must follow the header; `None` if the counts are absurd.
     pub fn word_count(&self) -> Option<usize> {
         let labels = self.labels.node_count()?.div_ceil(4) as u64;
         let words = 3 * (u64::from(self.vertex_count) + u64::from(self.triangle_count)) + labels;
@@ -132,7 +132,7 @@ impl SceneHeader {
     }
 }
 
-/// One structure of a volume that a host sends, with its material.
+/// One structure of a host's volume, with its material.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct UploadStructure {
@@ -140,31 +140,31 @@ pub struct UploadStructure {
     pub label: u32,
     /// Bits of [`role`].
     pub role: u32,
-    /// 1: `limits` count; 0: the structure takes the limits that the operator sets.
+    /// 1: `limits` apply; 0: the structure uses the operator's limits.
     pub own_limits: u32,
-    /// What it rests on: `stylet_anatomy::Surroundings` on the wire.
+    /// Support: `stylet_anatomy::Surroundings` on the wire.
     pub surroundings: u32,
     /// Young's modulus, Pa.
     pub young_pa: f64,
     /// Poisson's ratio.
     pub poisson: f64,
-    /// For links along x, y, z: shortest and longest as a share of their length at rest, and shear (rad).
+    /// For links along x, y, z: shortest and longest as a fraction of their rest length, and shear (rad).
     pub limits: [[f64; 3]; 3],
     /// Name for people.
     pub name: Text<32>,
 }
 
-/// Goes with `dims[0] * dims[1] * dims[2]` cells, x fastest; every cell but 0 is tissue.
+/// Precedes `dims[0] * dims[1] * dims[2]` cells, x fastest; every nonzero cell is tissue.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct UploadHeader {
-    /// The host that sends it.
+    /// The sending host.
     pub host_id: u64,
-    /// The reply carries it back.
+    /// Number repeated in the reply.
     pub command_id: u64,
     /// Cells along x, y, z.
     pub dims: [u32; 3],
-    /// How many of `structures` count; 0: all tissue is one structure.
+    /// Number of `structures` in use; 0: all tissue is one structure.
     pub structure_count: u32,
     /// Edge of a cell, m.
     pub spacing_m: f64,
@@ -172,7 +172,7 @@ pub struct UploadHeader {
     pub patient_from_scene: [f64; 12],
     /// Name of the volume.
     pub name: Text<64>,
-    /// The first `structure_count` of them count.
+    /// The first `structure_count` are in use.
     pub structures: [UploadStructure; MAX_STRUCTURES],
 }
 

@@ -1,10 +1,11 @@
-//! The second device, which the other hand holds: its latest state, and one record for every tick of its loop.
+//! The second device, held by the other hand: its latest state, and one record for every tick of its loop.
 
 use crate::DeadlineTotals;
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
-/// One tick, as hosts see it. Written by the second device's thread only, on a board that exists in a run with a second device.
+/// One tick, as seen by hosts. Written only by the second device's thread, on a board that exists in a run with a
+/// second device.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct SecondState {
@@ -12,9 +13,9 @@ pub struct SecondState {
     pub tick: u64,
     /// `CLOCK_MONOTONIC` at the wake-up of this tick.
     pub time_ns: u64,
-    /// Tip of what the hand holds, scene frame, m.
+    /// Tip of the held tool, scene frame, m.
     pub tip_in_scene_m: [f64; 3],
-    /// Quaternion i, j, k, w; what the hand holds lies along +z of its own frame.
+    /// Quaternion i, j, k, w; the held tool lies along +z of its frame.
     pub world_from_tool: [f64; 4],
     /// Force on the hand, after the gate of this device, N.
     pub force_on_hand_n: [f64; 3],
@@ -22,27 +23,27 @@ pub struct SecondState {
     pub torque_on_hand_nm: [f64; 3],
     /// Largest magnitude written to the device since the last reset.
     pub peak_force_n: f64,
-    /// Factor on the force of the contact, as the operator set it.
+    /// The operator's factor on the contact force.
     pub force_scale: f64,
     /// Peak force of this device, N.
     pub device_limit_n: f64,
-    /// Deadlines of this loop that were missed since the last reset.
+    /// Missed deadlines of this loop since the last reset.
     pub missed_deadlines: u64,
     /// Longest wake-up latency since the last reset.
     pub worst_wake_ns: u64,
     /// Longest tick since the last reset.
     pub worst_work_ns: u64,
-    /// The tissue tick whose answer was used.
+    /// The tissue tick whose response was used.
     pub tissue_tick: u64,
-    /// Records that the ring could not take because the bridge was late.
+    /// Records for which the ring had no room because the bridge was late.
     pub records_lost: u64,
-    /// Times that the gate had to change the force.
+    /// Number of times the gate changed the force.
     pub gate_interventions: u64,
     /// As [`crate::HapticState::gate_counts`].
     pub gate_counts: [u64; 8],
-    /// Energy taken from the hand minus given to it, as the passivity controller books it.
+    /// Energy taken from the hand minus energy returned, as booked by the passivity controller.
     pub energy_j: f64,
-    /// Root mean square of the force over the thermal time of the motors.
+    /// Root mean square of the force over the thermal time constant of the motors.
     pub warmth_n: f64,
     /// [`crate::ParametersInForce::generation`] that the tick ran with.
     pub parameters_generation: u64,
@@ -54,9 +55,9 @@ pub struct SecondState {
     pub fault: u32,
     /// Bits of [`crate::flags`]: engaged, waiting, in contact, simulated device, at goal, gate acted, real time.
     pub flags: u32,
-    /// Bits of the buttons that are pressed.
+    /// Bits of the pressed buttons.
     pub buttons: u32,
-    /// Edge of the elements that what the probe presses was solved for in, um; 0 before that is there.
+    /// Edge of the elements in which the probe's answers were solved, µm; 0 before they exist.
     pub probe_edge_um: u32,
 }
 
@@ -68,9 +69,9 @@ pub struct SecondRecord {
     pub session_id: u64,
     /// Number of the tick.
     pub tick: u64,
-    /// When the tick was due on the ideal grid, `CLOCK_MONOTONIC`.
+    /// Deadline of the tick on the ideal grid, `CLOCK_MONOTONIC`.
     pub due_ns: u64,
-    /// From the time at which the tick was due until the thread ran.
+    /// From the deadline until the thread ran.
     pub wake_latency_ns: u64,
     /// From wake-up until the force was written.
     pub force_written_ns: u64,
@@ -82,18 +83,18 @@ pub struct SecondRecord {
     pub fault: u32,
     /// Bits of [`crate::flags`].
     pub flags: u32,
-    /// Bits of the buttons that are pressed.
+    /// Bits of the pressed buttons.
     pub buttons: u32,
-    /// Tip of what the hand holds, scene frame, m.
+    /// Tip of the held tool, scene frame, m.
     pub tip_in_scene_m: [f64; 3],
-    /// Quaternion i, j, k, w; with the tip all that the device said.
+    /// Quaternion i, j, k, w; with the tip, the full report of the device.
     pub world_from_tool: [f64; 4],
     /// Force on the hand, after the gate, N.
     pub force_on_hand_n: [f64; 3],
     /// Torque on the hand, after the gate, N m.
     pub torque_on_hand_nm: [f64; 3],
-    /// Size of the force that the contact asked for, before the gate, N.
+    /// Magnitude of the contact force before the gate, N.
     pub contact_force_n: f64,
-    /// The tissue tick whose answer was used.
+    /// The tissue tick whose response was used.
     pub tissue_tick: u64,
 }

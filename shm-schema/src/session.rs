@@ -1,15 +1,15 @@
-//! Which run of `rt-core` this is and what it got from the kernel.
+//! Description of a run of `rt-core`, with its grants from the kernel.
 
 use crate::{ExercisesInForce, Text};
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
-/// Announced five times a second, and to every new host. A recording keeps what describes the run.
+/// Announced five times a second, and to every new host. A recording keeps the fields that describe the run.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Session {
-    /// Number of the run; differs from every other run.
+    /// Number of the run; unique.
     pub session_id: u64,
     /// [`crate::SCHEMA_VERSION`] of the core.
     pub schema_version: u32,
@@ -36,13 +36,13 @@ pub struct Session {
     pub second: ThreadReport,
     /// 1 when `mlockall` succeeded.
     pub memory_locked: u32,
-    /// 1 when `--no-rt` was asked for.
+    /// 1 if `--no-rt` was requested.
     #[serde(skip)]
     pub no_rt_asked: u32,
-    /// Messages from hosts that were refused in this run.
+    /// Host messages refused in this run.
     #[serde(skip)]
     pub refused: u64,
-    /// Faults that an instructor put in.
+    /// Instructor-injected faults.
     #[serde(skip)]
     pub exercises: ExercisesInForce,
     /// Name of the device.
@@ -51,7 +51,7 @@ pub struct Session {
     pub second_device: Text<64>,
     /// Version of the core.
     pub version: Text<32>,
-    /// What was asked for and not granted, and what to do about it; empty when nothing is missing.
+    /// Requests that were not granted, and their remedies; empty if everything was granted.
     #[serde(skip)]
     pub advice: Text<512>,
 }
@@ -69,7 +69,7 @@ impl Session {
     }
 }
 
-/// What one thread asked for and what the kernel says it has.
+/// One thread's request, and the kernel's report of it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
 #[serde(default)]
@@ -80,21 +80,21 @@ pub struct ThreadReport {
     pub priority: u32,
     /// Priority that was requested; 0 for none.
     pub asked_priority: u32,
-    /// Core asked for; `u32::MAX` for none.
+    /// Requested core; `u32::MAX` for none.
     pub asked_core: u32,
-    /// The one core that `sched_getaffinity` leaves it, or `u32::MAX` when it may run on several.
+    /// The one core allowed by `sched_getaffinity`, or `u32::MAX` if there are several.
     pub core: u32,
     /// Zero.
     pub reserved: u32,
 }
 
 impl ThreadReport {
-    /// Whether the kernel reports `SCHED_FIFO`.
+    /// True if the kernel reports `SCHED_FIFO`.
     pub fn is_fifo(&self) -> bool {
         self.policy == 1
     }
 
-    /// The core that a thread of real-time priority has, and that hosts on its machine leave to it.
+    /// Core of a thread with real-time priority, which hosts on its machine leave to it.
     pub fn own_core(&self) -> Option<usize> {
         (self.is_fifo() && self.core != u32::MAX).then_some(self.core as usize)
     }

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use num_enum::TryFromPrimitive;
 use serde::{Deserialize, Serialize};
 
-/// One tick, as the operator's program sees it. Written by the haptic thread only.
+/// One tick, as seen by the operator's program. Written only by the haptic thread.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
 #[serde(default)]
@@ -18,7 +18,7 @@ pub struct HapticState {
     pub tip_in_scene_m: [f64; 3],
     /// Unit vector from hub to tip.
     pub needle_direction: [f64; 3],
-    /// Where the tip met the membrane; only meaningful while [`flags::IN_CONTACT`] is set.
+    /// Position at which the tip met the membrane; valid only while [`flags::IN_CONTACT`] is set.
     pub contact_in_scene_m: [f64; 3],
     /// Depth since the tip met the membrane (u_tip of paper eq. 6).
     pub depth_m: f64,
@@ -34,19 +34,19 @@ pub struct HapticState {
     pub force_terms_n: [f64; 5],
     /// Largest magnitude written to the device since the last reset.
     pub peak_force_n: f64,
-    /// Factor on the force of the law, as the operator set it.
+    /// The operator's factor on the force of the law.
     pub force_scale: f64,
     /// Peak force of the device, N.
     pub device_limit_n: f64,
-    /// Deadlines of the force loop that were missed since the last reset.
+    /// Missed deadlines of the force loop since the last reset.
     pub missed_deadlines: u64,
     /// Longest wake-up latency of the force loop since the last reset.
     pub worst_wake_ns: u64,
     /// Longest tick of the force loop since the last reset.
     pub worst_work_ns: u64,
-    /// The tissue tick whose answer was used.
+    /// The tissue tick whose response was used.
     pub tissue_tick: u64,
-    /// Deadlines of the tissue loop that were missed since the last reset.
+    /// Missed deadlines of the tissue loop since the last reset.
     pub tissue_missed_deadlines: u64,
     /// Longest wake-up latency of the tissue loop since the last reset.
     pub tissue_worst_wake_ns: u64,
@@ -54,31 +54,33 @@ pub struct HapticState {
     pub worst_residual: f64,
     /// Longest tick of the tissue loop since the last reset.
     pub worst_tissue_work_ns: u64,
-    /// Records that the ring could not take because the bridge was late.
+    /// Records for which the ring had no room because the bridge was late.
     pub records_lost: u64,
-    /// Times that the gate had to change the force.
+    /// Number of times the gate changed the force.
     pub gate_interventions: u64,
-    /// How often each stage of the gate acted: not finite, passivity, slew, magnitude, continuous, device, torque, fault.
+    /// Number of actions of each stage of the gate: not finite, passivity, slew, magnitude, continuous, device, torque,
+    /// fault.
     pub gate_counts: [u64; 8],
-    /// Energy taken from the hand minus given to it, as the passivity controller books it.
+    /// Energy taken from the hand minus energy returned, as booked by the passivity controller.
     pub energy_j: f64,
-    /// Root mean square of the force over the thermal time of the motors.
+    /// Root mean square of the force over the thermal time constant of the motors.
     pub warmth_n: f64,
-    /// Smallest volume that three links of an element near the tip span, over that at rest, where the tissue's answer is linear; 1
+    /// Smallest corner volume of an element near the tip, relative to rest, where the tissue's answer is linear; 1
     /// elsewhere. At 0 and below a cell is folded.
     pub least_corner: f64,
-    /// How far the tissue at the tip was displaced when its linear answer folded, m; 0 while it has not since the needle went in.
+    /// Displacement of the tissue at the tip when its linear answer folded, m; 0 if it has not since the insertion.
     pub folded_from_m: f64,
     /// Coupled mode: the tissue's answer along the insertion direction, before the gate.
     pub tissue_force_n: f64,
     /// [`crate::ParametersInForce::generation`] that the tick ran with.
     pub parameters_generation: u64,
-    /// Tip of the needle less where a rigid one in the same hand would have it, scene frame, m; 0 for a needle that does not bend.
+    /// Displacement of the tip from that of a rigid needle in the same hand, scene frame, m; 0 for a needle that does
+    /// not bend.
     pub tip_deflection_m: [f64; 3],
-    /// In contact without a line: how old the pose is that the tissue has answered to within its tolerance. 0 on a line, which the
-    /// force loop solves in the same tick.
+    /// In contact without a line: age of the pose that the tissue has answered within its tolerance. 0 on a line, which
+    /// the force loop solves in the same tick.
     pub lag_ns: u64,
-    /// How far the tip has come since that pose.
+    /// Travel of the tip since that pose.
     pub lag_m: f64,
     /// Largest [`lag_ns`](Self::lag_ns) since the last reset.
     pub worst_lag_ns: u64,
@@ -108,7 +110,7 @@ pub struct HapticState {
 
 /// Bits of [`HapticState::flags`] and [`crate::TickRecord::flags`].
 pub mod flags {
-    /// Both threads run under `SCHED_FIFO`: it was asked for, and the kernel confirmed it before the loops began.
+    /// Both threads run under `SCHED_FIFO`: it was requested, and the kernel confirmed it before the loops began.
     pub const REAL_TIME: u32 = 1;
     /// The operator has armed the force.
     pub const ENGAGED: u32 = 1 << 1;
@@ -118,23 +120,23 @@ pub mod flags {
     pub const PUNCTURED: u32 = 1 << 3;
     /// The device is a simulation.
     pub const SIMULATED_DEVICE: u32 = 1 << 4;
-    /// The hand has reached the goal it was last given.
+    /// The hand has reached its last goal.
     pub const AT_GOAL: u32 = 1 << 5;
     /// The gate limited this tick's force.
     pub const GATE_ACTED: u32 = 1 << 6;
     /// Engaged, but the force is still too large to begin with: move the needle until it is small.
     pub const WAITING: u32 = 1 << 7;
-    /// The tissue answers along lines that are prepared while the needle is outside: before it goes in, [`LINE_READY`]
-    /// should be set, or it goes in as without a line.
+    /// The tissue answers along lines that are prepared while the needle is outside: unless [`LINE_READY`] is set
+    /// before it goes in, the insertion runs without a line.
     pub const LINE_NEEDED: u32 = 1 << 8;
-    /// The needle is on a line that is ready.
+    /// The needle is on a prepared line.
     pub const LINE_READY: u32 = 1 << 9;
-    /// The linear answer of the tissue near the tip is folded in this tick: it is not that of tissue.
+    /// The linear answer of the tissue near the tip is folded in this tick: it is not physical.
     pub const FOLDED: u32 = 1 << 10;
-    /// The hand holds no needle: it has left one in the tissue and is not out yet, or is on the way of one that stays in. It meets
-    /// nothing, and feels nothing.
+    /// No needle in hand: it has left one in the tissue and is not out yet, or is on the path of one that stays in.
+    /// Contact and force are disabled.
     pub const HAND_EMPTY: u32 = 1 << 11;
-    /// The hand moves for a host, or waits to hear from it again ([`crate::Request::KeepMoving`]).
+    /// The hand moves for a host, or waits for its renewal ([`crate::Request::KeepMoving`]).
     pub const IN_MOTION: u32 = 1 << 12;
 }
 
@@ -155,12 +157,12 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// `None` when this build does not know the number.
+    /// Returns the phase; `None` if this build does not know the number.
     pub fn from_number(number: u32) -> Option<Self> {
         Self::try_from(number).ok()
     }
 
-    /// What a person reads.
+    /// Name shown to users.
     pub fn name(self) -> &'static str {
         match self {
             Self::Outside => "outside",
@@ -172,7 +174,7 @@ impl Phase {
     }
 }
 
-/// Why the force is off, by stable number.
+/// Reason why the force is off, by stable number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
 #[repr(u32)]
 pub enum Fault {
@@ -182,7 +184,7 @@ pub enum Fault {
     DeviceSilent = 1,
     /// The device reported an error.
     DeviceError = 2,
-    /// The device sent a position that is not a number.
+    /// The device reported a position that is not a number.
     NonFiniteInput = 3,
     /// The force law gave a value that is not a number.
     NonFiniteForce = 4,
@@ -192,7 +194,7 @@ pub enum Fault {
     TissueUnsolved = 6,
     /// 20 deadlines missed in a row.
     OverrunStreak = 7,
-    /// The force loop has stopped by itself.
+    /// The force loop has stopped unasked.
     LoopStopped = 8,
     /// The device is disconnected.
     DeviceLost = 9,
@@ -200,17 +202,17 @@ pub enum Fault {
     DeviceNotCalibrated = 10,
     /// The motors are too warm.
     DeviceWarm = 11,
-    /// The device stopped at a limit of its own.
+    /// The device stopped at one of its limits.
     DeviceStopped = 12,
 }
 
 impl Fault {
-    /// `None` when this build does not know the number.
+    /// Returns the fault; `None` if this build does not know the number.
     pub fn from_number(number: u32) -> Option<Self> {
         Self::try_from(number).ok()
     }
 
-    /// What a person reads.
+    /// Message shown to users.
     pub fn message(self) -> &'static str {
         match self {
             Self::None => "no fault",

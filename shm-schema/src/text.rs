@@ -1,4 +1,4 @@
-//! Text of bounded length that any bytes may claim to be.
+//! Text of bounded length, valid for any bytes.
 
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -33,7 +33,7 @@ impl<const N: usize> Text<N> {
         Self { bytes }
     }
 
-    /// The words, where they are UTF-8 without control characters and followed by zeros alone; `None` for any other bytes.
+    /// Returns the text if it is UTF-8 without control characters, padded with zeros alone; `None` for any other bytes.
     pub fn exact(&self) -> Option<&str> {
         let end = self.bytes.iter().position(|&b| b == 0).unwrap_or(N);
         let (words, rest) = self.bytes.split_at(end);
@@ -41,7 +41,7 @@ impl<const N: usize> Text<N> {
         (rest.iter().all(|&b| b == 0) && !words.chars().any(char::is_control)).then_some(words)
     }
 
-    /// What can be read of it: up to the first zero, with broken UTF-8 and control characters replaced.
+    /// Returns the readable part: up to the first zero, with broken UTF-8 and control characters replaced.
     pub fn read(&self) -> String {
         let end = self.bytes.iter().position(|&b| b == 0).unwrap_or(N);
         String::from_utf8_lossy(&self.bytes[..end])
@@ -51,7 +51,7 @@ impl<const N: usize> Text<N> {
     }
 }
 
-/// As the words that can be read.
+/// Serialises the readable text.
 impl<const N: usize> Serialize for Text<N> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&self.read())

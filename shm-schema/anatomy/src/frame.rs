@@ -1,27 +1,27 @@
-//! Where the patient lies in the scene.
+//! Placement of the patient in the scene.
 
 use nalgebra::{IsometryMatrix3, Matrix3, Point3, Rotation3, Translation3, Vector3};
 
-/// Rows whose products differ from those of a rotation by more (Frobenius norm) are no rotation.
+/// Largest deviation of the rows' products from a rotation's (Frobenius norm).
 const NO_ROTATION: f64 = 1e-3;
 
 /// The rigid transform between the frame of a scene and the patient's: right, anterior, superior (RAS), in m.
 ///
-/// Its rotation is a matrix and not a quaternion, so that places keep every bit on the way through files.
+/// Its rotation is a matrix, not a quaternion, so that positions keep every bit through files.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PatientFrame {
     patient_from_scene: IsometryMatrix3<f64>,
 }
 
 impl Default for PatientFrame {
-    /// The scene's axes are the patient's.
+    /// Aligns the scene's axes with the patient's.
     fn default() -> Self {
         Self::new(Matrix3::identity(), Vector3::zeros())
     }
 }
 
 impl PatientFrame {
-    /// From a rotation (or a mirrored one, which is kept) and a translation in m.
+    /// Builds a frame from a rotation (or a reflected one, which is kept) and a translation in m.
     pub fn new(rotation: Matrix3<f64>, translation_m: Vector3<f64>) -> Self {
         Self {
             patient_from_scene: IsometryMatrix3::from_parts(
@@ -31,7 +31,8 @@ impl PatientFrame {
         }
     }
 
-    /// From the form of records: row-major rotation, then translation in m. Anything that is no rotation is taken as none.
+    /// Reads the form in records: row-major rotation, then translation in m. An invalid rotation gives the identity
+    /// frame.
     pub fn of_wire(wire: &[f64; 12]) -> Self {
         let rotation = Matrix3::from_row_slice(&wire[..9]);
         let is_rotation = (rotation * rotation.transpose() - Matrix3::identity()).norm() < NO_ROTATION;
@@ -39,7 +40,7 @@ impl PatientFrame {
         Self::new(rotation, Vector3::from_column_slice(&wire[9..]))
     }
 
-    /// The form of records, see [`PatientFrame::of_wire`].
+    /// Returns the form in records, see [`PatientFrame::of_wire`].
     pub fn to_wire(&self) -> [f64; 12] {
         let mut wire = [0.0; 12];
         wire[..9].copy_from_slice(self.rotation().transpose().as_slice());
@@ -47,38 +48,38 @@ impl PatientFrame {
         wire
     }
 
-    /// Patient axes from scene axes; its transpose turns back.
+    /// Rotation from scene axes to patient axes; its transpose reverses it.
     pub fn rotation(&self) -> &Matrix3<f64> {
         self.patient_from_scene.rotation.matrix()
     }
 
-    /// The origin of the scene in the patient, in m.
+    /// Origin of the scene in the patient, in m.
     pub fn translation_m(&self) -> &Vector3<f64> {
         &self.patient_from_scene.translation.vector
     }
 
-    /// A place in the patient (RAS, m) from one in the scene (m).
+    /// Converts a position in the scene (m) to the patient (RAS, m).
     pub fn patient_from_scene(&self, in_scene_m: [f64; 3]) -> [f64; 3] {
         self.patient_from_scene
             .transform_point(&Point3::from(in_scene_m))
             .into()
     }
 
-    /// A place in the scene (m) from one in the patient (RAS, m).
+    /// Converts a position in the patient (RAS, m) to the scene (m).
     pub fn scene_from_patient(&self, in_patient_m: [f64; 3]) -> [f64; 3] {
         self.patient_from_scene
             .inverse_transform_point(&Point3::from(in_patient_m))
             .into()
     }
 
-    /// A direction in the patient from one in the scene.
+    /// Converts a direction in the scene to the patient.
     pub fn patient_from_scene_direction(&self, in_scene: [f64; 3]) -> [f64; 3] {
         self.patient_from_scene
             .transform_vector(&Vector3::from(in_scene))
             .into()
     }
 
-    /// A direction in the scene from one in the patient.
+    /// Converts a direction in the patient to the scene.
     pub fn scene_from_patient_direction(&self, in_patient: [f64; 3]) -> [f64; 3] {
         self.patient_from_scene
             .inverse_transform_vector(&Vector3::from(in_patient))
@@ -86,7 +87,7 @@ impl PatientFrame {
     }
 }
 
-/// RAS from LPS, and LPS from RAS: the first two axes point the other way.
+/// Converts LPS to RAS, and RAS to LPS: the first two axes are reversed.
 pub fn ras_from_lps(v: Vector3<f64>) -> Vector3<f64> {
     Vector3::new(-v.x, -v.y, v.z)
 }
@@ -109,7 +110,7 @@ mod tests {
         assert!((0..3).all(|a| (back[a] - place[a]).abs() < 1e-15), "{back:?}");
     }
 
-    /// The arithmetic that stood in the plan, the report and the image readers.
+    /// The arithmetic formerly in the plan, the report and the image readers.
     #[test]
     fn every_bit_is_that_of_rows_and_columns_by_hand() {
         let frame = oblique();

@@ -1,4 +1,4 @@
-//! Knowledge of the patient that every part shares: what an organ is by its name, what it is made of, and the patient's frame.
+//! Anatomy shared by all parts: organs by name, their material, and the patient's frame.
 #![warn(missing_docs)]
 
 mod frame;

@@ -1,13 +1,13 @@
-//! The one classifier of structures by name: names of TG-263, and what people write instead.
+//! Classifies structures by name: names of TG-263, and common variants.
 
 use crate::tissue::{Material, Role};
 
-/// An organ, or a volume that is drawn for the treatment.
+/// An organ, or a volume drawn for the treatment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Organ {
     /// PTV, CTV, GTV or ITV.
     TargetVolume,
-    /// Where the prostate was before its removal.
+    /// Bed of the removed prostate.
     ProstateBed,
     /// The prostate.
     Prostate,
@@ -31,16 +31,16 @@ pub enum Organ {
     Perineum,
     /// Skin.
     Skin,
-    /// Muscle, and what lies around everything else.
+    /// Muscle, and everything else around the organs.
     Surroundings,
 }
 
-/// How one organ is recognised, and what it is.
+/// Names of one organ, and its properties.
 struct Row {
     organ: Organ,
-    /// Beginnings of the name in lower case, letters and digits only.
+    /// Prefixes of the name, lower case, letters and digits only.
     names: &'static [&'static str],
-    /// Words that may stand anywhere in the name.
+    /// Words that may occur anywhere in the name.
     words: &'static [&'static str],
     role: Role,
     material: Material,
@@ -73,7 +73,7 @@ const BOWEL_AND_NERVES: [&str; 8] = [
     "neurovascular",
 ];
 
-/// The longer name first where one begins with another.
+/// A longer name comes before its prefix.
 const TABLE: [Row; 14] = {
     use Organ as O;
     use Role::{Spare, Target, Tissue};
@@ -144,7 +144,7 @@ const TABLE: [Row; 14] = {
 };
 
 impl Organ {
-    /// The organ whose name of TG-263 the name begins with; `None` for a name that is not in the table.
+    /// Returns the organ whose TG-263 name is a prefix of the name; `None` for an unknown name.
     ///
     /// ```
     /// use stylet_anatomy::{Organ, Role};
@@ -160,19 +160,19 @@ impl Organ {
             .map(|row| row.organ)
     }
 
-    /// Whether a word for the organ stands anywhere in the name, in upper or lower case: "wall of the urethra" mentions the
+    /// True if a word for the organ occurs anywhere in the name, in any case: "wall of the urethra" mentions the
     /// urethra, but does not begin with it.
     pub fn is_mentioned_in(self, name: &str) -> bool {
         let name = folded(name);
         self.row().words.iter().any(|word| name.contains(word))
     }
 
-    /// What the organ is in the procedure.
+    /// Role of the organ in the procedure.
     pub fn role(self) -> Role {
         self.row().role
     }
 
-    /// What the organ is made of where nothing else is known.
+    /// Default material of the organ.
     pub fn material(self) -> Material {
         self.row().material
     }
@@ -186,12 +186,12 @@ impl Organ {
     }
 
     fn row(self) -> &'static Row {
-        // In the order of the variants, which a test holds.
+        // In the order of the variants, as a test checks.
         &TABLE[self as usize]
     }
 }
 
-/// In lower case and without accents: "Próstata" is "prostata".
+/// Converts to lower case without accents: "Próstata" gives "prostata".
 fn folded(name: &str) -> String {
     let plain = |c: char| match c {
         'à' | 'á' | 'â' | 'ã' | 'ä' | 'å' => 'a',
@@ -203,15 +203,15 @@ fn folded(name: &str) -> String {
         'ñ' => 'n',
         c => c,
     };
-    // The accent may be a character of its own.
+    // The accent may be a separate character.
     let is_mark = |c: &char| ('\u{300}'..='\u{36f}').contains(c);
     name.to_lowercase().chars().filter(|c| !is_mark(c)).map(plain).collect()
 }
 
-/// The part of an organ, where a name says so.
+/// Part of an organ that a name mentions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// What fills a hollow organ.
+    /// Content of a hollow organ.
     Content,
     /// The capsule of the prostate.
     Capsule,
@@ -226,7 +226,7 @@ impl Part {
         (Self::Wall, "wall"),
     ];
 
-    /// The first part that is mentioned in the name.
+    /// Returns the first part mentioned in the name.
     pub fn of_name(name: &str) -> Option<Self> {
         let name = name.to_ascii_lowercase();
         let mentioned = |(_, word): &&(Self, &str)| name.contains(word);
@@ -248,7 +248,7 @@ const TARGET_WORDS: [&str; 10] = [
     "target",
 ];
 
-/// The place of the name that most likely is the target's; `None` if none of them sounds like one.
+/// Returns the index of the name most likely to be the target's; `None` if none resembles one.
 pub fn target_among(names: &[&str]) -> Option<usize> {
     let mentions = |word: &&str| names.iter().position(|n| folded(n).contains(*word));
     TARGET_WORDS.iter().find_map(mentions)

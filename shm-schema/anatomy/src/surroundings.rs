@@ -1,11 +1,11 @@
-//! What a body rests on, face by face.
+//! Support of a body, face by face.
 
 use serde::{Deserialize, Serialize};
 
-/// What lies beyond a face at the outside of the body.
+/// Medium beyond an outer face of the body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Beyond {
-    /// Soft tissue that the scene leaves out: it gives way like a layer of fat on something fixed.
+    /// Soft tissue that the scene omits: it yields like a layer of fat on a fixed base.
     #[default]
     Fat,
     /// Air: skin, or the inside of an empty rectum.
@@ -15,7 +15,7 @@ pub enum Beyond {
 }
 
 impl Beyond {
-    /// In the order of their numbers on the wire.
+    /// All media in the order of their numbers on the wire.
     pub const ALL: [Self; 3] = [Self::Fat, Self::Free, Self::Fixed];
 
     /// Name in scene files.
@@ -27,13 +27,13 @@ impl Beyond {
         }
     }
 
-    /// The one of that name.
+    /// Returns the medium of that name.
     pub fn of_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|beyond| beyond.name() == name)
     }
 }
 
-/// What lies beyond the faces of a structure towards -x, +x, -y, +y, -z and +z, where they are at the outside of the body.
+/// Media beyond the faces of a structure towards -x, +x, -y, +y, -z and +z, where these are outer faces of the body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Surroundings(pub [Beyond; 6]);
 
@@ -41,18 +41,18 @@ impl Surroundings {
     /// Fat on all sides.
     pub const FAT: Self = Self([Beyond::Fat; 6]);
 
-    /// The same on all sides.
+    /// The same medium on all sides.
     pub const fn all(beyond: Beyond) -> Self {
         Self([beyond; 6])
     }
 
-    /// Two bits for each face, the first lowest.
+    /// Encodes two bits for each face, the first lowest.
     pub fn to_wire(self) -> u32 {
         let bits = |(face, beyond): (usize, Beyond)| (beyond as u32) << (2 * face);
         self.0.into_iter().enumerate().map(bits).sum()
     }
 
-    /// `None` where a number stands for nothing.
+    /// Decodes; `None` for an unknown number.
     pub fn of_wire(bits: u32) -> Option<Self> {
         let mut faces = [Beyond::Fat; 6];
         for (face, slot) in faces.iter_mut().enumerate() {

@@ -1,12 +1,12 @@
-//! What a structure is in the procedure, and how it yields.
+//! Role of a structure in the procedure, and its stiffness.
 
 use super::Surroundings;
 use serde::{Deserialize, Serialize};
 
-/// What a structure is in the procedure.
+/// Role of a structure in the procedure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Role {
-    /// Seeds are planned in it.
+    /// Seeds are planned in the structure.
     Target,
     /// To be kept from needles and dose.
     Spare,
@@ -15,18 +15,19 @@ pub enum Role {
     Tissue,
 }
 
-/// How a structure yields.
+/// Mechanical properties of a structure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Young's modulus, in Pa.
     pub young_pa: f64,
     /// Poisson's ratio.
     pub poisson: f64,
-    /// For links along x, y, z: shortest and longest as a share of the rest length, and shear in rad; `None`: the operator's limits.
+    /// For links along x, y, z: shortest and longest as a fraction of the rest length, and shear in rad; `None`: the
+    /// operator's limits.
     pub limits: Option<[[f64; 3]; 3]>,
     /// The structure never moves.
     pub fixed: bool,
-    /// What it rests on where it is at the outside of the body.
+    /// Support of its outer faces.
     pub surroundings: Surroundings,
 }
 
@@ -49,7 +50,7 @@ impl Material {
     pub const WALL: Self = Self::soft(20e3);
     /// Every other tissue. Assumed, as in the built-in pelvis: skin and muscle together.
     pub const OTHER: Self = Self::soft(15e3);
-    /// Apparent modulus of cancellous bone: 0.1 to 0.5 GPa, Goldstein 1987. Fixed, since the table holds the pelvis.
+    /// Apparent modulus of cancellous bone: 0.1 to 0.5 GPa, Goldstein 1987. Fixed, since the table supports the pelvis.
     pub const BONE: Self = Self {
         young_pa: 300e6,
         poisson: 0.3,

@@ -9,7 +9,7 @@ pub type Text = (&'static str, fn(&Insertion) -> &str);
 pub type Whole = (&'static str, fn(&Insertion) -> i32);
 pub type Measured = (&'static str, fn(&Motion) -> f64);
 
-/// Text that every row has.
+/// Text columns, set in every row.
 pub const TEXTS: [Text; 6] = [
     ("id", |row| &row.id),
     ("scene", |row| &row.scene),
@@ -18,10 +18,10 @@ pub const TEXTS: [Text; 6] = [
     ("tissue", |row| &row.tissue),
     ("source", |row| &row.source),
 ];
-/// Whole numbers that every row has.
+/// Integer columns, set in every row.
 pub const WHOLES: [Whole; 2] = [("implant", |row| row.implant), ("needle", |row| row.needle)];
 pub const PRESCRIPTION: &str = "prescription_gy";
-/// Results; null where the insertion failed.
+/// Results; null if the insertion failed.
 pub const MEASURED: [Measured; 5] = [
     ("peak_force_n", |m| m.peak_force_n),
     ("displacement_before_puncture_mm", |m| m.displacement_before_puncture_mm),
@@ -29,12 +29,12 @@ pub const MEASURED: [Measured; 5] = [
     ("target_shift_mm", |m| m.target_shift_mm),
     ("duration_s", |m| m.duration_s),
 ];
-/// Null where the insertion went through.
+/// Null if the insertion succeeded.
 pub const FAILURE: &str = "failure";
 /// The list of seeds.
 pub const SEEDS: &str = "seeds";
 
-/// Fields of a seed in the list `seeds`; the last seven are null where the insertion failed.
+/// Fields of a seed in the list `seeds`; the last seven are null if the insertion failed.
 pub const SEED_COLUMNS: [&str; 14] = [
     "planned_x_mm",
     "planned_y_mm",
@@ -51,10 +51,10 @@ pub const SEED_COLUMNS: [&str; 14] = [
     "rest_axis_z",
     "dropped_after_s",
 ];
-/// So many of them are always there.
+/// Number of these that are always set.
 pub const PLANNED: usize = 7;
 
-/// The values of a seed in the order of [`SEED_COLUMNS`].
+/// Returns the values of a seed in the order of [`SEED_COLUMNS`].
 pub fn seed_values(seed: &Seed) -> [Option<f64>; SEED_COLUMNS.len()] {
     let mut values = [None; SEED_COLUMNS.len()];
     let planned = seed
@@ -70,7 +70,7 @@ pub fn seed_values(seed: &Seed) -> [Option<f64>; SEED_COLUMNS.len()] {
     values
 }
 
-/// A seed from the values of [`seed_values`]; `None` where a planned one is missing.
+/// Returns the seed with the values of [`seed_values`]; `None` if a planned one is missing.
 pub fn seed_of(values: [Option<f64>; SEED_COLUMNS.len()]) -> Option<Seed> {
     let three = |first: usize| Some([values[first]?, values[first + 1]?, values[first + 2]?]);
     let rest = || {
@@ -88,10 +88,10 @@ pub fn seed_of(values: [Option<f64>; SEED_COLUMNS.len()]) -> Option<Seed> {
     })
 }
 
-/// The schema of a file with these drawn quantities.
+/// Returns the schema of a file with these drawn quantities.
 ///
 /// # Errors
-/// Where a quantity has a name that Parquet does not take.
+/// If Parquet does not accept the name of a quantity.
 pub fn schema(quantities: &[String]) -> Result<TypePtr, ParquetError> {
     let mut text = String::from("message insertion {\n");
     for (name, _) in TEXTS {

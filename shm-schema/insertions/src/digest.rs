@@ -1,10 +1,11 @@
-//! One number for all results, whichever files they came in.
+//! One digest for all results, independent of how they are split into files.
 
 use crate::columns::{MEASURED, TEXTS, WHOLES, seed_values};
 use crate::{Insertion, Table};
 use sha2::{Digest, Sha256};
 
-/// SHA-256 of every bit of every row in the order of their ids, in hexadecimal: the same however a study was divided.
+/// Returns the SHA-256 of every bit of every row in the order of their ids, in hexadecimal: the same however a study
+/// was divided.
 pub fn digest(table: &Table) -> String {
     let mut rows: Vec<&Insertion> = table.rows.iter().collect();
     rows.sort_by(|a, b| a.id.cmp(&b.id));

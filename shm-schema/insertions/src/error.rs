@@ -1,32 +1,32 @@
-//! What can be wrong with a file of insertions.
+//! Errors of a file of insertions.
 
 use parquet::errors::ParquetError;
 use std::path::PathBuf;
 use stylet_write::WriteError;
 
-/// A file that cannot be read or written.
+/// Failure to read or write a file.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
-    /// The disk.
+    /// Error of the file system.
     #[error("{}: it cannot be read ({source})", .path.display())]
     Open {
         /// The file or folder.
         path: PathBuf,
-        /// What the system reported.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// Not the file that a study writes.
+    /// Not a file written by a study.
     #[error("{}: it is no complete Parquet file of a study ({why}); delete it and run its shard again", .path.display())]
     Content {
         /// The file.
         path: PathBuf,
-        /// What was expected and what was found.
+        /// Expected and actual content.
         why: String,
     },
-    /// The rows do not make a file.
+    /// The rows cannot be encoded.
     #[error("the rows of a study cannot be written as Parquet: {0}")]
     Encode(#[from] ParquetError),
-    /// The disk.
+    /// Error of the file system.
     #[error(transparent)]
     Write(#[from] WriteError),
 }

@@ -1,4 +1,4 @@
-//! Names of the files in the folder of a study.
+//! File names in the folder of a study.
 
 use crate::TableError;
 use std::fmt;
@@ -8,16 +8,16 @@ use std::str::FromStr;
 /// Ending of the tables.
 pub const FILE_ENDING: &str = "parquet";
 
-/// The K-th of N parts of a study, from 1.
+/// Part K of N of a study, from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// From 1 to `of`.
     pub number: u32,
-    /// How many there are.
+    /// Number of parts.
     pub of: u32,
 }
 
-/// What is no shard.
+/// Text that is not a shard.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{0}\" is no shard: give K/N with K from 1 to N, as 3/8")]
 pub struct NoShard(String);
@@ -42,26 +42,26 @@ impl fmt::Display for Shard {
 }
 
 impl Shard {
-    /// Everything in one part.
+    /// The whole study as one part.
     pub const WHOLE: Self = Self { number: 1, of: 1 };
 
-    /// What of `count` things is in this part: their numbers follow each other, and parts differ by one at most.
+    /// Returns the part's share of `count` items: consecutive numbers; shares differ by at most one.
     pub fn range(self, count: usize) -> std::ops::Range<usize> {
         let end = |k: u32| (count as u128 * u128::from(k) / u128::from(self.of)) as usize;
         end(self.number - 1)..end(self.number)
     }
 
-    /// Name of the shard, of its file and of its folder while it is under way.
+    /// Name of the shard, of its file, and of its folder while it runs.
     pub fn name(self) -> String {
         format!("shard-{:05}-of-{:05}", self.number, self.of)
     }
 
-    /// The file in the folder of the study.
+    /// Path in the folder of the study.
     pub fn file(self, folder: &Path) -> PathBuf {
         folder.join(format!("{}.{FILE_ENDING}", self.name()))
     }
 
-    /// The shard of a file or a folder with such a name.
+    /// Returns the shard of a file or folder of that name.
     pub fn of_name(name: &str) -> Option<Self> {
         let stem = name.split_once('.').map_or(name, |(stem, _)| stem);
         let (number, of) = stem.strip_prefix("shard-")?.split_once("-of-")?;
@@ -71,15 +71,15 @@ impl Shard {
     }
 }
 
-/// The label volume with the structures of a scene, which dose is scored in.
+/// Label volume with the structures of a scene, in which dose is scored.
 pub fn structures_file(folder: &Path, scene: &str) -> PathBuf {
     folder.join(format!("{scene}.seg.nrrd"))
 }
 
-/// The finished shards in a folder, in their order.
+/// Returns the finished shards in a folder, in order.
 ///
 /// # Errors
-/// Where the folder cannot be read.
+/// If the folder cannot be read.
 pub fn shard_files(folder: &Path) -> Result<Vec<(Shard, PathBuf)>, TableError> {
     let open = |source| TableError::Open {
         path: folder.to_owned(),

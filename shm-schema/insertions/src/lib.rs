@@ -1,6 +1,7 @@
-//! Results of a population study: one row for each simulated insertion, in Parquet files that any program can query.
+//! Results of a population study: one row per simulated insertion, in Parquet files that any program can query.
 //!
-//! The core writes them and the host reads them. Lengths in mm, patient frame (RAS); forces in N, times in s, strengths in U.
+//! The core writes them and the host reads them. Lengths in mm, patient frame (RAS); forces in N, times in s, strengths
+//! in U.
 
 #![warn(missing_docs)]
 
@@ -18,36 +19,36 @@ pub use folder::{FILE_ENDING, Shard, shard_files, structures_file};
 pub use read::read;
 pub use write::write;
 
-/// One needle that was inserted, or that could not be.
+/// One needle that was inserted or could not be.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Insertion {
-    /// `STUDY/SCENE/PLAN/IMPLANT/NEEDLE`; all random numbers of the insertion follow from it.
+    /// `STUDY/SCENE/PLAN/IMPLANT/NEEDLE`; seeds all random numbers of the insertion.
     pub id: String,
     /// Name of the scene.
     pub scene: String,
-    /// Name of the plan, which is that of its file without the ending.
+    /// Name of the plan: its file name without extension.
     pub plan: String,
     /// Number of the implant in its scene and plan, from 1.
     pub implant: i32,
     /// Number of the needle in its plan, from 1.
     pub needle: i32,
-    /// Hole of the template; empty where the plan names none.
+    /// Hole of the template; empty if the plan names none.
     pub hole: String,
     /// Tissue model.
     pub tissue: String,
-    /// Model of the seeds, as source files name it.
+    /// Seed model, as in source files.
     pub source: String,
     /// Prescribed dose, Gy.
     pub prescription_gy: f64,
-    /// What was drawn or set for this insertion, in the order of [`Table::quantities`].
+    /// Values drawn or set for this insertion, in the order of [`Table::quantities`].
     pub drawn: Vec<f64>,
-    /// What happened; the text says why nothing did.
+    /// The result, or the reason why the insertion failed.
     pub outcome: Result<Motion, String>,
-    /// In the order of the drops.
+    /// Seeds in the order of the drops.
     pub seeds: Vec<Seed>,
 }
 
-/// What an insertion did to hand and tissue.
+/// Effect of an insertion on hand and tissue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// Largest force on the hand, N.
@@ -56,38 +57,38 @@ pub struct Motion {
     pub displacement_before_puncture_mm: f64,
     /// Largest displacement of an element during the whole insertion, mm.
     pub largest_displacement_mm: f64,
-    /// Largest shift of the middle of the target during the whole insertion, mm.
+    /// Largest shift of the target's centre during the whole insertion, mm.
     pub target_shift_mm: f64,
-    /// Duration on the clock of the simulation, s.
+    /// Simulated duration, s.
     pub duration_s: f64,
 }
 
-/// One seed as planned, and where it rests.
+/// One seed as planned and at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seed {
-    /// Where the plan wants it, mm.
+    /// Planned position, mm.
     pub planned_mm: [f64; 3],
-    /// Direction of its needle in the plan.
+    /// Planned direction of its needle.
     pub planned_axis: [f64; 3],
     /// Air kerma strength, U.
     pub strength_u: f64,
-    /// `None` where the insertion failed.
+    /// `None` if the insertion failed.
     pub rest: Option<Rest>,
 }
 
 /// A seed in tissue that has come to rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rest {
-    /// Its middle, mm.
+    /// Its centre, mm.
     pub at_mm: [f64; 3],
     /// Its axis.
     pub axis: [f64; 3],
-    /// When it was dropped, after the tip's first contact with tissue, s.
+    /// Time of the drop after the tip's first contact with tissue, s.
     pub dropped_after_s: f64,
 }
 
 impl Seed {
-    /// From plan to rest, mm: its length, and what of it is along the needle (positive: too deep).
+    /// Distance from plan to rest, mm, and its component along the needle (positive: too deep).
     pub fn misplacement_mm(&self) -> Option<[f64; 2]> {
         let rest = self.rest?;
         let off = [0, 1, 2].map(|a| rest.at_mm[a] - self.planned_mm[a]);
@@ -96,25 +97,25 @@ impl Seed {
     }
 }
 
-/// What was studied.
+/// Description of the study.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct About {
     /// Name of the study.
     pub study: String,
-    /// SHA-256 of all that the results follow from; files of different studies are not mixed.
+    /// SHA-256 of all inputs; files of different studies are not mixed.
     pub fingerprint: String,
-    /// The study file as it was read.
+    /// Contents of the study file.
     pub definition: String,
     /// Program and version.
     pub made_by: String,
 }
 
-/// The content of one file.
+/// Contents of one file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// What was studied.
+    /// Description of the study.
     pub about: About,
-    /// Columns of what was drawn, such as `stiffness`; units stand in the names.
+    /// Columns of drawn values, such as `stiffness`; names include units.
     pub quantities: Vec<String>,
     /// Insertions.
     pub rows: Vec<Insertion>,

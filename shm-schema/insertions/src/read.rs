@@ -1,4 +1,4 @@
-//! A table from a Parquet file; columns are found by their names.
+//! Reads a table from a Parquet file; columns are found by name.
 
 use crate::columns::{self, FAILURE, MEASURED, PRESCRIPTION, SEED_COLUMNS, SEEDS, TEXTS, WHOLES};
 use crate::write::{DEFINITION, FINGERPRINT, QUANTITIES, STUDY};
@@ -11,10 +11,10 @@ use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use std::fs::File;
 use std::path::Path;
 
-/// Reads a file that [`write`](crate::write) made.
+/// Reads a file written by [`write`](crate::write).
 ///
 /// # Errors
-/// Where it is no Parquet, or lacks a column or what names its study.
+/// If it is not Parquet, or lacks a column or the name of its study.
 pub fn read(path: &Path) -> Result<Table, TableError> {
     let opened = File::open(path).map_err(|source| TableError::Open {
         path: path.to_owned(),
@@ -60,7 +60,7 @@ fn noted(about: &FileMetaData, key: &str) -> Result<String, ParquetError> {
 
 struct Group<'a>(Box<dyn RowGroupReader + 'a>);
 
-/// Values that are there, and of each place how far it is defined and whether it continues a list.
+/// Non-null values, with the definition and repetition level of each entry.
 struct Column<T> {
     values: Vec<T>,
     defined: Vec<i16>,
@@ -168,7 +168,7 @@ impl Group<'_> {
             .collect())
     }
 
-    /// Of each row its seeds.
+    /// Returns the seeds of each row.
     fn seeds(&self) -> Result<Vec<Vec<Seed>>, ParquetError> {
         let mut rows: Vec<Vec<[Option<f64>; SEED_COLUMNS.len()]>> = Vec::new();
         for (field, name) in SEED_COLUMNS.iter().enumerate() {

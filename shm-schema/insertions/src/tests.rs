@@ -1,4 +1,4 @@
-//! Files hold what was written, to the last bit, and say what they lack.
+//! Files preserve every bit, and a damaged file names what it lacks.
 
 use super::*;
 use std::path::Path;

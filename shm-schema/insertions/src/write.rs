@@ -1,4 +1,4 @@
-//! A table to a Parquet file, which appears under its name only once it is complete.
+//! Writes a table to a Parquet file, which gets its name only once it is complete.
 
 use crate::columns::{self, MEASURED, PLANNED, SEED_COLUMNS, TEXTS, WHOLES};
 use crate::{Insertion, Table, TableError};
@@ -20,7 +20,7 @@ pub const QUANTITIES: &str = "stylet.quantities";
 /// Writes all rows; the same table gives the same bytes.
 ///
 /// # Errors
-/// Where a quantity cannot be a column, or the disk takes no file.
+/// If a quantity cannot be a column, or the disk refuses the file.
 pub fn write(path: &Path, table: &Table) -> Result<(), TableError> {
     let mut bytes = Vec::new();
     encode(&mut bytes, table)?;
@@ -92,7 +92,7 @@ fn texts<'t>(
     column::<ByteArrayType>(group, &values, optional.then_some(&levels), None)
 }
 
-/// One field of all seeds. A list without seeds has a level of its own: nothing is defined in it.
+/// Writes one field of all seeds. A list without seeds has a definition level at which nothing is defined.
 fn seeds(group: &mut Group, rows: &[Insertion], field: usize) -> Result<(), ParquetError> {
     let (mut values, mut defined, mut repeated) = (Vec::new(), Vec::new(), Vec::new());
     for row in rows {

@@ -4,7 +4,7 @@ use clap::Command;
 use clap_complete::{Shell, generate};
 use std::path::PathBuf;
 
-/// Path and text of the script for each shell.
+/// Returns path and text of the script for each shell.
 pub fn scripts(program: Command) -> Vec<(PathBuf, Vec<u8>)> {
     let name = program.get_name().to_owned();
     let program = without_hidden(&program);
@@ -24,8 +24,8 @@ pub fn scripts(program: Command) -> Vec<(PathBuf, Vec<u8>)> {
     paths.map(|(shell, path)| (path.into(), script(shell))).into()
 }
 
-/// The generator (4.6.11) enters the states of subcommands as `rt__core__subcmd__doctor` and handles them as
-/// `rt__subcmd__core__subcmd__doctor`, if the name of the program has a hyphen: nothing would be completed there.
+/// Renames mismatched states: the generator (4.6.11) enters subcommands as `rt__core__subcmd__doctor` and handles them
+/// as `rt__subcmd__core__subcmd__doctor` if the program's name has a hyphen, so nothing would be completed there.
 fn with_one_name_for_each_state(name: &str, script: Vec<u8>) -> Vec<u8> {
     let (entered, handled) = (name.replace('-', "__"), name.replace('-', "__subcmd__"));
     match String::from_utf8(script) {
@@ -34,7 +34,7 @@ fn with_one_name_for_each_state(name: &str, script: Vec<u8>) -> Vec<u8> {
     }
 }
 
-/// A command without its hidden subcommands, which the scripts would offer.
+/// Returns the command without its hidden subcommands, which the scripts would offer.
 fn without_hidden(command: &Command) -> Command {
     let shown = command.get_subcommands().filter(|below| !below.is_hide_set());
     let mut copy = Command::new(command.get_name().to_owned())

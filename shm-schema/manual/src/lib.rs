@@ -1,4 +1,4 @@
-//! Man pages and shell completions of a program, from the same definition of its command line that the program reads.
+//! Writes man pages and shell completions of a program from the definition of its command line.
 
 #![warn(missing_docs)]
 
@@ -20,10 +20,10 @@ pub struct ManualArgs {
     out: PathBuf,
 }
 
-/// Why the pages could not be written.
+/// Failure to write the pages.
 #[derive(Debug, thiserror::Error)]
 pub enum ManualError {
-    /// A page could not be put together.
+    /// A page could not be rendered.
     #[error("the pages cannot be put together ({0})")]
     Render(#[from] io::Error),
     /// The folder of a file cannot be made.
@@ -31,7 +31,7 @@ pub enum ManualError {
     Folder {
         /// The folder.
         folder: PathBuf,
-        /// What the system reported.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// A file cannot be written.
@@ -40,10 +40,10 @@ pub enum ManualError {
 }
 
 impl ManualArgs {
-    /// Writes every page and completion of `program` and prints how many.
+    /// Writes every page and completion of `program` and prints their number.
     ///
     /// # Errors
-    /// Where the folder cannot be made or written.
+    /// If the folder cannot be made or written.
     pub fn run(&self, program: Command) -> Result<(), ManualError> {
         let name = program.get_name().to_owned();
         let files = files(program)?;
@@ -69,10 +69,10 @@ fn write(path: &Path, text: &[u8]) -> Result<(), ManualError> {
     Ok(write_whole(path, text)?)
 }
 
-/// Every page and completion of a program: the path below a folder such as `/usr/share`, and the text.
+/// Returns every page and completion of a program: the path below a folder such as `/usr/share`, and the text.
 ///
 /// # Errors
-/// None in practice: the texts are put together in memory.
+/// None in practice: the texts are rendered in memory.
 ///
 /// ```
 /// let program = clap::Command::new("needle").about("Drives a needle").subcommand(clap::Command::new("stop"));

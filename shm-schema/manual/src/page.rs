@@ -5,9 +5,9 @@ use clap_mangen::Man;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Path and text of each page.
+/// Returns path and text of each page.
 pub fn pages(program: Command) -> io::Result<Vec<(PathBuf, Vec<u8>)>> {
-    // What `help` prints is on the pages themselves.
+    // The pages themselves contain what `help` prints.
     let mut program = program.disable_help_subcommand(true);
     program.build();
     let version = format!("Stylet {}", program.get_version().unwrap_or_default());
@@ -16,7 +16,7 @@ pub fn pages(program: Command) -> io::Result<Vec<(PathBuf, Vec<u8>)>> {
     Ok(pages)
 }
 
-/// The page of a command, then those of its subcommands.
+/// Adds the page of a command, then those of its subcommands.
 fn add(command: &Command, version: &str, above: Option<&str>, pages: &mut Vec<(PathBuf, Vec<u8>)>) -> io::Result<()> {
     let name = command.get_display_name().unwrap_or_else(|| command.get_name());
     let path = Path::new("man/man1").join(format!("{name}.1"));
@@ -56,7 +56,7 @@ fn page(name: &str, command: &Command, version: &str, above: Option<&str>) -> io
     Ok(text)
 }
 
-/// Lines of a help text stay lines: the formatter would fill them into one paragraph.
+/// Keeps the lines of a help text apart: the formatter would fill them into one paragraph.
 fn with_lines_apart(arg: Arg) -> Arg {
     match arg.get_help().map(ToString::to_string) {
         Some(help) if help.contains('\n') && arg.get_long_help().is_none() => arg.help(help.replace('\n', "\n\n")),
@@ -64,13 +64,13 @@ fn with_lines_apart(arg: Arg) -> Arg {
     }
 }
 
-/// A line as it stands, for roff: no escapes, no requests, hyphens that can be copied.
+/// Escapes a line for roff: no requests, and hyphens that can be copied.
 fn literal(line: &str) -> String {
     let line = line.replace('\\', "\\e").replace('-', "\\-");
     match line.chars().next() {
-        // An empty line is bad style for the formatter.
+        // The formatter discourages empty lines.
         None => ".sp".to_owned(),
-        // It would be a request.
+        // It would be parsed as a request.
         Some('.' | '\'') => format!("\\&{line}"),
         Some(_) => line,
     }

@@ -1,4 +1,4 @@
-//! The latest state of a loop that owns a device, on a blackboard of its own for each run.
+//! The latest state of a loop that owns a device, on a separate blackboard for each run.
 
 use super::wire::Wire;
 use super::{Ipc, MAX_HOSTS, Node, ServiceError, core_failed, failed, host_failed, name};
@@ -15,9 +15,9 @@ const STATE_KEY: u64 = 0;
 
 type Board = PortFactory<Ipc, u64>;
 
-/// What stands on a board.
+/// State shown on a board.
 pub trait OnBoard: Pod + Debug {
-    /// Of the board, before the number of the run.
+    /// Name of the board, before the number of the run.
     const NAME: &'static str;
 }
 
@@ -35,7 +35,7 @@ pub struct StateWriter<T = HapticState>(Box<dyn Writes<T>>);
 /// Reads the board of one run.
 pub struct StateReader<T = HapticState>(Box<dyn Reads<T>>);
 
-// As in `ports`: no other crate compiles what stands behind these.
+// As in `ports`: no other crate compiles the types behind these.
 trait Writes<T> {
     fn write(&self, state: &T);
 }
@@ -44,7 +44,7 @@ trait Reads<T> {
     fn read(&self) -> T;
 }
 
-/// The entry goes first, then its port, then the board.
+/// Dropped in this order: entry, port, board.
 struct Port<E, P> {
     entry: E,
     _port: P,
@@ -114,7 +114,7 @@ impl<T: OnBoard> StateReader<T> {
         })))
     }
 
-    /// The latest state.
+    /// Returns the latest state.
     pub fn read(&self) -> T {
         self.0.read()
     }

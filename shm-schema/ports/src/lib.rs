@@ -1,6 +1,6 @@
-//! Names, configuration and ports of every service, so that all programs meet without reading a foreign file.
+//! Names, configuration and ports of every service.
 //!
-//! Each service has one way to make its ports. Nobody else makes any: no other crate knows iceoryx2.
+//! Each service has one constructor for its ports. Only this crate uses iceoryx2, so no other crate can make a port.
 
 #![warn(missing_docs)]
 
@@ -23,7 +23,7 @@ pub use ports::{Connected, Loan, Publisher, SendError, Slice, SlicePublisher, Sl
 /// The form of service that all programs use.
 type Ipc = ipc::Service;
 
-/// Why shared memory could not be used; the text says what to do.
+/// Failure to use shared memory; the text says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum ServiceError {
     /// The folder of the instance cannot be used.
@@ -32,10 +32,10 @@ pub enum ServiceError {
     /// No core runs under that name.
     #[error("no rt-core is running (instance \"{0}\"). Start it in another terminal: rt-core{flag}", flag = flag(.0))]
     Absent(String),
-    /// As many programs as there may be are connected.
+    /// The maximum number of programs is connected.
     #[error("{0}")]
     Full(String),
-    /// A port, or the memory behind it.
+    /// A port or its memory failed.
     #[error("{0}")]
     Port(String),
 }
@@ -63,10 +63,10 @@ fn name(service: &str) -> Result<ServiceName, ServiceError> {
     ServiceName::new(&format!("stylet/{SCHEMA_VERSION}/{service}")).map_err(|e| failed(service, e))
 }
 
-/// Who publishes a service; everybody else subscribes.
+/// Publisher of a service; everyone else subscribes.
 #[derive(Clone, Copy)]
 enum By {
-    /// The core, or a relay in its place.
+    /// The core, or a relay in its role.
     Core,
     Hosts,
 }
@@ -94,7 +94,7 @@ impl By {
     }
 }
 
-/// Why a port of the core, or of a relay in its place, could not be made.
+/// Error for a port of the core, or of a relay in its role.
 fn core_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
     ServiceError::Port(format!(
         "cannot use shared memory: {service}: {why:?}. Is another rt-core or relay running under this instance name? Choose another with \
@@ -102,14 +102,15 @@ fn core_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
     ))
 }
 
-/// Why a port of a host could not be made.
+/// Error for a port of a host.
 fn host_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
     ServiceError::Full(format!(
         "{service}: {why:?}. At most {MAX_HOSTS} hosts can watch one core; close another window, or check the room in /dev/shm"
     ))
 }
 
-// `history`: how many of the last a host gets that joins; `again`: that joins again, after the ports were made anew beneath it.
+// `history`: number of past values that a joining host receives; `again`: the same for a host that rejoins after the
+// ports were recreated.
 macro_rules! service {
     ($(#[$doc:meta])* $module:ident: $value:ty, by $who:ident, history $history:expr, again $again:expr, buffer $buffer:expr) => {
         $(#[$doc])*
@@ -131,7 +132,7 @@ macro_rules! service {
                     .map_err(|e| failed(NAME, e))
             }
 
-            /// Sends; what a full queue has no room for is dropped.
+            /// Returns a sender; values are dropped when a queue is full.
             pub fn publisher(node: &Node) -> Result<Publisher<$value>, ServiceError> {
                 open(node)?
                     .publisher_builder()
@@ -141,7 +142,7 @@ macro_rules! service {
                     .map_err(|e| By::$who.publisher_failed(NAME, e))
             }
 
-            /// Receives.
+            /// Returns a receiver.
             pub fn subscriber(node: &Node) -> Result<Subscriber<$value>, ServiceError> {
                 open(node)?
                     .subscriber_builder()
@@ -151,7 +152,7 @@ macro_rules! service {
                     .map_err(|e| By::$who.subscriber_failed(NAME, e))
             }
 
-            /// Who is connected.
+            /// Returns a monitor of connections.
             pub fn watch(node: &Node) -> Result<Watch, ServiceError> {
                 let service = open(node)?;
                 Ok(Watch::new(move || service.dynamic_config().into()))
@@ -174,7 +175,7 @@ macro_rules! service {
                     .service_builder(&name(NAME)?)
                     .publish_subscribe::<[Wire<$value>]>()
                     .user_header::<Wire<$header>>()
-                    // One more, while one takes the place of another.
+                    // One more, for a publisher that replaces another.
                     .max_publishers(By::$who.publishers() + 1)
                     .max_subscribers(MAX_HOSTS + 2)
                     .max_nodes(MAX_HOSTS + 4)
@@ -184,8 +185,8 @@ macro_rules! service {
                     .map_err(|e| failed(NAME, e))
             }
 
-            /// Sends slices, of at most `length` values without taking more memory; what a full queue has no room for is
-            /// dropped.
+            /// Returns a sender of slices, of at most `length` values without allocating more memory; slices are
+            /// dropped when a queue is full.
             pub fn publisher(node: &Node, length: usize) -> Result<SlicePublisher<$value, $header>, ServiceError> {
                 let service = open(node)?;
                 SlicePublisher::new(length, move |length| {
@@ -200,7 +201,7 @@ macro_rules! service {
                 .map_err(|e| By::$who.publisher_failed(NAME, e))
             }
 
-            /// Receives.
+            /// Returns a receiver.
             pub fn subscriber(node: &Node) -> Result<SliceSubscriber<$value, $header>, ServiceError> {
                 open(node)?
                     .subscriber_builder()
@@ -210,7 +211,7 @@ macro_rules! service {
                     .map_err(|e| By::$who.subscriber_failed(NAME, e))
             }
 
-            /// Who is connected.
+            /// Returns a monitor of connections.
             pub fn watch(node: &Node) -> Result<Watch, ServiceError> {
                 let service = open(node)?;
                 Ok(Watch::new(move || service.dynamic_config().into()))
@@ -220,37 +221,37 @@ macro_rules! service {
 }
 
 service!(
-    /// Which run this is: [`Session`].
+    /// Description of the run: [`Session`].
     session: Session, by Core, history 1, again 1, buffer 2);
 service!(
-    /// What happened: [`Event`].
+    /// Events of the run: [`Event`].
     events: Event, by Core, history 64, again 64, buffer 512);
 service!(
     /// Parameters that took effect: [`ParametersInForce`].
     parameters: ParametersInForce, by Core, history 1, again 1, buffer 2);
 service!(
-    /// The plan: [`PlanInForce`].
+    /// Plan in force: [`PlanInForce`].
     plan: PlanInForce, by Core, history 1, again 1, buffer 2);
 service!(
     /// Requests of hosts: [`Command`].
     commands: Command, by Hosts, history 0, again 0, buffer 64);
 service!(
-    /// Requests that take force or motion away, beside the same in `commands`: no flood there keeps them from being read.
+    /// Requests that remove force or motion, in addition to `commands`: a flood there cannot delay them.
     stops: Command, by Hosts, history 0, again 0, buffer 8);
 service!(
-    /// Answers to them: [`Reply`].
+    /// Answers to requests: [`Reply`].
     replies: Reply, by Core, history 0, again 128, buffer 128);
 service!(
     /// Results of rehearsals: [`Rehearsal`].
     rehearsals: Rehearsal, by Core, history 0, again 8, buffer 8);
 service!(
-    /// The line to a core on another machine: [`Relayed`].
+    /// Connection to a core on another machine: [`Relayed`].
     relayed: Relayed, by Core, history 1, again 1, buffer 2);
 service!(
-    /// Who is connected over a relay: [`Class`].
+    /// Members connected through a relay: [`Class`].
     class: Class, by Core, history 1, again 1, buffer 2);
 service!(
-    /// What hosts ask of the needle's lease: [`LeaseOrder`].
+    /// Requests of hosts for the needle's lease: [`LeaseOrder`].
     lease: LeaseOrder, by Hosts, history 0, again 0, buffer 8);
 service!(
     /// Every tick of the force loop; the header is the run of the core.
@@ -261,9 +262,9 @@ service!(
     second_records: [SecondRecord] under u64, by Core, history 0, again RECORD_BUFFER, buffer RECORD_BUFFER,
     loans 2, kept |all| all);
 
-// Slices that memory is taken for: iceoryx2 would take enough for every host to hold every slice that it may, hundreds of MB of
-// locked memory for a large scene. Two wait in the queues; beside them stand what is being filled and one for each host that
-// stopped while it read. When all are held, nothing is sent until one returns.
+// Number of slices with memory: by default iceoryx2 would allocate for every host to hold its maximum, hundreds of MB
+// of locked memory for a large scene. Two wait in the queues; one is being filled, and each host may hold one that it
+// stopped reading. When all are held, nothing is sent until one returns.
 service!(
     /// The deformed surface and displacements inside.
     snapshots: [Vertex] under SnapshotHeader, by Core, history 1, again 1, buffer 2,
@@ -272,7 +273,8 @@ service!(
     /// Rest surface, structures and labels; sent again under a new generation when the scene changes.
     scene: [u32] under SceneHeader, by Core, history 1, again 1, buffer 2, loans 2, kept |_| 6);
 service!(
-    /// Volumes that hosts send, each through a port of its own: its memory is as large as the volume, and the core maps all of it.
+    /// Volumes that hosts send, each through a separate port: its memory is as large as the volume, and the core maps
+    /// all of it.
     uploads: [u8] under UploadHeader, by Hosts, history 0, again 0, buffer 2, loans 2, kept |_| 2);
 
 #[cfg(test)]
@@ -280,7 +282,7 @@ mod tests {
     use super::*;
     use std::time::Duration;
 
-    /// A port that grew ended the core when a host had stopped while it read: more slices were held than it began with.
+    /// A port that grew ended the core when a host had stopped while reading: more slices were held than it began with.
     #[test]
     fn slices_that_nobody_returns_are_refused_and_longer_ones_find_room() {
         let instance = Instance::new(&format!("held-{}", std::process::id())).unwrap();
@@ -309,12 +311,13 @@ mod tests {
         }
     }
 
-    /// Each pass of the bridge sent a batch: the queue held 0.13 s of them, and a recorder that stalled for longer lost ticks.
+    /// Each pass of the bridge sent a batch: the queue held 0.13 s of them, and a recorder that stalled for longer lost
+    /// ticks.
     #[test]
     fn a_host_that_stalls_for_ten_seconds_loses_no_record() {
         let held = BATCH_EVERY * RECORD_BUFFER as u32;
         assert!(held >= Duration::from_secs(10), "{held:?}");
-        // Full batches, sent without a pause, hold at least as much at 1 kHz.
+        // Full batches, sent without a pause, last at least as long at 1 kHz.
         assert!(Duration::from_millis(MAX_BATCH as u64) >= BATCH_EVERY);
         let bytes = ((MAX_HOSTS + 2) * (RECORD_BUFFER + 4) + RECORD_BUFFER) * MAX_BATCH * size_of::<TickRecord>();
         assert!(bytes < 43_000_000, "{bytes} bytes in /dev/shm");

@@ -1,4 +1,5 @@
-//! A program's place in shared memory: in the epoch of a core for a host, in one of its own for whoever makes the core's ports.
+//! A program's node in shared memory: a host joins the epoch of a core; the program that makes the core's ports opens
+//! its own.
 
 use super::{Ipc, ServiceError, failed};
 use iceoryx2::config::Config;
@@ -8,7 +9,7 @@ use iceoryx2::prelude::{FileName, LogLevel, Path, SemanticString, SignalHandling
 use std::time::Duration;
 use stylet_shm_schema::{Attendance, Epoch, Instance, Owned};
 
-/// A program's place in the shared memory of an epoch; every port is made on one, and goes before it.
+/// A program's node in the shared memory of an epoch; every port is made on one, and is dropped before it.
 pub struct Node {
     inner: Box<dyn InnerNode + Send>,
     epoch: Epoch,
@@ -27,7 +28,7 @@ impl InnerNode for node::Node<Ipc> {
 }
 
 impl Node {
-    /// For a host: in the epoch that the owner of `instance` has announced.
+    /// Joins, as a host, the epoch announced by the owner of `instance`.
     pub fn join(instance: &Instance) -> Result<Self, ServiceError> {
         let epoch = instance.epoch().ok_or_else(|| ServiceError::absent(instance))?;
         let attendance = instance.attend()?;
@@ -36,12 +37,12 @@ impl Node {
         Ok(node)
     }
 
-    /// The same for a host that was in an earlier epoch of the run: what it may have missed is sent to it again.
+    /// Joins again, as a host from an earlier epoch of the run: values that it may have missed are sent again.
     pub fn join_again(instance: &Instance) -> Result<Self, ServiceError> {
         Self::join(instance).map(|node| Self { is_again: true, ..node })
     }
 
-    /// For the program that makes the ports of the core in `epoch`.
+    /// Opens a node for the program that makes the core's ports in `epoch`.
     pub fn open(epoch: Epoch) -> Result<Self, ServiceError> {
         set_log_level(LogLevel::Fatal);
         let free = free_bytes();
@@ -69,39 +70,39 @@ impl Node {
         self.is_again
     }
 
-    /// The epoch that it is in.
+    /// Epoch of the node.
     pub fn epoch(&self) -> &Epoch {
         &self.epoch
     }
 
-    /// Whether its epoch is that which hosts join now: if not, everything on it goes nowhere.
+    /// True if hosts join its epoch now; otherwise everything sent on it is lost.
     pub fn is_current(&self) -> bool {
         self.epoch.instance().epoch().as_ref() == Some(&self.epoch)
     }
 
-    /// Frees what programs that died have left.
+    /// Frees resources of dead programs.
     pub fn clean_up(&self) {
-        // What another program cleans at the same time is left to it.
+        // Resources that another program is cleaning at the same time are left to it.
         let _ = self.inner().try_cleanup_dead_nodes();
     }
 }
 
-/// The place of the core in an instance, for the program that makes its ports itself: a relay, or a test.
+/// The core's role in an instance, for a program that makes the core's ports itself: a relay, or a test.
 pub struct Meeting {
-    /// On which the ports are made.
+    /// Node on which the ports are made.
     pub node: Node,
     owned: Owned,
 }
 
 impl Meeting {
-    /// Makes this program the owner of `instance`; hosts do not come yet.
+    /// Makes this program the owner of `instance`; hosts cannot join yet.
     pub fn new(instance: &Instance) -> Result<Self, ServiceError> {
         let owned = instance.own()?;
         let node = Node::open(owned.begin()?)?;
         Ok(Self { node, owned })
     }
 
-    /// Lets hosts in, once every port of the core is there.
+    /// Admits hosts, once every port of the core exists.
     pub fn open(&self) -> Result<(), ServiceError> {
         self.node.epoch.secure()?;
         Ok(self.owned.announce(&self.node.epoch)?)
@@ -118,10 +119,10 @@ fn config(epoch: &Epoch) -> Result<Config, ServiceError> {
     Ok(config)
 }
 
-/// Less than this, and even the first objects of a program might not fit.
+/// Least free memory: with less, even the first objects of a program might not fit.
 const MIN_ROOM_BYTES: u64 = 4 << 20;
 
-/// Free memory in `/dev/shm`; all there could be when the kernel does not say.
+/// Free memory in `/dev/shm`; the maximum if the kernel does not say.
 fn free_bytes() -> u64 {
     // SAFETY: an all-zero statvfs is valid.
     let mut stat: libc::statvfs = unsafe { std::mem::zeroed() };

@@ -1,5 +1,5 @@
-//! What a program holds of a service. Behind each port stands a trait object, so that iceoryx2, which is generic through
-//! and through, is compiled for this crate alone (ADR 19), and so that no other crate can make a port in another way.
+//! Ports of a service. Behind each stands a trait object: iceoryx2, which is heavily generic, is then compiled for this
+//! crate alone (ADR 19), and no other crate can make a port in another way.
 
 use super::Ipc;
 use super::wire::Wire;
@@ -14,7 +14,7 @@ use iceoryx2::service::dynamic_config::publish_subscribe::DynamicConfig;
 use std::cell::{Cell, RefCell};
 use std::fmt::Debug;
 
-/// Why something could not be sent.
+/// Failure to send.
 #[derive(Debug, thiserror::Error)]
 #[error("no room in shared memory: {0}")]
 pub struct SendError(String);
@@ -37,10 +37,10 @@ pub struct SlicePublisher<T, H>(Box<dyn SendsSlices<T, H>>);
 /// Receives slices under a header.
 pub struct SliceSubscriber<T, H>(Box<dyn ReceivesSlices<T, H>>);
 
-/// A slice in shared memory, read where it lies.
+/// A slice in shared memory, read in place.
 pub struct Slice<T, H>(Box<dyn Held<T, H>>);
 
-/// A slice in shared memory to be filled, then sent.
+/// A slice in shared memory to fill and send.
 pub struct Loan<T, H>(Box<dyn Loaned<T, H>>);
 
 trait Sends<T> {
@@ -78,7 +78,7 @@ impl<T: Pod + Debug> Sends<T> for publisher::Publisher<Ipc, Wire<T>, ()> {
     }
 
     fn connect(&self) {
-        // A host that cannot be connected now is connected the next time.
+        // A host that cannot be connected now is connected next time.
         let _ = self.update_connections();
     }
 }
@@ -90,8 +90,8 @@ impl<T: Pod + Debug> Receives<T> for subscriber::Subscriber<Ipc, Wire<T>, ()> {
     }
 }
 
-/// A port whose memory is taken once. A slice that is longer than those before it gets a port of its own, which takes its
-/// place: a port of iceoryx2 0.10 that grows ends the program as soon as more slices are held than it began with.
+/// A port with fixed memory. A slice longer than those before it gets a new port, which replaces the old one: a port of
+/// iceoryx2 0.10 that grows ends the program once more slices are held than it began with.
 struct Growing<T: Pod + Debug, H: Pod + Debug, F> {
     port: RefCell<publisher::Publisher<Ipc, [Wire<T>], Wire<H>>>,
     length: Cell<usize>,
@@ -138,7 +138,7 @@ where
     }
 
     fn connect(&self) {
-        // A host that cannot be connected now is connected the next time.
+        // A host that cannot be connected now is connected next time.
         let _ = self.port.borrow().update_connections();
     }
 }
@@ -190,12 +190,12 @@ impl<T> Publisher<T> {
         Self(Box::new(port))
     }
 
-    /// Sends to everybody who is connected; to how many.
+    /// Sends to all connected programs; returns their number.
     pub fn send(&self, value: T) -> Result<usize, SendError> {
         self.0.send(value)
     }
 
-    /// Connects programs that came and drops those that went.
+    /// Connects new programs and drops those that left.
     pub fn connect(&self) {
         self.0.connect();
     }
@@ -209,12 +209,12 @@ impl<T> Subscriber<T> {
         Self(Box::new(port))
     }
 
-    /// The next value; none where there is none, or none can be had.
+    /// Returns the next value; `None` if there is none or it cannot be read.
     pub fn receive(&self) -> Option<T> {
         self.receive_from().map(|(_, value)| value)
     }
 
-    /// The same, with the number of the port that sent it, which no program can choose.
+    /// As `receive`, with the number of the sending port, which no program can choose.
     pub fn receive_from(&self) -> Option<(u128, T)> {
         self.0.receive()
     }
@@ -225,7 +225,7 @@ where
     T: Pod + Debug,
     H: Pod + Debug + Default,
 {
-    /// `make` makes a port for slices of at most so many values.
+    /// Uses `make` to make a port for slices of at most that many values.
     pub(super) fn new(
         length: usize,
         make: impl Fn(usize) -> Result<publisher::Publisher<Ipc, [Wire<T>], Wire<H>>, PublisherCreateError> + 'static,
@@ -239,17 +239,17 @@ where
 }
 
 impl<T, H> SlicePublisher<T, H> {
-    /// Sends to everybody who is connected; to how many.
+    /// Sends to all connected programs; returns their number.
     pub fn send(&self, header: &H, values: &[T]) -> Result<usize, SendError> {
         self.0.send(header, values)
     }
 
-    /// A slice of that length, to be filled where it lies; none where there is no room.
+    /// Returns a slice of that length to fill in place; `None` if there is no room.
     pub fn loan(&self, length: usize) -> Option<Loan<T, H>> {
         self.0.loan(length)
     }
 
-    /// Connects programs that came and drops those that went.
+    /// Connects new programs and drops those that left.
     pub fn connect(&self) {
         self.0.connect();
     }
@@ -264,42 +264,42 @@ impl<T, H> SliceSubscriber<T, H> {
         Self(Box::new(port))
     }
 
-    /// The next slice; none where there is none, or none can be had.
+    /// Returns the next slice; `None` if there is none or it cannot be read.
     pub fn receive(&self) -> Option<Slice<T, H>> {
         self.0.receive()
     }
 }
 
 impl<T, H> Slice<T, H> {
-    /// What stands over the slice.
+    /// Header of the slice.
     pub fn header(&self) -> &H {
         self.0.header()
     }
 
-    /// The slice.
+    /// Values of the slice.
     pub fn values(&self) -> &[T] {
         self.0.values()
     }
 }
 
 impl<T, H> Loan<T, H> {
-    /// Where header and values lie, for a thread that fills them while the loan stays here.
+    /// Returns pointers to header and values, for a thread that fills them while the loan stays here.
     pub fn parts(&mut self) -> (*mut H, *mut T) {
         self.0.parts()
     }
 
-    /// Sends it to everybody who is connected; to how many.
+    /// Sends it to all connected programs; returns their number.
     pub fn send(self) -> Result<usize, SendError> {
         self.0.send()
     }
 }
 
-/// Programs that take what a service sends, and those that send.
+/// Numbers of subscribers and publishers of a service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Connected {
-    /// How many take.
+    /// Number of subscribers.
     pub subscribers: usize,
-    /// How many send.
+    /// Number of publishers.
     pub publishers: usize,
 }
 
@@ -312,7 +312,7 @@ impl From<&DynamicConfig<<Ipc as Service>::Bag>> for Connected {
     }
 }
 
-/// Who is connected to a service.
+/// Monitors the connections of a service.
 pub struct Watch(Box<dyn Fn() -> Connected>);
 
 impl Watch {
@@ -320,7 +320,7 @@ impl Watch {
         Self(Box::new(connected))
     }
 
-    /// Who is connected now.
+    /// Returns the present connections.
     pub fn connected(&self) -> Connected {
         (self.0)()
     }

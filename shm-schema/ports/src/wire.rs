@@ -1,4 +1,4 @@
-//! The contract's types as iceoryx2 takes them: its trait is not ours, and they are not its.
+//! Wraps the contract's types for iceoryx2: neither its trait nor these types are local to this crate.
 
 use bytemuck::{Pod, TransparentWrapper};
 use iceoryx2::prelude::ZeroCopySend;
@@ -9,6 +9,6 @@ use std::fmt::Debug;
 #[repr(transparent)]
 pub struct Wire<T>(pub T);
 
-// SAFETY: plain old data has no pointer and no destructor, and every program takes its layout from the contract, whose version is part of
-// every service name.
+// SAFETY: plain old data has no pointer and no destructor, and every program takes its layout from the contract, whose
+// version is part of every service name.
 unsafe impl<T: Pod + Debug> ZeroCopySend for Wire<T> {}

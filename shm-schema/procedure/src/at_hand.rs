@@ -1,16 +1,16 @@
-//! The procedure for a hand that follows no script: where it is, from what is seen alone, and what comes next.
+//! The procedure for a hand without a script: its step and the next operation, from observation alone.
 
 use crate::tolerance::{BY_HAND_M, OUTSIDE_M, PLACED_BEFORE_M, PLACED_WITHIN_M, STALLED_M, is_at_rest};
 use crate::{Operation, Step};
 
-/// A needle and its path as they are now. Depths are from the entry along the path, m.
+/// A needle and its path at present. Depths are from the entry along the path, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AtHand {
     /// Depth of the tip, m.
     pub depth_m: f64,
     /// Distance of the tip from the path, m.
     pub beside_m: f64,
-    /// Speed of the tip along the needle, m/s; `None` while it is not known.
+    /// Speed of the tip along the needle, m/s; `None` while unknown.
     pub speed_m_per_s: Option<f64>,
     /// Seeds that this needle has dropped.
     pub dropped: usize,
@@ -21,7 +21,7 @@ pub struct AtHand {
 }
 
 impl AtHand {
-    /// The step that the needle is in: [`Step::Place`] to [`Step::Retract`], or [`Step::Done`] once it is outside again.
+    /// Returns the present step: [`Step::Place`] to [`Step::Retract`], or [`Step::Done`] once it is outside again.
     pub fn step(&self) -> Step {
         if self.next_drop_m.is_none() {
             return if self.is_outside() { Step::Done } else { Step::Retract };
@@ -38,7 +38,7 @@ impl AtHand {
         }
     }
 
-    /// What to do next; `None` when the needle is done.
+    /// Returns the next operation; `None` when the needle is done.
     pub fn next(&self) -> Option<Operation> {
         match self.step() {
             Step::Place => Some(Operation::Place),
@@ -50,17 +50,18 @@ impl AtHand {
         }
     }
 
-    /// Near enough to the path to go in.
+    /// True if the needle is near enough to the path to go in.
     pub fn is_on_path(&self) -> bool {
         self.beside_m <= PLACED_WITHIN_M
     }
 
-    /// The tip is outside the body, or so near to the entry that it makes no difference.
+    /// True if the tip is outside the body, or too near the entry to matter.
     pub fn is_outside(&self) -> bool {
         self.depth_m < OUTSIDE_M
     }
 
-    /// The seed may be dropped: the tip is at its place, or rests as near to it as the force lets the hand come.
+    /// True if the seed may be dropped: the tip is at its place, or rests as near to it as the force lets the hand
+    /// come.
     pub fn is_at_next_drop(&self) -> bool {
         let Some(next_m) = self.next_drop_m else { return false };
         let off_m = (self.depth_m - next_m).abs();
@@ -74,7 +75,7 @@ mod tests {
     use crate::NeedleWay;
     use nalgebra::Vector3;
 
-    /// A tip that is where it was sent to, along z from the origin, with drops at 30 and 20 mm.
+    /// A tip at its goal, along z from the origin, with drops at 30 and 20 mm.
     fn at(depth_m: f64, dropped: usize) -> AtHand {
         let drops_m = [0.03, 0.02];
         AtHand {

@@ -1,8 +1,8 @@
-//! The procedure: what a hand does for one needle after another, and when each part of it is done.
+//! The procedure: the hand's operations for one needle after another, and when each is done.
 //!
-//! Everything here is pure: no link, no device, no clock. The host drives [`Procedure`] over the link, the core drives it over
-//! the two ticks of a rehearsal, and the window asks [`AtHand`] what comes next for a hand that follows no script.
-//! All three share the operations, their order, and the tolerances in [`tolerance`].
+//! Everything here is pure: no link, no device, no clock. The host drives [`Procedure`] over the link, the core drives
+//! it over the two ticks of a rehearsal, and the window asks [`AtHand`] for the next operation of a hand without a
+//! script. All three share the operations, their order, and the tolerances in [`tolerance`].
 //!
 //! Lengths in m, speeds in m/s, times in s, scene frame.
 

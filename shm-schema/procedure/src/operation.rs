@@ -1,4 +1,4 @@
-//! The operations of one needle, in their order, and where the tip goes in each.
+//! The operations of one needle, in order, and the tip's target in each.
 
 use nalgebra::Vector3;
 
@@ -26,22 +26,22 @@ impl Default for Pace {
     }
 }
 
-/// Where the tip goes for one needle, scene frame.
+/// Path of the tip for one needle, scene frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeedleWay {
-    /// Where the tip starts, outside the body, m.
+    /// Start of the tip, outside the body, m.
     pub entry_m: Vector3<f64>,
     /// Unit vector into the body.
     pub direction: Vector3<f64>,
-    /// Where the tip leaves each seed, m, in the order of the drops: deepest first.
+    /// Drop positions, m, in the order of the drops: deepest first.
     pub drops_m: Vec<Vector3<f64>>,
-    /// How far from the entry the tip is drawn back to after the last drop, m, along the needle.
+    /// Depth to which the tip is drawn back after the last drop, m, from the entry along the needle.
     pub retract_to_m: f64,
-    /// From middle to middle of two seeds, m, where they are one strand.
+    /// Pitch between seed centres, m, if they form one strand.
     pub strand_pitch_m: Option<f64>,
 }
 
-/// A step of the procedure, as a person counts them.
+/// A step of the procedure, as shown to users.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Step {
     /// Plan the needle and its seeds.
@@ -50,13 +50,13 @@ pub enum Step {
     Place,
     /// Push the tip to the deepest drop.
     Insert,
-    /// Drop the seeds, one at each place on the way out.
+    /// Drop the seeds, one at each position on the way out.
     Drop,
     /// Take the needle out.
     Retract,
     /// Wait until the tissue is at rest.
     Settle,
-    /// Nothing is left to do.
+    /// The needle is done.
     Done,
 }
 
@@ -75,10 +75,10 @@ impl Step {
     }
 }
 
-/// One thing that is done; each ends by a rule of its own.
+/// One action; each has its own criterion for its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operation {
-    /// Bring tissue, seeds and peaks back to their start.
+    /// Return tissue, seeds and peaks to their start.
     Reset,
     /// Publish the plan of the needle.
     PublishPlan,
@@ -88,26 +88,26 @@ pub enum Operation {
     Place,
     /// Move the tip to the first drop.
     Insert,
-    /// Move the tip inwards to a drop, counted from 0 in its needle, where the needle is continued.
+    /// Move the tip inwards to a drop, counted from 0 in its needle, when continuing a needle.
     InsertTo(usize),
     /// Drop a seed, counted from 0 over all needles.
     Drop(usize),
     /// Draw the tip back to a drop, counted from 0 in its needle.
     DrawBack(usize),
-    /// Draw the tip back to where the needle is left after the last drop.
+    /// Draw the tip back to its resting place after the last drop.
     Retract,
     /// Draw the tip back to the entry.
     TakeOut,
     /// Leave the needle where it is; the hand comes out without it.
     Leave,
-    /// Draw out the needle that was left first of those that stay in.
+    /// Draw out the needle that was left first.
     DrawOut,
     /// Wait until the tissue is at rest.
     Settle,
 }
 
 impl Operation {
-    /// The step that it belongs to.
+    /// Returns the step that contains the operation.
     pub fn step(self) -> Step {
         match self {
             Self::Reset | Self::PublishPlan => Step::Plan,
@@ -119,7 +119,7 @@ impl Operation {
         }
     }
 
-    /// Where the tip goes, m, and how fast, m/s; `None` where it does not move.
+    /// Returns the tip's target, m, and its speed, m/s; `None` if the tip does not move.
     pub(crate) fn target(self, way: &NeedleWay, pace: &Pace) -> Option<(Vector3<f64>, f64)> {
         match self {
             Self::Place => Some((way.entry_m, pace.approach_m_per_s)),
@@ -140,7 +140,7 @@ impl Operation {
 }
 
 impl NeedleWay {
-    /// Operations from the entry to the last drop; the number of the first drop is `first_drop`.
+    /// Returns the operations from the entry to the last drop; the number of the first drop is `first_drop`.
     pub(crate) fn to_the_last_drop(&self, first_drop: usize) -> impl Iterator<Item = Operation> {
         let of_drop = move |index: usize| {
             let arrive = match index {

@@ -1,4 +1,4 @@
-//! The scripted procedure: which request comes next, and when each operation is done.
+//! The scripted procedure: the next request, and the end of each operation.
 
 mod continuing;
 mod failure;
@@ -17,16 +17,16 @@ use std::collections::VecDeque;
 use stylet_shm_schema::{Fault, HandMove, HapticState, flags};
 pub use waiting::{Patience, Waiting, WaitsFor};
 
-/// In a rehearsal a request that is not answered, or does not take effect, within this time has failed, s.
+/// In a rehearsal, time after which a request without an answer or effect has failed, s.
 const REPLY_LIMIT_S: f64 = 3.0;
 
-/// Preparing the tissue for a needle takes seconds, on a busy machine many.
+/// Time limit for preparing the tissue for a needle: seconds on an idle machine, many on a busy one.
 const LINE_LIMIT_S: f64 = 120.0;
 
-/// A needle that is drawn out slowly takes its time.
+/// Time limit for drawing a needle out slowly.
 const LEFT_LIMIT_S: f64 = 30.0;
 
-/// What became of the last request.
+/// Status of the last request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reply {
     /// Not answered yet.
@@ -35,61 +35,62 @@ pub enum Reply {
     Accepted,
     /// Accepted and in effect.
     InEffect,
-    /// A seed was refused since the tip is outside the tissue.
+    /// A seed was refused because the tip is outside the tissue.
     TipOutsideTissue,
-    /// Refused for another reason, in words.
+    /// Refused for another reason, given as text.
     Refused(String),
 }
 
-/// What is seen of needle and tissue.
+/// Observed state of needle and tissue.
 #[derive(Clone, Copy, Debug)]
 pub struct Observed<'a> {
     /// The latest tick of the force.
     pub state: &'a HapticState,
-    /// How far any element is from its place at rest, m; `None` while it is not known.
+    /// Largest displacement of any element, m; `None` while unknown.
     pub displacement_m: Option<f64>,
 }
 
-/// What to do now.
+/// Next action of the driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Next {
-    /// Send this.
+    /// Send this request.
     Send(HandRequest),
-    /// Nothing until something new is seen.
+    /// Wait for a new observation.
     Wait,
-    /// An operation is done, and another follows.
+    /// An operation is done; another follows.
     Continue,
-    /// All is done.
+    /// All operations are done.
     Done,
 }
 
-/// Needles in sequence. Call [`Procedure::advance`] whenever something new is seen.
+/// Needles in sequence. Call [`Procedure::advance`] on every new observation.
 #[derive(Clone, Debug)]
 pub struct Procedure {
     ways: Vec<NeedleWay>,
-    /// Those that go in first and stay: each goes to its first drop and leaves no seed. They are numbered behind the others.
+    /// Needles that go in first and stay: each goes to its first drop and drops no seed. Their numbers follow those of
+    /// the others.
     stabilising: Vec<NeedleWay>,
     pace: Pace,
-    /// What is still to be done, each with the number of its needle.
+    /// Remaining operations, each with the number of its needle.
     ahead: VecDeque<(usize, Operation)>,
     /// Drops that were refused because the tip was outside the tissue.
     lost: Vec<usize>,
     /// From here on a fault ends the procedure.
     is_engaged: bool,
-    /// Somebody asked to re-arm where a fault stands at the beginning.
+    /// Re-arm if a fault stands at the beginning.
     rearms: bool,
     patience: Patience,
     waits_for: WaitsFor,
     now_s: f64,
-    /// Seeds in the tissue when the drop at work was sent.
+    /// Seeds in the tissue when the present drop was sent.
     seeds_before: u32,
-    /// Needles that stayed in when the operation at work began.
+    /// Needles that stayed in when the present operation began.
     left_before: u32,
-    /// A displacement that the tissue has kept to, where needles stay in.
+    /// A displacement at which the tissue has remained, when needles stay in.
     kept_m: f64,
     is_sent: bool,
     begun_s: f64,
-    /// When the tissue was last not ready for the needle.
+    /// Time at which the tissue was last not ready for the needle.
     ready_s: f64,
     holds_since_s: Option<f64>,
 }
@@ -99,8 +100,8 @@ fn waits_for_line(state: &HapticState) -> bool {
 }
 
 impl Procedure {
-    /// The whole procedure from a reset: each needle is planned, goes in, and is taken out; between two of them the tissue
-    /// comes to rest.
+    /// Returns the whole procedure from a reset: each needle is planned, inserted and taken out; the tissue comes to
+    /// rest between two of them.
     pub fn of_needles(ways: Vec<NeedleWay>, pace: Pace) -> Self {
         let mut ahead = VecDeque::new();
         let mut drops = 0;
@@ -124,7 +125,7 @@ impl Procedure {
         Self::new(ways, pace, ahead)
     }
 
-    /// A procedure that was stopped, from where it was: without a reset, and no drop twice.
+    /// Continues a stopped procedure from its present state: without a reset, and no drop twice.
     pub fn continuing(ways: Vec<NeedleWay>, pace: Pace, done: &Done) -> Self {
         let ahead = ahead(&ways, done);
         Self {
@@ -133,13 +134,13 @@ impl Procedure {
         }
     }
 
-    /// How long it waits for what does not arrive.
+    /// Sets how long it waits.
     #[must_use]
     pub fn with_patience(self, patience: Patience) -> Self {
         Self { patience, ..self }
     }
 
-    /// What it waits for, and for how long.
+    /// Returns what it waits for, and for how long.
     pub fn waiting(&self) -> Waiting {
         Waiting {
             waits_for: self.waits_for,
@@ -147,7 +148,8 @@ impl Procedure {
         }
     }
 
-    /// One needle in tissue at rest, until the tissue has come to rest again with the needle drawn back.
+    /// Returns the script of one needle in tissue at rest, until the tissue has come to rest again with the needle
+    /// drawn back.
     pub fn rehearsal(way: NeedleWay, pace: Pace) -> Self {
         let mut ahead = VecDeque::from([(0, Operation::Engage)]);
         ahead.extend(way.to_the_last_drop(0).map(|operation| (0, operation)));
@@ -183,26 +185,28 @@ impl Procedure {
         }
     }
 
-    /// The step at present.
+    /// Returns the present step.
     pub fn step(&self) -> Step {
         self.ahead.front().map_or(Step::Done, |(_, operation)| operation.step())
     }
 
-    /// Which needle is at work, counted from 0; the last one when all are done.
+    /// Returns the present needle, counted from 0; the last one when all are done.
     pub fn needle(&self) -> usize {
         let last = self.ways.len().saturating_sub(1);
-        // A stabilising one belongs to the needle that comes next, or to the last.
+        // A stabilising needle counts with the needle that comes next, or with the last.
         let own = self.ahead.iter().find(|(needle, _)| *needle <= last);
         own.map_or(last, |(needle, _)| *needle)
     }
 
-    /// Numbers of the drops that left no seed, counted from 0 over all needles: the tip was outside the tissue.
+    /// Returns the numbers of the drops that left no seed, counted from 0 over all needles: the tip was outside the
+    /// tissue.
     pub fn lost(&self) -> &[usize] {
         &self.lost
     }
 
-    /// What to do at `now_s`, in seconds since the procedure began; `reply` is what became of the last request. `observed` is
-    /// `None` while the force loop shows nothing. After a failure the procedure must not go on.
+    /// Returns the next action at `now_s`, in seconds since the procedure began; `reply` is the status of the last
+    /// request. `observed` is `None` while the force loop shows nothing. The procedure must not continue after a
+    /// failure.
     pub fn advance(&mut self, now_s: f64, observed: Option<&Observed>, reply: Reply) -> Result<Next, StepFailure> {
         let Some(&(needle, operation)) = self.ahead.front() else {
             return Ok(Next::Done);
@@ -315,7 +319,7 @@ impl Procedure {
             }
             Operation::Place if waits_for_line(observed.state) => {
                 self.waits(now_s, WaitsFor::Line)?;
-                // The time to arrive counts from when the line is ready.
+                // The time for arrival counts from when the line is ready.
                 self.ready_s = now_s;
                 Ok(false)
             }
@@ -371,7 +375,7 @@ impl Procedure {
         now_s - *self.holds_since_s.get_or_insert(now_s) >= least_s
     }
 
-    /// Fails once it has waited for longer than its patience.
+    /// Fails once its patience has run out.
     fn waits(&mut self, now_s: f64, waits_for: WaitsFor) -> Result<(), StepFailure> {
         self.waits_for = waits_for;
         let limit_s = self.patience.limit_s(match waits_for {

@@ -1,4 +1,4 @@
-//! Numbers, cells, tables and cards, as every section of a page writes them.
+//! Numbers, cells, tables and cards shared by all sections of a page.
 
 use maud::{Markup, Render, html};
 
@@ -72,7 +72,7 @@ pub fn count(value: f64) -> Markup {
     cell(num(value))
 }
 
-/// Renders a number as a cell, or that there is none.
+/// Renders a number as a cell, or a mark that there is none.
 pub fn or_na(value: Option<f64>) -> Markup {
     html! {
         @match value {

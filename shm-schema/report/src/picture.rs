@@ -1,4 +1,4 @@
-//! What all pictures share: SVG that the page scales, fonts, and colours that the colour-blind can distinguish.
+//! Common parts of all pictures: SVG scaled by the page, fonts, and colours that the colour-blind can distinguish.
 
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
@@ -9,7 +9,7 @@ const FONT: &str = "system-ui, sans-serif";
 pub const INK: RGBColor = RGBColor(0x33, 0x3d, 0x47);
 /// Colour of the mesh.
 pub const FAINT: RGBColor = RGBColor(0xe3, 0xe7, 0xeb);
-/// Colours of Okabe and Ito, without their yellow, which white swallows.
+/// Colours of Okabe and Ito, without their yellow, which is too faint on white.
 pub const COLOURS: [RGBColor; 7] = [
     BLUE,
     ORANGE,
@@ -59,7 +59,7 @@ pub fn label(size: u32) -> TextStyle<'static> {
     (FONT, size).into_font().color(&INK)
 }
 
-/// Gives a chart the axes of all pictures, with their names; `more` sets what is its own.
+/// Gives a chart the common axes with their names; `more` sets its own options.
 ///
 /// # Errors
 /// Those of the backend.

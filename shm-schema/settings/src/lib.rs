@@ -23,7 +23,7 @@ pub use scene::{BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_LEFT_NEEDLES, MAX
 pub use set::ParameterSet;
 pub use table::{PARAMETER_COUNT, PARAMETERS, ParameterId};
 
-/// Part of the dialog that a parameter stands in.
+/// Section of the dialog that holds a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterGroup {
     /// Limits of the tissue.
@@ -32,14 +32,14 @@ pub enum ParameterGroup {
     Needle,
     /// Coefficients of eq. 8 to 10, and the gate.
     Force,
-    /// What the needle goes through besides the gland.
+    /// Tissue other than the gland on the needle's path.
     Layers,
-    /// What seeds do after they were dropped.
+    /// Migration of dropped seeds.
     Seeds,
 }
 
 impl ParameterGroup {
-    /// In the order of the dialog.
+    /// All groups in the order of the dialog.
     pub const ALL: [Self; 5] = [Self::Tissue, Self::Needle, Self::Force, Self::Layers, Self::Seeds];
 
     /// Heading of the group.
@@ -54,7 +54,7 @@ impl ParameterGroup {
     }
 }
 
-/// One row of the table. `min`, `max`, `default` are SI; a person reads `value * display_per_si` in `unit`.
+/// One row of the table. `min`, `max`, `default` are SI; users see `value * display_per_si` in `unit`.
 #[derive(Clone, Copy, Debug)]
 pub struct ParameterSpec {
     /// Number of the parameter.
@@ -63,26 +63,26 @@ pub struct ParameterSpec {
     pub key: &'static str,
     /// Name in the dialog.
     pub label: &'static str,
-    /// Where it stands in the dialog.
+    /// Group in the dialog.
     pub group: ParameterGroup,
-    /// Unit that a person reads; empty for a pure number.
+    /// Unit shown to users; empty for a pure number.
     pub unit: &'static str,
     /// Factor from SI to `unit`.
     pub display_per_si: f64,
-    /// Least value, SI.
+    /// Smallest value, SI.
     pub min: f64,
     /// Largest value, SI.
     pub max: f64,
-    /// Value at the start, SI.
+    /// Default value, SI.
     pub default: f64,
-    /// Where the default comes from: paper, publication, or our own reasons (`docs/physics.md`).
+    /// Source of the default: paper, publication, or our own reasons (`docs/physics.md`).
     pub source: &'static str,
-    /// What the parameter does.
+    /// Effect of the parameter.
     pub help: &'static str,
 }
 
 impl ParameterId {
-    /// Returns the parameter of a number, or `None` for a number that no parameter has.
+    /// Returns the parameter of a number, or `None` for an unknown number.
     pub fn from_number(number: u32) -> Option<Self> {
         PARAMETERS.get(number as usize).map(|spec| spec.id)
     }
@@ -94,13 +94,13 @@ impl ParameterId {
 }
 
 impl ParameterSpec {
-    /// Whether `value` (SI) is a number within the limits.
+    /// True if `value` (SI) is a number within the limits.
     pub fn allows(&self, value: f64) -> bool {
-        // Not a number is in no range.
+        // NaN is in no range.
         (self.min..=self.max).contains(&value)
     }
 
-    /// `None` when `value` (SI) is allowed.
+    /// Returns the problem with `value` (SI); `None` if it is allowed.
     pub fn problem(&self, value: f64) -> Option<ParameterProblem> {
         (!self.allows(value)).then_some(ParameterProblem::OutOfLimits { id: self.id, value })
     }

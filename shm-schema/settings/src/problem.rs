@@ -1,15 +1,15 @@
-//! What makes a set of parameters invalid: one function for the core and for the window.
+//! Validates a set of parameters: one function for the core and for the window.
 
 use super::{PARAMETERS, ParameterId, ParameterSet};
 use ParameterId as P;
 
-/// What is wrong with a set of parameters; each names the parameters that are involved.
+/// A problem with a set of parameters; each names the parameters involved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ParameterProblem {
     /// A value outside the limits of its row, or not a number.
     #[error("{}", out_of_limits(*id, *value))]
     OutOfLimits {
-        /// Which parameter.
+        /// The parameter.
         id: ParameterId,
         /// The value, SI.
         value: f64,
@@ -30,19 +30,19 @@ pub enum ParameterProblem {
         keys(parameters)
     )]
     TooStiff {
-        /// The parameters that make the stiffness.
+        /// Parameters that determine the stiffness.
         parameters: &'static [ParameterId],
         /// Before the force scale, N/m.
         stiffness_n_per_m: f64,
         /// Largest stiffness before the force scale, N/m.
         limit_n_per_m: f64,
     },
-    /// A model refuses what the table allows. Tests hold that it does not happen.
+    /// A model refuses values that the table allows. Tests check that this does not happen.
     #[error("{0}")]
     Unusable(String),
 }
 
-/// Every problem of one set; at least one.
+/// All problems of one set; at least one.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{}", lines(.0))]
 pub struct ParameterProblems(pub Vec<ParameterProblem>);
@@ -55,7 +55,7 @@ const GUIDE: &[P] = &[P::GuideStiffness, P::GuideGain, P::ForceScale];
 const COUPLED: &[P] = &[P::TissueStiffness, P::Coupling, P::ForceScale];
 
 impl ParameterProblem {
-    /// The parameters that are involved.
+    /// Returns the parameters involved.
     pub fn parameters(&self) -> &[ParameterId] {
         match self {
             Self::OutOfLimits { id, .. } => std::slice::from_ref(id),
@@ -67,7 +67,7 @@ impl ParameterProblem {
 }
 
 impl ParameterSet {
-    /// Every value outside its limits; where there is none, every combination that is forbidden on any device.
+    /// Returns every value outside its limits or, if there is none, every combination forbidden on any device.
     pub fn problems(&self) -> Vec<ParameterProblem> {
         let out: Vec<_> = PARAMETERS
             .iter()
@@ -79,7 +79,7 @@ impl ParameterSet {
         }
         let [horizontal, vertical] = SHEARS.map(|id| self.get(id).to_degrees());
         let folding = folding([horizontal, vertical, vertical]);
-        // Not a number is a problem as well.
+        // NaN is a problem as well.
         let folds = folding.is_nan() || folding > 1.0;
         folds
             .then_some(ParameterProblem::CellsFold { folding })
@@ -87,9 +87,9 @@ impl ParameterSet {
             .collect()
     }
 
-    /// As [`problems`](Self::problems), and every spring that a device cannot hold whose stiffest is
-    /// `max_stiffness_n_per_m`. The spring of stuck friction is not among them: its force is bounded, so what it can be
-    /// is found by trial (`docs/stability.md`), and the passivity controller softens it.
+    /// As [`problems`](Self::problems), and every spring stiffer than `max_stiffness_n_per_m`, the most that the device
+    /// can hold. The spring of stuck friction is excluded: its force is bounded, so its limit is found by trial
+    /// (`docs/stability.md`), and the passivity controller softens it.
     pub fn problems_on(&self, max_stiffness_n_per_m: f64) -> Vec<ParameterProblem> {
         let mut problems = self.problems();
         if problems
@@ -108,7 +108,7 @@ impl ParameterSet {
             (COUPLED, self.get(P::TissueStiffness) * self.get(P::Coupling)),
         ];
         for (parameters, stiffness_n_per_m) in springs {
-            // Not a number fails as well.
+            // NaN fails as well.
             let felt_n_per_m = stiffness_n_per_m * scale;
             if felt_n_per_m.is_nan() || felt_n_per_m > max_stiffness_n_per_m {
                 problems.push(ParameterProblem::TooStiff {
@@ -122,7 +122,7 @@ impl ParameterSet {
     }
 }
 
-/// How close a corner of three links with these shear angles can come to folding: at 1 its volume can be zero,
+/// Returns how close a corner of three links with these shear angles can come to folding: at 1 its volume can be zero,
 /// above it negative (`docs/physics.md`, Tissue: constraints).
 pub fn folding(shear_deg: [f64; 3]) -> f64 {
     let [x, y, z] = shear_deg.map(|angle| angle.to_radians().tan());

@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct ParameterSet {
-    /// By the number of the parameter, SI.
+    /// Values by the number of the parameter, SI.
     pub values: [f64; PARAMETER_COUNT],
 }
 
@@ -25,7 +25,7 @@ impl ParameterSet {
         self.values[id as usize]
     }
 
-    /// Changes a parameter to `value`, SI; nothing is verified.
+    /// Changes a parameter to `value`, SI, without validation.
     pub fn set(&mut self, id: ParameterId, value: f64) {
         self.values[id as usize] = value;
     }

@@ -8,7 +8,7 @@ const RAD: f64 = std::f64::consts::PI / 180.0;
 
 macro_rules! parameters {
     ($( $id:ident $key:literal $label:literal $group:ident $unit:literal $per_si:expr, $min:expr, $max:expr, $default:expr, $source:literal, $help:literal; )*) => {
-        /// Number of a parameter; its place in [`PARAMETERS`] and in [`ParameterSet`](crate::ParameterSet).
+        /// Number of a parameter, its index in [`PARAMETERS`] and in [`ParameterSet`](crate::ParameterSet).
         #[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive, IntoPrimitive, Serialize, Deserialize)]
         #[serde(try_from = "u32", into = "u32")]
         #[repr(u32)]
@@ -27,7 +27,7 @@ macro_rules! parameters {
     };
 }
 
-// Limits and defaults stand in the unit that a person reads.
+// Limits and defaults are in the unit shown to users.
 parameters! {
     MinStretch "tissue.min_stretch" "Smallest link" Tissue "elements" 1.0, 0.05, 1.0, 0.55, "paper eq. 4", "How far a link between neighbouring elements can be compressed.";
     MaxStretch "tissue.max_stretch" "Largest link" Tissue "elements" 1.0, 1.0, 4.0, 1.75, "paper eq. 3", "How far a link between neighbouring elements can be stretched.";

@@ -1,4 +1,4 @@
-//! The table agrees with itself, and every problem of a set names its parameters.
+//! The table is consistent, and every problem of a set names its parameters.
 
 use super::*;
 use ParameterId as P;
@@ -44,7 +44,7 @@ fn every_bad_value_is_named() {
     assert!(text.contains("needle.puncture_depth = 1000.000000 mm"), "{text}");
 }
 
-/// The refusal used to name `shear_deg`, which no row of the table has.
+/// The refusal used to name `shear_deg`, which is no row of the table.
 #[test]
 fn a_refusal_of_shear_names_the_rows_of_both_angles() {
     let mut set = ParameterSet::default();

@@ -1,4 +1,4 @@
-//! Files and folders of one user: made for that user alone, and refused where they are another's.
+//! Files and folders of one user: private to that user, and refused if they belong to another.
 
 use super::InstanceError;
 use std::fs::{DirBuilder, DirEntry, File, OpenOptions, Permissions, TryLockError};
@@ -6,23 +6,23 @@ use std::io;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
-/// Shared memory of the kernel: objects of POSIX, and files in memory.
+/// Shared memory of the kernel: POSIX objects, and files in memory.
 const SHARED_MEMORY: &str = "/dev/shm";
 
-/// The user of this process.
+/// User of this process.
 pub(super) fn user() -> u32 {
     // SAFETY: getuid has no preconditions.
     unsafe { libc::getuid() }
 }
 
-/// The folder of all instances: that of the user's session where there is one, else one in shared memory.
+/// Returns the folder of all instances: in the user's session if there is one, else in shared memory.
 pub(super) fn base() -> PathBuf {
     bases().next().unwrap_or_else(|| PathBuf::from(SHARED_MEMORY))
 }
 
-/// Both folders: a core may have been started outside of the session that a window is in.
+/// Returns both folders: a core may have been started outside the window's session.
 pub(super) fn bases() -> impl Iterator<Item = PathBuf> {
-    // A service of the user, and a login without a session manager, do not have the variable.
+    // A service of the user, and a login without a session manager, lack the variable.
     let named = std::env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from);
     let session = Some(named.unwrap_or_else(|| PathBuf::from(format!("/run/user/{}", user())))).filter(|folder| {
         let about = std::fs::symlink_metadata(folder);
@@ -32,7 +32,7 @@ pub(super) fn bases() -> impl Iterator<Item = PathBuf> {
     session.map(|folder| folder.join("stylet")).into_iter().chain([shared])
 }
 
-/// Opens a file for this user alone, which must not be a link.
+/// Opens a private file, which must not be a link.
 pub(super) fn open(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
     options
         .mode(0o600)
@@ -65,7 +65,7 @@ pub(super) fn foreign(path: &Path, uid: u32) -> InstanceError {
     }
 }
 
-/// Makes a folder for this user alone, or finds it to be one.
+/// Makes a private folder, or verifies an existing one.
 pub(super) fn secure_folder(path: &Path) -> Result<(), InstanceError> {
     match DirBuilder::new().mode(0o700).create(path) {
         Err(why) if why.kind() != io::ErrorKind::AlreadyExists => return Err(failed(path)(why)),
@@ -92,7 +92,7 @@ pub(super) fn objects(prefix: &str) -> impl Iterator<Item = DirEntry> {
 
 pub(super) fn remove_objects(prefix: &str) {
     for entry in objects(prefix) {
-        // Those of another user stay: nothing opens them.
+        // Files of another user stay: nothing opens them.
         let _ = std::fs::remove_file(entry.path());
     }
 }

@@ -7,15 +7,15 @@ use std::io::{self, Read, Write};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
-/// Sixteen hexadecimal digits: nobody guesses one.
+/// Sixteen hexadecimal digits, which cannot be guessed.
 const TOKEN_DIGITS: usize = 16;
 
-/// Whether a text is a token.
+/// True if a text is a token.
 pub(super) fn is_token(text: &str) -> bool {
     text.len() == TOKEN_DIGITS && text.bytes().all(|b| b.is_ascii_hexdigit())
 }
 
-/// The right to be the core of an instance, for as long as it is kept. What the instance has in shared memory goes with it.
+/// The right to be the core of an instance, held until dropped. Dropping it removes the instance's shared memory.
 pub struct Owned {
     pub(super) instance: Instance,
     pub(super) folder: PathBuf,
@@ -23,12 +23,12 @@ pub struct Owned {
 }
 
 impl Owned {
-    /// The instance that is owned.
+    /// The owned instance.
     pub fn instance(&self) -> &Instance {
         &self.instance
     }
 
-    /// A new epoch, which hosts do not know yet.
+    /// Begins an epoch, which hosts do not know yet.
     pub fn begin(&self) -> Result<Epoch, InstanceError> {
         let mut bytes = [0; TOKEN_DIGITS / 2];
         let random = Path::new("/dev/urandom");
@@ -54,14 +54,14 @@ impl Owned {
             .map_err(failed(&path))
     }
 
-    /// A host has said that it cannot use the shared memory of `epoch`.
+    /// True if a host has complained that it cannot use the shared memory of `epoch`.
     pub fn hears_complaint(&self, epoch: &Epoch) -> bool {
         let mut token = String::new();
         let deaf = open(OpenOptions::new().read(true), &self.folder.join("deaf"));
         deaf.and_then(|file| file.take(64).read_to_string(&mut token)).is_ok() && token == epoch.token
     }
 
-    /// Removes the files of every epoch. Hosts keep what they have mapped until they see that the epoch is over.
+    /// Removes the files of every epoch. Hosts keep their mappings until they see that the epoch is over.
     pub fn clear(&self) {
         for name in ["current", "deaf"] {
             let _ = std::fs::remove_file(self.folder.join(name));
@@ -93,7 +93,7 @@ pub struct Epoch {
 }
 
 impl Epoch {
-    /// The epoch of that token in the folder of `instance`; for the process that its owner starts.
+    /// Returns the epoch of that token in the folder of `instance`; for the process that its owner starts.
     pub fn of(instance: Instance, folder: PathBuf, token: String) -> Self {
         Self {
             instance,
@@ -122,27 +122,27 @@ impl Epoch {
         self.folder.join(&self.token)
     }
 
-    /// Begins the name of every shared-memory object of this epoch.
+    /// Returns the prefix of every shared-memory object of this epoch.
     pub fn prefix(&self) -> String {
         format!("{}{}_", self.instance.prefix(), self.token)
     }
 
-    /// Says to the owner that this host cannot use the shared memory of this epoch, which some host has damaged.
+    /// Reports to the owner that this host cannot use the shared memory of this epoch, which some host has damaged.
     pub fn complain(&self) {
         let deaf = open(
             OpenOptions::new().write(true).create(true).truncate(true),
             &self.folder.join("deaf"),
         );
-        // One that cannot be written is tried again.
+        // A complaint that cannot be written is tried again.
         let _ = deaf.and_then(|mut file| file.write_all(self.token.as_bytes()));
     }
 
-    /// Takes every right to the objects of this epoch from other users, and has the kernel give all memory that they may use:
-    /// writing to an object that finds none left would end the program by a signal.
+    /// Revokes other users' rights to the objects of this epoch, and allocates all memory that they may use: writing to
+    /// an object without memory would end the program by a signal.
     pub fn secure(&self) -> Result<(), InstanceError> {
         for entry in objects(&self.prefix()) {
             let path = entry.path();
-            // One that was removed meanwhile needs nothing.
+            // An object removed meanwhile needs nothing.
             let Ok(file) = open(OpenOptions::new().read(true).write(true), &path) else {
                 continue;
             };

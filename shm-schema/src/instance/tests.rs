@@ -1,4 +1,4 @@
-//! Who owns an instance, who finds it, and what is left of it.
+//! Owners of an instance, hosts that find it, and its remains.
 
 use super::*;
 use std::fs::Permissions;

@@ -1,4 +1,4 @@
-//! Every request survives the record, and no record of any bytes is taken for what it is not.
+//! Every request survives the record, and no bytes are mistaken for another request.
 
 use super::*;
 use crate::{BUILTIN_SCENES, COMMAND_BYTES, MAX_SEEDS, PARAMETERS, Prescribed, Reason, RefusalCode, Text};
@@ -136,7 +136,7 @@ fn every_request_survives_its_record() {
         numbers.push(command.kind);
     }
     numbers.dedup();
-    // Numbers are never given to another request.
+    // Numbers are never reused.
     assert_eq!(numbers, (1..=21).chain([30, 31]).collect::<Vec<u32>>());
 }
 

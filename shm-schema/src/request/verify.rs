@@ -1,4 +1,4 @@
-//! Verifies every value of a request, or lists every reason against it.
+//! Validates every value of a request, or lists every reason against it.
 
 use super::*;
 use crate::check::{MAX_COORDINATE_M, is_unit};
@@ -8,13 +8,13 @@ use crate::{
     Text,
 };
 
-/// One thing that is wrong with a request.
+/// One problem with a request.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RequestError {
     /// No request has this number.
     #[error("command number {0} is not known; host and core differ")]
     UnknownCommand(u32),
-    /// The payload is no request of that kind.
+    /// The payload is not a request of that kind.
     #[error("the {kind:?} command cannot be read; host and core differ")]
     Malformed {
         /// Kind of the request.
@@ -31,14 +31,14 @@ pub enum RequestError {
     Count {
         /// Name of the entries.
         what: &'static str,
-        /// How many came.
+        /// Number received.
         count: usize,
-        /// Least number.
+        /// Smallest number.
         least: usize,
         /// Largest number.
         most: usize,
     },
-    /// A place is farther than [`MAX_COORDINATE_M`].
+    /// A position is farther out than [`MAX_COORDINATE_M`].
     #[error("the place {0:?} must be within {MAX_COORDINATE_M} m")]
     TooFar([f64; 3]),
     /// A direction is not a unit vector.
@@ -49,9 +49,9 @@ pub enum RequestError {
     OutOfLimits {
         /// Name of the quantity with its unit.
         what: &'static str,
-        /// The value that came.
+        /// The value received.
         value: f64,
-        /// Least value.
+        /// Smallest value.
         low: f64,
         /// Largest value.
         high: f64,
@@ -59,19 +59,19 @@ pub enum RequestError {
     /// Needles are numbered from 1 on.
     #[error("no needle has the number 0")]
     NoNeedle,
-    /// Words that cannot be shown, or none.
+    /// The words cannot be shown, or are empty.
     #[error("the words are empty, or no UTF-8 of one line in {MARK_BYTES} bytes")]
     InvalidText,
     /// No built-in scene has this number.
     #[error("there is no built-in scene number {number}; from 0 they are {}", BUILTIN_SCENES.join(", "))]
     UnknownScene {
-        /// The number that came.
+        /// The number received.
         number: u32,
     },
 }
 
 impl RequestError {
-    /// Returns the reason as a reply carries it.
+    /// Returns the reason for a reply.
     pub fn reason(&self) -> Reason {
         let alone = |code| Reason::new(code, Reason::NO_SUBJECT);
         match *self {
@@ -89,7 +89,7 @@ impl RequestError {
     }
 }
 
-/// Everything that is wrong with one request; at least one error.
+/// All problems with one request; at least one.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{}", crate::refusal::lines(.0))]
 pub struct RequestErrors(pub Vec<RequestError>);
@@ -172,7 +172,7 @@ impl Verify {
     fn parameters(&mut self, changes: &[ParameterChange]) {
         self.count("changes of parameters", changes.len(), 1, crate::PARAMETER_COUNT);
         for change in changes {
-            // Tighter limits follow, once all parameters are known.
+            // Tighter limits are checked once all parameters are known.
             self.within("a parameter", change.value, [f64::MIN, f64::MAX]);
         }
     }

@@ -1,15 +1,16 @@
-//! Text that others chose (files, peers, services, members of a class), as a terminal and a spreadsheet may be given it.
+//! Sanitises foreign text (of files, peers, services, members of a class) for a terminal and a spreadsheet.
 
 #![warn(missing_docs)]
 
 use std::borrow::Cow;
 
-/// A file chooses what it makes a message say, and how much.
+/// A file controls what a message quotes of it, and how much.
 const MOST_CHARS: usize = 4000;
-/// A peer chooses what it makes a line of a log say, and how often.
+/// A peer controls what a log line quotes of it, and how often.
 const MOST_CHARS_OF_LINE: usize = 400;
 
-/// Foreign text for a terminal: no control characters but line feeds, no marks that turn the direction of writing, and not endless.
+/// Sanitises foreign text for a terminal: no control characters but line feeds, no bidirectional marks, and bounded
+/// length.
 ///
 /// ```
 /// assert_eq!(stylet_text::printable("a\u{1b}[2Jb\nc\u{202e}d"), "a[2Jb\ncd");
@@ -22,7 +23,7 @@ pub fn printable(text: &str) -> String {
     kept
 }
 
-/// As [`printable`], in one line: a peer that sends a line feed does not write a line of its own into a log.
+/// As [`printable`], in one line: a peer cannot forge a line of a log by sending a line feed.
 pub fn printable_line(text: &str) -> String {
     let mut line: String = printable(text).replace('\n', " ");
     if let Some((end, _)) = line.char_indices().nth(MOST_CHARS_OF_LINE) {
@@ -32,12 +33,13 @@ pub fn printable_line(text: &str) -> String {
     line
 }
 
-/// As [`printable`], of any length: a table that holds foreign names.
+/// As [`printable`], of any length: for a table with foreign names.
 pub fn printable_table(text: &str) -> String {
     text.chars().filter(|c| is_shown(*c)).collect()
 }
 
-/// A cell of a table. A spreadsheet computes what begins as a formula does; the quotation mark makes it text. Numbers stay.
+/// Escapes a cell of a table. A spreadsheet evaluates text that begins like a formula; a leading apostrophe prevents
+/// that. Numbers are unchanged.
 ///
 /// ```
 /// use stylet_text::cell;

@@ -1,4 +1,4 @@
-//! Memory that one process writes and every other may only read.
+//! Memory that one process writes and all others may only read.
 
 use crate::cells::{self, CELLS};
 use bytemuck::Pod;
@@ -10,10 +10,11 @@ use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::ptr::NonNull;
 use std::sync::atomic::AtomicU64;
 
-/// Each part begins on a line of the processor's cache.
+/// Each part begins on a cache line.
 const LINE: usize = 64;
 
-/// Where the parts of a board are: the number of the newest cell, then the cells, each its number, a header and values.
+/// Offsets of a board's parts: the number of the newest cell, then the cells, each with its number, a header and
+/// values.
 #[derive(Clone, Copy)]
 struct Layout {
     header: usize,
@@ -49,7 +50,8 @@ unsafe impl Send for Mapped {}
 
 impl Mapped {
     fn new(memory: BorrowedFd, layout: Layout, rights: ProtFlags) -> io::Result<Self> {
-        // SAFETY: a new mapping at an address that the kernel chooses; the size of the memory is sealed, so that it stays behind it.
+        // SAFETY: a new mapping at an address that the kernel chooses; the size of the memory is sealed, so that it
+        // stays behind it.
         let at = unsafe { rustix::mm::mmap(std::ptr::null_mut(), layout.total, rights, MapFlags::SHARED, memory, 0)? };
         let at = NonNull::new(at.cast()).ok_or(io::ErrorKind::OutOfMemory)?;
         Ok(Self { at, layout })
@@ -62,7 +64,8 @@ impl Mapped {
     }
 
     fn newest(&self) -> &AtomicU64 {
-        // SAFETY: the first eight bytes of a mapping are aligned, live as long as `self` and are used as an atomic alone.
+        // SAFETY: the first eight bytes of a mapping are aligned, live as long as `self` and are used as an atomic
+        // alone.
         unsafe { self.at.cast().as_ref() }
     }
 
@@ -94,7 +97,7 @@ impl Drop for Mapped {
 pub struct Writer<H, T = ()> {
     mapped: Mapped,
     values: usize,
-    /// Of the last write.
+    /// Number of the last write.
     number: u64,
     holds: PhantomData<fn(H, T)>,
 }
@@ -107,7 +110,7 @@ pub struct Reader<H, T = ()> {
 }
 
 impl<H: Pod, T: Pod> Writer<H, T> {
-    /// A board of zeros, and its descriptor for readers, through which nobody can map or write it.
+    /// Returns a zeroed board and its descriptor for readers, through which it cannot be mapped writable or written.
     pub fn new(name: &str, values: usize) -> io::Result<(Self, OwnedFd)> {
         let layout = Layout::of::<H, T>(values).ok_or(io::ErrorKind::OutOfMemory)?;
         let memory = rustix::fs::memfd_create(name, MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING)?;
@@ -124,17 +127,17 @@ impl<H: Pod, T: Pod> Writer<H, T> {
         Ok((writer, memory))
     }
 
-    /// Values in each cell.
+    /// Number of values in each cell.
     pub fn len(&self) -> usize {
         self.values
     }
 
-    /// Whether a cell has a header alone.
+    /// True if a cell has only a header.
     pub fn is_empty(&self) -> bool {
         self.values == 0
     }
 
-    /// Shows what `fill` leaves in a cell, which holds an earlier write before. Neither waits nor allocates.
+    /// Publishes what `fill` writes to a cell, which holds an earlier write before. Neither waits nor allocates.
     pub fn write(&mut self, fill: impl FnOnce(&mut H, &mut [T])) {
         self.number += 1;
         let mapped = &self.mapped;
@@ -143,8 +146,8 @@ impl<H: Pod, T: Pod> Writer<H, T> {
             |cell| mapped.number(cell),
             self.number,
             |cell| {
-                // SAFETY: header and values of the cell lie apart inside the mapping, aligned, valid for every bit pattern; this
-                // process has no other reference to them, and no other process can write them.
+                // SAFETY: header and values of the cell lie apart inside the mapping, aligned, valid for every bit
+                // pattern; this process has no other reference to them, and no other process can write them.
                 let (header, values) = unsafe {
                     let values = std::slice::from_raw_parts_mut(mapped.values(cell).as_ptr(), self.values);
                     (mapped.header(cell).as_mut(), values)
@@ -171,14 +174,14 @@ impl<H: Pod, T: Pod> Reader<H, T> {
         })
     }
 
-    /// Whether something was written that was not taken yet.
+    /// True if there is a write that was not taken yet.
     pub fn has_news(&self) -> bool {
         // SYNC: a hint; `take` looks again.
         self.mapped.newest().load(std::sync::atomic::Ordering::Relaxed) != self.seen
     }
 
-    /// Copies the newest write that was not taken yet to `header` and `values`, which must have room for a cell. False where there
-    /// is none, or where the writer was faster than the copy: then they hold anything.
+    /// Copies the newest write not taken yet to `header` and `values`, which must have room for a cell. Returns false
+    /// if there is none, or if the writer overtook the copy: their contents are then undefined.
     ///
     /// # Safety
     /// Both must be valid for writes, of a header and of as many values as the board was opened with.
@@ -189,8 +192,9 @@ impl<H: Pod, T: Pod> Reader<H, T> {
             |cell| mapped.number(cell),
             self.seen,
             |cell| {
-                // SAFETY: the source lies inside the mapping, the caller answers for the target. Another process may write meanwhile:
-                // the copy is of plain bytes, which are used only when the number of the cell stayed the same.
+                // SAFETY: the source lies inside the mapping, the caller answers for the target. Another process may
+                // write meanwhile: the copy is of plain bytes, which are used only when the number of the cell stayed
+                // the same.
                 unsafe {
                     std::ptr::copy_nonoverlapping(mapped.header::<H>(cell).as_ptr(), header, 1);
                     std::ptr::copy_nonoverlapping(mapped.values::<T>(cell).as_ptr(), values, count);
@@ -203,7 +207,7 @@ impl<H: Pod, T: Pod> Reader<H, T> {
 }
 
 impl<H: Pod> Reader<H> {
-    /// The newest header that was not taken yet.
+    /// Returns the newest header not taken yet.
     pub fn take(&mut self) -> Option<H> {
         let mut header = H::zeroed();
         // SAFETY: there is room for a header, and there are no values.
@@ -257,7 +261,7 @@ mod tests {
         assert!(Reader::<u64>::new(loose.as_fd(), 0).is_err());
     }
 
-    /// What is taken while the writer goes on is whole, whoever is faster.
+    /// Data taken while the writer continues is consistent, whoever is faster.
     #[test]
     fn a_fast_writer_tears_nothing() {
         let (mut writer, memory) = Writer::<u64, u64>::new("test", 2000).expect("room");

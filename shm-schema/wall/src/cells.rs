@@ -1,6 +1,8 @@
-//! The protocol of a board: one writer fills cells in turn, readers take the newest that stayed whole while they copied it.
+//! The protocol of a board: one writer fills cells in turn; readers take the newest one that stayed unchanged during
+//! their copy.
 //!
-//! A cell has a number: even when it is whole, odd while it is written. Readers never write, so the writer never waits.
+//! A cell has a number: even when it is complete, odd while it is written. Readers never write, so the writer never
+//! waits.
 
 #[cfg(loom)]
 use loom::sync::atomic::{AtomicU64, Ordering, fence};
@@ -10,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering, fence};
 /// Cells of a board. A reader has the time of three writes to copy one.
 pub const CELLS: usize = 4;
 
-/// Cell of the write with that number; numbers begin with 1.
+/// Returns the cell of the write with that number; numbers begin with 1.
 pub fn cell_of(number: u64) -> usize {
     (number % CELLS as u64) as usize
 }
@@ -27,7 +29,8 @@ pub fn write<'a>(newest: &AtomicU64, cell: impl Fn(usize) -> &'a AtomicU64, numb
     newest.store(number, Ordering::Release);
 }
 
-/// Copies the newest cell that is newer than `seen`; its number, or `None` where there is none or the writer has overtaken the copy.
+/// Copies the newest cell that is newer than `seen`; returns its number, or `None` if there is none or the writer has
+/// overtaken the copy.
 pub fn read<'a>(
     newest: &AtomicU64,
     cell: impl Fn(usize) -> &'a AtomicU64,
@@ -57,7 +60,7 @@ mod tests {
         values: [[AtomicU64; 2]; CELLS],
     }
 
-    /// Every order in which a writer and a reader can meet: what is taken is whole.
+    /// Every interleaving of a writer and a reader: a taken cell is consistent.
     #[test]
     fn a_cell_that_is_taken_is_whole() {
         let writes = CELLS as u64 + 1;

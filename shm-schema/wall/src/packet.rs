@@ -1,4 +1,4 @@
-//! Packets between both processes: a kind, plain bytes, and sometimes the descriptor of sealed memory.
+//! Packets between both processes: a kind, plain bytes, and for some the descriptor of sealed memory.
 
 use bytemuck::{AnyBitPattern, Pod};
 use rustix::fs::{MemfdFlags, SealFlags};
@@ -14,7 +14,7 @@ use std::os::unix::fs::FileExt;
 #[cfg(any(doc, test))]
 use stylet_shm_schema::*;
 
-/// What a packet holds.
+/// Content of a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, num_enum::TryFromPrimitive)]
 #[repr(u32)]
 pub enum Kind {
@@ -48,11 +48,11 @@ pub enum Kind {
     SeenSnapshots,
     /// From the host of a measurement: [`SeenRecords`].
     SeenRecords,
-    /// From the bridge: its ports are there.
+    /// From the bridge: its ports are open.
     Ready = 101,
     /// From the bridge: [`Alive`].
     Alive,
-    /// From the bridge: why it cannot go on, in words.
+    /// From the bridge: why it cannot continue, as text.
     Failed,
     /// From the bridge: a [`Command`].
     Command,
@@ -60,7 +60,7 @@ pub enum Kind {
     Upload,
 }
 
-/// What a bridge needs before it makes its ports.
+/// Data that a bridge needs before it makes its ports.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Start {
@@ -74,7 +74,7 @@ pub struct Start {
     pub has_second: u64,
 }
 
-/// Which scene a board of snapshots is for.
+/// Scene and size of a board of snapshots.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct BoardSize {
@@ -86,21 +86,21 @@ pub struct BoardSize {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Alive {
-    /// Somebody takes snapshots.
+    /// A host takes snapshots.
     pub has_viewers: u64,
-    /// Requests that it has refused since it began.
+    /// Requests refused since it began.
     pub refused: u64,
 }
 
-/// A snapshot, as the host of a measurement saw it. Times of `CLOCK_MONOTONIC`, ns.
+/// A snapshot, as seen by the host of a measurement. Times of `CLOCK_MONOTONIC`, ns.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct SeenSnapshot {
     /// Tick of the tissue loop that made it.
     pub tissue_tick: u64,
-    /// When that tick woke.
+    /// Wake-up time of that tick.
     pub time_ns: u64,
-    /// When the host saw it.
+    /// Time at which the host saw it.
     pub seen_ns: u64,
 }
 
@@ -112,37 +112,37 @@ pub struct SeenRecords {
     pub first: u64,
     /// The last tick.
     pub last: u64,
-    /// How many there were.
+    /// Number of records.
     pub count: u64,
 }
 
 /// The largest packet: a batch of records, or a rehearsal.
 pub const MOST_BYTES: usize = 64 << 10;
-/// Between two looks of the bridge, or of the host of a measurement, at what others have written.
+/// Polling interval of the bridge, and of the host of a measurement.
 pub const LOOK_EVERY: std::time::Duration = std::time::Duration::from_millis(1);
-/// How often the bridge says that it lives.
+/// Interval of the bridge's heartbeat.
 pub const ALIVE_EVERY: std::time::Duration = std::time::Duration::from_millis(50);
-/// The kind, and four bytes that keep what follows aligned.
+/// Length of the head: the kind, and four bytes that keep the rest aligned.
 const HEAD: usize = 8;
 
-/// A packet that was received.
+/// A received packet.
 #[derive(Debug)]
 pub struct Packet {
-    /// What it holds.
+    /// Kind of the content.
     pub kind: Kind,
-    /// The descriptor that came with it.
+    /// Descriptor that came with it.
     pub memory: Option<OwnedFd>,
-    /// The bytes behind its head.
+    /// Bytes after its head.
     pub bytes: Vec<u8>,
 }
 
 impl Packet {
-    /// The bytes as one value; `None` where they are more or fewer.
+    /// Returns the bytes as one value; `None` if the length differs.
     pub fn value<T: AnyBitPattern>(&self) -> Option<T> {
         bytemuck::try_pod_read_unaligned(&self.bytes).ok()
     }
 
-    /// The bytes as values; none where they are not whole ones.
+    /// Returns the bytes as values; none if they do not divide evenly.
     pub fn values<T: AnyBitPattern + Pod>(&self) -> Vec<T> {
         let whole = self.bytes.len().is_multiple_of(size_of::<T>().max(1));
         let chunks = self.bytes.chunks_exact(size_of::<T>().max(1)).filter(|_| whole);
@@ -150,14 +150,14 @@ impl Packet {
     }
 }
 
-/// One end of a connection; nothing waits on it.
+/// One end of a connection; never blocks.
 #[derive(Debug)]
 pub struct Socket {
     end: OwnedFd,
     buffer: Vec<u8>,
 }
 
-/// Why nothing was received or sent.
+/// Reason why nothing was received or sent.
 #[derive(Debug)]
 pub enum Closed {
     /// The other process has ended.
@@ -167,18 +167,18 @@ pub enum Closed {
 }
 
 impl Socket {
-    /// Both ends.
+    /// Returns both ends.
     pub fn pair() -> io::Result<(Self, OwnedFd)> {
         let flags = SocketFlags::CLOEXEC;
         let (own, other) = socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, flags, None)?;
         for end in [&own, &other] {
-            // More than the default, for what a new bridge is sent at once; less is slower, not wrong.
+            // Larger than the default, for the initial state of a new bridge; a smaller buffer is slower, not wrong.
             let _ = rustix::net::sockopt::set_socket_send_buffer_size(end, 4 << 20);
         }
         Ok((Self::of(own), other))
     }
 
-    /// The end that a process was given.
+    /// Wraps the end given to a process.
     pub fn of(end: OwnedFd) -> Self {
         Self {
             end,
@@ -186,12 +186,12 @@ impl Socket {
         }
     }
 
-    /// For waiting until there is something to receive.
+    /// Returns the descriptor to wait on for packets.
     pub fn as_fd(&self) -> BorrowedFd<'_> {
         self.end.as_fd()
     }
 
-    /// Sends a packet whole; false where there is no room for it now.
+    /// Sends a packet whole; false if there is no room for it now.
     pub fn send(&self, kind: Kind, bytes: &[u8], memory: Option<BorrowedFd>) -> Result<bool, Closed> {
         let mut head = [0; HEAD];
         head[..4].copy_from_slice(&(kind as u32).to_ne_bytes());
@@ -213,7 +213,7 @@ impl Socket {
         }
     }
 
-    /// The next packet that makes sense; `None` where there is none now. Packets of no known kind are dropped.
+    /// Returns the next valid packet; `None` if there is none now. Packets of unknown kind are dropped.
     pub fn receive(&mut self) -> Result<Option<Packet>, Closed> {
         let mut was_reset = false;
         loop {
@@ -224,7 +224,7 @@ impl Socket {
                 Ok(received) => received,
                 Err(rustix::io::Errno::INTR) => continue,
                 Err(rustix::io::Errno::AGAIN) => return Ok(None),
-                // Said first where the other process ended with packets unread; what it had sent comes after.
+                // Reported first if the other process ended with packets unread; its own packets follow.
                 Err(rustix::io::Errno::CONNRESET) if !std::mem::replace(&mut was_reset, true) => continue,
                 Err(rustix::io::Errno::CONNRESET) => return Err(Closed::Ended),
                 Err(why) => return Err(Closed::Io(why.into())),
@@ -246,7 +246,7 @@ impl Socket {
     }
 }
 
-/// A packet out of any bytes.
+/// Parses a packet from any bytes.
 pub fn parse(bytes: &[u8], memory: Option<OwnedFd>) -> Option<Packet> {
     let (head, bytes) = bytes.split_at_checked(HEAD)?;
     let kind = Kind::try_from(u32::from_ne_bytes(*head.first_chunk()?)).ok()?;
@@ -254,7 +254,7 @@ pub fn parse(bytes: &[u8], memory: Option<OwnedFd>) -> Option<Packet> {
     Some(Packet { kind, memory, bytes })
 }
 
-/// Memory that holds these values and that nobody can change.
+/// Returns immutable memory that holds these values.
 pub fn sealed<T: Pod>(name: &str, values: &[T]) -> io::Result<OwnedFd> {
     let memory = rustix::fs::memfd_create(name, MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING)?;
     let mut file = File::from(memory);
@@ -267,7 +267,7 @@ pub fn sealed<T: Pod>(name: &str, values: &[T]) -> io::Result<OwnedFd> {
     Ok(memory)
 }
 
-/// The values of sealed memory, at most `most` of them; an error where anybody could still change it, or where it is no memory.
+/// Returns the values of sealed memory, at most `most` of them; fails if it could still be changed, or is not memory.
 pub fn unsealed<T: Pod>(memory: OwnedFd, most: usize) -> io::Result<Vec<T>> {
     let refuse = || io::Error::from(io::ErrorKind::InvalidData);
     let is_sealed = rustix::fs::fcntl_get_seals(&memory)?.contains(SealFlags::SHRINK | SealFlags::WRITE);
@@ -300,7 +300,7 @@ mod tests {
         assert!(matches!(other.receive(), Err(Closed::Ended)));
     }
 
-    /// The kernel reports the reset before what was sent: why a bridge had failed was lost.
+    /// The kernel reports the reset before the remaining data: the reason of a bridge's failure was lost.
     #[test]
     fn what_a_process_said_last_arrives_though_it_read_nothing() {
         let (mut own, other) = Socket::pair().expect("a socket");

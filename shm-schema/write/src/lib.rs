@@ -1,4 +1,4 @@
-//! Files that appear under their name only once they are complete.
+//! Writes files that get their name only once they are complete.
 
 #![warn(missing_docs)]
 
@@ -7,23 +7,23 @@ use std::io::{self, BufWriter, Write};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-/// Readable and writable for all, less what the umask takes away, as for any new file.
+/// Readable and writable for all, minus the umask, as for any new file.
 const MODE: u32 = 0o666;
 
-/// A file that could not be written.
+/// Failure to write a file.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: it cannot be written ({source}); check the folder and the space on the disk", .path.display())]
 pub struct WriteError {
     /// The file.
     pub path: PathBuf,
-    /// What the system reported.
+    /// Error of the operating system.
     pub source: io::Error,
 }
 
-/// Writes a file in one step: whoever opens `path` finds the old file or all of the new one.
+/// Writes a file atomically: `path` is always the old file or the complete new one.
 ///
 /// # Errors
-/// Where the folder does not exist, may not be written or is full; the old file is then unchanged.
+/// If the folder does not exist, may not be written or is full; the old file is then unchanged.
 ///
 /// ```
 /// let folder = tempfile::tempdir().unwrap();
@@ -35,7 +35,7 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     write_streamed(path, |file| file.write_all(bytes))
 }
 
-/// As [`write_whole`], for content that is too large to hold: `write` gets a buffered file.
+/// As [`write_whole`], for content too large for memory: `write` gets a buffered file.
 ///
 /// # Errors
 /// As [`write_whole`], and every error of `write`.
@@ -55,7 +55,7 @@ fn streamed(path: &Path, write: impl FnOnce(&mut BufWriter<&mut File>) -> io::Re
         write(&mut buffered)?;
         buffered.flush()
     };
-    // A link stays a link; a device or a pipe has no name to be replaced.
+    // A link stays a link; a device or a pipe cannot be replaced.
     let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     if std::fs::metadata(&path).is_ok_and(|about| !about.is_file()) {
         return fill(&mut File::options().write(true).open(&path)?);

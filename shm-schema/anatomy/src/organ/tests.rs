@@ -1,8 +1,8 @@
-//! The table against the classifiers that it replaced, each kept here as it was.
+//! The table against the classifiers that it replaced, each kept here unchanged.
 
 use super::*;
 
-/// Names of TG-263, of the built-in scenes, of the fixtures, and of people.
+/// Names of TG-263, of the built-in scenes, of the fixtures, and as typed by users.
 const NAMES: [&str; 62] = [
     "Prostate",
     "prostate",
@@ -174,7 +174,7 @@ fn dose_finds_the_target_where_it_did() {
     }
 }
 
-/// `view/slice/speckle.rs`, `BY_NAME`: the first of these words that fits.
+/// `view/slice/speckle.rs`, `BY_NAME`: the first of these words that occurs.
 #[test]
 fn slices_meet_the_words_that_they_met() {
     let words = [
@@ -208,7 +208,7 @@ fn slices_meet_the_words_that_they_met() {
     }
 }
 
-/// `needle/layers.rs`, `of_structure`. It compared letter by letter, so the "Skin" of TG-263 was no skin.
+/// `needle/layers.rs`, `of_structure`. It compared case-sensitively, so the "Skin" of TG-263 was not skin.
 #[test]
 fn the_needle_feels_skin_where_it_did_and_under_the_name_of_tg_263() {
     let is_skin = |name: &str| Organ::Skin.is_mentioned_in(name) || Organ::Perineum.is_mentioned_in(name);
@@ -220,7 +220,7 @@ fn the_needle_feels_skin_where_it_did_and_under_the_name_of_tg_263() {
     assert!(!is_skin("perineal body"));
 }
 
-/// "Prostata" was tissue for the readers and no target for the dose.
+/// "Prostata" was tissue for the readers and not a target for the dose.
 #[test]
 fn prostata_is_a_target() {
     assert_eq!(Organ::of_name("Prostata").map(Organ::role), Some(Role::Target));
@@ -228,7 +228,7 @@ fn prostata_is_a_target() {
     assert_eq!(Organ::of_name("prostatic urethra"), None);
 }
 
-/// "Próstata" was tissue, and the urethra had the measures of an unknown structure.
+/// "Próstata" was tissue, and the urethra had the constraints of an unknown structure.
 #[test]
 fn names_of_near_languages_are_known_with_and_without_accents() {
     for name in [

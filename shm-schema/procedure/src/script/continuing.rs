@@ -1,25 +1,25 @@
-//! A procedure that was stopped is continued from what is in the tissue: the seeds, and the needle if it is still there.
+//! Continues a stopped procedure from the seeds in the tissue, and from the needle if it is still there.
 
 use crate::tolerance::{OUTSIDE_M, PLACED_WITHIN_M};
 use crate::{NeedleWay, Operation};
 use nalgebra::Vector3;
 use std::collections::{BTreeSet, VecDeque};
 
-/// A tip that is deeper than a drop by less is drawn back to it, m; one that is less deep is inserted to it.
+/// A tip deeper than a drop by less than this is drawn back to it, m; a shallower one is inserted to it.
 const SAME_DEPTH_M: f64 = 1e-3;
 
-/// What has been done of a procedure.
+/// Completed part of a procedure.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Done {
-    /// Numbers of the drops that were made, counted from 0 over all needles.
+    /// Numbers of the completed drops, counted from 0 over all needles.
     pub drops: BTreeSet<usize>,
-    /// Among them those that left no seed.
+    /// Those of them that left no seed.
     pub lost: Vec<usize>,
-    /// The needle that is in the tissue, counted from 0, and how deep it is from its entry, m.
+    /// The needle in the tissue, counted from 0, and its depth from its entry, m.
     pub inside: Option<(usize, f64)>,
 }
 
-/// The needle whose way this tip is on, and how deep it is, m; `None` outside, and beside all ways.
+/// Returns the needle on whose path this tip is, and its depth, m; `None` outside, and off all paths.
 pub fn needle_inside(ways: &[NeedleWay], tip_m: [f64; 3]) -> Option<(usize, f64)> {
     let on = |(number, way): (usize, &NeedleWay)| {
         let from_entry_m = Vector3::from(tip_m) - way.entry_m;
@@ -32,7 +32,7 @@ pub fn needle_inside(ways: &[NeedleWay], tip_m: [f64; 3]) -> Option<(usize, f64)
     nearest.map(|(number, depth_m, _)| (number, depth_m))
 }
 
-/// The operations that are left. The needle in the tissue comes first; needles whose drops are all made are left out.
+/// Returns the remaining operations. The needle in the tissue comes first; completed needles are omitted.
 pub(super) fn ahead(ways: &[NeedleWay], done: &Done) -> VecDeque<(usize, Operation)> {
     let inside = done.inside.map(|(needle, _)| needle);
     let others = (0..ways.len()).filter(|&needle| Some(needle) != inside);

@@ -1,49 +1,49 @@
-//! Why a procedure cannot go on.
+//! Reasons why a procedure cannot continue.
 
 use super::Procedure;
 use stylet_shm_schema::Fault;
 
 impl Procedure {
-    /// Re-arms after a fault that stands at the beginning; without this it does not begin.
+    /// Re-arms after a fault that stands at the beginning; otherwise the procedure does not begin.
     #[must_use]
     pub fn rearming(self) -> Self {
         Self { rearms: true, ..self }
     }
 }
 
-/// Why the procedure cannot go on. Times are those that were waited, s.
+/// Reason why the procedure cannot continue. Times are those waited, s.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StepFailure {
-    /// The force loop shows nothing.
+    /// The force loop shows no state.
     #[error("waited {0:.1} s for the state of the force loop")]
     NoState(f64),
     /// The force went off after it was turned on.
     #[error("the force is off: {}", .0.message())]
     ForceOff(Fault),
-    /// A fault stood before the force was turned on, and nobody asked to re-arm.
+    /// A fault stood before the force was turned on, and re-arming was not requested.
     #[error("a fault keeps the force off, and only a person re-arms: {}", .0.message())]
     FaultStands(Fault),
     /// A request was refused.
     #[error("{request} was refused: {why}")]
     Refused {
-        /// Which one.
+        /// Name of the request.
         request: &'static str,
-        /// The reasons, in words.
+        /// The reasons, as text.
         why: String,
     },
     /// A request was not answered.
     #[error("waited {1:.1} s for a reply to {0}")]
     NoReply(&'static str, f64),
-    /// A request was accepted and nothing came of it.
+    /// A request was accepted without effect.
     #[error("waited {1:.1} s for {0} to take effect")]
     NoEffect(&'static str, f64),
-    /// A seed was dropped and is not in the tissue.
+    /// A seed was dropped but is not in the tissue.
     #[error("waited {0:.1} s for the seed in the tissue")]
     NoSeed(f64),
     /// A needle was not left in the tissue, or not drawn out of it.
     #[error("waited {0:.0} s for the needle to stay in the tissue, or to be drawn out of it")]
     NotLeft(f64),
-    /// The tissue did not come to be ready for the needle.
+    /// The tissue was not prepared for the needle in time.
     #[error(
         "waited {0:.0} s for the tissue to be ready for the needle where it is placed; rt-core prepares that beside \
          its loops, so give it a processor, or run with --tissue chainmail"
@@ -52,9 +52,9 @@ pub enum StepFailure {
     /// The tip did not arrive.
     #[error("waited {limit_s:.1} s for the tip at its target; it is {:.2} mm from it along the needle", off_along_m * 1e3)]
     NotArrived {
-        /// The time that the move was given, s.
+        /// Time limit of the move, s.
         limit_s: f64,
-        /// How far the tip is beyond its target along the needle, m.
+        /// Overshoot of the tip along the needle, m.
         off_along_m: f64,
     },
 }

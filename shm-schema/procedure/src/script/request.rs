@@ -1,27 +1,27 @@
-//! What the procedure asks of whoever drives it.
+//! Requests of the procedure to its driver.
 
 use stylet_shm_schema::HandMove;
 
-/// What the procedure asks of whoever drives it.
+/// A request of the procedure to its driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum HandRequest {
-    /// Bring tissue, seeds and peaks back to their start.
+    /// Return tissue, seeds and peaks to their start.
     Reset,
     /// Publish the plan of a needle, counted from 0.
     PublishPlan {
-        /// Which needle.
+        /// Number of the needle.
         needle: usize,
     },
-    /// Have the tissue prepared for a stabilising needle, counted from 0.
+    /// Prepare the tissue for a stabilising needle, counted from 0.
     ExpectStabilising {
-        /// Which one.
+        /// Number of the stabilising needle.
         number: usize,
     },
     /// Leave the needle where it is.
     LeaveNeedle,
-    /// Draw out the needle that was left first of those that stay in.
+    /// Draw out the needle that was left first.
     DrawFirstLeft {
-        /// How fast, m/s.
+        /// Speed, m/s.
         speed_m_per_s: f64,
     },
     /// Turn the force on.
@@ -30,13 +30,13 @@ pub enum HandRequest {
     MoveHand(HandMove),
     /// Leave a seed at the tip.
     DropSeed {
-        /// From middle to middle of two seeds, m, where they are one strand.
+        /// Pitch between seed centres, m, if they form one strand.
         strand_pitch_m: Option<f64>,
     },
 }
 
 impl HandRequest {
-    /// The request in a message to people.
+    /// Name of the request in messages.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Reset => "Reset",

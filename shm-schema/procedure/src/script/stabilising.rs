@@ -6,7 +6,8 @@ use crate::{NeedleWay, Operation, Pace};
 use std::collections::VecDeque;
 
 impl Procedure {
-    /// The same with needles that go in first, stay in without a seed while the others come and go, and are drawn out at the end.
+    /// Adds needles that go in first, stay in without a seed while the others come and go, and are drawn out at the
+    /// end.
     #[must_use]
     pub fn stabilised(self, stabilising: Vec<NeedleWay>) -> Self {
         if stabilising.is_empty() {
@@ -15,7 +16,7 @@ impl Procedure {
         let mut own = self.ahead;
         let mut ahead = VecDeque::new();
         let first = self.ways.len();
-        // What the first needle begins with, the stabilising ones begin with.
+        // A reset at the start of the first needle moves before the stabilising ones.
         if own.front() == Some(&(0, Operation::Reset)) {
             ahead.extend(own.pop_front());
         }
@@ -33,7 +34,7 @@ impl Procedure {
         }
     }
 
-    /// The same beside needles that go in before it, and stay.
+    /// As [`rehearsal`](Self::rehearsal), with needles that go in first and stay.
     pub fn rehearsal_beside(way: NeedleWay, pace: Pace, stabilising: Vec<NeedleWay>) -> Self {
         let mut rehearsal = Self::rehearsal(way, pace);
         if !stabilising.is_empty() {
@@ -47,7 +48,8 @@ impl Procedure {
         rehearsal
     }
 
-    /// One needle that goes to its first drop and out again, without a seed, in tissue that then comes to rest.
+    /// Returns the script of one needle that goes to its first drop and out again without dropping a seed, in tissue
+    /// that then comes to rest.
     pub fn pass(way: NeedleWay, pace: Pace) -> Self {
         let then = [
             Operation::Engage,
@@ -59,13 +61,13 @@ impl Procedure {
         Self::new(vec![way], pace, then.map(|operation| (0, operation)).into())
     }
 
-    /// Which stabilising needle is at work, counted from 0; `None` while one that leaves seeds is.
+    /// Returns the present stabilising needle, counted from 0; `None` while a needle that drops seeds is at work.
     pub fn stabilising(&self) -> Option<usize> {
         let (needle, _) = self.ahead.front()?;
         needle.checked_sub(self.ways.len())
     }
 
-    /// Whether the tissue has stayed where it was: with needles in it, it rests elsewhere.
+    /// True if the tissue has not moved: with needles in it, it rests away from zero.
     pub(super) fn keeps(&mut self, displacement_m: f64) -> bool {
         let keeps = (displacement_m - self.kept_m).abs() < TISSUE_REST_M;
         if !keeps {
@@ -75,7 +77,7 @@ impl Procedure {
     }
 }
 
-/// Needles from that number on go in and stay.
+/// Returns the operations of needles that go in and stay, numbered from `first`.
 fn stay(first: usize, count: usize) -> impl Iterator<Item = (usize, Operation)> {
     (first..first + count).flat_map(move |needle| {
         let begins = (needle == first).then_some(Operation::Engage);

@@ -1,4 +1,4 @@
-//! The machine against a hand that follows each request, and against each way in which it may fail to.
+//! The state machine against a hand that follows each request, and against each way of failing to.
 
 use super::*;
 use bytemuck::Zeroable;
@@ -15,7 +15,7 @@ fn way() -> NeedleWay {
     }
 }
 
-/// A hand that is at its goal at once, and tissue at rest.
+/// A hand that reaches its goal at once, and tissue at rest.
 struct Obedient {
     state: HapticState,
     now_s: f64,
@@ -33,7 +33,7 @@ impl Obedient {
         }
     }
 
-    /// One millisecond; drops after `lost` are refused.
+    /// Steps one millisecond; drops after `lost` are refused.
     fn step(&mut self, procedure: &mut Procedure, lost: &[usize]) -> Result<Next, StepFailure> {
         self.now_s += 1e-3;
         let drops = self
@@ -78,7 +78,7 @@ impl Obedient {
     }
 }
 
-/// Depth of each move from the entry, mm, and "drop" of each drop.
+/// Depth of each move from the entry, mm, and "drop" for each drop.
 fn words(sent: &[HandRequest]) -> Vec<String> {
     let word = |request: &HandRequest| match request {
         HandRequest::MoveHand(goal) => format!("{:.0} mm at {:.0} mm/s", goal.tip_m[2] * 1e3, goal.speed_m_per_s * 1e3),
@@ -265,7 +265,7 @@ fn an_operator_decides_how_long_is_waited_and_sees_what_for() {
     assert_eq!(failed, Err(StepFailure::NoReply("Reset", 60.0)));
 }
 
-/// Stopped after `sent` requests, and continued by what is in the tissue: what is sent after that.
+/// Stops after `sent` requests and continues from the state of the tissue; returns the requests after that.
 fn continued(ways: &[NeedleWay], sent: usize) -> (Obedient, Vec<HandRequest>) {
     let mut hand = Obedient::new();
     let mut procedure = Procedure::of_needles(ways.to_vec(), Pace::default());
@@ -283,7 +283,7 @@ fn continued(ways: &[NeedleWay], sent: usize) -> (Obedient, Vec<HandRequest>) {
     (hand, before)
 }
 
-/// A run that was stopped began at its first needle again, without the seeds that were there.
+/// A run that was stopped restarted at its first needle, ignoring the seeds already there.
 #[test]
 fn a_procedure_goes_on_from_wherever_it_was_stopped_with_no_seed_twice_and_none_missing() {
     let beside = |x: f64| NeedleWay {
@@ -305,7 +305,7 @@ fn a_procedure_goes_on_from_wherever_it_was_stopped_with_no_seed_twice_and_none_
             .count();
         assert_eq!(drops, 6, "stopped after {stopped}");
     }
-    // In the second needle, with its first seed dropped: straight to the second.
+    // In the second needle, with its first seed dropped: continues at its second.
     let (hand, _) = continued(&ways, 13);
     assert_eq!(
         words(&hand.sent)[..4],
@@ -334,13 +334,13 @@ fn stabilising_needles_go_in_first_stay_and_are_drawn_out_at_the_end() {
     }
     assert_eq!((most, hand.state.left_count, hand.state.seed_count), (2, 0, 2));
     assert_eq!(left_at_drops, [2, 2], "both stay in while seeds are dropped");
-    // The reset comes before the first; the last two are drawn out.
+    // The reset precedes the first; the last two are drawn out.
     assert_eq!(which, [None, Some(0), Some(1), None, Some(0), Some(1)]);
     let names: Vec<_> = hand.sent.iter().map(HandRequest::name).collect();
     assert_eq!(names.iter().filter(|name| **name == "LeaveNeedle").count(), 2);
     assert_eq!(names.iter().filter(|name| **name == "Engage").count(), 1);
     assert_eq!(names.first(), Some(&"Reset"));
-    // A rehearsal beside them ends with both in.
+    // A rehearsal with them ends with both in.
     let mut rehearsal = Procedure::rehearsal_beside(way(), Pace::default(), vec![beside(0.0), beside(0.02)]);
     let mut hand = Obedient::new();
     while hand.step(&mut rehearsal, &[]).expect("goes on") != Next::Done {}

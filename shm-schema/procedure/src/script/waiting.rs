@@ -1,16 +1,16 @@
-//! What a procedure waits for, and how long it does.
+//! Conditions that a procedure waits for, and its patience.
 
 use std::fmt;
 
-/// How long a procedure waits for what does not arrive.
+/// Patience of a procedure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Patience {
-    /// For the usual times, in which an idle machine answers: for a rehearsal, whose time is its own.
+    /// The usual times of an idle machine: for a rehearsal, whose time is simulated.
     #[default]
     Usual,
-    /// For this time at least, s: for a run that nobody watches.
+    /// At least this time, s: for an unattended run.
     AtLeast(f64),
-    /// Until the operator decides.
+    /// Unlimited, until the operator decides.
     Operator,
 }
 
@@ -24,24 +24,24 @@ impl Patience {
     }
 }
 
-/// What is not there yet.
+/// A missing condition.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WaitsFor {
     /// The state of the force loop.
     State,
     /// The reply to a request.
     Reply(&'static str),
-    /// A request that was accepted to take effect.
+    /// The effect of an accepted request.
     Effect(&'static str),
-    /// The seed that was dropped.
+    /// The dropped seed.
     Seed,
     /// A needle to stay in the tissue, or to be out of it.
     Left,
-    /// The tissue, prepared for the needle where it is placed.
+    /// The tissue, prepared for the placed needle.
     Line,
     /// The tip at its target.
     Tip {
-        /// How far it is beyond its target along the needle, m.
+        /// Overshoot of the tip along the needle, m.
         off_along_m: f64,
     },
     /// The tissue at rest.
@@ -63,11 +63,11 @@ impl fmt::Display for WaitsFor {
     }
 }
 
-/// What a procedure waits for, and for how long.
+/// The condition that a procedure waits for, and the time waited.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waiting {
-    /// What is not there yet.
+    /// The missing condition.
     pub waits_for: WaitsFor,
-    /// For so long, s.
+    /// Time waited, s.
     pub for_s: f64,
 }
