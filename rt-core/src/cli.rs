@@ -21,8 +21,8 @@ use stylet_sim::scene::TissueKind;
 
 /// Real-time process of Stylet: owns the haptic device, the 1 kHz force loop and the 200 Hz tissue step.
 ///
-/// Start it first; any number of hosts may connect and disconnect. It asks for SCHED_FIFO and locked memory and refuses to
-/// run without them, unless started with --no-rt. With a subcommand it carries out that task instead.
+/// Start it first; any number of hosts may connect and disconnect. It asks for SCHED_FIFO and locked memory and refuses
+/// to run without them, unless started with --no-rt. With a subcommand it carries out that task instead.
 #[derive(Parser, Debug)]
 #[command(name = "rt-core", version, args_conflicts_with_subcommands = true)]
 pub struct Cli {
@@ -43,11 +43,14 @@ pub enum Task {
     Campaign(Box<CampaignArgs>),
     /// Verify that a saved latency report is unaltered, who signed it, and which programs it is of
     Verify(VerifyArgs),
-    /// Compare the latency reports of many PCs: who passes, how each changed and what changed with it; a page and a CSV table
+    /// Compare the latency reports of many PCs: who passes, how each changed and what changed with it; a page and a CSV
+    /// table
     Fleet(FleetArgs),
-    /// Write the file that an auditor asks for: purpose, hazards, requirements with their tests and runs, packages and licences
+    /// Write the file that an auditor asks for: purpose, hazards, requirements with their tests and runs, packages and
+    /// licences
     Credibility(CredibilityArgs),
-    /// Check whether this PC is fit for the force loop, and what to change; change it, measured before and after; undo it
+    /// Check whether this PC is fit for the force loop, and what to change; change it, measured before and after; undo
+    /// it
     Doctor(DoctorArgs),
     /// List the haptic devices that can be used: what of each is there, what it says, and what is missing
     Devices(DevicesArgs),
@@ -58,10 +61,11 @@ pub enum Task {
     Study(Box<stylet_study::args::StudyArgs>),
     /// Solve for what the ultrasound probe presses in a scene's own cells: once, for minutes; later runs use it
     ///
-    /// A run with a second device (--device-2) solves for it within seconds, in the larger elements that needles' lines are solved for in: in
-    /// 'pelvis' 2.7 mm (fem) and 5.5 mm (chainmail), with a press that is 10 and 15 % too strong and moves the gland 7 and 12 % too far. This solves
-    /// in the scene's cells and keeps the answers; later runs of the same scene and tissue begin with them. The window says below the scene
-    /// in which elements the probe is solved for.
+    /// A run with a second device (--device-2) solves for it within seconds, in the larger elements that needles' lines
+    /// are solved for in: in 'pelvis' 2.7 mm (fem) and 5.5 mm (chainmail), with a press that is 10 and 15 % too strong
+    /// and moves the gland 7 and 12 % too far. This solves in the scene's cells and keeps the answers; later runs of
+    /// the same scene and tissue begin with them. The window says below the scene in which elements the probe is solved
+    /// for.
     Probe(ProbeArgs),
     /// Measure what each part of a scene costs in a tissue tick
     Cost {
@@ -116,7 +120,8 @@ pub struct RunArgs {
     /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
     #[arg(long, value_name = "PATH")]
     libhd: Option<PathBuf>,
-    /// The library of the Force Dimension SDK, libdrd.so or libdhd.so [default: STYLET_LIBDRD, else where the system has it]
+    /// The library of the Force Dimension SDK, libdrd.so or libdhd.so [default: STYLET_LIBDRD, else where the system
+    /// has it]
     #[arg(long, value_name = "PATH")]
     libdrd: Option<PathBuf>,
     /// The Inverse service of Haply [default: STYLET_HAPLY_URL, else ws://localhost:10001]

@@ -24,7 +24,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// The exit code of the run or of its task.
+/// Returns the exit code of the run or of its task.
 fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
     Ok(match &cli.task {
         None => run(&cli.run).map(|()| 0)?,
@@ -46,7 +46,7 @@ fn carry_out(cli: &Cli) -> Result<u8, Box<dyn Error>> {
     })
 }
 
-/// Set by the first signal that asks this program to end.
+/// Returns a flag that the first termination signal sets.
 fn stop_on_signal() -> Result<Arc<AtomicBool>, Box<dyn Error>> {
     let stop = Arc::new(AtomicBool::new(false));
     for signal in [
@@ -93,7 +93,7 @@ fn run(args: &RunArgs) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A panic in any thread ends the process, and with it the force.
+/// Ends the process on a panic in any thread, and the force with it.
 fn abort_on_panic() {
     let print = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {

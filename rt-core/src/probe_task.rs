@@ -1,4 +1,4 @@
-//! `rt-core probe`: what the ultrasound probe presses, solved for in a scene's own cells and kept for later runs.
+//! `rt-core probe`: solves for the ultrasound probe in a scene's own cells and saves the answers for later runs.
 
 use clap::Args;
 use std::path::PathBuf;
@@ -11,25 +11,25 @@ use stylet_runtime::replay::file::{Flight, FlightError};
 use stylet_sim::probe::{NoWall, ProbeShape};
 use stylet_sim::scene::{SceneSource, TissueKind};
 
-/// Why nothing was kept.
+/// Reason why nothing was saved.
 #[derive(Debug, thiserror::Error)]
 pub enum ProbeTaskError {
     /// The recording cannot be read.
     #[error(transparent)]
     Flight(#[from] FlightError),
-    /// It has no scene.
+    /// The recording has no scene.
     #[error("{0}: the recording has no tissue, so no scene: take one of a smaller body, or the scene's name (--scene)")]
     NoScene(PathBuf),
     /// The scene cannot be used.
     #[error(transparent)]
     Body(#[from] NoLine),
-    /// No probe in it.
+    /// The scene has no probe.
     #[error(transparent)]
     Probe(#[from] NoProbe),
-    /// The file.
+    /// The file cannot be used.
     #[error(transparent)]
     File(#[from] KeptError),
-    /// Nowhere to keep it.
+    /// There is no folder for it.
     #[error("neither XDG_CACHE_HOME nor HOME is set: say where to keep it (--folder)")]
     NoFolder,
 }
@@ -52,13 +52,14 @@ pub struct ProbeArgs {
     /// Solve again although the answers are there
     #[arg(long)]
     again: bool,
-    /// Where to keep them; runs look in the default folder [default: $XDG_CACHE_HOME/stylet/probes or ~/.cache/stylet/probes]
+    /// Where to keep them; runs look in the default folder [default: $XDG_CACHE_HOME/stylet/probes or
+    /// ~/.cache/stylet/probes]
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
 }
 
 impl ProbeArgs {
-    /// Solves, with a line for each tenth, and keeps the answers.
+    /// Solves, prints a line for each tenth, and saves the answers.
     pub fn run(&self, stop: &AtomicBool) -> Result<(), ProbeTaskError> {
         let folder = self.folder.clone().or_else(kept_probe::default_folder);
         let folder = folder.ok_or(ProbeTaskError::NoFolder)?;
@@ -72,7 +73,7 @@ impl ProbeArgs {
             return Ok(());
         }
         let [quick_mm, fine_mm] = body.probe_edges_m().map(|edge_m| 1e3 * edge_m);
-        // A recording names the probe by this edge: there would be two of one name.
+        // A recording names the probe by this edge, which would be ambiguous.
         if quick_mm == fine_mm {
             println!("a run solves in cells of {fine_mm:.2} mm, which are the scene's own: nothing to keep");
             return Ok(());
@@ -106,7 +107,7 @@ impl ProbeArgs {
         Ok(())
     }
 
-    /// The scene, and the tissue that was recorded with it.
+    /// Returns the scene, and the tissue recorded with it.
     fn source(&self) -> Result<(SceneSource, Option<TissueKind>), ProbeTaskError> {
         let Some(path) = &self.flight else {
             return Ok((SceneSource::Builtin(self.scene.clone()), None));

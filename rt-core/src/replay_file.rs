@@ -1,4 +1,4 @@
-//! `rt-core replay FILE`: what a flight recording holds, and whether its repetition is bit-identical.
+//! `rt-core replay FILE`: shows a flight recording, and whether its repetition is bit-identical.
 
 use clap::Args;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ use stylet_runtime::rt::tissue_tape::TissueFlight;
 use stylet_shm_schema::{Fault, flags};
 use stylet_text::printable_line;
 
-/// Why a recording could not be repeated.
+/// Reason why a recording could not be repeated.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The recording cannot be read.
@@ -35,7 +35,7 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Prints what it finds; true when every force and position is bit-identical.
+    /// Prints the results; true if every force and position is bit-identical.
     pub fn run(&self) -> Result<bool, ReplayError> {
         let flight = Flight::read(&self.file)?;
         if flight.version != env!("CARGO_PKG_VERSION") {
@@ -47,7 +47,7 @@ impl Replay {
         }
         println!("reason   {}", printable_line(&flight.reason.to_string()));
         println!("device   {}", printable_line(&flight.device_name));
-        // Before denormal numbers are off: what prepared the lines had them on.
+        // Before denormal numbers are off: they were on when the lines were prepared.
         let again = flight.tissue.as_ref().map(|recorded| solve_again(&flight, recorded));
         let again = again.transpose()?.unwrap_or_default();
         // The loops run with denormal numbers off, and so must their repetition.
@@ -69,7 +69,7 @@ impl Replay {
     }
 }
 
-/// A recording holds no columns of needle lines; those that count take some seconds each.
+/// Solves the columns of needle lines, which a recording does not hold: some seconds each.
 fn solve_again(flight: &Flight, recorded: &TissueFlight) -> Result<LinesAgain, RepeatError> {
     if let Some(edge_m) = recorded.probe_edge_m() {
         println!(
@@ -94,7 +94,7 @@ fn solve_again(flight: &Flight, recorded: &TissueFlight) -> Result<LinesAgain, R
     )
 }
 
-/// True as well where the run had no second device.
+/// Repeats the second device; true as well if the run had none.
 fn repeat_second(flight: &Flight) -> bool {
     let Some(figures) = &flight.second_device else {
         return true;
@@ -118,7 +118,7 @@ fn repeat_second(flight: &Flight) -> bool {
     print_result("second", again.as_ref())
 }
 
-/// Each change of the fault, with its tick.
+/// Prints each change of the fault, with its tick.
 fn print_faults(ticks: impl Iterator<Item = (u64, u32)>) {
     let mut before = 0;
     for (tick, fault) in ticks {

@@ -1,4 +1,4 @@
-//! What the loops of a run cost, as `rt-core --report` writes it.
+//! Cost of the loops of a run, as written by `rt-core --report`.
 
 use serde::Serialize;
 use stylet_runtime::process::{LoopReport, RunReport};
@@ -8,7 +8,7 @@ use stylet_runtime::process::{LoopReport, RunReport};
 pub struct Report {
     haptic: Loop,
     tissue: Loop,
-    /// Of a run with a second device.
+    /// Present in a run with a second device.
     #[serde(skip_serializing_if = "Option::is_none")]
     second: Option<Loop>,
 }
@@ -21,7 +21,7 @@ struct Loop {
     /// `u32::MAX` for any core.
     core: u32,
     ticks: u64,
-    /// Since the start; no reset clears it.
+    /// Since the start, regardless of resets.
     missed_deadlines: u64,
     /// Since the start, to a tenth.
     worst_wake_us: f64,

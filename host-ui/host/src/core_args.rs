@@ -1,4 +1,4 @@
-//! Which core a command speaks to, and which scene it is to run.
+//! Selects the core of a command, and the scene that it runs.
 
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -11,8 +11,8 @@ pub struct CoreArgs {
     /// Name that rt-core was started under
     #[arg(long, default_value = "main", value_parser = Instance::new)]
     pub instance: Instance,
-    /// What to run instead of rt-core's scene: paper, pelvis or full, which are built in, or a volume: NIfTI-1, NRRD, MetaImage,
-    /// DICOM RT Structure Set, or a scene file (.toml)
+    /// What to run instead of rt-core's scene: paper, pelvis or full, which are built in, or a volume: NIfTI-1, NRRD,
+    /// MetaImage, DICOM RT Structure Set, or a scene file (.toml)
     #[arg(long, value_name = "SCENE", value_parser = choice)]
     pub scene: Option<SceneChoice>,
     /// Which label of the volume is the gland [default: all but 0]
@@ -21,23 +21,23 @@ pub struct CoreArgs {
 }
 
 impl CoreArgs {
-    /// Where the scene is to be read from.
+    /// Returns the file of the scene.
     pub fn file(&self) -> Option<&Path> {
         self.scene.as_ref().and_then(SceneChoice::file)
     }
 }
 
-/// A scene that a user names.
+/// A scene named by a user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SceneChoice {
-    /// By its place among [`BUILTIN_SCENES`].
+    /// Index in [`BUILTIN_SCENES`].
     BuiltIn(usize),
-    /// A file that is read and uploaded.
+    /// A file to read and upload.
     File(PathBuf),
 }
 
 impl SceneChoice {
-    /// A file wins over the built-in scene of its name.
+    /// Parses a name; a file takes precedence over a built-in scene of the same name.
     pub fn named(name: &str) -> Self {
         let path = PathBuf::from(name);
         let number = BUILTIN_SCENES.iter().position(|scene| *scene == name);
@@ -47,7 +47,7 @@ impl SceneChoice {
         }
     }
 
-    /// Where the scene is read from; `None` for a built-in one.
+    /// Returns the file of the scene; `None` for a built-in one.
     pub fn file(&self) -> Option<&Path> {
         match self {
             Self::BuiltIn(_) => None,

@@ -1,4 +1,4 @@
-//! The host side of shared memory: the link to the core, which core and scene a command asks for, recordings.
+//! The host side of shared memory: the link to the core, the choice of core and scene, recordings.
 
 #![warn(missing_docs)]
 

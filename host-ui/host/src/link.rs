@@ -1,4 +1,4 @@
-//! The only place of the host that uses shared memory: receives what the core publishes, checked, and sends requests.
+//! The host's only access to shared memory: receives and validates what the core publishes, and sends requests.
 
 mod inbox;
 mod motion;
@@ -26,30 +26,30 @@ use thread::Receiver;
 pub use player::{Piece, Playback, Played};
 pub use received::{Answer, LinkError, LinkStatus, SceneModel, Snapshot};
 
-/// The heartbeat may rest this long.
+/// Longest pause of the heartbeat.
 const SILENT_AFTER: Duration = Duration::from_millis(100);
-/// Without the board, the only heartbeat is the announcement once a second.
+/// Longest pause without the board, when the only heartbeat is the announcement once a second.
 const SILENT_AFTER_WITHOUT_BOARD: Duration = Duration::from_millis(1500);
 const ABSENT_AFTER: Duration = Duration::from_secs(2);
-/// A relay says five times a second who is connected.
+/// Lifetime of the class list; a relay sends it five times a second.
 const CLASS_STAYS: Duration = Duration::from_secs(2);
-/// A picture of the tissue is converted at most so often for a window: converting costs more than receiving.
+/// Shortest interval at which a window converts pictures of the tissue: converting costs more than receiving.
 const SNAPSHOTS_EVERY: Duration = Duration::from_millis(12);
 const EVENTS_KEPT: usize = 256;
 const ANSWERS_KEPT: usize = 256;
 const REHEARSALS_KEPT: usize = 8;
-/// Number of a command whose answer nobody waits for.
+/// Number of a command that needs no answer.
 const UNANSWERED: u64 = 0;
 /// Largest volume that the core accepts, in cells.
 pub const MAX_UPLOAD_CELLS: usize = 64 << 20;
 
 /// One host's connection to the core of one instance.
 ///
-/// A thread of its own receives, however slow the host is; what the host has not taken for long is dropped, the oldest first,
-/// and shows as gaps in the numbers of ticks and events.
+/// A separate thread receives, however slow the host is; data that the host does not take in time is dropped, oldest
+/// first, and shows as gaps in the numbers of ticks and events.
 pub struct Link {
     receiver: Receiver,
-    /// Of a recording in place of a core.
+    /// Present for a recording that replaces a core.
     playback: Option<Playback>,
     instance: Instance,
     host_id: u64,
@@ -66,7 +66,7 @@ pub struct Link {
     motions: Motions,
 }
 
-/// Two hosts must not take each other's answers.
+/// Returns a random id: two hosts must not take each other's answers.
 fn random_host_id() -> u64 {
     use std::hash::{BuildHasher, Hasher};
     let mut hasher = std::collections::hash_map::RandomState::new().build_hasher();
@@ -75,29 +75,29 @@ fn random_host_id() -> u64 {
 }
 
 impl Link {
-    /// Never fails and never blocks: a thread connects, as often as it must.
+    /// Never fails and never blocks: a thread connects, and reconnects as needed.
     pub fn new(instance: Instance) -> Self {
         Self::with_snapshots_every(instance, SNAPSHOTS_EVERY)
     }
 
-    /// One that converts every snapshot that it finds, for a recording.
+    /// Returns a link that converts every snapshot, for a recording.
     pub fn for_recording(instance: Instance) -> Self {
         Self::with_snapshots_every(instance, Duration::ZERO)
     }
 
-    /// A recording in place of a core: everything is as the core said it, and every request is refused.
+    /// Plays a recording as if from a core; every request is refused.
     pub fn playing(instance: Instance, played: Arc<Played>) -> Self {
         let playback = Playback::of(&played);
         let receiver = Receiver::play(played, playback.clone());
         Self::of(instance, random_host_id(), receiver, Some(playback))
     }
 
-    /// The recording that is in place of a core.
+    /// Returns the recording that replaces a core.
     pub fn playback(&self) -> Option<&Playback> {
         self.playback.as_ref()
     }
 
-    /// Takes a picture of the tissue only so often; all else as it comes.
+    /// Limits the rate at which pictures of the tissue are taken; everything else is taken as it arrives.
     pub fn with_snapshots_every(instance: Instance, every: Duration) -> Self {
         let host_id = random_host_id();
         let receiver = Receiver::start(instance.clone(), host_id, every);
@@ -124,8 +124,8 @@ impl Link {
         }
     }
 
-    /// Takes everything that was received since the last call. Never waits. Call it each frame: what this host moves stops when it
-    /// polls no more.
+    /// Takes everything received since the last call. Never waits. Call it each frame: the motions of this host stop
+    /// when it stops polling.
     pub fn poll(&mut self) {
         let inbox = self.receiver.take();
         self.take(inbox);
@@ -134,7 +134,7 @@ impl Link {
         }
     }
 
-    /// The longest pause between the last calls of [`Link::poll`].
+    /// Returns the longest pause between recent calls of [`Link::poll`].
     pub fn longest_pause(&self) -> Duration {
         self.motions.longest_pause()
     }
@@ -144,12 +144,12 @@ impl Link {
         let _sent = self.receiver.send(Outgoing::Promise(until));
     }
 
-    /// The instance that this link is for.
+    /// Instance of this link.
     pub fn instance(&self) -> &Instance {
         &self.instance
     }
 
-    /// Whether the core runs.
+    /// Status of the core.
     pub fn status(&self) -> LinkStatus {
         let Some(moved) = self.pulse.moved else {
             return LinkStatus::Absent { why: self.why_absent() };
@@ -188,32 +188,32 @@ impl Link {
         format!("{what} (instance \"{name}\"). Start it in another terminal: rt-core{flag}")
     }
 
-    /// The present run of the core.
+    /// Present run of the core.
     pub fn session(&self) -> Option<&Session> {
         self.latest.session.as_ref()
     }
 
-    /// The last valid one.
+    /// Last valid state.
     pub fn state(&self) -> Option<&HapticState> {
         self.state.as_ref()
     }
 
-    /// The last valid one of the second device; nothing in a run without one.
+    /// Last valid state of the second device; `None` in a run without one.
     pub fn second_state(&self) -> Option<&SecondState> {
         self.second_state.as_ref()
     }
 
-    /// Every record of the second device since the last call.
+    /// Returns every record of the second device since the last call.
     pub fn take_second_records(&mut self) -> Vec<SecondRecord> {
         std::mem::take(&mut self.second_records).into()
     }
 
-    /// The scene that runs.
+    /// The running scene.
     pub fn scene(&self) -> Option<&Arc<SceneModel>> {
         self.latest.scene.get()
     }
 
-    /// The last one that belongs to the scene.
+    /// Last snapshot of the running scene.
     pub fn snapshot(&self) -> Option<&Snapshot> {
         let scene = self.latest.scene.get()?;
         self.latest
@@ -232,56 +232,56 @@ impl Link {
         self.latest.plan.get()
     }
 
-    /// The line to the core where that runs on another machine.
+    /// Connection to a core on another machine.
     pub fn relayed(&self) -> Option<&Relayed> {
         let id = self.latest.id();
         self.latest.relayed.as_ref().filter(|r| id == Some(r.session_id))
     }
 
-    /// Who is connected over a relay of this machine, while that says so.
+    /// Members connected through a relay of this machine, while it reports them.
     pub fn class(&self) -> Option<&Class> {
         let (came, class) = self.latest.class.as_ref()?;
         let is_of_run = self.latest.id() == Some(class.session_id);
         (is_of_run && came.elapsed() < CLASS_STAYS).then_some(class)
     }
 
-    /// Asks the relay of this machine for the needle, or to hand it over. [`Link::class`] shows what came of it.
+    /// Asks this machine's relay for the needle, or to hand it over. [`Link::class`] shows the result.
     pub fn lease(&mut self, request: &LeaseRequest) -> Result<(), LinkError> {
         let id = self.next_id()?;
         self.ask(id, Outgoing::Lease(request.encode())).map(|_| ())
     }
 
-    /// Every record since the last call. Ticks whose record this host did not see are missing in their numbers.
+    /// Returns every record since the last call. Ticks whose record this host missed show as gaps in the numbers.
     pub fn take_records(&mut self) -> Vec<TickRecord> {
         std::mem::take(&mut self.records).into()
     }
 
-    /// The last 256 of this run of the core.
+    /// Last 256 events of this run of the core.
     pub fn events(&self) -> &VecDeque<Event> {
         &self.latest.events
     }
 
-    /// Events of this run that happened while this host was connected and that it did not see.
+    /// Number of events of this run that happened while this host was connected but did not reach it.
     pub fn events_unseen(&self) -> u64 {
         self.latest.events_unseen
     }
 
-    /// What the core said; once for each command.
+    /// Returns the core's answer; once for each command.
     pub fn reply(&mut self, command_id: u64) -> Option<Answer> {
         self.answers.remove(&command_id)
     }
 
-    /// What a [`Request::Rehearse`] came to, once its reply says that it was carried out.
+    /// Returns the result of a [`Request::Rehearse`], once its reply says that it was carried out.
     pub fn rehearsal(&mut self, command_id: u64) -> Option<Box<Rehearsal>> {
         self.rehearsals.remove(&command_id)
     }
 
-    /// Invalid messages from shared memory that were dropped.
+    /// Number of invalid messages dropped from shared memory.
     pub fn invalid_dropped(&self) -> u64 {
         self.invalid_dropped
     }
 
-    /// The id of the command; its [`Answer`] comes later.
+    /// Sends a request and returns its command id; its [`Answer`] comes later.
     pub fn send(&mut self, request: &Request) -> Result<u64, LinkError> {
         let id = self.next_id()?;
         let command = request.encode(self.host_id, id);
@@ -295,7 +295,7 @@ impl Link {
         Ok(id)
     }
 
-    /// A segmented volume for the core to run instead of the present scene.
+    /// Uploads a segmented volume for the core to run instead of the present scene.
     pub fn upload(&mut self, volume: &LabelVolume) -> Result<u64, LinkError> {
         let expected: usize = volume.dims.iter().product();
         if volume.cells.len() != expected || !(1..=MAX_UPLOAD_CELLS).contains(&expected) {
@@ -321,7 +321,7 @@ impl Link {
         self.ask(id, Outgoing::Upload(Box::new(header), volume.cells.clone()))
     }
 
-    /// What cannot be sent after all is refused by an [`Answer`].
+    /// Queues a message; one that cannot be sent later is refused by an [`Answer`].
     fn ask(&self, id: u64, outgoing: Outgoing) -> Result<u64, LinkError> {
         match self.receiver.send(outgoing) {
             true => Ok(id),
@@ -335,7 +335,7 @@ impl Link {
         if self.playback.is_some() {
             return Err(LinkError("a recording is shown; close it first".to_owned()));
         }
-        // A host that did not poll for seconds does not take the core for stopped.
+        // A host that did not poll for seconds must not conclude that the core has stopped.
         self.pulse = self.receiver.pulse();
         if let LinkStatus::Absent { why } = self.status() {
             return Err(LinkError(why));

@@ -1,27 +1,27 @@
-//! What somebody marked or put in, and faults: the moments that a debrief names, in bounded memory.
+//! Marks, exercises and faults: the moments that a debrief names, in bounded memory.
 
 use std::collections::VecDeque;
 use stylet_shm_schema::{Event, EventKind};
 
-/// More of one run of the core are not kept; the oldest go.
+/// Most moments kept for one run of the core; the oldest are dropped.
 const MOST: usize = 512;
 
-/// Words of the mark that goes with an instructor's stop.
+/// Words of the mark for an instructor's stop.
 pub const STOPPED: &str = "stopped by the instructor";
 
-/// What a moment is.
+/// Kind of a moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MomentKind {
-    /// Somebody marked it.
+    /// A mark.
     Mark,
-    /// An instructor put a fault in, or took all out.
+    /// An instructor injected a fault, or removed all.
     Exercise,
-    /// A fault took the force off.
+    /// A fault turned the force off.
     Fault,
 }
 
 impl MomentKind {
-    /// In one word.
+    /// Returns the kind in one word.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mark => "mark",
@@ -36,14 +36,14 @@ impl MomentKind {
 pub struct Moment {
     /// `CLOCK_MONOTONIC` of the core.
     pub time_ns: u64,
-    /// What it is.
+    /// Kind of the moment.
     pub kind: MomentKind,
-    /// What a person reads.
+    /// Text for people.
     pub text: String,
 }
 
 impl Moment {
-    /// `None` for an event of another kind.
+    /// Converts an event; `None` for other kinds.
     pub fn of(event: &Event) -> Option<Self> {
         let (kind, text) = match EventKind::from_number(event.kind)? {
             EventKind::Mark => (MomentKind::Mark, event.text.read()),
@@ -60,7 +60,7 @@ impl Moment {
     }
 }
 
-/// Those of one run of the core.
+/// Moments of one run of the core.
 #[derive(Clone, Debug, Default)]
 pub struct Moments {
     session_id: u64,
@@ -69,7 +69,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// `events` may hold some that were taken before. True when a reset is among those that are new.
+    /// Takes events, some of which may have been taken before. True if a reset is among the new ones.
     pub fn take<'a>(&mut self, events: impl IntoIterator<Item = &'a Event>) -> bool {
         let mut was_reset = false;
         for event in events {
@@ -94,12 +94,12 @@ impl Moments {
         was_reset
     }
 
-    /// In the order in which they were reported.
+    /// All moments in the order in which they were reported.
     pub fn all(&self) -> impl DoubleEndedIterator<Item = &Moment> {
         self.all.iter()
     }
 
-    /// From that time on.
+    /// Returns the moments from that time on.
     pub fn since(&self, time_ns: u64) -> Vec<Moment> {
         let later = self.all.iter().filter(|moment| moment.time_ns >= time_ns);
         later.cloned().collect()

@@ -1,4 +1,5 @@
-//! Several cores at a glance, for whoever instructs: of each the state board and what it announces, and nothing that costs more.
+//! Several cores at a glance, for an instructor: the state board and the announcements of each, and nothing more
+//! expensive.
 
 use crate::moments::STOPPED;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,36 +14,36 @@ use stylet_shm_schema::{
 
 const PASS: Duration = Duration::from_millis(100);
 const CONNECT_EVERY: Duration = Duration::from_secs(1);
-/// Ports of a core that is silent for so long are made anew.
+/// Most orders queued for the thread.
 const ORDERS: usize = 64;
 
-/// A trainee and the core that they sit at.
+/// A trainee and their core.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trainee {
-    /// For people.
+    /// Name for people.
     pub name: String,
-    /// Of their core, or of a relay in its place.
+    /// Instance of their core, or of a relay in its place.
     pub instance: Instance,
 }
 
-/// What is known of one of them.
+/// State of one trainee.
 #[derive(Clone, Debug)]
 pub struct Glance {
-    /// Who it is.
+    /// The trainee.
     pub trainee: Trainee,
-    /// When its core was heard last; `None` while it never was.
+    /// Time at which its core was last heard; `None` if never.
     pub heard: Option<Instant>,
     /// The last valid state.
     pub state: Option<HapticState>,
     /// The present run.
     pub session: Option<Session>,
-    /// Seeds of the plan in force, and where it enters and goes.
+    /// Plan in force: seeds, entry and direction.
     pub plan: Option<PlanInForce>,
-    /// The line to the core, where that runs on another machine.
+    /// Connection to a core on another machine.
     pub relayed: Option<Relayed>,
 }
 
-/// All of them, seen by a thread of its own.
+/// All trainees, watched by a separate thread.
 pub struct Roster {
     glances: Arc<Mutex<Vec<Glance>>>,
     stops: mpsc::SyncSender<usize>,
@@ -51,7 +52,7 @@ pub struct Roster {
 }
 
 impl Roster {
-    /// Never fails and never blocks: a thread connects, as often as it must.
+    /// Never fails and never blocks: a thread connects, and reconnects as needed.
     pub fn start(trainees: Vec<Trainee>) -> Self {
         let glance = |trainee: &Trainee| Glance {
             trainee: trainee.clone(),
@@ -89,12 +90,12 @@ impl Roster {
         }
     }
 
-    /// As they are now.
+    /// Returns the present state of all.
     pub fn glances(&self) -> Vec<Glance> {
         lock(&self.glances).clone()
     }
 
-    /// Stops the hand of one, and marks the moment. False where it could not be asked for.
+    /// Stops one trainee's hand, and marks the moment. False if the order could not be queued.
     pub fn stop(&self, number: usize) -> bool {
         let taken = self.stops.try_send(number).is_ok();
         if let Some(thread) = &self.thread {
@@ -119,7 +120,7 @@ fn lock(glances: &Mutex<Vec<Glance>>) -> MutexGuard<'_, Vec<Glance>> {
     glances.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Ports to one core. In this order they are dropped: the node last.
+/// Ports to one core, dropped in this order: the node last.
 struct Ports {
     board: Option<(u64, StateReader)>,
     session: Subscriber<Session>,
@@ -157,7 +158,7 @@ impl Seat {
     fn pass(&mut self, instance: &Instance, glances: &Mutex<Vec<Glance>>, number: usize) {
         if self.tried.is_none_or(|at| at.elapsed() >= CONNECT_EVERY) {
             self.tried = Some(Instant::now());
-            // Those of an epoch that is over go before others are made.
+            // Ports of a past epoch are dropped before new ones are made.
             self.ports = self.ports.take().filter(|ports| ports.node.is_current());
             self.ports = self.ports.take().or_else(|| Ports::new(instance));
         }
@@ -188,7 +189,7 @@ impl Seat {
         let state = ports.board.as_ref().map(|(_, board)| board.read());
         let state = state.filter(|state| check::state(state).is_ok());
         glance.state = state.or(glance.state);
-        // What comes out of a dead core's memory does not move.
+        // The memory of a dead core does not change.
         let beat = (session.time_ns, glance.state.map_or(0, |s| s.tick));
         if beat != self.beat {
             self.beat = beat;
@@ -203,7 +204,7 @@ impl Seat {
         };
         for request in [Request::StopHand, Request::Mark(mark)] {
             self.commands += 1;
-            // No reply is waited for: the list shows what the hand does.
+            // The reply is ignored: the list shows what the hand does.
             let command = request.encode(u64::from(std::process::id()) << 32, self.commands);
             if let (Some(ports), Ok(command)) = (&self.ports, command) {
                 if CommandKind::is_stop(command.kind) {

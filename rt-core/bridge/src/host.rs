@@ -1,4 +1,4 @@
-//! The host of a measurement: says when it saw what, and passes requests on.
+//! The host of a measurement: reports when it saw data, and passes requests on.
 
 use crate::{Ended, wait};
 use std::time::Duration;
@@ -38,7 +38,7 @@ pub fn watch(instance: &Instance, socket: &mut Socket) -> Result<Ended, Ended> {
     loop {
         ports = ports.filter(|ports| ports.node.is_current());
         let Some(ports) = &mut ports else {
-            // Until a core is there, and its bridge.
+            // Waits for a core and its bridge.
             ports = Node::join(instance).and_then(Ports::new).ok();
             wait(socket, CONNECT_EVERY);
             socket.receive()?;

@@ -1,4 +1,4 @@
-//! A host that never pauses, as a load beside a measurement: more than any window.
+//! A host that never pauses, as a load during a measurement: heavier than any window.
 
 use crate::Ended;
 use std::time::Duration;
@@ -18,16 +18,16 @@ fn listen(instance: &Instance) -> Result<(Snapshots, Records, Node), ServiceErro
     ))
 }
 
-/// The core starts after its load.
+/// Interval of connection attempts: the core starts after its load.
 const CONNECT_EVERY: Duration = Duration::from_millis(25);
 
-/// As many as the largest built-in scene shows.
+/// As many vertices as the largest built-in scene.
 const VERTICES: usize = 50_000;
 
-/// Copies all that `instance` shows, again and again, until the other end of `socket` closes.
+/// Copies everything that `instance` publishes, over and over, until the other end of `socket` closes.
 pub fn copy_all(instance: &Instance, socket: &mut Socket) -> Result<Ended, Ended> {
     let mut ports = None;
-    // Until there is a picture, and beside a program that publishes none, it goes over as much memory.
+    // Without a picture, or next to a program that publishes none, it reads as much memory.
     let mut vertices = vec![Vertex::default(); VERTICES];
     let mut kept = Vec::new();
     loop {
@@ -48,7 +48,7 @@ pub fn copy_all(instance: &Instance, socket: &mut Socket) -> Result<Ended, Ended
             kept.extend_from_slice(sample.values());
             idle = false;
         }
-        // What a window does with a picture: go over it again and again.
+        // Like a window with a picture, it reads it several times.
         for _ in 0..if idle { 1 } else { 16 } {
             std::hint::black_box(vertices.clone());
         }

@@ -1,7 +1,7 @@
-//! `stylet-bridge`: meets hosts over iceoryx2 and carries what they and the force process say to each other.
+//! `stylet-bridge`: serves hosts over iceoryx2, and relays data between them and the force process.
 //!
-//! `rt-core` starts it with one end of a socket as its standard input, and starts it anew where it ends or hangs. It owns
-//! nothing that lasts: whatever a new one needs, the force process sends again.
+//! `rt-core` starts it with one end of a socket as its standard input, and restarts it if it ends or hangs. It holds no
+//! lasting state: the force process sends everything again to a new one.
 
 mod host;
 mod load;
@@ -20,10 +20,10 @@ use stylet_wall::board::Reader;
 use stylet_wall::packet::{ALIVE_EVERY, Alive, BoardSize, Closed, Kind, LOOK_EVERY, Packet, Socket, Start};
 
 const CLEAN_EVERY: Duration = Duration::from_secs(1);
-/// Packets of the force process that are carried on before hosts have their turn.
+/// Packets of the force process relayed before hosts have their turn.
 const PACKETS_AT_ONCE: u32 = 64;
 
-/// Why this process ends.
+/// Reason why this process ends.
 #[derive(Debug, thiserror::Error)]
 enum Ended {
     #[error("start rt-core: it starts this program by itself")]
@@ -77,7 +77,7 @@ fn follow_force_process() {
     }
 }
 
-/// The bridge of `INSTANCE FOLDER TOKEN`; for a measurement `host INSTANCE` or `load INSTANCE`.
+/// Runs the bridge of `INSTANCE FOLDER TOKEN`; for a measurement `host INSTANCE` or `load INSTANCE`.
 fn carry_out(arguments: &[OsString], socket: &mut Socket) -> Result<Ended, Ended> {
     let instance = |name: &OsString| Instance::new(&name.to_string_lossy());
     match arguments {
@@ -107,7 +107,7 @@ fn serve(epoch: &Epoch, socket: &mut Socket) -> Result<Ended, Ended> {
     }
 }
 
-/// Until something arrives, and no longer than that.
+/// Waits until something arrives, at most `longest`.
 fn wait(socket: &Socket, longest: Duration) {
     let longest = Timespec::try_from(longest).ok();
     let _ = poll(
@@ -116,7 +116,7 @@ fn wait(socket: &Socket, longest: Duration) {
     );
 }
 
-/// All that this process holds.
+/// State of this process.
 struct Bridge {
     ports: Ports,
     state: Option<Reader<HapticState>>,
@@ -160,7 +160,7 @@ impl Bridge {
                 has_viewers: self.ports.has_viewers().into(),
                 refused: self.ports.refused,
             };
-            // One that finds no room is not missed: the next comes soon.
+            // A heartbeat without room may be dropped: the next comes soon.
             socket.send(Kind::Alive, bytemuck::bytes_of(&alive), None)?;
         }
         if self.cleaned.elapsed() >= CLEAN_EVERY {

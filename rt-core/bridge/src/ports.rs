@@ -1,4 +1,4 @@
-//! Every port of the core, and what goes through each.
+//! Every port of the core, and the data through each.
 
 use std::os::fd::{AsFd, BorrowedFd};
 use stylet_ports::{
@@ -9,17 +9,17 @@ use stylet_shm_schema::*;
 use stylet_wall::board::Reader;
 use stylet_wall::packet::{Closed, Kind, Packet, Socket, Start, sealed, unsealed};
 
-/// Requests of one port that are handed on in a pass. More are refused, so that a flood reaches neither loop. By port, since a
-/// host may call itself anything.
+/// Most requests of one port relayed in a pass. More are refused, so that a flood reaches neither loop. Counted by
+/// port, since a host can claim any id.
 const MAX_OF_A_PORT: u32 = 16;
-/// Refusals for that reason that are answered in one pass, the others are counted: every host has all answers in its queue, and
-/// those to one that floods would drive out those to the others.
+/// Most such refusals answered in one pass; the others are only counted. Every host has all answers in its queue, and
+/// answers to a flooding host would displace the others.
 const MAX_ANSWERED: u32 = 1;
-/// Requests taken from the queues in one pass. Queues are read one after the other, so that a host that fills its own faster than
-/// it is read would keep the core from those behind it; one that is counted alone takes less time than one that is handed on.
+/// Most requests taken from the queues in one pass. Queues are read one after the other, so a host that fills its queue
+/// faster than it is read would block those behind it; counting a request takes less time than relaying it.
 const MAX_TAKEN: usize = 8192;
 
-/// One port for each service of the core; [`service`] says what each holds.
+/// One port for each service of the core; see [`service`].
 pub struct Ports {
     session_id: u64,
     session: Publisher<Session>,
@@ -30,7 +30,7 @@ pub struct Ports {
     rehearsals: Publisher<Rehearsal>,
     records: SlicePublisher<TickRecord, u64>,
     snapshots: SlicePublisher<Vertex, SnapshotHeader>,
-    /// What the snapshots of the scene are copied from, and how long each is.
+    /// Source of the scene's snapshots, and their length.
     shown: Option<(Reader<SnapshotHeader, Vertex>, usize)>,
     viewers: Watch,
     scene: SlicePublisher<u32, SceneHeader>,
@@ -39,13 +39,13 @@ pub struct Ports {
     uploads: SliceSubscriber<u8, UploadHeader>,
     /// Taken from a queue when the force process had no room for it.
     held: Option<Command>,
-    /// Requests that were refused here.
+    /// Requests refused here.
     pub refused: u64,
     /// The latest tick.
     pub state: StateWriter<HapticState>,
-    /// In a run with a second device.
+    /// Present in a run with a second device.
     pub second: Option<Second>,
-    /// Goes last.
+    /// Dropped last.
     pub node: Node,
 }
 
@@ -90,7 +90,7 @@ impl Ports {
         })
     }
 
-    /// Somebody takes snapshots.
+    /// True if a host takes snapshots.
     pub fn has_viewers(&self) -> bool {
         self.viewers.connected().subscribers > 0
     }
@@ -111,9 +111,9 @@ impl Ports {
         }
     }
 
-    /// Sends to every host what the force process says.
+    /// Publishes a packet of the force process to every host.
     pub fn publish(&self, packet: Packet) {
-        // What finds no room reaches nobody: hosts see a gap in its numbers.
+        // A message without room reaches no host: hosts see a gap in the numbers.
         let _sent = match packet.kind {
             Kind::Session => send(&self.session, &packet),
             Kind::Parameters => send(&self.parameters, &packet),
@@ -157,9 +157,9 @@ impl Ports {
         }
     }
 
-    /// Hands the force process what hosts ask for, as far as it has room.
+    /// Relays the requests of hosts to the force process, as far as it has room.
     pub fn forward(&mut self, socket: &Socket) -> Result<(), Closed> {
-        // Those that take force or motion away come first, through queues of their own, and none is too many.
+        // Requests that remove force or motion come first, through separate queues, without a limit.
         for _ in 0..MAX_TAKEN {
             match self.held.take().or_else(|| self.stops.receive()) {
                 Some(command) if self.hand_on(socket, command)? => {}
@@ -187,7 +187,7 @@ impl Ports {
         Ok(())
     }
 
-    /// False where the force process has no room now; the command is held until it has.
+    /// Relays a command; false if the force process has no room now, in which case the command is held until it has.
     fn hand_on(&mut self, socket: &Socket, command: Command) -> Result<bool, Closed> {
         let sent = socket.send(Kind::Command, bytemuck::bytes_of(&command), None)?;
         self.held = (!sent).then_some(command);
@@ -212,7 +212,7 @@ struct Taken {
 }
 
 impl Taken {
-    /// Counts a request; false where it is one too many of its port.
+    /// Counts a request; false if it exceeds its port's limit.
     fn admits(&mut self, port: u128) -> bool {
         if let Some((_, count)) = self.of_port.iter_mut().find(|(of, _)| *of == port) {
             *count += 1;
@@ -222,7 +222,7 @@ impl Taken {
         true
     }
 
-    /// Counts a refusal; false where it is not answered.
+    /// Counts a refusal; false if it is not answered.
     fn answers(&mut self) -> bool {
         self.answered += 1;
         self.answered <= MAX_ANSWERED

@@ -1,7 +1,7 @@
-//! What the receiving thread has taken out of shared memory and the host has not taken yet, in bounded memory.
+//! Data that the receiving thread has taken out of shared memory and the host has not taken yet, in bounded memory.
 //!
-//! Nothing here waits for the host: of what says how things are, the newest stays; of what happened once, the last ones stay
-//! up to the limits below. What is dropped shows as a gap in the numbers of ticks and events, and is counted there.
+//! Nothing here waits for the host. State keeps the latest value; events keep a bounded queue. Dropped data shows as a
+//! gap in the numbers of ticks and events, and is counted there.
 
 use super::{SceneModel, Snapshot};
 use std::collections::VecDeque;
@@ -12,29 +12,29 @@ use stylet_shm_schema::{
     Session, TickRecord,
 };
 
-/// Records that wait for the host: five minutes at 1 kHz, 72 MB.
+/// Most records queued for the host: five minutes at 1 kHz, 72 MB.
 pub const RECORDS_KEPT: usize = 300_000;
-/// Events that wait for the host: 1 MB.
+/// Most events queued for the host: 1 MB.
 const EVENTS_KEPT: usize = 4096;
-/// Replies to this host that wait for it.
+/// Most replies queued for the host.
 const REPLIES_KEPT: usize = 1024;
-/// Results of rehearsals that wait for the host.
+/// Most results of rehearsals queued for the host.
 const REHEARSALS_KEPT: usize = 8;
 
-/// What the receiving thread knows of the connection.
+/// State of the connection, as seen by the receiving thread.
 #[derive(Clone, Debug, Default)]
 pub struct Pulse {
-    /// When the heartbeat was last seen to move.
+    /// Time at which the heartbeat last moved.
     pub moved: Option<Instant>,
-    /// When it was last looked at: a host that stood still itself does not know how the core is.
+    /// Time of the last check: a host that was suspended itself does not know the core's state.
     pub looked: Option<Instant>,
-    /// Whether the heartbeat is that of the board, every tick, or that of the announcements.
+    /// The heartbeat is that of the board, every tick, rather than that of the announcements.
     pub has_board: bool,
-    /// Why there are no ports.
+    /// Reason why there are no ports.
     pub trouble: Option<String>,
 }
 
-/// What was received since the host took the last.
+/// Data received since the host last took it.
 #[derive(Default)]
 pub struct Inbox {
     pub pulse: Pulse,
@@ -45,13 +45,13 @@ pub struct Inbox {
     pub parameters: Option<ParametersInForce>,
     pub plan: Option<PlanInForce>,
     pub relayed: Option<Relayed>,
-    /// With when it came.
+    /// The class, with its time of arrival.
     pub class: Option<(Instant, Box<Class>)>,
     pub events: VecDeque<Event>,
     pub rehearsals: VecDeque<Box<Rehearsal>>,
-    /// To this host.
+    /// Replies to this host.
     pub replies: VecDeque<Reply>,
-    /// Commands and volumes that could not be sent, and why.
+    /// Commands and volumes that could not be sent, with the reason.
     pub unsent: VecDeque<(u64, String)>,
     pub records: VecDeque<TickRecord>,
     pub second_state: Option<SecondState>,
@@ -60,7 +60,7 @@ pub struct Inbox {
 }
 
 impl Inbox {
-    /// All of it; the connection stays known.
+    /// Takes all data; the connection's state is kept.
     pub fn take(&mut self) -> Self {
         let pulse = self.pulse.clone();
         std::mem::replace(
@@ -72,7 +72,7 @@ impl Inbox {
         )
     }
 
-    /// Another run of the core: nothing of the last one is of use to anyone.
+    /// Begins another run of the core: all data of the last one is dropped.
     pub fn begin(&mut self, session: Session) {
         self.session = Some(session);
         self.state = None;

@@ -1,37 +1,37 @@
-//! Motions that this host ordered, which go on while it says that it lives.
+//! Motions ordered by this host, which continue while it renews them.
 //!
-//! Tied to the host's own calls of `poll`, not to the thread that receives: that lives on when the host hangs.
+//! Renewal is tied to the host's own calls of `poll`, not to the receiving thread, which would outlive a hung host.
 
 use super::Answer;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::{Event, EventKind, Request, VALID_RANGE_S};
 
-/// Polls from which the host's pauses are known.
+/// Number of polls over which the host's pauses are measured.
 const POLLS: usize = 16;
-/// The third longest pause of those is foreseen: a host that is slow each time keeps its motion, and one that is slow once brakes and
-/// goes on.
+/// Rank of the pause that a promise covers, the third longest: a host that is slow each time keeps its motion, and one
+/// that is slow once brakes and resumes.
 const FORESEEN: usize = 2;
-/// A promise is for so many pauses, and is renewed so often while it lasts.
+/// Length of a promise in pauses, and number of renewals within it.
 const PAUSES: f64 = 1.5;
 const RENEWALS: u32 = 3;
-/// How often a promise is passed on while the program's own lasts, and for how long each time, s.
+/// Interval at which the program's promise is passed on in short ones, s.
 const RENEW_EVERY: Duration = Duration::from_millis(8);
 const LONGEST_RENEWAL_S: f64 = 0.03;
-/// No needle lies deeper than this, m.
+/// Greatest depth of a needle, m.
 const LONGEST_DRAW_M: f64 = 0.5;
 
 /// One motion, from its request on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Ordered {
     command_id: u64,
-    /// The first tick that knows it; the reply says which.
+    /// First tick that knows it, from the reply.
     from_tick: Option<u64>,
-    /// When it has ended for certain, where no state shows its end.
+    /// Time at which it has certainly ended, if no state shows its end.
     until: Option<Instant>,
 }
 
-/// What moves by this host's orders, by the numbers of [`EventKind::MotionGivenUp`]: the needle's hand, the second device's, and needles
-/// that are drawn out.
+/// Motions ordered by this host, by the numbers of [`EventKind::MotionGivenUp`]: the needle's hand, the second
+/// device's, and needles being drawn out.
 #[derive(Default)]
 pub struct Motions {
     ordered: [Option<Ordered>; 3],
@@ -42,7 +42,7 @@ pub struct Motions {
 }
 
 impl Motions {
-    /// Takes a request that was sent. True where it begins a motion.
+    /// Records a request that was sent. True if it begins a motion.
     pub fn sent(&mut self, request: &Request, command_id: u64, now: Instant) -> bool {
         let begun = Ordered {
             command_id,
@@ -70,7 +70,7 @@ impl Motions {
         true
     }
 
-    /// Takes the core's answer to a request.
+    /// Records the core's answer to a request.
     pub fn answered(&mut self, command_id: u64, answer: &Answer) {
         for ordered in &mut self.ordered {
             if let Some(motion) = ordered.as_mut().filter(|motion| motion.command_id == command_id) {
@@ -82,7 +82,7 @@ impl Motions {
         }
     }
 
-    /// Takes what happened: a motion that was given up does not go on.
+    /// Records an event: a motion that was given up does not continue.
     pub fn take(&mut self, event: &Event) {
         if EventKind::from_number(event.kind) == Some(EventKind::MotionGivenUp)
             && let Some(ordered) = self.ordered.get_mut(event.code as usize)
@@ -91,7 +91,7 @@ impl Motions {
         }
     }
 
-    /// Takes the newest states, the needle's and the second device's: tick, and whether the hand is in motion.
+    /// Records the newest states of the needle and the second device: tick, and whether the hand is in motion.
     pub fn seen(&mut self, states: [Option<(u64, bool)>; 2]) {
         for (ordered, state) in self.ordered.iter_mut().zip(states) {
             let has_ended = |motion: &mut Ordered| {
@@ -102,17 +102,17 @@ impl Motions {
         }
     }
 
-    /// The longest pause between the host's last polls.
+    /// Returns the longest pause between the host's recent polls.
     pub fn longest_pause(&self) -> Duration {
         self.pauses.iter().copied().max().unwrap_or_default()
     }
 
-    /// Another run of the core knows nothing of them.
+    /// Forgets all motions: another run of the core does not know them.
     pub fn forget(&mut self) {
         self.ordered = [None; 3];
     }
 
-    /// The host polls. What to promise, where it is time for it.
+    /// Records a poll of the host. Returns the promise to make, if one is due.
     pub fn polled(&mut self, now: Instant) -> Option<f64> {
         if let Some(before) = self.polled.replace(now) {
             self.pauses[self.next_pause % POLLS] = now - before;
@@ -124,7 +124,7 @@ impl Motions {
         (is_time && self.ordered.iter().any(Option::is_some)).then(|| self.renew(now))
     }
 
-    /// A promise now.
+    /// Returns a promise to make now.
     pub fn renew(&mut self, now: Instant) -> f64 {
         self.renewed = Some(now);
         self.valid_s()
@@ -139,8 +139,8 @@ impl Motions {
     }
 }
 
-/// The program's promise, passed on in short ones by the thread that owns the ports: a process that is killed or stopped leaves no long
-/// one behind.
+/// Passes the program's promise on in short ones, from the thread that owns the ports: a killed or suspended process
+/// leaves no long promise behind.
 #[derive(Default)]
 pub struct Renewals {
     /// End of the program's promise.
@@ -149,7 +149,7 @@ pub struct Renewals {
 }
 
 impl Renewals {
-    /// Takes a promise of the program.
+    /// Records a promise of the program.
     pub fn promise(&mut self, until: Instant) {
         (self.until, self.renewed) = (Some(until), None);
     }
@@ -210,7 +210,7 @@ mod tests {
             host
         }
 
-        /// What it promises, with the number of the poll.
+        /// Returns its promises, each with the number of the poll.
         fn polls(&mut self, pauses_ms: &[u64]) -> Vec<(usize, f64)> {
             let mut promises = Vec::new();
             for (poll, &pause_ms) in pauses_ms.iter().enumerate() {
@@ -237,7 +237,7 @@ mod tests {
         }
     }
 
-    /// A window whose frames took 150 ms promised 225, and its hand went on for 8 mm after it was killed.
+    /// A window with frames of 150 ms promised 225 ms, and its hand moved on for 8 mm after it was killed.
     #[test]
     fn a_long_promise_is_passed_on_in_short_ones_and_ends() {
         let (mut renewals, now) = (Renewals::default(), Instant::now());

@@ -1,4 +1,4 @@
-//! A recording in place of a core: a thread puts what the core said into the inbox, each at its time.
+//! Plays a recording like a core: a thread puts its messages into the inbox, each at its time.
 
 use super::inbox::Inbox;
 use super::second;
@@ -10,47 +10,47 @@ use std::time::{Duration, Instant};
 use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
 
 const PASS: Duration = Duration::from_millis(4);
-/// A heartbeat, without which the host would take the core for silent while the recording is held.
+/// Interval of the heartbeat, without which the host would consider the core silent while the recording is paused.
 const BEAT: Duration = Duration::from_millis(20);
 
-/// What the core said at one time.
+/// A recorded message of the core.
 pub enum Piece {
     /// A tick of the force loop.
     Tick(Box<TickRecord>),
-    /// Something happened.
+    /// An event.
     Event(Box<Event>),
     /// A tick of the second device's loop.
     Second(Box<SecondRecord>),
-    /// What ticks do not say of the state.
+    /// Fields of the state that ticks do not hold.
     State(Box<HapticState>),
-    /// The scene from now on.
+    /// Scene from now on.
     Scene(Arc<SceneModel>),
-    /// The plan from now on.
+    /// Plan from now on.
     Plan(Box<PlanInForce>),
-    /// The parameters from now on.
+    /// Parameters from now on.
     Parameters(Box<ParametersInForce>),
-    /// The tissue.
+    /// Snapshot of the tissue.
     Snapshot(Box<Snapshot>),
 }
 
 /// The first run of the core in a recording.
 pub struct Played {
-    /// As the core announced itself, as far as the recording says.
+    /// Announcement of the core, as far as recorded.
     pub session: Session,
-    /// In the order of their times, ns since the first of them.
+    /// Messages in time order, ns since the first.
     pub pieces: Vec<(u64, Piece)>,
     /// Why reading ended before the end of the file, if it did.
     pub cut_off: Option<String>,
 }
 
 impl Played {
-    /// How long it is, ns.
+    /// Duration, ns.
     pub fn length_ns(&self) -> u64 {
         self.pieces.last().map_or(0, |(time_ns, _)| *time_ns)
     }
 }
 
-/// The host's side of a recording that is played.
+/// The host's control of a played recording.
 #[derive(Clone, Default)]
 pub struct Playback {
     held: Arc<AtomicBool>,
@@ -67,37 +67,37 @@ impl Playback {
         }
     }
 
-    /// Holds it, or lets it go on.
+    /// Pauses or resumes.
     pub fn hold(&self, held: bool) {
         // SYNC: read by `Player::pass`; nothing but the flag is carried. So with the flag and the number below.
         self.held.store(held, Ordering::Relaxed);
     }
 
-    /// Begins it again.
+    /// Restarts from the beginning.
     pub fn again(&self) {
         // SYNC: taken by `Player::pass`.
         self.again.store(true, Ordering::Relaxed);
         self.hold(false);
     }
 
-    /// Whether it is held.
+    /// True while paused.
     pub fn is_held(&self) -> bool {
         // SYNC: stored by `hold`.
         self.held.load(Ordering::Relaxed)
     }
 
-    /// How far it is, s.
+    /// Position, s.
     pub fn at_s(&self) -> f64 {
         // SYNC: stored by `Player::pass`.
         self.at_ns.load(Ordering::Relaxed) as f64 * 1e-9
     }
 
-    /// How long it is, s.
+    /// Duration, s.
     pub fn length_s(&self) -> f64 {
         self.length_ns as f64 * 1e-9
     }
 
-    /// Whether all of it was shown.
+    /// True once all of it was shown.
     pub fn has_ended(&self) -> bool {
         // SYNC: stored by `Player::pass`.
         self.at_ns.load(Ordering::Relaxed) >= self.length_ns
@@ -109,7 +109,7 @@ pub struct Player {
     played: Arc<Played>,
     playback: Playback,
     inbox: Arc<Mutex<Inbox>>,
-    /// Rises with each time that it begins: ticks do not go back within a run of the core.
+    /// Increased with each restart: ticks never go back within a run of the core.
     session: Session,
     next: usize,
     state: Option<HapticState>,
@@ -144,7 +144,7 @@ impl Player {
         lock(&self.inbox).begin(self.session);
     }
 
-    /// Puts in what is due, and returns how long to wait.
+    /// Plays the messages that are due, and returns the time to wait.
     pub fn pass(&mut self) -> Duration {
         let now = Instant::now();
         // SYNC: set by `Playback::again`.
@@ -179,7 +179,7 @@ impl Player {
     }
 }
 
-/// A piece as of the run `session_id`; ticks carry the state on.
+/// Plays a message as of the run `session_id`; ticks update the state.
 fn put(
     inbox: &mut Inbox,
     piece: &Piece,
@@ -227,7 +227,7 @@ fn put(
     }
 }
 
-/// What a tick says of the state.
+/// Copies the fields of a tick to the state.
 fn carry(record: &TickRecord, state: &mut HapticState) {
     (state.tick, state.time_ns) = (record.tick, record.due_ns + record.wake_latency_ns);
     (state.phase, state.fault, state.flags) = (record.phase, record.fault, record.flags);

@@ -3,7 +3,7 @@
 use stylet_ports::{self as service, Node, Publisher, ServiceError, SliceSubscriber, Subscriber};
 use stylet_shm_schema::*;
 
-// Ports before the node, so that they go first.
+// Ports precede the node, so that they are dropped first.
 pub struct Ports {
     pub session: Subscriber<Session>,
     pub events: Subscriber<Event>,

@@ -1,4 +1,4 @@
-//! Keeps what belongs to the present run of the core, of what the receiving thread has taken.
+//! Filters received data: keeps what belongs to the present run of the core.
 
 use super::inbox::Inbox;
 use super::*;
@@ -39,7 +39,7 @@ impl<T> PerSession<T> {
     }
 }
 
-/// The newest of everything that the core says.
+/// The newest data of each kind from the core.
 #[derive(Default)]
 pub struct Latest {
     pub session: Option<Session>,
@@ -48,11 +48,11 @@ pub struct Latest {
     pub parameters: PerSession<ParametersInForce>,
     pub plan: PerSession<PlanInForce>,
     pub relayed: Option<Relayed>,
-    /// With when it came.
+    /// The class, with its time of arrival.
     pub class: Option<(Instant, Box<Class>)>,
     pub events: VecDeque<Event>,
     early_events: VecDeque<Event>,
-    /// Numbers that are missing among the events of this run.
+    /// Numbers missing among the events of this run.
     pub events_unseen: u64,
 }
 
@@ -77,7 +77,7 @@ impl Latest {
         }
     }
 
-    /// History may be delivered twice when the ports are made again.
+    /// Adds an event. History may be delivered twice when the ports are recreated.
     pub fn put_event(&mut self, event: Event) {
         let is_current = self.id() == Some(event.session_id);
         let queue = match is_current {
@@ -186,7 +186,7 @@ impl Link {
     }
 }
 
-/// Records behind those that wait. A host that never takes them must not grow.
+/// Appends records in bounded memory, in case a host never takes them.
 fn join<T>(held: &mut VecDeque<T>, new: VecDeque<T>) {
     match held.is_empty() {
         true => *held = new,

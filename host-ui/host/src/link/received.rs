@@ -1,11 +1,11 @@
-//! What a host knows of the core, as types of its own.
+//! A host's view of the core, in its own types.
 
 use std::sync::OnceLock;
 use std::time::Duration;
 use stylet_shm_schema::{Reason, Refusal, RefusalCode, Reply, ReplyStatus, SceneHeader, SnapshotHeader, Vertex, check};
 use stylet_surfaces::bodies::{Bodies, Segmentation};
 
-/// Whether the core runs.
+/// Status of the core.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LinkStatus {
     /// No core has announced itself, or it has been silent for long; `why` says what to do.
@@ -17,27 +17,27 @@ pub enum LinkStatus {
     Live,
     /// The heartbeat has not moved.
     Silent {
-        /// For how long.
+        /// Time since the last heartbeat.
         since: Duration,
     },
 }
 
-/// The rest surface of the scene that runs.
+/// The rest surface of the running scene.
 #[derive(Clone, Debug)]
 pub struct SceneModel {
-    /// Counts, boxes, structures.
+    /// Counts, bounding boxes, structures.
     pub header: SceneHeader,
     /// Vertices at rest, m.
     pub rest_m: Vec<[f32; 3]>,
     /// Vertices of each triangle.
     pub triangles: Vec<[u32; 3]>,
-    /// One for each cell of `header.labels`: 0 outside, else one more than the place among the header's structures.
+    /// One for each cell of `header.labels`: 0 outside, else one more than the index among the header's structures.
     pub labels: Vec<u8>,
     bodies: OnceLock<Bodies>,
 }
 
 impl SceneModel {
-    /// A scene in these parts.
+    /// Builds a scene from these parts.
     pub fn new(header: SceneHeader, rest_m: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, labels: Vec<u8>) -> Self {
         Self {
             header,
@@ -48,12 +48,12 @@ impl SceneModel {
         }
     }
 
-    /// The surfaces as they are drawn, where a call of [`SceneModel::bodies`] has made them.
+    /// Returns the drawn surfaces, if a call of [`SceneModel::bodies`] has made them.
     pub fn bodies_made(&self) -> Option<&Bodies> {
         self.bodies.get()
     }
 
-    /// The surfaces as they are drawn. The first call makes them, which takes too long for a frame.
+    /// Returns the drawn surfaces. The first call makes them, which takes too long for a frame.
     pub fn bodies(&self) -> &Bodies {
         self.bodies.get_or_init(|| {
             Bodies::of(Segmentation {
@@ -65,7 +65,7 @@ impl SceneModel {
         })
     }
 
-    /// As the core sends it behind the header: vertices, triangles, labels of the cells.
+    /// Encodes the words behind the core's header: vertices, triangles, labels of the cells.
     pub fn words(&self) -> Vec<u32> {
         let positions = self.rest_m.iter().flatten().map(|c| c.to_bits());
         let indices = self.triangles.iter().flatten().copied();
@@ -76,7 +76,7 @@ impl SceneModel {
         positions.chain(indices).chain(cells).collect()
     }
 
-    /// The same scene of another run of the core.
+    /// Returns the same scene under another run of the core.
     #[must_use]
     pub fn of_session(&self, session_id: u64) -> Self {
         let header = SceneHeader {
@@ -86,7 +86,7 @@ impl SceneModel {
         Self::new(header, self.rest_m.clone(), self.triangles.clone(), self.labels.clone())
     }
 
-    /// From what the core sends; nothing where it does not hold together.
+    /// Decodes the core's data; `None` if it is inconsistent.
     pub fn of_words(header: &SceneHeader, words: &[u32]) -> Option<Self> {
         check::scene(header, words).ok()?;
         let (positions, rest) = words.split_at(3 * header.vertex_count as usize);
@@ -115,7 +115,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// From its parts; nothing where they do not hold together.
+    /// Builds a snapshot from its parts; `None` if they are inconsistent.
     pub fn of_parts(
         mut header: SnapshotHeader,
         positions_m: Vec<[f32; 3]>,
@@ -133,7 +133,7 @@ impl Snapshot {
         })
     }
 
-    /// From what the core sends; nothing where it does not hold together.
+    /// Decodes the core's data; `None` if it is inconsistent.
     pub(super) fn of_vertices(header: &SnapshotHeader, vertices: &[Vertex]) -> Option<Self> {
         check::snapshot(header, vertices).ok()?;
         let (surface, inside) = vertices.split_at(header.vertex_count as usize);
@@ -146,14 +146,14 @@ impl Snapshot {
     }
 }
 
-/// What the core said to a command or an upload.
+/// The core's answer to a command or an upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Answer {
-    /// Whether it was carried out.
+    /// The request was carried out.
     pub accepted: bool,
-    /// For people.
+    /// Text for people.
     pub text: String,
-    /// For programs; empty when accepted.
+    /// Reasons for programs; empty if accepted.
     pub reasons: Vec<Reason>,
     /// First tick of the force loop that ran with the change.
     pub effective_tick: u64,
@@ -171,7 +171,7 @@ impl From<Refusal> for Answer {
 }
 
 impl Answer {
-    /// From what the core sends; nothing where it does not hold together.
+    /// Decodes the core's data; `None` if it is inconsistent.
     pub(super) fn of_reply(reply: &Reply) -> Option<Self> {
         let status = ReplyStatus::from_number(reply.status)?;
         Some(Self {
@@ -182,7 +182,7 @@ impl Answer {
         })
     }
 
-    /// To a request that never reached the core.
+    /// Answers a request that never reached the core.
     pub(super) fn unsent(why: String) -> Self {
         Self {
             accepted: false,
@@ -192,13 +192,13 @@ impl Answer {
         }
     }
 
-    /// Whether it was refused for this reason.
+    /// True if it was refused for this reason.
     pub fn is_refused_for(&self, code: RefusalCode) -> bool {
         self.reasons.iter().any(|reason| reason.code() == Some(code))
     }
 }
 
-/// Why something could not be sent.
+/// Reason why something could not be sent.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct LinkError(pub String);

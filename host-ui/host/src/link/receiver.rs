@@ -1,7 +1,7 @@
-//! The thread that owns every port of a host: it takes what arrives however slow the host is, and sends what the host asks.
+//! The thread that owns every port of a host: it receives, however slow the host is, and sends the host's requests.
 //!
-//! iceoryx2's ports belong to one thread. The queue of records holds seconds of them ([`RECORD_BUFFER`]), and
-//! this thread looks every two milliseconds.
+//! iceoryx2's ports belong to one thread. The queue of records holds seconds of them ([`RECORD_BUFFER`]), and this
+//! thread polls every two milliseconds.
 
 use super::inbox::Inbox;
 use super::motion::Renewals;
@@ -16,23 +16,23 @@ use stylet_shm_schema::*;
 
 const CLEAN_EVERY: Duration = Duration::from_secs(1);
 const CLEAN_AFTER: Duration = Duration::from_millis(300);
-/// Whether the ports are those of the present epoch.
+/// Interval of the check that the ports belong to the present epoch.
 const LOOK_EVERY: Duration = Duration::from_millis(20);
-/// Ports through which no state or no record has come for so long, while the core says that it lives, are damaged.
+/// Silence of state or records, while the core reports that it lives, after which the ports count as damaged.
 const DEAF_AFTER: Duration = Duration::from_millis(1500);
 const CONNECT_AGAIN_AFTER: Duration = Duration::from_millis(250);
 const OPEN_BOARD_EVERY: Duration = Duration::from_millis(20);
 
-/// What the host asks the core for.
+/// A message of the host to the core.
 pub enum Outgoing {
     Command(Box<Command>),
-    /// What this host moves goes on until then, as long as this process runs.
+    /// This host's motions continue until then, as long as this process runs.
     Promise(Instant),
     Upload(Box<UploadHeader>, Vec<u8>),
     Lease(LeaseOrder),
 }
 
-/// The thread's side: one pass over all ports after the other.
+/// The thread's side: one pass over all ports at a time.
 pub struct Passes {
     // Dropped in this order: handles before the ports, and those before their node.
     board: Option<StateReader>,
@@ -46,13 +46,13 @@ pub struct Passes {
     renewals: Renewals,
     session: Option<Session>,
     tick: u64,
-    /// The newest record: what a bridge that was started anew sends again is older.
+    /// The newest record: a restarted bridge sends older ones again.
     record_tick: u64,
     looked: Option<Instant>,
-    /// When state and records were last seen to go on, or the ports were made.
+    /// When state and records last advanced, or the ports were made.
     heard: [(u64, Instant); 2],
     connect_failed: Option<Instant>,
-    /// Since when ports cannot be made although a core is there.
+    /// Time since which ports cannot be made although a core is running.
     failing: Option<Instant>,
     board_tried: Option<Instant>,
     pub snapshots_every: Duration,
@@ -103,7 +103,7 @@ impl Passes {
         self.connect();
     }
 
-    /// Drops the ports of an epoch that is over, and makes those of the present one.
+    /// Drops the ports of a past epoch, and makes those of the present one.
     fn connect(&mut self) {
         let now = Instant::now();
         let long_ago = |then: Option<Instant>, every| then.is_none_or(|t: Instant| now - t >= every);
@@ -149,7 +149,8 @@ impl Passes {
         lock(&self.inbox).pulse.trouble = trouble;
     }
 
-    /// The owner of the ports cannot see what a host sees: where some of them are damaged, it makes all anew when a host says so.
+    /// Complains about damaged ports. Their owner cannot see damage that a host sees, and recreates all of them on a
+    /// complaint.
     fn complain(&mut self, now: Instant) {
         let Some(ports) = &self.ports else { return };
         for (heard, tick) in self.heard.iter_mut().zip([self.tick, self.record_tick]) {
@@ -173,7 +174,7 @@ impl Passes {
                     continue;
                 }
                 Outgoing::Lease(order) => {
-                    // The list shows what came of it, and goes where there is no relay.
+                    // The class list shows the result, and disappears without a relay.
                     let _ = self.ports.as_ref().map(|ports| ports.lease.send(order));
                     continue;
                 }
@@ -192,7 +193,7 @@ impl Passes {
     fn send_command(&self, command: &Command) -> Result<(), String> {
         let ports = self.ports.as_ref().ok_or("there is no connection to rt-core")?;
         if CommandKind::is_stop(command.kind) {
-            // Both ways: this one passes every flood, the other comes after what was asked for before.
+            // Sent both ways: this one passes every flood, the other keeps its order among earlier requests.
             let _ = ports.stops.send(*command);
         }
         match ports.commands.send(*command) {
@@ -218,7 +219,7 @@ impl Passes {
         }
     }
 
-    /// What has numbers first: of it the queues drop the oldest.
+    /// Receives numbered data first: its queues drop the oldest.
     fn receive(&mut self, ports: &Ports) {
         self.receive_session(ports);
         let snapshot = self.receive_snapshot(ports);
@@ -246,7 +247,7 @@ impl Passes {
                 invalid += 1;
             }
         }
-        // Before the replies: whoever has the reply to a rehearsal has its result.
+        // Before the replies: a host that has the reply to a rehearsal has its result.
         while let Some(rehearsal) = ports.rehearsals.receive() {
             match check::rehearsal(&rehearsal) {
                 Ok(()) if rehearsal.host_id == self.host_id => inbox.put_rehearsal(rehearsal),
@@ -295,7 +296,7 @@ impl Passes {
         let mut newest = None;
         while let Some(session) = ports.session.receive() {
             if session.schema_version == SCHEMA_VERSION && session.period_ns > 0 {
-                // Two publishers, a dead one and its successor, are not received in the order of time.
+                // Messages of two publishers, a dead one and its successor, do not arrive in time order.
                 if newest.is_none_or(|n: Session| n.time_ns <= session.time_ns) {
                     newest = Some(session);
                 }
@@ -307,7 +308,7 @@ impl Passes {
         match &self.session {
             Some(old) if old.session_id == session.session_id => lock(&self.inbox).session = Some(session),
             Some(old) if old.started_ns > session.started_ns => return,
-            // Everything of an earlier run goes before anything of the new one is opened.
+            // Everything of an earlier run is dropped before anything of the new one is opened.
             _ => {
                 (self.board, self.board_tried, self.tick, self.record_tick) = (None, None, 0, 0);
                 self.second.close();
@@ -317,7 +318,7 @@ impl Passes {
         self.session = Some(session);
     }
 
-    /// The newest; inside it nothing where it does not hold together.
+    /// Returns the newest snapshot; the inner `None` marks an inconsistent one.
     fn receive_snapshot(&mut self, ports: &Ports) -> Option<Option<Snapshot>> {
         if self.snapshot_taken.is_some_and(|t| t.elapsed() < self.snapshots_every) {
             return None;
@@ -364,7 +365,7 @@ impl Passes {
         pulse.looked = Some(Instant::now());
     }
 
-    /// Removes what a dead core left: nobody else does it in the background.
+    /// Removes the remains of a dead core: no other process does so in the background.
     fn tidy(&mut self) {
         let silent = self.beat_moved.map_or(ABSENT_AFTER, |t| t.elapsed());
         if silent >= ABSENT_AFTER {
@@ -380,7 +381,7 @@ impl Passes {
     }
 }
 
-/// With the run that each belongs to; nothing for one that does not hold together.
+/// Returns each scene with its run; `None` for an inconsistent one.
 fn receive_scene(ports: &Ports) -> Vec<Option<(u64, Arc<SceneModel>)>> {
     let mut scenes = Vec::new();
     while let Some(sample) = ports.scene.receive() {

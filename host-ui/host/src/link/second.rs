@@ -1,4 +1,4 @@
-//! The second device, as the receiving thread takes it: only in a run that has one.
+//! The receiving thread's side of the second device, in a run that has one.
 
 use super::inbox::Inbox;
 use std::time::{Duration, Instant};
@@ -13,22 +13,22 @@ pub struct SecondEnds {
     board: Option<StateReader<SecondState>>,
     records: Option<SliceSubscriber<SecondRecord, u64>>,
     tried: Option<Instant>,
-    /// The newest tick: what a bridge that was started anew sends again is older.
+    /// The newest tick: a restarted bridge sends older ones again.
     tick: u64,
 }
 
 impl SecondEnds {
-    /// Of another run, or none.
+    /// Closes for another run, or none.
     pub fn close(&mut self) {
         *self = Self::default();
     }
 
-    /// Of another epoch of the same run.
+    /// Closes the ports for another epoch of the same run.
     pub fn close_ports(&mut self) {
         (self.board, self.records, self.tried) = (None, None, None);
     }
 
-    /// Opens what the run of `session` has.
+    /// Opens the services of the run of `session`.
     pub fn open(&mut self, node: &Node, session: &Session) {
         let is_whole = self.board.is_some() && self.records.is_some();
         if !session.has_second() || is_whole || self.tried.is_some_and(|t| t.elapsed() < OPEN_EVERY) {
@@ -42,7 +42,7 @@ impl SecondEnds {
         self.board = StateReader::open(node, session.session_id).ok();
     }
 
-    /// Takes what has arrived; how much of it was invalid.
+    /// Takes all arrived data; returns how many messages were invalid.
     pub fn receive(&mut self, session_id: u64, inbox: &mut Inbox) -> u64 {
         let mut invalid = 0;
         while let Some(batch) = self.records.as_ref().and_then(SliceSubscriber::receive) {
@@ -67,7 +67,7 @@ impl SecondEnds {
     }
 }
 
-/// What a tick says of the state; the rest is as it was, or zero.
+/// Copies the fields of a tick to the state; the rest stays unchanged, or zero.
 pub fn carry(record: &SecondRecord, before: Option<&SecondState>) -> SecondState {
     let mut state = before.copied().unwrap_or(bytemuck::Zeroable::zeroed());
     (state.tick, state.time_ns) = (record.tick, record.due_ns + record.wake_latency_ns);

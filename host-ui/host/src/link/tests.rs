@@ -5,7 +5,7 @@ use bytemuck::Zeroable;
 use std::time::Instant;
 use stylet_ports::{self as service, Meeting, StateWriter};
 
-/// A name that leaves nothing in shared memory; to be dropped last.
+/// A name whose shared memory is removed at the end; drop it last.
 struct Swept(Instance);
 
 impl std::ops::Deref for Swept {
@@ -25,7 +25,7 @@ fn instance(name: &str) -> Swept {
     Swept(Instance::new(&format!("{name}-{}", std::process::id())).unwrap())
 }
 
-/// Polls as a frame would until it holds.
+/// Polls like a frame until the condition holds.
 fn until(link: &mut Link, mut holds: impl FnMut(&mut Link) -> bool) -> bool {
     let begun = Instant::now();
     while begun.elapsed() < Duration::from_secs(20) {
@@ -38,14 +38,14 @@ fn until(link: &mut Link, mut holds: impl FnMut(&mut Link) -> bool) -> bool {
     false
 }
 
-/// A core's place, with every service that a host joins.
+/// A core's meeting point, with every service that a host joins.
 fn core(instance: &Instance) -> Meeting {
     let core = Meeting::new(instance).unwrap();
     core.open().unwrap();
     core
 }
 
-/// Has made its ports: what is sent from now on reaches it.
+/// Returns a link with open ports: everything sent from now on reaches it.
 fn connected(core: &Meeting) -> Link {
     let sessions = service::session::watch(&core.node).unwrap();
     let stops = service::stops::watch(&core.node).unwrap();
@@ -92,7 +92,7 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
             effective_tick: 1,
             set: ParameterSet::default(),
         };
-        // Before the announcement: the link keeps it.
+        // Sent before the announcement: the link keeps it.
         parameters.send(in_force).unwrap();
         std::thread::sleep(Duration::from_millis(20));
         link.poll();
@@ -111,7 +111,7 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
     }
 }
 
-/// A bridge that fails is started anew, with ports of its own, and sends again what hosts may have missed.
+/// A failed bridge is restarted with new ports, and resends what hosts may have missed.
 #[test]
 fn a_host_moves_to_new_ports_of_the_same_run_without_a_gap_or_a_record_twice() {
     let instance = instance("epoch");
@@ -131,7 +131,7 @@ fn a_host_moves_to_new_ports_of_the_same_run_without_a_gap_or_a_record_twice() {
             records.send(&5, &[record]).unwrap();
         };
         if from > 1 {
-            // Before any host is there.
+            // Before any host exists.
             (from..=to).for_each(send);
         }
         let connect = || {
@@ -242,7 +242,7 @@ fn sends_records(core: &Meeting, session_id: u64, batches: u64, every: Duration)
     std::thread::sleep(Duration::from_millis(50));
     for batch in 0..batches {
         if batch % 100 == 0 {
-            // The heartbeat: without it the host would make its ports again.
+            // The heartbeat: without it the host would recreate its ports.
             sessions.send(announce(session_id, 2 + batch)).unwrap();
         }
         let two = [1, 2].map(|n| TickRecord {
@@ -255,7 +255,7 @@ fn sends_records(core: &Meeting, session_id: u64, batches: u64, every: Duration)
     }
 }
 
-/// The window took records in its frame: whatever came in the time of 64 batches, 0.13 s, before it was lost without a word.
+/// The window took records in its frame: all but the last 64 batches, 0.13 s, were lost without notice.
 #[test]
 fn a_frame_of_three_seconds_loses_no_record() {
     let instance = instance("slow");
@@ -276,7 +276,7 @@ fn a_frame_of_three_seconds_loses_no_record() {
     assert!(ticks.iter().zip(1..).all(|(&tick, n)| tick == n));
 }
 
-/// Gaps in the numbers of the events were not looked at.
+/// Gaps in the numbers of the events were ignored.
 #[test]
 fn events_that_were_not_seen_are_counted_and_those_before_this_host_are_not() {
     let mut latest = Latest::default();
@@ -298,7 +298,7 @@ fn a_request_that_cannot_be_sent_is_answered() {
     let sessions = service::session::publisher(node).unwrap();
     sessions.send(announce(3, 1)).unwrap();
     assert!(until(&mut link, |link| link.status() == LinkStatus::Live));
-    // Nobody takes commands.
+    // No port takes commands.
     let id = link.send(&Request::Engage).unwrap();
     let mut answer = None;
     assert!(until(&mut link, |link| {

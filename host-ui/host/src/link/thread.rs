@@ -10,7 +10,7 @@ use std::time::Duration;
 use stylet_shm_schema::Instance;
 
 const PASS: Duration = Duration::from_millis(2);
-/// What the host may ask for ahead of the thread that sends it.
+/// Most messages of the host queued for the sending thread.
 const OUTGOING: usize = 64;
 
 /// The host's side of the thread; dropping it ends the thread and closes the ports.
@@ -38,7 +38,7 @@ impl Receiver {
         Self::with_thread("link", inbox, outgoing, make)
     }
 
-    /// Plays a recording; requests go nowhere.
+    /// Plays a recording; requests are ignored.
     pub fn play(played: Arc<Played>, playback: Playback) -> Self {
         let inbox = Arc::new(Mutex::new(Inbox::default()));
         let (outgoing, _) = mpsc::sync_channel(OUTGOING);
@@ -46,7 +46,7 @@ impl Receiver {
         Self::with_thread("player", inbox, outgoing, move || move || player.pass())
     }
 
-    /// The thread calls what `make` makes again and again, and waits in between for as long as it says.
+    /// Starts a thread that calls the function made by `make` repeatedly, waiting in between for the returned time.
     fn with_thread<P: FnMut() -> Duration>(
         name: &str,
         inbox: Arc<Mutex<Inbox>>,
@@ -74,17 +74,17 @@ impl Receiver {
         }
     }
 
-    /// Everything since the last call.
+    /// Takes everything received since the last call.
     pub fn take(&self) -> Inbox {
         lock(&self.inbox).take()
     }
 
-    /// What is known of the connection now, without taking anything.
+    /// Returns the present state of the connection, without taking data.
     pub fn pulse(&self) -> Pulse {
         lock(&self.inbox).pulse.clone()
     }
 
-    /// False when more waits than may.
+    /// Queues a message; false if the queue is full.
     pub fn send(&self, outgoing: Outgoing) -> bool {
         let accepted = self.outgoing.try_send(outgoing).is_ok();
         if let Some(thread) = &self.thread {
@@ -106,7 +106,7 @@ impl Drop for Receiver {
     }
 }
 
-/// What is held behind the lock is whole after each statement.
+/// The data behind the lock is consistent after each statement.
 pub(super) fn lock(inbox: &Mutex<Inbox>) -> MutexGuard<'_, Inbox> {
     inbox.lock().unwrap_or_else(PoisonError::into_inner)
 }

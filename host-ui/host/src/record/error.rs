@@ -1,10 +1,10 @@
-//! Why a session cannot be recorded, or a recording not be used.
+//! Errors of recording a session and of using a recording.
 
 use crate::link::LinkError;
 use std::path::{Path, PathBuf};
 use stylet_base::WriteError;
 
-/// Why a session cannot be recorded, or a recording not be used; each text says what to do where something can be done.
+/// Failure to record a session or to use a recording; each text says what to do if there is a remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// No core was found, or it does not answer; the text says what to do.
@@ -19,13 +19,13 @@ pub enum RecordError {
     /// The core did not do what it accepted.
     #[error("the core did not write its flight recording in time")]
     NoFlight,
-    /// The signals that end a recording cannot be caught.
+    /// The signals that end a recording cannot be handled.
     #[error("{0}")]
     Signals(String),
     /// No thread could be started.
     #[error("no thread could be started to write: {0}")]
     NoThread(std::io::Error),
-    /// The thread that writes failed by itself.
+    /// The writer thread panicked.
     #[error("the recording ended by itself")]
     Panicked,
     /// The recording lacks ticks or events.
@@ -34,13 +34,13 @@ pub enum RecordError {
          The file says which; a faster disk, or fewer programs beside this one, lose none"
     )]
     Missing {
-        /// Ticks that are missing.
+        /// Missing ticks.
         ticks: u64,
-        /// Gaps that they are missing in.
+        /// Gaps in the ticks.
         gaps: usize,
         /// Ticks that never left the core.
         in_core: u64,
-        /// Events that are missing.
+        /// Missing events.
         events: u64,
     },
     /// A file cannot be created, read or written; the text says why.
@@ -48,7 +48,7 @@ pub enum RecordError {
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Problem with the file.
         why: String,
     },
     /// The program that serves viewers cannot be used; the text says why.
@@ -59,7 +59,7 @@ pub enum RecordError {
     Write(#[from] WriteError),
 }
 
-/// Why the bytes of a recording cannot be shown; the text follows the name of the file.
+/// Reason why the bytes of a recording cannot be shown; the text follows the name of the file.
 #[derive(Debug, thiserror::Error)]
 pub enum ShowError {
     /// Another kind of file.
@@ -68,13 +68,13 @@ pub enum ShowError {
     /// An earlier version recorded it.
     #[error("it holds no scene: an earlier version recorded it; record it again to look at it")]
     NoScene,
-    /// Nothing of use stands before the place at which reading ended.
+    /// Nothing usable precedes the damage.
     #[error("{0}")]
     Damaged(String),
 }
 
 impl RecordError {
-    /// An error about a file, which it names.
+    /// Returns an error about a file, which it names.
     pub(super) fn of_file(path: &Path, why: impl ToString) -> Self {
         Self::File {
             path: path.to_owned(),

@@ -1,4 +1,4 @@
-//! What can be made of a recording: a table, and a motion for the core's replay device.
+//! Exports of a recording: a table, and a motion for the core's replay device.
 
 use super::error::RecordError;
 use super::read::read;
@@ -12,7 +12,7 @@ use stylet_shm_schema::motion::{Motion, MotionSample};
 /// The period of the force loop's ideal grid.
 const PERIOD_NS: u64 = 1_000_000;
 
-/// What to export from a recording.
+/// Export settings.
 pub struct Export {
     /// The recording, MCAP.
     pub recording: PathBuf,
@@ -26,7 +26,7 @@ pub struct Export {
     pub motion_2: Option<PathBuf>,
 }
 
-/// Writes what was asked for, and prints what the recording holds.
+/// Writes the requested exports, and prints the contents of the recording.
 pub fn export(options: &Export) -> Result<(), RecordError> {
     let recording = read(&options.recording)?;
     println!(
@@ -170,8 +170,9 @@ fn csv(ticks: &[TickRecord], file: &mut impl Write) -> std::io::Result<()> {
     table.flush()
 }
 
-/// A hand's motion in the first session, on the grid of the force loop, from the session, the due time and the sample of each tick; and
-/// how many samples had to be held, because the loop missed a deadline or the recording a tick.
+/// Returns a hand's motion in the first session, on the grid of the force loop, from the session, due time and sample
+/// of each tick; and the number of samples that were held because the loop missed a deadline or the recording lacks a
+/// tick.
 fn motion(ticks: impl Iterator<Item = (u64, u64, MotionSample)>) -> (Motion, usize) {
     let mut motion = Motion {
         period_ns: PERIOD_NS,

@@ -1,15 +1,15 @@
-//! Which numbers of a session never arrived: ticks or events.
+//! Gaps in the ticks or events of a session.
 
 use std::collections::BTreeSet;
 
-/// Ticks, or events, that are missing in a row.
+/// Consecutive missing ticks or events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
     /// The run of the core.
     pub session_id: u64,
-    /// The first that is missing.
+    /// First missing number.
     pub tick: u64,
-    /// Ticks that are missing.
+    /// Number missing.
     pub missing: u64,
 }
 
@@ -20,7 +20,7 @@ impl std::fmt::Display for Gap {
     }
 }
 
-/// Counts the ticks, or events, that arrive and those that are missing.
+/// Counts received and missing ticks, or events.
 #[derive(Clone, Debug, Default)]
 pub struct Gaps {
     records: u64,
@@ -31,7 +31,7 @@ pub struct Gaps {
 }
 
 impl Gaps {
-    /// One record; false when its tick came before.
+    /// Counts one record; false if its tick came before.
     pub fn record(&mut self, session_id: u64, tick: u64) -> bool {
         self.sessions.insert(session_id);
         if let Some((session, next)) = self.next
@@ -54,12 +54,12 @@ impl Gaps {
         true
     }
 
-    /// Ticks that arrived.
+    /// Ticks received.
     pub fn records(&self) -> u64 {
         self.records
     }
 
-    /// Ticks that arrived more than once.
+    /// Ticks received more than once.
     pub fn repeated(&self) -> u64 {
         self.repeated
     }
@@ -69,12 +69,12 @@ impl Gaps {
         self.sessions.len()
     }
 
-    /// The gaps, in their order.
+    /// Gaps in order.
     pub fn gaps(&self) -> &[Gap] {
         &self.gaps
     }
 
-    /// Ticks that are missing in all gaps.
+    /// Missing ticks in all gaps.
     pub fn missing(&self) -> u64 {
         self.gaps.iter().map(|g| g.missing).sum()
     }

@@ -1,6 +1,7 @@
-//! A session for viewers while it runs: the messages of a recording, given to the program `stylet-live`, which serves them.
+//! Streams a running session to viewers: the messages of a recording, given to the program `stylet-live`, which serves
+//! them.
 //!
-//! That program is built by `make live` alone: the crates that it serves with are no part of the workspace.
+//! That program is built by `make live` alone: its server crates are not part of the workspace.
 
 use super::error::RecordError;
 use super::writer::{self, Item, Totals};
@@ -10,13 +11,13 @@ use std::sync::mpsc;
 
 const PROGRAM: &str = "stylet-live";
 
-/// The program that serves, ended with this.
+/// The serving program, ended when this is dropped.
 pub struct Server {
     child: Child,
     messages: Option<ChildStdin>,
 }
 
-/// Starts it; it says itself where it listens.
+/// Starts the program, which prints its own address.
 pub fn start(address: &str) -> Result<Server, RecordError> {
     let mut child = Command::new(beside())
         .args(["--listen", address])
@@ -31,7 +32,7 @@ pub fn start(address: &str) -> Result<Server, RecordError> {
     Ok(Server { child, messages })
 }
 
-/// Beside this program, or wherever the shell finds it.
+/// Returns the program's path: in this program's folder, or found by the shell.
 fn beside() -> PathBuf {
     let here = std::env::current_exe().ok();
     let here = here.and_then(|here| here.parent().map(|folder| folder.join(PROGRAM)));
@@ -40,7 +41,7 @@ fn beside() -> PathBuf {
 }
 
 impl Server {
-    /// Until nobody sends any more.
+    /// Sends until all senders are gone.
     pub fn send(mut self, from: &mpsc::Receiver<Item>) -> Result<Totals, RecordError> {
         match self.messages.take() {
             Some(messages) => writer::send_all(messages, from),
@@ -51,7 +52,7 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
-        // Its input is closed, at which it ends.
+        // Closes its input, at which it ends.
         self.messages = None;
         let _ = self.child.wait();
     }

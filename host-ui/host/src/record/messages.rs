@@ -1,7 +1,7 @@
-//! What stands in a recording: JSON messages, each kind with its JSON schema, so that any viewer of MCAP opens them.
+//! Messages of a recording: JSON, each kind with its JSON schema, so that any viewer of MCAP opens them.
 //!
-//! JSON and not a binary form: 1 kHz of it costs one core a few per cent, zstd takes most of its size back (figures in
-//! CHANGELOG), and every reader has a parser. Numbers are written so that they read back to the same bits.
+//! JSON rather than a binary form: 1 kHz of it costs one core a few per cent, zstd recovers most of its size (figures
+//! in CHANGELOG), and every reader has a parser. Numbers are written so that they read back to the same bits.
 
 use super::{scene, setting};
 use crate::link::Snapshot;
@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use stylet_shm_schema::{Event, EventKind, LeftNeedlePose, SeedPose, SnapshotHeader, Text, Vertex};
 
-/// Where each kind of message goes, and the name and text of its schema.
+/// Channel of a kind of message, with the name and text of its schema.
 pub struct Channel {
     pub topic: &'static str,
     pub schema: &'static str,
@@ -31,7 +31,7 @@ pub const TISSUE: Channel = Channel {
     schema: "stylet.Tissue",
     text: tissue_schema,
 };
-/// The well-known schema of this name: viewers draw it.
+/// The well-known schema of this name, which viewers can draw.
 pub const GLAND: Channel = Channel {
     topic: "/stylet/gland",
     schema: "foxglove.PointCloud",
@@ -115,7 +115,7 @@ pub fn event(e: &Event) -> Value {
     })
 }
 
-/// Reads an event; `None` for bytes that are none.
+/// Reads an event; `None` for invalid bytes.
 pub fn event_of(data: &[u8]) -> Option<Event> {
     let e: NamedEvent = serde_json::from_slice(data).ok()?;
     let kind = (1..64)
@@ -156,7 +156,7 @@ fn tissue_schema() -> Value {
     )
 }
 
-/// A [`SnapshotHeader`], as far as viewers need it.
+/// The fields of a [`SnapshotHeader`] that viewers need.
 #[derive(Serialize, Deserialize)]
 struct Tissue {
     session_id: u64,
@@ -171,7 +171,7 @@ struct Tissue {
     max_displacement_m: f64,
     work_ns: u64,
     seeds: Vec<SeedPose>,
-    // Recordings of earlier versions lack what follows.
+    // Absent from recordings of earlier versions.
     #[serde(default)]
     needles_left_in: Vec<LeftNeedlePose>,
     #[serde(default)]
@@ -204,7 +204,7 @@ pub fn tissue(snapshot: &Snapshot) -> Value {
     })
 }
 
-/// Returns the header of a snapshot, as far as [`tissue`] keeps it.
+/// Returns the header of a snapshot, with the fields that [`tissue`] keeps.
 pub fn tissue_of(data: &[u8]) -> Option<SnapshotHeader> {
     let t: Tissue = serde_json::from_slice(data).ok()?;
     let mut header = SnapshotHeader {
@@ -229,7 +229,7 @@ pub fn tissue_of(data: &[u8]) -> Option<SnapshotHeader> {
     Some(header)
 }
 
-/// Copies what there is room for, and returns how many that are.
+/// Copies as many as fit, and returns their number.
 fn fill<T: Copy>(room: &mut [T], from: &[T]) -> u32 {
     let count = room.len().min(from.len());
     room[..count].copy_from_slice(&from[..count]);

@@ -1,9 +1,9 @@
-//! A session on disk: every record of the force loop, the tissue's snapshots and what happened, in MCAP; and what can be
-//! made of such a file.
+//! Records a session in MCAP: every record of the force loop, the tissue's snapshots, and events. Also exports such
+//! files.
 //!
-//! The link's thread takes what arrives in shared memory, another encodes and writes it. A disk may be slow for five minutes
-//! before a tick is lost (72 MB, `link`), and a program that is stopped altogether for 12 s (`service::RECORD_BUFFER`). What
-//! is lost all the same is counted and listed, for each kind of message.
+//! The link's thread takes what arrives in shared memory, another encodes and writes it. A disk may stall for five
+//! minutes before a tick is lost (72 MB, `link`), and a suspended program for 12 s (`service::RECORD_BUFFER`). Any loss
+//! is counted and listed for each kind of message.
 
 mod error;
 mod export;
@@ -35,15 +35,15 @@ use writer::{Item, Totals};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 const FIND_LIMIT: Duration = Duration::from_secs(3);
-/// A core that somebody starts at the same time is there by then.
+/// Time for a core that is being started at the same time to appear.
 const APPEAR_LIMIT: Duration = Duration::from_secs(1);
-/// What is handed to the writer ahead of it, beyond which the link's memory is used.
+/// Most items queued for the writer; beyond that the link's memory is used.
 const ITEMS_AHEAD: usize = 32;
-/// Two snapshots that are kept and are farther apart than they should be by this have a gap between them, s.
+/// Delay between two kept snapshots, beyond the expected interval, that counts as a gap, s.
 const SNAPSHOT_LATE_S: f64 = 0.1;
 const PRINT_EVERY: Duration = Duration::from_secs(10);
 
-/// Where a session goes.
+/// Destination of a session.
 pub enum To {
     /// Into a file, MCAP.
     File(PathBuf),
@@ -51,19 +51,19 @@ pub enum To {
     Viewers(String),
 }
 
-/// What to record.
+/// Recording settings.
 pub struct Options {
-    /// Which core.
+    /// Instance of the core.
     pub instance: Instance,
-    /// Where it goes.
+    /// Destination.
     pub to: To,
-    /// Until interrupted, or until the core ends, when not given.
+    /// Duration; if `None`, until interrupted or until the core ends.
     pub duration: Option<Duration>,
-    /// Snapshots of the gland kept in a second; 0 for none.
+    /// Snapshots of the gland kept per second; 0 for none.
     pub snapshots_hz: f64,
 }
 
-/// Records until the time is over or it is interrupted; an error when a tick was lost on the way.
+/// Records until the time is up or it is interrupted; fails if a tick was lost on the way.
 pub fn run(options: &Options) -> Result<(), RecordError> {
     let interrupted = Interrupt::on_signals().map_err(|e| RecordError::Signals(e.to_string()))?;
     let stop = || interrupted.asked();
@@ -96,7 +96,7 @@ fn find_core(link: &mut Link, stop: impl Fn() -> bool) -> Result<(), RecordError
     while begun.elapsed() < FIND_LIMIT && !stop() {
         link.poll();
         if link.status() == LinkStatus::Live && link.scene().is_some() {
-            // Records from before the recording began are not part of it.
+            // Records from before the start are not part of the recording.
             link.take_records();
             link.take_second_records();
             return Ok(());
@@ -114,22 +114,22 @@ fn find_core(link: &mut Link, stop: impl Fn() -> bool) -> Result<(), RecordError
     }
 }
 
-/// What was last handed to the writer.
+/// State of the data handed to the writer.
 #[derive(Default)]
 struct Handed {
     session: Option<u64>,
     event: u64,
     tissue_tick: u64,
     snapshot_ns: u64,
-    /// When the next snapshot is to be kept.
+    /// Due time of the next snapshot.
     due_ns: u64,
-    /// What the core had lost when the recording began.
+    /// Records lost in the core before the recording began.
     lost_before: Option<u64>,
     /// Generations of scene, plan and parameters.
     settings: [Option<u64>; 3],
 }
 
-/// Takes what arrives and hands it to the writer; while that is behind, the link keeps what arrives.
+/// Takes arriving data and hands it to the writer; while the writer lags, the link keeps the data.
 fn take(link: &mut Link, options: &Options, stop: impl Fn() -> bool, to: &mpsc::SyncSender<Item>) {
     let begun = Instant::now();
     let mut printed = begun;
@@ -163,7 +163,7 @@ impl Handed {
     fn collect(&mut self, link: &mut Link, snapshots_hz: f64, items: &mut Vec<Item>) {
         if let Some(session) = link.session().filter(|s| self.session != Some(s.session_id)) {
             self.session = Some(session.session_id);
-            // A run that begins while it is recorded had lost nothing.
+            // A run that begins during the recording had lost nothing.
             let lost_before = link.state().map_or(0, |s| s.records_lost);
             self.lost_before = Some(self.lost_before.map_or(lost_before, |_| 0));
             (self.event, self.tissue_tick, self.snapshot_ns, self.due_ns) = (0, 0, 0, 0);
@@ -189,7 +189,7 @@ impl Handed {
             if snapshots_hz > 0.0 && now_ns >= self.due_ns {
                 let since_s = now_ns.saturating_sub(self.snapshot_ns) as f64 * 1e-9;
                 let period_ns = (1e9 / snapshots_hz) as u64;
-                // From when it was due, so that the rate is that asked for whatever the core's is.
+                // Counted from the due time, so that the rate is the requested one whatever the core's is.
                 self.due_ns = (self.due_ns + period_ns).max(now_ns + period_ns / 2);
                 let late = self.snapshot_ns > 0 && since_s > 2.0 / snapshots_hz + SNAPSHOT_LATE_S;
                 items.extend(late.then_some(Item::SnapshotsMissing(since_s)));
@@ -208,7 +208,7 @@ impl Handed {
 }
 
 impl Handed {
-    /// Scene, plan and parameters where they have changed.
+    /// Adds scene, plan and parameters that have changed.
     fn collect_settings(&mut self, link: &Link, items: &mut Vec<Item>) {
         let [scene, plan, parameters] = &mut self.settings;
         let is_new = |last: &mut Option<u64>, generation: u64| last.replace(generation) != Some(generation);
@@ -224,7 +224,7 @@ impl Handed {
     }
 }
 
-/// Asks the core to write its flight recording; the core's message about it.
+/// Asks the core to write its flight recording; returns the core's message about it.
 pub fn save_flight(instance: &Instance) -> Result<String, RecordError> {
     let mut link = Link::new(instance.clone());
     find_core(&mut link, || false)?;

@@ -1,4 +1,4 @@
-//! A recording read for a window: what the core said, each with its time.
+//! Reads a recording for a window: the core's messages, each with its time.
 
 use super::error::{RecordError, ShowError};
 use super::messages::{EVENT, GLAND, TICK, TISSUE, event_of, gland_of, tissue_of};
@@ -12,7 +12,7 @@ use std::sync::Arc;
 use stylet_base::interrupt::Interrupt;
 use stylet_shm_schema::{SecondRecord, Session, SnapshotHeader, TickRecord, check};
 
-/// Longer recordings are shown up to here.
+/// Longest recording shown in full.
 const MOST_BYTES: usize = 1 << 30;
 
 /// Reads a recording of `host-ui record` for a window; refuses one without a scene.
@@ -22,7 +22,7 @@ pub fn played(path: &Path, interrupt: &Interrupt) -> Result<Played, RecordError>
     played_of(&bytes, interrupt).map_err(|why| invalid(why.to_string()))
 }
 
-/// As [`played`], of the bytes of a file; the text of an error follows the name of the file.
+/// As [`played`], for the bytes of a file; the text of an error follows the name of the file.
 pub fn played_of(bytes: &[u8], interrupt: &Interrupt) -> Result<Played, ShowError> {
     let mut reader = Reader::default();
     let cut_off = stream::each(bytes, |topic, time_ns, data| match interrupt.asked() {
@@ -43,7 +43,7 @@ struct Reader {
 }
 
 impl Reader {
-    /// A message that is not known is left out; the error says why nothing more is read.
+    /// Takes a message, skipping unknown ones; the error says why reading ends.
     fn take(&mut self, topic: &str, time_ns: u64, data: &[u8]) -> Result<(), String> {
         self.bytes += data.len();
         if self.bytes > MOST_BYTES {
@@ -68,7 +68,7 @@ impl Reader {
             }
             t if t == EVENT.topic => match event_of(data).filter(|e| e.session_id == session_id) {
                 Some(event) => Piece::Event(Box::new(event)),
-                // Another version may know more kinds.
+                // Another version may have more kinds.
                 None => return Ok(()),
             },
             t if t == SECOND.topic => {
@@ -123,7 +123,7 @@ impl Reader {
         let Some(session) = self.session.filter(|_| self.has_scene) else {
             return Err(cut_off.map_or(ShowError::NoScene, ShowError::Damaged));
         };
-        // The thread that takes what arrives has states and snapshots a moment later than ticks.
+        // The receiving thread takes states and snapshots slightly later than ticks.
         self.pieces.sort_by_key(|(time_ns, _)| *time_ns);
         let first_ns = self.pieces.iter().find(|(_, piece)| matches!(piece, Piece::Tick(_)));
         let first_ns = first_ns.map_or(0, |(time_ns, _)| *time_ns);

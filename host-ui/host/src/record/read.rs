@@ -1,4 +1,4 @@
-//! A recording read again, as far as an export needs it.
+//! Reads a recording for an export.
 
 use super::error::RecordError;
 use super::gaps::Gaps;
@@ -12,11 +12,11 @@ use stylet_shm_schema::{SecondRecord, TickRecord};
 pub struct Recording {
     /// The ticks, without repetitions.
     pub ticks: Vec<TickRecord>,
-    /// Those of the second device.
+    /// Ticks of the second device.
     pub second: Vec<SecondRecord>,
-    /// Which ticks are missing.
+    /// Missing ticks.
     pub gaps: Gaps,
-    /// Why reading ended before the end of the file, if it did: a recording that was cut off is still of use.
+    /// Why reading ended before the end of the file, if it did: a truncated recording is still usable.
     pub cut_off: Option<String>,
 }
 

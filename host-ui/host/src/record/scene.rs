@@ -1,4 +1,4 @@
-//! The scene in a recording, and how its tissue is displaced.
+//! The scene in a recording, and the displacements of its tissue.
 
 use super::messages::Channel;
 use super::setting::schema;
@@ -70,7 +70,7 @@ struct Scene {
     nodes: Grid,
     name: String,
     structures: Vec<Structure>,
-    /// Words as they follow a `SceneHeader`, little-endian, base64.
+    /// Words that follow a `SceneHeader`, little-endian, base64.
     words: String,
 }
 
@@ -133,7 +133,7 @@ pub fn scene(model: &SceneModel) -> Value {
     serde_json::to_value(scene).unwrap_or_default()
 }
 
-/// `None` for what does not hold together.
+/// Decodes a scene; `None` if it is inconsistent.
 pub fn scene_of(data: &[u8], session_id: u64) -> Option<SceneModel> {
     let s: Scene = serde_json::from_slice(data).ok()?;
     let mut header = SceneHeader {
@@ -182,7 +182,7 @@ pub fn scene_of(data: &[u8], session_id: u64) -> Option<SceneModel> {
     SceneModel::of_words(&header, &words.collect::<Vec<_>>())
 }
 
-/// Places as three `f32` each, little-endian, base64.
+/// Encodes positions as three `f32` each, little-endian, base64.
 fn places(places_m: &[[f32; 3]]) -> String {
     let bytes: Vec<u8> = places_m.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
     STANDARD.encode(bytes)
@@ -198,7 +198,7 @@ pub fn places_of(text: &str) -> Option<Vec<[f32; 3]>> {
 #[derive(Serialize, Deserialize)]
 struct Field {
     scene_generation: u64,
-    /// m, base64.
+    /// Displacements in m, base64.
     displacements: String,
 }
 
@@ -210,7 +210,7 @@ pub fn field(snapshot: &Snapshot) -> Value {
     serde_json::to_value(field).unwrap_or_default()
 }
 
-/// Generation of the scene, and the displacements.
+/// Returns the generation of the scene, and the displacements.
 pub fn field_of(data: &[u8]) -> Option<(u64, Vec<[f32; 3]>)> {
     let field: Field = serde_json::from_slice(data).ok()?;
     Some((field.scene_generation, places_of(&field.displacements)?))

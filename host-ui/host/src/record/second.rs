@@ -1,4 +1,4 @@
-//! The second device in a recording: its ticks as messages, and what an export makes of them.
+//! The second device in a recording: its ticks as messages, and their export.
 
 use super::messages::{Channel, object, vector, whole};
 use serde_json::{Value, json};

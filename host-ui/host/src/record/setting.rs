@@ -1,6 +1,7 @@
-//! What a recording holds beside ticks, so that a window can show it: run, plan, parameters and states.
+//! Setting of a recording, needed to show it in a window: run, plan, parameters and states.
 //!
-//! Fields have names, so that a recording outlives the layout of shared memory; what a later build does not find has its default.
+//! Fields are named, so that a recording outlives the layout of shared memory; a field unknown to the file takes its
+//! default.
 
 use super::messages::Channel;
 use bytemuck::Zeroable;

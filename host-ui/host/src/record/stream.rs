@@ -1,17 +1,17 @@
-//! The messages of an MCAP file, whatever its bytes are.
+//! Reads the messages of an MCAP file, whatever its bytes.
 
 use super::error::ShowError;
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::collections::BTreeMap;
 
-/// Neither a record nor a chunk of ours is larger, packed or not: a damaged length must not ask for more memory than there is.
+/// Longer than any record or chunk of ours, packed or not: a damaged length must not request more memory than there is.
 const LONGEST_RECORD_BYTES: usize = 64 << 20;
 
-/// Hands on topic, time and bytes of each message. Gives why reading ended before the end of the file, if it did.
+/// Passes on topic, time and bytes of each message. Returns why reading ended before the end of the file, if it did.
 ///
 /// # Errors
-/// Where the file is no MCAP file, with the reason.
+/// If the file is not MCAP, with the reason.
 pub fn each(
     bytes: &[u8],
     mut take: impl FnMut(&str, u64, &[u8]) -> Result<(), String>,

@@ -1,4 +1,4 @@
-//! What a recording says of what it lost.
+//! Reports of a recording on what it lost.
 
 use super::*;
 use crate::link::{Piece, SceneModel, Snapshot};
@@ -24,7 +24,8 @@ fn event(sequence: u64) -> Item {
     Item::Event(Box::new(event))
 }
 
-/// A recording said how many ticks it lacked and not which; lost events and times without a snapshot went unsaid.
+/// A recording reported how many ticks it lacked, but not which; lost events and times without a snapshot went
+/// unreported.
 #[test]
 fn what_a_recording_lacks_is_listed_for_each_kind() {
     let path = std::env::temp_dir().join(format!("stylet-lacks-{}.mcap", std::process::id()));
@@ -93,7 +94,7 @@ fn marked() -> Event {
     event
 }
 
-/// What one run of a core said, with numbers that decimal fractions do not have.
+/// Messages of one run of a core, with numbers that have no exact decimal fraction.
 fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
     let tick = |tick: u64| TickRecord {
         session_id: 1,
@@ -229,7 +230,7 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
         }
     }
     assert_eq!(kinds, [20, 1, 1, 1, 1, 1, 20, 1]);
-    // Cut off or damaged anywhere it ends with a reason or with what came before, and never with a panic.
+    // Truncated or damaged anywhere, it ends with a reason or with the earlier data, and never with a panic.
     for end in (0..bytes.len()).step_by(97) {
         let _ended = played_of(&bytes[..end], &Interrupt::default());
         let mut damaged = bytes.clone();
@@ -238,7 +239,7 @@ fn a_recording_holds_all_that_a_window_shows_in_the_same_bits() {
     }
 }
 
-/// In place of a core: it lives, its ticks and its state come, it can be held and shown again, and takes no request.
+/// Like a core: it is live, its ticks and its state arrive, it can be paused and restarted, and it takes no request.
 #[test]
 fn a_recording_is_played_as_a_core_speaks() {
     let (path, last, ..) = recorded("played");

@@ -17,14 +17,14 @@ use std::process::ChildStdin;
 use std::sync::{Arc, mpsc};
 use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
 
-/// A recording cut off by a crash lacks the last chunk at most: about two seconds.
+/// Size of a chunk: a recording cut off by a crash lacks at most the last one, about two seconds.
 const CHUNK_BYTES: u64 = 1 << 20;
-/// Gaps listed one by one in the file; all are counted.
+/// Most gaps listed in the file; all are counted.
 const GAPS_LISTED: usize = 1000;
-/// Gaps listed one by one in the terminal.
+/// Most gaps listed in the terminal.
 const GAPS_PRINTED: usize = 10;
 
-/// What the taking thread hands over.
+/// An item from the receiving thread.
 pub enum Item {
     Session(Box<Session>),
     Records(Vec<TickRecord>),
@@ -33,27 +33,27 @@ pub enum Item {
     Scene(Arc<SceneModel>),
     Plan(Box<PlanInForce>),
     Parameters(Box<ParametersInForce>),
-    /// As it was when the snapshot after it was taken.
+    /// State when the snapshot after it was taken.
     State(Box<HapticState>),
     Snapshot(Box<Snapshot>),
-    /// One that was seen and is not kept.
+    /// A snapshot that was seen but not kept.
     SnapshotLeftOut,
-    /// No snapshot was kept for so long, s.
+    /// Time without a kept snapshot, s.
     SnapshotsMissing(f64),
-    /// As the core itself says, since the recording began.
+    /// Records lost since the recording began, by the core's count.
     LostInCore(u64),
 }
 
-/// What a recording holds, and what it lacks.
+/// Contents of a recording, and its losses.
 #[derive(Default)]
 pub struct Totals {
     pub gaps: Gaps,
-    /// Of the second device's ticks.
+    /// Ticks of the second device.
     pub second: Gaps,
     pub events: Gaps,
     pub snapshots: u64,
     pub snapshots_left_out: u64,
-    /// How often, and for how long altogether, there was no snapshot to keep.
+    /// Number and total duration of gaps between snapshots.
     pub snapshot_gaps: u64,
     pub snapshot_gaps_s: f64,
     pub lost_in_core: u64,
@@ -87,7 +87,7 @@ impl Totals {
         )
     }
 
-    /// The numbers of what is missing, the first gaps of each kind.
+    /// Describes the missing numbers: the first gaps of each kind.
     pub fn missing_words(&self) -> Vec<String> {
         let line = |(what, gaps): (&str, &Gaps)| {
             let first: Vec<String> = gaps.gaps().iter().take(GAPS_PRINTED).map(Gap::to_string).collect();
@@ -140,7 +140,7 @@ fn listed_gaps(gaps: &Gaps) -> String {
     listed.collect::<Vec<_>>().join(" ")
 }
 
-/// By their places here.
+/// Channels by index.
 const CHANNELS: [&Channel; 11] = [
     &TICK,
     &EVENT,
@@ -159,14 +159,14 @@ struct Writer<W: Write + Seek> {
     file: mcap::Writer<W>,
     channels: [u16; CHANNELS.len()],
     sequences: [u32; CHANNELS.len()],
-    /// `CLOCK_MONOTONIC` of the newest message that has a time of its own.
+    /// `CLOCK_MONOTONIC` of the newest message with a time.
     newest_ns: u64,
-    /// Added to `CLOCK_MONOTONIC` gives the time since 1970.
+    /// Offset from `CLOCK_MONOTONIC` to the time since 1970.
     epoch_ns: u64,
     totals: Totals,
 }
 
-/// Writes until nobody sends any more; the file is whole then.
+/// Writes until all senders are gone; the file is complete then.
 pub fn write_all(path: &Path, from: &mpsc::Receiver<Item>) -> Result<Totals, RecordError> {
     let failed = |e: mcap::McapError| RecordError::of_file(path, e);
     let file =
@@ -183,7 +183,7 @@ pub fn write_all(path: &Path, from: &mpsc::Receiver<Item>) -> Result<Totals, Rec
     Ok(totals)
 }
 
-/// The same to a program that shows it, message by message.
+/// Writes likewise to a program that shows the messages one by one.
 pub fn send_all(program: ChildStdin, from: &mpsc::Receiver<Item>) -> Result<Totals, RecordError> {
     let failed = |e: mcap::McapError| RecordError::Live(format!("it ended, or reads no more: {e}"));
     let plain = mcap::WriteOptions::new()
@@ -268,7 +268,7 @@ impl<W: Write + Seek> Writer<W> {
         Ok(())
     }
 
-    /// A message without a time of its own is of the time of the one before it.
+    /// Writes a message without a time at the time of the one before it.
     fn between(&mut self, channel: usize, message: &serde_json::Value) -> mcap::McapResult<()> {
         self.message(channel, self.newest_ns, message.to_string().as_bytes())
     }
@@ -316,7 +316,7 @@ impl<W: Write + Seek> Writer<W> {
     }
 }
 
-/// Time since 1970 less `CLOCK_MONOTONIC`, once for a recording: a clock that is set meanwhile makes no step in it.
+/// Returns the time since 1970 minus `CLOCK_MONOTONIC`, once per recording: setting the clock meanwhile causes no step.
 fn epoch_ns() -> u64 {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
     // SAFETY: `time` is valid for writes; the clock always exists on Linux.
