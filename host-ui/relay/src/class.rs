@@ -1,4 +1,4 @@
-//! Who is there, as hosts of this machine are shown it, and what they ask of the lease.
+//! The class list for hosts of this machine, and their requests for the lease.
 
 use crate::control::Order;
 use crate::wire::Who;
@@ -6,14 +6,14 @@ use bytemuck::Zeroable;
 use stylet_ports::{self as service, Node, Publisher, ServiceError, Subscriber};
 use stylet_shm_schema::{Class, ClassMember, LeaseOrder, LeaseRequest, MAX_CLASS, Text};
 
-/// The ports; a relay beside a core has them as well as one in place of it.
+/// Ports of the class; every relay has them, whether next to a core or replacing one.
 pub struct ClassPorts {
     class: Publisher<Class>,
     orders: Subscriber<LeaseOrder>,
 }
 
 impl ClassPorts {
-    /// On a node of the instance.
+    /// Opens the ports on a node of the instance.
     pub fn new(node: &Node) -> Result<Self, ServiceError> {
         Ok(Self {
             class: service::class::publisher(node)?,
@@ -21,17 +21,17 @@ impl ClassPorts {
         })
     }
 
-    /// Connects hosts that came and drops those that went.
+    /// Connects new hosts and drops those that left.
     pub fn connect(&self) {
         self.class.connect();
     }
 
-    /// Shows hosts who is there.
+    /// Publishes the class to hosts.
     pub fn show(&self, who: &Who, session_id: u64, is_beside_core: bool) {
         let _ = self.class.send(class(who, session_id, is_beside_core));
     }
 
-    /// What a host asked; what is invalid is dropped.
+    /// Returns a host's order; invalid ones are dropped.
     pub fn order(&self) -> Option<Order> {
         loop {
             let order = self.orders.receive()?;
@@ -69,7 +69,7 @@ fn class(who: &Who, session_id: u64, is_beside_core: bool) -> Class {
     class
 }
 
-/// What is no number is 0.
+/// Converts ms to ns; a value that is not a number gives 0.
 fn ns(ms: f64) -> u64 {
     (ms * 1e6) as u64
 }

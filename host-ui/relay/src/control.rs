@@ -1,4 +1,4 @@
-//! Orders from this machine to a relay that runs here: one line each, over a socket that only its user can open.
+//! Orders from this machine to its relay: one line each, over a socket that only its user can open.
 
 use crate::RelayError;
 use std::io::{BufRead, BufReader, Write};
@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 use stylet_shm_schema::Instance;
 
-/// An order's line at most, bytes.
+/// Longest line of an order, bytes.
 const LINE: usize = 200;
 const PATIENCE: Duration = Duration::from_secs(2);
 
@@ -16,21 +16,21 @@ fn path(instance: &Instance) -> PathBuf {
     instance.folder().join("relay.socket")
 }
 
-/// What the lease can be asked for.
+/// An order for the lease.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Order {
     /// To operate from here.
     Take,
-    /// Not to operate from here any more.
+    /// To stop operating from here.
     Release,
-    /// That somebody else operates.
+    /// To let another member operate.
     Give(String),
-    /// Who is there.
+    /// To list the members.
     Status,
 }
 
 impl Order {
-    /// The line of the order.
+    /// Encodes the order as a line.
     pub fn line(&self) -> String {
         match self {
             Self::Take => "take".to_owned(),
@@ -40,7 +40,7 @@ impl Order {
         }
     }
 
-    /// The order of a line.
+    /// Parses the order of a line.
     pub fn of_line(line: &str) -> Option<Self> {
         match line.trim() {
             "take" => Some(Self::Take),
@@ -60,7 +60,7 @@ pub struct Orders {
 }
 
 impl Orders {
-    /// Takes the place of one that was killed.
+    /// Opens the socket, replacing that of a killed relay.
     pub fn listen(instance: &Instance) -> Result<Self, RelayError> {
         instance.make_folder()?;
         let path = path(instance);
@@ -77,7 +77,7 @@ impl Orders {
         let Ok((stream, _)) = self.listener.accept() else {
             return;
         };
-        // Whoever can open the socket can end the relay as well; a line that does not come is not waited for long.
+        // A program that can open the socket could end the relay anyway; the wait for its line is short.
         let _ = stream.set_nonblocking(false);
         let _ = stream.set_read_timeout(Some(Duration::from_millis(50)));
         let mut line = String::new();
@@ -99,7 +99,7 @@ impl Drop for Orders {
     }
 }
 
-/// Sends an order to the relay of `instance`; its answer.
+/// Sends an order to the relay of `instance` and returns its answer.
 pub fn ask(instance: &Instance, order: &Order) -> Result<String, RelayError> {
     let failed = |e: std::io::Error| {
         RelayError(format!(

@@ -1,7 +1,8 @@
-//! Carries the services of a core to hosts on other machines and their requests back, over zenoh and QUIC with certificates on both sides.
+//! Carries the services of a core to hosts on other machines and their requests back, over zenoh and QUIC with
+//! certificates on both sides.
 //!
-//! `serve` runs beside the core as one more host; `join` makes the same services on another machine. Data goes
-//! *core → `serve` → `net` → `join` → hosts*; requests go back through `serve::rights` and `serve::lease`.
+//! `serve` runs next to the core as one more host; `join` offers the same services on another machine. Data flows *core
+//! → `serve` → `net` → `join` → hosts*; requests return through `serve::rights` and `serve::lease`.
 
 #![warn(missing_docs)]
 
@@ -19,7 +20,7 @@ pub mod serve;
 pub mod slice;
 pub mod wire;
 
-/// Why the relay ended or did not begin; the text says what to do.
+/// Reason why the relay ended or did not begin; the text says what to do.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct RelayError(pub String);

@@ -14,10 +14,12 @@ use stylet_relay::serve::{self, keeper};
 use stylet_relay::{RelayError, join, say};
 use stylet_shm_schema::Instance;
 
-/// Carries a running Stylet to other machines: a class that watches, an instructor elsewhere, an operator at another screen.
+/// Carries a running Stylet to other machines: a class that watches, an instructor elsewhere, an operator at another
+/// screen.
 ///
-/// On the machine with rt-core: `relay keys new --host ADDRESS` once, `relay keys invite NAME --role observer` for each person, then `relay
-/// serve`. On another machine: `relay join --invitation FILE`, and host-ui, record and everything else run there as they do beside the core.
+/// On the machine with rt-core: `relay keys new --host ADDRESS` once, `relay keys invite NAME --role observer` for each
+/// person, then `relay serve`. On another machine: `relay join --invitation FILE`, and host-ui, record and everything
+/// else run there as they do beside the core.
 #[derive(Parser)]
 #[command(name = "relay", version)]
 struct Cli {
@@ -42,7 +44,8 @@ enum Task {
         #[arg(long, hide = true)]
         kept: bool,
     },
-    /// Show the core of another machine here, as if it ran here; asks for the code of the invitation, or takes it from the standard input
+    /// Show the core of another machine here, as if it ran here; asks for the code of the invitation, or takes it from
+    /// the standard input
     Join {
         /// Address of the machine that serves, with or without a port [default: that of the invitation]
         host: Option<String>,
@@ -85,7 +88,8 @@ enum KeysTask {
     Invite {
         /// Name of the person
         name: String,
-        /// What the person may do: an operator moves the needle, an instructor stops the hand and changes parameters and scene, an observer watches
+        /// What the person may do: an operator moves the needle, an instructor stops the hand and changes parameters
+        /// and scene, an observer watches
         #[arg(long)]
         role: Role,
         /// Address of this machine, with or without a port, as the member reaches it
@@ -134,7 +138,7 @@ fn main() -> ExitCode {
     code
 }
 
-/// Set by what ends a program: a person, another program, or a terminal that closes.
+/// Returns a flag set by termination signals: from a user, another program, or a closed terminal.
 fn on_signals() -> Result<Arc<AtomicBool>, RelayError> {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     say::end_on_panic();
@@ -148,7 +152,7 @@ fn on_signals() -> Result<Arc<AtomicBool>, RelayError> {
     Ok(stop)
 }
 
-/// As `nohup` leaves it: the program stays when its terminal closes.
+/// True if the signal is ignored, as under `nohup`: the program survives its terminal.
 fn is_ignored(signal: libc::c_int) -> bool {
     // SAFETY: numbers alone.
     let mut action: libc::sigaction = unsafe { std::mem::zeroed() };
@@ -157,7 +161,7 @@ fn is_ignored(signal: libc::c_int) -> bool {
     action.sa_sigaction == libc::SIG_IGN
 }
 
-/// The code of an invitation: a line of the standard input, which a person types unseen.
+/// Reads the code of an invitation: a line of the standard input, typed without echo.
 fn code() -> Result<String, RelayError> {
     let is_typed = std::io::stdin().is_terminal();
     let shown = is_typed.then(hide_typing).flatten();
@@ -175,7 +179,7 @@ fn code() -> Result<String, RelayError> {
     Ok(line)
 }
 
-/// The settings of the terminal before.
+/// Turns echo off and returns the former settings of the terminal.
 fn hide_typing() -> Option<libc::termios> {
     // SAFETY: numbers alone.
     let mut settings: libc::termios = unsafe { std::mem::zeroed() };
@@ -190,7 +194,7 @@ fn hide_typing() -> Option<libc::termios> {
     Some(shown)
 }
 
-/// An address with the usual port where it has none.
+/// Appends the default port to an address without one.
 fn with_port(host: &str) -> String {
     let has_port = host
         .rsplit_once(':')
@@ -301,7 +305,7 @@ fn keys_task(task: KeysTask, lab: &Lab) -> Result<(), RelayError> {
 mod tests {
     use super::*;
 
-    /// Pages and completions come from the same definition as the command line; see `tests/package` for what such files hold.
+    /// Pages and completions come from the definition of the command line; `tests/package` checks their contents.
     #[test]
     fn every_command_has_its_page_and_every_option_its_place_in_it() {
         let files = stylet_manual::files(Cli::command()).expect("in memory");

@@ -1,4 +1,4 @@
-//! The session of zenoh: QUIC alone, certificates on both sides, no scouting, nothing allowed that is not listed.
+//! The zenoh session: QUIC alone, certificates on both sides, no scouting, and access only as listed.
 
 use crate::RelayError;
 use crate::keys::{Identity, SEATS, seat_name};
@@ -19,20 +19,22 @@ use zenoh::qos::Reliability;
 pub use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Config, Wait};
 
-/// Port where `serve` listens where no other is given.
+/// Default port of `serve`.
 pub const PORT: u16 = 7461;
-/// A link that is silent for so long is closed, ms.
+/// Silence after which a link is closed, ms.
 const LEASE_MS: u32 = 600;
-/// What is sent whole waits so long for room. A peer that is silent is lost after [`LEASE_MS`]; one that is heard is slow, and waited for.
+/// Longest wait for room by a message that is sent whole. A silent peer is lost after [`LEASE_MS`]; one that is heard
+/// is slow, and is waited for.
 pub const PATIENCE_US: u64 = 10_000_000;
-/// A connection that is not made after so long is begun again: QUIC sends a first packet that was lost again after a second. Four round trips.
+/// Time after which an unfinished connection is restarted: QUIC resends a lost first packet only after a second. Four
+/// round trips.
 const OPEN_MS: u32 = 700;
-/// A member takes a scene.
+/// Largest message to a member: a scene.
 const MAX_OF_SERVER: usize = 4 * MAX_SCENE_WORDS + (1 << 20);
-/// A server puts no larger message of a member together, whoever sends it.
+/// Largest message to a server, from any sender.
 const MAX_OF_MEMBER: usize = 2 * MAX_PART_BYTES;
 
-/// Where a message goes.
+/// Destination of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// From the server to one seat.
@@ -42,7 +44,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// Its key expression.
+    /// Returns its key expression.
     pub fn key(self) -> String {
         let root = format!("stylet/{SCHEMA_VERSION}");
         match self {
@@ -52,12 +54,12 @@ impl Place {
     }
 }
 
-/// The key that every request to the server matches.
+/// Key matched by every request to the server.
 pub fn every_ask() -> String {
     format!("stylet/{SCHEMA_VERSION}/ask/*")
 }
 
-/// With datagrams beside its streams, for [`put_newest`].
+/// Returns an endpoint with datagrams as well as streams, for [`put_newest`].
 fn endpoint(at: &str) -> String {
     format!("quic/{at}?mixed_rel=1")
 }
@@ -86,7 +88,7 @@ fn common(mode: &str, tls: Value, max_message_bytes: usize) -> Value {
     })
 }
 
-/// What `serve` listens on: addresses with ports.
+/// Opens the session of `serve`, listening on addresses with ports.
 pub fn serve(listen: &[String], identity: &Identity) -> Result<Session, RelayError> {
     let tls = json!({
         "root_ca_certificate_base64": base64(&identity.authority),
@@ -107,7 +109,8 @@ pub fn serve(listen: &[String], identity: &Identity) -> Result<Session, RelayErr
     })
 }
 
-/// A session of the member with `identity`, which connects to `server`, an address with a port, whenever it can.
+/// Opens the session of the member with `identity`, which connects to `server`, an address with a port, whenever it
+/// can.
 pub fn join(server: &str, identity: &Identity) -> Result<Session, RelayError> {
     let tls = json!({
         "root_ca_certificate_base64": base64(&identity.authority),
@@ -126,12 +129,13 @@ pub fn join(server: &str, identity: &Identity) -> Result<Session, RelayError> {
 }
 
 fn open(config: &Value) -> Result<Session, zenoh::Error> {
-    // A second session of one program has the log already.
+    // A second session of one program finds the log in use.
     let _ = tracing::subscriber::set_global_default(Log);
     zenoh::open(Config::from_json5(&config.to_string())?).wait()
 }
 
-/// Default deny; a seat may ask and hear under its own name alone. Who of them is admitted the server decides, message by message.
+/// Access rules: deny by default; a seat may send and receive under its own name alone. The server admits seats message
+/// by message.
 fn access() -> Value {
     let server = "server";
     let mut rules = vec![json!({
@@ -160,7 +164,7 @@ fn access() -> Value {
     json!({ "enabled": true, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies })
 }
 
-/// Sends a message; what congestion drops is sent again by whoever needs it.
+/// Sends a message; the receiver requests it again if congestion drops it.
 pub fn put(session: &Session, place: Place, priority: Priority, bytes: impl Into<Bytes>) {
     let sent = session
         .put(place.key(), bytes.into())
@@ -168,11 +172,11 @@ pub fn put(session: &Session, place: Place, priority: Priority, bytes: impl Into
         .priority(priority)
         .express(true)
         .wait();
-    // A session that is closing sends nothing; its end is seen elsewhere.
+    // A closing session sends nothing; its end is noticed elsewhere.
     let _ = sent;
 }
 
-/// The same in datagrams, which are never sent again: what is lost is not worth waiting for, and holds up nothing that comes after it.
+/// As [`put`], in datagrams that are never resent: a lost one is not worth waiting for, and delays nothing after it.
 pub fn put_newest(session: &Session, place: Place, priority: Priority, bytes: impl Into<Bytes>) {
     let sent = session
         .put(place.key(), bytes.into())
@@ -184,7 +188,7 @@ pub fn put_newest(session: &Session, place: Place, priority: Priority, bytes: im
     let _ = sent;
 }
 
-/// The same, but waits for room: for the one member that asked for it, on a thread of its own.
+/// As [`put`], but waits for room: for the one member that asked, on its own thread.
 pub fn put_whole(session: &Session, place: Place, priority: Priority, bytes: impl Into<Bytes>) {
     let sent = session
         .put(place.key(), bytes.into())
@@ -194,7 +198,7 @@ pub fn put_whole(session: &Session, place: Place, priority: Priority, bytes: imp
     let _ = sent;
 }
 
-/// Calls `take` with key and bytes of each message; on a thread of zenoh, so it must not wait.
+/// Calls `take` with key and bytes of each message, on a thread of zenoh, so it must not block.
 pub fn hear(
     session: &Session,
     key: &str,
@@ -208,7 +212,7 @@ pub fn hear(
         .map_err(|e| RelayError(format!("cannot hear {key}: {e}")))
 }
 
-/// Closes a session, which may wait for a peer that does not answer; it is given up after two seconds.
+/// Closes a session. It may wait for a peer that does not answer, and is abandoned after two seconds.
 pub fn close(session: Session) {
     let (done, ended) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
@@ -219,14 +223,14 @@ pub fn close(session: Session) {
 }
 
 const SAY_EVERY: Duration = Duration::from_secs(10);
-/// Different reasons in that time.
+/// Most different reasons reported in that time.
 const SAY_AT_MOST: usize = 8;
 static SAID: Mutex<Vec<(String, Instant)>> = Mutex::new(Vec::new());
 
 /// zenoh warns that its access rules may not know a link's network interface; ours name none.
 const NO_CONCERN: &str = "Transport returned multiple network interfaces";
 
-/// What a person reads of a message of zenoh: of a handshake that failed, the reason that its library gives in quotation marks.
+/// Extracts the text for users from a zenoh message: for a failed handshake, the quoted reason of its library.
 fn reason(text: &str) -> Option<String> {
     if text.starts_with(NO_CONCERN) {
         return None;
@@ -241,7 +245,7 @@ fn reason(text: &str) -> Option<String> {
     Some(format!("refused: a connection, in its handshake: {quoted}"))
 }
 
-/// Prints what zenoh reports as an error or a warning: a refused certificate is one.
+/// Prints zenoh's errors and warnings, such as a refused certificate.
 struct Log;
 
 struct Text(String);
@@ -270,11 +274,11 @@ impl Subscriber for Log {
     fn event(&self, event: &Event<'_>) {
         let mut text = Text(String::new());
         event.record(&mut text);
-        // A peer that is refused tries again at once; the same reason is said once in a while.
+        // A refused peer retries at once; the same reason is printed only once in a while.
         let Some(why) = reason(&text.0) else { return };
         let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
         said.retain(|(_, at)| at.elapsed() < SAY_EVERY);
-        // A peer may have chosen some of it.
+        // A peer may have chosen part of it.
         let why = why.replace(char::is_control, " ");
         if said.len() < SAY_AT_MOST && said.iter().all(|(last, _)| *last != why) {
             say(why.clone());

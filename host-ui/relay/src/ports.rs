@@ -1,4 +1,4 @@
-//! Ports of shared memory: those of a host beside the core, and those of a core for hosts on another machine.
+//! Ports of shared memory: those of a host next to the core, and those of a core for hosts on another machine.
 
 use crate::class::ClassPorts;
 use std::cell::RefCell;
@@ -8,11 +8,11 @@ use stylet_ports::{
 };
 use stylet_shm_schema::*;
 
-/// What a host beside the core has but for records and snapshots, which have threads of their own.
+/// Ports of a host next to the core, except records and snapshots, which have their own threads.
 pub struct Near {
     /// Announcements of the core.
     pub session: Subscriber<Session>,
-    /// What happened.
+    /// Events.
     pub events: Subscriber<Event>,
     /// Parameters in force.
     pub parameters: Subscriber<ParametersInForce>,
@@ -22,22 +22,22 @@ pub struct Near {
     pub replies: Subscriber<Reply>,
     /// Results of rehearsals.
     pub rehearsals: Subscriber<Rehearsal>,
-    /// The scene that runs.
+    /// The running scene.
     pub scene: SliceSubscriber<u32, SceneHeader>,
     commands: Publisher<Command>,
     stops: Publisher<Command>,
     requests: Subscriber<Command>,
-    /// Host and number of what was sent from here and has not come back over `requests`.
+    /// Host and number of requests sent from here that have not come back over `requests`.
     sent: RefCell<VecDeque<(u64, u64)>>,
     /// The node of these ports.
     pub node: Node,
 }
 
-/// Requests that may be on their way back.
+/// Most requests that may be on their way back.
 const SENT_AT_MOST: usize = 1024;
 
 impl Near {
-    /// Ports to the core in whose epoch `node` is.
+    /// Opens ports to the core in the epoch of `node`.
     pub fn new(node: Node) -> Result<Self, ServiceError> {
         Ok(Self {
             session: service::session::subscriber(&node)?,
@@ -55,7 +55,7 @@ impl Near {
         })
     }
 
-    /// A request to the core.
+    /// Sends a request to the core.
     pub fn ask(&self, command: Command) -> Result<(), ServiceError> {
         if CommandKind::is_stop(command.kind) {
             let _ = self.stops.send(command);
@@ -70,7 +70,7 @@ impl Near {
         Ok(())
     }
 
-    /// The next request of a host beside the core: one that was not sent from here.
+    /// Returns the next request of another host next to the core.
     pub fn request_of_others(&self) -> Option<Command> {
         loop {
             let command = self.requests.receive()?;
@@ -82,7 +82,7 @@ impl Near {
         }
     }
 
-    /// A port for one volume, filled and sent; it must live until the core has mapped it.
+    /// Opens a port for one volume, filled and sent; it must live until the core has mapped it.
     pub fn upload(
         &self,
         header: &UploadHeader,
@@ -95,11 +95,11 @@ impl Near {
     }
 }
 
-/// What `join` publishes but for records and snapshots, which have threads of their own.
+/// Ports published by `join`, except records and snapshots, which have their own threads.
 pub struct Far {
     /// Announcements of the core.
     pub session: Publisher<Session>,
-    /// What happened.
+    /// Events.
     pub events: Publisher<Event>,
     /// Parameters in force.
     pub parameters: Publisher<ParametersInForce>,
@@ -109,22 +109,22 @@ pub struct Far {
     pub replies: Publisher<Reply>,
     /// Results of rehearsals.
     pub rehearsals: Publisher<Rehearsal>,
-    /// The line itself.
+    /// State of the connection.
     pub relayed: Publisher<Relayed>,
-    /// Who is there, and what hosts here ask of the lease.
+    /// The class, and requests of hosts here for the lease.
     pub class: ClassPorts,
-    /// The scene that runs.
+    /// The running scene.
     pub scene: SlicePublisher<u32, SceneHeader>,
     /// Requests of hosts here.
     pub commands: Subscriber<Command>,
     /// Volumes of hosts here.
     pub uploads: SliceSubscriber<u8, UploadHeader>,
-    /// The place of the core here, with the node of these ports.
+    /// The core's meeting point here, with the node of these ports.
     pub meeting: Meeting,
 }
 
 impl Far {
-    /// Ports in place of a core of `instance`; fails where a core or another `join` has them.
+    /// Opens the ports of a core of `instance`; fails if a core or another `join` has them.
     pub fn new(instance: &Instance) -> Result<Self, ServiceError> {
         let meeting = Meeting::new(instance)?;
         let node = &meeting.node;
@@ -146,7 +146,7 @@ impl Far {
         Ok(far)
     }
 
-    /// Connects hosts that came and drops those that went.
+    /// Connects new hosts and drops those that left.
     pub fn connect(&self) {
         self.session.connect();
         self.events.connect();
@@ -160,13 +160,13 @@ impl Far {
     }
 }
 
-/// The port of records of a `join`, with the node that it lives on.
+/// Opens the port of records of a `join`, with its node.
 pub fn far_records(instance: &Instance) -> Result<(SlicePublisher<TickRecord, u64>, Node), ServiceError> {
     let node = Node::join(instance)?;
     Ok((service::records::publisher(&node, MAX_BATCH)?, node))
 }
 
-/// The port of snapshots of a `join`, with the node that it lives on.
+/// Opens the port of snapshots of a `join`, with its node.
 pub fn far_snapshots(instance: &Instance) -> Result<(SlicePublisher<Vertex, SnapshotHeader>, Node), ServiceError> {
     let node = Node::join(instance)?;
     Ok((service::snapshots::publisher(&node, 1 << 13)?, node))

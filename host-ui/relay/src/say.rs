@@ -1,4 +1,4 @@
-//! Lines for the terminal, written by a thread of their own: an output that is full or closed holds up nobody who stops the hand.
+//! Writes terminal lines on a separate thread: a full or closed output must not delay a stop of the hand.
 
 use std::io::Write;
 use std::sync::OnceLock;
@@ -6,15 +6,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 
-/// Lines that may wait; more are dropped and counted.
+/// Most lines queued; more are dropped and counted.
 const WAITING: usize = 256;
-/// The last lines of a program that ends are waited for no longer.
+/// Longest wait for the last lines of an ending program.
 const PATIENCE: Duration = Duration::from_millis(100);
 
 enum Line {
     Out(String),
     Error(String),
-    /// All lines before it are written.
+    /// Answered once all lines before it are written.
     Flush(SyncSender<()>),
 }
 
@@ -22,24 +22,25 @@ static WRITER: OnceLock<SyncSender<Line>> = OnceLock::new();
 // SYNC: a figure on its own; no other data is published by it.
 static DROPPED: AtomicU64 = AtomicU64::new(0);
 
-/// Writes a line to the standard output, soon. Never waits and never panics.
+/// Queues a line for the standard output. Never blocks and never panics.
 pub fn say(line: impl Into<String>) {
     give(Line::Out(line.into()));
 }
 
-/// The same to the standard error.
+/// Queues a line for the standard error.
 pub fn complain(line: impl Into<String>) {
     give(Line::Error(line.into()));
 }
 
-/// Waits until all lines are written, but no longer than [`PATIENCE`].
+/// Waits until all lines are written, at most [`PATIENCE`].
 pub fn flush() {
     let (done, written) = sync_channel(1);
     give(Line::Flush(done));
     let _ = written.recv_timeout(PATIENCE);
 }
 
-/// Ends the process where one of its threads panics: the hand stops for a process that ends, and may go on for one without a thread.
+/// Ends the process when one of its threads panics: the hand stops when the process ends, but might move on for a
+/// process that lacks a thread.
 pub fn end_on_panic() {
     std::panic::set_hook(Box::new(|why| {
         complain(format!("relay: {why}"));
@@ -66,7 +67,7 @@ fn writer() -> &'static SyncSender<Line> {
     })
 }
 
-/// What cannot be written is lost: there is nobody to tell.
+/// Writes lines; failures are ignored, as there is no output to report them to.
 fn write(lines: &Receiver<Line>) {
     for line in lines {
         let dropped = DROPPED.swap(0, Ordering::Relaxed);

@@ -1,7 +1,6 @@
-//! Short slices of the processor, and timers that are not late, for threads that wait more than they work: beside programs that compute
-//! they get their turn sooner.
+//! Short scheduler slices and precise timers for threads that mostly wait: next to computing programs they run sooner.
 
-/// As `sched_setattr` takes it (its first version).
+/// Argument of `sched_setattr` (its first version).
 #[repr(C)]
 struct Attributes {
     size: u32,
@@ -14,11 +13,11 @@ struct Attributes {
     period: u64,
 }
 
-/// The least that the kernel takes.
+/// Shortest slice that the kernel accepts.
 const SLICE_NS: u64 = 100_000;
 
-/// For this thread and those that it starts. Not a higher priority: the share stays, in smaller parts. Kernels before 6.12 and those
-/// that refuse leave everything as it is.
+/// Shortens the slices of this thread and those that it starts. The priority is unchanged: the same share comes in
+/// smaller parts. Has no effect on kernels before 6.12 or that refuse.
 pub fn shorten() {
     // SAFETY: numbers alone.
     let nice = unsafe { libc::getpriority(libc::PRIO_PROCESS, 0) };
@@ -32,18 +31,19 @@ pub fn shorten() {
         deadline: 0,
         period: 0,
     };
-    // SAFETY: `attributes` is valid for reads and for its size; 0 is this thread. The slack, which lets the kernel wake several threads at
-    // once, 50 us late, is a figure of this thread as well.
+    // SAFETY: `attributes` is valid for reads and for its size; 0 is this thread. The slack, which lets the kernel wake
+    // several threads at once, 50 us late, is a figure of this thread as well.
     unsafe {
         libc::syscall(libc::SYS_sched_setattr, 0, &attributes, 0);
         libc::prctl(libc::PR_SET_TIMERSLACK, 1_usize);
     }
 }
 
-/// For this thread: those that wake to hand something on go before it. What it makes takes milliseconds and is late by as many anyway.
+/// Lets threads that wake to pass data on run before this one, whose work takes milliseconds and may be late by as
+/// many.
 pub fn let_others_first() {
     const NICE: i32 = 5;
-    // SAFETY: numbers alone; 0 is this thread. Where it is refused everything stays as it is.
+    // SAFETY: numbers alone; 0 is this thread. A refusal changes nothing.
     unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
 }
 
@@ -51,7 +51,7 @@ pub fn let_others_first() {
 mod tests {
     use super::*;
 
-    /// What the kernel says of this thread; nothing where it knows no slices.
+    /// Returns this thread's slice as the kernel reports it; `None` if it knows no slices.
     fn slice_ns() -> Option<u64> {
         // SAFETY: numbers alone.
         let mut attributes: Attributes = unsafe { std::mem::zeroed() };
@@ -61,7 +61,7 @@ mod tests {
         (taken == 0 && attributes.runtime > 0).then_some(attributes.runtime)
     }
 
-    /// In a thread of its own, so that no other test has short slices.
+    /// Runs in a separate thread, so that no other test has short slices.
     #[test]
     fn slices_are_short_for_a_thread_and_those_that_it_starts() {
         let test = std::thread::spawn(|| {

@@ -1,4 +1,4 @@
-//! What comes from the net, damaged: the decoders refuse it or take what is valid, and never panic.
+//! Damaged network data: the decoders refuse it or take the valid part, and never panic.
 
 mod decoders;
 
@@ -8,7 +8,7 @@ use stylet_relay::control::Order;
 use stylet_relay::wire::{self, Hello, Kind, MAX_THIN_BYTES, Present, Rest, Stamp, Thin, Ticks, Who, encode};
 use stylet_shm_schema::{HandMove, HapticState, Request, SceneHeader, SnapshotHeader, TickRecord, Vertex};
 
-/// A message of each kind that is accepted, but for the large plain ones.
+/// One accepted message of each kind, except the large plain ones.
 fn examples() -> Vec<(&'static str, Vec<u8>)> {
     let message = |kind, parts: &[&[u8]]| encode(kind, Stamp::default(), parts);
     let mut state = HapticState::zeroed();
@@ -65,7 +65,7 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
 
 #[test]
 fn damaged_messages_are_refused_or_valid_and_never_panic() {
-    // Knuth's linear congruence, so that a failure repeats.
+    // Knuth's linear congruential generator, so that a failure repeats.
     let mut state = 19_u64;
     let mut below = |limit: usize| {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
@@ -93,7 +93,7 @@ fn damaged_messages_are_refused_or_valid_and_never_panic() {
     );
 }
 
-/// `make relay-fuzz` begins with these, and what it finds is kept among them.
+/// `make relay-fuzz` begins with these, and its findings are kept among them.
 #[test]
 fn the_corpus_is_taken_without_a_panic() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus/wire");
@@ -108,7 +108,8 @@ fn the_corpus_is_taken_without_a_panic() {
         .map(|f| f.expect("readable").path())
         .collect();
     assert!(files.len() >= examples().len());
-    // Messages of another version would be refused at their first word, and a fuzzer that begins with them learns nothing.
+    // Messages of another version would be refused at their first word, and a fuzzer that begins with them learns
+    // nothing.
     for (name, bytes) in examples() {
         let kept = std::fs::read(folder.join(name)).expect("kept");
         assert_eq!(kept.get(..4), bytes.get(..4), "{name}: UPDATE_CORPUS=1 makes it anew");

@@ -1,4 +1,4 @@
-//! Messages from the net, at the server's end and at a member's.
+//! Messages from the network, at the server's end and at a member's.
 
 #![no_main]
 

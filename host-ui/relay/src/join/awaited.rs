@@ -1,12 +1,12 @@
-//! What a greeting brings, until it has come.
+//! Data expected after a greeting, until it has arrived.
 
 use std::time::{Duration, Instant};
 
-/// A greeting that did not come whole is asked for again after so long, each time after twice as long as the time before.
+/// Time after which a greeting with an incomplete answer is repeated; doubles each time.
 const AFTER: Duration = Duration::from_millis(400);
 const AFTER_AT_MOST: Duration = Duration::from_millis(3_200);
 
-/// What a greeting brings.
+/// Data expected after a greeting.
 pub(super) struct Awaited {
     pub session: bool,
     pub parameters: bool,
@@ -26,13 +26,13 @@ impl Awaited {
         }
     }
 
-    /// A greeting may be sent before the server knows that this member listens.
+    /// True if a greeting is due: it may have been sent before the server knew that this member listens.
     pub fn is_due(&self, has_scene: bool) -> bool {
         let complete = has_scene && !self.session && !self.parameters && !self.plan;
         !complete && self.since.elapsed() >= self.patience
     }
 
-    /// How long the next one is waited for.
+    /// Returns the next, longer, wait.
     pub fn longer(&self) -> Duration {
         (2 * self.patience).min(AFTER_AT_MOST)
     }

@@ -1,13 +1,13 @@
-//! When something happened at the server, by this machine's clock: by the messages that were on their way for the shortest time.
+//! Converts the server's times to this machine's clock, from the messages with the shortest delay.
 
 use crate::wire::Stamp;
 
-/// Clocks drift apart: what was least in this time and the one before counts.
+/// Clocks drift apart: the minimum over this time and the period before counts.
 const WINDOW_NS: u64 = 10_000_000_000;
 
 #[derive(Clone, Copy, Debug)]
 struct Least {
-    /// From a message's time there to its arrival by the clock here.
+    /// Difference between a message's time of sending there and its arrival by the clock here.
     ahead_ns: i64,
     round_trip_ns: u64,
 }
@@ -26,7 +26,7 @@ impl Least {
     }
 }
 
-/// The server's clock. A message takes half of the shortest round trip where it does not wait.
+/// The server's clock. A message without queueing takes half of the shortest round trip.
 #[derive(Debug)]
 pub(super) struct Clock {
     run: u64,
@@ -52,7 +52,7 @@ impl Clock {
         self.now = self.now.of(least);
     }
 
-    /// A message came. A server on another machine has another clock.
+    /// Records the arrival of a message. A server on another machine has another clock.
     pub fn heard(&mut self, stamp: &Stamp, now_ns: u64) {
         if stamp.run != self.run {
             *self = Self {
@@ -71,7 +71,7 @@ impl Clock {
         );
     }
 
-    /// A message was answered after so long.
+    /// Records a round trip.
     pub fn answered(&mut self, round_trip_ns: u64, now_ns: u64) {
         let least = Least {
             round_trip_ns,
@@ -84,7 +84,7 @@ impl Clock {
         self.now.of(self.before)
     }
 
-    /// How long a message is on its way at least; 0 while no round trip is known.
+    /// Shortest travel time of a message; 0 while no round trip is known.
     pub fn way_ns(&self) -> u64 {
         match self.least().round_trip_ns {
             u64::MAX => 0,
@@ -92,7 +92,7 @@ impl Clock {
         }
     }
 
-    /// The time here when it was `there_ns` at the server.
+    /// Converts `there_ns` at the server to the time here.
     pub fn here_ns(&self, there_ns: u64) -> u64 {
         let ahead_ns = match self.least().ahead_ns {
             i64::MAX => 0,
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn the_message_that_waited_least_says_how_far_the_clocks_are_apart() {
-        // The other clock is 5000 ms ahead, or 7000 behind; 20 ms each way, and some wait.
+        // The other clock is 5000 ms ahead, or 7000 behind; 20 ms each way, plus queueing for some.
         for ahead_ms in [5000, -7000_i64] {
             let mut clock = Clock::new();
             let there = |here_ms: u64| (here_ms.wrapping_add_signed(ahead_ms)) * MS;
@@ -137,7 +137,7 @@ mod tests {
     fn clocks_that_drift_are_followed_and_another_server_begins_anew() {
         let mut clock = Clock::new();
         for s in 0..60 {
-            // 1 ms in a second.
+            // A drift of 1 ms per second.
             clock.heard(&stamp(1, (1000 + s) * 1000 * MS), ((1000 + s) * 1000 + s) * MS);
         }
         let lag_ms = clock.here_ns(1059 * 1000 * MS) / MS;

@@ -1,4 +1,4 @@
-//! The session with the server. zenoh connects again by itself; where that brings nothing a session of its own takes its place.
+//! The session with the server. zenoh reconnects by itself; if that fails, a new session replaces it.
 
 use super::{Member, Options, Queues};
 use crate::RelayError;
@@ -11,13 +11,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// A server that a session has not heard for so long is called by a new one. zenoh tries five times a second, but a transport that is closed
-/// while it is being opened is not opened again (zenoh 1.10: a session that has not noted its endpoints yet).
+/// Silence of the server after which a new session is opened. zenoh tries five times a second, but does not reopen a
+/// transport that is closed while opening (zenoh 1.10: a session that has not noted its endpoints yet).
 const DEAF: Duration = Duration::from_secs(2);
 
 type Opening = Receiver<Result<Session, RelayError>>;
 
-/// Of a member.
+/// Connection of a member.
 pub(super) struct Connection {
     server: String,
     identity: Identity,
@@ -35,7 +35,7 @@ impl Connection {
         }
     }
 
-    /// On a thread of its own: zenoh waits without end for a server that does not answer.
+    /// Opens a session on a separate thread: zenoh waits without limit for a server that does not answer.
     fn open(&self) -> Opening {
         let (server, identity) = (self.server.clone(), self.identity.clone());
         let (to_here, opened) = sync_channel(1);
@@ -43,7 +43,7 @@ impl Connection {
         opened
     }
 
-    /// The first session; nothing where `stop` came before a server answered.
+    /// Opens the first session; `None` if `stop` came before a server answered.
     pub fn first(&mut self, stop: &AtomicBool) -> Result<Option<Session>, RelayError> {
         let opening = self.open();
         // SYNC: set by a signal; nothing but the flag is carried.
@@ -62,7 +62,7 @@ impl Connection {
         Ok(None)
     }
 
-    /// Calls the server anew where it is not heard; the new session takes the place of the old one unless that was heard meanwhile.
+    /// Opens a new session if the server is silent; it replaces the old one unless that was heard meanwhile.
     pub fn pass(&mut self, member: &Arc<Member>, queues: &Arc<Queues>) -> Result<(), RelayError> {
         match self.opening.as_ref().map(Receiver::try_recv) {
             None if self.since.elapsed() >= DEAF && !member.is_answered(DEAF) => self.opening = Some(self.open()),
@@ -71,7 +71,7 @@ impl Connection {
             Some(Ok(opened)) => {
                 self.again();
                 match opened {
-                    // It was heard meanwhile.
+                    // The old session was heard meanwhile.
                     Ok(session) if member.has_server() => close_aside(session),
                     Ok(session) => {
                         listen(&session, member, queues)?;
@@ -90,19 +90,19 @@ impl Connection {
     }
 }
 
-/// Which may take two seconds.
+/// Closes a session on a separate thread, since it may take two seconds.
 fn close_aside(session: Session) {
     std::thread::spawn(move || net::close(session));
 }
 
-/// What the server sends to this member goes to its queues.
+/// Queues the server's messages to this member.
 pub(super) fn listen(session: &Session, member: &Arc<Member>, queues: &Arc<Queues>) -> Result<(), RelayError> {
     let (queues, place) = (Arc::clone(queues), Place::To(member.seat));
     let member = Arc::clone(member);
     net::hear(session, &place.key(), move |_, bytes| queues.take(&member, bytes))
 }
 
-/// The session in use, which may be another from one message to the next.
+/// The session in use, which may change from one message to the next.
 pub(super) struct InUse(Mutex<Session>);
 
 impl InUse {

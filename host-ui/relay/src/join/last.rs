@@ -1,4 +1,5 @@
-//! Which record hosts here had last, kept where a member that is killed and started again finds it: it asks for what was made meanwhile.
+//! The last record that hosts here received, saved for a member that is killed and restarted: it requests the records
+//! made meanwhile.
 
 use crate::RelayError;
 use std::fs::File;
@@ -6,25 +7,25 @@ use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::PathBuf;
 use stylet_shm_schema::Instance;
 
-/// Servers keep records for so long.
+/// Time for which servers keep records.
 const KEPT_NS: u64 = 60_000_000_000;
 const LENGTH: usize = 24;
 
-/// The tick that comes next in a run of the core.
+/// The next tick in a run of the core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Next {
     pub session_id: u64,
     pub tick: u64,
 }
 
-/// The file; removed by a member that ends, since hosts of a later one have no gap to fill.
+/// The file. A member that ends removes it, since hosts of a later one have no gap to fill.
 pub(super) struct Last {
     file: File,
     path: PathBuf,
 }
 
 impl Last {
-    /// Where the member of `instance` notes it, and what one that was killed has noted less than a minute ago.
+    /// Opens the file for the member of `instance`, and returns the note of one killed less than a minute ago.
     pub fn open(instance: &Instance, now_ns: u64) -> Result<(Self, Option<Next>), RelayError> {
         let folder = instance.make_folder()?;
         let path = folder.join("relay.last");
@@ -42,14 +43,14 @@ impl Last {
         let mut bytes = [0; LENGTH];
         self.file.read_exact_at(&mut bytes, 0).ok()?;
         let [session_id, tick, time_ns]: [u64; 3] = bytemuck::pod_read_unaligned(&bytes);
-        // A clock that another start of this machine had is ahead.
+        // After a reboot the noted time may be ahead of the clock.
         let is_recent = now_ns.checked_sub(time_ns).is_some_and(|age_ns| age_ns < KEPT_NS);
         is_recent.then_some(Next { session_id, tick })
     }
 
-    /// Hosts here have all before `next`.
+    /// Notes that hosts here have all records before `next`.
     pub fn note(&self, next: Next, now_ns: u64) {
-        // Where it cannot be written, a member that is killed costs what it did without it.
+        // Without the file, a killed member only loses the records made meanwhile.
         let _ = self
             .file
             .write_all_at(bytemuck::bytes_of(&[next.session_id, next.tick, now_ns]), 0);

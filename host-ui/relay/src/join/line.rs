@@ -1,4 +1,4 @@
-//! What hosts here are shown of the line to the server.
+//! State of the connection to the server, as shown to hosts here.
 
 use super::{Member, Options};
 use crate::now_ns;
@@ -9,9 +9,9 @@ use stylet_shm_schema::{Relayed, Text};
 
 const EVERY: Duration = Duration::from_millis(200);
 
-/// Who sits here, at which server, and when hosts were shown that last.
+/// This member, its server, and the time of the last report to hosts.
 pub(super) struct Line {
-    /// The run of the core, as hosts here know it.
+    /// The run of the core, as announced to hosts here.
     pub session_id: u64,
     server: String,
     name: String,
@@ -34,7 +34,7 @@ impl Line {
         &self.name
     }
 
-    /// What hosts are shown, five times a second.
+    /// Returns the report for hosts, five times a second.
     pub fn due(&mut self, member: &Member, who: &Who, is_heard: bool, round_trip_ns: u64) -> Option<Relayed> {
         if self.said.is_some_and(|said| said.elapsed() < EVERY) {
             return None;

@@ -1,4 +1,5 @@
-//! On another machine: the services of the core as if it ran here, and the requests of hosts here to the server.
+//! The relay on another machine: offers the core's services as if it ran here, and sends the requests of hosts here to
+//! the server.
 
 mod awaited;
 mod clock;
@@ -24,48 +25,48 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use stylet_shm_schema::Instance;
 
-/// Messages that may wait for a thread; more are dropped, and records among them asked for again.
+/// Most messages queued for a thread; more are dropped, and dropped records are requested again.
 const WAITING: usize = 4096;
 const SNAPSHOTS_WAITING: usize = 32;
-/// A server that was not heard for so long is taken for lost, until it is heard again.
+/// Silence after which the server counts as lost, until it is heard again.
 const SILENCE: Duration = Duration::from_millis(300);
 
-/// How to join.
+/// Settings of a member.
 pub struct Options {
-    /// The instance that hosts here use.
+    /// Instance for hosts here.
     pub instance: Instance,
     /// Address and port of the server.
     pub server: String,
-    /// Who this is.
+    /// Invitation of this member.
     pub invitation: Invitation,
     /// The certificate and key of the invitation.
     pub identity: Identity,
 }
 
-/// What the threads of a member share.
+/// State shared by a member's threads.
 struct Member {
     session: InUse,
     instance: Instance,
     seat: u16,
-    // SYNC: what follows are figures on their own; no other data is published by them.
+    // SYNC: the fields below are independent figures; no other data is published by them.
     end: AtomicBool,
     server_run: AtomicU64,
     /// Newest time of the server, by its clock.
     heard_ns: AtomicU64,
-    /// When the server was heard last, by this machine's clock.
+    /// Time at which the server was last heard, by this machine's clock.
     heard_at_ns: AtomicU64,
-    /// Why the server takes nothing of this member, and when it said so last, by this machine's clock.
+    /// Why the server refuses this member, and when it last said so, by this machine's clock.
     refused: Mutex<Option<(String, u64)>>,
     /// Records lost for good.
     lost: AtomicU64,
     clock: Mutex<Clock>,
-    /// Snapshots that never came, or came too late to be shown.
+    /// Snapshots that never arrived, or too late to be shown.
     snapshots_lost: AtomicU64,
-    /// When the newest snapshot that was shown was made, by this machine's clock; 0 for none.
+    /// Time at which the newest shown snapshot was made, by this machine's clock; 0 for none.
     snapshot_made_ns: AtomicU64,
-    /// Hosts here have been announced a run of the core: what comes before that they drop.
+    /// A run of the core has been announced to hosts here; they drop data before that.
     is_announced: AtomicBool,
-    /// Changes the number of the core's run for hosts here, where its board cannot be made under its own.
+    /// Changes the number of the core's run for hosts here, if its board cannot be made under its own.
     salt: AtomicU64,
 }
 
@@ -74,7 +75,7 @@ impl Member {
         self.end.load(Ordering::Relaxed)
     }
 
-    /// The run of the core as hosts here know it.
+    /// The run of the core, as announced to hosts here.
     fn run(&self, session_id: u64) -> u64 {
         session_id ^ self.salt.load(Ordering::Relaxed)
     }
@@ -90,22 +91,22 @@ impl Member {
     }
 
     fn clock(&self) -> MutexGuard<'_, Clock> {
-        // What is behind the lock is whole after each statement.
+        // The data behind the lock is consistent after each statement.
         self.clock.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Within that time.
+    /// True if the server was heard within that time.
     fn has_heard(&self, within: Duration) -> bool {
         let at = self.heard_at_ns.load(Ordering::Relaxed);
         at != 0 && u128::from(now_ns().saturating_sub(at)) < within.as_nanos()
     }
 
-    /// By records or by a refusal.
+    /// True if records or a refusal arrived within that time.
     fn is_answered(&self, within: Duration) -> bool {
         self.has_heard(within) || self.refusal(within).is_some()
     }
 
-    /// Why the server takes nothing of this member.
+    /// Returns why the server refuses this member.
     fn refusal(&self, within: Duration) -> Option<String> {
         let refused = self.refused.lock().unwrap_or_else(PoisonError::into_inner);
         let recent = |at| u128::from(now_ns().saturating_sub(at)) < within.as_nanos();
@@ -128,7 +129,7 @@ impl Member {
         }
     }
 
-    /// A message that may be lost: another comes soon.
+    /// Sends a message that may be lost: another follows soon.
     fn say(&self, kind: Kind, number: u64, body: &[u8]) {
         let bytes = encode(kind, self.stamp(number), &[body]);
         net::put(
@@ -139,9 +140,9 @@ impl Member {
         );
     }
 
-    /// A message that is not to be lost while there is a connection.
+    /// Sends a message that must not be lost while there is a connection.
     fn ask(&self, kind: Kind, parts: &[&[u8]]) {
-        // Behind all that a hand asks for.
+        // Below all requests of a hand.
         let priority = match kind {
             Kind::Upload => Priority::Data,
             _ => Priority::InteractiveHigh,
@@ -151,10 +152,10 @@ impl Member {
     }
 }
 
-/// A message as a callback hands it to a thread.
+/// A message passed from a callback to a thread.
 type Bytes = Vec<u8>;
 
-/// Where messages go by their kind.
+/// Queues of messages by kind.
 struct Queues {
     records: SyncSender<Bytes>,
     snapshots: SyncSender<Bytes>,
@@ -189,7 +190,7 @@ impl Queues {
 
 /// Joins until `stop`.
 pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
-    // Before there are threads, of zenoh as well.
+    // Before any thread starts, including zenoh's.
     crate::slice::shorten();
     let mut connection = Connection::new(options);
     let Some(session) = connection.first(stop)? else {
@@ -239,7 +240,7 @@ pub fn run(options: &Options, stop: &AtomicBool) -> Result<(), RelayError> {
     while !stop.load(Ordering::Relaxed) && !threads.iter().any(std::thread::JoinHandle::is_finished) {
         rounds.pass();
         connection.pass(&member, &queues)?;
-        // One wait for a message in place of a pause, so that a message does not wait.
+        // Waits for one message instead of sleeping, so that a message is not delayed.
         if let Ok(bytes) = rest.recv_timeout(rounds.pause()) {
             rounds.take(&bytes);
             rest.try_iter().take(WAITING).for_each(|bytes| rounds.take(&bytes));

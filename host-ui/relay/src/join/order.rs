@@ -1,4 +1,4 @@
-//! Records in the order of their ticks: what the network lost is asked for again, and what is lost for good is counted.
+//! Records in the order of their ticks: those lost on the network are requested again, and lasting losses are counted.
 
 use super::last::Next;
 use crate::wire::Ticks;
@@ -6,35 +6,36 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::TickRecord;
 
-/// Ticks asked for at once.
+/// Most ticks in one request.
 const ASK_AT_MOST: u64 = 1280;
-/// A request that was not answered for so long is made again.
+/// Time after which an unanswered request is repeated.
 const ASK_EVERY: Duration = Duration::from_millis(150);
-/// Records that did not come for so long, while later ones came, are given up.
+/// Time after which missing records are given up while later ones arrive.
 const PATIENCE: Duration = Duration::from_secs(6);
-/// Batches that may wait for an earlier one: more than a minute of them.
+/// Most batches that may wait for an earlier one: more than a minute of them.
 const HELD_AT_MOST: usize = 4096;
 
-/// Batches are known by the run of the core and their ticks, not by the server: one that was started again goes on with them.
+/// Reorders batches. They are identified by the run of the core and their ticks, not by the server, so a restarted
+/// server continues them.
 #[derive(Default)]
 pub struct Order {
     /// The run of the core, and the one before it.
     session: u64,
     session_before: u64,
-    /// The tick that comes next; nothing before the first.
+    /// Next tick; `None` before the first.
     next: Option<u64>,
-    /// By their first tick.
+    /// Batches by their first tick.
     held: BTreeMap<u64, Vec<TickRecord>>,
-    /// What was held when the run ended.
+    /// Batches held when the run ended.
     ended: VecDeque<Vec<TickRecord>>,
-    /// When the tick that comes next was missed first; when ticks were asked for last, and the last of those.
+    /// Time at which the next tick was first missed; time of the last request, and its last tick.
     missed: Option<Instant>,
     asked: Option<(Instant, u64)>,
     lost: u64,
 }
 
 impl Order {
-    /// Goes on where another has ended.
+    /// Continues after another member.
     pub(super) fn from(next: Option<Next>) -> Self {
         Self {
             session: next.map_or(0, |next| next.session_id),
@@ -43,13 +44,13 @@ impl Order {
         }
     }
 
-    /// What comes after all that was taken.
+    /// Returns the position after everything taken.
     pub(super) fn next(&self) -> Option<Next> {
         let session_id = self.session;
         self.next.map(|tick| Next { session_id, tick })
     }
 
-    /// A batch that arrived.
+    /// Adds an arriving batch.
     pub fn put(&mut self, records: Vec<TickRecord>) {
         let Some(first) = records.first().copied() else { return };
         if !is_one_batch(&records) || (first.session_id == self.session_before && first.session_id != self.session) {
@@ -68,7 +69,7 @@ impl Order {
         }
     }
 
-    /// The server does not keep these any more.
+    /// Gives up ticks that the server no longer keeps.
     pub fn give_up(&mut self, ticks: Ticks) {
         let is_missed = self.next.is_some_and(|next| (ticks.from..=ticks.to).contains(&next));
         if ticks.session_id == self.session && is_missed && self.first_held().is_some_and(|first| ticks.to < first) {
@@ -85,7 +86,7 @@ impl Order {
         (self.next, self.missed, self.asked) = (Some(tick), None, None);
     }
 
-    /// The records that come next, once they are there.
+    /// Returns the next records, once they are there.
     pub fn take(&mut self, now: Instant) -> Option<Vec<TickRecord>> {
         if let Some(records) = self.ended.pop_front() {
             return Some(records);
@@ -101,7 +102,7 @@ impl Order {
                 return None;
             };
             let mut records = self.held.remove(&first)?;
-            // Of a batch that came in two forms.
+            // The batch may have arrived in two forms.
             records.retain(|record| record.tick >= next);
             if records.is_empty() {
                 continue;
@@ -113,7 +114,7 @@ impl Order {
         }
     }
 
-    /// The ticks to ask for now.
+    /// Returns the ticks to request now.
     pub fn missing(&mut self, now: Instant) -> Option<Ticks> {
         let (next, first) = (self.next?, self.first_held()?);
         let is_due = self
@@ -131,7 +132,7 @@ impl Order {
         })
     }
 
-    /// Records of the runs of the core that never came.
+    /// Number of records of the core's runs that never arrived.
     pub fn lost(&self) -> u64 {
         self.lost
     }
@@ -141,7 +142,7 @@ fn last_tick(records: &[TickRecord]) -> u64 {
     records.last().map_or(0, |record| record.tick)
 }
 
-/// Of one run, with ticks that rise.
+/// True for records of one run with rising ticks.
 fn is_one_batch(records: &[TickRecord]) -> bool {
     let pairs = |pair: &[TickRecord]| pair[0].session_id == pair[1].session_id && pair[0].tick < pair[1].tick;
     records.windows(2).all(pairs) && last_tick(records) < u64::MAX
@@ -212,7 +213,7 @@ mod tests {
         assert_eq!(order.lost(), 30);
     }
 
-    /// A server that is started again has no numbers of its own: what was made meanwhile is asked for.
+    /// A restarted server restarts its numbers: the records made meanwhile are requested.
     #[test]
     fn what_was_made_without_a_server_is_asked_for_part_by_part() {
         let (mut order, now) = (Order::default(), Instant::now());
@@ -251,7 +252,7 @@ mod tests {
         order.put(batch(3));
         assert_eq!(taken(&mut order, now), [1]);
         order.put(of_session(8, 100));
-        // Late, of the run before.
+        // Late, from the run before.
         order.put(batch(2));
         assert_eq!(taken(&mut order, now), [3, 100]);
         assert_eq!(order.lost(), 0);

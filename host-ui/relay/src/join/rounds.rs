@@ -1,4 +1,4 @@
-//! One pass of a member after the other: what is in force goes to hosts here, their requests go to the server.
+//! Passes of a member: the state in force goes to hosts here, their requests go to the server.
 
 use super::awaited::Awaited;
 use super::line::Line;
@@ -22,21 +22,22 @@ use stylet_shm_schema::{
     SCHEMA_VERSION, Session, Text,
 };
 
-/// Requests of hosts here wait for half of it on average: while they come, as from a hand, and after a while without any.
+/// Interval of passes, half of which delays a request on average: used while requests arrive, as from a hand, and for a
+/// while after.
 const PASS: Duration = Duration::from_millis(2);
 const QUIET_PASS: Duration = Duration::from_millis(10);
 const QUIET: Duration = Duration::from_secs(1);
-/// A server that refuses says so to each greeting.
+/// Lifetime of a refusal; a refusing server repeats it for each greeting.
 const REFUSED_FOR: Duration = Duration::from_secs(3);
-/// For hosts that come and orders of a terminal, which no operator waits for.
+/// Interval of the check for new hosts and orders of a terminal, which need no quick answer.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 const HELLO_EVERY: Duration = Duration::from_millis(50);
-/// For so long an event that was missed is waited for.
+/// Longest wait for a missing event.
 const EVENT_PATIENCE: Duration = Duration::from_millis(500);
-/// Takes two milliseconds, in which records may wait.
+/// Interval of a clean-up, which takes two milliseconds and may delay records.
 const CLEAN_EVERY: Duration = Duration::from_secs(10);
 
-/// All of a member but the threads of records and snapshots.
+/// State of a member, except for the threads of records and snapshots.
 pub(super) struct Rounds {
     member: Arc<Member>,
     // The board before the ports, and those before their node.
@@ -46,19 +47,19 @@ pub(super) struct Rounds {
     orders: Orders,
     scenes: Scenes,
     scene: (u64, u64),
-    /// Run of the core and number of the last event that hosts here had.
+    /// Run of the core and number of the last event sent to hosts here.
     event: (u64, u64),
-    /// A volume that goes to the server.
+    /// A volume on its way to the server.
     volume: Option<Volume>,
-    /// Why the server takes nothing of this member, as it was said here last.
+    /// The server's refusal, as last reported here.
     refused: Option<String>,
-    /// Since when an event between that one and the next is missed.
+    /// Time since which an event before the next one is missing.
     event_missed: Option<Instant>,
     who: Who,
     line: Line,
     hello: Instant,
     epoch: u64,
-    /// What is in force and has not come since it was asked for, and when that was.
+    /// Requested state that has not arrived, and the time of the request.
     awaited: Awaited,
     has_server: bool,
     round_trip_ns: u64,
@@ -101,7 +102,7 @@ impl Rounds {
         Arc::clone(&self.scenes)
     }
 
-    /// From one pass to the next, where no message comes.
+    /// Returns the pause between passes without messages.
     pub(super) fn pause(&self) -> Duration {
         match self.asked.elapsed() < QUIET {
             true => PASS,
@@ -119,7 +120,7 @@ impl Rounds {
         let has_server = self.member.has_server();
         if has_server != self.has_server {
             self.has_server = has_server;
-            // What was sent meanwhile was lost: all that is in force is asked for again.
+            // Messages sent meanwhile were lost: the whole state is requested again.
             if has_server {
                 self.ask_for_all();
             }
@@ -199,7 +200,7 @@ impl Rounds {
         )
     }
 
-    /// Without a server each request is answered at once: none waits and is carried out later.
+    /// Takes requests of hosts. Without a server each is answered at once: none is carried out later.
     fn take_requests(&mut self) {
         let has_server = self.member.has_server();
         while let Some(command) = self.far.commands.receive() {
@@ -229,7 +230,7 @@ impl Rounds {
         }
     }
 
-    /// Why nothing goes to the server.
+    /// Returns why nothing goes to the server.
     fn why_not(&self) -> String {
         match &self.refused {
             Some(why) => format!("the server refuses this member: {why}"),
@@ -245,7 +246,7 @@ impl Rounds {
         let _ = self.far.replies.send(reply);
     }
 
-    /// A message for hosts here; dropped where it is invalid.
+    /// Publishes a message to hosts here; invalid ones are dropped.
     pub(super) fn take(&mut self, bytes: &[u8]) {
         let Ok(message) = wire::decode(bytes) else { return };
         let taken = match message.kind {
@@ -291,7 +292,7 @@ impl Rounds {
         Ok(())
     }
 
-    /// Under another number where a member that was killed has left its board, which nobody can write any more.
+    /// Opens the board, under another number if a killed member has left one that can no longer be written.
     fn open_board(&mut self, session_id: u64) {
         for _ in 0..3 {
             if let Ok(board) = StateWriter::create(&self.far.meeting.node, self.member.run(session_id)) {
@@ -330,11 +331,12 @@ impl Rounds {
             return Err(Invalid("event"));
         }
         let (session, last) = self.event;
-        // What was sent again to one who has it.
+        // Resent to a member that has it.
         if event.session_id == session && event.sequence <= last {
             return Ok(());
         }
-        // All that is in force is asked for again, the last events with it; those that are not kept are not waited for.
+        // The whole state is requested again, including the last events; events that are no longer kept are not waited
+        // for.
         if event.session_id == session && event.sequence > last + 1 {
             let missed = self
                 .event_missed

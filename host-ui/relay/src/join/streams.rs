@@ -1,4 +1,4 @@
-//! The threads of the streams: records in order and whole, snapshots made whole again. What is invalid is dropped.
+//! The threads of the streams: restore the order of records, and whole snapshots. Invalid data is dropped.
 
 use super::last::Last;
 use super::order::Order;
@@ -13,17 +13,18 @@ use std::time::{Duration, Instant};
 use stylet_ports::SlicePublisher;
 use stylet_shm_schema::{TickRecord, check};
 
-/// Without a message they look so often whether the end has come, and what is to be asked for.
+/// Interval at which, without messages, they check for the end and for missing records.
 const WAIT: Duration = Duration::from_millis(20);
 
-/// A snapshot that is older is not shown: the next one is on its way. A line on which all of them take long gets half of it more than its way.
+/// Largest age of a shown snapshot: the next one is on its way. A line on which all of them are slow gets half of it on
+/// top of its travel time.
 const LATE_NS: u64 = 200_000_000;
-/// Snapshots that overtake one another are so many numbers apart at most.
+/// Largest distance between the numbers of snapshots that overtake one another.
 const LATE_NUMBERS: u64 = 32;
-/// Where none was shown for so long, one that is late is.
+/// Time without a shown snapshot after which a late one is shown.
 const BLIND: Duration = Duration::from_secs(2);
 
-/// What the scene at rest is, as the thread of the rest has it.
+/// The scene at rest, from the thread of the other messages.
 pub type Scenes = Arc<Mutex<Arc<Rest>>>;
 
 pub(super) fn records(member: &Member, messages: &Receiver<Bytes>) -> Result<(), RelayError> {
@@ -39,7 +40,7 @@ pub(super) fn records(member: &Member, messages: &Receiver<Bytes>) -> Result<(),
                 .for_each(|bytes| take(&mut order, &bytes));
         }
         let now = Instant::now();
-        // Until then they wait here, where more of them fit than come in a minute.
+        // Until then they wait here, with room for more than a minute of them.
         if member.is_announced.load(Ordering::Relaxed)
             && hand_on(member, &port, &mut order, now)
             && let Some(next) = order.next()
@@ -54,7 +55,7 @@ pub(super) fn records(member: &Member, messages: &Receiver<Bytes>) -> Result<(),
     Ok(())
 }
 
-/// What comes next to hosts here; whether there was anything.
+/// Publishes the next records to hosts here; returns whether there were any.
 fn hand_on(member: &Member, port: &SlicePublisher<TickRecord, u64>, order: &mut Order, now: Instant) -> bool {
     let mut any = false;
     while let Some(mut batch) = order.take(now) {
@@ -74,7 +75,7 @@ fn take(order: &mut Order, bytes: &[u8]) {
     match message.kind {
         Kind::Records => {
             let records = wire::unpack(message.body);
-            // A batch with an invalid record is one that was lost.
+            // A batch with an invalid record counts as lost.
             let valid = records
                 .ok()
                 .filter(|batch| batch.iter().all(|r| check::record(r).is_ok()));
@@ -91,8 +92,8 @@ fn take(order: &mut Order, bytes: &[u8]) {
     }
 }
 
-/// How many between the newest snapshot and another are missed; nothing where that is older and came late. Numbers of a server that took this member for
-/// one that had left begin anew.
+/// Returns how many snapshots between the newest and another are missing; `None` if the other is older and late.
+/// Numbers restart if the server had considered this member gone.
 fn missed(newest: (u64, u64), other: (u64, u64)) -> Option<u64> {
     if other.0 != newest.0 || other.1 + LATE_NUMBERS < newest.1 {
         return Some(0);
@@ -122,7 +123,7 @@ pub(super) fn snapshots(member: &Member, messages: &Receiver<Bytes>, scenes: &Sc
                 let clock = member.clock();
                 (clock.here_ns(header.time_ns), clock.way_ns())
             };
-            // What came late was worth having for what it holds.
+            // A late snapshot is still needed for its contents.
             if now_ns().saturating_sub(made_ns) > LATE_NS.max(way_ns + LATE_NS / 2) && shown.elapsed() < BLIND {
                 member.snapshots_lost.fetch_add(1, Ordering::Relaxed);
                 continue;

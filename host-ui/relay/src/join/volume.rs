@@ -1,13 +1,13 @@
-//! A volume of a host here on its way to the server, in parts: between them go greetings, promises and requests.
+//! Sends the volume of a host here to the server in parts, with greetings, promises and requests in between.
 
 use super::Member;
 use crate::wire::{Kind, PART_BYTES};
 use stylet_shm_schema::UploadHeader;
 
-/// Parts in one pass.
+/// Parts per pass.
 const AT_ONCE: usize = 2;
 
-/// What is sent of it.
+/// Progress of the transfer.
 pub(super) struct Volume {
     header: UploadHeader,
     cells: Vec<u8>,
@@ -15,7 +15,7 @@ pub(super) struct Volume {
 }
 
 impl Volume {
-    /// Of which nothing is sent.
+    /// Returns a volume of which nothing has been sent.
     pub fn new(header: UploadHeader, cells: &[u8]) -> Self {
         Self {
             header,

@@ -8,11 +8,11 @@ use rcgen::{
 };
 use time::{Duration, OffsetDateTime};
 
-/// A seat's certificate still says whose it is for so long after its time, so that whoever is refused then is refused by name. What it
-/// is worth ends with its time, by the lab's list.
+/// Time after expiry for which a seat's certificate still identifies its member, so that the refusal can be addressed
+/// by name. The right to connect ends at expiry, by the lab's list.
 const NAMED_AFTER: Duration = Duration::days(365);
 
-/// From when until when a certificate is valid.
+/// Period of validity of a certificate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Validity {
     from: OffsetDateTime,
@@ -20,7 +20,7 @@ pub struct Validity {
 }
 
 impl Validity {
-    /// So many days from now on. A clock that is an hour behind accepts it too.
+    /// Valid for `days` from now on. A clock that is an hour slow accepts it too.
     pub fn days(days: u32) -> Self {
         let now = OffsetDateTime::now_utc();
         Self {
@@ -29,7 +29,7 @@ impl Validity {
         }
     }
 
-    /// One that ended an hour ago.
+    /// Returns a period that ended an hour ago.
     pub fn ended() -> Self {
         let now = OffsetDateTime::now_utc();
         Self {
@@ -44,7 +44,7 @@ impl Validity {
     }
 }
 
-/// Whom a certificate is for.
+/// Subject of a certificate.
 pub enum Subject<'a> {
     /// The machine with the core, by its names and addresses.
     Machine(&'a [String]),
@@ -54,7 +54,7 @@ pub enum Subject<'a> {
 
 /// The lab's authority, PEM.
 pub struct Authority {
-    /// Its certificate, which everybody has.
+    /// Its certificate, known to everyone.
     pub certificate: String,
     /// Its key, which stays in the lab.
     pub key: String,
@@ -71,7 +71,7 @@ fn named(hosts: &[String], name: &str) -> Result<CertificateParams, RelayError> 
     Ok(params)
 }
 
-/// The same each time, so that the authority can be put together again from its key.
+/// Returns the same parameters each time, so that the authority can be rebuilt from its key.
 fn authority() -> Result<CertificateParams, RelayError> {
     let mut params = named(&[], "Stylet lab")?;
     params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
@@ -80,7 +80,7 @@ fn authority() -> Result<CertificateParams, RelayError> {
 }
 
 impl Authority {
-    /// A new one, valid for twenty years.
+    /// Makes a new one, valid for twenty years.
     pub fn make() -> Result<Self, RelayError> {
         let key = KeyPair::generate().map_err(failed)?;
         let mut params = authority()?;
@@ -93,7 +93,7 @@ impl Authority {
         })
     }
 
-    /// Certificate and key of a subject, PEM.
+    /// Returns certificate and key of a subject, PEM.
     pub fn sign(&self, subject: &Subject<'_>, validity: Validity) -> Result<(String, String), RelayError> {
         let (mut params, usage, after) = match subject {
             Subject::Machine(hosts) => (

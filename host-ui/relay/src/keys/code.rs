@@ -1,4 +1,4 @@
-//! The code that opens an invitation: whoever finds the file without it has nothing.
+//! The code that opens an invitation: the file is useless without it.
 
 use crate::RelayError;
 use base64::Engine;
@@ -8,9 +8,9 @@ use ring::pbkdf2::{self, PBKDF2_HMAC_SHA256};
 use ring::rand::{SecureRandom, SystemRandom};
 use std::num::NonZeroU32;
 
-/// Without letters and digits that look alike.
+/// Alphabet without letters and digits that look alike.
 const LETTERS: &[u8; 32] = b"abcdefghjkmnpqrstuvwxyz023456789";
-/// Of five bits each: 80 bits, which nobody guesses.
+/// Length of a code. Each letter holds five bits: 80 bits, which cannot be guessed.
 const LENGTH: usize = 16;
 const SALT_BYTES: usize = 16;
 const ROUNDS: NonZeroU32 = NonZeroU32::new(100_000).expect("not zero");
@@ -22,14 +22,14 @@ fn random<const N: usize>() -> Result<[u8; N], RelayError> {
     Ok(bytes)
 }
 
-/// A new code, in groups of four.
+/// Makes a new code, in groups of four.
 pub fn make() -> Result<String, RelayError> {
     let letters = random::<LENGTH>()?.map(|byte| char::from(LETTERS[usize::from(byte) % LETTERS.len()]));
     let groups = letters.chunks(4).map(|group| group.iter().collect::<String>());
     Ok(groups.collect::<Vec<_>>().join("-"))
 }
 
-/// A key of its own for each salt, so that its one nonce is used once.
+/// Derives a separate key for each salt, so that its single nonce is used once.
 fn key(code: &str, salt: &[u8]) -> Result<LessSafeKey, RelayError> {
     let plain: String = code.chars().filter(|c| c.is_alphanumeric()).collect();
     let mut bytes = [0; 32];
@@ -50,7 +50,7 @@ fn wrong() -> RelayError {
     )
 }
 
-/// The words closed with the code, for a file.
+/// Encrypts text with the code, for a file.
 pub fn seal(words: &str, code: &str) -> Result<String, RelayError> {
     let salt = random::<SALT_BYTES>()?;
     let mut sealed = words.as_bytes().to_vec();
@@ -60,7 +60,7 @@ pub fn seal(words: &str, code: &str) -> Result<String, RelayError> {
     Ok(STANDARD.encode([&salt[..], &sealed].concat()))
 }
 
-/// What was sealed with the code.
+/// Decrypts text that was sealed with the code.
 pub fn open(sealed: &str, code: &str) -> Result<String, RelayError> {
     let bytes = STANDARD.decode(sealed).map_err(|_| wrong())?;
     let (salt, sealed) = bytes.split_at_checked(SALT_BYTES).ok_or_else(wrong)?;

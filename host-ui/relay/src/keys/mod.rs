@@ -1,7 +1,8 @@
 //! The keys of a lab: its authority, the certificate of the machine with the core, and its members with their roles.
 //!
-//! A member's certificate names a *seat*, a number that is never given twice; who sits there, in which role and until when stands in
-//! `members.json` beside the authority's key. So a role is what the lab says now, and not what a certificate said when it was made.
+//! A member's certificate names a *seat*, a number that is never reused; its member, role and expiry are in
+//! `members.json` next to the authority's key. A role is therefore the lab's present decision, not that of the day on
+//! which the certificate was made.
 
 mod certificate;
 mod code;
@@ -17,7 +18,7 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Seats of a lab: that many certificates can be made by one authority.
+/// Number of seats of a lab, the most certificates of one authority.
 pub const SEATS: u16 = 256;
 
 /// Certificate, key and authority of one side, PEM.
@@ -31,12 +32,12 @@ pub struct Identity {
     pub key: String,
 }
 
-/// The common name of the certificate of a seat.
+/// Returns the common name of a seat's certificate.
 pub fn seat_name(seat: u16) -> String {
     format!("seat-{seat:03}")
 }
 
-/// The seat of a common name.
+/// Parses the seat of a common name.
 pub fn seat_of(name: &str) -> Option<u16> {
     let seat = name.strip_prefix("seat-")?.parse().ok()?;
     ((1..=SEATS).contains(&seat) && seat_name(seat) == name).then_some(seat)
@@ -64,23 +65,23 @@ impl fmt::Display for Role {
     }
 }
 
-/// Somebody with a certificate.
+/// A person with a certificate.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Member {
     /// Number of the seat, 1 to [`SEATS`].
     pub seat: u16,
     /// Name for people.
     pub name: String,
-    /// What the member may do.
+    /// Role of the member.
     pub role: Role,
     /// End of the certificate, seconds since 1970.
     pub until_s: i64,
-    /// Nothing is accepted from the member any more.
+    /// The member is refused from now on.
     pub revoked: bool,
 }
 
 impl Member {
-    /// Why nothing is accepted from the member.
+    /// Returns why the member is refused.
     pub fn why_closed(&self, now_s: i64) -> Option<&'static str> {
         if self.revoked {
             return Some("the certificate is revoked");
@@ -89,34 +90,34 @@ impl Member {
     }
 }
 
-/// Seconds since 1970; a clock before that is one that nothing is valid by.
+/// Seconds since 1970; a clock before that makes every certificate invalid.
 pub fn now_s() -> i64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(i64::MAX, |t| t.as_secs() as i64)
 }
 
-/// Everybody with a certificate.
+/// All persons with a certificate.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Members {
-    /// In the order of their seats.
+    /// Members in the order of their seats.
     pub members: Vec<Member>,
 }
 
 impl Members {
-    /// Who sits there, revoked or not.
+    /// Returns the member of a seat, revoked or not.
     pub fn at(&self, seat: u16) -> Option<&Member> {
         self.members.iter().find(|member| member.seat == seat)
     }
 }
 
-/// What a member gets, as one file: all that `relay join` needs.
+/// A member's file: all that `relay join` needs.
 #[derive(Clone, Serialize, Deserialize)]
 pub struct Invitation {
     /// Address of the lab's machine, with or without a port.
     pub server: String,
     /// Name of the member.
     pub name: String,
-    /// What the member may do.
+    /// Role of the member.
     pub role: Role,
     /// The seat.
     pub seat: u16,
@@ -126,12 +127,12 @@ pub struct Invitation {
     pub authority: String,
     /// Certificate of the member, PEM.
     pub certificate: String,
-    /// Key of the member, PEM, sealed with the code of the invitation: who has both is the member.
+    /// Key of the member, PEM, sealed with the code of the invitation: whoever has both is the member.
     pub sealed_key: String,
 }
 
 impl Invitation {
-    /// From the file that `relay keys invite` wrote.
+    /// Reads a file written by `relay keys invite`.
     pub fn read(path: &Path) -> Result<Self, RelayError> {
         let text = read(path)?;
         let invitation: Self = serde_json::from_str(&text).map_err(|e| {
@@ -150,7 +151,7 @@ impl Invitation {
         }
     }
 
-    /// Certificate, key and authority, opened with the code.
+    /// Returns certificate, key and authority, opened with the code.
     pub fn identity(&self, code: &str) -> Result<Identity, RelayError> {
         Ok(Identity {
             authority: self.authority.clone(),
@@ -174,7 +175,7 @@ fn read(path: &Path) -> Result<String, RelayError> {
     fs::read_to_string(path).map_err(|e| failed(path, e))
 }
 
-/// Written beside and renamed, readable for its owner alone.
+/// Writes atomically to a file readable only by its owner.
 fn write(path: &Path, text: &str) -> Result<(), RelayError> {
     let beside = path.with_extension("new");
     let _ = fs::remove_file(&beside);
@@ -190,7 +191,7 @@ fn write(path: &Path, text: &str) -> Result<(), RelayError> {
 }
 
 impl Lab {
-    /// The lab in `folder`.
+    /// Returns the lab in `folder`.
     pub fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
@@ -217,7 +218,7 @@ impl Lab {
         self.keep(&Members::default())
     }
 
-    /// Certificate, key and authority of the machine with the core.
+    /// Returns certificate, key and authority of the machine with the core.
     pub fn identity(&self) -> Result<Identity, RelayError> {
         let hint = |e: RelayError| RelayError(format!("{e}. 'relay keys new --host ADDRESS' makes a lab's keys"));
         Ok(Identity {
@@ -227,7 +228,7 @@ impl Lab {
         })
     }
 
-    /// Everybody with a certificate.
+    /// Returns all persons with a certificate.
     pub fn members(&self) -> Result<Members, RelayError> {
         let path = self.file("members.json");
         serde_json::from_str(&read(&path)?).map_err(|e| failed(&path, e))
@@ -238,7 +239,7 @@ impl Lab {
         write(&self.file("members.json"), &text)
     }
 
-    /// Makes a member's key and certificate, and the code that opens the key. Names are used once, as seats are.
+    /// Makes a member's key and certificate, and the code that opens the key. Names, like seats, are used once.
     pub fn invite(
         &self,
         name: &str,
@@ -289,7 +290,7 @@ impl Lab {
         Ok((invitation, code))
     }
 
-    /// Revokes everybody of that name; how many there were.
+    /// Revokes all members of that name; returns their number.
     pub fn revoke(&self, name: &str) -> Result<usize, RelayError> {
         let mut members = self.members()?;
         let mut count = 0;
@@ -305,7 +306,7 @@ impl Lab {
     }
 }
 
-/// Writes an invitation where only its owner can read it.
+/// Writes an invitation readable only by its owner.
 pub fn write_invitation(path: &Path, invitation: &Invitation) -> Result<(), RelayError> {
     let text = serde_json::to_string_pretty(invitation).map_err(|e| RelayError(e.to_string()))?;
     write(path, &text)

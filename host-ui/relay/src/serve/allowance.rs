@@ -1,8 +1,8 @@
-//! How much of something a seat may have: so much at once, and so much in each second after that.
+//! Rate limit of a seat: a burst, and a rate after that.
 
 use std::time::Instant;
 
-/// What is left, and what comes back.
+/// A token bucket: its level and its refill rate.
 #[derive(Clone, Copy, Debug)]
 pub struct Allowance {
     most: f64,
@@ -12,7 +12,7 @@ pub struct Allowance {
 }
 
 impl Allowance {
-    /// `most` at once, and `per_s` in each second.
+    /// Allows `most` at once, and `per_s` in each second.
     pub fn new(most: f64, per_s: f64, now: Instant) -> Self {
         Self {
             most,
@@ -22,7 +22,7 @@ impl Allowance {
         }
     }
 
-    /// Takes `amount`; false where there is not so much.
+    /// Takes `amount`; false if it is not available.
     pub fn take(&mut self, amount: f64, now: Instant) -> bool {
         let since_s = now.saturating_duration_since(self.at).as_secs_f64();
         self.left = (self.left + since_s * self.per_s).min(self.most);

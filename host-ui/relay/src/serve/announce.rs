@@ -1,4 +1,5 @@
-//! What the core publishes beside its state, records and snapshots: sent to all as it comes, and to one member all that is in force.
+//! Publications of the core except state, records and snapshots: sent to all as they arrive, and to a new member in
+//! full.
 
 use super::{Server, lock};
 use crate::class::ClassPorts;
@@ -13,12 +14,12 @@ use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::{Event, ParametersInForce, PlanInForce, Reply, SCHEMA_VERSION, Session, check};
 
 const OPEN_EVERY: Duration = Duration::from_millis(20);
-/// Ports that have heard no announcement for so long are made anew: another core may have swept their folder.
+/// Silence after which the ports are recreated: another core may have swept their folder.
 const CLEAN_EVERY: Duration = Duration::from_secs(1);
 const EVENTS_KEPT: usize = 64;
 const REPLIES_KEPT: usize = 32;
 
-/// The ports, and what is in force.
+/// The ports, and the state in force.
 pub struct Announcements {
     server: Arc<Server>,
     // The ports before their node.
@@ -31,7 +32,7 @@ pub struct Announcements {
     session: Option<Session>,
     parameters: Option<ParametersInForce>,
     plan: Option<PlanInForce>,
-    /// Identity and message.
+    /// Identity and message of the scene.
     scene: Option<((u64, u64), Bytes)>,
     events: VecDeque<Event>,
     replies: VecDeque<Reply>,
@@ -57,17 +58,17 @@ impl Announcements {
         }
     }
 
-    /// The ports to the core, when there are any.
+    /// Returns the ports to the core, if any.
     pub fn near(&self) -> Option<&Near> {
         self.near.as_ref()
     }
 
-    /// The ports by which hosts beside the core know the class, when there are any.
+    /// Returns the ports of the class for hosts next to the core, if any.
     pub fn class(&self) -> Option<&ClassPorts> {
         self.class.as_ref()
     }
 
-    /// To everybody and to hosts beside the core.
+    /// Sends the class to all members and to hosts next to the core.
     pub fn show(&self, who: &Who) {
         self.send(Kind::Who, &[&who.to_bytes()]);
         if let Some(class) = &self.class {
@@ -85,7 +86,7 @@ impl Announcements {
         encode(kind, self.server.stamp(), parts)
     }
 
-    /// To everybody.
+    /// Sends a message to all.
     pub fn send(&self, kind: Kind, parts: &[&[u8]]) {
         self.server.to_all(self.message(kind, parts));
     }
@@ -159,7 +160,7 @@ impl Announcements {
             self.events.drain(..self.events.len().saturating_sub(EVENTS_KEPT));
             self.send(Kind::Event, &[bytemuck::bytes_of(&event)]);
         }
-        // Before the replies: whoever has the reply to a rehearsal has its result.
+        // Before the replies: a host that has the reply to a rehearsal has its result.
         while let Some(sample) = near.rehearsals.receive() {
             self.send(Kind::Rehearsal, &[bytemuck::bytes_of(&sample)]);
         }
@@ -170,20 +171,20 @@ impl Announcements {
         }
     }
 
-    /// The member has the scene that is in force, or there is none.
+    /// True if the member has the scene in force, or there is none.
     pub fn has_scene(&self, hello: &Hello) -> bool {
         let theirs = (hello.scene_session, hello.scene_generation);
         self.scene.as_ref().is_none_or(|(id, _)| *id == theirs)
     }
 
-    /// The scene that is in force, to a member that says that it has another.
+    /// Sends the scene in force to a member that reports another.
     pub fn send_scene(&self, seat: u16, now: Instant) {
         if let (Some((id, bytes)), Some(outlet)) = (&self.scene, lock(&self.server.outlets).get_mut(&seat)) {
             outlet.scene(*id, bytes, now);
         }
     }
 
-    /// All that is in force but the scene, to a member that has just come or was cut off.
+    /// Sends the state in force, except the scene, to a member that has just joined or was cut off.
     pub fn greet(&self, seat: u16) {
         let outlets = lock(&self.server.outlets);
         let Some(outlet) = outlets.get(&seat) else { return };

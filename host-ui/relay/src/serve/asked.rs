@@ -1,4 +1,5 @@
-//! One message of a member, from its certificate's seat to what the core gets of it. Nothing passes that is not asked for by right.
+//! Handles one message of a member, from the seat of its certificate to the request to the core. Nothing passes without
+//! the right to it.
 
 use super::lease::Holder;
 use super::rights::{Right, right, right_to_upload};
@@ -11,10 +12,10 @@ use bytemuck::Zeroable;
 use std::time::Instant;
 use stylet_shm_schema::{Command, CommandKind, Reply, ReplyStatus, Request, Text};
 
-/// A request that left its member so long ago, by what the member had heard of the server, is not carried out: the
-/// hand that made it does not know what happened since.
+/// Largest age of a request, by the server messages that its member had heard: the hand that made an older one does not
+/// know the later events.
 const LATE_NS: u64 = 500_000_000;
-/// A promise to go on with a motion, which holds for 0.3 s at most, is worth nothing after so long: its hand may be gone.
+/// Largest age of a promise to continue a motion, which holds for 0.3 s at most: the hand of an older one may be gone.
 const PROMISE_LATE_NS: u64 = 250_000_000;
 
 const LATE: &str = "it was made before the connection was lost, or arrives late: look, and ask again";
@@ -33,7 +34,7 @@ pub(super) fn take(rounds: &mut Rounds, seat: u16, bytes: &[u8], now_ns: u64) {
         true => PROMISE_LATE_NS,
         false => LATE_NS,
     };
-    // A clock that another start of this machine had may be ahead.
+    // After a reboot the message's time may be ahead of the clock.
     let late = message.stamp.heard_ns > now_ns || now_ns - message.stamp.heard_ns > limit_ns;
     match message.kind {
         Kind::Hello => greeting(rounds, seat, &message, late),
@@ -58,7 +59,7 @@ pub(super) fn take(rounds: &mut Rounds, seat: u16, bytes: &[u8], now_ns: u64) {
     }
 }
 
-/// Renews a motion; many of these come in a second.
+/// True for a message that renews a motion; many arrive each second.
 fn is_promise(message: &Message<'_>) -> bool {
     let promises = |command: Command| command.kind == CommandKind::KeepMoving as u32;
     message.kind == Kind::Command && wire::one::<Command>(message.body).is_ok_and(promises)
@@ -79,7 +80,7 @@ fn greeting(rounds: &mut Rounds, seat: u16, message: &Message<'_>, late: bool) {
         rounds.log(seat, line);
     }
     let is_new = known != Some(epoch);
-    // One that asks for all again and again waits: what it says next time is new as well.
+    // A member that keeps asking for everything waits: its next greeting is new as well.
     let greets = is_new && rounds.greets(seat);
     if greets {
         rounds.announcements.greet(seat);
@@ -120,7 +121,7 @@ fn answer(rounds: &Rounds, seat: u16, kind: Kind, body: &[u8]) {
     }
 }
 
-/// Says so here, and to the host that asked; of a promise to nobody.
+/// Reports a refusal here, and to the host that asked; refusals of promises are not reported.
 fn refuse(rounds: &mut Rounds, seat: u16, message: &Message<'_>, why: &str) {
     if is_promise(message) {
         return;
@@ -157,7 +158,7 @@ fn refuse(rounds: &mut Rounds, seat: u16, message: &Message<'_>, why: &str) {
     }
 }
 
-/// Whether the member has the right now; the lease is taken where nobody has it.
+/// True if the member has the right now; takes the lease if it is free.
 fn allowed(rounds: &mut Rounds, seat: u16, member: &Member, right: Option<Right>) -> Result<(), String> {
     match right {
         None => Err(format!("an {} may not do this", member.role)),
@@ -182,7 +183,7 @@ fn command(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_
             Ok((command, right(member.role, request.kind())))
         });
     let passed = checked.and_then(|(command, right)| {
-        // Renewing a motion takes the needle from nobody.
+        // Renewing a motion does not take the lease.
         let is_promise = command.kind == CommandKind::KeepMoving as u32;
         if is_promise && rounds.lease.holder() != Holder::Seat(seat) {
             return Ok(());
@@ -196,7 +197,7 @@ fn command(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_
     }
 }
 
-/// The right is looked at before the first part is kept, and once more when the volume is whole.
+/// Takes a part of a volume. The right is checked before the first part is kept, and again when the volume is whole.
 fn upload(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>, late: bool) {
     if let Err(why) = part(rounds, seat, member, message, late) {
         refuse(rounds, seat, message, &why);
@@ -216,7 +217,7 @@ fn part(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>, 
         }
         rounds.volume = Some(Volume::begin(seat, header, now));
     }
-    // The parts of one that was refused are on their way.
+    // Parts of a refused volume are still arriving.
     let Some(volume) = rounds.volume.as_mut().filter(|volume| volume.seat == seat) else {
         return Ok(());
     };
@@ -235,7 +236,7 @@ fn part(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>, 
     Ok(())
 }
 
-/// To operate, to stop operating, or to hand over to somebody else.
+/// Handles a request to operate, to stop operating, or to hand over.
 fn lease(rounds: &mut Rounds, seat: u16, member: &Member, message: &Message<'_>) {
     let order = std::str::from_utf8(message.body).ok().and_then(Order::of_line);
     let mine = rounds.lease.holder() == Holder::Seat(seat);

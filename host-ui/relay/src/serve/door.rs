@@ -1,4 +1,4 @@
-//! What a seat's message needs to be taken at all, by its kind and its first bytes: before it waits with those of others.
+//! Filters a seat's messages by kind and first bytes, before they queue with those of others.
 
 use super::allowance::Allowance;
 use super::lock;
@@ -9,12 +9,12 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// Messages of one seat that may wait for the server; it takes all of them every 2 ms.
+/// Most messages of one seat queued for the server, which takes all of them every 2 ms.
 const WAITING: usize = 64;
-/// Parts of one volume that may wait.
+/// Most parts of one volume queued.
 const PARTS_WAITING: usize = 512;
 
-/// Who may come in, and how often.
+/// Admitted seats and their rate limits.
 #[derive(Default)]
 pub struct Door(Mutex<Inside>);
 
@@ -24,21 +24,21 @@ struct Inside {
     gates: BTreeMap<u16, Gate>,
 }
 
-/// Of one seat, whoever sits there and however often it connects.
+/// Limits of one seat, whoever holds it and however often it connects.
 struct Gate {
     waiting: usize,
     turned_away: u64,
-    /// Twenty a second say that a member lives.
+    /// Signs of life, twenty a second.
     greetings: Allowance,
-    /// A window sends one or two for each frame, and a promise of its motion every 8 ms.
+    /// A window sends one or two for each frame, and a promise for its motion every 8 ms.
     requests: Allowance,
-    /// What is asked of the lease.
+    /// Orders for the lease.
     orders: Allowance,
-    /// A member asks at most seven times a second where no answer comes.
+    /// A member asks at most seven times a second while it gets no answer.
     again: Allowance,
     /// One for each snapshot.
     seen: Allowance,
-    /// What is refused anyway, with the reason.
+    /// Messages that are refused anyway, with the reason.
     refused: Allowance,
 }
 
@@ -76,33 +76,33 @@ impl Gate {
 }
 
 impl Door {
-    /// Whoever is in the list and whose time lasts.
+    /// Admits members in the list whose time has not expired.
     pub fn admit(&self, members: &Members) {
         let now_s = now_s();
         let open = members.members.iter().filter(|m| m.why_closed(now_s).is_none());
         lock(&self.0).roles = open.map(|m| (m.seat, m.role)).collect();
     }
 
-    /// Whether a message may wait for the server; one that may is [`Door::took`] afterwards.
+    /// True if a message may queue for the server; call [`Door::took`] afterwards for an admitted one.
     pub fn lets_in(&self, seat: u16, bytes: &[u8], now: Instant) -> bool {
         let inside = &mut *lock(&self.0);
         let gate = inside.gates.entry(seat).or_insert_with(|| Gate::new(now));
         let role = inside.roles.get(&seat).copied();
         let lets_in = gate.lets_in(role, bytes, now);
         gate.waiting += usize::from(lets_in);
-        // Whoever is not admitted greets on, and is told why.
+        // A seat that is not admitted keeps greeting, and hears the reason.
         gate.turned_away += u64::from(!lets_in && role.is_some());
         lets_in
     }
 
-    /// A message of the seat waits no longer.
+    /// Records that a message of the seat has left the queue.
     pub fn took(&self, seat: u16) {
         if let Some(gate) = lock(&self.0).gates.get_mut(&seat) {
             gate.waiting = gate.waiting.saturating_sub(1);
         }
     }
 
-    /// How many messages of which seats were turned away since this was asked last.
+    /// Returns the seats whose messages were turned away since the last call, with their numbers.
     pub fn turned_away(&self) -> Vec<(u16, u64)> {
         let gates = &mut lock(&self.0).gates;
         let counts = gates

@@ -1,5 +1,5 @@
-//! The process that starts the server and outlives it: where the server is killed or stands still while somebody on the net
-//! operates, it stops the hand; it starts a server that was killed again.
+//! The process that starts the server and outlives it: it stops the hand if the server is killed or hangs while a
+//! remote member operates, and restarts a killed server.
 
 use super::lease::SILENCE;
 use super::tape::{self, Tape};
@@ -17,19 +17,19 @@ use stylet_ports::{self as service, Node, ServiceError};
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::Request;
 
-/// Exit code of a server that says itself why it cannot serve.
+/// Exit code of a server that has reported itself why it cannot serve.
 pub const CANNOT: u8 = 1;
 const BEAT_EVERY: Duration = Duration::from_millis(50);
 const LOOK_EVERY: Duration = Duration::from_millis(20);
-/// A server that did not run for so long is started again after a pause.
+/// Shortest run of a server that is restarted without a pause.
 const SHORT: Duration = Duration::from_secs(1);
 const PAUSE: Duration = Duration::from_millis(100);
-/// A server that was asked to end is waited for no longer.
+/// Longest wait for a server that was asked to end.
 const END_PATIENCE: Duration = Duration::from_secs(4);
-/// A server that takes none of what it asked for is not waited for longer.
+/// Longest wait for a server that does not take the data it requested.
 const WRITE_PATIENCE: Duration = Duration::from_millis(100);
 
-/// The server's side: says twenty times a second that it runs, and whether somebody on the net operates.
+/// The server's side: reports twenty times a second that it runs, and whether a remote member operates.
 pub struct Beat {
     to_keeper: Option<UnixStream>,
     sent: Instant,
@@ -37,7 +37,7 @@ pub struct Beat {
 }
 
 impl Beat {
-    /// Over the standard input, which the keeper made.
+    /// Connects over the standard input, which the keeper made.
     pub fn of_stdin() -> Self {
         let stream = std::io::stdin().as_fd().try_clone_to_owned().map(UnixStream::from);
         let stream = stream.and_then(|stream| stream.set_nonblocking(true).map(|()| stream));
@@ -48,24 +48,24 @@ impl Beat {
         }
     }
 
-    /// The keeper's socket, for what is asked of it.
+    /// Returns the keeper's socket, for requests to it.
     pub(super) fn keeper(&self) -> Option<UnixStream> {
         self.to_keeper.as_ref().and_then(|stream| stream.try_clone().ok())
     }
 
-    /// With each pass of the server.
+    /// Reports on each pass of the server.
     pub fn pass(&mut self, operated: bool) {
         if operated != self.operated || self.sent.elapsed() >= BEAT_EVERY {
             (self.operated, self.sent) = (operated, Instant::now());
             if let Some(stream) = &mut self.to_keeper {
-                // A keeper that was killed has this process stopped by the kernel.
+                // If the keeper is killed, the kernel stops this process.
                 let _ = stream.write(&[u8::from(operated)]);
             }
         }
     }
 }
 
-/// Runs this program with `arguments` and `--kept`, again and again until `stop`.
+/// Runs this program with `arguments` and `--kept`, restarting it until `stop`.
 pub fn keep(instance: &Instance, arguments: &[OsString], stop: &AtomicBool) -> Result<(), RelayError> {
     let failed = |e: std::io::Error| RelayError(format!("the server cannot be started: {e}"));
     let mut tape = Tape::new(instance);
@@ -104,7 +104,7 @@ fn start(arguments: &[OsString], theirs: UnixStream) -> std::io::Result<Child> {
     command.spawn()
 }
 
-/// Without its keeper a server ends, and stops the hand as it does.
+/// Ends a server without its keeper; it stops the hand as it ends.
 fn end_with_keeper() -> std::io::Result<()> {
     // SAFETY: a system call with plain arguments.
     match unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGTERM) } {
@@ -113,7 +113,7 @@ fn end_with_keeper() -> std::io::Result<()> {
     }
 }
 
-/// Until the server has ended.
+/// Watches until the server has ended.
 fn watch(instance: &Instance, from_server: &mut UnixStream, tape: &mut Tape, child: &Child, stop: &AtomicBool) {
     let (mut operated, mut is_stopped, mut heard, mut asked) = (false, false, Instant::now(), None);
     let mut beats = [0; 64];
@@ -150,7 +150,7 @@ fn watch(instance: &Instance, from_server: &mut UnixStream, tape: &mut Tape, chi
             unsafe { libc::kill(child.id() as libc::pid_t, signal) };
         }
     }
-    // One that ends when it is asked to stops the hand itself.
+    // A server that ends on request stops the hand itself.
     let is_orderly = asked.is_some_and(|since| since.elapsed() < END_PATIENCE);
     if operated && !is_stopped && !is_orderly {
         stop_hand(instance, "the relay was killed");
@@ -165,7 +165,7 @@ fn stop_hand(instance: &Instance, why: &str) {
         if let Ok(command) = Request::StopHand.encode(now_ns(), 1) {
             let _ = port.send(command);
         }
-        // The core connects to a new port within one of its passes, and takes what is there.
+        // The core connects to a new port within one of its passes, and takes its messages.
         std::thread::sleep(Duration::from_millis(30));
         Ok(())
     };

@@ -1,21 +1,21 @@
-//! Batches of records that the server keeps for members that miss them.
+//! Batches of records kept for members that missed them.
 
 use crate::wire::Ticks;
 use std::collections::VecDeque;
 use std::sync::Arc;
 use stylet_shm_schema::TickRecord;
 
-/// A minute of batches: 2 MB at rest, 18 MB where no record is like the one before.
+/// A minute of batches: 2 MB at rest, 18 MB if no record resembles the one before.
 const AT_MOST: usize = 3000;
-/// Batches sent for one request at most.
+/// Most batches sent for one request.
 const AGAIN_AT_MOST: usize = 96;
 
-/// Of the run of the core whose records came last, in the order of their ticks.
+/// Batches of the latest run of the core, in the order of their ticks.
 #[derive(Default)]
 pub struct Kept {
     session_id: u64,
     batches: VecDeque<Batch>,
-    /// What was made before this server was started has come, as far as it is known.
+    /// Batches from before this server's start have arrived, as far as known.
     is_whole: bool,
 }
 
@@ -25,22 +25,22 @@ struct Batch {
     bytes: Arc<Vec<u8>>,
 }
 
-/// What a member gets that missed ticks.
+/// Answer to a member that missed ticks.
 #[derive(Default)]
 pub struct Again {
     /// Ticks that are not kept.
     pub lost: Option<Ticks>,
-    /// Messages with those that are.
+    /// Messages with the kept ticks.
     pub batches: Vec<Arc<Vec<u8>>>,
 }
 
 impl Kept {
-    /// Whether there is a batch.
+    /// True if there is a batch.
     pub fn has_any(&self) -> bool {
         !self.batches.is_empty()
     }
 
-    /// The newest batch, with the message that carries it.
+    /// Adds the newest batch, with the message that carries it.
     pub fn keep(&mut self, records: &[TickRecord], bytes: Vec<u8>) {
         let Some((first, last)) = records.first().zip(records.last()) else {
             return;
@@ -59,7 +59,7 @@ impl Kept {
         }
     }
 
-    /// Batches that another kept, in the order of their ticks; those of this run that are older than all here are taken.
+    /// Adds another's batches, in the order of their ticks: those of this run that are older than all here.
     pub fn complete(&mut self, older: impl DoubleEndedIterator<Item = (Vec<TickRecord>, Vec<u8>)>) {
         for (records, bytes) in older.rev() {
             let Some((first, last)) = records.first().zip(records.last()) else {
@@ -77,7 +77,8 @@ impl Kept {
         self.is_whole = true;
     }
 
-    /// What a member gets that missed `ticks`. Of what may still come nothing is said: the member asks again.
+    /// Returns the answer for a member that missed `ticks`. It omits ticks that may still arrive: the member asks
+    /// again.
     pub fn again(&self, ticks: Ticks) -> Again {
         let missed = || {
             self.batches

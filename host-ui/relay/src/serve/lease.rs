@@ -1,42 +1,43 @@
-//! Who holds the needle: one at a time. A hand beside the core goes before any on the net, and a hand that is silent loses it.
+//! The lease of the needle, with one holder at a time. A hand next to the core takes precedence over remote ones, and a
+//! silent hand loses it.
 
 use std::time::{Duration, Instant};
 
-/// An operator that is silent for so long operates no more, and the hand is stopped.
+/// Silence after which an operator loses the lease and the hand is stopped.
 pub const SILENCE: Duration = Duration::from_millis(300);
-/// For so long after its last request a hand beside the core goes before any other.
+/// Time after its last request during which a hand next to the core takes precedence.
 pub const LOCAL_STAYS: Duration = Duration::from_secs(10);
 
-/// Who operates.
+/// Holder of the lease.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Holder {
-    /// The first operator that asks may.
+    /// Free for the first operator that asks.
     Nobody,
-    /// A host beside the core.
+    /// A host next to the core.
     Local,
     /// The member of a seat.
     Seat(u16),
 }
 
-/// Why a seat does not operate.
+/// Reason why a seat does not operate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Held {
-    /// A host beside the core operates.
+    /// A host next to the core operates.
     ByLocal,
     /// The member of that seat operates.
     BySeat(u16),
 }
 
-/// The lease, and who asked for it.
+/// The lease, and its applicant.
 pub struct Lease {
     holder: Holder,
-    /// When the holder was heard last.
+    /// Time at which the holder was last heard.
     heard: Instant,
     asked: Option<u16>,
 }
 
 impl Lease {
-    /// Nobody's.
+    /// Returns a free lease.
     pub fn new(now: Instant) -> Self {
         Self {
             holder: Holder::Nobody,
@@ -45,24 +46,24 @@ impl Lease {
         }
     }
 
-    /// Who operates.
+    /// Holder of the lease.
     pub fn holder(&self) -> Holder {
         self.holder
     }
 
-    /// The seat that asked to operate and does not yet.
+    /// Seat that asked to operate and does not yet.
     pub fn asked(&self) -> Option<u16> {
         self.asked
     }
 
-    /// A member is alive.
+    /// Records that a member is alive.
     pub fn heard(&mut self, seat: u16, now: Instant) {
         if self.holder == Holder::Seat(seat) {
             self.heard = now;
         }
     }
 
-    /// A host beside the core moved the needle. The seat that operated until then.
+    /// Records that a host next to the core moved the needle. Returns the seat that operated until then.
     pub fn local_operates(&mut self, now: Instant) -> Option<u16> {
         let before = self.give(Holder::Local, now);
         match before {
@@ -71,7 +72,7 @@ impl Lease {
         }
     }
 
-    /// A seat asks to operate, by a word or by its first request.
+    /// Requests the lease for a seat, by an order or by its first request.
     pub fn take(&mut self, seat: u16, now: Instant) -> Result<(), Held> {
         let refused = match self.holder {
             Holder::Seat(other) if other != seat => Held::BySeat(other),
@@ -85,7 +86,7 @@ impl Lease {
         Err(refused)
     }
 
-    /// Hands it over; who had it.
+    /// Hands it over; returns the former holder.
     pub fn give(&mut self, to: Holder, now: Instant) -> Holder {
         if to == self.asked.map_or(Holder::Nobody, Holder::Seat) {
             self.asked = None;
@@ -94,7 +95,7 @@ impl Lease {
         std::mem::replace(&mut self.holder, to)
     }
 
-    /// The seat that operated and has fallen silent: the hand has to be stopped.
+    /// Returns the seat that operated and has fallen silent: the hand must be stopped.
     pub fn silent(&mut self, now: Instant) -> Option<u16> {
         let Holder::Seat(seat) = self.holder else { return None };
         if now - self.heard < SILENCE {

@@ -1,4 +1,5 @@
-//! Beside the core: one more host of normal priority, which sends what the core publishes and checks what members ask.
+//! The relay next to the core: one more host of normal priority, which sends the core's publications and checks
+//! members' requests.
 
 mod allowance;
 mod announce;
@@ -37,7 +38,7 @@ use stylet_shm_schema::Instance;
 
 const PASS: Duration = Duration::from_millis(2);
 
-/// How to serve.
+/// Settings of a server.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The core's instance.
@@ -48,29 +49,29 @@ pub struct Options {
     pub lab: Lab,
 }
 
-/// What the threads of a server share.
+/// State shared by a server's threads.
 pub struct Server {
     session: Session,
     instance: Instance,
     run: u64,
-    // SYNC: a flag alone, no data is published by it.
+    // SYNC: a flag alone; no data is published by it.
     end: AtomicBool,
     kept: Mutex<Kept>,
     door: Door,
-    /// The seats that hear the core: their members are in the list, and are heard. Nothing goes to any other.
+    /// Seats that receive the core's data: their members are in the list, and are heard. No other seat receives any.
     outlets: Mutex<BTreeMap<u16, Outlet>>,
-    /// Of each of them.
+    /// Pace of each seat.
     paces: Mutex<BTreeMap<u16, Pace>>,
 }
 
-/// What one request came as.
+/// Form of a request's arrival.
 struct Asked {
     seat: u16,
     bytes: Vec<u8>,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // What is behind the locks is whole after each statement.
+    // The data behind the locks is consistent after each statement.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -84,7 +85,7 @@ impl Server {
         lock(&self.outlets).contains_key(&seat)
     }
 
-    /// To every seat that hears the core.
+    /// Sends to every seat that receives the core's data.
     fn to_all(&self, bytes: Vec<u8>) {
         let bytes = Bytes::from(bytes);
         lock(&self.outlets)
@@ -101,21 +102,21 @@ impl Server {
         }
     }
 
-    /// The message that carries the state and the newest batch of records.
+    /// Returns the message with the state and the newest batch of records.
     fn newest(&self, state: &HapticState, packed: &[u8]) -> Vec<u8> {
         let parts = [bytemuck::bytes_of(state), packed];
         encode(Kind::Newest, self.stamp(), &parts)
     }
 
-    /// The message that carries a packed batch of records.
+    /// Returns the message with a packed batch of records.
     fn batch(&self, packed: &[u8]) -> Vec<u8> {
         encode(Kind::Records, self.stamp(), &[packed])
     }
 }
 
-/// Serves until `stop`; `beat` has with each pass whether somebody on the net operates.
+/// Serves until `stop`; reports to `beat` on each pass whether a remote member operates.
 pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<(), RelayError> {
-    // Before there are threads, of zenoh as well.
+    // Before any thread starts, including zenoh's.
     crate::slice::shorten();
     let members = options.lab.members()?;
     let session = net::serve(&options.listen, &options.lab.identity()?)?;
@@ -130,11 +131,11 @@ pub fn run(options: &Options, stop: &AtomicBool, beat: &mut Beat) -> Result<(), 
         paces: Mutex::new(BTreeMap::new()),
     });
     server.door.admit(&members);
-    // The door bounds what waits, for each seat by itself.
+    // The door limits the queue of each seat separately.
     let (to_asked, asked) = channel();
     let doorkeeper = Arc::clone(&server);
     net::hear(&session, &net::every_ask(), move |key, bytes| {
-        // The access rules let a certificate put under its own seat alone.
+        // The access rules let a certificate publish under its own seat alone.
         if let Some(seat) = key.rsplit('/').next().and_then(seat_of)
             && doorkeeper.door.lets_in(seat, bytes, Instant::now())
         {
@@ -172,7 +173,7 @@ fn serve(mut rounds: Rounds, asked: &Receiver<Asked>, stop: &AtomicBool, beat: &
     while !stop.load(Ordering::Relaxed) {
         rounds.pass();
         beat.pass(rounds.is_operated_from_the_net());
-        // A promise of an operator does not wait for the next pass, and no flood keeps that waiting.
+        // An operator's promise does not wait for the next pass, and no flood delays it.
         let next = Instant::now() + PASS;
         while let Some(left) = next.checked_duration_since(Instant::now())
             && let Ok(request) = asked.recv_timeout(left)
@@ -182,7 +183,7 @@ fn serve(mut rounds: Rounds, asked: &Receiver<Asked>, stop: &AtomicBool, beat: &
         }
     }
     rounds.stop_hand_of_the_net("the relay ends");
-    // The core looks every 2 ms; the ports go with this thread's end.
+    // The core polls every 2 ms; the ports close when this thread ends.
     std::thread::sleep(10 * PASS);
 }
 

@@ -1,4 +1,4 @@
-//! What goes to one seat, on threads of that seat's own: one that takes nothing keeps nobody else waiting.
+//! Sends to one seat, on that seat's own threads: a member that takes nothing delays no other.
 
 use super::Server;
 use super::allowance::Allowance;
@@ -11,26 +11,26 @@ use std::time::{Duration, Instant};
 
 /// More messages than a greeting has.
 const WAITING: usize = 512;
-/// Records that are asked for again: a minute of a hand that moves, 18 MB, takes 14 s.
+/// Rate of resent records: a minute of a moving hand, 18 MB, takes 14 s.
 const AGAIN_BYTES: f64 = 4e6;
 const AGAIN_BYTES_PER_S: f64 = 1e6;
-/// The same scene is not sent again sooner, and each time only after twice as long.
+/// Shortest interval before the same scene is resent; doubles each time.
 const SCENE_AGAIN: Duration = Duration::from_secs(3);
 
-/// The queues to a seat. What does not fit is dropped; the member asks for it again.
+/// The queues to a seat. Messages that do not fit are dropped; the member requests them again.
 pub struct Outlet {
     messages: SyncSender<Bytes>,
     scenes: SyncSender<Bytes>,
     again: SyncSender<Ticks>,
-    /// The scene that was sent last, when it may be sent again, and after how long once more.
+    /// The scene sent last, the time of its next permitted resend, and the interval after that.
     scene: Option<((u64, u64), Instant, Duration)>,
 }
 
 impl Outlet {
-    /// To a seat that is heard. The threads end when this is dropped.
+    /// Opens the queues to a seat that is heard. The threads end when this is dropped.
     pub fn new(server: &Arc<Server>, seat: u16) -> Self {
         let (to_messages, messages) = sync_channel(WAITING);
-        // None waits: one is on its way, or there is room for one.
+        // None queues: one is on its way, or there is room for one.
         let (to_scenes, scenes) = sync_channel(0);
         let (to_again, missed) = sync_channel(1);
         spawn("messages", server, move |server| {
@@ -62,7 +62,7 @@ impl Outlet {
         self.scene = Some((id, now + patience, patience));
     }
 
-    /// The member is another process, which has no scene yet.
+    /// Forgets the scene: the member is another process, which has none yet.
     pub fn forget_scene(&mut self) {
         self.scene = None;
     }
@@ -74,13 +74,13 @@ impl Outlet {
 
 fn spawn(name: &str, server: &Arc<Server>, run: impl FnOnce(&Server) + Send + 'static) {
     let server = Arc::clone(server);
-    // Without the thread the queue is one that nobody empties.
+    // Without the thread the queue is never emptied.
     let _ = std::thread::Builder::new()
         .name(name.to_owned())
         .spawn(move || run(&server));
 }
 
-/// Sends what comes; a member that does not take it is waited for, [`crate::net::PATIENCE_US`] at most.
+/// Sends queued messages; waits for a slow member, at most [`crate::net::PATIENCE_US`].
 fn send(server: &Server, seat: u16, priority: Priority, all: &Receiver<Bytes>) {
     for bytes in all {
         if !server.hears(seat) {
@@ -90,7 +90,7 @@ fn send(server: &Server, seat: u16, priority: Priority, all: &Receiver<Bytes>) {
     }
 }
 
-/// Sends records again, at most so many bytes in a second; a member that got fewer than it asked for asks for the others.
+/// Resends records at a limited rate; a member that received fewer than it requested requests the rest.
 fn again(server: &Server, seat: u16, missed: &Receiver<Ticks>) {
     let mut allowance = Allowance::new(AGAIN_BYTES, AGAIN_BYTES_PER_S, Instant::now());
     for ticks in missed {

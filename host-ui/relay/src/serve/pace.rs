@@ -1,31 +1,31 @@
-//! How much of the snapshots a member gets: what its line carries in time, by what it says that it has had.
+//! Adapts a member's snapshots to the capacity of its line, from its acknowledgements.
 
 use crate::wire::MAX_THIN_BYTES;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Snapshots on their way at most.
+/// Most snapshots on their way.
 const AT_MOST: usize = 4;
-/// A snapshot that is on its way for so long keeps further ones back, and shows that less has to be sent.
+/// Time on its way after which a snapshot holds further ones back, and shows that less must be sent.
 const SLOW: Duration = Duration::from_millis(100);
-/// A snapshot that came within this time shows that more can be sent.
+/// Travel time within which a snapshot shows that more can be sent.
 const FAST: Duration = Duration::from_millis(60);
-/// A snapshot that was not seen for so long is taken for lost.
+/// Time after which an unacknowledged snapshot counts as lost.
 const LOST: Duration = Duration::from_millis(400);
-/// Bytes of places in a snapshot at least.
+/// Smallest number of bytes for positions in a snapshot.
 const LEAST_BYTES: usize = 1500;
 const MORE_BYTES: usize = 500;
-/// In the first of a line that is not known yet.
+/// Bytes in the first snapshot on an unknown line.
 const FIRST_BYTES: usize = MAX_THIN_BYTES / 4;
 
-/// Of one member.
+/// Pace of one member.
 pub struct Pace {
-    /// Those on their way.
+    /// Snapshots on their way.
     away: VecDeque<Away>,
     number: u64,
     bytes: usize,
     had: Had,
-    /// Without the scene a snapshot is of no use, and takes the line from it.
+    /// Without the scene a snapshot is useless, and takes capacity from the scene.
     has_scene: bool,
 }
 
@@ -35,14 +35,15 @@ struct Away {
     places: Places,
 }
 
-/// The places of a message: the fingerprint of all of them, and the part that it holds; of a stride of 0 none.
+/// The positions in a message: the fingerprint of all of them, and the part contained; a stride of 0 means none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Places {
     pub fingerprint: u64,
     pub stride: usize,
 }
 
-/// The parts that a member has had of the places that were sent last. Those before them it may have lost to these, whether it says so or not.
+/// The parts that a member has of the last positions. It may have lost earlier ones to these, whether it reports so or
+/// not.
 #[derive(Default)]
 struct Had {
     fingerprint: u64,
@@ -84,16 +85,16 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// What the member says: whether it has the scene of the snapshots.
+    /// Notes whether the member has the scene of the snapshots.
     pub fn note_scene(&mut self, has_scene: bool) {
         self.has_scene = has_scene;
     }
 
-    /// Bytes of places that the next snapshot may have; nothing while the line is full.
+    /// Returns the bytes available for positions in the next snapshot; `None` while the line is full.
     pub fn room(&mut self, now: Instant) -> Option<usize> {
         while let Some(lost) = self.away.pop_front_if(|away| now - away.at >= LOST) {
             self.less();
-            // A member that lost what it had does not say so.
+            // A member that lost its positions does not report so.
             if lost.places.stride == 0 {
                 self.had = Had::default();
             }
@@ -102,17 +103,17 @@ impl Pace {
         (self.has_scene && self.away.len() < AT_MOST && !is_slow).then_some(self.bytes)
     }
 
-    /// The number of the next snapshot.
+    /// Number of the next snapshot.
     pub fn next(&self) -> u64 {
         self.number
     }
 
-    /// Whether the member has had all places of the fingerprint.
+    /// True if the member has all positions of the fingerprint.
     pub fn has_all(&self, fingerprint: u64) -> bool {
         self.had.has_all(fingerprint)
     }
 
-    /// It is on its way, with these places.
+    /// Records a sent snapshot with its positions.
     pub fn sent(&mut self, now: Instant, places: Places) {
         self.had.sent(places);
         self.away.push_back(Away {
@@ -123,13 +124,14 @@ impl Pace {
         self.number += 1;
     }
 
-    /// The member begins anew: it has had nothing.
+    /// Resets: the member has nothing.
     pub fn forget(&mut self) {
         self.had = Had::default();
         self.away.clear();
     }
 
-    /// The member has had it, and could use it or not: one of a scene that it has not got yet, or without places that it knows.
+    /// Records an acknowledgement and whether the snapshot was usable; it is not if the member lacks its scene or the
+    /// positions that it refers to.
     pub fn seen(&mut self, number: u64, is_of_use: bool, now: Instant) {
         let Some(earlier) = self.away.iter().position(|away| away.number == number) else {
             return;
@@ -140,13 +142,13 @@ impl Pace {
             true => self.had.note(number, places),
             false => self.had = Had::default(),
         }
-        // A line that carries next to nothing says nothing of what it can carry.
+        // A nearly empty snapshot says nothing about the line's capacity.
         if places.stride == 0 {
             return;
         }
         match now - at {
             late if late >= SLOW => self.less(),
-            // Snapshots are datagrams: of one that has lost a datagram nothing arrives, and a smaller one has fewer.
+            // Snapshots are datagrams: one that lost a datagram is lost whole, and a smaller one has fewer.
             _ if earlier > 0 => self.bytes = (self.bytes / 4 * 3).max(LEAST_BYTES),
             early if early < FAST => self.bytes = (self.bytes + MORE_BYTES).min(MAX_THIN_BYTES),
             _ => {}
@@ -167,7 +169,7 @@ mod tests {
         stride: 1,
     };
 
-    /// Of a member with the scene.
+    /// Pace of a member with the scene.
     fn pace() -> Pace {
         let mut pace = Pace::default();
         assert_eq!(pace.room(Instant::now()), None, "no scene yet");
@@ -175,7 +177,7 @@ mod tests {
         pace
     }
 
-    /// Sent and seen at once.
+    /// Sends and acknowledges at once.
     fn pass(pace: &mut Pace, fingerprint: u64, stride: usize, is_seen: bool) {
         let (number, now) = (pace.next(), Instant::now());
         pace.sent(now, Places { fingerprint, stride });
@@ -196,7 +198,7 @@ mod tests {
         assert!(pace.has_all(7) && !pace.has_all(8));
         pass(&mut pace, 7, 0, true);
         assert!(pace.has_all(7));
-        // One without places that is lost: the member may have lost what it had.
+        // A lost one without positions: the member may have lost its own.
         let long_ago = Instant::now();
         pass(&mut pace, 7, 0, false);
         pace.room(long_ago + 2 * LOST);
@@ -208,7 +210,7 @@ mod tests {
         pace.seen(number, false, Instant::now());
         assert!(!pace.has_all(8), "it does not know them");
         pass(&mut pace, 8, 1, true);
-        // Others were sent and nothing is heard of them: the member may have them in place of these.
+        // Others were sent without acknowledgement: the member may have replaced these by them.
         pass(&mut pace, 9, 1, false);
         assert!(!pace.has_all(8) && !pace.has_all(9));
         pass(&mut pace, 8, 1, true);

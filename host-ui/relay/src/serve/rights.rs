@@ -1,9 +1,9 @@
-//! What a role may ask of the core. What is not listed is refused.
+//! Rights of each role towards the core. Anything not listed is refused.
 
 use crate::keys::Role;
 use stylet_shm_schema::{CommandKind, RefusalCode};
 
-/// What a request from the net needs.
+/// Right needed by a remote request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Right {
     /// The role alone.
@@ -12,36 +12,36 @@ pub enum Right {
     Lease,
 }
 
-/// What `role` needs for a request of that kind; `None` where it may never make one.
+/// Returns what `role` needs for a request of that kind; `None` if it may never make one.
 pub fn right(role: Role, kind: CommandKind) -> Option<Right> {
     use CommandKind as K;
     match (role, kind) {
         (Role::Observer, _) | (_, K::Shutdown) => None,
-        // What takes force or motion away is nobody's alone.
+        // Everyone may remove force or motion.
         (_, K::StopHand | K::StopSecondHand | K::Disengage | K::SaveFlight | K::Rehearse | K::Mark) => {
             Some(Right::Role)
         }
         (Role::Instructor, K::SetParameters | K::LoadBuiltinScene | K::SetPlan) => Some(Right::Role),
-        // Faults are for a trainee to find, who operates.
+        // Faults are for a trainee, who operates, to find.
         (role, K::BeginExercise | K::EndExercises) => (role == Role::Instructor).then_some(Right::Role),
         (Role::Instructor, _) => None,
         (Role::Operator, _) => Some(Right::Lease),
     }
 }
 
-/// What a volume in place of the scene needs.
+/// Returns the right needed for a volume that replaces the scene.
 pub fn right_to_upload(role: Role) -> Option<Right> {
     right(role, CommandKind::LoadBuiltinScene)
 }
 
-/// Whether a request of a host beside the core shows that somebody operates there.
+/// True if a request of a host next to the core shows that it operates.
 ///
-/// A promise shows that a host lives; a window here may give one for a motion that a member has taken over.
+/// A promise shows only that a host lives; a window here may send one for a motion that a member has taken over.
 pub fn operates(kind: CommandKind) -> bool {
     kind != CommandKind::KeepMoving && right(Role::Operator, kind) == Some(Right::Lease)
 }
 
-/// A request that a refusal of the relay answers has no code of its own in the core's list.
+/// Code for refusals by the relay, for which the core's list has no separate one.
 pub const REFUSED: RefusalCode = RefusalCode::TooManyRequests;
 
 #[cfg(test)]

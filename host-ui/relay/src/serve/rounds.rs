@@ -1,4 +1,4 @@
-//! One pass of the server after the other: what the core says, who is alive, who operates, and the hand that is stopped.
+//! Passes of the server: the core's publications, living members, the operator, and stops of the hand.
 
 use super::allowance::Allowance;
 use super::announce::Announcements;
@@ -21,18 +21,18 @@ use stylet_shm_schema::{Request, UploadHeader};
 
 const WHO_EVERY: Duration = Duration::from_millis(200);
 const MEMBERS_EVERY: Duration = Duration::from_millis(500);
-/// The list is read for a seat that is not in it so often at most.
+/// Shortest interval at which the list is read for an unlisted seat.
 const UNKNOWN_EVERY: Duration = Duration::from_millis(20);
-/// A member that was silent for so long has left.
+/// Silence after which a member has left.
 const LEFT_AFTER: Duration = Duration::from_secs(2);
-/// A list that cannot be read for so long admits nobody: an editor may be writing it.
+/// Time for which an unreadable list stays in force, since an editor may be writing it; after that no seat is admitted.
 const LIST_PATIENCE: Duration = Duration::from_secs(2);
-/// What was turned away at the door is said so often.
+/// Interval of reports on messages turned away at the door.
 const TURNED_AWAY_EVERY: Duration = Duration::from_secs(10);
-/// What the server calls a host beside the core.
+/// The server's name for a host next to the core.
 const LOCAL: &str = "a window beside the core";
 
-/// What a seat may have of the server's log and of greetings, however often it connects.
+/// Limits of a seat on the server's log and on greetings, however often it connects.
 struct Patience {
     lines: Allowance,
     unsaid: u64,
@@ -51,16 +51,16 @@ impl Patience {
     }
 }
 
-/// A member that is connected.
+/// A connected member.
 pub(super) struct Presence {
-    /// Which run and silence of the member it is.
+    /// The member's run and its silences so far.
     pub epoch: (u64, u64),
     pub heard: Instant,
     pub round_trip_ns: u64,
     pub lost: u64,
 }
 
-/// All of the server but the threads of the streams.
+/// State of the server, except for the threads of the streams.
 pub(super) struct Rounds {
     pub(super) server: Arc<Server>,
     pub(super) announcements: Announcements,
@@ -68,7 +68,7 @@ pub(super) struct Rounds {
     pub(super) present: BTreeMap<u16, Presence>,
     pub(super) members: Members,
     pub(super) upload: Option<SlicePublisher<u8, UploadHeader>>,
-    /// The volume that comes in parts.
+    /// The volume arriving in parts.
     pub(super) volume: Option<Volume>,
     patience: BTreeMap<u16, Patience>,
     orders: Orders,
@@ -77,7 +77,7 @@ pub(super) struct Rounds {
     stops: u64,
     who_sent: Instant,
     members_read: Instant,
-    /// When the list was read last without an error.
+    /// Time at which the list was last read without an error.
     members_known: Instant,
     members_due: bool,
     turned_away: Instant,
@@ -113,7 +113,7 @@ impl Rounds {
     pub(super) fn pass(&mut self) {
         let now = Instant::now();
         if now - self.passed >= super::lease::SILENCE {
-            // This process stood still itself: whoever operated could not be heard.
+            // This process itself was suspended, so it could not hear the operator.
             self.stop_hand_of_the_net("the relay stood still");
         }
         self.passed = now;
@@ -147,21 +147,21 @@ impl Rounds {
         }
     }
 
-    /// Nothing goes to the seat any more.
+    /// Stops sending to the seat.
     fn forget(&mut self, seat: u16) {
         lock(&self.server.outlets).remove(&seat);
         lock(&self.server.paces).remove(&seat);
         self.present.remove(&seat);
     }
 
-    /// The seat hears the core from now on.
+    /// Starts sending the core's data to the seat.
     pub(super) fn admit(&self, seat: u16) {
         let new = || Outlet::new(&self.server, seat);
         lock(&self.server.outlets).entry(seat).or_insert_with(new);
         lock(&self.server.paces).entry(seat).or_default();
     }
 
-    /// At once where a seat is not in the list: it may have been given a moment ago.
+    /// Reads the list at once for an unlisted seat: it may just have been assigned.
     pub(super) fn read_members_for(&mut self, seat: u16) {
         if self.members.at(seat).is_none() && self.members_read.elapsed() >= UNKNOWN_EVERY {
             self.members_due = true;
@@ -187,7 +187,7 @@ impl Rounds {
         self.dismiss();
     }
 
-    /// Whoever is in the list no more, or may do something else now.
+    /// Drops members who are no longer in the list or whose role has changed.
     fn dismiss(&mut self) {
         if let Holder::Seat(seat) = self.lease.holder()
             && self.valid(seat).map(|member| member.role) != Ok(Role::Operator)
@@ -203,7 +203,7 @@ impl Rounds {
         }
     }
 
-    /// The member, while its place in the list and its time last.
+    /// Returns the member while its entry in the list is valid.
     pub(super) fn valid(&self, seat: u16) -> Result<Member, &'static str> {
         let member = self
             .members
@@ -215,7 +215,7 @@ impl Rounds {
         }
     }
 
-    /// Whoever shows a certificate of the lab may know why it does not count.
+    /// Informs the holder of a lab's certificate why it is refused.
     fn tell_refused(&self, seat: u16, why: &str) {
         let bytes = encode(Kind::Refused, self.server.stamp(), &[why.as_bytes()]);
         put(&self.server.session, Place::To(seat), Priority::InteractiveLow, bytes);
@@ -227,12 +227,12 @@ impl Rounds {
             .or_insert_with(|| Patience::new(Instant::now()))
     }
 
-    /// Whether the seat is greeted again now.
+    /// True if the seat may be greeted again now.
     pub(super) fn greets(&mut self, seat: u16) -> bool {
         self.patience(seat).greetings.take(1.0, Instant::now())
     }
 
-    /// A hand beside the core goes before any on the net.
+    /// Gives precedence to a hand next to the core.
     fn watch_local_hosts(&mut self, now: Instant) {
         let Some(near) = self.announcements.near() else { return };
         let mut local = false;
@@ -264,7 +264,7 @@ impl Rounds {
         say(format!("the hand is stopped: {why}"));
     }
 
-    /// Name and role for the log.
+    /// Returns name and role for the log.
     pub(super) fn name(&self, seat: u16) -> String {
         match self.members.at(seat) {
             Some(member) => format!("{} ({}, seat {seat})", member.name, member.role),
@@ -272,13 +272,14 @@ impl Rounds {
         }
     }
 
-    /// Says who was refused what and why, as often as a seat may have it said.
+    /// Logs a refusal and its reason, within the seat's limit.
     pub(super) fn refuse(&mut self, seat: u16, what: &str, why: &str) {
         let name = self.name(seat);
         self.log(seat, format!("refused: {name}: {what}: {why}"));
     }
 
-    /// Greetings come twenty times a second: who may not connect is told each time, and it is said here once in a while.
+    /// Refuses a greeting. Greetings arrive twenty times a second: the member always hears the reason, but the log
+    /// repeats it only once in a while.
     pub(super) fn refuse_greeting(&mut self, seat: u16, why: &str) {
         self.tell_refused(seat, why);
         if self.patience(seat).refusals.take(1.0, Instant::now()) {
@@ -286,7 +287,7 @@ impl Rounds {
         }
     }
 
-    /// A line on behalf of a seat.
+    /// Logs a line on behalf of a seat.
     pub(super) fn log(&mut self, seat: u16, line: String) {
         let patience = self.patience(seat);
         if !patience.lines.take(1.0, Instant::now()) {
@@ -303,7 +304,7 @@ impl Rounds {
         asked::take(self, seat, bytes, now_ns());
     }
 
-    /// Why a seat does not operate, in words.
+    /// Describes why a seat does not operate.
     pub(super) fn held_words(&self, held: Held) -> String {
         match held {
             Held::ByLocal => format!("{LOCAL} operates; ask there to hand over"),
@@ -336,7 +337,7 @@ impl Rounds {
         }
     }
 
-    /// Orders from this machine, of its terminals and windows: whoever sits here decides who operates.
+    /// Takes orders of this machine's terminals and windows: its user decides who operates.
     fn take_orders(&mut self, now: Instant) {
         let class = self.announcements.class();
         let mut given: Vec<Holder> = std::iter::from_fn(|| class?.order())
@@ -352,7 +353,7 @@ impl Rounds {
         }
     }
 
-    /// What is answered, and who operates then.
+    /// Returns the answer, and the new holder.
     fn decide(&self, order: &Order) -> (String, Option<Holder>) {
         match order {
             Order::Status => (self.who().words(), None),
@@ -368,14 +369,14 @@ impl Rounds {
         }
     }
 
-    /// The seat of an operator who is connected.
+    /// Returns the seat of a connected operator.
     pub(super) fn operator(&self, name: &str) -> Option<u16> {
         let valid = |m: &&Member| m.role == Role::Operator && !m.revoked && self.present.contains_key(&m.seat);
         let mut members = self.members.members.iter().filter(valid);
         members.find(|m| m.name == name).map(|m| m.seat)
     }
 
-    /// The hand does not go on for one who has handed it over.
+    /// Hands the lease over and stops the motion of the former holder.
     pub(super) fn hand_over(&mut self, to: Holder, now: Instant) {
         let before = self.lease.give(to, now);
         if before != to {

@@ -1,4 +1,4 @@
-//! The threads of the streams: state and records as they come, and snapshots thinned.
+//! The threads of the streams: state and records as they arrive, and thinned snapshots.
 
 use super::pace::Places;
 use super::tape::Newest;
@@ -10,15 +10,15 @@ use std::time::{Duration, Instant};
 use stylet_ports::{self as service, Node, ServiceError, SliceSubscriber, StateReader};
 use stylet_shm_schema::{HapticState, Instance, SceneHeader, SnapshotHeader, TickRecord, Vertex};
 
-/// How often the queue of records is looked at: a batch waits half of it on average.
+/// Polling interval of the queue of records, half of which delays a batch on average.
 const RECORDS_EVERY: Duration = Duration::from_micros(100);
-/// After a batch for most of the time that the batch before it took to come, and no longer.
+/// Longest pause after a batch; normally most of the interval between the last two batches.
 const RECORDS_PAUSE: Duration = Duration::from_millis(16);
-/// 60 a second at most.
+/// Shortest interval between snapshots: 60 a second.
 const SNAPSHOTS_EVERY: Duration = Duration::from_micros(16_700);
 const BOARD_EVERY: Duration = Duration::from_millis(20);
 
-/// Where the core writes its state.
+/// The core's state board.
 #[derive(Default)]
 struct Board {
     // The reader before its node.
@@ -27,7 +27,7 @@ struct Board {
 }
 
 impl Board {
-    /// The state of the run, once its board is there.
+    /// Returns the state of the run, once its board exists.
     fn state(&mut self, instance: &Instance, session_id: u64) -> Option<HapticState> {
         let is_of_it = (self.reader.as_ref()).is_some_and(|(id, _, node)| *id == session_id && node.is_current());
         if !is_of_it && self.tried.is_none_or(|tried| tried.elapsed() >= BOARD_EVERY) {
@@ -43,7 +43,7 @@ impl Board {
     }
 }
 
-/// Sends each batch of records with the state of the moment, and keeps it for those that miss it.
+/// Sends each batch of records with the present state, and keeps it for members that miss it.
 pub fn records(server: &Server) {
     let mut watched = Watched::<SliceSubscriber<TickRecord, u64>>::new();
     let (mut board, mut last, mut newest_record) = (Board::default(), Instant::now(), Newest::default());
@@ -89,7 +89,7 @@ type Pictures = (
     SliceSubscriber<u32, SceneHeader>,
 );
 
-/// Sends the newest snapshot, thinned, 60 times a second, to each member as much of it as its line carries.
+/// Sends the newest snapshot, thinned, 60 times a second, to each member as far as its line allows.
 pub fn snapshots(server: &Server) {
     crate::slice::let_others_first();
     let mut watched = Watched::<Pictures>::new();

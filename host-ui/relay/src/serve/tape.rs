@@ -1,6 +1,8 @@
-//! The last records of the core, which the keeper has: a server that was killed cannot send what was made until the next one hears.
+//! The core's last records, held by the keeper: a killed server cannot send the records made before the next one
+//! listens.
 //!
-//! The server asks for them with one byte once it hears records itself. They come over the same socket, each batch behind its length.
+//! The server requests them with one byte once it receives records itself. They come over the same socket, each batch
+//! preceded by its length.
 
 use super::kept::Kept;
 use super::watched::Watched;
@@ -14,11 +16,11 @@ use stylet_ports::{self as service, Node, SliceSubscriber, Subscriber};
 use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::{Instance, MAX_BATCH, Session, TickRecord, check};
 
-/// What the server sends to have them.
+/// The server's request for them.
 pub const ASK: u8 = 2;
 /// Ten seconds of batches, 3 MB.
 const AT_MOST: usize = 500;
-/// A keeper that has not answered for so long has none.
+/// Silence after which the keeper is assumed to have none.
 const PATIENCE: Duration = Duration::from_secs(1);
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
@@ -34,7 +36,7 @@ pub struct Tape {
 }
 
 impl Tape {
-    /// Of the core of `instance`.
+    /// Opens the tape of the core of `instance`.
     pub fn new(instance: &Instance) -> Self {
         Self {
             instance: instance.clone(),
@@ -45,7 +47,7 @@ impl Tape {
         }
     }
 
-    /// Takes what the core has sent; its queue holds 12 s.
+    /// Takes the core's records; its queue holds 12 s.
     pub fn pass(&mut self) {
         let make = |node: &Node| {
             let records = service::records::subscriber(node)?;
@@ -66,7 +68,7 @@ impl Tape {
         self.batches.drain(..self.batches.len().saturating_sub(AT_MOST));
     }
 
-    /// To a server that asked; one that does not take them is not waited for.
+    /// Sends to a server that asked, without waiting for it to take them.
     pub fn send(&mut self, mut to: &UnixStream) {
         self.pass();
         let mut bytes = Vec::new();
@@ -79,7 +81,7 @@ impl Tape {
     }
 }
 
-/// The newest record that came: a bridge that was started anew sends the last 12 s again.
+/// The newest record received: a restarted bridge sends the last 12 s again.
 #[derive(Default)]
 pub(super) struct Newest {
     session_id: u64,
@@ -87,7 +89,7 @@ pub(super) struct Newest {
 }
 
 impl Newest {
-    /// Those of a batch that have not come before.
+    /// Returns the new records of a batch.
     pub(super) fn newer(&mut self, batch: &[TickRecord]) -> Vec<TickRecord> {
         let mut newer = Vec::with_capacity(batch.len());
         for record in batch {
@@ -100,7 +102,7 @@ impl Newest {
     }
 }
 
-/// On a thread of the server's: completes what it keeps, once it hears records itself.
+/// Completes the kept batches on a thread of the server, once it receives records itself.
 pub(super) fn complete(server: &Server, keeper: Option<UnixStream>) {
     let has_any = |server: &Server| lock(&server.kept).has_any();
     while !server.ends() && !has_any(server) {
@@ -134,7 +136,7 @@ fn ask(mut keeper: &UnixStream) -> Option<Vec<Vec<TickRecord>>> {
     }
 }
 
-/// All of `bytes`, from a socket that does not wait.
+/// Reads all of `bytes` from a non-blocking socket.
 fn read(mut from: &UnixStream, mut bytes: &mut [u8], end: Instant) -> Option<()> {
     while !bytes.is_empty() {
         match from.read(bytes) {

@@ -1,12 +1,12 @@
-//! A volume that a member sends in parts: none is kept without the right to it, and there is one at a time.
+//! A volume that a member sends in parts: kept only with the right to it, and one at a time.
 
 use std::time::{Duration, Instant};
 use stylet_shm_schema::UploadHeader;
 
-/// One that does not go on for so long gives its place to another.
+/// Silence after which a volume gives way to another.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// What has come of it.
+/// Progress of the volume.
 pub(super) struct Volume {
     pub seat: u16,
     pub header: UploadHeader,
@@ -15,7 +15,7 @@ pub(super) struct Volume {
 }
 
 impl Volume {
-    /// Begun, without cells.
+    /// Begins a volume without cells.
     pub fn begin(seat: u16, header: UploadHeader, now: Instant) -> Self {
         Self {
             seat,
@@ -25,12 +25,12 @@ impl Volume {
         }
     }
 
-    /// Of another seat, and still coming.
+    /// True if it is of another seat, and still arriving.
     pub fn keeps_out(&self, seat: u16, now: Instant) -> bool {
         self.seat != seat && now - self.at < PATIENCE
     }
 
-    /// Whether these are the cells that come next; then they are taken.
+    /// Takes the cells if they are the next ones; returns whether they are.
     pub fn goes_on(&mut self, seat: u16, header: &UploadHeader, at: usize, cells: &[u8], now: Instant) -> bool {
         let goes_on = self.seat == seat
             && bytemuck::bytes_of(&self.header) == bytemuck::bytes_of(header)

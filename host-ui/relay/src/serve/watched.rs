@@ -1,4 +1,4 @@
-//! Ports to the core of one thread, made again in each epoch.
+//! Ports of one thread to the core, recreated in each epoch.
 
 use std::time::{Duration, Instant};
 use stylet_ports::{Node, ServiceError};
@@ -6,7 +6,7 @@ use stylet_shm_schema::Instance;
 
 const LOOK_EVERY: Duration = Duration::from_millis(20);
 
-/// Ports, and the node that they live on.
+/// Ports and their node.
 pub struct Watched<P> {
     ports: Option<(P, Node)>,
     looked: Option<Instant>,
@@ -14,7 +14,7 @@ pub struct Watched<P> {
 }
 
 impl<P> Watched<P> {
-    /// None yet.
+    /// Returns a value without ports.
     pub fn new() -> Self {
         Self {
             ports: None,
@@ -23,12 +23,12 @@ impl<P> Watched<P> {
         }
     }
 
-    /// The ports, when there are any.
+    /// Returns the ports, if any.
     pub fn get(&mut self, instance: &Instance, make: impl FnOnce(&Node) -> Result<P, ServiceError>) -> Option<&P> {
         let now = Instant::now();
         if self.looked.is_none_or(|looked| now - looked >= LOOK_EVERY) {
             self.looked = Some(now);
-            // Those of an epoch that is over go before others are made.
+            // Ports of a past epoch are dropped before new ones are made.
             self.ports = self.ports.take().filter(|(_, node)| node.is_current());
             if self.ports.is_none() {
                 self.ports = self.open(instance, make).ok();

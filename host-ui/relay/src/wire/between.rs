@@ -1,9 +1,10 @@
-//! Places between those that a message holds: until they are held themselves they move as those around them do.
+//! Interpolates positions that a message omits: until they are received themselves, they move with their neighbours.
 //!
-//! What the places of the message have moved by since they were held before, and how long that was, is spread to the corners of a lattice,
-//! with the weights by which it is read there (normalised convolution, Knutsson and Westin 1993). Where nothing has moved nothing is added.
+//! The displacements of received positions since their last reception, and the times between, are spread to the corners
+//! of a lattice, with the weights by which it is read there (normalised convolution, Knutsson and Westin 1993). Without
+//! motion nothing is added.
 
-/// The box around all places at rest, m.
+/// Bounding box of all positions at rest, m.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Bounds {
     lower: [f32; 3],
@@ -21,27 +22,27 @@ impl Bounds {
     }
 }
 
-/// Corners along an axis at most.
+/// Most corners along an axis.
 const MOST_CORNERS: f32 = 64.0;
 
-/// Displacements with times on a lattice about as fine as the places that a message holds are apart.
+/// Displacements with times on a lattice about as fine as the positions in a message.
 pub(super) struct Lattice {
     lower_m: [f32; 3],
     per_m: f32,
     corners: [usize; 3],
-    /// Weighted values, and the weights.
+    /// Weighted sums, and the weights.
     sums: Vec<[f32; 5]>,
     has_moved: bool,
 }
 
 impl Lattice {
-    /// For so many places within `bounds`.
+    /// Returns a lattice for that many positions within `bounds`.
     pub fn new(bounds: &Bounds, places: usize) -> Self {
         let extent_m = [0, 1, 2].map(|i| bounds.upper[i] - bounds.lower[i]);
         let longest_m = extent_m.into_iter().fold(0.0, f32::max);
         let volume_m3: f32 = extent_m.iter().product();
         let cell_m = (volume_m3 / places.max(1) as f32).cbrt().max(longest_m / MOST_CORNERS);
-        // A scene without an extent has one corner, and one with places that are no numbers as well.
+        // A scene without an extent has one corner, as does one with positions that are not numbers.
         let per_m = Some(1.0 / cell_m).filter(|per_m| per_m.is_finite()).unwrap_or(0.0);
         let corners = extent_m.map(|extent_m| (extent_m * per_m).clamp(0.0, MOST_CORNERS) as usize + 2);
         Self {
@@ -53,12 +54,12 @@ impl Lattice {
         }
     }
 
-    /// Whether any displacement was not 0: where none was there is nothing to read.
+    /// True if any displacement was not 0; otherwise there is nothing to read.
     pub fn has_moved(&self) -> bool {
         self.has_moved
     }
 
-    /// The eight corners around a place, with their weights.
+    /// Returns the eight corners around a position, with their weights.
     #[inline]
     fn around(&self, place_m: [f32; 3]) -> [(usize, f32); 8] {
         let (mut low, mut share) = ([0; 3], [0.0; 3]);
@@ -84,7 +85,7 @@ impl Lattice {
         ]
     }
 
-    /// At a place that the message holds: a displacement, m, in a time, s.
+    /// Adds a received position: a displacement, m, in a time, s.
     pub fn add(&mut self, place_m: [f32; 3], [x, y, z, time_s]: [f32; 4]) {
         self.has_moved |= x != 0.0 || y != 0.0 || z != 0.0;
         for (corner, weight) in self.around(place_m) {
@@ -94,7 +95,7 @@ impl Lattice {
         }
     }
 
-    /// At any place, by those around it; 0 where there are none.
+    /// Interpolates at any position; 0 without neighbours.
     pub fn at(&self, place_m: [f32; 3]) -> [f32; 4] {
         let mut total = [0.0_f32; 5];
         for (corner, weight) in self.around(place_m) {

@@ -1,74 +1,74 @@
-//! The small payloads by which the two sides of the relay keep each other: who is alive, what is missing, who is there.
+//! Small control payloads of both sides of the relay: signs of life, missing records, members.
 
 use crate::keys::Role;
 use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 use stylet_shm_schema::check::Invalid;
 
-/// A member is alive, twenty times a second.
+/// A member's sign of life, twenty times a second.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct Hello {
-    /// Another number after each silence: everything that is in force is sent again.
+    /// Changes after each silence: the whole state is then sent again.
     pub epoch: u64,
     /// The scene that the member has: run of the core.
     pub scene_session: u64,
     /// The scene that the member has: its generation.
     pub scene_generation: u64,
-    /// Round trip as the member measures it.
+    /// Round trip as measured by the member.
     pub round_trip_ns: u64,
     /// Records that the member lost for good.
     pub lost: u64,
 }
 
-/// Ticks of one run of the core, from the first to the last.
+/// Ticks of one run of the core, first to last inclusive.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 pub struct Ticks {
     /// The run of the core.
     pub session_id: u64,
-    /// The first.
+    /// First tick.
     pub from: u64,
-    /// The last.
+    /// Last tick.
     pub to: u64,
 }
 
-/// One member that is connected.
+/// One connected member.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Present {
     /// Name for people.
     pub name: String,
-    /// Its role; none for one that is not in the list any more.
+    /// Its role; `None` for a member no longer in the list.
     pub role: Option<Role>,
     /// Round trip, ms.
     pub round_trip_ms: f64,
     /// Records that it lost for good.
     pub lost: u64,
-    /// Since it was heard last, ms.
+    /// Time since it was last heard, ms.
     pub silent_ms: f64,
 }
 
-/// Who is connected and who operates.
+/// Connected members and the operator.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Who {
-    /// Name of who operates; "the window beside the core", or nobody.
+    /// Name of the operator; "the window beside the core", or `None`.
     pub operator: Option<String>,
-    /// Whether that is a host beside the core.
+    /// The operator is a host next to the core.
     #[serde(default)]
     pub local: bool,
-    /// Name of who asked to operate.
+    /// Name of the member who asked to operate.
     pub asked: Option<String>,
-    /// Everybody who is connected.
+    /// All connected members.
     pub present: Vec<Present>,
 }
 
 impl Who {
-    /// As JSON.
+    /// Encodes as JSON.
     pub fn to_bytes(&self) -> Vec<u8> {
         serde_json::to_vec(self).unwrap_or_default()
     }
 
-    /// From JSON of bounded size.
+    /// Decodes JSON of bounded size.
     pub fn of_bytes(bytes: &[u8]) -> Result<Self, Invalid> {
         const MOST: usize = 128 << 10;
         match bytes.len() <= MOST {
@@ -77,7 +77,7 @@ impl Who {
         }
     }
 
-    /// For a terminal, a line each.
+    /// Formats for a terminal, one line per member.
     pub fn words(&self) -> String {
         let mut lines = vec![format!("operates: {}", self.operator.as_deref().unwrap_or("nobody"))];
         lines.extend(self.asked.as_ref().map(|name| format!("asks to operate: {name}")));

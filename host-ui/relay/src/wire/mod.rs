@@ -1,4 +1,4 @@
-//! Messages between the two sides: a head and a payload; one encoder, one decoder that trusts no length.
+//! Messages between the two sides: a head and a payload; one encoder, and one decoder that trusts no length.
 
 mod between;
 mod control;
@@ -14,10 +14,10 @@ use num_enum::TryFromPrimitive;
 use stylet_shm_schema::check::Invalid;
 use stylet_shm_schema::{HapticState, SCHEMA_VERSION, SceneHeader, UploadHeader};
 
-/// First word of every message: rises with the form of messages and with the schema.
+/// First word of every message: changes with the format of messages and with the schema.
 const MAGIC: u32 = u32::from_le_bytes(*b"st6\0") ^ (SCHEMA_VERSION << 24);
 
-/// What a message holds, by stable number.
+/// Content of a message, by stable number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, TryFromPrimitive)]
 #[repr(u32)]
 pub enum Kind {
@@ -25,7 +25,7 @@ pub enum Kind {
     Session = 1,
     /// A `HapticState`.
     State = 2,
-    /// `TickRecord`s of one batch, packed, as they are sent again.
+    /// `TickRecord`s of one batch, packed, when resent.
     Records = 3,
     /// A thinned snapshot.
     Snapshot = 4,
@@ -41,31 +41,32 @@ pub enum Kind {
     Reply = 9,
     /// A `Rehearsal`.
     Rehearsal = 10,
-    /// Who is connected and who operates, as JSON.
+    /// Members and operator, as JSON.
     Who = 11,
     /// Answer to a [`Kind::Hello`]: its `sent_ns`.
     Echo = 12,
     /// `Ticks` whose records are not kept any more.
     Missing = 13,
-    /// A `HapticState` and the newest batch of `TickRecord`s, packed, in one message: each of them costs either side as much as its bytes do.
+    /// A `HapticState` and the newest batch of `TickRecord`s, packed, in one message: the cost of a message at either
+    /// side equals that of its bytes.
     Newest = 14,
-    /// Why the server takes nothing of a member, in words.
+    /// Why the server refuses a member, as text.
     Refused = 15,
-    /// A member is alive; `number` is its process.
+    /// A member's sign of life; `number` is its process.
     Hello = 20,
     /// A `Command` of a member's host.
     Command = 21,
-    /// An `UploadHeader`, the number of the first cell, and the cells from there on: a part of a volume.
+    /// Part of a volume: an `UploadHeader`, the number of the first cell, and the cells from there on.
     Upload = 22,
-    /// `Ticks` whose records are to be sent again.
+    /// `Ticks` whose records are to be resent.
     Again = 23,
-    /// What a member asks of the lease: a word.
+    /// A member's order for the lease: a word.
     Lease = 24,
-    /// A member has had the snapshot of that number; [`OF_USE`] where it could take it.
+    /// Acknowledges the snapshot of that number; [`OF_USE`] if it was usable.
     Seen = 25,
 }
 
-/// The payload of [`Kind::Seen`] for a snapshot that a member could take; another says that it could not.
+/// Payload of [`Kind::Seen`] for a usable snapshot; any other means that it was not.
 pub const OF_USE: &[u8] = &[1];
 
 #[repr(C)]
@@ -79,24 +80,24 @@ struct Head {
     heard_ns: u64,
 }
 
-/// What stands before the payload of a message.
+/// Header of a message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stamp {
-    /// Which run of the sender.
+    /// Run of the sender.
     pub run: u64,
-    /// Rises by one within a kind of message that has numbers.
+    /// Increases by one within a kind of message that has numbers.
     pub number: u64,
     /// The sender's clock.
     pub sent_ns: u64,
-    /// From a member: `sent_ns` of the newest message that it had from the server. It shows how late the message is, by the
+    /// From a member: `sent_ns` of the newest message received from the server. It shows the age of the message by the
     /// server's own clock.
     pub heard_ns: u64,
 }
 
-/// A message whose head is valid; its payload is still to be read.
+/// A message with a valid head; its payload is still to be read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Message<'a> {
-    /// What the payload holds.
+    /// Kind of the payload.
     pub kind: Kind,
     /// Run, number and times.
     pub stamp: Stamp,
@@ -104,7 +105,7 @@ pub struct Message<'a> {
     pub body: &'a [u8],
 }
 
-/// The bytes of a message whose payload stands in parts.
+/// Encodes a message whose payload is in parts.
 pub fn encode(kind: Kind, stamp: Stamp, parts: &[&[u8]]) -> Vec<u8> {
     let head = Head {
         magic: MAGIC,
@@ -121,7 +122,7 @@ pub fn encode(kind: Kind, stamp: Stamp, parts: &[&[u8]]) -> Vec<u8> {
     bytes
 }
 
-/// The message in `bytes`.
+/// Decodes the message in `bytes`.
 pub fn decode(bytes: &[u8]) -> Result<Message<'_>, Invalid> {
     let (head, body) = bytes
         .split_at_checked(size_of::<Head>())
@@ -140,7 +141,7 @@ pub fn decode(bytes: &[u8]) -> Result<Message<'_>, Invalid> {
     Ok(Message { kind, stamp, body })
 }
 
-/// A payload of one value.
+/// Decodes a payload of one value.
 pub fn one<T: Pod>(body: &[u8]) -> Result<T, Invalid> {
     match body.len() == size_of::<T>() {
         true => Ok(bytemuck::pod_read_unaligned(body)),
@@ -148,7 +149,7 @@ pub fn one<T: Pod>(body: &[u8]) -> Result<T, Invalid> {
     }
 }
 
-/// A payload of values of one type, `most` at most.
+/// Decodes a payload of at most `most` values of one type.
 pub fn many<T: Pod>(body: &[u8], most: usize) -> Result<Vec<T>, Invalid> {
     if !body.len().is_multiple_of(size_of::<T>()) || body.len() / size_of::<T>() > most {
         return Err(Invalid("length of a payload"));
@@ -159,7 +160,7 @@ pub fn many<T: Pod>(body: &[u8], most: usize) -> Result<Vec<T>, Invalid> {
         .collect())
 }
 
-/// The payloads of a state and of records in one of both.
+/// Splits a combined payload into state and records.
 pub fn state_and_records(body: &[u8]) -> Result<(&[u8], &[u8]), Invalid> {
     body.split_at_checked(size_of::<HapticState>())
         .ok_or(Invalid("records without a state"))
@@ -172,30 +173,31 @@ fn headed<H: Pod, T: Pod>(body: &[u8], most: usize) -> Result<(H, Vec<T>), Inval
     Ok((bytemuck::pod_read_unaligned(header), many(rest, most)?))
 }
 
-/// Words of a scene at most.
+/// Most words of a scene.
 pub const MAX_SCENE_WORDS: usize = 16 << 20;
-/// Cells of an upload at most.
+/// Most cells of an upload.
 pub const MAX_UPLOAD_CELLS: usize = 64 << 20;
 
-/// A scene with its words, checked.
+/// Decodes and validates a scene with its words.
 pub fn scene(body: &[u8]) -> Result<(SceneHeader, Vec<u32>), Invalid> {
     let (header, words) = headed::<SceneHeader, u32>(body, MAX_SCENE_WORDS)?;
     stylet_shm_schema::check::scene(&header, &words)?;
     Ok((header, words))
 }
 
-/// Cells that a part of a volume has, but for the last.
+/// Cells in a part of a volume, except the last.
 pub const PART_BYTES: usize = 32 << 10;
-/// A message with a part is no longer.
+/// Length limit of a message with a part.
 pub const MAX_PART_BYTES: usize = PART_BYTES + size_of::<Head>() + size_of::<UploadHeader>() + size_of::<u64>();
 
-/// Cells of a volume; more than any where they cannot be counted.
+/// Number of cells of a volume; the maximum if it overflows.
 pub fn cells(header: &UploadHeader) -> usize {
     let count = header.dims.iter().try_fold(1_usize, |n, &d| n.checked_mul(d as usize));
     count.unwrap_or(usize::MAX)
 }
 
-/// A part of a volume: which volume, the number of its first cell, and its cells. The core checks what they mean.
+/// Decodes a part of a volume: the volume, the number of its first cell, and its cells. The core validates their
+/// meaning.
 pub fn part(body: &[u8]) -> Result<(UploadHeader, usize, Vec<u8>), Invalid> {
     let (header, rest) = body
         .split_at_checked(size_of::<UploadHeader>())
@@ -210,7 +212,7 @@ pub fn part(body: &[u8]) -> Result<(UploadHeader, usize, Vec<u8>), Invalid> {
     }
 }
 
-/// Words of a refusal, without what a terminal would take for an order.
+/// Decodes the text of a refusal, without control sequences.
 pub fn words(body: &[u8]) -> Result<String, Invalid> {
     const MOST: usize = 300;
     match std::str::from_utf8(body) {

@@ -1,5 +1,6 @@
-//! Records of a batch in fewer bytes, without loss: the first as it is, then what differs in each from the one before, byte beside byte of the
-//! same place, and LZ4 over all of it. A batch at rest fits into one packet, where it took six, and each packet costs both ends their time.
+//! Lossless packing of a batch of records: the first unchanged, then the difference of each from the one before, bytes
+//! grouped by their offset, and LZ4 over all of it. A batch at rest fits into one packet instead of six, and each
+//! packet costs both ends time.
 
 use bytemuck::Zeroable;
 use lz4_flex::block;
@@ -9,7 +10,7 @@ use stylet_shm_schema::check::Invalid;
 
 const RECORD: usize = size_of::<TickRecord>();
 
-/// Where a byte of record `n` of `count` stands.
+/// Index of a byte of record `n` of `count`.
 fn index(count: usize, n: usize, place: usize) -> usize {
     match n {
         0 => place,
@@ -17,7 +18,7 @@ fn index(count: usize, n: usize, place: usize) -> usize {
     }
 }
 
-/// How many there are, and their bytes packed; the first [`MAX_BATCH`] of them.
+/// Packs the first [`MAX_BATCH`] records, preceded by their number.
 pub fn pack(records: &[TickRecord]) -> Vec<u8> {
     let records = &records[..records.len().min(MAX_BATCH)];
     let count = records.len();
@@ -32,13 +33,13 @@ pub fn pack(records: &[TickRecord]) -> Vec<u8> {
     }
     let mut packed = (count as u32).to_le_bytes().to_vec();
     packed.resize(4 + block::get_maximum_output_size(beside.len()), 0);
-    // There is room for whatever they are.
+    // There is room for any input.
     let length = block::compress_into(&beside, &mut packed[4..]).unwrap_or(0);
     packed.truncate(4 + length);
     packed
 }
 
-/// The records of [`pack`], in every bit; whether they are valid is for `check`.
+/// Unpacks the records of [`pack`], bit by bit; `check` validates them.
 pub fn unpack(packed: &[u8]) -> Result<Vec<TickRecord>, Invalid> {
     let (count, packed) = packed
         .split_first_chunk()

@@ -15,7 +15,7 @@ fn scene(vertices: u32, nodes: u32) -> Rest {
     Rest::of_scene(&header, &words)
 }
 
-/// Each place is displaced by up to `most_m`, each differently.
+/// Displaces each position differently by up to `most_m`.
 fn snapshot(vertices: u32, nodes: u32, most_m: f32) -> (SnapshotHeader, Vec<Vertex>) {
     let mut header = SnapshotHeader::zeroed();
     (header.session_id, header.scene_generation) = (3, 2);
@@ -94,7 +94,7 @@ fn a_large_snapshot_is_shared_among_messages_and_whole_after_them() {
     assert_eq!(last.len(), vertices.len());
 }
 
-/// Outlines were ragged while tissue moved fast: each message moved every n-th place alone.
+/// Outlines were ragged while tissue moved fast: each message moved only every n-th position.
 #[test]
 fn places_between_those_that_a_message_holds_move_with_them() {
     let sides = [20_u32, 24, 25];

@@ -1,9 +1,10 @@
-//! A snapshot as a screen needs it: what moved from rest, in half floats, within a bound of bytes.
+//! A snapshot reduced for a screen: displacements from rest, in half floats, within a limit of bytes.
 //!
-//! A half float has 11 bits: a displacement is wrong by at most 1/2048 of its larger coordinate's power of two, 3.8 um up to
-//! 15.6 mm and 7.6 um up to 31 mm. Where all of a scene does not fit, each message holds one of n places and the next
-//! message the next ones, and the places in between move with those around them; the header, needle, seeds and needles that stay in are
-//! whole in each. While no place moves, a member that has had all of them gets none: a scene at rest costs a member 1 kB in place of 40.
+//! A half float has 11 bits: the error of a displacement is at most 1/2048 of its larger coordinate's power of two, 3.8
+//! µm up to 15.6 mm and 7.6 µm up to 31 mm. If a scene does not fit, each message holds one of n positions and the next
+//! message the next ones, and the positions in between move with their neighbours; the header, needle, seeds and
+//! needles that stay in are complete in each. While no position moves, a member that has all of them receives none: a
+//! scene at rest costs a member 1 kB instead of 40.
 
 use super::between::{Bounds, Lattice};
 use bytemuck::{Pod, Zeroable};
@@ -16,14 +17,14 @@ use stylet_shm_schema::{
     SnapshotHeader, Vertex,
 };
 
-/// Bytes of the payload of one snapshot at most.
+/// Most bytes of one snapshot's payload.
 pub const MAX_THIN_BYTES: usize = 40_000;
-/// Vertices of a scene at most.
+/// Most vertices of a scene.
 const MAX_VERTICES: usize = 4 * MAX_LABEL_CELLS;
 /// The part of the header before its arrays of seeds and needles.
 const PREFIX: usize = offset_of!(SnapshotHeader, seeds);
 
-/// Which places a message holds, see [`held_by`]; with a stride of 0 none, since they are where they were.
+/// The positions in a message, see [`held_by`]; a stride of 0 means none, since they are unchanged.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Share {
@@ -31,7 +32,7 @@ struct Share {
     phase: u32,
 }
 
-/// What stands still in a scene: the places from which displacements count.
+/// The fixed part of a scene: the origins of the displacements.
 #[derive(Clone, Debug, Default)]
 pub struct Rest {
     id: SceneId,
@@ -42,7 +43,7 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// Of a scene that was checked.
+    /// Builds it from a validated scene.
     pub fn of_scene(header: &SceneHeader, words: &[u32]) -> Self {
         let vertices = words.get(..3 * header.vertex_count as usize).unwrap_or_default();
         let vertices = vertices
@@ -73,7 +74,7 @@ impl Rest {
             && header.node_count as usize == self.total() - self.vertices
     }
 
-    /// From where a place's displacement counts: of a node the snapshot has the displacement itself.
+    /// Origin of a position's displacement; for a node the snapshot itself holds the displacement.
     fn origin_m(&self, i: usize) -> [f32; 3] {
         match i < self.vertices {
             true => self.places_m.get(i).copied().unwrap_or_default(),
@@ -82,7 +83,7 @@ impl Rest {
     }
 }
 
-/// A snapshot with its places in half floats, made once for all members.
+/// A snapshot with its positions in half floats, made once for all members.
 pub struct Thin {
     /// Header, seeds and needles.
     head: Vec<u8>,
@@ -91,7 +92,7 @@ pub struct Thin {
 }
 
 impl Thin {
-    /// Nothing for a snapshot of another scene.
+    /// Thins a snapshot; `None` if it is of another scene.
     pub fn of(rest: &Rest, header: &SnapshotHeader, vertices: &[Vertex]) -> Option<Self> {
         if !rest.fits(header) || check::snapshot(header, vertices).is_err() {
             return None;
@@ -116,18 +117,18 @@ impl Thin {
         })
     }
 
-    /// Of the scene and all places: the same as long as none has moved.
+    /// Fingerprint of the scene and all positions: unchanged while none has moved.
     pub fn fingerprint(&self) -> u64 {
         self.fingerprint
     }
 
-    /// Into how many messages its places are shared, with `room` bytes of them in each.
+    /// Number of messages that share its positions, with `room` bytes of them in each.
     pub fn stride(&self, room: usize) -> usize {
         let room = room.min(MAX_THIN_BYTES - self.head.len() - size_of::<Share>());
         self.places.len().div_ceil((room / 6).max(1)).max(1)
     }
 
-    /// The payload of the `number`-th message.
+    /// Returns the payload of the `number`-th message.
     pub fn with_places(&self, number: u64, room: usize) -> Vec<u8> {
         let stride = self.stride(room);
         let phase = (number % stride as u64) as usize;
@@ -138,7 +139,7 @@ impl Thin {
         bytes
     }
 
-    /// The payload for a member that has had these places.
+    /// Returns the payload for a member that has these positions.
     pub fn without_places(&self) -> Vec<u8> {
         self.before_places(0, 0)
     }
@@ -152,8 +153,8 @@ impl Thin {
     }
 }
 
-/// Of each `stride` places that follow one another one, and the next one in the next `stride` of them: neighbours in a grid, whose rows are
-/// as long as they may be, do not all fall to one message.
+/// Selects one of each `stride` consecutive positions, and the next one in the next `stride`: otherwise neighbours in a
+/// grid, whose rows have any length, could all fall to one message.
 fn held_by(stride: usize, phase: usize, total: usize) -> impl Iterator<Item = usize> + Clone {
     let of_group = move |group: usize| group * stride + (phase + group) % stride;
     let groups = if stride == 0 { 0 } else { total.div_ceil(stride) };
@@ -164,14 +165,14 @@ fn is_held_by(stride: usize, phase: usize, i: usize) -> bool {
     i % stride == (phase + i / stride) % stride
 }
 
-/// The displacements that the far side knows, by place.
+/// Displacements known to the far side, by position.
 #[derive(Debug, Default)]
 pub struct Displacements {
     of: SceneId,
     held: Vec<Held>,
 }
 
-/// What a message held of a place last, and when that was so; a guess by the places around it until one has.
+/// The last received displacement of a position and its time; a guess from its neighbours until it is received.
 #[derive(Clone, Copy, Debug, Default)]
 struct Held {
     moved_m: [f32; 3],
@@ -180,18 +181,18 @@ struct Held {
 }
 
 impl Held {
-    /// In s, from then to `time_ns`.
+    /// Age in s at `time_ns`.
     fn age_s(&self, time_ns: u64) -> f32 {
         time_ns.saturating_sub(self.time_ns) as f32 * 1e-9
     }
 
-    /// From this to the next, with the time between them.
+    /// Returns the change from this to the next, with the time between.
     fn change(&self, next: &Self) -> [f32; 4] {
         let [x, y, z] = [0, 1, 2].map(|a| next.moved_m[a] - self.moved_m[a]);
         [x, y, z, self.age_s(next.time_ns)]
     }
 
-    /// Where it is at `time_ns`, when the places around it have moved by `change`: no further than they have in a longer time.
+    /// Extrapolates to `time_ns`, given the neighbours' `change`: no further than they moved if the time is longer.
     fn moved_on_m(&self, [x, y, z, time_s]: [f32; 4], time_ns: u64) -> [f32; 3] {
         let share = match time_s > 0.0 {
             true => (self.age_s(time_ns) / time_s).min(1.0),
@@ -202,8 +203,8 @@ impl Held {
     }
 }
 
-/// The snapshot in `body`, whole: places that it does not hold are as they were in an earlier one, moved on as those around them have
-/// moved since. `None` for one of another scene, and for one without places where they are not known.
+/// Decodes a whole snapshot: missing positions are taken from earlier ones and moved with their neighbours. `None` for
+/// another scene, and for a snapshot without positions that are not known.
 pub fn decode_snapshot(
     rest: &Rest,
     known: &mut Displacements,
@@ -248,7 +249,7 @@ pub fn decode_snapshot(
     }
     let vertices = known.take(rest, header.time_ns, (stride, phase), moved);
     if let Err(invalid) = check::snapshot(&header, &vertices) {
-        // What is invalid is not kept for the next one.
+        // Invalid data is not kept for the next one.
         *known = Displacements::default();
         return Err(invalid);
     }
@@ -256,7 +257,7 @@ pub fn decode_snapshot(
 }
 
 impl Displacements {
-    /// Of a scene of which nothing was held before: places lie as far from rest as those around them of which it is known.
+    /// Guesses the displacements of a scene without earlier data from the neighbours that are known.
     fn guess(rest: &Rest, time_ns: u64, moved: impl Iterator<Item = (usize, [f32; 3])> + Clone) -> Self {
         let mut lattice = Lattice::new(&rest.bounds, moved.clone().count());
         moved.for_each(|(i, [x, y, z])| lattice.add(rest.places_m[i], [x, y, z, 0.0]));
@@ -274,7 +275,7 @@ impl Displacements {
         }
     }
 
-    /// All places, by those that a message holds.
+    /// Updates all positions from those in a message.
     fn take(
         &mut self,
         rest: &Rest,
@@ -285,7 +286,7 @@ impl Displacements {
         if stride == 0 {
             self.held.iter_mut().for_each(|held| held.time_ns = time_ns);
         }
-        // Of a message that holds all places nothing lies between them.
+        // A message with all positions leaves none in between.
         let mut changes = Lattice::new(&rest.bounds, if stride > 1 { moved.len() } else { 1 });
         for (i, moved_m) in held_by(stride, phase, rest.total()).zip(moved) {
             let next = Held {

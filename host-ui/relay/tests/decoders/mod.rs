@@ -1,5 +1,5 @@
-// Every decoder of what comes from the net, as the two sides call them; for the fuzzer, which includes this file, and for the tests of its
-// corpus.
+// Every decoder of network data, as the two sides call them; for the fuzzer, which includes this file, and for the
+// tests of its corpus.
 
 use bytemuck::Zeroable;
 use stylet_relay::control::Order;
@@ -9,8 +9,8 @@ use stylet_shm_schema::{
     SnapshotHeader, check,
 };
 
-/// Takes the bytes for one message, at the server's end and at a member's. What is accepted is valid by the checks of shared memory.
-/// True where the message was accepted.
+/// Decodes the bytes as one message, at the server's end and at a member's. Accepted values are valid by the checks of
+/// shared memory. True if the message was accepted.
 pub fn take(bytes: &[u8]) -> bool {
     let Ok(message) = wire::decode(bytes) else {
         return false;
@@ -51,12 +51,12 @@ fn scene(body: &[u8]) -> bool {
     let Ok((header, words)) = wire::scene(body) else {
         return false;
     };
-    // A snapshot of the scene, as far as there can be one.
+    // A snapshot of the scene, as far as possible.
     let _ = Rest::of_scene(&header, &words);
     true
 }
 
-/// Against a scene of the counts that the snapshot states, where it is a small one, and against none.
+/// Decodes against a scene with the counts of the snapshot, if it is small, and against none.
 fn snapshot(body: &[u8]) -> bool {
     let mut known = Displacements::default();
     let of_none = wire::decode_snapshot(&Rest::default(), &mut known, body);

@@ -1,4 +1,4 @@
-//! Records whole and in order, snapshots at the rate of a screen, and a recording on the far side that is that of the near one.
+//! Records complete and in order, snapshots at screen rate, and a far recording equal to the near one.
 
 use crate::fixture::{Keys, Named, core, invitation, join, lease, program, scratch, until};
 use crate::host::Host;
@@ -99,7 +99,7 @@ fn a_late_and_lossy_cable_costs_no_record() {
     seen.has_every_record();
 }
 
-/// It waited for the first answer of a server inside zenoh, and no signal but SIGKILL ended it.
+/// It waited for the first answer of a server inside zenoh, and only SIGKILL ended it.
 #[test]
 fn a_join_that_no_server_answers_ends_when_it_is_asked_to() {
     let (keys, far) = (Keys::new(), Named::new());
@@ -124,7 +124,7 @@ fn record(instance: &Instance, out: &Path) -> std::process::Child {
         .expect("host-ui starts")
 }
 
-/// Rows of a recording by their tick, as `host-ui export` writes them.
+/// Rows of a recording by tick, as written by `host-ui export`.
 fn rows(recording: &Path) -> BTreeMap<u64, String> {
     let table = recording.with_extension("csv");
     let exported = Command::new(program("host-ui"))
@@ -165,7 +165,7 @@ fn a_recording_on_the_far_side_is_that_of_the_near_one() {
         assert!(output.status.success(), "ticks were lost");
     }
     let [here, there] = files.map(|file| rows(&file));
-    // A recording marks its first tick: what was before it is not known.
+    // A recording marks its first tick: earlier data is unknown.
     let (from, to) = (
         *here.keys().next().max(there.keys().next()).expect("rows"),
         *here.keys().next_back().min(there.keys().next_back()).expect("rows"),
@@ -221,7 +221,7 @@ fn a_core_and_a_server_that_are_started_again_are_seen_again() {
     assert!(again, "{}", joined.log());
 }
 
-/// Each recording on its machine had a gap of what was made while it was down.
+/// Each recording on its machine lacked the records made while it was down.
 #[test]
 fn a_member_that_was_killed_hands_on_what_was_made_until_it_was_started_again() {
     let (near, far) = (Named::new(), Named::new());
@@ -233,7 +233,7 @@ fn a_member_that_was_killed_hands_on_what_was_made_until_it_was_started_again() 
     let mut host = Host::new(&far);
     assert!(host.sees_the_core(Duration::from_secs(10)), "{}", killed.log());
     let mut ticks = Vec::new();
-    // As a window does: records of another run than the one that was announced are dropped.
+    // Like a window: it drops records of a run other than the announced one.
     let mut takes = |host: &mut Host, more: usize| {
         let enough = ticks.len() + more;
         let came = until(Duration::from_secs(15), || {

@@ -1,4 +1,5 @@
-//! A process that stands still, is killed or is cut off in an insertion: the core beside it loses nothing, and the far side is whole again.
+//! A process that hangs, is killed or is cut off during an insertion: the core loses nothing, and the far side recovers
+//! completely.
 
 use crate::fixture::{Keys, Named, Running, core, join, lease, until};
 use crate::host::{Host, go};
@@ -7,7 +8,7 @@ use crate::watch::quantile;
 use std::time::{Duration, Instant};
 use stylet_relay::keys::{Role, Validity};
 
-/// Of each fault; `STYLET_RELAY_FAULTS` makes it more.
+/// Repetitions of each fault; `STYLET_RELAY_FAULTS` sets more.
 fn times() -> usize {
     std::env::var("STYLET_RELAY_FAULTS")
         .ok()
@@ -15,7 +16,7 @@ fn times() -> usize {
         .unwrap_or(3)
 }
 
-/// What is faulty.
+/// Affected process.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Who {
     Server,
@@ -23,7 +24,7 @@ enum Who {
     Operator,
 }
 
-/// How.
+/// Kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fault {
     Stopped,
@@ -31,7 +32,7 @@ enum Fault {
     Cut,
 }
 
-/// Everything of an insertion with an operator and an observer on the net.
+/// An insertion with an operator and an observer on the network.
 struct Class {
     local: Host,
     operator: Host,
@@ -79,7 +80,7 @@ impl Class {
         class
     }
 
-    /// The needle goes in and out again between 20 and 50 mm after the start of its way.
+    /// Moves the needle in and out again between 20 and 50 mm from the start of its path.
     fn insert(&mut self) -> Result<(), String> {
         let scene = self.local.scene.expect("seen");
         self.forward = !self.forward;
@@ -102,7 +103,7 @@ impl Class {
             .unwrap_or(0)
     }
 
-    /// Does it, for half a second where it ends by itself; returns when it has ended.
+    /// Injects the fault, for half a second if it ends by itself; returns when it has ended.
     fn strike(&mut self, who: Who, fault: Fault) -> Instant {
         let half_a_second = || std::thread::sleep(Duration::from_millis(500));
         let i = usize::from(who == Who::Observer);
@@ -159,17 +160,17 @@ fn through(invitation: &std::path::Path, named: &Named, cable: &Proxy) -> Runnin
     join(&path, named)
 }
 
-/// One fault, and what it did.
+/// One fault and its effect.
 struct Struck {
     who: Who,
     fault: Fault,
-    /// From its end until records come again.
+    /// Time from its end until records arrive again.
     back_ms: f64,
-    /// Records that the members say they lost for good, together.
+    /// Records that the members report as lost for good, in total.
     lost: u64,
 }
 
-/// Records that a member has lost for good since it was started; nothing while it does not answer.
+/// Records that a member has lost for good since its start; `None` while it does not answer.
 fn lost(far: &Named) -> Option<u64> {
     let words = lease(far, &["status"]);
     let number = words.split(" records lost").next()?.rsplit(' ').next()?;
@@ -201,7 +202,7 @@ impl Class {
         let far = self.joined.iter().flatten().map(Running::log).collect::<String>();
         assert!(back, "{who:?} {fault:?}: {}\nmembers: {far}", self.served.log());
         let back_ms = ended.elapsed().as_secs_f64() * 1e3;
-        // What is asked for again comes meanwhile, or is counted.
+        // Requested records arrive meanwhile, or are counted.
         std::thread::sleep(Duration::from_millis(500));
         let after = self.lost();
         Struck {
@@ -213,7 +214,7 @@ impl Class {
     }
 }
 
-/// All kinds, or those that `STYLET_RELAY_FAULTS_OF` names, as "Server Killed".
+/// All kinds, or those named by `STYLET_RELAY_FAULTS_OF`, as "Server Killed".
 fn kinds() -> Vec<(Who, Fault)> {
     let asked = std::env::var("STYLET_RELAY_FAULTS_OF").unwrap_or_default();
     let all = [Who::Observer, Who::Operator, Who::Server]
@@ -233,7 +234,7 @@ fn faults_in_an_insertion_cost_the_core_no_record_and_the_far_side_comes_back() 
             assert_eq!(inserted, Ok(()), "{round} {who:?} {fault:?}: {}", class.served.log());
             let stops = class.served.log().matches("the hand is stopped").count();
             struck.push(class.suffer(who, fault));
-            // Whoever operates is cut off from the hand by all but what befalls the observer.
+            // Every fault but the observer's cuts the operator off from the hand.
             if who != Who::Observer && class.served.log().matches("the hand is stopped").count() == stops {
                 unstopped += 1;
             }
@@ -257,7 +258,7 @@ fn faults_in_an_insertion_cost_the_core_no_record_and_the_far_side_comes_back() 
     println!("{}", lease(&class.far[1], &["status"]));
     assert!(ticks.len() > 1000);
     assert_eq!(missing, 0, "the core's own records have gaps");
-    // Each kill of a server cost a member what was made until the next one heard, about 0.9 s of it.
+    // Each kill of a server cost a member the records of about 0.9 s, until the next one listened.
     let lost: u64 = struck.iter().map(|s| s.lost).sum();
     assert_eq!(lost, 0, "records that the members lost for good");
     assert_eq!(

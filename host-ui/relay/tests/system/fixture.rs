@@ -1,4 +1,4 @@
-//! A core, a lab, and the two sides of the relay, each ended when it is dropped.
+//! A core, a lab, and the two sides of the relay, each ended when dropped.
 
 use std::fs::File;
 use std::os::unix::process::CommandExt;
@@ -10,13 +10,13 @@ use stylet_relay::keys::{Invitation, Lab, Role, Validity, write_invitation};
 use stylet_shm_schema::Instance;
 pub use stylet_test_kit::{program, until};
 
-/// A number that no other test of this process has.
+/// Returns a number unique in this process.
 pub fn fresh() -> u32 {
     static NEXT: AtomicU32 = AtomicU32::new(0);
     NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
-/// A name that no other test uses; its files go when it is dropped, so it is declared before what uses it.
+/// A unique name; its files are removed when it is dropped, so declare it before its users.
 pub struct Named(pub Instance);
 
 impl Named {
@@ -34,12 +34,12 @@ impl Drop for Named {
     }
 }
 
-/// A folder for one test's files, emptied first.
+/// Returns an empty folder for one test's files.
 pub fn scratch(name: &str) -> PathBuf {
     stylet_test_kit::scratch(&format!("relay-{name}-{}", fresh()))
 }
 
-/// A process of ours, with what it prints in a file.
+/// A process of the test, with its output in a file.
 pub struct Running {
     pub child: Child,
     log: PathBuf,
@@ -78,7 +78,7 @@ impl Running {
     }
 }
 
-/// A test that is killed cannot end what it started.
+/// Ends the process with its test: a killed test cannot end it.
 fn end_with_the_test() -> std::io::Result<()> {
     // SAFETY: a system call with plain arguments.
     match unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGTERM) } {
@@ -99,7 +99,7 @@ impl Drop for Running {
     }
 }
 
-/// The core of an instance.
+/// Starts the core of an instance.
 pub fn core(named: &Named, options: &[&str]) -> Running {
     let folder = scratch("core");
     let mut command = Command::new(program("rt-core"));
@@ -116,7 +116,7 @@ pub fn core(named: &Named, options: &[&str]) -> Running {
     Running::start(&mut command, folder.join("log"))
 }
 
-/// A lab's keys, and a port of this machine that is free.
+/// A lab's keys, and a free port of this machine.
 pub struct Keys {
     pub folder: PathBuf,
     pub lab: Lab,
@@ -128,7 +128,7 @@ impl Keys {
         Self::reached_at(&["127.0.0.1".to_owned()])
     }
 
-    /// Of a machine with these addresses.
+    /// Makes the keys of a machine with these addresses.
     pub fn reached_at(hosts: &[String]) -> Self {
         let folder = scratch("lab");
         let lab = Lab::new(&folder);
@@ -174,13 +174,13 @@ impl Keys {
     }
 }
 
-/// An invitation, with its code beside it.
+/// Saves an invitation, with its code next to it.
 pub fn keep(path: &Path, (invitation, code): &(Invitation, String)) {
     write_invitation(path, invitation).expect("written");
     std::fs::write(path.with_extension("code"), code).expect("written");
 }
 
-/// As the person who got the file and the code types it.
+/// Returns the code, as typed by the recipient.
 pub fn code(invitation: &Path) -> File {
     File::open(invitation.with_extension("code")).expect("kept beside the invitation")
 }
@@ -198,7 +198,7 @@ pub fn joining(invitation: &Path, named: &Named) -> Command {
     command
 }
 
-/// What `relay lease` prints.
+/// Returns the output of `relay lease`.
 pub fn lease(named: &Named, words: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_relay"))
         .arg("lease")
@@ -209,7 +209,7 @@ pub fn lease(named: &Named, words: &[&str]) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-/// Reads an invitation again.
+/// Reads a saved invitation.
 pub fn invitation(path: &Path) -> Invitation {
     Invitation::read(path).expect("an invitation")
 }

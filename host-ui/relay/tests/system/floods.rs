@@ -1,4 +1,4 @@
-//! Floods of one seat, as a program that is not ours would send them, and what the operator and another observer have beside them.
+//! Floods from one seat, as a foreign program would send them, and their effect on the operator and another observer.
 
 use crate::fixture::{Keys, Named, Running, core, invitation, join, until};
 use crate::host::{Host, go};
@@ -13,12 +13,12 @@ use stylet_relay::now_ns;
 use stylet_relay::wire::{self, Hello, Kind, Stamp, Ticks, encode};
 use stylet_shm_schema::{Mark, Request, UploadHeader, flags};
 
-/// Of each flood.
+/// Duration of each flood.
 const LENGTH: Duration = Duration::from_secs(4);
-/// A message in each of these: 5,000 a second.
+/// Interval of the messages: 5,000 a second.
 const EVERY: Duration = Duration::from_micros(200);
 
-/// What an observer of an instance had for a while.
+/// Data received by an observer of an instance in some time.
 #[derive(Default)]
 struct Had {
     records: usize,
@@ -26,7 +26,7 @@ struct Had {
     oldest_ms: f64,
     /// Longest time without a snapshot.
     blind_ms: f64,
-    /// Records of a hand that is not on its way.
+    /// Records of a resting hand.
     at_rest: usize,
 }
 
@@ -66,11 +66,11 @@ fn watch(named: &Named, end: Instant) -> Had {
     had
 }
 
-/// A member's session without a member's program.
+/// A member's session without the member's program.
 struct Eve {
     session: Session,
     seat: u16,
-    /// Bytes that came, and the newest time and tick of the server.
+    /// Bytes received, and the newest time and tick of the server.
     came: Arc<[AtomicU64; 3]>,
 }
 
@@ -115,7 +115,7 @@ impl Eve {
         self.send(Kind::Hello, process, &[bytemuck::bytes_of(&hello)]);
     }
 
-    /// The bytes that came, and how many messages were sent, while `flood` went on.
+    /// Returns the bytes received and the number of messages sent during `flood`.
     fn flood(&self, end: Instant, flood: &dyn Fn(&Self, u64)) -> (u64, u64) {
         let before = self.came[0].load(Ordering::Relaxed);
         let (mut sent, begun) = (0, Instant::now());
@@ -132,7 +132,7 @@ impl Eve {
     }
 }
 
-/// Who sends what.
+/// Name, role and messages of a flood.
 type Flood = (&'static str, Role, &'static dyn Fn(&Eve, u64));
 
 fn command(eve: &Eve, request: &Request, number: u64) {
@@ -187,7 +187,7 @@ const FLOODS: [Flood; 7] = [
     ),
 ];
 
-/// Everybody but the flood.
+/// All parties except the flood.
 struct Class {
     otto: Host,
     served: Running,
@@ -220,7 +220,7 @@ impl Class {
         }
     }
 
-    /// The operator's hand is on its way at 1 mm/s, and a flood goes on beside it.
+    /// Moves the operator's hand at 1 mm/s during a flood.
     fn suffer(&mut self, number: usize, (name, role, flood): Flood) -> [Had; 2] {
         let scene = self.otto.scene.expect("seen");
         self.otto.ask(&go(&scene, 0.06, 0.001)).expect("an operator");

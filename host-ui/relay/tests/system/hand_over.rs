@@ -1,4 +1,4 @@
-//! The needle goes from hand to hand by what windows ask through their ports, and every window is shown who has it.
+//! The needle changes hands on the windows' requests through their ports, and every window shows its holder.
 
 use crate::fixture::{Keys, Named, Running, core, join, until};
 use crate::host::{Host, go, node, still_moving_m};
@@ -7,7 +7,7 @@ use stylet_ports::{self as service, Node, Publisher, Subscriber};
 use stylet_relay::keys::{Role, Validity};
 use stylet_shm_schema::{Class, LeaseOrder, LeaseRequest};
 
-/// A host with the ports by which a window knows the class and asks for the needle.
+/// A host with a window's ports for the class and the lease.
 struct Window {
     host: Host,
     class: Subscriber<Class>,
@@ -51,7 +51,7 @@ impl Window {
     }
 }
 
-/// A core, who sits beside it, and two operators on the net.
+/// A core, the window next to it, and two remote operators.
 struct Room {
     local: Window,
     otto: Window,
@@ -92,7 +92,7 @@ impl Room {
         [&mut self.local, &mut self.otto, &mut self.paula]
     }
 
-    /// Each window, whichever machine it is on.
+    /// True if all windows show this operator.
     fn all_show_operator(&mut self, name: &str) -> bool {
         self.windows().into_iter().all(|window| window.shows_operator(name))
     }
@@ -111,7 +111,7 @@ fn a_window_asks_for_the_needle_and_who_has_it_hands_it_over_through_their_ports
     let asked = |window: &mut Window| window.is_shown(|class| class.asked.read() == "paula");
     assert!(room.windows().into_iter().all(asked), "{}", room.served.log());
     assert!(room.paula.moves(0.0).is_err_and(|why| why.contains("otto")));
-    // Whoever does not have it does not hand it over.
+    // A member without it cannot hand it over.
     room.paula.ask(&LeaseRequest::Give("paula".to_owned()));
     let refused = "paula (operator, seat 2): the needle: only who operates hands over";
     assert!(

@@ -1,4 +1,4 @@
-//! A host of a test: it sees what a window would see, asks what a window would ask, and renews what it moves.
+//! A test host: it sees and requests the same as a window, and renews its motions.
 
 use crate::fixture::{Named, fresh, until};
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use stylet_shm_schema::{
     Command, HapticState, Instance, PlanInForce, Reply, ReplyStatus, Request, SceneHeader, Session, TickRecord,
 };
 
-/// A node of an instance, once a core or a relay has made it.
+/// Returns a node of an instance, once a core or a relay has made it.
 pub fn node(named: &Named) -> Node {
     let mut node = Node::join(&named.0);
     until(Duration::from_secs(20), || {
@@ -39,7 +39,7 @@ impl Ports {
     }
 }
 
-/// A host of the smallest kind: it asks, and takes what the core says.
+/// A minimal host: it sends requests and receives the core's data.
 pub struct Host {
     instance: Instance,
     ports: Option<Ports>,
@@ -50,12 +50,12 @@ pub struct Host {
     replies: Vec<Reply>,
     id: u64,
     next: u64,
-    /// Lives as long as the host does: what it moves goes on.
+    /// Lives as long as the host, whose motions it renews.
     promises: Option<Promises>,
 }
 
 impl Host {
-    /// Of an instance whose core or relay may still be on its way.
+    /// Joins an instance whose core or relay may still be starting.
     pub fn new(named: &Named) -> Self {
         Self {
             instance: named.0.clone(),
@@ -71,7 +71,7 @@ impl Host {
         }
     }
 
-    /// Drops the ports of an epoch that is over, and makes those of the present one.
+    /// Drops the ports of a past epoch, and makes those of the present one.
     fn connect(&mut self) {
         if self.ports.as_ref().is_some_and(|ports| !ports.near.node.is_current()) {
             self.ports = None;
@@ -121,7 +121,7 @@ impl Host {
         board.map(StateReader::read)
     }
 
-    /// Waits until the core is seen with its scene.
+    /// Waits until the core is visible with its scene.
     pub fn sees_the_core(&mut self, limit: Duration) -> bool {
         until(limit, || self.sees_it_now())
     }
@@ -147,7 +147,7 @@ impl Host {
         id
     }
 
-    /// The words of the refusal where it was refused.
+    /// Sends a request; returns the text of a refusal.
     pub fn ask(&mut self, request: &Request) -> Result<(), String> {
         let id = self.send(request);
         let mut answer = None;
@@ -203,13 +203,14 @@ fn promises(instance: &Instance, promise: &Command, end: &AtomicBool) {
     }
 }
 
-/// Where the hand rests before an insertion into the built-in scene, 20 mm before the tissue, and 60 mm on along z.
+/// Returns a point on a path along z: the hand starts 20 mm before the tissue of the built-in scene, and the path is 60
+/// mm long.
 pub fn way(scene: &SceneHeader, depth_m: f64) -> [f64; 3] {
     let middle = |a: usize| 0.5 * (scene.lower_m[a] + scene.upper_m[a]);
     [middle(0), middle(1), scene.lower_m[2] - 0.02 + depth_m]
 }
 
-/// The hand to a place on that way.
+/// Moves the hand to a point on that path.
 pub fn go(scene: &SceneHeader, depth_m: f64, speed_m_per_s: f64) -> Request {
     Request::MoveHand(stylet_shm_schema::HandMove {
         tip_m: way(scene, depth_m),
@@ -219,7 +220,7 @@ pub fn go(scene: &SceneHeader, depth_m: f64, speed_m_per_s: f64) -> Request {
     })
 }
 
-/// How far the hand still goes: its way in 150 ms.
+/// Travel of the hand in 150 ms.
 pub fn still_moving_m(host: &mut Host) -> f64 {
     let place = |host: &mut Host| host.state().map_or([0.0; 3], |s| s.tip_in_scene_m);
     let before = place(host);

@@ -1,4 +1,5 @@
-//! One hand holds the needle: the one beside the core first, one on the net while it is heard, and it is handed over.
+//! One hand holds the needle: first the one next to the core, then a remote one while it is heard; it can be handed
+//! over.
 
 use crate::fixture::{Keys, Named, Running, core, join, lease, until};
 use crate::host::{Host, go, still_moving_m};
@@ -6,7 +7,7 @@ use std::time::Duration;
 use stylet_relay::keys::{Role, Validity};
 use stylet_shm_schema::Request;
 
-/// An operator on the net whose hand is on a slow way, and the processes that carry it.
+/// A remote operator with a slowly moving hand, and the processes that carry it.
 struct Way {
     local: Host,
     host: Host,
@@ -68,7 +69,7 @@ fn the_hand_stops_where_its_operator_stands_still_or_is_killed() {
         );
         assert!(lease(&way.near, &["status"]).contains("operates: nobody"));
         if signal == libc::SIGSTOP {
-            // What the operator sent before it stood still is not carried out when it goes on.
+            // Requests that the operator sent before it was suspended are not carried out when it resumes.
             let scene = way.host.scene.expect("seen");
             way.host.send(&go(&scene, 0.02, 0.005));
             std::thread::sleep(Duration::from_millis(700));
@@ -125,7 +126,7 @@ fn a_hand_beside_the_core_goes_first_and_hands_over() {
         "a window beside the core operates now, and otto",
         Duration::from_secs(1)
     ));
-    // What takes motion away is nobody's alone.
+    // Everyone may remove motion.
     way.host.ask(&Request::StopHand).expect("allowed");
     assert!(lease(&way.near, &["give", "otto"]).contains("otto operates now"));
     way.host.ask(&go(&scene, 0.0, 0.005)).expect("handed over");

@@ -1,4 +1,5 @@
-//! Members behind lines of their own, in network namespaces: a line of 100 Mbit/s, and a class of twenty. As root, by `make relay-class`.
+//! Members on separate lines, in network namespaces: a line of 100 Mbit/s, and a class of twenty. As root, by `make
+//! relay-class`.
 
 use crate::fixture::{Keys, Named, Running, core, lease, scratch, until};
 use crate::host::Host;
@@ -19,7 +20,7 @@ fn observers() -> usize {
         .unwrap_or(20)
 }
 
-/// Each without the class and with it.
+/// Rounds, each without the class and with it.
 fn rounds() -> usize {
     let asked = std::env::var("STYLET_RELAY_ROUNDS").ok().and_then(|s| s.parse().ok());
     asked.unwrap_or(3)
@@ -51,7 +52,7 @@ fn a_line_of_100_megabits_carries_records_whole_and_snapshots_in_time() {
     drop(joined);
 }
 
-/// How late the core's loop woke up (us), while a host beside it takes the records; they stay there.
+/// Wake-up latencies of the core's loop (µs), while a host next to it takes the records, which stay there.
 fn wakes_us(local: &mut Host) -> Vec<f64> {
     local.poll();
     local.taken.clear();
@@ -63,7 +64,8 @@ fn wakes_us(local: &mut Host) -> Vec<f64> {
     local.taken.iter().map(|r| r.wake_latency_ns as f64 * 1e-3).collect()
 }
 
-/// How many of the ticks that were `made` a member's host has, once the last of them is there or has not come for a while. What is missing is printed.
+/// Fraction of the ticks in `made` that a member's host has, once the last has arrived or has been missing for a while.
+/// Prints missing ones.
 fn share_of(made: &BTreeSet<u64>, host: &mut Host, named: &Named) -> f64 {
     let last = made.last().copied();
     until(Duration::from_secs(5), || {
@@ -117,7 +119,7 @@ fn a_class_of_twenty_gets_its_records_and_the_core_does_not_notice() {
         assert!(all, "{}", served.log());
         std::thread::sleep(Duration::from_secs(5));
         let mut hosts: Vec<Host> = far.iter().map(Host::new).collect();
-        // All of them in each round: what waits for a host that is not polled is bounded.
+        // Polls all of them in each round: queues of a host that is not polled are bounded.
         let all_see = until(Duration::from_secs(30), || {
             hosts.iter_mut().map(Host::sees_it_now).filter(|sees| *sees).count() == far.len()
         });
@@ -139,7 +141,7 @@ fn a_class_of_twenty_gets_its_records_and_the_core_does_not_notice() {
         drop(hosts);
         drop(joined);
     }
-    // Each round too: a bad one is not hidden among the others.
+    // Also for each round: a bad one must not be hidden among the others.
     let p99s = |rounds: &[Vec<f64>]| -> Vec<f64> { rounds.iter().map(|us| quantile(&mut us.clone(), 0.99)).collect() };
     let [mut quiet, mut busy] = [&without_us, &with_us].map(|rounds| p99s(rounds));
     for (without, with) in quiet.iter().zip(&busy) {

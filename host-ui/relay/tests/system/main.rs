@@ -1,4 +1,5 @@
-//! Whole processes: a core, a relay beside it, and relays that join under other instances of this machine, as other machines would.
+//! Whole processes: a core, its relay, and relays that join under other instances of this machine, as other machines
+//! would.
 
 mod carries;
 mod faults;

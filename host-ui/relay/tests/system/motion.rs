@@ -1,6 +1,7 @@
-//! An operator over the relay whose program, relay, line or terminal ends in a motion: the hand is at rest within 0.4 s and 5 mm.
+//! A remote operator whose program, relay, line or terminal ends during a motion: the hand is at rest within 0.4 s and
+//! 5 mm.
 //!
-//! As `tests/tests/system/motion_sender.rs` measures it beside the core.
+//! `tests/tests/system/motion_sender.rs` measures the same without a relay.
 
 use crate::fixture::{Keys, Named, Running, code, core, joining, program, scratch, until};
 use crate::host::Host;
@@ -16,17 +17,17 @@ use stylet_relay::keys::{Role, Validity, write_invitation};
 use stylet_relay::now_ns;
 use stylet_shm_schema::{TickRecord, flags};
 
-/// Of each kind; `STYLET_TRIALS` makes more.
+/// Trials of each kind; `STYLET_TRIALS` sets more.
 const TRIALS: usize = 2;
-/// Speed of the insertion: the fastest of published ones, mm/s.
+/// Speed of the insertion: the fastest published, mm/s.
 const MM_PER_S: &str = "123";
-/// At rest is slower than 3 mm/s: over so many ticks less than this, m.
+/// Rest means slower than 3 mm/s: less than this over that many ticks, m.
 const REST_TICKS: usize = 50;
 const AT_REST_M: f64 = 1.5e-4;
 const MOST_MM: f64 = 5.0;
 const MOST_TICKS: usize = 400;
 
-/// What ends, and how.
+/// Component that ends, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum End {
     ProgramKilled,
@@ -35,10 +36,10 @@ enum End {
     RelayStopped,
     LineCut,
     TerminalClosed,
-    /// The relay's output was full before, and its line is cut: it has something to say.
+    /// The relay's output was full, and its line is cut: it has a message to print.
     OutputFull,
     OutputClosed,
-    /// The same of the server's output, and the operator's relay is killed.
+    /// As above for the server's output, and the operator's relay is killed.
     ServersOutputFull,
     ServersOutputClosed,
     ServersTerminalClosed,
@@ -60,7 +61,7 @@ const ALL: [End; 12] = [
     End::ServerKilledWithItsKeeper,
 ];
 
-/// A pipe that is full, and its other end.
+/// A full pipe, and its other end.
 pub fn full() -> (PipeReader, Stdio) {
     let (reader, mut writer) = std::io::pipe().expect("a pipe");
     let set = |flags: libc::c_int| {
@@ -80,7 +81,7 @@ fn closed() -> Stdio {
     std::io::pipe().expect("a pipe").1.into()
 }
 
-/// A terminal: the end of the person, and that of a program.
+/// A terminal: the user's end, and a program's.
 fn terminal() -> (File, File) {
     let (mut person, mut program) = (0, 0);
     let nothing = std::ptr::null_mut();
@@ -95,7 +96,7 @@ fn terminal() -> (File, File) {
         )
     };
     assert_eq!(opened, 0, "no terminal");
-    // No program keeps the end of the person open.
+    // No program keeps the user's end open.
     for end in [person, program] {
         // SAFETY: an open file of ours.
         unsafe { libc::fcntl(end, libc::F_SETFD, libc::FD_CLOEXEC) };
@@ -104,7 +105,7 @@ fn terminal() -> (File, File) {
     unsafe { (File::from_raw_fd(person), File::from_raw_fd(program)) }
 }
 
-/// Makes the program the first of a session whose terminal is its standard input.
+/// Makes the program a session leader whose terminal is its standard input.
 fn take_terminal() -> std::io::Result<()> {
     // SAFETY: system calls with plain arguments.
     let taken = unsafe { libc::setsid() != -1 && libc::ioctl(libc::STDIN_FILENO, libc::TIOCSCTTY, 0) == 0 };
@@ -119,7 +120,7 @@ impl Program {
         Self(command.spawn().expect("the program starts"))
     }
 
-    /// On a terminal; the end of the person closes it.
+    /// Starts the program on a terminal; closing the user's end closes it.
     fn on_terminal(command: &mut Command) -> (Self, File) {
         let (person, program) = terminal();
         let end = || Stdio::from(OwnedFd::from(program.try_clone().expect("a second handle")));
@@ -163,18 +164,18 @@ impl Drop for Program {
     }
 }
 
-/// The server, the operator's relay and its program; what is needed to end them.
+/// The server, the operator's relay and its program, with what is needed to end them.
 struct Way {
     program: Program,
     relay: Program,
     server: Program,
     cable: Proxy,
-    /// Terminals and pipes, the relay's and the server's.
+    /// Terminals and pipes of the relay and the server.
     persons: [Option<File>; 2],
     _readers: [Option<PipeReader>; 2],
 }
 
-/// Where its output goes.
+/// Sets the destination of its output.
 fn output(command: &mut Command, is_full: bool, is_closed: bool, log: &Path) -> Option<PipeReader> {
     let words = || Stdio::from(File::create(log).expect("written"));
     command.stderr(words());
@@ -260,12 +261,12 @@ fn through(invitation: &Path, cable: &Proxy) -> PathBuf {
     path
 }
 
-/// What another host saw of the hand.
+/// Motion of the hand as seen by another host.
 #[derive(Debug)]
 struct Trial {
     mm_per_s: f64,
     farthest_mm: f64,
-    /// Until it was at rest.
+    /// Ticks until it was at rest.
     ticks: usize,
 }
 
@@ -281,7 +282,7 @@ fn watch(beside: &mut Host, limit: Duration, ready: impl Fn(&[TickRecord]) -> bo
     })
 }
 
-/// Faster than 30 mm/s, for a host.
+/// True if a host sees it move faster than 30 mm/s.
 fn moves(records: &[TickRecord]) -> bool {
     let [.., before, _, _, _, _, _, _, _, _, last] = records else {
         return false;
@@ -289,7 +290,7 @@ fn moves(records: &[TickRecord]) -> bool {
     apart_m(last, before) > 3e-4 && last.flags & flags::IN_MOTION != 0
 }
 
-/// Ends it so long after the needle is seen to move.
+/// Ends the component at that time after the needle is seen to move.
 fn trial(way: &mut Way, end: End, beside: &mut Host, after: Duration) -> Trial {
     beside.poll();
     beside.taken.clear();
@@ -298,7 +299,7 @@ fn trial(way: &mut Way, end: End, beside: &mut Host, after: Duration) -> Trial {
         "{end:?}: the needle does not move"
     );
     watch(beside, after, |_| false);
-    // Between two ways of the needle nothing would be seen.
+    // Between two strokes of the needle nothing would be seen.
     watch(beside, Duration::from_secs(5), moves);
     let ended_ns = now_ns();
     way.strike(end);
@@ -325,7 +326,7 @@ fn trials() -> usize {
     asked.unwrap_or(TRIALS)
 }
 
-/// Those that `STYLET_TRIALS_OF` names, or all.
+/// Kinds named by `STYLET_TRIALS_OF`, or all.
 fn kinds() -> impl Iterator<Item = End> {
     let asked = std::env::var("STYLET_TRIALS_OF").unwrap_or_default();
     ALL.into_iter().filter(move |end| format!("{end:?}").contains(&asked))

@@ -1,4 +1,4 @@
-//! Where a window on the far side draws the tissue while it moves fast, against where it was in that tissue tick.
+//! Tissue outlines in a far window during fast motion, against the true positions in that tissue tick.
 
 use crate::fixture::{Keys, Named, core, join, until};
 use crate::host::{Host, go, still_moving_m};
@@ -14,7 +14,7 @@ use stylet_shm_schema::Instance;
 use stylet_shm_schema::{SnapshotHeader, Vertex};
 use stylet_test_kit::witness::where_the_machine_runs;
 
-/// Age in ms, header and places of each snapshot, by its tissue tick.
+/// Age in ms, header and positions of each snapshot, by its tissue tick.
 type Shown = BTreeMap<u64, (f64, Box<SnapshotHeader>, Vec<Vertex>)>;
 
 fn rest(instance: &Instance) -> Rest {
@@ -49,7 +49,8 @@ fn apart_mm(a: &Vertex, b: &Vertex) -> f64 {
     squares.sum::<f64>().sqrt() * 1e3
 }
 
-/// Largest error of any place in any snapshot, and the largest root of the mean square in one, of the places that have moved by then.
+/// Largest error of any position in any snapshot, and largest root mean square in one, over the positions that have
+/// moved by then.
 #[derive(Default)]
 struct Errors {
     most_mm: f64,
@@ -64,7 +65,7 @@ impl Errors {
     }
 }
 
-/// What was drawn before: each message moved its own places, and the others stood where they were held last.
+/// The former method: each message moved its own positions, and the others stayed at their last values.
 struct Standing {
     places: Vec<Vertex>,
     stride: usize,
@@ -112,7 +113,7 @@ fn places_that_move_with_their_neighbours_are_nearer_to_the_tissue_than_those_th
         let (here, there) = std::thread::scope(|scope| {
             let here = scope.spawn(|| shown(&near.0, end));
             let there = scope.spawn(|| shown(&far.0, end));
-            // Every place was in two messages before.
+            // By then every position was in two messages.
             std::thread::sleep(Duration::from_millis(800));
             local.ask(&go(&scene, 0.0, 0.2)).expect("beside the core");
             (here.join().expect("ran"), there.join().expect("ran"))
@@ -123,7 +124,7 @@ fn places_that_move_with_their_neighbours_are_nearer_to_the_tissue_than_those_th
             let moving = (0..truth.len()).filter(moves);
             moving.map(|i| apart_mm(&of[i], &truth[i])).collect()
         };
-        // The same snapshots, each in one message as large as may be, taken in both ways.
+        // The same snapshots, each in one message of the largest size, decoded in both ways.
         let (mut known, mut standing) = (Displacements::default(), Standing::new(resting));
         let (mut drawn_mm, mut standing_mm) = (Errors::default(), Errors::default());
         for (number, (_, header, truth)) in here.values().enumerate() {
@@ -133,7 +134,7 @@ fn places_that_move_with_their_neighbours_are_nearer_to_the_tissue_than_those_th
             let decoded = decode_snapshot(&rest, &mut known, &body).expect("valid");
             let (_, drawn) = decoded.expect("of this scene");
             standing.take(truth);
-            // Until each place was in two messages.
+            // Until each position was in two messages.
             if number >= 2 * standing.stride {
                 drawn_mm.add(&errors(&drawn, truth));
                 standing_mm.add(&errors(&standing.places, truth));

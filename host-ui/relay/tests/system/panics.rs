@@ -1,4 +1,5 @@
-//! A thread that panics ends its process, whatever becomes of its words: for a process that ends the hand is stopped (`lease.rs`).
+//! A thread that panics ends its process, even if its message cannot be printed: the hand is stopped for a process that
+//! ends (`lease.rs`).
 
 use crate::fixture::until;
 use crate::motion::full;

@@ -1,4 +1,4 @@
-//! A cable between a member and the server: datagrams that are late, lost, or cut off altogether.
+//! A cable between a member and the server: datagrams are delayed, lost, or cut off altogether.
 
 use std::collections::VecDeque;
 use std::net::{SocketAddr, UdpSocket};
@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// What a cable does to a datagram. Flags and figures alone: no data is published by them.
+/// Treatment of a datagram. Flags and figures alone: no data is published by them.
 #[derive(Default)]
 struct Quality {
     end: AtomicBool,
@@ -15,14 +15,14 @@ struct Quality {
     loss_per_mille: AtomicU32,
 }
 
-/// A proxy of UDP on this machine; it ends when it is dropped.
+/// A UDP proxy on this machine; it ends when dropped.
 pub struct Proxy {
     pub port: u16,
     quality: Arc<Quality>,
 }
 
 impl Proxy {
-    /// A good cable to a port of this machine.
+    /// Returns a good cable to a port of this machine.
     pub fn to(port: u16) -> Self {
         let front = UdpSocket::bind("127.0.0.1:0").expect("a free port");
         let own = front.local_addr().expect("bound").port();
@@ -32,12 +32,12 @@ impl Proxy {
         Self { port: own, quality }
     }
 
-    /// Nothing passes while it is cut.
+    /// Cuts or restores the cable.
     pub fn cut(&self, is_cut: bool) {
         self.quality.cut.store(is_cut, Ordering::Relaxed);
     }
 
-    /// Each datagram is late by `delay`, and so many of a thousand are lost, each way.
+    /// Delays each datagram by `delay`, and loses that many of a thousand, each way.
     pub fn worsen(&self, delay: Duration, loss_per_mille: u32) {
         self.quality.delay_us.store(delay.as_micros() as u64, Ordering::Relaxed);
         self.quality.loss_per_mille.store(loss_per_mille, Ordering::Relaxed);
@@ -50,7 +50,7 @@ impl Drop for Proxy {
     }
 }
 
-/// Every address in front has a socket behind, as a router would give it.
+/// Gives every front address its own socket behind, as a router would.
 fn carry(front: &UdpSocket, port: u16, quality: &Quality) {
     front.set_nonblocking(true).expect("a socket");
     let mut routes: Vec<(SocketAddr, UdpSocket)> = Vec::new();

@@ -1,4 +1,4 @@
-//! No command passes without the right to it, and each refusal says who asked what.
+//! No command passes without the right to it, and each refusal names the member and the request.
 
 use crate::fixture::{Keys, Named, core, join, keep, until};
 use crate::host::{Host, go, node, still_moving_m};
@@ -94,7 +94,7 @@ fn an_instructor_stops_the_hand_and_does_not_move_it() {
         "the hand goes on"
     );
     host.ask(&Request::SetPlan(None)).expect("allowed");
-    // A fault goes in and out again, and a mark: the events come back to where they were asked for.
+    // A fault is injected and removed, and a mark is made: the events return to the requesting host.
     host.ask(&Request::BeginExercise(Exercise::DeviceLost))
         .expect("allowed");
     let lost = |host: &mut Host| {
@@ -108,7 +108,7 @@ fn an_instructor_stops_the_hand_and_does_not_move_it() {
     host.ask(&marked()).expect("allowed");
 }
 
-/// The trainee operates, and does not put in or take out what is to be found.
+/// The trainee operates, and cannot inject or remove the fault to be found.
 #[test]
 fn an_operator_marks_and_puts_no_fault_in() {
     let (near, far) = (Named::new(), Named::new());
@@ -135,7 +135,7 @@ fn an_operator_marks_and_puts_no_fault_in() {
     assert!(came, "the mark did not come back");
 }
 
-/// Nothing comes to a member whose certificate is not accepted, and nothing of it passes.
+/// True if a member whose certificate is not accepted receives nothing and sends nothing.
 fn is_shut_out(validity: Validity, of_another_lab: bool) -> String {
     let (near, far) = (Named::new(), Named::new());
     let core = core(&near, &[]);
@@ -159,7 +159,7 @@ fn is_shut_out(validity: Validity, of_another_lab: bool) -> String {
     assert!(local.sees_the_core(Duration::from_secs(10)), "{}", core.log());
     let before = hand_of(&mut local);
     let scene = local.scene.expect("seen");
-    // A member that never connected shows nothing here: hosts have nobody to ask.
+    // A member that never connected shows nothing here: hosts find no core.
     if host.has_ports() {
         host.send(&go(&scene, 0.0, 0.2));
     }

@@ -1,4 +1,4 @@
-//! Who is in the list of members hears the core, now and at each change of the list, and nobody else's seat notices.
+//! Listed members receive the core's data, at each change of the list, without any effect on other seats.
 
 use crate::fixture::{Keys, Named, Running, core, join, until};
 use crate::host::{Host, go, still_moving_m};
@@ -6,7 +6,7 @@ use std::time::Duration;
 use stylet_relay::keys::{Member, Role, Validity, now_s};
 use stylet_shm_schema::Request;
 
-/// An operator whose hand is on a slow way, and an observer.
+/// An operator with a slowly moving hand, and an observer.
 struct Class {
     otto: Host,
     olga: Host,
@@ -44,7 +44,7 @@ impl Class {
         class
     }
 
-    /// At 2 mm/s the hand is on its way for longer than a test takes.
+    /// Moves at 2 mm/s, which outlasts the test.
     fn move_the_hand(&mut self) {
         let scene = self.otto.scene.expect("seen");
         self.otto.ask(&go(&scene, 0.04, 0.002)).expect("an operator");
@@ -189,7 +189,7 @@ fn a_changed_expiry_stops_nothing_and_a_removed_operator_stops_the_hand() {
     }
 }
 
-/// A list that was gone left the one before in force for ever.
+/// A missing list left the one before in force for ever.
 #[test]
 fn an_unreadable_list_admits_nobody_after_2_s() {
     let mut class = Class::begin();

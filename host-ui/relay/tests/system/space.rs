@@ -1,12 +1,12 @@
-//! Network namespaces with a cable each, which no test leaves behind: not where it is ended by a signal, and not beyond the next start where
-//! it is killed.
+//! Network namespaces with a cable each, which no test leaves behind: a test ended by a signal removes them, and the
+//! next start removes those of a killed one.
 
 use crate::fixture::{Named, Running, code, scratch};
 use std::path::Path;
 use std::process::Command;
 use std::sync::Once;
 
-/// Begins the name of every namespace; the process that made it and a number follow.
+/// Prefix of every namespace; the process that made it and a number follow.
 const PREFIX: &str = "stylet";
 
 fn run(words: &str) {
@@ -22,14 +22,14 @@ fn run(words: &str) {
     );
 }
 
-/// A namespace with a cable to this one; removed when it is dropped.
+/// A namespace with a cable to this one; removed when dropped.
 pub struct Line {
     name: String,
     number: usize,
 }
 
 impl Line {
-    /// Of `rate` each way, in the words of `tc`, or as fast as it can.
+    /// Makes a line of `rate` each way, in the words of `tc`, or unlimited.
     pub fn new(number: usize, rate: Option<&str>) -> Self {
         static TIDY: Once = Once::new();
         TIDY.call_once(|| {
@@ -59,7 +59,7 @@ impl Line {
         line
     }
 
-    /// Address by which the namespace of that number reaches this one.
+    /// Address at which the namespace of that number reaches this one.
     pub fn server(number: usize) -> String {
         format!("10.77.{number}.1")
     }
@@ -88,7 +88,7 @@ impl Drop for Line {
     }
 }
 
-/// Names of interfaces have 15 letters at most.
+/// Names of interfaces have at most 15 letters.
 fn cable(process: u32, number: usize, end: &str) -> String {
     format!("st{}{end}{number}", process % 100_000)
 }
@@ -101,7 +101,7 @@ fn remove(name: &str, process: u32, number: usize) {
         .output();
 }
 
-/// Name, process and number of each namespace that such a test has made.
+/// Name, process and number of each namespace made by such a test.
 fn spaces() -> Vec<(String, u32, usize)> {
     let listed = Command::new("ip").args(["netns", "list"]).output();
     let listed = listed.map(|output| String::from_utf8_lossy(&output.stdout).into_owned());
@@ -113,7 +113,7 @@ fn spaces() -> Vec<(String, u32, usize)> {
     listed.unwrap_or_default().lines().filter_map(of_line).collect()
 }
 
-/// Removes the namespaces of the processes that are meant.
+/// Removes the namespaces of the selected processes.
 fn sweep(is_meant: impl Fn(u32) -> bool) {
     for (name, process, number) in spaces() {
         if is_meant(process) {
@@ -122,7 +122,7 @@ fn sweep(is_meant: impl Fn(u32) -> bool) {
     }
 }
 
-/// What this process has made is removed before a signal ends it.
+/// Removes this process's namespaces before a signal ends it.
 fn sweep_on_signals() {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     let mut signals = signal_hook::iterator::Signals::new([SIGHUP, SIGINT, SIGTERM]).expect("handlers");
@@ -145,7 +145,7 @@ mod tests {
         spaces().iter().any(|(_, its, _)| *its == process)
     }
 
-    /// This program again, with a namespace that it holds.
+    /// Runs this program again, holding a namespace.
     fn holder() -> Running {
         let mut command = Command::new(std::env::current_exe().expect("this program"));
         command
@@ -166,7 +166,7 @@ mod tests {
         }
     }
 
-    /// Twenty namespaces of a class that was killed stayed until somebody removed them by hand.
+    /// Twenty namespaces of a killed class used to stay until they were removed by hand.
     #[test]
     #[ignore = "as root: it makes network namespaces"]
     fn a_line_of_a_killed_test_is_removed_by_the_next_and_one_of_an_ended_test_by_itself() {

@@ -1,4 +1,4 @@
-//! What arrives at a host: records by their ticks, and snapshots with their age.
+//! Data arriving at a host: records by their ticks, and snapshots with their age.
 
 use crate::fixture::{Named, lease, until};
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ use stylet_relay::now_ns;
 use stylet_shm_schema::BATCH_EVERY;
 use stylet_shm_schema::Instance;
 
-/// Of each measurement, s; `STYLET_RELAY_S` makes it longer for a figure.
+/// Duration of each measurement, s; `STYLET_RELAY_S` makes it longer for a figure.
 pub fn seconds(everyday: f64) -> f64 {
     let asked = std::env::var("STYLET_RELAY_S").ok().and_then(|s| s.parse().ok());
     asked.unwrap_or(everyday)
@@ -19,22 +19,22 @@ pub fn seconds(everyday: f64) -> f64 {
 
 const LOOK_EVERY: Duration = Duration::from_micros(100);
 
-/// No record passes a relay sooner, by half.
+/// Half the shortest time in which a record passes a relay.
 const SOONEST: Duration = Duration::from_micros(300);
 
-/// Whom a host that looks for records looks beside.
+/// Coordination of hosts that poll for records.
 pub enum Beside {
     Nobody,
-    /// One that is rung when a batch is there.
+    /// Signals when a batch is there.
     Ringing(Sender<()>),
-    /// One by which it is rung.
+    /// Is signalled.
     Rung(Receiver<()>),
 }
 
-/// When each tick was seen first, by a host that looks every 0.1 ms; not while no batch can come, so that the looking takes
-/// less of the processor than what is looked at.
+/// Time at which each tick was first seen, by a host that polls every 0.1 ms; it pauses while no batch can come, so
+/// that polling takes less processor time than the relay.
 pub fn arrivals(instance: &Instance, until: Instant, beside: &Beside) -> BTreeMap<u64, Instant> {
-    // So that it is the relay that is measured, not when this thread gets its turn.
+    // Measures the relay, not this thread's scheduling.
     stylet_relay::slice::shorten();
     let node = Node::join(instance).expect("shared memory");
     let port = service::records::subscriber(&node).expect("a port");
@@ -50,7 +50,7 @@ pub fn arrivals(instance: &Instance, until: Instant, beside: &Beside) -> BTreeMa
             Beside::Ringing(bell) if pause != LOOK_EVERY => {
                 let _ = bell.send(());
             }
-            // One that rang while this host was looking for the batch before is not missed: it is in the queue.
+            // A signal during the search for the batch before is not missed: it is queued.
             Beside::Rung(bell) if pause != LOOK_EVERY => {
                 let _ = bell.recv_timeout(BATCH_EVERY);
                 pause = SOONEST;
@@ -62,7 +62,7 @@ pub fn arrivals(instance: &Instance, until: Instant, beside: &Beside) -> BTreeMa
     seen
 }
 
-/// What a socket of this machine takes for a batch from one thread to another, ms: what no relay can be faster than here.
+/// Time that a socket of this machine takes for a batch between threads, ms: a lower limit for any relay here.
 pub fn socket_ages_ms(until: Instant) -> Vec<f64> {
     const BATCH_BYTES: usize = 7_000;
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
@@ -88,7 +88,7 @@ pub fn socket_ages_ms(until: Instant) -> Vec<f64> {
     })
 }
 
-/// How old each snapshot was when it came, ms, by its tissue tick. Both sides are on this machine, so their clock is one.
+/// Age of each snapshot on arrival, ms, by its tissue tick. Both sides share this machine's clock.
 pub fn pictures(instance: &Instance, until: Instant) -> Vec<(u64, f64)> {
     let node = Node::join(instance).expect("shared memory");
     let port = service::snapshots::subscriber(&node).expect("a port");
@@ -112,17 +112,17 @@ pub fn quantile(values: &mut [f64], share: f64) -> f64 {
         .unwrap_or(f64::NAN)
 }
 
-/// First and last of each run of ticks that follow one another.
+/// First and last of each run of consecutive ticks.
 pub fn gaps(ticks: &[u64]) -> Vec<(u64, u64)> {
     let runs = ticks.chunk_by(|a, b| a + 1 == *b);
     runs.filter_map(|run| Some((*run.first()?, *run.last()?))).collect()
 }
 
-/// Records and snapshots of one host for a while.
+/// Records and snapshots of one host in some time.
 pub struct Seen {
     pub records: BTreeMap<u64, Instant>,
     pub snapshots: Vec<(u64, f64)>,
-    /// What `relay lease status` prints there in the end.
+    /// Final output of `relay lease status` there.
     pub words: String,
 }
 
@@ -145,19 +145,19 @@ impl Seen {
         }
     }
 
-    /// Ticks between the first and the last whose record did not come.
+    /// Missing ticks between the first and the last.
     pub fn missing(&self) -> u64 {
         let ticks: Vec<u64> = self.records.keys().copied().collect();
         ticks.windows(2).map(|pair| pair[1] - pair[0] - 1).sum()
     }
 
-    /// Median, 99th percentile and largest age of the snapshots, ms; the first, which was kept for whoever comes late, left out.
+    /// Median, 99th percentile and largest age of the snapshots, ms; without the first, which was kept for latecomers.
     pub fn ages_ms(&self) -> [f64; 3] {
         let mut ages_ms: Vec<f64> = self.snapshots.iter().skip(1).map(|(_, age)| *age).collect();
         [0.5, 0.99, 1.0].map(|share| quantile(&mut ages_ms, share))
     }
 
-    /// See [`snapshots_lost`].
+    /// Lost snapshots, see [`snapshots_lost`].
     pub fn snapshots_lost(&self) -> u64 {
         snapshots_lost(&self.words)
     }
@@ -174,7 +174,7 @@ impl Seen {
         )
     }
 
-    /// Every record, and the words of the member agree.
+    /// Checks that every record arrived, and that the member's report agrees.
     pub fn has_every_record(&self) {
         assert!(self.records.len() > 500, "{} records", self.records.len());
         assert_eq!(self.missing(), 0);
@@ -182,14 +182,14 @@ impl Seen {
     }
 }
 
-/// Snapshots that never came since the member joined, of the words of `relay lease status` there.
+/// Snapshots that never arrived since the member joined, from the output of `relay lease status` there.
 pub fn snapshots_lost(words: &str) -> u64 {
     let before = words.split(" snapshots lost").next();
     let number = before.and_then(|words| words.rsplit(' ').next());
     number.and_then(|n| n.parse().ok()).unwrap_or_else(|| panic!("{words}"))
 }
 
-/// Waits for a host's first snapshots: the scene of a core, which is large, comes before them.
+/// Waits for a host's first snapshots: the scene of a core, which is large, precedes them.
 pub fn settle(far: &Named) {
     until(Duration::from_secs(10), || {
         let end = Instant::now() + Duration::from_millis(300);
