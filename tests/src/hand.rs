@@ -1,4 +1,4 @@
-//! What the hand feels: a slow insertion, and the force record that it leaves.
+//! Force on the hand: a slow insertion, and its force record.
 
 use crate::{Core, ask, until};
 use std::time::Duration;
@@ -15,7 +15,8 @@ pub struct Insertion {
 }
 
 impl Insertion {
-    /// Engaged, with the tip at the entry, on a needle line where the tissue has such, then moving at `speed_m_per_s` for at most 60 mm.
+    /// Begins engaged, with the tip at the entry, on a needle line if the tissue has one, then moves at `speed_m_per_s`
+    /// for at most 60 mm.
     pub fn begin(core: &mut Core, speed_m_per_s: f64) -> Self {
         let mut link = core.host();
         let plan = default_plan(&link.scene().expect("live").header);
@@ -23,7 +24,7 @@ impl Insertion {
         ask(&mut link, &Request::Engage).expect("engaged");
         let to = move_request(plan.entry_m, plan.direction, 0.2, 2.0);
         ask(&mut link, &to).expect("moved");
-        // A hand goes on while its host polls.
+        // The hand keeps moving only while its host polls.
         until(Duration::from_millis(800), || {
             link.poll();
             false
@@ -47,7 +48,7 @@ impl Insertion {
         insertion
     }
 
-    /// To `depth_m` behind the entry.
+    /// Moves to `depth_m` behind the entry.
     pub fn go(&mut self, depth_m: f64, speed_m_per_s: f64) {
         let to = std::array::from_fn(|a| self.entry_m[a] + self.direction[a] * depth_m);
         let to = move_request(to, self.direction, speed_m_per_s, 2.0);
@@ -60,7 +61,7 @@ impl Insertion {
         self.records.append(&mut self.link.take_records());
     }
 
-    /// Takes for so long what comes.
+    /// Takes data for that time.
     pub fn watch(&mut self, time: Duration) {
         until(time, || {
             self.take();
@@ -68,7 +69,7 @@ impl Insertion {
         });
     }
 
-    /// Takes until `ready`; false if that does not come in time.
+    /// Takes data until `ready`; false if that does not happen in time.
     pub fn watch_until(&mut self, limit: Duration, mut ready: impl FnMut(&mut Link) -> bool) -> bool {
         until(limit, || {
             self.take();
@@ -76,7 +77,7 @@ impl Insertion {
         })
     }
 
-    /// Until the membrane resists with 2 N.
+    /// Pushes until the membrane resists with 2 N.
     pub fn press(&mut self) {
         let pressed = until(Duration::from_secs(20), || {
             self.take();
@@ -94,7 +95,7 @@ pub fn missed(records: &[TickRecord]) -> u64 {
     records.iter().map(|r| u64::from(r.missed)).sum()
 }
 
-/// No tick is missing, and no force differs from the one before by more than the slew limit allows.
+/// Checks that no tick is missing, and that consecutive forces stay within the slew limit.
 pub fn assert_smooth(records: &[TickRecord]) {
     assert!(records.len() > 100, "{} records", records.len());
     let slew = stylet_shm_schema::PARAMETERS
@@ -110,7 +111,7 @@ pub fn assert_smooth(records: &[TickRecord]) {
     }
 }
 
-/// The force was on all the time and no fault was raised.
+/// Checks that the force was always on without a fault.
 pub fn assert_undisturbed(records: &[TickRecord]) {
     assert_smooth(records);
     let disturbed = records.iter().find(|r| r.fault != 0 || r.flags & flags::ENGAGED == 0);

@@ -1,4 +1,4 @@
-//! Fixtures for whole-system tests: a core process of its own for each test, and a host that talks to it.
+//! Fixtures for whole-system tests: a separate core process for each test, and a host connected to it.
 
 pub mod hand;
 pub mod phantom;
@@ -19,14 +19,14 @@ use stylet_shm_schema::Instance;
 use stylet_shm_schema::Request;
 pub use stylet_test_kit::{program, scratch, until, witness};
 
-/// An instance name that no other test uses.
+/// Returns a unique instance name.
 pub fn fresh_instance() -> Instance {
     static NEXT: AtomicU32 = AtomicU32::new(0);
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
     Instance::new(&format!("t{}-{number}", std::process::id())).expect("letters, digits and a hyphen")
 }
 
-/// A name without a core, whose files go when it is dropped: declare it before what uses it.
+/// A name without a core, whose files are removed when it is dropped: declare it before its users.
 pub struct Alone(pub Instance);
 
 impl Drop for Alone {
@@ -51,12 +51,12 @@ impl Core {
         Self::launch(fresh_instance(), options, &[])
     }
 
-    /// Under a name that another core may have had.
+    /// Starts under a name that another core may have had.
     pub fn start_as(instance: Instance, options: &[&str]) -> Self {
         Self::launch(instance, options, &[])
     }
 
-    /// With these variables in its environment.
+    /// Starts with these variables in its environment.
     pub fn start_in(options: &[&str], variables: &[(&str, &str)]) -> Self {
         Self::launch(fresh_instance(), options, variables)
     }
@@ -92,12 +92,12 @@ impl Core {
         files
     }
 
-    /// SIGKILL: nothing is tidied up. Gives the name, for the next core.
+    /// Kills the core with SIGKILL, without any cleanup. Returns the name, for the next core.
     pub fn kill(mut self) -> Instance {
         self.child.kill().expect("ours");
         self.child.wait().expect("ours");
         let instance = self.instance.clone();
-        // The files of the dead core stay: that is what the next one must cope with.
+        // The files of the dead core stay: the next one must cope with them.
         std::mem::forget(self);
         instance
     }
@@ -116,7 +116,7 @@ impl Core {
         self.child.id()
     }
 
-    /// Kills the process and keeps what the test knows of it.
+    /// Kills the process and keeps the fixture's data.
     pub fn kill_only(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
@@ -126,7 +126,7 @@ impl Core {
         matches!(self.child.try_wait(), Ok(None))
     }
 
-    /// A host that sees this core live.
+    /// Returns a host that sees this core live.
     pub fn host(&mut self) -> Link {
         let mut link = Link::new(self.instance.clone());
         let live = until(Duration::from_secs(10), || {
@@ -140,7 +140,7 @@ impl Core {
         link
     }
 
-    /// Ends it and reads what each loop cost.
+    /// Ends it and returns the cost of each loop.
     pub fn finish(mut self) -> serde_json::Value {
         // SAFETY: the child is ours and not yet waited for.
         unsafe { libc::kill(self.child.id() as libc::pid_t, libc::SIGTERM) };
@@ -155,12 +155,12 @@ impl Drop for Core {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
-        // A job of a window that was dropped closes its link a moment later.
+        // A background job of a dropped window closes its link a moment later.
         let is_swept = until(Duration::from_secs(2), || {
             self.instance.sweep();
             left_behind(&self.instance).is_empty()
         });
-        // A test that fails for another reason says so itself.
+        // A test that fails for another reason reports that itself.
         assert!(
             is_swept || std::thread::panicking(),
             "a host of {} outlives its core: drop links, nodes and ports before the core ends. Left: {:?}",
@@ -170,7 +170,7 @@ impl Drop for Core {
     }
 }
 
-/// A window in this process may have left a core to the force loop; a core that is started next would inherit that.
+/// Undoes the affinity of a window in this process, which the next core would inherit.
 fn use_every_core() -> std::io::Result<()> {
     // SAFETY: the set is plain data that lives through the call; cores that do not exist are left out by the kernel.
     unsafe {
@@ -183,7 +183,7 @@ fn use_every_core() -> std::io::Result<()> {
     }
 }
 
-/// What an instance has in shared memory.
+/// Lists the files of an instance in shared memory.
 pub fn left_behind(instance: &Instance) -> Vec<String> {
     let prefix = instance.prefix();
     let names = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
@@ -195,12 +195,13 @@ pub fn left_behind(instance: &Instance) -> Vec<String> {
         .collect()
 }
 
-/// Sends one command and waits for its answer: `Ok` with the first tick that knew it, or the reasons against it.
+/// Sends one command and waits for its answer: `Ok` with the first tick that used it, or the reasons against it.
 pub fn ask(link: &mut Link, request: &Request) -> Result<u64, String> {
     ask_within(link, request, Duration::from_secs(5))
 }
 
-/// Loads a built-in scene. The answer comes once the core has built it, which is ordinary work: on a busy machine it takes long.
+/// Loads a built-in scene. The answer comes once the core has built it, which is ordinary work and takes long on a busy
+/// machine.
 pub fn load_builtin(link: &mut Link, number: u32) -> Result<u64, String> {
     ask_within(link, &Request::LoadBuiltinScene(number), Duration::from_secs(60))
 }
@@ -221,7 +222,7 @@ fn ask_within(link: &mut Link, request: &Request, limit: Duration) -> Result<u64
     }
 }
 
-/// The clock of the records.
+/// Reads the clock of the records.
 pub fn now_ns() -> u64 {
     let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
     // SAFETY: the call only writes to `now`.
@@ -229,7 +230,7 @@ pub fn now_ns() -> u64 {
     now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64
 }
 
-/// A number of a variable of the environment, which makes a test longer, or the everyday one.
+/// Returns a number from the environment, which lengthens a test, or the everyday one.
 pub fn repeats(variable: &str, everyday: u64) -> u64 {
     let asked = std::env::var(variable).ok().and_then(|n| n.parse().ok());
     asked.unwrap_or(everyday)

@@ -1,4 +1,4 @@
-//! A Phantom that is not there: the fake `libHD.so`, found and commanded.
+//! A faked Phantom: the library `libHD.so`, found and commanded.
 
 use fake_hd::{Block, Control};
 use std::path::PathBuf;
@@ -6,7 +6,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use stylet_hw::{Axes, Device, DeviceFault, Phantom, PhantomConfig, Placement, Sample, Wrench};
 
-/// The built library.
+/// Returns the built library.
 pub fn library() -> PathBuf {
     fake_control::library("libfake_hd.so")
 }
@@ -18,7 +18,7 @@ pub struct Fake {
 }
 
 impl Fake {
-    /// Healthy, with nothing counted.
+    /// Makes it healthy, with all counters at zero.
     pub fn new() -> Self {
         static ALONE: Mutex<()> = Mutex::new(());
         let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -27,7 +27,7 @@ impl Fake {
         Self { control, _alone: alone }
     }
 
-    /// A Phantom over it whose servo thread needs no rights; what it reports is printed.
+    /// Opens a Phantom over it whose servo thread needs no rights; its reports are printed.
     pub fn open(&self) -> Phantom {
         let arm = Box::new(|| Ok("not armed".to_owned()));
         Phantom::open(config(), arm, Box::new(|text| println!("reported: {text}"))).expect("a healthy device")
@@ -40,7 +40,7 @@ impl Default for Fake {
     }
 }
 
-/// The fake at the world's origin.
+/// Settings of the fake at the world's origin.
 pub fn config() -> PhantomConfig {
     PhantomConfig {
         library: Some(library()),
@@ -50,7 +50,7 @@ pub fn config() -> PhantomConfig {
     }
 }
 
-/// Drives `device` as the force loop does, every millisecond, until `ready`; false when it has not come true in time.
+/// Drives `device` every millisecond, as the force loop does, until `ready`; false if it has not come true in time.
 pub fn drive(
     device: &mut Phantom,
     wrench: &Wrench,

@@ -1,4 +1,4 @@
-//! A pointer on a display without a screen, by the protocol of X11 and its extension XTEST.
+//! A pointer on a virtual display, by the protocol of X11 and its extension XTEST.
 
 use crate::Display;
 use std::io::{Read, Write};
@@ -52,7 +52,7 @@ impl Pointer {
         self.stream.write_all(&request).expect("sent");
     }
 
-    /// Moves there, and presses and releases the left button.
+    /// Moves there, and clicks the left button.
     pub fn click(&mut self, [x, y]: [f32; 2]) {
         let place = [x as i16, y as i16];
         self.fake(MOTION, 0, place);

@@ -12,7 +12,7 @@ use stylet_shm_schema::ParameterSet;
 use stylet_sim::scene::TissueKind;
 use stylet_sim::scene::{Labels, Scene, SceneSource};
 
-/// A scene with a body to rehearse in, and what a host would see of it.
+/// A scene with a body to rehearse in, and a host's view of it.
 pub struct Theatre {
     pub scene: SceneModel,
     stage: Stage,
@@ -35,7 +35,7 @@ impl Theatre {
         let (header, words) = picture.parts();
         let device = DeviceInfo::phantom_premium_1_5();
         let mut stage = Stage::build(source, TissueKind::ChainMail, device).expect("the scene was built before");
-        // As the core does.
+        // As in the core.
         stage.seeds_and_forces_alone();
         Self {
             scene: SceneModel::of_words(header, words).expect("the core's own picture holds together"),

@@ -1,4 +1,4 @@
-//! A program that moves the hand, ended in each of the ways in which programs end, and what the hand does then.
+//! A program that moves the hand, ended in each possible way, and the motion of the hand afterwards.
 
 use crate::{now_ns, until};
 use nalgebra::Vector3;
@@ -12,41 +12,41 @@ use std::time::Duration;
 use stylet_host::link::Link;
 use stylet_shm_schema::{EventKind, TickRecord, flags};
 
-/// At rest is slower than 3 mm/s, as the core has it: over so many ticks less than this, m. Then the spring of the hand lets go of its
-/// last tenths of a millimetre, as after each stop.
+/// Rest means slower than 3 mm/s, as in the core: less than this over that many ticks, m. Then the spring of the hand
+/// releases its last tenths of a millimetre, as after each stop.
 const REST_TICKS: usize = 50;
 const AT_REST_M: f64 = 1.5e-4;
-/// A motion that lapsed is given up after these.
+/// Ticks after which a lapsed motion is given up.
 const GRACE_TICKS: usize = 300;
-/// What the hand may do without an owner.
+/// Largest motion of the hand without an owner.
 const FARTHEST_MM: f64 = 5.0;
 const LONGEST_TICKS: usize = 400;
-/// The hand is watched for so long after its sender has ended, or was to end.
+/// Time for which the hand is watched after its sender has ended, or should have.
 const WATCHED: Duration = Duration::from_millis(900);
 /// A program that closes in order writes its results first.
 const ENDS_WITHIN: Duration = Duration::from_secs(5);
-/// A motion that is under way has gone so far within ten ticks, m.
+/// Distance within ten ticks that shows a motion under way, m.
 const MOVES_M: f64 = 3e-4;
-/// One that goes on goes on for more than this, mm.
+/// Distance that shows a continued motion, mm.
 const GOES_ON_MM: f64 = 5.0;
 
-/// How a program that moves the hand ends, or who no longer reads what it writes.
+/// End of a program that moves the hand, or of the reader of its output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// SIGKILL.
     Killed,
     /// SIGSTOP.
     Stopped,
-    /// Both outputs are pipes that nobody empties.
+    /// Both outputs are pipes that are never emptied.
     OutputFull,
-    /// Nobody reads its outputs any more.
+    /// The readers of its outputs are gone.
     OutputClosed,
     /// Its terminal is closed: SIGHUP.
     HungUp,
 }
 
 impl Ending {
-    /// All of them.
+    /// All endings.
     pub const ALL: [Self; 5] = [
         Self::Killed,
         Self::Stopped,
@@ -66,7 +66,7 @@ impl Ending {
     }
 }
 
-/// Where the needle is when its sender ends.
+/// Place of the needle when its sender ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// It touches nothing.
@@ -91,7 +91,7 @@ impl Place {
     }
 }
 
-/// Each ending, in the air and in tissue.
+/// All combinations of endings with air and tissue.
 pub fn kinds() -> impl Iterator<Item = (Place, Ending)> {
     let places = [Place::Air, Place::Tissue].into_iter();
     places.flat_map(|place| Ending::ALL.map(|ending| (place, ending)))
@@ -109,7 +109,7 @@ pub struct Sender {
 }
 
 impl Sender {
-    /// Starts the program with the outputs that `ending` is about.
+    /// Starts the program with the outputs that `ending` requires.
     pub fn start(mut command: Command, ending: Ending) -> Self {
         if ending != Ending::HungUp {
             let (reader, writer) = std::io::pipe().expect("a pipe");
@@ -125,7 +125,7 @@ impl Sender {
         // SAFETY: both numbers are valid for writes, and nothing else is asked for.
         let opened = unsafe { libc::openpty(&raw mut ours, &raw mut its, nothing, nothing.cast(), nothing.cast()) };
         assert_eq!(opened, 0, "no terminal: {}", std::io::Error::last_os_error());
-        // SAFETY: descriptors that were just opened, and that nobody else has.
+        // SAFETY: descriptors that were just opened, and are owned by no other value.
         let (ours, its) = unsafe { (OwnedFd::from_raw_fd(ours), OwnedFd::from_raw_fd(its)) };
         // SAFETY: plain numbers. No other child keeps the terminal open.
         unsafe { libc::fcntl(ours.as_raw_fd(), libc::F_SETFD, libc::FD_CLOEXEC) };
@@ -149,7 +149,7 @@ impl Sender {
         }
     }
 
-    /// Takes effect at once.
+    /// Applies the ending at once.
     pub fn end(&mut self, ending: Ending) {
         match (ending, &mut self.outputs) {
             (Ending::Killed, _) => self.send(libc::SIGKILL),
@@ -166,7 +166,7 @@ impl Sender {
         assert_eq!(unsafe { libc::kill(self.child.id() as libc::pid_t, signal) }, 0);
     }
 
-    /// Whether it has not ended.
+    /// True if it has not ended.
     pub fn is_running(&mut self) -> bool {
         matches!(self.child.try_wait(), Ok(None))
     }
@@ -179,7 +179,7 @@ impl Drop for Sender {
     }
 }
 
-/// Writes until nothing more fits. The program's own end still waits where it is full.
+/// Writes until nothing more fits. The program's own end blocks when the pipe is full.
 fn fill(writer: &PipeWriter) {
     let path = format!("/proc/self/fd/{}", writer.as_raw_fd());
     let opened = File::options().write(true).custom_flags(libc::O_NONBLOCK).open(path);
@@ -188,22 +188,22 @@ fn fill(writer: &PipeWriter) {
     while end.write(b"\n").is_ok() {}
 }
 
-/// What another host saw of the hand.
+/// Motion of the hand as seen by another host.
 #[derive(Debug)]
 pub struct Trial {
     /// Speed of the tip when its sender ended.
     pub mm_per_s: f64,
-    /// Way of the tip from then on; of a terminal that is closed, from that on.
+    /// Path of the tip from then on; for a closed terminal, from its closing.
     pub farthest_mm: f64,
     /// Ticks until it was at rest.
     pub ticks: usize,
-    /// Both from the moment on at which the sender owned the hand no longer.
+    /// Both from the moment at which the sender no longer owned the hand.
     alone: (f64, usize),
-    /// It never reached its goal. One that brakes within reach of it arrives, and is not given up.
+    /// It never reached its goal. A hand that brakes near its goal arrives, and its motion is not given up.
     pub was_on_its_way: bool,
-    /// The program went on, and so did the motion.
+    /// The program continued, and so did the motion.
     pub went_on: bool,
-    /// Motions that lapsed for good.
+    /// Motions given up.
     pub given_up: usize,
 }
 
@@ -218,9 +218,9 @@ fn moves(records: &[TickRecord], place: Place) -> bool {
     (tip(last) - tip(before)).norm() > MOVES_M && last.flags & flags::IN_MOTION != 0 && place.has(last)
 }
 
-/// Ends the sender so long after the needle is seen to move in `place`, and watches what the hand does.
+/// Ends the sender at that time after the needle is seen to move in `place`, and watches the hand.
 ///
-/// A program that is killed or stopped owns the hand no longer; any other one owns it until it is gone.
+/// A killed or stopped program no longer owns the hand; any other owns it until it is gone.
 pub fn trial(
     observer: &mut Link,
     sender: &mut Sender,
@@ -281,7 +281,7 @@ fn stands_still(ending: Ending) -> bool {
     matches!(ending, Ending::Killed | Ending::Stopped)
 }
 
-/// How far the tip goes from the first record on, mm, and the ticks until it is at rest.
+/// Path of the tip from the first record, mm, and the ticks until it is at rest.
 fn way_and_ticks(records: &[TickRecord]) -> (f64, usize) {
     let at = tip(&records[0]);
     let way_mm = records.iter().map(|r| (tip(r) - at).norm()).fold(0.0, f64::max) * 1e3;
@@ -297,14 +297,14 @@ fn given_up_since(observer: &Link, tick: u64) -> usize {
 }
 
 impl Trial {
-    /// What is wrong with it.
+    /// Returns the violation, if any.
     fn fault(&self, ending: Ending) -> Option<&'static str> {
         let is_alone_too_long = self.alone.0 > FARTHEST_MM || self.alone.1 > LONGEST_TICKS;
         // A program that ends in order stops the hand itself.
         let must_be_said = stands_still(ending) && self.was_on_its_way;
         match self.went_on {
             true if self.given_up > 0 => Some("the motion lapsed although its program goes on"),
-            // One that reaches its goal meanwhile moves on for a while.
+            // A hand that reaches its goal meanwhile moves on for a while.
             true if self.farthest_mm <= GOES_ON_MM && self.ticks <= LONGEST_TICKS => {
                 Some("the motion ended although its program goes on")
             }
@@ -322,7 +322,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Prints the head.
+    /// Prints the header.
     pub fn begin(sender: &'static str) -> Self {
         println!(
             "| sender | needle in | ending | trials | went on | way, middle (mm) | way, most (mm) | at rest, middle (ticks) | at rest, most (ticks) | from at most (mm/s) |"
@@ -334,7 +334,7 @@ impl Table {
         }
     }
 
-    /// Prints what trials of one kind came to.
+    /// Prints the results of trials of one kind.
     pub fn row(&mut self, (place, ending): (Place, Ending), trials: &[Trial]) {
         let ended: Vec<&Trial> = trials.iter().filter(|trial| !trial.went_on).collect();
         let middle_and_most = |of: &dyn Fn(&Trial) -> f64| {
@@ -364,7 +364,7 @@ impl Table {
         }));
     }
 
-    /// Judges them all.
+    /// Judges all rows.
     pub fn end(self) {
         assert!(
             self.faults.is_empty(),

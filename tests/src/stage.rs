@@ -1,4 +1,4 @@
-//! A core for trials one after the other, with the needle at a known place before each.
+//! A core for successive trials, with the needle at a known place before each.
 
 use crate::{Core, ask, until};
 use std::time::Duration;
@@ -7,7 +7,7 @@ use stylet_implant::workflow::{default_plan, move_request, plan_request};
 use stylet_random::Random;
 use stylet_shm_schema::{Request, flags};
 
-/// A core with a host that looks on, and takes the hand back between trials.
+/// A core with an observing host that takes the hand back between trials.
 pub struct Stage {
     pub core: Core,
     pub observer: Link,
@@ -16,7 +16,7 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// A core whose needle is in the air.
+    /// Opens a core with the needle in the air.
     pub fn open() -> Self {
         let mut core = Core::start();
         let observer = core.host();
@@ -42,7 +42,7 @@ impl Stage {
         assert!(is_there, "the hand does not arrive: {:?}", self.observer.state());
     }
 
-    /// Takes the needle to where it was at first.
+    /// Takes the needle back to its first place.
     pub fn draw_out(&mut self) {
         let (tip_m, direction) = self.home;
         self.go(tip_m, direction);

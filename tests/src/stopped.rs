@@ -1,9 +1,9 @@
-//! One thread of another process, stopped while the others go on.
+//! Stops one thread of another process while the others run.
 
 /// Stopped by ptrace until dropped. The process must be a child of this one, or this one root.
 pub struct StoppedThread(libc::pid_t);
 
-/// The thread of `process` that has this name.
+/// Returns the thread of `process` with this name.
 pub fn thread_id(process: u32, name: &str) -> libc::pid_t {
     let tasks = std::fs::read_dir(format!("/proc/{process}/task")).expect("a process that runs");
     let ids = tasks
@@ -33,7 +33,7 @@ impl StoppedThread {
     }
 }
 
-/// All threads of the process have ended but those that are traced, or it no longer exists.
+/// True once all threads of the process have ended except traced ones, or it no longer exists.
 pub fn is_dead(process: u32) -> bool {
     let stat = std::fs::read_to_string(format!("/proc/{process}/stat"));
     stat.map_or(true, |s| s.contains(") Z "))
@@ -42,8 +42,8 @@ pub fn is_dead(process: u32) -> bool {
 impl Drop for StoppedThread {
     fn drop(&mut self) {
         let nothing = std::ptr::null_mut::<libc::c_void>();
-        // SAFETY: a thread that we have seized; the status is not wanted. One that ended meanwhile is waited for, or its
-        // process could not be.
+        // SAFETY: a thread that we have seized; the status is not wanted. One that ended meanwhile is waited for, or
+        // its process could not be.
         unsafe {
             if libc::ptrace(libc::PTRACE_DETACH, self.0, nothing, nothing) != 0 {
                 libc::waitpid(self.0, std::ptr::null_mut(), libc::__WALL);

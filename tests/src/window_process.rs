@@ -1,17 +1,17 @@
-//! Windows of the operator's program, as processes of their own.
+//! Windows of the operator's program, as separate processes.
 
 use crate::{Core, Display, program};
 use std::process::{Child, Command, Stdio};
 
-/// A real window on a display without a screen; killed with SIGKILL when dropped.
+/// A real window on a virtual display; killed with SIGKILL when dropped.
 pub struct Window {
     child: Child,
-    /// Where it has one to itself.
+    /// Present if it has a display to itself.
     _display: Option<Display>,
 }
 
 impl Window {
-    /// On a display of its own.
+    /// Opens it on a separate display.
     pub fn open(core: &Core) -> Self {
         let display = Display::open();
         let child = start(&display, core);

@@ -16,7 +16,7 @@ struct Sphere {
     radius_m: f64,
 }
 
-/// Along z, about its middle.
+/// A cylinder along z, about its centre.
 struct Cylinder {
     radius_m: f64,
     length_m: f64,
@@ -54,7 +54,7 @@ impl Region for Cylinder {
     }
 }
 
-/// Through a grid of 1 mm, as a computed dose would come.
+/// Samples the field on a grid of 1 mm, like a computed dose.
 fn dvh(structure: &Structure, field_gy: impl Fn([f64; 3]) -> f64 + Sync) -> Dvh {
     let mut grid = DoseGrid::covering([0.0; 3], [0.062; 3], GRID_M).expect("small");
     grid.fill(|p| field_gy(from_middle(p)));
@@ -62,12 +62,12 @@ fn dvh(structure: &Structure, field_gy: impl Fn([f64; 3]) -> f64 + Sync) -> Dvh 
     Dvh::new(&dose, &structure.volumes_m3).expect("there are points")
 }
 
-/// Fine enough that a structure has some ten thousand cells.
+/// Fine enough for some ten thousand cells in a structure.
 fn pitch_m(volume_m3: f64) -> f64 {
     (volume_m3 / 2e5).cbrt().min(0.5e-3)
 }
 
-/// Largest difference from the closed form over the whole curve, as a share of the structure.
+/// Largest difference from the closed form over the whole curve, as a fraction of the structure.
 fn worst(dvh: &Dvh, volume_m3: f64, from_gy: f64, to_gy: f64, closed_m3: impl Fn(f64) -> f64) -> f64 {
     (0..=200)
         .map(|i| from_gy + (to_gy - from_gy) * f64::from(i) / 200.0)
@@ -94,7 +94,7 @@ fn spheres_in_fields_that_rise_along_a_line_or_to_the_middle() {
             let (low, high) = (145.0 - slope * radius_m, 145.0 + slope * radius_m);
             errors.push(worst(&curve, volume, low, high, |gy| cap((gy - 145.0) / slope)));
         }
-        // 145 Gy in the middle, and half of it at the surface.
+        // 145 Gy in the centre, and half of it at the surface.
         let fall = |r2: f64| 145.0 * (-(2.0_f64.ln()) * r2 / radius_m.powi(2)).exp();
         let curve = dvh(&sphere, |d| fall(d.iter().map(|c| c * c).sum()));
         let inside = |gy: f64| {
@@ -107,7 +107,8 @@ fn spheres_in_fields_that_rise_along_a_line_or_to_the_middle() {
             radius_m * 1e3
         );
         assert!(errors.iter().all(|&e| e < 1e-3), "{errors:?}");
-        // The field itself at the points, as a plan's dose is taken; a grid of 1 mm is too coarse for a dose that halves within 2 mm.
+        // The field itself at the points, as for a plan's dose; a grid of 1 mm is too coarse for a dose that halves
+        // within 2 mm.
         let dose: Vec<f64> = sphere
             .points_m
             .iter()
@@ -139,7 +140,7 @@ fn cylinders_in_fields_along_across_and_around() {
             let t = ((gy - 145.0) / slope / radius_m).clamp(-1.0, 1.0);
             radius_m * radius_m * (t.acos() - t * (1.0 - t * t).sqrt()) * length_m
         });
-        // As beside a long source 20 mm thick: 1 / (rho² + (20 mm)²).
+        // As near a long source 20 mm thick: 1 / (rho² + (20 mm)²).
         let core = 0.02_f64.powi(2);
         let around = dvh(&cylinder, |d| 145.0 * core / (d[0] * d[0] + d[1] * d[1] + core));
         let edge = 145.0 * core / (radius_m * radius_m + core);
@@ -213,7 +214,7 @@ fn the_differential_curve_adds_up_to_the_structure_and_to_the_cumulative_curve()
 
 #[test]
 fn a_closed_mesh_is_the_same_body_as_its_formula() {
-    // A sphere of triangles, and the sphere itself less what a flat triangle cuts off.
+    // A sphere of triangles, and the sphere itself minus the volume cut off by flat triangles.
     let (rings, around) = (60, 120);
     let radius = 0.01;
     let mut points = vec![
@@ -259,7 +260,7 @@ fn a_closed_mesh_is_the_same_body_as_its_formula() {
     assert!(Mesh::new(&points, &[[0, 1, 9_999_999]]).is_err());
 }
 
-/// Thick slices, turned in space: the structure is its voxels, no more and no less.
+/// Thick slices, rotated in space: the structure is exactly its voxels.
 #[test]
 fn labels_are_counted_by_their_voxels_in_place_and_volume() {
     let dims = [20, 16, 6];
@@ -307,14 +308,14 @@ fn labels_are_counted_by_their_voxels_in_place_and_volume() {
     let field = |p: &[f64; 3]| 100.0 + 3000.0 * (Vector3::from(*p) - voxels.frame.origin_m).dot(&axis);
     let dose: Vec<f64> = found[0].points_m.iter().map(field).collect();
     let curve = Dvh::new(&dose, &found[0].volumes_m3).expect("points");
-    // Slices 1 to 4 reach from half a slice before the first middle to half a slice after the last.
+    // Slices 1 to 4 reach from half a slice before the first centre to half a slice after the last.
     let (low, high) = (100.0 + 3000.0 * 0.5 * 5e-3, 100.0 + 3000.0 * 4.5 * 5e-3);
     assert!(curve.lowest_gy() >= low && curve.highest_gy() <= high);
     let whole = found[0].volume_m3();
     for share in [0.1, 0.25, 0.5, 0.9] {
         let gy = curve.dose_of_gy(share * whole).expect("smaller");
         let expected = high - share * (high - low);
-        // One voxel of 527 is another structure.
+        // One voxel of 527 belongs to another structure.
         assert!(
             (gy - expected).abs() < 0.003 * (high - low),
             "{share}: {gy} and {expected}"

@@ -10,7 +10,7 @@ fn kernel(name: &str) -> DoseKernel {
     DoseKernel::new(&Source::read(&file).expect("valid"), Interval::ALL)
 }
 
-/// Seeds off the voxels, each turned another way; every fifth without a direction.
+/// Seeds off the voxel centres, each in another direction; every fifth without a direction.
 fn seeds(count: usize) -> Vec<Seed> {
     (0..count)
         .map(|i| {
@@ -42,7 +42,7 @@ fn centres(grid: &DoseGrid) -> Vec<[f64; 3]> {
 fn any_grid_agrees_with_the_loop_over_seeds_and_voxels() {
     for name in ["i125_6711", "pd103_200"] {
         let (kernel, seeds) = (kernel(name), seeds(12));
-        // The last one holds voxels farther than the table and within capsules.
+        // The last grid has voxels beyond the table and within capsules.
         for (origin, spacing, dims) in [
             ([0.0; 3], [0.002, 0.002, 0.002], [36, 31, 36]),
             ([0.011, -0.003, 0.02], [0.0007, 0.0031, 0.005], [37, 1, 5]),
@@ -54,7 +54,7 @@ fn any_grid_agrees_with_the_loop_over_seeds_and_voxels() {
             let mut worst = 0.0_f64;
             for (at, found) in centres(&grid).into_iter().zip(grid.dose_gy()) {
                 let expected: f64 = seeds.iter().map(|s| kernel.exact_at_gy(s, at)).sum();
-                // Dose comes in steps of 2^-30 Gy a seed.
+                // Dose is quantised in steps of 2^-30 Gy per seed.
                 worst = worst.max((found - expected).abs() / (expected + 1e-2));
             }
             println!("{name}, spacing {spacing:?}: worst {worst:.1e}");
@@ -63,7 +63,7 @@ fn any_grid_agrees_with_the_loop_over_seeds_and_voxels() {
     }
 }
 
-/// With angles that ask for columns of 2.5 degrees, and with one that asks for columns of 1 degree.
+/// With angles that require columns of 2.5 degrees, and with one that requires columns of 1 degree.
 #[test]
 fn a_seed_whose_ends_differ_gives_each_side_its_own_dose() {
     for second_deg in [45.0, 37.0] {
@@ -171,7 +171,7 @@ fn grids_that_cannot_be_are_refused() {
     }
 }
 
-/// A seed without direction has spheres for isodose surfaces.
+/// The isodose surfaces of a seed without a direction are spheres.
 #[test]
 fn the_isodose_of_one_seed_is_a_sphere_of_the_right_size() {
     let kernel = kernel("i125_6711");
@@ -201,7 +201,8 @@ fn the_isodose_of_one_seed_is_a_sphere_of_the_right_size() {
             worst * 1e3,
             (volume / expected - 1.0) * 100.0
         );
-        // A net's points lie within the voxel that the surface passes: the arc's height over a voxel, h²/(8 r), and as much for its corners.
+        // A net's points lie within the voxel that the surface crosses: the sagitta over a voxel, h²/(8 r), and as much
+        // for its corners.
         assert!(worst < 0.12e-3, "off by {worst} m");
         assert!((volume / expected - 1.0).abs() < 0.03, "volume {volume} and {expected}");
         assert!(volume > 0.0, "the triangles are turned inside out");

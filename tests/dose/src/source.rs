@@ -1,4 +1,4 @@
-//! Source files: ours are consistent in themselves, and a bad one is refused with everything that is wrong in it.
+//! Source files: ours are consistent, and a bad one is refused with all of its errors.
 
 use std::path::Path;
 use stylet_dose::Source;
@@ -19,7 +19,7 @@ fn numbers(table: &toml::Table, section: &str, key: &str) -> Vec<f64> {
     list.iter().map(number).collect()
 }
 
-/// g_P goes with the geometry of a point, g_L with that of a line; both are printed, so each checks the other.
+/// g_P belongs to the point geometry, g_L to the line geometry; both are printed, so each checks the other.
 #[test]
 fn the_point_column_of_6711_follows_from_the_line_column() {
     let table: toml::Table = text("i125_6711").parse().expect("TOML");
@@ -38,7 +38,7 @@ fn the_point_column_of_6711_follows_from_the_line_column() {
     }
 }
 
-/// phi_an is the dose averaged over all directions, over that at 90 degrees.
+/// phi_an is the dose averaged over all directions, relative to that at 90 degrees.
 #[test]
 fn the_mean_over_directions_of_f_is_phi_an() {
     for (name, allowed) in [("i125_6711", 0.0018), ("pd103_200", 0.0027)] {

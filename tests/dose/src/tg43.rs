@@ -1,4 +1,4 @@
-//! TG-43 against an evaluation by another program, and its limits where the formulae have none.
+//! TG-43 against an evaluation by another program, and its limits where the formulae are singular.
 
 use stylet_dose::decay::Interval;
 use stylet_dose::tg43::Formalism;
@@ -54,7 +54,7 @@ fn formulae_agree_with_an_independent_evaluation_on_the_axis_and_off_it() {
     }
 }
 
-/// The same points about a seed in several places and directions.
+/// The same points around a seed in several positions and directions.
 #[test]
 fn dose_at_points_agrees_with_an_independent_evaluation_in_every_direction() {
     let table = references();

@@ -1,5 +1,5 @@
-//! A block of atomics between a test and a fake driver: commands one way, reports the other. In memory, or in a file that two
-//! processes map.
+//! A block of atomics between a test and a fake driver: commands one way, reports the other. It is in memory, or in a
+//! file mapped by two processes.
 //!
 //! A block of zeros is a healthy device.
 
@@ -9,23 +9,25 @@ use libloading::os::unix::Library;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-/// A block that both sides use.
+/// A block used by both sides.
 ///
 /// # Safety
 ///
 /// The type is `repr(C)` and consists of atomics of 4 and 8 bytes, and of arrays of them.
-// SYNC: every value of a block stands for itself, so each access is relaxed; its partner is the other side's access of the same field.
+// SYNC: every value of a block is independent, so each access is relaxed; its partner is the other side's access of the
+// same field.
 pub unsafe trait Block: Sized + Sync + 'static {
-    /// Name of the function by which the library gives its block: another one for each fake, so that one test may have several.
+    /// Name of the function that returns the library's block: different for each fake, so that one test may use
+    /// several.
     const EXPORT: &str;
 
-    /// A block of zeros that lives until the process ends.
+    /// Returns a block of zeros that lives until the process ends.
     fn in_memory() -> &'static Self {
         let memory = memmap2::MmapMut::map_anon(size_of::<Self>()).expect("memory for the block");
         at(memory)
     }
 
-    /// The block in `file`, which is created when it is missing.
+    /// Returns the block in `file`, which is created if missing.
     fn in_file(file: &Path) -> &'static Self {
         let mut options = std::fs::OpenOptions::new();
         let opened = options.read(true).write(true).create(true).truncate(false).open(file);
@@ -37,7 +39,7 @@ pub unsafe trait Block: Sized + Sync + 'static {
         at(unsafe { memmap2::MmapMut::map_mut(&opened) }.expect("the control file can be mapped"))
     }
 
-    /// The block in the file that the environment names, or one in memory.
+    /// Returns the block in the file named by the environment, or one in memory.
     fn of_environment(variable: &str) -> &'static Self {
         match std::env::var_os(variable) {
             Some(file) => Self::in_file(file.as_ref()),
@@ -62,12 +64,12 @@ fn at<T: Block>(memory: memmap2::MmapMut) -> &'static T {
     unsafe { &*start.cast::<T>() }
 }
 
-/// The built library `name` of a fake. Cargo puts it beside the tests, or one folder up when it was built by itself; the newer one
-/// counts.
+/// Path of the built library `name` of a fake. Cargo puts it next to the tests, or one folder up if it was built
+/// separately; the newer one counts.
 ///
 /// # Panics
 ///
-/// When it is in neither.
+/// If it is in neither.
 pub fn library(name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("a test knows its own file");
     let deps = test.parent().expect("tests live in <target>/<profile>/deps");
@@ -78,11 +80,11 @@ pub fn library(name: &str) -> PathBuf {
     newest.unwrap_or_else(|| panic!("{name} is missing: run `cargo build --profile quick --workspace` first"))
 }
 
-/// The block of the fake at `path`, which stays loaded.
+/// Returns the block of the fake at `path`, which stays loaded.
 ///
 /// # Panics
 ///
-/// When it cannot be loaded, or is no fake.
+/// If it cannot be loaded, or is not a fake.
 pub fn block_of<T: Block>(path: &Path) -> &'static T {
     // SAFETY: our own library; it has no constructors.
     let library = unsafe { Library::new(path) }.expect("the fake can be loaded");

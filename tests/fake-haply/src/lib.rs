@@ -1,7 +1,8 @@
-//! An Inverse service for tests: one Inverse3 behind it that goes where the test leads it, with errors on command.
+//! An Inverse service for tests: one Inverse3, moved by the test, with errors on command.
 //!
-//! Names and types of the messages are typed here a second time, which reveals a wrong one in the code under test. The test
-//! and the fake share a [`Service`]; it is reached over a socket ([`Server`]) or without one, in steps ([`Stepped`]).
+//! Names and types of the messages are typed independently here, which reveals a wrong one in the code under test. The
+//! test and the fake share a [`Service`]; it is reached over a socket ([`Server`]) or without one, in steps
+//! ([`Stepped`]).
 
 #![warn(missing_docs)]
 

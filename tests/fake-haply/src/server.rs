@@ -13,10 +13,10 @@ use crate::service::{Sent, Service, Wrong};
 
 const TICK: Duration = Duration::from_millis(1);
 
-/// Serves until it is dropped.
+/// Serves until dropped.
 pub struct Server {
     address: SocketAddr,
-    // SYNC: relaxed throughout; the flag carries nothing with it.
+    // SYNC: relaxed throughout; the flag publishes no other data.
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
@@ -37,7 +37,7 @@ impl Server {
         }
     }
 
-    /// What `--haply-url` takes.
+    /// Returns the value for `--haply-url`.
     pub fn url(&self) -> String {
         format!("ws://{}", self.address)
     }
@@ -135,7 +135,7 @@ fn websocket(stream: TcpStream, service: &Service, stop: &AtomicBool) {
             thread::sleep(Duration::from_millis(ms));
         }
         for sent in answers {
-            // Before it arrives, so that what answers it is in turn.
+            // Before it arrives, so that its answer is in turn.
             service.state().answered();
             let message = match sent {
                 Sent::Text(text) => Message::text(text),

@@ -1,35 +1,35 @@
-//! What the service knows of its device, how it answers, and what goes wrong.
+//! State of the service and its device, its answers, and its faults.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use serde_json::{Value, json};
 
-/// A force that is not renewed for so long is dropped. The maker says that the device then returns to idle, and not after how
-/// long: this figure is the fake's own.
+/// Time after which a force that is not renewed is dropped. The vendor says that the device then returns to idle,
+/// without a time: this figure is the fake's own.
 pub const IDLE_AFTER_MS: u64 = 100;
 
-/// What goes wrong.
+/// Fault of the service.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrong {
-    /// Nothing.
+    /// No fault.
     #[default]
     Nothing,
-    /// Each answer takes so many milliseconds.
+    /// Each answer takes this many milliseconds.
     Late(u64),
     /// It neither reads nor answers.
     Hangs,
-    /// It reads, carries out, and does not answer.
+    /// It reads and obeys, but does not answer.
     Silent,
     /// It answers with an old state, and does nothing.
     Old,
-    /// A number of the position is none, in one of five ways.
+    /// A number of the position is invalid, in one of five ways.
     NoNumber(u32),
     /// The position is a thousand kilometres away.
     Far,
-    /// The answer is no state, in one of six ways.
+    /// The answer is not a state, in one of six ways.
     Broken(u32),
-    /// The device is not in the list.
+    /// The device is missing from the list.
     Unplugged,
     /// Another device is in its place.
     Other,
@@ -39,57 +39,57 @@ pub enum Wrong {
     NotReady,
     /// The device has no power.
     NoPower,
-    /// The connection is closed, and no other is taken.
+    /// The connection is closed, and no other is accepted.
     Closes,
-    /// The answer is no text.
+    /// The answer is not text.
     Binary,
-    /// The answer is longer than any that is taken.
+    /// The answer is longer than the most accepted.
     Long,
     /// Each answer is sent twice.
     Twice,
     /// Each answer is sent twenty times.
     Floods,
-    /// Somebody has scaled the frame.
+    /// The frame was scaled by another program.
     Scaled,
-    /// The orientation of the handle is none, in one of three ways.
+    /// The orientation of the handle is invalid, in one of three ways.
     BadGrip(u32),
 }
 
-/// The service, for the test and for whoever serves it.
+/// The service, shared by the test and the server.
 #[derive(Clone)]
 pub struct Service(Arc<Mutex<State>>);
 
 /// Commands of the test, and reports of the fake.
 pub struct State {
     // Commands of the test:
-    /// What goes wrong.
+    /// Present fault.
     pub wrong: Wrong,
     /// Tip in the frame of the device, m.
     pub tip_m: [f64; 3],
-    /// What the service calls its device.
+    /// Device id in the service.
     pub id: String,
     /// Its type.
     pub kind: String,
-    /// Another program has it.
+    /// Another program uses the device.
     pub in_use: bool,
-    /// Axes that the service uses, whatever it was asked for.
+    /// Axes that the service uses, whatever was requested.
     pub axes: Option<String>,
-    /// Version of the service; none where it does not say it.
+    /// Version of the service; `None` if it does not report one.
     pub version: Option<String>,
     /// Orientation of a handle, w first.
     pub grip: Option<[f64; 4]>,
     /// The handle's first and third button.
     pub buttons: [bool; 2],
-    /// Time in steps; none is the time of the system.
+    /// Time in steps; `None` for the system's time.
     pub now_ms: Option<u64>,
     // Reports of the fake:
     /// The last force that arrived, N.
     pub force_n: [f64; 3],
-    /// When it arrived.
+    /// Time of its arrival.
     pub force_ms: u64,
     /// Largest force that arrived, N.
     pub peak_n: f64,
-    /// Messages that were not what the interface says.
+    /// Messages that violate the interface.
     pub wrong_messages: u32,
     /// Forces that arrived while an answer was owed.
     pub out_of_turn: u32,
@@ -97,9 +97,9 @@ pub struct State {
     pub messages: u64,
     /// Connections that were opened.
     pub opens: u32,
-    /// Force when a connection was closed by the other side.
+    /// Force when the other side closed the connection.
     pub force_at_close_n: [f64; 3],
-    /// The session as it was configured.
+    /// Configuration of the session.
     pub session: Value,
     /// The preset of the device.
     pub preset: Value,
@@ -111,9 +111,9 @@ pub struct State {
 /// A message to the other side.
 #[derive(Clone, Debug)]
 pub enum Sent {
-    /// A text.
+    /// Text.
     Text(String),
-    /// No text.
+    /// Binary data.
     Binary,
 }
 
@@ -148,14 +148,14 @@ impl Default for Service {
 }
 
 impl Service {
-    /// Commands and reports, while nobody else uses them.
+    /// Locks commands and reports.
     pub fn state(&self) -> MutexGuard<'_, State> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl State {
-    /// Nothing goes wrong any more, and the device is the one of the beginning.
+    /// Removes all faults, and restores the original device.
     pub fn heal(&mut self) {
         (self.wrong, self.in_use, self.axes) = (Wrong::Nothing, false, None);
         self.id = "049D".to_owned();
@@ -163,32 +163,32 @@ impl State {
         self.version = Some("3.5.0.0".to_owned());
     }
 
-    /// The time of the service.
+    /// Returns the time of the service.
     pub fn now_ms(&self) -> u64 {
         self.now_ms.unwrap_or_else(|| self.begun.elapsed().as_millis() as u64)
     }
 
-    /// Force of the motors: the last one, unless it was not renewed or the device has none.
+    /// Returns the force of the motors: the last one, unless it expired or the device has none.
     pub fn motors_n(&self) -> [f64; 3] {
         let renewed = self.now_ms() - self.force_ms <= IDLE_AFTER_MS;
         let is_there = !matches!(self.wrong, Wrong::Unplugged | Wrong::Other | Wrong::NoPower);
         if renewed && is_there { self.force_n } else { [0.0; 3] }
     }
 
-    /// What a new connection gets first.
+    /// Returns the first message of a new connection.
     pub fn open(&mut self) -> String {
         self.opens += 1;
         self.owed = 0;
         self.snapshot().to_string()
     }
 
-    /// Without a connection there is no force.
+    /// Records a closed connection, which ends the force.
     pub fn closed(&mut self) {
         self.force_at_close_n = self.force_n;
         self.force_n = [0.0; 3];
     }
 
-    /// Carries out a message; returns what is sent for it.
+    /// Obeys a message; returns the answers.
     pub fn answer(&mut self, text: &str) -> Vec<Sent> {
         self.messages += 1;
         if self.take(text).is_none() {
@@ -224,12 +224,12 @@ impl State {
         }
     }
 
-    /// An answer has left.
+    /// Records that an answer has left.
     pub fn answered(&mut self) {
         self.owed = self.owed.saturating_sub(1);
     }
 
-    /// None where the message is not what the interface says.
+    /// Obeys a message; `None` if it violates the interface.
     fn take(&mut self, text: &str) -> Option<()> {
         let value: Value = serde_json::from_str(text).ok()?;
         if let Some(configure) = value.get("session").and_then(|s| s.get("configure")) {
@@ -259,13 +259,13 @@ impl State {
 
     fn snapshot(&self) -> Value {
         let [x, mut y, z] = self.tip_m;
-        // A number that is replaced in the text.
+        // A number replaced in the text.
         if matches!(self.wrong, Wrong::NoNumber(_)) {
             y = 7777.25;
         }
         let x = if self.wrong == Wrong::Far { 1e6 } else { x };
         let id = if self.wrong == Wrong::Other { "0BAD" } else { &self.id };
-        // What an encoder's last digit does.
+        // Jitter of an encoder's last digit.
         let jitter = (self.messages % 7) as f64 * 1e-6;
         let scale = if self.wrong == Wrong::Scaled { 2.0 } else { 1.0 };
         let identity = json!({"w": 1.0, "x": 0.0, "y": 0.0, "z": 0.0});

@@ -1,4 +1,4 @@
-//! The service without a socket and without a clock: what it sends arrives when its own time says so.
+//! The service without a socket and without a clock: its messages arrive at its own simulated time.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -16,7 +16,7 @@ pub struct Stepped {
 }
 
 impl Stepped {
-    /// A new connection, unless the service takes none.
+    /// Opens a connection, unless the service accepts none.
     pub fn open(service: &Service) -> Option<Self> {
         let mut state = service.state();
         if state.wrong == Wrong::Closes {
@@ -35,7 +35,7 @@ impl Stepped {
         })
     }
 
-    /// The service reads what has arrived, unless it hangs.
+    /// Lets the service read all arrived messages, unless it hangs.
     fn advance(&mut self) -> Result<(), WireError> {
         let mut state = self.service.state();
         if self.closed || state.wrong == Wrong::Closes {

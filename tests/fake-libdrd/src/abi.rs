@@ -1,6 +1,7 @@
 //! The exported functions.
 //!
-//! Pointers must point to as many values as the interface states. A panic aborts the process: it cannot unwind out of a C function.
+//! Pointers must point to as many values as the interface states. A panic aborts the process: it cannot unwind out of a
+//! C function.
 #![allow(non_snake_case)]
 
 use core::ffi::{c_char, c_double, c_int, c_uchar, c_uint, c_ushort};
@@ -20,7 +21,7 @@ thread_local! {
     static LAST_ERROR: Cell<u32> = const { Cell::new(0) };
 }
 
-/// The block of this library.
+/// Returns the block of this library.
 #[unsafe(no_mangle)]
 extern "C" fn fake_drd_control() -> *const Control {
     control()
@@ -42,7 +43,7 @@ impl Drop for Call {
     }
 }
 
-/// Counts the call, and takes its time; whether the test makes it fail.
+/// Counts the call, and takes its time; returns whether the test makes it fail.
 fn call(function: &str) -> Call {
     let (c, index) = (control(), index_of(function));
     c.calls[index].fetch_add(1, Relaxed);
@@ -65,7 +66,7 @@ fn call(function: &str) -> Call {
     Call(left > 0)
 }
 
-/// Carries out a call to the open device; -1 where the test makes it fail, or the device is not there.
+/// Executes a call to the open device; -1 if the test makes it fail, or the device is missing.
 fn to_device(function: &str, id: c_char, work: impl FnOnce(&mut Firmware) -> c_int) -> c_int {
     let call = call(function);
     let mut device = firmware();
@@ -82,7 +83,7 @@ fn to_device(function: &str, id: c_char, work: impl FnOnce(&mut Firmware) -> c_i
     }
 }
 
-/// As `to_device`, for what needs the expert mode.
+/// As `to_device`, for functions that need the expert mode.
 fn expert(function: &str, id: c_char, work: impl FnOnce(&mut Firmware) -> c_int) -> c_int {
     to_device(function, id, |device| {
         if device.expert {
@@ -137,7 +138,7 @@ extern "C" fn dhdClose(id: c_char) -> c_int {
         return failed(INVALID_INDEX);
     }
     device.open = false;
-    // A device whose cable is unplugged does not hear of it.
+    // A device whose cable is unplugged does not receive it.
     if !device.broken {
         control().force_mode.store(0, Relaxed);
     }

@@ -15,7 +15,7 @@ pub const CALLS_KEPT: usize = 4096;
 /// Environment variable with the file of the block, for a fake in another process.
 pub const VARIABLE: &str = "FAKE_LIBDRD_CONTROL";
 
-/// The block. Index of `fail`, `fail_times` and `calls` is the function's place in [`FUNCTIONS`](crate::table::FUNCTIONS).
+/// The block. Arrays `fail`, `fail_times` and `calls` are indexed as [`FUNCTIONS`](crate::table::FUNCTIONS).
 #[repr(C)]
 pub struct Control {
     // Commands of the test:
@@ -29,7 +29,7 @@ pub struct Control {
     pub in_use: AtomicU32,
     /// Type of the device; 0 is an omega.7.
     pub system_type: AtomicI32,
-    /// Place in the status array, from 1, that has the number `status_number`; 0 for none.
+    /// Index into the status array, from 1, that has the value `status_number`; 0 for none.
     pub status_place: AtomicU32,
     /// See `status_place`.
     pub status_number: AtomicI32,
@@ -39,27 +39,27 @@ pub struct Control {
     pub turn_off: AtomicU32,
     /// 1: forces cannot be turned on.
     pub stays_off: AtomicU32,
-    /// 1 the position is no number, 2 the matrix is no rotation, 3 the position is a thousand kilometres away.
+    /// 1 the position is not a number, 2 the matrix is not a rotation, 3 the position is a thousand kilometres away.
     pub bad_pose: AtomicU32,
-    /// 1: the SDK says yes to everything, and neither sends nor receives.
+    /// 1: the SDK reports success, and neither sends nor receives.
     pub frozen: AtomicU32,
     /// 1: the next call that sets a force does not return until this is 0.
     pub hang: AtomicU32,
     /// Time that each call takes.
     pub late_us: AtomicU32,
-    /// 1: a pose is the one before.
+    /// 1: each pose repeats the one before.
     pub time_guard: AtomicU32,
-    /// 1: the motors cannot give all of the force.
+    /// 1: the motors cannot reach the full force.
     pub saturated: AtomicU32,
     /// 1: the device has no watchdog.
     pub no_watchdog: AtomicU32,
     /// One bit per button.
     pub buttons: AtomicU32,
-    /// Time of the firmware; 0 is the time of the system.
+    /// Time of the firmware; 0 for the system's time.
     pub now_us: AtomicU64,
     /// Tip, m, device frame, as `f64` bits.
     pub tip_m: [AtomicU64; 3],
-    /// Turn of the handle about y, rad.
+    /// Rotation of the handle about y, rad.
     pub turn_rad: AtomicU64,
     // Reports of the fake:
     /// Number of calls, by function.
@@ -74,11 +74,11 @@ pub struct Control {
     pub overlapping: AtomicU32,
     /// 1: forces are on.
     pub force_mode: AtomicU32,
-    /// The watchdog, in units of 125 us; 0 is none.
+    /// The watchdog, in units of 125 µs; 0 is none.
     pub watchdog_units: AtomicU32,
     /// Force, then torque, of the last call that reached the device.
     pub commanded: [AtomicU64; 6],
-    /// When that was.
+    /// Time of that call.
     pub commanded_us: AtomicU64,
     /// Largest force so far, N.
     pub peak_force_n: AtomicU64,
@@ -98,7 +98,7 @@ unsafe impl Block for Control {
 }
 
 impl Control {
-    /// The next `times` calls of `function` fail.
+    /// Makes the next `times` calls of `function` fail.
     pub fn fail(&self, function: &str, code: u32, times: u32) {
         let index = index_of(function);
         self.fail[index].store(code, Relaxed);
@@ -110,29 +110,29 @@ impl Control {
         self.calls[index_of(function)].load(Relaxed)
     }
 
-    /// The status array has this number at this place, from 0.
+    /// Sets a value of the status array, index from 0.
     pub fn status(&self, place: usize, number: i32) {
         self.status_number.store(number, Relaxed);
         self.status_place.store(place as u32 + 1, Relaxed);
     }
 
-    /// Force that reached the device last, N, device frame.
+    /// Returns the force that last reached the device, N, device frame.
     pub fn commanded_n(&self) -> [f64; 3] {
         [0, 1, 2].map(|axis| get(&self.commanded[axis]))
     }
 
-    /// Torque that reached the device last, N m, device frame.
+    /// Returns the torque that last reached the device, N m, device frame.
     pub fn commanded_nm(&self) -> [f64; 3] {
         [3, 4, 5].map(|axis| get(&self.commanded[axis]))
     }
 
-    /// Whether the watchdog has run out at the time `now_us`.
+    /// True if the watchdog has expired at `now_us`.
     pub fn is_dropped(&self, now_us: u64) -> bool {
         let watchdog_us = u64::from(self.watchdog_units.load(Relaxed)) * 125;
         watchdog_us > 0 && now_us.saturating_sub(self.commanded_us.load(Relaxed)) > watchdog_us
     }
 
-    /// Force of the motors at the time `now_us`: none where forces are off or the watchdog has run out.
+    /// Returns the force of the motors at `now_us`: zero if forces are off or the watchdog has expired.
     pub fn motors_n(&self, now_us: u64) -> [f64; 3] {
         if self.force_mode.load(Relaxed) == 0 || self.is_dropped(now_us) {
             [0.0; 3]

@@ -12,7 +12,7 @@ pub const ID: i8 = 0;
 #[derive(Default)]
 pub struct Firmware {
     pub open: bool,
-    /// The cable was unplugged; only closing and opening repairs it.
+    /// The cable was unplugged; only closing and reopening repairs it.
     pub broken: bool,
     pub expert: bool,
     pub off_cause: i32,
@@ -41,7 +41,7 @@ pub fn now_us() -> u64 {
 }
 
 impl Firmware {
-    /// What the firmware does by itself.
+    /// Advances the firmware's own behaviour.
     pub fn advance(&mut self) {
         let c = control();
         match c.turn_off.swap(0, Relaxed) {
@@ -79,7 +79,7 @@ impl Firmware {
         c.commanded_us.store(now_us(), Relaxed);
     }
 
-    /// The pose of the device, or what a command makes of it.
+    /// Returns the pose of the device, or the one set by a command.
     pub fn read_pose(&mut self) -> ([f64; 3], [[f64; 3]; 3]) {
         let c = control();
         let (sin, cos) = get(&c.turn_rad).sin_cos();
@@ -97,7 +97,7 @@ impl Firmware {
         self.pose
     }
 
-    /// The state of the device as the SDK has it.
+    /// Returns the state of the device as reported by the SDK.
     pub fn status(&mut self) -> Vec<i32> {
         if control().frozen.load(Relaxed) == 0 || self.last_status.is_empty() {
             self.last_status = self.read_status();

@@ -1,9 +1,10 @@
-//! The interface as it is published, typed independently of the code under test, so that a wrong name or type fails.
+//! The published interface, typed independently of the code under test, so that a wrong name or type fails.
 
-/// Where a declaration was read.
+/// Source of a declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// In `dhdc.h` of SDK 3.17.5 (github chai3d/chai3d, 7c76b1f) and, with the same types, in that of 3.7.0 (CHAI3D 3.2).
+    /// In `dhdc.h` of SDK 3.17.5 (github chai3d/chai3d, 7c76b1f) and, with the same types, in that of 3.7.0 (CHAI3D
+    /// 3.2).
     Both,
     /// Only in `dhdc.h` of SDK 3.17.5.
     Newer,
@@ -16,9 +17,9 @@ pub struct Function {
     pub name: &'static str,
     /// Its declaration in C without the name: the result, and the types of the arguments.
     pub c: &'static str,
-    /// Where it was read.
+    /// Source of the declaration.
     pub source: Source,
-    /// A library without it is of no use.
+    /// The library is useless without it.
     pub required: bool,
 }
 
@@ -76,7 +77,7 @@ pub const FUNCTIONS: [Function; COUNT] = [
     optional("dhdSetMaxTorque", "int (double, char)", Source::Newer),
 ];
 
-/// Name of every error, by its number less one.
+/// Name of every error, by its number minus one.
 pub const ERRORS: [&str; 22] = [
     "DHD_ERROR",
     "DHD_ERROR_COM",
@@ -102,7 +103,7 @@ pub const ERRORS: [&str; 22] = [
     "DHD_ERROR_NO_REGULATION",
 ];
 
-/// Places of the status array, in their order.
+/// Entries of the status array, in order.
 pub const STATUS: [&str; 17] = [
     "POWER",
     "CONNECTED",
@@ -123,11 +124,11 @@ pub const STATUS: [&str; 17] = [
     "AXIS_CHECKED",
 ];
 
-/// Place of a function in [`FUNCTIONS`].
+/// Returns the index of a function in [`FUNCTIONS`].
 ///
 /// # Panics
 ///
-/// When the interface has no such function.
+/// If the interface has no such function.
 pub fn index_of(function: &str) -> usize {
     let found = FUNCTIONS.iter().position(|f| f.name == function);
     found.expect("a function of the interface")

@@ -23,13 +23,13 @@ pub struct ErrorInfo {
     device: u32,
 }
 
-/// The block of this library.
+/// Returns the block of this library.
 #[unsafe(no_mangle)]
 extern "C" fn fake_hd_control() -> *const Control {
     control()
 }
 
-/// Counts the call; true when the test makes it fail.
+/// Counts the call; true if the test makes it fail.
 fn fails(function: &str) -> bool {
     let (c, index) = (control(), index_of(function));
     c.calls[index].fetch_add(1, Relaxed);
@@ -73,7 +73,7 @@ unsafe extern "C" fn hdInitDevice(name: *const c_char) -> u32 {
     }
 }
 
-/// Whether `handle` is the open device; raises an error otherwise.
+/// True if `handle` is the open device; raises an error otherwise.
 fn checked(d: &mut Driver, handle: u32) -> bool {
     let right = d.open && handle == HANDLE;
     if !right {
@@ -202,7 +202,7 @@ extern "C" fn hdIsEnabled(capability: u32) -> u8 {
     u8::from(!off && driver().enabled.contains(&capability))
 }
 
-/// Number of values of a parameter of one of `kinds`; raises an error and returns `None` otherwise.
+/// Returns the number of values of a parameter of one of `kinds`; raises an error and returns `None` otherwise.
 fn count_of(d: &mut Driver, parameter: u32, kinds: &[Kind], null: bool) -> Option<usize> {
     let found = PARAMETERS.iter().find(|(number, ..)| *number == parameter);
     match found {
@@ -341,7 +341,7 @@ unsafe extern "C" fn hdSetDoublev(parameter: u32, values: *const f64) {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn hdSetLongv(parameter: u32, _values: *const c_long) {
     if !fails("hdSetLongv") {
-        // Motor values and Cartesian forces do not go together.
+        // Motor values and Cartesian forces exclude each other.
         driver().raise(if parameter == 0x2750 { 0x0204 } else { 0x0100 });
     }
 }

@@ -13,9 +13,9 @@ pub const CALLS_KEPT: usize = 4096;
 /// Environment variable with the file of the block, for a fake in another process.
 pub const VARIABLE: &str = "FAKE_LIBHD_CONTROL";
 
-/// The block. Index of `fail`, `fail_times` and `calls` is the function's place in [`FUNCTIONS`](crate::table::FUNCTIONS).
-// SYNC: every value stands for itself, so each access is relaxed; its partner is the other side's access of the same field.
-// `goal_number` is the exception: see `send_hand`.
+/// The block. Arrays `fail`, `fail_times` and `calls` are indexed as [`FUNCTIONS`](crate::table::FUNCTIONS).
+// SYNC: every value is independent, so each access is relaxed; its partner is the other side's access of the same
+// field. `goal_number` is the exception: see `send_hand`.
 #[repr(C)]
 pub struct Control {
     // Commands of the test:
@@ -49,17 +49,17 @@ pub struct Control {
     pub nan: AtomicU32,
     /// 1: each frame raises the error for warm motors.
     pub warm_motors: AtomicU32,
-    /// Temperature of the motors as a share of their limit, in thousandths.
+    /// Temperature of the motors as a fraction of their limit, in thousandths.
     pub temperature_milli: AtomicU32,
     /// Error that the end of the next frame raises once.
     pub error_in_frame: AtomicU32,
     /// 1: the force stays off whatever is enabled.
     pub no_force: AtomicU32,
-    /// The test changes it after it has written a goal and a speed.
+    /// Changed by the test after it has written a goal and a speed.
     pub goal_number: AtomicU32,
     /// Goal of the hand, m, device frame.
     pub goal_m: [AtomicU64; 3],
-    /// Speed of the hand, as `f64` bits like all 64 bit values that are no counts.
+    /// Speed of the hand, as `f64` bits, like all 64-bit values that are not counts.
     pub goal_speed_m_per_s: AtomicU64,
     /// Angles of the gimbal: turn, lift, roll.
     pub gimbal_rad: [AtomicU64; 3],
@@ -98,7 +98,7 @@ unsafe impl Block for Control {
 }
 
 impl Control {
-    /// The next `times` calls of `function` fail.
+    /// Makes the next `times` calls of `function` fail.
     pub fn fail(&self, function: &str, code: u32, times: u32) {
         let index = index_of(function);
         // SYNC: relaxed; see `Control`. A test sets the failure before it makes the call.
@@ -122,17 +122,17 @@ impl Control {
         self.goal_number.fetch_add(1, Ordering::Release);
     }
 
-    /// Force of the last tick, N.
+    /// Returns the force of the last tick, N.
     pub fn force(&self) -> [f64; 3] {
         self.force_n.each_ref().map(get)
     }
 
-    /// Force that the callback of `tick` set, N; kept for the last `FORCES_KEPT` ticks.
+    /// Returns the force set by the callback of `tick`, N; kept for the last `FORCES_KEPT` ticks.
     pub fn force_at(&self, tick: u64) -> [f64; 3] {
         self.forces_n[tick as usize % FORCES_KEPT].each_ref().map(get)
     }
 
-    /// Names of the calls that came from outside the servo thread.
+    /// Returns the names of the calls from outside the servo thread.
     pub fn order(&self) -> Vec<&'static str> {
         // SYNC: relaxed; see `Control`.
         let count = self.call_count.load(Ordering::Relaxed) as usize;

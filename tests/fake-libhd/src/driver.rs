@@ -7,7 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
 
 use crate::control::{Block, Control, FORCES_KEPT, VARIABLE, get, put};
-// SYNC: relaxed where nothing else is said; see `Control`.
+// SYNC: relaxed unless stated otherwise; see `Control`.
 use std::sync::atomic::Ordering::{Acquire, Relaxed};
 
 pub const HANDLE: u32 = 7;
@@ -68,7 +68,7 @@ impl Driver {
         }
     }
 
-    /// Puts an error on the stack; a full stack drops the oldest.
+    /// Pushes an error onto the stack; a full stack drops the oldest.
     pub fn raise(&mut self, code: u32) {
         if self.errors.len() == 32 {
             self.errors.remove(0);
@@ -123,7 +123,7 @@ impl Driver {
         self.enabled.contains(&0x4000) && control().no_force.load(Relaxed) == 0
     }
 
-    /// Raises the error of a force that the motors refuse, and records the largest one.
+    /// Raises the error of a force that the motors refuse, and records the largest force.
     pub fn check_force(&mut self) {
         let size = Vector3::from(self.force_n).norm();
         if size > get(&control().peak_force_n) {
@@ -153,7 +153,7 @@ impl Driver {
         about(-Vector3::y(), turn) * about(-Vector3::x(), lift) * about(-Vector3::z(), roll)
     }
 
-    /// A parameter of real numbers, in the driver's units; `None` for one that has none.
+    /// Returns a parameter of real numbers, in the driver's units; `None` if it has none.
     pub fn reals(&self, parameter: u32) -> Option<Vec<f64>> {
         let c = control();
         let nan = c.nan.load(Relaxed);

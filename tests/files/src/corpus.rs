@@ -1,11 +1,11 @@
-//! Every file of the corpora, cut and bent, is answered by its reader; memory stays in bounds.
+//! Every file of the corpora, cut and altered, is answered by its reader, within bounded memory.
 //!
-//! The corpora hold what fuzzing started from and what it found (docs/tools/fuzz).
+//! The corpora hold the seeds and the findings of fuzzing (docs/tools/fuzz).
 
 use std::path::PathBuf;
 use stylet_files as files;
 
-/// What all readers together may take beside what the test has (KiB).
+/// Memory limit of all readers together, in addition to the test's own (KiB).
 const MAX_KIB: u64 = 1 << 20;
 
 fn corpus(reader: &str) -> Vec<(PathBuf, Vec<u8>)> {
@@ -18,7 +18,7 @@ fn corpus(reader: &str) -> Vec<(PathBuf, Vec<u8>)> {
     files.into_iter().map(bytes).collect()
 }
 
-/// The most that this process has held since the last time this was asked (KiB).
+/// Largest memory of this process since the last call (KiB).
 fn peak_kib() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").expect("status");
     let line = status.lines().find(|l| l.starts_with("VmHWM")).expect("VmHWM");
@@ -28,7 +28,7 @@ fn peak_kib() -> u64 {
         .expect("a number")
 }
 
-/// Each file as it is, cut at every 64th, with bytes turned and with runs of ones as sizes are.
+/// Replays each file unchanged, cut at every 64th byte, with bytes altered, and with runs of ones instead of sizes.
 fn replay(reader: &str, read: fn(&[u8]) -> Option<files::ContentError>) {
     let before = peak_kib();
     let (mut runs, mut refused) = (0, 0);
@@ -46,7 +46,7 @@ fn replay(reader: &str, read: fn(&[u8]) -> Option<files::ContentError>) {
     for (path, bytes) in corpus(reader) {
         take(&bytes);
         (0..64).for_each(|n| take(&bytes[..bytes.len() * n / 64]));
-        // What was found is slow by nature; bent it only takes long.
+        // Fuzzing's slow files only take time when altered.
         if path
             .file_name()
             .is_some_and(|n| n.to_string_lossy().starts_with("found"))

@@ -1,4 +1,4 @@
-//! DICOM of another program (pydicom) is read as it says, and what we write is the same to that program.
+//! DICOM files of another program (pydicom) are read correctly, and that program reads ours the same.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -41,8 +41,8 @@ fn volume_mm3(v: &Voxels, name: &str) -> f64 {
     count as f64 * v.frame.spacing_m.iter().product::<f64>() * 1e9
 }
 
-/// Every voxel against 24 x 24 points in it, by the radii that the phantom was drawn with; those that are about half covered may go
-/// either way, and are counted.
+/// Compares every voxel with 24 x 24 points in it, by the radii with which the phantom was drawn. Voxels about half
+/// covered may go either way, and are counted.
 fn compare_with_what_was_drawn(v: &Voxels) -> usize {
     type Inside = fn(f64, f64) -> bool;
     // Smaller ones first, with their slices.
@@ -95,7 +95,7 @@ fn a_structure_set_lies_on_the_grid_of_its_tilted_images() {
         // The first pixel of the lowest image, LPS to RAS.
         let off = v.frame.origin_m * 1e3 - nalgebra::Vector3::new(9.0, 14.0, 33.0);
         assert!(off.norm() < 1e-6, "{off:?}");
-        // The third axis goes to the head and forward: (0, -sin, cos) in LPS.
+        // The third axis points to the head and forwards: (0, -sin, cos) in LPS.
         let normal = v.frame.directions.column(2).into_owned();
         let tilt = 0.35_f64;
         assert!((normal - nalgebra::Vector3::new(0.0, tilt.sin(), tilt.cos())).norm() < 1e-6);

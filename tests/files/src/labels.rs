@@ -1,4 +1,5 @@
-//! Label volumes written by SimpleITK and pynrrd lie where those programs say, and each writer of ours is read back.
+//! Label volumes written by SimpleITK and pynrrd are placed as those programs say, and files of each of our writers are
+//! read back.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

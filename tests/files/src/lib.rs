@@ -1,4 +1,4 @@
-//! Readers of files against what other programs wrote, and against hostile input.
+//! Readers of files against those written by other programs, and against hostile input.
 
 #[cfg(test)]
 mod corpus;

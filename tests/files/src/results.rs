@@ -1,4 +1,4 @@
-//! What commands write beside their figures, and what they report of seeds and sources that are odd.
+//! Further output of commands, and their reports on implausible seeds and sources.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,7 +8,7 @@ fn source() -> PathBuf {
     repository("sources/i125_6711.toml")
 }
 
-/// `host-ui dose` of some seeds; gives whether it went well, and what it said.
+/// Runs `host-ui dose` on some seeds; returns whether it succeeded, and its output.
 fn dose(source: &Path, seeds: &Path, out: &Path, more: &[&str]) -> (bool, String) {
     let ended = Command::new(program("host-ui"))
         .args([
@@ -29,7 +29,7 @@ fn dose(source: &Path, seeds: &Path, out: &Path, more: &[&str]) -> (bool, String
     )
 }
 
-/// Results were written beside those of another plan, and none of them named what it was made from.
+/// Results used to be written among those of another plan, and none named its inputs.
 #[test]
 fn results_go_into_a_folder_of_their_own_and_name_their_inputs() {
     let folder = scratch("results-named");
@@ -50,7 +50,8 @@ fn results_go_into_a_folder_of_their_own_and_name_their_inputs() {
     assert_eq!(std::fs::read(out.join("dose_grid.csv")).expect("still there"), before);
 }
 
-/// Seeds beside the target and on one spot, and a source of HDR counted for ever, gave figures without a word.
+/// Seeds outside the target or at one position, and an HDR source counted for ever, used to give figures without a
+/// warning.
 #[test]
 fn seeds_that_lie_oddly_are_reported_and_a_temporary_source_needs_its_time() {
     let folder = scratch("results-odd");
@@ -83,7 +84,7 @@ fn seeds_that_lie_oddly_are_reported_and_a_temporary_source_needs_its_time() {
     assert!(done, "{said}");
 }
 
-/// Names of structures reached the terminal with their escape sequences.
+/// Names of structures used to reach the terminal with their escape sequences.
 #[test]
 fn names_of_structures_reach_the_terminal_without_control_characters() {
     let folder = scratch("results-escape");

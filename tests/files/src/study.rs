@@ -1,4 +1,5 @@
-//! Files of one study that name each other, checked by another program (pydicom) against a table out of the standard.
+//! Files of one study that reference each other, checked by another program (pydicom) against a table from the
+//! standard.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -48,7 +49,7 @@ fn seeds(folder: &Path) -> PathBuf {
     path
 }
 
-/// Writes a study into a folder of the test's own; gives structure set, plan and dose.
+/// Writes a study into a folder of the test; returns structure set, plan and dose.
 fn study(name: &str, seeds: &Path, structures: &Path, more: &[&Path]) -> [PathBuf; 3] {
     let out = scratch(name).join("study");
     let source = repository("sources/i125_6711.toml");
@@ -82,7 +83,7 @@ fn check(files: &[PathBuf], images: &[PathBuf]) -> (bool, serde_json::Value) {
     python(&paths)
 }
 
-/// Exported files named nothing but the plan, and each was of a patient, a study and a frame of its own.
+/// Exported files used to reference only the plan, each with its own patient, study and frame.
 #[test]
 fn structure_set_plan_and_dose_of_a_study_lack_no_attribute_and_name_each_other_and_their_images() {
     let folder = scratch("study-seeds");
@@ -90,7 +91,7 @@ fn structure_set_plan_and_dose_of_a_study_lack_no_attribute_and_name_each_other_
     let (done, found) = check(&files, &images());
     assert!(done, "{found:#}");
     assert!(found["looked_at"].as_u64().is_some_and(|n| n > 400), "{found:#}");
-    // Patient, study and frame are those of the structure set that was given; needles, holes and dates those of the seeds.
+    // Patient, study and frame are those of the given structure set; needles, holes and dates those of the seeds.
     let text = r#"
 import json, sys, pydicom
 given, plan = pydicom.dcmread(sys.argv[1]), pydicom.dcmread(sys.argv[2])
@@ -113,13 +114,13 @@ print(json.dumps({"same": [str(given[k].value) == str(plan[k].value) for k in ke
             [null, null, today, 0.45]
         ])
     );
-    // What is written is read again: plan and dose, the dose as it was computed.
+    // Reads the output again: plan and dose, the dose as computed.
     let again = scratch("study-again").join("dose.json");
     let (done, said) = host_ui(&[Path::new("compare"), &files[2], &files[2], Path::new("--json"), &again]);
     assert!(done && said.contains("0.000000 Gy"), "{said}");
 }
 
-/// The checker itself: it would be of no use if it found nothing.
+/// Checks the checker, which must find errors.
 #[test]
 fn a_study_that_lacks_any_one_attribute_is_found_out() {
     let folder = scratch("study-seeds-red");
@@ -150,7 +151,7 @@ print(json.dumps({"tried": tried, "unseen": unseen}))
     let folder = data("");
     let found = script(text, &[&folder, &files[0], &files[1], &files[2]]);
     assert!(found["tried"].as_u64().is_some_and(|n| n > 120), "{found}");
-    // Needed for characters beyond ASCII alone, or for sources of beta rays; each may be there otherwise.
+    // Required only for characters beyond ASCII, or for beta sources; each may be present otherwise.
     let optional = ["SpecificCharacterSet", "SourceStrengthUnits"];
     let unseen: Vec<_> = found["unseen"].as_array().expect("a list").iter().collect();
     assert!(unseen.iter().all(|key| optional.iter().any(|o| key == o)), "{unseen:?}");
@@ -168,7 +169,7 @@ ds = pydicom.dcmread(sys.argv[1]); ds.ReferencedRTPlanSequence[0].ReferencedSOPI
     );
 }
 
-/// `convert` made a new patient, study and frame for every file.
+/// `convert` used to make a new patient, study and frame for every file.
 #[test]
 fn files_without_dicom_among_them_get_one_patient_study_and_frame() {
     let folder = scratch("study-plain");
@@ -178,7 +179,7 @@ fn files_without_dicom_among_them_get_one_patient_study_and_frame() {
     let seeds = seeds(&folder);
     let (done, found) = check(&study("study-made", &seeds, &labels, &[]), &[]);
     assert!(done, "{found:#}");
-    // With the images of the patient, whose identity then counts.
+    // With the images of the patient, whose identity is then used.
     let series = folder.join("series");
     std::fs::create_dir_all(&series).expect("a folder");
     for image in images() {
@@ -214,7 +215,7 @@ ds = pydicom.dcmread(sys.argv[1]); ds.PatientID = "P7"; ds.save_as(sys.argv[2]);
     assert!(!out.exists(), "nothing is written");
 }
 
-/// Every `convert` invented patient, study and frame; needles, holes and dates were lost on the way through a table.
+/// Every `convert` used to make up patient, study and frame; needles, holes and dates were lost in a table.
 #[test]
 fn conversions_keep_patient_study_and_frame_names_needles_and_dates() {
     let out = scratch("study-kept");
@@ -269,7 +270,7 @@ print(json.dumps({"same": same, "seeds": [seeds(f) for f in files[:3]], "names":
     }
 }
 
-/// RT Dose could not be read at all.
+/// RT Dose used to be unreadable.
 #[test]
 fn a_dose_of_pydicom_is_read_whichever_way_its_rows_and_frames_run() {
     let out = scratch("study-dose");
@@ -312,11 +313,11 @@ print("{}")
             .collect();
         assert_eq!(rows.len(), 60, "{name}");
         for row in &rows {
-            // To LPS, as the phantom has it.
+            // To LPS, as in the phantom.
             let expected = 20.0 - 0.4 * row[0] + 0.2 * row[1] + 0.1 * row[2];
             assert!((row[3] - expected).abs() < 6e-4, "{name}: {row:?}, {expected}");
         }
-        // Through a table and DICOM again it is the same dose.
+        // It is the same dose after a table and DICOM again.
         let again = out.join(format!("{name}_again.dcm"));
         let plan = data("dicom/plan_pairs.dcm");
         let (done, said) = host_ui(&[Path::new("convert"), &to, &again, Path::new("--plan"), &plan]);

@@ -31,7 +31,7 @@ impl Tree {
         std::fs::read_to_string(self.root.join(file)).unwrap_or_else(|why| panic!("{file} cannot be read: {why}"))
     }
 
-    /// Files whose path is `tail`, or ends in it after a `/`; crates may move without a change to the pages.
+    /// Returns files whose path is `tail`, or ends in it after a `/`; crates may move without a change to the pages.
     fn ending_in<'a>(&'a self, tail: &'a str) -> impl Iterator<Item = &'a str> {
         let files = self.files.iter().map(String::as_str);
         files.filter(move |file| {
@@ -40,7 +40,7 @@ impl Tree {
         })
     }
 
-    /// Whether `path` is the end of the path of a file, of a module (`.rs` left out), or of a folder.
+    /// True if `path` is the end of the path of a file, of a module (without `.rs`), or of a folder.
     fn has(&self, path: &str) -> bool {
         let path = path.trim_end_matches('/');
         let folder = format!("/{path}/");
@@ -55,7 +55,7 @@ impl Tree {
             .any(|file| file.rsplit('/').skip(1).any(|part| part == name))
     }
 
-    /// Pages that the tests in this file check.
+    /// Returns the pages that the tests in this file check.
     fn pages(&self) -> impl Iterator<Item = &str> {
         let checked = |file: &&str| file.ends_with(".md") && (file.starts_with("docs/") || ROOT_PAGES.contains(file));
         self.files.iter().map(String::as_str).filter(checked)
@@ -73,7 +73,7 @@ impl Tree {
         found
     }
 
-    /// Words of all source files but this one, without comments: a name in a comment alone does not exist.
+    /// Returns the words of all source files but this one, without comments: a name in a comment alone does not exist.
     fn words_of_sources(&self) -> BTreeSet<String> {
         let is_source = |file: &&String| file.ends_with(".rs") && !file.ends_with("docs_names.rs");
         let mut known = BTreeSet::new();
@@ -110,7 +110,7 @@ fn without_comments(source: &str) -> String {
     source.lines().map(code).collect::<Vec<_>>().join("\n")
 }
 
-/// Runs of letters, digits and `_`.
+/// Splits into runs of letters, digits and `_`.
 fn words(text: &str) -> impl Iterator<Item = &str> {
     text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_')
         .filter(|word| !word.is_empty())
@@ -120,7 +120,7 @@ fn is_identifier(word: &str) -> bool {
     word.len() > 1 && word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
 }
 
-/// What stands between single backticks, outside fenced blocks.
+/// Returns the text between single backticks, outside fenced blocks.
 fn code_spans(page: &str) -> Vec<&str> {
     let mut spans = Vec::new();
     for (number, part) in page.split("```").enumerate() {
@@ -131,8 +131,8 @@ fn code_spans(page: &str) -> Vec<&str> {
     spans
 }
 
-/// Whether a span is one name of the code: `snake_case`, `SCREAMING_CASE`, `CamelCase`, `Type::item`. Three letters such
-/// as `e_b` are mathematics.
+/// True if a span is one name of the code: `snake_case`, `SCREAMING_CASE`, `CamelCase`, `Type::item`. Three letters
+/// such as `e_b` are mathematics.
 fn is_code_name(span: &str) -> bool {
     let whole = words(span).all(is_identifier) && span.chars().all(|c| c.is_ascii_alphanumeric() || "_:".contains(c));
     let capitals = span.chars().filter(char::is_ascii_uppercase).count();
@@ -142,7 +142,7 @@ fn is_code_name(span: &str) -> bool {
     whole && span.len() > 3 && (span.contains('_') || span.contains("::") || camel)
 }
 
-/// `a/{b,c}/d` as `a/b/d` and `a/c/d`.
+/// Expands `a/{b,c}/d` to `a/b/d` and `a/c/d`.
 fn without_braces(path: &str) -> Vec<String> {
     match path
         .split_once('{')
@@ -156,7 +156,7 @@ fn without_braces(path: &str) -> Vec<String> {
     }
 }
 
-/// Cells of the rows of every table on a page.
+/// Returns the cells of the rows of every table on a page.
 fn rows(page: &str) -> impl Iterator<Item = Vec<&str>> {
     let lines = page
         .lines()
@@ -266,7 +266,7 @@ fn every_link_and_path_on_a_page_leads_to_a_file() {
     assert!(wrong.is_empty(), "these lead nowhere:\n{}", wrong.join("\n"));
 }
 
-/// Returns formulas between `\\(` and `\\)` or `\\[` and `\\]`, as mdBook's MathJax takes them.
+/// Returns formulas between `\\(` and `\\)` or `\\[` and `\\]`, the delimiters of mdBook's MathJax.
 fn formulas(page: &str) -> Vec<&str> {
     let mut found = Vec::new();
     for (opening, closing) in [(r"\\(", r"\\)"), (r"\\[", r"\\]")] {
@@ -276,7 +276,7 @@ fn formulas(page: &str) -> Vec<&str> {
     found
 }
 
-/// Tells whether Markdown takes a part of a formula as its own: an escape such as `\\,` or emphasis.
+/// True if Markdown would interpret part of a formula: an escape such as `\\,` or emphasis.
 fn loses_by_markdown(formula: &str) -> bool {
     let plain = formula.replace(r"\\", "");
     let pairs = || plain.chars().zip(plain.chars().skip(1));

@@ -1,4 +1,4 @@
-//! The house rules that no compiler holds: walls between crates and folders, layout of tests, sizes.
+//! House rules that no compiler checks: walls between crates and folders, layout of tests, sizes.
 
 mod circles;
 mod crates;
@@ -12,7 +12,7 @@ fn assert_none(found: &[String]) {
     assert!(found.is_empty(), "{} found:\n{}", found.len(), found.join("\n"));
 }
 
-/// Every file with one of the endings, with its text.
+/// Returns every file with one of the extensions, with its text.
 fn sources(endings: &[&str]) -> Vec<(String, String)> {
     tree::files(endings)
         .into_iter()
@@ -38,7 +38,7 @@ fn no_crate_depends_on_what_its_layer_may_not_know() {
     assert_none(&crates::forbidden(&tree::manifest("Cargo.toml"), &manifests.collect()));
 }
 
-/// Whoever wants no relay neither downloads nor builds anything of it (ADR 18).
+/// A build without the relay neither downloads nor compiles any of it (ADR 18).
 #[test]
 fn the_workspace_takes_nothing_of_the_relay() {
     let packages = |lock: &str| {

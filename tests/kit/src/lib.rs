@@ -1,11 +1,12 @@
-//! What every test of the system starts from: the built programs, the repository, a folder of its own, a machine that runs.
+//! Common basis of system tests: the built programs, the repository, a folder for each test, and a check for machine
+//! stalls.
 
 pub mod witness;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Polls `ready` every 2 ms; false when it has not come true in time.
+/// Polls `ready` every 2 ms; false if it has not come true in time.
 pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
     let start = Instant::now();
     while start.elapsed() < limit {
@@ -17,12 +18,12 @@ pub fn until(limit: Duration, mut ready: impl FnMut() -> bool) -> bool {
     false
 }
 
-/// A file of the repository, by its path from the root.
+/// Returns a file of the repository, by its path from the root.
 pub fn repository(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)
 }
 
-/// A built program of the workspace; `make test` builds them first.
+/// Returns a built program of the workspace; `make test` builds them first.
 pub fn program(name: &str) -> PathBuf {
     let test = std::env::current_exe().expect("a test knows its own file");
     let folder = test
@@ -34,7 +35,7 @@ pub fn program(name: &str) -> PathBuf {
     path
 }
 
-/// A folder for one test's files, emptied first.
+/// Returns an empty folder for one test's files.
 pub fn scratch(name: &str) -> PathBuf {
     let folder = program("rt-core")
         .parent()

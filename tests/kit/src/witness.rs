@@ -1,7 +1,7 @@
-//! Whether the machine itself stood still: on each core a thread above every loop, which sleeps two milliseconds at a time.
+//! Detects stalls of the machine itself: on each core a thread above every loop sleeps two milliseconds at a time.
 //!
-//! A hypervisor that takes a core away for 100 ms raises the fault that it should, whatever the program does. Such a time says
-//! nothing about what a test asks, and it is not judged.
+//! A hypervisor that takes a core away for 100 ms rightly raises a fault, whatever the program does. Such a time is no
+//! evidence for or against a test's claim, and is not judged.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -9,14 +9,15 @@ use std::sync::{Arc, Barrier};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Twenty deadlines missed in a row are a fault; a stall of fewer is the program's to bear.
+/// Shortest stall that excuses a failure. Twenty missed deadlines in a row are a fault; the program must bear a stall
+/// of fewer.
 pub const STALL: Duration = Duration::from_millis(15);
 
 const SLEEP: Duration = Duration::from_millis(2);
 const PRIORITY: libc::c_int = 98;
-/// A shared machine was seen to stand still for 30 ms every five seconds, which is as long as an attempt is.
+/// Most attempts. A shared machine was seen to stall for 30 ms every five seconds, which is the length of an attempt.
 const ATTEMPTS: usize = 12;
-/// No attempt begins after this.
+/// Latest start of an attempt.
 const PATIENCE: Duration = Duration::from_secs(180);
 
 #[derive(Default)]
@@ -25,14 +26,14 @@ struct Seen {
     longest_ns: AtomicU64,
 }
 
-/// Watches every core until it is asked, or dropped.
+/// Watches every core until it is queried or dropped.
 pub struct Witness {
     seen: Arc<Seen>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Witness {
-    /// Returns as soon as every core is watched.
+    /// Returns once every core is watched.
     pub fn begin() -> Self {
         let seen = Arc::new(Seen::default());
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get());
@@ -46,8 +47,8 @@ impl Witness {
         Self { seen, threads }
     }
 
-    /// The longest time that a core ran nothing of the highest priority. It waits for the watcher of a core that stands still
-    /// at this moment, or a stall that has just ended would not count yet.
+    /// Returns the longest time in which a core ran nothing of the highest priority. Waits for the watcher of a core
+    /// that is stalled now; otherwise a stall that has just ended would not count yet.
     pub fn longest_stall(mut self) -> Duration {
         self.stop();
         Duration::from_nanos(self.seen.longest_ns.load(Ordering::Relaxed))
@@ -67,12 +68,12 @@ impl Drop for Witness {
     }
 }
 
-/// Without the rights for that priority it sees busy cores as well.
+/// Watches a core. Without the rights for that priority it sees busy cores as well.
 fn watch(core: usize, seen: &Seen, are_watching: &Barrier) {
     let priority = libc::sched_param {
         sched_priority: PRIORITY,
     };
-    // SAFETY: plain data of this thread; a refusal leaves it as it is.
+    // SAFETY: plain data of this thread; a refusal changes nothing.
     unsafe {
         let mut set: libc::cpu_set_t = std::mem::zeroed();
         libc::CPU_SET(core, &mut set);
@@ -88,7 +89,7 @@ fn watch(core: usize, seen: &Seen, are_watching: &Barrier) {
     }
 }
 
-/// Runs a check of what happens in time, and again, for up to three minutes, where it failed while the machine stood still.
+/// Runs a timing check, and repeats it for up to three minutes if it failed while the machine was stalled.
 pub fn where_the_machine_runs(check: impl Fn()) {
     repeat_after_stalls(|| {
         let witness = Witness::begin();
@@ -97,7 +98,7 @@ pub fn where_the_machine_runs(check: impl Fn()) {
     });
 }
 
-/// An attempt gives its outcome and the longest stall in it.
+/// Repeats an attempt, which returns its outcome and the longest stall in it.
 fn repeat_after_stalls(mut attempt: impl FnMut() -> (std::thread::Result<()>, Duration)) {
     let begun = Instant::now();
     for number in 1.. {
@@ -115,7 +116,7 @@ fn repeat_after_stalls(mut attempt: impl FnMut() -> (std::thread::Result<()>, Du
 mod tests {
     use super::*;
 
-    /// A failure on a machine that ran is a failure at once, and is not tried until it passes.
+    /// A failure on a running machine is a failure at once: it is not repeated until it passes.
     #[test]
     fn a_failure_is_repeated_only_where_a_core_stood_still() {
         let (ran, stood_still) = (STALL / 2, STALL * 2);
@@ -142,7 +143,7 @@ mod tests {
         }
     }
 
-    /// A rival of a higher priority on one core is what a hypervisor looks like from inside.
+    /// From inside, a rival of higher priority on one core looks like a hypervisor.
     #[test]
     fn a_core_that_ran_nothing_is_seen() {
         let witness = Witness::begin();

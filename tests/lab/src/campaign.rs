@@ -1,4 +1,4 @@
-//! A campaign that is killed three times ends as one report in which no second counts twice and none is missing.
+//! A campaign that is killed three times ends as one report in which every second counts exactly once.
 
 use serde_json::Value;
 use std::path::Path;
@@ -41,7 +41,7 @@ fn sweep(process: u32) {
     }
 }
 
-/// Loads of a process that was killed end with it; they follow their parent.
+/// Kills the process after that progress; its loads follow their parent and end too.
 fn kill_after_progress(file: &Path, out: &Path, seconds: f64) {
     let before = measured_s(out);
     let mut child = start(file, out);
@@ -64,7 +64,7 @@ fn a_campaign_killed_three_times_counts_no_second_twice() {
     let folder = scratch("lab-campaign");
     let (file, out) = (folder.join("night.toml"), folder.join("out"));
     std::fs::write(&file, FILE).expect("written");
-    // In the first part twice, then in the second.
+    // Twice in the first part, then in the second.
     for seconds in [0.9, 1.9, 3.9] {
         kill_after_progress(&file, &out, seconds);
     }
@@ -76,7 +76,7 @@ fn a_campaign_killed_three_times_counts_no_second_twice() {
     let report: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!(report["complete"], true);
     let total = report["measured_s"].as_f64().expect("a time");
-    // A part may end half a second early, and a loop some ticks after its time.
+    // A part may end half a second early, and a loop some ticks late.
     assert!((11.0..12.3).contains(&total), "{total} s of 12");
     let parts = report["parts"].as_array().expect("a list");
     assert_eq!(parts.len(), 2);
@@ -86,7 +86,7 @@ fn a_campaign_killed_three_times_counts_no_second_twice() {
         let force = &part["force"];
         let points = force["ticks"].as_f64().expect("a count") + force["missed_deadlines"].as_f64().expect("a count");
         let measured = part["measured_s"].as_f64().expect("a time");
-        // Each grid point was either served or missed, once. Those missed between the last tick of a session and its
+        // Each grid point was either served or missed, once. Points missed between the last tick of a session and its
         // end, and those before its first, are at most a few.
         assert!(
             (points - measured * rate).abs() <= 0.02 * measured * rate,
@@ -97,7 +97,7 @@ fn a_campaign_killed_three_times_counts_no_second_twice() {
         assert_eq!(Some(in_windows), force["ticks"].as_f64());
     }
     assert!(sessions >= 4, "{sessions} sessions");
-    // The times of the sessions lie apart.
+    // The sessions do not overlap in time.
     let mut times: Vec<(u64, u64)> = Vec::new();
     for s in report["sessions"].as_array().expect("a list") {
         let record: Value = serde_json::from_str(

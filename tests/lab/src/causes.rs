@@ -10,7 +10,7 @@ use stylet_test_kit::{program, scratch};
 /// Injections of ten that must be named.
 const AT_LEAST: usize = 8;
 
-/// Returns why no trace can be had here; the tests then report it and end.
+/// Returns why tracing is unavailable here; the tests then report it and end.
 fn no_trace() -> Option<String> {
     // SAFETY: no preconditions.
     if unsafe { libc::geteuid() } != 0 {
@@ -92,8 +92,8 @@ fn instances_left(process: i32) -> bool {
     path.is_some_and(|p| Path::new(p).join(format!("instances/stylet-{process}")).exists())
 }
 
-/// Returns `Ok(true)` when at least two late ticks have the injected cause as their first one; and the words of the
-/// report for them.
+/// Returns `Ok(true)` if at least two late ticks have the injected cause as their first one; and the report's text for
+/// them.
 fn run(injection: &Injection) -> Result<(bool, String), String> {
     let out = folder(injection.name);
     let mut child = start(&out, 4, injection.over_us);

@@ -6,7 +6,7 @@ mod threads;
 use serde_json::Value;
 use std::time::{Duration, Instant};
 
-/// The measurement into which something is injected.
+/// The measurement that is disturbed.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
     pub process: i32,
@@ -15,17 +15,17 @@ pub struct Target {
     pub core: usize,
 }
 
-/// Begin of the names of all threads that an injection starts.
+/// Prefix of the names of all injection threads.
 pub const NAME: &str = "inj-";
 
 /// One way to make ticks late.
 pub struct Injection {
     pub name: &'static str,
-    /// Ticks that are late by so much, in microseconds, are looked at.
+    /// Lateness in microseconds above which ticks are examined.
     pub over_us: u64,
-    /// Injects until `end`; an error where this machine does not offer it.
+    /// Injects until `end`; fails if this machine does not support it.
     pub run: fn(Target, Instant) -> Result<(), String>,
-    /// Test whether a cause of the report is the injected one.
+    /// Returns whether a cause in the report is the injected one.
     pub is_named: fn(&Value) -> bool,
 }
 
@@ -37,7 +37,7 @@ fn who(cause: &Value, name: &str) -> bool {
     cause["who"].as_str().is_some_and(|w| w.contains(name))
 }
 
-/// All injections. The first three need nothing but root.
+/// All injections. The first three need only root.
 pub const ALL: &[Injection] = &[
     Injection {
         name: "a thread of higher priority on the core",
@@ -112,7 +112,7 @@ fn until(end: Instant, every: Duration, mut each: impl FnMut()) {
     }
 }
 
-/// Uses the core for `time`.
+/// Keeps the core busy for `time`.
 fn spin(time: Duration) {
     let start = Instant::now();
     while start.elapsed() < time {

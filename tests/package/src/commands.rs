@@ -1,4 +1,4 @@
-//! `docs/commands.md`: the commands and options of both programs, as their help lists them.
+//! `docs/commands.md`: the commands and options of both programs, from their help.
 
 use crate::PROGRAMS;
 use crate::help::{Help, helps};
@@ -37,7 +37,7 @@ fn page() -> String {
     page
 }
 
-/// Returns each command that a help lists, as it is typed, with its line.
+/// Returns each command in a help, as typed, with its line.
 fn commands(help: &Help) -> Vec<(String, String)> {
     let listed = help.subcommands().into_iter();
     listed
@@ -57,7 +57,7 @@ fn options(program: &str) -> String {
         .to_owned()
 }
 
-/// Returns text as it may stand in a cell of a table.
+/// Escapes text for a table cell.
 fn cell(text: &str) -> String {
     text.replace('|', "\\|")
 }

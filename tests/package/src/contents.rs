@@ -1,4 +1,4 @@
-//! What each Debian package holds: every file is there, names what is installed, and is in one package only.
+//! Contents of each Debian package: every file exists, names only installed files, and is in one package.
 
 use crate::{PROGRAMS, manual};
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use stylet_test_kit::repository;
 
-/// What the packages install: absolute path, and the file it comes from. The pages are written to `pages` first.
+/// Returns the installed files: absolute path and source. Writes the pages to `pages` first.
 fn installed(pages: &Path) -> BTreeMap<String, PathBuf> {
     let mut all = BTreeMap::new();
     for program in PROGRAMS {
@@ -42,13 +42,13 @@ fn assets(program: &str) -> Vec<Vec<String>> {
         .expect("lists of source, folder, mode")
 }
 
-/// Files behind one entry; every one must be there.
+/// Returns the files behind one entry; every one must exist.
 fn sources(program: &str, source: &str, pages: &Path) -> Vec<PathBuf> {
     let path = match source.strip_prefix("target/release/") {
         None => repository(&format!("{program}/{source}")),
         Some(built) => match built.strip_prefix("manual/") {
             None => stylet_test_kit::program(built),
-            // Compressed on the way.
+            // Compressed by the packaging.
             Some(page) => pages.join(page.trim_end_matches(".gz")),
         },
     };
@@ -71,7 +71,7 @@ fn text(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|why| panic!("{}: {why}", path.display()))
 }
 
-/// `key=value` lines, the last one of each key.
+/// Parses `key=value` lines; the last one of each key counts.
 fn keys(text: &str) -> BTreeMap<&str, &str> {
     let lines = text.lines().filter(|line| !line.starts_with('#'));
     lines.filter_map(|line| line.split_once('=')).collect()
@@ -111,7 +111,7 @@ fn the_desktop_starts_what_is_installed_and_finds_its_icon() {
     assert!(files.contains_key(&format!("/usr/bin/{}", keys["TryExec"])));
     let icon = format!("/usr/share/icons/hicolor/scalable/apps/{}.svg", keys["Icon"]);
     assert!(text(&files[&icon]).contains("<svg "), "{icon}");
-    // By this name the desktop knows whose window it is.
+    // The desktop identifies the program's window by this name.
     let window = text(&repository("host-ui/src/app/mod.rs"));
     assert!(window.contains(&format!("with_app_id(\"{}\")", keys["StartupWMClass"])));
 }
@@ -186,7 +186,7 @@ fn rules_for_devices_name_the_vendors_that_the_programs_look_for() {
     }
 }
 
-/// Nobody gets rights without a question that was answered.
+/// Rights are granted only after a question was answered.
 #[test]
 fn scripts_are_valid_and_the_question_about_rights_begins_with_none() {
     for program in PROGRAMS {

@@ -5,9 +5,9 @@ use stylet_test_kit::program;
 
 /// Help of one command.
 pub struct Help {
-    /// The command as it is typed.
+    /// The command as typed.
     pub words: Vec<String>,
-    /// What it prints.
+    /// Output of its help.
     pub text: String,
 }
 

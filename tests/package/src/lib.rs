@@ -1,4 +1,4 @@
-//! What is installed: man pages and completions of both programs, and what the Debian packages hold.
+//! Installed files: man pages and completions of both programs, and the contents of the Debian packages.
 
 #[cfg(test)]
 mod commands;
@@ -12,7 +12,7 @@ mod pages;
 #[cfg(test)]
 const PROGRAMS: [&str; 2] = ["rt-core", "host-ui"];
 
-/// Pages and completions of both programs, as the programs write them.
+/// Returns the folder with pages and completions, as written by the programs.
 #[cfg(test)]
 fn manual(name: &str) -> std::path::PathBuf {
     let folder = stylet_test_kit::scratch(name);

@@ -1,11 +1,11 @@
-//! Every subcommand and option that a program lists in its help has its entry on a page and in the completions.
+//! Every subcommand and option in a program's help has its entry on a page and in the completions.
 
 use crate::help::helps;
 use crate::{PROGRAMS, manual};
 use std::path::Path;
 use std::process::Command;
 
-/// Long options with an entry of their own.
+/// Long options with a separate entry.
 fn options(help: &str) -> Vec<String> {
     let lines = help.lines().map(str::trim_start);
     let entries = lines.filter_map(|line| {

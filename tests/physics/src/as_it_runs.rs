@@ -1,5 +1,5 @@
-//! Finite elements as they run: one cycle a tick, a patch of 4 mm, work ahead, and lines in bodies that are hard to
-//! solve.
+//! Finite elements under run conditions: one cycle a tick, a patch of 4 mm, work ahead, and lines in bodies that are
+//! hard to solve.
 
 use crate::patch::{PATCH_M, PERIOD_S, PatchTick, STRAIGHT, Way, converged, insertion};
 use crate::rows::{Row, keep};
@@ -27,8 +27,7 @@ fn held(patch: TipPatch) -> Held {
 }
 
 /// Runs a needle off its line; returns the worst tick against the converged solution of the same tick, field in percent
-/// of the patch's travel and force on the tip in percent of the insertion's largest; ticks whose answer is not for a
-/// hand.
+/// of the patch's travel and force on the tip in percent of the insertion's largest; ticks whose answer is not rendered.
 fn off_its_line(nu: f64, way: Way, depth_m: f64) -> ([f64; 2], [f64; 2], usize, usize) {
     let mut scene = Scene::builtin("paper").expect("built in").for_tissue(TissueKind::Fem);
     scene.structures[0].material.poisson = nu;
@@ -150,14 +149,14 @@ fn newton(model: &BatchModel<f32>, lattice_middle_m: [f64; 3]) -> (f64, f64, u32
     )
 }
 
-/// Towards nothing the body moves as one piece, by what its springs say; towards a table it moves as one whose surface
-/// is fixed.
+/// Towards no support the body moves rigidly, as its springs dictate; towards a table it moves like a body with a fixed
+/// surface.
 #[test]
 fn a_foundation_goes_to_both_of_its_limits() {
     let lattice = Scene::from_labels("block", &block(|_| 1, BLOCK, Vec::new(), H))
         .expect("valid")
         .lattice;
-    // Or the body would turn as well.
+    // Otherwise the body would rotate as well.
     let middle_m = BLOCK.map(|n| 0.5 * n as f64 * H);
     let edge_m = BLOCK.map(|n| n as f64 * H);
     let surface = move |p: [f64; 3]| (0..3).any(|a| p[a] < 1e-9 || p[a] > edge_m[a] - 1e-9);
@@ -192,7 +191,7 @@ fn a_foundation_goes_to_both_of_its_limits() {
     });
 }
 
-/// A body that bone holds at one corner can turn about it: a line that answers anything there is refused or bounded.
+/// A body that bone holds at one corner can rotate about it: a line with an unbounded answer is refused or bounded.
 #[test]
 fn a_part_that_one_corner_holds_is_refused_or_stays_in_reach() {
     let mut soft = Structure::soft("gland", 1);

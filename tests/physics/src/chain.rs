@@ -108,7 +108,7 @@ fn the_same_session_gives_the_same_bytes() {
     assert_eq!(bits(), bits());
 }
 
-/// Hosts need it to show how far a membrane is from its puncture.
+/// Hosts need it to show the distance of a membrane from its puncture.
 #[test]
 fn the_output_has_the_puncture_depth_of_the_membrane_in_front() {
     let mut device = SimulatedPhantom::new(SimulatedPhantomConfig {

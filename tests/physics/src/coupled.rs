@@ -9,7 +9,7 @@ use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
 use stylet_sim::scene::TissueKind;
 
-/// Follows its path to a micrometre whatever the force, so that two sessions have one motion.
+/// Follows its path to a micrometre at any force, so that two sessions have the same motion.
 const GUIDED: Hand = Hand {
     mass_kg: 0.5,
     damping_n_s_per_m: 1e4,
@@ -24,8 +24,8 @@ fn world(fem: bool) -> World {
     World::new(scene, kind, limits, 1).expect("the paper's gland can be solved")
 }
 
-/// Returns the forces of the tissue along the path by tick: as the haptic loop has them, and as the body has just
-/// answered.
+/// Returns the forces of the tissue along the path by tick: as used by the haptic loop, and as answered by the body
+/// just now.
 fn forces(fem: bool, tissue_every: u64, seconds: f64) -> Vec<(f64, f64, f64)> {
     let world = world(fem);
     let (start, stiffness) = (axis_start(&world), 700.0);

@@ -1,4 +1,4 @@
-//! Every hand of the envelope, every lateness of the link, three places: does the loop sing?
+//! Every hand of the envelope, every delay of the link, three places: checks for sustained oscillation.
 
 mod coupled;
 mod on_line;
@@ -14,7 +14,7 @@ enum Place {
     Contact,
     /// 45 mm deep in the gland, stuck.
     InTissue,
-    /// Place behind the skin and some fat, half way to piercing the capsule.
+    /// Behind the skin and some fat, half way to piercing the capsule.
     AtMembrane,
 }
 
@@ -23,17 +23,17 @@ const PLACES: [Place; 3] = [Place::Contact, Place::InTissue, Place::AtMembrane];
 /// Outcome of one session.
 struct Case {
     name: String,
-    /// Motion of the tip to and fro in the first and the second of two seconds at rest.
+    /// Oscillation of the tip in the first and the second of two seconds at rest.
     early_m: f64,
     late_m: f64,
-    /// Largest excess of energy given over energy taken at any time, and what rounding explains of it then.
+    /// Largest excess of returned over received energy at any time, and the part explained by rounding.
     excess_j: f64,
     bound_j: f64,
-    /// The same from when the hand took over, less what the springs held then.
+    /// The same from the hand-over on, minus the energy stored in the springs then.
     after_j: f64,
 }
 
-/// An oscillation that the encoders can see.
+/// An oscillation that the encoders can resolve.
 const SINGING_M: f64 = 2.0 * STEP_M;
 const STEP_M: f64 = 3e-5;
 
@@ -42,7 +42,7 @@ impl Case {
         self.late_m > SINGING_M
     }
 
-    /// Comes to rest, and gives the hand no more than it took.
+    /// Checks that it comes to rest, and returns no more energy to the hand than it received.
     fn assert_rests(&self) {
         assert!(
             !self.sings(),
@@ -52,7 +52,7 @@ impl Case {
             self.early_m
         );
         assert!(self.late_m <= self.early_m + STEP_M, "{} grows", self.name);
-        // Until a shake is seen to be one; uncontrolled it is some hundred times that.
+        // Threshold of a real oscillation; an uncontrolled one is some hundred times larger.
         assert!(
             self.after_j < 10e-3,
             "{} gives {} J after the change",
@@ -68,7 +68,7 @@ impl Case {
     }
 }
 
-/// Brings the needle there with an operator who sees to it, hands over to `hand`, gives it a nudge, and waits.
+/// Brings the needle there under an attentive operator, hands over to `hand`, nudges it, and waits.
 fn session(hand: Hand, late_ticks: usize, place: Place, controlled: bool) -> Case {
     let layers: &[_] = match place {
         Place::Contact | Place::InTissue => &[(0.0, LayerKind::Gland)],
@@ -95,7 +95,7 @@ fn session(hand: Hand, late_ticks: usize, place: Place, controlled: bool) -> Cas
     let mut ticks = rig.run(2.0);
     let before = *ticks.last().expect("ticks");
     rig.device.device.set_hand(hand);
-    // A nudge: 2 mm back and forth, quicker than a hand means to move.
+    // A nudge: 2 mm back and forth, faster than intended motion.
     rig.go_to(rest_m - 2e-3, 0.1);
     let mut after = rig.run(0.05);
     rig.go_to(rest_m, 0.1);
@@ -120,7 +120,7 @@ fn session(hand: Hand, late_ticks: usize, place: Place, controlled: bool) -> Cas
     }
 }
 
-/// Returns the widest swing of the tip about its mean way: a slow creep is no oscillation.
+/// Returns the widest swing of the tip about its mean path: slow creep is not an oscillation.
 fn to_and_fro(ticks: &[Tick]) -> f64 {
     let window = |part: &[Tick]| {
         let (low, high) = part.iter().fold((f64::MAX, f64::MIN), |(low, high), t| {
@@ -132,8 +132,8 @@ fn to_and_fro(ticks: &[Tick]) -> f64 {
     ticks.chunks(250).map(window).fold(0.0, f64::max)
 }
 
-/// Returns the largest work done on the hand beyond `from_j` and beyond what rounding can hide at that time: half a
-/// step of each encoder times the way that the force went. Gives both.
+/// Returns the largest work done on the hand beyond `from_j` and beyond the rounding error at that time, which is half
+/// a step of each encoder times the path of the force. Returns both.
 fn excess(ticks: &[Tick], from_j: f64) -> (f64, f64) {
     let mut before = ticks[0].output.wrench.force_n;
     let (mut hidden_j, mut worst) = (0.5 * STEP_M * before.abs().sum(), (0.0, 0.0));
@@ -180,7 +180,7 @@ fn no_hand_of_the_envelope_makes_the_loop_sing_at_any_lateness_anywhere() {
     }
 }
 
-/// The test above can fail: the same sessions with no control of passivity and no softening.
+/// Shows that the test above can fail: the same sessions without passivity control and softening.
 #[test]
 fn without_control_late_links_sing() {
     for place in [Place::InTissue, Place::AtMembrane] {

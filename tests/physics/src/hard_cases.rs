@@ -86,7 +86,7 @@ fn span(ticks: &[Tick], of: impl Fn(&Tick) -> f64) -> (f64, f64) {
     (low, ticks.iter().map(&of).fold(f64::MIN, f64::max))
 }
 
-/// Case 10, the other half: turning round.
+/// Case 10, the other half: reversal.
 #[test]
 fn on_reversal_friction_turns_within_a_millimetre() {
     let mut rig = inserted(Hand::steady(), LinkFaults::default());
@@ -99,7 +99,7 @@ fn on_reversal_friction_turns_within_a_millimetre() {
     let way_m = deepest - turned.true_tip_m;
     println!("friction turns {:.2} mm after the needle", way_m * 1e3);
     assert!(way_m < 1e-3, "after {way_m} m");
-    // A hand that stops pushing feels it spring back no farther.
+    // A hand that stops pushing feels no further spring-back.
     for (who, hand) in [("passive hand", Hand::passive()), ("device alone", Hand::absent())] {
         let mut rig = inserted(Hand::steady(), LinkFaults::default());
         let before_m = rig.run(0.001)[0].true_tip_m;
@@ -133,7 +133,7 @@ fn quantised_positions_give_nearly_the_force_of_exact_ones() {
     assert!(jump <= 0.5 + 1e-9);
 }
 
-/// Case 12; samples that are no numbers are refused by the device and the gate (`gate_tests.rs`, `hw/tests`).
+/// Case 12; the device and the gate refuse samples that are not numbers (`gate_tests.rs`, `hw/tests`).
 #[test]
 fn late_lost_and_repeated_samples_neither_sing_nor_kick() {
     for (late_ticks, per_thousand) in [(0, 100), (1, 100), (2, 100), (0, 300)] {

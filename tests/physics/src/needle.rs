@@ -1,4 +1,4 @@
-//! Hard cases of a needle on its line, as a scene ships: both loops, the paper's gland, ChainMail and finite elements.
+//! Hard cases of a needle on its line, as shipped: both loops, the paper's gland, ChainMail and finite elements.
 
 use nalgebra::Vector3;
 use stylet_benches::rig::Tick;
@@ -19,14 +19,14 @@ mod off_line;
 
 const KINDS: [TissueKind; 2] = [TissueKind::ChainMail, TissueKind::Fem];
 
-/// Body and line, used by one insertion after the other.
+/// Body and line, shared by successive insertions.
 struct Theatre {
     world: Option<Box<World>>,
     start: Vector3<f64>,
     line: ReadyLine,
 }
 
-/// One needle in a steady hand; depths are from where the body begins.
+/// One needle in a steady hand; depths are from the body's surface.
 struct Insertion {
     session: Session,
     surface: Vector3<f64>,
@@ -41,7 +41,7 @@ impl Theatre {
         Self::beside_axis(&SceneSource::Builtin(scene.to_owned()), tissue, 0.0)
     }
 
-    /// Distance of the needle from the axis of the gland, along x.
+    /// Builds a needle at that distance from the axis of the gland, along x.
     fn beside_axis(source: &SceneSource, tissue: TissueKind, beside_m: f64) -> Self {
         let scene = source.build().expect("no problem with it");
         let limits = TissueParameters::default().validate().expect("defaults are valid");
@@ -79,7 +79,7 @@ impl Theatre {
 }
 
 impl Insertion {
-    /// Brings the tip there and lets it stand for half a second.
+    /// Brings the tip there and holds it for half a second.
     fn go_to(&mut self, depth_m: f64, speed_m_per_s: f64) -> Vec<Tick> {
         let goal = self.surface + Vector3::z() * depth_m;
         let way_m = (goal - self.session.true_tip_in_world()).norm();
@@ -108,7 +108,7 @@ fn rest_n(ticks: &[Tick]) -> f64 {
     -ticks.last().expect("ticks").output.wrench.force_n.z
 }
 
-/// A membrane that was pierced is a hole: on the same track it is not felt again.
+/// A pierced membrane is a hole: on the same track it is not felt again.
 #[test]
 fn a_second_pass_on_one_track_meets_no_membrane() {
     for kind in KINDS {
@@ -124,8 +124,8 @@ fn a_second_pass_on_one_track_meets_no_membrane() {
     }
 }
 
-/// ChainMail by eq. 6 had 37 % more displacement at 3 mm after 6 mm than on the way there. Friction has a memory too:
-/// what is asked is that it is the same after each further turn.
+/// ChainMail by eq. 6 had 37 % more displacement at 3 mm after 6 mm than on the way there. Friction has a memory too,
+/// so the test requires the same displacement after each further reversal.
 #[test]
 fn turns_at_depth_come_back_to_the_same_force() {
     for kind in KINDS {
@@ -207,7 +207,7 @@ fn a_hand_that_trembles_for_a_minute_at_depth_moves_nothing_on() {
     }
 }
 
-/// Slip is decided by force: what the tissue takes and the hand feels is the same at any speed.
+/// Slip is decided by force: the tissue's load and the felt force are the same at any speed.
 #[test]
 fn speeds_from_half_a_millimetre_to_123_in_a_second_end_alike() {
     for kind in KINDS {

@@ -1,5 +1,5 @@
-//! A needle that holds a patch of tissue and slips by eq. 6, as off its line: what each tick holds, and the
-//! converged answer to it.
+//! A needle that holds a patch of tissue and slips by eq. 6, as off its line: the patch of each tick, and the converged
+//! answer to it.
 
 use stylet_sim::needle::{NeedleParameters, Phase, transmission};
 use stylet_sim::scene::Lattice;
@@ -15,12 +15,12 @@ pub const STRAIGHT: Way = Way {
     direction: [0.0, 0.0, 1.0],
     speed_m_per_s: 0.05,
 };
-/// Ticks in which the needle comes near before it meets the gland.
+/// Ticks of the approach before the needle meets the gland.
 const APPROACH: usize = 10;
 
-/// Patch that one tick holds, and the one that the tip will come to on a straight way.
+/// Patch held in one tick, and the one that the tip reaches next on a straight path.
 pub struct PatchTick {
-    /// Now.
+    /// Present patch.
     pub held: Option<TipPatch>,
     /// Patch that work ahead prepares.
     pub next: Option<TipPatch>,
@@ -28,7 +28,7 @@ pub struct PatchTick {
     pub by_m: f64,
 }
 
-/// A needle's way through the gland.
+/// Path of a needle through the gland.
 #[derive(Clone, Copy, Debug)]
 pub struct Way {
     /// Unit vector.
@@ -56,8 +56,7 @@ pub fn insertion(lattice: &Lattice, way: Way, depth_m: f64) -> Vec<PatchTick> {
         position_m: at(by_m, lattice.rest_m(element)),
         edge_m: PATCH_M,
     };
-    // What the loop would see ahead, not what the script has later. The body moves with the patch: seen from it, at
-    // rest.
+    // The loop's prediction, not the script's future. The body moves with the patch: relative to it, at rest.
     let still = vec![0.0; lattice.element_count()];
     let rest = Deformed {
         lattice,

@@ -1,4 +1,4 @@
-//! Rows of `docs/stability.md` that tests write: hard cases as the program ships, each with its figure.
+//! Rows of `docs/stability.md` written by tests: hard cases of the shipped program, each with its figure.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -17,13 +17,13 @@ pub struct Row {
     pub should: &'static str,
     /// Outcome, with figures.
     pub happened: String,
-    /// Set where the outcome meets the requirement.
+    /// The outcome meets the requirement.
     pub met: bool,
-    /// Live warning that reports a case that is known to fall short.
+    /// Live warning for a case known to fall short.
     pub warning: &'static str,
 }
 
-/// Tests of one binary run side by side.
+/// Tests of one binary run in parallel.
 static PAGE: Mutex<()> = Mutex::new(());
 
 const BEGIN: &str = "<!-- rows that tests write -->\n";
@@ -35,7 +35,7 @@ pub fn lock() -> std::sync::MutexGuard<'static, ()> {
     PAGE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Writes the row with `UPDATE_DOCS`; without it the page has to have the row, met or not met as here.
+/// Writes the row with `UPDATE_DOCS`; otherwise checks that the page has the row with the same outcome.
 pub fn keep(row: &Row) {
     println!(
         "{:>2} {}, {}: {} {}",

@@ -1,4 +1,4 @@
-//! Every hard case of tissue, for every model: finite, unfolded, residual met; and the page that says so.
+//! Every hard case of tissue, for every model: finite, unfolded, residual met; and the page with the results.
 
 mod cases;
 mod drive;

@@ -1,4 +1,4 @@
-//! The torque that keeps a needle on its path, against wrists of many kinds over a late link.
+//! The torque that keeps a needle on its path, against many wrists over a delayed link.
 
 use crate::rows::{Row, keep};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -16,7 +16,7 @@ struct Wrist {
     stiffness_nm_per_rad: f64,
 }
 
-/// Corners and the middle of each axis. Assumed: a pen grip at the soft end, a wrist with a fist at the stiff one.
+/// Corners and the centre of each axis. Assumed: a pen grip at the soft end, a wrist with a fist at the stiff one.
 fn wrists() -> impl Iterator<Item = Wrist> {
     let (inertias, dampings, stiffnesses) = ([2e-4, 8e-4, 3e-3], [5e-3, 1.6e-2, 5e-2], [0.1, 0.45, 2.0]);
     inertias.into_iter().flat_map(move |inertia_kg_m2| {
@@ -36,8 +36,8 @@ const STEPS: usize = 50;
 /// Step of a rotary encoder of a Phantom's gimbal; more than half of it is an oscillation.
 const SEEN_RAD: f64 = 2e-3;
 
-/// Turns the handle by 10 degrees with the tip 45 mm deep; swing in the first and the last half second of eight, and
-/// the largest torque.
+/// Turns the handle by 10 degrees with the tip 45 mm deep; returns the swing in the first and the last half second of
+/// eight, and the largest torque.
 fn turn(wrist: Wrist, late_ticks: usize, gain: f64) -> (f64, f64, f64) {
     let info = DeviceInfo::phantom_premium_1_5();
     let force = ForceParameters {
@@ -119,7 +119,7 @@ fn no_wrist_sings_that_turns_a_deep_needle() {
     assert!(most_nm > 0.03, "the torque loop has nothing to do: {most_nm} Nm");
 }
 
-/// The test above can fail: a guide ten times as stiff over the same links.
+/// Shows that the test above can fail: a guide ten times as stiff over the same links.
 #[test]
 fn a_torque_ten_times_as_stiff_sings_over_a_late_link() {
     let singing = wrists().filter(|&wrist| turn(wrist, 3, 10.0).1 > SEEN_RAD).count();

@@ -1,4 +1,4 @@
-//! Stiffness of a wall that the loop holds, against Colgate's bound.
+//! Stiffest wall that the loop renders stably, against Colgate's bound.
 
 use stylet_benches::wall::Wall;
 use stylet_hw::Hand;

@@ -1,5 +1,5 @@
-//! What the hand feels while bridges are killed and stopped, beside the same insertion undisturbed, twice: it differs from those no more
-//! than they differ from each other.
+//! Force on the hand while bridges are killed and stopped, against two undisturbed insertions: it differs from them no
+//! more than they differ from each other.
 
 use crate::wall::{bridge, send};
 use nalgebra::Vector3;
@@ -11,14 +11,14 @@ use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, repeats};
 
 const M_PER_S: f64 = 0.002;
-/// Forces are compared by the way of the tip, in pieces of this, m.
+/// Forces are compared by the position of the tip, in pieces of this length, m.
 const PIECE_M: f64 = 1e-4;
-/// Of the way that an insertion has, m.
+/// Length of an insertion's path, m.
 const LONGEST_M: f64 = 0.055;
-/// A round takes about so long: a bridge that is stopped is replaced after 0.4 s.
+/// Approximate length of a round: a stopped bridge is replaced after 0.4 s.
 const ROUND_S: f64 = 0.8;
 
-/// Mean force in each piece of the way, N.
+/// Mean force in each piece of the path, N.
 fn forces(records: &[TickRecord]) -> Vec<f64> {
     let first = Vector3::from(records[0].tip_in_scene_m);
     let mut sums: Vec<(f64, f64)> = Vec::new();
@@ -33,7 +33,8 @@ fn forces(records: &[TickRecord]) -> Vec<f64> {
         .collect()
 }
 
-/// The forces of an insertion in which the bridge is killed or stopped so often, or left alone for as long.
+/// Returns the forces of an insertion in which the bridge is killed or stopped that often, or left alone for the same
+/// time.
 fn insertion(rounds: u64, speed_m_per_s: f64, is_disturbed: bool) -> Vec<f64> {
     let mut core = Core::start();
     let mut hand = Insertion::begin(&mut core, speed_m_per_s);
@@ -58,7 +59,7 @@ fn insertion(rounds: u64, speed_m_per_s: f64, is_disturbed: bool) -> Vec<f64> {
     forces
 }
 
-/// Three insertions of one kind differ by chance as well: to be read, not to be run each day.
+/// Insertions of one kind differ by chance as well: to be interpreted by a reader, not run each day.
 #[test]
 #[ignore = "a measurement: make wall"]
 fn killed_and_stopped_bridges_change_no_force_beyond_what_two_insertions_differ() {

@@ -21,7 +21,7 @@ unsafe extern "system" fn always(_: *mut c_void) -> u32 {
     ffi::CALLBACK_CONTINUE
 }
 
-/// Calls each function as its documentation says; gives the error that each left, which must be none.
+/// Calls each function as documented; returns the error that each left, which must be none.
 fn call_all(api: &Api) -> Vec<(&'static str, u32)> {
     let mut left = Vec::new();
     // SAFETY: no preconditions.
@@ -79,7 +79,7 @@ fn call_all(api: &Api) -> Vec<(&'static str, u32)> {
     assert!(call!(hdGetSchedulerTimeStamp()) >= 0.0);
     call!(hdStopScheduler());
     call!(hdUnschedule(schedule));
-    // Neither can be set to anything that the interface names: so they are called for their refusals.
+    // The interface names no value for either: they are called to be refused.
     // SAFETY: one value each.
     unsafe {
         (api.hdSetBooleanv)(0x2001, &0);

@@ -1,4 +1,4 @@
-//! The Phantom over a driver that misbehaves: what the force loop sees, what the motors get, and how it ends.
+//! The Phantom over a misbehaving driver: input of the force loop, output to the motors, and the end.
 
 use fake_hd::Block;
 use fake_hd::control::{get, put};
@@ -27,7 +27,7 @@ fn open(config: PhantomConfig) -> Result<Phantom, OpenError> {
     Phantom::open(config, quiet_arm(), Box::new(|text| println!("reported: {text}")))
 }
 
-/// With the messages that it has reported so far.
+/// Opens a device; returns it with the messages that it has reported so far.
 fn open_listening(config: PhantomConfig) -> (Phantom, Arc<Mutex<Vec<String>>>) {
     let heard = Arc::new(Mutex::new(Vec::new()));
     let ear = Arc::clone(&heard);
@@ -96,7 +96,7 @@ fn torque_about_the_needle_turns_the_roll_joint_and_keeps_to_the_joints_limits()
     };
     let torque = || fake.control.torque_mnm.each_ref().map(get);
     let near = |want: [f64; 3]| move |torque: [f64; 3]| torque.iter().zip(want).all(|(a, b)| (a - b).abs() < 1e-9);
-    // World +z is away from the operator: clockwise as the operator sees it, which the roll joint counts as positive.
+    // World +z is away from the operator: clockwise for the operator, which the roll joint counts as positive.
     let roll = near([0.0, 0.0, 40.0]);
     assert!(
         drive(&mut device, &about(Vector3::z() * 0.04), LONG, |_| roll(torque())),
@@ -116,7 +116,7 @@ fn torque_about_the_needle_turns_the_roll_joint_and_keeps_to_the_joints_limits()
         "{:?}",
         torque()
     );
-    // With the stylus rolled by a quarter the lift joint has turned under it, not with it.
+    // With the stylus rolled by a quarter turn, the lift joint stays, since it lies below the roll.
     put(&fake.control.gimbal_rad[2], std::f64::consts::FRAC_PI_2);
     assert!(
         drive(&mut device, &about(Vector3::x() * 0.1), LONG, |_| lift(torque())),
@@ -345,7 +345,7 @@ fn warm_motors_turn_the_force_off_until_they_have_cooled() {
     assert!(drive(&mut device, &push(), LONG, |s| *s == Err(DeviceFault::Overheated)));
     assert!(drive(&mut device, &push(), LONG, |_| fake.control.force() == [0.0; 3]));
     assert!((device.readings().temperature - 0.96).abs() < 1e-9);
-    // Below the limit, above the one for coming back.
+    // Below the limit, above the one for resuming.
     fake.control.temperature_milli.store(900, Relaxed);
     let back = drive(&mut device, &push(), Duration::from_millis(1200), Result::is_ok);
     assert!(!back, "they have hardly cooled");
@@ -364,7 +364,7 @@ fn a_force_that_nobody_renews_is_released() {
         until(LONG, || fake.control.force() == [0.0; 3]),
         "the force loop has stopped"
     );
-    // The force goes out first, the fault is reported at the end of the same tick.
+    // The force is cut first; the fault is reported at the end of the same tick.
     assert!(until(LONG, || device.read(1e-3) == Err(DeviceFault::TimedOut)));
     assert!(
         drive(&mut device, &push(), LONG, |s| s.is_ok() && feels(&fake, 1.0)()),
@@ -378,7 +378,7 @@ fn unplugged_and_plugged_in_again_without_loading_the_library_anew() {
     let (mut device, heard) = open_listening(config());
     assert!(drive(&mut device, &push(), LONG, |s| s.is_ok() && feels(&fake, 1.0)()));
     fake.control.unplugged.store(1, Relaxed);
-    // Its pose is no number either; the cable is what the operator has to hear of.
+    // Its pose is not a number either; the operator must be told about the cable.
     let mut first = None;
     assert!(drive(&mut device, &push(), LONG, |s| {
         first = s.err();
@@ -399,7 +399,7 @@ fn unplugged_and_plugged_in_again_without_loading_the_library_anew() {
     fake.control.unplugged.store(0, Relaxed);
     assert!(drive(&mut device, &push(), LONG, |s| s.is_ok() && feels(&fake, 1.0)()));
     assert_eq!(fake.control.inits.load(Relaxed), 2);
-    // It is felt before it is reported.
+    // The hand feels it before the report.
     let is_reported = || {
         heard
             .lock()
@@ -471,7 +471,8 @@ fn a_panic_in_the_callback_stays_in_it_and_leaves_zero_force() {
     drop(fake.open());
 }
 
-/// The servo thread of a reconnected device used to exert the newest force until the connector saw that arming had failed.
+/// The servo thread of a reconnected device used to exert the newest force until the connector saw that arming had
+/// failed.
 #[test]
 fn a_servo_thread_that_could_not_be_armed_exerts_no_force() {
     let fake = Fake::new();
@@ -527,7 +528,7 @@ fn the_callback_makes_no_heap_call() {
         ..push()
     };
     assert!(drive(&mut device, &wrench, LONG, |_| FRAMES.load(Relaxed) > 1000));
-    // Through faults and errors too.
+    // Also during faults and errors.
     fake.control.nan.store(1, Relaxed);
     fake.control.warm_motors.store(1, Relaxed);
     let before = FRAMES.load(Relaxed);

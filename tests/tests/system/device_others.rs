@@ -1,4 +1,4 @@
-//! The core with the devices of other makers, as whole processes: each over its fake, whose hand is led from here.
+//! The core with devices of other vendors, as whole processes: each over its fake, whose hand the test moves.
 
 use fake_drd::control::{VARIABLE, put};
 use fake_drd::{Block, Control};
@@ -17,11 +17,11 @@ const STEP_M: f64 = 5e-5;
 
 /// A fake device.
 trait Led {
-    /// The hand is so far to the right, up and away from the origin, m.
+    /// Moves the hand to this offset to the right, up and away from the origin, m.
     fn hold(&self, place_m: [f64; 3]);
-    /// Force that the driver has for the motors, N.
+    /// Returns the driver's force for the motors, N.
     fn commanded_n(&self) -> f64;
-    /// The cable is out, or in again.
+    /// Unplugs the cable, or plugs it in.
     fn plug(&self, plugged: bool);
 }
 
@@ -60,9 +60,9 @@ struct Rig<L: Led> {
     link: Link,
     core: Core,
     device: L,
-    /// Where the device's origin lies in the scene.
+    /// Origin of the device in the scene.
     origin_m: Vector3<f64>,
-    /// Where the hand is, from there.
+    /// Position of the hand from there.
     hand_m: Vector3<f64>,
 }
 
@@ -75,7 +75,8 @@ impl<L: Led> Rig<L> {
             link.state().is_some_and(|s| s.tick > 10)
         }));
         let state = *link.state().expect("live");
-        // While the core locks its memory a servo thread may stand still for longer than its driver's watchdog: the operator arms.
+        // While the core locks its memory a servo thread may stall for longer than its driver's watchdog: the operator
+        // arms.
         println!("at the start: {:?}", Fault::from_number(state.fault));
         assert_eq!(state.flags & flags::SIMULATED_DEVICE, 0);
         let origin_m = Vector3::from(state.tip_in_scene_m);
@@ -93,7 +94,8 @@ impl<L: Led> Rig<L> {
         self.device.hold([-place_m.x, place_m.y, place_m.z]);
     }
 
-    /// Leads the hand there and waits until the core has seen it: scene z is away from the operator, scene x to the left.
+    /// Moves the hand there and waits until the core has seen it: scene z is away from the operator, scene x to the
+    /// left.
     fn lead(&mut self, to_m: [f64; 3]) {
         let goal = Vector3::from(to_m) - self.origin_m;
         while (goal - self.hand_m).norm() > 0.0 {
@@ -140,7 +142,7 @@ impl<L: Led> Rig<L> {
         assert!(engaged, "{armed} {:?}", self.fault());
     }
 
-    /// Into the membrane, unplugged there, plugged in again and armed by the operator.
+    /// Inserts into the membrane, unplugs there, plugs in again and lets the operator arm.
     fn run(mut self, name: &str, peak_n: f64) -> L {
         assert!(self.link.session().expect("live").device.read().contains(name));
         let plan = default_plan(&self.link.scene().expect("live").header);

@@ -1,4 +1,4 @@
-//! The whole procedure with a Phantom: the fake driver in the core's process, its hand led from here.
+//! The whole procedure with a Phantom: the fake driver in the core's process, its hand moved by the test.
 
 use fake_hd::control::{VARIABLE, get};
 use fake_hd::{Block, Control};
@@ -20,12 +20,12 @@ struct Rig {
     link: Link,
     core: Core,
     control: &'static Control,
-    /// Where the device's origin lies in the scene.
+    /// Origin of the device in the scene.
     origin_m: Vector3<f64>,
 }
 
 impl Rig {
-    /// The driver comes from the variable or from the option, as an operator would give it.
+    /// Selects the driver by the variable or by the option, as an operator would.
     fn start(name: &str, by_variable: bool) -> Self {
         let file = scratch(name).join("control");
         let control = Control::in_file(&file);
@@ -59,7 +59,7 @@ impl Rig {
         }
     }
 
-    /// Leads the hand there: scene z is away from the operator, scene x to the left.
+    /// Moves the hand there: scene z is away from the operator, scene x to the left.
     fn lead(&self, to_m: [f64; 3], speed_m_per_s: f64) {
         let from_origin = Vector3::from(to_m) - self.origin_m;
         self.control
@@ -75,7 +75,7 @@ impl Rig {
     }
 }
 
-/// Where the operator's hand has to be for what the script does now.
+/// Returns the goal of the operator's hand for the script's present step.
 fn goal(run: &Run, plan: &NeedlePlan, seeds_dropped: usize) -> Option<[f64; 3]> {
     match run.step() {
         Step::Plan | Step::Done => None,
@@ -86,7 +86,7 @@ fn goal(run: &Run, plan: &NeedlePlan, seeds_dropped: usize) -> Option<[f64; 3]> 
     }
 }
 
-/// Over real motors the core ends, for its end is what releases them; that is when a recording is wanted.
+/// With real motors the core ends, since only its end releases them; a recording is then needed.
 #[test]
 fn a_force_loop_that_stops_over_a_phantom_ends_the_core_and_leaves_a_recording() {
     where_the_machine_runs(|| {
@@ -154,7 +154,7 @@ fn the_whole_procedure_runs_with_a_phantom_and_its_motors_get_the_force() {
             "the membrane gave way"
         );
         assert!(largest > 3.0, "{largest} N");
-        // Two grids of 1 kHz: the very tick of the peak may be passed over.
+        // Two grids of 1 kHz: the tick of the peak itself may be skipped.
         assert!(
             (commanded - largest).abs() < 0.1 * largest,
             "{commanded} N commanded, {largest} N meant"
@@ -235,7 +235,7 @@ fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_o
             rig.link.poll();
             said(&rig.link).is_some_and(|t| t.contains("power and cable"))
         }));
-        // The force of the loop goes to zero in the ticks of the ramp, and stays there. Records come in batches, after the event.
+        // The force of the loop ramps to zero and stays there. Records come in batches, after the event.
         let (mut records, mut lost) = (Vec::<TickRecord>::new(), None);
         assert!(
             until(LONG, || {
@@ -249,7 +249,7 @@ fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_o
         let lost = lost.expect("seen");
         let late = records.iter().skip(lost + 21).find(|r| r.force_on_hand_n != [0.0; 3]);
         assert!(late.is_none(), "{late:?}");
-        // Arming again without a device is of no use.
+        // Re-arming without a device has no effect.
         ask(&mut rig.link, &Request::Engage).expect("answered");
         assert!(until(LONG, || {
             rig.link.poll();
@@ -268,7 +268,7 @@ fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_o
             }),
             "the pose comes again"
         );
-        // In the membrane the gate would wait for a small force.
+        // Inside the membrane the gate would wait for a small force.
         assert!(until(LONG, || {
             rig.link.poll();
             (tip(&rig.link) - entry).norm() < 2e-3

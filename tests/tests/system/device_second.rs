@@ -1,4 +1,4 @@
-//! Two hands in one procedure, as whole processes: both are seen and moved, and either may be lost without the other.
+//! Two hands in one procedure, as whole processes: both are visible and movable, and each may fail without the other.
 
 use fake_haply::{Server, Service, Wrong};
 use nalgebra::Vector3;
@@ -48,7 +48,7 @@ impl Rig {
     }
 }
 
-/// Whether the needle's hand and the other hand have a flag.
+/// Returns a flag of the needle's hand and of the other hand.
 fn is_on(link: &Link, flag: u32) -> [bool; 2] {
     [
         link.state().is_some_and(|s| s.flags & flag != 0),
@@ -92,7 +92,7 @@ fn both_hands_are_seen_and_each_goes_where_it_is_asked_to() {
         assert!(rig.waits_for(|link| is_on(link, flags::AT_GOAL)[1]));
         let there = Vector3::from(rig.link.second_state().expect("seen").tip_in_scene_m);
         assert!((there - goal).norm() < 5e-4, "{there} {goal}");
-        // Turned about its axis by atan2(0.6, 0.8), whichever of both came first.
+        // Rotated about its axis by atan2(0.6, 0.8), whichever of both came first.
         let turned = |link: &Link| link.second_state().expect("seen").world_from_tool;
         let half = 0.6_f64.atan2(0.8) / 2.0;
         assert!(
@@ -117,7 +117,8 @@ fn both_hands_are_seen_and_each_goes_where_it_is_asked_to() {
     });
 }
 
-/// The whole way: the hand's goal, its loop, the contact in the tissue loop, the snapshot that a window draws, and the force that comes back.
+/// The whole path: the hand's goal, its loop, the contact in the tissue loop, the snapshot for a window, and the
+/// returning force.
 #[test]
 fn a_probe_that_is_pressed_is_felt_and_moves_the_gland_and_withdrawn_leaves_nothing() {
     where_the_machine_runs(|| {
@@ -145,7 +146,7 @@ fn a_probe_that_is_pressed_is_felt_and_moves_the_gland_and_withdrawn_leaves_noth
         let moved_m = |link: &Link| link.snapshot().map_or(0.0, |s| s.header.max_displacement_m);
         assert_eq!((force_n(&rig.link).norm(), moved_m(&rig.link)), (0.0, 0.0));
         bring(&mut rig, within);
-        // The rectum is lower than the probe is thick: both walls are moved, and push against each other.
+        // The rectum is lower than the probe is thick: both walls move, and push against each other.
         assert!(rig.waits_for(|link| moved_m(link) > 1e-3), "{}", moved_m(&rig.link));
         let lies_n = force_n(&rig.link);
         bring(&mut rig, within + Vector3::new(0.0, 6e-3, 0.0));

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use stylet_test_kit::{program, scratch};
 
-/// A gland, a urethra and a rectum in voxels of 1.0 x 0.9 x 2.5 mm under an oblique affine, and 40 seeds along tilted needles;
-/// prints volume, D90, V100, V150 of the gland, D30 of the urethra, D2cc of the rectum, from 27 points in each voxel.
+/// A gland, a urethra and a rectum in voxels of 1.0 x 0.9 x 2.5 mm under an oblique affine, and 40 seeds along tilted
+/// needles; prints volume, D90, V100, V150 of the gland, D30 of the urethra, D2cc of the rectum, from 27 points in each
+/// voxel.
 const WRITE_CASE: &str = r##"
 import sys, math, tomllib, numpy as np, nibabel as nib
 volume, seeds_file, source_file = sys.argv[1:4]
@@ -62,7 +63,7 @@ print(cc, d[int(0.9 * len(d))], (d >= 145).mean() * 100, (d >= 217.5).mean() * 1
 
 pub struct Case {
     pub folder: PathBuf,
-    /// Of the gland cc, D90, V100, V150; of the urethra D30; of the rectum D2cc.
+    /// Volume (cc), D90, V100, V150 of the gland; D30 of the urethra; D2cc of the rectum.
     pub expected: [f64; 6],
 }
 
@@ -187,7 +188,7 @@ fn dose_at_points_and_over_a_time_comes_as_csv() {
     );
     let points = write("points.csv", "x_mm,y_mm,z_mm\n11,2,3\n");
     let dose = |more: &[&str]| {
-        // Results are not added to those of before.
+        // Results are not added to earlier ones.
         let _ = std::fs::remove_dir_all(folder.join("out"));
         let files = [
             ("--source", source()),

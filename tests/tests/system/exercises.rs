@@ -1,4 +1,4 @@
-//! What an instructor puts in is felt and seen, is announced, and ends when it is asked to.
+//! Injected faults are felt and seen, are announced, and end on request.
 
 use std::time::Duration;
 use stylet_host::link::Link;
@@ -9,15 +9,15 @@ use stylet_shm_schema::{Exercise, Mark, Phase, Request};
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, fresh_instance, until};
 
-/// What a needle of the scripted procedure left.
+/// Result of a needle of the scripted procedure.
 struct Seen {
     seeds_m: Vec<[f64; 3]>,
     surface_m: Vec<[f32; 3]>,
-    /// Mean over the snapshots with the tip inside of the largest displacement of any tissue.
+    /// Largest displacement of any tissue, averaged over the snapshots with the tip inside.
     moved_inside_m: f64,
 }
 
-/// `put_in` once the procedure has begun with its reset, and the needle is not in yet.
+/// Injects `put_in` once the procedure has begun with its reset and before the needle is in.
 fn procedure(link: &mut Link, put_in: Option<Exercise>) -> Seen {
     let plan = default_plan(&link.scene().expect("a live core has a scene").header);
     let mut run = Run::new(plan, Pace::default());
@@ -83,7 +83,7 @@ fn a_gland_that_has_moved_gets_its_seeds_beside_their_places_and_stiff_tissue_gi
             "the gland is drawn {drawn_mm} mm from before"
         );
         assert_eq!(link.snapshot().expect("live").header.body_moved_m, moved_m);
-        // The next procedure begins with a reset: nothing of it is left.
+        // The next procedure begins with a reset, which removes it.
         let factor = 3.0;
         let stiff = procedure(&mut link, Some(Exercise::StiffTissue { factor }));
         assert_eq!(link.snapshot().expect("live").header.body_moved_m, [0.0; 3]);
@@ -164,7 +164,7 @@ fn a_list_of_trainees_sees_each_stops_one_hand_and_says_who_is_silent() {
         ask(link, &request).expect("taken");
     }
     let tip_m = |which: usize| roster.glances()[which].state.map(|s| s.tip_in_scene_m);
-    // A hand goes on while its host polls.
+    // The hand keeps moving only while its host polls.
     let mut moves = |which: usize| {
         let before = tip_m(which);
         until(Duration::from_millis(400), || {

@@ -1,4 +1,4 @@
-//! A fault needs a person: a script does not turn the force on again unless that was asked for.
+//! A fault requires a decision: a script does not turn the force on again unless asked to.
 
 use std::process::Command;
 use std::time::Duration;

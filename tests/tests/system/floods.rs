@@ -1,7 +1,8 @@
 //! Hosts that send as fast as they can: another host's stop and release are in force within 20 ticks.
 //!
-//! Counted in ticks of the force loop, from the tick in which the request was in its queue to the first that obeyed it. The test shares
-//! the machine with the flood, so its own clock would say how busy that is. `make floods` asks 1,000 times under each flood.
+//! Counted in ticks of the force loop, from the tick in which the request was in its queue to the first that obeyed it.
+//! The test shares the machine with the flood, so its own clock would measure the load instead. `make floods` tests
+//! 1,000 requests under each flood.
 
 use std::process::{Child, Command as Process, Stdio};
 use std::sync::Arc;
@@ -15,13 +16,13 @@ use stylet_tests::hand::assert_smooth;
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, now_ns, repeats, until};
 
-/// A stop that is in force later than this came too late, ticks.
+/// Latest tick at which a stop must be in force.
 const MOST_TICKS: usize = 20;
 const PROCESSES: usize = 10;
-/// Tells the program of a test that it is one of those that flood this instance.
+/// Marks a test process as one that floods this instance.
 const INSTANCE: &str = "FLOODS_INSTANCE";
 
-/// Which identities the requests of a flood have.
+/// Identities in the requests of a flood.
 #[derive(Clone, Copy, Debug)]
 enum Flood {
     OneIdentity,
@@ -82,7 +83,7 @@ impl Drop for Flooding {
     }
 }
 
-/// Sends good requests as fast as it can; where hosts have no room for one more, waits for it.
+/// Sends valid requests as fast as it can; waits if there is no room for another host.
 fn send_all(instance: &Instance, has_new_identities: bool, is_over: &AtomicBool, sent: &AtomicU64) {
     let own = 1000 + u64::from(std::process::id());
     while !is_over.load(Ordering::Relaxed) {
@@ -116,7 +117,7 @@ fn a_process_that_floods() {
     }
 }
 
-/// A host by its ports: it sends from this thread, at a time that is known.
+/// A host by its ports: it sends from this thread, at a known time.
 struct Stopper {
     stops: service::Publisher<Command>,
     commands: service::Publisher<Command>,
@@ -135,7 +136,7 @@ impl Stopper {
         }
     }
 
-    /// Asks as a link does, and gives when the request was in its queue.
+    /// Sends a request as a link does, and returns the time at which it was queued.
     fn ask(&mut self, request: &Request) -> u64 {
         self.asked += 1;
         let command = request.encode(7, self.asked).expect("fits");
@@ -146,7 +147,7 @@ impl Stopper {
     }
 }
 
-/// The operator, who moves and arms again what another host has stopped.
+/// The operator, who moves and re-arms after another host's stop.
 struct Operator {
     link: Link,
     records: Vec<TickRecord>,
@@ -165,7 +166,7 @@ impl Operator {
         self.watch_until(time, |_| false);
     }
 
-    /// Asks until the core says so: a flood of answers may take the place of one.
+    /// Repeats a request until the state shows it: a flood of answers may displace one.
     fn set(&mut self, flag: u32, request: &Request) {
         let is_set = (0..20).any(|_| {
             self.link.send(request).expect("sent");
@@ -175,7 +176,7 @@ impl Operator {
     }
 }
 
-/// Stops a hand that moves and releases the force in turn, under a flood.
+/// Alternately stops a moving hand and releases the force, under a flood.
 fn stops_under(flood: Flood, count: u64) {
     let mut core = Core::start();
     let (link, records) = (core.host(), Vec::new());

@@ -1,4 +1,4 @@
-//! Insertions at the speeds of the clinic: forces of each layer, what gives way, and how far the gland goes along.
+//! Insertions at clinical speeds: forces of each layer, punctures, and displacement of the gland.
 
 use nalgebra::Vector3;
 use stylet_benches::session::{Session, axis_start, gland_shift_m};
@@ -11,11 +11,11 @@ use stylet_sim::scene::{Scene, TissueKind};
 use stylet_sim::tissue::MaterialPoint;
 use stylet_tests::rehearsal::Theatre;
 
-/// What an insertion was.
+/// Result of an insertion.
 struct Insertion {
     largest_force_n: f64,
     largest_shift_m: f64,
-    /// Each membrane that gave way, and how far from the start it was met.
+    /// Each punctured membrane, and the distance from the start at which it was met.
     gave_way: Vec<(LayerKind, f64)>,
 }
 
@@ -31,7 +31,7 @@ fn insertion(scene: &str, depth_m: f64, speed_m_per_s: f64) -> Insertion {
     insertion_from(world, start, depth_m, speed_m_per_s)
 }
 
-/// Along z.
+/// Runs an insertion along z.
 fn insertion_from(world: World, start: Vector3<f64>, depth_m: f64, speed_m_per_s: f64) -> Insertion {
     let mut session = Session::new(world, start, Hand::steady(), 5);
     session.go_to(start + Vector3::z() * depth_m, speed_m_per_s);
@@ -74,7 +74,7 @@ fn insertion_from(world: World, start: Vector3<f64>, depth_m: f64, speed_m_per_s
     }
 }
 
-/// Layers with a membrane that a line along z comes into in the body at rest.
+/// Layers with a membrane on a line along z through the body at rest.
 fn membranes_on_line(world: &World, start: Vector3<f64>, depth_m: f64) -> Vec<(LayerKind, f64)> {
     let (lattice, layers) = (&world.scene.lattice, Layers::default());
     let half_m = 0.5 * lattice.spacing_m;
@@ -119,7 +119,7 @@ fn skin_gives_way_at_its_own_force_and_is_not_the_last_membrane() {
     assert!(was.gave_way.len() >= 2, "{:?}", was.gave_way);
 }
 
-/// What is met may be pushed ahead, or have come nearer, by no more than two elements.
+/// Largest shift, to and fro, of the place where a layer is met: two elements.
 const MET_WITHIN_M: f64 = 2e-3;
 
 fn assert_met(what: &str, met: &[(LayerKind, f64)], lies: &[(LayerKind, f64)]) {
@@ -134,14 +134,14 @@ fn assert_met(what: &str, met: &[(LayerKind, f64)], lies: &[(LayerKind, f64)]) {
     }
 }
 
-/// Three punctures in the pelvis were once taken for one too many: the third is the bladder.
+/// Three punctures in the pelvis were once mistaken for one too many: the third is the bladder.
 #[test]
 fn what_gives_way_in_the_pelvis_lies_on_the_needles_line() {
     let plan = default_plan(&Theatre::builtin("pelvis").scene.header);
     assert_eq!(plan.direction, [0.0, 0.0, 1.0]);
     let deepest_m = plan.seeds_m.iter().map(|s| plan.along_m(*s)).fold(0.0, f64::max);
     let start = Vector3::from(plan.entry_m);
-    // To where the window lets a needle go, and on into the bladder.
+    // To the deepest point that the window allows, and on into the bladder.
     for (what, depth_m, membranes) in [("planned path", deepest_m + 0.01, 2), ("beyond it", 0.11, 3)] {
         let lies = membranes_on_line(&world("pelvis"), start, depth_m);
         assert_eq!(lies.len(), membranes, "{what}: {lies:?}");
@@ -150,7 +150,7 @@ fn what_gives_way_in_the_pelvis_lies_on_the_needles_line() {
     }
 }
 
-/// `docs/physics.md`, layers: the tip is in the urethra already when the capsule before it gives way.
+/// `docs/physics.md`, layers: the tip is already in the urethra when the capsule before it gives way.
 #[test]
 fn on_the_axis_of_the_gland_the_urethra_is_felt_as_gland_and_the_bladder_gives_way() {
     let start = axis_start(&world("pelvis"));

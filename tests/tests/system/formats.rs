@@ -1,4 +1,4 @@
-//! One gland with urethra and rectum in every format runs in a core as the same structures at the same place.
+//! One gland with urethra and rectum, in every format, runs in a core as the same structures at the same place.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -7,7 +7,8 @@ use stylet_shm_schema::role;
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, program, scratch, until};
 
-/// A gland, a urethra through it and a rectum beside it, 0.8 x 0.9 x 1.5 mm, oblique; prints centres in patient mm and volumes.
+/// A gland, a urethra through it and a rectum next to it, 0.8 x 0.9 x 1.5 mm, oblique; prints centres in patient mm and
+/// volumes.
 const WRITE: &str = r#"
 import json, sys, numpy as np, nibabel as nib
 shape, zooms = (80, 75, 45), np.array([0.8, 0.9, 1.5])
@@ -57,7 +58,7 @@ fn convert(from: &Path, to: &Path) {
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
 }
 
-/// As NRRD with names, MetaImage, NIfTI by a scene file each, and as DICOM contours.
+/// Writes it as NRRD with names, MetaImage, NIfTI with a scene file each, and DICOM contours.
 fn formats(folder: &Path) -> Vec<PathBuf> {
     let by_scene_file = |file: &str| {
         let path = folder.join(format!("{file}.toml"));

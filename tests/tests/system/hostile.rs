@@ -1,7 +1,7 @@
-//! Peers that mix what is valid, stale and broken, over shared memory and over OpenIGTLink: no tick is without its record, and every
-//! fault has a name and takes the force away.
+//! Peers that mix valid, stale and broken messages, over shared memory and over OpenIGTLink: every tick has its record,
+//! and every fault has a name and removes the force.
 //!
-//! A seed repeats the messages, not their moments. `make hostile` goes on for ten minutes.
+//! A seed repeats the messages, not their times. `make hostile` runs for ten minutes.
 
 use crate::igtl::{Served, needle_of};
 use bytemuck::Zeroable;
@@ -18,14 +18,14 @@ use stylet_tests::hand::force_n;
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, repeats, until};
 
-/// A fault takes the force away within so many ticks.
+/// Ticks within which a fault removes the force.
 const ZERO_WITHIN: usize = 20;
-/// What a device calls no force, N.
+/// Largest force that a device counts as zero, N.
 const ZERO_N: f64 = 1e-9;
-/// Messages that were good once and are sent again.
+/// Formerly valid messages that are sent again.
 const STALE: usize = 64;
 
-/// Counts of what was sent, by kind of message: valid, stale, broken.
+/// Counts of sent messages by kind: valid, stale, broken.
 type Sent = [AtomicU64; 3];
 
 fn place(random: &mut Random) -> [f64; 3] {
@@ -37,7 +37,7 @@ fn direction(random: &mut Random) -> [f64; 3] {
     [x, y, (1.0 - x * x - y * y).sqrt()]
 }
 
-/// A request that a core may carry out. None ends it: that is obeyed, as it must be.
+/// Draws a request that a core may carry out. None ends the core, which would rightly obey.
 fn request(random: &mut Random) -> Request {
     let hand = HandMove {
         tip_m: place(random),
@@ -86,7 +86,7 @@ fn request(random: &mut Random) -> Request {
 fn broken(random: &mut Random, good: &Command) -> Command {
     let mut command = if random.below(2) == 0 { *good } else { Command::zeroed() };
     match random.below(3) {
-        // One word of it, as a bit that falls over.
+        // One bit of it flipped.
         0 => {
             let words = bytemuck::cast_slice_mut::<u8, u64>(bytemuck::bytes_of_mut(&mut command));
             words[random.below(words.len())] ^= 1 << random.below(64);
@@ -109,7 +109,7 @@ fn broken(random: &mut Random, good: &Command) -> Command {
     command
 }
 
-/// A host that talks at random, by its ports.
+/// Runs a host that sends at random, by its ports.
 fn host(instance: &Instance, seed: u64, is_over: &AtomicBool, sent: &Sent) {
     let (mut random, mut stale) = (Random(seed), Vec::<Command>::new());
     let count = |kind: usize| sent[kind].fetch_add(1, Ordering::Relaxed);
@@ -127,7 +127,7 @@ fn host(instance: &Instance, seed: u64, is_over: &AtomicBool, sent: &Sent) {
             std::thread::sleep(Duration::from_millis(50));
             continue;
         };
-        // Comes and goes, as hosts do.
+        // Hosts come and go.
         for _ in 0..200 + random.below(4000) {
             if is_over.load(Ordering::Relaxed) || !node.is_current() {
                 break;
@@ -162,7 +162,7 @@ fn host(instance: &Instance, seed: u64, is_over: &AtomicBool, sent: &Sent) {
     }
 }
 
-/// A client that talks at random.
+/// Runs a client that sends at random.
 fn client(address: &str, seed: u64, is_over: &AtomicBool, sent: &Sent) {
     let (mut random, mut stale) = (Random(seed), Vec::<Vec<u8>>::new());
     let mut drained = vec![0; 1 << 16];
@@ -278,7 +278,7 @@ fn hostile_peers_cost_no_tick_and_raise_no_fault_without_a_name() {
             "they say nothing"
         );
         assert!(core.is_running());
-        // And the operator's word still counts.
+        // The operator's requests still count.
         let mut operator = core.host();
         ask(&mut operator, &Request::EndExercises).expect("taken");
         ask(&mut operator, &Request::Engage).expect("armed");

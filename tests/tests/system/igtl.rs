@@ -1,5 +1,5 @@
-//! `host-ui igtl`: what a client of OpenIGTLink gets is where the core has it, in RAS and mm; what a client sends moves the hand or is
-//! refused in words; and no client costs a frame or a tick.
+//! `host-ui igtl`: clients of OpenIGTLink receive the core's positions, in RAS and mm; their messages move the hand or
+//! are refused with a reason; and no client costs a frame or a tick.
 
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -13,7 +13,7 @@ use stylet_tests::hand::Insertion;
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, program, until};
 
-/// The process, where it listens, and what it printed.
+/// The process, its address, and its output.
 pub struct Served {
     child: Child,
     pub address: String,
@@ -74,7 +74,7 @@ fn receive(stream: &mut TcpStream) -> Message {
     Message::of(&header, &body).expect("a message")
 }
 
-/// The next that is wanted, within 600 messages.
+/// Returns the next wanted message, within 600 messages.
 fn receive_one<T>(stream: &mut TcpStream, wanted: impl Fn(Message) -> Option<T>) -> T {
     let mut messages = (0..600).map(|_| receive(stream));
     messages.find_map(wanted).expect("it comes")
@@ -103,7 +103,7 @@ pub fn send(stream: &mut TcpStream, device: &str, columns: [[f32; 3]; 4]) -> io:
     stream.write_all(&message.encode().expect("fits"))
 }
 
-/// The needle's transform, so many mm on along its own axis.
+/// Returns the needle's transform moved by `mm` along its own axis.
 pub fn further(mut columns: [[f32; 3]; 4], mm: f32) -> [[f32; 3]; 4] {
     (0..3).for_each(|a| columns[3][a] += mm * columns[2][a]);
     columns
@@ -156,7 +156,7 @@ fn a_client_gets_needle_gland_and_state_where_the_core_has_them() {
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
         let all = gland.points.iter().map(|p| f64::from(p[a]));
         let (least, most) = all.fold((f64::MAX, f64::MIN), |(l, m), c| (l.min(c), m.max(c)));
-        // The box is that of whole elements.
+        // The bounding box covers whole elements.
         assert!(
             (least - low).abs() < 2.0 && (most - high).abs() < 2.0,
             "{least} to {most}, {low} to {high}"
@@ -168,7 +168,7 @@ fn a_client_gets_needle_gland_and_state_where_the_core_has_them() {
     core.finish();
 }
 
-/// The seeds stood where the gland had been before an exercise moved it.
+/// The seeds used to stay in place when an exercise moved the gland.
 #[test]
 fn seeds_go_with_a_gland_that_moves() {
     let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "fem"]);
@@ -198,7 +198,7 @@ fn seeds_go_with_a_gland_that_moves() {
         link.snapshot().is_some_and(|s| s.header.body_moved_m == by_m)
     });
     assert!(is_there, "the body rests");
-    // What was underway, and what is sent twice a second.
+    // Messages on their way, and those sent twice a second.
     std::thread::sleep(Duration::from_secs(1));
     drop(stream);
     let mut stream = served.connect();
@@ -223,7 +223,7 @@ fn a_tracker_moves_the_needle_and_its_silence_stops_it() {
     let served = Served::start(&core, &["--hand", "Stylus", "--hand-speed", "20"]);
     let mut stream = served.connect();
     let (rest_m, shown) = (tip_m(&mut link), needle_of(&mut stream));
-    // 5 mm in its own frame, as a tracker sends it: again and again.
+    // 5 mm in its own frame, sent repeatedly like a tracker.
     let is_there = until(Duration::from_secs(20), || {
         send(&mut stream, "Stylus", further(shown, 5.0)).expect("sent");
         std::thread::sleep(Duration::from_millis(15));
@@ -238,7 +238,7 @@ fn a_tracker_moves_the_needle_and_its_silence_stops_it() {
     let back = needle_of(&mut stream);
     assert_eq!(back[2], shown[2], "it points where it pointed");
 
-    // 200 mm take 10 s: whoever asked for them falls silent after 6 mm.
+    // 200 mm take 10 s: the sender falls silent after 6 mm.
     let there_m = tip_m(&mut link);
     send(&mut stream, "Stylus", further(shown, -200.0)).expect("sent");
     let moves = until(Duration::from_secs(10), || distance_m(tip_m(&mut link), there_m) > 1e-3);
@@ -272,7 +272,7 @@ fn a_transform_that_nobody_agreed_to_is_refused_in_words_and_moves_nothing() {
     );
     send(&mut streams[1], "Probe", further(shown, 5.0)).expect("sent");
     assert!(refusal(&mut streams[1]).text.contains("\"Stylus\" alone"));
-    // A place that no hand reaches is refused by the core, in its words.
+    // The core refuses an unreachable goal with its own text.
     std::thread::sleep(Duration::from_millis(60));
     send(&mut streams[1], "Stylus", further(shown, 1e7)).expect("sent");
     let status = refusal(&mut streams[1]);
@@ -284,13 +284,14 @@ fn a_transform_that_nobody_agreed_to_is_refused_in_words_and_moves_nothing() {
     core.finish();
 }
 
-/// Of each measurement; `STYLET_IGTL_S` makes it longer for a figure.
+/// Duration of each measurement; `STYLET_IGTL_S` makes it longer for a figure.
 pub fn watched() -> Duration {
     let asked = std::env::var("STYLET_IGTL_S").ok().and_then(|s| s.parse().ok());
     Duration::from_secs_f64(asked.unwrap_or(4.0))
 }
 
-/// Messages of the needle, each decoded with its checksum and later than the one before; and the longest time between two.
+/// Counts messages of the needle, each decoded with its checksum and later than the one before; also returns the
+/// longest interval.
 fn watch(stream: &mut TcpStream, end: Instant) -> (usize, Duration) {
     let (mut count, mut longest, mut last, mut time) = (0, Duration::ZERO, Instant::now(), (0, 0));
     while Instant::now() < end {
@@ -304,7 +305,7 @@ fn watch(stream: &mut TcpStream, end: Instant) -> (usize, Duration) {
     (count, longest)
 }
 
-/// One does not read, one stops within a message, one sends what is no message, and one sends without end.
+/// One does not read, one stops within a message, one sends an invalid message, and one sends without end.
 #[test]
 fn clients_that_hang_cost_no_frame_and_no_tick() {
     where_the_machine_runs(|| {
@@ -338,10 +339,10 @@ fn clients_that_hang_cost_no_frame_and_no_tick() {
                 match flood.write(&bytes[at..]) {
                     Ok(length) => (sent, at) = (sent + length, (at + length) % bytes.len()),
                     Err(why) if why.kind() == ErrorKind::WouldBlock => {}
-                    // It does not read either, and is disconnected for that: it comes again.
+                    // It does not read either, is disconnected for that, and reconnects.
                     Err(_) => (flood, at) = (connect_to(&address), 0),
                 }
-                // More than any tracker, and no more of the machine than one client may have.
+                // More than any tracker, and no more of the machine than one client may use.
                 std::thread::sleep(Duration::from_micros(200));
             }
             sent / bytes.len()

@@ -1,4 +1,5 @@
-//! `host-ui igtl` with the client of another implementation, pyigtl: it reads what the codec writes, watches a core and moves its hand.
+//! `host-ui igtl` with the client of another implementation, pyigtl: it reads the codec's output, watches a core and
+//! moves its hand.
 
 use crate::igtl::{Served, distance_m, tip_m, watched};
 use std::path::Path;
@@ -6,7 +7,7 @@ use std::process::Command;
 use std::time::Duration;
 use stylet_tests::Core;
 
-/// `make igtl-test` installs pyigtl in a folder of its own and names its Python in `STYLET_PYIGTL`.
+/// Runs pyigtl, which `make igtl-test` installs in a separate folder, naming its Python in `STYLET_PYIGTL`.
 fn pyigtl(words: &[&str]) -> serde_json::Value {
     let python = std::env::var("STYLET_PYIGTL").expect("STYLET_PYIGTL names a Python with pyigtl");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../host-ui/igtl/tests/client.py");
@@ -80,7 +81,7 @@ fn pyigtl_watches_and_moves_the_hand() {
             .iter()
             .all(|device| count(device) > watched().as_secs_f64())
     );
-    // A core without real time may be behind on a busy machine, and says so.
+    // A core without real time may lag on a busy machine, and says so.
     let log = served.log();
     let refused = log
         .lines()

@@ -1,4 +1,4 @@
-//! One insertion through both processes: gland, force and seeds do what the paper describes.
+//! One insertion through both processes: gland, force and seeds behave as the paper describes.
 
 use std::time::Duration;
 use stylet_host::link::Link;
@@ -7,7 +7,7 @@ use stylet_shm_schema::{Phase, TickRecord, flags};
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, until};
 
-/// What a host saw of a whole procedure.
+/// A host's view of a whole procedure.
 struct Seen {
     records: Vec<TickRecord>,
     worst_residual: f64,

@@ -1,4 +1,4 @@
-//! SIGKILL of the host in the middle of an insertion: the loop does not notice, and a new host sees the insertion.
+//! SIGKILL of the host during an insertion: the loop is unaffected, and a new host sees the insertion.
 
 use std::time::Duration;
 use stylet_host::link::LinkStatus;
@@ -7,11 +7,11 @@ use stylet_shm_schema::{Phase, Request, TickRecord};
 use stylet_tests::window_process::Window;
 use stylet_tests::{Core, Display, ask, until};
 
-/// How long each window lives.
+/// Lifetime of each window.
 const WINDOW_LIFE: Duration = Duration::from_millis(2500);
 const WINDOWS: u32 = 3;
 
-/// Records of one slow insertion with a window open; with `kill` it is killed and opened anew on the way.
+/// Records one slow insertion with a window open; with `kill` the window is killed and reopened on the way.
 fn insertion(display: &Display, kill: bool) -> Vec<TickRecord> {
     let mut core = Core::start();
     let mut link = core.host();
@@ -40,7 +40,7 @@ fn insertion(display: &Display, kill: bool) -> Vec<TickRecord> {
             window = Window::open_on(display, &core);
         }
     }
-    // A host that comes now sees the insertion that is under way.
+    // A new host sees the insertion under way.
     let mut late = core.host();
     let sees = until(Duration::from_secs(3), || {
         late.poll();
@@ -77,8 +77,8 @@ fn missed(records: &[TickRecord]) -> u64 {
 #[test]
 fn killing_hosts_in_an_insertion_leaves_no_gap_that_a_run_without_kills_does_not_have() {
     let display = Display::open();
-    // Interleaved, since a shared machine has gaps of its own: two rounds, and up to six where chance alone might have
-    // put the gaps beside the kills. A gap that the kills make is there each time.
+    // Interleaved, since a shared machine has gaps anyway: two rounds, and up to six if chance alone might explain gaps
+    // near the kills. A gap caused by the kills appears each time.
     let (mut control, mut killed) = (Vec::new(), Vec::new());
     let least = |runs: &[(u64, u64)]| runs.iter().map(|r| r.0).min().unwrap_or(0);
     let most = |runs: &[(u64, u64)]| runs.iter().map(|r| r.0).max().unwrap_or(0);

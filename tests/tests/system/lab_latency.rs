@@ -1,11 +1,11 @@
-//! The latency laboratory as a user runs it: report, verdict in the exit code, a report that was altered, a second rate.
+//! The latency laboratory in use: report, verdict in the exit code, an altered report, a second rate.
 
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
 use stylet_tests::{program, scratch};
 
-/// `rt-core latency` for two seconds into `out`. Without the rights to real time it measures all the same.
+/// Runs `rt-core latency` for two seconds into `out`. Without real-time rights it measures all the same.
 fn latency(out: &Path, more: &[&str]) -> Output {
     Command::new(program("rt-core"))
         .args(["latency", "--duration", "2s", "--rt-if-allowed", "--out"])
@@ -52,7 +52,7 @@ fn report_holds_the_whole_path_and_the_loops_stayed_clean() {
     let output = latency(&out, &["--load", "ui"]);
     let report = read(&out);
     assert_eq!(report["schema"], "stylet.latency/1");
-    // The whole way was walked: device, law, tissue, host.
+    // Every part of the path was measured: device, law, tissue, host.
     for (section, name) in [
         ("haptic", "wake-up"),
         ("haptic", "device read to force written"),
@@ -63,7 +63,7 @@ fn report_holds_the_whole_path_and_the_loops_stayed_clean() {
         assert!(t["count"].as_u64().expect("a count") > 100, "{section} {name}: {t}");
         assert!(t["max_us"].as_f64() >= t["min_us"].as_f64(), "{t}");
     }
-    // The stages of a tick are parts of it: no stage took longer than the longest tick.
+    // No stage of a tick took longer than the longest tick.
     let whole_us = times(&report, "haptic", "whole tick")["max_us"]
         .as_f64()
         .expect("measured");
@@ -78,7 +78,7 @@ fn report_holds_the_whole_path_and_the_loops_stayed_clean() {
         assert_eq!(counts["unmeasured"], 0, "{section}: {counts}");
     }
     assert_eq!(report["host"]["records_missing"], 0);
-    // 1500 ticks are too few for p99.99; the report has the length that it needs.
+    // 1500 ticks are too few for p99.99; the report states the length that it needs.
     let p9999 = &times(&report, "haptic", "wake-up")["quantiles"][4];
     assert_eq!((&p9999["us"], &p9999["needs_s"]), (&Value::Null, &Value::from(100.0)));
     // The exit code is the verdict.
@@ -166,8 +166,8 @@ fn the_same_loops_run_at_five_kilohertz() {
     let seconds = |name: &str| report["protocol"][name].as_f64().expect("a time");
     let measured_s = seconds("measured_s");
     let grid = ((measured_s + seconds("warm_up_s")) * 5_000.0).round() as u64;
-    // Every point of the 5 kHz grid was either served or counted as missed. The warm-up ends after so many ticks, whatever was
-    // missed among them.
+    // Every point of the 5 kHz grid was either served or counted as missed. The warm-up ends after that many ticks,
+    // including missed ones.
     assert!(
         (grid..=grid + grid / 10).contains(&(ticks + missed)),
         "{ticks} ticks and {missed} missed of {grid}"
@@ -228,7 +228,7 @@ fn doctor_reports_the_same_in_words_and_in_json() {
     let findings = json["findings"].as_array().expect("a list");
     let blocked = findings.iter().any(|f| f["severity"] == "blocker");
     assert_eq!(code, Some(i32::from(blocked)));
-    // What the kernel says of itself, read another way.
+    // The kernel's own data, read another way.
     let virtual_machine = std::fs::read_to_string("/proc/cpuinfo")
         .expect("readable")
         .contains(" hypervisor");

@@ -1,4 +1,4 @@
-//! The whole system: processes, devices, faults, recordings, and implants carried out.
+//! The whole system: processes, devices, faults, recordings, and executed implants.
 
 mod bridge_force;
 mod device_abi;

@@ -1,5 +1,6 @@
-//! Programs that end, hang or are read by nobody while they move the hand: it is at rest within 5 mm and 0.4 s of its owner's end, and
-//! goes on while it has one. A killed procedure used to leave a hand that went on for 55 mm and 5 s.
+//! Programs that end, hang or lose their readers while they move the hand: it is at rest within 5 mm and 0.4 s of its
+//! owner's end, and keeps moving while it has an owner. A killed procedure used to leave a hand that moved on for 55 mm
+//! and 5 s.
 //!
 //! The window and a gamepad are in `tests/window/src/senders.rs`; `make senders` makes fifty trials of each.
 
@@ -16,7 +17,7 @@ use stylet_tests::stage::Stage;
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, program, repeats, scratch, until};
 
-/// Speed of the insertion: the fastest of published ones, mm/s.
+/// Speed of the insertion: the fastest published, mm/s.
 const MM_PER_S: &str = "123";
 
 #[test]
@@ -29,7 +30,7 @@ fn a_hand_whose_procedure_ends_or_hangs_is_at_rest_within_5_mm_and_400_ticks() {
                 .map(|_| {
                     stage.draw_out();
                     let mut sender = Sender::start(procedure(&stage.core), ending);
-                    // The way to the entry takes half a second, that in the tissue as long.
+                    // The path to the entry takes half a second, that in the tissue as long.
                     let after = Duration::from_secs_f64(0.25 * stage.random.unit());
                     trial(&mut stage.observer, &mut sender, (place, ending), after, BEGINS_WITHIN)
                 })
@@ -87,13 +88,13 @@ fn igtl(core: &Core, port: u16) -> Command {
     command
 }
 
-/// Its output is not read: it cannot say where it listens.
+/// Its output is not read, so it cannot report its port.
 fn free_port() -> u16 {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     listener.local_addr().expect("bound").port()
 }
 
-/// A client that sends the needle elsewhere, again and again, until dropped.
+/// A client that keeps sending the needle elsewhere until dropped.
 struct Tracker {
     is_over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,

@@ -1,11 +1,11 @@
-//! A command for a core that does not run says so soon: it used to look for one for 3 s.
+//! A command for a core that does not run fails soon: it used to look for one for 3 s.
 
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Alone, Core, fresh_instance, program, scratch};
 
-/// An operator who has forgotten to start it waits no longer.
+/// Longest wait of an operator who has forgotten to start it.
 const SOON: Duration = Duration::from_secs(2);
 
 fn assert_says_so(instance: &str, command: &[&str]) {
@@ -34,7 +34,7 @@ fn a_command_without_a_core_says_so_within_two_seconds() {
         for command in [&["procedure"] as &[&str], &["flight"], &recorded] {
             assert_says_so(alone.0.name(), command);
         }
-        // What a core that was killed has left is no core.
+        // The remains of a killed core are not a core.
         let mut core = Core::start();
         drop(core.host());
         let killed = Alone(core.kill());

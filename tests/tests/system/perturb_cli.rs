@@ -43,7 +43,7 @@ fn trials_are_the_same_on_any_number_of_threads_and_none_moves_without_an_error(
     assert!((of(&still, "Prostate V100 [percent]", "planned") - case.expected[2]).abs() < 0.5);
 }
 
-/// What a shift does to the figures is known from seeds that were shifted in their file.
+/// The effect of a shift on the figures is known from seeds shifted in their file.
 #[test]
 fn a_shift_scores_as_seeds_shifted_in_their_file_and_criteria_count_the_trials() {
     let case = case("perturb-shifted");
@@ -113,7 +113,7 @@ fn a_shift_scores_as_seeds_shifted_in_their_file_and_criteria_count_the_trials()
     }
     let criteria = found["criteria"].as_array().expect("a list");
     let percent: Vec<f64> = criteria.iter().filter_map(|c| c["percent"].as_f64()).collect();
-    // Three of the target, two of the urethra, one of the rectum, then those asked for.
+    // Three for the target, two for the urethra, one for the rectum, then those requested.
     assert_eq!((percent.len(), percent[6], percent[7]), (8, 100.0, 0.0));
     let (fine, said, _) = trials(&seeds, "refused", &["--strand-correlation", "1"]);
     assert!(

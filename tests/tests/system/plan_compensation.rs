@@ -1,4 +1,5 @@
-//! Compensation halves the mean seed error at least, on plans and glands that it was not tuned on; and the page that says so.
+//! Compensation at least halves the mean seed error, on plans and glands that it was not tuned on; and the page that
+//! says so.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -22,17 +23,17 @@ struct Row {
     gland: &'static str,
     needles: usize,
     seeds: usize,
-    /// Needles that cannot be done as planned.
+    /// Needles that cannot be inserted as planned.
     not_as_planned: usize,
-    /// Needles that no way was found for.
+    /// Needles without a solution.
     not_possible: usize,
     insert_m_per_s: f64,
-    /// Mean and worst, before and after.
+    /// Mean and worst error, before and after.
     errors_m: [[f64; 2]; 2],
     rehearsals: usize,
-    /// Of them for edges.
+    /// Those due to edges.
     for_edges: usize,
-    /// Seeds on an edge even so, and how far one of them moves at most.
+    /// Seeds still on an edge, and the largest motion of one of them.
     sensitive: (usize, f64),
     seconds: f64,
 }
@@ -53,7 +54,7 @@ fn first_plan(theatre: &Theatre) -> ImplantPlan {
     plan
 }
 
-/// The default needle of a scene as a needle of a plan.
+/// Returns the default needle of a scene as a needle of a plan.
 fn default_needle(theatre: &Theatre, seeds: usize) -> Needle {
     let plan = plan_with_seeds(&theatre.scene.header, seeds);
     let mut needle = first_plan_needle(plan.entry_m, plan.direction);
@@ -79,7 +80,7 @@ fn first_plan_needle(entry_m: [f64; 3], direction: [f64; 3]) -> Needle {
     }
 }
 
-/// An ellipsoid with a hollow on one side, 1 mm elements, oblique to nothing.
+/// An ellipsoid with a hollow on one side, 1 mm elements, not aligned with any axis.
 fn ellipsoid() -> Labels {
     let dims = [80, 70, 90];
     let half = [21.0, 16.0, 24.0];
@@ -221,7 +222,7 @@ fn compensation_of_every_needle_halves_it_and_the_page_says_so() {
     check(&rows);
 }
 
-/// Of the needles of automatic plans every so many.
+/// Compensates every `every`-th needle of automatic plans.
 fn compensated(every: usize) -> Vec<Row> {
     let some = |plan: &ImplantPlan| plan.needles.iter().step_by(every).cloned().collect::<Vec<Needle>>();
     let mut rows = Vec::new();

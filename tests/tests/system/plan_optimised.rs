@@ -1,4 +1,4 @@
-//! The automatic plan of the built-in pelvis keeps the limits that the peripheral pattern does not keep.
+//! The automatic plan of the built-in pelvis keeps the limits that the peripheral pattern violates.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -15,7 +15,7 @@ use stylet_implant::plan::{Anatomy, Needle, Template, check};
 use stylet_implant::readers::DoseFile;
 use stylet_tests::rehearsal::Theatre;
 
-/// V150 was 84.5 % and D10 of the urethra 291 Gy: the pattern looked at the coverage of the target alone.
+/// V150 was 84.5 % and D10 of the urethra 291 Gy: the pattern considered only the coverage of the target.
 #[test]
 fn the_automatic_plan_of_the_pelvis_keeps_its_limits() {
     let theatre = Theatre::builtin("pelvis");
@@ -68,7 +68,7 @@ fn the_automatic_plan_of_the_pelvis_keeps_its_limits() {
             assert!(wrong.is_empty(), "{wrong:?}");
             assert_eq!(found.figures.broken(), Vec::<String>::new());
             assert!(found.plan.needles.len() <= 25);
-            // Other trials than those of the search.
+            // Trials other than those of the search.
             let how = Perturbation {
                 errors: Errors::of_sigma(4e-3),
                 trials: 1000,
@@ -81,7 +81,7 @@ fn the_automatic_plan_of_the_pelvis_keeps_its_limits() {
     }
 }
 
-/// The window had no button for a study: its three files were of three patients.
+/// The window had no button for a study: its three files had three different patients.
 #[test]
 fn a_plan_of_a_scene_becomes_three_files_that_belong_together() {
     let theatre = Theatre::builtin("pelvis");
@@ -110,7 +110,7 @@ fn a_plan_of_a_scene_becomes_three_files_that_belong_together() {
     };
     let identities = ["structure_set.dcm", "plan.dcm", "dose.dcm"].map(|name| Identity::of(&opened(name)));
     assert!(identities.iter().all(|other| *other == identities[0]), "{identities:?}");
-    // Contours enclose what the segmentation has, and every structure is there.
+    // Contours enclose the segmentation, and every structure is present.
     let set = StructureSet::of(&opened("structure_set.dcm")).expect("contours");
     let header = &theatre.scene.header;
     assert_eq!(set.structures.len(), header.structures().len());
@@ -130,14 +130,14 @@ fn a_plan_of_a_scene_becomes_three_files_that_belong_together() {
             .filter(|&&cell| usize::from(cell) == number + 1)
             .count();
         let expected_m3 = cells as f64 * cell_m3;
-        // They lay half a voxel off, and thin ones were read back up to 3.2 % larger than their cells.
+        // They were half a voxel off, and thin ones were read back up to 3.2 % larger than their cells.
         println!("{name}: {:.3} of its cells", found_m3 / expected_m3);
         assert!(
             (found_m3 / expected_m3 - 1.0).abs() < 1e-6,
             "{name}: {found_m3} of {expected_m3} m3"
         );
     }
-    // Seeds where they are planned, and the dose that they give there.
+    // Seeds at their planned positions, and their dose there.
     let written = dicom::plan::open(&folder.join("plan.dcm")).expect("a plan");
     let dose = dicom::dose::of_file(&folder.join("dose.dcm")).expect("a dose");
     assert_eq!(dose.plan.as_deref(), Some(written.uid.as_str()));
@@ -158,7 +158,7 @@ fn a_plan_of_a_scene_becomes_three_files_that_belong_together() {
     let expected: f64 = seeds.iter().map(|seed| kernel.exact_at_gy(seed, in_scene)).sum();
     let found = dose.at_gy(place).expect("in the grid");
     assert!((found / expected - 1.0).abs() < 1e-3, "{found} of {expected} Gy");
-    // Cancelled, nothing is written.
+    // After a cancellation nothing is written.
     let other = folder.with_file_name("cancelled");
     let stop = |share: f32| match share > 0.03 {
         true => ControlFlow::Break(()),

@@ -1,4 +1,4 @@
-//! A rehearsal says what the live run does: same scene, same needle, seeds within a stated bound; and it disturbs nothing.
+//! A rehearsal predicts the live run: same scene, same needle, seeds within a stated bound; and it disturbs nothing.
 
 use std::time::Duration;
 use stylet_base::interrupt::Interrupt;
@@ -9,15 +9,16 @@ use stylet_shm_schema::{Event, EventKind, Fault, NeedleRehearsal, RefusalCode, R
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, until};
 
-/// Live and rehearsed seeds agree within this, and what two live runs differ by themselves.
+/// Tolerance between live and rehearsed seeds, in addition to the difference between two live runs.
 const AGREE_M: f64 = 0.1e-3;
-/// The tissue looks where the tip is every 5 ms and takes hold then: at which moment between two looks the tip meets it is chance.
+/// The tissue checks the tip every 5 ms and holds it then: the time of contact between two checks is random.
 const TISSUE_PERIOD_S: f64 = 5e-3;
-/// A hand that comes later finds tissue that has recovered: in this time by 63 % (`tissue.recovery_time`) of at most what it gave
+/// A later hand finds recovered tissue: by 63 % in this time (`tissue.recovery_time`) of at most the displacement
 /// before puncture.
 const RECOVERY_S: f64 = 1.0;
 
-/// Where each seed came to rest, and when it was dropped after the tip's first contact, by the clock and by the tissue's own.
+/// Resting place of each seed, and the time of its drop after the tip's first contact, by the clock and by the tissue's
+/// own.
 struct Live {
     seeds_m: Vec<[f64; 3]>,
     dropped_after_s: Vec<[f64; 2]>,
@@ -65,7 +66,7 @@ fn rehearsed(link: &mut Link, task: &NeedleTask) -> Rest {
     rehearser.rehearse(&task.drops, &Pace::default()).expect("goes through")
 }
 
-/// The default needle of the host: rehearsed, then done.
+/// Rehearses and executes the host's default needle.
 fn rehearsed_is_live(scene: &str) {
     let mut core = Core::start_with(&["--rt-if-allowed", "--scene", scene]);
     let mut link = core.host();
@@ -82,7 +83,7 @@ fn rehearsed_is_live(scene: &str) {
     let mut typical = 0;
     for (i, (live, rehearsed)) in placed.seeds_m.iter().zip(&rest.seeds_m).enumerate() {
         let (off_m, error_m) = (apart_m(live, rehearsed), apart_m(live, &planned[i]));
-        // A host that waits for a processor orders each move and drop later; a loop that does stands still meanwhile.
+        // A host that waits for a processor orders each move and drop later; a loop that does is suspended meanwhile.
         let late_s = placed.dropped_after_s[i].map(|s| (s - rest.dropped_after_s[i]).abs());
         let bound_m = AGREE_M
             + Pace::default().insert_m_per_s * TISSUE_PERIOD_S
@@ -98,7 +99,7 @@ fn rehearsed_is_live(scene: &str) {
             rest.dropped_after_s[i]
         );
         typical += usize::from(off_m < bound_m);
-        // A tip that stops halfway between two elements takes hold of either.
+        // A tip that stops halfway between two elements holds either.
         assert!(
             off_m < bound_m + element_m,
             "seed {}: {live:?} live, {rehearsed:?} rehearsed",
@@ -127,7 +128,8 @@ fn so_does_the_one_of_the_pelvis() {
     where_the_machine_runs(|| rehearsed_is_live("pelvis"));
 }
 
-/// A needle was felt by one loop, and moved tissue by the other's rule: seeds came 11 to 18 mm short, and the last was lost.
+/// One loop computed the force, and the other moved the tissue by a different rule: seeds came 11 to 18 mm short, and
+/// the last was lost.
 #[test]
 fn in_finite_elements_every_seed_rests_where_it_was_rehearsed() {
     where_the_machine_runs(|| {
@@ -137,7 +139,7 @@ fn in_finite_elements_every_seed_rests_where_it_was_rehearsed() {
         let rest = rehearsed(&mut link, &task);
         let placed = live(&mut link, &task);
         assert_eq!(placed.seeds_m.len(), task.plan.deepest_first().len(), "none is lost");
-        // The hand stops within 0.3 mm of its goal, before or behind it: where the core is taken away, on the other side.
+        // The hand stops within 0.3 mm of its goal, before or behind it; on the other side if the core is taken away.
         let missed = link.state().expect("live").missed_deadlines;
         let bound_m = if missed < 50 { 0.35e-3 } else { 1.2e-3 };
         for ((live, rehearsed), plan) in placed.seeds_m.iter().zip(&rest.seeds_m).zip(task.plan.deepest_first()) {

@@ -41,7 +41,7 @@ impl Drop for Host {
     }
 }
 
-/// Ends the core, and nothing is left of it and its hosts.
+/// Ends the core, and checks that nothing is left of it and its hosts.
 fn finish(core: Core, hand: Insertion) {
     drop(hand);
     let instance = core.instance.clone();
@@ -51,11 +51,11 @@ fn finish(core: Core, hand: Insertion) {
 
 const KILLS: usize = 100;
 const ROUNDS: usize = 10;
-/// A machine that stands still in more rounds than these cannot show it.
+/// Most rounds that may be skipped because the machine was stalled.
 const MOST_NOT_JUDGED: usize = 25;
 const ROUND: Duration = Duration::from_millis(2500);
 
-/// One round with a host that lives and one with hosts that are killed: missed deadlines of each.
+/// Runs one round with a living host and one with killed hosts: returns the missed deadlines of each.
 fn round(core: &Core, hand: &mut Insertion) -> (u64, u64) {
     let mut host = Host::start(&core.instance);
     hand.watch(Duration::from_millis(500));
@@ -69,7 +69,7 @@ fn round(core: &Core, hand: &mut Insertion) -> (u64, u64) {
     let (begin, since) = (hand.records.len(), Instant::now());
     for kill in 1..=KILLS / ROUNDS {
         let host = Host::start(&core.instance);
-        // At all stages of coming up: after 10 to 230 ms.
+        // At all stages of start-up: after 10 to 230 ms.
         let until = since + ROUND * kill as u32 / (KILLS / ROUNDS) as u32;
         let late = Duration::from_millis(240 * (kill as u64 % 7) / 7);
         hand.watch((until - late).saturating_duration_since(Instant::now()));
@@ -84,7 +84,7 @@ fn a_hundred_killed_hosts_in_one_insertion_cost_no_more_deadlines_than_hosts_tha
     let mut core = Core::start();
     let mut hand = Insertion::begin(&mut core, 0.001);
     let (mut control, mut killed, mut not_judged) = (Vec::new(), Vec::new(), 0);
-    // Turn by turn in the same insertion, since a shared machine has bad seconds of its own.
+    // Alternately in the same insertion, since a shared machine has bad seconds anyway.
     while control.len() < ROUNDS && not_judged < MOST_NOT_JUDGED {
         hand.records.clear();
         let witness = Witness::begin();
@@ -169,7 +169,7 @@ fn stopped_and_starved_hosts_are_not_felt_and_go_on_by_themselves() {
         host.signal(libc::SIGCONT);
         hand.watch(Duration::from_secs(1));
         assert!(host.is_running(), "the host did not survive being stopped");
-        // The core's queue holds 12 s: a host that stood still for 3 s has lost nothing.
+        // The core's queue holds 12 s: a host suspended for 3 s has lost nothing.
         host.signal(libc::SIGINT);
         let ended = host.0.wait().expect("ours");
         assert_eq!(ended.code(), Some(0), "a recording without gaps ends without an error");
@@ -179,7 +179,7 @@ fn stopped_and_starved_hosts_are_not_felt_and_go_on_by_themselves() {
     });
 }
 
-/// Sends as fast as it can for a while; how many were taken in by the queue.
+/// Sends as fast as it can for some time; returns how many the queue accepted.
 fn flood(instance: &Instance, time: Duration, mut next: impl FnMut(u64) -> Command) -> u64 {
     let node = Node::join(instance).expect("same user");
     let port = service::commands::publisher(&node).expect("a free place");
@@ -210,7 +210,7 @@ fn a_flood_of_good_commands_reaches_neither_hand_nor_loop_and_the_operator_can_s
             let instance = instance.clone();
             std::thread::spawn(move || flood(&instance, Duration::from_secs(seconds), |id| plan(host, id)))
         };
-        // One that came between two that flood: its queue is read after that of one of them.
+        // A host that joined between two flooding ones: its queue is read after one of theirs.
         let first = begin(77, 4);
         hand.watch(Duration::from_millis(500));
         let mut another = core.host();
@@ -257,7 +257,7 @@ fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
             for word in bytemuck::cast_slice_mut::<u8, u64>(bytemuck::bytes_of_mut(&mut command)) {
                 *word = random.draw();
             }
-            // Half of them with a kind that exists, and values that are what is wrong.
+            // Half of them with a valid kind and invalid values.
             if n % 2 == 0 {
                 let value = f64::from_bits(random.draw() | 0x7ff0_0000_0000_0000);
                 let id = ParameterId::ForceScale;
@@ -268,11 +268,11 @@ fn ten_thousand_invalid_commands_are_all_refused_and_counted() {
             } else {
                 command.kind |= 1 << 31;
             }
-            // Each one is to arrive: again where the queue is full.
+            // Each must arrive: repeated if the queue is full.
             while port.send(command).expect("sent") == 0 {
                 hand.watch(Duration::from_millis(2));
             }
-            // No faster than the queue of 64 is read: each one is to be counted.
+            // No faster than the queue of 64 is read: each must be counted.
             if n % 32 == 31 {
                 hand.watch(Duration::from_millis(8));
             }

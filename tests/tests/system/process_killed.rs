@@ -1,4 +1,4 @@
-//! What programs that were killed left in shared memory is removed by the next one, whatever its name.
+//! The remains of killed programs in shared memory are removed by the next one, whatever its name.
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -60,11 +60,11 @@ fn files_of_killed_programs_go_with_the_next_start_and_those_of_living_ones_stay
     let mut link = living.host();
     let mut next = Core::start();
     drop(next.host());
-    // The killed core had another name than the one that comes next, as the campaign had.
+    // The killed core had a name other than the next one's, as the campaign had.
     for swept in [&of_campaign, &of_core] {
         assert_eq!(left_behind(swept), [""; 0], "{}", swept.name());
     }
-    // It serves, and a host that comes late finds it.
+    // It serves, and a late host finds it.
     link.poll();
     let before = link.state().expect("live").tick;
     let goes_on = until(Duration::from_secs(5), || {

@@ -1,4 +1,4 @@
-//! Limits of a PC that are raised, or named for what they are; and totals that a reset does not clear.
+//! Limits of a PC are raised, or reported; and totals survive a reset.
 
 use std::os::unix::process::CommandExt;
 use std::process::{Command, Output, Stdio};
@@ -7,7 +7,7 @@ use stylet_shm_schema::Request;
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, ask, fresh_instance, program, scratch, until};
 
-/// Of those that this process may use.
+/// Returns the first core that this process may use.
 fn first_core() -> String {
     let status = std::fs::read_to_string("/proc/self/status").expect("Linux");
     let list = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:"));
@@ -15,7 +15,7 @@ fn first_core() -> String {
     list.split([',', '-']).next().expect("one at least").to_owned()
 }
 
-/// Runs with these soft and hard limits, for a moment; the hard one stays for `None`.
+/// Runs briefly with these soft and hard limits; the hard one stays for `None`.
 fn limited(resource: libc::__rlimit_resource_t, soft: u64, hard: Option<u64>, options: &[&str]) -> Output {
     let instance = fresh_instance();
     let mut command = Command::new(program("rt-core"));
@@ -66,7 +66,7 @@ fn few_open_files_are_raised_or_named() {
     assert!(said(&named).contains("may open 56 files and needs"), "{}", said(&named));
 }
 
-/// It was killed by SIGXFSZ without a word.
+/// It used to be killed by SIGXFSZ without a message.
 #[test]
 fn short_files_are_named_and_end_nothing_by_a_signal() {
     let named = limited(libc::RLIMIT_FSIZE, 100 << 10, Some(100 << 10), &[]);
@@ -97,7 +97,7 @@ fn a_tissue_priority_above_that_of_the_force_loop_is_refused_where_they_share_a_
     }
 }
 
-/// After a standstill and a re-arm the report at the end knew of neither.
+/// After a stall and a re-arm the final report knew of neither.
 #[test]
 fn a_standstill_stays_in_the_report_after_a_reset_and_a_rearm() {
     where_the_machine_runs(|| {

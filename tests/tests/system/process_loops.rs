@@ -1,4 +1,5 @@
-//! A loop that stops, alone or with the whole process: the force goes, the operator gets a message, and it can go on.
+//! A loop that stops, alone or with the whole process: the force is removed, the operator gets a message, and the run
+//! can continue.
 
 use std::time::Duration;
 use stylet_shm_schema::{EventKind, Fault, Request, flags};
@@ -9,7 +10,7 @@ use stylet_tests::{Core, ask, left_behind, until};
 
 const LONG: Duration = Duration::from_secs(20);
 
-/// Words that the operator reads about a fault.
+/// True if the operator's window reports the fault.
 fn is_reported(link: &stylet_host::link::Link, fault: Fault) -> bool {
     let kind = EventKind::FaultRaised as u32;
     link.events()
@@ -45,7 +46,7 @@ fn tissue_that_stops_takes_the_force_off_and_the_operator_rearms() {
         println!("{:.2} N to zero in {ramp} ticks", force_n(&hand.records[raised - 1]));
         assert!(ramp <= 20, "{ramp} ticks to zero");
 
-        // Still stopped: arming it again ends in the same fault, not in a force.
+        // Still stopped: re-arming ends in the same fault, not in a force.
         ask(&mut hand.link, &Request::Engage).expect("taken");
         hand.watch(Duration::from_millis(100));
         let state = hand.link.state().expect("live");
@@ -71,7 +72,7 @@ fn tissue_that_stops_takes_the_force_off_and_the_operator_rearms() {
     });
 }
 
-/// The core used to end, and seeds that were placed went with it; no motor of a simulation needs that.
+/// The core used to end, and lost the placed seeds; a simulation has no motors that would need that.
 #[test]
 fn a_simulated_force_loop_that_stops_is_waited_for_and_keeps_the_force_off() {
     where_the_machine_runs(|| {
@@ -134,7 +135,8 @@ fn a_core_that_is_stopped_whole_and_goes_on_turns_the_force_off_and_lives() {
         assert!(back && core.is_running(), "the core did not come back");
         hand.watch(Duration::from_millis(500));
         assert_smooth(&hand.records);
-        // Whichever loop woke first: after such a gap either nothing was late any more, or the force went off with a name.
+        // Whichever loop woke first: after such a gap either nothing was late any more, or the force was removed with a
+        // named fault.
         let last = hand.records.last().expect("records");
         let off = last.fault == Fault::TissueStale as u32 && force_n(last) == 0.0;
         let on = last.fault == 0 && last.flags & flags::ENGAGED != 0;

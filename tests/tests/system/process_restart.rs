@@ -1,4 +1,4 @@
-//! Cores that are killed, restarted, doubled, or find no memory: what the operator reads, and what is left.
+//! Cores that are killed, restarted, doubled, or find no memory: the operator's messages, and the remains.
 
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -51,7 +51,7 @@ fn a_killed_core_is_seen_and_its_successor_is_found_by_the_same_host() {
         );
         assert_undisturbed(&hand.records);
 
-        // Three times, at once: the host that watched the first one finds each.
+        // Three times in succession: the host that watched the first one finds each.
         let (mut instance, mut last) = (instance, before);
         for _ in 0..3 {
             let mut next = Core::start_as(instance.clone(), &["--rt-if-allowed"]);
@@ -141,7 +141,7 @@ fn what_killed_cores_and_hosts_left_is_removed_by_the_next_run() {
     });
 }
 
-/// Runs in a mount namespace of its own, with a small `/dev/shm`, so that no other program is hurt.
+/// Runs in a separate mount namespace with a small `/dev/shm`, so that no other program is affected.
 const FULL: &str = r#"
 set -u
 mount -t tmpfs -o size=60m tmpfs /dev/shm || exit 77
@@ -203,7 +203,7 @@ fn full_shared_memory_is_reported_in_words_and_who_runs_already_goes_on() {
     }
 }
 
-/// A wild write of a host there made the core unfindable for as long as it ran.
+/// A host's wild write there used to make the core unfindable for the rest of its run.
 #[test]
 fn a_core_announces_itself_again_where_a_host_has_overwritten_that() {
     let mut core = Core::start();

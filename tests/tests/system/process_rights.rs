@@ -1,6 +1,7 @@
-//! `rt-core` with file capabilities, started by a user without rights: nothing that a variable or an option names is loaded.
+//! `rt-core` with file capabilities, started by a user without rights: it loads nothing named by a variable or an
+//! option.
 //!
-//! `STYLET_LIBHD` was, so that every user's own code had the capabilities of the program.
+//! It used to load `STYLET_LIBHD`, so that any user's code had the program's capabilities.
 
 use std::ffi::CString;
 use std::os::unix::ffi::OsStrExt;
@@ -10,9 +11,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use stylet_test_kit::program;
 
-/// The user "nobody".
+/// User id of "nobody".
 const NOBODY: u32 = 65534;
-/// Each of these names a folder with a library under every name that is looked for, or one of the libraries.
+/// Each of these names a folder with a library under every name that is searched for, or one of the libraries.
 const FOLDERS: [&str; 8] = [
     "HOME",
     "GTDD_HOME",
@@ -29,7 +30,7 @@ const FILES: [(&str, &str); 3] = [
     ("LD_PRELOAD", "libHD.so"),
 ];
 
-/// Counts what is opened, read or made in a folder, by anybody.
+/// Counts files opened, read or made in a folder by any process.
 struct Watch(libc::c_int);
 
 impl Watch {
@@ -85,7 +86,7 @@ impl Trap {
         self.folder.path().join(name)
     }
 
-    /// Runs a copy of the program as a user without rights; what it prints, and whether it looked into the folder.
+    /// Runs a copy of the program as a user without rights; returns its output, and whether it accessed the folder.
     fn run(&self, copy: &str, options: &[&str], variables: &[(&str, PathBuf)]) -> (String, bool) {
         let watch = Watch::of(&self.path("trap"));
         let mut command = Command::new(self.path(copy));
@@ -101,7 +102,7 @@ impl Trap {
     }
 }
 
-/// A copy of the program that has capabilities, and one that has none; nothing where they cannot be given.
+/// Makes a copy of the program with capabilities, and one without; `None` if they cannot be granted.
 fn trap() -> Option<Trap> {
     // SAFETY: geteuid has no preconditions.
     if unsafe { libc::geteuid() } != 0 {
@@ -135,7 +136,7 @@ fn a_capable_program_loads_nothing_that_a_variable_names() {
             assert!(!looked, "{name} with {options:?}: {text}");
         }
     }
-    // The same trap closes on a program without rights of its own.
+    // The same trap closes on a program without rights.
     for (name, file) in FILES {
         let (text, looked) = trap.run("plain", &["devices"], &[(name, trap.path("trap").join(file))]);
         assert!(looked, "{name}: {text}");

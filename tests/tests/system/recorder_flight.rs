@@ -28,7 +28,7 @@ fn assert_identical(file: &Path) -> Flight {
     Flight::read(file).expect("just read")
 }
 
-/// Asks for a recording and gives its file.
+/// Requests a recording and returns its file.
 fn request(core: &Core, hand: &mut Insertion) -> PathBuf {
     ask(&mut hand.link, &Request::SaveFlight).expect("saved");
     hand.take();
@@ -54,7 +54,7 @@ fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit
     where_the_machine_runs(|| {
         let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "paper"]);
         let mut hand = Insertion::begin(&mut core, 0.006);
-        // Parameters, seeds and a turn on the way, and longer than the distance of two checkpoints of the tissue.
+        // Parameters, seeds and a reversal on the way, for longer than two checkpoints of the tissue.
         hand.watch(Duration::from_secs(5));
         let change = |id, value| ParameterChange { id, value };
         let changes = vec![
@@ -79,7 +79,7 @@ fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit
             tissue.memory.body.iter().any(|&byte| byte != 0),
             "it begins with tissue that is not at rest"
         );
-        // The forces of the file are those that the host saw.
+        // The forces in the file are those that the host saw.
         let seen = |tick| hand.records.iter().find(|r: &&TickRecord| r.tick == tick);
         let compared = haptic
             .ticks
@@ -87,7 +87,7 @@ fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit
             .filter_map(|e| seen(e.record.tick).map(|r| (e.record, *r)));
         assert!(compared.inspect(|(a, b)| assert_eq!(a, b)).count() > 3000);
 
-        // A fault: the tissue thread stands still for a while.
+        // A fault: the tissue thread is stopped for a while.
         drop(StoppedThread::stop(core.id(), "tissue"));
         let stopped = StoppedThread::stop(core.id(), "tissue");
         assert!(hand.watch_until(Duration::from_secs(3), |link| {
@@ -159,11 +159,11 @@ fn repeats_on_a_line(tissue: &str) {
     let mut hand = Insertion::begin(&mut core, 0.01);
     hand.watch(Duration::from_secs(3));
     ask(&mut hand.link, &Request::DropSeed { strand_pitch_m: None }).expect("dropped");
-    // Longer than either tape reaches back: both begin with the needle in tissue.
+    // Longer than either tape: both begin with the needle in tissue.
     hand.go(0.02, 0.01);
     hand.watch(Duration::from_secs(9));
     let first = request(&core, &mut hand);
-    // The next one begins with tapes that came back.
+    // The next one begins with returned tapes.
     hand.go(0.005, 0.01);
     hand.watch(Duration::from_secs(2));
     let second = request(&core, &mut hand);
@@ -187,7 +187,7 @@ fn repeats_on_a_line(tissue: &str) {
     assert!(tissue.loads.iter().any(|(_, loads)| loads.is_any()) && !flight.lines.is_empty());
 }
 
-/// Each exercise is on the tapes: a stiff line, a device that was lost, a body that moved with a needle in it.
+/// Each exercise is on the tapes: a stiff line, a lost device, a body moved with a needle in it.
 #[test]
 fn exercises_repeat_bit_for_bit() {
     where_the_machine_runs(|| {
@@ -233,7 +233,7 @@ fn exercises_repeat_bit_for_bit() {
     });
 }
 
-/// One bit of one input makes another outcome, and the comparison says so; a damaged file is refused.
+/// One altered bit of one input changes the outcome, and the comparison detects it; a damaged file is refused.
 fn what_was_changed_is_found(flight: &Flight, file: &Path) {
     let mut other = flight.clone();
     let haptic = other.haptic.as_mut().expect("recorded");
@@ -246,7 +246,7 @@ fn what_was_changed_is_found(flight: &Flight, file: &Path) {
     );
 
     let tissue = other.tissue.as_mut().expect("recorded");
-    // The last one: the next would take the held element back.
+    // The last one: the next would hold the element again.
     let late = tissue.ticks.len() - 1;
     tissue.ticks[late].pose.held_travel_m.z += 1e-4;
     let recorded = other.tissue.as_ref().expect("recorded");

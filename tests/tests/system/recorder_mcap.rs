@@ -1,4 +1,5 @@
-//! `host-ui record`: no tick is lost with the window open, others can read the file, and the hand can be played again.
+//! `host-ui record`: no tick is lost with the window open, other programs can read the file, and the hand can be
+//! replayed.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -8,7 +9,7 @@ use stylet_tests::window_process::Window;
 use stylet_tests::witness::where_the_machine_runs;
 use stylet_tests::{Core, program, scratch, until};
 
-/// Of the recording; `STYLET_RECORD_S` makes it longer for a figure.
+/// Duration of the recording; `STYLET_RECORD_S` makes it longer for a figure.
 fn seconds() -> f64 {
     std::env::var("STYLET_RECORD_S")
         .ok()
@@ -31,7 +32,7 @@ fn text(output: &Output) -> String {
     )
 }
 
-/// The MCAP project's own reader for Python, in a virtual environment that is made once.
+/// Returns the MCAP project's own reader for Python, in a virtual environment that is made once.
 fn independent_reader() -> Result<PathBuf, String> {
     let folder = program("rt-core").with_file_name("test-out").join("mcap-reader");
     let python = folder.join("bin/python");
@@ -102,7 +103,7 @@ fn record(core: &Core, out: &Path, duration_s: f64) -> Child {
         .expect("host-ui starts")
 }
 
-/// The core sent a batch every 2 ms into a queue of 64: a recorder that was held up for 0.2 s lost ticks.
+/// The core sent a batch every 2 ms into a queue of 64: a recorder that was delayed by 0.2 s lost ticks.
 #[test]
 fn a_recorder_that_stalls_for_ten_seconds_loses_no_tick() {
     where_the_machine_runs(|| {
@@ -144,9 +145,9 @@ fn a_recording_with_the_window_open_loses_no_tick_and_others_read_it() {
         assert!(output.status.success(), "ticks were lost");
         drop(window);
 
-        // What this program reads is what the host saw.
+        // This program reads what the host saw.
         let recording = stylet_host::record::read(&file).expect("readable");
-        // A machine that takes the core away has fewer ticks to record, and the records count those it missed.
+        // If the machine takes the core away there are fewer ticks to record, and the records count those missed.
         let served = recording.ticks.len();
         let missed: u64 = recording.ticks.iter().map(|t| u64::from(t.missed)).sum();
         assert!(
@@ -228,7 +229,7 @@ fn a_recorded_hand_plays_again_and_the_forces_are_those_of_then() {
         let mut link = core.host();
         stylet_tests::ask(&mut link, &stylet_shm_schema::Request::Engage).expect("engaged");
         let mut played = Vec::new();
-        // Missed ticks make five seconds of motion last longer.
+        // Missed ticks stretch five seconds of motion.
         let silent = until(Duration::from_secs(30), || {
             link.poll();
             played.append(&mut link.take_records());
@@ -241,7 +242,7 @@ fn a_recorded_hand_plays_again_and_the_forces_are_those_of_then() {
         let then = peak(&mut ticks.iter().map(|t| norm(t.force_on_hand_n)));
         let now = peak(&mut played.iter().map(|r| norm(r.force_on_hand_n)));
         println!("peak force then {then:.3} N, played {now:.3} N");
-        // The tissue loop meets the tip at another of its ticks: up to 5 ms of 20 mm/s are 0.1 mm of depth.
+        // The tissue loop meets the tip at another of its ticks: up to 5 ms at 20 mm/s are 0.1 mm of depth.
         assert!(
             then > 3.0 && (now - then).abs() < 0.05 * then,
             "{then} N then, {now} N now"

@@ -1,4 +1,5 @@
-//! After arming, no real-time thread allocates or faults a page, over thousands of ticks of each, with a procedure running.
+//! After arming, no real-time thread allocates or faults a page, over thousands of ticks of each, with a procedure
+//! running.
 
 use std::time::Duration;
 use stylet_implant::workflow::{Pace, Run, RunStatus, default_plan};
@@ -12,7 +13,7 @@ fn armed_threads_make_no_heap_call_and_fault_no_page() {
     });
 }
 
-/// Lines come to both loops while they run, and go back to be freed.
+/// Lines arrive in both loops while they run, and are returned to be freed.
 #[test]
 fn armed_threads_make_no_heap_call_and_fault_no_page_with_finite_elements() {
     where_the_machine_runs(|| {
@@ -20,7 +21,7 @@ fn armed_threads_make_no_heap_call_and_fault_no_page_with_finite_elements() {
     });
 }
 
-/// The third thread, moved and pressed on by nothing yet, keeps the contract of the others.
+/// The third thread, before any motion or contact, keeps the same contract.
 #[test]
 fn armed_threads_make_no_heap_call_and_fault_no_page_with_a_second_device() {
     where_the_machine_runs(|| {

@@ -11,7 +11,7 @@ fn resident_mb(process: u32) -> f64 {
     kb * 1e-3
 }
 
-/// Memory after each of so many changes between `paper` and `pelvis`.
+/// Memory after each of `swaps` changes between `paper` and `pelvis`.
 fn over_swaps(swaps: usize) -> Vec<f64> {
     let mut core = Core::start();
     let mut link = core.host();
@@ -36,8 +36,7 @@ fn mean(of: &[f64]) -> f64 {
     of.iter().sum::<f64>() / of.len() as f64
 }
 
-/// A scene that was not given back each time would add several MB a change. How the heap fills up over hundreds of changes is
-/// measured below.
+/// A leaked scene would add several MB per change. The growth of the heap over hundreds of changes is measured below.
 #[test]
 fn memory_stays_over_changes_of_the_scene() {
     let memory_mb = over_swaps(48);
@@ -57,7 +56,7 @@ fn memory_over_four_hundred_changes() {
         "MB by hundreds {hundreds:.2?}, last of the second {:.4}",
         hundreds[3] / hundreds[1]
     );
-    // A line under way takes 20 MB and more, and chance decides whether one is: the least is without.
+    // A line being solved takes 20 MB and more, at random: the minimum is without one.
     let least: Vec<f64> = memory_mb
         .chunks(100)
         .map(|hundred| hundred.iter().copied().fold(f64::MAX, f64::min))

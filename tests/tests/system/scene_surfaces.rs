@@ -1,5 +1,5 @@
-//! How far what is drawn of a body is from its segmentation: smooth surfaces, and those through the middles of the outermost
-//! elements that were drawn before.
+//! Distance of a drawn body from its segmentation: smooth surfaces, and the former ones through the centres of the
+//! outermost elements.
 
 use std::collections::HashMap;
 use std::time::Instant;
@@ -25,14 +25,14 @@ fn of_lattice(model: &SceneModel) -> Bodies {
     })
 }
 
-/// A surface and the cells that it is drawn from, both counted in cells.
+/// A surface and its source cells, both in units of cells.
 struct Drawn<'a> {
     model: &'a SceneModel,
     triangles: Vec<[Place; 3]>,
     is_in: Vec<bool>,
 }
 
-/// In cells, but for the volume: the share by which it differs.
+/// Errors in cells, except the volume, which is a relative difference.
 #[derive(Debug)]
 struct Errors {
     mean: f64,
@@ -68,7 +68,7 @@ impl<'a> Drawn<'a> {
             && self.is_in[(cell[0] + dims[0] * (cell[1] + dims[1] * cell[2])) as usize]
     }
 
-    /// Cell and axis and side of each face between inside and outside.
+    /// Cell, axis and side of each face between inside and outside.
     fn faces(&self) -> Vec<([i64; 3], usize, i64)> {
         let dims = self.model.header.labels.dims.map(i64::from);
         let mut faces = Vec::new();
@@ -139,7 +139,8 @@ impl<'a> Drawn<'a> {
     }
 }
 
-/// The least of the distances to what is in each cell around; a triangle reaches less than a cell beyond the cell of its middle.
+/// Smallest distance to the contents of the surrounding cells; a triangle reaches less than a cell beyond the cell of
+/// its centre.
 fn nearest(p: &Place, in_cell: impl Fn([i64; 3]) -> f64) -> f64 {
     let within = |reach| around(p, reach).map(&in_cell).fold(f64::INFINITY, f64::min);
     let near = within(1);
@@ -201,8 +202,8 @@ fn to_triangle(p: &Place, triangle: &[Place; 3]) -> f64 {
     to_side(0).min(to_side(1)).min(to_side(2))
 }
 
-/// Drawn surfaces went through the middles of the outermost elements: half an element too small all round, in steps, and a
-/// structure of one element's thickness had none.
+/// Drawn surfaces used to pass through the centres of the outermost elements: half an element too small all round, in
+/// steps, and a structure one element thick had none.
 #[test]
 fn what_is_drawn_follows_the_segmentation() {
     println!("part, h in mm: mean mm, Hausdorff mm, volume %: before, after");
@@ -217,7 +218,7 @@ fn what_is_drawn_follows_the_segmentation() {
             let h = model.header.spacing_m * 1e3;
             let words = |e: &Errors| format!("{:.3} {:.3} {:+.2}", e.mean * h, e.hausdorff * h, e.volume * 1e2);
             println!("{name} {part}, {h:.3}: {}; {}", words(&before), words(&after));
-            // What was drawn before keeps neither bound.
+            // The former surface keeps neither bound.
             assert!(before.mean > 0.2 && before.volume < -0.05, "{name} {part}: {before:?}");
             assert!(after.mean < 0.2 && after.hausdorff < 0.6, "{name} {part}: {after:?}");
             assert!(after.volume.abs() < 5e-3, "{name} {part}: {after:?}");
@@ -225,7 +226,7 @@ fn what_is_drawn_follows_the_segmentation() {
     }
 }
 
-/// Against the solid that was drawn, in the paper's grid: a ball as large as the gland, off the middle of a cell.
+/// Against the original solid, in the paper's grid: a ball as large as the gland, off the centre of a cell.
 #[test]
 fn a_ball_is_drawn_as_a_ball() {
     const CELLS: usize = 40;
@@ -267,7 +268,7 @@ fn time_to_make_and_to_move_them() {
         let start = Instant::now();
         let bodies = model.bodies();
         let made = start.elapsed();
-        // Everything moves: the dearest frame.
+        // Everything moves: the most expensive frame.
         let now_m: Vec<[f32; 3]> = model.rest_m.iter().map(|p| p.map(|c| c * 1.01)).collect();
         let mut out = Vec::new();
         let mut times_us: Vec<f64> = (0..200)

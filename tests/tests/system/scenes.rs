@@ -1,4 +1,5 @@
-//! Scenes of many structures, live: built in, sent by a host, and refused with every reason while the running one goes on.
+//! Scenes of many structures, live: built in, sent by a host, or refused with every reason while the running one
+//! continues.
 
 use bytemuck::Zeroable;
 use std::process::Command;
@@ -104,7 +105,7 @@ fn the_default_needle_reaches_the_gland_in_the_pelvis_past_bone_urethra_and_rect
             ended && matches!(status, RunStatus::Done),
             "the procedure failed: {status:?}"
         );
-        // Where they rest is compared with a rehearsal in `plan_rehearsal`.
+        // Their resting places are compared with a rehearsal in `plan_rehearsal`.
         assert_eq!(link.snapshot().expect("live").header.seed_count, 5);
         let state = link.state().expect("live");
         assert_eq!(state.fault, Fault::None as u32);
@@ -113,7 +114,7 @@ fn the_default_needle_reaches_the_gland_in_the_pelvis_past_bone_urethra_and_rect
     });
 }
 
-/// A host of its own that sends volumes with structures.
+/// A separate host that sends volumes with structures.
 struct Sender {
     replies: service::Subscriber<Reply>,
     node: service::Node,
@@ -132,7 +133,7 @@ impl Sender {
         }
     }
 
-    /// The core's answer, or every reason against it.
+    /// Returns the core's answer, or every reason against it.
     fn send(&mut self, header: &UploadHeader, cells: &[u8]) -> Result<(), String> {
         self.sent += 1;
         let port = service::uploads::publisher(&self.node, cells.len()).expect("a free place");
@@ -161,7 +162,7 @@ impl Sender {
 
 const DIMS: [u32; 3] = [20, 18, 16];
 
-/// A block of label 1 in fat of label 2, with both structures.
+/// Returns a block of label 1 in fat of label 2, with both structures.
 fn volume() -> (UploadHeader, Vec<u8>) {
     let [nx, ny, nz] = DIMS.map(|d| d as usize);
     let inner = |n: usize, count: usize| (5..count - 5).contains(&n);
@@ -232,7 +233,7 @@ fn a_volume_with_structures_runs_and_its_target_is_planned_in() {
     });
 }
 
-/// What a refusal must name, what to spoil.
+/// Text that a refusal must contain, and the change that spoils the volume.
 type Case<'a> = (&'a [&'a str], &'a dyn Fn(&mut UploadHeader, &mut Vec<u8>));
 
 #[test]

@@ -16,7 +16,7 @@ fn invalid<T: Pod>() -> Vec<T> {
         let bytes: Vec<u8> = (0..size_of::<T>()).map(|_| random.draw() as u8).collect();
         all.push(pod_read_unaligned(&bytes));
     }
-    // Doubles that are not numbers, in every place.
+    // Doubles that are not numbers, in every field.
     let nan = f64::NAN.to_ne_bytes();
     all.push(pod_read_unaligned(
         &nan.iter().copied().cycle().take(size_of::<T>()).collect::<Vec<u8>>(),
@@ -34,7 +34,7 @@ fn core_refuses_invalid_records_of_hosts_and_runs_on() {
         let commands = service::commands::publisher(&node).expect("a free place");
         let mut sent = 0;
         for mut command in invalid::<Command>() {
-            // A record that happens to be a valid request to end is obeyed, as it must be.
+            // A record that happens to be a valid request to end is rightly obeyed.
             if command.kind == CommandKind::Shutdown as u32 {
                 command.kind = u32::MAX;
             }
@@ -56,7 +56,7 @@ fn core_refuses_invalid_records_of_hosts_and_runs_on() {
         let uploads = service::uploads::publisher(&node, 64).expect("a free place");
         for header in invalid::<UploadHeader>() {
             let cells = std::array::from_fn::<u8, 64, _>(|i| i as u8);
-            // Two of a host wait at most: a core that is kept from its processor takes none of them for a while.
+            // At most two of a host wait: a core kept from its processor takes none of them for a while.
             let sent = until(Duration::from_secs(20), || uploads.send(&header, &cells).is_ok());
             assert!(sent, "no room for a volume in 20 s");
             std::thread::sleep(Duration::from_millis(1));

@@ -1,4 +1,4 @@
-//! The procedure in a label volume written by another program, and volumes that cannot be used.
+//! The procedure in a label volume written by another program, and unusable volumes.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -77,7 +77,7 @@ fn procedure_runs_in_an_oblique_anisotropic_volume_and_the_geometry_is_right() {
                 .expect("JSON");
         assert_eq!(result["seeds"].as_array().map(Vec::len), Some(5), "{result:#}");
 
-        // The surface that the core sent back, in patient mm, against the voxels that nibabel wrote.
+        // The surface sent back by the core, in patient mm, against nibabel's voxels.
         let link = core.host();
         let scene = link.scene().expect("live");
         let t = scene.header.patient_from_scene;

@@ -1,4 +1,5 @@
-//! The wall between hosts and the force: memory that a host damages, and a bridge that is killed or hangs, reach neither loop nor the next start.
+//! The wall between hosts and the force: memory damaged by a host, and a killed or hung bridge, reach neither loop nor
+//! the next start.
 
 use std::fs::File;
 use std::os::unix::fs::{FileExt, PermissionsExt};
@@ -16,7 +17,7 @@ pub fn send(signal: libc::c_int, process: u32) {
     unsafe { libc::kill(process as libc::pid_t, signal) };
 }
 
-/// The bridge of a core, once there is one other than `before`.
+/// Returns the bridge of a core, once there is one other than `before`.
 pub fn bridge(core: u32, before: Option<u32>) -> Option<u32> {
     let children = std::fs::read_to_string(format!("/proc/{core}/task/{core}/children")).ok()?;
     let mut children = children.split_whitespace().filter_map(|pid| pid.parse().ok());
@@ -26,7 +27,7 @@ pub fn bridge(core: u32, before: Option<u32>) -> Option<u32> {
     })
 }
 
-/// Lines of the map of a process that it shares, writable, with whoever has the same file.
+/// Returns the mappings that a process shares, writable, with other openers of the same file.
 pub fn shared_writable(process: u32) -> Vec<String> {
     let maps = std::fs::read_to_string(format!("/proc/{process}/maps")).unwrap_or_default();
     let is_shared = |line: &&str| {
@@ -44,7 +45,7 @@ fn the_force_process_maps_nothing_that_another_process_can_write() {
     let maps = shared_writable(core.id());
     assert!(maps.iter().all(|line| line.contains("/memfd:stylet-")), "{maps:#?}");
     assert!(!maps.is_empty(), "boards of state and snapshots");
-    // Nobody else can map a board writable, not even with its descriptor.
+    // No other process can map a board writable, not even with its descriptor.
     let mut boards = 0;
     for entry in std::fs::read_dir(format!("/proc/{}/fd", core.id()))
         .expect("ours")
@@ -116,7 +117,7 @@ fn a_bridge_that_is_killed_or_stopped_is_replaced_and_the_hand_feels_nothing() {
     });
 }
 
-/// A user that is not this one; `None` where the test has no right to be another.
+/// Runs as a different user; `None` if the test has no right to.
 fn as_user(user: u32, program: &Path, arguments: &[&str]) -> Option<Command> {
     // SAFETY: no preconditions.
     if unsafe { libc::getuid() } != 0 {
@@ -132,7 +133,7 @@ fn as_user(user: u32, program: &Path, arguments: &[&str]) -> Option<Command> {
     Some(command)
 }
 
-/// An empty file of another user under the right name used to be waited for in silence, and one of 300 MB was allocated.
+/// The core used to wait in silence for another user's empty file of the right name, and allocated one of 300 MB.
 #[test]
 fn what_another_user_leaves_is_named_or_is_not_in_the_way() {
     let (own, other) = (12_345, 65_534);
@@ -148,7 +149,7 @@ fn what_another_user_leaves_is_named_or_is_not_in_the_way() {
         "--flight-dir",
         &flights,
     ];
-    // Where the user could not even run the program, as in a home folder that is closed, there is nothing to see.
+    // If the user cannot even run the program, as in a closed home folder, there is nothing to test.
     let reachable = std::env::temp_dir().join(format!("stylet-other-user-{}", std::process::id()));
     std::fs::create_dir_all(&reachable).expect("room");
     std::fs::set_permissions(&reachable, std::fs::Permissions::from_mode(0o755)).expect("ours");
@@ -173,7 +174,7 @@ fn what_another_user_leaves_is_named_or_is_not_in_the_way() {
         assert!(made.is_none_or(|status| status.expect("a shell").success()), "{what}");
     };
     let name = folder.display();
-    // In the way: named, with its owner.
+    // In the way: reported with its owner.
     for what in [
         format!("mkdir {name}"),
         format!("umask 0; : > {name}"),

@@ -1,4 +1,5 @@
-//! Wild writes of hosts, into what they map and into every file that they can open: they reach neither the force nor the next start.
+//! Wild writes of hosts, into their mappings and into every file that they can open, reach neither the force nor the
+//! next start.
 
 use crate::wall::{bridge, shared_writable};
 use std::collections::BTreeSet;
@@ -31,7 +32,7 @@ impl Recorder {
         Self(child.expect("host-ui starts"))
     }
 
-    /// Files that it could damage, of which the names hold `kind`.
+    /// Returns the files that it could damage whose names contain `kind`.
     fn files(&self, kind: &str) -> BTreeSet<PathBuf> {
         let maps = shared_writable(self.0.id());
         let paths = maps
@@ -50,10 +51,10 @@ impl Drop for Recorder {
     }
 }
 
-/// What a wild pointer of a host may damage.
+/// Target of a host's wild pointer.
 #[derive(Clone, Copy, Debug)]
 enum Damaged {
-    /// Mappings of which the names hold this.
+    /// Mappings whose names contain this.
     Mapped(&'static str),
     /// Every file that a host can open.
     Opened,
@@ -87,7 +88,8 @@ fn openable(instance: &Instance) -> Vec<PathBuf> {
     found
 }
 
-/// Writes eight random bytes at a time into what a host can damage, as a wild pointer in it would, for `time`. How many.
+/// Writes eight random bytes at a time into memory that a host can damage, like a wild pointer, for `time`. Returns the
+/// number of writes.
 fn write_wildly(
     damaged: Damaged,
     (recorder, instance): (&Recorder, &Instance),
@@ -179,14 +181,14 @@ fn assert_survives(damaged: Damaged, seed: u64) -> Survived {
     assert!(writes > 0, "{damaged:?} {seed}: nothing was written");
     assert!(core.is_running(), "{damaged:?} {seed}: the core ended");
     drop(recorder);
-    // A host that meets what is damaged may end by it, as the one that wrote may: the next one finds its way.
+    // A host reconnects by itself, and an earlier one receives the last 12 s again: the records have no gap.
     let (hosts, seen) = (1..=5)
         .find_map(|hosts| Some((hosts, look(&core.instance)?)))
         .unwrap_or_else(|| panic!("{damaged:?} {seed}: no host gets state and records"));
     assert!(core.is_running(), "{damaged:?} {seed}: the core ended");
     assert_eq!(seen, "fault 0, lost 0, missing 0", "{damaged:?} {seed}");
     let is_replaced = bridge(core.id(), None) != first;
-    // SIGKILL: the next start finds everything that was damaged.
+    // SIGKILL: the next start finds all of the damage.
     let instance = core.kill();
     let mut next = Core::start_as(instance, &["--rt-if-allowed"]);
     drop(next.host());
@@ -220,7 +222,7 @@ fn wild_writes_of_a_host_reach_neither_the_force_nor_the_next_start() {
     assert_all_survive(repeats("STYLET_WILD_SEEDS", 1), &kinds);
 }
 
-/// A host that has a path wrong writes into what it never maps, such as the name of the present epoch.
+/// A host with a wrong path writes to files that it never maps, such as the name of the present epoch.
 #[test]
 fn wild_writes_into_files_reach_neither_the_force_nor_the_next_start() {
     assert_all_survive(repeats("STYLET_WILD_FILES", 1), &[Damaged::Opened]);

@@ -1,4 +1,4 @@
-//! The real window on a core of its own, drawn by the software driver and driven like by a person.
+//! The real window on a separate core, drawn by the software driver and driven like by a person.
 
 use crate::kept::{assert_like_kept, tolerant, with_fewer_greys};
 use egui_kittest::Harness;
@@ -129,7 +129,7 @@ impl Driven {
         picture
     }
 
-    /// Like [`Driven::compare`], while the plan is shown in place of the plots.
+    /// Like [`Driven::compare`], while the plan replaces the plots.
     pub fn compare_plan(&mut self, name: &str) {
         assert_like_kept(name, &tolerant(), || {
             self.draw();

@@ -104,8 +104,7 @@ fn differing(place: &str, one: &Value, other: &Value, off: f64) -> Vec<String> {
     }
 }
 
-/// Guards against a debrief of the last needle alone, with a strength of its own, in the
-/// instructor's window.
+/// Guards against a debrief of the last needle alone, with the wrong strength, in the instructor's window.
 #[test]
 fn instructor_and_trainee_write_the_same_debrief() {
     let mut driven = open(SMALL);
@@ -233,7 +232,7 @@ fn exercises_are_shown_to_both_while_they_run_and_after() {
     drop((host, other));
 }
 
-/// Checks the list of hosts; the relay is a package of its own, so its state is published here.
+/// Checks the list of hosts; the relay is a separate package, so its state is published here.
 #[test]
 fn members_are_listed_and_the_needle_can_be_handed_over() {
     let mut driven = Driven::open_plain(SMALL);

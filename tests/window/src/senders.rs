@@ -1,5 +1,5 @@
-//! Windows that end, hang or are read by nobody while they move the hand, by a script or by a gamepad: as `motion_sender` of the system
-//! has it for the programs without a window.
+//! Windows that end, hang or lose their readers while they move the hand, by a script or by a gamepad: the counterpart
+//! of `motion_sender` for programs without a window.
 
 use crate::driven::{Driven, window_on};
 use crate::plugged::Table as Plugs;
@@ -18,11 +18,11 @@ use stylet_tests::{Display, program, repeats, until};
 const SIZE: [f32; 2] = [1280.0, 800.0];
 const RUN: &str = "Run steps 2 to 6";
 const BEGINS_WITHIN: Duration = Duration::from_secs(40);
-/// Tells the program of a test that it is the window of this instance, with a stick that is pushed so far.
+/// Marks a test process as the window of this instance, with the stick pushed by this much.
 const INSTANCE: &str = "SENDERS_INSTANCE";
 const STICK: &str = "SENDERS_STICK";
 
-/// Where the window has its button for a run. The real one has the same size.
+/// Position of the window's button for a run; the same in the real one.
 fn run_button() -> [f32; 2] {
     let driven = Driven::open_plain(SIZE);
     let middle = driven.window.get_by_label(RUN).rect().center();
@@ -135,7 +135,7 @@ fn window_with_a_stick_that_is_pushed() {
     window.state_mut().use_controllers(Controllers::start(plugs.clone()));
     plugs.plug(Kind::Gamepad);
     let mut pushes = false;
-    // Until somebody ends it.
+    // Until it is ended.
     loop {
         window.run_steps(1);
         if !pushes && window.query_by_label("Test gamepad").is_some() && window.state().link().plan().is_some() {

@@ -101,7 +101,7 @@ fn terminal() -> (File, File) {
         // SAFETY: an open file of ours.
         unsafe { libc::fcntl(end, libc::F_SETFD, libc::FD_CLOEXEC) };
     }
-    // SAFETY: open files that nobody else has.
+    // SAFETY: open files owned by no other value.
     unsafe { (File::from_raw_fd(person), File::from_raw_fd(program)) }
 }
 

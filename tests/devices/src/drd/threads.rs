@@ -149,7 +149,7 @@ fn a_device_that_hangs_for_ever_can_be_dropped() {
     assert!(drive(&mut device, &push(), Result::is_err));
     drop(device);
     fake.control.hang.store(0, Relaxed);
-    // The abandoned thread returns, leaves zero force and ends; nobody closes its device.
+    // The abandoned thread returns, leaves zero force and ends, without closing its device.
     assert!(until(LONG, || fake.control.commanded_n() == [0.0; 3]));
     let ticks = fake.control.calls_of("dhdSetForceAndTorqueAndGripperForce");
     std::thread::sleep(Duration::from_millis(50));

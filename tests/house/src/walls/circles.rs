@@ -1,18 +1,18 @@
-//! Circles of imports among the modules of one folder, at every depth of a crate.
+//! Circular imports among the modules of one folder, at every depth of a crate.
 //!
-//! A path from below module `a` to below its sibling `b` is an edge `a -> b`. A parent that names its children and
-//! children that name items of their parent are no edges; an item that the parent imports counts as the
-//! sibling that it came from. Files of one folder may know each other; a circle counts where a folder is part of it,
-//! and always at the root of a crate.
+//! A path from below module `a` to below its sibling `b` is an edge `a -> b`. Parents that name their children and
+//! children that name items of their parent make no edges; an item that the parent imports counts as part of its
+//! original sibling. Files of one folder may import each other; a circle counts if a folder is part of it, and always
+//! at the root of a crate.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::imports::{Crate, ModulePath, Reference};
 
-/// Edges among the modules of one folder, with the first places that make each.
+/// Edges among the modules of one folder, with the first locations of each.
 type Graph = BTreeMap<String, BTreeMap<String, Vec<String>>>;
 
-/// One line for each edge within a circle: `folder: a -> b (file:line)`.
+/// Returns one line for each edge in a circle: `folder: a -> b (file:line)`.
 pub fn circles(module: &Crate) -> Vec<String> {
     let mut found = Vec::new();
     for (folder, graph) in graphs(module) {
@@ -88,7 +88,7 @@ fn graphs(module: &Crate) -> BTreeMap<ModulePath, Graph> {
 
 type Imported = BTreeMap<(ModulePath, String), ModulePath>;
 
-/// What name each module with children imports from where.
+/// Origin of each name that a module with children imports.
 fn imported_by_parents(module: &Crate) -> Imported {
     let parents = module
         .references
@@ -101,7 +101,7 @@ fn imported_by_parents(module: &Crate) -> Imported {
     bound.collect()
 }
 
-/// Follows a path through the imports of the modules that it leads to.
+/// Resolves a path through the imports of the modules on it.
 fn resolve(module: &Crate, imported: &Imported, reference: &Reference) -> ModulePath {
     let mut target = reference.to.clone();
     for _ in 0..8 {
@@ -127,7 +127,7 @@ fn resolve(module: &Crate, imported: &Imported, reference: &Reference) -> Module
     target
 }
 
-/// Strongly connected components of more than one node.
+/// Returns strongly connected components of more than one node.
 fn components(graph: &Graph) -> Vec<BTreeSet<String>> {
     let reached: BTreeMap<&String, BTreeSet<&String>> = graph.keys().map(|node| (node, reach(graph, node))).collect();
     let mut found: Vec<BTreeSet<String>> = Vec::new();

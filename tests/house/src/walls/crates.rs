@@ -1,4 +1,4 @@
-//! Which crate of the workspace may depend on which, and what it may not bring in.
+//! Allowed dependencies between the workspace's crates, and banned external ones.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use super::layers::{LAYERS, OUTSIDE};
 /// Manifest of each member by its folder.
 pub type Manifests = BTreeMap<String, Table>;
 
-/// One line for each dependency that the table does not allow.
+/// Returns one line for each dependency that the table does not allow.
 pub fn forbidden(workspace: &Table, members: &Manifests) -> Vec<String> {
     let mut found = Vec::new();
     let edges: BTreeMap<&String, Dependencies> = members
@@ -54,7 +54,7 @@ struct Dependencies {
     others: BTreeSet<String>,
 }
 
-/// Dependencies of every kind and target that a manifest names.
+/// Returns dependencies of every kind and target in a manifest.
 fn dependencies(folder: &str, workspace: &Table, manifest: &Table) -> Dependencies {
     let mut found = Dependencies {
         ours: BTreeSet::new(),
@@ -91,7 +91,7 @@ fn dependencies(folder: &str, workspace: &Table, manifest: &Table) -> Dependenci
     found
 }
 
-/// A path from a folder, from the root: `host-ui/dose` and `../files` give `host-ui/files`.
+/// Joins a path to a folder, relative to the root: `host-ui/dose` and `../files` give `host-ui/files`.
 fn joined(folder: &str, path: &str) -> String {
     let mut parts: Vec<&str> = folder.split('/').collect();
     for part in path.split('/') {

@@ -1,4 +1,4 @@
-//! Modules of a crate, and the paths by which each names another.
+//! Modules of a crate, and the paths by which they name each other.
 
 use proc_macro2::{Ident, TokenStream, TokenTree};
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ pub struct Reference {
     pub to: ModulePath,
     pub file: String,
     pub line: usize,
-    /// Name that an import binds in `from`; none for a path within an expression.
+    /// Name that an import binds in `from`; `None` for a path within an expression.
     pub binds: Option<String>,
 }
 
@@ -27,7 +27,7 @@ pub struct Crate {
     pub references: Vec<Reference>,
 }
 
-/// Reads a crate from its root file on, along its `mod` items.
+/// Reads a crate from its root file, following its `mod` items.
 pub fn read_crate(root: &str, read: &dyn Fn(&str) -> Option<String>) -> Crate {
     let mut found = Crate::default();
     found.children.insert(Vec::new(), Vec::new());

@@ -9,30 +9,29 @@ const WINDOW: &[&str] = &[
     "wgpu",
     "winit",
 ];
-/// What computes pictures without a window uses `wgpu`.
+/// Crates that compute pictures without a window use `wgpu`.
 const TOOLKIT: &[&str] = &["egui", "eframe", "egui-wgpu", "winit"];
-/// `shm-schema/ports` alone makes ports (ADR 19).
+/// Only `shm-schema/ports` makes ports (ADR 19).
 const PORTS: &[&str] = &["iceoryx2"];
 const ARGUMENTS: &[&str] = &["clap"];
 const PROGRAM: &[&str] = &["indicatif", "signal-hook"];
 const DEVICES: &[&str] = &["evdev", "libloading"];
 const DICOM: &[&str] = &["dicom-core", "dicom-dictionary-std", "dicom-object", "nifti"];
 
-/// What one crate may know.
+/// Dependencies allowed to one crate.
 pub struct Layer {
     pub folder: &'static str,
-    /// Folders of those of our crates that it may name in its manifest.
+    /// Folders of our crates that its manifest may name.
     pub may_use: &'static [&'static str],
-    /// Crates of others that neither it nor what it depends on may name.
+    /// External crates that neither it nor its dependencies may name.
     pub never: &'static [&'static [&'static str]],
-    /// Crates of others that it may not name itself.
+    /// External crates that it may not name itself.
     pub not_itself: &'static [&'static [&'static str]],
 }
 
-/// From the bottom up: a crate uses what stands above it in this table. A new crate gets a row; a row may stand here
-/// before its crate does.
+/// From the bottom up: a crate uses those above it in this table. A new crate needs a row; a row may precede its crate.
 pub const LAYERS: &[Layer] = &[
-    // Of the tests, what the relay's own take from a package beside them.
+    // Tests: those of the relay use one of its packages.
     Layer {
         folder: "tests/kit",
         may_use: &[],
@@ -155,7 +154,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema/wall",
             "shm-schema/random",
         ],
-        // The process that owns the device never speaks to hosts itself.
+        // The process that owns the device never communicates with hosts itself.
         never: &[WINDOW, PORTS, PROGRAM, DICOM],
         not_itself: &[],
     },
@@ -344,5 +343,5 @@ pub const LAYERS: &[Layer] = &[
     },
 ];
 
-/// Crates that test and measure: they may use every crate, and no other crate may use them.
+/// Crates for tests and measurements: they may use every crate, and no other crate may use them.
 pub const OUTSIDE: &[&str] = &["tests", "tests/fake-libhd", "benches"];

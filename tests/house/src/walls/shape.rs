@@ -3,10 +3,10 @@
 use super::syntax::{self, is_test};
 use syn::visit::{self, Visit};
 
-/// Lines that a source file may have.
+/// Most lines of a source file.
 pub const LINES: usize = 400;
 
-/// Ends of the paths of files that may be longer, and why.
+/// Path suffixes of files that may be longer, and why.
 pub const LONGER: &[(&str, &str)] = &[
     (
         "fake-libhd/src/abi.rs",
@@ -28,7 +28,7 @@ pub const LONGER: &[(&str, &str)] = &[
     ),
 ];
 
-/// Tests stand at the end of `name.rs`, in `name/tests.rs`, or below `name/tests/`.
+/// Checks that tests stand at the end of `name.rs`, in `name/tests.rs`, or below `name/tests/`.
 pub fn test_layout(path: &str, source: &str) -> Vec<String> {
     let stem = path.rsplit('/').next().unwrap_or(path).trim_end_matches(".rs");
     let mut found = Vec::new();
@@ -57,7 +57,7 @@ pub fn too_long(path: &str, lines: usize, longer: &[(&str, &str)]) -> Option<Str
     }
 }
 
-/// Public functions whose error is a `String` or several: `file:line name`.
+/// Returns public functions whose error is one or several `String`s: `file:line name`.
 pub fn prose_errors(path: &str, source: &str) -> Vec<String> {
     let mut found = ProseErrors(Vec::new());
     found.visit_file(&syntax::parse(path, source));
@@ -120,7 +120,7 @@ fn returns_prose(output: &syn::ReturnType) -> bool {
     prose.contains(&output)
 }
 
-/// Lines that name a folder of somebody's machine.
+/// Returns lines that name a folder of a developer's machine.
 pub fn machine_paths(path: &str, source: &str) -> Vec<String> {
     const FOLDERS: [&str; 4] = ["/home/", "/Users/", "/root/", "/work/"];
     /// Names that stand for any user.
@@ -137,7 +137,7 @@ pub fn machine_paths(path: &str, source: &str) -> Vec<String> {
         .collect()
 }
 
-/// Whether an absolute path in the line starts with the folder.
+/// True if an absolute path in the line starts with the folder.
 fn begins_path(line: &str, folder: &str) -> bool {
     let starts = line.match_indices(folder).map(|(at, _)| line[..at].chars().next_back());
     let mut before = starts

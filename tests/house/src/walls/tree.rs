@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Folders that hold what a build or a run made.
+/// Folders with build or run output.
 const MADE: [&str; 4] = ["target", "out", "__pycache__", "node_modules"];
 
 pub fn root() -> PathBuf {
@@ -13,7 +13,7 @@ pub fn root() -> PathBuf {
         .unwrap()
 }
 
-/// All files whose name ends in one of the endings, as paths from the root, sorted.
+/// Returns all files with one of the extensions, as sorted paths from the root.
 pub fn files(endings: &[&str]) -> Vec<String> {
     let (root, mut found) = (root(), Vec::new());
     collect(&root, &root, endings, &mut found);
@@ -41,7 +41,7 @@ pub fn manifest(path: &str) -> toml::Table {
     read(path).parse().unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// Folders of the members of the workspace.
+/// Returns the folders of the workspace's members.
 pub fn members() -> Vec<String> {
     let manifest = manifest("Cargo.toml");
     let members = manifest["workspace"]["members"].as_array().unwrap();
@@ -51,16 +51,16 @@ pub fn members() -> Vec<String> {
         .collect()
 }
 
-/// Packages beside the workspace that depend on its crates, with a lock file of their own.
+/// Packages outside the workspace that depend on its crates, with their own lock file.
 const ALONE: [&str; 1] = ["host-ui/relay"];
 
-/// Folders of the members of the workspace and of the packages beside it.
+/// Returns the folders of the workspace's members and of the packages outside it.
 pub fn packages() -> Vec<String> {
     let alone = ALONE.into_iter().map(str::to_string);
     members().into_iter().chain(alone).collect()
 }
 
-/// Root files of the library and the programs of a member.
+/// Returns the root files of a member's library and programs.
 pub fn crate_roots(member: &str) -> Vec<String> {
     let manifest = manifest(&format!("{member}/Cargo.toml"));
     let library = manifest.get("lib").and_then(|lib| lib.get("path"));

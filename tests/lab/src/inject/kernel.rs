@@ -128,7 +128,7 @@ pub fn large_fsync(target: Target, end: Instant) -> Result<(), String> {
     }))?
 }
 
-/// The interrupt goes back to where it was when this is dropped.
+/// Restores the interrupt's core when dropped.
 struct Moved {
     file: PathBuf,
     before: String,
@@ -186,7 +186,7 @@ fn read_directly(path: &PathBuf, seed: u64, end: Instant) -> Result<(), String> 
         .custom_flags(libc::O_DIRECT)
         .open(path)
         .map_err(|e| e.to_string())?;
-    // O_DIRECT wants an address that is a multiple of a block.
+    // O_DIRECT needs an address that is a multiple of a block.
     let mut room = vec![0_u8; 8_192];
     let offset = room.as_ptr().align_offset(4_096);
     let mut random = stylet_random::Random(seed);

@@ -61,7 +61,7 @@ pub fn timers(target: Target, end: Instant) -> Result<(), String> {
             // SAFETY: an all-zero event is valid.
             let mut event: libc::sigevent = unsafe { std::mem::zeroed() };
             let mut timer: libc::timer_t = std::ptr::null_mut();
-            // A timer that notifies nobody expires in no interrupt, so each sends a signal that is ignored.
+            // A timer without notification expires in no interrupt, so each sends an ignored signal.
             event.sigev_notify = libc::SIGEV_SIGNAL;
             event.sigev_signo = libc::SIGURG;
             // SAFETY: both are valid for the call.

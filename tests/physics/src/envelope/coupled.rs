@@ -1,5 +1,5 @@
-//! The hands of the envelope in coupled mode, where the force is what the tissue answers at 200 Hz: a needle off its
-//! line, both models.
+//! The hands of the envelope in coupled mode, where the force is the tissue's answer at 200 Hz: a needle off its line,
+//! both models.
 
 use super::{Case, SINGING_M, excess, to_and_fro, worst};
 use crate::rows::{Row, keep};
@@ -13,7 +13,7 @@ use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::{Labels, Role, Scene, Structure, TissueKind};
 
-/// Follows its path to a micrometre whatever the force.
+/// Follows its path to a micrometre at any force.
 const GUIDED: Hand = Hand {
     mass_kg: 0.5,
     damping_n_s_per_m: 1e4,
@@ -28,7 +28,7 @@ fn coupled() -> ForceParameters {
     }
 }
 
-/// Makes 28 x 28 x 40 mm of gland in cells of 2 mm: small, so that a tick is soon solved.
+/// Makes 28 x 28 x 40 mm of gland in cells of 2 mm: small, for fast ticks.
 fn block(kind: TissueKind) -> Box<World> {
     let mut gland = Structure::soft("gland", 1);
     gland.role = Role::Target;
@@ -47,12 +47,11 @@ fn run(session: &mut Session, seconds: f64) -> Vec<Tick> {
     (0..(seconds * 1e3) as usize).map(|_| session.tick()).collect()
 }
 
-/// Three quarters of a second each, from one second after the nudge on: those of a hand that still moves after two of
-/// them, which go on to the eighth second, as where a handle is turned.
+/// Windows of three quarters of a second, from one second after the nudge; a hand that still moves after two of them is
+/// followed to the eighth second, as when a handle is rotated.
 const LOOKS: usize = 9;
 
-/// Runs `super::session` with the tip brought to rest `rest_m` behind where the body begins; returns how far it moves
-/// to and fro.
+/// Runs `super::session` with the tip brought to rest `rest_m` behind the body's surface; returns its oscillation.
 fn session(mut world: Box<World>, hand: Hand, late_ticks: usize, rest_m: f64) -> (Case, Vec<f64>, Box<World>) {
     world.tissue.return_to_rest();
     let start = axis_start(&world);
@@ -122,7 +121,7 @@ fn no_hand_sings_in_coupled_mode() {
                 }
             }
         }
-        // One that decays moves less from look to look, and is at rest by the last.
+        // A decaying motion shrinks from window to window, and is at rest by the last.
         let rests = |looks_m: &[f64]| {
             looks_m.windows(2).all(|pair| pair[1] < pair[0]) && looks_m.last().is_some_and(|m| *m <= SINGING_M)
         };
@@ -149,8 +148,8 @@ fn no_hand_sings_in_coupled_mode() {
     }
 }
 
-/// Creep in by 10 mm and pull back faster: by eq. 6 the tissue follows a slow needle, and let a fast one go. That gave
-/// the hand 24 mJ a cycle.
+/// Creeps in by 10 mm and pulls back faster: by eq. 6 the tissue follows a slow needle and releases a fast one, which
+/// gave the hand 24 mJ a cycle.
 #[test]
 fn a_closed_cycle_in_coupled_mode_gives_the_hand_nothing() {
     for kind in [TissueKind::ChainMail, TissueKind::Fem] {

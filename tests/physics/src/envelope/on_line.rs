@@ -1,4 +1,5 @@
-//! The same hands on a needle line, as every scene ships: the real loops, compliance and membranes of finite elements.
+//! The same hands on a needle line, as in every shipped scene: the real loops, compliance and membranes of finite
+//! elements.
 
 use super::{Case, excess, to_and_fro, worst};
 use nalgebra::Vector3;
@@ -12,7 +13,7 @@ use stylet_sim::limits::TissueParameters;
 use stylet_sim::line::ReadyLine;
 use stylet_sim::scene::{Labels, Role, SceneSource, Structure, TissueKind};
 
-/// A body and the line through the middle of its gland, used by one session after the other.
+/// A body and the line through the centre of its gland, shared by successive sessions.
 struct Theatre {
     world: Option<Box<World>>,
     start: Vector3<f64>,
@@ -56,7 +57,7 @@ impl Theatre {
         let line = body.prepare(1, start.into(), [0.0, 0.0, 1.0], false, &mut || true);
         let mut line = line.expect("through the gland");
         if tissue == TissueKind::Fem {
-            // What the hand feels is of full resolution; the body that is drawn does not matter here.
+            // The felt force has full resolution; the drawn body does not matter here.
             let light = LineBody::of_source(source, TissueKind::ChainMail).expect("can be solved");
             let light = light
                 .expect("has lines")
@@ -70,7 +71,7 @@ impl Theatre {
         }
     }
 
-    /// Runs [`super::session`] with the tip brought to rest `rest_m` behind where the body begins.
+    /// Runs [`super::session`] with the tip brought to rest `rest_m` behind the body's surface.
     fn session(&mut self, (hand, late_ticks): (Hand, usize), (name, rest_m): (&str, f64), controlled: bool) -> Case {
         let faults = LinkFaults {
             late_ticks,
@@ -122,8 +123,7 @@ impl Theatre {
     }
 }
 
-/// Links that are so many ticks late, and every so many-th hand of the envelope: of every second one all corners are
-/// among them.
+/// Delays of the link in ticks, and a stride over the hands of the envelope: a stride of two includes all corners.
 #[derive(Clone, Copy)]
 struct Extent {
     lateness: &'static [usize],
@@ -199,7 +199,8 @@ fn no_hand_sings_on_a_line_at_any_lateness() {
     no_hand_sings_on_bone(ALL);
 }
 
-/// The tests above can fail. Tissue in series is softer than a membrane before a rigid hand: it takes eight ticks.
+/// Shows that the tests above can fail. Tissue in series is softer than a membrane before a rigid hand: it takes eight
+/// ticks.
 #[test]
 fn without_control_a_link_eight_ticks_late_sings_on_a_line() {
     let mut theatre = Theatre::of("paper", TissueKind::ChainMail);
@@ -213,12 +214,12 @@ fn without_control_a_link_eight_ticks_late_sings_on_a_line() {
         cases.iter().filter(|case| case.sings()).count()
     };
     assert_eq!(sing(3, false), 0);
-    // More than the controller has accounts for.
+    // More than the controller allows for.
     assert!(sing(8, false) > 0, "what sings is not seen");
 }
 
-/// A scene file may have structures of any modulus. In tissue ten times as stiff as a prostate 6 of 108 hands sang over
-/// a link that is three ticks late, and in stiffer tissue all were thrown out.
+/// A scene file may have structures of any modulus. In tissue ten times as stiff as a prostate, 6 of 108 hands
+/// oscillated over a link with a delay of three ticks, and in stiffer tissue all were ejected.
 #[test]
 fn no_hand_sings_on_a_line_in_tissue_of_any_stiffness() {
     no_hand_sings_in_stiff_tissue(LATE);
@@ -232,7 +233,7 @@ fn no_hand_sings_in_stiff_tissue(extent: Extent) {
     }
 }
 
-/// Bone is a wall, and the shaft in the tissue before it holds as well.
+/// Bone is a wall, and the tissue before it grips the shaft as well.
 #[test]
 fn no_hand_sings_on_bone_at_the_end_of_a_line() {
     no_hand_sings_on_bone(LATE);

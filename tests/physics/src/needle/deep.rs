@@ -1,14 +1,13 @@
-//! A needle in tissue that is pushed aside, turned back, weighed and slowed: cases of a whole loop that write their own
-//! rows.
+//! A needle in tissue that is pushed aside, reversed, weighed and slowed: whole-loop cases that write their own rows.
 
 use super::*;
 use crate::rows::{Row, keep};
 use stylet_benches::rig::hand_envelope;
 
-/// Two steps of the encoders: an oscillation that they can see.
+/// Two steps of the encoders: an oscillation that they can resolve.
 const SEEN_M: f64 = 6e-5;
 
-/// Returns the widest swing of the tip along x within a quarter of a second, about its mean way.
+/// Returns the widest swing of the tip along x within a quarter of a second, about its mean path.
 fn to_and_fro_m(places: &[f64]) -> f64 {
     let swing = |part: &[f64]| {
         let (low, high) = part
@@ -19,7 +18,7 @@ fn to_and_fro_m(places: &[f64]) -> f64 {
     places.chunks(250).map(swing).fold(0.0, f64::max)
 }
 
-/// 45 mm deep a hand of the envelope pushes 4 mm aside, and later back to the way in.
+/// 45 mm deep, a hand of the envelope pushes 4 mm aside, and later back to the path.
 #[test]
 fn no_hand_sings_that_pushes_a_deep_needle_aside() {
     let mut theatre = Theatre::of(TissueKind::ChainMail);
@@ -95,7 +94,8 @@ fn an_unfinished_puncture_is_reversible() {
             found
         };
         let (direct, after) = (at(None), at(Some(6e-3)));
-        // The hand itself ends elsewhere when it comes from the other side: by how far the tissue went along with it.
+        // The hand itself ends elsewhere when it comes from the other side: by the distance that the tissue moved with
+        // it.
         let surface_m = theatre.start.z + 5e-3;
         let share = |found: (f64, f64, f64)| found.0 / (found.2 - surface_m);
         let more = 100.0 * (share(after) / share(direct) - 1.0);
@@ -119,7 +119,7 @@ fn an_unfinished_puncture_is_reversible() {
     }
 }
 
-/// Slip is solved in the force loop: the rate of the tissue is what is drawn, not what is felt.
+/// Slip is solved in the force loop: the rate of the tissue affects the picture, not the force.
 #[test]
 fn the_rate_of_the_tissue_loop_is_not_felt() {
     for kind in KINDS {
@@ -160,8 +160,8 @@ fn the_rate_of_the_tissue_loop_is_not_felt() {
     }
 }
 
-/// F_G with 0.2 kg, as handles weigh: lifting the handle is paid by the spring that carries it in a real workshop, and
-/// is no debt.
+/// F_G with 0.2 kg, the mass of a handle: in a real workshop the supporting spring pays for lifting the handle, so it
+/// is no energy debt.
 #[test]
 fn a_handle_that_is_carried_may_be_lifted() {
     let weighed = ForceParameters {
@@ -216,7 +216,7 @@ fn a_handle_that_is_carried_may_be_lifted() {
     assert!(weight_n > 1.0);
 }
 
-/// Follows its path to a micrometre whatever the force.
+/// Follows its path to a micrometre at any force.
 const GUIDED: Hand = Hand {
     mass_kg: 0.5,
     damping_n_s_per_m: 1e4,
@@ -224,8 +224,8 @@ const GUIDED: Hand = Hand {
     effort: None,
 };
 
-/// Tissue, membrane and friction together, in the whole loop: what the hand gets back is what it put in, less what was
-/// cut and slipped.
+/// Tissue, membrane and friction together, in the whole loop: the hand receives the energy that it supplied, minus that
+/// of cutting and slip.
 #[test]
 fn a_closed_insertion_gives_the_hand_no_more_than_it_took() {
     for kind in KINDS {

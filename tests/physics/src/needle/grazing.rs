@@ -31,7 +31,7 @@ struct Found {
     held_n: f64,
     /// Force at the end, along the needle.
     rest_n: f64,
-    /// Largest across the needle, where the force is at least a newton, over that along it.
+    /// Largest force across the needle, relative to that along it, where the force is at least a newton.
     across: f64,
     step_n: f64,
     punctures: u32,
@@ -40,7 +40,7 @@ struct Found {
     depth_m: f64,
 }
 
-/// Inserts through `point` on the face, or close to it, in `direction`, and out again.
+/// Inserts through `point` on the face, or close to it, in `direction`, and withdraws.
 fn insert(
     source: &SceneSource,
     kind: TissueKind,
@@ -110,9 +110,8 @@ fn tilted(degrees: f64) -> Vector3<f64> {
     Vector3::new(sine, 0.0, cosine)
 }
 
-/// The needle stopped within a nanometre before the face, as encoders have it where the entry lies on one of their
-/// steps, and met nothing from there on. Where it comes to rest in the tissue is decided by friction and cutting alone,
-/// whatever the angle is.
+/// The needle stopped within a nanometre before the face, as when the entry lies on an encoder step, and met nothing
+/// from there on. Its resting place in the tissue depends on friction and cutting alone, whatever the angle.
 #[test]
 fn a_face_met_at_an_angle_is_felt_as_one_met_squarely() {
     let gland = SceneSource::Builtin("paper".to_owned());
@@ -121,7 +120,7 @@ fn a_face_met_at_an_angle_is_felt_as_one_met_squarely() {
     let middle = (Vector3::from(low) + Vector3::from(high)) / 2.0;
     let block = block();
     let on_face = Vector3::new(15e-3, 24e-3, 0.0);
-    // A place that the needle goes through, and how far before it the path begins.
+    // A point on the needle's path, and the distance before it at which the path begins.
     let places = [
         ("a block's face met at 45 degrees", &block, on_face, 0.0, 45.0),
         (

@@ -1,10 +1,10 @@
-//! Hard cases that no plan foresees: busy machines, edges, bone, membranes close together, bodies that rest on nothing.
+//! Hard cases that no plan foresees: busy machines, edges, bone, closely spaced membranes, unsupported bodies.
 
 use super::*;
 use stylet_anatomy::{Beyond, Surroundings};
 use stylet_sim::scene::{Labels, Role, Structure};
 
-/// No force changes faster, N for each tick: the gate's limit, and what the hand's own filter adds to it.
+/// Largest change of force, N per tick: the gate's limit, plus the contribution of the hand's own filter.
 const SLEW_N: f64 = 0.5 + 1e-9;
 
 fn largest_step_n(ticks: &[Tick]) -> f64 {
@@ -37,7 +37,7 @@ fn other(name: &str) -> Structure {
     structure
 }
 
-/// The slip is the force loop's own: what the hand feels does not wait for the tissue.
+/// The slip is solved in the force loop: the felt force does not wait for the tissue.
 #[test]
 fn tissue_ticks_that_do_not_take_place_are_not_felt() {
     for kind in KINDS {
@@ -78,7 +78,7 @@ fn tissue_ticks_that_do_not_take_place_are_not_felt() {
     }
 }
 
-/// The fastest hand of the envelope: the membrane gives way in a tick, the force on the hand does not.
+/// The fastest hand of the envelope: the membrane gives way in a tick, but the force on the hand changes slowly.
 #[test]
 fn a_puncture_at_full_speed_stays_within_the_slew_limit() {
     for kind in KINDS {
@@ -106,7 +106,7 @@ fn a_puncture_at_full_speed_stays_within_the_slew_limit() {
     }
 }
 
-/// Through the rim of the gland, where a line has little tissue and the body little hold.
+/// Through the rim of the gland, where a line has little tissue and the body little support.
 #[test]
 fn a_needle_through_the_rim_leaves_the_gland_at_rest() {
     for kind in KINDS {
@@ -138,7 +138,7 @@ fn a_needle_through_the_rim_leaves_the_gland_at_rest() {
     }
 }
 
-/// Skin of 4 mm on a gland: the second membrane begins before the first has been pressed in by its 8 mm.
+/// Skin of 4 mm on a gland: the second membrane begins before the first has been indented by its 8 mm.
 #[test]
 fn membranes_closer_than_their_depth_give_way_one_after_the_other() {
     for kind in KINDS {
@@ -186,7 +186,7 @@ fn bone_on_the_way_is_not_entered() {
             moved_m * 1e3
         );
         assert!((tip_m - 30e-3).abs() < 0.3e-3, "{tip_m} m");
-        // The hand is stronger than the device, which gives all that it has.
+        // The hand is stronger than the device, which gives its maximum.
         let most_n = needle.session.device_limit_n();
         assert!(
             (rest_n(&ticks) - most_n).abs() < 0.1,
@@ -198,7 +198,7 @@ fn bone_on_the_way_is_not_entered() {
     }
 }
 
-/// From fat to a table on all sides the same needle moves less; a body that nothing holds is refused.
+/// From fat to a table on all sides the same needle moves less; an unsupported body is refused.
 #[test]
 fn what_a_body_rests_on_goes_from_nothing_to_a_table() {
     for kind in KINDS {

@@ -1,5 +1,4 @@
-//! A needle that goes in off its line in finite elements: what the hand and the window have of it, in the scenes that
-//! ship.
+//! A needle off its line in finite elements: its force and display, in the shipped scenes.
 
 use super::*;
 use crate::rows::{Row, keep};
@@ -24,7 +23,7 @@ fn insert(scene: &str, degrees: f64, speed_m_per_s: f64, coupling: f64) -> Found
     let start = axis_start(&world);
     let (sine, cosine) = degrees.to_radians().sin_cos();
     let direction = Vector3::new(sine, 0.0, cosine);
-    // Through the same place on the surface.
+    // Through the same point on the surface.
     let surface = start + Vector3::z() * 5e-3;
     let start = surface - direction * 8e-3;
     let force = ForceParameters {
@@ -58,8 +57,8 @@ fn insert(scene: &str, degrees: f64, speed_m_per_s: f64, coupling: f64) -> Found
     found
 }
 
-/// The body is solved one cycle a tick there, and lags most where the patch is another in each tick. No force of eq. 8
-/// to 10 goes by it; in coupled mode one does, and is turned off before it is wrong by more than a fifth.
+/// Off the line the body is solved one cycle a tick, and lags most when the patch changes in each tick. No force of eq.
+/// 8 to 10 depends on it; in coupled mode one does, and is turned off before its error exceeds a fifth.
 #[test]
 fn an_off_line_needle_keeps_its_own_force() {
     for (case, coupling) in [

@@ -1,4 +1,4 @@
-//! The hard cases: each put to each model that it concerns.
+//! The hard cases, each run on every model that it concerns.
 
 use super::drive::{Seen, drive};
 use super::models::{Kind, block, block_on_bone, body};
@@ -12,7 +12,7 @@ const TICK_S: f64 = 5e-3;
 /// The tolerance of both models.
 const TOLERANCE: f64 = 1.001e-3;
 
-/// Cases that are known to fall short, and why; the page says so. A case that is met again must leave this list.
+/// Cases known to fall short, and why; the page says so. A case that is met again must leave this list.
 pub const SHORT: [(u32, Kind, &str); 4] = [
     (
         3,
@@ -172,7 +172,7 @@ fn middle(scene: &Scene) -> u32 {
     scene.lattice.element_of_cell(i, j, k).expect("the middle is tissue")
 }
 
-/// Returns a way that turns and speeds up: up to `per_tick` elements a tick within `reach` elements.
+/// Returns a turning, accelerating path: up to `per_tick` elements a tick within `reach` elements.
 fn turning(tick: u32, per_tick: f64, reach: f64) -> [f64; 3] {
     let t = f64::from(tick) * per_tick / reach;
     [
@@ -504,7 +504,7 @@ fn parts(kind: Kind) -> Option<(String, bool)> {
     let seen = drive(&mut *model, 160, TICK_S, |tick, body| {
         Some(held_at(body, element, turning(tick, 0.3, reach)))
     });
-    // FEM solves both parts in one, to its tolerance of the travel.
+    // FEM solves both parts together, to its tolerance of the displacement.
     let still = if kind == Kind::Fem {
         TOLERANCE * seen.farthest
     } else {

@@ -1,4 +1,4 @@
-//! Drives a tissue model through a script and looks at every tick: finite, unfolded, residual, still.
+//! Drives a tissue model through a script and checks every tick: finite, unfolded, residual, at rest.
 
 use stylet_sim::tissue::{Deformed, Held, HeldOutcome, TissueModel};
 
@@ -6,19 +6,19 @@ use stylet_sim::tissue::{Deformed, Held, HeldOutcome, TissueModel};
 #[derive(Clone, Debug)]
 pub struct Seen {
     pub finite: bool,
-    /// Smallest volume that three links of an element span, over that at rest; not above zero is folded.
+    /// Smallest corner volume of an element, relative to rest; not above zero is folded.
     pub least_corner: f64,
     pub worst_residual: f64,
     pub unconverged: u32,
     pub refused: u32,
     pub limited: u32,
-    /// Farthest that an element was from rest, in elements.
+    /// Largest displacement of an element, in elements.
     pub farthest: f64,
-    /// Most that the farthest displacement rose from one tick to the next while nothing was held, in elements.
+    /// Largest growth of that displacement from one tick to the next while nothing was held, in elements.
     pub grew_free: f64,
 }
 
-/// Takes `ticks` steps; `held` is asked before each.
+/// Takes `ticks` steps; calls `held` before each.
 pub fn drive(
     model: &mut dyn TissueModel,
     ticks: u32,
@@ -71,8 +71,8 @@ pub fn farthest(body: &Deformed) -> f64 {
     )
 }
 
-/// Returns the smallest volume spanned by the links of an element to three neighbours, one along each axis, over all
-/// eight corners.
+/// Returns the smallest corner volume of an element over all eight corners: that spanned by its links to three
+/// neighbours, one along each axis.
 fn least_corner(body: &Deformed) -> f64 {
     let mut least = f64::INFINITY;
     for element in 0..body.lattice.element_count() as u32 {

@@ -1,4 +1,4 @@
-//! The tissue models that every case is put to, and the bodies it is put to them on.
+//! The tissue models under test, and their bodies.
 
 use stylet_sim::limits::{Limits, TissueParameters};
 use stylet_sim::scene::{Labels, Scene, Structure};
@@ -22,7 +22,7 @@ impl Kind {
         }
     }
 
-    /// Limits of the model, from settings that are the model's own but for what the case sets.
+    /// Limits of the model, with the case's settings and the model's own for the rest.
     pub fn limits(self, parameters: &TissueParameters) -> Limits {
         let mut parameters = parameters.clone();
         if self == Kind::Relaxed {
@@ -35,7 +35,7 @@ impl Kind {
         match self {
             Kind::Fem => {
                 let mut fem = FemTissue::<f32>::new(scene).expect("the case gives valid materials");
-                // What the solver can do, not what it has time for in the loop.
+                // The solver's capability, not its time in the loop.
                 fem.settings.max_cycles = 40;
                 Box::new(fem)
             }
@@ -44,7 +44,7 @@ impl Kind {
     }
 }
 
-/// Cuts a body by formula; its label numbers the structure, 0 is no tissue.
+/// Builds a body from a formula; its label numbers the structure, 0 is no tissue.
 pub fn body(dims: [usize; 3], structures: Vec<Structure>, label: impl Fn([usize; 3]) -> u8) -> Scene {
     let [nx, ny, _] = dims;
     let cell = |n: usize| [n % nx, n / nx % ny, n / (nx * ny)];
