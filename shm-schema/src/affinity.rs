@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn a_core_is_left_once_and_only_to_a_loop_of_real_time_priority_on_this_machine() {
+    fn a_core_is_left_once_and_only_to_a_local_real_time_loop() {
         let mut session: Session = bytemuck::Zeroable::zeroed();
         (session.time_ns, session.haptic.policy, session.haptic.core) = (10 * FRESH_NS, 1, 3);
         let now_ns = session.time_ns + FRESH_NS / 2;
@@ -107,7 +107,7 @@ mod tests {
 
     /// Runs in a separate thread, so that no other test loses a core.
     #[test]
-    fn a_thread_and_those_that_it_starts_stay_off_a_core_but_never_off_their_last() {
+    fn a_thread_and_its_children_leave_a_core_but_never_their_last() {
         let test = std::thread::spawn(|| {
             // SAFETY: it only names this thread.
             let me = unsafe { libc::gettid() };

@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn requests_of_the_lease_survive_and_a_count_of_others_lists_no_more_than_there_are() {
+    fn lease_requests_survive_and_member_counts_are_clamped() {
         for request in [
             LeaseRequest::Take,
             LeaseRequest::Release,

@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn every_back_end_is_listed_with_its_forms_and_whether_anybody_has_tried_it() {
+    fn every_back_end_is_listed_with_its_forms_and_test_status() {
         let root = Path::new("/nonexistent");
         for backend in BACKENDS {
             let listed = list(backend, root, &nowhere(), true);
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_service_that_is_not_there_is_said_with_what_to_do_and_is_left_alone_where_only_looks_are_wanted() {
+    fn a_missing_service_is_reported_with_a_remedy_unless_only_looking() {
         let backend = BACKENDS.iter().find(|b| b.kind == BackendKind::Haply).expect("listed");
         let listed = |libraries: &Libraries, try_it| text(&list(backend, Path::new("/nonexistent"), libraries, try_it));
         let asked = listed(&nowhere(), true);

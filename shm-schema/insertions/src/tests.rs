@@ -111,7 +111,7 @@ fn what_is_no_table_is_named_with_what_to_do() {
 }
 
 #[test]
-fn misplacement_is_the_way_from_plan_to_rest_and_its_part_along_the_needle() {
+fn misplacement_is_the_distance_to_plan_and_its_axial_part() {
     assert_eq!(seed(2, true).misplacement_mm(), Some([5.0, -4.0]));
     assert_eq!(seed(2, false).misplacement_mm(), None);
 }

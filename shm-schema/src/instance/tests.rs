@@ -82,7 +82,7 @@ fn what_a_host_uses_is_not_swept() {
 }
 
 #[test]
-fn a_folder_that_others_may_enter_is_closed_and_a_file_in_its_place_is_named() {
+fn an_open_folder_is_closed_and_a_file_in_its_place_is_named() {
     let path = std::env::temp_dir().join(format!("stylet-folder-{}", std::process::id()));
     std::fs::create_dir(&path).expect("room");
     std::fs::set_permissions(&path, Permissions::from_mode(0o755)).expect("ours");

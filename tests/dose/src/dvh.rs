@@ -199,7 +199,7 @@ fn doses_to_volumes_follow_the_closed_form_and_d01cc_is_not_d2cc() {
 }
 
 #[test]
-fn the_differential_curve_adds_up_to_the_structure_and_to_the_cumulative_curve() {
+fn the_differential_curve_sums_to_volume_and_cumulative_curve() {
     let sphere = Structure::of_region("sphere", &Sphere { radius_m: 0.01 }, 0.5e-3);
     let curve = dvh(&sphere, |d| 100.0 + 3000.0 * d[0]);
     let bins = curve.bins(1.0, 200.0);

@@ -56,7 +56,7 @@ fn formulae_agree_with_an_independent_evaluation_on_the_axis_and_off_it() {
 
 /// The same points around a seed in several positions and directions.
 #[test]
-fn dose_at_points_agrees_with_an_independent_evaluation_in_every_direction() {
+fn point_dose_agrees_with_an_independent_evaluation_in_all_directions() {
     let table = references();
     for name in ["i125_6711", "pd103_200"] {
         let kernel = DoseKernel::new(&source(name), Interval::ALL);

@@ -186,7 +186,7 @@ fn plans_of_pydicom_are_read_with_place_direction_and_strength() {
 }
 
 #[test]
-fn a_plan_written_from_csv_is_the_same_plan_in_pydicom_and_when_it_is_imported_again() {
+fn a_csv_plan_is_the_same_in_pydicom_and_after_reimport() {
     let out = scratch("dicom-plan");
     let (csv, dcm, back) = (out.join("seeds.csv"), out.join("plan.dcm"), out.join("back.csv"));
     let mut text = String::from("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u\n");

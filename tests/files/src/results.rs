@@ -53,7 +53,7 @@ fn results_go_into_a_folder_of_their_own_and_name_their_inputs() {
 /// Seeds outside the target or at one position, and an HDR source counted for ever, used to give figures without a
 /// warning.
 #[test]
-fn seeds_that_lie_oddly_are_reported_and_a_temporary_source_needs_its_time() {
+fn implausible_seeds_are_reported_and_temporary_sources_need_a_time() {
     let folder = scratch("results-odd");
     let seeds = folder.join("odd.csv");
     let table = "x_mm,y_mm,z_mm,strength_u\n-1,4,38,0.5\n-1,4,38,0.5\n300,0,40,0.5\n";

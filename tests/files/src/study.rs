@@ -85,7 +85,7 @@ fn check(files: &[PathBuf], images: &[PathBuf]) -> (bool, serde_json::Value) {
 
 /// Exported files used to reference only the plan, each with its own patient, study and frame.
 #[test]
-fn structure_set_plan_and_dose_of_a_study_lack_no_attribute_and_name_each_other_and_their_images() {
+fn the_files_of_a_study_are_complete_and_reference_each_other() {
     let folder = scratch("study-seeds");
     let files = study("study-linked", &seeds(&folder), &data("dicom/structures.dcm"), &[]);
     let (done, found) = check(&files, &images());

@@ -117,7 +117,7 @@ fn the_desktop_starts_what_is_installed_and_finds_its_icon() {
 }
 
 #[test]
-fn the_unit_of_a_lab_pc_starts_what_is_installed_with_the_limits_that_the_loops_ask_for() {
+fn the_lab_unit_starts_the_installed_program_with_the_loops_limits() {
     let files = installed(&manual("package-unit"));
     let unit = text(&files["/usr/lib/systemd/system/stylet-rt-core@.service"]);
     let keys = keys(&unit);

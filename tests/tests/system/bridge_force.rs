@@ -62,7 +62,7 @@ fn insertion(rounds: u64, speed_m_per_s: f64, is_disturbed: bool) -> Vec<f64> {
 /// Insertions of one kind differ by chance as well: to be interpreted by a reader, not run each day.
 #[test]
 #[ignore = "a measurement: make wall"]
-fn killed_and_stopped_bridges_change_no_force_beyond_what_two_insertions_differ() {
+fn killed_bridges_change_forces_no_more_than_chance_does() {
     let rounds = repeats("STYLET_BRIDGE_FORCE_ROUNDS", 2);
     let speed_m_per_s = M_PER_S.min(LONGEST_M / (2.0 * rounds as f64 * ROUND_S + 2.0));
     where_the_machine_runs(|| {

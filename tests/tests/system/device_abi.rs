@@ -139,7 +139,7 @@ fn wrong_calls_get_the_errors_of_the_interface() {
 }
 
 #[test]
-fn every_error_of_the_interface_turns_the_force_off_and_the_device_comes_back() {
+fn every_interface_error_turns_the_force_off_and_the_device_recovers() {
     let fake = Fake::new();
     let mut device = fake.open();
     let push = Wrench::from_force(Vector3::new(0.0, 1.0, 0.0));

@@ -87,7 +87,7 @@ fn pose_and_force_change_frames_and_units_as_stated() {
 }
 
 #[test]
-fn torque_about_the_needle_turns_the_roll_joint_and_keeps_to_the_joints_limits() {
+fn torque_about_the_needle_turns_the_roll_joint_within_its_limits() {
     let fake = Fake::new();
     let mut device = fake.open();
     let about = |torque_nm: Vector3<f64>| Wrench {
@@ -254,7 +254,7 @@ fn an_error_in_any_call_of_the_start_is_named_and_leaves_nothing_open() {
 }
 
 #[test]
-fn a_premium_is_calibrated_when_the_operator_presses_the_button_and_not_before() {
+fn a_premium_is_calibrated_only_when_the_operator_presses_the_button() {
     let fake = Fake::new();
     fake.control.uncalibrated.store(1, Relaxed);
     let (mut device, heard) = open_listening(config());
@@ -420,7 +420,7 @@ fn unplugged_and_plugged_in_again_without_loading_the_library_anew() {
 }
 
 #[test]
-fn another_model_that_comes_back_is_refused_since_limits_were_set_for_the_first() {
+fn another_model_after_a_reconnect_is_refused() {
     let fake = Fake::new();
     let (mut device, heard) = open_listening(config());
     assert!(drive(&mut device, &push(), LONG, Result::is_ok));
@@ -438,7 +438,7 @@ fn another_model_that_comes_back_is_refused_since_limits_were_set_for_the_first(
 }
 
 #[test]
-fn a_dropped_device_has_zero_force_and_is_stopped_unscheduled_and_disabled_in_this_order() {
+fn a_dropped_device_is_zeroed_stopped_unscheduled_then_disabled() {
     let fake = Fake::new();
     let mut device = fake.open();
     let strong = Wrench::from_force(Vector3::new(0.0, 8.0, 0.0));

@@ -88,7 +88,7 @@ fn goal(run: &Run, plan: &NeedlePlan, seeds_dropped: usize) -> Option<[f64; 3]> 
 
 /// With real motors the core ends, since only its end releases them; a recording is then needed.
 #[test]
-fn a_force_loop_that_stops_over_a_phantom_ends_the_core_and_leaves_a_recording() {
+fn a_stopped_force_loop_over_a_phantom_ends_the_core_with_a_recording() {
     where_the_machine_runs(|| {
         let mut rig = Rig::start("phantom-stopped", true);
         let stopped = StoppedThread::stop(rig.core.id(), "haptic");
@@ -175,7 +175,7 @@ fn the_whole_procedure_runs_with_a_phantom_and_its_motors_get_the_force() {
 }
 
 #[test]
-fn unplugged_in_mid_insertion_the_force_is_off_the_screen_says_why_and_it_goes_on_after_a_re_plug() {
+fn unplugging_turns_the_force_off_with_a_message_until_replugged() {
     where_the_machine_runs(|| {
         let mut rig = Rig::start("phantom-unplugged", false);
         let plan = default_plan(&rig.link.scene().expect("live").header);

@@ -120,7 +120,7 @@ fn both_hands_are_seen_and_each_goes_where_it_is_asked_to() {
 /// The whole path: the hand's goal, its loop, the contact in the tissue loop, the snapshot for a window, and the
 /// returning force.
 #[test]
-fn a_probe_that_is_pressed_is_felt_and_moves_the_gland_and_withdrawn_leaves_nothing() {
+fn a_pressed_probe_is_felt_and_moves_the_gland_until_withdrawn() {
     where_the_machine_runs(|| {
         let mut rig = Rig::start(&["--device-2", "simulated", "--scene", "pelvis"]);
         rig.engage();

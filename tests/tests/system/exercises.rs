@@ -64,7 +64,7 @@ fn words(link: &mut Link) -> Vec<(MomentKind, String)> {
 }
 
 #[test]
-fn a_gland_that_has_moved_gets_its_seeds_beside_their_places_and_stiff_tissue_gives_way_less() {
+fn a_moved_gland_misplaces_seeds_and_stiff_tissue_yields_less() {
     where_the_machine_runs(|| {
         let mut core = Core::start();
         let mut link = core.host();
@@ -98,7 +98,7 @@ fn a_gland_that_has_moved_gets_its_seeds_beside_their_places_and_stiff_tissue_gi
 }
 
 #[test]
-fn marks_and_exercises_are_events_with_their_words_and_the_session_says_what_is_in_force() {
+fn marks_and_exercises_are_events_and_the_session_lists_those_in_force() {
     let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "paper"]);
     let mut link = core.host();
     let tick = link.state().expect("live").tick;

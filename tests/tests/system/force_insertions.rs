@@ -152,7 +152,7 @@ fn what_gives_way_in_the_pelvis_lies_on_the_needles_line() {
 
 /// `docs/physics.md`, layers: the tip is already in the urethra when the capsule before it gives way.
 #[test]
-fn on_the_axis_of_the_gland_the_urethra_is_felt_as_gland_and_the_bladder_gives_way() {
+fn on_the_gland_axis_urethra_feels_as_gland_and_the_bladder_yields() {
     let start = axis_start(&world("pelvis"));
     let lies = membranes_on_line(&world("pelvis"), start, 0.1);
     let [skin, capsule, _urethra, _capsule, bladder] = lies[..] else {

@@ -256,7 +256,7 @@ fn a_tracker_moves_the_needle_and_its_silence_stops_it() {
 }
 
 #[test]
-fn a_transform_that_nobody_agreed_to_is_refused_in_words_and_moves_nothing() {
+fn an_unexpected_transform_is_refused_with_a_reason_and_moves_nothing() {
     let mut core = Core::start_with(&["--no-rt"]);
     let mut link = core.host();
     let (closed, open) = (Served::start(&core, &[]), Served::start(&core, &["--hand", "Stylus"]));

@@ -50,7 +50,7 @@ fn run_procedure(link: &mut Link) -> Seen {
 }
 
 #[test]
-fn needle_enters_gland_moves_force_peaks_at_puncture_and_seeds_end_off_plan() {
+fn an_insertion_moves_the_gland_peaks_at_puncture_and_misplaces_seeds() {
     where_the_machine_runs(|| {
         let mut core = Core::start();
         let mut link = core.host();

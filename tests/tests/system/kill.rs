@@ -75,7 +75,7 @@ fn missed(records: &[TickRecord]) -> u64 {
 }
 
 #[test]
-fn killing_hosts_in_an_insertion_leaves_no_gap_that_a_run_without_kills_does_not_have() {
+fn killing_hosts_in_an_insertion_adds_no_gap() {
     let display = Display::open();
     // Interleaved, since a shared machine has gaps anyway: two rounds, and up to six if chance alone might explain gaps
     // near the kills. A gap caused by the kills appears each time.

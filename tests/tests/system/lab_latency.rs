@@ -96,7 +96,7 @@ fn report_holds_the_whole_path_and_the_loops_stayed_clean() {
 }
 
 #[test]
-fn limits_decide_the_exit_code_and_the_tail_is_not_judged_where_it_proves_nothing() {
+fn limits_set_the_exit_code_and_an_inconclusive_tail_is_not_judged() {
     let out = scratch("lab-limits");
     let output = latency(&out, &["--limit", "wake_p50_us=0", "--limit", "jitter_p99_us=1e9"]);
     assert_eq!(

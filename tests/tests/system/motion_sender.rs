@@ -21,7 +21,7 @@ use stylet_tests::{Core, program, repeats, scratch, until};
 const MM_PER_S: &str = "123";
 
 #[test]
-fn a_hand_whose_procedure_ends_or_hangs_is_at_rest_within_5_mm_and_400_ticks() {
+fn a_hand_rests_within_5_mm_and_400_ticks_of_its_procedures_end() {
     where_the_machine_runs(|| {
         let mut stage = Stage::open();
         let mut table = Table::begin("procedure");
@@ -53,7 +53,7 @@ fn procedure(core: &Core) -> Command {
 }
 
 #[test]
-fn a_hand_whose_openigtlink_server_ends_or_hangs_is_at_rest_within_5_mm_and_400_ticks() {
+fn a_hand_rests_within_5_mm_and_400_ticks_of_its_igtl_servers_end() {
     where_the_machine_runs(|| {
         let mut stage = Stage::open();
         let mut table = Table::begin("igtl");

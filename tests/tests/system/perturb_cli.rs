@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 #[test]
-fn trials_are_the_same_on_any_number_of_threads_and_none_moves_without_an_error() {
+fn trials_do_not_depend_on_threads_and_zero_error_moves_none() {
     let case = case("perturb-case");
     let trials = |threads: &str, more: &[&str], out: &str| {
         let out = case.folder.join(out);
@@ -45,7 +45,7 @@ fn trials_are_the_same_on_any_number_of_threads_and_none_moves_without_an_error(
 
 /// The effect of a shift on the figures is known from seeds shifted in their file.
 #[test]
-fn a_shift_scores_as_seeds_shifted_in_their_file_and_criteria_count_the_trials() {
+fn a_shift_scores_as_shifted_seeds_and_criteria_count_trials() {
     let case = case("perturb-shifted");
     let seeds = case.folder.join("seeds.csv");
     let trials = |plan: &Path, out: &str, more: &[&str]| {

@@ -80,7 +80,7 @@ fn round(core: &Core, hand: &mut Insertion) -> (u64, u64) {
 }
 
 #[test]
-fn a_hundred_killed_hosts_in_one_insertion_cost_no_more_deadlines_than_hosts_that_live() {
+fn a_hundred_killed_hosts_cost_no_more_deadlines_than_living_ones() {
     let mut core = Core::start();
     let mut hand = Insertion::begin(&mut core, 0.001);
     let (mut control, mut killed, mut not_judged) = (Vec::new(), Vec::new(), 0);
@@ -191,7 +191,7 @@ fn flood(instance: &Instance, time: Duration, mut next: impl FnMut(u64) -> Comma
 }
 
 #[test]
-fn a_flood_of_good_commands_reaches_neither_hand_nor_loop_and_the_operator_can_still_release() {
+fn the_operator_can_release_under_a_flood_that_disturbs_no_loop() {
     where_the_machine_runs(|| {
         let mut core = Core::start();
         let mut hand = Insertion::begin(&mut core, 0.004);

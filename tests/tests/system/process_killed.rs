@@ -43,7 +43,7 @@ impl Drop for Campaign {
 
 /// The files of a killed campaign used to stay until the PC was restarted, some 100 MB of memory each time.
 #[test]
-fn files_of_killed_programs_go_with_the_next_start_and_those_of_living_ones_stay() {
+fn the_next_start_removes_files_of_killed_programs_only() {
     let campaign = Campaign::start(&scratch("killed-campaign"));
     let mut killed = Core::start();
     drop(killed.host());

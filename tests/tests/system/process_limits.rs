@@ -75,7 +75,7 @@ fn short_files_are_named_and_end_nothing_by_a_signal() {
 }
 
 #[test]
-fn a_tissue_priority_above_that_of_the_force_loop_is_refused_where_they_share_a_core() {
+fn a_tissue_priority_above_the_force_loops_is_refused_on_a_shared_core() {
     let refused = |task: &[&str]| {
         let core = first_core();
         let output = Command::new(program("rt-core"))

@@ -74,7 +74,7 @@ fn tissue_that_stops_takes_the_force_off_and_the_operator_rearms() {
 
 /// The core used to end, and lost the placed seeds; a simulation has no motors that would need that.
 #[test]
-fn a_simulated_force_loop_that_stops_is_waited_for_and_keeps_the_force_off() {
+fn a_stopped_simulated_force_loop_is_waited_for_with_the_force_off() {
     where_the_machine_runs(|| {
         let mut core = Core::start();
         let mut hand = Insertion::begin(&mut core, 0.005);

@@ -50,7 +50,7 @@ fn request(core: &Core, hand: &mut Insertion) -> PathBuf {
 }
 
 #[test]
-fn a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit() {
+fn request_fault_and_end_leave_recordings_that_repeat_bit_for_bit() {
     where_the_machine_runs(|| {
         let mut core = Core::start_with(&["--rt-if-allowed", "--tissue", "paper"]);
         let mut hand = Insertion::begin(&mut core, 0.006);

@@ -57,7 +57,7 @@ fn every_built_in_scene_runs_by_its_number_and_says_what_it_is_made_of() {
 }
 
 #[test]
-fn the_default_needle_reaches_the_gland_in_the_pelvis_past_bone_urethra_and_rectum() {
+fn the_default_needle_in_the_pelvis_avoids_bone_urethra_and_rectum() {
     where_the_machine_runs(|| {
         let mut core = Core::start_with(&["--rt-if-allowed", "--scene", "pelvis"]);
         let mut link = core.host();
@@ -237,7 +237,7 @@ fn a_volume_with_structures_runs_and_its_target_is_planned_in() {
 type Case<'a> = (&'a [&'a str], &'a dyn Fn(&mut UploadHeader, &mut Vec<u8>));
 
 #[test]
-fn volumes_that_cannot_be_used_get_one_refusal_with_every_reason_and_the_scene_goes_on() {
+fn unusable_volumes_are_refused_with_every_reason_and_the_scene_runs() {
     where_the_machine_runs(|| {
         let mut core = Core::start();
         let mut link = core.host();

@@ -58,7 +58,7 @@ fn procedure(core: &Core, scene: &Path, out: &Path) -> Output {
 }
 
 #[test]
-fn procedure_runs_in_an_oblique_anisotropic_volume_and_the_geometry_is_right() {
+fn the_procedure_runs_in_an_oblique_anisotropic_volume_at_its_place() {
     where_the_machine_runs(|| {
         let folder = scratch("volume");
         let file = folder.join("gland.nii.gz");

@@ -68,7 +68,7 @@ fn the_force_process_maps_nothing_that_another_process_can_write() {
 }
 
 #[test]
-fn a_bridge_that_is_killed_or_stopped_is_replaced_and_the_hand_feels_nothing() {
+fn a_killed_or_stopped_bridge_is_replaced_unfelt_by_the_hand() {
     where_the_machine_runs(|| {
         let mut core = Core::start();
         let mut hand = Insertion::begin(&mut core, 0.002);

@@ -88,7 +88,7 @@ fn a_hand_whose_window_ends_or_hangs_is_at_rest_within_5_mm_and_400_ticks() {
 
 #[test]
 #[ignore = "a window of slow frames promises its hand for too long"]
-fn a_hand_whose_gamepad_is_of_a_window_that_ends_or_hangs_is_at_rest_within_5_mm_and_400_ticks() {
+fn a_hand_rests_within_5_mm_and_400_ticks_of_its_gamepad_windows_end() {
     where_the_machine_runs(|| {
         let mut stage = Stage::open();
         let mut table = Table::begin("gamepad");

@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_host_promises_one_and_a_half_of_its_pauses_and_one_long_one_is_not_foreseen() {
+    fn a_promise_covers_one_and_a_half_usual_pauses_but_no_single_long_one() {
         for (pause_ms, valid_s, every) in [(2, 0.02, 4), (16, 0.024, 1), (60, 0.09, 1), (900, 0.3, 1)] {
             let mut host = Host::moves();
             host.polls(&[pause_ms; 40]);

@@ -10,7 +10,7 @@ use stylet_surfaces::bodies::{Bodies, Segmentation};
 pub enum LinkStatus {
     /// No core has announced itself, or it has been silent for long; `why` says what to do.
     Absent {
-        /// What to do.
+        /// Instructions for the user.
         why: String,
     },
     /// The heartbeat moves.

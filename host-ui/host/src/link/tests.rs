@@ -113,7 +113,7 @@ fn a_restarted_core_is_found_and_nothing_of_the_first_run_is_left() {
 
 /// A failed bridge is restarted with new ports, and resends what hosts may have missed.
 #[test]
-fn a_host_moves_to_new_ports_of_the_same_run_without_a_gap_or_a_record_twice() {
+fn a_host_on_new_ports_of_a_run_has_every_record_exactly_once() {
     let instance = instance("epoch");
     let mut link = Link::new(instance.0.clone());
     let mut ticks = Vec::new();
@@ -278,7 +278,7 @@ fn a_frame_of_three_seconds_loses_no_record() {
 
 /// Gaps in the numbers of the events were ignored.
 #[test]
-fn events_that_were_not_seen_are_counted_and_those_before_this_host_are_not() {
+fn unseen_events_count_only_from_when_the_host_joined() {
     let mut latest = Latest::default();
     latest.begin(announce(1, 1));
     for sequence in [7, 8, 8, 12] {

@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_noted_less_than_a_minute_ago_is_found_and_what_is_invalid_is_not() {
+    fn only_a_valid_note_younger_than_a_minute_is_found() {
         let instance = Instance::new(&format!("last-{}", std::process::id())).expect("valid");
         let next = Next {
             session_id: 7,

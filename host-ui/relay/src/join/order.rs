@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn one_that_goes_on_asks_for_what_was_made_between_and_in_another_run_for_nothing() {
+    fn a_successor_requests_the_gap_in_the_same_run_only() {
         let (mut before, now) = (Order::default(), Instant::now());
         before.put(batch(1));
         assert_eq!(taken(&mut before, now), [1]);

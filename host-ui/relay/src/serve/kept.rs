@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_server_that_was_started_again_has_what_was_made_before_it_and_says_nothing_before_that_came() {
+    fn a_restarted_server_has_earlier_records_and_answers_once_they_arrive() {
         let mut kept = kept(5..8);
         assert_eq!(answer(&kept, 55, 65), (None, vec![5, 6]));
         assert_eq!(answer(&kept, 20, 49), (None, vec![]), "it may come");

@@ -148,7 +148,7 @@ fn places_between_those_that_a_message_holds_move_with_them() {
 }
 
 #[test]
-fn a_snapshot_without_places_shows_those_that_are_known_and_nothing_where_they_are_not() {
+fn a_snapshot_without_positions_needs_known_ones() {
     let rest = scene(3000, 5000);
     let (mut header, vertices) = snapshot(3000, 5000, 10e-3);
     let thin = Thin::of(&rest, &header, &vertices).expect("of this scene");

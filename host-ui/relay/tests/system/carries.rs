@@ -223,7 +223,7 @@ fn a_core_and_a_server_that_are_started_again_are_seen_again() {
 
 /// Each recording on its machine lacked the records made while it was down.
 #[test]
-fn a_member_that_was_killed_hands_on_what_was_made_until_it_was_started_again() {
+fn a_restarted_member_hands_on_the_records_made_while_it_was_down() {
     let (near, far) = (Named::new(), Named::new());
     let _core = core(&near, &[]);
     let keys = Keys::new();

@@ -225,7 +225,7 @@ fn kinds() -> Vec<(Who, Fault)> {
 }
 
 #[test]
-fn faults_in_an_insertion_cost_the_core_no_record_and_the_far_side_comes_back() {
+fn insertion_faults_lose_no_core_record_and_the_far_side_recovers() {
     let mut class = Class::begin();
     let (mut struck, mut unstopped) = (Vec::new(), 0);
     for round in 0..times() {

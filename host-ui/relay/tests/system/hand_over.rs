@@ -99,7 +99,7 @@ impl Room {
 }
 
 #[test]
-fn a_window_asks_for_the_needle_and_who_has_it_hands_it_over_through_their_ports() {
+fn a_window_requests_the_needle_and_its_holder_hands_it_over() {
     let mut room = Room::begin();
     assert!(room.local.is_shown(|class| class.is_beside_core == 1));
     assert!(room.otto.is_shown(|class| class.is_beside_core == 0));
@@ -135,7 +135,7 @@ fn a_window_asks_for_the_needle_and_who_has_it_hands_it_over_through_their_ports
 }
 
 #[test]
-fn the_window_beside_the_core_takes_the_needle_and_gives_it_through_its_port() {
+fn the_window_next_to_the_core_takes_and_gives_the_needle() {
     let mut room = Room::begin();
     room.otto.moves(0.0).expect("nobody operates");
     room.local.ask(&LeaseRequest::Take);

@@ -133,7 +133,7 @@ fn a_hand_beside_the_core_goes_first_and_hands_over() {
 }
 
 #[test]
-fn one_operator_hands_the_needle_to_another_and_the_hand_rests_between_them() {
+fn the_hand_rests_while_an_operator_hands_the_needle_over() {
     let mut way = Way::begin();
     let other = Named::new();
     let _joined = join(&way.keys.invite("paula", Role::Operator, Validity::days(1)), &other);

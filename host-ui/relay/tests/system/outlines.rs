@@ -92,7 +92,7 @@ impl Standing {
 }
 
 #[test]
-fn places_that_move_with_their_neighbours_are_nearer_to_the_tissue_than_those_that_stand_still() {
+fn positions_moved_with_their_neighbours_are_closer_to_the_tissue() {
     let (near, far) = (Named::new(), Named::new());
     let _core = core(&near, &["--scene", "pelvis"]);
     let keys = Keys::new();

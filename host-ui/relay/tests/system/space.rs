@@ -169,7 +169,7 @@ mod tests {
     /// Twenty namespaces of a killed class used to stay until they were removed by hand.
     #[test]
     #[ignore = "as root: it makes network namespaces"]
-    fn a_line_of_a_killed_test_is_removed_by_the_next_and_one_of_an_ended_test_by_itself() {
+    fn lines_go_with_their_test_or_if_it_was_killed_with_the_next() {
         let mut ended = holder();
         let process = ended.child.id();
         ended.signal(libc::SIGTERM);

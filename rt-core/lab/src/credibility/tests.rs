@@ -111,7 +111,7 @@ fn the_page_says_what_it_is_not() {
 }
 
 #[test]
-fn outcomes_of_a_run_stand_beside_their_requirement_and_an_altered_run_is_refused() {
+fn outcomes_stand_next_to_requirements_and_altered_runs_are_refused() {
     let folder = std::env::temp_dir().join(format!("stylet-credibility-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("made");
     let text = format!(

@@ -103,11 +103,11 @@ pub const REQUIREMENTS: &[Requirement] = &[
         tests: &[
             (
                 "tests/tests/system/device_procedure.rs",
-                "a_force_loop_that_stops_over_a_phantom_ends_the_core_and_leaves_a_recording",
+                "a_stopped_force_loop_over_a_phantom_ends_the_core_with_a_recording",
             ),
             (
                 "tests/tests/system/process_loops.rs",
-                "a_simulated_force_loop_that_stops_is_waited_for_and_keeps_the_force_off",
+                "a_stopped_simulated_force_loop_is_waited_for_with_the_force_off",
             ),
             (
                 "tests/tests/system/process_loops.rs",
@@ -122,11 +122,11 @@ pub const REQUIREMENTS: &[Requirement] = &[
         tests: &[
             (
                 "tests/tests/system/kill.rs",
-                "killing_hosts_in_an_insertion_leaves_no_gap_that_a_run_without_kills_does_not_have",
+                "killing_hosts_in_an_insertion_adds_no_gap",
             ),
             (
                 "tests/tests/system/process_hosts.rs",
-                "a_flood_of_good_commands_reaches_neither_hand_nor_loop_and_the_operator_can_still_release",
+                "the_operator_can_release_under_a_flood_that_disturbs_no_loop",
             ),
         ],
     },
@@ -249,7 +249,7 @@ pub const REQUIREMENTS: &[Requirement] = &[
         tests: &[
             (
                 "tests/dose/src/tg43.rs",
-                "dose_at_points_agrees_with_an_independent_evaluation_in_every_direction",
+                "point_dose_agrees_with_an_independent_evaluation_in_all_directions",
             ),
             (
                 "tests/dose/src/grid.rs",
@@ -280,7 +280,7 @@ pub const REQUIREMENTS: &[Requirement] = &[
             ),
             (
                 "tests/tests/system/volume.rs",
-                "procedure_runs_in_an_oblique_anisotropic_volume_and_the_geometry_is_right",
+                "the_procedure_runs_in_an_oblique_anisotropic_volume_at_its_place",
             ),
         ],
     },
@@ -290,7 +290,7 @@ pub const REQUIREMENTS: &[Requirement] = &[
         hazards: &["HAZ-07"],
         tests: &[(
             "tests/files/src/study.rs",
-            "structure_set_plan_and_dose_of_a_study_lack_no_attribute_and_name_each_other_and_their_images",
+            "the_files_of_a_study_are_complete_and_reference_each_other",
         )],
     },
     Requirement {
@@ -335,7 +335,7 @@ pub const REQUIREMENTS: &[Requirement] = &[
         hazards: &["HAZ-05", "HAZ-09"],
         tests: &[(
             "tests/tests/system/recorder_flight.rs",
-            "a_request_a_fault_and_the_end_each_leave_a_recording_that_repeats_bit_for_bit",
+            "request_fault_and_end_leave_recordings_that_repeat_bit_for_bit",
         )],
     },
     Requirement {

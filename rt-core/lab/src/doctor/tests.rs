@@ -439,7 +439,7 @@ fn devices_are_known_by_their_vendor() {
 }
 
 #[test]
-fn what_the_driver_lacks_is_reported_and_weighs_more_where_a_device_is_connected() {
+fn missing_driver_parts_weigh_more_with_a_connected_device() {
     let ecp = || Fake::new().with("proc/sys/dev/parport/parport0/modes", "PCSPP,TRISTATE,ECP\n");
     let port = |fake: &Fake| {
         let found = devices::driver(&Machine::at(&fake.0), &nobody());

@@ -212,7 +212,7 @@ fn a_loop_that_was_stopped_or_lost_its_priority_is_said_to() {
 }
 
 #[test]
-fn work_that_takes_long_by_itself_and_a_tick_before_that_did_not_end_are_two_things() {
+fn long_work_differs_from_an_unfinished_earlier_tick() {
     let busy = "  haptic-500 [001] d..2. 10.000900: sched_waking: comm=other pid=3 prio=120 target_cpu=000\n  \
                 haptic-500 [001] d..2. 10.001400: sched_switch: prev_comm=haptic prev_pid=500 prev_prio=19 prev_state=S ==> next_comm=swapper/1 next_pid=0 next_prio=120\n";
     assert_eq!(first(busy, 1_390).kind, Kind::OwnWork);

@@ -73,7 +73,7 @@ fn a_rehearsal_leaves_its_seeds_off_plan_and_repeats_bit_by_bit() {
 /// Loose seeds rest with the tissue around each; a strand used to be stretched to 17 mm between seeds that a spacer
 /// holds 10 mm apart.
 #[test]
-fn a_strand_keeps_its_pitch_and_rests_where_the_tissue_at_its_seeds_balances() {
+fn a_strand_keeps_its_pitch_and_rests_in_balance() {
     let (mut stage, mut run, stop) = (stage(), needle(), AtomicBool::new(false));
     let set = ParameterSet::default();
     let along = |r: &Rehearsed| r.seeds.iter().map(|s| s.position_m[2]).collect::<Vec<_>>();
@@ -124,7 +124,7 @@ fn tissue_that_sticks_less_by_eq_6_leaves_seeds_nearer_to_plan() {
 }
 
 #[test]
-fn a_drop_outside_the_tissue_and_a_stop_are_reported_and_leave_the_stage_usable() {
+fn the_stage_survives_a_drop_outside_the_tissue_and_a_stop() {
     let (mut stage, mut run, stop) = (stage(), needle(), AtomicBool::new(false));
     let set = ParameterSet::default();
     run.drops_m = vec![run.entry_m + run.direction * 1e-3];

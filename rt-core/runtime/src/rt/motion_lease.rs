@@ -169,14 +169,14 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_lapses_when_its_promise_is_over_and_is_given_up_after_the_grace() {
+    fn a_motion_lapses_with_its_promise_and_is_given_up_after_the_grace() {
         let lease = MotionLease::begin(Some(promise(MINE, 25)), 1e-3);
         assert_eq!(ends(lease), [(25, Lapse::Brake), (25 + 301, Lapse::GiveUp)]);
         assert_eq!(ends(MotionLease::begin(None, 1e-3)), [], "a rehearsal has no host");
     }
 
     #[test]
-    fn the_promise_of_the_host_that_moves_it_renews_it_and_that_of_another_does_not() {
+    fn only_the_moving_host_renews_a_motion() {
         for (host_id, lapses) in [(MINE, 0), (MINE + 1, 1)] {
             let mut lease = MotionLease::begin(Some(promise(MINE, 25)), 1e-3);
             let mut seen = Vec::new();

@@ -182,7 +182,7 @@ mod tests {
 
     /// A pseudo-terminal has neither modem lines nor a register.
     #[test]
-    fn a_terminal_is_refused_by_its_name_and_a_serial_port_is_found_by_its_own() {
+    fn a_serial_port_is_found_by_name_and_a_terminal_is_refused() {
         // SAFETY: no preconditions; the ends close with the test.
         let master = unsafe { libc::posix_openpt(libc::O_RDWR | libc::O_NOCTTY) };
         let mut name = [0_u8; 64];

@@ -124,7 +124,7 @@ fn a_procedure_goes_through_each_needle_step_by_step() {
 }
 
 #[test]
-fn a_needle_that_is_drawn_back_first_is_then_taken_out_but_not_in_a_rehearsal() {
+fn a_drawn_back_needle_is_taken_out_except_in_a_rehearsal() {
     let way = NeedleWay {
         retract_to_m: 0.01,
         strand_pitch_m: None,
@@ -150,7 +150,7 @@ fn a_drop_outside_the_tissue_is_lost_and_the_next_one_is_dropped() {
 }
 
 #[test]
-fn a_tip_that_rests_short_of_its_target_arrives_later_and_one_too_far_away_not_at_all() {
+fn a_tip_resting_short_arrives_late_and_a_distant_one_never() {
     let mut after_s = Vec::new();
     for short_m in [0.0, 1.5e-3] {
         let (mut hand, mut procedure) = (Obedient::new(), Procedure::rehearsal(way(), Pace::default()));
@@ -223,7 +223,7 @@ fn nothing_is_sent_while_a_fault_stands_unless_somebody_asked_to_rearm() {
 }
 
 #[test]
-fn a_fault_ends_a_procedure_that_may_rearm_only_once_the_force_was_turned_on() {
+fn a_rearming_procedure_ends_on_a_fault_only_after_engaging() {
     let (mut hand, procedure) = (Obedient::new(), Procedure::rehearsal(way(), Pace::default()));
     let mut procedure = procedure.rearming();
     hand.state.fault = Fault::DeviceError as u32;
@@ -285,7 +285,7 @@ fn continued(ways: &[NeedleWay], sent: usize) -> (Obedient, Vec<HandRequest>) {
 
 /// A run that was stopped restarted at its first needle, ignoring the seeds already there.
 #[test]
-fn a_procedure_goes_on_from_wherever_it_was_stopped_with_no_seed_twice_and_none_missing() {
+fn a_stopped_procedure_continues_with_every_seed_exactly_once() {
     let beside = |x: f64| NeedleWay {
         entry_m: Vector3::new(x, 0.0, 0.0),
         drops_m: [0.03, 0.02].map(|z| Vector3::new(x, 0.0, z)).to_vec(),

@@ -30,7 +30,7 @@ fn with(fake: Fake, id: u32, name: &str, allowed: [&str; 2]) -> Fake {
 const NONE: &str = "(none) voluntary full lazy\n";
 
 #[test]
-fn what_draws_on_the_core_of_the_loop_is_named_with_the_command_that_moves_it() {
+fn a_renderer_on_the_loop_core_is_named_with_the_command_to_move_it() {
     let fake = with(machine(NONE), 77, "Xorg", ["0-2", "0-2"]);
     // One thread of it is enough; what does not draw may be anywhere.
     let fake = with(fake, 300, "host-ui", ["0-1", "2"]);

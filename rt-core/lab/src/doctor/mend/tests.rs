@@ -67,7 +67,7 @@ fn settings_are_changed_read_back_and_undone() {
 }
 
 #[test]
-fn what_somebody_else_has_changed_since_is_left_alone_and_what_is_refused_is_said() {
+fn undo_keeps_foreign_edits_and_reports_refusals() {
     let (root, machine) = machine("foreign", FILES);
     let mut changes = Changes::planned(&tunable::all(&machine, 1));
     // A folder cannot be written, as a setting that the kernel refuses.

@@ -82,7 +82,7 @@ fn a_needle_that_bends_leaves_its_seeds_to_the_side_of_its_bevel() {
 }
 
 #[test]
-fn scatter_moves_the_needle_of_a_rehearsal_and_the_same_seed_moves_it_alike() {
+fn scatter_moves_a_rehearsed_needle_reproducibly_by_seed() {
     let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
     let mut set = ParameterSet::default();
     set.set(ParameterId::EntryScatter, 1.5e-3);

@@ -207,7 +207,7 @@ fn no_cell_folds_beside_a_tip_on_a_line() {
 
 /// The window near the tip affects no force and no seed, only the shift of the target.
 #[test]
-fn seeds_and_forces_of_a_rehearsal_are_those_of_the_body_that_is_not_corrected() {
+fn fold_correction_changes_no_seed_and_no_force_of_a_rehearsal() {
     let (mut stage, run, stop) = (stage(), needle(), AtomicBool::new(false));
     let [linear, large] = [false, true].map(|is_large| {
         let world = stage.world.as_mut().expect("given back");

@@ -168,7 +168,7 @@ fn check(kind: TissueKind, counts: &[usize], needles: usize) {
 }
 
 #[test]
-fn needles_beside_those_that_stay_in_leave_their_seeds_where_they_were_rehearsed() {
+fn seeds_rest_as_rehearsed_with_needles_that_stay_in() {
     check(TissueKind::ChainMail, &[2], 3);
 }
 
@@ -176,13 +176,13 @@ fn needles_beside_those_that_stay_in_leave_their_seeds_where_they_were_rehearsed
 /// finite elements as above.
 #[test]
 #[ignore = "finite elements: half a minute"]
-fn three_needles_in_finite_elements_leave_their_seeds_where_they_were_rehearsed() {
+fn three_needles_in_finite_elements_leave_seeds_as_rehearsed() {
     check(TissueKind::Fem, &[2], 3);
 }
 
 #[test]
 #[ignore = "takes a minute"]
-fn eight_needles_beside_two_and_four_leave_their_seeds_where_they_were_rehearsed() {
+fn eight_needles_with_two_and_four_staying_in_leave_seeds_as_rehearsed() {
     for kind in [TissueKind::ChainMail, TissueKind::Fem] {
         check(kind, &[0, 2, 4], 8);
     }

@@ -132,7 +132,7 @@ fn a_recording_with_a_probe_repeats_in_every_bit() {
 /// The probe presses while one needle stays in and another goes in beside it; its effect on both lines is recorded, and
 /// matters.
 #[test]
-fn a_recording_with_a_probe_and_a_needle_that_stays_in_repeats_in_every_bit() {
+fn a_recording_with_probe_and_staying_needle_repeats_bit_for_bit() {
     for kind in [TissueKind::Fem, TissueKind::ChainMail] {
         let mut run = Recorded::with_probe(kind);
         run.make_room_to_leave();

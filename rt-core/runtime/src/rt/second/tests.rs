@@ -164,7 +164,7 @@ fn the_hand_feels_the_contact_smoothly_between_two_steps_of_the_tissue() {
 }
 
 #[test]
-fn whatever_fails_the_force_is_zero_in_time_and_comes_back_with_the_operator_alone() {
+fn after_any_fault_the_force_is_zero_in_time_until_the_operator_rearms() {
     let stale = (STALE_TISSUE_NS / TICK_NS) as usize + TISSUE_TICKS as usize;
     for (cause, expected, ticks) in [
         (Cause::Silent, Fault::DeviceSilent, SILENT_SAMPLES as usize),
@@ -267,7 +267,7 @@ const SIMULATED: DeviceInfo = DeviceInfo {
 
 /// The probe continued to move and turn after its host had died.
 #[test]
-fn a_hand_whose_host_falls_silent_is_at_rest_within_5_mm_and_goes_on_when_it_is_heard() {
+fn a_hand_stops_within_5_mm_of_host_silence_and_resumes_when_heard() {
     let promise = Promise::first(7);
     let mut rig = Rig::new();
     let mut move_on = to_depth(-0.3);

@@ -43,7 +43,7 @@ fn a_device_that_counts_as_lost_is_felt_as_one_that_is() {
 
 /// The device and its motion stay in place; the needle moves within the body at a patient's pace.
 #[test]
-fn a_body_that_moves_leaves_hand_and_goal_where_they_are_and_the_needle_elsewhere_in_it() {
+fn a_body_shift_moves_the_needle_in_the_body_but_not_hand_or_goal() {
     let mut rig = Rig::new();
     rig.order(to_depth(-0.01));
     let before = *rig.run(1500).last().expect("ticks");

@@ -81,7 +81,7 @@ fn a_hand_goes_on_when_its_host_is_heard_again_and_not_for_another() {
 }
 
 #[test]
-fn a_goal_whose_host_is_silent_for_longer_is_given_up_and_a_new_one_is_needed() {
+fn a_goal_is_given_up_after_long_host_silence_until_a_new_one() {
     let mut rig = moving();
     rig.run(325);
     assert_eq!(rig.given_up(), [Moved::Needle]);
