@@ -1,4 +1,4 @@
-//! Puts into the program what a filed report must name: commit, and every dependency with its version and licence.
+//! Embeds the facts that a filed report must name: commit, and every dependency with its version and licence.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -76,7 +76,7 @@ fn locked(lock: &Path) -> Option<Needs> {
     Some(needs)
 }
 
-/// Returns the packages that `program` needs, without itself.
+/// Returns the packages that `program` depends on, without itself.
 fn needed(needs: &Needs, program: &str) -> BTreeSet<Package> {
     let mut found = BTreeSet::new();
     let mut open = vec![program.to_owned()];
@@ -138,7 +138,7 @@ fn sources() -> Vec<PathBuf> {
 fn licence(sources: &[PathBuf], (name, version): &Package) -> Option<String> {
     let manifest = |source: &PathBuf| std::fs::read_to_string(source.join(format!("{name}-{version}/Cargo.toml"))).ok();
     let text = sources.iter().find_map(manifest)?;
-    // A line of it: parsing hundreds of manifests whole would cost the build more than it is worth.
+    // One line of it: parsing hundreds of manifests in full would slow the build too much.
     let line = text
         .lines()
         .find_map(|l| l.strip_prefix("license = \"")?.strip_suffix('"'));

@@ -103,8 +103,8 @@ pub enum ArgsError {
 }
 
 impl LatencyArgs {
-    /// Settings of the loops, with an instance of its own, so that a running simulator is not disturbed in its shared
-    /// memory.
+    /// Returns the settings of the loops, with a separate instance, so that a running simulator is not disturbed in its
+    /// shared memory.
     pub fn options(&self) -> Result<Options, ArgsError> {
         let instance = format!("lab-{}", std::process::id());
         let mut options = self.real_time.options(&instance)?;
@@ -130,7 +130,7 @@ impl LatencyArgs {
     }
 }
 
-/// A tick is late when it has used up so much of its period before its end.
+/// A tick is late once it has used this fraction of its period before its end.
 const LATE_SHARE: u64 = 5;
 
 impl LatencyArgs {
@@ -154,7 +154,7 @@ impl LatencyArgs {
     }
 }
 
-/// Share of a core that the loop itself, and all else of real-time priority on it, may need besides spinning.
+/// Fraction of a core kept free for the loop itself and for everything else of real-time priority.
 const SHARE_KEPT_FREE: f64 = 0.15;
 
 /// Returns the longest spin that leaves the core below the kernel's share for real-time threads.
@@ -166,7 +166,7 @@ pub(crate) fn longest_spin_ns(period_ns: u64, throttle: Option<Throttle>) -> u64
     ((share - SHARE_KEPT_FREE).max(0.0) * period_ns as f64).round() as u64
 }
 
-/// A length of time that is none.
+/// An invalid duration.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct DurationError(String);

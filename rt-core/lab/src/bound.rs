@@ -6,18 +6,18 @@ use serde::Serialize;
 /// Confidence of every bound.
 const CONFIDENCE: f64 = 0.95;
 
-/// Bound by a count of misses in so many grid points, if misses are independent.
+/// Bound from a count of misses in `of` grid points, if misses are independent.
 #[derive(Clone, Debug, Serialize)]
 pub struct MissBound {
     pub misses: u64,
     /// Grid points, served or missed.
     pub of: u64,
     pub confidence: f64,
-    /// Probability that a grid point is missed, at most, with this confidence.
+    /// Upper bound of the probability of a miss, at this confidence.
     pub at_most: Option<f64>,
-    /// The same as misses in an hour.
+    /// The same as misses per hour.
     pub at_most_per_hour: Option<f64>,
-    /// 3/n, which holds only where nothing was missed.
+    /// 3/n, valid only if nothing was missed.
     pub rule_of_three: Option<f64>,
 }
 
@@ -57,7 +57,7 @@ fn upper(k: u64, n: u64, confidence: f64) -> f64 {
 }
 
 /// Ranks, counted from 1, between whose order statistics the quantile `q` of `n` independent samples lies with 95 %
-/// confidence, whatever their distribution; `None` where so few samples have no such interval.
+/// confidence, for any distribution; `None` if there are too few samples.
 ///
 /// The number of samples at or below the quantile is binomial (n, q); each end leaves 2.5 % (David and Nagaraja, Order
 /// Statistics, section 7.1).
@@ -69,7 +69,7 @@ pub fn ranks_of_quantile(q: f64, n: u64) -> Option<(u64, u64)> {
     // The largest r with P(count < r) <= 2.5 %, and the smallest s with P(count < s) >= 97.5 %.
     let first_above = |p: f64| {
         let (mean, sd) = (q * n as f64, (q * (1.0 - q) * n as f64).sqrt());
-        // Eight deviations: what lies farther out has a probability below 1e-10.
+        // Eight deviations: the probability farther out is below 1e-10.
         let (mut low, mut high) = (
             (mean - 8.0 * sd - 8.0).max(0.0) as u64,
             ((mean + 8.0 * sd + 8.0) as u64).min(n),

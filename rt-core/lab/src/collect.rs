@@ -40,7 +40,7 @@ pub struct LateTick {
     pub work_ns: u64,
 }
 
-/// A toggle: when its tick was due, and our clock before and after the pin was written.
+/// A toggle: the deadline of its tick, and our clock before and after the pin was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ToggleTime {
     pub due_ns: u64,
@@ -78,7 +78,7 @@ pub struct LoopTiming {
     pub lost: u64,
     /// Times at which the loop toggled its pin, warm-up included.
     pub toggles: Vec<ToggleTime>,
-    /// Channel for ticks that are late by so many nanoseconds, wake-up and work together.
+    /// Channel for ticks late by this many nanoseconds, wake-up and work together.
     late: Option<(u64, Sender<LateTick>)>,
     plan: Plan,
     seen: u64,

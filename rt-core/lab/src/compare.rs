@@ -1,4 +1,4 @@
-//! Our wake-up latency, alternating with another one: that of `cyclictest` on the same core with the same priority and
+//! Our wake-up latency, alternating with a reference: that of `cyclictest` on the same core with the same priority and
 //! interval, or our own without the load.
 
 use crate::load::{Load, LoadError, Running};
@@ -19,7 +19,7 @@ use stylet_runtime::process::Options;
 const SHORTEST_TURN_NS: u64 = 11_000_000_000;
 /// A turn with or without the trace: p99 with ten samples beyond it at 1 kHz.
 const SHORTEST_TRACED_TURN_NS: u64 = 2_000_000_000;
-/// Bins of 1 ns; what is later than a millisecond is known by its number and its maximum alone.
+/// Bins of 1 ns; of latencies above a millisecond only the number and the maximum are known.
 const BINS: u64 = 1_000_000;
 const COMPARED: [(&str, f64); 4] = [("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999), ("max", 1.0)];
 
@@ -61,12 +61,12 @@ pub struct Comparison {
     pub against: Against,
     /// Version of the other program; empty where it is this one.
     pub tool: String,
-    /// Why nothing could be compared.
+    /// Reason why nothing could be compared.
     pub absent: Option<String>,
     pub names: [&'static str; COMPARED.len()],
     pub turn_s: f64,
     pub rounds: Vec<Round>,
-    /// Ours over the other's; below 1 ours is earlier.
+    /// Ours divided by the reference; below 1 ours is earlier.
     pub median_ratio: Turn,
     /// All turns together, for the picture.
     #[serde(skip)]
@@ -75,7 +75,7 @@ pub struct Comparison {
     pub others: Histogram<u64>,
 }
 
-/// Why there is no comparison.
+/// Reason why there is no comparison.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
     /// Our side.
@@ -87,12 +87,12 @@ pub enum CompareError {
     /// The other side.
     #[error(transparent)]
     Tool(#[from] ToolError),
-    /// Histograms of different bins; a fault of the program.
+    /// Histograms of different bins; a bug.
     #[error("histograms: {0}")]
     Histograms(String),
 }
 
-/// Why a program that measures the same has no histogram.
+/// Reason why the reference program has no histogram.
 #[derive(Debug, thiserror::Error)]
 pub enum ToolError {
     /// Program that is missing.
@@ -124,10 +124,10 @@ pub enum ToolError {
     Failed {
         /// The program.
         program: &'static str,
-        /// First line of what it printed.
+        /// First line of its output.
         said: String,
     },
-    /// Program that ended well without a histogram in its file.
+    /// The program ended without an error, but without a histogram in its file.
     #[error("{0} wrote no histogram")]
     NoHistogram(&'static str),
     /// A signal asked this program to end.
@@ -222,7 +222,7 @@ fn without(setup: &Setup, load: Load, interrupted: &AtomicBool) -> Result<Histog
 fn turn(histogram: &Histogram<u64>) -> Turn {
     COMPARED.map(|(_, q)| {
         if q < 1.0 {
-            // A value past the last bin of cyclictest is not one to compare with.
+            // A value past the last bin of cyclictest cannot be compared.
             quantile_us(histogram, q).filter(|us| *us < BINS as f64 / 1e3)
         } else {
             (!histogram.is_empty()).then(|| histogram.max() as f64 / 1e3)
@@ -251,7 +251,7 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     }
 }
 
-/// Returns the first line of its help; `None` where it is not installed.
+/// Returns the first line of its help; `None` if it is not installed.
 fn version() -> Option<String> {
     let output = Command::new("cyclictest").arg("--help").output().ok()?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
@@ -286,7 +286,7 @@ fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>,
         })?;
     let ended = wait(CYCLICTEST, &mut child, interrupted);
     drop(load);
-    // The ui load was in shared memory, and there was no core to clean up after it.
+    // The ui load was in shared memory, and no core could clean up after it.
     setup.options.instance.sweep();
     let text = std::fs::read_to_string(&file).unwrap_or_default();
     let _ = std::fs::remove_file(&file);

@@ -18,7 +18,7 @@ use stylet_sim::tissue::{ChainMailTissue, FemTissue, Held, MaterialPoint, Tissue
 const TICKS: usize = 320;
 const TICK_S: f64 = 5e-3;
 const SPEED_M_PER_S: f64 = 0.05;
-/// The membrane gives here; from then on the tip passes from element to element.
+/// Depth at which the membrane gives way; from then on the tip passes from element to element.
 const PUNCTURE_M: f64 = 8e-3;
 const ROUNDS: usize = 3;
 const SEEDS: usize = 100;
@@ -28,7 +28,7 @@ const RELAXATION: u32 = 8;
 /// A part that takes longer than this in one round is measured over its first ticks only, and the table says so.
 const ROUND_LIMIT: Duration = Duration::from_secs(5);
 
-/// Why a scene has no cost.
+/// Reason why a scene has no cost.
 #[derive(Debug, thiserror::Error)]
 pub enum CostError {
     /// Parameters of the tissue that are out of range.
@@ -43,7 +43,7 @@ fn lines(problems: &[impl ToString]) -> String {
     problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
-/// Microseconds of every tick of one part, in each round; at last the least of each tick, in order.
+/// Microseconds of every tick of one part, in each round; finally the minimum for each tick, in order.
 struct Part {
     name: String,
     period_us: f64,
@@ -180,7 +180,7 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, CostError> {
     };
     let name = format!("  with relaxation, {RELAXATION} iterations (off by default)");
     models.push(chainmail(name, scene, &relaxed)?);
-    // In a coarser body the ticks below, in elements of the scene, would be others.
+    // In a coarser body the ticks below, in elements of the scene, would differ.
     let elastic = scene.clone().for_tissue(TissueKind::Fem);
     if elastic.coarseness() == 1 {
         let fem = FemTissue::<f32>::new(&elastic).map_err(CostError::FiniteElements)?;
@@ -264,7 +264,7 @@ fn play(
     }
 }
 
-/// Reads from the body what the loop reads after each step.
+/// Reads the same values from the body as the loop does after each step.
 fn read_body(scene: &Scene, timed: &mut Timed, script: &Script, [locate, seeds, surface]: &mut [Vec<f64>; 3]) {
     let n = scene.lattice.element_count();
     let points: Vec<MaterialPoint> = (0..SEEDS)

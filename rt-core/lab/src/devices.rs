@@ -1,4 +1,4 @@
-//! `rt-core devices`: every back end, what of it is there, what it says of itself without a force, and what is missing.
+//! `rt-core devices`: every back end, its parts that are present, its report without a force, and missing parts.
 
 use clap::Args;
 use serde::Serialize;
@@ -10,13 +10,13 @@ use stylet_hw::libhd::diagnose::{self as phantom, Surroundings};
 use stylet_hw::{Device, Finding, Severity, SimulatedPhantom, SimulatedPhantomConfig, drd, haply};
 use stylet_runtime::device::Libraries;
 
-/// Below the list.
+/// Printed below the list.
 const BOTH_HANDS: &str = "--device-2 takes the same names, for the other hand, which holds the ultrasound probe. Both hands cannot hold one \
                           device, and two Phantoms through OpenHaptics are refused.";
 
-/// A driver that does not answer for this long is left alone.
+/// Time after which a silent driver is abandoned.
 const TRIAL_LIMIT: Duration = Duration::from_secs(15);
-/// Largest number of devices of one maker that are asked.
+/// Most devices of one vendor that are queried.
 const MAX_DEVICES: u8 = 4;
 
 /// What the list is asked for.
@@ -46,7 +46,7 @@ struct Listed {
     /// Forms to write after `--device`.
     forms: Vec<String>,
     help: &'static str,
-    /// Set where it was never tried on the device itself.
+    /// The back end was never tested on a real device.
     untried: bool,
     /// A run can use it now.
     usable: bool,
@@ -60,7 +60,7 @@ struct Line {
     cure: String,
 }
 
-/// Lists, and prints the list; 0.
+/// Prints the list; returns 0.
 pub fn run(args: &DevicesArgs) -> u8 {
     let libraries =
         Libraries::or_of_environment(args.libhd.as_deref(), args.libdrd.as_deref(), args.haply_url.as_deref());
@@ -89,7 +89,7 @@ fn list(backend: &Backend, root: &Path, libraries: &Libraries, try_it: bool) -> 
         BackendKind::ForceDimension => force_dimension(root, libraries.libdrd.as_deref(), try_it),
         BackendKind::Haply => inverse3(libraries, try_it),
     };
-    // A note is about what another device of the maker needs.
+    // A note concerns another device of the vendor.
     let usable = findings.iter().all(|f| f.severity != Severity::Problem)
         && findings.iter().any(|f| f.severity == Severity::Good);
     Listed {
@@ -132,7 +132,7 @@ fn force_dimension(root: &Path, library: Option<&Path>, try_it: bool) -> Vec<Fin
     findings
 }
 
-/// Examines the service, which has the device to itself: files and cables alone tell nothing.
+/// Examines the service, which owns the device: files and cables alone show nothing.
 fn inverse3(libraries: &Libraries, try_it: bool) -> Vec<Finding> {
     match libraries.inverse_service() {
         Ok(service) if try_it => within_limit(move || haply::diagnose(&service)),
@@ -149,7 +149,7 @@ fn inverse3(libraries: &Libraries, try_it: bool) -> Vec<Finding> {
     }
 }
 
-/// Returns the findings of the trial, or that the driver does not answer; its thread is then left alone.
+/// Returns the findings of the trial, or that the driver does not answer; its thread is then abandoned.
 fn within_limit(trial: impl FnOnce() -> Vec<Finding> + Send + 'static) -> Vec<Finding> {
     let (found, findings) = mpsc::channel();
     std::thread::spawn(move || {

@@ -1,8 +1,8 @@
-//! How late a wake-up may become in a longer run: peaks over a threshold, only where the data allow it.
+//! Extrapolates the lateness of wake-ups to a longer run: peaks over a threshold, only if the data permit it.
 //!
 //! The method: the latest wake-ups over a threshold, one for each cluster (Ferro and Segers 2003), a generalised Pareto
 //! distribution by maximum likelihood, and levels with intervals by profile likelihood (Coles 2001, section 4.3). Every
-//! assumption is tested first; where one fails there is no level, but the reason with its figure.
+//! assumption is tested first; if one fails, the result is the reason with its figure instead of a level.
 
 mod cluster;
 mod fit_test;
@@ -14,17 +14,17 @@ use cluster::decluster;
 use pareto::{Pareto, interval};
 use serde::Serialize;
 
-/// Share of the wake-ups over the threshold, and their number at most.
+/// Inverse fraction of the wake-ups over the threshold, and their largest number.
 const SHARE_OVER: u64 = 50;
 const MOST_OVER: usize = LARGEST / 2;
 /// Clusters that a fit needs.
 const FEWEST_CLUSTERS: usize = 100;
-/// No level for more than so many times the length of the run.
+/// Longest extrapolation, in lengths of the run.
 const FARTHEST: f64 = 100.0;
-/// The fit is refused below this probability.
+/// Probability below which the fit is refused.
 const FIT_LEVEL: f64 = 0.05;
 
-/// A wake-up latency that is exceeded once in a time, on average.
+/// A wake-up latency exceeded on average once in a given time.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReturnLevel {
     pub every_s: f64,
@@ -33,13 +33,13 @@ pub struct ReturnLevel {
     pub interval_us: [f64; 2],
 }
 
-/// The distribution of what lies over the threshold.
+/// The distribution of the excesses over the threshold.
 #[derive(Clone, Debug, Serialize)]
 pub struct Tail {
     pub threshold_us: f64,
     pub exceedances: usize,
     pub clusters: usize,
-    /// One where exceedances do not come in clusters.
+    /// One if exceedances do not cluster.
     pub extremal_index: f64,
     pub scale_us: f64,
     /// Above zero the tail has no end.
@@ -50,18 +50,18 @@ pub struct Tail {
     pub anderson_darling_5_percent: f64,
 }
 
-/// Extrapolation from a run to wake-ups later than those that it saw.
+/// Extrapolation from a run to wake-ups later than any observed.
 #[derive(Clone, Debug, Serialize)]
 pub struct Extremes {
     pub stationarity: Stationarity,
     pub tests_of_the_tail: Vec<TestResult>,
     pub tail: Option<Tail>,
     pub levels: Vec<ReturnLevel>,
-    /// Why there are no levels; empty where there are.
+    /// Reasons why there are no levels; empty if there are.
     pub not_applicable_because: Vec<String>,
 }
 
-/// Examines the wake-ups of a loop of so many grid points a second.
+/// Examines the wake-ups of a loop with `rate_hz` grid points a second.
 pub fn examine(sample: &Sample, rate_hz: f64) -> Extremes {
     let stationarity = stationary::examine(&sample.series, sample.stride);
     let mut found = Extremes {
@@ -92,7 +92,7 @@ fn fit(sample: &Sample, found: &mut Extremes) -> Result<Option<(Tail, Pareto)>, 
     let wanted = (sample.grid / SHARE_OVER).min(MOST_OVER as u64) as usize;
     let mut sorted: Vec<u64> = largest.iter().map(|(_, ns)| *ns).collect();
     sorted.sort_unstable_by(|a, b| b.cmp(a));
-    // The first value that is not over the threshold is the threshold.
+    // The first value not over the threshold is the threshold.
     let Some(&threshold) = sorted.get(wanted).filter(|_| wanted >= FEWEST_CLUSTERS) else {
         return Err(format!(
             "{wanted} wake-ups over a threshold of one in {SHARE_OVER}, a fit needs {FEWEST_CLUSTERS}"
@@ -159,7 +159,7 @@ fn tail_tests(clusters: &[(u64, u64)], excesses: &[f64], grid: u64) -> Vec<TestR
     ]
 }
 
-/// Levels for ten runs, an hour and a day, as far as the run reaches.
+/// Returns levels for ten runs, an hour and a day, as far as the run permits.
 fn levels(tail: &Tail, pareto: &Pareto, grid: u64, rate_hz: f64) -> Result<Vec<ReturnLevel>, String> {
     let run_s = grid as f64 / rate_hz;
     let mut every_s: Vec<f64> = vec![10.0 * run_s];

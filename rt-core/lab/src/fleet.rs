@@ -1,5 +1,5 @@
-//! `rt-core fleet`: one page over the latency reports of many PCs: who passes, how each PC changed, and what changed
-//! with it.
+//! `rt-core fleet`: one page over the latency reports of many PCs: passing PCs, changes in each, and what changed with
+//! them.
 
 mod change;
 mod entry;

@@ -1,7 +1,7 @@
-//! Detects lost time that the kernel does not account for: on a virtual machine its own count of it may stay 0.
+//! Detects lost time that the kernel does not account for: in a virtual machine its own count may stay 0.
 //!
-//! A thread on another core spins for a tenth of each millisecond and reads the clock. A gap during which the kernel
-//! switched no thread is an interrupt, firmware, or a hypervisor that ran something else.
+//! A thread on another core spins for a tenth of each millisecond and reads the clock. A gap without a thread switch is
+//! an interrupt, firmware, or a hypervisor that ran something else.
 
 use crate::sample::histogram;
 use hdrhistogram::Histogram;
@@ -11,14 +11,13 @@ use stylet_runtime::rt::clock;
 
 const PERIOD_NS: u64 = 1_000_000;
 const SPIN_NS: u64 = 100_000;
-/// Away from the wake-ups that are measured: neither the force loop nor the tissue loop wakes while this spins, at 1
-/// kHz.
+/// Phase away from the measured wake-ups: neither the force loop nor the tissue loop wakes during this spin, at 1 kHz.
 const PHASE_NS: u64 = 800_000;
-/// Two reads of the clock are farther apart than this only when the thread was interrupted.
+/// Two reads of the clock farther apart than this were interrupted.
 const GAP_NS: u64 = 20_000;
-/// A wake-up later than this is kept: no tissue step lasts so long.
+/// Wake-ups later than this are kept: no tissue step takes so long.
 const LATE_NS: u64 = 1_000_000;
-/// Gaps and late wake-ups that are kept one by one.
+/// Most gaps and late wake-ups kept individually.
 const KEPT: usize = 4096;
 
 /// Result of the gap watch.

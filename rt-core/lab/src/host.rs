@@ -1,6 +1,6 @@
 //! The host of a measurement, at normal priority: it moves the hand, and records when it sees the tissue respond.
 //!
-//! The observer is a separate process, as every host is: the force process maps no memory that a host could write.
+//! The observer is a separate process, like every host: the force process maps no memory that a host could write.
 
 use crate::sample::histogram;
 use hdrhistogram::Histogram;
@@ -21,17 +21,17 @@ use stylet_wall::packet::{Kind, SeenRecords, SeenSnapshot, Socket};
 const CYCLE_NS: u64 = 4_000_000_000;
 /// Mean tip speed of needle insertions (Podder 2006 and the U. Alberta data): 48 mm/s.
 const SPEED_M_PER_S: f64 = 0.048;
-/// The probe's way is longer.
+/// The probe's path is longer.
 const SECOND_SPEED_M_PER_S: f64 = 0.1;
 const ACCELERATION_M_PER_S2: f64 = 1.0;
-/// Seeds that the script leaves in the gland; they move with it and cost the tissue tick their share.
+/// Seeds that the script drops in the gland; they move with it and add to the cost of a tissue tick.
 const SEEDS: u64 = 32;
-/// Pause between two looks of the host; part of what it measures.
+/// Polling interval of the host; part of its measured delay.
 pub const LOOK: Duration = stylet_wall::packet::LOOK_EVERY;
-/// Pause between two promises that the script still lives.
+/// Interval of the script's promises.
 const RENEW_NS: u64 = 50_000_000;
-/// Passes in which the core must be seen, 15 s on an idle PC. Passes, not time: where threads of real time leave
-/// nothing of the only core, run and host are both still starting.
+/// Passes within which the core must be seen, 15 s on an idle PC. Passes, not time: if real-time threads use up the
+/// only core, run and host are both still starting.
 const PATIENCE_PASSES: u32 = 14_000;
 
 /// Observations of the host.
@@ -44,7 +44,7 @@ pub struct HostReport {
     pub records: u64,
     /// Ticks without a record among those seen.
     pub records_missing: u64,
-    /// Each in words, with whose it was and its tick.
+    /// Faults as text, with device and tick.
     pub faults: Vec<String>,
     pub insertions: u64,
 }
@@ -54,7 +54,7 @@ pub struct HostReport {
 pub struct Script {
     outside_m: [f64; 3],
     inside_m: [f64; 3],
-    /// The tip of the other hand, likewise.
+    /// Tip of the other hand, likewise.
     second_outside_m: [f64; 3],
     second_inside_m: [f64; 3],
 }
@@ -84,7 +84,7 @@ impl Script {
     }
 }
 
-/// The process that looks, and the connection to it; ended when dropped.
+/// The observing process, and the connection to it; ended when dropped.
 struct Eyes {
     process: Child,
     socket: Socket,
@@ -120,27 +120,28 @@ pub struct Host {
     warm_up_ticks: u64,
     step: u64,
     renewed_ns: u64,
-    /// Set where the other hand moves next to the needle's.
+    /// The other hand moves as well.
     moves_second: bool,
     report: HostReport,
 }
 
-/// Distance behind the needle at which the other hand moves where there is no rectum, m.
+/// Distance behind the needle at which the other hand moves if there is no rectum, m.
 const BEHIND_M: f64 = 0.04;
-/// Distance that the probe is pressed from where it meets the wall, and that of its tip beyond the target's middle, m.
+/// Depth to which the probe is pressed from contact with the wall, and distance of its tip beyond the target's centre,
+/// m.
 const PRESSED_M: f64 = 5e-3;
 const BEYOND_TARGET_M: f64 = 35e-3;
 
-/// Why the host of the measurement saw nothing.
+/// Reason why the host of the measurement saw nothing.
 #[derive(Debug, thiserror::Error)]
 pub enum HostError {
-    /// The process that looks was not started.
+    /// The observing process was not started.
     #[error("stylet-bridge, which looks as a host does, cannot be started: {0}")]
     NotStarted(std::io::Error),
-    /// Host that ended by itself.
+    /// The host ended unexpectedly.
     #[error("stylet-bridge, which looks as a host does, ended")]
     Ended,
-    /// No tick within so many seconds.
+    /// No tick within this many seconds.
     #[error("the loops published nothing for {0} s")]
     Silent(u64),
 }
@@ -174,7 +175,7 @@ impl Host {
         })
     }
 
-    /// Moves the hand of a second device next to the needle's, where the run has one.
+    /// Moves the hand of a second device as well, if the run has one.
     pub fn with_second(self, moves_second: bool) -> Self {
         Self { moves_second, ..self }
     }
@@ -254,7 +255,7 @@ impl Host {
             .push(format!("{whose}, tick {}: {fault}", event.tick));
     }
 
-    /// Follows the script, half a cycle in, half a cycle out; engaging again each time re-arms after a fault.
+    /// Follows the script, half a cycle in, half a cycle out; each engaging re-arms after a fault.
     fn follow_script(&mut self, time_ns: u64) {
         let due = time_ns / (CYCLE_NS / 2) + 1;
         if self.step >= due {
@@ -273,7 +274,7 @@ impl Host {
         }
     }
 
-    /// Renews the promise as far ahead as allowed: a hand that stops would be another measurement.
+    /// Renews the promise for the longest time allowed: a stopped hand would change the measurement.
     fn keep_moving(&mut self, now_ns: u64) {
         if now_ns - self.renewed_ns >= RENEW_NS {
             self.renewed_ns = now_ns;
@@ -310,7 +311,7 @@ impl Host {
 mod tests {
     use super::*;
 
-    /// Behind it, where the probe was once, its contact cannot be solved and the force goes off.
+    /// Behind it, where the probe once was, its contact has no solution and the force goes off.
     #[test]
     fn the_probe_of_the_script_lies_in_the_rectum() {
         let scene = Scene::builtin("pelvis").expect("fits");

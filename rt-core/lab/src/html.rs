@@ -13,7 +13,7 @@ use crate::verdict::Outcome;
 use maud::{Markup, PreEscaped, html};
 use stylet_report::parts::{Column, cards, cell, micro, num, or_na, table};
 
-/// Returns the whole page; the report's digest stands in it as zeros, once.
+/// Returns the whole page, with the report's digest once as zeros.
 pub fn page(report: &Report, measured: &Measured) -> Result<String, DrawError> {
     let pictures = pictures(report, measured)?;
     let main = html! {
@@ -71,7 +71,7 @@ fn header(r: &Report) -> Markup {
     }
 }
 
-/// Returns who measured, where, with which device, as far as it was named.
+/// Returns operator, site and device, as far as given.
 fn whose(r: &Report) -> Option<String> {
     let w = &r.whose;
     let serial = w.device_serial.as_ref().map(|s| format!("device {s}"));
@@ -139,7 +139,7 @@ fn limits(r: &Report) -> Markup {
     }
 }
 
-/// Shortens evidence: the reasons why the environment does not qualify stand at the top of the page once.
+/// Shortens evidence: the reasons why the environment does not qualify appear once, at the top of the page.
 fn short(evidence: &str) -> String {
     match (
         evidence.strip_prefix("environment not qualified"),

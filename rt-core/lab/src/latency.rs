@@ -1,4 +1,4 @@
-//! `rt-core latency`: measure, compare with the limits, write the report, print the verdict.
+//! `rt-core latency`: measures, compares with the limits, writes the report, prints the verdict.
 
 use crate::args::{ArgsError, LatencyArgs};
 use crate::compare::{Against, CompareError, compare};
@@ -16,16 +16,16 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use stylet_runtime::process::Options;
 
-/// Why there is no report; the text is for people.
+/// Reason why there is no report; the text is for people.
 #[derive(Debug, thiserror::Error)]
 pub enum LatencyError {
-    /// Settings of the loops.
+    /// The settings of the loops are invalid.
     #[error(transparent)]
     Args(#[from] ArgsError),
-    /// Operator, site, device or key.
+    /// Operator, site, device or key are invalid.
     #[error(transparent)]
     Whose(#[from] WhoseError),
-    /// Limits of the verdict.
+    /// The limits of the verdict are invalid.
     #[error(transparent)]
     Limits(#[from] LimitsError),
     /// The folder of the report.
@@ -42,13 +42,13 @@ pub enum LatencyError {
     /// Nothing was compared.
     #[error(transparent)]
     Compare(#[from] CompareError),
-    /// No spin could be looked for.
+    /// No spin could be searched for.
     #[error(transparent)]
     Spin(#[from] SpinError),
-    /// The capture of an instrument.
+    /// The capture of an instrument cannot be used.
     #[error(transparent)]
     External(#[from] ExternalError),
-    /// The notes of the pin.
+    /// The notes of the pin cannot be written.
     #[error(transparent)]
     Toggles(#[from] stylet_write::WriteError),
     /// The report cannot be written.
@@ -118,7 +118,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
         whose: &whose,
         spin_search,
     });
-    // A signature of an earlier report in the same folder is none of this one.
+    // The signature of an earlier report in the same folder does not apply to this one.
     let json = args.out.join(JSON);
     let _ = std::fs::remove_file(sign::signature_of(&json));
     files::write(&args.out, &mut report, &measured)?;
@@ -143,7 +143,7 @@ fn setup_of<'a>(args: &'a LatencyArgs, options: &'a Options) -> Setup<'a> {
     }
 }
 
-/// Prints the verdict on the terminal: one line for each limit, then all of them.
+/// Prints the verdict on the terminal: one line for each limit, then the overall one.
 fn print_verdict(report: &Report) {
     for j in &report.verdict.limits {
         let value = j.value.map_or("n/a".to_owned(), |v| format!("{v:.1}"));

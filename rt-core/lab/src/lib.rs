@@ -1,9 +1,9 @@
-//! The latency laboratory: runs the real loops under load, and reports with evidence how late they are.
+//! The latency laboratory: runs the real loops under load, and documents their lateness.
 //!
 //! [`latency`] runs a measurement and writes a report, [`campaign`] one of hours and nights; [`verify`] verifies that a
 //! saved report is unaltered; [`fleet`] compares the reports of many PCs; [`doctor`] checks whether this PC is fit, and
-//! makes it fitter; [`devices`] lists the haptic devices that can be used; [`credibility`] is the file for an auditor.
-//! No report claims conformity with a standard.
+//! improves it; [`devices`] lists the usable haptic devices; [`credibility`] is the file for an auditor. No report
+//! claims conformity with a standard.
 
 #![warn(missing_docs)]
 

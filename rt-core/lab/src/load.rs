@@ -46,9 +46,9 @@ pub enum LoadProcess {
 }
 
 impl LoadProcess {
-    /// Returns the core for the process that has `before` of its kind before it: one on each core. Left to itself the
-    /// kernel gives a core another mixture each time, and a wake-up that ends a stream through memory takes twice as
-    /// long as one that ends a computation.
+    /// Returns the core for a process with `before` of its kind before it: one on each core. Left to itself the kernel
+    /// would mix them differently each time, and a wake-up that interrupts a stream through memory takes twice as long
+    /// as one that interrupts a computation.
     fn core(self, before: usize) -> Option<usize> {
         let cores = core_affinity::get_core_ids()?;
         matches!(self, Self::Cpu | Self::Memory)
@@ -101,30 +101,30 @@ impl Load {
     }
 }
 
-/// Why a load does not run.
+/// Reason why a load does not run.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
-    /// Loads are this program, started again.
+    /// This program, which the loads are, cannot be found.
     #[error("cannot find this program: {0}")]
     Program(io::Error),
-    /// A process of the load.
+    /// A process of the load does not start.
     #[error("cannot start the load: {0}")]
     Start(io::Error),
-    /// The load of the window.
+    /// The window load has no display.
     #[error("the window load needs a display; without one: xvfb-run -a rt-core latency ...")]
     NoDisplay,
-    /// The window's program.
+    /// The window's program does not start.
     #[error("cannot start {}: {why}; build it: cargo build --release -p host-ui", .program.display())]
     Window {
-        /// Path at which it should lie.
+        /// Expected path.
         program: PathBuf,
         /// Error of the system.
         why: io::Error,
     },
-    /// Load that ended: nothing was measured under it.
+    /// The load ended: nothing was measured under it.
     #[error("the load ended by itself ({0})")]
     Ended(std::process::ExitStatus),
-    /// The file that the load writes.
+    /// The load's file cannot be used.
     #[error("{}: {why}", .file.display())]
     File {
         /// The file.
@@ -186,7 +186,7 @@ impl Running {
         Ok(())
     }
 
-    /// Fails if a process of the load has ended before its time: then there was no load.
+    /// Fails if a process of the load has ended early: the load was then incomplete.
     pub(crate) fn ended(&mut self) -> Result<(), LoadError> {
         for child in &mut self.processes {
             if let Ok(Some(status)) = child.try_wait() {
@@ -224,13 +224,13 @@ impl Drop for Running {
     }
 }
 
-/// The body of one such process, on `core` where one is named; ends when `stopped`.
+/// Runs one such process, on `core` if given; ends when `stopped`.
 ///
 /// # Errors
 /// `file` cannot be written.
 pub fn work(kind: LoadProcess, core: Option<usize>, file: &Path, stopped: impl Fn() -> bool) -> Result<(), LoadError> {
     if let Some(id) = core {
-        // Where it may not, it loads whichever core it gets.
+        // If not permitted, it loads whichever core it gets.
         core_affinity::set_for_current(core_affinity::CoreId { id });
     }
     match kind {

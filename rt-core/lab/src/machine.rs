@@ -1,4 +1,4 @@
-//! Facts that the kernel reports about this PC, read below a root path so that tests can show it another machine.
+//! The kernel's facts about this PC, read below a root path so that tests can present another machine.
 
 mod threads;
 
@@ -15,7 +15,7 @@ pub struct Machine {
     root: PathBuf,
 }
 
-/// Preemption model: how soon the kernel lets a woken real-time thread run.
+/// Preemption model: the delay before a woken real-time thread runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Preemption {
     RealTime,
@@ -37,7 +37,7 @@ impl Preemption {
         })
     }
 
-    /// Returns whether a thread that works inside the kernel gives way to a real-time thread at once.
+    /// True if a thread inside the kernel yields to a real-time thread at once.
     pub fn gives_way(self) -> bool {
         matches!(self, Self::RealTime | Self::Full | Self::Lazy)
     }
@@ -72,7 +72,7 @@ impl Machine {
         Self { root: root.into() }
     }
 
-    /// Returns whether it is this machine, and not one made of files.
+    /// True if it is this machine rather than one made of files.
     pub fn is_this(&self) -> bool {
         self.root == Path::new("/")
     }
@@ -82,13 +82,13 @@ impl Machine {
         self.root.join(path)
     }
 
-    /// Contents without the white space around them; `None` where the file is missing or not readable.
+    /// Returns the contents, trimmed; `None` if the file is missing or unreadable.
     pub fn text(&self, path: &str) -> Option<String> {
         let text = std::fs::read_to_string(self.path(path)).ok()?;
         Some(text.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_owned())
     }
 
-    /// Names in a folder, sorted; empty where it is missing.
+    /// Returns the names in a folder, sorted; empty if it is missing.
     pub fn names(&self, folder: &str) -> Vec<String> {
         let entries = std::fs::read_dir(self.path(folder)).into_iter().flatten().flatten();
         let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
@@ -200,7 +200,7 @@ impl Machine {
             .map(|(_, v)| v.trim().to_owned())
     }
 
-    /// Returns the name and microseconds to leave of each sleep state that is not disabled.
+    /// Returns the name and exit latency in microseconds of each enabled sleep state.
     pub fn idle_states(&self, core: usize) -> Vec<(String, u64)> {
         let folder = format!("sys/devices/system/cpu/cpu{core}/cpuidle");
         let state = |name: &String| {
@@ -211,7 +211,7 @@ impl Machine {
         self.names(&folder).iter().filter_map(state).collect()
     }
 
-    /// Interrupts that may be served on `core`: number and who uses it.
+    /// Returns the interrupts that `core` may serve: number and user.
     pub fn interrupts_allowed_on(&self, core: usize) -> Vec<(u32, String)> {
         let table = self.text("proc/interrupts").unwrap_or_default();
         let user = |number: u32| {

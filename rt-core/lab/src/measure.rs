@@ -21,9 +21,9 @@ use stylet_runtime::rt::timing::{PoseTimes, Probe, Probes};
 use stylet_runtime::rt::tissue::TISSUE_STAGES;
 use stylet_sim::scene::{Scene, SceneError};
 
-/// Ticks of the first half second are not recorded: caches and page tables are still being filled.
+/// Time at the start that is not recorded: caches and page tables are still filling.
 pub const WARM_UP_S: f64 = 0.5;
-/// Windows of a report at most, none shorter than 100 ms.
+/// Most windows of a report, none shorter than 100 ms.
 const WINDOWS: u64 = 240;
 const SHORTEST_WINDOW_NS: u64 = 100_000_000;
 /// Below both loops, above everything of normal priority.
@@ -40,22 +40,22 @@ pub struct Setup<'a> {
     pub trace_over_ns: Option<u64>,
     /// Checkpoints that receive the samples gathered so far during the run.
     pub checkpoints: Option<&'a Checkpoints<'a>>,
-    /// The force loop toggles it for an instrument.
+    /// Pin that the force loop toggles for an instrument.
     pub toggle: Option<Pin>,
 }
 
 /// Checkpoints of a long run; the names of the loops are `force` and `tissue`.
 pub struct Checkpoints<'a> {
     pub every: Duration,
-    /// Length of the windows of which the worst is kept.
+    /// Length of the windows whose maxima are kept.
     pub window_ns: u64,
     pub take: &'a (dyn Fn(&'static str, &LoopTiming) + Sync),
 }
 
-/// The ring to the gathering thread holds so much time of ticks.
+/// Capacity of the ring to the gathering thread, in time.
 const RING_NS: u64 = 4_000_000_000;
 
-/// Why nothing was measured.
+/// Reason why nothing was measured.
 #[derive(Debug, thiserror::Error)]
 pub enum MeasureError {
     /// The scene cannot be built.
@@ -70,7 +70,7 @@ pub enum MeasureError {
     /// The host saw no tick.
     #[error(transparent)]
     Host(#[from] HostError),
-    /// The pin for an instrument.
+    /// The pin for an instrument cannot be used.
     #[error(transparent)]
     Pin(#[from] PinError),
     /// A thread of the measurement ended early.
@@ -83,7 +83,7 @@ pub struct Measured {
     pub run: RunReport,
     pub haptic: LoopTiming,
     pub tissue: LoopTiming,
-    /// The loop of the second device, where the run has one.
+    /// The loop of the second device, if the run has one.
     pub second: Option<LoopTiming>,
     pub host: HostReport,
     pub gaps: GapReport,
@@ -92,7 +92,7 @@ pub struct Measured {
     pub window_ns: u64,
 }
 
-/// Returns the voluntary switches beyond the one of each sleep.
+/// Returns the voluntary switches beyond one for each sleep.
 pub fn switches_beyond_sleep(report: &LoopReport) -> i64 {
     (report.usage.voluntary_switches - report.sleeps as i64).max(0)
 }
@@ -115,7 +115,7 @@ fn plan(period_ns: u64, duration_ns: u64, window_ns: u64) -> Plan {
     }
 }
 
-/// Returns a core for the gap watch: one that no loop uses, else that of the tissue loop.
+/// Returns a core for the gap watch: one without a loop, else that of the tissue loop.
 fn watch_core(options: &Options) -> Option<usize> {
     let cores = core_affinity::get_core_ids().unwrap_or_default();
     let free = cores.iter().map(|c| c.id).find(|&id| {
@@ -161,7 +161,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
             .saturating_sub(WATCH_PRIORITY_BELOW_TISSUE)
             .max(1)
     });
-    // On the only core it would take from the bridge and the host what they live on.
+    // On a single core it would starve the bridge and the host.
     let priority = priority.filter(|_| watch_core(options) != options.haptic_core);
     let second_core = options.second.as_ref().and_then(|second| second.core);
     let second_core = second_core.filter(|&core| ![options.haptic_core, options.tissue_core].contains(&Some(core)));
@@ -209,7 +209,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         };
         let haptic = threads.spawn(move || gathered(haptic, haptic_ring, "force"));
         let tissue = threads.spawn(move || gathered(tissue, tissue_ring, "tissue"));
-        // A campaign keeps the two loops that every run has.
+        // A campaign keeps the two loops present in every run.
         let second = second.map(|(timing, ring)| threads.spawn(move || timing.gather(ring)));
         let gaps = threads.spawn(move || gaps::watch(core, priority, stop));
         let machine = &machine;
@@ -223,7 +223,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         let cores: Vec<CoreWatch> = cores.into_iter().filter_map(|t| t.join().ok()).collect();
         let (haptic, tissue) = (haptic.join(), tissue.join());
         let second = second.map(|thread| thread.join());
-        // It ends with the gathering of the force loop.
+        // It ends when the force loop's gathering ends.
         let trace = trace.map(|started| started.map_or_else(Ok, |thread| thread.join()));
         (run, host.join(), gaps.join(), cores, trace, haptic, tissue, second)
     });
@@ -233,7 +233,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
     options.instance.sweep();
     loaded?;
     let panicked = |_| MeasureError::Panicked;
-    // The reason why the loops did not run is more useful than that the host saw nothing.
+    // The loops' error is more useful than the host's, which saw nothing.
     let run = run?;
     Ok(Measured {
         run,

@@ -34,7 +34,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Returns a share of samples as a percentage or, when small, as one in so many.
+/// Formats a fraction of samples as a percentage or, when small, as one in N.
 fn share(value: f64) -> String {
     if value >= 0.01 {
         format!("{} %", number(value * 100.0))
@@ -43,7 +43,7 @@ fn share(value: f64) -> String {
     }
 }
 
-/// A logarithmic axis with a key point at each power of ten alone.
+/// A logarithmic axis with key points only at powers of ten.
 #[derive(Clone)]
 struct Decades(std::ops::Range<f64>, fn(f64) -> String);
 
@@ -82,7 +82,7 @@ impl ValueFormatter<f64> for Decades {
     }
 }
 
-/// Returns the next power of ten at or above.
+/// Returns the next power of ten, rounding up.
 fn decade_above(value: f64) -> f64 {
     10_f64.powi(value.max(1e-9).log10().ceil() as i32)
 }
@@ -94,11 +94,11 @@ pub struct Series<'a> {
     pub histogram: &'a Histogram<u64>,
 }
 
-/// Plots the histogram of the wake-up latency: linear microseconds, logarithmic count. The legend has the number past
+/// Plots the histogram of the wake-up latency: linear microseconds, logarithmic count. The legend gives the number past
 /// the right edge.
 pub fn wake_histogram(series: &[Series]) -> Result<String, DrawError> {
     picture(|root| {
-        // Wide enough for the body; a long tail would press it into a line, and has another picture.
+        // Wide enough for the body; a long tail would squeeze it into a line, and has another picture.
         let at = |s: &Series, q| s.histogram.value_at_quantile(q) as f64 / 1e3;
         let wide = |s: &Series| (at(s, 0.999) * 1.25).min(at(s, 0.99) * 4.0);
         let right = series.iter().map(wide).fold(1.0, f64::max);
@@ -120,7 +120,7 @@ pub fn wake_histogram(series: &[Series]) -> Result<String, DrawError> {
                 if s.color == BLUE {
                     Rectangle::new([(from, 0.5), (to, n as f64)], style)
                 } else {
-                    // A line across the top, so that what is behind stays visible.
+                    // A line across the top, so that the background stays visible.
                     Rectangle::new([(from, n as f64 * 0.88), (to, n as f64)], style)
                 }
             }))?;
@@ -152,7 +152,7 @@ fn beyond(series: &Series, right_us: f64) -> String {
     }
 }
 
-/// Plots where a tick's time goes: for each stage a bar from p50 to p99.9 and a point at the largest.
+/// Plots the parts of a tick's time: for each stage a bar from p50 to p99.9 and a point at the maximum.
 pub fn stages(timing: &LoopTiming) -> Result<String, DrawError> {
     let named = timing.stage_names.iter().copied().zip(&timing.stages);
     let rows: Vec<(&str, &Histogram<u64>)> = named.chain([("whole tick", &timing.work)]).collect();
@@ -190,7 +190,7 @@ pub fn stages(timing: &LoopTiming) -> Result<String, DrawError> {
     })
 }
 
-/// Returns the worst wake-up and the longest tick of each window of the run.
+/// Plots the worst wake-up and the longest tick of each window of the run.
 pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, DrawError> {
     picture(|root| {
         let used: Vec<(f64, &Window)> = windows
@@ -230,7 +230,7 @@ pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, DrawError> 
     })
 }
 
-/// Returns the share of ticks later than so many microseconds, both axes logarithmic.
+/// Plots the fraction of ticks later than each latency, both axes logarithmic.
 pub fn tail(series: &[Series]) -> Result<String, DrawError> {
     picture(|root| {
         let longest = series.iter().map(|s| s.histogram.max()).max().unwrap_or(1) as f64 / 1e3;
@@ -256,7 +256,7 @@ pub fn tail(series: &[Series]) -> Result<String, DrawError> {
     })
 }
 
-/// Microseconds and the share of samples above them.
+/// Returns latencies in microseconds and the fraction of samples above them.
 fn above(histogram: &Histogram<u64>) -> Vec<(f64, f64)> {
     let count = histogram.len() as f64;
     let mut left = count;
@@ -269,7 +269,7 @@ fn above(histogram: &Histogram<u64>) -> Vec<(f64, f64)> {
     line
 }
 
-/// Axes whose x is a number of decimals as short as can be.
+/// Draws axes whose x labels have as few decimals as possible.
 fn mesh<X, Y>(chart: &mut ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, Y>>, x: &str, y: &str) -> Drawn
 where
     X: Ranged<ValueType = f64> + ValueFormatter<f64>,
@@ -280,7 +280,7 @@ where
     })
 }
 
-/// In the upper right corner.
+/// Draws a legend in the upper right corner.
 fn legend(root: &Canvas, entries: &[(String, RGBColor)]) -> Drawn {
     let right = root.dim_in_pixel().0 as i32 - 30;
     for (i, (name, color)) in entries.iter().enumerate() {
@@ -292,7 +292,7 @@ fn legend(root: &Canvas, entries: &[(String, RGBColor)]) -> Drawn {
     Ok(())
 }
 
-/// In the lower left corner, where a tail has nothing to show.
+/// Draws a legend in the lower left corner, which a tail leaves empty.
 fn legend_at_left(root: &Canvas, entries: &[(String, RGBColor)]) -> Drawn {
     for (i, (name, color)) in entries.iter().rev().enumerate() {
         let y = SIZE.1 as i32 - 66 - 18 * i as i32;

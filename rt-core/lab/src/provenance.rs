@@ -7,7 +7,7 @@ use stylet_hw::sim::hand::Hand;
 use stylet_runtime::process::{LoopReport, Options, RunReport};
 use stylet_shm_schema::{ParameterId, ParameterSet};
 
-/// Commit of the sources, `unknown` where they were built without git.
+/// Commit of the sources, `unknown` if built without git.
 pub const COMMIT: &str = env!("STYLET_COMMIT");
 
 /// Compiler that built the program.
@@ -49,7 +49,7 @@ pub struct Fact {
     pub value: String,
 }
 
-/// A real-time setting: what was asked for, and what the kernel reports.
+/// A real-time setting: the request, and the kernel's report.
 #[derive(Clone, Debug, Serialize)]
 pub struct Setting {
     pub name: String,
@@ -105,7 +105,7 @@ pub fn dependencies() -> Vec<Dependency> {
     list.lines().filter_map(read).collect()
 }
 
-/// Returns the damping of the hand and of the force law that the stiffness margin counts on, N s/m.
+/// Returns the damping of the hand and of the force law that the stiffness margin assumes, N s/m.
 pub fn dampings_n_s_per_m() -> (f64, f64) {
     let law = ParameterSet::default().get(ParameterId::Damping);
     (Hand::passive().damping_n_s_per_m, law)
@@ -256,7 +256,7 @@ fn policy_name(policy: u32) -> &'static str {
     }
 }
 
-/// Returns every real-time setting, asked against got.
+/// Returns every real-time setting, requested and granted.
 pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Setting> {
     let mut settings = Vec::new();
     let mut add = |name: &str, asked: String, got: String, met: bool| {
@@ -324,8 +324,7 @@ pub fn settings(machine: &Machine, options: &Options, run: &RunReport) -> Vec<Se
     settings
 }
 
-/// Returns why the tail of a measurement tells more about this environment than about the program; empty when it does
-/// not.
+/// Returns why the tail of a measurement reflects this environment rather than the program; empty if it does not.
 pub fn unqualified(machine: &Machine, run: &RunReport) -> Vec<String> {
     let mut reasons = Vec::new();
     if let Some(name) = machine.hypervisor() {

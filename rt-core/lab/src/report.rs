@@ -17,15 +17,15 @@ use crate::watch::CoreWatch;
 use crate::whose::Whose;
 use serde::Serialize;
 
-/// Version of the format: it rises when a field changes its meaning or is removed.
+/// Version of the format: incremented when a field changes its meaning or is removed.
 pub const SCHEMA: &str = "stylet.latency/1";
 pub const JSON: &str = "report.json";
 pub const PAGE: &str = "report.html";
 pub const HISTOGRAMS: &str = "histograms.hlog";
-/// Stands where the digest will be while the digest is taken.
+/// Placeholder for the digest while it is computed.
 pub const NO_DIGEST: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
-/// File in the report's folder. The digest of the page is taken with the report's own digest in it as zeros.
+/// File in the report's folder. The page's digest is computed with the report's own digest as zeros.
 #[derive(Clone, Debug, Serialize)]
 pub struct FileDigest {
     pub name: &'static str,
@@ -70,7 +70,7 @@ pub struct LoopSection {
     pub times: Vec<Summary>,
     pub counts: LoopCounts,
     pub miss_bound: MissBound,
-    /// Own work at p99.9 as a share of the period.
+    /// Own work at p99.9 as a fraction of the period.
     pub work_p999_of_period: Option<f64>,
 }
 
@@ -81,7 +81,7 @@ pub struct HostSection {
     pub records: u64,
     pub records_missing: u64,
     pub faults: u64,
-    /// Each in words.
+    /// Faults as text.
     pub which_faults: Vec<String>,
 }
 
@@ -100,7 +100,7 @@ pub struct StiffnessSection {
     pub margins: Vec<Margin>,
 }
 
-/// One of the latest wake-ups, and what was seen elsewhere at the same time.
+/// One of the latest wake-ups, and simultaneous observations elsewhere.
 #[derive(Clone, Debug, Serialize)]
 pub struct Late {
     pub at_s: f64,
@@ -138,7 +138,7 @@ pub struct Verdict {
     pub limits: Vec<LimitResult>,
 }
 
-/// The whole report. Declared in the order in which it is read.
+/// The whole report, declared in reading order.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     pub schema: &'static str,
@@ -149,7 +149,7 @@ pub struct Report {
     pub program: String,
     pub commit: &'static str,
     pub command: Vec<String>,
-    /// Reports of older versions have neither this nor `programs`.
+    /// Missing from reports of older versions, as is `programs`.
     pub whose: Whose,
     pub programs: Vec<ProgramDigest>,
     pub protocol: Protocol,
@@ -164,7 +164,7 @@ pub struct Report {
     pub stiffness: StiffnessSection,
     pub windows: Vec<WindowRow>,
     pub latest_wake_ups: Vec<Late>,
-    /// Late ticks with their causes; only where a trace was asked for.
+    /// Late ticks with their causes, if a trace was requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trace: Option<TraceSection>,
     /// Wake-ups of the force loop in equal parts of the run. Reports of older versions have neither this nor

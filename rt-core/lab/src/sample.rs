@@ -1,5 +1,4 @@
-//! Samples of a run that are kept with its histograms, so that dependence, change and the far tail can be examined
-//! afterwards.
+//! Samples of a run kept with its histograms, for a later examination of dependence, change and the far tail.
 
 use hdrhistogram::Histogram;
 use std::cmp::Reverse;
@@ -11,9 +10,9 @@ const LONGEST_NS: u64 = 10_000_000_000;
 const DIGITS: u8 = 3;
 /// Equal parts of the run with a histogram each.
 pub const PARTS: usize = 8;
-/// Latest wake-ups that are kept with their place on the grid.
+/// Latest wake-ups kept with their grid point.
 pub const LARGEST: usize = 2_000;
-/// Wake-ups kept in the order of time; between half of them and all.
+/// Wake-ups kept in time order; at least half this number, except in short runs.
 const SERIES: usize = 16_384;
 
 /// Returns a histogram of nanoseconds with fixed bounds.
@@ -60,7 +59,7 @@ impl Sample {
             if self.series.len() == SERIES {
                 self.thin();
             }
-            // After thinning, this tick may be one between two entries.
+            // After thinning, this tick may lie between two entries.
             if self.ticks.is_multiple_of(self.stride) {
                 self.series.push(wake_ns);
             }

@@ -1,21 +1,20 @@
-//! Detached signatures of reports, made and checked by OpenSSH's `ssh-keygen -Y`: the keys are those people have
-//! already.
+//! Detached signatures of reports, made and checked by OpenSSH's `ssh-keygen -Y`, with keys that users already have.
 
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-/// Purpose of the signature; one made for another purpose with the same key does not pass.
+/// Purpose of the signature; a signature for another purpose with the same key is rejected.
 const NAMESPACE: &str = "stylet-latency-report";
 const PROGRAM: &str = "ssh-keygen";
 
-/// A signature cannot be made, or does not pass.
+/// A signature cannot be made, or is rejected.
 #[derive(Debug, thiserror::Error)]
 pub enum SignError {
     /// The program is missing.
     #[error("ssh-keygen is not installed, and signatures need it: sudo apt-get install openssh-client")]
     Missing,
-    /// A file that was named is missing or not readable.
+    /// A named file is missing or unreadable.
     #[error("cannot read {}: {source}", .path.display())]
     File {
         /// The file.
@@ -31,7 +30,7 @@ pub enum SignError {
     Refused {
         /// The key.
         key: PathBuf,
-        /// First line of what `ssh-keygen` reports.
+        /// First line of the output of `ssh-keygen`.
         said: String,
     },
     /// The file or its signature was altered.
@@ -39,7 +38,7 @@ pub enum SignError {
     Altered {
         /// Name of the file.
         file: String,
-        /// First line of what `ssh-keygen` reports.
+        /// First line of the output of `ssh-keygen`.
         said: String,
     },
     /// The signature is good, but its key belongs to no permitted signer.
@@ -47,12 +46,12 @@ pub enum SignError {
     WrongKey {
         /// Kind and fingerprint.
         key: String,
-        /// The file of those who may sign.
+        /// The file of permitted signers.
         allowed: PathBuf,
     },
 }
 
-/// Who signed.
+/// The signer.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Signer {
     /// Kind and fingerprint of the key.
@@ -68,7 +67,7 @@ pub fn signature_of(file: &Path) -> PathBuf {
     name.into()
 }
 
-/// Checks that signing will find what it needs, before a long measurement.
+/// Checks the requirements of signing before a long measurement.
 pub fn ready(key: &Path) -> Result<(), SignError> {
     readable(key)?;
     let asked = Command::new(PROGRAM).arg("-?").stdin(Stdio::null()).output();
@@ -81,7 +80,7 @@ pub fn sign(file: &Path, key: &Path) -> Result<PathBuf, SignError> {
     let signature = signature_of(file);
     // An older one would make ssh-keygen ask.
     let _ = std::fs::remove_file(&signature);
-    // Its own input: a key may ask for its passphrase.
+    // A separate input: a key may ask for its passphrase.
     let output = Command::new(PROGRAM)
         .args(["-Y", "sign", "-n", NAMESPACE, "-f"])
         .args([key, file])
@@ -98,7 +97,7 @@ pub fn sign(file: &Path, key: &Path) -> Result<PathBuf, SignError> {
     })
 }
 
-/// Checks the signature of `file`; `allowed`: who may sign, in OpenSSH's format of allowed signers.
+/// Checks the signature of `file`; `allowed` is a file of permitted signers in OpenSSH's format.
 pub fn check(file: &Path, allowed: Option<&Path>) -> Result<Signer, SignError> {
     let signature = signature_of(file);
     let good = ask(&["check-novalidate", "-n", NAMESPACE], &[("-s", &signature)], file)?;

@@ -1,4 +1,4 @@
-//! `--spin-us auto`: the smallest spin before each deadline with which the loop wakes sooner than cyclictest does.
+//! `--spin-us auto`: finds the smallest spin before each deadline with which the loop wakes sooner than cyclictest.
 
 use crate::compare::{self, CompareError};
 use crate::measure::{MeasureError, Setup, measure};
@@ -9,15 +9,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use stylet_runtime::process::Options;
 use stylet_runtime::rt::clock::Wait;
 
-/// The loop's p50 and p99 must be at most this share of cyclictest's: a third, so that half of it is kept on a day that
-/// is a little worse.
+/// Largest ratio of the loop's p50 and p99 to cyclictest's: a third, so that a factor of two remains on a slightly
+/// worse day.
 const SHARE: f64 = 1.0 / 3.0;
-/// Trials in a row that must meet it: a percentile of three seconds may be low by chance.
+/// Consecutive trials that must meet it: a percentile of three seconds may be low by chance.
 const TRIALS: usize = 2;
 /// Each trial brings p99 with ten samples beyond it at 1 kHz.
 const TRIAL_NS: u64 = 3_000_000_000;
 const FIRST_US: u64 = 10;
-/// The spin is known to this.
+/// Resolution of the spin.
 const STEP_US: u64 = 5;
 
 /// `--spin-us` as given.
@@ -49,20 +49,20 @@ pub struct Trial {
     pub spin_us: u64,
     pub p50_us: Option<f64>,
     pub p99_us: Option<f64>,
-    /// Both are low enough.
+    /// Both percentiles are low enough.
     pub met: bool,
 }
 
-/// Spins that were tried, and the result.
+/// Spins tried, and the result.
 #[derive(Clone, Debug, Serialize)]
 pub struct SpinSearch {
     /// p50 and p99 that the loop must not exceed, microseconds.
     pub at_most_us: [f64; 2],
     pub trials: Vec<Trial>,
-    /// `None` where no spin is enough: then the longest one that was tried is used.
+    /// `None` if no spin is enough: the longest one tried is then used.
     pub found_us: Option<u64>,
     pub used_us: u64,
-    /// Share of the core that spinning takes at most.
+    /// Largest fraction of the core taken by spinning.
     pub core_share: f64,
 }
 
@@ -83,13 +83,13 @@ impl SpinSearch {
     }
 }
 
-/// Why no spin could be looked for.
+/// Reason why no spin could be searched for.
 #[derive(Debug, thiserror::Error)]
 pub enum SpinError {
-    /// cyclictest, whose times decide.
+    /// The comparison with cyclictest failed.
     #[error("--spin-us auto: {0}")]
     Compare(#[from] CompareError),
-    /// A trial.
+    /// A trial failed.
     #[error("--spin-us auto: {0}")]
     Measure(#[from] MeasureError),
     /// Too few values to compare.
@@ -162,8 +162,7 @@ pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Resul
     })
 }
 
-/// Returns the smallest spin for which `is_met`, if a longer one never does worse: doubled until it is met, then halved
-/// in between.
+/// Returns the smallest spin for which `is_met`, if a longer one is never worse: doubled until met, then bisected.
 fn smallest(longest_us: u64, mut is_met: impl FnMut(u64) -> bool) -> Option<u64> {
     let (mut low, mut high) = (0, FIRST_US.min(longest_us));
     while !is_met(high) {

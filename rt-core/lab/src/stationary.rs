@@ -1,10 +1,9 @@
-//! Tests whether a run stayed the same from its first part to its last: Kolmogorov-Smirnov tests on wake-ups that were
-//! thinned until they no longer depend on each other.
+//! Tests whether a run was stationary: Kolmogorov-Smirnov tests on wake-ups that were thinned until independent.
 
 use crate::sample::PARTS;
 use serde::Serialize;
 
-/// A test rejects below this probability.
+/// Probability below which a test rejects.
 pub const LEVEL: f64 = 0.01;
 /// Values that the tests need after thinning.
 const FEWEST: usize = 400;
@@ -39,17 +38,17 @@ impl TestResult {
 /// Result of the tests.
 #[derive(Clone, Debug, Serialize)]
 pub struct Stationarity {
-    /// Ticks between the values that were compared.
+    /// Ticks between the compared values.
     pub every: u64,
     pub values: usize,
-    /// Set where values so far apart no longer depend on each other.
+    /// Values at that distance are independent.
     pub independent: bool,
     pub tests: Vec<TestResult>,
-    /// Why the run does not count as stationary; empty where it does.
+    /// Reasons why the run does not count as stationary; empty if it does.
     pub against: Vec<String>,
 }
 
-/// Examines a series in the order of time; `stride`: ticks from one value to the next.
+/// Examines a series in time order; `stride` is the number of ticks between values.
 pub fn examine(series: &[u64], stride: u64) -> Stationarity {
     let mut step = 1;
     let mut kept: Vec<f64> = series.iter().map(|&v| v as f64).collect();
@@ -80,7 +79,7 @@ pub fn examine(series: &[u64], stride: u64) -> Stationarity {
     }
 }
 
-/// Returns whether a value and the next few are correlated in rank beyond what each part of the run has in common.
+/// True if a value and the next few are rank-correlated beyond what each part of the run has in common.
 fn depends(values: &[f64]) -> bool {
     let mut ranks = ranks(values);
     for part in ranks.chunks_mut(values.len().div_ceil(PARTS)) {
@@ -92,7 +91,7 @@ fn depends(values: &[f64]) -> bool {
         return true;
     }
     let n = ranks.len() as f64;
-    // The mean of each part was taken out, which moves each correlation by about minus one in the length of a part.
+    // The mean of each part was removed, which shifts each correlation by about minus one over the length of a part.
     let bias = PARTS as f64 / n;
     (1..=LAGS).any(|lag| {
         let product: f64 = ranks.iter().zip(&ranks[lag..]).map(|(a, b)| a * b).sum();
@@ -185,8 +184,7 @@ pub fn uniform(name: &'static str, values: &[f64]) -> TestResult {
     TestResult { name, distance, p }
 }
 
-/// Returns the probability of a distance at least so large; `n` values, or n m / (n + m) of two samples (Stephens
-/// 1970).
+/// Returns the probability of at least this distance; `n` values, or n m / (n + m) of two samples (Stephens 1970).
 fn kolmogorov(distance: f64, n: f64) -> f64 {
     let x = (n.sqrt() + 0.12 + 0.11 / n.sqrt()) * distance;
     if x < 0.2 {
@@ -255,7 +253,7 @@ mod tests {
 
     #[test]
     fn halves_of_different_scale_are_refused() {
-        // The power, measured: 4,096 wake-ups show a tenth more in the second half in some runs, a fifth more in nearly
+        // The measured power: 4,096 wake-ups show a tenth more in the second half in some runs, a fifth more in nearly
         // all.
         for (factor, least) in [(1.1, 35), (1.2, 95), (1.5, 100)] {
             let n = refused(factor);
@@ -285,7 +283,7 @@ mod tests {
     #[test]
     fn too_few_wake_ups_are_refused_with_their_number() {
         assert_eq!(examine(&[5; 100], 1).against, ["100 wake-ups, the tests need 400"]);
-        // A clock that stands still.
+        // A stopped clock.
         assert!(!examine(&[5; 1_000], 1).against.is_empty());
     }
 }

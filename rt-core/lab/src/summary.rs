@@ -1,4 +1,4 @@
-//! A histogram in a few numbers; a percentile that the run was too short for has none.
+//! Summarises a histogram in a few numbers, without percentiles that the run was too short for.
 
 use crate::bound::ranks_of_quantile;
 use hdrhistogram::Histogram;
@@ -19,10 +19,10 @@ const BEYOND: f64 = 10.0;
 pub struct Quantile {
     pub name: &'static str,
     pub us: Option<f64>,
-    /// 95 % interval, from the order statistics of the samples; it holds for any distribution of independent samples.
+    /// 95 % interval, from the order statistics of the samples; valid for any distribution of independent samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interval_us: Option<[f64; 2]>,
-    /// Length of the run that a value needs, where there is none.
+    /// Length of run needed for a missing value.
     pub needs_s: Option<f64>,
 }
 
@@ -123,8 +123,8 @@ mod tests {
 
     #[test]
     fn interval_holds_the_percentile_in_95_of_100_runs() {
-        // Claim: of 400 seeded runs with a known p90 and p99, the intervals hold them as often as the binomial allows,
-        // at least 95 % less three deviations. Bins widen the intervals a little, so there is no bound from above but
+        // Claim: over 400 seeded runs with a known p90 and p99, the intervals contain them as often as the binomial
+        // allows, at least 95 % minus three deviations. Bins widen the intervals slightly, so the only upper bound is
         // 400.
         for (name, q) in [("p90", 0.9), ("p99", 0.99)] {
             let mut held = 0;

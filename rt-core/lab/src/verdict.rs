@@ -1,4 +1,4 @@
-//! Limits, and whether a measurement meets them: pass, fail, or not measurable, each with its evidence.
+//! Limits, and their outcome in a measurement: pass, fail, or not measurable, each with its evidence.
 
 use crate::collect::LoopTiming;
 use crate::measure::{Measured, switches_beyond_sleep};
@@ -32,7 +32,7 @@ enum Reading {
 
 /// One row of the table of limits.
 pub struct LimitSpec {
-    /// Stable; for the trace from requirement to evidence.
+    /// Stable id, for the trace from requirement to evidence.
     pub id: &'static str,
     pub name: &'static str,
     pub unit: &'static str,
@@ -93,7 +93,7 @@ impl LimitSpec {
         matches!(self.reading, Reading::StiffnessMargin(_))
     }
 
-    /// Returns whether a virtual machine, or time taken by firmware, decides the reading more than this program does.
+    /// True if a virtual machine, or firmware time, affects the reading more than this program does.
     fn is_tail(&self) -> bool {
         match self.reading {
             Reading::Wake(q) | Reading::Work(q) | Reading::Path(q) | Reading::StiffnessMargin(q) => q > 0.995,
@@ -106,12 +106,12 @@ impl LimitSpec {
 /// A limit by its name, with the value in force.
 pub type Limits = BTreeMap<&'static str, f64>;
 
-/// Limits that are unknown or no numbers, each with its place; at the end those that exist.
+/// Unknown or non-numeric limits, each with its origin; the existing ones follow.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.join("\n"))]
 pub struct LimitsError(Vec<String>);
 
-/// Defaults, then the file, then what the command line sets.
+/// Returns the defaults, overridden by the file, then by the command line.
 pub fn limits(period_ns: u64, file: Option<&Path>, given: &[String]) -> Result<Limits, LimitsError> {
     let mut limits: Limits = LIMITS.iter().map(|l| (l.name, l.default_for(period_ns))).collect();
     let mut problems = Vec::new();
@@ -189,7 +189,7 @@ pub struct LimitResult {
     pub reason: &'static str,
 }
 
-/// Why the tail of a distribution says nothing about this program here; empty when it does.
+/// Reasons why the tail of a distribution says nothing about this program here; empty if it does.
 pub type Unqualified = [String];
 
 /// Compares every limit with the measurement.
@@ -222,7 +222,7 @@ pub fn evaluate(limits: &Limits, measured: &Measured, period_ns: u64, unqualifie
     LIMITS.iter().map(evaluate_one).collect()
 }
 
-/// Returns the overall outcome: one failure fails all; else one that could not be measured leaves it open.
+/// Returns the overall outcome: one failure fails all; otherwise an unmeasurable one leaves it open.
 pub fn overall(results: &[LimitResult]) -> Outcome {
     let any = |outcome| results.iter().any(|j| j.outcome == outcome);
     if any(Outcome::Fail) {
@@ -236,7 +236,7 @@ pub fn overall(results: &[LimitResult]) -> Outcome {
 
 type Read = (Option<f64>, String);
 
-/// Returns a percentile with what it rests on; the largest value needs one sample.
+/// Returns a percentile with its basis; the maximum needs one sample.
 fn percentile(histogram: &Histogram<u64>, quantile: f64) -> Read {
     let count = histogram.len();
     if quantile >= MAX {

@@ -1,4 +1,4 @@
-//! Verifies that a saved report is unaltered, who signed it, and which programs it is of.
+//! Verifies that a saved report is unaltered, its signature, and its programs.
 
 use crate::provenance::sha256;
 use crate::report::{JSON, NO_DIGEST};
@@ -32,9 +32,9 @@ pub struct ReadError {
     pub source: std::io::Error,
 }
 
-/// Checks the report, and prints every problem; without one, who signed the report.
+/// Checks the report, and prints every problem; without one, the signer.
 ///
-/// Returns 0 when the report is unaltered and is what was asked for, else 1.
+/// Returns 0 if the report is unaltered and meets the request, else 1.
 ///
 /// # Errors
 /// `report.json` or a named program cannot be read.
@@ -45,7 +45,7 @@ pub fn run(args: &VerifyArgs) -> Result<u8, ReadError> {
         args.report.clone()
     };
     let bytes = read(&file)?;
-    // Damage may leave bytes that are not text; the file then differs from its digest.
+    // Damaged bytes may not be text; the file then differs from its digest.
     let text = String::from_utf8_lossy(&bytes);
     let folder = file.parent().unwrap_or(Path::new("."));
     let mut problems = problems(&text, |name| std::fs::read(folder.join(name)).ok());
@@ -75,7 +75,7 @@ fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
     })
 }
 
-/// Returns who signed the report, or the problem with its signature.
+/// Returns the signer of the report, or the problem with its signature.
 fn signature(file: &Path, allowed: Option<&Path>) -> Result<String, String> {
     let signature = sign::signature_of(file);
     let name = signature.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -93,13 +93,13 @@ fn signature(file: &Path, allowed: Option<&Path>) -> Result<String, String> {
                 signer.key
             ),
         }),
-        // What cannot be checked without the program is a problem only where somebody asks for it.
+        // A check that needs the missing program is a problem only if it was requested.
         Err(SignError::Missing) if allowed.is_none() => Ok(format!("{name}: not checked: {}", SignError::Missing)),
         Err(problem) => Err(format!("{name}: {problem}")),
     }
 }
 
-/// Returns the discrepancy where the report is not of the program `binary`.
+/// Returns the discrepancy if the report is not of the program `binary`.
 fn other_program(report: &Value, binary: &Path, digest: &str) -> Option<String> {
     let programs = report["programs"].as_array().map_or(&[][..], Vec::as_slice);
     let text = |program: &Value, key: &str| program[key].as_str().unwrap_or_default().to_owned();
@@ -121,7 +121,7 @@ fn other_program(report: &Value, binary: &Path, digest: &str) -> Option<String> 
     ))
 }
 
-/// Returns everything that was altered; `read` returns the content of a file in the report's folder.
+/// Returns everything that was altered; `read` returns the contents of a file in the report's folder.
 pub(crate) fn problems(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>) -> Vec<String> {
     let Ok(report) = serde_json::from_str::<Value>(text) else {
         return vec![format!("{JSON}: tampered with or damaged, it is not JSON")];
@@ -146,7 +146,7 @@ pub(crate) fn problems(text: &str, read: impl Fn(&str) -> Option<Vec<u8>>) -> Ve
             problems.push(format!("{name}: missing"));
             continue;
         };
-        // The page shows the report's digest, which did not exist yet when the page's was taken.
+        // The page shows the report's digest, which did not exist yet when the page's was computed.
         let bare = match std::str::from_utf8(&bytes) {
             Ok(page) => page.replacen(digest, NO_DIGEST, 1).into_bytes(),
             Err(_) => bytes,

@@ -1,4 +1,4 @@
-//! Counters that the kernel keeps of the cores while a measurement runs: frequency, steal time, interrupts served.
+//! The kernel's counters of the cores during a measurement: frequency, steal time, interrupts served.
 
 use crate::machine::Machine;
 use serde::Serialize;
@@ -11,12 +11,12 @@ pub struct CoreWatch {
     pub core: usize,
     pub lowest_mhz: Option<f64>,
     pub highest_mhz: Option<f64>,
-    /// Steal time as `/proc/stat` reports it, s; some hypervisors leave it at 0 whatever they take.
+    /// Steal time from `/proc/stat`, s; some hypervisors leave it at 0 whatever they take.
     pub steal_s: Option<f64>,
     pub interrupts: Option<u64>,
 }
 
-/// Looks four times a second until `stop`.
+/// Reads the counters four times a second until `stop`.
 pub fn watch(machine: &Machine, core: usize, stop: &AtomicBool) -> CoreWatch {
     let count = || (machine.steal_s(core), machine.interrupts_served(core));
     let (steal_before, served_before) = count();

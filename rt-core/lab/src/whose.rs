@@ -1,4 +1,4 @@
-//! Who measured, where, with which device: options of the command line, with defaults from a file of the site.
+//! Operator, site and device of a measurement: command-line options, with defaults from a file of the site.
 
 use crate::sign::{self, SignError};
 use clap::Args;
@@ -53,11 +53,11 @@ pub enum WhoseError {
     Sign(#[from] SignError),
 }
 
-/// Characters of a name at most.
+/// Most characters of a name.
 const LONGEST: usize = 200;
 
 impl WhoseArgs {
-    /// Options over defaults; a key is looked at before anything is measured.
+    /// Merges options with defaults; a key is checked before anything is measured.
     pub fn read(&self) -> Result<Whose, WhoseError> {
         let defaults = self.site_file.as_deref().map(of_site).transpose()?.unwrap_or_default();
         let whose = Whose {
@@ -95,7 +95,7 @@ fn of_site(path: &Path) -> Result<Whose, WhoseError> {
         path: path.to_owned(),
         source: Box::new(source),
     })?;
-    // A key is named as seen from the file.
+    // A key's path is relative to the file.
     let folder = path.parent().unwrap_or(Path::new("."));
     whose.sign = whose.sign.map(|key| folder.join(key));
     Ok(whose)

@@ -1,9 +1,8 @@
-//! `rt-core campaign`: measurements of hours and nights, part after part, that continue after whatever ended them.
+//! `rt-core campaign`: measurements of hours and nights, in parts, that continue after any interruption.
 //!
-//! The file of a campaign names its parts (`plan`). Each start of the program measures what is left of a part in a
-//! separate session, and writes what it has gathered every minute (`session`). One report is made of all sessions
-//! (`report`, `page`). What was measured after the last checkpoint of a session that was killed is not counted, and
-//! measured again.
+//! The file of a campaign names its parts (`plan`). Each start of the program measures the rest of a part in a separate
+//! session, and writes its data every minute (`session`). One report covers all sessions (`report`, `page`). Data after
+//! the last checkpoint of a killed session is discarded and measured again.
 
 mod page;
 mod plan;
@@ -56,7 +55,7 @@ pub struct CampaignArgs {
     real_time: RealTimeArgs,
 }
 
-/// Why a campaign does not run.
+/// Reason why a campaign does not run.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
     /// The file of the campaign, or one of its folder, cannot be read.
@@ -67,18 +66,18 @@ pub enum CampaignError {
         /// Error of the system.
         source: std::io::Error,
     },
-    /// Everything that is wrong with the file, one a line.
+    /// All problems with the file, one per line.
     #[error("{0}")]
     Plan(String),
-    /// The folder is of another campaign.
+    /// The folder belongs to another campaign.
     #[error("{} holds another campaign: its {COPY} differs from {}; expected the same file, or a new folder", .folder.display(), .file.display())]
     Other {
         /// The folder.
         folder: PathBuf,
-        /// The file that was given.
+        /// The given file.
         file: PathBuf,
     },
-    /// The campaign runs already.
+    /// The campaign is already running.
     #[error("{} is in use: another rt-core measures this campaign", .0.display())]
     InUse(PathBuf),
     /// A checkpoint that cannot be used.
@@ -98,7 +97,7 @@ pub enum CampaignError {
     /// The loops did not run.
     #[error(transparent)]
     Measure(#[from] MeasureError),
-    /// A picture of the page.
+    /// A picture of the page cannot be drawn.
     #[error(transparent)]
     Draw(#[from] DrawError),
     /// The report as JSON.
@@ -134,7 +133,7 @@ pub fn run(args: &CampaignArgs, interrupted: &AtomicBool) -> Result<u8, Campaign
     }
     let store = Store::open(&args.out)?;
     if !args.report {
-        // Where the PC was restarted, the number of this process may be one that a session before had.
+        // After a restart of the PC, this process may have the number of an earlier session's.
         let options = args.real_time.options(&format!("lab-{}", std::process::id()))?;
         measure_what_is_left(&plan, &store, &options, interrupted)?;
     }

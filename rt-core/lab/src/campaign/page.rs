@@ -7,7 +7,7 @@ use crate::plots::{self, BLUE, DrawError, MaximaPart, ORANGE, Series};
 use maud::{Markup, PreEscaped, html};
 use stylet_report::parts::{Column, cell, num, or_na, table};
 
-/// Returns the whole page, which needs nothing else.
+/// Returns the whole page, which is self-contained.
 pub fn page(r: &CampaignReport) -> Result<String, DrawError> {
     let title = if r.name.is_empty() {
         "Latency campaign".to_owned()
@@ -116,7 +116,7 @@ fn pictures(r: &CampaignReport) -> Result<Markup, DrawError> {
         })
         .collect();
     let maxima = plots::maxima(&parts)?;
-    // The quietest and the loudest part show the range; all of them would lie over each other.
+    // The quietest and the loudest part show the range; all parts would overlap.
     let median = |p: &PartReport| p.force.wake_times.value_at_quantile(0.99);
     let least = measured().min_by_key(|(p, _)| median(p));
     let most = measured().max_by_key(|(p, _)| median(p)).filter(|_| parts.len() > 1);

@@ -18,7 +18,7 @@ pub struct Part {
     pub spin_us: u64,
 }
 
-/// All parts in their order, repetitions written out.
+/// All parts in order, with repetitions expanded.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     pub name: String,
@@ -73,7 +73,7 @@ fn kilohertz() -> u32 {
     1_000
 }
 
-/// Every problem with a file of a campaign, one a line.
+/// Every problem with a file of a campaign, one per line.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.join("\n"))]
 pub struct PlanError(pub Vec<String>);

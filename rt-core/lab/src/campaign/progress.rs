@@ -1,4 +1,4 @@
-//! Progress of a campaign on the terminal: a line every few seconds, with the time that is left.
+//! Progress of a campaign on the terminal: a line every few seconds, with the remaining time.
 
 use super::CampaignError;
 use super::plan::Plan;
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 pub struct Progress {
     part: String,
     left_ns: u64,
-    /// Measured before this session began, and planned in all.
+    /// Time measured before this session began, and total planned time.
     before_s: f64,
     planned_s: f64,
 }
@@ -50,7 +50,7 @@ impl Progress {
         )
     }
 
-    /// Shows it until `ended`: on a terminal one line that changes each second, else a line each ten minutes.
+    /// Shows it until `ended`: on a terminal one line that changes each second, else a line every ten minutes.
     pub fn show(&self, ended: &AtomicBool) {
         let begin = Instant::now();
         let terminal = std::io::stderr().is_terminal();
@@ -76,7 +76,7 @@ impl Progress {
     }
 }
 
-/// Hours, minutes and seconds: `7 h 05 min`, `4 min 10 s`, `12 s`.
+/// Formats hours, minutes and seconds: `7 h 05 min`, `4 min 10 s`, `12 s`.
 pub fn time(seconds: f64) -> String {
     let s = seconds.max(0.0).round() as u64;
     match s {

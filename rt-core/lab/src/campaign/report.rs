@@ -68,7 +68,7 @@ pub struct CampaignReport {
     pub hypervisor: Option<String>,
 }
 
-/// Joins all sessions. Two that measured the same moment are refused: nothing may count twice.
+/// Combines all sessions. Sessions that overlap in time are refused: no time may count twice.
 pub fn report(plan: &Plan, store: &Store) -> Result<CampaignReport, CampaignError> {
     let (force, tissue) = (store.records(FORCE)?, store.records(TISSUE)?);
     for sessions in [&force, &tissue] {

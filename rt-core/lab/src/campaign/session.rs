@@ -1,4 +1,4 @@
-//! Measurements of a session, as they are written at each checkpoint and read again.
+//! Measurements of a session, as written at each checkpoint and read again.
 
 use super::CampaignError;
 use super::plan::Part;
@@ -12,9 +12,9 @@ use std::sync::Mutex;
 use stylet_write::write_whole;
 
 const SCHEMA: &str = "stylet.campaign-session/1";
-/// Shortfall of time with which a part is still complete: the run ends between two ticks.
+/// Shortfall with which a part still counts as complete: the run ends between two ticks.
 const COMPLETE_NS: u64 = 500_000_000;
-/// Names of the loops, as they stand in the names of the files.
+/// Names of the loops in file names.
 pub const FORCE: &str = "force";
 pub const TISSUE: &str = "tissue";
 

@@ -19,8 +19,7 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// Returns the timing that a loop has gathered in `seconds` from `first_ns` on: each tick wakes 10 us late, the last
-/// one 900.
+/// Returns the timing of a loop over `seconds` from `first_ns` on: each tick wakes 10 µs late, the last one 900.
 fn gathered(first_ns: u64, seconds: u64) -> LoopTiming {
     let mut timing = LoopTiming::new(
         &[],
@@ -84,7 +83,7 @@ fn sessions_of_a_part_add_up_and_what_is_left_is_measured() {
     let left = |part: usize| store.left_ns(part, &plan.parts[part]).expect("readable") / 1_000_000_000;
     assert_eq!((left(0), left(1)), (10, 20));
     put(&store, 0, 1_000_000_000, 4);
-    // A later checkpoint of the same session takes the place of the one before: it was killed, and began again.
+    // A later checkpoint of the same session replaces the one before: it was killed, and began again.
     put(&store, 0, 20_000_000_000, 6);
     put(&store, 1, 40_000_000_000, 20);
     assert_eq!((left(0), left(1), left(2)), (0, 0, 10));
@@ -116,7 +115,7 @@ fn two_sessions_of_one_moment_are_refused() {
         matches!(&refused, CampaignError::Checkpoint { why, .. } if why.contains("twice")),
         "{refused}"
     );
-    // The same times of another start of the PC are other times.
+    // The same times after a restart of the PC are different times.
     let file = out.join("part-001-session-000-force.json");
     for file in [file.clone(), out.join("part-001-session-000-tissue.json")] {
         let mut text: serde_json::Value =

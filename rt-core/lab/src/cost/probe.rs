@@ -1,4 +1,4 @@
-//! Cost of the ultrasound probe in a tick of the tissue, in a scene with a rectum for it.
+//! Cost of the ultrasound probe in a tissue tick, in a scene with a rectum for it.
 
 use super::{CostError, TICK_S, TICKS};
 use std::time::Instant;
@@ -9,18 +9,18 @@ use stylet_sim::tissue::fem::batch::BatchModel;
 
 const PRESSED_M: f64 = 10e-3;
 const BEYOND_TARGET_M: f64 = 35e-3;
-/// Every so many ticks the hand jumps.
+/// Number of ticks between jumps of the hand.
 const JUMP_EVERY: usize = 40;
 const JUMP_M: f64 = 5e-3;
 
-/// A probe and its way: pressed 10 mm into the wall and back, with jumps of 5 mm.
+/// A probe and its path: pressed 10 mm into the wall and back, with jumps of 5 mm.
 pub struct Pressed {
     at_rest: BodyProbe,
     poses: Vec<ProbePose>,
 }
 
 impl Pressed {
-    /// Makes the part; nothing in a scene in which a probe could not lie.
+    /// Makes the part; `None` in a scene without room for a probe.
     pub fn of(scene: &Scene) -> Result<Option<Self>, CostError> {
         let Some(scene) = scene.clone().for_lines(TissueKind::ChainMail) else {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! Evidence by the categories of the FDA's guidance and the factors of ASME V&V 40: what there is, and what is missing.
+//! Evidence by the categories of the FDA's guidance and the factors of ASME V&V 40, present and missing.
 
 use serde::Serialize;
 
@@ -10,7 +10,7 @@ pub struct Category {
     pub name: &'static str,
     /// Evidence, each with its place in the repository.
     pub there: &'static [(&'static str, &'static str)],
-    /// Empty where nothing is known to be missing.
+    /// Empty if nothing is known to be missing.
     pub missing: &'static str,
 }
 

@@ -1,4 +1,4 @@
-//! Hazards: what could harm, in which situation, and how.
+//! Hazards: sources of harm, situations, and harms.
 
 use serde::Serialize;
 

@@ -1,9 +1,9 @@
-//! `rt-core credibility`: what an auditor asks for, in one file: what the simulator is for, what could harm, which test
-//! holds it off, and which run shows it.
+//! `rt-core credibility`: a single file for an auditor: purpose of the simulator, hazards, the tests against them, and
+//! the runs as evidence.
 //!
 //! The tables are `context` (purpose and limits), `hazards`, `trace` (requirements) and `evidence` (the categories of
-//! the FDA's guidance, the factors of ASME V&V 40, with what is there and what is missing). Runs come from reports of
-//! `rt-core latency`. The file names standards as the vocabulary of its reader and claims conformity with none.
+//! the FDA's guidance, the factors of ASME V&V 40, present and missing). Runs come from reports of `rt-core latency`.
+//! The file names standards as the vocabulary of its reader and claims conformity with none.
 
 mod context;
 mod evidence;
@@ -83,12 +83,12 @@ struct Credibility {
     pub packages: Vec<Package>,
 }
 
-/// A requirement with what the runs show of it.
+/// A requirement with its evidence from runs.
 #[derive(Serialize)]
 struct Traced {
     #[serde(flatten)]
     pub requirement: &'static Requirement,
-    /// Outcomes by the number of the run, from 1; empty where no run was given or it has no limit of this name.
+    /// Outcomes by the number of the run, from 1; empty if no run was given or none has a limit of this name.
     pub outcomes: Vec<(usize, String)>,
 }
 

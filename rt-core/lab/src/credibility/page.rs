@@ -1,11 +1,11 @@
-//! The credibility file as a page; every id is a place that can be linked to.
+//! The credibility file as a page; every id is a link target.
 
 use super::{Credibility, Traced};
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 use stylet_report::parts::{Column, cell, table};
 
-/// Returns the whole page, which needs nothing else.
+/// Returns the whole page, which is self-contained.
 pub fn page(c: &Credibility) -> String {
     let main = html! {
         header { h1 { "Credibility file of Stylet" } }
@@ -34,7 +34,7 @@ pub fn page(c: &Credibility) -> String {
     stylet_report::page("Credibility file of Stylet", "", &main)
 }
 
-/// Returns a place with this id.
+/// Returns a link target with this id.
 fn anchor(id: &str) -> Markup {
     html! { code id=(id) { (id) } }
 }

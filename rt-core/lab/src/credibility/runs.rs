@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A run that shows something.
+/// A run that serves as evidence.
 #[derive(Clone, Debug, Serialize)]
 pub struct Run {
     pub file: String,
@@ -21,7 +21,7 @@ pub struct Run {
     pub outcomes: BTreeMap<String, String>,
 }
 
-/// A report that is no evidence.
+/// A report that is not evidence.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {why}", .path.display())]
 pub struct RunError {
@@ -29,7 +29,7 @@ pub struct RunError {
     why: String,
 }
 
-/// Reads `report.json` in `folder`. One that was altered is refused.
+/// Reads `report.json` in `folder`. An altered one is refused.
 pub fn read(folder: &Path) -> Result<Run, RunError> {
     let path = folder.join(JSON);
     let failed = |why: String| RunError {

@@ -8,13 +8,13 @@ use serde::Serialize;
 pub struct Package {
     pub name: String,
     pub version: String,
-    /// Licence as its author declares it; `not known` where its sources were not there when this program was built.
+    /// Licence as declared by its author; `not known` if its sources were missing when this program was built.
     pub licence: String,
     pub of: &'static str,
     pub known_anomalies: Vec<&'static str>,
 }
 
-/// Packages of others that `rt-core` or `host-ui` is built from.
+/// Third-party packages in `rt-core` or `host-ui`.
 pub fn packages() -> Vec<Package> {
     let list = include_str!(concat!(env!("OUT_DIR"), "/packages.txt"));
     list.lines().filter_map(package).collect()

@@ -1,4 +1,4 @@
-//! Nothing in the credibility file leads nowhere: every id, test and place exists.
+//! Every reference in the credibility file resolves: ids, tests and paths exist.
 
 use super::evidence::{CATEGORIES, FACTORS};
 use super::hazards::HAZARDS;
@@ -61,7 +61,7 @@ fn places_of_evidence_exist_and_both_lists_are_whole() {
     assert_eq!(numbers, (1..=8).collect::<Vec<u32>>());
     assert_eq!(FACTORS.len(), 13);
     for (what, place) in CATEGORIES.iter().flat_map(|c| c.there) {
-        // What is no path is a command.
+        // Anything that is not a path is a command.
         assert!(
             repository(place).exists() || place.starts_with("rt-core "),
             "{what}: {place}"
@@ -103,7 +103,7 @@ fn the_page_says_what_it_is_not() {
     ] {
         assert!(page.contains(words), "{words}");
     }
-    // Every link has its place.
+    // Every link has its target.
     for link in page.split("href=\"#").skip(1) {
         let id = link.split('"').next().expect("closed");
         assert!(page.contains(&format!("id=\"{id}\"")), "{id}");

@@ -1,4 +1,4 @@
-//! Requirements that hold hazards off, each with the tests that fail if it does not.
+//! Requirements that control the hazards, each with the tests that fail if it does not hold.
 
 use serde::Serialize;
 

@@ -1,9 +1,9 @@
-//! Cores: how many, who else uses the one of the force loop, and how deep they sleep.
+//! Cores: their number, other users of the force loop's core, and their sleep states.
 
 use super::{Finding, FindingLevel};
 use crate::machine::{Machine, core_list};
 
-/// Waking from a deeper sleep than this is seen in the wake-up latency.
+/// Exit latency above which a sleep state shows in the wake-up latency.
 const DEEP_US: u64 = 20;
 
 pub fn count(machine: &Machine) -> Finding {
@@ -46,7 +46,7 @@ pub fn isolation(machine: &Machine, core: usize) -> Finding {
     )
 }
 
-/// The most that are named one by one.
+/// Most that are listed individually.
 const NAMED: usize = 4;
 
 pub fn interrupts(machine: &Machine, core: usize) -> Finding {

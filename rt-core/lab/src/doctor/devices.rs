@@ -1,4 +1,4 @@
-//! Haptic devices: what is connected, and whether their driver would find it.
+//! Haptic devices: those connected, and whether their driver would find them.
 
 use super::{Finding, FindingLevel};
 use crate::machine::Machine;
@@ -36,7 +36,7 @@ pub fn may_use(path: &Path) -> bool {
     std::fs::File::options().read(true).write(true).open(path).is_ok()
 }
 
-/// Examines the newer Touch, a HID device: the driver speaks with it through `/dev/hidraw*`, which belongs to root at
+/// Examines the newer Touch, a HID device: the driver accesses it through `/dev/hidraw*`, which belongs to root at
 /// first.
 pub fn hidraw(machine: &Machine, usable: impl Fn(&Path) -> bool) -> Finding {
     let folder = "sys/class/hidraw";

@@ -1,5 +1,5 @@
-//! Programs that draw and may run on the force loop's core. They move whole pictures inside the kernel, and a kernel
-//! that does not preempt itself lets the loop wait until one is through (docs/measurements.md).
+//! Drawing programs that may run on the force loop's core. They move whole pictures inside the kernel, and a
+//! non-preemptible kernel makes the loop wait until one is done (docs/measurements.md).
 
 use super::tunable::{Tunable, as_kernel_prints};
 use super::{Finding, FindingLevel};
@@ -79,7 +79,7 @@ pub fn servers(machine: &Machine, core: usize) -> Finding {
     Finding::new(CHECK, FindingLevel::Warning, what, cure.join("\n"))
 }
 
-/// Returns every other core; empty where there is none.
+/// Returns every other core; empty if there is none.
 fn elsewhere(machine: &Machine, core: usize) -> String {
     let mut elsewhere = machine.online_cores();
     elsewhere.remove(&core);
@@ -89,7 +89,7 @@ fn elsewhere(machine: &Machine, core: usize) -> String {
     }
 }
 
-/// Returns the cores of each thread of theirs, where they can hold the loop; without the core of the loop.
+/// Returns the cores of each of their threads that can block the loop; without the core of the loop.
 pub fn settings(machine: &Machine, core: usize) -> Vec<Tunable> {
     let elsewhere = elsewhere(machine, core);
     if elsewhere.is_empty() || machine.preemption().gives_way() {

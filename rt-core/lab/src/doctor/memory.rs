@@ -1,4 +1,4 @@
-//! Memory: swap, and huge pages that are made while a loop runs.
+//! Memory: swap, and huge pages created while a loop runs.
 
 use super::{Finding, FindingLevel};
 use crate::machine::Machine;

@@ -1,7 +1,7 @@
-//! `rt-core doctor`: is this PC fit for a 1 kHz force loop, and what to change, as commands to type.
+//! `rt-core doctor`: checks whether this PC is fit for a 1 kHz force loop, and lists the commands that improve it.
 //!
-//! Each check is a function of a `Machine` and the core of the force loop; all of them read below a root path,
-//! so that tests can present any machine to them.
+//! Each check is a function of a `Machine` and the core of the force loop; all of them read below a root path, so that
+//! tests can present any machine to them.
 
 mod cores;
 mod devices;
@@ -31,7 +31,7 @@ pub enum FindingLevel {
     Note,
     /// The tail will be worse than it could be.
     Warning,
-    /// The force loop does not run as it must, or its figures prove nothing.
+    /// The force loop cannot run properly, or its figures prove nothing.
     Blocker,
 }
 
@@ -49,7 +49,7 @@ impl FindingLevel {
 /// One line of the doctor.
 #[derive(Clone, Debug, Serialize)]
 pub struct Finding {
-    /// Stable.
+    /// Stable name of the check.
     pub check: &'static str,
     /// Severity.
     pub severity: FindingLevel,
@@ -74,7 +74,7 @@ impl Finding {
     }
 }
 
-/// Returns all findings, in the order in which one would fix them.
+/// Returns all findings, in the order of their remedies.
 pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Vec<Finding> {
     let mut findings = vec![
         kernel::hypervisor(machine),
@@ -115,7 +115,7 @@ fn verdict(findings: &[Finding]) -> &'static str {
     }
 }
 
-/// Examines this PC and prints; 1 when there is a blocker.
+/// Examines this PC and prints the findings; returns 1 if there is a blocker.
 fn print(json: bool, core: usize) -> u8 {
     let (here, _) = Surroundings::of_this_process(None);
     let findings = examine(&Machine::this(), core, &here);

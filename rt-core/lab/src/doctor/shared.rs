@@ -1,4 +1,4 @@
-//! Shared memory: room, and what dead programs left.
+//! Shared memory: free space, and remains of dead programs.
 
 use super::{Finding, FindingLevel};
 use crate::machine::Machine;
@@ -44,7 +44,7 @@ pub fn space(machine: &Machine, free: impl Fn(&Path) -> Option<u64>) -> Finding 
     }
 }
 
-/// Instances with files in shared memory and no program that uses them.
+/// Finds instances with files in shared memory that no program uses.
 pub fn stale_services(machine: &Machine) -> Finding {
     let found = instances(&machine.names("dev/shm"));
     let used = maps(machine);
@@ -86,7 +86,7 @@ fn instances(names: &[String]) -> BTreeSet<String> {
     names.iter().filter_map(instance).collect()
 }
 
-/// Lines of memory maps that lie in shared memory, of each process that lets us look.
+/// Returns the lines of memory maps in shared memory, for each readable process.
 fn maps(machine: &Machine) -> Vec<String> {
     let processes = machine
         .names("proc")

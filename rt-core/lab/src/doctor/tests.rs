@@ -1,4 +1,4 @@
-//! Every line of the doctor, shown a machine that is well and one that is not.
+//! Every line of the doctor, on a healthy machine and on a faulty one.
 
 use super::*;
 use std::path::{Path, PathBuf};
@@ -44,7 +44,7 @@ const CLOCKS: &str = "sys/devices/system/clocksource/clocksource0/available_cloc
 const CLOCK: &str = "sys/devices/system/clocksource/clocksource0/current_clocksource";
 const RELEASE: &str = "proc/sys/kernel/osrelease";
 
-/// Expects a level, and a cure exactly where there is something to do.
+/// Expects a level, and a cure exactly if there is something to do.
 #[track_caller]
 pub(super) fn expect(finding: &Finding, severity: FindingLevel, says: &str) {
     assert_eq!(finding.severity, severity, "{finding:?}");
@@ -92,7 +92,7 @@ fn preemption_model_is_read_where_the_kernel_reports_it() {
     expect(&real.see(kernel::preemption), FindingLevel::Good, "PREEMPT_RT");
     let named = Fake::new().with("proc/version", &version("PREEMPT_RT"));
     expect(&named.see(kernel::preemption), FindingLevel::Good, "PREEMPT_RT");
-    // The debug file wins over how the kernel was built.
+    // The debug file takes precedence over the build options.
     let running = Fake::new()
         .with("proc/version", &version("PREEMPT_DYNAMIC"))
         .with(RELEASE, "6.12-x\n")
@@ -291,7 +291,7 @@ fn interrupts_on_our_core_are_named_and_irqbalance_is_seen() {
         !finding.what.contains("acpi") && finding.cure.contains("echo 0 "),
         "{finding:?}"
     );
-    // What really happens wins over what is allowed.
+    // The effective affinity takes precedence over the permitted one.
     let moved = machine().with("proc/irq/25/effective_affinity_list", "0\n");
     expect(
         &moved.see(|m| cores::interrupts(m, 1)),

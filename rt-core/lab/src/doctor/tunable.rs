@@ -1,4 +1,4 @@
-//! Settings of the kernel that are files: what each is now, what it should be, and what it costs the loop otherwise.
+//! Kernel settings that are files: present value, wanted value, and the cost to the loop otherwise.
 
 use super::{Finding, FindingLevel};
 use crate::machine::{Machine, Throttle, core_list, cores};
@@ -6,11 +6,11 @@ use crate::machine::{Machine, Throttle, core_list, cores};
 /// A setting that can be changed while the PC runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tunable {
-    /// The check that looks at it.
+    /// The check that examines it.
     pub check: &'static str,
     /// Path without the leading slash.
     pub path: String,
-    /// Start time of a thread whose cores these are ([`Machine::began`]).
+    /// Start time of the thread whose cores these are ([`Machine::began`]).
     pub began: Option<u64>,
     pub now: String,
     pub wanted: String,
@@ -22,7 +22,7 @@ impl Tunable {
     }
 }
 
-/// Returns the value in force: of `a [b] c` the word in brackets, of a thread the cores that it may run on.
+/// Returns the value in force: for `a [b] c` the word in brackets, for a thread its permitted cores.
 pub fn value(machine: &Machine, path: &str) -> Option<String> {
     if let Some(allowed) = machine.allowed_cores(path) {
         return Some(allowed);
@@ -35,12 +35,12 @@ pub fn value(machine: &Machine, path: &str) -> Option<String> {
 }
 
 const CPU: &str = "sys/devices/system/cpu";
-/// Waking from a deeper sleep than this, in microseconds, is seen in the wake-up latency.
+/// Exit latency, in microseconds, above which a sleep state shows in the wake-up latency.
 const DEEP_US: u64 = 20;
 /// Seconds between two updates of the memory statistics; the default of 1 wakes a worker on every core each second.
 const STAT_INTERVAL: &str = "120";
 
-/// One that is looked at by a check of this file.
+/// A setting examined by a check of this file.
 struct Quiet {
     check: &'static str,
     path: &'static str,
@@ -93,13 +93,13 @@ const QUIET: [Quiet; 5] = [
     },
 ];
 
-/// Returns check and wanted value of a setting that only this file knows.
+/// Returns check and wanted value of a setting known only to this file.
 pub fn quiet(path: &str) -> Option<(&'static str, &'static str)> {
     let found = QUIET.iter().find(|q| q.path == path)?;
     Some((found.check, found.wanted))
 }
 
-/// Findings of the settings that only this file knows.
+/// Returns the findings on the settings known only to this file.
 pub fn findings(machine: &Machine) -> Vec<Finding> {
     QUIET
         .iter()
@@ -116,7 +116,7 @@ pub fn findings(machine: &Machine) -> Vec<Finding> {
         .collect()
 }
 
-/// Returns whether a value is the wanted one; an interval may be longer.
+/// True if a value is the wanted one; an interval may be longer.
 fn met(q: &Quiet, now: &str) -> bool {
     let number = |text: &str| text.parse::<u64>().ok();
     match (q.wanted == STAT_INTERVAL, number(now), number(q.wanted)) {
@@ -140,7 +140,7 @@ pub fn all(machine: &Machine, core: usize) -> Vec<Tunable> {
         }
     };
     for q in &QUIET {
-        // What is better than wanted stays.
+        // A value better than wanted stays.
         let now = value(machine, q.path).filter(|now| met(q, now));
         add(q.check, q.path.to_owned(), now.as_deref().unwrap_or(q.wanted));
     }
@@ -202,7 +202,7 @@ pub fn as_kernel_prints(list: &str) -> String {
     words.collect::<Vec<String>>().join(",")
 }
 
-/// Returns the finding on how the processor weighs speed against energy.
+/// Returns the finding on the processor's preference for speed or energy.
 pub fn energy_preference(machine: &Machine, core: usize) -> Finding {
     let path = format!("{CPU}/cpu{core}/cpufreq/energy_performance_preference");
     match machine.text(&path).as_deref() {
@@ -252,7 +252,7 @@ const FAST: [&str; 6] = [
     "network-latency",
 ];
 
-/// Returns a daemon that sets the same things by a profile.
+/// Returns a daemon that makes the same settings by a profile.
 pub fn tuned(machine: &Machine) -> Finding {
     let profile = machine.text("etc/tuned/active_profile").unwrap_or_default();
     let fast = profile.split_whitespace().any(|p| FAST.contains(&p));

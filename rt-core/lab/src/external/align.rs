@@ -3,12 +3,12 @@
 
 use super::capture::CaptureError;
 
-/// The line from our clock to that of the instrument, by least squares.
+/// Linear map from our clock to the instrument's, by least squares.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alignment {
     /// Pairs of a toggle's index and an edge's index.
     pub pairs: Vec<(usize, usize)>,
-    /// The instrument's clock runs faster than ours by so much.
+    /// Relative rate by which the instrument's clock is faster than ours.
     pub drift: f64,
     /// Standard uncertainty of the drift.
     pub drift_u: f64,
@@ -18,15 +18,15 @@ pub struct Alignment {
     pub residuals_s: Vec<f64>,
 }
 
-/// Edges that must be there.
+/// Fewest edges needed.
 const FEWEST: usize = 20;
-/// A gap between edges is that of two toggles when it differs by less: drift of any quartz, and jitter.
+/// Largest relative difference of two gaps that count as equal: drift of any quartz, and jitter.
 const DRIFT: f64 = 5e-4;
 const JITTER_S: f64 = 4e-4;
-/// Share of the gaps in the overlap that must agree.
+/// Fraction of the gaps in the overlap that must agree.
 const SHARE: f64 = 0.8;
 
-/// Aligns `edges_s` with `toggles_s`; the reason where they are not of one run.
+/// Aligns `edges_s` with `toggles_s`; fails with a reason if they are not of one run.
 pub fn align(toggles_s: &[f64], edges_s: &[f64]) -> Result<Alignment, CaptureError> {
     if edges_s.len() < FEWEST || toggles_s.len() < FEWEST {
         return Err(format!(
@@ -38,7 +38,7 @@ pub fn align(toggles_s: &[f64], edges_s: &[f64]) -> Result<Alignment, CaptureErr
     }
     let (ours, theirs) = (gaps(toggles_s), gaps(edges_s));
     let agrees = |a: f64, b: f64| (a - b).abs() < JITTER_S + DRIFT * a;
-    // `shift`: index of the toggle that the first edge is; negative where the capture began before the loop did.
+    // `shift`: index of the first edge's toggle; negative if the capture began before the loop.
     let mut best = (0, 0, 0_isize);
     for shift in -(theirs.len() as isize - 1)..ours.len() as isize {
         let first = (-shift).max(0) as usize;
@@ -81,7 +81,7 @@ fn line(toggles_s: &[f64], edges_s: &[f64], pairs: Vec<(usize, usize)>) -> Align
     let xy = || pairs.iter().map(|&(t, e)| (toggles_s[t] - origin_s, edges_s[e]));
     let (sx, sy) = xy().fold((0.0, 0.0), |(sx, sy), (x, y)| (sx + x, sy + y));
     let (mx, my) = (sx / n, sy / n);
-    // Around the means, and with the slope 1 taken out: what is left is small, and is not lost in rounding.
+    // Around the means, and with the slope 1 removed: the small remainder is not lost in rounding.
     let (sxx, sxd) = xy().fold((0.0, 0.0), |(sxx, sxd), (x, y)| {
         let (dx, d) = (x - mx, (y - x) - (my - mx));
         (sxx + dx * dx, sxd + dx * d)

@@ -31,15 +31,15 @@ pub struct Delay {
     pub expanded_us: f64,
 }
 
-/// Later than this after its toggle an edge is not its answer.
+/// Longest delay of an answer after its toggle.
 const LATEST_S: f64 = 0.5;
-/// Answers that must be there.
+/// Fewest answers needed.
 const FEWEST: usize = 10;
 
-/// An input that moves has rested for so long before a motion begins.
+/// Rest of an input before a new motion.
 const REST_S: f64 = 0.3;
 
-/// Edges of an input at which something begins that others answer to.
+/// Edges of an input at which events begin that others answer.
 pub struct Begins<'a> {
     pub channel: &'a Channel,
     pub edges_s: Vec<f64>,

@@ -21,7 +21,7 @@ pub struct Capture {
     pub channels: Vec<Channel>,
 }
 
-/// Why a capture cannot be used; for people.
+/// Reason why a capture cannot be used; for people.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct CaptureError(String);
@@ -38,12 +38,12 @@ impl From<&str> for CaptureError {
     }
 }
 
-/// A sound card's samples are taken as edges where they cross half of their range with so much of it to spare.
+/// Hysteresis around half of the range at which a sound card's samples count as edges, relative to the range.
 const HYSTERESIS: f64 = 0.15;
-/// Channels of a capture at most.
+/// Most channels of a capture.
 const MOST_CHANNELS: usize = 64;
 
-/// Reads a capture by what its file begins with.
+/// Reads a capture in the format that its first bytes indicate.
 pub fn read(path: &Path) -> Result<Capture, CaptureError> {
     let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
     let capture = if bytes.starts_with(b"RIFF") {
@@ -202,7 +202,7 @@ fn seconds(text: &str) -> Option<f64> {
     (value > 0.0).then_some(value * unit)
 }
 
-/// Samples of 16 bits; an edge is where they cross the middle of their range, between two samples by a straight line.
+/// Reads samples of 16 bits; an edge is where they cross the middle of their range, linearly interpolated.
 pub fn wav(bytes: &[u8]) -> Result<Capture, CaptureError> {
     let number = |at: usize, length: usize| -> Option<u32> {
         let field = bytes.get(at..at + length)?;
@@ -276,7 +276,7 @@ fn crossings(samples: &[f64], step_s: f64, number: usize) -> Channel {
             && let Some(at_s) = crossed_s
         {
             channel.edges_s.push(at_s);
-            // From a tenth to nine tenths, as fast as between these two samples.
+            // From a tenth to nine tenths, at the slope between these two samples.
             let part = (b - samples[left]).abs() / range;
             rises.push((i - left) as f64 * step_s * 0.8 / part);
         }

@@ -1,8 +1,8 @@
-//! `rt-core latency --external FILE`: does an instrument outside this program agree with it?
+//! `rt-core latency --external FILE`: compares this program's measurement with an external instrument's.
 //!
-//! During a measurement with `--toggle` the force loop toggles a pin and notes when. A logic analyser or a sound card
-//! records the pin, and what answers to it. Afterwards the capture is read ([`capture`]), aligned with the notes by the
-//! pattern of the times between edges ([`align`]), and each delay is given with its uncertainty ([`budget`]).
+//! During a measurement with `--toggle` the force loop toggles a pin and notes the times. A logic analyser or a sound
+//! card records the pin and the responses to it. Afterwards the capture is read ([`capture`]), aligned with the notes
+//! by the pattern of the times between edges ([`align`]), and each delay is given with its uncertainty ([`budget`]).
 
 mod align;
 mod budget;
@@ -19,7 +19,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use stylet_write::{WriteError, write_whole};
 
-/// Notes of the loop: when the pin was toggled.
+/// Notes of the loop: times at which the pin was toggled.
 pub const TOGGLES: &str = "toggles.csv";
 const JSON: &str = "external.json";
 const PAGE: &str = "external.html";
@@ -28,7 +28,7 @@ const HEAD: &str = "due_ns,before_ns,after_ns";
 /// The capture cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ExternalError {
-    /// The notes of the loop.
+    /// The notes of the loop cannot be used.
     #[error("{}: {why}; expected the folder of a measurement with --toggle", .path.display())]
     Toggles {
         /// The file.
@@ -36,7 +36,7 @@ pub enum ExternalError {
         /// Problem with it.
         why: String,
     },
-    /// The file of the instrument.
+    /// The instrument's file cannot be used.
     #[error("{}: {why}", .path.display())]
     Capture {
         /// The file.
@@ -59,19 +59,19 @@ pub struct External {
     toggles: usize,
     edges: usize,
     pairs: usize,
-    /// The instrument's clock runs faster than ours by so many parts in a million, with its expanded uncertainty (k =
-    /// 2).
+    /// Relative rate by which the instrument's clock is faster than ours, in parts per million, with its expanded
+    /// uncertainty (k = 2).
     drift_ppm: f64,
     drift_expanded_ppm: f64,
-    /// Deviation of edges from our notes once drift and offset are taken out.
+    /// Deviation of edges from our notes after removal of drift and offset.
     pin_deviation_us: f64,
     pin_worst_us: f64,
     /// Longest time that writing the pin took by our clock.
     pin_write_worst_us: f64,
-    /// Time from which a tick was due until its pin had changed; by both clocks together.
+    /// Time from the deadline of a tick until its pin had changed; by both clocks together.
     due_to_pin_us: [f64; 3],
     delays: Vec<Delay>,
-    /// Inputs without a delay, and why.
+    /// Inputs without a delay, with the reason.
     without: Vec<String>,
 }
 
@@ -114,7 +114,7 @@ fn read_toggles(folder: &Path) -> Result<Vec<ToggleTime>, ExternalError> {
 /// Evaluates `file` against the notes in `folder`; writes external.json and external.html there.
 ///
 /// # Errors
-/// The capture is not one of this run, or a file cannot be read or written.
+/// The capture is of another run, or a file cannot be read or written.
 pub fn run(folder: &Path, file: &Path, motion: Option<&str>) -> Result<u8, ExternalError> {
     let toggles = read_toggles(folder)?;
     let failed = |why| ExternalError::Capture {
@@ -144,8 +144,8 @@ pub fn run(folder: &Path, file: &Path, motion: Option<&str>) -> Result<u8, Exter
     Ok(0)
 }
 
-/// Evaluates a capture: the pin is the input that agrees best with the notes, `motion` the one that shows when the
-/// handle moves.
+/// Evaluates a capture: the pin is the input that agrees best with the notes, `motion` the one that shows motion of the
+/// handle.
 fn evaluate(
     toggles: &[ToggleTime],
     capture: &Capture,

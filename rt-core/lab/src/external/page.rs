@@ -5,7 +5,7 @@ use super::budget::Delay;
 use maud::{Markup, html};
 use stylet_report::parts::{Column, cell, micro, num, table};
 
-/// Returns the whole page, which needs nothing else.
+/// Returns the whole page, which is self-contained.
 pub fn page(e: &External) -> String {
     let [p50, p99, most] = e.due_to_pin_us;
     let rows = [

@@ -1,5 +1,5 @@
-//! Synthetic captures: a known shift and drift are recovered within the stated uncertainty; a capture of something else
-//! is refused.
+//! Synthetic captures: a known shift and drift are recovered within the stated uncertainty; an unrelated capture is
+//! refused.
 
 use super::capture::{self, Capture, Channel};
 use super::evaluate;
@@ -131,7 +131,7 @@ fn a_capture_of_another_run_or_of_a_clock_is_refused() {
     };
     let [own, _] = edges(&ours, 2);
     assert!(evaluate(&ours, &capture(own.clone()), "", None).is_ok());
-    // Part of it is enough, and so is one that began later.
+    // Part of it is enough, as is one that began later.
     assert!(evaluate(&ours, &capture(own[50..90].to_vec()), "", None).is_ok());
     let [other, _] = edges(&toggles(77, 200), 2);
     let clock: Vec<f64> = (0..400).map(|i| f64::from(i) * 0.05).collect();
@@ -147,8 +147,8 @@ fn a_capture_of_another_run_or_of_a_clock_is_refused() {
     }
 }
 
-/// A handle is struck each second and rings for 20 ms; the patch of the screen answers after 38 to 42 ms, and at no
-/// time of the pin.
+/// A handle is struck each second and rings for 20 ms; the patch of the screen answers after 38 to 42 ms, unrelated to
+/// the pin.
 #[test]
 fn motion_to_photon_is_measured_beside_the_pin() {
     let ours = toggles(3, 400);
@@ -182,7 +182,7 @@ fn motion_to_photon_is_measured_beside_the_pin() {
         .expect("a delay");
     assert!((d.mean_us - 40_000.0).abs() <= d.expanded_us, "{d:?}");
     assert!(d.pairs == 20 && d.expanded_us < 3_000.0, "{d:?}");
-    // What moves when it likes is no answer to the pin.
+    // Independent motion is no answer to the pin.
     assert!(
         e.without.iter().any(|why| why.contains("edges of pin")),
         "{:?}",

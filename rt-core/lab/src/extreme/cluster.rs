@@ -1,11 +1,11 @@
-//! Late wake-ups that belong together: the intervals estimator of Ferro and Segers (2003).
+//! Clusters of late wake-ups: the intervals estimator of Ferro and Segers (2003).
 
 /// Returns the latest of each cluster, in the order of time, and the extremal index; `over`: (grid point, value), in
 /// the order of time.
 pub fn decluster(over: &[(u64, u64)]) -> (Vec<(u64, u64)>, f64) {
     let gaps: Vec<u64> = over.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
     let index = extremal_index(&gaps);
-    // So many of the longest gaps lie between clusters; gaps as long as the next one do not.
+    // This many of the longest gaps lie between clusters; gaps as long as the next one do not.
     let mut sorted = gaps.clone();
     sorted.sort_unstable_by(|a, b| b.cmp(a));
     let between = ((index * over.len() as f64).floor() as usize).saturating_sub(1);
@@ -24,7 +24,7 @@ pub fn decluster(over: &[(u64, u64)]) -> (Vec<(u64, u64)>, f64) {
     (clusters, index)
 }
 
-/// Equations 5 and 6 of the paper; one where there is nothing to estimate it from.
+/// Computes equations 5 and 6 of the paper; one if there is no data.
 fn extremal_index(gaps: &[u64]) -> f64 {
     let n = gaps.len() as f64;
     let sum = |of: &dyn Fn(f64) -> f64| gaps.iter().map(|&t| of(t as f64)).sum::<f64>();
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
     use stylet_random::Random;
 
-    /// Returns ticks over a threshold that one in 50 passes; each pulls the next few along with it.
+    /// Returns ticks over a threshold that one in 50 passes; each raises the next few.
     fn over(length: u64, seed: u64) -> Vec<(u64, u64)> {
         let mut random = Random(seed);
         let n = 60_000;

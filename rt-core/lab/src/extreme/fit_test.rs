@@ -59,7 +59,7 @@ mod tests {
             };
             let n = refused(&|random| draw(random, 1.0, shape));
             println!("shape {shape}: {n} of 200 refused");
-            // 10 and three deviations; with 200 values the limit of infinitely many is passed a little more often.
+            // 10 and three deviations; with 200 values the asymptotic limit is exceeded slightly more often.
             assert!((2..=20).contains(&n), "shape {shape}: {n} of 200");
         }
     }

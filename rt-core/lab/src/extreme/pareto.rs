@@ -15,7 +15,7 @@ pub struct Pareto {
 }
 
 impl Pareto {
-    /// Fits by maximum likelihood (Grimshaw 1993): for each shape / scale the best shape is known in closed form.
+    /// Fits by maximum likelihood (Grimshaw 1993): for each shape / scale the best shape has a closed form.
     pub fn fit(excesses: &[f64]) -> Self {
         let (mean, most) = (mean(excesses), largest(excesses));
         let shape_at = |rate: f64| excesses.iter().map(|y| (rate * y).ln_1p()).sum::<f64>() / excesses.len() as f64;
@@ -83,7 +83,7 @@ fn ln_likelihood(excesses: &[f64], scale: f64, shape: f64) -> f64 {
     -n * scale.ln() - (1.0 + 1.0 / shape) * sum
 }
 
-/// Excess over the threshold that one in `m` passes, for a scale of one.
+/// Returns the excess that one in `m` passes, for a scale of one.
 fn reach(shape: f64, m: f64) -> f64 {
     if shape.abs() < 1e-9 {
         m.ln()

@@ -1,4 +1,4 @@
-//! Levels are given where the data allow them and are right, and refused where they do not.
+//! Levels are correct where the data permit them, and refused elsewhere.
 
 use super::*;
 use crate::bound::binomial_cdf;
@@ -61,7 +61,7 @@ fn the_true_level_lies_inside_its_interval_in_95_of_100_runs() {
 
 #[test]
 fn runs_that_change_are_refused_with_the_figure() {
-    // The power, measured: the second half is so many times as late as the first.
+    // The measured power: the second half is later by this factor.
     for (factor, least) in [(1.2, 38), (1.5, 40), (3.0, 40)] {
         let scale = |i: u64| if i < TICKS / 2 { 1.0 } else { factor };
         let found: Vec<Extremes> = (0..40).map(|seed| examine(&run(900 + seed, scale), 1_000.0)).collect();

@@ -1,10 +1,10 @@
-//! Changes from one report of a PC to the next, and what the PCs that pass have in common.
+//! Changes from one report of a PC to the next, and common properties of passing PCs.
 
 use super::Pc;
 use super::entry::{Entry, Percentile};
 use crate::verdict::Outcome;
 
-/// A tail has grown where it is longer by more than this, and the intervals, where there are any, lie apart.
+/// A tail has grown if it is longer by more than this factor, and the intervals, if any, do not overlap.
 const GROWN: f64 = 1.25;
 
 /// A tail that grew between two reports of one PC and one protocol.
@@ -60,7 +60,7 @@ fn has_grown(from: Percentile, to: Percentile) -> bool {
     to.us > GROWN * from.us && apart
 }
 
-/// Returns the differences between the machine sections. A fact that older versions did not write is no change.
+/// Returns the differences between the machine sections. A fact missing from an older version is no change.
 fn changes(before: &Entry, after: &Entry) -> Vec<Change> {
     let mut names: Vec<&String> = before.machine.keys().chain(after.machine.keys()).collect();
     names.sort();
@@ -81,7 +81,7 @@ fn changes(before: &Entry, after: &Entry) -> Vec<Change> {
     names.into_iter().filter(differs).map(change).collect()
 }
 
-/// A value that every passing PC has, and what the others have instead.
+/// A value of every passing PC, and the others' values.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Common {
     pub what: String,
@@ -93,7 +93,7 @@ pub struct Common {
 /// Compares the latest reports; facts in which most other PCs differ come first.
 pub fn in_common(pcs: &[Pc]) -> Vec<Common> {
     let (good, others): (Vec<&Pc>, Vec<&Pc>) = pcs.iter().partition(|pc| pc.latest().outcome == Outcome::Pass);
-    // What a single PC has in common with itself says nothing.
+    // A single PC has nothing to compare.
     let Some((first, rest)) = good.split_first().filter(|(_, rest)| !rest.is_empty()) else {
         return Vec::new();
     };

@@ -1,4 +1,4 @@
-//! Part of a report that the fleet needs; reports of all versions of schema 1 are read.
+//! The part of a report used by the fleet; reports of all versions of schema 1 are read.
 
 use crate::report::SCHEMA;
 use crate::verdict::Outcome;
@@ -19,7 +19,7 @@ pub struct Percentile {
 pub struct Entry {
     pub path: String,
     pub digest: String,
-    /// Name of the PC; in reports that lack it, the name of the folder that holds the report's.
+    /// Name of the PC; in reports that lack it, the name of the folder above the report's.
     pub pc: String,
     pub made_at: String,
     pub outcome: Outcome,
@@ -38,14 +38,14 @@ pub struct Entry {
     pub machine: BTreeMap<String, String>,
 }
 
-/// A file that is not counted.
+/// A file that does not count.
 #[derive(Debug)]
 pub struct Unread {
     pub path: String,
     pub why: String,
 }
 
-/// Values that differ from run to run without meaning anything, or that say which PC it is.
+/// Values that differ from run to run without meaning, or that identify the PC.
 const OWN: [&str; 3] = ["memory lock", "PC: name", "PC: serial number"];
 
 pub fn read(file: &Path) -> Result<Entry, Unread> {

@@ -9,7 +9,7 @@ use crate::verdict::Outcome;
 use maud::{Markup, PreEscaped, html};
 use stylet_report::parts::{Column, cards, cell, num, or_na, table};
 
-/// Returns the whole page, which needs nothing else.
+/// Returns the whole page, which is self-contained.
 pub fn page(pcs: &[Pc], unread: &[Unread]) -> Result<String, DrawError> {
     let trends = trends(pcs)?;
     let growths: Vec<(&Pc, Growth)> = pcs
@@ -81,7 +81,7 @@ fn overview(pcs: &[Pc]) -> Markup {
         Outcome::NotMeasurable => 1,
         Outcome::Pass => 2,
     };
-    // What needs attention first.
+    // Urgent entries first.
     sorted.sort_by_key(rank);
     let rows: Vec<Vec<Markup>> = sorted.into_iter().map(row).collect();
     let head = [
@@ -118,7 +118,7 @@ fn trends(pcs: &[Pc]) -> Result<Markup, DrawError> {
             single.push(pc.name.as_str());
             continue;
         }
-        // Short runs have no p99.9; a line is of one percentile.
+        // Short runs have no p99.9; a line shows a single percentile.
         let (tail, of): (_, fn(&Entry) -> Option<Percentile>) = if same.iter().all(|e| e.p999.is_some()) {
             ("p99.9", |e| e.p999)
         } else {

@@ -22,8 +22,7 @@ impl Drop for Folder {
     }
 }
 
-/// Returns a report as a PC of that kernel and governor would write it on a day of March; `p999_us` with a tenth of
-/// uncertainty.
+/// Returns a report of a PC with that kernel and governor on a day of March; `p999_us` with a tenth of uncertainty.
 fn report(pc: &str, day: u32, p999_us: f64, kernel: &str, governor: &str, verdict: &str) -> Value {
     let outcome = if verdict == "FAIL" { "FAIL" } else { "PASS" };
     let quantile =
@@ -130,7 +129,7 @@ fn page_names_who_passes_what_grew_and_what_changed_with_it() {
         );
     }
     assert!(page.contains("<h1>Latency of 5 PCs</h1>") && page.contains("20 reports, "));
-    // What needs attention stands first.
+    // Urgent entries come first.
     let latest = section(&page, "Latest report");
     let place = |pc: &str| latest.find(&format!("<b>{pc}</b>")).expect("every PC has a row");
     assert!(place("bravo") < place("echo") && place("echo") < place("alpha"));
@@ -196,7 +195,7 @@ fn altered_copied_and_foreign_files_are_not_counted_and_named() {
 
 #[test]
 fn reports_of_older_versions_are_read() {
-    // Before percentiles had intervals and reports named PC and operator.
+    // From before percentiles had intervals and reports named PC and operator.
     let folder = Folder(std::env::temp_dir().join(format!("stylet-fleet-old-{}", std::process::id())));
     for (day, p999_us) in [(1, 20.0), (8, 50.0)] {
         let mut old = report("", day, p999_us, "6.1.0-rt", "menu", "PASS");
@@ -225,8 +224,8 @@ fn nothing_found_is_an_error_that_says_what_was_expected() {
     assert!(run(&args(&folder.0.join("missing"))).is_err());
 }
 
-/// Writes the page of the twenty reports for whoever wants to look at it: STYLET_FLEET_OUT names the folder, and
-/// STYLET_FLEET_ALSO one with measured reports that join them.
+/// Writes the page of the twenty reports for inspection: STYLET_FLEET_OUT names the folder, and STYLET_FLEET_ALSO one
+/// with measured reports to add.
 #[test]
 #[ignore = "for looking at the page"]
 fn page_to_look_at() {

@@ -1,4 +1,4 @@
-//! The late ticks of a traced run: what made them late, each with a small picture of the trace around it.
+//! The late ticks of a traced run: the cause of each, with a small picture of the trace around it.
 
 use crate::report::Report;
 use crate::trace::{Kind, Lane, Outlier, TracePiece, TraceSection};
@@ -17,7 +17,7 @@ const LANES: [(Lane, &str, &str); 4] = [
     (Lane::Interrupts, "interrupts", "#b3362b"),
     (Lane::Idle, "idle", "#b9c2ca"),
 ];
-/// Pieces at least so wide have their name in them.
+/// Smallest width of a piece that shows its name.
 const NAMED: f64 = 60.0;
 /// Width of a letter of the pictures.
 const LETTER: f64 = 5.4;
@@ -55,7 +55,7 @@ fn summary(t: &TraceSection) -> String {
     )
 }
 
-/// Lists all causes by kind and name, those that took most time first.
+/// Lists all causes by kind and name, the costliest first.
 fn totals(outliers: &[Outlier]) -> Markup {
     let mut all: BTreeMap<(Kind, &str), (u32, f64, f64)> = BTreeMap::new();
     for c in outliers.iter().flat_map(|o| &o.causes) {
@@ -124,7 +124,7 @@ fn picture(o: &Outlier) -> Markup {
             text x=(fixed(place)) y="12" text-anchor=(anchor) font-size="10" fill="#333d47" { (what) }
         }
     };
-    // Both names stand outside of the time between them, so that they are clear of each other.
+    // Both names are outside the interval between them, so that they do not overlap.
     html! {
         svg viewBox={ "0 0 " (WIDTH) " " (bottom + 16.0) } xmlns="http://www.w3.org/2000/svg" font-family="system-ui, sans-serif" role="img"
             aria-label={ "Trace around the tick: " (o.cause) } {

@@ -104,7 +104,7 @@ pub fn comparison(r: &Report) -> Markup {
     }
 }
 
-/// Shows how `--spin-us auto` came to its spin.
+/// Shows how `--spin-us auto` chose its spin.
 pub fn spin(r: &Report) -> Markup {
     let Some(s) = &r.spin_search else {
         return Markup::default();

@@ -1,4 +1,4 @@
-//! Processes and their threads: names, when each began, and the cores that it may run on.
+//! Processes and their threads: names, start times, and permitted cores.
 
 use super::{Machine, cores};
 use std::collections::BTreeSet;
@@ -12,7 +12,7 @@ pub struct Process {
     pub name: String,
 }
 
-/// The file that shows which cores a thread may run on.
+/// File with the permitted cores of a thread.
 const STATUS: &str = "status";
 
 impl Machine {
@@ -28,12 +28,12 @@ impl Machine {
         ids.into_iter().filter_map(named).collect()
     }
 
-    /// Returns whether a program of this name runs.
+    /// True if a program of this name runs.
     pub fn runs(&self, name: &str) -> bool {
         self.processes().iter().any(|process| process.name == name)
     }
 
-    /// Returns the file of each thread that shows which cores it may run on.
+    /// Returns the file of each thread with its permitted cores.
     pub fn threads(&self, process: u32) -> Vec<String> {
         let folder = format!("proc/{process}/task");
         let names = self.names(&folder);
@@ -41,7 +41,7 @@ impl Machine {
         names.iter().map(path).collect()
     }
 
-    /// Returns the cores that a thread may run on, as the kernel prints them; `None` where `path` is no thread's.
+    /// Returns the permitted cores of a thread, as the kernel prints them; `None` if `path` is not a thread's.
     pub fn allowed_cores(&self, path: &str) -> Option<String> {
         thread_of(path)?;
         let status = self.text(path)?;
@@ -49,17 +49,17 @@ impl Machine {
         Some(list.trim().to_owned())
     }
 
-    /// Returns when the thread began, in ticks of the kernel's clock since the PC started: another with its number
-    /// began later.
+    /// Returns the start time of a thread, in ticks of the kernel's clock since boot: another thread with its number
+    /// started later.
     pub fn began(&self, path: &str) -> Option<u64> {
         thread_of(path)?;
         let stat = self.text(&format!("{}stat", path.strip_suffix(STATUS)?))?;
-        // The name, in brackets, may hold spaces and brackets.
+        // The name, in brackets, may contain spaces and brackets.
         let (_, rest) = stat.rsplit_once(')')?;
         rest.split_whitespace().nth(19)?.parse().ok()
     }
 
-    /// Lets a thread run on these cores alone.
+    /// Restricts a thread to these cores.
     pub fn allow_cores(&self, path: &str, list: &str) -> io::Result<()> {
         let thread = thread_of(path).ok_or(io::ErrorKind::NotFound)?;
         if !self.is_this() {

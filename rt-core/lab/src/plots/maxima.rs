@@ -14,7 +14,7 @@ pub struct MaximaPart<'a> {
     pub windows: Vec<(f64, f64, f64)>,
 }
 
-/// Returns begin and end of each window in seconds of measurement, without breaks between sessions.
+/// Returns begin and end of each window in seconds of measurement, without the breaks between sessions.
 fn places(parts: &[MaximaPart]) -> Vec<Vec<(f64, f64)>> {
     let mut at = 0.0;
     let mut place = |part: &MaximaPart| {
@@ -28,7 +28,7 @@ fn places(parts: &[MaximaPart]) -> Vec<Vec<(f64, f64)>> {
     parts.iter().map(&mut place).collect()
 }
 
-/// Wake-ups and own work, logarithmic microseconds over hours; a line parts the parts.
+/// Plots wake-ups and own work, in logarithmic microseconds over hours; lines separate the parts.
 pub fn maxima(parts: &[MaximaPart]) -> Result<String, DrawError> {
     drawn(SIZE, |root| {
         let places = places(parts);
@@ -82,7 +82,7 @@ pub fn maxima(parts: &[MaximaPart]) -> Result<String, DrawError> {
 mod tests {
     use super::*;
 
-    /// Each session's last window was drawn as long as the others, and an hour in five sessions was 74 minutes wide.
+    /// Each session's last window was drawn as wide as the others, and an hour in five sessions was 74 minutes wide.
     #[test]
     fn windows_are_as_wide_as_they_were_measured() {
         let part = |lengths: &[f64]| MaximaPart {

@@ -25,7 +25,7 @@ impl TrendPoint {
     }
 }
 
-/// Powers of ten around all points, so that pictures of several PCs have one scale.
+/// Powers of ten around all points, so that pictures of several PCs share one scale.
 pub fn trend_range_us<'a>(points: impl Iterator<Item = &'a TrendPoint>) -> [f64; 2] {
     let fold = |[low, high]: [f64; 2], us: f64| [low.min(us), high.max(us)];
     let [low, high] = points.flat_map(TrendPoint::values).fold([9.0, 50.0], fold);
@@ -41,8 +41,7 @@ fn unit(seconds: f64) -> (f64, &'static str) {
         .unwrap_or((1.0, "seconds"))
 }
 
-/// Plots p50 and the tail, whose name is `tail`, over the time; a bar is the 95 % interval, a full point a report that
-/// passed.
+/// Plots p50 and the tail, named `tail`, over time; a bar is the 95 % interval, a filled point a report that passed.
 pub fn trend(points: &[TrendPoint], tail: &str, range_us: [f64; 2]) -> Result<String, DrawError> {
     drawn(SIZE, |root| {
         let first_s = points.iter().map(|p| p.time_s).fold(f64::MAX, f64::min);
@@ -80,7 +79,7 @@ pub fn trend(points: &[TrendPoint], tail: &str, range_us: [f64; 2]) -> Result<St
                 chart.draw_series([Circle::new((x, us), 4, ORANGE.stroke_width(2))])?;
             }
         }
-        // The names stand below and above the first points.
+        // The names are below and above the first points.
         for (values, name, side, factor) in [(&p50, "p50", VPos::Top, 0.8), (&late, tail, VPos::Bottom, 1.25)] {
             if let Some(&(x, us)) = values.first() {
                 let style = label(12).pos(Pos::new(HPos::Left, side));

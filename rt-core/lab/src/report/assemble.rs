@@ -1,4 +1,4 @@
-//! Puts a report together from what was measured.
+//! Assembles a report from the measurements.
 
 use super::{
     Environment, GapSection, HostSection, Late, LoopCounts, LoopSection, Margin, NO_DIGEST, Protocol, Report, SCHEMA,
@@ -35,7 +35,7 @@ pub struct Parts<'a> {
     pub spin_search: Option<SpinSearch>,
 }
 
-/// Puts a report together; digests are still missing.
+/// Assembles a report; digests are still missing.
 pub fn report(parts: &Parts) -> Report {
     let Parts { options, measured, .. } = parts;
     let period_ns = options.haptic_period_ns;
@@ -159,7 +159,7 @@ fn loop_section(run: &LoopReport, timing: &LoopTiming, rate_hz: f64, [path, outp
 }
 
 fn parts_of_run(timing: &LoopTiming, rate_hz: f64) -> Vec<Summary> {
-    // A second of the run brings a part that share of its samples.
+    // One second of the run gives each part that fraction of its samples.
     let rate_of_part_hz = rate_hz / PARTS as f64;
     let parts = timing.sample.parts.iter().enumerate().filter(|(_, h)| !h.is_empty());
     parts
@@ -240,7 +240,7 @@ fn latest(measured: &Measured) -> Vec<Late> {
     .collect()
 }
 
-/// Returns the cause that the trace showed; where it does not cover the tick, that which the gap watch saw.
+/// Returns the cause shown by the trace; if it does not cover the tick, that seen by the gap watch.
 fn cause(measured: &Measured, tick: &LateTick) -> String {
     let outliers = measured.trace.iter().flat_map(|t| &t.outliers);
     let traced = outliers.into_iter().find(|o| o.due_ns == tick.due_ns);
@@ -250,7 +250,7 @@ fn cause(measured: &Measured, tick: &LateTick) -> String {
     )
 }
 
-/// Returns the trace, with times from the begin of the measurement.
+/// Returns the trace, with times relative to the start of the measurement.
 fn traced(measured: &Measured) -> Option<TraceSection> {
     let mut section = measured.trace.clone()?;
     for outlier in &mut section.outliers {
@@ -259,7 +259,7 @@ fn traced(measured: &Measured) -> Option<TraceSection> {
     Some(section)
 }
 
-/// Returns what the gap watch saw between two times.
+/// Returns the gap watch's observations between two times.
 fn seen_elsewhere(gaps: &GapReport, from_ns: u64, to_ns: u64) -> String {
     let core = gaps.core.map_or("another core".to_owned(), |c| format!("core {c}"));
     if let Some(ns) = gaps.gap_during(from_ns, to_ns) {

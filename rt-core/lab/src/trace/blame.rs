@@ -1,10 +1,10 @@
-//! Causes of a late tick, from the pieces of time between its due time and its wake-up: kind, name, microseconds.
+//! Causes of a late tick, from the intervals between its deadline and its wake-up: kind, name, microseconds.
 
 use super::event::{Interruption, Task};
 use super::timeline::{Holder, Loop, Piece};
 use serde::Serialize;
 
-/// Cause that kept the loop from its tick.
+/// Kind of cause that delayed the loop's tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
@@ -20,7 +20,7 @@ pub enum Kind {
     LostPriority,
     /// The loop was stopped by a signal or a debugger.
     Stopped,
-    /// The loop waited in the kernel for something else than its time.
+    /// The loop waited in the kernel for something other than its time.
     Blocked,
     /// Handler of a device interrupt.
     Interrupt,
@@ -28,9 +28,9 @@ pub enum Kind {
     SoftInterrupt,
     /// An interrupt of the processor itself.
     ProcessorInterrupt,
-    /// Timers of others that expired.
+    /// Expired timers of others.
     Timers,
-    /// The loop's own tick before had not ended.
+    /// The loop's own previous tick had not ended.
     OwnWork,
     /// The loop's own tick took long and nothing interrupted it.
     SlowWork,
@@ -38,7 +38,7 @@ pub enum Kind {
     NothingRan,
 }
 
-/// One cause, with all pieces of time that it took.
+/// One cause, with all of its intervals.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cause {
     pub kind: Kind,
@@ -52,19 +52,19 @@ pub struct Cause {
     pub priority: Option<i32>,
     pub us: f64,
     pub times: u32,
-    /// System call or work item that it was in.
+    /// System call or work item in progress.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub inside: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub woken_by: Option<String>,
 }
 
-/// A piece without an event is not a wake-up of ordinary length from here on.
+/// Length from which an interval without an event is more than an ordinary wake-up.
 const SILENT_NS: u64 = 20_000;
-/// Causes are kept from this share of the lateness on, and from [`LEAST_US`] on.
+/// Smallest fraction of the lateness at which a cause is kept; see also [`LEAST_US`].
 const LEAST_SHARE: f64 = 0.1;
 const LEAST_US: f64 = 8.0;
-/// Causes of one tick at most.
+/// Most causes of one tick.
 const MOST: usize = 4;
 /// Numbers of normal threads begin here.
 const NORMAL: i32 = 100;
@@ -74,11 +74,11 @@ pub fn fifo(priority: i32) -> Option<i32> {
     (0..NORMAL - 1).contains(&priority).then_some(NORMAL - 1 - priority)
 }
 
-/// Returns the causes, longest first; `woke_ns` is when the loop's clock was read after its sleep.
+/// Returns the causes, longest first; `woke_ns` is when the loop read its clock after its sleep.
 pub fn causes(pieces: &[Piece], woke_ns: u64) -> Vec<Cause> {
     let late_us = pieces.iter().map(Piece::length_ns).sum::<u64>() as f64 / 1e3;
     let mut all: Vec<Cause> = Vec::new();
-    // The loop still ran when its time came: the tick before had not ended.
+    // The loop was still running at its deadline: its previous tick had not ended.
     let mut own_before = true;
     for piece in pieces.iter().flat_map(|piece| piece.cut_at(woke_ns)) {
         let piece = &piece;
@@ -159,7 +159,7 @@ fn cause(piece: &Piece, own_before: bool) -> Option<Cause> {
 
 fn of_thread(piece: &Piece, task: &Task, known_in_kernel: bool, silent: bool) -> Option<Kind> {
     if piece.own != Loop::Runnable {
-        // Its time has come and no interrupt says so: interrupts are off, or nothing runs.
+        // Its deadline has passed without an interrupt: interrupts are off, or nothing runs.
         return silent.then_some(if known_in_kernel {
             Kind::KernelWork
         } else {

@@ -6,7 +6,7 @@ use std::os::unix::fs::FileExt;
 
 /// Counts of system management interrupts, Intel SDM volume 4: `MSR_SMI_COUNT`.
 const SMI_COUNT: u64 = 0x34;
-/// Largest number of counters that are named.
+/// Most counters that are named.
 const NAMED: usize = 5;
 
 /// All counters of one core at one time.

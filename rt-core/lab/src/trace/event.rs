@@ -1,4 +1,4 @@
-//! Lines of the kernel's trace as events: what an event says about who has a core. Text in, values out; nothing else.
+//! Parses lines of the kernel's trace into events about the use of a core. Pure: text in, values out.
 
 /// Something that interrupts threads.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -13,7 +13,7 @@ pub enum Interruption {
     Timer(String),
 }
 
-/// Part of an event that the decoder uses.
+/// Part of an event used by the decoder.
 #[derive(Clone, Debug, PartialEq)]
 pub enum What {
     Switch {
@@ -48,7 +48,7 @@ pub struct Task {
 pub struct Event {
     /// `CLOCK_MONOTONIC`, to a microsecond.
     pub at_ns: u64,
-    /// The thread that had the core: its name and number.
+    /// The thread on the core: its name and number.
     pub name: String,
     pub pid: i32,
     pub what: What,
@@ -59,7 +59,7 @@ pub fn events(text: &str, from_ns: u64) -> Vec<Event> {
     text.lines().filter_map(|line| event(line, from_ns)).collect()
 }
 
-/// Events that the buffer lost, as its text says.
+/// Number of events lost by the buffer, according to its text.
 pub fn lost(text: &str) -> u64 {
     let lines = text.lines().filter_map(|l| l.split_once("[LOST ")?.1.split_once(' '));
     lines.filter_map(|(n, _)| n.parse::<u64>().ok()).sum()
@@ -129,8 +129,8 @@ fn what(kind: &str, fields: &str) -> What {
     known.unwrap_or_else(|| by_ending(kind))
 }
 
-/// Vectors are `<name>_entry` and `<name>_exit`; system calls `sys_<name>(` and `sys_<name> -> 0x0`, printed in two
-/// ways.
+/// Decodes kinds by suffix: vectors are `<name>_entry` and `<name>_exit`; system calls `sys_<name>(` and `sys_<name> ->
+/// 0x0`, printed in two ways.
 fn by_ending(kind: &str) -> What {
     if let Some(call) = kind.strip_prefix("sys_enter_").or_else(|| kind.strip_prefix("sys_")) {
         return if let Some((name, _)) = call.split_once('(') {
@@ -161,7 +161,7 @@ fn switch(fields: &str) -> Option<What> {
     })
 }
 
-/// Reads a thread, whose name may hold spaces: it ends where its number begins.
+/// Parses a thread, whose name may contain spaces: it ends where its number begins.
 fn task(fields: &str, prefix: &str) -> Option<Task> {
     let (begin, end) = (format!("{prefix}comm="), format!(" {prefix}pid="));
     let (name, _) = fields.split_once(&begin)?.1.split_once(&end)?;

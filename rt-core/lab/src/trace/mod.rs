@@ -1,8 +1,8 @@
 //! The cause of each late tick, from the kernel's own trace.
 //!
 //! A trace instance runs in a bounded buffer ([`tracefs`]). After a late tick a thread of normal priority freezes it,
-//! reads it ([`witness`]), takes its lines as events ([`event`]), walks over them to see who had the core when
-//! ([`timeline`]), and names what stood between the tick's due time and its wake-up ([`blame`], [`words`]).
+//! reads it ([`witness`]), parses its lines as events ([`event`]), reconstructs the use of the core ([`timeline`]), and
+//! names the causes between the tick's deadline and its wake-up ([`blame`], [`words`]).
 
 mod blame;
 mod counters;
@@ -20,10 +20,10 @@ pub use witness::{Watched, watch};
 
 use serde::Serialize;
 
-/// Late ticks that are kept with their trace; a later one takes the place of the least late.
+/// Late ticks kept with their trace; a later one replaces the least late.
 pub const KEPT: usize = 32;
 
-/// Row of the picture for a piece of time.
+/// Row of the picture for an interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Lane {
@@ -33,7 +33,7 @@ pub enum Lane {
     Idle,
 }
 
-/// Who had the core for how long, microseconds from the tick's due time.
+/// Holder of the core over an interval, microseconds from the tick's deadline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TracePiece {
     pub from_us: f64,
@@ -61,10 +61,10 @@ pub struct Outlier {
     /// All causes in words.
     pub cause: String,
     pub causes: Vec<Cause>,
-    /// Counts of the machine on this core in the `counted_over_ms` around it, the most frequent first.
+    /// Counts on this core in the `counted_over_ms` around it, the most frequent first.
     pub counted: Vec<Counted>,
     pub counted_over_ms: f64,
-    /// System management interrupts in the same time; absent where they cannot be counted.
+    /// System management interrupts in the same time; absent if they cannot be counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system_management_interrupts: Option<u64>,
     /// The trace around it.
@@ -74,15 +74,15 @@ pub struct Outlier {
 /// Result of the trace of a run.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct TraceSection {
-    /// Why there is no trace.
+    /// Reason why there is no trace.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub absent: Option<String>,
-    /// A tick counts as late from here on: wake-up, or wake-up and own work together.
+    /// Lateness from which a tick counts: wake-up, or wake-up and own work together.
     pub over_us: f64,
     pub buffer_kib_per_core: u64,
     pub events: Vec<String>,
     pub late_ticks: u64,
-    /// Late ticks without a trace, because the buffer was being read or did not reach back so far.
+    /// Late ticks without a trace, because the buffer was being read or did not reach back far enough.
     pub untraced: u64,
     pub longest_read_ms: f64,
     pub lost_events: u64,
@@ -91,7 +91,7 @@ pub struct TraceSection {
 }
 
 impl TraceSection {
-    /// Returns a run that was to be traced and could not be.
+    /// Returns the section of a run whose trace failed.
     pub fn absent(over_ns: u64, why: &TraceError) -> Self {
         Self {
             absent: Some(why.to_string()),

@@ -1,4 +1,4 @@
-//! Causes decoded from kept texts of the kernel's trace. The thread of the loop is `haptic-500`, `SCHED_FIFO` 80.
+//! Causes decoded from saved texts of the kernel's trace. The thread of the loop is `haptic-500`, `SCHED_FIFO` 80.
 
 use super::blame::{self, Cause, Kind};
 use super::{event, timeline};
@@ -19,7 +19,7 @@ fn after_sleep(to: &str, lines: &[&str]) -> String {
     let mut text = format!(
         "          haptic-500     [001] d..2.  10.000020: sched_switch: prev_comm=haptic prev_pid=500 prev_prio=19 prev_state=S ==> {to}\n"
     );
-    // An interrupt stands in the name of the thread that it interrupts: that of the line before.
+    // An interrupt is listed under the interrupted thread: that of the line before.
     let mut thread = "<idle>-0";
     for line in lines {
         let (of, rest) = line.split_once(' ').expect("a thread and an event");
@@ -54,8 +54,8 @@ fn a_wake_up_in_time_has_no_cause() {
     assert_eq!(causes(&text, 1_012), []);
 }
 
-/// Some kernels record no switch away from the idle thread; then the name that stands before each event says who has
-/// the core.
+/// Some kernels record no switch away from the idle thread; the name before each event then shows the thread on the
+/// core.
 #[test]
 fn a_rival_is_named_where_the_kernel_records_no_switch_from_idle() {
     let text = after_sleep(
@@ -232,7 +232,7 @@ fn a_trace_that_begins_after_the_tick_says_nothing() {
     assert!(timeline::pieces(&events, LOOP, PRIORITY, 10_001_000_000, 10_003_000_000).is_none());
 }
 
-/// Half a millisecond of a busy core, as the kernel wrote it. Every microsecond has one holder.
+/// Half a millisecond of a busy core, as written by the kernel. Every microsecond has one holder.
 #[test]
 fn pieces_of_a_kept_trace_cover_every_microsecond_once() {
     let events = event::events(include_str!("tests/busy_core.txt"), 0);

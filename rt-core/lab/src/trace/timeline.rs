@@ -1,4 +1,4 @@
-//! Who had the core, from one event to the next: a walk over the events of one core.
+//! Use of a core over time, from a walk over its events.
 
 use super::event::{Event, Interruption, Task, What};
 use std::collections::BTreeMap;
@@ -8,24 +8,24 @@ use std::collections::BTreeMap;
 pub enum Loop {
     /// Waits for its time.
     Asleep,
-    /// Could run, and does not.
+    /// Ready to run, but not running.
     Runnable,
     Running,
     /// Thread stopped by a signal or a debugger.
     Stopped,
-    /// Waits in the kernel for something else than its time.
+    /// Waits in the kernel for something other than its time.
     Blocked,
 }
 
-/// Who had the core.
+/// Holder of the core.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Holder {
-    /// No thread: the sleep state, where it is known.
+    /// No thread: the sleep state, if known.
     Idle(Option<u32>),
     OwnLoop,
     Thread {
         task: Task,
-        /// The system call that it is in, as far as it is traced.
+        /// Present system call, if traced.
         call: Option<String>,
         /// The work item of a kernel worker.
         work: Option<String>,
@@ -34,14 +34,14 @@ pub enum Holder {
     Interruption(Interruption),
 }
 
-/// A stretch of time between two events.
+/// An interval between two events.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Piece {
     pub from_ns: u64,
     pub to_ns: u64,
     pub holder: Holder,
     pub own: Loop,
-    /// Priority with which the loop was woken last, the kernel's number.
+    /// Priority of the loop at its last wake-up, the kernel's number.
     pub own_priority: i32,
     /// Another thread, or none, was given the core while the loop could run.
     pub passed_over: bool,
@@ -52,7 +52,7 @@ impl Piece {
         self.to_ns - self.from_ns
     }
 
-    /// Returns its parts before and after a moment.
+    /// Returns its parts before and after a time.
     pub fn cut_at(&self, at_ns: u64) -> impl Iterator<Item = Self> + use<> {
         let at_ns = at_ns.clamp(self.from_ns, self.to_ns);
         let [mut before, mut after] = [self.clone(), self.clone()];
@@ -73,12 +73,12 @@ struct Walk {
     calls: BTreeMap<i32, String>,
     work: BTreeMap<i32, String>,
     wakers: BTreeMap<i32, String>,
-    /// Threads as the scheduler named them last.
+    /// Threads as last named by the scheduler.
     known: BTreeMap<i32, Task>,
 }
 
-/// Returns the pieces of `[from_ns, to_ns]` on the core of `events`; `own_pid` is the loop's thread, `own_priority` the
-/// kernel's number of its priority. `None` where the events begin later.
+/// Returns the intervals of `[from_ns, to_ns]` on the core of `events`; `own_pid` is the loop's thread, `own_priority`
+/// the kernel's number of its priority. `None` if the events begin later.
 pub fn pieces(events: &[Event], own_pid: i32, own_priority: i32, from_ns: u64, to_ns: u64) -> Option<Vec<Piece>> {
     let first = events.first().filter(|e| e.at_ns <= from_ns)?;
     let mut walk = Walk::begin(first, events, own_pid, own_priority);
@@ -112,7 +112,7 @@ fn push(pieces: &mut Vec<Piece>, walk: &Walk, from_ns: u64, to_ns: u64) {
 }
 
 impl Walk {
-    /// The loop's own state at the begin follows from the first event that names it.
+    /// Derives the loop's initial state from the first event that names it.
     fn begin(first: &Event, events: &[Event], own_pid: i32, own_priority: i32) -> Self {
         let named = events.iter().find_map(|e| match &e.what {
             What::Switch { from, .. } if from.pid == own_pid => Some(Loop::Running),
@@ -121,7 +121,7 @@ impl Walk {
             _ if e.pid == own_pid => Some(Loop::Running),
             _ => None,
         });
-        // The thread that has the core at the begin: its priority is in the switch that takes the core away.
+        // The thread on the core at the start: its priority is in the switch that removes it.
         let current = events.iter().find_map(|e| match &e.what {
             What::Switch { from, .. } => Some(from.clone()),
             _ => None,
@@ -146,8 +146,8 @@ impl Walk {
         }
     }
 
-    /// Each event stands in the name of the thread that has the core. Some kernels record no switch away from the idle
-    /// thread: then the thread has had the core since the event before.
+    /// Processes an event, which names the thread on the core. Some kernels record no switch away from the idle thread:
+    /// then the thread has had the core since the previous event.
     fn see(&mut self, e: &Event) {
         if e.pid == self.current.pid {
             return;
@@ -217,7 +217,7 @@ impl Walk {
             // The idle thread has the number of the least urgent normal thread.
             self.passed_over |= to.pid == 0 || to.priority > self.own_priority;
         }
-        // A switch happens in no interrupt: an end that the buffer lost must not stay for ever.
+        // A switch never happens inside an interrupt: an end that the buffer lost must not persist.
         self.interruptions.clear();
         self.current = to.clone();
     }

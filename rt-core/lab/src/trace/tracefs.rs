@@ -1,5 +1,5 @@
-//! A separate trace instance in the kernel's tracefs: made, frozen, read, and removed whatever happens to this
-//! process.
+//! A separate trace instance in the kernel's tracefs: created, frozen, read, and always removed, even if this process
+//! is killed.
 
 use crate::machine::Machine;
 use std::ffi::CString;
@@ -10,12 +10,12 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-/// Buffer of each core: a tenth of a second of a busy one. Nothing is recorded while it is read, so it is no longer
-/// than needed.
+/// Buffer of each core: a tenth of a second of a busy one. No longer than necessary, since nothing is recorded while it
+/// is read.
 pub const BUFFER_KIB: u64 = 256;
-/// Begin of the names of our instances; the number of the process follows.
+/// Prefix of our instances' names; the number of the process follows.
 const NAME: &str = "stylet-";
-/// Events that are recorded where the kernel has them; `*` stands for all of a group with this ending.
+/// Events recorded if the kernel has them; `*` stands for all of a group with this suffix.
 const EVENTS: &[&str] = &[
     "sched/sched_switch",
     "sched/sched_waking",
@@ -33,7 +33,7 @@ const EVENTS: &[&str] = &[
     "workqueue/workqueue_execute_end",
     "power/cpu_idle",
 ];
-/// System calls in which the kernel works for long.
+/// System calls with long work in the kernel.
 const CALLS: &[&str] = &[
     "fsync",
     "fdatasync",
@@ -54,7 +54,7 @@ const CALLS: &[&str] = &[
     "execve",
 ];
 
-/// Why there is no trace. The text is for people.
+/// Reason why there is no trace. The text is for people.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     #[error("the kernel's trace cannot be used: {0}; it needs root (sudo) and a kernel with CONFIG_TRACING")]
@@ -96,7 +96,7 @@ impl Root {
     }
 }
 
-/// Returns a mount of tracefs that has no place in any folder.
+/// Returns a mount of tracefs that is attached to no folder.
 fn mount() -> io::Result<OwnedFd> {
     const FSCONFIG_CMD_CREATE: libc::c_ulong = 6;
     let own = |result: libc::c_long| {
@@ -132,9 +132,9 @@ fn mount() -> io::Result<OwnedFd> {
 pub struct Instance {
     root: Root,
     name: String,
-    /// Removes the instance as soon as its input ends, so that not even SIGKILL leaves one.
+    /// Removes the instance as soon as its input ends, so that not even SIGKILL leaves one behind.
     keeper: Option<Child>,
-    /// Events that the kernel has, as `group/name`.
+    /// Events supported by the kernel, as `group/name`.
     pub events: Vec<String>,
 }
 
@@ -174,7 +174,7 @@ impl Instance {
         fs::write(&path, value).map_err(|why| TraceError::File { path, why })
     }
 
-    /// Turns on what there is.
+    /// Enables the supported events; returns them.
     fn enable(&self) -> Vec<String> {
         let names_of = |group: &str| Machine::at(self.path("events")).names(group);
         let mut wanted: Vec<String> = Vec::new();
@@ -194,12 +194,12 @@ impl Instance {
         wanted
     }
 
-    /// Stops recording; what is in the buffer stays.
+    /// Stops recording; the buffer is kept.
     pub fn freeze(&self) -> Result<(), TraceError> {
         self.put("tracing_on", "0")
     }
 
-    /// Records again.
+    /// Resumes recording.
     pub fn thaw(&self) -> Result<(), TraceError> {
         self.put("tracing_on", "1")
     }
@@ -249,7 +249,7 @@ fn remove(root: &Root, name: &str) {
     }
 }
 
-/// Instances of processes that are no more.
+/// Removes instances of dead processes.
 fn remove_dead(root: &Root) {
     let names = Machine::at(&root.path).names("instances");
     for name in names {

@@ -18,18 +18,18 @@ pub struct Watched<'a> {
     pub core: usize,
     pub thread: &'static str,
     pub priority: Option<u32>,
-    /// A tick is late from here on.
+    /// Lateness from which a tick counts.
     pub over_ns: u64,
 }
 
-/// Pause between two readings of the counters between late ticks.
+/// Interval of counter readings between late ticks.
 const LOOK: Duration = Duration::from_millis(250);
-/// Events so long before a late tick show who had the core when it was due.
+/// Length of events before a late tick that show the holder of the core at its deadline.
 const BEFORE_NS: u64 = 200_000_000;
-/// The picture begins and ends so much before and after the tick, as a share of its lateness, at least 50 us.
+/// Margin of the picture before and after the tick, as a fraction of its lateness, at least 50 µs.
 const MARGIN: f64 = 0.4;
 const LEAST_MARGIN_NS: u64 = 50_000;
-/// Pieces of one picture at most: the longest ones.
+/// Most intervals in one picture: the longest ones.
 const PIECES: usize = 250;
 
 struct Witness<'a> {
@@ -107,7 +107,7 @@ impl Witness<'_> {
             .instance
             .freeze()
             .and_then(|()| self.instance.read(self.watched.core));
-        // A trace that cannot be thawed is one that cannot be read the next time.
+        // A trace that cannot be thawed will fail to be read next time.
         let _ = self.instance.thaw();
         let end_ns = clock::now_ns();
         self.section.longest_read_ms = self.section.longest_read_ms.max((end_ns - begin_ns) as f64 / 1e6);
@@ -135,10 +135,10 @@ impl Witness<'_> {
         }
     }
 
-    /// `None` where the trace does not cover the tick.
+    /// Returns the tick with its causes; `None` if the trace does not cover it.
     fn outlier(&self, tick: &LateTick, own_pid: i32, events: &[Event], now: &Counters) -> Option<Outlier> {
         let woke_ns = tick.due_ns + tick.wake_ns;
-        // A tick that woke in time and worked too long is late for what happened during its work.
+        // A tick that woke in time and worked too long is late because of events during its work.
         let end_ns = if tick.wake_ns >= self.watched.over_ns {
             woke_ns
         } else {
@@ -177,7 +177,7 @@ impl Witness<'_> {
     }
 }
 
-/// Returns the pieces as they are drawn: neighbours with one name are one.
+/// Returns the intervals as drawn: neighbours with one name are merged.
 pub(super) fn picture(pieces: &[Piece], due_ns: u64) -> Vec<TracePiece> {
     let mut drawn: Vec<TracePiece> = Vec::new();
     for piece in pieces {

@@ -2,12 +2,12 @@
 
 use super::blame::{Cause, Kind};
 
-/// The surroundings that decide what it means that nothing ran.
+/// The environment, which determines the meaning of an interval in which nothing ran.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Below {
-    /// Set on a virtual machine.
+    /// The machine is virtual.
     pub virtual_machine: bool,
-    /// System management interrupts around the tick; `None` where they cannot be counted.
+    /// System management interrupts around the tick; `None` if they cannot be counted.
     pub smi: Option<u64>,
 }
 
@@ -20,7 +20,7 @@ pub fn sentence(causes: &[Cause], below: Below) -> String {
     all.join("; ")
 }
 
-/// Such as `IRQ 28 (nvme0q1) 312 us`.
+/// Formats a cause, such as `IRQ 28 (nvme0q1) 312 us`.
 pub fn words(c: &Cause, below: Below) -> String {
     let us = format!("{:.0} us", c.us);
     let who = match c.pid {
@@ -59,7 +59,7 @@ pub fn words(c: &Cause, below: Below) -> String {
     }
 }
 
-/// A thread that had the core may have turned interrupts off, which no event shows.
+/// Describes an interval without events: a thread on the core may have turned interrupts off, which no event shows.
 fn nothing_ran(us: &str, who: &str, is_thread: bool, below: Below) -> String {
     match below {
         Below { smi: Some(n), .. } if n > 0 => {

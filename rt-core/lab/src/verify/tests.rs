@@ -1,4 +1,4 @@
-//! Every change is found and named: a byte, a key, a program.
+//! Every change is detected and named: a byte, a key, a program.
 
 use super::*;
 
@@ -41,13 +41,13 @@ fn unaltered_report_passes_and_every_change_is_found() {
     assert!(check("{", None, b"")[0].contains("not JSON"));
 }
 
-/// A report in its own folder, with two keys: that of A. Meyer, who may sign, and another.
+/// A report in its own folder, with two keys: that of A. Meyer, a permitted signer, and another.
 struct Signed {
     folder: PathBuf,
 }
 
 impl Signed {
-    /// Makes a folder; `None` where ssh-keygen is not installed.
+    /// Makes a folder; `None` if ssh-keygen is not installed.
     fn new(name: &str) -> Option<Self> {
         let folder = std::env::temp_dir().join(format!("stylet-signed-{name}-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&folder);
@@ -94,7 +94,7 @@ impl Signed {
         std::fs::write(self.path(name), bytes).expect("the folder can be written");
     }
 
-    /// Changes the byte in the middle of a file for the time of `then`.
+    /// Flips the byte in the middle of a file during `then`.
     fn flipped(&self, name: &str, then: impl FnOnce()) {
         let whole = std::fs::read(self.path(name)).expect("a file");
         let mut flipped = whole.clone();
@@ -198,7 +198,7 @@ fn wrong_key_and_missing_signature_are_named() {
     std::fs::remove_file(signed.path("report.json.sig")).expect("removed");
     assert!(signed.signature().expect_err("none").contains("not signed"));
     assert_eq!(signature(&signed.path(JSON), None).as_deref(), Ok("not signed"));
-    // A key that is none.
+    // An invalid key.
     signed.put("meyer", b"no key");
     let why = sign::sign(&signed.path(JSON), &signed.path("meyer"))
         .expect_err("no key")

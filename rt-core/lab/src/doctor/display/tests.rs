@@ -1,5 +1,4 @@
-//! An X server on the core of the force loop: named, moved and moved back; on kernels that give way it is left where it
-//! is.
+//! An X server on the core of the force loop: named, moved and moved back; on preemptible kernels it is left alone.
 
 use super::*;
 use crate::doctor::mend::file::{Changes, State};
@@ -7,7 +6,7 @@ use crate::doctor::tests::{Fake, expect};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command};
 
-/// Returns a machine of three cores whose kernel works like this.
+/// Returns a machine of three cores with this preemption model.
 fn machine(preemption: &str) -> Fake {
     Fake::new()
         .with("sys/devices/system/cpu/online", "0-2\n")
@@ -32,7 +31,7 @@ const NONE: &str = "(none) voluntary full lazy\n";
 #[test]
 fn a_renderer_on_the_loop_core_is_named_with_the_command_to_move_it() {
     let fake = with(machine(NONE), 77, "Xorg", ["0-2", "0-2"]);
-    // One thread of it is enough; what does not draw may be anywhere.
+    // One thread of it is enough; other programs may run anywhere.
     let fake = with(fake, 300, "host-ui", ["0-1", "2"]);
     let fake = with(fake, 500, "bash", ["0-2", "0-2"]);
     let finding = fake.see(|m| servers(m, 2));
@@ -51,7 +50,7 @@ fn a_renderer_on_the_loop_core_is_named_with_the_command_to_move_it() {
     expect(&away.see(|m| servers(m, 2)), FindingLevel::Good, "no display server");
 }
 
-/// On such kernels the loop takes the core from whatever works in the kernel.
+/// On such kernels the loop preempts work inside the kernel.
 #[test]
 fn on_a_kernel_that_gives_way_it_is_no_fault_and_nothing_is_moved() {
     for word in ["none voluntary (full) lazy", "none voluntary full (lazy)"] {
@@ -76,13 +75,13 @@ fn each_thread_keeps_its_cores_but_that_of_the_loop() {
         ("proc/90/task/91/status", Some(1091), "2", "0-1"),
     ];
     assert_eq!(moved, expected);
-    // The ids of a machine made of files belong to others here.
+    // On the real machine those ids belong to other processes.
     let mut changes = Changes::planned(&all);
     fake.of(|m| changes.apply(m));
     assert!(changes.changes.iter().all(|c| matches!(c.state, State::Refused(_))));
 }
 
-/// A process that does nothing, ended when dropped.
+/// An idle process, ended when dropped.
 struct Idle(Child);
 
 impl Drop for Idle {
@@ -96,7 +95,7 @@ impl Drop for Idle {
 fn a_process_is_moved_and_moved_back_but_never_another_of_its_number() {
     let here = Machine::this();
     let folder = tempfile::tempdir().expect("a folder");
-    // An undo moves only what draws, by its name.
+    // An undo moves only drawing programs, by name.
     let named = folder.path().join("Xvfb");
     std::os::unix::fs::symlink("/bin/sleep", &named).expect("linked");
     let mut command = Command::new(&named);

@@ -1,5 +1,5 @@
-//! Settings that the doctor itself makes: the only ones that it undoes. An undo runs as root, and anybody may have
-//! written its list.
+//! Settings that the doctor makes, the only ones that it undoes. An undo runs as root, and any user may have written
+//! its list.
 
 use super::file::{Change, State};
 use crate::doctor::{display, tunable};
@@ -15,7 +15,7 @@ const FILE_SYSTEMS: [u32; 2] = [0x9fa0, 0x6265_6572];
 /// Bound on the length of a state, longer than the kernel's reason for a refusal.
 const LONGEST_STATE: usize = 400;
 
-/// Values that a setting may have.
+/// Permitted values of a setting.
 enum Values {
     Number,
     Word,
@@ -26,7 +26,7 @@ enum Values {
 struct Setting {
     check: &'static str,
     values: Values,
-    /// Value that the doctor sets it to; `None` where it depends on the PC.
+    /// The doctor's value; `None` if it depends on the PC.
     wanted: Option<&'static str>,
 }
 
@@ -82,7 +82,7 @@ fn setting(path: &str) -> Option<Setting> {
     Some(Setting { check, values, wanted })
 }
 
-/// Returns why the doctor cannot have made this change; `None` where it may have.
+/// Returns why the doctor cannot have made this change; `None` if it may have.
 pub fn refusal(change: &Change) -> Option<String> {
     let named = change.path.escape_default();
     let Some(setting) = setting(&change.path) else {
@@ -112,14 +112,14 @@ pub fn refusal(change: &Change) -> Option<String> {
 /// Opens the file of a setting to write to it.
 ///
 /// # Errors
-/// Where it is missing, is reached through a link other than that of a core to its frequency policy, or is not the
+/// If it is missing, is reached through a link other than that of a core to its frequency policy, or is not the
 /// kernel's own.
 pub fn open(machine: &Machine, path: &str) -> io::Result<File> {
     let (mount, rest) = path.split_once('/').ok_or(io::ErrorKind::NotFound)?;
     let flags = OFlags::PATH | OFlags::DIRECTORY | OFlags::NOFOLLOW | OFlags::CLOEXEC;
     let folder = fs::open(machine.path(mount), flags, Mode::empty())?;
     let rest = of_policy(&folder, rest).unwrap_or_else(|| rest.to_owned());
-    // A pipe in the place of the file is not waited for.
+    // Does not wait for a pipe in place of the file.
     let flags = OFlags::WRONLY | OFlags::NONBLOCK | OFlags::NOCTTY | OFlags::CLOEXEC;
     let resolve = ResolveFlags::BENEATH | ResolveFlags::NO_SYMLINKS | ResolveFlags::NO_MAGICLINKS;
     let file = File::from(fs::openat2(&folder, &*rest, flags, Mode::empty(), resolve)?);
@@ -141,7 +141,7 @@ fn of_policy(sys: &OwnedFd, path: &str) -> Option<String> {
     is_numbered(policy, "policy").then(|| format!("devices/system/cpu/cpufreq/{policy}/{name}"))
 }
 
-/// Returns whether a thread's process still draws: no other is moved.
+/// True if a thread's process still draws: no other is moved.
 pub fn is_drawing(machine: &Machine, path: &str) -> bool {
     let process = path.split('/').nth(1).unwrap_or_default();
     let name = machine.text(&format!("proc/{process}/comm"));

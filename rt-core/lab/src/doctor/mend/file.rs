@@ -1,4 +1,4 @@
-//! Settings that were changed, as the file from which they are undone.
+//! Changed settings, as the file from which they are undone.
 
 use super::{MendError, allowed};
 use crate::doctor::tunable::{self, Tunable};
@@ -10,7 +10,7 @@ use std::os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt};
 use std::path::Path;
 
 const SCHEMA: &str = "stylet.settings/1";
-/// A PC of 1,000 cores takes a tenth of it.
+/// Most bytes read; a PC of 1,000 cores needs a tenth.
 const MOST_BYTES: u64 = 4 << 20;
 
 /// State of a change.
@@ -19,10 +19,10 @@ const MOST_BYTES: u64 = 4 << 20;
 pub enum State {
     Planned,
     Applied,
-    /// The kernel did not take it: its reason.
+    /// The kernel refused it, for this reason.
     Refused(String),
     Undone,
-    /// Changed by others since: its value; it was left alone.
+    /// Changed by others since, to this value; left alone.
     Foreign(String),
 }
 
@@ -32,7 +32,7 @@ pub struct Change {
     pub check: String,
     /// Path without the leading slash.
     pub path: String,
-    /// Start time of a thread whose cores were changed, so that another thread of that number does not get them.
+    /// Start time of a thread whose cores were changed, so that no other thread with its number gets them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub began: Option<u64>,
     pub before: String,
@@ -40,7 +40,7 @@ pub struct Change {
     pub state: State,
 }
 
-/// All of them, in the order in which they are applied; undone the other way round.
+/// All changes in the order in which they are applied; undone in reverse.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Changes {
@@ -51,7 +51,7 @@ pub struct Changes {
 }
 
 impl Change {
-    /// Returns whether it changed a thread that has ended, though another may have its number now.
+    /// True if it changed a thread that has ended, even if another has its number now.
     fn has_ended(&self, machine: &Machine) -> bool {
         self.began.is_some() && machine.began(&self.path) != self.began
     }
@@ -63,7 +63,7 @@ fn boot() -> String {
 }
 
 impl Changes {
-    /// Plans the settings that are not met; none is applied yet.
+    /// Plans the settings that are not met, without applying any.
     pub fn planned(tunables: &[Tunable]) -> Self {
         let open = tunables.iter().filter(|t| !t.is_met());
         Self {
@@ -82,13 +82,12 @@ impl Changes {
         }
     }
 
-    /// Reads a list. One that others can write is none that this program wrote, nor is one that names anything but its
-    /// settings.
+    /// Reads a list. A list that others can write, or that names anything but this program's settings, is refused.
     pub fn read(path: &Path) -> Result<Self, MendError> {
         Self::open(path, false).map(|(read, _)| read)
     }
 
-    /// Returns the list and its file, into which the states of an undo go: its name may by then be another's.
+    /// Returns the list and its file, which receives the states of an undo: its name may point elsewhere by then.
     pub fn open_to_undo(path: &Path) -> Result<(Self, File), MendError> {
         Self::open(path, true)
     }
@@ -109,7 +108,7 @@ impl Changes {
         }
     }
 
-    /// Writes the list into its file again.
+    /// Rewrites the list into its file.
     pub fn rewrite(&self, path: &Path, file: &File) -> Result<(), MendError> {
         let text = self.text();
         let written = file.write_all_at(text.as_bytes(), 0);
@@ -138,7 +137,7 @@ impl Changes {
         }
     }
 
-    /// Gives each applied setting its value from before, unless others have changed it since.
+    /// Restores each applied setting, unless others have changed it since.
     ///
     /// A change that is only planned may have been made: the program was killed between both writes of its file.
     pub fn undo(&mut self, machine: &Machine) {
@@ -169,7 +168,7 @@ impl Changes {
         self.changes.iter().any(refused)
     }
 
-    /// Returns whether nothing of it is in force, or the PC was restarted since.
+    /// True if none of it is in force, or the PC was restarted since.
     pub fn is_undone(&self) -> bool {
         let done = |c: &Change| matches!(c.state, State::Undone | State::Refused(_));
         self.boot != boot() || self.changes.iter().all(done)
@@ -195,7 +194,7 @@ impl Changes {
     }
 }
 
-/// Reads the text of a regular file that no other user could have written, and returns both.
+/// Reads the text of a regular file that no other user could have written; returns file and text.
 fn own_text(path: &Path, is_written: bool) -> io::Result<(String, File)> {
     let flags = libc::O_NOFOLLOW | libc::O_NONBLOCK;
     let file = File::options()
@@ -236,7 +235,7 @@ fn put(machine: &Machine, path: &str, value: &str) -> Result<(), String> {
     } else {
         let mut file = allowed::open(machine, path).map_err(|e| e.to_string())?;
         if !machine.is_this() {
-            // A file of the kernel has no length.
+            // A kernel file has no length.
             file.set_len(0).map_err(|e| e.to_string())?;
         }
         file.write_all(value.as_bytes()).map_err(|e| e.to_string())?;

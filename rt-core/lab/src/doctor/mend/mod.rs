@@ -1,5 +1,4 @@
-//! `rt-core doctor --apply`: changes the settings that the doctor names, so that each can be undone, and measures
-//! before and after.
+//! `rt-core doctor --apply`: changes the settings that the doctor names, reversibly, and measures before and after.
 
 mod allowed;
 pub(super) mod file;
@@ -59,7 +58,7 @@ pub struct DoctorArgs {
     undo: Option<PathBuf>,
 }
 
-/// Why settings were not changed, or not all of them.
+/// Reason why settings were not changed, or not all of them.
 #[derive(Debug, thiserror::Error)]
 pub enum MendError {
     /// The file of an undo cannot be used.
@@ -70,7 +69,7 @@ pub enum MendError {
         /// Problem with it.
         why: String,
     },
-    /// The folder holds what is needed to undo an earlier change.
+    /// The folder holds the data for undoing an earlier change.
     #[error("{} is there already: undo it first, or name another folder", .0.display())]
     NotUndone(PathBuf),
     /// A file cannot be written.
@@ -207,7 +206,7 @@ fn mend(
     eprintln!("rt-core: measuring for {:.0} s before", duration_ns as f64 / 1e9);
     let before = side(core, duration_ns, out, interrupted)?;
     let mut changes = Changes::planned(tunables);
-    // What is needed to undo is on the disk before anything changes.
+    // The undo data is on disk before anything changes.
     write_whole(&undo, changes.text().as_bytes())?;
     changes.apply(machine);
     write_whole(&undo, changes.text().as_bytes())?;

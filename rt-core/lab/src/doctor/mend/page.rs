@@ -1,4 +1,4 @@
-//! The page of a change: what was changed, and how the force loop woke before and after.
+//! The page of a change: the changed settings, and the wake-ups of the force loop before and after.
 
 use super::MendReport;
 use super::file::State;
@@ -20,7 +20,7 @@ pub fn ratios(before: &Summary, after: &Summary) -> Vec<(&'static str, String)> 
     all
 }
 
-/// Returns the whole page, which needs nothing else.
+/// Returns the whole page, which is self-contained.
 pub fn page(r: &MendReport) -> Result<String, DrawError> {
     let series = |name, color, histogram| Series { name, color, histogram };
     let both = [

@@ -70,7 +70,7 @@ fn settings_are_changed_read_back_and_undone() {
 fn undo_keeps_foreign_edits_and_reports_refusals() {
     let (root, machine) = machine("foreign", FILES);
     let mut changes = Changes::planned(&tunable::all(&machine, 1));
-    // A folder cannot be written, as a setting that the kernel refuses.
+    // A folder cannot be written, like a setting that the kernel refuses.
     changes.changes[0].path = "proc/irq".to_owned();
     changes.apply(&machine);
     assert!(matches!(changes.changes[0].state, State::Refused(_)));

@@ -1,4 +1,4 @@
-//! A list that anybody may have written, undone by root: it wrote any file that it named, through `proc/self/root`.
+//! A list written by any user, undone by root: it used to write any file that it named, through `proc/self/root`.
 
 use super::super::file::Changes;
 use crate::machine::Machine;
@@ -11,7 +11,7 @@ const GOVERNOR: &str = "sys/devices/system/cpu/cpu1/cpufreq/scaling_governor";
 const INTERVAL: &str = "proc/sys/vm/stat_interval";
 const IRQ: &str = "proc/irq/36/smp_affinity_list";
 
-/// A machine of files, with other files that are no settings.
+/// A machine of files, with other files that are not settings.
 struct Fake {
     root: tempfile::TempDir,
     machine: Machine,
@@ -59,7 +59,7 @@ impl Fake {
         std::fs::write(self.path(path), text).expect("written");
     }
 
-    /// Puts a link, a pipe or nothing in the place of a file or a folder.
+    /// Replaces a file or a folder with a link, a pipe or nothing.
     fn replace(&self, path: &str, with: impl Fn(&Path)) {
         let path = self.path(path);
         let _ = std::fs::remove_file(&path).or_else(|_| std::fs::remove_dir_all(&path));
@@ -84,7 +84,7 @@ impl Fake {
         found
     }
 
-    /// Undoes a list of one change; whether anything on the machine has changed.
+    /// Undoes a list of one change; returns whether anything on the machine has changed.
     fn writes(&self, change: Value, list: impl Fn(&Path)) -> bool {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("undo.json");
@@ -189,7 +189,7 @@ fn a_forged_path_or_value_writes_nothing() {
     }
 }
 
-/// The name of a setting leads elsewhere.
+/// The name of a setting points elsewhere.
 #[test]
 fn a_link_a_pipe_and_a_file_of_another_user_are_not_written() {
     let [interval, governor, irq, _] = own();
