@@ -1,5 +1,5 @@
-//! Dose of a whole implant: time as a ratio to the straightforward loop in the same run, with the error against it
-//! beside it.
+//! Dose of a whole implant: time as a ratio to the straightforward loop in the same run, and the error
+//! against it.
 //!
 //! `cargo bench -p stylet-benches --bench dose`. Rounds are interleaved, so that a noisy machine disturbs all rows
 //! alike.

@@ -1,4 +1,4 @@
-//! ChainMail on the path of a session with nothing left to do in any tick: the columns of its own coarser body solved
+//! ChainMail on the path of a session with nothing left to do in any tick: the columns of the coarser body solved
 //! to the end, and limits met as far as f32 has them. Shipped models are compared with that, in addition to the
 //! comparison with finite elements.
 

@@ -65,7 +65,7 @@ pub enum Action {
     ToggleIsodose,
     ToggleImage,
     ToggleTheme,
-    /// Starts a core in place of one that has ended.
+    /// Starts a core to replace one that has ended.
     StartCore,
     /// Saves the window as PNG.
     SavePicture,

@@ -137,11 +137,12 @@ enum Task {
         /// Transforms of the needle per second, 1 to 200
         #[arg(long, default_value_t = 60.0, value_name = "HZ")]
         hz: f64,
-        /// Let transforms of this name move the simulated hand: a tracker or a stepper behind PLUS. Anyone who reaches the address can
-        /// send them
+        /// Let transforms of this name move the simulated hand: a tracker or a stepper behind PLUS. Anyone who reaches
+        /// the address can send them
         #[arg(long, value_name = "NAME")]
         hand: Option<String>,
-        /// Let transforms of this name, such as ProbeToScene, move the simulated hand with the ultrasound probe (rt-core --device-2)
+        /// Let transforms of this name, such as ProbeToScene, move the simulated hand with the ultrasound probe
+        /// (rt-core --device-2)
         #[arg(long, value_name = "NAME")]
         probe: Option<String>,
         /// Maximum speed of both hands, 0.1 to 1000 mm/s

@@ -4,7 +4,7 @@
 /// Most heaps; each thread's heap keeps freed blocks below a threshold, which glibc raises over
 /// time.
 const HEAPS_AT_MOST: libc::c_int = 2;
-/// Smallest block with a mapping of its own: a picture, a mesh or a volume returns to the system
+/// Smallest block with a separate mapping: a picture, a mesh or a volume returns to the system
 /// when it is dropped.
 const OWN_MAPPING_BYTES: libc::c_int = 1 << 20;
 

@@ -62,8 +62,8 @@ pub fn has_more_rights_than_user() -> bool {
     unsafe { libc::getauxval(libc::AT_SECURE) != 0 }
 }
 
-/// Loads the library at `path`, or the first of the driver's files that can be loaded, and never closes it. `bind` looks up its
-/// functions, or lists those that it lacks.
+/// Loads the library at `path`, or the first of the driver's files that can be loaded, and never closes it. `bind`
+/// looks up its functions, or lists those that it lacks.
 pub fn load<T>(
     driver: &Driver,
     path: Option<&Path>,

@@ -22,8 +22,8 @@ impl Axes {
         world_from_device: Quaternion::new(0.0, 0.0, 1.0, 0.0),
         handle_from_tool: Quaternion::new(0.0, 0.0, 1.0, 0.0),
     };
-    /// Force Dimension: x towards the operator, y to the operator's right, z up; the handle points along its own -x (CHAI3D 3.3,
-    /// which turns the axes of a Phantom into these and those of a Force Dimension device not at all).
+    /// Force Dimension: x towards the operator, y to the operator's right, z up; the handle points along its own -x
+    /// (CHAI3D 3.3, which turns the axes of a Phantom into these and those of a Force Dimension device not at all).
     pub const FORCE_DIMENSION: Self = Self {
         world_from_device: Quaternion::new(0.5, -0.5, 0.5, 0.5),
         handle_from_tool: Quaternion::new(0.5, 0.5, -0.5, -0.5),

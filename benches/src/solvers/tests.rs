@@ -1,4 +1,4 @@
-//! What the pass leaves violated.
+//! Violations left by the pass.
 
 use super::*;
 use stylet_sim::limits::TissueParameters;

@@ -198,7 +198,7 @@ mod tests {
     }
 
     /// Guards against a line from the last sample before a loss to the first after it: a ramp that
-    /// nobody measured.
+    /// was never measured.
     #[test]
     fn gaps_cut_the_curve() {
         let mut envelope = Envelope::new(40 * MS);

@@ -28,8 +28,8 @@ pub enum InputError {
     NotText,
 }
 
-/// Returns a regular file and its size in bytes. Refuses a pipe at once, even if nobody writes to
-/// it.
+/// Returns a regular file and its size in bytes. Refuses a pipe at once, even one
+/// without a writer.
 pub fn open(path: &Path) -> Result<(File, u64), InputError> {
     let file = OpenOptions::new()
         .read(true)

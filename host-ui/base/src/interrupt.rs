@@ -54,8 +54,7 @@ fn is_ignored(signal: i32) -> bool {
     }
 }
 
-/// Lets a command end silently once nobody reads its output, as `head` expects; by default Rust
-/// panics.
+/// Lets a command end silently once its output is no longer read, as `head` expects; by default Rust panics.
 pub fn end_with_reader() {
     // SAFETY: the default action runs no code of ours, and no other thread has started.
     unsafe { libc::signal(libc::SIGPIPE, libc::SIG_DFL) };

@@ -43,7 +43,7 @@ impl<T: Send + 'static> Job<T> {
     }
 }
 
-/// Asks the thread to end, because nobody reads its messages any more.
+/// Asks the thread to end, because its messages are no longer read.
 impl<T> Drop for Job<T> {
     fn drop(&mut self) {
         self.interrupt.ask();

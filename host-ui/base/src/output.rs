@@ -22,7 +22,7 @@ pub enum OutputError {
     Create {
         /// The folder.
         folder: PathBuf,
-        /// What the system reported.
+        /// Error of the operating system.
         why: Error,
     },
 }
@@ -48,7 +48,7 @@ pub fn new_folder(folder: &Path) -> Result<(), OutputError> {
 mod tests {
     use super::*;
 
-    /// Guards against results next to those of an earlier run, which nobody could tell apart.
+    /// Guards against results next to those of an earlier run, which could not be told apart.
     #[test]
     fn only_an_empty_folder_is_accepted() {
         let folder = tempfile::tempdir().unwrap();

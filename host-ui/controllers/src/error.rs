@@ -25,7 +25,7 @@ pub enum OpenError {
         name: String,
         /// Its device node.
         path: PathBuf,
-        /// What the system reported.
+        /// Error of the operating system.
         source: io::Error,
     },
 }

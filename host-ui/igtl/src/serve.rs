@@ -140,7 +140,7 @@ fn seeds(patient: &PatientFrame, snapshot: &Snapshot) -> Vec<Point> {
 }
 
 /// Returns the surface of the targets, with the vertices that they use; of the whole body if no
-/// target has a surface of its own.
+/// target has its own surface.
 fn surface(patient: &PatientFrame, scene: &SceneModel, snapshot: &Snapshot) -> PolyData {
     let header = &scene.header;
     let own = |s: &&StructureInfo| s.role & role::TARGET != 0 && s.triangle_count > 0;

@@ -26,7 +26,7 @@ pub struct Tissue {
 impl Tissue {
     /// Water or jelly around the probe and in the bladder: almost no echo and no attenuation.
     pub const COUPLING: Self = Self::new(0.0, 0.0, 1.52);
-    /// Prostate and every soft tissue without a row of its own: 0.5 dB per cm and MHz, as scanners assume.
+    /// Prostate and every soft tissue without its own row: 0.5 dB per cm and MHz, as scanners assume.
     pub const SOFT: Self = Self::new(GLAND, 0.5, 1.63);
     /// Gas, which hides everything behind it.
     pub const GAS: Self = Self::new(0.0, 25.0, 0.04).with_xray(0.0);

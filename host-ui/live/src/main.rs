@@ -1,8 +1,8 @@
-//! Reads the messages of a session from its standard input, as MCAP, and serves them to viewers
-//! that speak Foxglove's protocol.
+//! Reads the messages of a session from its standard input, as MCAP, and serves them to viewers that speak Foxglove's
+//! protocol.
 //!
-//! `host-ui record --live` starts it. Channels and schemas come with the messages and are those of
-//! a recording. A slow viewer loses its oldest waiting messages and delays nobody.
+//! `host-ui record --live` starts it. Channels and schemas come with the messages and are those of a recording. A slow
+//! viewer loses its oldest waiting messages and delays no other.
 
 use foxglove::{ChannelBuilder, PartialMetadata, RawChannel, Schema, WebSocketServer};
 use mcap::records::Record;

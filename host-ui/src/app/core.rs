@@ -1,4 +1,4 @@
-//! A core that this window starts in place of one that has ended.
+//! A core that this window starts to replace one that has ended.
 
 use super::{App, refusal};
 use std::os::unix::process::CommandExt;
@@ -22,7 +22,7 @@ impl Drop for StartedCore {
 }
 
 impl App {
-    /// Starts a core under the window's instance name, in a process group of its own.
+    /// Starts a core under the window's instance name, in a separate process group.
     pub(super) fn start_core(&mut self) {
         let program = program();
         self.started_core = None;

@@ -230,7 +230,7 @@ impl PlanArgs {
         inputs.extend(self.asked.file().map(|file| ("--scene", file)));
         inputs.extend(self.errors_of.as_deref().map(|folder| ("--errors-of", folder)));
         let made = serde_json::to_string(&provenance::made(&inputs)?)?;
-        // One line, because JSON has no line feeds of its own.
+        // One line, because JSON needs no line feeds.
         let text = format!("# made: {made}\n{}", file::to_text(plan, frames)?);
         write_whole(&self.out, text.as_bytes())?;
         let Some(csv) = &self.csv else { return Ok(()) };

@@ -61,7 +61,7 @@ impl Planning {
     }
 }
 
-/// Plan as it is shown.
+/// Plan as shown.
 pub struct Implant {
     /// Number that grows with every change.
     pub revision: u64,

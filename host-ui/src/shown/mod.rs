@@ -81,7 +81,7 @@ pub struct Shown {
     /// Number of refused requests that the operator has not dismissed, and the last reason.
     pub refusals: u64,
     pub last_refusal: String,
-    /// Last fault of this run that nobody re-armed after; if the core ended, its reason.
+    /// Last fault of this run without a re-arming; if the core ended, its reason.
     pub last_fault: String,
     /// Gamepads and 3D mice, and whether this window has the focus that they need.
     pub controllers: Latest,

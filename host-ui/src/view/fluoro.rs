@@ -199,7 +199,7 @@ impl FluoroView {
         };
         self.tube = Some(Tube::AtWork(Job::begin("fluoroscopy", move |sender, _| {
             let greys = tube.shoot(&arm, &exposure, &body, &field, &metal).greys();
-            // The window may have closed, so nobody waits for the picture.
+            // The window may have closed, so the picture may have no receiver.
             let _ = sender.send((tube, arm, greys));
         })));
         self.dose.count(&exposure, &arm);

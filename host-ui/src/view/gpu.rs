@@ -1,6 +1,6 @@
 //! The offscreen picture: textures, pipelines and buffers on the graphics card.
 //!
-//! The picture is drawn into a texture of its own and shown as an image, so that a window and a
+//! The picture is drawn into a separate texture and shown as an image, so that a window and a
 //! test see the same pixels.
 
 mod growing;

@@ -29,7 +29,7 @@ const TURN_PER_POINT_RAD: f32 = 0.008;
 const NEEDLE_VIEW_M: f32 = 0.06;
 /// Width beyond which a picture has room for dose labels.
 const ALONE: f32 = 500.0;
-/// Smallest visible change, so that a force and a tip at rest leave the picture as it is.
+/// Smallest visible change, so that a force and a tip at rest leave the picture unchanged.
 const SEEN_M: f64 = 2e-5;
 const SEEN_N: f64 = 0.02;
 /// Opacity of isodose surfaces.

@@ -6,7 +6,7 @@
 //! use nalgebra::{UnitQuaternion, Vector3};
 //! use stylet_device::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
 //!
-//! /// A device that nobody moves.
+//! /// A device at rest.
 //! struct Still(u64);
 //!
 //! impl Device for Still {

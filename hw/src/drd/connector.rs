@@ -1,4 +1,4 @@
-//! The keeper of a Force Dimension device: connects it, starts its servo thread, watches it, and reconnects it after a loss.
+//! Connects a Force Dimension device, starts its servo thread, watches it, and reconnects it after a loss.
 
 use core::time::Duration;
 use std::sync::Arc;

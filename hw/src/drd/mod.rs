@@ -3,7 +3,7 @@
 //!
 //! Tested only against a fake library, not on a device.
 //!
-//! The SDK has no thread of its own. Its calls go to the device and back and may block. An armed
+//! The SDK starts no thread. Its calls go to the device and back and may block. An armed
 //! servo thread of ours makes them, outside the force loop; for the resulting delay see
 //! [`libhd`](crate::libhd). A connector of normal priority opens the device and reopens it after a
 //! loss. Only one of the two threads makes calls at any time.

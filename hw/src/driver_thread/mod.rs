@@ -1,9 +1,9 @@
-//! Common parts of back ends whose driver is served by a thread of its own, outside the force loop.
+//! Common parts of back ends whose driver runs on a separate thread, outside the force loop.
 //!
-//! Three threads take part. The *force loop* reads the newest sample and writes a wrench, and never
-//! waits ([`ends`]). The *servo thread*, armed, exchanges both with the driver. It turns the force
-//! off by itself on a fault or on a stale wrench ([`hold`]). The *keeper*, of normal priority,
-//! makes the calls that may block: it connects, watches, releases and reconnects ([`keeper`]).
+//! Three threads take part. The *force loop* reads the newest sample and writes a wrench, and never waits ([`ends`]).
+//! The *servo thread*, armed, exchanges both with the driver. It turns the force off by itself on a fault or on a stale
+//! wrench ([`hold`]). The *keeper*, of normal priority, makes the calls that may block: it connects, watches, releases
+//! and reconnects ([`keeper`]).
 
 pub mod arm;
 pub mod ends;

@@ -1,4 +1,4 @@
-//! The servo thread of a device that has no thread of its own: started, armed, called at its rate, and ended.
+//! The servo thread of a device whose driver has none: started, armed, called at its rate, and ended.
 
 use core::time::Duration;
 use std::panic::{AssertUnwindSafe, catch_unwind};

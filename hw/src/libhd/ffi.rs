@@ -15,7 +15,8 @@ pub type Handle = u32;
 pub type Enum = u32;
 /// The scheduler's handle of a callback.
 pub type Schedule = c_ulong;
-/// A function that the scheduler runs each servo tick with its context; returns [`CALLBACK_DONE`] or [`CALLBACK_CONTINUE`].
+/// A function that the scheduler runs each servo tick with its context; returns [`CALLBACK_DONE`] or
+/// [`CALLBACK_CONTINUE`].
 pub type Callback = unsafe extern "system" fn(*mut c_void) -> u32;
 
 /// One entry of the driver's error stack; returned by value.

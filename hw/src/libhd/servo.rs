@@ -80,8 +80,8 @@ impl Servo {
     pub unsafe extern "system" fn callback(context: *mut c_void) -> u32 {
         // SAFETY: by the function's contract.
         let servo = unsafe { &*context.cast::<Self>() };
-        // SYNC: acquire pairs with the release store at the end of this function: a callback sees what the last one left,
-        // whichever thread ran it.
+        // SYNC: acquire pairs with the release store at the end of this function: a callback sees what the last one
+        // left, whichever thread ran it.
         if servo.busy.swap(true, Ordering::Acquire) {
             return CALLBACK_DONE;
         }

@@ -66,7 +66,7 @@ impl Hand {
         }
     }
 
-    /// Creates a device that nobody holds.
+    /// Creates a device without a hand on it.
     pub const fn absent() -> Self {
         Self {
             mass_kg: 0.0,

@@ -6,7 +6,8 @@ use crate::device::HandGoal;
 
 /// The moving equilibrium of the hand.
 ///
-/// From rest it follows a straight line to its goal. A new goal starts from the present position and velocity, so that the velocity never changes by more than acceleration times period.
+/// From rest it follows a straight line to its goal. A new goal starts from the present position and velocity, so that
+/// the velocity never changes by more than acceleration times period.
 #[derive(Debug, Clone)]
 pub struct HandPath {
     position_m: Vector3<f64>,

@@ -244,7 +244,7 @@ fn a_script_visits_its_waypoints_in_order_and_ends() {
     assert!((ticks as f64 * DT_S - 5.0).abs() < 0.01);
 }
 
-/// Checks the roll: the tool lies along +z of its own frame, and its +y follows the hand's request.
+/// Checks the roll: the tool lies along the +z of its frame, and its +y follows the hand's request.
 #[test]
 fn a_hand_rolls_the_tool_only_on_request() {
     let mut device = SimulatedPhantom::new(SimulatedPhantomConfig::default());

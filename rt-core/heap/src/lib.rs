@@ -1,8 +1,8 @@
 //! Counts each thread's heap calls, so that a loop can prove that it makes none; maps large blocks by themselves.
 //!
-//! A heap serves a large block from a hole between small ones, whatever threshold for mappings it was given: the threshold
-//! only says how the heap grows. The small blocks that come after it keep the hole from closing, and under `mlockall` no page
-//! of a hole is given back. Where scenes come and go, large blocks therefore never lie in the heap.
+//! A heap serves a large block from a hole between small ones, whatever threshold for mappings it was given: the
+//! threshold only says how the heap grows. The small blocks that come after it keep the hole from closing, and under
+//! `mlockall` no page of a hole is given back. Where scenes come and go, large blocks therefore never lie in the heap.
 
 #![warn(missing_docs)]
 

@@ -7,7 +7,7 @@ const LARGE_BYTES: usize = 32 << 10;
 /// The smallest page of any machine, and so what every mapping is aligned to.
 const ALIGNED_BYTES: usize = 4 << 10;
 
-/// Whether a block of this layout is mapped: the same answer when it comes and when it goes.
+/// True if a block of this layout is mapped: the same answer on allocation and on release.
 pub fn takes(layout: Layout) -> bool {
     layout.size() >= LARGE_BYTES && layout.align() <= ALIGNED_BYTES
 }

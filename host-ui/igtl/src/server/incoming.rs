@@ -96,7 +96,7 @@ fn pass_over(mut length: u64, whole: &mut impl FnMut(&mut [u8]) -> Result<(), En
     Ok(())
 }
 
-/// Waits for as long as the connection lasts: an unfinished message delays nobody else.
+/// Waits for as long as the connection lasts: an unfinished message delays no other client.
 fn read_whole(stream: &mut TcpStream, mut bytes: &mut [u8], client: &Client, ended: &AtomicBool) -> Result<(), Ended> {
     while !bytes.is_empty() {
         // SYNC: a flag alone.

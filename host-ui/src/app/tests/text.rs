@@ -184,7 +184,7 @@ fn out_of_reach<'a>(drawn: &mut Drawn, before: &Painted, mut left: Vec<&'a Piece
         if !left.iter().any(|other| std::ptr::eq(*other, piece)) {
             continue;
         }
-        // Another window covers it here; this window is tested in a state of its own.
+        // Another window covers it here; this window is tested separately.
         if drawn.ctx.layer_id_at(place).is_some_and(|layer| layer != piece.layer) {
             left.retain(|other| other.layer != piece.layer || !near_clip(other, piece));
             continue;

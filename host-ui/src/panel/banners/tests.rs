@@ -166,7 +166,7 @@ fn unstable_cases_are_warned_of_while_they_last() {
                 state.flags |= flags::LINE_NEEDED | flags::IN_CONTACT;
                 "No needle line: "
             }
-            // This one belongs to the scene, as long as it is loaded, and is not a banner.
+            // This one belongs to the scene, while it is loaded, and is not a banner.
             35 => {
                 let mut scene = stylet_shm_schema::SceneHeader::zeroed();
                 (scene.spacing_m, scene.body_edge) = (1.364e-3, 1);

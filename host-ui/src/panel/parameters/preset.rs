@@ -20,7 +20,7 @@ pub enum PresetError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system reported.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// A folder or a device, which may be endless.

@@ -55,7 +55,7 @@ fn running_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
             }
         });
     });
-    // On a line of its own, because a long text must not widen the panel.
+    // On a separate line, because a long text must not widen the panel.
     let text = match waits(shown) {
         Some(waits) => format!("{step}: {waits}"),
         None => step.to_owned(),

@@ -10,7 +10,7 @@ const LEAST: f32 = 1e-3;
 /// Surface elements of each vertex, with shares that sum to one.
 #[derive(Clone, Debug, Default)]
 pub struct Bonds {
-    /// Where the bonds of each vertex end.
+    /// Ends of the bonds of each vertex.
     ends: Vec<u32>,
     bonds: Vec<(u32, f32)>,
 }

@@ -10,7 +10,7 @@ fn sources() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests")
 }
 
-/// Compiles a program of `tests/` with the library, in a folder of its own.
+/// Compiles a program of `tests/` with the library, in a separate folder.
 fn compiled(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("stylet-igtl-{}-{name}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for temporary files");

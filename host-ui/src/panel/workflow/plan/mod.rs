@@ -1,4 +1,4 @@
-//! The plan: whole-plan actions in the step; its needles at the right, in place of the instruments.
+//! The plan: whole-plan actions in the step; its needles at the right, instead of the instruments.
 
 mod card;
 mod findings;
