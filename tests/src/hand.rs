@@ -48,6 +48,16 @@ impl Insertion {
         insertion
     }
 
+    /// Keeps the records of a hand that moves by itself.
+    pub fn of(link: Link) -> Self {
+        Self {
+            link,
+            records: Vec::new(),
+            entry_m: [0.0; 3],
+            direction: [0.0; 3],
+        }
+    }
+
     /// Moves to `depth_m` behind the entry.
     pub fn go(&mut self, depth_m: f64, speed_m_per_s: f64) {
         let to = std::array::from_fn(|a| self.entry_m[a] + self.direction[a] * depth_m);

@@ -18,6 +18,9 @@ const MAX_ANSWERED: u32 = 1;
 /// Most requests taken from the queues in one pass. Queues are read one after the other, so a host that fills its queue
 /// faster than it is read would block those behind it; counting a request takes less time than relaying it.
 const MAX_TAKEN: usize = 8192;
+/// Number of requests after which the bridge looks for stops again: a pass under the flood of ten processes takes tens
+/// of milliseconds.
+const STOPS_EVERY: usize = 64;
 
 /// One port for each service of the core; see [`service`].
 pub struct Ports {
@@ -159,16 +162,11 @@ impl Ports {
 
     /// Relays the requests of hosts to the force process, as far as it has room.
     pub fn forward(&mut self, socket: &Socket) -> Result<(), Closed> {
-        // Requests that remove force or motion come first, through separate queues, without a limit.
-        for _ in 0..MAX_TAKEN {
-            match self.held.take().or_else(|| self.stops.receive()) {
-                Some(command) if self.hand_on(socket, command)? => {}
-                Some(_) => return Ok(()),
-                None => break,
-            }
-        }
         let mut taken = Taken::default();
-        for _ in 0..MAX_TAKEN {
+        for number in 0..MAX_TAKEN {
+            if number % STOPS_EVERY == 0 && !self.forward_stops(socket)? {
+                return Ok(());
+            }
             let Some((port, command)) = self.commands.receive_from() else {
                 break;
             };
@@ -185,6 +183,17 @@ impl Ports {
             }
         }
         Ok(())
+    }
+
+    /// Relays requests that remove force or motion, which have separate queues, without a limit. False if the force
+    /// process has no room now.
+    fn forward_stops(&mut self, socket: &Socket) -> Result<bool, Closed> {
+        while let Some(command) = self.held.take().or_else(|| self.stops.receive()) {
+            if !self.hand_on(socket, command)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Relays a command; false if the force process has no room now, in which case the command is held until it has.

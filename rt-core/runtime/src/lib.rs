@@ -3,6 +3,7 @@
 #![warn(missing_docs)]
 
 pub mod args;
+mod background;
 pub mod control;
 pub mod device;
 pub mod environment;

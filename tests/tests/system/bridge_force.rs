@@ -1,14 +1,16 @@
-//! Force on the hand while bridges are killed and stopped, against two undisturbed insertions: it differs from them no
-//! more than they differ from each other.
+//! Force on the hand while bridges are killed and stopped, against two undisturbed insertions of the same recorded
+//! motion: it differs from them no more than they differ from each other.
 
 use crate::wall::{bridge, send};
 use nalgebra::Vector3;
+use std::path::Path;
+use std::process::Command;
 use std::time::{Duration, Instant};
 use stylet_host::link::LinkStatus;
-use stylet_shm_schema::TickRecord;
+use stylet_shm_schema::{Request, TickRecord};
 use stylet_tests::hand::{Insertion, assert_undisturbed, force_n};
 use stylet_tests::witness::where_the_machine_runs;
-use stylet_tests::{Core, repeats};
+use stylet_tests::{Core, ask, program, repeats, scratch};
 
 const M_PER_S: f64 = 0.002;
 /// Forces are compared by the position of the tip, in pieces of this length, m.
@@ -17,6 +19,9 @@ const PIECE_M: f64 = 1e-4;
 const LONGEST_M: f64 = 0.055;
 /// Approximate length of a round: a stopped bridge is replaced after 0.4 s.
 const ROUND_S: f64 = 0.8;
+
+/// Time for which the recorded hand stands before the body: its line is solved for meanwhile.
+const STANDS: Duration = Duration::from_secs(6);
 
 /// Mean force in each piece of the path, N.
 fn forces(records: &[TickRecord]) -> Vec<f64> {
@@ -33,11 +38,50 @@ fn forces(records: &[TickRecord]) -> Vec<f64> {
         .collect()
 }
 
-/// Returns the forces of an insertion in which the bridge is killed or stopped that often, or left alone for the same
-/// time.
-fn insertion(rounds: u64, speed_m_per_s: f64, is_disturbed: bool) -> Vec<f64> {
+/// Writes the motion of a hand that inserts a needle for that time: it needs no host, as a person's hand needs none.
+fn record_motion(time: Duration, speed_m_per_s: f64, file: &Path) {
+    let session = file.with_extension("mcap");
     let mut core = Core::start();
     let mut hand = Insertion::begin(&mut core, speed_m_per_s);
+    hand.go(-0.005, 0.1);
+    hand.watch(Duration::from_secs(1));
+    let host_ui = |arguments: &[&str]| {
+        let mut command = Command::new(program("host-ui"));
+        command.args(arguments);
+        command
+    };
+    let [session, motion] = [&session, file].map(|path| path.display().to_string());
+    let seconds = time.as_secs_f64().to_string();
+    let instance = core.instance.name().to_owned();
+    let mut recorder = host_ui(&[
+        "record",
+        "--instance",
+        &instance,
+        "--out",
+        &session,
+        "--duration",
+        &seconds,
+    ])
+    .spawn()
+    .expect("host-ui starts");
+    hand.watch(STANDS);
+    hand.go(LONGEST_M, speed_m_per_s);
+    hand.watch(time.saturating_sub(STANDS));
+    assert!(recorder.wait().expect("ours").success());
+    drop(hand);
+    core.finish();
+    let exported = host_ui(&["export", &session, "--motion", &motion]).status();
+    assert!(exported.expect("host-ui starts").success());
+}
+
+/// Returns the forces of the recorded insertion in which the bridge is killed or stopped that often, or left alone.
+fn insertion(rounds: u64, motion: &Path, is_disturbed: bool) -> Vec<f64> {
+    let device = format!("replay:{}", motion.display());
+    let mut core = Core::start_with(&["--rt-if-allowed", "--device", &device]);
+    let mut link = core.host();
+    ask(&mut link, &Request::Engage).expect("engaged");
+    let mut hand = Insertion::of(link);
+    hand.watch(STANDS);
     let begun = Instant::now();
     if is_disturbed {
         for round in 0..2 * rounds {
@@ -50,8 +94,7 @@ fn insertion(rounds: u64, speed_m_per_s: f64, is_disturbed: bool) -> Vec<f64> {
             hand.watch(Duration::from_millis(300));
         }
     }
-    let all = Duration::from_secs_f64(2.0 * rounds as f64 * ROUND_S + 2.0);
-    hand.watch(all.saturating_sub(begun.elapsed()));
+    hand.watch(length(rounds).saturating_sub(begun.elapsed()));
     assert_undisturbed(&hand.records);
     let forces = forces(&hand.records);
     drop(hand);
@@ -59,14 +102,20 @@ fn insertion(rounds: u64, speed_m_per_s: f64, is_disturbed: bool) -> Vec<f64> {
     forces
 }
 
+fn length(rounds: u64) -> Duration {
+    Duration::from_secs_f64(2.0 * rounds as f64 * ROUND_S + 2.0)
+}
+
 /// Insertions of one kind differ by chance as well: to be interpreted by a reader, not run each day.
 #[test]
 #[ignore = "a measurement: make wall"]
 fn killed_bridges_change_forces_no_more_than_chance_does() {
     let rounds = repeats("STYLET_BRIDGE_FORCE_ROUNDS", 2);
-    let speed_m_per_s = M_PER_S.min(LONGEST_M / (2.0 * rounds as f64 * ROUND_S + 2.0));
+    let speed_m_per_s = M_PER_S.min(LONGEST_M / length(rounds).as_secs_f64());
+    let motion = scratch("bridge-force").join("a.motion");
     where_the_machine_runs(|| {
-        let [disturbed, one, other] = [true, false, false].map(|is| insertion(rounds, speed_m_per_s, is));
+        record_motion(length(rounds) + 2 * STANDS, speed_m_per_s, &motion);
+        let [disturbed, one, other] = [true, false, false].map(|is| insertion(rounds, &motion, is));
         let pieces = disturbed.len().min(one.len()).min(other.len());
         let most = |difference: &dyn Fn(usize) -> f64| (0..pieces).map(difference).fold(0.0, f64::max);
         let bound_n = most(&|at| (one[at] - other[at]).abs());

@@ -282,7 +282,17 @@ fn hostile_peers_cost_no_tick_and_raise_no_fault_without_a_name() {
         let mut operator = core.host();
         ask(&mut operator, &Request::EndExercises).expect("taken");
         ask(&mut operator, &Request::Engage).expect("armed");
-        let mut stream = TcpStream::connect(&served.address).expect("it listens");
+        // The server admits no more clients of an address that connected too often, for ten seconds.
+        let mut stream = None;
+        let is_admitted = until(Duration::from_secs(30), || {
+            std::thread::sleep(Duration::from_millis(500));
+            stream = TcpStream::connect(&served.address)
+                .ok()
+                .filter(|stream| stream.peek(&mut [0]).is_ok_and(|bytes| bytes > 0));
+            stream.is_some()
+        });
+        assert!(is_admitted, "an honest client is refused for good");
+        let mut stream = stream.expect("just seen");
         needle_of(&mut stream);
         let releases = until(Duration::from_secs(5), || {
             ask(&mut operator, &Request::Disengage).is_ok() && operator.state().is_some_and(|s| s.fault == 0)

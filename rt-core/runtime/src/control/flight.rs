@@ -1,6 +1,7 @@
 //! Collects the tapes of both loops, returns them, and writes the recording to disk on a separate thread.
 
 use super::line_archive::LineArchive;
+use crate::background;
 use crate::replay::file::{Flight, FlightError};
 use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
 use crate::rt::haptic_tape::{HapticFlight, HapticTape};
@@ -196,13 +197,11 @@ impl FlightKeeper {
         let path = self.next_path(gathering.wanted.kind);
         let ticket = gathering.wanted.ticket;
         let (flight, sender) = (gathering.into_flight(&self.common, lines), self.written.0.clone());
-        let spawned = std::thread::Builder::new()
-            .name("flight-writer".to_owned())
-            .spawn(move || {
-                let result = save(&flight, &path);
-                // The receiver is gone once the control thread has ended.
-                let _ = sender.send(Saved { ticket, result });
-            });
+        let spawned = background::spawn("flight-writer", move || {
+            let result = save(&flight, &path);
+            // The receiver is gone once the control thread has ended.
+            let _ = sender.send(Saved { ticket, result });
+        });
         if let Err(why) = spawned {
             let result = Err(SaveError::Thread(why));
             let _ = self.written.0.send(Saved { ticket, result });

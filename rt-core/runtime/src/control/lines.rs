@@ -5,6 +5,7 @@
 //! and of the one after it are solved ahead and kept until a needle arrives.
 
 use super::line_archive::{Half, LineArchive};
+use crate::background;
 use crate::lines::{LineBody, NoLine};
 use crate::rt::exchange::TissueOrder;
 use crate::rt::wiring::ControlPorts;
@@ -295,7 +296,7 @@ impl LinePreparer {
             }
         };
         // The thread could not be started; the next pass tries again.
-        if let Ok(thread) = std::thread::Builder::new().name("needle-line".to_owned()).spawn(work) {
+        if let Ok(thread) = background::spawn("needle-line", work) {
             self.under_way = Some(LineTask { axis, thread, stop });
         }
     }

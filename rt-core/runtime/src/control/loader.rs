@@ -1,5 +1,6 @@
 //! Builds scenes on a separate thread; the running scene stays until the next one is ready.
 
+use crate::background;
 use crate::rt::exchange::Ticket;
 use std::sync::mpsc;
 use stylet_anatomy::PatientFrame;
@@ -52,7 +53,7 @@ impl SceneLoader {
             let scene = build().map(|(scene, source)| (Box::new(scene), source));
             let _ = sender.send(Loaded { wanted, scene });
         };
-        let thread = std::thread::Builder::new().name("scene-loader".to_owned()).spawn(work);
+        let thread = background::spawn("scene-loader", work);
         thread.map_err(|_| Refusal::new(RefusalCode::Internal, "no thread could be started to load the scene"))?;
         self.busy = true;
         Ok(())

@@ -1,6 +1,7 @@
 //! Solves in the background for the answers of the ultrasound probe, once per scene of a run whose second hand holds
 //! it.
 
+use crate::background;
 use crate::lines::{LineBody, NoProbe};
 use crate::rt::exchange::TissueOrder;
 use crate::rt::outside::OutsideTape;
@@ -103,7 +104,7 @@ impl ProbePreparer {
             })
         };
         // The thread could not be started; the next pass tries again.
-        if let Ok(thread) = std::thread::Builder::new().name("probe".to_owned()).spawn(work) {
+        if let Ok(thread) = background::spawn("probe", work) {
             self.under_way = Some(Task {
                 scene_generation,
                 thread,

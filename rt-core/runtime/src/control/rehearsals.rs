@@ -1,5 +1,6 @@
 //! Runs rehearsals for hosts: one at a time, in the background, while the scene keeps running.
 
+use crate::background;
 use crate::rehearse::{NeedleRun, RehearseError, Rehearsed, Stage, timed};
 use crate::rt::exchange::Ticket;
 use std::sync::Arc;
@@ -90,7 +91,7 @@ impl RehearsalRunner {
                 stage,
             }
         };
-        let thread = std::thread::Builder::new().name("rehearsal".to_owned()).spawn(work);
+        let thread = background::spawn("rehearsal", work);
         let failed = |_| Refusal::new(RefusalCode::Internal, "no thread could be started to rehearse");
         self.under_way = Some((ticket, thread.map_err(failed)?));
         Ok(())

@@ -6,6 +6,7 @@ mod session;
 mod setup;
 mod threads;
 
+use crate::background;
 use crate::control::{BridgeError, Control, ControlSetup, LOOP_ENDED};
 use crate::device::{DeviceChoice, DeviceError, Libraries};
 use crate::rt::arm::{Refused, Usage};
@@ -181,6 +182,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
         // Later threads and processes stay off the core as well: the bridge and all background work.
         affinity::keep_off(core);
     }
+    background::answer_first();
     let setup = Setup::new(options)?;
     let kernel = setup::lock_memory(options)?;
     let (session_id, info, second_info) = (setup.session_id, setup.info, setup.second_info);
