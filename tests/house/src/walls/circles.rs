@@ -178,8 +178,8 @@ mod tests {
             ("src/lib.rs", "mod a; mod b; mod c;"),
             ("src/a.rs", "pub mod deep;"),
             ("src/a/deep.rs", "\nuse crate::{c, b::{self, Thing}};"),
-            ("src/b/mod.rs", "fn f() { let x = crate::c::g::<u8>(); }"),
-            ("src/c.rs", "fn g() { super::a::deep::h(); }"),
+            ("src/b/mod.rs", "fn f() { assert!(x, crate::c::g::<u8>()); }"),
+            ("src/c.rs", "#[error(\"{}\", super::a::deep::h())] struct Lost;"),
         ]);
         assert_eq!(
             found,

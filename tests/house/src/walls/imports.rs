@@ -211,6 +211,12 @@ impl<'ast> Visit<'ast> for Reader<'_> {
         self.read_tokens(call.tokens.clone());
     }
 
+    fn visit_attribute(&mut self, attribute: &'ast syn::Attribute) {
+        if let syn::Meta::List(list) = &attribute.meta {
+            self.read_tokens(list.tokens.clone());
+        }
+    }
+
     /// Ignores the path of `pub(in crate::a)`, which imports nothing.
     fn visit_vis_restricted(&mut self, _: &'ast syn::VisRestricted) {}
 }
