@@ -25,8 +25,13 @@ pub struct Component {
     /// Value of the tissue around it above that of the volume: tissue is uneven, and a component
     /// has many voxels.
     pub tissue: f64,
-    /// Sum of the values above the tissue around it.
+    /// Sum of the values above the tissue around it; at least that of its bright voxels, because
+    /// dark streaks of metal may take away the rest.
     pub signal: f64,
+    /// Sum of the bright voxels alone.
+    pub core: f64,
+    /// Highest value above the tissue.
+    pub peak: f64,
     /// Centre of the signal.
     pub middle_m: Vector3<f64>,
 }
@@ -109,7 +114,11 @@ fn component(volume: &VoxelValues<f32>, level: &Level, mut voxels: Vec<usize>) -
     };
     let excess: Vec<f64> = voxels.iter().map(excess).collect();
     let tissue = tissue_around(volume, level, &voxels);
-    let signal = excess.iter().map(|excess| excess - tissue).sum();
+    let signal: f64 = excess.iter().map(|excess| excess - tissue).sum();
+    let bright = excess
+        .iter()
+        .filter(|excess| **excess >= level.threshold - level.tissue);
+    let core = bright.map(|excess| excess - tissue.max(0.0)).sum();
     let weighted = voxels
         .iter()
         .zip(&excess)
@@ -118,7 +127,9 @@ fn component(volume: &VoxelValues<f32>, level: &Level, mut voxels: Vec<usize>) -
     Component {
         middle_m: weighted.sum::<Vector3<f64>>() / weight.max(f64::MIN_POSITIVE),
         tissue,
-        signal,
+        signal: signal.max(core),
+        core,
+        peak: excess.iter().copied().fold(0.0, f64::max),
         excess,
         voxels,
     }

@@ -4,7 +4,7 @@
 /// Smallest standard deviation of the signals of single seeds, as a share.
 const LEAST_SPREAD: f64 = 0.1;
 /// Largest deviation of a count from the signal, in seeds, to match the number implanted.
-const MOST_OFF: f64 = 0.75;
+pub const MOST_OFF: f64 = 0.75;
 const ROUNDS: usize = 8;
 
 /// Seeds of each component.

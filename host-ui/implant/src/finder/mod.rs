@@ -22,10 +22,14 @@ use stylet_files::VoxelValues;
 
 /// Largest number of seeds in a component; a stronger signal is bone, contrast medium or a hip.
 const MOST_IN_ONE: f64 = 12.0;
-/// Smallest signal of a component, in seeds; a weaker one is noise and is not reported.
-const LEAST_REPORTED: f64 = 0.15;
 /// Probability below which a count is reported as doubtful.
 const SURE: f64 = 0.9;
+/// Seeds that overlap by more of their length than this leaves, and are nearer than this share of
+/// their diameter, cannot both be there; the fit of those that touch is off by less.
+const OVERLAP: f64 = 0.7;
+const NEARER: f64 = 0.6;
+/// Cosine above which seeds are parallel.
+const PARALLEL: f64 = 0.9;
 /// Deviation above which a place is reported as doubtful.
 const CERTAIN_M: f64 = 0.5e-3;
 
@@ -82,6 +86,8 @@ pub struct Doubt {
     pub signal: f64,
     /// Number of seeds that it was counted as.
     pub counted: usize,
+    /// Its highest value.
+    pub peak: f64,
     /// Doubt, in words.
     pub why: String,
 }
@@ -158,12 +164,15 @@ pub fn find(volume: &VoxelValues<f32>, search: &Search) -> Result<Found, FinderE
                 together: fit.seeds.len(),
             });
         }
-        doubts.extend(doubt(component, fit, counts.signal(n), sure).map(|(at_m, why)| Doubt {
-            place_m: place(at_m),
-            signal: counts.signal(n),
-            counted: fit.seeds.len(),
-            why,
-        }));
+        doubts.extend(
+            doubt((component, fit), counts.signal(n), sure, search).map(|(at_m, why)| Doubt {
+                place_m: place(at_m),
+                signal: counts.signal(n),
+                counted: fit.seeds.len(),
+                peak: component.peak + level.tissue,
+                why,
+            }),
+        );
     }
     seeds.sort_by(|a, b| b.position_m[2].total_cmp(&a.position_m[2]));
     doubts.sort_by(|a, b| b.signal.total_cmp(&a.signal));
@@ -179,21 +188,46 @@ pub fn find(volume: &VoxelValues<f32>, search: &Search) -> Result<Found, FinderE
 }
 
 /// Returns place and reason if a component is doubtful.
-fn doubt(component: &Component, fit: &Fitted, signal: f64, sure: f64) -> Option<(Vector3<f64>, String)> {
+fn doubt(
+    (component, fit): (&Component, &Fitted),
+    signal: f64,
+    sure: f64,
+    search: &Search,
+) -> Option<(Vector3<f64>, String)> {
     let counted = fit.seeds.len();
     let worst_m = fit.seeds.iter().map(|s| s.deviation_m).fold(0.0, f64::max);
     let why = if counted == 0 && signal > MOST_IN_ONE {
         "too large for seeds: left out".to_owned()
-    } else if counted == 0 && signal >= LEAST_REPORTED {
+    } else if counted == 0 {
         "too faint for a seed: left out".to_owned()
     } else if counted > 0 && sure < SURE {
         format!("the count is {:.0} % probable", sure * 100.0)
+    } else if let Some(apart_m) = in_one_place(fit, search) {
+        format!(
+            "two of them would lie in one place, {:.2} mm apart: it may be a marker or a calcification",
+            apart_m * 1e3
+        )
     } else if worst_m > CERTAIN_M {
         format!("a place is known to {:.1} mm only", worst_m * 1e3)
     } else {
         return None;
     };
     Some((component.middle_m, why))
+}
+
+/// Returns the distance of two seeds that overlap along their axes and are nearer than bodies can
+/// be, m.
+fn in_one_place(fit: &Fitted, search: &Search) -> Option<f64> {
+    let seeds = &fit.seeds;
+    let pairs = (0..seeds.len()).flat_map(|b| (0..b).map(move |a| (&seeds[a], &seeds[b])));
+    let apart = pairs.filter_map(|(one, other)| {
+        let off = other.middle_m - one.middle_m;
+        let along = off.dot(&one.axis);
+        let across_m = (off - one.axis * along).norm();
+        let overlap = along.abs() < search.length_m * OVERLAP && one.axis.dot(&other.axis).abs() > PARALLEL;
+        (overlap && across_m < search.diameter_m * NEARER).then_some(across_m)
+    });
+    apart.min_by(f64::total_cmp)
 }
 
 fn to_the_head(directions: &Matrix3<f64>, axis: Vector3<f64>) -> [f64; 3] {

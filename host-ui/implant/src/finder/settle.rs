@@ -5,7 +5,7 @@
 //! fit of the voxels does.
 
 use super::components::Component;
-use super::counts::Counts;
+use super::counts::{Counts, MOST_OFF};
 use super::shape::Line;
 use super::split::{Fitted, Fitter};
 
@@ -52,6 +52,10 @@ impl Fitter<'_> {
         for n in doubtful.collect::<Vec<_>>() {
             changes.extend(self.changes(components, fits, counts, n));
         }
+        if wanted.is_none() {
+            // Streaks are explained better by each further seed, which the signal does not have.
+            changes.retain(|change| is_of_signal(counts, change));
+        }
         for _ in 0..CHANGES {
             let total: usize = counts.seeds.iter().sum();
             let Some(chosen) = choose(&changes, total, wanted) else {
@@ -74,6 +78,9 @@ impl Fitter<'_> {
             changes.retain(|change| !changed.contains(&change.component));
             for n in changed {
                 changes.extend(self.changes(components, fits, counts, n));
+            }
+            if wanted.is_none() {
+                changes.retain(|change| is_of_signal(counts, change));
             }
         }
     }
@@ -101,6 +108,11 @@ impl Fitter<'_> {
         };
         others.into_iter().flatten().map(other).collect()
     }
+}
+
+/// Returns whether the signal of a component allows a change of its count.
+fn is_of_signal(counts: &Counts, change: &Change) -> bool {
+    (counts.signal(change.component) - change.lines.len() as f64).abs() < MOST_OFF
 }
 
 /// Returns the indices of the changes to make next; none without a gain.

@@ -14,7 +14,7 @@ impl Fitter<'_> {
     /// seeds.
     ///
     /// Adds the signal of its own seeds and their residuals in the bright voxels: in the many
-    /// others uneven tissue would add up.
+    /// others uneven tissue would add up. It is at least that of the bright voxels.
     pub fn signals(&self, components: &[Component], lines: &[Vec<Line>], field: &[f64], tissue: &[f64]) -> Vec<f64> {
         let bright = self.level.threshold - self.level.tissue;
         let of_component = |((component, lines), tissue): ((&Component, &Vec<Line>), &f64)| {
@@ -25,7 +25,7 @@ impl Fitter<'_> {
             let voxels = component.voxels.iter().zip(&component.excess).zip(&own);
             let left = voxels.map(|((n, excess), own)| (excess, excess - tissue - (field[*n] - own) - own));
             let counted = left.filter(|(excess, _)| lines.is_empty() || **excess >= bright);
-            of_seeds + counted.map(|(_, left)| left).sum::<f64>()
+            (of_seeds + counted.map(|(_, left)| left).sum::<f64>()).max(component.core)
         };
         components.iter().zip(lines).zip(tissue).map(of_component).collect()
     }

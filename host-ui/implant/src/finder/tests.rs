@@ -214,3 +214,90 @@ fn a_volume_without_seeds_is_refused() {
     let none = find(&volume(2000.0), &high).unwrap_err();
     assert!(none.to_string().contains("choose a lower --threshold"), "{none}");
 }
+
+/// Returns a CT of seeds along z, each with its signal, and of a body of gold; with a dark streak
+/// across the seed `in_streak`.
+fn scan(seeds_mm: &[[f64; 3]], in_streak: usize, gold_mm: Option<[f64; 3]>) -> VoxelValues<f32> {
+    let sides_mm = [0.6, 0.6, 1.25];
+    let dims = [80, 80, 33];
+    let columns = Matrix3::from_diagonal(&(Vector3::from(sides_mm) * 1e-3));
+    let middle = [0, 1, 2].map(|a| (dims[a] - 1) as f64 / 2.0);
+    let frame = VoxelFrame::new(columns, -(columns * Vector3::from(middle)), "test").unwrap();
+    let line = |at: [f64; 3], of: [f64; 3], half_mm: f64, wide_mm: f64| {
+        let across = (at[0] - of[0]).powi(2) + (at[1] - of[1]).powi(2);
+        let beyond = ((at[2] - of[2]).abs() - half_mm).max(0.0);
+        (-0.5 * (across + beyond * beyond) / (wide_mm * wide_mm)).exp()
+    };
+    let value = |n: usize| {
+        let index = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
+        let at = [0, 1, 2].map(|a| (index[a] as f64 - middle[a]) * sides_mm[a]);
+        let metal: f64 = seeds_mm.iter().map(|of| 3000.0 * line(at, *of, 2.0, 0.75)).sum();
+        let gold = gold_mm.map_or(0.0, |of| 9000.0 * line(at, of, 1.2, 0.8));
+        let [x, y, z] = seeds_mm[in_streak];
+        let is_dark = (at[1] - y).abs() < 2.5 && (at[2] - z).abs() < 5.0 && (1.5..15.0).contains(&(at[0] - x).abs());
+        let noise = f64::from(((n as u32).wrapping_mul(2_654_435_761) >> 16) as u8) / 8.0;
+        (30.0 + noise + metal + gold - if is_dark { 400.0 } else { 0.0 }) as f32
+    };
+    VoxelValues {
+        dims,
+        values: (0..dims.iter().product()).map(value).collect(),
+        frame,
+    }
+}
+
+const SCANNED_MM: [[f64; 3]; 6] = [
+    [12.0, 10.0, -8.0],
+    [-10.0, 8.0, -5.0],
+    [0.0, -8.0, 0.0],
+    [8.0, -12.0, 8.0],
+    [-12.0, -10.0, 10.0],
+    [-3.0, 14.0, 4.0],
+];
+
+/// Guards against a seed of 3,200 HU in a streak of 400 HU that was neither found nor listed, while
+/// another one counted as two, or as five without a number.
+#[test]
+fn a_seed_in_a_dark_streak_is_found() {
+    for in_streak in 0..6 {
+        let volume = scan(&SCANNED_MM, in_streak, None);
+        for count in [Some(6), None] {
+            let search = Search {
+                count,
+                ..Search::default()
+            };
+            let found = find(&volume, &search).unwrap();
+            assert_eq!(found.seeds.len(), 6, "{in_streak}, {count:?}: {:?}", found.doubts);
+            for place_mm in SCANNED_MM {
+                let off =
+                    |seed: &super::FoundSeed| (Vector3::from(seed.position_m) * 1e3 - Vector3::from(place_mm)).norm();
+                let nearest = found.seeds.iter().map(off).fold(f64::INFINITY, f64::min);
+                assert!(nearest < 0.5, "{in_streak}: {place_mm:?} is {nearest:.2} mm off");
+            }
+        }
+    }
+}
+
+/// Guards against a gold marker that became three seeds without a word, and holds the promise that
+/// all that is left out is listed.
+#[test]
+fn a_marker_is_doubtful_and_all_components_are_seeds_or_listed() {
+    let volume = scan(&SCANNED_MM, 0, Some([3.0, 3.0, 0.0]));
+    for threshold in [None, Some(300.0)] {
+        let search = Search {
+            threshold,
+            ..Search::default()
+        };
+        let found = find(&volume, &search).unwrap();
+        let marker = found.doubts.iter().find(|doubt| (doubt.place_m[0] - 3e-3).abs() < 1e-3);
+        let marker = marker.unwrap_or_else(|| panic!("{:?}", found.doubts));
+        assert!(marker.counted != 1 && marker.peak > 5000.0, "{marker:?}");
+        let left_out = found.doubts.iter().filter(|doubt| doubt.counted == 0).count();
+        let single = found.seeds.iter().filter(|seed| seed.together == 1).count();
+        assert_eq!(
+            single + found.split_components + left_out,
+            found.components,
+            "{:?}",
+            found.doubts
+        );
+    }
+}
