@@ -90,7 +90,7 @@ pub fn read(path: &Path) -> Result<SceneFile, FileError> {
 /// Loads the volume of a scene file, with the structures that the file defines.
 pub fn load(path: &Path, progress: &Progress) -> Result<(SceneFile, LabelVolume), FileError> {
     let scene = read(path)?;
-    let path_of_volume = path.parent().unwrap_or(Path::new("")).join(&scene.volume);
+    let path_of_volume = path.with_file_name(&scene.volume);
     let voxels = read_voxels(&path_of_volume, progress)?;
     let name = scene.name.clone().unwrap_or_else(|| file_name(path));
     let refused = |why: ContentError| FileError::of(path, why);
@@ -209,7 +209,7 @@ fn part(k: &mut Keys) -> Option<Part> {
         called: k.text("called"),
         role,
         young_pa: k.number("young_kpa", 0.01, 1e8).map(|v| v * 1e3),
-        poisson: k.number("poisson", 0.0, 0.4999),
+        poisson: k.number("poisson", 0.0, Material::MAX_POISSON),
         limits,
         fixed: k.yes("fixed"),
         surroundings: surroundings(k),

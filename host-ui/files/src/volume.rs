@@ -1,11 +1,13 @@
 //! A segmented volume in the core's form: cubic elements on the lattice of the scene frame.
 
 mod cover;
+mod movable;
 
 use super::frame::VoxelFrame;
 use super::progress::{Progress, Stage};
 use crate::error::ContentError;
 use cover::{covered, covers};
+use movable::movable;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 use stylet_anatomy::{Material, Organ, PatientFrame, Role};
@@ -200,6 +202,7 @@ impl LabelVolume {
                 }
             ));
         }
+        movable(&structures)?;
         if !structures.iter().any(|t| t.role == Role::Target) {
             notes.push(
                 "no structure is a target, so the whole body is aimed at; name one Prostate, CTV or PTV".to_owned(),

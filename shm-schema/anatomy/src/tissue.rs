@@ -32,6 +32,9 @@ pub struct Material {
 }
 
 impl Material {
+    /// Largest Poisson's ratio that the solvers take: 0.5 would need an extra unknown, the pressure.
+    pub const MAX_POISSON: f64 = 0.499;
+
     const fn soft(young_pa: f64) -> Self {
         Self {
             young_pa,

@@ -4,8 +4,8 @@ use super::problem::SceneProblem;
 use super::structure::Structure;
 use crate::limits::{AxisLimits, folding};
 
-/// Largest Poisson's ratio that the solvers take: 0.5 would need an extra unknown, the pressure.
-pub(super) const MAX_POISSON: f64 = 0.499;
+/// Largest Poisson's ratio, the same for who writes a scene.
+pub(super) const MAX_POISSON: f64 = stylet_anatomy::Material::MAX_POISSON;
 /// Above bone and steel, a number that is most likely in the wrong unit.
 const MAX_YOUNG_PA: f64 = 1e12;
 
