@@ -6,7 +6,7 @@ RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),
 BIN := $(or $(CARGO_TARGET_DIR),target)/quick
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test build build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: attributes deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test build build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -104,6 +104,9 @@ live-test: build live ## Watch 'host-ui record --live' for LIVE_SECONDS (60) wit
 	@docs/tools/need python3-venv
 	python3 -m venv $(BIN)/live-client && $(BIN)/live-client/bin/pip install -q websockets==17.4
 	docs/tools/live-test "$(BIN)" $(BIN)/live-client/bin/python $(or $(LIVE_SECONDS),60)
+
+attributes: ## Read 10,000 objects of each kind with damaged attributes; a wrong figure without a note fails
+	STYLET_ATTRIBUTES=$(or $(OBJECTS),10000) $(CARGO) test --profile quick -p stylet-files --lib damaged_attributes -- --nocapture
 
 fuzz: ## Fuzz each file reader for FUZZ_SECONDS (600) seconds
 	docs/tools/fuzz

@@ -20,6 +20,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 use std::path::PathBuf;
 use stylet_base::interrupt;
 use stylet_controllers as controller;
+use stylet_files::dicom::Shared;
+use stylet_files::together;
 use stylet_host::core_args::CoreArgs;
 use stylet_host::record;
 use stylet_host::roster::Trainee;
@@ -216,6 +218,7 @@ impl Cli {
                 if self.image.is_some() && self.window.file().is_none() {
                     return Err("--image belongs to a patient: give the segmentation with --scene FILE".into());
                 }
+                together(&[self.window.file(), self.image.as_deref()], Shared::Frame)?;
                 let first = self.trainees.first().map(|trainee| trainee.instance.clone());
                 let instance = first.unwrap_or(self.window.instance);
                 let others: Vec<Instance> = self.trainees.iter().skip(1).map(|t| t.instance.clone()).collect();
@@ -303,6 +306,7 @@ impl Cli {
                 if let Some(speed) = insert_speed.filter(|s| !(0.1..=500.0).contains(s)) {
                     return Err(format!("--insert-speed {speed}: give 0.1 to 500 mm/s").into());
                 }
+                together(&[common.file(), plan.as_deref()], Shared::Frame)?;
                 let instance = common.instance.clone();
                 let ended = procedure::run(procedure::Options {
                     connect: procedure::Connect { asked: common, core },

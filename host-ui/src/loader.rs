@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 use stylet_base::job::{Job, JobUpdate};
+use stylet_files::agreed;
+use stylet_files::dicom::Shared;
 use stylet_files::{self as files, FileError, Image, LabelVolume, Progress, scene};
 
 /// Result of reading a file.
@@ -43,8 +45,11 @@ impl Loader {
         self.begin(path, move |path, progress| scene_of(path, label, image, progress));
     }
 
-    pub fn begin_image(&mut self, path: &Path) {
-        self.begin(path, |path, progress| Image::read(path, progress).map(Loaded::Image));
+    /// Starts to read an image, which must be of the patient of the scene's file.
+    pub fn begin_image(&mut self, path: &Path, scene_file: Option<PathBuf>) {
+        self.begin(path, move |path, progress| {
+            image_of(path, scene_file.as_deref(), progress).map(Loaded::Image)
+        });
     }
 
     fn begin(
@@ -91,6 +96,19 @@ impl Loader {
     }
 }
 
+fn image_of(path: &Path, scene_file: Option<&Path>, progress: &Progress) -> Result<Image, FileError> {
+    let notes = agreed(&[scene_file, Some(path)], Shared::Frame)?.notes;
+    let mut image = Image::read(path, progress)?;
+    let notes = image
+        .frame
+        .warning
+        .take()
+        .into_iter()
+        .chain(notes.into_iter().map(|(_, note)| note));
+    image.frame.warning = Some(notes.collect::<Vec<_>>().join("; ")).filter(|notes| !notes.is_empty());
+    Ok(image)
+}
+
 fn scene_of(path: &Path, label: Option<u8>, image: Option<PathBuf>, progress: &Progress) -> Result<Loaded, FileError> {
     let (volume, named) = match scene::is_scene(path) && label.is_none() {
         true => scene::load(path, progress).map(|(scene, volume)| (volume, scene.image))?,
@@ -99,7 +117,7 @@ fn scene_of(path: &Path, label: Option<u8>, image: Option<PathBuf>, progress: &P
     let Some(file) = image.or_else(|| named.map(|file| path.with_file_name(file))) else {
         return Ok(Loaded::Scene(Box::new(volume), None));
     };
-    let image = Image::read(&file, progress)?;
+    let image = image_of(&file, Some(path), progress)?;
     image
         .covers(&volume.patient, volume.middle_m())
         .map_err(|why| FileError::of(&file, why))?;

@@ -18,6 +18,12 @@ pub fn file_name(path: &Path) -> String {
         .map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
+/// Returns the folder of a file; a bare name is in the present one.
+pub fn folder(path: &Path) -> &Path {
+    let parent = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    parent.unwrap_or(Path::new("."))
+}
+
 /// Reads a regular file that is neither empty nor larger than 1 GiB.
 pub fn whole(path: &Path, progress: &Progress) -> Result<Vec<u8>, ContentError> {
     let (file, size) = input::open(path)?;

@@ -4,6 +4,7 @@
 
 mod affine;
 pub mod bytes;
+mod carried;
 pub mod convert;
 pub mod dicom;
 pub mod element;
@@ -17,10 +18,12 @@ pub mod nrrd;
 pub mod open;
 mod overlap;
 mod progress;
+mod report;
 pub mod scene;
 mod volume;
 mod watched;
 
+pub use carried::{agreed, lines_of, together};
 pub use element::Sink;
 pub use error::{ContentError, FileError};
 pub use frame::VoxelFrame;
@@ -28,6 +31,7 @@ pub use image::Image;
 pub use load::read;
 pub use open::read_voxels;
 pub use progress::{Progress, Stage};
+pub use report::report;
 pub use volume::{LabelVolume, Tissue, VoxelValues, Voxels};
 pub use watched::watched;
 

@@ -33,7 +33,7 @@ pub fn read(bytes: &[u8], data_file: DataReader, sink: Sink<u8>) -> Result<Voxel
 }
 
 /// Reads a file as an image.
-pub fn read_image(bytes: &[u8], data_file: DataReader, sink: Sink<f32>) -> Result<VoxelValues<f32>, ContentError> {
+pub fn read_image<V>(bytes: &[u8], data_file: DataReader, sink: Sink<V>) -> Result<VoxelValues<V>, ContentError> {
     let (header, voxels) = open(bytes, data_file, sink)?;
     match list_axis(&header)? {
         None => Ok(voxels),

@@ -1,6 +1,6 @@
 //! The format of a file, by its content; the formats' own readers do the rest.
 
-use super::bytes::{data_file, whole};
+use super::bytes::{data_file, folder, whole};
 use super::element::Sink;
 use super::error::{ContentError, FileError};
 use super::progress::Progress;
@@ -47,7 +47,7 @@ pub fn read_voxels(path: &Path, progress: &Progress) -> Result<Voxels, FileError
     let sink = Sink::labels(progress);
     let data = |name: &str| data_file(path, name, progress);
     let voxels = match Format::of(&bytes) {
-        Some(Format::Dicom) => dicom::read(&bytes).and_then(|object| dicom::structures::read(&object, path.parent())),
+        Some(Format::Dicom) => dicom::read(&bytes).and_then(|object| dicom::structures::read(&object, folder(path))),
         Some(Format::Nrrd) => nrrd::read(&bytes, &data, sink),
         Some(Format::Nifti) => nifti::read(&bytes, sink).map(|v| v.named(BTreeMap::new())),
         Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink).map(|v| v.named(BTreeMap::new())),

@@ -5,7 +5,7 @@ pub mod scene;
 use std::path::{Path, PathBuf};
 use stylet_base::write_whole;
 use stylet_dose::{DoseGrid, Dvh};
-use stylet_files::dicom::dose::{self, DoseImage, DoseOf, Histogram};
+use stylet_files::dicom::dose::{self, DoseImage, DoseKind, DoseOf, Histogram};
 use stylet_files::dicom::images::Slice;
 use stylet_files::dicom::plan::{self, PlannedOn, SeedPlan};
 use stylet_files::dicom::structures::write::{self as structures, Outlined};
@@ -86,6 +86,7 @@ pub fn write(folder: &Path, study: LinkedStudy) -> Result<WrittenStudy, FileErro
         origin_m: study.dose.centre_m([0; 3]),
         spacing_m: study.dose.spacing_m(),
         dose_gy: study.dose.dose_gy(),
+        kind: &DoseKind::default(),
     };
     let of = DoseOf {
         uid: dose_uid,

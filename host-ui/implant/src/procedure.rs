@@ -162,19 +162,19 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
         retract_m_per_s: of_file(|s| s.retract_m_per_s).unwrap_or(usual.retract_m_per_s),
         ..usual
     };
-    let beside = options.connect.asked.file().and_then(Path::parent);
-    let of_scene = said.as_ref().and_then(|s| s.plan.as_deref());
-    let of_scene = of_scene.map(|plan| beside.unwrap_or(Path::new("")).join(plan));
+    let file_of_scene = options.connect.asked.file();
+    let of_scene = file_of_scene.zip(said.as_ref().and_then(|s| s.plan.as_deref()));
+    let of_scene = of_scene.map(|(scene, plan)| scene.with_file_name(plan));
     let plan = options.plan.as_deref().or(of_scene.as_deref());
     let inputs = [
-        ("--scene", options.connect.asked.file()),
+        ("--scene", file_of_scene),
         ("--plan", plan),
         ("--source", options.source.as_deref()),
     ];
     let inputs: Vec<(&str, &Path)> = inputs.into_iter().filter_map(|(o, p)| Some((o, p?))).collect();
     let made = provenance::made(&inputs).map_err(|e| ProcedureError::Input(e.to_string()))?;
     let mut job = match plan {
-        Some(path) => Job::from_file(path, &scene)?,
+        Some(path) => Job::from_file(path, &scene, file_of_scene)?,
         None => Job::suggested(&scene, options.seeds),
     };
     if let Some(implant) = &job.implant {

@@ -6,6 +6,7 @@ use std::io::{Error, Read};
 use std::path::{Path, PathBuf};
 use stylet_base::format::utc_now;
 use stylet_base::input;
+use stylet_files::dicom::Identity;
 
 /// Number of bytes read at a time.
 const PART_BYTES: usize = 1 << 16;
@@ -37,13 +38,20 @@ fn hexadecimal(digest: &[u8]) -> String {
 }
 
 /// Returns program, version, time, and each of the `inputs` by the option that named it, with size
-/// and SHA-256.
+/// and SHA-256, and with the patient and the frame of reference of a clinical file.
 pub fn made(inputs: &[(&str, &Path)]) -> Result<Value, DigestError> {
     let inputs: Result<Vec<Value>, DigestError> = inputs
         .iter()
         .map(|(option, path)| {
             let (sha256, bytes) = sha256(path)?;
-            Ok(json!({ "option": option, "file": path.display().to_string(), "bytes": bytes, "sha256": sha256 }))
+            let mut input =
+                json!({ "option": option, "file": path.display().to_string(), "bytes": bytes, "sha256": sha256 });
+            if let Ok(Some(identity)) = Identity::of_path(path) {
+                input["patient_id"] = json!(identity.patient_id);
+                input["study_uid"] = json!(identity.study);
+                input["frame_of_reference_uid"] = json!(identity.frame_of_reference);
+            }
+            Ok(input)
         })
         .collect();
     Ok(json!({

@@ -63,7 +63,7 @@ impl App {
         }
         let folder = PathBuf::from(format!("out/core-ended-{}", format::utc_now()));
         if self.shown.planning.implant.is_some() && std::fs::create_dir_all(&folder).is_ok() {
-            self.planner.export(folder.join("plan.toml"));
+            self.planner.export(folder.join("plan.toml"), self.scene_file());
         }
         self.save_debrief_as(folder);
     }

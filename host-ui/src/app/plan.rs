@@ -54,6 +54,7 @@ impl App {
         ) {
             self.shown.note = None;
         }
+        let scene_file = self.scene_file();
         let planner = &mut self.planner;
         match action {
             PlanAction::Begin => planner.begin(),
@@ -70,17 +71,14 @@ impl App {
             PlanAction::Cancel => planner.cancel(),
             PlanAction::Import(path) => {
                 if let Some(scene) = self.link.scene() {
-                    planner.import(path, scene.clone());
+                    planner.import(path, scene.clone(), scene_file);
                 }
             }
-            PlanAction::Export(path) => planner.export(path),
+            PlanAction::Export(path) => planner.export(path, scene_file),
             PlanAction::ExportStudy => {
                 if let Some(scene) = self.link.scene() {
                     let folder = PathBuf::from(format!("out/study-{}", format::utc_now()));
-                    // Another window may have loaded another scene since.
-                    let name = scene.header.name.read();
-                    let file = self.scene_file.as_ref().filter(|(_, of)| *of == name);
-                    planner.export_study(folder, scene.clone(), file.map(|(path, _)| path.clone()));
+                    planner.export_study(folder, scene.clone(), scene_file);
                 }
             }
             PlanAction::NextNeedle => self.next_needle(),
@@ -91,6 +89,14 @@ impl App {
             PlanAction::Decide(accept) => planner.decide(accept),
             PlanAction::WithdrawUpdate => planner.withdraw_update(),
         }
+    }
+
+    /// Returns the file of the present scene, if this window loaded it.
+    pub(super) fn scene_file(&self) -> Option<PathBuf> {
+        // Another window may have loaded another scene since.
+        let name = self.link.scene()?.header.name.read();
+        let file = self.scene_file.as_ref().filter(|(_, of)| *of == name);
+        file.map(|(path, _)| path.clone())
     }
 
     fn next_needle(&mut self) {

@@ -232,7 +232,7 @@ impl App {
     pub(super) fn load_image(&mut self, path: &Path) {
         if !self.shown.load.is_busy() {
             recent::remember(&mut self.settings.recent, absolute(path), true);
-            self.loader.begin_image(path);
+            self.loader.begin_image(path, self.scene_file());
         }
     }
 

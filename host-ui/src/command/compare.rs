@@ -5,6 +5,10 @@ use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use stylet_dose::gamma::{self, Agreement, Criterion};
+use stylet_files::FileError;
+use stylet_files::dicom::Shared;
+use stylet_files::together;
+use stylet_implant::plan::seeds;
 use stylet_implant::provenance;
 use stylet_implant::readers::{DoseFile, read_any_dose};
 
@@ -12,7 +16,7 @@ use stylet_implant::readers::{DoseFile, read_any_dose};
 const USUAL_THRESHOLD_PERCENT: f64 = 10.0;
 
 const HELP: &str = "\
-Doses are RT Dose (.dcm) or dose_grid.csv of host-ui dose. The second one is interpolated linearly at every voxel of the first;
+Doses are RT Dose (.dcm), dose_grid.csv of host-ui dose, or NRRD in Gy, of one patient, frame of reference and type. The second one is interpolated linearly at every voxel of the first;
 voxels outside of it are counted and left out.
 
 With --gamma the share of voxels whose gamma index is at most 1 is reported too (Low et al. 1998). It takes a dose difference in
@@ -65,7 +69,14 @@ impl CompareArgs {
         if !(0.0..=1000.0).contains(&self.threshold) {
             return Err(format!("--threshold {}: give 0 to 1000 percent", self.threshold).into());
         }
+        together(&[Some(&self.dose), Some(&self.with)], Shared::Frame)?;
         let (one, other) = (read_any_dose(&self.dose)?, read_any_dose(&self.with)?);
+        for (path, dose) in [(&self.dose, &one), (&self.with, &other)] {
+            seeds::report(path, &dose.notes);
+        }
+        one.kind
+            .comparable(&other.kind)
+            .map_err(|why| FileError::of(&self.with, why))?;
         let highest = one.dose_gy.iter().copied().fold(0.0, f64::max);
         let of_gy = self.of_gy.unwrap_or(highest);
         if !(of_gy > 0.0 && of_gy.is_finite()) {

@@ -14,11 +14,12 @@ use stylet_files::dicom::images::Slice;
 use stylet_files::dicom::plan::{self, SeedPlan};
 use stylet_files::dicom::structures::write::{Outlined, Written, of_set, of_voxels};
 use stylet_files::dicom::structures::{self, StructureSet};
-use stylet_files::dicom::{self, Identity, RT_DOSE, RT_PLAN};
+use stylet_files::dicom::{self, Identity, RT_DOSE, RT_PLAN, Shared};
+use stylet_files::together;
 use stylet_files::{self as files, FileError, bytes, scene};
 use stylet_implant::plan::exchange::plan_source;
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{DayOfImplant, DoseFile, Mapped, SeedDefaults, SeedFile, read_dose};
+use stylet_implant::readers::{DayOfImplant, DoseFile, Mapped, SeedDefaults, SeedFile, is_dose_volume, read_any_dose};
 
 const MAX_PLAN_BYTES: u64 = 4 << 20;
 
@@ -29,11 +30,11 @@ Conversions:
   seed plan      .csv (columns as for host-ui dose) into .dcm (RT Plan; needs --source), and back;
                  .toml (plan of host-ui) into .dcm or .csv; .dcm into .dcm
   dose           .csv (dose_grid.csv of host-ui dose) into .dcm (RT Dose; needs --plan) or .nrrd;
-                 .dcm (RT Dose) into .csv, .nrrd or .dcm
+                 .dcm (RT Dose) or .nrrd of a dose into .csv, .nrrd or .dcm
 
-Patient, study and frame of reference of a DICOM file are kept, and a table of seeds keeps them in columns. Other formats lose
-them: give --like FILE, a DICOM file of the same patient, when you convert back to DICOM. Use host-ui dicom to write files that
-belong together (structure set, plan and dose of one study).
+Patient, study and frame of reference of a DICOM file are kept: in tables as comment lines, in NRRD as pairs of the header. NIfTI
+and MetaImage lose them: give --like FILE, a DICOM file of the same patient, when you convert back to DICOM. Files of two patients or
+frames are refused. Use host-ui dicom to write files that belong together (structure set, plan and dose of one study).
 
 Orientation and spacing are kept: NIfTI is in RAS, DICOM and MetaImage in LPS, NRRD names its own.
 Losses (overlaps, structures without volume) are reported.
@@ -73,11 +74,8 @@ pub struct ConvertArgs {
 
 impl ConvertArgs {
     pub fn run(self) -> Result<(), CommandError> {
-        if is_dose(&self.from)? {
+        if is_dose(&self.from)? || dicom_class(&self.from)?.as_deref() == Some(RT_DOSE) {
             return self.dose();
-        }
-        if dicom_class(&self.from)?.as_deref() == Some(RT_DOSE) {
-            return self.dose_of_dicom();
         }
         if dicom_class(&self.from)?.as_deref() == Some(RT_PLAN) && has_ending(&self.to, "dcm") {
             return self.plan_again();
@@ -109,6 +107,7 @@ impl ConvertArgs {
         if to_dicom && dicom_class(&self.from)?.is_some() {
             return self.structures_again();
         }
+        let identity = self.identity()?;
         let voxels = files::watched(&self.from, |progress| files::read_voxels(&self.from, progress))?;
         // Contours may overlap, but a voxel has one label.
         let lost = voxels.overlap.iter().filter(|_| !to_dicom);
@@ -117,15 +116,19 @@ impl ConvertArgs {
         }
         if to_dicom {
             let structures = of_voxels(&voxels).map_err(|why| FileError::of(&self.to, why))?;
-            let identity = self.identity(None)?;
-            self.write_structures(&identity, &[], &structures)?;
+            self.write_structures(&identity.unwrap_or_default().completed(), &[], &structures)?;
         } else {
-            write_labels(&voxels, &self.to)?;
+            write_labels(&voxels, &self.to, identity.as_ref())?;
             let keeps_names = has_ending(&self.to, "nrrd");
             if !keeps_names && !voxels.names.is_empty() {
                 eprintln!(
                     "note: names of structures have no place in this format: {}",
                     printable(&names(&voxels))
+                );
+            }
+            if !keeps_names && identity.is_some() {
+                eprintln!(
+                    "note: patient and frame of reference have no place in this format, so they are not compared later"
                 );
             }
         }
@@ -139,9 +142,11 @@ impl ConvertArgs {
         let object = dicom::read(&content).map_err(refused)?;
         let set = StructureSet::of(&object).map_err(refused)?;
         seeds::report(&self.from, &set.notes);
-        let folder = self.from.parent().unwrap_or(Path::new(""));
-        let images = dicom::images::find(folder, &set.series, &set.images).map_err(refused)?;
-        let identity = self.identity(Some(Identity::of(&object)))?;
+        let of_file = Identity::of(&object);
+        let found = dicom::images::find(bytes::folder(&self.from), &set.series, &set.images, &of_file);
+        let (images, notes) = found.map_err(refused)?;
+        seeds::report(&self.from, &notes);
+        let identity = self.identity()?.unwrap_or(of_file).completed();
         self.write_structures(&identity, &images, &of_set(set))?;
         self.written()
     }
@@ -165,7 +170,7 @@ impl ConvertArgs {
     fn plan_again(&self) -> Result<(), CommandError> {
         let plan = plan::open(&self.from)?;
         let plan = SeedPlan {
-            identity: self.identity(Some(plan.identity.clone()))?,
+            identity: self.identity()?.unwrap_or_default().completed(),
             uid: dicom::new_uid(),
             ..plan
         };
@@ -173,13 +178,16 @@ impl ConvertArgs {
         self.written()
     }
 
-    /// Returns the identity of --like, else that of the input file, else a new one.
-    fn identity(&self, of_file: Option<Identity>) -> Result<Identity, CommandError> {
-        let Some(like) = &self.like else {
-            return Ok(of_file.unwrap_or_default());
-        };
-        let identity = Identity::of_file(like)?;
-        Ok(identity.ok_or_else(|| format!("{}: it is not a DICOM file; --like needs one", like.display()))?)
+    /// Returns the identity of --like, else that of the input file, else that of the plan of a dose;
+    /// files of two patients or frames are refused.
+    fn identity(&self) -> Result<Option<Identity>, CommandError> {
+        if let Some(like) = &self.like
+            && Identity::of_path(like)?.is_none()
+        {
+            return Err(format!("{}: it names no patient; --like needs a DICOM file", like.display()).into());
+        }
+        let files = [self.like.as_deref(), Some(&self.from), self.plan.as_deref()];
+        Ok(together(&files, Shared::Frame)?)
     }
 
     fn seeds_to_plan(&self) -> Result<(), CommandError> {
@@ -196,7 +204,7 @@ impl ConvertArgs {
         seeds::report(&self.from, &notes);
         let plan = SeedPlan {
             label: "Stylet".to_owned(),
-            identity: self.identity(file.identity.take())?,
+            identity: self.identity()?.unwrap_or_default().completed(),
             uid: dicom::new_uid(),
             structure_set: None,
             prescription_gy,
@@ -211,15 +219,10 @@ impl ConvertArgs {
 
     fn seeds_to_csv(&self) -> Result<(), CommandError> {
         let file = self.read_seeds(self.source()?.as_ref())?;
-        let identity = file.identity.as_ref().map(Identity::to_columns).unwrap_or_default();
-        let (mut names, mut values) = (String::new(), String::new());
-        for (column, value) in identity {
-            names += &format!(",{column}");
-            values += &format!(",\"{}\"", value.replace('"', "\"\""));
-        }
+        let identity = self.identity()?.as_ref().map(Identity::comments).unwrap_or_default();
         let is_dated = file.rows.iter().any(|row| row.strength_on.is_some());
         let dated = if is_dated { "strength_date," } else { "" };
-        let mut out = format!("x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,{dated}needle,hole{names}\n");
+        let mut out = format!("{identity}x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,{dated}needle,hole\n");
         for row in file.rows {
             let seed = plan_seed(row);
             let [x, y, z] = seed.position_m.map(|v| v * 1e3);
@@ -230,7 +233,7 @@ impl ConvertArgs {
             let day = seed.strength_on.map_or_else(String::new, |day| day.to_string());
             let day = if is_dated { day + "," } else { day };
             out.push_str(&format!(
-                "{x},{y},{z},{axis},{},{day}{needle},{hole}{values}\n",
+                "{x},{y},{z},{axis},{},{day}{needle},{hole}\n",
                 seed.strength_u
             ));
         }
@@ -254,54 +257,38 @@ impl ConvertArgs {
     }
 
     fn dose(&self) -> Result<(), CommandError> {
-        let grid = read_dose(&self.from)?;
+        let dose = read_any_dose(&self.from)?;
+        seeds::report(&self.from, &dose.notes);
+        let identity = self.identity()?;
         if has_ending(&self.to, "nrrd") {
-            write_whole(&self.to, &dose_nrrd(&grid))?;
-            return self.written();
-        }
-        self.needs_ending("dcm", "a dose out of CSV becomes an RT Dose or .nrrd")?;
-        let plan = self
-            .plan
-            .as_deref()
-            .ok_or("an RT Dose needs --plan FILE: the RT Plan that it is the dose of")?;
-        let plan = plan::open(plan)?;
-        self.write_dose(&grid, &self.identity(Some(plan.identity))?, &plan.uid)
-    }
-
-    fn dose_of_dicom(&self) -> Result<(), CommandError> {
-        let dose = dicom::dose::of_file(&self.from)?;
-        let identity = self.identity(Some(dose.identity.clone()))?;
-        let plan = dose.plan.clone();
-        let grid = DoseFile::from(dose);
-        if has_ending(&self.to, "nrrd") {
-            write_whole(&self.to, &dose_nrrd(&grid))?;
+            write_whole(&self.to, &dose_nrrd(&dose, identity.as_ref()))?;
             return self.written();
         }
         if has_ending(&self.to, "csv") {
-            write::doses(&self.to, grid.places_m(), &grid.dose_gy)?;
+            let comments = identity.as_ref().map(Identity::comments).unwrap_or_default() + &dose.kind.comments();
+            write::doses_after(&comments, &self.to, dose.places_m(), &dose.dose_gy)?;
             return self.written();
         }
-        self.needs_ending("dcm", "an RT Dose becomes .csv, .nrrd or .dcm")?;
+        self.needs_ending("dcm", "a dose becomes an RT Dose, .nrrd or .csv")?;
         let other = self.plan.as_deref().map(plan::open).transpose()?.map(|plan| plan.uid);
-        let plan = other.or(plan).ok_or("it names no plan; give one with --plan FILE")?;
-        self.write_dose(&grid, &identity, &plan)
-    }
-
-    fn write_dose(&self, grid: &DoseFile, identity: &Identity, plan: &str) -> Result<(), CommandError> {
+        let plan = other.or(dose.plan.clone());
+        let plan = plan.ok_or("an RT Dose needs --plan FILE: the RT Plan that it is the dose of")?;
         let image = dicom::dose::DoseImage {
-            dims: grid.dims,
-            origin_m: grid.origin_m,
-            spacing_m: grid.spacing_m,
-            dose_gy: &grid.dose_gy,
+            dims: dose.dims,
+            origin_m: dose.origin_m,
+            spacing_m: dose.spacing_m,
+            dose_gy: &dose.dose_gy,
+            kind: &dose.kind,
         };
         let of = dicom::dose::DoseOf {
             uid: &dicom::new_uid(),
-            identity,
-            plan,
+            identity: &identity.unwrap_or_default().completed(),
+            plan: &plan,
             structure_set: None,
             histograms: &[],
         };
-        write_whole(&self.to, &dicom::dose::bytes(&image, &of)?)?;
+        let bytes = dicom::dose::bytes(&image, &of).map_err(|why| FileError::of(&self.to, why))?;
+        write_whole(&self.to, &bytes)?;
         self.written()
     }
 
@@ -334,7 +321,7 @@ fn is_plan_file(path: &Path) -> bool {
 }
 
 fn is_dose(path: &Path) -> Result<bool, CommandError> {
-    Ok(has_ending(path, "csv") && first_line(path)?.contains("dose_gy"))
+    Ok(is_dose_volume(path) || has_ending(path, "csv") && first_line(path)?.contains("dose_gy"))
 }
 
 fn names(voxels: &files::Voxels) -> String {
@@ -357,14 +344,15 @@ fn first_line(path: &Path) -> Result<String, CommandError> {
 }
 
 /// Writes the dose in double precision, without loss.
-fn dose_nrrd(grid: &DoseFile) -> Vec<u8> {
+fn dose_nrrd(grid: &DoseFile, identity: Option<&Identity>) -> Vec<u8> {
+    let pairs = identity.map(Identity::pairs).unwrap_or_default() + &grid.kind.pairs();
     let [x, y, z] = grid.origin_m.map(|v| v * 1e3);
     let [a, b, c] = grid.spacing_m.map(|v| v * 1e3);
     let [nx, ny, nz] = grid.dims;
     let mut out = format!(
-        "NRRD0004\n# dose in Gy\ntype: double\ndimension: 3\nspace: right-anterior-superior\nsizes: {nx} {ny} {nz}\n\
+        "NRRD0004\ntype: double\ndimension: 3\nspace: right-anterior-superior\nsizes: {nx} {ny} {nz}\n\
          space directions: ({a},0,0) (0,{b},0) (0,0,{c})\nkinds: domain domain domain\nendian: little\nencoding: raw\n\
-         space origin: ({x},{y},{z})\n\n"
+         space origin: ({x},{y},{z})\ndose_units:=GY\n{pairs}\n"
     )
     .into_bytes();
     grid.dose_gy.iter().for_each(|d| out.extend(d.to_le_bytes()));

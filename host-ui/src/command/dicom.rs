@@ -13,7 +13,8 @@ use stylet_files::dicom::images::{self, Slice};
 use stylet_files::dicom::plan::{PlanSeed, SeedPlan};
 use stylet_files::dicom::structures::StructureSet;
 use stylet_files::dicom::structures::write::{Outlined, of_set, of_voxels};
-use stylet_files::dicom::{self, Identity};
+use stylet_files::dicom::{self, Identity, Shared};
+use stylet_files::together;
 use stylet_files::{FileError, bytes, read_voxels, watched};
 use stylet_implant::linked::{self, LinkedStudy};
 use stylet_implant::plan::exchange::plan_source;
@@ -69,11 +70,11 @@ impl DicomArgs {
     pub fn run(self) -> Result<(), CommandError> {
         let c = &self.common;
         within("--spacing-mm", self.spacing_mm, 0.05, 100.0)?;
+        let identity = self.identity()?;
         let loaded = c.load(&self.seeds)?;
         let prescription_gy = c.prescription_gy(&loaded)?;
         let judge = c.judge(&self.structures, &loaded, POINTS_FOR_DOSE)?;
         let drawn = self.drawn()?;
-        let identity = self.identity(&drawn, &loaded)?;
         new_folder(&c.out)?;
         let task = LongTask::new(judge.points(), "points have their dose");
         let verdict = judge.judge_reporting(&loaded.kernel, &loaded.seeds, &|done| task.advance(done));
@@ -146,7 +147,6 @@ impl DicomArgs {
             };
             return Ok(Drawn {
                 structures: of_voxels(&voxels).map_err(refused)?,
-                identity: None,
                 images,
             });
         }
@@ -155,61 +155,39 @@ impl DicomArgs {
         let images = match &self.images {
             Some(folder) => one_series(folder)?,
             None => {
-                let folder = path.parent().unwrap_or(Path::new(""));
-                images::find(folder, &set.series, &set.images).map_err(refused)?
+                let identity = Identity::of(&object);
+                let found = images::find(bytes::folder(path), &set.series, &set.images, &identity);
+                let (images, notes) = found.map_err(refused)?;
+                seeds::report(path, &notes);
+                images
             }
         };
         Ok(Drawn {
             structures: of_set(set),
-            identity: Some(Identity::of(&object)),
             images,
         })
     }
 
     /// Returns the identity of the first file that has one; all others must agree with it.
-    fn identity(&self, drawn: &Drawn, loaded: &Loaded) -> Result<Identity, CommandError> {
-        let mut all: Vec<(PathBuf, Identity)> = Vec::new();
-        if let Some(like) = &self.like {
-            let identity = Identity::of_file(like)?;
-            let identity = identity.ok_or_else(|| format!("{}: it is not a DICOM file", like.display()))?;
-            all.push((like.clone(), identity));
+    fn identity(&self) -> Result<Identity, CommandError> {
+        if let Some(like) = &self.like
+            && Identity::of_path(like)?.is_none()
+        {
+            return Err(format!("{}: it names no patient; --like needs a DICOM file", like.display()).into());
         }
-        all.extend(
-            drawn
-                .identity
-                .clone()
-                .map(|identity| (self.structures.clone(), identity)),
-        );
-        all.extend(loaded.identity.clone().map(|identity| (self.seeds.clone(), identity)));
-        if let Some(image) = drawn.images.first() {
-            let folder = self.images.clone().unwrap_or_else(|| self.structures.clone());
-            all.push((folder, image.identity.clone()));
-        }
-        let Some((first, identity)) = all.first().cloned() else {
-            return Ok(Identity::new());
-        };
-        for (path, other) in &all[1..] {
-            if let Some(why) = other.differs_from(&identity) {
-                return Err(format!(
-                    "{}: {why} as {} has it; give files of one patient",
-                    path.display(),
-                    first.display()
-                )
-                .into());
-            }
-            if other.study != identity.study {
-                let note = format!("it is of another study; that of {} is taken", first.display());
-                seeds::report(path, &[note]);
-            }
-        }
-        Ok(identity)
+        let files = [
+            self.like.as_deref(),
+            Some(&self.structures),
+            Some(&self.seeds),
+            self.images.as_deref(),
+        ];
+        Ok(together(&files, Shared::Frame)?.unwrap_or_default().completed())
     }
 }
 
-/// Structures with their images and identity.
+/// Structures with their images.
 struct Drawn {
     structures: Vec<Outlined>,
-    identity: Option<Identity>,
     images: Vec<Slice>,
 }
 

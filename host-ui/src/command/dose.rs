@@ -11,6 +11,8 @@ use stylet_dose::kernel::DoseKernel;
 use stylet_dose::picture::Curve;
 use stylet_dose::seed::Seed;
 use stylet_dose::{DoseGrid, DosePoints, picture, structure};
+use stylet_files::dicom::Shared;
+use stylet_files::together;
 use stylet_implant::provenance;
 use stylet_implant::readers::read_points;
 use stylet_implant::sheet::{self, Column, Implant, State};
@@ -71,6 +73,12 @@ impl DoseArgs {
         let c = &self.common;
         within("--spacing-mm", self.spacing_mm, 0.05, 100.0)?;
         within("--bin-gy", self.bin_gy, 1e-3, 1e4)?;
+        let clinical = [
+            Some(self.seeds.as_path()),
+            self.points.as_deref(),
+            self.structures.as_deref(),
+        ];
+        let identity = together(&clinical, Shared::Frame)?;
         let loaded = c.load(&self.seeds)?;
         let (source, kernel, seeds) = (&loaded.source, &loaded.kernel, &loaded.seeds);
         let points = self.points.as_deref().map(read_points).transpose()?;
@@ -99,7 +107,13 @@ impl DoseArgs {
         if let Some(points_m) = &points {
             let mut dose = DosePoints::new(points_m);
             dose.add(kernel, seeds);
-            write::doses(&c.out.join("dose_points.csv"), points_m.iter().copied(), dose.dose_gy())?;
+            let places = points_m.iter().copied();
+            write::doses(
+                &c.out.join("dose_points.csv"),
+                identity.as_ref(),
+                places,
+                dose.dose_gy(),
+            )?;
         }
         if let Some((judge, verdict)) = &judged {
             let prescription_gy = c.prescription_gy(&loaded)?;
@@ -137,7 +151,7 @@ impl DoseArgs {
             let grid = grid(seeds, kernel, self.spacing_mm * 1e-3, None)?;
             let [nx, ny, nz] = grid.dims();
             let centres = (0..nx * ny * nz).map(|i| grid.centre_m([i % nx, i / nx % ny, i / nx / ny]));
-            write::doses(&c.out.join("dose_grid.csv"), centres, grid.dose_gy())?;
+            write::doses(&c.out.join("dose_grid.csv"), identity.as_ref(), centres, grid.dose_gy())?;
         }
         write::json(&c.out.join("made.json"), &made)?;
         println!("written: {}", c.out.display());

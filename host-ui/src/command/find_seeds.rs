@@ -8,15 +8,18 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use stylet_base::format::printable;
 use stylet_base::output::new_folder;
+use stylet_files::dicom::{self, Shared};
 use stylet_files::image::read_values;
-use stylet_files::{bytes, dicom, watched};
+use stylet_files::together;
+use stylet_files::{bytes, watched};
 use stylet_implant::finder::{self, Found, Search};
 use stylet_implant::provenance;
 
 /// Largest number of seeds in an implant.
 const MOST_SEEDS: u64 = 400;
-/// Number of bytes that identify a DICOM file.
-const START_BYTES: u64 = 160;
+
+/// Most doubts on the terminal, those with the largest signals; `found.json` has all.
+const MOST_LISTED: usize = 40;
 
 const HELP: &str = "\
 Voxels above a threshold are joined into components. Each is fitted by as many seeds as its signal (the sum of its excess over the
@@ -62,6 +65,8 @@ impl FindSeedsArgs {
     pub fn run(self) -> Result<(), CommandError> {
         within("--length-mm", self.length_mm, 1.0, 10.0)?;
         within("--diameter-mm", self.diameter_mm, 0.2, 3.0)?;
+        let is_dicom = self.is_of_a_ct()?;
+        let identity = together(&[Some(&self.ct)], Shared::Frame)?;
         let ct = watched(&self.ct, |progress| read_values(&self.ct, progress))?;
         let search = Search {
             threshold: self.threshold,
@@ -75,10 +80,25 @@ impl FindSeedsArgs {
             eprintln!("note: {}: {}", self.ct.display(), printable(note));
         }
         new_folder(&self.out)?;
-        write::found_seeds(&self.out.join("seeds.csv"), &found.seeds)?;
-        write::json(&self.out.join("found.json"), &self.json(&found)?)?;
+        write::found_seeds(&self.out.join("seeds.csv"), identity.as_ref(), &found.seeds)?;
+        write::json(&self.out.join("found.json"), &self.json(&found, is_dicom)?)?;
         self.print(&found);
         Ok(())
+    }
+
+    /// Refuses a DICOM series that is not in HU; returns whether it is DICOM at all.
+    fn is_of_a_ct(&self) -> Result<bool, CommandError> {
+        let Some((modality, unit)) = dicom::series::modality(&self.ct)? else {
+            return Ok(false);
+        };
+        if modality != "CT" || !["", "HU"].contains(&unit.as_str()) {
+            return Err(format!(
+                "{}: its Modality is \"{modality}\" and its RescaleType \"{unit}\"; seeds are found in a CT, whose values are in HU",
+                self.ct.display()
+            )
+            .into());
+        }
+        Ok(true)
     }
 
     fn print(&self, found: &Found) {
@@ -100,12 +120,15 @@ impl FindSeedsArgs {
             found.seeds.len(),
             self.count.map_or_else(String::new, |n| format!(" of {n}"))
         );
-        for doubt in &found.doubts {
+        for doubt in found.doubts.iter().take(MOST_LISTED) {
             let [x, y, z] = doubt.place_m.map(|m| m * 1e3);
             println!(
-                "doubtful: at {x:.1}, {y:.1}, {z:.1} mm, signal of {:.2} seeds, counted as {}: {}",
-                doubt.signal, doubt.counted, doubt.why
+                "doubtful: at {x:.1}, {y:.1}, {z:.1} mm, signal of {:.2} seeds, up to {:.0} HU, counted as {}: {}",
+                doubt.signal, doubt.peak, doubt.counted, doubt.why
             );
+        }
+        if found.doubts.len() > MOST_LISTED {
+            println!("doubtful: {} more in found.json", found.doubts.len() - MOST_LISTED);
         }
         if let Some(count) = self.count.filter(|n| *n != found.seeds.len() as u64) {
             eprintln!(
@@ -117,16 +140,17 @@ impl FindSeedsArgs {
         println!("written: {}", self.out.display());
     }
 
-    fn json(&self, found: &Found) -> Result<serde_json::Value, CommandError> {
+    fn json(&self, found: &Found, is_dicom: bool) -> Result<serde_json::Value, CommandError> {
         let mm = |place: [f64; 3]| place.map(|m| m * 1e3);
         let doubts = found
             .doubts
             .iter()
-            .map(|d| json!({ "at_mm": mm(d.place_m), "signal_seeds": d.signal, "counted": d.counted, "why": d.why }));
+            .map(|d| json!({ "at_mm": mm(d.place_m), "signal_seeds": d.signal, "peak_hu": d.peak, "counted": d.counted, "why": d.why }));
         let mut inputs: Vec<(&str, &Path)> = vec![("ct", &self.ct)];
         // One file of a series selects all files in its folder.
-        let is_slice = bytes::start(&self.ct, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
-        inputs.extend(self.ct.parent().filter(|_| is_slice).map(|folder| ("series", folder)));
+        if is_dicom && self.ct.is_file() {
+            inputs.push(("series", bytes::folder(&self.ct)));
+        }
         Ok(json!({
             "seeds": found.seeds.len(),
             "asked": self.count,

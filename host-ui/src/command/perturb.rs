@@ -14,6 +14,8 @@ use stylet_dose::criterion::{Criterion, CriterionCount};
 use stylet_dose::edema::{Edema, Swelling};
 use stylet_dose::perturb::{self, Errors};
 use stylet_dose::report::Judge;
+use stylet_files::dicom::Shared;
+use stylet_files::together;
 use stylet_implant::provenance;
 
 const POINTS_FOR_A_TRIAL: usize = 40_000;
@@ -117,6 +119,7 @@ impl PerturbArgs {
         let c = &self.common;
         let errors = self.errors()?;
         let edema = self.edema()?;
+        together(&[Some(&self.plan), Some(&self.structures)], Shared::Frame)?;
         let loaded = c.load(&self.plan)?;
         let kernel = &loaded.kernel;
         let strands = self.strands(&loaded, &errors)?;

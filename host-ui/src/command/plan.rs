@@ -14,6 +14,8 @@ use stylet_dose::perturb::Errors;
 use stylet_dose::report::Judge;
 use stylet_dose::{DoseKernel, Dvh, Source};
 use stylet_files::dicom::plan::Date;
+use stylet_files::dicom::{Identity, Shared};
+use stylet_files::together;
 use stylet_host::core_args::CoreArgs;
 use stylet_implant::plan::first::{self, FirstPlan};
 use stylet_implant::plan::optimise::{Objectives, Statistic};
@@ -136,6 +138,7 @@ enum Wanted {
 impl PlanArgs {
     pub fn run(self) -> Result<(), CommandError> {
         let source = Source::read(&self.source)?;
+        let identity = together(&[self.asked.file(), self.seeds.as_deref()], Shared::Frame)?;
         let (seeds, prescription_gy) = self.seeds(&source)?;
         let prescription_gy = prescription_gy.filter(|gy| (1e-3..=1e4).contains(gy)).ok_or_else(|| {
             let file = self.source.display();
@@ -179,7 +182,7 @@ impl PlanArgs {
         for problem in check::problems(&plan, &anatomy) {
             println!("note: {}", stylet_base::format::printable_line(&problem.to_string()));
         }
-        self.write(&plan, &frames)?;
+        self.write(&plan, &frames, identity.as_ref())?;
         let (figures, broken) = figures(&plan, &anatomy, &kernel)?;
         for criterion in &broken {
             println!("note: {}", stylet_base::format::printable_line(criterion));
@@ -224,17 +227,26 @@ impl PlanArgs {
         Ok((Some((path, seeds)), prescription_gy))
     }
 
-    fn write(&self, plan: &ImplantPlan, frames: &PatientFrame) -> Result<(), CommandError> {
+    fn write(
+        &self,
+        plan: &ImplantPlan,
+        frames: &PatientFrame,
+        identity: Option<&Identity>,
+    ) -> Result<(), CommandError> {
         let mut inputs: Vec<(&str, &Path)> = vec![("--source", &self.source)];
         inputs.extend(self.seeds.as_deref().map(|file| ("--seeds", file)));
         inputs.extend(self.asked.file().map(|file| ("--scene", file)));
         inputs.extend(self.errors_of.as_deref().map(|folder| ("--errors-of", folder)));
         let made = serde_json::to_string(&provenance::made(&inputs)?)?;
-        // One line, because JSON needs no line feeds.
-        let text = format!("# made: {made}\n{}", file::to_text(plan, frames)?);
+        // One line, because JSON has no line feeds of its own.
+        let comments = format!(
+            "{}# made: {made}\n",
+            identity.map(Identity::comments).unwrap_or_default()
+        );
+        let text = comments.clone() + &file::to_text(plan, frames)?;
         write_whole(&self.out, text.as_bytes())?;
         let Some(csv) = &self.csv else { return Ok(()) };
-        let text = format!("# made: {made}\n{}", file::seeds_to_csv(plan, frames));
+        let text = comments + &file::seeds_to_csv(plan, frames);
         Ok(write_whole(csv, text.as_bytes())?)
     }
 }

@@ -11,6 +11,8 @@ use stylet_base::write_whole;
 use stylet_dose::decay::days_to_s;
 use stylet_dose::edema::Edema;
 use stylet_dose::{Seed, Structure};
+use stylet_files::dicom::Shared;
+use stylet_files::together;
 use stylet_implant::provenance;
 use stylet_implant::registration::RigidFit;
 use stylet_implant::sheet::{self, Column, Implant, State};
@@ -87,6 +89,7 @@ impl PostImplantArgs {
                 "--edema is for the dose of the whole life of the seeds; leave --from-days and --to-days out".into(),
             );
         }
+        self.compare_files()?;
         let loaded = c.load(&self.planned)?;
         let (structures, target) = c.structures(&self.structures, &loaded.seeds, POINTS_FOR_DOSE / 3)?;
         let implant = Implant {
@@ -132,6 +135,24 @@ impl PostImplantArgs {
             columns.extend(again.map(|(state, edema)| Column::of(&implant, &loaded.kernel, state, Some(edema))));
         }
         self.write(&implant, &columns)
+    }
+
+    /// Compares the files: all are of one patient, those of one day in one frame of reference.
+    fn compare_files(&self) -> Result<(), CommandError> {
+        let of_plan = [
+            Some(self.planned.as_path()),
+            Some(&self.structures),
+            self.delivered.as_deref(),
+        ];
+        let day0 = [self.day0.as_deref(), self.day0_structures.as_deref()];
+        let day30 = [self.day30.as_deref(), self.day30_structures.as_deref()];
+        for of_day in [of_plan.as_slice(), &day0, &day30] {
+            together(of_day, Shared::Frame)?;
+        }
+        for of_day in [day0, day30] {
+            together(&[of_plan.as_slice(), &of_day].concat(), Shared::Patient)?;
+        }
+        Ok(())
     }
 
     fn edema(&self) -> Result<Option<Edema>, CommandError> {

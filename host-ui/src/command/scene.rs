@@ -4,6 +4,8 @@ use super::CommandError;
 use std::path::Path;
 use stylet_base::format::printable;
 use stylet_files as files;
+use stylet_files::dicom::Shared;
+use stylet_files::together;
 use stylet_implant::readers::{SeedDefaults, read_seeds};
 
 /// Explanation of scene files.
@@ -68,10 +70,9 @@ pub fn check(file: &Path, label: Option<u8>) -> Result<(), CommandError> {
 /// Prints the content of a scene file except its volume; reads its plan.
 fn check_scene_file(file: &Path) -> Result<(), CommandError> {
     let scene = files::scene::read(file)?;
-    let plan = scene
-        .plan
-        .as_ref()
-        .map(|plan| file.parent().unwrap_or(Path::new("")).join(plan));
+    let plan = scene.plan.as_ref().map(|plan| file.with_file_name(plan));
+    let image = scene.image.as_ref().map(|image| file.with_file_name(image));
+    together(&[Some(file), image.as_deref(), plan.as_deref()], Shared::Frame)?;
     if let Some(path) = plan.as_ref().filter(|p| files::scene::is_scene(p)) {
         println!(
             "  plan: {}, read when there is a scene",
@@ -91,8 +92,7 @@ fn check_scene_file(file: &Path) -> Result<(), CommandError> {
             printable(&path.display().to_string())
         );
     }
-    if let Some(named) = &scene.image {
-        let path = file.with_file_name(named);
+    if let Some(path) = image {
         let image = files::watched(&path, |progress| files::Image::read(&path, progress))?;
         let [x, y, z] = image.dims;
         println!(

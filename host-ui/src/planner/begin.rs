@@ -72,14 +72,19 @@ impl Planner {
     }
 
     /// Starts to read a plan from a file.
-    pub fn import(&mut self, path: PathBuf, scene: Arc<SceneModel>) {
-        self.begin_job("Reading the plan", |_, _| Ok(jobs::import(path, scene)));
+    pub fn import(&mut self, path: PathBuf, scene: Arc<SceneModel>, scene_file: Option<PathBuf>) {
+        self.begin_job("Reading the plan", |_, _| Ok(jobs::import(path, scene, scene_file)));
     }
 
     /// Starts to write the plan to a file.
-    pub fn export(&mut self, path: PathBuf) {
+    pub fn export(&mut self, path: PathBuf, scene_file: Option<PathBuf>) {
         self.begin_job("Writing the plan", |planner, outlines| {
-            Ok(jobs::export(path, Arc::new(planner.planned()?.clone()), outlines))
+            Ok(jobs::export(
+                path,
+                Arc::new(planner.planned()?.clone()),
+                outlines,
+                scene_file,
+            ))
         });
     }
 

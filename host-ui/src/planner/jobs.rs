@@ -98,16 +98,21 @@ pub(super) fn strength(outlines: Arc<AnatomyOutlines>, plan: Arc<ImplantPlan>) -
     })
 }
 
-pub(super) fn import(path: PathBuf, scene: Arc<SceneModel>) -> Job<JobMessage> {
+pub(super) fn import(path: PathBuf, scene: Arc<SceneModel>, scene_file: Option<PathBuf>) -> Job<JobMessage> {
     Job::begin("plan reader", move |messages, _| {
-        let plan = exchange::read(&path, &scene.header).map_err(Failure::from);
+        let plan = exchange::read(&path, &scene.header, scene_file.as_deref()).map_err(Failure::from);
         let _ = messages.send(JobMessage::Plan(plan));
     })
 }
 
-pub(super) fn export(path: PathBuf, plan: Arc<ImplantPlan>, outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
+pub(super) fn export(
+    path: PathBuf,
+    plan: Arc<ImplantPlan>,
+    outlines: Arc<AnatomyOutlines>,
+    scene_file: Option<PathBuf>,
+) -> Job<JobMessage> {
     Job::begin("plan writer", move |messages, _| {
-        let written = exchange::write(&path, &plan, &outlines.frames);
+        let written = exchange::write(&path, &plan, &outlines.frames, scene_file.as_deref());
         let saved = written.map(|()| format!("Plan saved as {}", path.display()));
         let _ = messages.send(JobMessage::End(saved.map_err(Failure::from)));
     })

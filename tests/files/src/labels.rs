@@ -104,7 +104,7 @@ fn what_is_written_is_read_back_the_same() {
         let first = files::read_voxels(&folder().join(from), &files::Progress::default()).expect("read");
         for to in ["a.nrrd", "a.seg.nrrd", "a.mha", "a.nii.gz"] {
             let path = folder_out.join(to);
-            files::convert::write_labels(&first, &path).expect("written");
+            files::convert::write_labels(&first, &path, None).expect("written");
             let again = files::read_voxels(&path, &files::Progress::default()).expect("read again");
             assert_eq!(again.labels, first.labels, "{from} to {to}");
             assert_near(&format!("{from} to {to}"), &centres(&again), &centres(&first));

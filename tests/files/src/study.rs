@@ -298,9 +298,12 @@ for name, row, column, bits, absolute in (("a", [1, 0, 0], [0, 1, 0], 16, True),
     values = [gy(place(i, j, k)) / float(ds.DoseGridScaling) for k in range(frames) for j in range(rows) for i in range(columns)]
     ds.PixelData = np.rint(values).astype("<u2" if bits == 16 else "<u4").tobytes()
     ds.save_as(f"{sys.argv[1]}/{name}.dcm", write_like_original=False)
+    plan = pydicom.dcmread(sys.argv[2])
+    for key in ("PatientID", "StudyInstanceUID", "FrameOfReferenceUID"): setattr(plan, key, getattr(ds, key))
+    plan.save_as(f"{sys.argv[1]}/{name}_plan.dcm")
 print("{}")
 "#;
-    script(text, &[&out]);
+    script(text, &[&out, &data("dicom/plan_pairs.dcm")]);
     for name in ["a", "b", "c"] {
         let (from, to) = (out.join(format!("{name}.dcm")), out.join(format!("{name}.csv")));
         let (done, said) = host_ui(&[Path::new("convert"), &from, &to]);
@@ -308,6 +311,7 @@ print("{}")
         let table = std::fs::read_to_string(&to).expect("written");
         let rows: Vec<Vec<f64>> = table
             .lines()
+            .filter(|l| !l.starts_with('#'))
             .skip(1)
             .map(|l| l.split(',').map(|n| n.parse().expect("a number")).collect())
             .collect();
@@ -319,7 +323,7 @@ print("{}")
         }
         // It is the same dose after a table and DICOM again.
         let again = out.join(format!("{name}_again.dcm"));
-        let plan = data("dicom/plan_pairs.dcm");
+        let plan = out.join(format!("{name}_plan.dcm"));
         let (done, said) = host_ui(&[Path::new("convert"), &to, &again, Path::new("--plan"), &plan]);
         assert!(done, "{said}");
         let (done, said) = host_ui(&[

@@ -90,7 +90,7 @@ pub fn put(driven: &mut Driven, name: &str, plan: &ImplantPlan) {
         .outlines
         .expect("known")
         .frames;
-    exchange::write(&path, plan, &frames).expect("written");
+    exchange::write(&path, plan, &frames, None).expect("written");
     import(driven, &path);
     assert_eq!(
         driven.window.state().planner().plan().map(|p| p.needles.len()),

@@ -62,7 +62,7 @@ fn import(driven: &mut Driven, plan: &ImplantPlan) {
         .outlines
         .expect("known")
         .frames;
-    exchange::write(&path, plan, &frames).expect("written");
+    exchange::write(&path, plan, &frames, None).expect("written");
     driven.window.get_by_label(PATH).focus();
     driven.window.run_steps(1);
     driven

@@ -1,12 +1,12 @@
 //! A DICOM file as an object. Lengths and depth are checked first, because the parser allocates the
 //! length that an element claims.
 
+use super::parse::parse;
 use crate::error::ContentError;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::{Tag, VR};
 use dicom_dictionary_std::{StandardDataDictionary, tags, uids};
-use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
-use std::io::Read;
+use dicom_object::InMemDicomObject;
 
 const MAX_DEPTH: usize = 16;
 const MAX_ELEMENTS: usize = 1 << 20;
@@ -71,12 +71,17 @@ fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), ContentError> {
 
 /// Reads everything before the pixels.
 pub fn read(bytes: &[u8]) -> Result<Object, ContentError> {
-    Ok(before_pixels(bytes)?.0)
+    Ok(before(bytes, FIRST_PIXELS)?.0)
+}
+
+/// Like [`read`], without the contours of a structure set, the bulk of it.
+pub fn read_head(bytes: &[u8]) -> Result<Object, ContentError> {
+    Ok(before(bytes, tags::ROI_CONTOUR_SEQUENCE)?.0)
 }
 
 /// Like [`read`]; also returns the bytes of the pixels, and whether their numbers are big-endian.
 pub fn read_with_pixels(bytes: &[u8]) -> Result<(Object, &[u8], bool), ContentError> {
-    let (object, mut walk) = before_pixels(bytes)?;
+    let (object, mut walk) = before(bytes, FIRST_PIXELS)?;
     if walk.at >= bytes.len() {
         return Err("it has no pixels; export it again".into());
     }
@@ -87,7 +92,8 @@ pub fn read_with_pixels(bytes: &[u8]) -> Result<(Object, &[u8], bool), ContentEr
     Ok((object, walk.value(&head)?, walk.syntax == Syntax::ExplicitBig))
 }
 
-fn before_pixels(bytes: &[u8]) -> Result<(Object, Walk<'_>), ContentError> {
+/// Reads everything before the first pixels, or before `last`.
+fn before(bytes: &[u8], last: Tag) -> Result<(Object, Walk<'_>), ContentError> {
     let values = bytes.iter().filter(|&&b| b == b'\\').count();
     if values > MAX_VALUES {
         return Err(ContentError::Invalid(format!(
@@ -101,38 +107,27 @@ fn before_pixels(bytes: &[u8]) -> Result<(Object, Walk<'_>), ContentError> {
         at,
         syntax,
         elements,
+        charsets: Vec::new(),
     };
-    let end = walk.top().map_err(|why| format!("{why}; copy or export it again"))?;
+    let end = walk
+        .top(last)
+        .map_err(|why| format!("{why}; copy or export it again"))?;
     walk.at = end;
-    let data = parse(syntax, &bytes[at..end])?;
+    let charsets: Vec<usize> = walk.charsets.iter().map(|begin| begin - at).collect();
+    let data = parse(syntax, &bytes[at..end], &charsets)?;
     let sop_class = super::values::text(&data, tags::SOP_CLASS_UID).unwrap_or_default();
     Ok((Object { sop_class, data }, walk))
 }
 
-/// Parses with a group 2 of our own in front, because the file's has served.
-fn parse(syntax: Syntax, dataset: &[u8]) -> Result<InMemDicomObject, ContentError> {
-    let meta = FileMetaTableBuilder::new()
-        .transfer_syntax(syntax.uid())
-        .media_storage_sop_class_uid(uids::RAW_DATA_STORAGE)
-        .media_storage_sop_instance_uid("2.25.0")
-        .build()
-        .map_err(|e| e.to_string())?;
-    let mut front = [[0; 128].as_slice(), b"DICM"].concat();
-    meta.write(&mut front).map_err(|e| e.to_string())?;
-    dicom_object::from_reader(front.as_slice().chain(dataset))
-        .map(|o| o.into_inner())
-        .map_err(|e| format!("it cannot be read ({e}); export it again").into())
-}
-
 #[derive(Clone, Copy, PartialEq)]
-enum Syntax {
+pub(super) enum Syntax {
     ExplicitLittle,
     ImplicitLittle,
     ExplicitBig,
 }
 
 impl Syntax {
-    fn uid(self) -> &'static str {
+    pub(super) fn uid(self) -> &'static str {
         match self {
             Self::ExplicitLittle => uids::EXPLICIT_VR_LITTLE_ENDIAN,
             Self::ImplicitLittle => uids::IMPLICIT_VR_LITTLE_ENDIAN,
@@ -164,6 +159,7 @@ fn transfer_syntax(bytes: &[u8]) -> Result<(String, usize), ContentError> {
         at: 132,
         syntax: Syntax::ExplicitLittle,
         elements: 0,
+        charsets: Vec::new(),
     };
     let mut found = None;
     while walk.at < bytes.len() && walk.group()? == 2 {
@@ -201,15 +197,17 @@ struct Walk<'a> {
     at: usize,
     syntax: Syntax,
     elements: usize,
+    /// Places of the elements that declare character sets.
+    charsets: Vec<usize>,
 }
 
 impl<'a> Walk<'a> {
-    /// Walks through the whole data set; returns its end, or the start of its pixels.
-    fn top(&mut self) -> Result<usize, ContentError> {
+    /// Walks through the data set; returns its end, or the start of its pixels or of `last`.
+    fn top(&mut self, last: Tag) -> Result<usize, ContentError> {
         while self.at < self.bytes.len() {
             let begin = self.at;
             let head = self.head()?;
-            if head.tag >= FIRST_PIXELS && head.tag.group() == FIRST_PIXELS.group() {
+            if head.tag == last || head.tag >= FIRST_PIXELS && head.tag.group() == FIRST_PIXELS.group() {
                 return Ok(begin);
             }
             self.content(&head, self.bytes.len(), 0)?;
@@ -355,7 +353,11 @@ impl<'a> Walk<'a> {
     }
 
     fn head(&mut self) -> Result<Head, ContentError> {
+        let begin = self.at;
         let tag = Tag(self.u16()?, self.u16()?);
+        if tag == tags::SPECIFIC_CHARACTER_SET {
+            self.charsets.push(begin);
+        }
         if tag.group() == ITEM.group() {
             let length = self.u32()?;
             return Ok(Head {

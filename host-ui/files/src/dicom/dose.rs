@@ -1,9 +1,13 @@
 //! RT Dose: a dose grid along the patient's axes, and the histograms of structures in it.
 
+mod kind;
 mod read;
 mod write;
 
-pub use read::{ReadDose, of_file};
+pub use kind::DoseKind;
+#[cfg(test)]
+pub(super) use read::of;
+pub use read::{ReadDose, of_file, of_volume};
 pub use write::bytes;
 
 use super::Identity;
@@ -18,6 +22,8 @@ pub struct DoseImage<'a> {
     pub spacing_m: [f64; 3],
     /// Dose of each voxel, in Gy, x fastest.
     pub dose_gy: &'a [f64],
+    /// Type and summation.
+    pub kind: &'a DoseKind,
 }
 
 /// References of a dose.

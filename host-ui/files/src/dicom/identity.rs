@@ -1,19 +1,16 @@
-//! Patient, study and frame of reference of a file.
+//! Patient, study and frame of reference of a file, which travel with all that is read and written.
 
-use super::super::element::short;
-use super::checked::{self, Object};
+use super::checked::Object;
 use super::values::{items, text};
 use super::write::{new_uid, now};
-use crate::error::FileError;
-use crate::progress::Progress;
 use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
-use std::path::Path;
+use std::ops::Range;
 
-/// Number of bytes that identify a DICOM file.
-const START_BYTES: u64 = 160;
+/// Most characters of a part; no DICOM value among them is longer.
+const MOST: usize = 200;
 
-/// Names of the parts in a table, in the order of `fields`.
+/// Names of the parts in other formats, in the order of `fields`.
 pub const COLUMNS: [&str; 12] = [
     "dicom_patient_name",
     "dicom_patient_id",
@@ -28,6 +25,11 @@ pub const COLUMNS: [&str; 12] = [
     "dicom_frame_of_reference",
     "dicom_position_reference",
 ];
+
+/// Places of the parts of a patient, a study and a frame among [`COLUMNS`].
+const PATIENT: Range<usize> = 0..4;
+const STUDY: Range<usize> = 4..10;
+const FRAME: Range<usize> = 10..12;
 
 /// Patient, study and frame of a file; a text is empty if the file omits it.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,7 +80,7 @@ impl Identity {
         }
     }
 
-    /// Returns the identity of a DICOM object; creates study and frame if it has none.
+    /// Returns the identity of a DICOM object.
     pub fn of(object: &Object) -> Self {
         let data = &object.data;
         let of = |tag| text(data, tag).unwrap_or_default();
@@ -87,46 +89,67 @@ impl Identity {
             patient_id: of(tags::PATIENT_ID),
             birth_date: of(tags::PATIENT_BIRTH_DATE),
             sex: of(tags::PATIENT_SEX),
-            study: text(data, tags::STUDY_INSTANCE_UID).unwrap_or_else(new_uid),
+            study: of(tags::STUDY_INSTANCE_UID),
             study_date: of(tags::STUDY_DATE),
             study_time: of(tags::STUDY_TIME),
             study_id: of(tags::STUDY_ID),
             accession_number: of(tags::ACCESSION_NUMBER),
             referring_physician: of(tags::REFERRING_PHYSICIAN_NAME),
-            frame_of_reference: frame_of_reference(data).unwrap_or_else(new_uid),
+            frame_of_reference: frame_of_reference(data).unwrap_or_default(),
             position_reference: of(tags::POSITION_REFERENCE_INDICATOR),
         }
     }
 
-    /// Returns the identity of the file at `path`; `None` for a file that is not DICOM.
-    pub fn of_file(path: &Path) -> Result<Option<Self>, FileError> {
-        let refused = |why| FileError::of(path, why);
-        if !crate::bytes::start(path, START_BYTES).is_some_and(|start| checked::is_dicom(&start)) {
-            return Ok(None);
+    /// Returns the identity with a new study and a new frame where it has none, to write DICOM.
+    #[must_use]
+    pub fn completed(mut self) -> Self {
+        for uid in [&mut self.study, &mut self.frame_of_reference] {
+            if uid.is_empty() {
+                *uid = new_uid();
+            }
         }
-        let bytes = crate::bytes::whole(path, &Progress::default()).map_err(refused)?;
-        let object = checked::read(&bytes).map_err(refused)?;
-        Ok(Some(Self::of(&object)))
+        self
     }
 
-    /// Returns the parts as columns of a table for [`Identity::of_columns`], without empty ones.
-    pub fn to_columns(&self) -> Vec<(&'static str, String)> {
+    /// Returns the identity with patient, study or frame of another one where it has none itself.
+    #[must_use]
+    pub(super) fn filled(mut self, mut other: Self) -> Self {
+        let mut of_other = other.fields();
+        for (of, lacks) in [
+            (PATIENT, self.patient_id.is_empty() && self.patient_name.is_empty()),
+            (STUDY, self.study.is_empty()),
+            (FRAME, self.frame_of_reference.is_empty()),
+        ] {
+            let own = self.fields();
+            let parts = own.into_iter().zip(&mut of_other).enumerate();
+            parts
+                .filter(|(n, _)| lacks && of.contains(n))
+                .for_each(|(_, (own, other))| std::mem::swap(own, *other));
+        }
+        self
+    }
+
+    /// Returns each part that is not empty, with its name in other formats.
+    pub fn parts(&self) -> Vec<(&'static str, String)> {
         let mut copy = self.clone();
-        let columns = COLUMNS.into_iter().zip(copy.fields());
-        let filled = columns.filter(|(_, field)| !field.is_empty());
-        filled.map(|(column, field)| (column, field.clone())).collect()
+        let all = COLUMNS.into_iter().zip(copy.fields());
+        let filled = all.filter(|(_, field)| !field.is_empty());
+        filled.map(|(name, field)| (name, field.clone())).collect()
     }
 
-    /// Reads the identity from one row of a table; `None` if it names no study and no frame.
-    pub fn of_columns<'a>(value: impl Fn(&str) -> Option<&'a str>) -> Option<Self> {
+    /// Creates an identity from its parts by their names; `None` if there is none.
+    pub(crate) fn of_parts<'a>(part: impl Fn(&str) -> Option<&'a str>) -> Option<Self> {
         let mut found = Self::new();
-        for (column, field) in COLUMNS.into_iter().zip(found.fields()) {
-            // No DICOM value among these is longer.
-            let text = value(column).unwrap_or_default().chars();
-            *field = text.filter(|c| !c.is_control()).take(64).collect();
+        for (name, field) in COLUMNS.into_iter().zip(found.fields()) {
+            *field = printed(part(name).unwrap_or_default());
         }
-        let is_uid = |uid: &str| !uid.is_empty() && uid.chars().all(|c| c.is_ascii_digit() || c == '.');
-        (is_uid(&found.study) && is_uid(&found.frame_of_reference)).then_some(found)
+        let is_uid = |uid: &str| uid.chars().all(|c| c.is_ascii_digit() || c == '.');
+        for uid in [&mut found.study, &mut found.frame_of_reference] {
+            if !is_uid(uid) {
+                uid.clear();
+            }
+        }
+        (!found.parts().is_empty()).then_some(found)
     }
 
     fn fields(&mut self) -> [&mut String; 12] {
@@ -145,22 +168,10 @@ impl Identity {
             &mut self.position_reference,
         ]
     }
+}
 
-    /// Returns the reason why files of both cannot be parts of one study: another patient, or
-    /// another frame.
-    pub fn differs_from(&self, other: &Self) -> Option<String> {
-        if self.patient_id != other.patient_id {
-            let (one, two) = (short(&self.patient_id), short(&other.patient_id));
-            return Some(format!("it is of patient \"{one}\" and not of \"{two}\""));
-        }
-        (self.frame_of_reference != other.frame_of_reference).then(|| {
-            format!(
-                "its frame of reference is {} and not {}, so its places mean something else",
-                short(&self.frame_of_reference),
-                short(&other.frame_of_reference)
-            )
-        })
-    }
+fn printed(part: &str) -> String {
+    part.chars().filter(|c| !c.is_control()).take(MOST).collect()
 }
 
 impl Default for Identity {
@@ -169,21 +180,21 @@ impl Default for Identity {
     }
 }
 
-/// Returns the frame of reference. A structure set may name it only in the sequence of frames, or
-/// with its structures.
+/// Returns the frame of reference. A structure set names it with its structures, or only in the
+/// sequence of frames.
 fn frame_of_reference(data: &InMemDicomObject) -> Option<String> {
     let first = |sequence, tag| items(data, sequence).iter().find_map(|item| text(item, tag));
     text(data, tags::FRAME_OF_REFERENCE_UID)
         .or_else(|| {
             first(
-                tags::REFERENCED_FRAME_OF_REFERENCE_SEQUENCE,
-                tags::FRAME_OF_REFERENCE_UID,
+                tags::STRUCTURE_SET_ROI_SEQUENCE,
+                tags::REFERENCED_FRAME_OF_REFERENCE_UID,
             )
         })
         .or_else(|| {
             first(
-                tags::STRUCTURE_SET_ROI_SEQUENCE,
-                tags::REFERENCED_FRAME_OF_REFERENCE_UID,
+                tags::REFERENCED_FRAME_OF_REFERENCE_SEQUENCE,
+                tags::FRAME_OF_REFERENCE_UID,
             )
         })
 }

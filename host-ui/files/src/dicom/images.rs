@@ -3,18 +3,20 @@
 use super::super::element::voxel_count;
 use super::super::frame::VoxelFrame;
 use super::super::{Progress, bytes};
-use super::values::{exactly, needed, text};
-use super::{Identity, checked};
+use super::values::{exactly, name, needed, text};
+use super::{Identity, Shared, agree, checked};
 use crate::error::ContentError;
 use dicom_dictionary_std::tags;
 use nalgebra::{Matrix3, Vector3};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use stylet_anatomy::ras_from_lps;
 
 /// Most files of a series; a usual one has some hundreds.
 const MAX_FILES: usize = 4096;
 /// Largest deviation of slices from even distances, as a share of one.
 const UNEVEN: f64 = 0.02;
+/// Largest deviation of positions that were rounded to 0.1 mm; it is reported.
+const ROUNDED_MM: f64 = 0.051;
 
 /// Distance from an image within which a contour lies in it.
 const SAME_PLANE_MM: f64 = 0.05;
@@ -130,11 +132,29 @@ pub fn all_in(folder: &Path) -> Result<Vec<Slice>, ContentError> {
     slices_of(folder, |_| true)
 }
 
-/// Returns the slices in a folder that belong to a series or are named one by one.
-pub fn find(folder: &Path, series: &[String], named: &[String]) -> Result<Vec<Slice>, ContentError> {
-    slices_of(folder, |slice| {
+/// Returns the slices in a folder that belong to a series or are named one by one, and remarks;
+/// they must be of one patient and frame with the structures drawn on them.
+pub fn find(
+    folder: &Path,
+    series: &[String],
+    named: &[String],
+    of: &Identity,
+) -> Result<(Vec<Slice>, Vec<String>), ContentError> {
+    let found = slices_of(folder, |slice| {
         series.contains(&slice.series) || named.contains(&slice.uid)
-    })
+    })?;
+    let Some(first) = found.first() else {
+        return Ok((found, Vec::new()));
+    };
+    let notes = together(of, &first.identity, "its images")?;
+    Ok((found, notes))
+}
+
+/// Compares the identities of a file and of its images; returns remarks.
+fn together(of: &Identity, other: &Identity, other_is: &str) -> Result<Vec<String>, ContentError> {
+    let both = [(PathBuf::from(other_is), other.clone()), (PathBuf::new(), of.clone())];
+    let agreed = agree(&both, Shared::Frame).map_err(|why| why.why)?;
+    Ok(agreed.notes.into_iter().map(|(_, note)| note).collect())
 }
 
 fn slices_of(folder: &Path, wanted: impl Fn(&Slice) -> bool) -> Result<Vec<Slice>, ContentError> {
@@ -185,6 +205,9 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
         let near = |a: Vector3<f64>, b: Vector3<f64>| (a - b).norm() < 1e-3 * a.norm();
         s.size == first.size && near(first.steps[0], s.steps[0]) && near(first.steps[1], s.steps[1])
     };
+    for slice in slices.iter().filter(|slice| slice.identity != first.identity) {
+        together(&slice.identity, &first.identity, "another of its images")?;
+    }
     if !slices.iter().all(alike) {
         return Err(ContentError::Invalid(
             "the images of its series differ in size, spacing or orientation; export one series".to_owned(),
@@ -197,15 +220,30 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
         return Ok(None);
     }
     let step = (heights[count - 1] - heights[0]) / (count - 1) as f64;
-    let uneven = |(i, h): (usize, &f64)| (h - heights[0] - step * i as f64).abs() > UNEVEN * step.abs().max(1e-3);
-    if step < 1e-3 || heights.iter().enumerate().any(uneven) {
+    let off = |(i, h): (usize, &f64)| (h - heights[0] - step * i as f64).abs();
+    let most_off = heights.iter().enumerate().map(off).fold(0.0, f64::max);
+    let repeated = heights.windows(2).filter(|w| w[1] - w[0] < 1e-3).count();
+    if repeated > 0 {
         return Err(ContentError::Invalid(format!(
-            "the {count} images of its series do not lie at even distances (on average {step:.3} mm): some are missing or duplicated"
+            "{repeated} of the {count} images of its series are there twice; keep one series"
+        )));
+    }
+    let is_rounded = most_off <= ROUNDED_MM && most_off < step / 4.0;
+    if most_off > UNEVEN * step && !is_rounded {
+        return Err(ContentError::Invalid(format!(
+            "the {count} images of its series do not lie at even distances (on average {step:.3} mm, off by up to {most_off:.3} mm): \
+             some are missing, or their distances differ"
         )));
     }
     let across = (slices[count - 1].corner - slices[0].corner) / (count - 1) as f64;
     let columns = Matrix3::from_columns(&[first.steps[0], first.steps[1], across].map(|c| ras_from_lps(c) * 1e-3));
-    let frame = VoxelFrame::new(columns, ras_from_lps(slices[0].corner) * 1e-3, "image series")?;
+    let mut frame = VoxelFrame::new(columns, ras_from_lps(slices[0].corner) * 1e-3, "image series")?;
+    if most_off > UNEVEN * step {
+        frame.warning = Some(format!(
+            "the positions of its images ({}) are off even distances of {step:.3} mm by up to {most_off:.3} mm; even ones are used",
+            name(tags::IMAGE_POSITION_PATIENT)
+        ));
+    }
     let dims = [first.size[0], first.size[1], count as u64];
     voxel_count(&dims)?;
     Ok(Some(Grid {
@@ -225,6 +263,12 @@ mod tests {
         let pipe = folder.path().join("pipe.dcm");
         let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
         assert!(made.success());
-        assert_eq!(find(folder.path(), &["series".to_owned()], &[]).unwrap().len(), 0);
+        assert_eq!(
+            find(folder.path(), &["series".to_owned()], &[], &Identity::new())
+                .unwrap()
+                .0
+                .len(),
+            0
+        );
     }
 }

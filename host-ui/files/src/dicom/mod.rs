@@ -2,17 +2,23 @@
 
 use crate::error::ContentError;
 
+mod agree;
+#[cfg(test)]
+mod attributes;
+mod charset;
 mod checked;
 pub mod dose;
 mod identity;
 pub mod images;
+mod parse;
 pub mod plan;
 pub mod series;
 pub mod structures;
 mod values;
 mod write;
 
-pub use checked::{Object, is_dicom, read};
+pub use agree::{Agreed, Shared, agree};
+pub use checked::{Object, is_dicom, read, read_head};
 pub use identity::{COLUMNS, Identity};
 pub use write::new_uid;
 

@@ -1,7 +1,9 @@
 //! RT Plan of a permanent implant: the sources, and the place of each seed.
 
 mod permanent;
+mod prescription;
 mod read;
+mod setups;
 mod write;
 
 pub use jiff::civil::Date;
@@ -11,8 +13,8 @@ pub use write::bytes;
 use super::Identity;
 use crate::error::FileError;
 use crate::progress::Progress;
+use crate::report::report;
 use std::path::Path;
-use stylet_base::format::printable;
 
 /// Plan in the patient frame (RAS, m); each strength in U on its own reference day.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,11 +85,9 @@ pub fn open(path: &Path) -> Result<SeedPlan, FileError> {
     let refused = |why| FileError::of(path, why);
     let bytes = crate::bytes::whole(path, &Progress::default()).map_err(refused)?;
     let plan = super::read(&bytes).and_then(|o| of(&o)).map_err(refused)?;
-    for note in &plan.notes {
-        eprintln!("note: {}: {}", path.display(), printable(note));
-    }
+    report(path, &plan.notes);
     Ok(plan)
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

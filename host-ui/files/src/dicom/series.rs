@@ -59,6 +59,29 @@ fn of_path(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, Content
     })
 }
 
+/// Returns modality and unit of the values of a series, by one of its files, or the first image of
+/// a folder; `None` if it is not DICOM.
+pub fn modality(path: &Path) -> Result<Option<(String, String)>, FileError> {
+    let files = match path.is_dir() {
+        true => dicom_files(path).map_err(|why| FileError::of(path, why))?,
+        false if images::begins_as_dicom(path) => vec![path.to_owned()],
+        false => Vec::new(),
+    };
+    for file in files {
+        let Ok(content) = bytes::whole(&file, &Progress::default()) else {
+            continue;
+        };
+        let Ok(object) = checked::read_head(&content) else {
+            continue;
+        };
+        let of = |tag: Tag| text(&object.data, tag).unwrap_or_default();
+        if object.data.get(tags::ROWS).is_some() {
+            return Ok(Some((of(tags::MODALITY), of(tags::RESCALE_TYPE))));
+        }
+    }
+    Ok(None)
+}
+
 /// One slice with its values, row by row.
 struct Frame {
     slice: Slice,
@@ -83,12 +106,19 @@ fn dicom_files(folder: &Path) -> Result<Vec<PathBuf>, ContentError> {
 fn of_folder(folder: &Path, progress: &Progress) -> Result<Vec<Frame>, ContentError> {
     let paths = dicom_files(folder)?;
     let mut series: BTreeMap<String, (Vec<PathBuf>, String)> = BTreeMap::new();
+    let mut unread: Vec<String> = Vec::new();
     for (n, path) in paths.iter().enumerate() {
         progress.report(Stage::Bytes, n, 2 * paths.len())?;
         let Ok(file) = bytes::whole(path, &Progress::default()) else {
             continue;
         };
-        let Ok(object) = checked::read(&file) else { continue };
+        let object = match checked::read(&file) {
+            Ok(object) => object,
+            Err(why) => {
+                unread.push(format!("{}: {why}", bytes::file_name(path)));
+                continue;
+            }
+        };
         let data = &object.data;
         let (Some(uid), Some(_)) = (text(data, tags::SERIES_INSTANCE_UID), data.get(tags::ROWS)) else {
             continue;
@@ -104,6 +134,14 @@ fn of_folder(folder: &Path, progress: &Progress) -> Result<Vec<Frame>, ContentEr
         }
     }
     let mut series: Vec<(Vec<PathBuf>, String)> = series.into_values().collect();
+    if let Some(why) = unread.first() {
+        // One of them may be a slice of the series.
+        return Err(ContentError::Invalid(format!(
+            "{} of its {} DICOM files cannot be read, so an image may be missing: {why}",
+            unread.len(),
+            paths.len()
+        )));
+    }
     let Some((paths, _)) = series.pop() else {
         return Err("it contains no DICOM image series; choose another folder".into());
     };
@@ -130,18 +168,18 @@ fn rest_of_series(path: &Path, object: &Object, progress: &Progress) -> Result<V
         return Err(unplaced(object));
     }
     let series = text(&object.data, tags::SERIES_INSTANCE_UID);
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
     let mut paths = Vec::new();
-    for other in dicom_files(folder)? {
+    for other in dicom_files(bytes::folder(path))? {
         let Ok(file) = bytes::whole(&other, &Progress::default()) else {
             continue;
         };
-        let of_series = checked::read(&file)
-            .ok()
-            .and_then(|o| text(&o.data, tags::SERIES_INSTANCE_UID));
+        let of_series = checked::read(&file).map(|o| text(&o.data, tags::SERIES_INSTANCE_UID));
+        let of_series = of_series.map_err(|why| {
+            why.within(format_args!(
+                "{} in its folder cannot be read, so an image may be missing",
+                other.display()
+            ))
+        })?;
         if of_series == series {
             paths.push(other);
         }
@@ -191,6 +229,11 @@ fn is_enhanced(object: &Object) -> bool {
 
 /// Returns slope and intercept from the stored number to the value.
 fn scale_of(data: &InMemDicomObject) -> Result<[f64; 2], ContentError> {
+    if text(data, tags::MODALITY).as_deref() == Some("CT") {
+        for tag in [tags::RESCALE_SLOPE, tags::RESCALE_INTERCEPT] {
+            number(data, tag)?.ok_or_else(|| format!("{} is missing, so its values are not in HU", name(tag)))?;
+        }
+    }
     let slope = number(data, tags::RESCALE_SLOPE)?.unwrap_or(1.0);
     let intercept = number(data, tags::RESCALE_INTERCEPT)?.unwrap_or(0.0);
     if slope == 0.0 {

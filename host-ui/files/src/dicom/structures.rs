@@ -1,9 +1,13 @@
 //! RT Structure Set: named contours, as a label volume on the grid of their images.
 
 mod cells;
+mod contours;
 mod outline;
+mod overlaps;
 mod planes;
 mod raster;
+mod reach;
+mod rois;
 mod solid;
 pub mod write;
 
@@ -11,19 +15,20 @@ use super::super::element::{short, voxel_count};
 use super::super::frame::VoxelFrame;
 use super::super::overlap::with_warning;
 use super::super::volume::Voxels;
+use super::Identity;
 use super::checked::Object;
 use super::images::{self, Grid};
-use super::values::{items, name, needed, numbers, text};
+use super::values::{items, needed, text};
 use crate::error::ContentError;
+use contours::Drawn;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
 use nalgebra::{Matrix3, Vector3};
+use rois::Rois;
 pub use solid::Solid;
 use std::path::Path;
-use stylet_anatomy::ras_from_lps;
 
 const MAX_STRUCTURES: usize = 255;
-const MAX_MM: f64 = 10_000.0;
 /// Side of a voxel without images. For contours that do not run along cells, the cell sides are
 /// divided into parts of at most this length.
 const SIDE_M: f64 = 0.5e-3;
@@ -96,9 +101,10 @@ fn any_in_another(polygons: &[Vec<[f64; 2]>]) -> bool {
 }
 
 /// Reads a structure set and the images in its folder.
-pub fn read(object: &Object, folder: Option<&Path>) -> Result<Voxels, ContentError> {
-    let set = StructureSet::of(object)?;
-    let slices = folder.map_or(Ok(Vec::new()), |f| images::find(f, &set.series, &set.images))?;
+pub fn read(object: &Object, folder: &Path) -> Result<Voxels, ContentError> {
+    let mut set = StructureSet::of(object)?;
+    let (slices, notes) = images::find(folder, &set.series, &set.images, &Identity::of(object))?;
+    set.notes.extend(notes);
     set.voxels(images::grid(slices)?)
 }
 
@@ -112,30 +118,26 @@ impl StructureSet {
             )));
         }
         let data = &object.data;
-        let mut names = Vec::new();
-        for roi in items(data, tags::STRUCTURE_SET_ROI_SEQUENCE) {
-            let number = needed(roi, tags::ROI_NUMBER, -2e9, 2e9)?;
-            let roi_name = text(roi, tags::ROI_NAME).unwrap_or_else(|| format!("ROI {number}"));
-            names.push((number, roi_name));
-        }
-        let (mut structures, mut notes, mut problems) = (Vec::new(), Vec::new(), Vec::new());
-        for drawn in items(data, tags::ROI_CONTOUR_SEQUENCE) {
-            let number = needed(drawn, tags::REFERENCED_ROI_NUMBER, -2e9, 2e9)?;
-            let known = names.iter().find(|(n, _)| *n == number);
-            let roi_name = known.map_or_else(|| format!("ROI {number}"), |(_, n)| n.clone());
-            match contours(drawn) {
-                Ok(contours) => structures.push(Contoured {
-                    name: roi_name,
-                    contours,
-                }),
-                Err(Unusable::LeftOut(why)) => notes.push(format!("{} is left out: {why}", short(&roi_name))),
-                Err(Unusable::Wrong(why)) => problems.push(format!("{}: {why}", short(&roi_name))),
+        let rois = Rois::of(data)?;
+        let (mut drawn, mut notes, mut problems) = (Vec::<Drawn>::new(), Vec::new(), Vec::new());
+        for item in items(data, tags::ROI_CONTOUR_SEQUENCE) {
+            let number = needed(item, tags::REFERENCED_ROI_NUMBER, -2e9, 2e9)?;
+            match Drawn::of(item, number, rois.name(number, &mut notes)) {
+                Ok(one) => match drawn.iter_mut().find(|other| other.number == number) {
+                    Some(other) => notes.extend(other.and(one)),
+                    None => drawn.push(one),
+                },
+                Err(why) => problems.push(why.to_string()),
             }
         }
         ContentError::all(problems)?;
-        for structure in &mut structures {
-            notes.extend(planes::tidy(structure));
+        let mut structures = Vec::new();
+        for one in drawn {
+            let (structure, remarks) = one.tidied();
+            notes.extend(remarks);
+            structures.extend(structure);
         }
+        notes.extend(rois::same_names(&structures));
         if structures.is_empty() {
             let why = if notes.is_empty() {
                 "there are no contours".to_owned()
@@ -164,8 +166,9 @@ impl StructureSet {
     /// Returns the voxels on the grid of the images, or else on one around the contours.
     pub fn voxels(self, grid: Option<Grid>) -> Result<Voxels, ContentError> {
         let mut notes = self.notes.clone();
+        let of_images = grid.clone();
         let grid = match grid {
-            Some(grid) => grid,
+            Some(grid) => reach::continued(grid, &self.structures)?,
             None => {
                 let grid = self.grid_around()?;
                 notes.push(format!(
@@ -177,6 +180,7 @@ impl StructureSet {
         };
         let (labels, lost) = raster::labels(&self.structures, &grid)?;
         notes.extend(lost);
+        notes.extend(of_images.and_then(|images| reach::beyond(&images, &grid, &labels, &self.structures)));
         let names = (1_u8..=255).zip(self.structures.into_iter().map(|s| s.name)).collect();
         let voxels = Voxels {
             dims: grid.dims,
@@ -258,64 +262,6 @@ fn in_mm(frame: &VoxelFrame) -> String {
     } else {
         format!("{x} x {y} mm")
     }
-}
-
-/// Reason why a structure cannot be used.
-enum Unusable {
-    /// It has no volume.
-    LeftOut(String),
-    Wrong(String),
-}
-
-fn contours(drawn: &InMemDicomObject) -> Result<Vec<Vec<Vector3<f64>>>, Unusable> {
-    let mut all = Vec::new();
-    for contour in items(drawn, tags::CONTOUR_SEQUENCE) {
-        let kind = text(contour, tags::CONTOUR_GEOMETRIC_TYPE).unwrap_or_default();
-        if !["CLOSED_PLANAR", "CLOSEDPLANAR_XOR"].contains(&kind.as_str()) {
-            return Err(Unusable::LeftOut(format!(
-                "a contour is {}; only closed planar ones enclose a volume",
-                if kind.is_empty() { "of no kind" } else { &kind }
-            )));
-        }
-        all.push(closed(contour).map_err(|why| Unusable::Wrong(why.to_string()))?);
-    }
-    if all.is_empty() {
-        return Err(Unusable::LeftOut("it has no contour".to_owned()));
-    }
-    Ok(all)
-}
-
-fn closed(contour: &InMemDicomObject) -> Result<Vec<Vector3<f64>>, ContentError> {
-    let values = numbers(contour, tags::CONTOUR_DATA)?.unwrap_or_default();
-    if values.len() % 3 != 0 || values.len() < 9 {
-        return Err(ContentError::Invalid(format!(
-            "{} has {} values; a closed contour has three for each of at least three corners",
-            name(tags::CONTOUR_DATA),
-            values.len()
-        )));
-    }
-    if let Some(far) = values.iter().find(|v| v.abs() > MAX_MM) {
-        return Err(ContentError::Invalid(format!(
-            "a corner is at {far} mm; at most {MAX_MM} mm is accepted"
-        )));
-    }
-    let points: Vec<_> = values
-        .chunks_exact(3)
-        .map(|p| ras_from_lps(Vector3::new(p[0], p[1], p[2])) * 1e-3)
-        .collect();
-    if let Some(normal) = area_vector(&points).try_normalize(1e-12) {
-        let off = points
-            .iter()
-            .map(|p| (p - points[0]).dot(&normal).abs())
-            .fold(0.0, f64::max);
-        if off > 10.0 * SAME_PLANE_M {
-            return Err(ContentError::Invalid(format!(
-                "a contour called planar is {:.2} mm off its plane",
-                off * 1e3
-            )));
-        }
-    }
-    Ok(points)
 }
 
 /// Returns the normal to the plane of a polygon, as long as its area (m2).

@@ -24,7 +24,11 @@ pub fn text(object: &InMemDicomObject, tag: Tag) -> Option<String> {
         _ => element.to_str().ok()?.into_owned(),
     };
     let shown: String = value.chars().filter(|c| !c.is_control()).collect();
-    let shown = shown.trim_matches(' ');
+    // One value that is there several times is one value.
+    let mut parts = shown.split('\\').map(|part| part.trim_matches(' '));
+    let first = parts.next().unwrap_or_default();
+    let is_one = parts.all(|part| part == first);
+    let shown = if is_one { first } else { shown.trim_matches(' ') };
     (!shown.is_empty()).then(|| shown.to_owned())
 }
 

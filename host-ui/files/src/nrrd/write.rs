@@ -1,13 +1,14 @@
 //! A label volume as NRRD, with Slicer's names of segments.
 
+use super::super::dicom::Identity;
 use super::super::volume::Voxels;
 use crate::error::ContentError;
 use flate2::{Compression, write::GzEncoder};
 use nalgebra::Vector3;
 use std::io::Write;
 
-/// Returns the bytes of the file, packed.
-pub fn bytes(v: &Voxels) -> Result<Vec<u8>, ContentError> {
+/// Returns the bytes of the file, packed, with patient and frame of reference in its header.
+pub fn bytes(v: &Voxels, identity: Option<&Identity>) -> Result<Vec<u8>, ContentError> {
     let vector = |c: Vector3<f64>| format!("({},{},{})", c.x * 1e3, c.y * 1e3, c.z * 1e3);
     let columns = v.frame.columns_m();
     // In LPS, like nearly all files.
@@ -28,6 +29,7 @@ pub fn bytes(v: &Voxels) -> Result<Vec<u8>, ContentError> {
             "Segment{n}_ID:=Segment_{label}\nSegment{n}_Name:={name}\nSegment{n}_LabelValue:={label}\nSegment{n}_Layer:=0\n"
         ));
     }
+    out += &identity.map(Identity::pairs).unwrap_or_default();
     out.push('\n');
     let mut packed = GzEncoder::new(out.into_bytes(), Compression::default());
     // The header stays unpacked: only bytes written from here on are packed.

@@ -86,13 +86,17 @@ pub fn write(
     let kernel = DoseKernel::new(&source, Interval::ALL);
     proceed(0.0)?;
     let (drawn, mut notes) = match like.map(of_file).transpose()?.flatten() {
-        Some(drawn) => (drawn, Vec::new()),
+        Some(mut drawn) => {
+            let notes = std::mem::take(&mut drawn.notes);
+            (drawn, notes)
+        }
         None => {
             let structures = of_voxels(&voxels(scene)?)?;
             let drawn = Drawn {
                 structures,
                 identity: Identity::new(),
                 images: Vec::new(),
+                notes: Vec::new(),
             };
             (drawn, vec!["patient, study and frame of reference are new".to_owned()])
         }
@@ -182,6 +186,7 @@ struct Drawn {
     structures: Vec<Outlined>,
     identity: Identity,
     images: Vec<Slice>,
+    notes: Vec<String>,
 }
 
 /// Reads the contours of a structure set, or of the one that a scene file names; `None` for any
@@ -199,11 +204,15 @@ fn of_file(path: &Path) -> Result<Option<Drawn>, SceneStudyError> {
     }
     let object = dicom::read(&content).map_err(refused)?;
     let set = StructureSet::of(&object).map_err(refused)?;
-    let beside = path.parent().unwrap_or(Path::new(""));
+    let identity = Identity::of(&object);
+    let found = images::find(bytes::folder(path), &set.series, &set.images, &identity);
+    let (images, found_notes) = found.map_err(refused)?;
+    let notes = [set.notes.clone(), found_notes].concat();
     Ok(Some(Drawn {
-        images: images::find(beside, &set.series, &set.images).map_err(refused)?,
-        identity: Identity::of(&object),
+        images,
+        identity: identity.completed(),
         structures: of_set(set),
+        notes,
     }))
 }
 

@@ -7,7 +7,8 @@ use stylet_anatomy::PatientFrame;
 use stylet_base::format::printable;
 use stylet_dose::Source;
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
-use stylet_files::dicom::{Identity, new_uid};
+use stylet_files::dicom::{Identity, Shared, new_uid};
+use stylet_files::together;
 use stylet_shm_schema::SceneHeader;
 
 /// Model of the source for files that name none.
@@ -23,9 +24,10 @@ pub fn usual() -> Result<(Source, f64), PlanError> {
     Ok((source, prescription_gy))
 }
 
-/// Reads a plan file (.toml), a table of seeds (.csv) or an RT Plan (.dcm); the error names the
-/// file.
-pub fn read(path: &Path, scene: &SceneHeader) -> Result<ImplantPlan, PlanError> {
+/// Reads a plan file (.toml), a table of seeds (.csv) or an RT Plan (.dcm), which must be of the
+/// patient and frame of the scene's file; the error names the file.
+pub fn read(path: &Path, scene: &SceneHeader, scene_file: Option<&Path>) -> Result<ImplantPlan, PlanError> {
+    together(&[scene_file, Some(path)], Shared::Frame).map_err(|e| PlanError::Invalid(vec![e.to_string()]))?;
     let patient = scene.patient();
     if has_ending(path, "toml") {
         return file::read(path, &patient);
@@ -69,17 +71,26 @@ fn source_of(declared: &Declared) -> Result<Source, PlanError> {
     )))
 }
 
-/// Writes all of the plan as .toml, its seeds as .csv or .dcm.
-pub fn write(path: &Path, plan: &ImplantPlan, patient: &PatientFrame) -> Result<(), PlanError> {
+/// Writes all of the plan as .toml, its seeds as .csv or .dcm, with the patient and frame of the
+/// scene's file.
+pub fn write(
+    path: &Path,
+    plan: &ImplantPlan,
+    patient: &PatientFrame,
+    scene_file: Option<&Path>,
+) -> Result<(), PlanError> {
+    let identity = scene_file.map(Identity::of_path).transpose();
+    let identity = identity.map_err(|e| PlanError::Invalid(vec![e.to_string()]))?.flatten();
+    let comments = identity.as_ref().map(Identity::comments).unwrap_or_default();
     let bytes = if has_ending(path, "toml") {
-        file::to_text(plan, patient)
-            .map_err(|e| PlanError::of_file(path, e))?
-            .into_bytes()
+        let text = file::to_text(plan, patient).map_err(|e| PlanError::of_file(path, e))?;
+        (comments + &text).into_bytes()
     } else if has_ending(path, "csv") {
-        file::seeds_to_csv(plan, patient).into_bytes()
+        (comments + &file::seeds_to_csv(plan, patient)).into_bytes()
     } else if has_ending(path, "dcm") {
         let of_file = |why: String| PlanError::of_file(path, why);
-        let seeds = seed_plan(plan, patient).map_err(|e| of_file(e.to_string()))?;
+        let mut seeds = seed_plan(plan, patient).map_err(|e| of_file(e.to_string()))?;
+        seeds.identity = identity.unwrap_or_default().completed();
         plan::bytes(&seeds).map_err(|e| of_file(e.to_string()))?
     } else {
         return Err(PlanError::of_file(path, "its name must end in .toml, .csv or .dcm"));

@@ -4,9 +4,9 @@ use super::{PlanError, file};
 use crate::readers::{Declared, SeedDefaults, SeedFile, SeedRow, read_seed_rows};
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
-use stylet_base::format::printable;
 use stylet_dose::decay::s_to_days;
 use stylet_dose::{Seed, Source};
+pub use stylet_files::report;
 
 /// Reads the seeds of a file in the patient's frame; a plan file is recognised by its extension, an
 /// RT Plan by its content.
@@ -41,7 +41,6 @@ fn of_plan_file(path: &Path) -> Result<SeedFile, PlanError> {
     let source = Source::known(&plan.source);
     Ok(SeedFile {
         notes: Vec::new(),
-        identity: None,
         rows,
         declared: Some(Declared {
             isotope: source.as_ref().map_or_else(String::new, |s| s.nuclide.clone()),
@@ -51,11 +50,4 @@ fn of_plan_file(path: &Path) -> Result<SeedFile, PlanError> {
             planned_on: None,
         }),
     })
-}
-
-/// Prints notes about a file to standard error.
-pub fn report(path: &Path, notes: &[String]) {
-    for note in notes {
-        eprintln!("note: {}: {}", path.display(), printable(note));
-    }
 }

@@ -69,10 +69,11 @@ impl Job {
         }
     }
 
-    /// Reads a plan file, a table of seeds or an RT Plan, in the patient's frame. Doubtful content
+    /// Reads a plan file, a table of seeds or an RT Plan, in the patient's frame, of the patient of the
+    /// scene's file. Doubtful content
     /// is reported and not refused.
-    pub fn from_file(path: &Path, scene: &SceneModel) -> Result<Self, ProcedureError> {
-        let plan = exchange::read(path, &scene.header)?;
+    pub fn from_file(path: &Path, scene: &SceneModel, scene_file: Option<&Path>) -> Result<Self, ProcedureError> {
+        let plan = exchange::read(path, &scene.header, scene_file)?;
         if plan.seed_count() == 0 || plan.seed_count() > MAX_SEEDS {
             return Err(ProcedureError::Input(format!(
                 "{}: {} seeds; 1 to {MAX_SEEDS} can be placed",

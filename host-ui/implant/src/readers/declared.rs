@@ -12,6 +12,10 @@ use stylet_files::dicom::plan::Date;
 const SAME_HALF_LIFE: f64 = 0.01;
 /// Largest age of a strength in days; a date beyond is a typing error.
 const MAX_DAYS: i32 = 3650;
+/// Strengths of the seeds of permanent implants, U.
+const USUAL_U: std::ops::RangeInclusive<f64> = 0.05..=10.0;
+/// Half-lives after the implant on which a strength may be given: an implant may be brought forward.
+const MOST_HALF_LIVES_AHEAD: f64 = 0.5;
 /// Difference below which doses are equal.
 const SAME_GY: f64 = 1e-6;
 
@@ -50,16 +54,31 @@ pub enum Mismatch {
     },
     /// The reference day of a strength is years from the implant.
     #[error(
-        "the strength of its seeds refers to {strength_on}, {days} days from the implant on {implant}; correct --implant-date"
+        "the strength of its seeds refers to {strength_on}, {} the implant on {implant}; correct --implant-date",
+        before(.days)
     )]
     Date {
         /// Day of the strength.
         strength_on: Date,
         /// Day of the implant.
         implant: Date,
-        /// Days between.
+        /// Days from the strength to the implant.
         days: i32,
     },
+    /// A seed without strength.
+    #[error("its seed {number} has a strength of 0 U; give its strength")]
+    NoStrength {
+        /// Number of the seed, from 1.
+        number: usize,
+    },
+}
+
+/// Returns the days from a strength to the implant in words.
+fn before(days: &i32) -> String {
+    match days {
+        ahead @ ..0 => format!("{} days after", -ahead),
+        days => format!("{days} days before"),
+    }
 }
 
 impl Declared {
@@ -117,11 +136,32 @@ impl SeedFile {
         let declared = self.declared.as_ref();
         let mut notes = std::mem::take(&mut self.notes);
         notes.extend(declared.map_or(Ok(Vec::new()), |d| d.check(source))?);
+        notes.extend(strengths(&self.rows)?);
         notes.extend(day.decay(&mut self.rows, declared, source)?);
         let (prescription_gy, note) = prescription(asked_gy, declared, source);
         notes.extend(note);
         Ok((prescription_gy, notes))
     }
+}
+
+/// Refuses seeds without a strength; reports strengths that no seed of a permanent implant has.
+fn strengths(rows: &[SeedRow]) -> Result<Option<String>, Mismatch> {
+    if let Some(place) = rows.iter().position(|row| row.seed.strength_u <= 0.0) {
+        return Err(Mismatch::NoStrength { number: place + 1 });
+    }
+    let unusual = rows
+        .iter()
+        .map(|row| row.seed.strength_u)
+        .filter(|u| !USUAL_U.contains(u));
+    let (count, most) = unusual.fold((0, 0.0_f64), |(count, most), u| (count + 1, most.max(u)));
+    Ok((count > 0).then(|| {
+        format!(
+            "{count} of its {} seeds have an unusual strength, up to {most} U (permanent seeds have {} to {} U): is it in U?",
+            rows.len(),
+            USUAL_U.start(),
+            USUAL_U.end()
+        )
+    }))
 }
 
 /// Compares models: "OncoSeed 6711" is 6711; a plan without a model matches any.
@@ -181,10 +221,11 @@ impl DayOfImplant {
         };
         let Some(implant) = self.0 else {
             let old = declared.and_then(|d| d.planned_on).map_or_else(String::new, |planned| {
-                format!(
-                    " (the plan is of {planned}, {} days later)",
-                    days_between(last, planned)
-                )
+                match days_between(last, planned) {
+                    0 => " (the day of the plan)".to_owned(),
+                    days if days < 0 => format!(" (the plan is of {planned}, {} days earlier)", -days),
+                    days => format!(" (the plan is of {planned}, {days} days later)"),
+                }
             });
             return Ok(Some(format!(
                 "strengths are used as of their reference date {when}{old}; give --implant-date to let them decay to that day"
@@ -193,7 +234,8 @@ impl DayOfImplant {
         for row in rows.iter_mut() {
             let Some(strength_on) = row.strength_on else { continue };
             let days = days_between(strength_on, implant);
-            if days.abs() > MAX_DAYS {
+            let half_lives = days_to_s(f64::from(-days)) / source.half_life_s;
+            if days.abs() > MAX_DAYS || half_lives > MOST_HALF_LIVES_AHEAD {
                 return Err(Mismatch::Date {
                     strength_on,
                     implant,
@@ -202,11 +244,16 @@ impl DayOfImplant {
             }
             row.seed.strength_u *= left_after(days_to_s(f64::from(days)), source.half_life_s);
         }
-        let left = left_after(days_to_s(f64::from(days_between(last, implant))), source.half_life_s);
-        Ok(Some(format!(
-            "strengths of {when} decay to the implant on {implant}: {:.1} % of the last one remain",
-            left * 100.0
-        )))
+        let ahead = days_between(implant, last);
+        let left = left_after(days_to_s(f64::from(-ahead)), source.half_life_s) * 100.0;
+        Ok(Some(match ahead > 0 {
+            true => format!(
+                "strengths of {when} are counted back to the implant on {implant}, {ahead} days before: {left:.1} % of the last one"
+            ),
+            false => {
+                format!("strengths of {when} decay to the implant on {implant}: {left:.1} % of the last one remain")
+            }
+        }))
     }
 }
 

@@ -2,11 +2,13 @@
 
 use super::table::{self, LineError, PLACE};
 use std::path::Path;
-use stylet_files::dicom::{self, dose::ReadDose};
-use stylet_files::{FileError, bytes};
+use stylet_files::dicom::dose::{DoseKind, ReadDose};
+use stylet_files::{FileError, Progress, Sink, bytes, dicom, lines_of, nrrd};
 
 /// Number of bytes that distinguish a DICOM file from a table.
 const START_BYTES: u64 = 160;
+/// Pair of an NRRD header that gives the unit of a dose.
+const UNITS_LINE: &str = "dose_units";
 
 /// Doses on a regular grid of places in RAS; x runs fastest.
 pub struct DoseFile {
@@ -18,6 +20,12 @@ pub struct DoseFile {
     pub spacing_m: [f64; 3],
     /// Doses in Gy.
     pub dose_gy: Vec<f64>,
+    /// Type and summation.
+    pub kind: DoseKind,
+    /// SOP instance UID of its plan.
+    pub plan: Option<String>,
+    /// Remarks on the reading for the user.
+    pub notes: Vec<String>,
 }
 
 impl From<ReadDose> for DoseFile {
@@ -27,6 +35,9 @@ impl From<ReadDose> for DoseFile {
             origin_m: dose.origin_m,
             spacing_m: dose.spacing_m,
             dose_gy: dose.dose_gy,
+            kind: dose.kind,
+            plan: dose.plan,
+            notes: dose.notes,
         }
     }
 }
@@ -72,24 +83,48 @@ impl DoseFile {
     }
 }
 
-/// Reads a dose from an RT Dose or a table, detected by the content.
+/// Reads a dose from an RT Dose, an NRRD volume or a table, detected by the content.
 pub fn read_any_dose(path: &Path) -> Result<DoseFile, FileError> {
-    let is_dicom = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
-    match is_dicom {
-        true => Ok(dicom::dose::of_file(path)?.into()),
-        false => read_dose(path),
+    let start = bytes::start(path, START_BYTES).unwrap_or_default();
+    if dicom::is_dicom(&start) {
+        return Ok(dicom::dose::of_file(path)?.into());
+    }
+    let kind = DoseKind::of_lines(lines_of(path));
+    match nrrd::is_nrrd(&start) {
+        true => read_volume(path, kind),
+        false => read_table(path, kind),
     }
 }
 
+/// Returns whether a file is an NRRD volume that `host-ui convert` wrote as a dose.
+pub fn is_dose_volume(path: &Path) -> bool {
+    let is_nrrd = bytes::start(path, START_BYTES).is_some_and(|start| nrrd::is_nrrd(&start));
+    is_nrrd && lines_of(path)(UNITS_LINE).is_some()
+}
+
+fn read_volume(path: &Path, kind: DoseKind) -> Result<DoseFile, FileError> {
+    let refused = |why| FileError::of(path, why);
+    let content = bytes::whole(path, &Progress::default()).map_err(refused)?;
+    let progress = Progress::default();
+    let data = |name: &str| bytes::data_file(path, name, &progress);
+    let volume = nrrd::read_image(&content, &data, Sink::exact(&progress)).map_err(refused)?;
+    let mut dose = DoseFile::from(dicom::dose::of_volume(&volume, kind).map_err(refused)?);
+    if !is_dose_volume(path) {
+        dose.notes
+            .push("it does not say its unit; its values are taken as Gy".to_owned());
+    }
+    Ok(dose)
+}
+
 /// Reads a dose grid in the format of `host-ui dose`: every place of a regular grid, x fastest.
-pub fn read_dose(path: &Path) -> Result<DoseFile, FileError> {
+fn read_table(path: &Path, kind: DoseKind) -> Result<DoseFile, FileError> {
     let (rows, _) = table::read(path, &[PLACE.as_slice(), &["dose_gy"]].concat(), &[], |row| {
         let dose = row
             .number("dose_gy")?
             .ok_or_else(|| LineError::new("dose_gy is empty"))?;
         Ok((row.position_m()?, dose))
     })?;
-    grid_of(&rows).ok_or_else(|| {
+    grid_of(&rows, kind).ok_or_else(|| {
         FileError::of(
             path,
             "its places are not a grid with x running fastest, like those of dose_grid.csv",
@@ -97,7 +132,7 @@ pub fn read_dose(path: &Path) -> Result<DoseFile, FileError> {
     })
 }
 
-fn grid_of(rows: &[([f64; 3], f64)]) -> Option<DoseFile> {
+fn grid_of(rows: &[([f64; 3], f64)], kind: DoseKind) -> Option<DoseFile> {
     let origin_m = rows.first()?.0;
     let near = |a: f64, b: f64| (a - b).abs() < 2e-7;
     let first_off = |from: usize, axis: usize| (from..rows.len()).find(|&r| !near(rows[r].0[axis], origin_m[axis]));
@@ -123,5 +158,8 @@ fn grid_of(rows: &[([f64; 3], f64)]) -> Option<DoseFile> {
         origin_m,
         spacing_m,
         dose_gy: rows.iter().map(|r| r.1).collect(),
+        notes: kind.remarks(),
+        kind,
+        plan: None,
     })
 }

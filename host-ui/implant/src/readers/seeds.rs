@@ -4,11 +4,10 @@ use super::columns::Mapped;
 use super::declared::Declared;
 pub use super::table::PLACE;
 use super::table::{self, LineError, Row, shown};
-use std::cell::OnceCell;
 use std::path::Path;
 use stylet_dose::Seed;
+use stylet_files::dicom;
 use stylet_files::dicom::plan::{Date, PlanSeed, SeedPlan};
-use stylet_files::dicom::{self, Identity};
 use stylet_files::{FileError, bytes};
 
 const MAX_U: f64 = 1e5;
@@ -50,8 +49,6 @@ pub struct SeedFile {
     pub rows: Vec<SeedRow>,
     /// Declarations; `None` for a table, which says nothing of its source.
     pub declared: Option<Declared>,
-    /// Patient, study and frame of reference, if the file names them.
-    pub identity: Option<Identity>,
     /// Remarks on the reading of the file.
     pub notes: Vec<String>,
 }
@@ -65,7 +62,7 @@ pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, File
 /// Reads a table of seeds or a DICOM RT Plan, which gives the strengths itself. A table has the
 /// columns
 /// `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci][,strength_date][,needle][,hole]`,
-/// and those of [`dicom::COLUMNS`]. It may also have columns that state their quantity and unit,
+/// and those of [`dicom::COLUMNS`], which are skipped. It may also have columns that state their quantity and unit,
 /// such as "Pos X (cm)", or any columns that [`SeedDefaults::columns`] names. Commas, semicolons or
 /// tabs separate them.
 pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileError> {
@@ -81,10 +78,7 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
         &dicom::COLUMNS,
     ]
     .concat();
-    // From the first row; all are of one patient.
-    let identity = OnceCell::new();
     let row = |row: &Row| {
-        identity.get_or_init(|| Identity::of_columns(|column| row.text(column)));
         Ok(SeedRow {
             seed: Seed {
                 position_m: row.position_m()?,
@@ -101,7 +95,6 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
         rows,
         notes,
         declared: None,
-        identity: identity.into_inner().flatten(),
     })
 }
 
@@ -109,7 +102,6 @@ fn of_plan(plan: SeedPlan) -> SeedFile {
     SeedFile {
         // They were reported when it was opened.
         notes: Vec::new(),
-        identity: Some(plan.identity),
         declared: Some(Declared {
             model: plan.source.model,
             isotope: plan.source.isotope,

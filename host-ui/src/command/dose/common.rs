@@ -14,7 +14,6 @@ use stylet_dose::report::{Judge, choose_target};
 use stylet_dose::seed::Seed;
 use stylet_dose::source::Source;
 use stylet_dose::structure::Structure;
-use stylet_files::dicom::Identity;
 use stylet_files::dicom::plan::Date;
 use stylet_implant::plan::seeds;
 use stylet_implant::readers::{DayOfImplant, Declared, Mapped, SeedDefaults, SeedRow, contours, labels, places};
@@ -78,8 +77,6 @@ pub struct Loaded {
     pub rows: Vec<SeedRow>,
     /// Declarations of a plan about its seeds.
     pub declared: Option<Declared>,
-    /// Patient, study and frame of reference, if the file of the seeds names them.
-    pub identity: Option<Identity>,
     prescription_gy: Option<f64>,
 }
 
@@ -116,7 +113,7 @@ impl Common {
         let agreed = file.agree(&source, self.prescription_gy, day);
         let (prescription_gy, notes) = agreed.map_err(|why| format!("{}: {why}", path.display()))?;
         seeds::report(path, &notes);
-        let (declared, identity) = (file.declared.take(), file.identity.take());
+        let declared = file.declared.take();
         let mut all: Vec<Seed> = file.rows.into_iter().map(|row| row.seed).collect();
         if source.tables.anisotropy_2d.is_none() && all.iter().any(|s| s.axis.is_some()) {
             return Err(format!(
@@ -150,7 +147,6 @@ impl Common {
             seeds: all,
             rows,
             declared,
-            identity,
             prescription_gy,
         })
     }

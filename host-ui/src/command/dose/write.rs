@@ -8,6 +8,7 @@ use stylet_base::{write_streamed, write_whole};
 use stylet_dose::Dvh;
 use stylet_dose::criterion::CriterionCount;
 use stylet_dose::perturb::{PERCENTILES, Spread};
+use stylet_files::dicom::Identity;
 use stylet_implant::finder::FoundSeed;
 use stylet_implant::readers::seeds::{AXIS, FOUND, PLACE};
 use stylet_implant::sheet::{NotComputed, Row};
@@ -18,7 +19,18 @@ pub fn json(path: &Path, value: &Value) -> Result<(), CommandError> {
 }
 
 fn csv(path: &Path, header: &[String], rows: impl Iterator<Item = Vec<String>>) -> Result<(), CommandError> {
+    csv_after("", path, header, rows)
+}
+
+/// Writes comment lines, then a table.
+fn csv_after(
+    comments: &str,
+    path: &Path,
+    header: &[String],
+    rows: impl Iterator<Item = Vec<String>>,
+) -> Result<(), CommandError> {
     let table = |file: &mut dyn std::io::Write| -> std::io::Result<()> {
+        file.write_all(comments.as_bytes())?;
         let mut writer = csv::Writer::from_writer(file);
         writer.write_record(header.iter().map(|name| cell(name).into_owned()))?;
         for row in rows {
@@ -33,17 +45,37 @@ fn owned(header: &[&str]) -> Vec<String> {
     header.iter().map(|&h| h.to_owned()).collect()
 }
 
-pub fn doses(path: &Path, points_m: impl Iterator<Item = [f64; 3]>, dose_gy: &[f64]) -> Result<(), CommandError> {
+/// Writes doses at places, after comment lines with patient and frame of reference.
+pub fn doses(
+    path: &Path,
+    identity: Option<&Identity>,
+    points_m: impl Iterator<Item = [f64; 3]>,
+    dose_gy: &[f64],
+) -> Result<(), CommandError> {
+    doses_after(&comments(identity), path, points_m, dose_gy)
+}
+
+fn comments(identity: Option<&Identity>) -> String {
+    identity.map(Identity::comments).unwrap_or_default()
+}
+
+/// Writes comment lines, then doses at places.
+pub fn doses_after(
+    comments: &str,
+    path: &Path,
+    points_m: impl Iterator<Item = [f64; 3]>,
+    dose_gy: &[f64],
+) -> Result<(), CommandError> {
     let rows = points_m.zip(dose_gy).map(|(p, gy)| {
         let [x, y, z] = p.map(|v| format!("{:.4}", v * 1e3));
         vec![x, y, z, format!("{gy:.6}")]
     });
-    csv(path, &owned(&["x_mm", "y_mm", "z_mm", "dose_gy"]), rows)
+    csv_after(comments, path, &owned(&["x_mm", "y_mm", "z_mm", "dose_gy"]), rows)
 }
 
 /// Writes the seeds of a CT in the columns that `host-ui dose --seeds` reads; the last three give
-/// the certainty of each.
-pub fn found_seeds(path: &Path, seeds: &[FoundSeed]) -> Result<(), CommandError> {
+/// the certainty of each. Comment lines before them have the patient and frame of the CT.
+pub fn found_seeds(path: &Path, identity: Option<&Identity>, seeds: &[FoundSeed]) -> Result<(), CommandError> {
     let header = [PLACE.as_slice(), &AXIS, &FOUND].concat();
     let rows = seeds.iter().map(|s| {
         let place = s.position_m.map(|m| format!("{:.3}", m * 1e3));
@@ -55,7 +87,7 @@ pub fn found_seeds(path: &Path, seeds: &[FoundSeed]) -> Result<(), CommandError>
         ];
         [place, axis, sure].concat()
     });
-    csv(path, &owned(&header), rows)
+    csv_after(&comments(identity), path, &owned(&header), rows)
 }
 
 /// Writes differential and cumulative histograms, up to the highest dose but not beyond ten times

@@ -2,8 +2,10 @@
 //! and frames.
 
 use super::super::super::element::{short, voxel_count};
-use super::super::values::{exactly, items, name, needed, numbers, text};
-use super::super::{Identity, Object, checked};
+use super::super::values::{exactly, items, name, needed, number, numbers, text};
+use super::super::{Object, checked};
+use super::DoseKind;
+use crate::VoxelValues;
 use crate::error::{ContentError, FileError};
 use crate::progress::Progress;
 use dicom_dictionary_std::{tags, uids};
@@ -21,8 +23,10 @@ const UNEVEN: f64 = 1e-3;
 /// Dose from a file, its voxels in the order of [`super::DoseImage`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReadDose {
-    /// Patient, study and frame of reference.
-    pub identity: Identity,
+    /// Type and summation.
+    pub kind: DoseKind,
+    /// Remarks on the reading for the user.
+    pub notes: Vec<String>,
     /// SOP instance UID of the dose itself.
     pub uid: String,
     /// SOP instance UID of its RT Plan.
@@ -47,7 +51,7 @@ pub fn of_file(path: &Path) -> Result<ReadDose, FileError> {
     of(&object, pixels, is_big_endian).map_err(refused)
 }
 
-fn of(object: &Object, pixels: &[u8], is_big_endian: bool) -> Result<ReadDose, ContentError> {
+pub(in crate::dicom) fn of(object: &Object, pixels: &[u8], is_big_endian: bool) -> Result<ReadDose, ContentError> {
     if object.sop_class != uids::RT_DOSE_STORAGE {
         return Err(ContentError::Invalid(format!(
             "it is DICOM of another kind (SOP class {}); a dose is an RT Dose",
@@ -69,16 +73,50 @@ fn of(object: &Object, pixels: &[u8], is_big_endian: bool) -> Result<ReadDose, C
         let item = items(data, tag).first()?;
         text(item, tags::REFERENCED_SOP_INSTANCE_UID)
     };
+    let (kind, mut notes) = DoseKind::of(data)?;
+    let dose_gy: Vec<f64> = grid.in_order(&raw).map(|value| value * scaling).collect();
+    notes.extend(negative(&dose_gy));
     Ok(ReadDose {
-        identity: Identity::of(object),
+        kind,
+        notes,
         uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_default(),
         plan: first(tags::REFERENCED_RT_PLAN_SEQUENCE),
         structure_set: first(tags::REFERENCED_STRUCTURE_SET_SEQUENCE),
         dims: grid.dims(),
         origin_m: grid.origin_m(),
         spacing_m: grid.spacing_m(),
-        dose_gy: grid.in_order(&raw).map(|value| value * scaling).collect(),
+        dose_gy,
     })
+}
+
+/// Takes a volume of another format as a dose in gray.
+pub fn of_volume(volume: &VoxelValues<f64>, kind: DoseKind) -> Result<ReadDose, ContentError> {
+    let frame = &volume.frame;
+    let steps = [0, 1, 2].map(|a| frame.directions.column(a) * frame.spacing_m[a]);
+    let grid = Layout::along(volume.dims, frame.origin_m, steps)?;
+    let dose_gy: Vec<f64> = grid.in_order(&volume.values).collect();
+    if !dose_gy.iter().all(|gy| gy.is_finite()) {
+        return Err("it contains a value that is not a number; write it again".into());
+    }
+    let mut notes: Vec<String> = frame.warning.iter().cloned().collect();
+    notes.extend(kind.remarks());
+    notes.extend(negative(&dose_gy));
+    Ok(ReadDose {
+        kind,
+        notes,
+        uid: String::new(),
+        plan: None,
+        structure_set: None,
+        dims: grid.dims(),
+        origin_m: grid.origin_m(),
+        spacing_m: grid.spacing_m(),
+        dose_gy,
+    })
+}
+
+fn negative(dose_gy: &[f64]) -> Option<String> {
+    let lowest = dose_gy.iter().copied().fold(0.0, f64::min);
+    (lowest < 0.0).then(|| format!("it has negative doses, the lowest of {lowest:.3} Gy"))
 }
 
 /// Layout of a file's voxels in the patient: columns, rows and frames, in this order, each with an
@@ -117,10 +155,16 @@ impl Layout {
             column * between_rows,
             across * frame_step_mm(data, frames, Vector3::from(first), across)?,
         ];
+        let in_ras = |mm: Vector3<f64>| ras_from_lps(mm) * 1e-3;
+        Self::along(counts, in_ras(Vector3::from(first)), steps.map(in_ras))
+    }
+
+    /// Creates a layout from the counts, the centre of the first voxel and the steps along columns,
+    /// rows and frames (RAS, m), which must be along the patient's axes.
+    fn along(counts: [usize; 3], first_m: Vector3<f64>, steps: [Vector3<f64>; 3]) -> Result<Self, ContentError> {
         let mut axes = [0; 3];
         let mut steps_m = [0.0; 3];
-        for (n, step) in steps.iter().enumerate() {
-            let ras = ras_from_lps(*step) * 1e-3;
+        for (n, ras) in steps.iter().enumerate() {
             let axis = ras.iamax();
             let aside = ras.norm_squared() - ras[axis] * ras[axis];
             // NaN compares false.
@@ -132,16 +176,13 @@ impl Layout {
         let mut sorted = axes;
         sorted.sort_unstable();
         if sorted != [0, 1, 2] {
-            return Err(ContentError::Invalid(format!(
-                "{} gives no right angles",
-                name(tags::IMAGE_ORIENTATION_PATIENT)
-            )));
+            return Err("its axes are not at right angles (ImageOrientationPatient)".into());
         }
         Ok(Self {
             counts,
             axes,
             steps_m,
-            first_m: ras_from_lps(Vector3::from(first)) * 1e-3,
+            first_m,
         })
     }
 
@@ -226,7 +267,27 @@ fn values(data: &InMemDicomObject, pixels: &[u8], is_big_endian: bool, count: us
         )));
     }
     let is_signed = needed(data, tags::PIXEL_REPRESENTATION, 0.0, 1.0)? == 1.0;
+    for (tag, whole) in [
+        (tags::BITS_STORED, bits),
+        (tags::HIGH_BIT, bits - 1.0),
+        (tags::SAMPLES_PER_PIXEL, 1.0),
+    ] {
+        if let Some(value) = number(data, tag)?.filter(|value| *value != whole) {
+            return Err(ContentError::Invalid(format!(
+                "{} is {value}; doses of {bits} bits have {whole}",
+                name(tag)
+            )));
+        }
+    }
     let size = bits as usize / 8;
+    // One byte more makes an odd length even.
+    if pixels.len() > (count * size).next_multiple_of(2) {
+        return Err(ContentError::Invalid(format!(
+            "{count} voxels need {} bytes, and {} are there: NumberOfFrames, Rows or Columns are not those of its pixels",
+            count * size,
+            pixels.len()
+        )));
+    }
     if pixels.len() < count * size {
         return Err(ContentError::Invalid(format!(
             "it is truncated: {count} voxels need {} bytes, and {} are there; copy or export it again",

@@ -1,6 +1,7 @@
 //! A dose as DICOM, for viewers and other planning systems.
 
 use super::super::write::{bytes as file_bytes, common, decimals, item, reference, sequence, string, whole};
+use super::kind::ERROR;
 use super::{DoseImage, DoseOf, Histogram};
 use crate::error::ContentError;
 use dicom_core::value::PrimitiveValue;
@@ -22,13 +23,23 @@ pub fn bytes(image: &DoseImage, of: &DoseOf) -> Result<Vec<u8>, ContentError> {
             "the dose grid has more than 4 GiB; choose larger voxels".to_owned(),
         ));
     }
-    let highest = image.dose_gy.iter().copied().fold(0.0, f64::max);
-    if !image.dose_gy.iter().all(|d| d.is_finite() && *d >= 0.0) || highest == 0.0 {
+    image.kind.writable()?;
+    let lowest = image.dose_gy.iter().copied().fold(0.0, f64::min);
+    let largest = image.dose_gy.iter().copied().map(f64::abs).fold(0.0, f64::max);
+    if !image.dose_gy.iter().all(|d| d.is_finite()) || largest == 0.0 {
         return Err(ContentError::Invalid(
-            "the dose is nowhere above 0, or not a number somewhere".to_owned(),
+            "the dose is 0 everywhere, or not a number somewhere".to_owned(),
         ));
     }
-    let scaling = highest / f64::from(u32::MAX - 1);
+    // Only differences may be negative (PS3.3, C.8.8.3).
+    let is_signed = lowest < 0.0;
+    if is_signed && image.kind.dose_type != ERROR {
+        return Err(ContentError::Invalid(format!(
+            "it has negative doses, the lowest of {lowest:.3} Gy, which a dose of type {} cannot have",
+            image.kind.dose_type
+        )));
+    }
+    let scaling = largest / f64::from(if is_signed { i32::MAX as u32 - 1 } else { u32::MAX - 1 });
     let scaling: f64 = format!("{scaling:.9e}").parse().unwrap_or(scaling);
     let pixels = pixels(image, scaling);
     // Left and posterior are positive in DICOM, so the rows of the file begin at our last voxel.
@@ -65,10 +76,10 @@ pub fn bytes(image: &DoseImage, of: &DoseOf) -> Result<Vec<u8>, ContentError> {
         short(tags::BITS_ALLOCATED, 32),
         short(tags::BITS_STORED, 32),
         short(tags::HIGH_BIT, 31),
-        short(tags::PIXEL_REPRESENTATION, 0),
+        short(tags::PIXEL_REPRESENTATION, usize::from(is_signed)),
         string(tags::DOSE_UNITS, VR::CS, "GY"),
-        string(tags::DOSE_TYPE, VR::CS, "PHYSICAL"),
-        string(tags::DOSE_SUMMATION_TYPE, VR::CS, "PLAN"),
+        string(tags::DOSE_TYPE, VR::CS, &image.kind.dose_type),
+        string(tags::DOSE_SUMMATION_TYPE, VR::CS, &image.kind.summation),
         decimals(tags::GRID_FRAME_OFFSET_VECTOR, &offsets),
         decimals(tags::DOSE_GRID_SCALING, &[scaling]),
         sequence(tags::REFERENCED_RT_PLAN_SEQUENCE, vec![plan]),
@@ -114,7 +125,7 @@ fn pixels(image: &DoseImage, scaling: f64) -> Vec<u8> {
     for k in 0..nz {
         for j in (0..ny).rev() {
             for i in (0..nx).rev() {
-                let value = (image.dose_gy[(k * ny + j) * nx + i] / scaling).round() as u32;
+                let value = (image.dose_gy[(k * ny + j) * nx + i] / scaling).round() as i64 as u32;
                 pixels.extend(value.to_le_bytes());
             }
         }

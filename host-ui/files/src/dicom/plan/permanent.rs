@@ -27,7 +27,11 @@ pub fn is_brachytherapy(data: &InMemDicomObject) -> Result<(), ContentError> {
 
 /// Refuses temporary sources, by technique, type, nuclide, movement and time; returns a note if the
 /// technique leaves it open.
-pub fn check(data: &InMemDicomObject, source: &PlanSource) -> Result<Option<String>, ContentError> {
+pub fn check(
+    data: &InMemDicomObject,
+    channels: &[&InMemDicomObject],
+    source: &PlanSource,
+) -> Result<Option<String>, ContentError> {
     let technique = text(data, tags::BRACHY_TREATMENT_TECHNIQUE).unwrap_or_default();
     let kind = text(data, tags::BRACHY_TREATMENT_TYPE).unwrap_or_default();
     let refused = |why: String| {
@@ -51,8 +55,7 @@ pub fn check(data: &InMemDicomObject, source: &PlanSource) -> Result<Option<Stri
         let technique = short(&technique);
         return refused(format!("its technique is {technique} and its sources are {isotope}"));
     }
-    let setups = items(data, tags::APPLICATION_SETUP_SEQUENCE).iter();
-    for channel in setups.flat_map(|s| items(s, tags::CHANNEL_SEQUENCE)) {
+    for channel in channels {
         if let Some(movement) = text(channel, tags::SOURCE_MOVEMENT_TYPE).filter(|m| m != "FIXED") {
             return refused(format!("its sources move ({})", short(&movement)));
         }

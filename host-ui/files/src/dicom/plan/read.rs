@@ -5,7 +5,7 @@ use super::super::Identity;
 use super::super::checked::Object;
 use super::super::values::{exactly, items, name, needed, number, text};
 use super::super::write::new_uid;
-use super::{Date, PlanSeed, PlanSource, PlannedOn, SeedPlan, permanent};
+use super::{Date, PlanSeed, PlanSource, SeedPlan, permanent, prescription, setups};
 use crate::error::ContentError;
 use dicom_core::Tag;
 use dicom_dictionary_std::{tags, uids};
@@ -32,17 +32,18 @@ pub fn of(object: &Object) -> Result<SeedPlan, ContentError> {
     }
     let data = &object.data;
     permanent::is_brachytherapy(data)?;
-    let sources = sources(data)?;
-    let stays = permanent::check(data, &sources[0].model)?;
+    let (setups, mut notes) = setups::of(data)?;
+    let channels: Vec<&InMemDicomObject> = setups.iter().flat_map(|s| items(s, tags::CHANNEL_SEQUENCE)).collect();
+    let sources = sources(data, &channels, &mut notes)?;
+    notes.extend(uneven(&channels));
+    notes.extend(permanent::check(data, &channels, &sources[0].model)?);
     let (mut seeds, mut problems) = (Vec::new(), Vec::new());
-    for setup in items(data, tags::APPLICATION_SETUP_SEQUENCE) {
-        for channel in items(setup, tags::CHANNEL_SEQUENCE) {
-            if let Err(why) = of_channel(channel, &sources, &mut seeds) {
-                problems.push(why.to_string());
-            }
-            if problems.len() >= MAX_PROBLEMS {
-                break;
-            }
+    for channel in channels {
+        if let Err(why) = of_channel(channel, &sources, &mut seeds, &mut notes) {
+            problems.push(why.to_string());
+        }
+        if problems.len() >= MAX_PROBLEMS {
+            break;
         }
     }
     ContentError::all(problems)?;
@@ -51,15 +52,17 @@ pub fn of(object: &Object) -> Result<SeedPlan, ContentError> {
             "it contains no seed: no channel has a control point with a position".to_owned(),
         ));
     }
-    let (source, mut notes) = one_model(sources)?;
-    notes.extend(stays);
+    let (source, of_models) = one_model(sources)?;
+    notes.extend(of_models);
+    let (prescription_gy, of_prescription) = prescription::of(data)?;
+    notes.extend(of_prescription);
     Ok(SeedPlan {
         label: text(data, tags::RT_PLAN_LABEL).unwrap_or_default(),
         identity: Identity::of(object),
-        structure_set: structure_set(data),
+        structure_set: prescription::structure_set(data),
         uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_else(new_uid),
-        prescription_gy: prescription_gy(data)?,
-        planned_on: date(data, tags::RT_PLAN_DATE),
+        prescription_gy,
+        planned_on: date(data, tags::RT_PLAN_DATE)?,
         source,
         seeds,
         notes,
@@ -73,10 +76,27 @@ struct Source {
     strength_on: Option<Date>,
 }
 
-fn sources(data: &InMemDicomObject) -> Result<Vec<Source>, ContentError> {
-    let (mut all, mut problems) = (Vec::new(), Vec::new());
+/// Returns the sources that channels use; others of the list have no part in the plan.
+fn sources(
+    data: &InMemDicomObject,
+    channels: &[&InMemDicomObject],
+    notes: &mut Vec<String>,
+) -> Result<Vec<Source>, ContentError> {
+    let (mut all, mut problems) = (Vec::<Source>::new(), Vec::new());
+    let used = |source: f64| {
+        let referred = |channel: &&InMemDicomObject| number(channel, tags::REFERENCED_SOURCE_NUMBER).ok().flatten();
+        channels.iter().filter_map(referred).any(|number| number == source)
+    };
     for item in items(data, tags::SOURCE_SEQUENCE) {
-        match source(item) {
+        if !number(item, tags::SOURCE_NUMBER)?.is_none_or(used) {
+            continue;
+        }
+        match source(item, notes) {
+            Ok(source) if all.iter().any(|other| other.number == source.number) => problems.push(format!(
+                "{} {} is given twice, so it is not known which seeds are of which",
+                name(tags::SOURCE_NUMBER),
+                source.number
+            )),
             Ok(source) => all.push(source),
             Err(why) => problems.push(why.to_string()),
         }
@@ -84,14 +104,14 @@ fn sources(data: &InMemDicomObject) -> Result<Vec<Source>, ContentError> {
     ContentError::all(problems)?;
     if all.is_empty() {
         return Err(ContentError::Invalid(format!(
-            "{} is missing or empty",
+            "{} has no source that a channel uses",
             name(tags::SOURCE_SEQUENCE)
         )));
     }
     Ok(all)
 }
 
-fn source(item: &InMemDicomObject) -> Result<Source, ContentError> {
+fn source(item: &InMemDicomObject, notes: &mut Vec<String>) -> Result<Source, ContentError> {
     let number = needed(item, tags::SOURCE_NUMBER, 0.0, 1e9)?;
     let at = |why: ContentError| why.within(format_args!("source {number}"));
     if let Some(units) = text(item, tags::SOURCE_STRENGTH_UNITS).filter(|u| u != "AIR_KERMA_RATE") {
@@ -104,11 +124,16 @@ fn source(item: &InMemDicomObject) -> Result<Source, ContentError> {
     let strength_u = needed(item, tags::REFERENCE_AIR_KERMA_RATE, 1e-6, 1e5).map_err(at)?;
     let half_life_days = needed(item, tags::SOURCE_ISOTOPE_HALF_LIFE, 1e-3, 1e6).map_err(at)?;
     let isotope = text(item, tags::SOURCE_ISOTOPE_NAME).ok_or_else(|| at("its isotope is missing".into()))?;
+    for tag in [tags::ACTIVE_SOURCE_LENGTH, tags::SOURCE_STRENGTH_REFERENCE_DATE] {
+        if text(item, tag).is_none() {
+            notes.push(format!("source {number}: {} is missing", name(tag)));
+        }
+    }
     let length_mm = number_within(item, 100.0).map_err(at)?;
     Ok(Source {
         number,
         strength_u,
-        strength_on: date(item, tags::SOURCE_STRENGTH_REFERENCE_DATE),
+        strength_on: date(item, tags::SOURCE_STRENGTH_REFERENCE_DATE).map_err(at)?,
         model: PlanSource {
             model: text(item, tags::SOURCE_DESCRIPTION)
                 .or(text(item, tags::SOURCE_MODEL_ID))
@@ -156,7 +181,12 @@ fn one_model(sources: Vec<Source>) -> Result<(PlanSource, Vec<String>), ContentE
     Ok((first, notes))
 }
 
-fn of_channel(channel: &InMemDicomObject, sources: &[Source], seeds: &mut Vec<PlanSeed>) -> Result<(), ContentError> {
+fn of_channel(
+    channel: &InMemDicomObject,
+    sources: &[Source],
+    seeds: &mut Vec<PlanSeed>,
+    notes: &mut Vec<String>,
+) -> Result<(), ContentError> {
     let channel_number = needed(channel, tags::CHANNEL_NUMBER, 0.0, 1e9)?;
     let at = |why: ContentError| why.within(format_args!("channel {channel_number}"));
     let referenced = needed(channel, tags::REFERENCED_SOURCE_NUMBER, 0.0, 1e9).map_err(at)?;
@@ -166,8 +196,24 @@ fn of_channel(channel: &InMemDicomObject, sources: &[Source], seeds: &mut Vec<Pl
     let applicator = number(channel, tags::SOURCE_APPLICATOR_NUMBER).map_err(at)?;
     let is_number = |n: &f64| n.fract() == 0.0 && (1.0..=MAX_NEEDLE).contains(n);
     let needle = applicator.filter(is_number).map(|n| n as u32);
+    let points = items(channel, tags::BRACHY_CONTROL_POINT_SEQUENCE);
+    if points.is_empty() {
+        let points = name(tags::BRACHY_CONTROL_POINT_SEQUENCE);
+        notes.push(format!(
+            "channel {channel_number} has no seed: {points} is missing or empty"
+        ));
+    }
+    let stated = number(channel, tags::NUMBER_OF_CONTROL_POINTS).map_err(at)?;
+    if stated.is_some_and(|stated| stated != points.len() as f64) {
+        return Err(at(format!(
+            "{} is not the number of control points, {}",
+            name(tags::NUMBER_OF_CONTROL_POINTS),
+            points.len()
+        )
+        .into()));
+    }
     let mut last: Option<Vector3<f64>> = None;
-    for point in items(channel, tags::BRACHY_CONTROL_POINT_SEQUENCE) {
+    for point in points {
         let Some(place) = exactly::<3>(point, tags::CONTROL_POINT3_D_POSITION).map_err(at)? else {
             return Err(at("a control point has no place in the patient".into()));
         };
@@ -188,7 +234,7 @@ fn of_channel(channel: &InMemDicomObject, sources: &[Source], seeds: &mut Vec<Pl
                 needle,
                 hole: hole.clone(),
                 position_m: (ras_from_lps(place) * 1e-3).into(),
-                axis: axis(point).map_err(at)?,
+                axis: axis_of(points, point).map_err(at)?,
                 strength_u: source.strength_u,
                 strength_on: source.strength_on,
             });
@@ -196,6 +242,63 @@ fn of_channel(channel: &InMemDicomObject, sources: &[Source], seeds: &mut Vec<Pl
         last = Some(place);
     }
     Ok(())
+}
+
+/// Reports attributes that only some channels have, and numbers that are given twice.
+fn uneven(channels: &[&InMemDicomObject]) -> Vec<String> {
+    let mut notes = Vec::new();
+    let points = |channel: &InMemDicomObject| items(channel, tags::BRACHY_CONTROL_POINT_SEQUENCE).to_vec();
+    let has_axis = |channel: &&&InMemDicomObject| {
+        points(channel)
+            .iter()
+            .any(|point| text(point, tags::CONTROL_POINT_ORIENTATION).is_some())
+    };
+    let has = |tag: Tag| channels.iter().filter(|channel| text(channel, tag).is_some()).count();
+    for (tag, count) in [
+        (tags::SOURCE_APPLICATOR_NUMBER, has(tags::SOURCE_APPLICATOR_NUMBER)),
+        (tags::SOURCE_APPLICATOR_ID, has(tags::SOURCE_APPLICATOR_ID)),
+        (
+            tags::CONTROL_POINT_ORIENTATION,
+            channels.iter().filter(has_axis).count(),
+        ),
+    ] {
+        if (1..channels.len()).contains(&count) {
+            notes.push(format!(
+                "{} is missing in {} of {} channels",
+                name(tag),
+                channels.len() - count,
+                channels.len()
+            ));
+        }
+    }
+    let mut numbers: Vec<String> = channels
+        .iter()
+        .filter_map(|channel| text(channel, tags::CHANNEL_NUMBER))
+        .collect();
+    numbers.sort_unstable();
+    if let Some(twice) = numbers.windows(2).find(|w| w[0] == w[1]) {
+        notes.push(format!(
+            "{} {} is given twice ({}); the seeds of both channels count",
+            name(tags::CHANNEL_NUMBER),
+            twice[0],
+            name(tags::CHANNEL_SEQUENCE)
+        ));
+    }
+    notes
+}
+
+/// Returns the axis of a seed, from any of the control points at its place.
+fn axis_of(points: &[InMemDicomObject], first: &InMemDicomObject) -> Result<Option<[f64; 3]>, ContentError> {
+    let place = |point: &InMemDicomObject| exactly::<3>(point, tags::CONTROL_POINT3_D_POSITION);
+    let of_first = place(first)?;
+    for point in points {
+        if place(point)? == of_first
+            && let Some(axis) = axis(point)?
+        {
+            return Ok(Some(axis));
+        }
+    }
+    Ok(None)
 }
 
 fn axis(point: &InMemDicomObject) -> Result<Option<[f64; 3]>, ContentError> {
@@ -207,36 +310,12 @@ fn axis(point: &InMemDicomObject) -> Result<Option<[f64; 3]>, ContentError> {
         .ok_or_else(|| format!("{} has no length", name(tags::CONTROL_POINT_ORIENTATION)).into())
 }
 
-fn prescription_gy(data: &InMemDicomObject) -> Result<Option<f64>, ContentError> {
-    for reference in items(data, tags::DOSE_REFERENCE_SEQUENCE) {
-        if text(reference, tags::DOSE_REFERENCE_TYPE).as_deref() == Some("TARGET") {
-            let dose = number(reference, tags::TARGET_PRESCRIPTION_DOSE)?;
-            if let Some(gy) = dose.filter(|gy| (1e-3..=1e4).contains(gy)) {
-                return Ok(Some(gy));
-            }
-        }
-    }
-    Ok(None)
-}
-
-/// Returns the structure set of the plan, and the number of its target.
-fn structure_set(data: &InMemDicomObject) -> Option<PlannedOn> {
-    let referenced = items(data, tags::REFERENCED_STRUCTURE_SET_SEQUENCE).first()?;
-    let target = items(data, tags::DOSE_REFERENCE_SEQUENCE)
-        .iter()
-        .filter(|r| text(r, tags::DOSE_REFERENCE_TYPE).as_deref() == Some("TARGET"))
-        .find_map(|r| number(r, tags::REFERENCED_ROI_NUMBER).ok().flatten());
-    Some(PlannedOn {
-        uid: text(referenced, tags::REFERENCED_SOP_INSTANCE_UID)?,
-        target: target
-            .filter(|n| (0.0..1e9).contains(n) && n.fract() == 0.0)
-            .map(|n| n as usize),
-    })
-}
-
-/// Returns a date; `None` if it is absent or invalid.
-fn date(object: &InMemDicomObject, tag: Tag) -> Option<Date> {
+/// Returns a date, if there is one.
+fn date(object: &InMemDicomObject, tag: Tag) -> Result<Option<Date>, ContentError> {
+    let Some(text) = text(object, tag) else { return Ok(None) };
     // Files from before 1993 have points between.
-    let digits: String = text(object, tag)?.chars().filter(|c| *c != '.').collect();
-    Date::strptime("%Y%m%d", digits).ok()
+    let digits: String = text.chars().filter(|c| *c != '.').collect();
+    let date = Date::strptime("%Y%m%d", digits);
+    date.map(Some)
+        .map_err(|_| format!("{} is \"{}\", which is not a day", name(tag), short(&text)).into())
 }

@@ -45,6 +45,11 @@ fn again(plan: &SeedPlan) -> Result<SeedPlan, ContentError> {
 fn a_written_plan_reads_back_equal() {
     let plan = plan(90);
     let mut again = again(&plan).unwrap();
+    let notes = std::mem::take(&mut again.notes);
+    assert!(
+        notes.len() == 1 && notes[0].contains("ControlPointOrientation"),
+        "{notes:?}"
+    );
     for (seed, was) in again.seeds.iter_mut().zip(&plan.seeds) {
         let off = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max);
         // Sixteen characters a number, and an axis in single precision.
@@ -177,4 +182,121 @@ fn temporary_sources_are_refused() {
         assert!(why.contains(reported) && why.contains("taken out again"), "{why}");
     }
     assert!(read(&[("300A0202", "HDR")]).unwrap_err().contains("taken out again"));
+}
+
+/// Returns the plan of four seeds after changes of its attributes; an empty value removes one.
+fn changed(changes: &[(&str, &str)]) -> Result<SeedPlan, String> {
+    use dicom_core::dictionary::DataDictionary;
+    use dicom_core::ops::{ApplyOp, AttributeAction, AttributeOp};
+    use dicom_dictionary_std::StandardDataDictionary;
+    let mut object = checked::read(&bytes(&plan(4)).unwrap()).unwrap();
+    for (at, value) in changes {
+        let at = StandardDataDictionary.parse_selector(at).unwrap();
+        let action = match *value {
+            "" => AttributeAction::Remove,
+            value => AttributeAction::SetStr(value.to_owned().into()),
+        };
+        object.data.apply(AttributeOp::new(at, action)).unwrap();
+    }
+    of(&object).map_err(|why| why.to_string())
+}
+
+/// Adds a copy of the first item of a sequence, with another value of one attribute.
+fn doubled(sequence: dicom_core::Tag, tag: dicom_core::Tag, value: &str) -> Result<SeedPlan, String> {
+    use super::super::values::items;
+    use super::super::write::{sequence as written, string};
+    let mut object = checked::read(&bytes(&plan(4)).unwrap()).unwrap();
+    let mut all = items(&object.data, sequence).to_vec();
+    let mut copy = all[0].clone();
+    copy.put(string(tag, dicom_core::VR::IS, value));
+    all.push(copy);
+    object.data.put(written(sequence, all));
+    of(&object).map_err(|why| why.to_string())
+}
+
+/// Guards against application setups that no fraction group names and that were counted.
+#[test]
+fn only_setups_of_a_fraction_group_count() {
+    use dicom_dictionary_std::tags;
+    let (setups, number) = (tags::APPLICATION_SETUP_SEQUENCE, tags::APPLICATION_SETUP_NUMBER);
+    let two = doubled(setups, number, "2").unwrap();
+    assert_eq!(two.seeds, changed(&[]).unwrap().seeds);
+    assert!(
+        two.notes
+            .join("; ")
+            .contains("application setup 2 with 4 channels is left out"),
+        "{:?}",
+        two.notes
+    );
+    assert!(doubled(setups, number, "1").unwrap_err().contains("is given twice"));
+    let elsewhere = [("300A0070[0].300C000A[0].300C000C", "7")];
+    assert!(changed(&elsewhere).unwrap_err().contains("setup 7, which is missing"));
+    let thrice = changed(&[("300A0070[0].300A0078", "3")]).unwrap();
+    assert!(
+        thrice.notes.join("; ").contains("NumberOfFractionsPlanned"),
+        "{:?}",
+        thrice.notes
+    );
+}
+
+/// Guards against a prescription of 14,500 that was dropped for that of the source, and against a
+/// second one that nobody heard of.
+#[test]
+fn prescriptions_are_plausible_and_others_reported() {
+    use dicom_dictionary_std::tags;
+    let dose = "300A0010[0].300A0026";
+    for wrong in ["14500", "0", "-145"] {
+        let why = changed(&[(dose, wrong)]).unwrap_err();
+        assert!(why.contains("TargetPrescriptionDose") && why.contains("cGy"), "{why}");
+    }
+    let two = doubled(tags::DOSE_REFERENCE_SEQUENCE, tags::TARGET_PRESCRIPTION_DOSE, "110").unwrap();
+    assert_eq!(two.prescription_gy, Some(145.0));
+    assert!(
+        two.notes.join("; ").contains("145 Gy counts, and not 110 Gy"),
+        "{:?}",
+        two.notes
+    );
+    for (at, value, named) in [
+        (dose, "", "TargetPrescriptionDose"),
+        ("300A0010[0].300A0020", "", "DoseReferenceType"),
+        ("300A0010[0].300A0020", "ORGAN_AT_RISK", "DoseReferenceType"),
+    ] {
+        let plan = changed(&[(at, value)]).unwrap();
+        assert_eq!(plan.prescription_gy, None);
+        assert!(plan.notes.join("; ").contains(named), "{:?}", plan.notes);
+    }
+}
+
+/// Guards against a source of the list that no channel uses and that was held against the plan.
+#[test]
+fn sources_that_no_channel_uses_have_no_part_in_the_plan() {
+    use dicom_dictionary_std::tags;
+    let all_of_the_first: Vec<(String, &str)> = (0..4)
+        .map(|n| (format!("300A0230[0].300A0280[{n}].300C000E"), "1"))
+        .collect();
+    let mut changes: Vec<(&str, &str)> = all_of_the_first.iter().map(|(at, to)| (at.as_str(), *to)).collect();
+    changes.extend([("300A0210[1].300A0226", "Ir-192"), ("300A0210[1].300A022A", "0")]);
+    let plan = changed(&changes).unwrap();
+    assert!(
+        plan.seeds
+            .iter()
+            .all(|seed| seed.strength_u == plan.seeds[0].strength_u)
+    );
+    // But a number that is given twice is not known.
+    let why = doubled(tags::SOURCE_SEQUENCE, tags::SOURCE_NUMBER, "1").unwrap_err();
+    assert!(why.contains("SourceNumber") && why.contains("is given twice"), "{why}");
+}
+
+#[test]
+fn days_and_numbers_of_control_points_are_checked() {
+    let why = changed(&[("300A0210[0].300A022C", "20261399")]).unwrap_err();
+    assert!(
+        why.contains("SourceStrengthReferenceDate") && why.contains("20261399"),
+        "{why}"
+    );
+    let why = changed(&[("300A0230[0].300A0280[1].300A0110", "4")]).unwrap_err();
+    assert!(
+        why.contains("channel 2") && why.contains("NumberOfControlPoints"),
+        "{why}"
+    );
 }

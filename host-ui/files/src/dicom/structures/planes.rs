@@ -2,7 +2,7 @@
 
 use super::super::super::element::short;
 use super::solid::encloses;
-use super::{Contoured, SAME_PLANE_M, area_vector};
+use super::{Contoured, SAME_PLANE_M, area_vector, overlaps};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::{BTreeSet, HashSet};
 
@@ -24,8 +24,9 @@ struct Plane {
     area_m2: f64,
 }
 
-/// Removes duplicate contours; returns irregularities in words.
-pub fn tidy(structure: &mut Contoured) -> Vec<String> {
+/// Removes duplicate contours and unites those that overlap in part, unless the file says that
+/// overlaps are holes; returns irregularities in words.
+pub fn tidy(structure: &mut Contoured, is_exclusive: bool) -> Vec<String> {
     let largest = structure.contours.iter().map(|c| area_vector(c));
     let largest = largest.max_by(|a, b| a.norm().total_cmp(&b.norm()));
     let Some(normal) = largest.and_then(|a| a.try_normalize(1e-12)) else {
@@ -33,13 +34,16 @@ pub fn tidy(structure: &mut Contoured) -> Vec<String> {
     };
     // Upwards, so that heights of axial planes are the patient's z.
     let normal = if normal[normal.iamax()] < 0.0 { -normal } else { normal };
-    let twice_m = without_duplicates(structure, normal);
+    let mut twice_m = without_duplicates(structure, normal);
+    let overlaps = overlaps::settle(structure, normal, is_exclusive);
+    twice_m.extend(&overlaps.copies_m);
     let planes = planes(structure, normal);
     let mut notes = Vec::new();
     let name = short(&structure.name);
     if !twice_m.is_empty() {
         notes.push(duplicates(&name, &twice_m, &planes));
     }
+    notes.extend(overlaps.notes(&name, usual_m(&planes).unwrap_or_default()));
     notes.extend(distances(&name, &planes));
     notes
 }
@@ -194,7 +198,8 @@ fn distances(name: &str, planes: &[Plane]) -> Vec<String> {
     vec![text]
 }
 
-fn first_of(all: &[String]) -> String {
+/// Returns the first of several texts, and how many more there are.
+pub fn first_of(all: &[String]) -> String {
     let mut text = all.iter().take(LISTED).cloned().collect::<Vec<_>>().join(", ");
     if all.len() > LISTED {
         text += &format!(" and {} more", all.len() - LISTED);

@@ -99,7 +99,7 @@ pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<Str
 }
 
 /// Corners of polygons in columns and rows.
-type Polygons = Vec<Vec<[f64; 2]>>;
+pub type Polygons = Vec<Vec<[f64; 2]>>;
 
 fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
     let Some(planes) = planes(structure, grid) else {
@@ -135,15 +135,7 @@ fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec
 /// Rasterises contours across the slices: a voxel belongs to the enclosed body if five of nine
 /// points in it do.
 fn runs_of_solid(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
-    let own_m = structure.plane_distance_m()?;
-    let solid = Solid::of(
-        structure,
-        if own_m.is_finite() {
-            own_m
-        } else {
-            grid.frame.spacing_m[2]
-        },
-    )?;
+    let solid = Solid::across(structure, grid.frame.spacing_m[2])?;
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for corner in 0..8 {
         let corner = Vector3::from([0, 1, 2].map(|a| match corner >> a & 1 {
@@ -195,7 +187,7 @@ fn runs_of_solid(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> R
 
 /// Returns the contours by the height of their plane, in slices; `None` if they do not lie in the
 /// slices.
-fn planes(structure: &Contoured, grid: &Grid) -> Option<Vec<(f64, Polygons)>> {
+pub fn planes(structure: &Contoured, grid: &Grid) -> Option<Vec<(f64, Polygons)>> {
     let step_m = grid.frame.spacing_m[2];
     let mut placed = Vec::new();
     for contour in &structure.contours {

@@ -83,6 +83,12 @@ impl Solid {
         })
     }
 
+    /// Like [`Solid::of`]; `single_m` is the thickness of a structure of one plane.
+    pub fn across(structure: &Contoured, single_m: f64) -> Result<Self, ContentError> {
+        let own_m = structure.plane_distance_m()?;
+        Self::of(structure, if own_m.is_finite() { own_m } else { single_m })
+    }
+
     /// Returns whether a place (RAS, m) lies inside.
     pub fn contains(&self, place_m: [f64; 3]) -> bool {
         let at = self.axes.transpose() * Vector3::from(place_m);

@@ -6,6 +6,7 @@ use super::*;
 use nalgebra::Rotation3;
 use std::f64::consts::PI;
 
+mod contours;
 mod without_images;
 
 fn grid(dims: [usize; 3], sides_mm: [f64; 3]) -> Grid {
@@ -36,6 +37,50 @@ fn written(v: &Voxels) -> Result<Vec<u8>, ContentError> {
         images: &[],
         structures: &write::of_voxels(v)?,
     })
+}
+
+/// Structure of a file: number, name, kind and contours.
+type Drawing<'a> = (usize, &'a str, &'a str, Vec<Vec<Vector3<f64>>>);
+
+/// Returns a structure set as it is read from a file.
+fn object(structures: &[Drawing]) -> Object {
+    use super::super::write::{decimals, item, sequence, string, whole};
+    use dicom_core::VR;
+    let v = Voxels {
+        dims: [1, 1, 1],
+        labels: vec![1],
+        frame: grid([1, 1, 1], [1.0; 3]).frame,
+        names: [(1, "any".to_owned())].into(),
+        also: Vec::new(),
+        overlap: None,
+    };
+    let mut object = checked::read(&written(&v).unwrap()).unwrap();
+    let mm = |c: &Vec<Vector3<f64>>| {
+        c.iter()
+            .flat_map(|p| [-p.x * 1e3, -p.y * 1e3, p.z * 1e3])
+            .collect::<Vec<_>>()
+    };
+    let roi =
+        |(number, name, ..): &Drawing| item([whole(tags::ROI_NUMBER, *number), string(tags::ROI_NAME, VR::LO, name)]);
+    let drawn = |(number, _, kind, contours): &Drawing| {
+        let contour = |c: &Vec<Vector3<f64>>| {
+            item([
+                string(tags::CONTOUR_GEOMETRIC_TYPE, VR::CS, kind),
+                decimals(tags::CONTOUR_DATA, &mm(c)),
+            ])
+        };
+        item([
+            whole(tags::REFERENCED_ROI_NUMBER, *number),
+            sequence(tags::CONTOUR_SEQUENCE, contours.iter().map(contour).collect()),
+        ])
+    };
+    for element in [
+        sequence(tags::STRUCTURE_SET_ROI_SEQUENCE, structures.iter().map(roi).collect()),
+        sequence(tags::ROI_CONTOUR_SEQUENCE, structures.iter().map(drawn).collect()),
+    ] {
+        object.data.put(element);
+    }
+    object
 }
 
 fn set(structures: Vec<(&str, Vec<Vec<Vector3<f64>>>)>) -> StructureSet {
@@ -300,29 +345,7 @@ fn missing_planes_and_duplicate_contours_are_reported() {
     let contours: Vec<_> = heights.iter().map(drawn).collect();
     let expected = 100.0 * (2.0 * PI / 200.0).sin() * radius * radius * (heights[heights.len() - 1] - heights[0] + 2.0);
     let volumes = |contours: Vec<Vec<Vector3<f64>>>| {
-        let v = Voxels {
-            dims: [1, 1, 1],
-            labels: vec![1],
-            frame: grid.frame.clone(),
-            names: [(1, "Prostate".to_owned())].into(),
-            also: Vec::new(),
-            overlap: None,
-        };
-        let mut object = checked::read(&written(&v).unwrap()).unwrap();
-        let item = |c: &Vec<Vector3<f64>>| {
-            let mm: Vec<f64> = c.iter().flat_map(|p| [-p.x * 1e3, -p.y * 1e3, p.z * 1e3]).collect();
-            super::super::write::item([
-                super::super::write::string(tags::CONTOUR_GEOMETRIC_TYPE, dicom_core::VR::CS, "CLOSED_PLANAR"),
-                super::super::write::decimals(tags::CONTOUR_DATA, &mm),
-            ])
-        };
-        let roi = super::super::write::item([
-            super::super::write::whole(tags::REFERENCED_ROI_NUMBER, 1),
-            super::super::write::sequence(tags::CONTOUR_SEQUENCE, contours.iter().map(item).collect()),
-        ]);
-        object
-            .data
-            .put(super::super::write::sequence(tags::ROI_CONTOUR_SEQUENCE, vec![roi]));
+        let object = object(&[(1, "Prostate", "CLOSED_PLANAR", contours)]);
         let set = StructureSet::of(&object).unwrap();
         let notes = set.notes.join("; ");
         let v = set.voxels(Some(grid.clone())).unwrap();

@@ -97,3 +97,50 @@ fn strengths_decay_to_the_day_of_the_implant() {
     let wrong = DayOfImplant(Some(Date::constant(2062, 10, 31)));
     assert!(wrong.decay(&mut same, None, &source).is_err());
 }
+
+/// Guards against seeds of 0 U and 50 U that passed, and against strengths of years ahead.
+#[test]
+fn strengths_of_no_seed_are_refused_or_reported() {
+    assert_eq!(strengths(&rows()).unwrap(), None);
+    let with = |strength_u: f64| {
+        let mut all = rows();
+        all[1].seed.strength_u = strength_u;
+        strengths(&all)
+    };
+    assert!(
+        with(0.0)
+            .unwrap_err()
+            .to_string()
+            .contains("seed 2 has a strength of 0 U")
+    );
+    assert!(
+        with(50.0)
+            .unwrap()
+            .unwrap()
+            .contains("1 of its 3 seeds have an unusual strength, up to 50 U")
+    );
+}
+
+/// Guards against "1214.8 % of the last one remain" and "-365 days later".
+#[test]
+fn a_reference_day_after_the_implant_is_told_or_refused() {
+    let source = Source::known("6711").unwrap();
+    let on = |month: i8, day: i8| DayOfImplant(Some(Date::constant(2026, month, day)));
+    // The strengths are of 2026-09-01.
+    let note = on(8, 22).decay(&mut rows(), None, &source).unwrap().unwrap();
+    assert!(
+        note.contains("counted back to the implant on 2026-08-22, 10 days before: 112.4 %"),
+        "{note}"
+    );
+    let why = on(2, 1).decay(&mut rows(), None, &source).unwrap_err().to_string();
+    assert!(why.contains("2026-09-01, 212 days after the implant"), "{why}");
+    let earlier = Declared {
+        planned_on: Some(Date::constant(2026, 8, 22)),
+        ..declared()
+    };
+    let note = DayOfImplant(None)
+        .decay(&mut rows(), Some(&earlier), &source)
+        .unwrap()
+        .unwrap();
+    assert!(note.contains("2026-08-22, 10 days earlier"), "{note}");
+}

@@ -1,0 +1,43 @@
+//! An identity that was written with a table or a header is the one that is read again.
+
+use super::*;
+
+fn identity() -> Identity {
+    Identity {
+        patient_name: "Müller^Jürgen=山田".to_owned(),
+        patient_id: "P 1;2".to_owned(),
+        study: "1.2.3".to_owned(),
+        frame_of_reference: "1.2.4".to_owned(),
+        study_date: "20260101".to_owned(),
+        study_time: String::new(),
+        ..Identity::new()
+    }
+}
+
+#[test]
+fn lines_of_tables_and_headers_keep_the_identity() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("table.csv");
+    let identity = identity();
+    let comments = identity.comments();
+    let spreadsheet: String = comments.lines().map(|line| format!("\"{line}\",,,\r\n")).collect();
+    let header = "x_mm,y_mm,z_mm\n1,2,3\n";
+    for text in [
+        format!("{comments}{header}"),
+        format!("# another\n{spreadsheet}{header}"),
+        format!("NRRD0004\ntype: double\n{}\n", identity.pairs()),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        assert_eq!(Identity::of_path(&path).unwrap().as_ref(), Some(&identity));
+    }
+    std::fs::write(&path, header).unwrap();
+    assert_eq!(Identity::of_path(&path).unwrap(), None);
+    // As written by earlier versions.
+    let columns = "x_mm,dicom_patient_id,dicom_study,dicom_frame_of_reference\n1,\"P, 1\",1.2,1.3\n";
+    std::fs::write(&path, columns).unwrap();
+    let read = Identity::of_path(&path).unwrap().unwrap();
+    assert_eq!(
+        (read.patient_id.as_str(), read.frame_of_reference.as_str()),
+        ("P, 1", "1.3")
+    );
+}
