@@ -1,18 +1,19 @@
 //! Every port of the core, and the data through each.
 
 use std::os::fd::{AsFd, BorrowedFd};
+use std::time::Instant;
 use stylet_ports::{
     self as service, Node, Publisher, SendError, ServiceError, SlicePublisher, SliceSubscriber, StateWriter,
     Subscriber, Watch,
 };
 use stylet_shm_schema::*;
 use stylet_wall::board::Reader;
-use stylet_wall::packet::{Closed, Kind, Packet, Socket, Start, sealed, unsealed};
+use stylet_wall::packet::{Closed, Kind, LOOK_EVERY, Packet, Socket, Start, sealed, unsealed};
 
-/// Most requests of one port relayed in a pass. More are refused, so that a flood reaches neither loop. Counted by
+/// Most requests of one port relayed in a millisecond. More are refused, so that a flood reaches neither loop. Counted by
 /// port, since a host can claim any id.
 const MAX_OF_A_PORT: u32 = 16;
-/// Most such refusals answered in one pass; the others are only counted. Every host has all answers in its queue, and
+/// Most such refusals answered in that time; the others are only counted. Every host has all answers in its queue, and
 /// answers to a flooding host would displace the others.
 const MAX_ANSWERED: u32 = 1;
 /// Most requests taken from the queues in one pass. Queues are read one after the other, so a host that fills its queue
@@ -41,9 +42,10 @@ pub struct Ports {
     stops: Subscriber<Command>,
     uploads: SliceSubscriber<u8, UploadHeader>,
     /// Taken from a queue when the force process had no room for it.
-    held: Option<Command>,
+    held: Option<(Kind, Command)>,
     /// Requests refused here.
     pub refused: u64,
+    taken: Taken,
     /// The latest tick.
     pub state: StateWriter<HapticState>,
     /// Present in a run with a second device.
@@ -86,6 +88,7 @@ impl Ports {
             stops: service::stops::subscriber(&node)?,
             uploads: service::uploads::subscriber(&node)?,
             held: None,
+            taken: Taken::new(),
             refused: 0,
             state: StateWriter::create(&node, session_id)?,
             second: second.transpose()?,
@@ -162,7 +165,9 @@ impl Ports {
 
     /// Relays the requests of hosts to the force process, as far as it has room.
     pub fn forward(&mut self, socket: &Socket) -> Result<(), Closed> {
-        let mut taken = Taken::default();
+        if self.taken.since.elapsed() >= LOOK_EVERY {
+            self.taken = Taken::new();
+        }
         for number in 0..MAX_TAKEN {
             if number % STOPS_EVERY == 0 && !self.forward_stops(socket)? {
                 return Ok(());
@@ -170,10 +175,13 @@ impl Ports {
             let Some((port, command)) = self.commands.receive_from() else {
                 break;
             };
-            match taken.admits(port) {
-                true if self.hand_on(socket, command)? => {}
+            match self.taken.admits(port) {
+                true if self.hand_on(socket, Kind::Command, command)? => {}
                 true => return Ok(()),
-                false => self.refuse(&command, taken.answers()),
+                false => {
+                    let answers = self.taken.answers();
+                    self.refuse(&command, answers);
+                }
             }
         }
         while let Some(slice) = self.uploads.receive() {
@@ -188,8 +196,12 @@ impl Ports {
     /// Relays requests that remove force or motion, which have separate queues, without a limit. False if the force
     /// process has no room now.
     fn forward_stops(&mut self, socket: &Socket) -> Result<bool, Closed> {
-        while let Some(command) = self.held.take().or_else(|| self.stops.receive()) {
-            if !self.hand_on(socket, command)? {
+        let next = |ports: &mut Self| match ports.held.take() {
+            None => Some((Kind::Stop, ports.stops.receive()?)),
+            held => held,
+        };
+        while let Some((kind, command)) = next(self) {
+            if !self.hand_on(socket, kind, command)? {
                 return Ok(false);
             }
         }
@@ -197,9 +209,9 @@ impl Ports {
     }
 
     /// Relays a command; false if the force process has no room now, in which case the command is held until it has.
-    fn hand_on(&mut self, socket: &Socket, command: Command) -> Result<bool, Closed> {
-        let sent = socket.send(Kind::Command, bytemuck::bytes_of(&command), None)?;
-        self.held = (!sent).then_some(command);
+    fn hand_on(&mut self, socket: &Socket, kind: Kind, command: Command) -> Result<bool, Closed> {
+        let sent = socket.send(kind, bytemuck::bytes_of(&command), None)?;
+        self.held = (!sent).then_some((kind, command));
         Ok(sent)
     }
 
@@ -213,14 +225,22 @@ impl Ports {
     }
 }
 
-/// Requests of one pass.
-#[derive(Default)]
+/// Requests of a millisecond, or of one pass that takes longer.
 struct Taken {
+    since: Instant,
     of_port: Vec<(u128, u32)>,
     answered: u32,
 }
 
 impl Taken {
+    fn new() -> Self {
+        Self {
+            since: Instant::now(),
+            of_port: Vec::new(),
+            answered: 0,
+        }
+    }
+
     /// Counts a request; false if it exceeds its port's limit.
     fn admits(&mut self, port: u128) -> bool {
         if let Some((_, count)) = self.of_port.iter_mut().find(|(of, _)| *of == port) {
@@ -249,7 +269,7 @@ mod tests {
     /// Seven new identities in one pass used to keep another host's stop from being read.
     #[test]
     fn a_port_that_floods_is_limited_and_leaves_room_for_others() {
-        let mut taken = Taken::default();
+        let mut taken = Taken::new();
         for count in 1..=2 * MAX_OF_A_PORT {
             assert_eq!(taken.admits(1), count <= MAX_OF_A_PORT);
         }

@@ -56,6 +56,8 @@ pub enum Kind {
     Failed,
     /// From the bridge: a [`Command`].
     Command,
+    /// From the bridge: a [`Command`] of the queue of stops, which comes before all others.
+    Stop,
     /// From the bridge: an [`UploadHeader`], with memory that holds its cells.
     Upload,
 }

@@ -4,7 +4,7 @@ use super::Control;
 use super::link::EventDetails;
 use super::requests::{hand_goal, needle_run};
 use super::second::Second;
-use super::wall::Asked;
+use super::wall::{Asked, MOST_PACKETS};
 use crate::rt::exchange::{HapticOrder, Moved, Ticket, TissueOrder, TissueStep};
 use crate::rt::second::SecondOrder;
 use crate::rt::tissue_tape::LeftTape;
@@ -26,11 +26,12 @@ impl Control {
     }
 
     fn take_each_command(&mut self) -> bool {
-        while let Some(asked) = self.link.wall.take_asked() {
-            match asked {
-                Asked::Command(command) if self.take_command(&command) => return true,
-                Asked::Command(_) => {}
-                Asked::Volume(header, cells) => self.take_volume(&header, &cells),
+        for _ in 0..MOST_PACKETS {
+            match self.link.wall.take_asked() {
+                Some(Asked::Command(command)) if self.take_command(&command) => return true,
+                Some(Asked::Command(_)) => {}
+                Some(Asked::Volume(header, cells)) => self.take_volume(&header, &cells),
+                None => break,
             }
         }
         false

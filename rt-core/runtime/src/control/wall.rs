@@ -27,7 +27,7 @@ use stylet_shm_schema::*;
 use stylet_wall::packet::{Alive, BoardSize, Kind, Socket, Start, unsealed};
 
 /// Most packets of the bridge taken in one pass; the rest wait in its socket.
-const MOST_PACKETS: usize = 256;
+pub const MOST_PACKETS: usize = 256;
 /// Interval between checks for complaints of hosts, and shortest life of an epoch.
 const COMPLAINTS_EVERY: Duration = Duration::from_millis(100);
 const SHORTEST_EPOCH: Duration = Duration::from_secs(2);
@@ -186,8 +186,9 @@ impl Wall {
         self.lost.take()
     }
 
-    /// Returns the next request of a host, in order.
+    /// Returns the next request of a host: in order, but those of the queue of stops first.
     pub fn take_asked(&mut self) -> Option<Asked> {
+        self.receive();
         self.asked.pop_front()
     }
 
@@ -313,6 +314,11 @@ impl Wall {
                     }
                 }
                 Kind::Failed => self.lost = Some(Text::<200>::new(&String::from_utf8_lossy(&packet.bytes)).read()),
+                Kind::Stop => {
+                    if let Some(stop) = packet.value().map(Box::new) {
+                        self.asked.push_front(Asked::Command(stop));
+                    }
+                }
                 Kind::Command => self.asked.extend(packet.value().map(Box::new).map(Asked::Command)),
                 Kind::Upload => {
                     let header = packet.value::<UploadHeader>();
