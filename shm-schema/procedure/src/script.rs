@@ -148,8 +148,7 @@ impl Procedure {
         }
     }
 
-    /// Returns the script of one needle in tissue at rest, until the tissue has come to rest again with the needle
-    /// drawn back.
+    /// Returns the script of one needle in tissue at rest, until the tissue rests again with the needle drawn back.
     pub fn rehearsal(way: NeedleWay, pace: Pace) -> Self {
         let mut ahead = VecDeque::from([(0, Operation::Engage)]);
         ahead.extend(way.to_the_last_drop(0).map(|operation| (0, operation)));
