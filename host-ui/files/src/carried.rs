@@ -49,8 +49,9 @@ impl Identity {
         let head = bytes::start(path, HEAD_BYTES).unwrap_or_default();
         let head = String::from_utf8_lossy(&head);
         if scene::is_scene(path) && !head.contains("\"stylet plan,") {
-            let volume = path.with_file_name(scene::read(path)?.volume);
-            return Self::of_path(&volume);
+            // What is no scene is refused by the reader that it was meant for, in words about that.
+            let scene = scene::read(path).ok();
+            return scene.map_or(Ok(None), |scene| Self::of_path(&path.with_file_name(scene.volume)));
         }
         let of_lines = Self::of_parts(|name| line(&head, name));
         Ok(of_lines.or_else(|| of_columns(&head)))
