@@ -19,8 +19,8 @@ pub struct Shift<'a> {
 impl Shift<'_> {
     /// Makes a displacement of a body that is all of one piece.
     pub fn of_all(by_m: [f64; 3]) -> Self {
-        const ALL: &[Range<u32>] = &[0..u32::MAX];
-        Shift { by_m, elements: ALL }
+        const ALL: Range<u32> = 0..u32::MAX;
+        Shift { by_m, elements: &[ALL] }
     }
 
     /// Adds it to a field in units of so many per metre.

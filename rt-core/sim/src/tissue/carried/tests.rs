@@ -79,8 +79,11 @@ fn an_affine_field_is_interpolated_exactly() {
     }
     assert!(seen[0] > 2000 && seen[1] > 1000, "{seen:?}");
     let by_m = [1e-3, 0.0, -2e-3];
-    let part = [0..elements / 2];
-    let shift = Shift { by_m, elements: &part };
+    let part = 0..elements / 2;
+    let shift = Shift {
+        by_m,
+        elements: std::slice::from_ref(&part),
+    };
     field.set(Carry { shift, ..Carry::NOT });
     let moved = |element: u32| field.at_m(&scene.lattice, element);
     assert!(off(moved(1500), by_m) < 1e-9, "{:?}", moved(1500));
