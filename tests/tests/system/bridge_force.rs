@@ -82,6 +82,8 @@ fn insertion(rounds: u64, motion: &Path, is_disturbed: bool) -> Vec<f64> {
     ask(&mut link, &Request::Engage).expect("engaged");
     let mut hand = Insertion::of(link);
     hand.watch(STANDS);
+    // Those from before the force was turned on.
+    hand.records.clear();
     let begun = Instant::now();
     if is_disturbed {
         for round in 0..2 * rounds {
