@@ -11,7 +11,7 @@ use std::sync::Arc;
 use stylet_anatomy::Beyond;
 
 /// A node that touches no element.
-const NO_PART: u32 = u32::MAX;
+pub(super) const NO_PART: u32 = u32::MAX;
 
 /// A stretch of elements with consecutive numbers, and the cell of the first.
 #[derive(Clone, Copy, Debug)]

@@ -11,7 +11,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 /// A grid place that no element touches.
-const NO_NODE: u32 = u32::MAX;
+pub(super) const NO_NODE: u32 = u32::MAX;
 
 /// Weight with which a load acts on a node, or with which the node is read.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,6 +13,7 @@ mod cycle;
 mod kernel;
 mod level;
 mod output;
+mod parts;
 mod solve;
 
 pub use level::{BatchModel, NodeWeight, Part};
