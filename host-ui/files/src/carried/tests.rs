@@ -41,3 +41,15 @@ fn lines_of_tables_and_headers_keep_the_identity() {
         ("P, 1", "1.3")
     );
 }
+
+/// A line feed in a name would begin a line with another identity.
+#[test]
+fn control_characters_of_a_name_end_no_line() {
+    let identity = Identity {
+        patient_name: "A\n# dicom_study: 9.9\r\n".to_owned(),
+        ..identity()
+    };
+    for text in [identity.comments(), identity.pairs()] {
+        assert_eq!(text.lines().count(), identity.parts().len(), "{text}");
+    }
+}

@@ -36,14 +36,14 @@ pub fn agree(all: &[(PathBuf, Identity)], shared: Shared) -> Result<Agreed, File
     let mut notes: Vec<(PathBuf, String)> = Vec::new();
     for (n, (path, identity)) in all.iter().enumerate() {
         for (other_path, other) in &all[..n] {
-            let beside = Beside {
+            let pair = Pair {
                 identity,
                 other,
                 other_file: other_path.display().to_string(),
             };
-            let found = beside.patient().and_then(|patient| {
+            let found = pair.patient().and_then(|patient| {
                 let frame = match shared {
-                    Shared::Frame => beside.frame()?,
+                    Shared::Frame => pair.frame()?,
                     Shared::Patient => Vec::new(),
                 };
                 Ok([patient, frame].concat())
@@ -51,7 +51,7 @@ pub fn agree(all: &[(PathBuf, Identity)], shared: Shared) -> Result<Agreed, File
             let found = found.map_err(|why| FileError::of(path, why))?;
             for note in found {
                 // Once for each file, whatever it is compared with.
-                if !notes.iter().any(|(of, _)| of == path) || !notes.iter().any(|(_, told)| *told == note) {
+                if !notes.iter().any(|(of, _)| of == path) || !notes.iter().any(|(_, noted)| *noted == note) {
                     notes.push((path.clone(), note));
                 }
             }
@@ -67,13 +67,13 @@ pub fn agree(all: &[(PathBuf, Identity)], shared: Shared) -> Result<Agreed, File
 }
 
 /// An identity and another one that it is compared with.
-struct Beside<'a> {
+struct Pair<'a> {
     identity: &'a Identity,
     other: &'a Identity,
     other_file: String,
 }
 
-impl Beside<'_> {
+impl Pair<'_> {
     fn patient(&self) -> Result<Vec<String>, String> {
         let (one, other, file) = (self.identity, self.other, &self.other_file);
         let differ = |a: &str, b: &str| !a.is_empty() && !b.is_empty() && a != b;
@@ -145,13 +145,8 @@ impl Beside<'_> {
     }
 
     fn missing(&self, tag: Tag, here: bool, what: &str) -> String {
-        let place = if here { "in it" } else { "in" };
-        let file = if here { "" } else { &self.other_file };
-        format!(
-            "{} is missing {place}{}{file}, so the {what} is not compared",
-            name(tag),
-            if here { "" } else { " " }
-        )
+        let file = if here { "it" } else { &self.other_file };
+        format!("{} is missing in {file}, so the {what} is not compared", name(tag))
     }
 }
 

@@ -134,7 +134,7 @@ impl Identity {
         let mut copy = self.clone();
         let all = COLUMNS.into_iter().zip(copy.fields());
         let filled = all.filter(|(_, field)| !field.is_empty());
-        filled.map(|(name, field)| (name, field.clone())).collect()
+        filled.map(|(name, field)| (name, printed(field))).collect()
     }
 
     /// Creates an identity from its parts by their names; `None` if there is none.
