@@ -4,9 +4,10 @@ SHELL := /bin/bash
 CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/quick
+PRODUCTS = --bin stylet-lab --bin stylet-study --bin stylet-clinic --bin stylet-igtl
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: attributes deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test build build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: attributes deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test build products build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -14,9 +15,12 @@ help: ## List the targets
 run: deps-run build ## Build, start rt-core and open the window; without a display, run the procedure without a window
 	@setpriv --pdeathsig TERM docs/tools/run "$(BIN)"
 
-build: ## Build both programs
+build: ## Build the simulator: force process, bridge, window
 # The workspace chooses the features, as for the tests, or both build every dependency for themselves.
 	$(CARGO) build --profile quick --workspace --bin rt-core --bin stylet-bridge --bin host-ui
+
+products: build ## Build what `rt-core latency`, `host-ui dose` and the other commands on files and measurements need
+	$(CARGO) build --profile quick --workspace $(PRODUCTS)
 
 test: deps-test ## Install what the tests need, build everything, run all tests
 # Both commands take the same packages: otherwise features differ and everything is built twice. Tests of what runs in real
@@ -25,7 +29,7 @@ test: deps-test ## Install what the tests need, build everything, run all tests
 	$(CARGO) test --profile quick --workspace --config 'target."cfg(all())".runner=["$(abspath docs/tools/test-program)"]'
 
 build-release: ## Build the programs as the packages hold them, with every dependency optimised
-	$(CARGO) build --release --workspace --bin rt-core --bin stylet-bridge --bin host-ui
+	$(CARGO) build --release --workspace --bin rt-core --bin stylet-bridge --bin host-ui $(PRODUCTS)
 
 package: deps-package build-release ## Build the Debian packages of both programs, into target/package
 	docs/tools/package "$(SHIPPED)"
@@ -43,7 +47,7 @@ report: ## Measure speed against error of every tissue model; writes benches/run
 	$(CARGO) run --release -p stylet-benches --bin report
 
 causes: ## Inject ten causes of late ticks into measurements, and see which of them the trace names (as root, about a minute)
-	$(CARGO) build --profile quick --workspace --bin rt-core --bin stylet-bridge
+	$(CARGO) build --profile quick --workspace --bin rt-core --bin stylet-bridge --bin stylet-lab
 	$(CARGO) test --profile quick -p stylet-tests-lab -- eight_of_ten --ignored --nocapture --test-threads=1
 
 ratios: build-release ## Measure the force loop beside cyclictest in alternating rounds and print the ratios, RATIOS_SECONDS (30) each (as root, quiet machine)
@@ -53,21 +57,21 @@ ratios: build-release ## Measure the force loop beside cyclictest in alternating
 procedure-test: deps-test build ## Drive a whole procedure with probe, contour, update of the plan and debrief through the window (three minutes)
 	$(CARGO) test --profile quick -p stylet-tests-window --lib update:: -- --ignored --nocapture
 
-igtl-test: deps-test build ## Compare OpenIGTLink with libOpenIGTLink and pyigtl, then serve IGTL_SECONDS (600) beside clients that hang (11 minutes)
+igtl-test: deps-test products ## Compare OpenIGTLink with libOpenIGTLink and pyigtl, then serve IGTL_SECONDS (600) beside clients that hang (11 minutes)
 	@docs/tools/need g++ libopenigtlink-dev python3-venv
 	python3 -m venv $(BIN)/pyigtl && $(BIN)/pyigtl/bin/pip install -q pyigtl==0.3.4
 	$(CARGO) test --profile quick -p stylet-igtl --lib library -- --ignored --nocapture
 	STYLET_PYIGTL=$(abspath $(BIN))/pyigtl/bin/python STYLET_IGTL_S=10 $(CARGO) test --profile quick -p stylet-tests --test system igtl_python -- --ignored --nocapture --test-threads=1
 	STYLET_IGTL_S=$(or $(IGTL_SECONDS),600) $(CARGO) test --profile quick -p stylet-tests --test system igtl::clients_that_hang -- --nocapture
 
-senders: deps-test build ## End what moves the hand in each way, SENDERS_TRIALS (50) times each: procedure, OpenIGTLink, window, gamepad (two hours)
+senders: deps-test products ## End what moves the hand in each way, SENDERS_TRIALS (50) times each: procedure, OpenIGTLink, window, gamepad (two hours)
 	SENDERS_TRIALS=$(or $(SENDERS_TRIALS),50) $(CARGO) test --profile quick -p stylet-tests --test system motion_sender:: -- --nocapture --test-threads=1
 	SENDERS_TRIALS=$(or $(SENDERS_TRIALS),50) $(CARGO) test --profile quick -p stylet-tests-window --lib senders:: -- --include-ignored --nocapture --test-threads=1
 
 floods: build ## Stop and release under three floods of requests, FLOODS_STOPS (1000) times each (three minutes)
 	FLOODS_STOPS=$(or $(FLOODS_STOPS),1000) $(CARGO) test --profile quick -p stylet-tests --test system floods::a_stop -- --include-ignored --nocapture --test-threads=1
 
-hostile: build ## Send what is valid, stale and broken to a core and its OpenIGTLink for HOSTILE_SECONDS (600), by HOSTILE_SEED (1)
+hostile: products ## Send what is valid, stale and broken to a core and its OpenIGTLink for HOSTILE_SECONDS (600), by HOSTILE_SEED (1)
 	HOSTILE_SECONDS=$(or $(HOSTILE_SECONDS),600) HOSTILE_SEED=$(or $(HOSTILE_SEED),1) $(CARGO) test --profile quick -p stylet-tests --test system hostile:: -- --nocapture --test-threads=1
 
 wall: build ## Damage what hosts share with WALL_SEEDS (50) seeds of each kind, kill and stop the bridge WALL_ROUNDS (100) times (about an hour)

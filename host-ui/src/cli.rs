@@ -2,20 +2,9 @@
 
 use crate::app;
 use crate::command::CommandError;
-use crate::command::class::ClassArgs;
-use crate::command::compare::CompareArgs;
-use crate::command::convert::ConvertArgs;
-use crate::command::dicom::DicomArgs;
-use crate::command::dose::DoseArgs;
 use crate::command::export::ExportArgs;
-use crate::command::find_seeds::FindSeedsArgs;
-use crate::command::perturb::PerturbArgs;
 use crate::command::picture::PictureArgs;
-use crate::command::plan::PlanArgs;
-use crate::command::post_implant::PostImplantArgs;
 use crate::command::record::RecordArgs;
-use crate::command::scene;
-use crate::command::study::StudyArgs;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::PathBuf;
 use stylet_base::interrupt;
@@ -27,9 +16,38 @@ use stylet_host::record;
 use stylet_host::roster::Trainee;
 use stylet_implant::class;
 use stylet_implant::procedure;
-use stylet_manual::ManualArgs;
+use stylet_manual::{ManualArgs, Product};
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::{MAX_LEFT_NEEDLES, ParameterChange};
+
+/// Commands on files, and of OpenIGTLink.
+pub const PRODUCTS: [Product; 2] = [
+    Product {
+        program: "stylet-clinic",
+        commands: &[
+            "scene",
+            "convert",
+            "dicom",
+            "plan",
+            "dose",
+            "find-seeds",
+            "post-implant",
+            "compare",
+            "perturb",
+            "study",
+            "class",
+        ],
+    },
+    Product {
+        program: "stylet-igtl",
+        commands: &["igtl"],
+    },
+];
+
+const AFTER_HELP: &str = "\
+Commands of other programs, which `host-ui COMMAND` starts:
+  stylet-clinic  scene, convert, dicom, plan, dose, find-seeds, post-implant, compare, perturb, study, class
+  stylet-igtl    igtl";
 
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
 ///
@@ -38,7 +56,7 @@ use stylet_shm_schema::{MAX_LEFT_NEEDLES, ParameterChange};
 /// or a 3D mouse hold the needle: F1 lists their functions, `host-ui controllers` lists the
 /// connected ones.
 #[derive(Parser, Debug)]
-#[command(name = "host-ui", version, args_conflicts_with_subcommands = true)]
+#[command(name = "host-ui", version, args_conflicts_with_subcommands = true, after_help = AFTER_HELP)]
 pub struct Cli {
     #[command(flatten)]
     window: CoreArgs,
@@ -127,30 +145,6 @@ enum Task {
     /// Record every tick of the force loop and the tissue's snapshots in an MCAP file, and count
     /// losses
     Record(RecordArgs),
-    /// Serve needle, seeds, gland and state to 3D Slicer over OpenIGTLink, until interrupted;
-    /// anyone who reaches the address can watch, because the protocol has no passwords
-    Igtl {
-        /// Name under which rt-core was started
-        #[arg(long, default_value = "main", value_parser = Instance::new)]
-        instance: Instance,
-        /// Address and port to listen on
-        #[arg(long, default_value = "127.0.0.1:18944", value_name = "ADDRESS")]
-        listen: std::net::SocketAddr,
-        /// Transforms of the needle per second, 1 to 200
-        #[arg(long, default_value_t = 60.0, value_name = "HZ")]
-        hz: f64,
-        /// Let transforms of this name move the simulated hand: a tracker or a stepper behind PLUS. Anyone who reaches
-        /// the address can send them
-        #[arg(long, value_name = "NAME")]
-        hand: Option<String>,
-        /// Let transforms of this name, such as ProbeToScene, move the simulated hand with the ultrasound probe
-        /// (rt-core --device-2)
-        #[arg(long, value_name = "NAME")]
-        probe: Option<String>,
-        /// Maximum speed of both hands, 0.1 to 1000 mm/s
-        #[arg(long, default_value_t = 100.0, value_name = "MM/S")]
-        hand_speed: f64,
-    },
     /// Convert a recording into a table, or into a motion for rt-core's replay device
     Export(ExportArgs),
     /// Let rt-core write its flight recording: the last seconds of both loops, for 'rt-core replay'
@@ -159,48 +153,10 @@ enum Task {
         #[arg(long, default_value = "main", value_parser = Instance::new)]
         instance: Instance,
     },
-    /// Segmented volumes and scene files
-    #[command(subcommand)]
-    Scene(SceneTask),
-    /// Convert label volumes, seed plans and doses between formats, DICOM among them
-    Convert(ConvertArgs),
-    /// Write structure set, plan and dose of one study as DICOM files that name each other
-    Dicom(Box<DicomArgs>),
-    /// Make a plan for the running scene: needles through the template, seeds, their strength; or
-    /// from a table of seeds
-    Plan(PlanArgs),
     /// Write the ultrasound of a probe, or a radiograph of a C-arm, of the running scene, as PNG
     Picture(PictureArgs),
-    /// Compute the dose of seeds (TG-43U1) at points, in structures, or on a grid
-    Dose(DoseArgs),
-    /// Find the implanted seeds in a CT volume, including seeds that touch
-    FindSeeds(FindSeedsArgs),
-    /// Compare the implant as planned, delivered, on day 0 and on day 30: dose, sectors, indices
-    /// and effect
-    PostImplant(Box<PostImplantArgs>),
-    /// Compute the difference of two doses, each an RT Dose or a dose_grid.csv
-    Compare(CompareArgs),
-    /// Compute the dose of a plan under random seed errors
-    Perturb(PerturbArgs),
-    /// Compare distributions and dose of the insertions of 'rt-core study' with published values
-    Study(StudyArgs),
-    /// Compare the trainees of a class and their progress: a page and a table
-    Class(ClassArgs),
     /// Write the man pages and shell completions of this program
     Manual(ManualArgs),
-}
-
-#[derive(Subcommand, Debug)]
-enum SceneTask {
-    /// Read a volume or a scene file and print what would be sent to rt-core
-    #[command(after_long_help = scene::HELP)]
-    Check {
-        /// NIfTI-1, NRRD (also Slicer's .seg.nrrd), MetaImage, DICOM RT Structure Set, or a scene file (.toml)
-        file: PathBuf,
-        /// Label of the gland [default: all but 0]
-        #[arg(long, value_name = "N")]
-        label: Option<u8>,
-    },
 }
 
 impl Cli {
@@ -241,54 +197,13 @@ impl Cli {
                 Ok(ended?)
             }
             Some(Task::Controllers) => Ok(controller::list()?),
-            Some(Task::Scene(SceneTask::Check { file, label })) => scene::check(&file, label),
             Some(Task::Record(args)) => args.run(),
-            Some(Task::Igtl {
-                instance,
-                listen,
-                hz,
-                hand,
-                probe,
-                hand_speed,
-            }) => {
-                if !(1.0..=200.0).contains(&hz) {
-                    return Err(format!("--hz {hz}: 1 to 200 Hz are possible").into());
-                }
-                if !(0.1..=1000.0).contains(&hand_speed) {
-                    return Err(format!("--hand-speed {hand_speed}: 0.1 to 1000 mm/s are possible").into());
-                }
-                let moved_by = |device: Option<String>| {
-                    device.map(|device| stylet_igtl::hand::HandOptions {
-                        device,
-                        speed_m_per_s: hand_speed * 1e-3,
-                    })
-                };
-                let ended = stylet_igtl::serve::run(&stylet_igtl::serve::Options {
-                    instance: instance.clone(),
-                    listen,
-                    rate_hz: hz,
-                    hand: moved_by(hand),
-                    probe: moved_by(probe),
-                });
-                instance.sweep();
-                Ok(ended?)
-            }
             Some(Task::Export(args)) => Ok(args.run()?),
             Some(Task::Flight { instance }) => {
                 println!("written: {}", record::save_flight(&instance)?);
                 Ok(())
             }
-            Some(Task::Convert(args)) => args.run(),
-            Some(Task::Dicom(args)) => args.run(),
-            Some(Task::FindSeeds(args)) => args.run(),
-            Some(Task::PostImplant(args)) => args.run(),
-            Some(Task::Compare(args)) => args.run(),
-            Some(Task::Plan(args)) => args.run(),
             Some(Task::Picture(args)) => args.run(),
-            Some(Task::Dose(args)) => args.run(),
-            Some(Task::Perturb(args)) => args.run(),
-            Some(Task::Study(args)) => args.run(),
-            Some(Task::Class(args)) => args.run(),
             Some(Task::Manual(args)) => Ok(args.run(Self::command())?),
             Some(Task::Procedure {
                 common,

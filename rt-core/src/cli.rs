@@ -1,30 +1,47 @@
 //! The command line of `rt-core`.
 
+use crate::devices::DevicesArgs;
 use crate::probe_task::ProbeArgs;
 use crate::replay_file::Replay;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
-use stylet_lab::args::LatencyArgs;
-use stylet_lab::campaign::CampaignArgs;
-use stylet_lab::credibility::CredibilityArgs;
-use stylet_lab::devices::DevicesArgs;
-use stylet_lab::doctor::DoctorArgs;
-use stylet_lab::fleet::FleetArgs;
-use stylet_lab::load::LoadProcess;
-use stylet_lab::verify::VerifyArgs;
-use stylet_manual::ManualArgs;
-use stylet_runtime::args::{OptionsError, RealTimeArgs, SecondArgs, scenes, tissue_kinds};
+use stylet_manual::{ManualArgs, Product};
+use stylet_runtime::args::{OptionsError, RealTimeArgs, SecondArgs, tissue_kinds};
 use stylet_runtime::device::{self, DeviceChoice, Libraries};
 use stylet_runtime::process::Options;
-use stylet_shm_schema::BUILTIN_SCENES;
 use stylet_sim::scene::TissueKind;
+
+/// Commands of the laboratory and of studies.
+pub const PRODUCTS: [Product; 2] = [
+    Product {
+        program: "stylet-lab",
+        commands: &[
+            "latency",
+            "campaign",
+            "verify",
+            "fleet",
+            "credibility",
+            "doctor",
+            "cost",
+        ],
+    },
+    Product {
+        program: "stylet-study",
+        commands: &["study"],
+    },
+];
+
+const AFTER_HELP: &str = "\
+Commands of other programs, which `rt-core COMMAND` starts:
+  stylet-lab    latency, campaign, verify, fleet, credibility, doctor, cost
+  stylet-study  study";
 
 /// Real-time process of Stylet: owns the haptic device, the 1 kHz force loop and the 200 Hz tissue step.
 ///
 /// Start it first; any number of hosts may connect and disconnect. It asks for SCHED_FIFO and locked memory and refuses
 /// to run without them, unless started with --no-rt. With a subcommand it carries out that task instead.
 #[derive(Parser, Debug)]
-#[command(name = "rt-core", version, args_conflicts_with_subcommands = true)]
+#[command(name = "rt-core", version, args_conflicts_with_subcommands = true, after_help = AFTER_HELP)]
 pub struct Cli {
     /// Carried out instead of a run.
     #[command(subcommand)]
@@ -37,28 +54,10 @@ pub struct Cli {
 /// What `rt-core` does instead of a run.
 #[derive(Subcommand, Debug)]
 pub enum Task {
-    /// Measure how late the loops are on this machine, and write a report with a verdict
-    Latency(Box<LatencyArgs>),
-    /// Measure for hours or nights, load after load, and continue after whatever ended it; one report over all of it
-    Campaign(Box<CampaignArgs>),
-    /// Verify that a saved latency report is unaltered, who signed it, and which programs it is of
-    Verify(VerifyArgs),
-    /// Compare the latency reports of many PCs: who passes, how each changed and what changed with it; a page and a CSV
-    /// table
-    Fleet(FleetArgs),
-    /// Write the file that an auditor asks for: purpose, hazards, requirements with their tests and runs, packages and
-    /// licences
-    Credibility(CredibilityArgs),
-    /// Check whether this PC is fit for the force loop, and what to change; change it, measured before and after; undo
-    /// it
-    Doctor(DoctorArgs),
     /// List the haptic devices that can be used: what of each is there, what it says, and what is missing
     Devices(DevicesArgs),
     /// Show a flight recording, repeat it, and check that all forces and positions are bit-identical
     Replay(Replay),
-    /// Run thousands of insertions over scenes, plans, hands and tissues, in shards that make Parquet files
-    #[cfg(feature = "study")]
-    Study(Box<stylet_study::args::StudyArgs>),
     /// Solve for what the ultrasound probe presses in a scene's own cells: once, for minutes; later runs use it
     ///
     /// A run with a second device (--device-2) solves for it within seconds, in the larger elements that needles' lines
@@ -67,32 +66,8 @@ pub enum Task {
     /// the same scene and tissue begin with them. The window says below the scene in which elements the probe is solved
     /// for.
     Probe(ProbeArgs),
-    /// Measure what each part of a scene costs in a tissue tick
-    Cost {
-        /// Built-in scene
-        #[arg(long, default_value = BUILTIN_SCENES[0], value_parser = scenes())]
-        scene: String,
-    },
     /// Write the man pages and shell completions of this program
     Manual(ManualArgs),
-    /// Remove the trace instance NAME once the input ends; started by `latency --trace`
-    #[command(hide = true)]
-    TraceKeeper {
-        /// Instance of tracefs
-        name: String,
-    },
-    /// One process of a load; started by `latency`
-    #[command(hide = true)]
-    Load {
-        /// What to do
-        work: LoadProcess,
-        /// Core on which to do it
-        #[arg(long)]
-        core: Option<usize>,
-        /// File that the load may write
-        #[arg(long)]
-        file: PathBuf,
-    },
 }
 
 /// Running the simulator.
@@ -159,7 +134,7 @@ mod tests {
         Cli::command().debug_assert();
         let cli = Cli::parse_from(["rt-core", "--instance", "t1", "--rt-if-allowed", "--exit-with-parent"]);
         assert!(cli.task.is_none() && cli.run.exit_with_parent);
-        assert!(Cli::try_parse_from(["rt-core", "--scene", "paper", "doctor"]).is_err());
+        assert!(Cli::try_parse_from(["rt-core", "--scene", "paper", "devices"]).is_err());
     }
 
     fn refused(options: &[&str]) -> String {

@@ -2,7 +2,6 @@
 //! PNG file.
 
 use super::CommandError;
-use super::dose::common::within;
 use crate::picture::png_of;
 use crate::shown::Shown;
 use clap::{Args, ValueEnum};
@@ -86,12 +85,18 @@ enum Wanted {
 
 impl PictureArgs {
     pub fn run(self) -> Result<(), CommandError> {
-        within("--way", self.way, -100.0, 100.0)?;
-        within("--turn", self.turn, -180.0, 180.0)?;
-        within("--depth", self.depth, 20.0, 120.0)?;
-        within("--gain", self.gain, -60.0, 60.0)?;
-        within("--orbital", self.orbital, -180.0, 180.0)?;
-        within("--cranial", self.cranial, -60.0, 60.0)?;
+        for (option, value, least, most) in [
+            ("--way", self.way, -100.0, 100.0),
+            ("--turn", self.turn, -180.0, 180.0),
+            ("--depth", self.depth, 20.0, 120.0),
+            ("--gain", self.gain, -60.0, 60.0),
+            ("--orbital", self.orbital, -180.0, 180.0),
+            ("--cranial", self.cranial, -60.0, 60.0),
+        ] {
+            if !(least..=most).contains(&value) {
+                return Err(format!("{option} {value}: give {least} to {most}").into());
+            }
+        }
         let mut live = Live::connect(&Connect {
             asked: self.asked.clone(),
             core: self.core.clone(),

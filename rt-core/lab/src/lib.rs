@@ -2,8 +2,7 @@
 //!
 //! [`latency`] runs a measurement and writes a report, [`campaign`] one of hours and nights; [`verify`] verifies that a
 //! saved report is unaltered; [`fleet`] compares the reports of many PCs; [`doctor`] checks whether this PC is fit, and
-//! improves it; [`devices`] lists the usable haptic devices; [`credibility`] is the file for an auditor. No report
-//! claims conformity with a standard.
+//! improves it; [`credibility`] is the file for an auditor. No report claims conformity with a standard.
 
 #![warn(missing_docs)]
 
@@ -14,7 +13,6 @@ mod collect;
 mod compare;
 pub mod cost;
 pub mod credibility;
-pub mod devices;
 pub mod doctor;
 mod external;
 mod extreme;

@@ -20,12 +20,16 @@ pub struct ProgramDigest {
     pub sha256: String,
 }
 
-/// Returns the digests of this program, and of the window's in the same folder.
+/// Returns the digests of this program, and of those of the simulator in the same folder.
 pub fn programs() -> Vec<ProgramDigest> {
     let Ok(own) = std::env::current_exe() else {
         return Vec::new();
     };
-    let all = [own.clone(), own.with_file_name("host-ui")];
+    let all = [
+        own.clone(),
+        own.with_file_name("rt-core"),
+        own.with_file_name("host-ui"),
+    ];
     let digest = |path: &std::path::PathBuf| {
         let bytes = std::fs::read(path).ok()?;
         Some(ProgramDigest {

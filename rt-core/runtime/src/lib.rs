@@ -14,4 +14,5 @@ pub mod process;
 pub mod rehearse;
 pub mod replay;
 pub mod rt;
+pub mod signals;
 pub mod stepped;

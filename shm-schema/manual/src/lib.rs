@@ -1,8 +1,9 @@
-//! Writes man pages and shell completions of a program from the definition of its command line.
+//! Command lines of several programs: their man pages and completions, and commands that another program carries out.
 
 #![warn(missing_docs)]
 
 mod completion;
+mod hand_over;
 mod page;
 #[cfg(test)]
 mod tests;
@@ -11,6 +12,8 @@ use clap::{Args, Command};
 use std::io;
 use std::path::{Path, PathBuf};
 use stylet_write::{WriteError, write_whole};
+
+pub use hand_over::{HandOverError, Product, hand_over};
 
 /// The subcommand that writes them.
 #[derive(Args, Debug)]

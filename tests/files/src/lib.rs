@@ -10,3 +10,5 @@ mod labels;
 mod results;
 #[cfg(test)]
 mod study;
+#[cfg(test)]
+mod together;

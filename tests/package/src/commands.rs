@@ -1,16 +1,18 @@
-//! `docs/commands.md`: the commands and options of both programs, from their help.
+//! `docs/commands.md`: the commands and options of the programs, from their help.
 
-use crate::PROGRAMS;
 use crate::help::{Help, helps};
+use crate::{PACKAGES, PROGRAMS};
 use std::fmt::Write as _;
 use stylet_test_kit::repository;
 
 const HEAD: &str = "\
 # Commands
 
-The test that checks this page also writes it, from the help of both programs:
+The test that checks this page also writes it, from the help of the programs:
 `UPDATE_DOCS=1 cargo test --profile quick -p stylet-tests-package commands`. `COMMAND --help` explains each option.
-The packages install man pages and completions for bash, zsh and fish; `rt-core manual` and `host-ui manual` write them.
+The packages install man pages and completions for bash, zsh and fish; the command `manual` of each program writes them.
+`rt-core` and `host-ui` start the programs of the laboratory, of studies, of files and of OpenIGTLink by themselves:
+`rt-core latency` and `stylet-lab latency` are the same command.
 [A class over the network](network.md) lists the commands of `relay`.
 ";
 
@@ -28,11 +30,13 @@ fn page() -> String {
         for (words, does) in helps.iter().flat_map(commands) {
             let _ = writeln!(page, "| `{words}` | {} |", cell(&does));
         }
-        let _ = write!(
-            page,
-            "\nOptions of a run, `{name} -h`:\n\n```\n{}\n```\n",
-            options(name)
-        );
+        if PACKAGES.contains(&name) {
+            let _ = write!(
+                page,
+                "\nOptions of a run, `{name} -h`:\n\n```\n{}\n```\n",
+                options(name)
+            );
+        }
     }
     page
 }

@@ -1,6 +1,6 @@
 //! Contents of each Debian package: every file exists, names only installed files, and is in one package.
 
-use crate::{PROGRAMS, manual};
+use crate::{PACKAGES, manual};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,7 +9,7 @@ use stylet_test_kit::repository;
 /// Returns the installed files: absolute path and source. Writes the pages to `pages` first.
 fn installed(pages: &Path) -> BTreeMap<String, PathBuf> {
     let mut all = BTreeMap::new();
-    for program in PROGRAMS {
+    for program in PACKAGES {
         for asset in assets(program) {
             for source in sources(program, &asset[0], pages) {
                 let name = source.file_name().expect("a file").to_string_lossy().into_owned();
@@ -189,7 +189,7 @@ fn rules_for_devices_name_the_vendors_that_the_programs_look_for() {
 /// Rights are granted only after a question was answered.
 #[test]
 fn scripts_are_valid_and_the_question_about_rights_begins_with_none() {
-    for program in PROGRAMS {
+    for program in PACKAGES {
         let folder = metadata(program)["maintainer-scripts"]
             .as_str()
             .expect("a folder")

@@ -1,4 +1,4 @@
-//! Installed files: man pages and completions of both programs, and the contents of the Debian packages.
+//! Installed files: man pages and completions of the programs, and the contents of the Debian packages.
 
 #[cfg(test)]
 mod commands;
@@ -10,7 +10,17 @@ mod help;
 mod pages;
 
 #[cfg(test)]
-const PROGRAMS: [&str; 2] = ["rt-core", "host-ui"];
+const PROGRAMS: [&str; 6] = [
+    "rt-core",
+    "stylet-lab",
+    "stylet-study",
+    "host-ui",
+    "stylet-clinic",
+    "stylet-igtl",
+];
+/// Packages, by the folder of their manifest.
+#[cfg(test)]
+const PACKAGES: [&str; 2] = ["rt-core", "host-ui"];
 
 /// Returns the folder with pages and completions, as written by the programs.
 #[cfg(test)]

@@ -99,12 +99,12 @@ fn a_shell_completes_subcommands_options_and_values() {
             .trim()
             .to_owned()
     };
-    assert_eq!(completed("rt-core", &["do"]), "doctor");
+    assert_eq!(completed("stylet-lab", &["do"]), "doctor");
     assert_eq!(completed("rt-core", &["--scene", "pel"]), "pelvis");
-    assert_eq!(completed("rt-core", &["doctor", "--j"]), "--json");
-    assert_eq!(completed("host-ui", &["scene", "ch"]), "check");
+    assert_eq!(completed("stylet-lab", &["doctor", "--j"]), "--json");
+    assert_eq!(completed("stylet-clinic", &["scene", "ch"]), "check");
     assert!(
-        !completed("rt-core", &["l"]).contains("load"),
+        !completed("stylet-lab", &["l"]).contains("load"),
         "a hidden subcommand is offered"
     );
 }

@@ -143,7 +143,7 @@ impl Program {
             ])
             .arg(scratch("motion").join("out"))
             .stdout(Stdio::null())
-            .stderr(Stdio::null());
+            .stderr(File::create(words_of_procedure()).expect("written"));
         Self::start(&mut command)
     }
 
@@ -162,6 +162,10 @@ impl Drop for Program {
         }
         let _ = self.0.wait();
     }
+}
+
+fn words_of_procedure() -> PathBuf {
+    scratch("motion").with_extension("log")
 }
 
 /// The server, the operator's relay and its program, with what is needed to end them.
@@ -294,10 +298,10 @@ fn moves(records: &[TickRecord]) -> bool {
 fn trial(way: &mut Way, end: End, beside: &mut Host, after: Duration) -> Trial {
     beside.poll();
     beside.taken.clear();
-    assert!(
-        watch(beside, Duration::from_secs(40), moves),
-        "{end:?}: the needle does not move"
-    );
+    if !watch(beside, Duration::from_secs(40), moves) {
+        let words = std::fs::read_to_string(words_of_procedure());
+        panic!("{end:?}: the needle does not move; its procedure said: {words:?}");
+    }
     watch(beside, after, |_| false);
     // Between two strokes of the needle nothing would be seen.
     watch(beside, Duration::from_secs(5), moves);

@@ -1,6 +1,6 @@
 //! Results as CSV, JSON and tables; the header of each column gives its unit.
 
-use crate::command::CommandError;
+use crate::CommandError;
 use serde_json::{Value, json};
 use std::path::Path;
 use stylet_base::format::cell;

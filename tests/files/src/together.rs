@@ -1,16 +1,19 @@
-//! Every subcommand that takes more than one clinical file, as the definition of the command line
-//! lists them, refuses files of two patients or frames, and reports files of two studies.
+//! Every subcommand that takes more than one clinical file, as the definitions of the command lines
+//! list them, refuses files of two patients or frames, and reports files of two studies.
 
 use clap::{Command, CommandFactory};
-use host_ui::cli::Cli;
 use std::any::TypeId;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use stylet_files::dicom::Identity;
 use stylet_files::dicom::dose::{self, DoseImage, DoseKind, DoseOf};
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
 use stylet_files::dicom::structures::write::{self as structures, Outlined, Written};
 use stylet_host::core_args::SceneChoice;
+use stylet_test_kit::{program, repository, scratch};
+
+/// Names of the definitions; the window is a command of the first.
+const PROGRAMS: [&str; 2] = ["host-ui", "stylet-clinic"];
 
 /// Content of a file that an option names.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,10 +87,6 @@ const FURTHER: [(&str, &[&str]); 7] = [
     ("post-implant", &["--source", "SOURCE", "--out", "OUT"]),
 ];
 
-fn repository(path: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path)
-}
-
 /// Returns each command without subcommands of its own.
 fn leaves(command: &Command, all: &mut Vec<Command>) {
     all.push(command.clone());
@@ -106,9 +105,9 @@ struct Files {
 
 impl Files {
     fn of(name: &str, identity: &Identity) -> Self {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("together").join(name);
-        std::fs::create_dir_all(&folder).unwrap();
-        let files = Self { folder };
+        let files = Self {
+            folder: scratch(&format!("together-{name}")),
+        };
         let put = |kind: Kind, bytes: Vec<u8>| std::fs::write(files.path(kind), bytes).unwrap();
         let square = |side: f64, z: f64| {
             let corner = |[x, y]: [f64; 2]| nalgebra::Vector3::new(x * side, y * side, z);
@@ -198,8 +197,8 @@ fn run(command: &Command, options: &[(&clap::Arg, Kind)], odd: &str, others: &Fi
     let out = others.folder.join("out");
     let _ = std::fs::remove_dir_all(&out);
     std::fs::create_dir_all(&out).unwrap();
-    let mut process = std::process::Command::new(env!("CARGO_BIN_EXE_host-ui"));
-    if name != "host-ui" {
+    let mut process = std::process::Command::new(program("host-ui"));
+    if !PROGRAMS.contains(&name) {
         process.arg(name);
     }
     for (arg, kind) in options {
@@ -260,11 +259,12 @@ fn every_command_compares_its_clinical_files() {
         (Files::of("study", &other_study), "another study"),
     ];
     let mut all = Vec::new();
-    leaves(&Cli::command(), &mut all);
+    leaves(&host_ui::cli::Cli::command(), &mut all);
+    leaves(&stylet_clinic::cli::Cli::command(), &mut all);
     let mut checked = BTreeSet::new();
     for command in &all {
         let name = command.get_name();
-        let key = if name == "host-ui" { "" } else { name };
+        let key = if PROGRAMS.contains(&name) { "" } else { name };
         let of_option = |id: &str| {
             CLINICAL
                 .iter()
@@ -324,7 +324,7 @@ fn the_files_of_a_scene_file_are_compared() {
         let [volume, plan] = [volume.path(Kind::Structures), plan.path(Kind::Seeds)];
         let text = format!("[volume]\nfile = {volume:?}\n[plan]\nfile = {plan:?}\n");
         std::fs::write(&scene, text).unwrap();
-        let mut process = std::process::Command::new(env!("CARGO_BIN_EXE_host-ui"));
+        let mut process = std::process::Command::new(program("host-ui"));
         let done = process.args(["scene", "check"]).arg(&scene).output().unwrap();
         let said = String::from_utf8_lossy(&done.stderr).into_owned();
         assert_eq!(said.contains("patient \"OTHER\""), is_refused, "{said}");

@@ -1,6 +1,6 @@
 //! Common parts of `dose`, `perturb` and `dicom`: source, seeds, times and structures.
 
-use crate::command::CommandError;
+use crate::CommandError;
 use clap::Args;
 use serde_json::json;
 use std::collections::BTreeMap;
