@@ -1,13 +1,14 @@
-# Two commands: `make run` starts the simulator, `make test` checks all of it.
+# Two commands: `make run` starts the simulator, `make test` checks it; `make test-all` also checks the products around it.
 
 SHELL := /bin/bash
 CARGO ?= cargo
 RELAY = cd host-ui/relay && CARGO_TARGET_DIR=$(abspath $(or $(CARGO_TARGET_DIR),target)) $(CARGO)
 BIN := $(or $(CARGO_TARGET_DIR),target)/quick
+SIMULATOR = --bin rt-core --bin stylet-bridge --bin host-ui
 PRODUCTS = --bin stylet-lab --bin stylet-study --bin stylet-clinic --bin stylet-igtl
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: attributes deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test build products build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: attributes deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -16,20 +17,26 @@ run: deps-run build ## Build, start rt-core and open the window; without a displ
 	@setpriv --pdeathsig TERM docs/tools/run "$(BIN)"
 
 build: ## Build the simulator: force process, bridge, window
-# The workspace chooses the features, as for the tests, or both build every dependency for themselves.
-	$(CARGO) build --profile quick --workspace --bin rt-core --bin stylet-bridge --bin host-ui
+	$(CARGO) build --profile quick $(SIMULATOR)
 
 products: build ## Build what `rt-core latency`, `host-ui dose` and the other commands on files and measurements need
 	$(CARGO) build --profile quick --workspace $(PRODUCTS)
 
-test: deps-test ## Install what the tests need, build everything, run all tests
-# Both commands take the same packages: otherwise features differ and everything is built twice. Tests of what runs in real
-# time run one at a time.
-	$(CARGO) build --profile quick --workspace --all-targets
-	$(CARGO) test --profile quick --workspace --config 'target."cfg(all())".runner=["$(abspath docs/tools/test-program)"]'
+# Tests of what runs in real time run one at a time.
+RUNNER = --config 'target."cfg(all())".runner=["$(abspath docs/tools/test-program)"]'
+# The workspace without the simulator's packages, which `make test` has tested.
+REST = --workspace $(shell $(CARGO) metadata --no-deps --format-version 1 | python3 -c 'import json, sys; all = json.load(sys.stdin); \
+    print(*("--exclude " + p["name"] for p in all["packages"] if p["id"] in all["workspace_default_members"]))')
+
+test: deps-test products ## Install what the tests need, test the simulator, and use each product once
+	$(CARGO) test --profile quick $(RUNNER)
+
+test-all: test ## Then test the products, and the programs with whole processes, windows and other programs' files
+	$(CARGO) build --profile quick $(REST) --all-targets
+	$(CARGO) test --profile quick $(REST) $(RUNNER)
 
 build-release: ## Build the programs as the packages hold them, with every dependency optimised
-	$(CARGO) build --release --workspace --bin rt-core --bin stylet-bridge --bin host-ui $(PRODUCTS)
+	$(CARGO) build --release --workspace $(SIMULATOR) $(PRODUCTS)
 
 package: deps-package build-release ## Build the Debian packages of both programs, into target/package
 	docs/tools/package "$(SHIPPED)"

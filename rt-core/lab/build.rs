@@ -59,19 +59,23 @@ type Package = (String, String);
 /// The packages that each one names, as `name` or `name version`.
 type Needs = BTreeMap<Package, Vec<String>>;
 
-/// Returns all locked packages.
+/// Returns all locked packages. A parser for all of TOML would change features of packages that the simulator is built
+/// from, so that building a product builds them twice; cargo writes one key, or one element of a list, a line.
 fn locked(lock: &Path) -> Option<Needs> {
     println!("cargo:rerun-if-changed={}", lock.display());
-    let lock: toml::Table = std::fs::read_to_string(lock).ok()?.parse().ok()?;
+    let lock = std::fs::read_to_string(lock).ok()?;
     let mut needs = Needs::new();
-    for package in lock.get("package")?.as_array()? {
-        let text = |key: &str| package.get(key).and_then(|v| v.as_str()).map(str::to_owned);
-        let listed = package.get("dependencies").and_then(|d| d.as_array());
-        let listed = listed
-            .into_iter()
-            .flatten()
-            .filter_map(|d| d.as_str().map(str::to_owned));
-        needs.insert((text("name")?, text("version")?), listed.collect());
+    for package in lock.split("[[package]]").skip(1) {
+        let text = |key: &str| {
+            package
+                .lines()
+                .find_map(|line| line.strip_prefix(key)?.strip_suffix('"'))
+        };
+        let listed = package
+            .lines()
+            .filter_map(|line| line.strip_prefix(" \"")?.strip_suffix("\","));
+        let own = (text("name = \"")?.to_owned(), text("version = \"")?.to_owned());
+        needs.insert(own, listed.map(str::to_owned).collect());
     }
     Some(needs)
 }
@@ -95,23 +99,23 @@ fn needed(needs: &Needs, program: &str) -> BTreeSet<Package> {
     found
 }
 
-/// Returns the packages of the core: the force process and its bridge.
-fn core(needs: &Needs) -> BTreeSet<Package> {
-    let programs = ["rt-core", "stylet-bridge"].map(|program| needed(needs, program));
-    programs.into_iter().flatten().collect()
+/// Returns the packages of some programs.
+fn of_programs(needs: &Needs, programs: &[&str]) -> BTreeSet<Package> {
+    programs.iter().flat_map(|program| needed(needs, program)).collect()
 }
 
-/// Lists `name version` of each package that the core needs, one a line.
+/// Lists `name version` of each package that a measurement runs on, one a line.
 fn dependencies(needs: &Needs) -> String {
-    let all = core(needs);
+    let all = of_programs(needs, &["rt-core", "stylet-bridge", "stylet-lab"]);
     all.iter()
         .map(|(name, version)| format!("{name} {version}\n"))
         .collect()
 }
 
-/// Lists `name version programs licence` of each foreign package in either program, one a line.
+/// Lists `name version programs licence` of each foreign package in the programs of either side, one a line.
 fn packages(needs: &Needs) -> String {
-    let (core, host) = (core(needs), needed(needs, "host-ui"));
+    let core = of_programs(needs, &["rt-core", "stylet-bridge", "stylet-lab", "stylet-study"]);
+    let host = of_programs(needs, &["host-ui", "stylet-clinic", "stylet-igtl"]);
     let ours = |name: &str| name.starts_with("stylet-") || name == "rt-core" || name == "host-ui";
     let sources = sources();
     let line = |package: &Package| {
