@@ -138,6 +138,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema/anatomy",
             "shm-schema/settings",
             "shm-schema/random",
+            "tests/kit",
         ],
         never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM],
         not_itself: &[],
@@ -153,6 +154,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema/anatomy",
             "shm-schema/wall",
             "shm-schema/random",
+            "tests/kit",
         ],
         // The process that owns the device never communicates with hosts itself.
         never: &[WINDOW, PORTS, DICOM],

@@ -14,20 +14,31 @@ impl Digest {
     }
 }
 
-/// Digests tip, force, torque, depth, speed and displacement of every tick, then the seeds and the largest force.
-fn digest(stage: &mut Stage, run: &NeedleRun) -> u64 {
+/// Digests tip, force, torque, depth, speed and displacement of every tick, then the seeds and the largest force. Adds
+/// every 200th tick and the seeds to a trace.
+fn digest(stage: &mut Stage, run: &NeedleRun, case: f64, trace: &mut Vec<Vec<f64>>) -> u64 {
     let active = activate(&ParameterSet::default(), &stage.device).expect("valid");
     let mut world = stage.world.take().expect("given back");
     world.tissue.return_to_rest();
     let mut rig = Rig::new(world, &active, (&stage.device, stage.hand), run);
     let (mut script, mut all) = (Script::new(run), Digest(0xcbf2_9ce4_8422_2325));
-    loop {
+    for tick in 0_u32.. {
         rig.tick();
         let state = rig.state();
         all.take(&state.tip_in_scene_m);
         all.take(&state.force_on_hand_n);
         all.take(&state.torque_on_hand_nm);
         all.take(&[state.depth_m, state.speed_m_per_s, rig.displacement_m()]);
+        if tick.is_multiple_of(200) {
+            let force_n = Vector3::from(state.force_on_hand_n).norm();
+            trace.push(vec![
+                case,
+                f64::from(tick),
+                state.depth_m,
+                force_n,
+                rig.displacement_m(),
+            ]);
+        }
         assert!(rig.seconds() < 120.0, "it does not end");
         if script.advance(&mut rig).expect("goes on") {
             break;
@@ -35,6 +46,13 @@ fn digest(stage: &mut Stage, run: &NeedleRun) -> u64 {
     }
     for seed in rig.seeds() {
         all.take(&seed.position_m);
+        trace.push(vec![
+            case,
+            -1.0,
+            seed.position_m[0],
+            seed.position_m[1],
+            seed.position_m[2],
+        ]);
     }
     all.take(&[rig.state().peak_force_n]);
     stage.world = Some(rig.into_world());
@@ -74,12 +92,24 @@ const KEPT: [u64; 8] = [
 
 #[test]
 fn the_paper_as_printed_keeps_its_bits() {
-    let mut found = Vec::new();
+    let (mut found, mut trace) = (Vec::new(), Vec::new());
     for scene in ["paper", "pelvis"] {
         for (speed_m_per_s, beside_m) in [(0.01, 0.0), (0.05, 0.0), (0.123, 0.0), (0.05, 0.004)] {
             let (mut stage, run) = through(scene, speed_m_per_s, beside_m);
-            found.push(digest(&mut stage, &run));
+            let case = found.len() as f64;
+            found.push(digest(&mut stage, &run, case, &mut trace));
         }
     }
-    assert_eq!(found, KEPT, "{found:#018x?}");
+    // Rows of a seed have the tick -1 and its place.
+    let columns = [
+        "case",
+        "tick",
+        "depth_m or x_m",
+        "force_n or y_m",
+        "displacement_m or z_m",
+    ];
+    let path = "rt-core/runtime/src/rehearse/tests/paper.csv";
+    let changed = stylet_test_kit::trace::first_difference(path, &columns, &trace);
+    assert_eq!(changed, None);
+    assert_eq!(found, KEPT, "less than the trace shows: {found:#018x?}");
 }

@@ -40,7 +40,7 @@ fn rate_terms_that_are_off_leave_every_bit_as_it_was() {
     let model = exact(LineSettings::default());
     let mut state = LineState::new(&model);
     let mut random = Random(23);
-    let (mut tip_m, mut hash) = (-1e-3, 0xcbf2_9ce4_8422_2325_u64);
+    let (mut tip_m, mut hash, mut trace) = (-1e-3, 0xcbf2_9ce4_8422_2325_u64, Vec::new());
     for cycle in 0..300 {
         if cycle % 50 == 0 {
             state.reset();
@@ -60,9 +60,22 @@ fn rate_terms_that_are_off_leave_every_bit_as_it_was() {
             for value in own.iter().chain(state.loads_n()) {
                 hash = (hash ^ value.to_bits()).wrapping_mul(0x0100_0000_01b3);
             }
+            if tip_m == end_m && cycle % 5 == 0 {
+                trace.push([&[f64::from(cycle), tip_m][..], &own].concat());
+            }
         }
     }
-    assert_eq!(hash, BITS, "{hash:#x}");
+    let columns = [
+        "cycle",
+        "tip_m",
+        "force_on_hand_n",
+        "tip_material_m",
+        "whole_n",
+        "elastic_j",
+    ];
+    let path = "rt-core/sim/src/line/contact/tests/bits.csv";
+    assert_eq!(stylet_test_kit::trace::first_difference(path, &columns, &trace), None);
+    assert_eq!(hash, BITS, "less than the trace shows: {hash:#x}");
 }
 
 /// Each tick used to make a scratch of 17 KB of zeros. What another line has left in one is never read.
