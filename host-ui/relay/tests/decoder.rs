@@ -65,12 +65,8 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
 
 #[test]
 fn damaged_messages_are_refused_or_valid_and_never_panic() {
-    // Knuth's linear congruential generator, so that a failure repeats.
-    let mut state = 19_u64;
-    let mut below = |limit: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-        (state >> 33) as usize % limit
-    };
+    let mut random = stylet_random::Random(19);
+    let mut below = |limit: usize| random.below(limit);
     let (mut accepted, mut refused) = (0, 0);
     for (name, bytes) in examples() {
         assert!(decoders::take(&bytes), "{name}");

@@ -80,11 +80,8 @@ mod tests {
 
     #[test]
     fn records_come_out_as_they_went_in() {
-        let mut seed = 1_u32;
-        let mut random = |_: usize, _: usize| {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (seed >> 24) as u8
-        };
+        let mut generator = stylet_random::Random(1);
+        let mut random = |_: usize, _: usize| generator.draw() as u8;
         for count in [0, 1, 20, MAX_BATCH] {
             for records in [batch(count, |_, place| place as u8), batch(count, &mut random)] {
                 let again = unpack(&pack(&records)).expect("packed");

@@ -344,21 +344,18 @@ fn a_hand_whose_far_operator_ends_is_at_rest_within_5_mm_and_400_ticks() {
     let invitation = keys.invite("otto", Role::Operator, Validity::days(1));
     let mut beside = Host::new(&near);
     assert!(beside.sees_the_core(Duration::from_secs(20)));
-    let mut random = now_ns() | 1;
+    let mut random = stylet_random::Random(now_ns());
     let mut all = Vec::new();
     println!("| what ends | trials | mm: least, middle, most | ticks: middle, most | from up to mm/s |");
     for end in kinds() {
         let mut seen = Vec::new();
         for _ in 0..trials() {
-            random = random
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
             let mut way = Way::begin(end, &keys, &invitation, &near, &far);
             seen.push(trial(
                 &mut way,
                 end,
                 &mut beside,
-                Duration::from_millis((random >> 33) % 700),
+                Duration::from_millis(random.below(700) as u64),
             ));
         }
         seen.sort_by(|a, b| a.farthest_mm.total_cmp(&b.farthest_mm));

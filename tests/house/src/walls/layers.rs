@@ -312,7 +312,13 @@ pub const LAYERS: &[Layer] = &[
     },
     Layer {
         folder: "host-ui/relay",
-        may_use: &["shm-schema", "shm-schema/manual", "shm-schema/ports", "tests/kit"],
+        may_use: &[
+            "shm-schema",
+            "shm-schema/manual",
+            "shm-schema/ports",
+            "shm-schema/random",
+            "tests/kit",
+        ],
         never: &[WINDOW, DEVICES, DICOM],
         not_itself: &[PORTS],
     },

@@ -31,7 +31,10 @@ impl HapticLoop {
     }
 
     pub(super) fn keep_moving(&mut self, promise: &Promise) {
-        if self.motions.hand.renew(promise, self.period_s)
+        let speed_m_per_s = self.chain.estimator.velocity_m_per_s().norm();
+        let speed_m_per_s = self.goal.map_or(0.0, |goal| goal.speed_m_per_s).max(speed_m_per_s);
+        let of_hand = promise.within_5_mm(speed_m_per_s);
+        if self.motions.hand.renew(&of_hand, self.period_s)
             && let Some(goal) = &self.goal
         {
             self.device.set_hand_goal(goal);

@@ -32,7 +32,8 @@ impl SecondLoop {
     }
 
     pub(super) fn keep_moving(&mut self, promise: &Promise) {
-        if self.memory.motion.renew(promise, self.period_s)
+        let promise = promise.within_5_mm(self.memory.goal.map_or(0.0, |goal| goal.speed_m_per_s));
+        if self.memory.motion.renew(&promise, self.period_s)
             && let Some(goal) = &self.memory.goal
         {
             self.device.set_hand_up(self.memory.up);
