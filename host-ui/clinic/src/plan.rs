@@ -35,8 +35,7 @@ V150 at most 60 %; urethra D10 at most 150 %, D30 130 %; rectum D2cc at most 100
 that cannot be met is reported. Within the limits the plan is robust: 95 % of 300 trials in which every seed is misplaced by 4 mm
 along each axis (standard deviation) meet a D90 of 90 % of the prescription. --robust selects their mean or another percentile,
 --misplacement-mm another deviation, and --errors-of takes shift, deviations and correlation from the seeds of a study. --compare
-searches three plans, prints the robustness and the cost of each, and writes one of them. Without a known urethra the plan is modified
-peripheral loading, with a note. With --seeds the plan consists of the seeds of a table (columns as in 'host-ui dose --help'), assigned
+searches three plans, prints the robustness and the cost of each, and writes one of them. A note says if no urethra is known. With --seeds the plan consists of the seeds of a table (columns as in 'host-ui dose --help'), assigned
 to needles by their numbers, or by their lines if there are none.
 
 Units: mm, patient frame (RAS); strength in U (1 U = 1 cGy cm2/h).
@@ -161,21 +160,17 @@ impl PlanArgs {
                     ControlFlow::Continue(())
                 };
                 let objectives = self.objectives(&source, prescription_gy, &frames)?;
-                let found = match self.compare {
-                    None => first::plan(template, &anatomy, &kernel, &source, &objectives, report).map(|one| vec![one]),
-                    Some(_) => first::proposals(template, &anatomy, &kernel, &source, &objectives, report),
-                };
+                let count = if self.compare.is_some() { 3 } else { 1 };
+                let found = first::proposals(template, &anatomy, &kernel, &source, &objectives, count, report);
                 bar.finish_and_clear();
                 let mut found = found?;
-                if found.iter().any(|plan| plan.measures.is_some()) {
-                    print!("{}", comparison(&found));
-                }
+                print!("{}", comparison(&found));
                 let wanted = self.compare.map_or(0, |wanted| wanted as usize);
                 let found = found.swap_remove(wanted.min(found.len() - 1));
                 for note in &found.notes {
                     println!("note: {}", stylet_base::format::printable_line(note));
                 }
-                found.plan
+                found.found.plan
             }
             Some((path, seeds)) => file::import(path, seeds, &frames, template, &source.model, prescription_gy)?,
         };
@@ -258,19 +253,19 @@ fn comparison(found: &[FirstPlan]) -> String {
         "plan", "V100", "D90", "V150", "needles", "seeds", "meet D90", "mean D90", "D90 p10", "limits"
     );
     for plan in found {
-        let Some(m) = &plan.measures else { continue };
+        let m = &plan.found;
         text += &format!(
             "{:14} {:6.1} {:6.1} {:6.1} {:7} {:5} {:8.1} {:10.1} {:8.1} {:>7}\n",
             plan.name,
             m.figures.v100,
             m.figures.d90,
             m.figures.v150,
-            plan.plan.needles.len(),
-            plan.plan.seed_count(),
+            m.plan.needles.len(),
+            m.plan.seed_count(),
             m.robust * 100.0,
             m.expected_d90,
             m.d90_p10,
-            if plan.notes.is_empty() { "kept" } else { "broken" }
+            if m.figures.beyond() == 0.0 { "kept" } else { "broken" }
         );
     }
     text

@@ -55,7 +55,7 @@ impl Planner {
             return;
         };
         let Some(found) = proposals.get(number) else { return };
-        match self.can_be(found.plan.clone()) {
+        match self.can_be(found.found.plan.clone()) {
             Ok(plan) => {
                 self.put(plan);
                 self.message = plan_message(&found.notes);

@@ -14,7 +14,6 @@ use stylet_dose::{DoseKernel, Source};
 use stylet_host::link::{Link, SceneModel};
 use stylet_implant::intraoperative::Proposed;
 use stylet_implant::linked::scene as study;
-use stylet_implant::plan::automatic::{self, Aims};
 use stylet_implant::plan::first::{self, FirstPlan};
 use stylet_implant::plan::optimise::Objectives;
 use stylet_implant::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Needle, compensate, exchange};
@@ -24,6 +23,8 @@ use stylet_shm_schema::Instance;
 /// Time within which a second host finds the core.
 const FIND_LIMIT: Duration = Duration::from_secs(10);
 const POLL_EVERY: Duration = Duration::from_millis(5);
+/// Number of plans to choose from.
+const PROPOSALS: usize = 3;
 pub(super) const FIRST_PLAN: &str = "Looking for a first plan";
 pub(super) const STUDY: &str = "Writing the DICOM study";
 
@@ -72,6 +73,7 @@ pub(super) fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
                 &kernel,
                 &source,
                 &objectives,
+                PROPOSALS,
                 report,
             )?)
         };
@@ -90,8 +92,7 @@ pub(super) fn strength(outlines: Arc<AnatomyOutlines>, plan: Arc<ImplantPlan>) -
             let source = Source::known(&plan.source)
                 .ok_or_else(|| format!("source {} is unknown; set the strength by hand", plan.source))?;
             let kernel = DoseKernel::new(&source, Interval::ALL);
-            let aims = Aims::new(plan.prescription_gy);
-            let strength_u = automatic::strength_u(&plan, &outlines.anatomy, &kernel, &aims)?;
+            let strength_u = first::strength_u(&plan, &outlines.anatomy, &kernel)?;
             Ok(plan.with_strength(strength_u))
         };
         let _ = messages.send(JobMessage::Plan(scaled()));

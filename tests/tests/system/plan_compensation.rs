@@ -46,9 +46,8 @@ fn first_plan(theatre: &Theatre) -> ImplantPlan {
     let template = Template::before(&theatre.scene.header);
     let proceed = |_| std::ops::ControlFlow::Continue(());
     let objectives = Objectives::new(&source, 145.0);
-    let plan = first::plan(template, &anatomy, &kernel, &source, &objectives, proceed)
-        .expect("a plan")
-        .plan;
+    let mut found = first::proposals(template, &anatomy, &kernel, &source, &objectives, 1, proceed).expect("a plan");
+    let plan = found.remove(0).found.plan;
     let found = stylet_implant::plan::check::problems(&plan, &anatomy);
     assert!(found.is_empty(), "{found:?}");
     plan

@@ -1,4 +1,4 @@
-//! The automatic plan of the built-in pelvis keeps the limits that the peripheral pattern violates.
+//! The automatic plan of the built-in pelvis keeps its limits.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -8,10 +8,9 @@ use stylet_dose::{DoseKernel, Source};
 use stylet_files::dicom::structures::StructureSet;
 use stylet_files::dicom::{self, Identity};
 use stylet_implant::linked::scene;
-use stylet_implant::plan::automatic::{self, Aims};
 use stylet_implant::plan::optimise::robust::Trials;
-use stylet_implant::plan::optimise::{self, Engine, Method, Objectives};
-use stylet_implant::plan::{Anatomy, Needle, Template, check};
+use stylet_implant::plan::optimise::{self, Engine, Objectives, Search};
+use stylet_implant::plan::{Anatomy, Template, check};
 use stylet_implant::readers::DoseFile;
 use stylet_tests::rehearsal::Theatre;
 
@@ -26,59 +25,39 @@ fn the_automatic_plan_of_the_pelvis_keeps_its_limits() {
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let engine = Engine::new(&kernel, optimise::bodies(&anatomy));
     let proceed = |_| ControlFlow::Continue(());
-    let before = automatic::plan(template, &anatomy, &kernel, "6711", &Aims::new(145.0), proceed).expect("a plan");
-    let figures = |plan: &stylet_implant::plan::ImplantPlan| engine.histograms(&plan.seeds()).figures(1.0, 145.0);
-    let crosses = |needle: &&Needle| {
-        let bone = &anatomy.bone[0];
-        !bone
-            .pieces_m(needle.entry_m, needle.direction, needle.depth_m)
-            .is_empty()
-    };
-    println!(
-        "peripheral: {} needles, {} of them through bone, {} seeds, {:?}",
-        before.needles.len(),
-        before.needles.iter().filter(crosses).count(),
-        before.seed_count(),
-        figures(&before)
-    );
     let objectives = Objectives::new(&source, 145.0);
-    for method in [Method::GreedyExchange, Method::Annealing] {
-        let begun = Instant::now();
-        let found = optimise::plan(template, &anatomy, &kernel, "6711", &objectives, method, proceed).expect("a plan");
-        let seconds = begun.elapsed().as_secs_f64();
-        let (begun, seeds) = (Instant::now(), found.plan.seeds());
-        let dose_at = |point_m: [f64; 3]| seeds.iter().map(|s| kernel.exact_at_gy(s, point_m)).sum::<f64>();
-        let sum: f64 = engine.points_m().map(dose_at).sum();
-        let loop_s = begun.elapsed().as_secs_f64();
-        println!(
-            "{method:?}: {} needles, {} seeds of {:.2} U, {} holes behind bone, {seconds:.1} s, {:.2} times the straightforward loop of {loop_s:.1} s; robust {:.3}, cost {:.4}\n  {:?}\n  samples {:?}",
-            found.plan.needles.len(),
-            found.plan.seed_count(),
-            seeds[0].strength_u,
-            found.behind_bone,
-            seconds / loop_s,
-            found.robust,
-            found.cost,
-            found.figures,
-            found.sampled
-        );
-        assert!(sum > 0.0);
-        if method == Method::default() {
-            let wrong = check::problems(&found.plan, &anatomy);
-            assert!(wrong.is_empty(), "{wrong:?}");
-            assert_eq!(found.figures.broken(), Vec::<String>::new());
-            assert!(found.plan.needles.len() <= 25);
-            // Trials other than those of the search.
-            let how = Perturbation {
-                errors: Errors::of_sigma(4e-3),
-                trials: 1000,
-                random_seed: 1,
-            };
-            let trials = Trials::new(&anatomy.target, &kernel, (&seeds, &[]), &[], how);
-            println!("  D90 is kept in {:.1} % of 1,000 trials", trials.kept(145.0) * 100.0);
-            assert!(trials.kept(145.0) >= 0.95, "{}", trials.kept(145.0));
-        }
-    }
+    let begun = Instant::now();
+    let search = Search::new(template, &anatomy, &kernel, "6711", &objectives, &proceed).expect("a plan");
+    let found = search.find(&objectives, &proceed).expect("a plan");
+    let seconds = begun.elapsed().as_secs_f64();
+    let (begun, seeds) = (Instant::now(), found.plan.seeds());
+    let dose_at = |point_m: [f64; 3]| seeds.iter().map(|s| kernel.exact_at_gy(s, point_m)).sum::<f64>();
+    let sum: f64 = engine.points_m().map(dose_at).sum();
+    let loop_s = begun.elapsed().as_secs_f64();
+    println!(
+        "{} needles, {} seeds of {:.2} U, {seconds:.1} s, {:.2} times the straightforward loop of {loop_s:.1} s; robust {:.3}\n  {:?}\n  samples {:?}",
+        found.plan.needles.len(),
+        found.plan.seed_count(),
+        seeds[0].strength_u,
+        seconds / loop_s,
+        found.robust,
+        found.figures,
+        found.sampled
+    );
+    assert!(sum > 0.0);
+    let wrong = check::problems(&found.plan, &anatomy);
+    assert!(wrong.is_empty(), "{wrong:?}");
+    assert_eq!(found.figures.broken(), Vec::<String>::new());
+    assert!(found.plan.needles.len() <= 25);
+    // Trials other than those of the search.
+    let how = Perturbation {
+        errors: Errors::of_sigma(4e-3),
+        trials: 1000,
+        random_seed: 1,
+    };
+    let trials = Trials::new(&anatomy.target, &kernel, (&seeds, &[]), &[], how);
+    println!("  D90 is kept in {:.1} % of 1,000 trials", trials.kept(145.0) * 100.0);
+    assert!(trials.kept(145.0) >= 0.95, "{}", trials.kept(145.0));
 }
 
 /// The window had no button for a study: its three files had three different patients.
@@ -90,7 +69,9 @@ fn a_plan_of_a_scene_becomes_three_files_that_belong_together() {
     let proceed = |_| ControlFlow::Continue(());
     let source = Source::known("6711").expect("comes with the program");
     let kernel = DoseKernel::new(&source, Interval::ALL);
-    let plan = automatic::plan(template, &anatomy, &kernel, "6711", &Aims::new(145.0), proceed).expect("a plan");
+    let objectives = Objectives::new(&source, 145.0);
+    let search = Search::new(template, &anatomy, &kernel, "6711", &objectives, &proceed).expect("a plan");
+    let plan = search.find(&objectives, &proceed).expect("a plan").plan;
     let folder = stylet_test_kit::scratch("plan-scene-study").join("study");
     let shares = std::cell::RefCell::new(Vec::new());
     let report = |share: f32| {

@@ -1,6 +1,6 @@
 //! Dose of the placed seeds, and a new plan for the remaining needles around them.
 
-use crate::plan::optimise::{self, Engine, Figures, Method, Objectives, Present, Search};
+use crate::plan::optimise::{self, Engine, Figures, Objectives, Present, Search};
 use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Needle, NeedleSeed, PlanError};
 use std::ops::ControlFlow;
 use stylet_dose::{DoseKernel, Seed, Source};
@@ -178,7 +178,7 @@ impl Situation<'_> {
             &objectives,
             &report,
         )?;
-        let found = search.find(&objectives, Method::default(), &report)?;
+        let found = search.find(&objectives, &report)?;
         let updated = ImplantPlan {
             needles: [begun, &found.plan.needles[..]].concat(),
             ..plan.clone()

@@ -1,11 +1,9 @@
-//! The automatic plan: inverse planning if the scene names structures to be spared, else modified
-//! peripheral loading.
+//! The automatic plan by inverse planning, and others to choose from.
 
-use super::automatic::{self, Aims};
-use super::optimise::{self, Figures, Method, Objectives, Proposal, Search, Statistic};
+use super::optimise::{self, Objectives, Proposal, Search, Statistic};
 use super::{Anatomy, ImplantPlan, PlanError, Template};
 use std::ops::ControlFlow;
-use stylet_dose::{DoseKernel, Source};
+use stylet_dose::{DoseKernel, DosePoints, Dvh, Source};
 
 /// Plan, with remarks on how it was made.
 #[derive(Clone, Debug)]
@@ -14,66 +12,32 @@ pub struct FirstPlan {
     pub name: &'static str,
     /// Description in a sentence.
     pub why: &'static str,
-    /// The plan.
-    pub plan: ImplantPlan,
-    /// Measures of the plan; `None` if it was made without limits.
-    pub measures: Option<Measures>,
-    /// Remarks: limits that are violated and by how much, or why the plan was made without limits.
-    /// Empty if all limits are met.
+    /// The plan with its measures.
+    pub found: Proposal,
+    /// Remarks: limits that are violated and by how much, and an unknown urethra.
     pub notes: Vec<String>,
 }
 
-/// Measures by which proposals are compared.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measures {
-    /// Measures of the dose.
-    pub figures: Figures,
-    /// Share of trials with misplaced seeds whose D90 is at least 90 % of the prescription.
-    pub robust: f64,
-    /// Mean D90 of those trials, percent of the prescription.
-    pub expected_d90: f64,
-    /// D90 that nine of ten of those trials reach, percent of the prescription.
-    pub d90_p10: f64,
-}
-
 /// Remark on a plan without a known urethra.
-pub const NO_URETHRA: &str = "no urethra is known, so the plan only covers the target (modified peripheral loading)";
+const NO_URETHRA: &str = "no urethra is known, so its dose has no limit";
 /// Cost of a needle in a plan with few of them.
 const FEW_NEEDLES: f32 = 6e-3;
+/// Pitch of the points for the strength of a plan, m.
+const DOSE_PITCH_M: f64 = 1e-3;
+/// Share of the target that gets the prescription at that strength.
+const COVERED: f64 = 0.96;
 
-/// Makes one plan for the objectives; returns an error if no needle fits. `report` gets the
-/// completed share; if it breaks, the search is cancelled.
-pub fn plan(
-    template: Template,
-    anatomy: &Anatomy,
-    kernel: &DoseKernel,
-    source: &Source,
-    objectives: &Objectives,
-    report: impl Fn(f32) -> ControlFlow<()>,
-) -> Result<FirstPlan, PlanError> {
-    let [_, urethra, _] = optimise::bodies(anatomy);
-    if urethra.is_none() {
-        return peripheral(template, anatomy, kernel, source, objectives, report);
-    }
-    let search = Search::new(template, anatomy, kernel, &source.model, objectives, &report)?;
-    let found = search.find(objectives, Method::default(), &report)?;
-    Ok(FirstPlan::of("Robust", ROBUST, found))
-}
-
-/// Makes several plans to choose from, the usual one first; only one without a known urethra.
-/// `report` as for [`plan`].
+/// Makes the first `count` of three plans to choose from, the usual one first; returns an error if
+/// no needle fits. `report` gets the completed share; if it breaks, the search is cancelled.
 pub fn proposals(
     template: Template,
     anatomy: &Anatomy,
     kernel: &DoseKernel,
     source: &Source,
     objectives: &Objectives,
+    count: usize,
     report: impl Fn(f32) -> ControlFlow<()>,
 ) -> Result<Vec<FirstPlan>, PlanError> {
-    let [_, urethra, _] = optimise::bodies(anatomy);
-    if urethra.is_none() {
-        return Ok(vec![peripheral(template, anatomy, kernel, source, objectives, report)?]);
-    }
     let search = Search::new(template, anatomy, kernel, &source.model, objectives, &|_| report(0.0))?;
     let few = Objectives {
         needle_cost: FEW_NEEDLES,
@@ -84,7 +48,11 @@ pub fn proposals(
         ..objectives.clone()
     };
     let aims = [
-        ("Robust", ROBUST, objectives),
+        (
+            "Robust",
+            "Most trials with misplaced seeds meet a D90 of 90 % of the prescription.",
+            objectives,
+        ),
         (
             "Fewer needles",
             "Robust as well, with as few needles as possible.",
@@ -96,87 +64,56 @@ pub fn proposals(
             &planned,
         ),
     ];
-    let count = aims.len() as f32;
+    let count = count.min(aims.len());
+    let [_, urethra, _] = optimise::bodies(anatomy);
     let find = |(number, (name, why, objectives)): (usize, (_, _, &Objectives))| {
-        let found = search.find(objectives, Method::default(), &|share| {
-            report((number as f32 + share) / count)
-        })?;
-        Ok(FirstPlan::of(name, why, found))
-    };
-    aims.into_iter().enumerate().map(find).collect()
-}
-
-const ROBUST: &str = "Most trials with misplaced seeds meet a D90 of 90 % of the prescription.";
-
-fn peripheral(
-    template: Template,
-    anatomy: &Anatomy,
-    kernel: &DoseKernel,
-    source: &Source,
-    objectives: &Objectives,
-    report: impl Fn(f32) -> ControlFlow<()>,
-) -> Result<FirstPlan, PlanError> {
-    let aims = Aims::new(objectives.prescription_gy);
-    Ok(FirstPlan {
-        name: "Peripheral",
-        why: "Modified peripheral loading.",
-        plan: automatic::plan(template, anatomy, kernel, &source.model, &aims, report)?,
-        measures: None,
-        notes: vec![NO_URETHRA.to_owned()],
-    })
-}
-
-impl FirstPlan {
-    fn of(name: &'static str, why: &'static str, found: Proposal) -> Self {
-        Self {
+        let found = search.find(objectives, &|share| report((number as f32 + share) / count as f32))?;
+        let mut notes = found.figures.broken();
+        notes.extend(urethra.is_none().then(|| NO_URETHRA.to_owned()));
+        Ok(FirstPlan {
             name,
             why,
-            notes: found.figures.broken(),
-            measures: Some(Measures {
-                figures: found.figures,
-                robust: found.robust,
-                expected_d90: found.expected_d90,
-                d90_p10: found.d90_p10,
-            }),
-            plan: found.plan,
-        }
-    }
+            found,
+            notes,
+        })
+    };
+    aims.into_iter().take(count).enumerate().map(find).collect()
+}
+
+/// Returns the strength, U, at which 96 % of the target gets the prescription: dose is linear in it.
+pub fn strength_u(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) -> Result<f64, PlanError> {
+    let target = anatomy.target.structure(DOSE_PITCH_M);
+    let dose_gy = DosePoints::new(&target.points_m).of_seeds_gy(kernel, &plan.with_strength(1.0).seeds());
+    let dvh = Dvh::new(&dose_gy, &target.volumes_m3);
+    let reached = dvh.and_then(|d| d.dose_of_gy(COVERED * d.volume_m3()));
+    let reached_gy = reached.filter(|gy| *gy > 0.0).ok_or(PlanError::NoDose)?;
+    Ok(plan.prescription_gy / reached_gy)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::anatomy::ball;
-    use crate::plan::template::PITCH_M;
-    use stylet_anatomy::PatientFrame;
+    use crate::plan::check::problems;
+    use crate::plan::optimise::glands::{GLANDS, TEMPLATE};
     use stylet_dose::decay::Interval;
 
+    /// Tests a scene like `paper`, which names no structure to be spared.
     #[test]
-    fn without_a_urethra_the_plan_is_peripheral() {
-        let middle_m = [0.05, 0.05, 0.06];
-        let template = Template {
-            middle_m: [0.05, 0.05, -0.01],
-            columns: [-1.0, 0.0, 0.0],
-            rows: [0.0, 1.0, 0.0],
-            inwards: [0.0, 0.0, 1.0],
-            pitch_m: PITCH_M,
-        };
-        let anatomy = Anatomy {
-            target: ball("gland", middle_m, [0.02, 0.0165, 0.018]),
-            spared: Vec::new(),
-            bone: Vec::new(),
-            lower_m: [0.0; 3],
-            upper_m: [0.1; 3],
-            patient: PatientFrame::default(),
-        };
+    fn a_plan_without_a_urethra_keeps_its_limits_and_says_so() {
+        let mut anatomy = GLANDS[0].anatomy();
+        anatomy.spared.clear();
         let source = Source::known("6711").unwrap();
         let kernel = DoseKernel::new(&source, Interval::ALL);
-        let proceed = |_| ControlFlow::Continue(());
-        let objectives = Objectives::new(&source, 145.0);
-        let first = plan(template, &anatomy, &kernel, &source, &objectives, proceed).unwrap();
-        let aims = Aims::new(145.0);
-        let peripheral = automatic::plan(template, &anatomy, &kernel, "6711", &aims, proceed).unwrap();
-        assert_eq!(first.plan, peripheral);
-        assert_eq!(first.notes, [NO_URETHRA]);
+        let (objectives, proceed) = (Objectives::new(&source, 145.0), |_| ControlFlow::Continue(()));
+        let first = proposals(TEMPLATE, &anatomy, &kernel, &source, &objectives, 1, proceed).unwrap();
+        assert_eq!(first[0].notes, [NO_URETHRA]);
+        let plan = &first[0].found.plan;
+        assert!(problems(plan, &anatomy).is_empty() && plan.needles.len() <= 25);
+        // The plan covers more, so seeds for 96 % may be weaker.
+        let strength_u = strength_u(plan, &anatomy, &kernel).unwrap();
+        assert!(
+            (0.5..1.0).contains(&(strength_u / plan.needles[0].seeds[0].strength_u)),
+            "{strength_u}"
+        );
     }
 }

@@ -4,7 +4,6 @@
 //! Lengths in m, scene frame; strength in U; files are in mm, in the patient's frame (RAS).
 
 pub mod anatomy;
-pub mod automatic;
 pub mod check;
 pub mod compensate;
 pub mod edit;

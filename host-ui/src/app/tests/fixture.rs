@@ -15,8 +15,8 @@ use stylet_dose::criteria::{Figure, Limit};
 use stylet_host::link::LinkStatus;
 use stylet_implant::plan::check::Problem;
 use stylet_implant::plan::compensate::edges::Sensitive;
-use stylet_implant::plan::first::{FirstPlan, Measures};
-use stylet_implant::plan::optimise::Figures;
+use stylet_implant::plan::first::FirstPlan;
+use stylet_implant::plan::optimise::{Figures, Proposal};
 use stylet_implant::plan::{Hole, ImplantPlan};
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::{
@@ -271,16 +271,18 @@ pub fn proposals(plan: &ImplantPlan) -> Arc<Vec<FirstPlan>> {
     let proposal = |(name, v150, robust, strength_u): (&'static str, f64, f64, Option<f64>)| FirstPlan {
         name,
         why: "Most trials with misplaced seeds meet a D90 of 90 % of the prescription.",
-        plan: strength_u.map_or_else(|| plan.clone(), |u| plan.with_strength(u)),
-        measures: Some(Measures {
+        found: Proposal {
+            plan: strength_u.map_or_else(|| plan.clone(), |u| plan.with_strength(u)),
             figures: Figures {
                 v150,
                 ..Figures::default()
             },
+            sampled: Figures::default(),
             robust,
             expected_d90: 101.2,
             d90_p10: 93.4,
-        }),
+            shortfall: 0.0,
+        },
         notes: Vec::new(),
     };
     let all = [

@@ -3,7 +3,6 @@
 use super::*;
 use crate::intraoperative::{Agreement, Contour, Solid, Transverse};
 use crate::plan::anatomy::{Body, ball};
-use crate::plan::optimise::plan as first_plan;
 use crate::plan::{Drops, PITCH_M, Template};
 use nalgebra::Vector3;
 use stylet_anatomy::PatientFrame;
@@ -78,16 +77,9 @@ fn contoured(by_m: [f64; 3], swollen: f64) -> Body {
 fn half_done(landed: impl Fn([f64; 3]) -> [f64; 3]) -> (ImplantPlan, usize, Vec<Seed>) {
     let (source, kernel) = iodine();
     let objectives = Objectives::new(&source, 145.0);
-    let found = first_plan(
-        TEMPLATE,
-        &anatomy(),
-        &kernel,
-        "6711",
-        &objectives,
-        Method::default(),
-        proceed,
-    )
-    .unwrap();
+    let anatomy = anatomy();
+    let search = Search::new(TEMPLATE, &anatomy, &kernel, "6711", &objectives, &proceed).unwrap();
+    let found = search.find(&objectives, &proceed).unwrap();
     let begun = found.plan.needles.len() / 2;
     let first = ImplantPlan {
         needles: found.plan.needles[..begun].to_vec(),
@@ -187,16 +179,8 @@ fn the_dose_of_placed_seeds_counts_once() {
         holes: vec!["F7".parse().unwrap()],
     };
     let objectives = Objectives::around_present(present.clone(), 0.5, &source, 145.0);
-    let found = first_plan(
-        TEMPLATE,
-        &anatomy,
-        &kernel,
-        "6711",
-        &objectives,
-        Method::GreedyExchange,
-        proceed,
-    )
-    .unwrap();
+    let search = Search::new(TEMPLATE, &anatomy, &kernel, "6711", &objectives, &proceed).unwrap();
+    let found = search.find(&objectives, &proceed).unwrap();
     assert!(found.plan.needles.iter().all(|n| n.hole != Some("F7".parse().unwrap())));
     assert!(found.plan.seeds().iter().all(|s| s.strength_u == 0.5));
     let engine = Engine::new(&kernel, optimise::bodies(&anatomy));

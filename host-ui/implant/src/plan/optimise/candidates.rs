@@ -41,8 +41,6 @@ pub struct Candidates {
     pub ways: Vec<Way>,
     /// Places, way by way.
     pub places: Vec<Place>,
-    /// Number of holes with target behind them that bone blocks.
-    pub behind_bone: usize,
 }
 
 impl Candidates {
@@ -53,7 +51,6 @@ impl Candidates {
             template: *template,
             ways: Vec::new(),
             places: Vec::new(),
-            behind_bone: 0,
         };
         for hole in Hole::all().filter(|hole| !used.contains(hole)) {
             found.add(hole, anatomy);
@@ -83,7 +80,6 @@ impl Candidates {
                 .find(|along_m| is_blocked(*along_m))
         };
         if free_until(&anatomy.bone, BONE_M).is_some() {
-            self.behind_bone += 1;
             return;
         }
         // The needle may end before a spared structure.

@@ -21,26 +21,20 @@ pub fn build(state: &mut State, report: &dyn Fn(f32) -> ControlFlow<()>) -> Cont
 }
 
 /// Applies the best of removing a seed and of moving it to any other place, seed by seed, then new
-/// seeds and another strength if they help; until nothing does, or for a number of rounds.
-pub fn exchange(state: &mut State, rounds: usize, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
-    for round in 0..rounds {
-        let before = state.cost;
-        let seeds = state.seeds.clone();
-        for (number, &seed) in seeds.iter().enumerate() {
-            report((round as f32 + number as f32 / seeds.len() as f32) / rounds as f32)?;
-            exchange_one(state, seed);
-        }
-        build(state, &|_| report((round + 1) as f32 / rounds as f32))?;
-        for strength in [state.strength.saturating_sub(1), state.strength + 1] {
-            if strength < state.strengths() {
-                state.take_if_better(&Move {
-                    strength,
-                    ..Move::default()
-                });
-            }
-        }
-        if state.cost > before - 1e-4 {
-            break;
+/// seeds and another strength if they help.
+pub fn exchange(state: &mut State, report: &dyn Fn(f32) -> ControlFlow<()>) -> ControlFlow<()> {
+    let seeds = state.seeds.clone();
+    for (number, &seed) in seeds.iter().enumerate() {
+        report(number as f32 / seeds.len() as f32)?;
+        exchange_one(state, seed);
+    }
+    build(state, &|_| report(1.0))?;
+    for strength in [state.strength.saturating_sub(1), state.strength + 1] {
+        if strength < state.strengths() {
+            state.take_if_better(&Move {
+                strength,
+                ..Move::default()
+            });
         }
     }
     ControlFlow::Continue(())

@@ -24,20 +24,8 @@ pub use search::Search;
 use super::anatomy::Body;
 use super::dose::criteria::DoseStructure;
 use super::dose::perturb::{Errors, Perturbation};
-use super::dose::{DoseKernel, Seed, Source};
-use super::{Anatomy, Hole, ImplantPlan, PlanError, Template};
-use std::ops::ControlFlow;
-
-/// Method that follows the greedy choice of seeds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Method {
-    /// Exchange of single seeds while that helps.
-    GreedyExchange,
-    /// Simulated annealing, and an exchange at its end. It is the default for the reasons in ADR
-    /// 13.
-    #[default]
-    Annealing,
-}
+use super::dose::{Seed, Source};
+use super::{Anatomy, Hole, ImplantPlan};
 
 /// Objectives of a plan; limits of the dose are those of [`Figures::measures`].
 #[derive(Clone, Debug, PartialEq)]
@@ -136,10 +124,6 @@ pub struct Proposal {
     pub d90_p10: f64,
     /// Distance of the requested D90 below 90 % of the prescription, as a share of that.
     pub shortfall: f64,
-    /// Cost that the search minimised, at the sample points; below 1 if limits are met.
-    pub cost: f32,
-    /// Number of holes before the target that bone blocks.
-    pub behind_bone: usize,
 }
 
 /// Returns target, urethra and rectum, by their names.
@@ -153,20 +137,6 @@ pub fn bodies(anatomy: &Anatomy) -> [Option<&Body>; 3] {
         named(DoseStructure::Urethra),
         named(DoseStructure::Rectum),
     ]
-}
-
-/// Searches for a plan; returns an error if no needle fits. `report` gets the completed share; if
-/// it breaks, the search is cancelled.
-pub fn plan(
-    template: Template,
-    anatomy: &Anatomy,
-    kernel: &DoseKernel,
-    source: &str,
-    objectives: &Objectives,
-    method: Method,
-    report: impl Fn(f32) -> ControlFlow<()>,
-) -> Result<Proposal, PlanError> {
-    Search::new(template, anatomy, kernel, source, objectives, &report)?.find(objectives, method, &report)
 }
 
 impl Proposal {
@@ -183,6 +153,6 @@ impl Proposal {
 }
 
 #[cfg(test)]
-mod glands;
+pub(super) mod glands;
 #[cfg(test)]
 mod tests;

@@ -1,4 +1,4 @@
-//! The search: a greedy choice from several strengths, the method on the best of them, and
+//! The search: a greedy choice from several strengths, annealing of the best of them, and
 //! corrections by the full dose engine.
 
 use super::annealing::{self, Schedule};
@@ -8,7 +8,7 @@ use super::objective::{Expected, Limits};
 use super::robust::Trials;
 use super::samples::Samples;
 use super::state::State;
-use super::{Method, Objectives, Proposal, bodies, greedy};
+use super::{Objectives, Proposal, bodies, greedy};
 use crate::plan::dose::{DoseKernel, Seed};
 use crate::plan::{Anatomy, PlanError, Template};
 use std::ops::ControlFlow;
@@ -44,8 +44,6 @@ const FIRST_KEPT: f32 = 0.9;
 const HIGHEST_KEPT: f32 = 1.1;
 /// Dose for the target, as a share of the prescription.
 const LEVEL: f32 = 1.0;
-/// Most rounds of an exchange over all seeds.
-const MOST_EXCHANGES: usize = 12;
 
 type Report<'a> = &'a dyn Fn(f32) -> ControlFlow<()>;
 
@@ -63,7 +61,7 @@ pub struct Search<'a> {
 
 impl<'a> Search<'a> {
     /// Computes doses of all places; prescription, strengths, misplacement and present seeds come
-    /// from `objectives`. `report` as for [`super::plan`].
+    /// from `objectives`. `report` gets the completed share; if it breaks, the search is cancelled.
     pub fn new(
         template: Template,
         anatomy: &'a Anatomy,
@@ -103,14 +101,14 @@ impl<'a> Search<'a> {
 
     /// Returns a plan for these objectives, which differ from those of [`Search::new`] in needles
     /// and robustness alone.
-    pub fn find(&self, objectives: &Objectives, method: Method, report: Report<'_>) -> Result<Proposal, PlanError> {
+    pub fn find(&self, objectives: &Objectives, report: Report<'_>) -> Result<Proposal, PlanError> {
         let mut best: Option<Proposal> = None;
         let mut first_strengths = FIRST_STRENGTHS.to_vec();
         for attempt in 1..ATTEMPTED.len() {
             let [from, to] = [attempt - 1, attempt].map(|n| ATTEMPTED[n]);
             let within = |share: f32| report(from + (to - from) * share);
             let mut state = self.begin(objectives, &first_strengths, &within)?;
-            self.attempt(&mut state, objectives, method, &mut best, &within)?;
+            self.attempt(&mut state, objectives, &mut best, &within)?;
             if best.as_ref().is_some_and(Proposal::is_as_asked) || state.strength == 0 {
                 break;
             }
@@ -125,7 +123,6 @@ impl<'a> Search<'a> {
         &self,
         state: &mut State,
         objectives: &Objectives,
-        method: Method,
         best: &mut Option<Proposal>,
         report: Report<'_>,
     ) -> Result<(), PlanError> {
@@ -137,10 +134,7 @@ impl<'a> Search<'a> {
             };
             let within = |share: f32| report(span[0] + (span[1] - span[0]) * share);
             let schedule = if round == 0 { FIRST_SEARCH } else { CORRECTION };
-            go_on(match method {
-                Method::GreedyExchange => greedy::exchange(state, MOST_EXCHANGES, &within),
-                Method::Annealing => anneal(state, &schedule, &within),
-            })?;
+            go_on(anneal(state, &schedule, &within))?;
             let (found, trials) = self.judge(state, objectives)?;
             let prescription_gy = objectives.prescription_gy / state.strength_u();
             let more = trials.strengthening(objectives.robust, prescription_gy);
@@ -212,8 +206,6 @@ impl<'a> Search<'a> {
                 expected_d90: percent(trials.expected_gy()),
                 d90_p10: percent(trials.kept_by_gy(0.9).unwrap_or(0.0)),
                 shortfall: trials.shortfall(objectives.robust, of_prescription_gy),
-                cost: state.cost,
-                behind_bone: self.candidates.behind_bone,
             };
             if best.as_ref().is_none_or(|(_, best)| found.is_better_than(best)) {
                 best = Some((strength, found));
@@ -235,7 +227,7 @@ fn go_on(flow: ControlFlow<()>) -> Result<(), PlanError> {
 /// Anneals, and then moves each seed once more if that helps.
 fn anneal(state: &mut State, schedule: &Schedule, report: Report<'_>) -> ControlFlow<()> {
     annealing::anneal(state, schedule, &|share| report(share * ANNEALED))?;
-    greedy::exchange(state, 1, &|share| report(ANNEALED + (1.0 - ANNEALED) * share))
+    greedy::exchange(state, &|share| report(ANNEALED + (1.0 - ANNEALED) * share))
 }
 
 /// Returns the limits with a small reserve, shifted by the error of the sample points.

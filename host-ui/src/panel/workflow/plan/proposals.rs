@@ -6,7 +6,7 @@ use crate::shown::Shown;
 use crate::theme;
 use egui::{Button, RichText};
 use egui_plot::{HLine, MarkerShape, PlotPoints, Points, VLine};
-use stylet_implant::plan::first::{FirstPlan, Measures};
+use stylet_implant::plan::first::FirstPlan;
 
 /// Height of the picture.
 const HEIGHT: f32 = 72.0;
@@ -24,7 +24,7 @@ pub fn proposals_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut 
         return;
     };
     let plan = shown.planning.implant.as_ref().map(|implant| &implant.plan);
-    let chosen = proposals.iter().position(|proposal| Some(&proposal.plan) == plan);
+    let chosen = proposals.iter().position(|proposal| Some(&proposal.found.plan) == plan);
     ui.horizontal_wrapped(|ui| {
         for (number, proposal) in proposals.iter().enumerate() {
             let button = Button::new(proposal.name).selected(chosen == Some(number));
@@ -70,7 +70,7 @@ fn picture_ui(ui: &mut egui::Ui, proposals: &[FirstPlan], chosen: Option<usize>)
                     .allow_hover(false),
             );
             for (number, proposal) in proposals.iter().enumerate() {
-                let Some(m) = &proposal.measures else { continue };
+                let m = &proposal.found;
                 let place = PlotPoints::from(vec![[m.figures.v150, m.robust * 100.0]]);
                 let is_chosen = chosen == Some(number);
                 let points = Points::new(proposal.name, place)
@@ -93,13 +93,11 @@ fn hint(proposal: &FirstPlan) -> String {
 
 /// Returns a text such as "25 needles, V150 42 %, 96 % keep D90", a share of the trials.
 fn words(proposal: &FirstPlan) -> String {
-    let needles = proposal.plan.needles.len();
-    let Some(Measures { figures, robust, .. }) = &proposal.measures else {
-        return format!("{needles} needles");
-    };
+    let found = &proposal.found;
     format!(
-        "{needles} needles, V150 {:.0} %, {:.0} % meet D90",
-        figures.v150,
-        robust * 100.0
+        "{} needles, V150 {:.0} %, {:.0} % meet D90",
+        found.plan.needles.len(),
+        found.figures.v150,
+        found.robust * 100.0
     )
 }
