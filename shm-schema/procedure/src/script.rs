@@ -357,11 +357,9 @@ impl Procedure {
         };
         let along_m = |place_m: Vector3<f64>| (place_m - way.entry_m).dot(&way.direction);
         let off_along_m = along_m(Vector3::from(state.tip_in_scene_m)) - along_m(Vector3::from(goal.tip_m));
-        self.waits_for = WaitsFor::Tip { off_along_m };
-        let limit_s = self.patience.limit_s(move_limit_s(goal.speed_m_per_s));
-        if now_s - self.begun_s.max(self.ready_s) > limit_s {
-            return Err(StepFailure::NotArrived { limit_s, off_along_m });
-        }
+        let waited_s = now_s - self.begun_s.max(self.ready_s);
+        let usual_s = move_limit_s(goal.speed_m_per_s);
+        self.has_waited(waited_s, usual_s, WaitsFor::Tip { off_along_m })?;
         let after_s = arrived_after_s(state, off_along_m);
         Ok(self.holds_for(after_s.is_some(), after_s.unwrap_or(0.0), now_s))
     }
@@ -374,25 +372,23 @@ impl Procedure {
         now_s - *self.holds_since_s.get_or_insert(now_s) >= least_s
     }
 
-    /// Fails once its patience has run out.
     fn waits(&mut self, now_s: f64, waits_for: WaitsFor) -> Result<(), StepFailure> {
-        self.waits_for = waits_for;
-        let limit_s = self.patience.limit_s(match waits_for {
+        let usual_s = match waits_for {
             WaitsFor::Line => LINE_LIMIT_S,
             WaitsFor::Left => LEFT_LIMIT_S,
             _ => REPLY_LIMIT_S,
-        });
-        if now_s - self.begun_s <= limit_s {
-            return Ok(());
+        };
+        self.has_waited(now_s - self.begun_s, usual_s, waits_for)
+    }
+
+    /// Fails once its patience has run out.
+    fn has_waited(&mut self, waited_s: f64, usual_s: f64, waits_for: WaitsFor) -> Result<(), StepFailure> {
+        self.waits_for = waits_for;
+        let limit_s = self.patience.limit_s(usual_s);
+        match waited_s <= limit_s {
+            true => Ok(()),
+            false => Err(StepFailure::Waited { waits_for, limit_s }),
         }
-        Err(match waits_for {
-            WaitsFor::State | WaitsFor::Rest | WaitsFor::Tip { .. } => StepFailure::NoState(limit_s),
-            WaitsFor::Reply(request) => StepFailure::NoReply(request, limit_s),
-            WaitsFor::Effect(request) => StepFailure::NoEffect(request, limit_s),
-            WaitsFor::Seed => StepFailure::NoSeed(limit_s),
-            WaitsFor::Left => StepFailure::NotLeft(limit_s),
-            WaitsFor::Line => StepFailure::NoLine(limit_s),
-        })
     }
 }
 

@@ -15,6 +15,10 @@ fn way() -> NeedleWay {
     }
 }
 
+fn waited(waits_for: WaitsFor, limit_s: f64) -> Result<Next, StepFailure> {
+    Err(StepFailure::Waited { waits_for, limit_s })
+}
+
 /// A hand that reaches its goal at once, and tissue at rest.
 struct Obedient {
     state: HapticState,
@@ -177,7 +181,7 @@ fn a_tip_resting_short_arrives_late_and_a_distant_one_never() {
     };
     let failure = failure.to_string();
     assert!(
-        failure.starts_with("waited 11.0 s for the tip at its target; it is -50.00 mm"),
+        failure.starts_with("waited 11.0 s for the tip, 50.0 mm from its target"),
         "{failure}"
     );
 }
@@ -199,16 +203,13 @@ fn what_is_not_answered_refused_or_without_effect_ends_the_procedure() {
     };
     assert_eq!(fails(Reply::Pending, 2.9), Ok(Next::Wait));
     assert_eq!(fails(Reply::Accepted, 2.9), Ok(Next::Wait));
-    assert_eq!(fails(Reply::Pending, 3.1), Err(StepFailure::NoReply("Reset", 3.0)));
-    assert_eq!(fails(Reply::Accepted, 3.1), Err(StepFailure::NoEffect("Reset", 3.0)));
+    assert_eq!(fails(Reply::Pending, 3.1), waited(WaitsFor::Reply("Reset"), 3.0));
+    assert_eq!(fails(Reply::Accepted, 3.1), waited(WaitsFor::Effect("Reset"), 3.0));
     let refused = fails(Reply::Refused("no".to_owned()), 0.1).map_err(|e| e.to_string());
     assert_eq!(refused, Err("Reset was refused: no".to_owned()));
     let mut unseen = Procedure::of_needles(vec![way()], Pace::default());
     assert_eq!(unseen.advance(0.0, None, Reply::Pending), Ok(Next::Wait));
-    assert_eq!(
-        unseen.advance(3.1, None, Reply::Pending),
-        Err(StepFailure::NoState(3.0))
-    );
+    assert_eq!(unseen.advance(3.1, None, Reply::Pending), waited(WaitsFor::State, 3.0));
 }
 
 #[test]
@@ -262,7 +263,7 @@ fn an_operator_decides_how_long_is_waited_and_sees_what_for() {
     let mut unwatched = begin(Patience::AtLeast(60.0));
     assert_eq!(unwatched.advance(59.0, Some(&observed), Reply::Pending), Ok(Next::Wait));
     let failed = unwatched.advance(61.0, Some(&observed), Reply::Pending);
-    assert_eq!(failed, Err(StepFailure::NoReply("Reset", 60.0)));
+    assert_eq!(failed, waited(WaitsFor::Reply("Reset"), 60.0));
 }
 
 /// Stops after `sent` requests and continues from the state of the tissue; returns the requests after that.
