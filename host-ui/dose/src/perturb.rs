@@ -4,7 +4,7 @@ mod errors;
 mod spread;
 
 pub use errors::Errors;
-pub use spread::{PERCENTILES, Spread, spreads};
+pub use spread::{PERCENTILES, Spread, spreads, t_95};
 
 use super::edema::Swelling;
 use super::kernel::DoseKernel;

@@ -61,7 +61,7 @@ fn percentile(sorted: &[f64], percent: f64) -> f64 {
 
 /// Returns the 97.5th percentile of Student's t, which bounds 95 % on two sides; `freedom` is at
 /// least 1.
-fn t_95(freedom: usize) -> f64 {
+pub fn t_95(freedom: usize) -> f64 {
     const FEW: [f64; 10] = [
         12.7062, 4.3027, 3.1824, 2.7764, 2.5706, 2.4469, 2.3646, 2.3060, 2.2622, 2.2281,
     ];

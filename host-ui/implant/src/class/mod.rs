@@ -6,7 +6,6 @@ mod picture;
 mod read;
 mod table;
 
-pub use figures::{Summary, Trend};
 pub use page::page;
 pub use read::{Class, ClassError, folder_of, is_name};
 pub use table::write as write_table;
@@ -48,79 +47,35 @@ pub struct Figure {
     pub name: &'static str,
     /// Name of the table's column.
     pub column: &'static str,
-    /// True for a count of rare events, for which an interval of Student's t would be wrong.
-    pub is_count: bool,
-    /// Number of decimals shown.
+    /// Number of decimals shown; 0 for a count of rare events, for which an interval of Student's t
+    /// would be wrong.
     pub decimals: usize,
     /// Value of an attempt, if it has one.
     pub of: fn(&Attempt) -> Option<f64>,
 }
 
+const fn figure(name: &'static str, column: &'static str, decimals: usize, of: fn(&Attempt) -> Option<f64>) -> Figure {
+    Figure {
+        name,
+        column,
+        decimals,
+        of,
+    }
+}
+
 /// Figures in the order of the columns.
 pub const FIGURES: [Figure; 9] = [
-    Figure {
-        name: "mean seed error (mm)",
-        column: "mean_error_mm",
-        is_count: false,
-        decimals: 2,
-        of: |a| Some(a.mean_error_mm),
-    },
-    Figure {
-        name: "worst seed error (mm)",
-        column: "worst_error_mm",
-        is_count: false,
-        decimals: 2,
-        of: |a| Some(a.worst_error_mm),
-    },
-    Figure {
-        name: "D90 of the target (% of prescription)",
-        column: "d90_percent",
-        is_count: false,
-        decimals: 1,
-        of: |a| a.d90_percent,
-    },
-    Figure {
-        name: "V100 of the target (%)",
-        column: "v100_percent",
-        is_count: false,
-        decimals: 1,
-        of: |a| a.v100_percent,
-    },
-    Figure {
-        name: "time (min)",
-        column: "time_min",
-        is_count: false,
-        decimals: 1,
-        of: |a| Some(a.duration_s / 60.0),
-    },
-    Figure {
-        name: "peak force (N)",
-        column: "peak_force_n",
-        is_count: false,
-        decimals: 1,
-        of: |a| Some(a.peak_force_n),
-    },
-    Figure {
-        name: "seeds lost",
-        column: "seeds_lost",
-        is_count: true,
-        decimals: 0,
-        of: |a| Some(a.seeds[1] as f64),
-    },
-    Figure {
-        name: "stops by the instructor",
-        column: "stops",
-        is_count: true,
-        decimals: 0,
-        of: |a| Some(a.stops as f64),
-    },
-    Figure {
-        name: "faults",
-        column: "faults",
-        is_count: true,
-        decimals: 0,
-        of: |a| Some(a.faults as f64),
-    },
+    figure("mean seed error (mm)", "mean_error_mm", 2, |a| Some(a.mean_error_mm)),
+    figure("worst seed error (mm)", "worst_error_mm", 2, |a| Some(a.worst_error_mm)),
+    figure("D90 of the target (% of prescription)", "d90_percent", 1, |a| {
+        a.d90_percent
+    }),
+    figure("V100 of the target (%)", "v100_percent", 1, |a| a.v100_percent),
+    figure("time (min)", "time_min", 1, |a| Some(a.duration_s / 60.0)),
+    figure("peak force (N)", "peak_force_n", 1, |a| Some(a.peak_force_n)),
+    figure("seeds lost", "seeds_lost", 0, |a| Some(a.seeds[1] as f64)),
+    figure("stops by the instructor", "stops", 0, |a| Some(a.stops as f64)),
+    figure("faults", "faults", 0, |a| Some(a.faults as f64)),
 ];
 
 #[cfg(test)]

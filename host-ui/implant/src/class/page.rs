@@ -1,6 +1,7 @@
 //! The page of a class, self-contained.
 
-use super::{Attempt, Class, FIGURES, Figure, Summary, Trend, picture};
+use super::figures::mean;
+use super::{Attempt, Class, FIGURES, Figure, picture};
 use maud::{Markup, html};
 use stylet_base::format;
 use stylet_report::parts::{cell, numbers};
@@ -32,9 +33,7 @@ pub fn page(class: &Class) -> String {
         (compared(&trainees))
         h2 { "Learning" }
         p {
-            "Session by session. A dashed line is a least-squares trend; it is drawn from five sessions on, and only where "
-            "its 95 % interval leaves out no change at all. Few sessions say little, and sessions of one trainee are not "
-            "independent."
+            "Session by session. Few sessions say little, and sessions of one trainee are not independent."
         }
         @for (name, own) in &trainees {
             (learning(class, name, own))
@@ -75,9 +74,10 @@ fn compared(trainees: &[(&str, &[Attempt])]) -> Markup {
 }
 
 fn summary(figure: &Figure, own: &[Attempt]) -> Markup {
+    let is_count = figure.decimals == 0;
     // The mean of counts is rarely an integer.
     let decimals = |v: f64| {
-        if figure.is_count && v.fract() != 0.0 {
+        if is_count && v.fract() != 0.0 {
             1
         } else {
             figure.decimals
@@ -85,11 +85,11 @@ fn summary(figure: &Figure, own: &[Attempt]) -> Markup {
     };
     let number = |v: f64| format::decimal(v, decimals(v));
     html! {
-        @match Summary::of(&of_all(figure, own)) {
+        @match mean(&of_all(figure, own)) {
             None => { "n/a" }
-            Some(s) => {
-                (number(s.mean))
-                @if let Some([low, high]) = s.interval.filter(|_| !figure.is_count) { small { (number(low)) " to " (number(high)) } }
+            Some((mean, interval)) => {
+                (number(mean))
+                @if let Some([low, high]) = interval.filter(|_| !is_count) { small { (number(low)) " to " (number(high)) } }
             }
         }
     }
@@ -102,13 +102,10 @@ fn learning(class: &Class, name: &str, own: &[Attempt]) -> Markup {
         div class="curves" {
             @for figure in CURVES.map(|n| &FIGURES[n]) {
                 @let values: Vec<Option<f64>> = own.iter().map(figure.of).collect();
-                @let all: Vec<f64> = values.iter().copied().flatten().collect();
                 @let most = of_all(figure, &class.attempts).into_iter().fold(0.0, f64::max);
-                @let trend = (all.len() == values.len()).then(|| Trend::of(&all)).flatten();
                 div {
                     p { (figure.name) }
-                    (picture::curve(&values, upwards(most), sessions, figure.decimals, trend.as_ref()))
-                    p { (in_words(figure, trend.as_ref(), all.len())) }
+                    (picture::curve(&values, upwards(most), sessions, figure.decimals))
                 }
             }
         }
@@ -119,20 +116,6 @@ fn learning(class: &Class, name: &str, own: &[Attempt]) -> Markup {
 fn upwards(most: f64) -> f64 {
     let step = 10_f64.powf(most.max(1e-3).log10().floor()) / 2.0;
     ((most / step).ceil() * step).max(step)
-}
-
-fn in_words(figure: &Figure, trend: Option<&Trend>, count: usize) -> String {
-    let signed = |v: f64| format::signed(v, figure.decimals);
-    match trend {
-        Some(t) => format!(
-            "{} each session (95 %: {} to {})",
-            signed(t.slope),
-            signed(t.interval[0]),
-            signed(t.interval[1])
-        ),
-        None if count < 5 => format!("{}: too few for a trend", counted(count, "session")),
-        None => "no trend: its interval includes zero".to_owned(),
-    }
 }
 
 /// Formats the session: its local time, or the folder's name if that is not a time.

@@ -1,6 +1,5 @@
 //! One figure of one trainee over the sessions, as SVG in the page.
 
-use super::Trend;
 use maud::{Markup, html};
 use stylet_base::format;
 
@@ -9,7 +8,7 @@ const SIZE: [f64; 2] = [360.0, 190.0];
 const EDGES: [f64; 4] = [46.0, 12.0, 12.0, 30.0];
 
 /// Draws values session by session; all trainees share the scale.
-pub fn curve(values: &[Option<f64>], most: f64, sessions: usize, decimals: usize, trend: Option<&Trend>) -> Markup {
+pub fn curve(values: &[Option<f64>], most: f64, sessions: usize, decimals: usize) -> Markup {
     let [width, height] = SIZE;
     let [left, right, above, below] = EDGES;
     let x = |n: f64| left + (n + 0.5) / sessions.max(1) as f64 * (width - left - right);
@@ -20,7 +19,6 @@ pub fn curve(values: &[Option<f64>], most: f64, sessions: usize, decimals: usize
         .iter()
         .map(|(n, v)| format!("{:.1},{:.1}", x(*n as f64), y(*v)))
         .collect();
-    let ends = trend.map(|t| [0, values.len().saturating_sub(1)].map(|n| (n as f64, t.first + t.slope * n as f64)));
     html! {
         svg viewBox=(format!("0 0 {width} {height}")) role="img" {
             @for part in [0.0, 0.5, 1.0] {
@@ -38,9 +36,6 @@ pub fn curve(values: &[Option<f64>], most: f64, sessions: usize, decimals: usize
                 circle cx=(x(*n as f64)) cy=(y(*value)) r="4" fill="#0072b2" {
                     title { "session " (n + 1) ": " (format::decimal(*value, decimals)) }
                 }
-            }
-            @if let Some([(a, from), (b, to)]) = ends {
-                line x1=(x(a)) y1=(y(from)) x2=(x(b)) y2=(y(to)) stroke="#d55e00" stroke-width="1.6" stroke-dasharray="6 4" {}
             }
         }
     }
