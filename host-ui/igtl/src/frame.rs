@@ -1,5 +1,6 @@
 //! The needle's frame as a transform in RAS and mm, and back.
 
+use nalgebra::Vector3;
 use stylet_anatomy::PatientFrame;
 
 const MM_PER_M: f64 = 1000.0;
@@ -13,39 +14,21 @@ pub fn place_mm(patient: &PatientFrame, in_scene_m: [f64; 3]) -> [f32; 3] {
 /// Returns the columns of the needle's frame in RAS: the third axis points along the needle, the
 /// origin is the tip.
 pub fn needle(patient: &PatientFrame, tip_in_scene_m: [f64; 3], direction_in_scene: [f64; 3]) -> [[f32; 3]; 4] {
-    let along = unit(patient.patient_from_scene_direction(direction_in_scene));
+    let along = Vector3::from(unit(patient.patient_from_scene_direction(direction_in_scene)));
     // Any axis that is not nearly parallel fixes the roll, which the needle lacks.
-    let aside = if along[0].abs() < 0.9 {
-        [1.0, 0.0, 0.0]
+    let aside = if along.x.abs() < 0.9 {
+        Vector3::x()
     } else {
-        [0.0, 1.0, 0.0]
+        Vector3::y()
     };
-    let second = unit(cross(along, aside));
-    let first = cross(second, along);
-    let axis = |v: [f64; 3]| v.map(|x| x as f32);
-    [
-        axis(first),
-        axis(second),
-        axis(along),
-        place_mm(patient, tip_in_scene_m),
-    ]
+    let second = along.cross(&aside).normalize();
+    let [first, second, along] = [second.cross(&along), second, along].map(|axis| axis.map(|x| x as f32).into());
+    [first, second, along, place_mm(patient, tip_in_scene_m)]
 }
 
-pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-pub fn unit(v: [f64; 3]) -> [f64; 3] {
-    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
-    if length > 0.0 {
-        v.map(|x| x / length)
-    } else {
-        [0.0, 0.0, 1.0]
-    }
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    let unit = Vector3::from(v).try_normalize(0.0);
+    unit.unwrap_or_else(Vector3::z).into()
 }
 
 /// Tool of a hand, in the scene.
@@ -61,17 +44,15 @@ pub struct Tool {
 
 /// Reads a transform of the same form; `None` unless its axes are those of a rigid body.
 pub fn tool(patient: &PatientFrame, columns: &[[f32; 3]; 4]) -> Option<Tool> {
-    let [x, y, z, origin_mm] = columns.map(|column| column.map(f64::from));
-    let product = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
+    let [x, y, z, origin_mm] = columns.map(|column| Vector3::from(column.map(f64::from)));
     let is = |value: f64, expected: f64| (value - expected).abs() <= AXES_OFF;
-    let have_length_one = [x, y, z].iter().all(|axis| is(product(*axis, *axis).sqrt(), 1.0));
-    let stand_on_each_other = [(x, y), (y, z), (z, x)].iter().all(|(a, b)| is(product(*a, *b), 0.0));
-    let is_rigid = have_length_one && stand_on_each_other && product(cross(x, y), z) > 0.0;
-    let tip_m = patient.scene_from_patient(origin_mm.map(|mm| mm / MM_PER_M));
+    let have_length_one = [x, y, z].iter().all(|axis| is(axis.norm(), 1.0));
+    let stand_on_each_other = [(x, y), (y, z), (z, x)].iter().all(|(a, b)| is(a.dot(b), 0.0));
+    let is_rigid = have_length_one && stand_on_each_other && x.cross(&y).dot(&z) > 0.0;
     is_rigid.then(|| Tool {
-        tip_m,
-        direction: unit(patient.scene_from_patient_direction(z)),
-        up: unit(patient.scene_from_patient_direction(y)),
+        tip_m: patient.scene_from_patient((origin_mm / MM_PER_M).into()),
+        direction: unit(patient.scene_from_patient_direction(z.into())),
+        up: unit(patient.scene_from_patient_direction(y.into())),
     })
 }
 
@@ -83,8 +64,8 @@ mod tests {
     fn the_needle_s_frame_is_right_handed_in_mm() {
         for direction in [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.3, -0.4, 0.866]] {
             let [x, y, z, tip] = needle(&PatientFrame::default(), [0.01, -0.02, 0.03], direction);
-            let wide = |v: [f32; 3]| v.map(f64::from);
-            let third = cross(wide(x), wide(y));
+            let wide = |v: [f32; 3]| Vector3::from(v.map(f64::from));
+            let third = wide(x).cross(&wide(y));
             assert!((0..3).all(|a| (third[a] - f64::from(z[a])).abs() < 1e-6));
             assert!((0..3).all(|a| (f64::from(z[a]) - unit(direction)[a]).abs() < 1e-6));
             assert_eq!(tip, [10.0, -20.0, 30.0]);

@@ -1,8 +1,9 @@
 //! A simulated hand that a tracker or a stepper moves: the client in control, and the check of its
 //! transforms.
 
+use crate::codec::Status;
 use crate::frame;
-use crate::server::{Received, Refusal};
+use crate::server::Received;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 use stylet_anatomy::PatientFrame;
@@ -87,21 +88,16 @@ impl Hand {
     }
 
     /// Returns how a transform of this name moves the hand, or why it may not.
-    pub fn agreed(&self, device: &str) -> Result<&HandOptions, Refusal> {
-        let options = self.options.as_ref().ok_or_else(|| Refusal {
-            code: 5,
-            name: "Access denied",
-            words: "this server takes no transforms: start it with --hand NAME to let one move the needle, with --probe NAME \
-                    to let one move the probe"
-                .to_owned(),
+    pub fn agreed(&self, device: &str) -> Result<&HandOptions, Status> {
+        let options = self.options.as_ref().ok_or_else(|| {
+            let words = "this server takes no transforms: start it with --hand NAME to let one move the needle, with \
+                         --probe NAME to let one move the probe";
+            Status::refused(5, "Access denied", words)
         })?;
         if options.device != device {
             let name = self.held.name();
-            return Err(Refusal {
-                code: 4,
-                name: "Not found",
-                words: format!("the {name} is moved by the transform \"{}\" alone", options.device),
-            });
+            let words = format!("the {name} is moved by the transform \"{}\" alone", options.device);
+            return Err(Status::refused(4, "Not found", words));
         }
         Ok(options)
     }
@@ -112,13 +108,12 @@ impl Hand {
         received: &Received,
         patient: &PatientFrame,
         now: Instant,
-    ) -> Result<Option<ProbeMove>, Refusal> {
+    ) -> Result<Option<ProbeMove>, Status> {
         let options = self.agreed(&received.device)?;
         let name = self.held.name();
-        let tool = frame::tool(patient, &received.columns).ok_or_else(|| Refusal {
-            code: 10,
-            name: "Configuration error",
-            words: "its axes are not those of a rigid body: three perpendicular, right-handed, of length 1".to_owned(),
+        let tool = frame::tool(patient, &received.columns).ok_or_else(|| {
+            let words = "its axes are not those of a rigid body: three perpendicular, right-handed, of length 1";
+            Status::refused(10, "Configuration error", words)
         })?;
         let goal = ProbeMove {
             hand: HandMove {
@@ -130,11 +125,10 @@ impl Hand {
             up: (self.held == Held::Probe).then_some(tool.up),
         };
         match self.holder {
-            Some((holder, heard)) if holder != received.from && now - heard < SILENCE => Err(Refusal {
-                code: 6,
-                name: "Busy",
-                words: format!("another client moves the {name}"),
-            }),
+            Some((holder, heard)) if holder != received.from && now - heard < SILENCE => {
+                let words = format!("another client moves the {name}");
+                Err(Status::refused(6, "Busy", words))
+            }
             _ => {
                 self.holder = Some((received.from, now));
                 let is_new = self.goal.replace(goal) != Some(goal);
@@ -183,7 +177,7 @@ mod tests {
         Hand::new(Held::Needle, options)
     }
 
-    fn code(taken: Result<Option<ProbeMove>, Refusal>) -> u16 {
+    fn code(taken: Result<Option<ProbeMove>, Status>) -> u16 {
         taken.expect_err("refused").code
     }
 

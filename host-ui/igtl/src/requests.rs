@@ -1,7 +1,8 @@
 //! Requests from the transforms of clients, and answers from the core to clients.
 
+use crate::codec::Status;
 use crate::hand::{Hand, HandOptions, Held};
-use crate::server::{Received, Refusal, Server};
+use crate::server::{Received, Server};
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 use stylet_host::link::{Link, LinkStatus};
@@ -32,7 +33,7 @@ impl Requests {
     pub fn pass(&mut self, link: &mut Link, server: &Server) {
         for received in server.received() {
             if let Err(refusal) = self.take(link, server, &received) {
-                server.refuse(received.from, &received.device, &refusal);
+                server.refuse(received.from, &received.device, refusal);
             }
         }
         for hand in &mut self.hands {
@@ -43,7 +44,7 @@ impl Requests {
         }
         self.awaited.retain(|(id, received)| match link.reply(*id) {
             Some(answer) if !answer.accepted => {
-                server.refuse(received.from, &received.device, &not_ready(answer.text));
+                server.refuse(received.from, &received.device, not_ready(answer.text));
                 false
             }
             answer => answer.is_none(),
@@ -59,7 +60,7 @@ impl Requests {
         }
     }
 
-    fn take(&mut self, link: &mut Link, server: &Server, received: &Received) -> Result<(), Refusal> {
+    fn take(&mut self, link: &mut Link, server: &Server, received: &Received) -> Result<(), Status> {
         let [needle, probe] = &mut self.hands;
         let hand = if probe.is_moved_by(&received.device) {
             probe
@@ -85,10 +86,6 @@ impl Requests {
     }
 }
 
-fn not_ready(words: String) -> Refusal {
-    Refusal {
-        code: 13,
-        name: "Not ready",
-        words,
-    }
+fn not_ready(words: String) -> Status {
+    Status::refused(13, "Not ready", words)
 }

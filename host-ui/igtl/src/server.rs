@@ -45,28 +45,6 @@ pub enum ServerError {
     Thread(io::Error),
 }
 
-/// Reason why a message of a client is refused, for the protocol's STATUS.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Refusal {
-    /// Protocol's number.
-    pub code: u16,
-    /// Protocol's name.
-    pub name: &'static str,
-    /// Description.
-    pub words: String,
-}
-
-impl Refusal {
-    fn status(&self) -> Status {
-        Status {
-            code: self.code,
-            subcode: 0,
-            error: self.name.to_owned(),
-            text: self.words.clone(),
-        }
-    }
-}
-
 /// Transform from a client.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Received {
@@ -163,7 +141,7 @@ impl Server {
 
     /// Answers a client's message with a STATUS, and logs it; repeats the same text to the same
     /// client only once in a while.
-    pub fn refuse(&self, from: SocketAddr, device: &str, refusal: &Refusal) {
+    pub fn refuse(&self, from: SocketAddr, device: &str, refusal: Status) {
         let client = lock(&self.shared).clients.iter().find(|c| c.address == from).cloned();
         if let Some(client) = client {
             client.refuse(device, refusal);

@@ -44,7 +44,7 @@ pub struct Point {
 }
 
 /// State of a device.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Status {
     /// Code: 1 is OK; the protocol's table lists the others.
     pub code: u16,
@@ -54,6 +54,18 @@ pub struct Status {
     pub error: String,
     /// Description.
     pub text: String,
+}
+
+impl Status {
+    /// Creates the reason why a message is refused, with the protocol's number and name.
+    pub fn refused(code: u16, name: &str, words: impl Into<String>) -> Self {
+        Self {
+            code,
+            subcode: 0,
+            error: name.to_owned(),
+            text: words.into(),
+        }
+    }
 }
 
 /// Content of a message.

@@ -130,12 +130,7 @@ fn place(address: IpAddr) -> IpAddr {
 
 /// Tells a client why it is refused, as far as its socket accepts data at once.
 pub fn answer(mut stream: &TcpStream, words: &str) {
-    let status = Status {
-        code: 13,
-        subcode: 0,
-        error: "Not ready".to_owned(),
-        text: words.to_owned(),
-    };
+    let status = Status::refused(13, "Not ready", words);
     let message = Message {
         device: "Stylet".to_owned(),
         time: Timestamp::now(),

@@ -2,8 +2,8 @@
 //! it is refused.
 
 use super::outgoing::Client;
-use super::{DEVICES_AT_MOST, Refusal, Shared, lock};
-use crate::codec::{Body, CodecError, HEADER_BYTES, Header, Message};
+use super::{DEVICES_AT_MOST, Shared, lock};
+use crate::codec::{Body, CodecError, HEADER_BYTES, Header, Message, Status};
 use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
 use std::sync::Mutex;
@@ -28,11 +28,11 @@ pub fn read(mut stream: TcpStream, client: &Client, shared: &Mutex<Shared>, ende
                 body_bytes,
             }) if body_bytes <= PASSED_OVER_AT_MOST => {
                 let words = format!("{kind} is not taken: clients may send TRANSFORM");
-                client.refuse(&device, &unknown(words));
+                client.refuse(&device, unknown(words));
                 pass_over(body_bytes, &mut whole)
             }
             Err(error) => {
-                client.refuse("Stylet", &unknown(error.to_string()));
+                client.refuse("Stylet", unknown(error.to_string()));
                 client.end("what it sent is no message");
                 Err(Ended)
             }
@@ -43,12 +43,8 @@ pub fn read(mut stream: TcpStream, client: &Client, shared: &Mutex<Shared>, ende
     }
 }
 
-fn unknown(words: String) -> Refusal {
-    Refusal {
-        code: 12,
-        name: "Unknown instruction",
-        words,
-    }
+fn unknown(words: String) -> Status {
+    Status::refused(12, "Unknown instruction", words)
 }
 
 fn take(
@@ -60,7 +56,7 @@ fn take(
     let device = header.device.clone();
     if header.kind != "TRANSFORM" {
         let words = format!("{} is not taken: clients may send TRANSFORM", header.kind);
-        client.refuse(&device, &unknown(words));
+        client.refuse(&device, unknown(words));
         return pass_over(header.body_bytes as u64, whole);
     }
     let mut body = vec![0; header.body_bytes];
@@ -80,7 +76,7 @@ fn take(
                 CodecError::Checksum { .. } => (9, "Checksum error", "its checksum is not that of its body".to_owned()),
                 other => (0, "Invalid packet", other.to_string()),
             };
-            client.refuse(&device, &Refusal { code, name, words });
+            client.refuse(&device, Status::refused(code, name, words));
         }
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! Messages still to be sent to one client.
 
-use super::{Bytes, LOOK_EVERY, Log, Refusal, lock};
-use crate::codec::{Body, Message, Timestamp};
+use super::{Bytes, LOOK_EVERY, Log, lock};
+use crate::codec::{Body, Message, Status, Timestamp};
 use std::collections::BTreeMap;
 use std::io::{ErrorKind, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
@@ -30,7 +30,7 @@ pub struct Client {
     pub address: SocketAddr,
     waiting: Mutex<Waiting>,
     arrived: Condvar,
-    refused: Mutex<Option<(Refusal, Instant)>>,
+    refused: Mutex<Option<(Status, Instant)>>,
     /// Time at which it came, or last moved a hand.
     active: Mutex<Instant>,
     log: Log,
@@ -80,11 +80,11 @@ impl Client {
         lock(&self.waiting).end.is_some()
     }
 
-    pub fn refuse(&self, device: &str, refusal: &Refusal) {
+    pub fn refuse(&self, device: &str, refusal: Status) {
         {
             let mut refused = lock(&self.refused);
-            let too_soon = |(known, at): &(Refusal, Instant)| {
-                let every = if known == refusal {
+            let too_soon = |(known, at): &(Status, Instant)| {
+                let every = if *known == refusal {
                     REFUSAL_EVERY
                 } else {
                     OTHER_REFUSAL_EVERY
@@ -96,11 +96,11 @@ impl Client {
             }
             *refused = Some((refusal.clone(), Instant::now()));
         }
-        self.say(&format!("refused, {}", refusal.words));
+        self.say(&format!("refused, {}", refusal.text));
         let message = Message {
             device: device.to_owned(),
             time: Timestamp::now(),
-            body: Body::Status(refusal.status()),
+            body: Body::Status(refusal),
         };
         // A name that is not text cannot be used in an answer.
         if let Ok(bytes) = message.encode() {
