@@ -64,23 +64,6 @@ pub struct Abilities {
 }
 
 const VENDOR_3DCONNEXION: u16 = 0x256f;
-const SIX_ABSOLUTE: [AbsoluteAxisCode; 6] = [
-    AbsoluteAxisCode::ABS_X,
-    AbsoluteAxisCode::ABS_Y,
-    AbsoluteAxisCode::ABS_Z,
-    AbsoluteAxisCode::ABS_RX,
-    AbsoluteAxisCode::ABS_RY,
-    AbsoluteAxisCode::ABS_RZ,
-];
-const SIX_RELATIVE: [RelativeAxisCode; 6] = [
-    RelativeAxisCode::REL_X,
-    RelativeAxisCode::REL_Y,
-    RelativeAxisCode::REL_Z,
-    RelativeAxisCode::REL_RX,
-    RelativeAxisCode::REL_RY,
-    RelativeAxisCode::REL_RZ,
-];
-
 impl Kind {
     /// Returns the kind of a device with these abilities; `None` for any other device.
     pub fn of(can: &Abilities) -> Option<Self> {
@@ -93,8 +76,9 @@ impl Kind {
             let has_stick = can.absolute.has(AbsoluteAxisCode::ABS_X.0) && can.absolute.has(AbsoluteAxisCode::ABS_Y.0);
             return has_stick.then_some(Self::Gamepad);
         }
-        let six =
-            SIX_ABSOLUTE.iter().all(|a| can.absolute.has(a.0)) || SIX_RELATIVE.iter().all(|a| can.relative.has(a.0));
+        // X, Y, Z and the turns about them have successive numbers.
+        let six = (AbsoluteAxisCode::ABS_X.0..=AbsoluteAxisCode::ABS_RZ.0).all(|a| can.absolute.has(a))
+            || (RelativeAxisCode::REL_X.0..=RelativeAxisCode::REL_RZ.0).all(|a| can.relative.has(a));
         // Joysticks and wheels have six axes too, but lack the buttons of a 3D mouse.
         let is_cap = can.vendor == VENDOR_3DCONNEXION || key(KeyCode::BTN_0);
         (six && is_cap && !key(KeyCode::BTN_TRIGGER)).then_some(Self::Mouse3d)

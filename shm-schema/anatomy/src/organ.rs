@@ -39,20 +39,14 @@ pub enum Organ {
 struct Row {
     organ: Organ,
     /// Prefixes of the name, lower case, letters and digits only.
-    names: &'static [&'static str],
+    names: &'static str,
     /// Words that may occur anywhere in the name.
-    words: &'static [&'static str],
+    words: &'static str,
     role: Role,
     material: Material,
 }
 
-const fn row(
-    organ: Organ,
-    names: &'static [&'static str],
-    words: &'static [&'static str],
-    role: Role,
-    material: Material,
-) -> Row {
+const fn row(organ: Organ, names: &'static str, words: &'static str, role: Role, material: Material) -> Row {
     Row {
         organ,
         names,
@@ -62,84 +56,37 @@ const fn row(
     }
 }
 
-const BOWEL_AND_NERVES: [&str; 8] = [
-    "penilebulb",
-    "bowel",
-    "colonsigmoid",
-    "sigmoid",
-    "analcanal",
-    "canalanal",
-    "nvb",
-    "neurovascular",
-];
+const PROSTATE: &str = "prostate prostata prostaat prosztata eturauhanen gland";
+const URETHRA: &str = "urethra uretra uretre harnrohre";
+const AT_RISK: &str = "penilebulb bowel colonsigmoid sigmoid analcanal canalanal nvb neurovascular";
+const BONE: &str = "bone femur pubic symphys pelvis sacrum";
 
 /// A longer name comes before its prefix.
 const TABLE: [Row; 14] = {
+    use Material as M;
     use Organ as O;
     use Role::{Spare, Target, Tissue};
     [
-        row(
-            O::TargetVolume,
-            &["ptv", "ctv", "gtv", "itv"],
-            &[],
-            Target,
-            Material::GLAND,
-        ),
-        row(
-            O::ProstateBed,
-            &["prostatebed", "prostatabett"],
-            &[],
-            Target,
-            Material::GLAND,
-        ),
-        row(
-            O::Prostate,
-            &["prostate", "prostata", "prostaat", "prosztata", "eturauhanen", "gland"],
-            &[],
-            Target,
-            Material::GLAND,
-        ),
-        row(
-            O::SeminalVesicle,
-            &["semvesicle", "seminalves"],
-            &[],
-            Tissue,
-            Material::GLAND,
-        ),
-        row(
-            O::Urethra,
-            &["urethra", "uretra", "uretre", "harnrohre"],
-            &["urethra", "uretra", "uretre", "harnrohre"],
-            Spare,
-            Material::URETHRA,
-        ),
+        row(O::TargetVolume, "ptv ctv gtv itv", "", Target, M::GLAND),
+        row(O::ProstateBed, "prostatebed prostatabett", "", Target, M::GLAND),
+        row(O::Prostate, PROSTATE, "", Target, M::GLAND),
+        row(O::SeminalVesicle, "semvesicle seminalves", "", Tissue, M::GLAND),
+        row(O::Urethra, URETHRA, URETHRA, Spare, M::URETHRA),
         row(
             O::Rectum,
-            &["rectum", "anorectum", "wallrectum", "rektum"],
-            &["rectum", "rektum"],
+            "rectum anorectum wallrectum rektum",
+            "rectum rektum",
             Spare,
-            Material::WALL,
+            M::WALL,
         ),
-        row(O::RectalWall, &["rectalwall"], &["rect", "rekt"], Spare, Material::WALL),
-        row(O::Bladder, &["bladder"], &["bladder"], Spare, Material::WALL),
-        row(O::OtherAtRisk, &BOWEL_AND_NERVES, &[], Spare, Material::OTHER),
-        row(
-            O::Bone,
-            &["bone", "femur", "pubic", "symphys", "pelvis", "sacrum"],
-            &["arch", "bone"],
-            Tissue,
-            Material::BONE,
-        ),
-        row(O::Fat, &["fat"], &["fat"], Tissue, Material::OTHER),
-        row(O::Perineum, &["perineum"], &["perineum"], Tissue, Material::OTHER),
-        row(O::Skin, &["skin"], &["skin"], Tissue, Material::OTHER),
-        row(
-            O::Surroundings,
-            &["external", "body", "muscle", "levator"],
-            &[],
-            Tissue,
-            Material::OTHER,
-        ),
+        row(O::RectalWall, "rectalwall", "rect rekt", Spare, M::WALL),
+        row(O::Bladder, "bladder", "bladder", Spare, M::WALL),
+        row(O::OtherAtRisk, AT_RISK, "", Spare, M::OTHER),
+        row(O::Bone, BONE, "arch bone", Tissue, M::BONE),
+        row(O::Fat, "fat", "fat", Tissue, M::OTHER),
+        row(O::Perineum, "perineum", "perineum", Tissue, M::OTHER),
+        row(O::Skin, "skin", "skin", Tissue, M::OTHER),
+        row(O::Surroundings, "external body muscle levator", "", Tissue, M::OTHER),
     ]
 };
 
@@ -156,7 +103,7 @@ impl Organ {
         let plain: String = folded(name).chars().filter(char::is_ascii_alphanumeric).collect();
         TABLE
             .iter()
-            .find(|row| row.names.iter().any(|n| plain.starts_with(n)))
+            .find(|row| row.names.split(' ').any(|n| plain.starts_with(n)))
             .map(|row| row.organ)
     }
 
@@ -164,7 +111,7 @@ impl Organ {
     /// urethra, but does not begin with it.
     pub fn is_mentioned_in(self, name: &str) -> bool {
         let name = folded(name);
-        self.row().words.iter().any(|word| name.contains(word))
+        self.row().words.split_whitespace().any(|word| name.contains(word))
     }
 
     /// Role of the organ in the procedure.
@@ -235,23 +182,12 @@ impl Part {
 }
 
 /// Words for the target in the order of preference.
-const TARGET_WORDS: [&str; 10] = [
-    "ptv",
-    "ctv",
-    "prostate",
-    "prostata",
-    "prostaat",
-    "prosztata",
-    "eturauhanen",
-    "gland",
-    "gtv",
-    "target",
-];
+const TARGET_WORDS: &str = "ptv ctv prostate prostata prostaat prosztata eturauhanen gland gtv target";
 
 /// Returns the index of the name most likely to be the target's; `None` if none resembles one.
 pub fn target_among(names: &[&str]) -> Option<usize> {
-    let mentions = |word: &&str| names.iter().position(|n| folded(n).contains(*word));
-    TARGET_WORDS.iter().find_map(mentions)
+    let mentions = |word: &str| names.iter().position(|n| folded(n).contains(word));
+    TARGET_WORDS.split(' ').find_map(mentions)
 }
 
 #[cfg(test)]

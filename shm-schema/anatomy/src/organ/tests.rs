@@ -2,6 +2,17 @@
 
 use super::*;
 
+const BOWEL_AND_NERVES: [&str; 8] = [
+    "penilebulb",
+    "bowel",
+    "colonsigmoid",
+    "sigmoid",
+    "analcanal",
+    "canalanal",
+    "nvb",
+    "neurovascular",
+];
+
 /// Names of TG-263, of the built-in scenes, of the fixtures, and as typed by users.
 const NAMES: [&str; 62] = [
     "Prostate",
