@@ -52,9 +52,6 @@ pub struct FindSeedsArgs {
     /// Diameter of a seed
     #[arg(long, value_name = "MM", default_value_t = 0.8)]
     diameter_mm: f64,
-    /// Count every component as one seed, to measure the gain of splitting
-    #[arg(long)]
-    no_split: bool,
     /// Folder for the results
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -73,7 +70,6 @@ impl FindSeedsArgs {
             count: self.count.map(|n| n as usize),
             length_m: self.length_mm * 1e-3,
             diameter_m: self.diameter_mm * 1e-3,
-            split: !self.no_split,
         };
         let found = finder::find(&ct, &search).map_err(|why| format!("{}: {why}", self.ct.display()))?;
         if let Some(note) = &ct.frame.warning {

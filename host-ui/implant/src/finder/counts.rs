@@ -51,29 +51,20 @@ fn cost(signal: f64, seeds: usize) -> f64 {
     (signal - seeds as f64).powi(2) / seeds.max(1) as f64
 }
 
-/// Returns every component as one seed.
-pub fn one_each(signals: &[f64]) -> Counts {
-    Counts {
-        seeds: vec![1; signals.len()],
-        of_one: median(signals.to_vec()),
-        signals: signals.to_vec(),
-        spread: LEAST_SPREAD,
-    }
-}
-
 /// Returns the counts that fit the signals best; a component of more than `most` seeds has none.
 pub fn of(signals: &[f64], count: Option<usize>, most: f64) -> Counts {
     let middle = median(signals.to_vec());
     let in_reach: f64 = signals.iter().filter(|s| **s < most * middle).sum();
     // If most components are several seeds, the median one is not a single seed; then the number of
     // seeds shows it.
-    let starts = [Some(middle), count.map(|count| in_reach / count.max(1) as f64)];
-    let found = starts
-        .into_iter()
-        .flatten()
-        .map(|start| of_start(signals, start, count, most));
-    let best = found.min_by(|a, b| a.total_cost().total_cmp(&b.total_cost()));
-    best.unwrap_or_else(|| one_each(signals))
+    let mut best = of_start(signals, middle, count, most);
+    if let Some(seeds) = count {
+        let other = of_start(signals, in_reach / seeds.max(1) as f64, count, most);
+        if other.total_cost() < best.total_cost() {
+            best = other;
+        }
+    }
+    best
 }
 
 fn of_start(signals: &[f64], start: f64, count: Option<usize>, most: f64) -> Counts {

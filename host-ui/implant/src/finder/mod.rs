@@ -44,9 +44,6 @@ pub struct Search {
     pub length_m: f64,
     /// Diameter of a seed, in m.
     pub diameter_m: f64,
-    /// True if a component may be several seeds; otherwise every component is one seed at its
-    /// centre, as a null model.
-    pub split: bool,
 }
 
 impl Default for Search {
@@ -57,7 +54,6 @@ impl Default for Search {
             count: None,
             length_m: 4.5e-3,
             diameter_m: 0.8e-3,
-            split: true,
         }
     }
 }
@@ -140,16 +136,10 @@ pub fn find(volume: &VoxelValues<f32>, search: &Search) -> Result<Found, FinderE
     let level = level::of(volume, search)?;
     let components = components::of(volume, &level)?;
     let signals: Vec<f64> = components.iter().map(|c| c.signal).collect();
-    let count = |signals: &[f64]| match search.split {
-        true => counts::of(signals, search.count, MOST_IN_ONE),
-        false => counts::one_each(signals),
-    };
+    let count = |signals: &[f64]| counts::of(signals, search.count, MOST_IN_ONE);
     let first = count(&signals);
     let fitter = Fitter::calibrated(volume, &level, search, &components, &first);
-    let (fits, counts) = match search.split {
-        true => fitter.fit_all(&components, &first, search.count, count),
-        false => (components.iter().map(|c| fitter.centre(c)).collect(), first),
-    };
+    let (fits, counts) = fitter.fit_all(&components, &first, search.count, count);
     let frame = &volume.frame;
     let place = |at_m: Vector3<f64>| -> [f64; 3] { (frame.directions * at_m + frame.origin_m).into() };
     let (mut seeds, mut doubts) = (Vec::new(), Vec::new());
@@ -181,7 +171,7 @@ pub fn find(volume: &VoxelValues<f32>, search: &Search) -> Result<Found, FinderE
         tissue: [level.tissue, level.noise],
         components: components.len(),
         split_components: fits.iter().filter(|f| f.seeds.len() > 1).count(),
-        blur_m: fitter.blur_m(),
+        blur_m: fitter.look.blur_m,
         seeds,
         doubts,
     })

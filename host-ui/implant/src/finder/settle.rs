@@ -61,12 +61,11 @@ impl Fitter<'_> {
             let Some(chosen) = choose(&changes, total, wanted) else {
                 return;
             };
-            for n in chosen.iter().map(|&at| changes[at].component).collect::<Vec<_>>() {
-                let at = chosen.iter().find(|&&at| changes[at].component == n);
-                let Some(change) = at.map(|&at| &changes[at]) else {
-                    continue;
-                };
-                let lines = change.lines.clone();
+            for Change {
+                component: n, lines, ..
+            } in chosen.iter().map(|&at| &changes[at])
+            {
+                let (n, lines) = (*n, lines.clone());
                 self.spread(&components[n], &fits.lines[n], -1.0, &mut fits.field);
                 let task = self.task(&components[n], Some(&fits.field), fits.tissue[n]);
                 counts.seeds[n] = lines.len();

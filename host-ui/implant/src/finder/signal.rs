@@ -18,9 +18,7 @@ impl Fitter<'_> {
     pub fn signals(&self, components: &[Component], lines: &[Vec<Line>], field: &[f64], tissue: &[f64]) -> Vec<f64> {
         let bright = self.level.threshold - self.level.tissue;
         let of_component = |((component, lines), tissue): ((&Component, &Vec<Line>), &f64)| {
-            let patch = Patch::of(self.volume.dims, self.volume.frame.spacing_m, &component.voxels);
-            let mut own = vec![0.0; component.voxels.len()];
-            lines.iter().for_each(|line| patch.add(line, &self.look, 1.0, &mut own));
+            let own = self.of_lines(component, lines);
             let of_seeds: f64 = lines.iter().map(|line| line.amount * self.look.signal).sum();
             let voxels = component.voxels.iter().zip(&component.excess).zip(&own);
             let left = voxels.map(|((n, excess), own)| (excess, excess - tissue - (field[*n] - own) - own));
@@ -37,9 +35,7 @@ impl Fitter<'_> {
         if lines.is_empty() {
             return component.tissue;
         }
-        let patch = Patch::of(self.volume.dims, self.volume.frame.spacing_m, &component.voxels);
-        let mut own = vec![0.0; component.voxels.len()];
-        lines.iter().for_each(|line| patch.add(line, &self.look, 1.0, &mut own));
+        let own = self.of_lines(component, lines);
         let voxels = component.voxels.iter().zip(&component.excess).zip(&own);
         let dim = voxels.filter(|((n, _), own)| **own + others[**n] < DIM * self.level.noise);
         let mut left: Vec<f64> = dim.map(|((n, excess), own)| excess - own - others[*n]).collect();
@@ -48,5 +44,13 @@ impl Fitter<'_> {
         }
         left.sort_by(f64::total_cmp);
         left[left.len() / 2]
+    }
+
+    /// Returns the contribution of seeds to each voxel of a component.
+    fn of_lines(&self, component: &Component, lines: &[Line]) -> Vec<f64> {
+        let patch = Patch::of(self.volume.dims, self.volume.frame.spacing_m, &component.voxels);
+        let mut own = vec![0.0; component.voxels.len()];
+        lines.iter().for_each(|line| patch.add(line, &self.look, 1.0, &mut own));
+        own
     }
 }

@@ -134,11 +134,6 @@ impl<'a> Fitter<'a> {
         fitter
     }
 
-    /// Returns the blur of the scanner, standard deviation, in m.
-    pub fn blur_m(&self) -> f64 {
-        self.look.blur_m
-    }
-
     /// Fits every component; then again, with counts from the signal that remains once neighbours
     /// and surroundings are known.
     pub fn fit_all(
@@ -183,13 +178,6 @@ impl<'a> Fitter<'a> {
         };
         self.settle(components, &mut all, &mut counts, wanted);
         (all.fitted, counts)
-    }
-
-    /// Returns a component as one seed at the middle of its signal.
-    pub fn centre(&self, component: &Component) -> Fitted {
-        let task = self.task(component, None, component.tissue);
-        let line = self.start(component, &task.data);
-        self.fitted(&task, &[line])
     }
 
     /// Returns the data of a component's fit, without the contribution of `neighbours` and `tissue`

@@ -1,9 +1,9 @@
-//! A synthetic CT of a known implant: the seeds found in it, compared with unsplit components.
+//! A synthetic CT of a known implant: the seeds found in it.
 
 use super::{FinderError, Found, Search, find};
 use crate::pairing;
 use nalgebra::{Matrix3, Vector3};
-use phantom::{Phantom, TOUCHING};
+use phantom::Phantom;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, DosePoints, Dvh, Region, Seed, Source, Structure};
 use stylet_files::{VoxelFrame, VoxelValues};
@@ -150,21 +150,6 @@ fn far(phantom: &Phantom, found: &Found) -> Vec<([f64; 3], f64, f64)> {
         )
     });
     all.filter(|(_, off_mm, _)| *off_mm > 1.0).collect()
-}
-
-/// Tests the null model: every component is one seed. It loses most seeds that touch another.
-#[test]
-fn components_that_are_not_split_lose_the_seeds_that_touch() {
-    let phantom = Phantom::new(1, None);
-    let search = Search {
-        count: Some(phantom.seeds.len()),
-        split: false,
-        ..Search::default()
-    };
-    let found = find(&phantom.volume, &search).unwrap();
-    let result = outcome(&phantom, &found);
-    println!("null model: {} seeds, {result:?}", found.seeds.len());
-    assert!(result.within_1_mm < 100 - TOUCHING / 2, "{result:?}");
 }
 
 /// Tests the signal alone, without the number implanted: it gives 104 for 100 here.

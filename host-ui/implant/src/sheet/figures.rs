@@ -7,14 +7,12 @@ use stylet_dose::metric::Value;
 use stylet_dose::{Dvh, Metric};
 
 /// Definitions of the figures, for the foot of the page.
-pub const DEFINITIONS: [&str; 7] = [
+pub const DEFINITIONS: [&str; 6] = [
     "D: dose that a share of the structure gets at least. V: share or volume with at least that percentage of the prescription.",
     "Conformity (van 't Riet 1997; COIN without organs, Baltas 1998): share of the target at the prescription, times the target's share of \
      all that is.",
     "Homogeneity (Wu 1988): (V100 - V150)/V100 of the target. Non-uniformity: V150/V100. External volume: what gets the prescription \
      outside of the target, over the target's volume.",
-    "Natural dose ratio: natural dose over prescription. The natural dose is where the histogram dV/du, u = D^(-3/2) (Anderson 1986), of all \
-     that surrounds the seeds has half of its peak on the side of low doses.",
     "BED (Dale 1989, as in TG-137): D(T) [1 + 2 d0 λ/(μ-λ) (β/α) κ(T)] - ln2 T/(α Tp); EQD2 = BED/(1 + 2/(α/β)).",
     "Edema (Chen 2000): V(t) = V (1 + M exp(-λe t)); seeds and tissue move together, the dose is the integral over time.",
     "D100 is the lowest of the points that the structure is made of, so it depends on their number.",
@@ -97,19 +95,14 @@ pub fn rows(implant: &Implant, columns: &[Column]) -> Vec<Row> {
         row("rectum", name, "Gy", 1, &|c| gy(organ(c, Organ::Rectum)?, name, rx));
     }
     row("indices", "conformity", "", 3, &|c| {
-        let (inside, all) = (target(c)?.at_least_m3(rx), at_prescription_m3(c)?);
+        let (inside, all) = (target(c)?.at_least_m3(rx), c.at_prescription_m3.clone()?);
         // The two volumes come from different points, so the share may slightly exceed 1.
         Ok(inside / target(c)?.volume_m3() * if all > 0.0 { (inside / all).min(1.0) } else { 0.0 })
     });
     row("indices", "homogeneity", "", 3, &|c| Ok(1.0 - non_uniformity(c, rx)?));
     row("indices", "non-uniformity", "", 3, &|c| non_uniformity(c, rx));
     row("indices", "external volume", "", 3, &|c| {
-        Ok((at_prescription_m3(c)? - target(c)?.at_least_m3(rx)).max(0.0) / target(c)?.volume_m3())
-    });
-    row("indices", "natural dose ratio", "", 3, &|c| {
-        let none = "its natural histogram does not fall to half of its peak within 30 mm";
-        let natural_gy = around(c)?.natural_gy.ok_or(none)?;
-        Ok(natural_gy / rx)
+        Ok((c.at_prescription_m3.clone()? - target(c)?.at_least_m3(rx)).max(0.0) / target(c)?.volume_m3())
     });
     let half_life_s = implant.source.half_life_s;
     let effect = |c: &Column, response: &Response, dose_gy: Cell, is_eqd2: bool| -> Cell {
@@ -150,16 +143,6 @@ fn organ(column: &Column, organ: Organ) -> Result<&Dvh, NotComputed> {
     column
         .organ(organ)
         .ok_or_else(|| format!("no structure is called {name}").into())
-}
-
-fn around(column: &Column) -> Result<&super::Around, NotComputed> {
-    let why = "with edema the surroundings do not move with the gland";
-    column.around.as_ref().ok_or_else(|| why.into())
-}
-
-fn at_prescription_m3(column: &Column) -> Cell {
-    let why = "the prescription isodose leaves the 30 mm around seeds and target";
-    around(column)?.at_prescription_m3.ok_or_else(|| why.into())
 }
 
 fn non_uniformity(column: &Column, rx_gy: f64) -> Cell {

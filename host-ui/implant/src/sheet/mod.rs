@@ -2,7 +2,6 @@
 //! sectors; several states side by side.
 
 mod figures;
-mod natural;
 mod page;
 mod sectors;
 
@@ -11,7 +10,6 @@ pub use page::page;
 pub use sectors::Sector;
 
 use crate::registration::RigidFit;
-use natural::natural_dose_gy;
 use serde_json::{Value, json};
 use stylet_anatomy::Organ;
 use stylet_dose::edema::Edema;
@@ -70,16 +68,6 @@ pub struct Histogram {
     pub dvh: Dvh,
 }
 
-/// Volumes at a dose beyond the target, the basis of indices.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Around {
-    /// Whole volume at the prescription, in m³; `None` if it leaves the margin of 30 mm around
-    /// seeds and target.
-    pub at_prescription_m3: Option<f64>,
-    /// Natural dose, in Gy.
-    pub natural_gy: Option<f64>,
-}
-
 /// A state with its dose.
 #[derive(Clone, Debug)]
 pub struct Column {
@@ -89,8 +77,8 @@ pub struct Column {
     pub name: String,
     /// Histograms, in the order of the structures.
     pub histograms: Vec<Histogram>,
-    /// Volumes around; `None` with edema, because the surroundings do not swell with the gland.
-    pub around: Option<Around>,
+    /// Whole volume at the prescription, in m³: the basis of indices.
+    pub at_prescription_m3: Result<f64, NotComputed>,
     /// Sectors of the target.
     pub sectors: Vec<Sector>,
     /// True if the dose is that of a gland that swells.
@@ -124,7 +112,10 @@ impl Column {
                 Some(_) => format!("{}, edema", state.name),
                 None => state.name.clone(),
             },
-            around: edema.is_none().then(|| around(implant, kernel, &state)),
+            at_prescription_m3: match edema {
+                Some(_) => Err("with edema the surroundings do not move with the gland".into()),
+                None => at_prescription_m3(implant, kernel, &state),
+            },
             swells: edema.is_some(),
             histograms,
             sectors,
@@ -150,8 +141,8 @@ impl Column {
     }
 }
 
-/// Computes the dose in the region around seeds and target.
-fn around(implant: &Implant, kernel: &DoseKernel, state: &State) -> Around {
+/// Returns the volume at the prescription in the region around seeds and target.
+fn at_prescription_m3(implant: &Implant, kernel: &DoseKernel, state: &State) -> Result<f64, NotComputed> {
     let mut corners: Vec<[f64; 3]> = state.seeds.iter().map(|s| s.position_m).collect();
     corners.extend(
         state
@@ -177,9 +168,9 @@ fn around(implant: &Implant, kernel: &DoseKernel, state: &State) -> Around {
     let leaves_gy = on_faces.fold(0.0, f64::max);
     let point_m3 = room.volumes_m3.first().copied().unwrap_or(0.0);
     let reached = dose_gy.iter().filter(|gy| **gy >= implant.prescription_gy).count() as f64 * point_m3;
-    Around {
-        at_prescription_m3: (leaves_gy < implant.prescription_gy).then_some(reached),
-        natural_gy: natural_dose_gy(&dose_gy, implant.prescription_gy, leaves_gy),
+    match leaves_gy < implant.prescription_gy {
+        true => Ok(reached),
+        false => Err("the prescription isodose leaves the 30 mm around seeds and target".into()),
     }
 }
 

@@ -60,8 +60,6 @@ fn the_page_has_every_figure_or_its_reason() {
     let (v100, v150) = (value("target", "V100", 0).unwrap(), value("target", "V150", 0).unwrap());
     assert!((value("indices", "homogeneity", 0).unwrap() - (v100 - v150) / v100).abs() < 1e-9);
     assert!((0.3..1.0).contains(&value("indices", "conformity", 0).unwrap()));
-    let ratio = value("indices", "natural dose ratio", 0).unwrap();
-    assert!((0.5..2.0).contains(&ratio), "{ratio}");
     // Seen swollen on day 0, the gland gets more once it has shrunk.
     assert!(value("target", "D90", 1).unwrap() > 1.05 * value("target", "D90", 0).unwrap());
     assert!(value("effect", "BED of target D90", 1).is_err());
