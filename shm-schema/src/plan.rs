@@ -63,6 +63,13 @@ pub struct PlannedNeedle {
     pub prescribed: Prescribed,
 }
 
+impl PlannedNeedle {
+    /// Returns the distance of a point from the entry, along the needle, m.
+    pub fn along_m(&self, point_m: [f64; 3]) -> f64 {
+        (0..3).map(|a| (point_m[a] - self.entry_m[a]) * self.direction[a]).sum()
+    }
+}
+
 /// The needle's path and the seeds planned along it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]

@@ -3,7 +3,7 @@
 use crate::{Core, ask, until};
 use std::time::Duration;
 use stylet_host::link::Link;
-use stylet_implant::workflow::{default_plan, move_request, plan_request};
+use stylet_implant::workflow::{default_plan, move_request};
 use stylet_shm_schema::{HapticState, ParameterId, Request, TickRecord, flags};
 
 /// A host that inserts slowly and keeps every record.
@@ -20,7 +20,7 @@ impl Insertion {
     pub fn begin(core: &mut Core, speed_m_per_s: f64) -> Self {
         let mut link = core.host();
         let plan = default_plan(&link.scene().expect("live").header);
-        ask(&mut link, &plan_request(&plan)).expect("planned");
+        ask(&mut link, &Request::SetPlan(Some(plan.clone()))).expect("planned");
         ask(&mut link, &Request::Engage).expect("engaged");
         let to = move_request(plan.entry_m, plan.direction, 0.2, 2.0);
         ask(&mut link, &to).expect("moved");

@@ -3,7 +3,7 @@
 use crate::{Core, ask, until};
 use std::time::Duration;
 use stylet_host::link::Link;
-use stylet_implant::workflow::{default_plan, move_request, plan_request};
+use stylet_implant::workflow::{default_plan, move_request};
 use stylet_random::Random;
 use stylet_shm_schema::{Request, flags};
 
@@ -51,7 +51,7 @@ impl Stage {
     /// Plans a needle, turns the force on and takes the needle to the entry.
     pub fn go_to_entry(&mut self) {
         let plan = default_plan(&self.observer.scene().expect("live").header);
-        ask(&mut self.observer, &plan_request(&plan)).expect("planned");
+        ask(&mut self.observer, &Request::SetPlan(Some(plan.clone()))).expect("planned");
         ask(&mut self.observer, &Request::Engage).expect("engaged");
         self.go(plan.entry_m, plan.direction);
     }

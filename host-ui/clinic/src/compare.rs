@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use stylet_dose::gamma::{self, Agreement, Criterion};
 use stylet_files::FileError;
 use stylet_files::dicom::Shared;
+use stylet_files::dicom::dose::ReadDose;
 use stylet_files::together;
 use stylet_implant::plan::seeds;
 use stylet_implant::provenance;
-use stylet_implant::readers::{DoseFile, read_any_dose};
+use stylet_implant::readers::{at_gy, places_m, read_any_dose};
 
 /// Share of the highest dose below which doses are left out of relative differences.
 const USUAL_THRESHOLD_PERCENT: f64 = 10.0;
@@ -172,14 +173,14 @@ fn highest_gamma(highest: f64) -> String {
     }
 }
 
-fn agreement(one: &DoseFile, other: &DoseFile, from_gy: f64, criterion: &Criterion) -> Option<Agreement> {
-    let all = one.places_m().zip(one.dose_gy.iter().copied());
+fn agreement(one: &ReadDose, other: &ReadDose, from_gy: f64, criterion: &Criterion) -> Option<Agreement> {
+    let all = places_m(one).zip(one.dose_gy.iter().copied());
     let places: Vec<([f64; 3], f64)> = all.filter(|(_, gy)| *gy >= from_gy).collect();
-    let gammas = criterion.gammas(&places, &|place| other.at_gy(place));
+    let gammas = criterion.gammas(&places, &|place| at_gy(other, place));
     Agreement::of(&gammas.into_iter().flatten().collect::<Vec<_>>())
 }
 
-fn difference(one: &DoseFile, other: &DoseFile, from_gy: f64) -> Option<Difference> {
+fn difference(one: &ReadDose, other: &ReadDose, from_gy: f64) -> Option<Difference> {
     let mut found = Difference {
         compared: 0,
         outside: 0,
@@ -188,8 +189,8 @@ fn difference(one: &DoseFile, other: &DoseFile, from_gy: f64) -> Option<Differen
         largest_gy: 0.0,
         largest_at_mm: [0.0; 3],
     };
-    for (place, gy) in one.places_m().zip(&one.dose_gy).filter(|(_, gy)| **gy >= from_gy) {
-        let Some(other_gy) = other.at_gy(place) else {
+    for (place, gy) in places_m(one).zip(&one.dose_gy).filter(|(_, gy)| **gy >= from_gy) {
+        let Some(other_gy) = at_gy(other, place) else {
             found.outside += 1;
             continue;
         };

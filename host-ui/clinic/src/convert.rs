@@ -2,7 +2,6 @@
 //! of the two files.
 
 use super::CommandError;
-use super::dicom::plan_seed;
 use super::dose::write;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -17,9 +16,9 @@ use stylet_files::dicom::structures::{self, StructureSet};
 use stylet_files::dicom::{self, Identity, RT_DOSE, RT_PLAN, Shared};
 use stylet_files::together;
 use stylet_files::{self as files, FileError, bytes, scene};
-use stylet_implant::plan::exchange::plan_source;
+use stylet_implant::plan::exchange::seeds_of_source;
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{DayOfImplant, DoseFile, Mapped, SeedDefaults, SeedFile, is_dose_volume, read_any_dose};
+use stylet_implant::readers::{DayOfImplant, Mapped, SeedDefaults, SeedFile, is_dose_volume, places_m, read_any_dose};
 
 const MAX_PLAN_BYTES: u64 = 4 << 20;
 
@@ -202,17 +201,8 @@ impl ConvertArgs {
         let agreed = file.agree(&source, None, DayOfImplant(None));
         let (prescription_gy, notes) = agreed.map_err(|why| format!("{}: {why}", self.from.display()))?;
         seeds::report(&self.from, &notes);
-        let plan = SeedPlan {
-            label: "Stylet".to_owned(),
-            identity: self.identity()?.unwrap_or_default().completed(),
-            uid: dicom::new_uid(),
-            structure_set: None,
-            prescription_gy,
-            planned_on: None,
-            source: plan_source(&source),
-            seeds: file.rows.into_iter().map(plan_seed).collect(),
-            notes: Vec::new(),
-        };
+        let identity = self.identity()?.unwrap_or_default().completed();
+        let plan = seeds_of_source(&source, file.rows, prescription_gy, identity);
         write_whole(&self.to, &plan::bytes(&plan)?)?;
         self.written()
     }
@@ -223,8 +213,7 @@ impl ConvertArgs {
         let is_dated = file.rows.iter().any(|row| row.strength_on.is_some());
         let dated = if is_dated { "strength_date," } else { "" };
         let mut out = format!("{identity}x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,{dated}needle,hole\n");
-        for row in file.rows {
-            let seed = plan_seed(row);
+        for seed in file.rows {
             let [x, y, z] = seed.position_m.map(|v| v * 1e3);
             let axis = seed.axis.map_or(",,".to_owned(), |[a, b, c]| format!("{a},{b},{c}"));
             let needle = seed.needle.map_or_else(String::new, |n| n.to_string());
@@ -266,7 +255,7 @@ impl ConvertArgs {
         }
         if has_ending(&self.to, "csv") {
             let comments = identity.as_ref().map(Identity::comments).unwrap_or_default() + &dose.kind.comments();
-            write::doses_after(&comments, &self.to, dose.places_m(), &dose.dose_gy)?;
+            write::doses_after(&comments, &self.to, places_m(&dose), &dose.dose_gy)?;
             return self.written();
         }
         self.needs_ending("dcm", "a dose becomes an RT Dose, .nrrd or .csv")?;
@@ -344,7 +333,7 @@ fn first_line(path: &Path) -> Result<String, CommandError> {
 }
 
 /// Writes the dose in double precision, without loss.
-fn dose_nrrd(grid: &DoseFile, identity: Option<&Identity>) -> Vec<u8> {
+fn dose_nrrd(grid: &dicom::dose::ReadDose, identity: Option<&Identity>) -> Vec<u8> {
     let pairs = identity.map(Identity::pairs).unwrap_or_default() + &grid.kind.pairs();
     let [x, y, z] = grid.origin_m.map(|v| v * 1e3);
     let [a, b, c] = grid.spacing_m.map(|v| v * 1e3);

@@ -2,7 +2,7 @@
 
 use super::CommandError;
 use super::dose::common::{Common, Loaded, within};
-use super::dose::{POINTS_FOR_DOSE, grid, write};
+use super::dose::{POINTS_FOR_DOSE, grid};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -10,17 +10,16 @@ use stylet_base::output::new_folder;
 use stylet_base::progress_bar::LongTask;
 use stylet_dose::Dvh;
 use stylet_files::dicom::images::{self, Slice};
-use stylet_files::dicom::plan::{PlanSeed, SeedPlan};
+use stylet_files::dicom::plan::SeedPlan;
 use stylet_files::dicom::structures::StructureSet;
 use stylet_files::dicom::structures::write::{Outlined, of_set, of_voxels};
 use stylet_files::dicom::{self, Identity, Shared};
 use stylet_files::together;
 use stylet_files::{FileError, bytes, read_voxels, watched};
 use stylet_implant::linked::{self, LinkedStudy};
-use stylet_implant::plan::exchange::plan_source;
+use stylet_implant::plan::exchange::seeds_of_source;
 use stylet_implant::plan::seeds;
 use stylet_implant::provenance;
-use stylet_implant::readers::SeedRow;
 
 /// Margin of the grid around the outermost structure.
 const GRID_MARGIN_M: f64 = 0.005;
@@ -90,21 +89,7 @@ impl DicomArgs {
                 histograms.push((left.remove(at).0, dvh));
             }
         }
-        let plan = plan(&loaded, &identity, prescription_gy);
-        let seeds_in_plan = plan.seeds.len();
         let target = number(judge.target_name());
-        let study = LinkedStudy {
-            identity: identity.clone(),
-            images: drawn.images,
-            structures: drawn.structures,
-            target,
-            plan,
-            dose: &dose,
-            histograms,
-            prescription_gy,
-        };
-        let written = linked::write(&c.out, study)?;
-        let [structure_set, plan_uid, dose_uid] = &written.uids;
         let mut inputs: Vec<(&str, &Path)> = vec![
             ("--source", &c.source),
             ("--seeds", &self.seeds),
@@ -112,22 +97,20 @@ impl DicomArgs {
         ];
         inputs.extend(self.like.as_deref().map(|file| ("--like", file)));
         inputs.extend(self.images.as_deref().map(|folder| ("--images", folder)));
-        let record = json!({
-            "patient_id": identity.patient_id,
-            "study_uid": identity.study,
-            "frame_of_reference_uid": identity.frame_of_reference,
-            "structure_set_uid": structure_set,
-            "plan_uid": plan_uid,
-            "dose_uid": dose_uid,
-            "seeds": seeds_in_plan,
-            "prescription_gy": prescription_gy,
-            "dose_voxels": dose.dims(),
-            "dose_spacing_mm": self.spacing_mm,
-            "made": provenance::made(&inputs)?,
-        });
-        write::json(&c.out.join("study.json"), &record)?;
+        let record = json!({ "dose_spacing_mm": self.spacing_mm, "made": provenance::made(&inputs)? });
+        let study = LinkedStudy {
+            plan: plan(&loaded, &identity, prescription_gy),
+            identity,
+            images: drawn.images,
+            structures: drawn.structures,
+            target,
+            dose: &dose,
+            histograms,
+            prescription_gy,
+        };
+        let written = linked::write(&c.out, study, record)?;
         print!("{}", stylet_base::format::printable_table(&judge.table(&verdict)));
-        for file in &written.files {
+        for file in &written {
             println!("written: {}", file.display());
         }
         Ok(())
@@ -230,28 +213,9 @@ fn bounds_m(structures: &[Outlined]) -> Option<([f64; 3], [f64; 3])> {
 }
 
 fn plan(loaded: &Loaded, identity: &Identity, prescription_gy: f64) -> SeedPlan {
-    let source = &loaded.source;
+    let (rows, prescription_gy) = (loaded.rows.clone(), Some(prescription_gy));
     SeedPlan {
-        label: "Stylet".to_owned(),
-        identity: identity.clone(),
-        uid: String::new(),
-        structure_set: None,
-        prescription_gy: Some(prescription_gy),
         planned_on: loaded.declared.as_ref().and_then(|d| d.planned_on),
-        source: plan_source(source),
-        seeds: loaded.rows.iter().cloned().map(plan_seed).collect(),
-        notes: Vec::new(),
-    }
-}
-
-/// Returns a seed with its needle and hole, in the form of a plan.
-pub fn plan_seed(row: SeedRow) -> PlanSeed {
-    PlanSeed {
-        needle: row.needle,
-        hole: row.hole.unwrap_or_default(),
-        position_m: row.seed.position_m,
-        axis: row.seed.axis,
-        strength_u: row.seed.strength_u,
-        strength_on: row.strength_on,
+        ..seeds_of_source(&loaded.source, rows, prescription_gy, identity.clone())
     }
 }

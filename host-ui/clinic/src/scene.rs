@@ -88,7 +88,7 @@ fn check_scene_file(file: &Path) -> Result<(), CommandError> {
         )?;
         println!(
             "  plan: {} seeds in {}",
-            seeds.len(),
+            seeds.rows.len(),
             printable(&path.display().to_string())
         );
     }

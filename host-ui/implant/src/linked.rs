@@ -2,6 +2,7 @@
 
 pub mod scene;
 
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use stylet_base::write_whole;
 use stylet_dose::{DoseGrid, Dvh};
@@ -39,24 +40,18 @@ pub struct LinkedStudy<'a> {
     pub prescription_gy: f64,
 }
 
-/// UIDs and paths of the written files.
-pub struct WrittenStudy {
-    /// Paths: structure set, plan, dose.
-    pub files: [PathBuf; 3],
-    /// SOP instance UIDs, in the same order.
-    pub uids: [String; 3],
-}
-
-/// Writes the three files into a folder.
-pub fn write(folder: &Path, study: LinkedStudy) -> Result<WrittenStudy, FileError> {
+/// Writes the three files into a folder, and `study.json` with their UIDs and the fields of
+/// `record`; returns the paths of structure set, plan and dose.
+pub fn write(folder: &Path, study: LinkedStudy, mut record: Value) -> Result<[PathBuf; 3], FileError> {
     let files = NAMES.map(|name| folder.join(name));
     let uids = [new_uid(), new_uid(), new_uid()];
     let [structure_set, plan_uid, dose_uid] = &uids;
-    let put = |n: usize, bytes: Result<Vec<u8>, ContentError>| {
-        let bytes = bytes.map_err(|why| FileError::of(&files[n], why))?;
+    let put_as = |path: &Path, bytes: Result<Vec<u8>, ContentError>| {
+        let bytes = bytes.map_err(|why| FileError::of(path, why))?;
         let unwritable = |e: stylet_base::WriteError| ContentError::Unwritable(e.source.to_string());
-        write_whole(&files[n], &bytes).map_err(|e| FileError::of(&files[n], unwritable(e)))
+        write_whole(path, &bytes).map_err(|e| FileError::of(path, unwritable(e)))
     };
+    let put = |n: usize, bytes| put_as(&files[n], bytes);
     put(
         0,
         structures::bytes(&structures::Written {
@@ -76,6 +71,19 @@ pub fn write(folder: &Path, study: LinkedStudy) -> Result<WrittenStudy, FileErro
         ..study.plan
     };
     put(1, plan::bytes(&plan))?;
+    for (key, value) in [
+        ("patient_id", json!(study.identity.patient_id)),
+        ("study_uid", json!(study.identity.study)),
+        ("frame_of_reference_uid", json!(study.identity.frame_of_reference)),
+        ("structure_set_uid", json!(structure_set)),
+        ("plan_uid", json!(plan_uid)),
+        ("dose_uid", json!(dose_uid)),
+        ("seeds", json!(plan.seeds.len())),
+        ("prescription_gy", json!(study.prescription_gy)),
+        ("dose_voxels", json!(study.dose.dims())),
+    ] {
+        record[key] = value;
+    }
     let histograms: Vec<Histogram> = study
         .histograms
         .iter()
@@ -96,7 +104,8 @@ pub fn write(folder: &Path, study: LinkedStudy) -> Result<WrittenStudy, FileErro
         histograms: &histograms,
     };
     put(2, dose::bytes(&image, &of))?;
-    Ok(WrittenStudy { files, uids })
+    put_as(&folder.join("study.json"), Ok(format!("{record:#}\n").into_bytes()))?;
+    Ok(files)
 }
 
 /// Returns a histogram in whole gray, or coarser if there would be too many bins.

@@ -25,11 +25,15 @@ pub struct DigestError {
 /// content.
 pub fn made_of(inputs: &[(&str, &[u8])]) -> Value {
     let input = |(name, content): &(&str, &[u8])| json!({ "input": name, "bytes": content.len(), "sha256": hexadecimal(&Sha256::digest(content)) });
+    of_inputs(inputs.iter().map(input).collect())
+}
+
+fn of_inputs(inputs: Vec<Value>) -> Value {
     json!({
         "program": "host-ui",
         "version": env!("CARGO_PKG_VERSION"),
         "made_at": utc_now(),
-        "inputs": inputs.iter().map(input).collect::<Vec<_>>(),
+        "inputs": inputs,
     })
 }
 
@@ -40,26 +44,18 @@ fn hexadecimal(digest: &[u8]) -> String {
 /// Returns program, version, time, and each of the `inputs` by the option that named it, with size
 /// and SHA-256, and with the patient and the frame of reference of a clinical file.
 pub fn made(inputs: &[(&str, &Path)]) -> Result<Value, DigestError> {
-    let inputs: Result<Vec<Value>, DigestError> = inputs
-        .iter()
-        .map(|(option, path)| {
-            let (sha256, bytes) = sha256(path)?;
-            let mut input =
-                json!({ "option": option, "file": path.display().to_string(), "bytes": bytes, "sha256": sha256 });
-            if let Ok(Some(identity)) = Identity::of_path(path) {
-                input["patient_id"] = json!(identity.patient_id);
-                input["study_uid"] = json!(identity.study);
-                input["frame_of_reference_uid"] = json!(identity.frame_of_reference);
-            }
-            Ok(input)
-        })
-        .collect();
-    Ok(json!({
-        "program": "host-ui",
-        "version": env!("CARGO_PKG_VERSION"),
-        "made_at": utc_now(),
-        "inputs": inputs?,
-    }))
+    let input = |(option, path): &(&str, &Path)| {
+        let (sha256, bytes) = sha256(path)?;
+        let mut input =
+            json!({ "option": option, "file": path.display().to_string(), "bytes": bytes, "sha256": sha256 });
+        if let Ok(Some(identity)) = Identity::of_path(path) {
+            input["patient_id"] = json!(identity.patient_id);
+            input["study_uid"] = json!(identity.study);
+            input["frame_of_reference_uid"] = json!(identity.frame_of_reference);
+        }
+        Ok(input)
+    };
+    Ok(of_inputs(inputs.iter().map(input).collect::<Result<_, DigestError>>()?))
 }
 
 /// Returns the digest in hexadecimal digits, and the size in bytes. For a folder it is that of the

@@ -194,7 +194,6 @@ impl ReceivedProcedure {
                     axis: Some(pose.axis),
                     ..planned
                 },
-                direction,
             });
         }
         (pairs, lost)

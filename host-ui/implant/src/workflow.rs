@@ -3,6 +3,6 @@
 mod plan;
 mod run;
 
-pub use plan::{NeedlePlan, default_plan, move_request, plan_request, plan_with_seeds};
+pub use plan::{default_plan, move_request, plan_with_seeds};
 pub use run::{NeedleTask, Placed, Run, RunError, RunFailure, RunStatus};
 pub use stylet_procedure::{Pace, Patience, Step, Waiting};

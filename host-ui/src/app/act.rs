@@ -10,7 +10,7 @@ use crate::settings::ThemeChoice;
 use crate::shown::LoadState;
 use std::time::Instant;
 use stylet_controllers::Wish;
-use stylet_implant::workflow::{default_plan, move_request, plan_request};
+use stylet_implant::workflow::{default_plan, move_request};
 use stylet_shm_schema::{
     PARAMETERS, ParameterChange, ParameterProblems, ParameterSet, PlannedNeedle, Refusal, Request,
 };
@@ -142,7 +142,7 @@ impl App {
             Action::PlanSeeds => {
                 if let Some(scene) = &self.shown.scene {
                     let plan = self.by_hand(default_plan(scene));
-                    self.send("Plan five seeds", &plan_request(&plan));
+                    self.send("Plan five seeds", &Request::SetPlan(Some(plan.clone())));
                 }
             }
             Action::LoadBuiltinScene(number) => self.load_builtin(number),

@@ -160,7 +160,6 @@ impl App {
             hole: of.hole,
             planned,
             delivered: planned,
-            direction: of.direction,
         };
         let own = shown.planning.progress.seeds_of(needle, shown.seeds.len());
         Some((pair, row.placed.and_then(|n| shown.seeds[own].get(n)).copied()))

@@ -13,8 +13,8 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use stylet_base::format;
 use stylet_implant::plan::exchange;
-use stylet_implant::workflow::{NeedlePlan, NeedleTask, Placed, Run, default_plan, plan_request};
-use stylet_shm_schema::{Prescribed, Text};
+use stylet_implant::workflow::{NeedleTask, Placed, Run, default_plan};
+use stylet_shm_schema::{PlannedNeedle, Prescribed, Request, Text};
 
 /// Period of the search for placed seeds, which compares every planned drop with every seed.
 const FIND_PLACED_EVERY: Duration = Duration::from_millis(300);
@@ -108,7 +108,7 @@ impl App {
         // Compensation may shift the entry a little from the hole.
         plan.entry_m = task.drops.entry_m;
         self.planner.begin_needle(number, self.shown.seeds.len());
-        self.send("Next needle", &plan_request(&plan));
+        self.send("Next needle", &Request::SetPlan(Some(plan.clone())));
     }
 
     /// Moves the axial slice to the plane that the template shows.
@@ -226,7 +226,7 @@ impl App {
     }
 
     /// Returns a needle by hand with the seeds of the settings.
-    pub(super) fn by_hand(&self, plan: NeedlePlan) -> NeedlePlan {
+    pub(super) fn by_hand(&self, plan: PlannedNeedle) -> PlannedNeedle {
         let Ok((source, dose_gy)) = exchange::usual() else {
             return plan;
         };
@@ -236,7 +236,7 @@ impl App {
             source: Text::new(&source.model),
             ..Default::default()
         };
-        NeedlePlan { prescribed, ..plan }
+        PlannedNeedle { prescribed, ..plan }
     }
 
     /// Advances the plan's progress with the script.

@@ -146,7 +146,7 @@ impl<L: Led> Rig<L> {
     fn run(mut self, name: &str, peak_n: f64) -> L {
         assert!(self.link.session().expect("live").device.read().contains(name));
         let plan = default_plan(&self.link.scene().expect("live").header);
-        let deepest_m = plan.deepest_first()[0];
+        let deepest_m = plan.seeds_m[0];
         let inside_m = Vector3::from(plan.entry_m).lerp(&Vector3::from(deepest_m), 0.3).into();
         self.engage();
         self.lead(plan.entry_m);

@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 use stylet_host::link::Link;
-use stylet_implant::workflow::{NeedlePlan, Pace, Run, RunStatus, Step, default_plan};
-use stylet_shm_schema::{Event, EventKind, Fault, Request, TickRecord, flags};
+use stylet_implant::workflow::{Pace, Run, RunStatus, Step, default_plan};
+use stylet_shm_schema::{Event, EventKind, Fault, PlannedNeedle, Request, TickRecord, flags};
 use stylet_tests::phantom::library;
 use stylet_tests::stopped::{StoppedThread, is_dead};
 use stylet_tests::witness::where_the_machine_runs;
@@ -76,12 +76,12 @@ impl Rig {
 }
 
 /// Returns the goal of the operator's hand for the script's present step.
-fn goal(run: &Run, plan: &NeedlePlan, seeds_dropped: usize) -> Option<[f64; 3]> {
+fn goal(run: &Run, plan: &PlannedNeedle, seeds_dropped: usize) -> Option<[f64; 3]> {
     match run.step() {
         Step::Plan | Step::Done => None,
         Step::Place => Some(plan.entry_m),
-        Step::Insert => plan.deepest_first().first().copied(),
-        Step::Drop => plan.deepest_first().get(seeds_dropped).copied(),
+        Step::Insert => plan.seeds_m.first().copied(),
+        Step::Drop => plan.seeds_m.get(seeds_dropped).copied(),
         Step::Retract | Step::Settle => Some(plan.entry_m),
     }
 }
@@ -187,7 +187,7 @@ fn unplugging_turns_the_force_off_with_a_message_until_replugged() {
             rig.link.poll();
             (tip(&rig.link) - entry).norm() < 2e-3
         }));
-        rig.lead(plan.deepest_first()[0], 0.02);
+        rig.lead(plan.seeds_m[0], 0.02);
         assert!(
             until(LONG, || {
                 rig.link.poll();
@@ -284,7 +284,7 @@ fn unplugging_turns_the_force_off_with_a_message_until_replugged() {
             "{armed} {:?}",
             rig.fault()
         );
-        rig.lead(plan.deepest_first()[0], 0.02);
+        rig.lead(plan.seeds_m[0], 0.02);
         assert!(
             until(LONG, || {
                 rig.link.poll();

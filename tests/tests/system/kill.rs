@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 use stylet_host::link::LinkStatus;
-use stylet_implant::workflow::{default_plan, move_request, plan_request};
+use stylet_implant::workflow::{default_plan, move_request};
 use stylet_shm_schema::{Phase, Request, TickRecord};
 use stylet_tests::window_process::Window;
 use stylet_tests::{Core, Display, ask, until};
@@ -16,7 +16,7 @@ fn insertion(display: &Display, kill: bool) -> Vec<TickRecord> {
     let mut core = Core::start();
     let mut link = core.host();
     let plan = default_plan(&link.scene().expect("live").header);
-    ask(&mut link, &plan_request(&plan)).expect("planned");
+    ask(&mut link, &Request::SetPlan(Some(plan.clone()))).expect("planned");
     ask(&mut link, &Request::Engage).expect("engaged");
     ask(&mut link, &move_request(plan.entry_m, plan.direction, 0.2, 2.0)).expect("moved");
     until(Duration::from_millis(800), || {

@@ -11,7 +11,7 @@ use stylet_implant::linked::scene;
 use stylet_implant::plan::optimise::robust::Trials;
 use stylet_implant::plan::optimise::{self, Engine, Objectives, Search};
 use stylet_implant::plan::{Anatomy, Template, check};
-use stylet_implant::readers::DoseFile;
+use stylet_implant::readers::{at_gy, places_m};
 use stylet_tests::rehearsal::Theatre;
 
 /// V150 was 84.5 % and D10 of the urethra 291 Gy: the pattern considered only the coverage of the target.
@@ -133,11 +133,10 @@ fn a_plan_of_a_scene_becomes_three_files_that_belong_together() {
             "{found:?}"
         );
     }
-    let dose = DoseFile::from(dose);
-    let place = dose.places_m().nth(dose.dose_gy.len() / 2).expect("a voxel");
+    let place = places_m(&dose).nth(dose.dose_gy.len() / 2).expect("a voxel");
     let in_scene = patient.scene_from_patient(place);
     let expected: f64 = seeds.iter().map(|seed| kernel.exact_at_gy(seed, in_scene)).sum();
-    let found = dose.at_gy(place).expect("in the grid");
+    let found = at_gy(&dose, place).expect("in the grid");
     assert!((found / expected - 1.0).abs() < 1e-3, "{found} of {expected} Gy");
     // After a cancellation nothing is written.
     let other = folder.with_file_name("cancelled");

@@ -79,7 +79,7 @@ fn rehearsed_is_live(scene: &str) {
         (rest.seeds_m.len(), rest.dropped_after_s.len())
     );
     let element_m = link.scene().expect("live").header.spacing_m;
-    let planned = task.plan.deepest_first();
+    let planned = task.plan.seeds_m.clone();
     let mut typical = 0;
     for (i, (live, rehearsed)) in placed.seeds_m.iter().zip(&rest.seeds_m).enumerate() {
         let (off_m, error_m) = (apart_m(live, rehearsed), apart_m(live, &planned[i]));
@@ -138,11 +138,11 @@ fn in_finite_elements_every_seed_rests_where_it_was_rehearsed() {
         let task = NeedleTask::as_planned(default_plan(&link.scene().expect("live").header));
         let rest = rehearsed(&mut link, &task);
         let placed = live(&mut link, &task);
-        assert_eq!(placed.seeds_m.len(), task.plan.deepest_first().len(), "none is lost");
+        assert_eq!(placed.seeds_m.len(), task.plan.seeds_m.len(), "none is lost");
         // The hand stops within 0.3 mm of its goal, before or behind it; on the other side if the core is taken away.
         let missed = link.state().expect("live").missed_deadlines;
         let bound_m = if missed < 50 { 0.35e-3 } else { 1.2e-3 };
-        for ((live, rehearsed), plan) in placed.seeds_m.iter().zip(&rest.seeds_m).zip(task.plan.deepest_first()) {
+        for ((live, rehearsed), plan) in placed.seeds_m.iter().zip(&rest.seeds_m).zip(task.plan.seeds_m.clone()) {
             let (off_m, error_m) = (apart_m(live, rehearsed), apart_m(live, &plan));
             println!(
                 "{:.3} mm from plan, rehearsal off by {:.3} mm; {missed} ticks missed",

@@ -73,7 +73,7 @@ fn the_default_needle_in_the_pelvis_avoids_bone_urethra_and_rectum() {
             Some(&scene.structures[scene.lattice.structure(element) as usize])
         };
         assert!(structure_at(plan.entry_m).is_none(), "the needle begins in tissue");
-        let deepest_m = plan.along_m(plan.deepest_first()[0]);
+        let deepest_m = plan.along_m(plan.seeds_m[0]);
         let mut met: Vec<&str> = Vec::new();
         for step in 0..=(deepest_m / 0.5e-3) as usize {
             let depth_m = step as f64 * 0.5e-3;

@@ -14,9 +14,9 @@ use stylet_dose::report::{Judge, choose_target};
 use stylet_dose::seed::Seed;
 use stylet_dose::source::Source;
 use stylet_dose::structure::Structure;
-use stylet_files::dicom::plan::Date;
+use stylet_files::dicom::plan::{Date, PlanSeed};
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{DayOfImplant, Declared, Mapped, SeedDefaults, SeedRow, contours, labels, places};
+use stylet_implant::readers::{DayOfImplant, Declared, Mapped, SeedDefaults, contours, dose_seed, labels, places};
 use stylet_population as population;
 
 /// Options of all commands that compute dose.
@@ -74,7 +74,7 @@ pub struct Loaded {
     /// Seeds, with their strength at the implant.
     pub seeds: Vec<Seed>,
     /// Seeds with needle, hole and the strength of the file.
-    pub rows: Vec<SeedRow>,
+    pub rows: Vec<PlanSeed>,
     /// Declarations of a plan about its seeds.
     pub declared: Option<Declared>,
     prescription_gy: Option<f64>,
@@ -114,7 +114,7 @@ impl Common {
         let (prescription_gy, notes) = agreed.map_err(|why| format!("{}: {why}", path.display()))?;
         seeds::report(path, &notes);
         let declared = file.declared.take();
-        let mut all: Vec<Seed> = file.rows.into_iter().map(|row| row.seed).collect();
+        let mut all: Vec<Seed> = file.rows.iter().map(dose_seed).collect();
         if source.tables.anisotropy_2d.is_none() && all.iter().any(|s| s.axis.is_some()) {
             return Err(format!(
                 "{} has no [anisotropy_2d], which seeds with an axis need; leave the axis columns out",
@@ -136,7 +136,7 @@ impl Common {
         let mut rows = of_file;
         // A strength without a day is that of the implant.
         for (row, seed) in rows.iter_mut().zip(&all).filter(|(row, _)| row.strength_on.is_none()) {
-            row.seed.strength_u = seed.strength_u;
+            row.strength_u = seed.strength_u;
         }
         seeds::report(path, places::on_one_spot(&all).as_slice());
         let interval = Interval::days(self.from_days, self.to_days.unwrap_or(f64::INFINITY));

@@ -20,13 +20,10 @@ const END_RINGS: usize = 8;
 const SHORTEST_M: f64 = 0.5e-3;
 const LONGEST: f64 = 2.0;
 
-/// Reason why clicks do not define a body.
+/// Error of clicks that have an outline in too few planes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ContourError {
-    /// Too few planes have an outline.
-    #[error("the gland needs an outline in {PLANES} planes or more, three points each; there are {0}")]
-    Planes(usize),
-}
+#[error("the gland needs an outline in {PLANES} planes or more, three points each; there are {0}")]
+pub struct ContourError(usize);
 
 /// Centre and squares of the radii of a plane, or their derivatives along the axis.
 #[derive(Clone, Debug)]
@@ -118,7 +115,7 @@ impl Solid {
         let outlines = contour.outlines();
         let count = outlines.len();
         if count < PLANES {
-            return Err(ContourError::Planes(count));
+            return Err(ContourError(count));
         }
         let at: Vec<(f64, Values)> = outlines.iter().map(|(at_m, o)| (*at_m, Values::of(o))).collect();
         // The parabola through three planes: its slope at a place, and half its second derivative.

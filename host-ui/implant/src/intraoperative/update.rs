@@ -135,13 +135,11 @@ impl Situation<'_> {
     fn resting(&self, needle: &Needle) -> Vec<Seed> {
         let rehearsed = self.rehearsed.iter().find(|(of, _)| of == needle);
         let off_m = rehearsed.map_or(&[][..], |(_, done)| &done.after_m);
-        let seeds = needle.seeds.iter().zip(needle.seeds_m()).enumerate();
-        let resting = seeds.map(|(n, (seed, planned_m))| {
+        let resting = needle.dose_seeds().enumerate().map(|(n, seed)| {
             let off_m = off_m.get(n).copied().unwrap_or_default();
             Seed {
-                position_m: [0, 1, 2].map(|a| planned_m[a] + off_m[a]),
-                axis: Some(needle.direction),
-                strength_u: seed.strength_u,
+                position_m: [0, 1, 2].map(|a| seed.position_m[a] + off_m[a]),
+                ..seed
             }
         });
         resting.collect()

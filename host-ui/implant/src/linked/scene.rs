@@ -10,7 +10,6 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
 use stylet_base::output::new_folder;
-use stylet_base::write_whole;
 use stylet_dose::decay::Interval;
 use stylet_dose::report::Judge;
 use stylet_dose::{DoseGrid, DoseKernel, Dvh, Seed, Source, structure};
@@ -51,12 +50,6 @@ pub enum SceneStudyError {
     /// The folder exists and is not empty, or cannot be created.
     #[error("{0}")]
     Folder(String),
-    /// `study.json` cannot be written.
-    #[error(transparent)]
-    Write(#[from] stylet_base::WriteError),
-    /// A figure is not representable in JSON.
-    #[error(transparent)]
-    Json(#[from] serde_json::Error),
     /// The work was cancelled.
     #[error("the study was cancelled; nothing was written")]
     Cancelled,
@@ -135,33 +128,9 @@ pub fn write(
     if target.is_none() {
         notes.push(format!("the target {} is not among the contours", anatomy.target.name));
     }
-    let identity = drawn.identity.clone();
     new_folder(folder).map_err(|why| SceneStudyError::Folder(why.to_string()))?;
-    let written = write_linked(
-        folder,
-        LinkedStudy {
-            identity: identity.clone(),
-            images: drawn.images,
-            structures: drawn.structures,
-            target,
-            plan: of_plan,
-            dose: &dose,
-            histograms,
-            prescription_gy: plan.prescription_gy,
-        },
-    )?;
-    let [structure_set, plan_uid, dose_uid] = &written.uids;
     let text = file::to_text(plan, &patient)?;
     let record = json!({
-        "patient_id": identity.patient_id,
-        "study_uid": identity.study,
-        "frame_of_reference_uid": identity.frame_of_reference,
-        "structure_set_uid": structure_set,
-        "plan_uid": plan_uid,
-        "dose_uid": dose_uid,
-        "seeds": seeds.len(),
-        "prescription_gy": plan.prescription_gy,
-        "dose_voxels": dose.dims(),
         "scene": scene.header.name.read(),
         "made": provenance::made_of(&[
             ("labels of the scene", &scene.labels),
@@ -169,8 +138,17 @@ pub fn write(
             ("model of the source", source.model.as_bytes()),
         ]),
     });
-    let text = serde_json::to_string_pretty(&record)? + "\n";
-    write_whole(&folder.join("study.json"), text.as_bytes())?;
+    let study = LinkedStudy {
+        identity: drawn.identity,
+        images: drawn.images,
+        structures: drawn.structures,
+        target,
+        plan: of_plan,
+        dose: &dose,
+        histograms,
+        prescription_gy: plan.prescription_gy,
+    };
+    write_linked(folder, study, record)?;
     // The files are written; there is nothing left to cancel.
     let _ = report(1.0);
     Ok(notes)

@@ -6,6 +6,7 @@ use std::path::Path;
 use stylet_anatomy::PatientFrame;
 use stylet_base::format::printable;
 use stylet_dose::Source;
+use stylet_dose::decay::s_to_days;
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
 use stylet_files::dicom::{Identity, Shared, new_uid};
 use stylet_files::together;
@@ -106,44 +107,41 @@ pub fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan,
             plan.source
         ))
     })?;
-    let of_needle = |(number, needle): (u32, &super::Needle)| {
-        let name = needle.hole.map_or_else(String::new, |h| h.to_string());
-        let axis = Some(patient.patient_from_scene_direction(needle.direction));
-        let seed = |(place, strength_u): ([f64; 3], f64)| PlanSeed {
-            needle: Some(number),
-            hole: name.clone(),
-            position_m: patient.patient_from_scene(place),
-            axis,
-            strength_u,
-            strength_on: None,
-        };
-        let strengths = needle.seeds.iter().map(|s| s.strength_u);
-        needle.seeds_m().zip(strengths).map(seed).collect::<Vec<_>>()
-    };
-    Ok(SeedPlan {
+    let prescription_gy = Some(plan.prescription_gy);
+    Ok(seeds_of_source(
+        &source,
+        plan.rows(patient),
+        prescription_gy,
+        Identity::new(),
+    ))
+}
+
+/// Returns seeds of a source in the form of an RT Plan, under a new UID.
+pub fn seeds_of_source(
+    source: &Source,
+    seeds: Vec<PlanSeed>,
+    prescription_gy: Option<f64>,
+    identity: Identity,
+) -> SeedPlan {
+    SeedPlan {
         label: "Stylet".to_owned(),
-        identity: Identity::new(),
+        identity,
         uid: new_uid(),
         structure_set: None,
-        prescription_gy: Some(plan.prescription_gy),
+        prescription_gy,
         planned_on: None,
-        source: plan_source(&source),
-        seeds: (1..).zip(&plan.needles).flat_map(of_needle).collect(),
+        source: PlanSource {
+            model: source.model.clone(),
+            manufacturer: String::new(),
+            isotope: source.nuclide.clone(),
+            half_life_days: s_to_days(source.half_life_s),
+            active_length_m: source.tables.active_length_m,
+        },
+        seeds,
         notes: Vec::new(),
-    })
+    }
 }
 
 fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
-}
-
-/// Returns a source in the form of an RT Plan.
-pub fn plan_source(source: &Source) -> PlanSource {
-    PlanSource {
-        model: source.model.clone(),
-        manufacturer: String::new(),
-        isotope: source.nuclide.clone(),
-        half_life_days: stylet_dose::decay::s_to_days(source.half_life_s),
-        active_length_m: source.tables.active_length_m,
-    }
 }

@@ -232,14 +232,11 @@ pub fn read(path: &Path, patient: &PatientFrame) -> Result<ImplantPlan, PlanErro
 /// Formats seeds for `host-ui dose --seeds`, with the number of their needle and its hole.
 pub fn seeds_to_csv(plan: &ImplantPlan, patient: &PatientFrame) -> String {
     let mut text = format!("{HEADER}\n");
-    for (number, needle) in (1..).zip(&plan.needles) {
-        let [a, b, c] = patient.patient_from_scene_direction(needle.direction);
-        let hole = needle.hole.map_or_else(String::new, |h| h.to_string());
-        for (seed, place_m) in needle.seeds.iter().zip(needle.seeds_m()) {
-            let [x, y, z] = patient.patient_from_scene(place_m).map(|c| c * 1e3);
-            let strength = seed.strength_u;
-            text += &format!("{x:.6},{y:.6},{z:.6},{a:.9},{b:.9},{c:.9},{strength},{number},{hole}\n");
-        }
+    for row in plan.rows(patient) {
+        let [x, y, z] = row.position_m.map(|c| c * 1e3);
+        let [a, b, c] = row.axis.unwrap_or_default();
+        let (strength, number, hole) = (row.strength_u, row.needle.unwrap_or_default(), row.hole);
+        text += &format!("{x:.6},{y:.6},{z:.6},{a:.9},{b:.9},{c:.9},{strength},{number},{hole}\n");
     }
     text
 }
@@ -268,8 +265,8 @@ pub fn import(
     let mut needles: Vec<(Option<u32>, Needle)> = Vec::new();
     let mut problems = Vec::new();
     for row in &rows {
-        let place_m = patient.scene_from_patient(row.seed.position_m);
-        let direction = row.seed.axis.map_or(template.inwards, |a| {
+        let place_m = patient.scene_from_patient(row.position_m);
+        let direction = row.axis.map_or(template.inwards, |a| {
             inwards(&template, patient.scene_from_patient_direction(a))
         });
         let is_its = |(number, needle): &(Option<u32>, Needle)| {
@@ -280,7 +277,7 @@ pub fn import(
             needles.len() - 1
         });
         let (number, needle) = &mut needles[at];
-        let hole = row.hole.as_deref().filter(|_| is_table);
+        let hole = Some(row.hole.as_str()).filter(|hole| is_table && !hole.is_empty());
         if let Err(why) = fits(needle, hole, place_m, direction, &template) {
             let needle = number.map_or_else(String::new, |n| format!("needle {n}: "));
             problems.push(format!("{needle}{why}"));
@@ -288,7 +285,7 @@ pub fn import(
         let along_m = needle.along_m(place_m);
         needle.seeds.push(NeedleSeed {
             along_m,
-            strength_u: row.seed.strength_u,
+            strength_u: row.strength_u,
         });
     }
     problems.dedup();

@@ -94,7 +94,7 @@ pub fn strength_u(plan: &ImplantPlan, anatomy: &Anatomy, kernel: &DoseKernel) ->
 mod tests {
     use super::*;
     use crate::plan::check::problems;
-    use crate::plan::optimise::glands::{GLANDS, TEMPLATE};
+    use crate::plan::optimise::tests::glands::{GLANDS, TEMPLATE};
     use stylet_dose::decay::Interval;
 
     /// Tests a scene like `paper`, which names no structure to be spared.

@@ -24,8 +24,10 @@ pub use edit::{History, Row};
 pub use error::PlanError;
 pub use needle::{Loading, Needle, NeedleSeed, SEED_LENGTH_M, SPACER_M};
 pub use rehearse::{Drops, LinkRehearser, RehearsalError, Rehearser};
+use stylet_anatomy::PatientFrame;
 use stylet_dose as dose;
-use stylet_shm_schema::{Prescribed, Text};
+use stylet_files::dicom::plan::PlanSeed;
+use stylet_shm_schema::{PlannedNeedle, Prescribed, Text};
 pub use template::{HOLES, Hole, NotAHole, PITCH_M, Template};
 
 /// Plan of an implant, complete before the first needle goes in.
@@ -67,17 +69,37 @@ impl ImplantPlan {
         }
     }
 
+    /// Returns a needle, counted from 0, for other hosts; `None` if there is no such needle.
+    pub fn planned(&self, number: usize) -> Option<PlannedNeedle> {
+        let needle = self.needles.get(number)?;
+        Some(PlannedNeedle {
+            entry_m: needle.entry_m,
+            direction: needle.direction,
+            seeds_m: needle.seeds_m().collect(),
+            prescribed: self.prescribed(number),
+        })
+    }
+
     /// Returns the seeds for dose computation, needle by needle, deepest first.
     pub fn seeds(&self) -> Vec<dose::Seed> {
-        let of_needle = |n: &Needle| {
-            let (axis, places) = (n.direction, n.seeds_m().collect::<Vec<_>>());
-            let seed = move |(s, position_m): (&NeedleSeed, [f64; 3])| dose::Seed {
-                position_m,
-                axis: Some(axis),
-                strength_u: s.strength_u,
+        self.needles.iter().flat_map(Needle::dose_seeds).collect()
+    }
+
+    /// Returns the seeds in the patient's frame with the number and hole of their needle.
+    pub fn rows(&self, patient: &PatientFrame) -> Vec<PlanSeed> {
+        let of_needle = |(number, needle): (u32, &Needle)| {
+            let hole = needle.hole.map_or_else(String::new, |h| h.to_string());
+            let axis = Some(patient.patient_from_scene_direction(needle.direction));
+            let row = |seed: dose::Seed| PlanSeed {
+                needle: Some(number),
+                hole: hole.clone(),
+                position_m: patient.patient_from_scene(seed.position_m),
+                axis,
+                strength_u: seed.strength_u,
+                strength_on: None,
             };
-            n.seeds.iter().zip(places).map(seed).collect::<Vec<_>>()
+            needle.dose_seeds().map(row).collect::<Vec<_>>()
         };
-        self.needles.iter().flat_map(of_needle).collect()
+        (1..).zip(&self.needles).flat_map(of_needle).collect()
     }
 }

@@ -2,6 +2,7 @@
 
 use super::template::Hole;
 use nalgebra::Vector3;
+use stylet_dose::Seed;
 
 /// Length of a seed from end to end.
 pub const SEED_LENGTH_M: f64 = 4.5e-3;
@@ -72,6 +73,15 @@ impl Needle {
     /// Returns the planned places of its seeds, deepest first.
     pub fn seeds_m(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         self.seeds.iter().map(|s| self.at_m(s.along_m))
+    }
+
+    /// Returns the seeds at their planned places for dose computation, deepest first.
+    pub fn dose_seeds(&self) -> impl Iterator<Item = Seed> + '_ {
+        self.seeds.iter().map(|s| Seed {
+            position_m: self.at_m(s.along_m),
+            axis: Some(self.direction),
+            strength_u: s.strength_u,
+        })
     }
 
     /// Sorts the seeds in the order of dropping, and sets the depth of the tip to that of the

@@ -1,11 +1,11 @@
 //! Seeds from any file that contains some: a plan file, a table, an RT Plan.
 
 use super::{PlanError, file};
-use crate::readers::{Declared, SeedDefaults, SeedFile, SeedRow, read_seed_rows};
+use crate::readers::{Declared, SeedDefaults, SeedFile, read_seeds};
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
+use stylet_dose::Source;
 use stylet_dose::decay::s_to_days;
-use stylet_dose::{Seed, Source};
 pub use stylet_files::report;
 
 /// Reads the seeds of a file in the patient's frame; a plan file is recognised by its extension, an
@@ -14,27 +14,13 @@ pub fn read(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, PlanError> 
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         return of_plan_file(path);
     }
-    read_seed_rows(path, defaults).map_err(|e| PlanError::Invalid(vec![e.to_string()]))
+    read_seeds(path, defaults).map_err(|e| PlanError::Invalid(vec![e.to_string()]))
 }
 
 fn of_plan_file(path: &Path) -> Result<SeedFile, PlanError> {
     // Its places are the patient's, and so are those of the default frame.
     let plan = file::read(path, &PatientFrame::default())?;
-    let of_needle = |(number, needle): (u32, &super::Needle)| {
-        let row = |(position_m, strength_u): ([f64; 3], f64)| SeedRow {
-            seed: Seed {
-                position_m,
-                axis: Some(needle.direction),
-                strength_u,
-            },
-            needle: Some(number),
-            hole: needle.hole.map(|h| h.to_string()),
-            strength_on: None,
-        };
-        let strengths = needle.seeds.iter().map(|s| s.strength_u);
-        needle.seeds_m().zip(strengths).map(row).collect::<Vec<_>>()
-    };
-    let rows: Vec<SeedRow> = (1..).zip(&plan.needles).flat_map(of_needle).collect();
+    let rows = plan.rows(&PatientFrame::default());
     if rows.is_empty() {
         return Err(PlanError::of_file(path, "the plan has no seed; load its needles first"));
     }

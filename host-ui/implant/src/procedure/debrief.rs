@@ -51,7 +51,6 @@ pub fn write(
                 axis: Some(pose.axis),
                 ..planned
             },
-            direction: drop.direction,
         })
     };
     let anatomy = Anatomy::of(scene)?;

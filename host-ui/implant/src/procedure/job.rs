@@ -8,12 +8,12 @@ use crate::plan::exchange;
 use crate::plan::rehearse::{Drops, LinkRehearser};
 use crate::plan::stabilise::{Stabilising, stabilising};
 use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, Template, check, compensate};
-use crate::workflow::{NeedlePlan, NeedleTask, Pace, plan_with_seeds};
+use crate::workflow::{NeedleTask, Pace, plan_with_seeds};
 use std::collections::BTreeMap;
 use std::path::Path;
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, SceneModel};
-use stylet_shm_schema::{MAX_SEEDS, SeedPose};
+use stylet_shm_schema::{MAX_SEEDS, PlannedNeedle, SeedPose};
 
 /// Planned seed, in the order of the drops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -197,8 +197,9 @@ impl Job {
                 strength_u: needle.and_then(|n| n.seeds.get(i)).map(|s| s.strength_u),
             };
             task.plan
-                .deepest_first()
-                .into_iter()
+                .seeds_m
+                .iter()
+                .copied()
                 .enumerate()
                 .map(drop)
                 .collect::<Vec<_>>()
@@ -208,8 +209,8 @@ impl Job {
 }
 
 /// Returns a needle without a template, in the form of a plan.
-fn needle_of(plan: &NeedlePlan) -> Needle {
-    let along = plan.deepest_first().into_iter().map(|seed| plan.along_m(seed));
+fn needle_of(plan: &PlannedNeedle) -> Needle {
+    let along = plan.seeds_m.iter().map(|seed| plan.along_m(*seed));
     Needle {
         hole: None,
         entry_m: plan.entry_m,

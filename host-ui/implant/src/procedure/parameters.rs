@@ -5,7 +5,7 @@ use super::wait;
 use std::time::Duration;
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::Link;
-use stylet_shm_schema::{PARAMETERS, ParameterChange, Request};
+use stylet_shm_schema::{PARAMETERS, ParameterChange, ParameterProblem, Request};
 
 const LIMIT: Duration = Duration::from_secs(5);
 
@@ -27,19 +27,8 @@ pub enum NoParameter {
         value: String,
     },
     /// The table forbids the value.
-    #[error("{key}: {value} is outside of {least} to {most} {unit}")]
-    OutOfLimits {
-        /// The parameter.
-        key: &'static str,
-        /// Value that was given, in `unit`.
-        value: f64,
-        /// Least value.
-        least: f64,
-        /// Largest value.
-        most: f64,
-        /// Display unit.
-        unit: &'static str,
-    },
+    #[error(transparent)]
+    OutOfLimits(#[from] ParameterProblem),
 }
 
 fn keys() -> String {
@@ -60,20 +49,15 @@ pub fn parameter(text: &str) -> Result<ParameterChange, NoParameter> {
     let si = given / spec.display_per_si;
     // The factor to the display unit and back may leave the limits by a bit.
     let within = si.clamp(spec.min, spec.max);
-    if !si.is_finite() || (si - within).abs() > 1e-9 * spec.max.abs() {
-        let [least, most] = [spec.min, spec.max].map(|limit| limit * spec.display_per_si);
-        return Err(NoParameter::OutOfLimits {
-            key: spec.key,
-            value: given,
-            least,
-            most,
-            unit: spec.unit,
-        });
+    let value = if (si - within).abs() > 1e-9 * spec.max.abs() {
+        si
+    } else {
+        within
+    };
+    match spec.problem(value) {
+        Some(problem) => Err(problem.into()),
+        None => Ok(ParameterChange { id: spec.id, value }),
     }
-    Ok(ParameterChange {
-        id: spec.id,
-        value: within,
-    })
 }
 
 /// Sends parameters and waits until they are in force.
@@ -113,8 +97,8 @@ mod tests {
             ("needle.template_gap", "KEY=VALUE"),
             ("needle.gap=1", "valid keys are tissue.min_stretch"),
             ("needle.template_gap=wide", "not a number"),
-            ("needle.template_gap=9", "0 to 3 mm"),
-            ("needle.template_gap=NaN", "outside"),
+            ("needle.template_gap=9", "0.000000 to 3.000000 mm"),
+            ("needle.template_gap=NaN", "not a number"),
         ] {
             let why = parameter(text).expect_err(text).to_string();
             assert!(why.contains(says), "{why}");

@@ -120,7 +120,7 @@ fn needles(job: &Job, seen: &Observations) -> Vec<Value> {
             "largest_displacement_mm": motion.map(|m| m.tissue.size_m * 1e3),
             "largest_displacement_tip_along_mm": motion.map(|m| tip_along_mm(&m.tissue)),
             "entry_mm": mm(task.drops.entry_m), "direction": task.drops.direction,
-            "planned_along_mm": task.plan.deepest_first().into_iter().map(|s| task.plan.along_m(s) * 1e3).collect::<Vec<_>>(),
+            "planned_along_mm": task.plan.seeds_m.iter().map(|s| task.plan.along_m(*s) * 1e3).collect::<Vec<_>>(),
             "dropped_along_mm": task.drops.along_m.iter().map(|a| a * 1e3).collect::<Vec<_>>(),
             "deflection_mm": deflection_m * 1e3,
         })

@@ -1,12 +1,12 @@
 //! Declarations of a plan about its seeds, compared with the source and the options of the dose:
 //! refused if the dose would be wrong, reported if it may be.
 
-use super::{SeedFile, SeedRow};
+use super::SeedFile;
 use stylet_base::format::printable;
 use stylet_base::nuclide::Nuclide;
 use stylet_dose::Source;
 use stylet_dose::decay::{days_to_s, left_after, s_to_days};
-use stylet_files::dicom::plan::Date;
+use stylet_files::dicom::plan::{Date, PlanSeed};
 
 /// Largest difference between half-lives of one isotope, as a share; tables differ by less.
 const SAME_HALF_LIFE: f64 = 0.01;
@@ -145,14 +145,11 @@ impl SeedFile {
 }
 
 /// Refuses seeds without a strength; reports strengths that no seed of a permanent implant has.
-fn strengths(rows: &[SeedRow]) -> Result<Option<String>, Mismatch> {
-    if let Some(place) = rows.iter().position(|row| row.seed.strength_u <= 0.0) {
+fn strengths(rows: &[PlanSeed]) -> Result<Option<String>, Mismatch> {
+    if let Some(place) = rows.iter().position(|row| row.strength_u <= 0.0) {
         return Err(Mismatch::NoStrength { number: place + 1 });
     }
-    let unusual = rows
-        .iter()
-        .map(|row| row.seed.strength_u)
-        .filter(|u| !USUAL_U.contains(u));
+    let unusual = rows.iter().map(|row| row.strength_u).filter(|u| !USUAL_U.contains(u));
     let (count, most) = unusual.fold((0, 0.0_f64), |(count, most), u| (count + 1, most.max(u)));
     Ok((count > 0).then(|| {
         format!(
@@ -203,7 +200,7 @@ impl DayOfImplant {
     /// stay, which is reported.
     fn decay(
         self,
-        rows: &mut [SeedRow],
+        rows: &mut [PlanSeed],
         declared: Option<&Declared>,
         source: &Source,
     ) -> Result<Option<String>, Mismatch> {
@@ -242,7 +239,7 @@ impl DayOfImplant {
                     days,
                 });
             }
-            row.seed.strength_u *= left_after(days_to_s(f64::from(days)), source.half_life_s);
+            row.strength_u *= left_after(days_to_s(f64::from(days)), source.half_life_s);
         }
         let ahead = days_between(implant, last);
         let left = left_after(days_to_s(f64::from(-ahead)), source.half_life_s) * 100.0;

@@ -10,84 +10,50 @@ const START_BYTES: u64 = 160;
 /// Pair of an NRRD header that gives the unit of a dose.
 const UNITS_LINE: &str = "dose_units";
 
-/// Doses on a regular grid of places in RAS; x runs fastest.
-pub struct DoseFile {
-    /// Number of places along x, y, z.
-    pub dims: [usize; 3],
-    /// First place, in m.
-    pub origin_m: [f64; 3],
-    /// Distances between places along x, y, z, in m.
-    pub spacing_m: [f64; 3],
-    /// Doses in Gy.
-    pub dose_gy: Vec<f64>,
-    /// Type and summation.
-    pub kind: DoseKind,
-    /// SOP instance UID of its plan.
-    pub plan: Option<String>,
-    /// Remarks on the reading for the user.
-    pub notes: Vec<String>,
+/// Returns every place of a dose (RAS), x fastest, in m.
+pub fn places_m(dose: &ReadDose) -> impl Iterator<Item = [f64; 3]> + '_ {
+    let [nx, ny, nz] = dose.dims;
+    (0..nx * ny * nz).map(move |n| {
+        let at = [n % nx, n / nx % ny, n / nx / ny];
+        [0, 1, 2].map(|a| dose.origin_m[a] + at[a] as f64 * dose.spacing_m[a])
+    })
 }
 
-impl From<ReadDose> for DoseFile {
-    fn from(dose: ReadDose) -> Self {
-        Self {
-            dims: dose.dims,
-            origin_m: dose.origin_m,
-            spacing_m: dose.spacing_m,
-            dose_gy: dose.dose_gy,
-            kind: dose.kind,
-            plan: dose.plan,
-            notes: dose.notes,
+/// Interpolates a dose linearly between the eight voxels around a place; `None` outside of the
+/// centres of the outermost.
+pub fn at_gy(dose: &ReadDose, place_m: [f64; 3]) -> Option<f64> {
+    let (mut low, mut share) = ([0; 3], [0.0; 3]);
+    for a in 0..3 {
+        let at = (place_m[a] - dose.origin_m[a]) / dose.spacing_m[a];
+        let last = (dose.dims[a] - 1) as f64;
+        // A part in a million of a voxel is rounding.
+        if !(-1e-6..=last + 1e-6).contains(&at) {
+            return None;
         }
+        let at = at.clamp(0.0, last);
+        low[a] = (at as usize).min(dose.dims[a].saturating_sub(2));
+        share[a] = at - low[a] as f64;
     }
-}
-
-impl DoseFile {
-    /// Returns every place, x fastest, in m.
-    pub fn places_m(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
-        let [nx, ny, nz] = self.dims;
-        (0..nx * ny * nz).map(move |n| {
-            let at = [n % nx, n / nx % ny, n / nx / ny];
-            [0, 1, 2].map(|a| self.origin_m[a] + at[a] as f64 * self.spacing_m[a])
-        })
-    }
-
-    /// Interpolates linearly between the eight voxels around a place; `None` outside of the centres
-    /// of the outermost.
-    pub fn at_gy(&self, place_m: [f64; 3]) -> Option<f64> {
-        let (mut low, mut share) = ([0; 3], [0.0; 3]);
-        for a in 0..3 {
-            let at = (place_m[a] - self.origin_m[a]) / self.spacing_m[a];
-            let last = (self.dims[a] - 1) as f64;
-            // A part in a million of a voxel is rounding.
-            if !(-1e-6..=last + 1e-6).contains(&at) {
-                return None;
-            }
-            let at = at.clamp(0.0, last);
-            low[a] = (at as usize).min(self.dims[a].saturating_sub(2));
-            share[a] = at - low[a] as f64;
+    let [nx, ny, _] = dose.dims;
+    let corner = |n: usize| {
+        let up = [n & 1, n >> 1 & 1, n >> 2];
+        let weight: f64 = (0..3)
+            .map(|a| if up[a] == 1 { share[a] } else { 1.0 - share[a] })
+            .product();
+        if weight == 0.0 {
+            return 0.0;
         }
-        let [nx, ny, _] = self.dims;
-        let corner = |n: usize| {
-            let up = [n & 1, n >> 1 & 1, n >> 2];
-            let weight: f64 = (0..3)
-                .map(|a| if up[a] == 1 { share[a] } else { 1.0 - share[a] })
-                .product();
-            if weight == 0.0 {
-                return 0.0;
-            }
-            let at = [0, 1, 2].map(|a| low[a] + up[a]);
-            weight * self.dose_gy[(at[2] * ny + at[1]) * nx + at[0]]
-        };
-        Some((0..8).map(corner).sum())
-    }
+        let at = [0, 1, 2].map(|a| low[a] + up[a]);
+        weight * dose.dose_gy[(at[2] * ny + at[1]) * nx + at[0]]
+    };
+    Some((0..8).map(corner).sum())
 }
 
 /// Reads a dose from an RT Dose, an NRRD volume or a table, detected by the content.
-pub fn read_any_dose(path: &Path) -> Result<DoseFile, FileError> {
+pub fn read_any_dose(path: &Path) -> Result<ReadDose, FileError> {
     let start = bytes::start(path, START_BYTES).unwrap_or_default();
     if dicom::is_dicom(&start) {
-        return Ok(dicom::dose::of_file(path)?.into());
+        return dicom::dose::of_file(path);
     }
     let kind = DoseKind::of_lines(lines_of(path));
     match nrrd::is_nrrd(&start) {
@@ -102,13 +68,13 @@ pub fn is_dose_volume(path: &Path) -> bool {
     is_nrrd && lines_of(path)(UNITS_LINE).is_some()
 }
 
-fn read_volume(path: &Path, kind: DoseKind) -> Result<DoseFile, FileError> {
+fn read_volume(path: &Path, kind: DoseKind) -> Result<ReadDose, FileError> {
     let refused = |why| FileError::of(path, why);
     let content = bytes::whole(path, &Progress::default()).map_err(refused)?;
     let progress = Progress::default();
     let data = |name: &str| bytes::data_file(path, name, &progress);
     let volume = nrrd::read_image(&content, &data, Sink::exact(&progress)).map_err(refused)?;
-    let mut dose = DoseFile::from(dicom::dose::of_volume(&volume, kind).map_err(refused)?);
+    let mut dose = dicom::dose::of_volume(&volume, kind).map_err(refused)?;
     if !is_dose_volume(path) {
         dose.notes
             .push("it does not say its unit; its values are taken as Gy".to_owned());
@@ -117,7 +83,7 @@ fn read_volume(path: &Path, kind: DoseKind) -> Result<DoseFile, FileError> {
 }
 
 /// Reads a dose grid in the format of `host-ui dose`: every place of a regular grid, x fastest.
-fn read_table(path: &Path, kind: DoseKind) -> Result<DoseFile, FileError> {
+fn read_table(path: &Path, kind: DoseKind) -> Result<ReadDose, FileError> {
     let (rows, _) = table::read(path, &[PLACE.as_slice(), &["dose_gy"]].concat(), &[], |row| {
         let dose = row
             .number("dose_gy")?
@@ -132,7 +98,7 @@ fn read_table(path: &Path, kind: DoseKind) -> Result<DoseFile, FileError> {
     })
 }
 
-fn grid_of(rows: &[([f64; 3], f64)], kind: DoseKind) -> Option<DoseFile> {
+fn grid_of(rows: &[([f64; 3], f64)], kind: DoseKind) -> Option<ReadDose> {
     let origin_m = rows.first()?.0;
     let near = |a: f64, b: f64| (a - b).abs() < 2e-7;
     let first_off = |from: usize, axis: usize| (from..rows.len()).find(|&r| !near(rows[r].0[axis], origin_m[axis]));
@@ -153,13 +119,15 @@ fn grid_of(rows: &[([f64; 3], f64)], kind: DoseKind) -> Option<DoseFile> {
         (0..3).all(|a| near(place[a], origin_m[a] + at[a] as f64 * spacing_m[a]))
     };
     let is_grid = spacing_m.iter().all(|s| *s > 0.0) && rows.iter().enumerate().all(fits);
-    is_grid.then(|| DoseFile {
+    is_grid.then(|| ReadDose {
         dims,
         origin_m,
         spacing_m,
         dose_gy: rows.iter().map(|r| r.1).collect(),
         notes: kind.remarks(),
         kind,
+        uid: String::new(),
         plan: None,
+        structure_set: None,
     })
 }

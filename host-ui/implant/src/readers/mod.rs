@@ -11,6 +11,6 @@ mod table;
 
 pub use columns::{Mapped, NotAColumn};
 pub use declared::{DayOfImplant, Declared, Mismatch};
-pub use grid::{DoseFile, is_dose_volume, read_any_dose};
-pub use seeds::{SeedDefaults, SeedFile, SeedRow, read_seed_rows, read_seeds};
+pub use grid::{at_gy, is_dose_volume, places_m, read_any_dose};
+pub use seeds::{SeedDefaults, SeedFile, dose_seed, read_seeds};
 pub use table::read_points;

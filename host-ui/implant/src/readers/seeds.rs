@@ -29,34 +29,15 @@ pub struct SeedDefaults {
     pub columns: Vec<Mapped>,
 }
 
-/// Seed, and its needle if the file names one.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SeedRow {
-    /// Seed; patient frame (RAS) for an RT Plan.
-    pub seed: Seed,
-    /// Number of the needle, from 1.
-    pub needle: Option<u32>,
-    /// Hole of the needle in the template, as in the file.
-    pub hole: Option<String>,
-    /// Reference day of the strength, if the file gives one.
-    pub strength_on: Option<Date>,
-}
-
 /// Seeds of a file, with its declarations about all of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeedFile {
-    /// The seeds with their needles.
-    pub rows: Vec<SeedRow>,
+    /// Seeds with their needles; patient frame (RAS) for an RT Plan.
+    pub rows: Vec<PlanSeed>,
     /// Declarations; `None` for a table, which says nothing of its source.
     pub declared: Option<Declared>,
     /// Remarks on the reading of the file.
     pub notes: Vec<String>,
-}
-
-/// Like [`read_seed_rows`], the seeds alone.
-pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, FileError> {
-    let rows = read_seed_rows(path, defaults)?.rows;
-    Ok(rows.into_iter().map(|row| row.seed).collect())
 }
 
 /// Reads a table of seeds or a DICOM RT Plan, which gives the strengths itself. A table has the
@@ -65,7 +46,7 @@ pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<Vec<Seed>, File
 /// and those of [`dicom::COLUMNS`], which are skipped. It may also have columns that state their quantity and unit,
 /// such as "Pos X (cm)", or any columns that [`SeedDefaults::columns`] names. Commas, semicolons or
 /// tabs separate them.
-pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileError> {
+pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileError> {
     let is_plan = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
     if is_plan {
         return Ok(of_plan(dicom::plan::open(path)?));
@@ -79,14 +60,12 @@ pub fn read_seed_rows(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, F
     ]
     .concat();
     let row = |row: &Row| {
-        Ok(SeedRow {
-            seed: Seed {
-                position_m: row.position_m()?,
-                axis: axis(row)?,
-                strength_u: strength_u(row, &defaults)?,
-            },
+        Ok(PlanSeed {
+            position_m: row.position_m()?,
+            axis: axis(row)?,
+            strength_u: strength_u(row, &defaults)?,
             needle: needle(row)?,
-            hole: row.text("hole").map(str::to_owned),
+            hole: row.text("hole").unwrap_or_default().to_owned(),
             strength_on: strength_on(row)?,
         })
     };
@@ -109,20 +88,16 @@ fn of_plan(plan: SeedPlan) -> SeedFile {
             prescription_gy: plan.prescription_gy,
             planned_on: plan.planned_on,
         }),
-        rows: plan.seeds.into_iter().map(row_of_plan).collect(),
+        rows: plan.seeds,
     }
 }
 
-fn row_of_plan(seed: PlanSeed) -> SeedRow {
-    SeedRow {
-        seed: Seed {
-            position_m: seed.position_m,
-            axis: seed.axis,
-            strength_u: seed.strength_u,
-        },
-        needle: seed.needle,
-        hole: Some(seed.hole).filter(|hole| !hole.is_empty()),
-        strength_on: seed.strength_on,
+/// Returns a seed for dose computation.
+pub fn dose_seed(seed: &PlanSeed) -> Seed {
+    Seed {
+        position_m: seed.position_m,
+        axis: seed.axis,
+        strength_u: seed.strength_u,
     }
 }
 

@@ -61,7 +61,7 @@ fn each_needle_has_the_seeds_that_came_after_its_plan() {
     assert!(heard.is_whole());
     assert_eq!(placed(&heard)[2..], [(2, Some(2)), (2, Some(3))]);
     let (pairs, lost) = heard.pairs(0.5);
-    assert!(lost.is_empty() && pairs.iter().all(|p| (p.error_along_m() - 2e-3).abs() < 1e-12));
+    assert!(lost.is_empty() && pairs.iter().all(|p| (p.offset().along_m - 2e-3).abs() < 1e-12));
     assert!(
         pairs
             .iter()

@@ -22,18 +22,10 @@ const NEAR_M: f64 = 3e-3;
 /// Fewest seeds that define a rotation.
 const FEWEST: usize = 4;
 
-/// Reason why two sets of seeds cannot be fitted.
+/// Error of too few planned or found seeds for a rotation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum FitError {
-    /// A rotation needs more places.
-    #[error("a fit of frames needs {FEWEST} seeds or more on both sides, and there are {planned} and {found}")]
-    TooFew {
-        /// Number of planned seeds.
-        planned: usize,
-        /// Number of found seeds.
-        found: usize,
-    },
-}
+#[error("a fit of frames needs {FEWEST} seeds or more on both sides, and there are {0} and {1}")]
+pub struct FitError(usize, usize);
 
 /// Transform from found to plan: `planned = rotation * found + shift`.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,10 +48,7 @@ impl RigidFit {
     /// Fits found places to those of a plan, m.
     pub fn of(planned_m: &[[f64; 3]], found_m: &[[f64; 3]]) -> Result<Self, FitError> {
         if planned_m.len() < FEWEST || found_m.len() < FEWEST {
-            return Err(FitError::TooFew {
-                planned: planned_m.len(),
-                found: found_m.len(),
-            });
+            return Err(FitError(planned_m.len(), found_m.len()));
         }
         let planned: Vec<Vector3<f64>> = planned_m.iter().map(|p| Vector3::from(*p)).collect();
         let found: Vec<Vector3<f64>> = found_m.iter().map(|p| Vector3::from(*p)).collect();

@@ -33,33 +33,22 @@ pub struct SeedPair {
     pub needle: usize,
     /// Hole of the needle; `None` for one that is held by hand.
     pub hole: Option<Hole>,
-    /// Planned seed.
+    /// Planned seed, with the direction of the needle, into the body.
     pub planned: Seed,
     /// Delivered seed at rest.
     pub delivered: Seed,
-    /// Direction of the needle, into the body.
-    pub direction: [f64; 3],
 }
 
 impl SeedPair {
     /// Returns the offset of the delivered seed from the planned one.
     pub fn offset(&self) -> SeedOffset {
-        SeedOffset::of(self.planned.position_m, self.delivered.position_m, self.direction)
+        let direction = self.planned.axis.unwrap_or_default();
+        SeedOffset::of(self.planned.position_m, self.delivered.position_m, direction)
     }
 
     /// Returns the distance from plan, m.
     pub fn error_m(&self) -> f64 {
         self.offset().distance_m()
-    }
-
-    /// Returns the distance along the needle, m; positive: deeper than planned.
-    pub fn error_along_m(&self) -> f64 {
-        self.offset().along_m
-    }
-
-    /// Returns the distance across the needle, m.
-    pub fn error_across_m(&self) -> f64 {
-        self.offset().across_m
     }
 }
 

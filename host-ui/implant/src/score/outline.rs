@@ -2,62 +2,23 @@
 
 use crate::plan::anatomy::Body;
 use nalgebra::Vector3;
-use std::collections::BTreeMap;
+use stylet_surfaces::mesh::cut::{Line, Sides, cut};
 
 /// Place in a picture.
 pub type Place = (f64, f64);
-
-/// Two corners of the surface on different sides of the plane, the one in front of it first.
-type Edge = (u32, u32);
 
 /// Returns the rings in which a plane cuts the surface of the body, one for each piece and each
 /// hole; scene frame, m.
 pub fn rings(body: &Body, on_plane_m: Vector3<f64>, normal: Vector3<f64>) -> Vec<Vec<Vector3<f64>>> {
     let (points_m, triangles) = body.surface();
-    let at = |n: u32| Vector3::from(points_m[n as usize].map(f64::from));
-    let side = |n: u32| (at(n) - on_plane_m).dot(&normal);
-    // The surface is closed, so a path that enters an edge in one triangle leaves it in the next.
-    let mut next: BTreeMap<Edge, Vec<Edge>> = BTreeMap::new();
-    for &[a, b, c] in triangles {
-        let (mut from, mut to) = (None, None);
-        for (p, q) in [(a, b), (b, c), (c, a)] {
-            match (side(p) > 0.0, side(q) > 0.0) {
-                (true, false) => from = Some((p, q)),
-                (false, true) => to = Some((q, p)),
-                _ => {}
-            }
-        }
-        if let (Some(from), Some(to)) = (from, to) {
-            next.entry(from).or_default().push(to);
-        }
-    }
-    let crossing = |(front, behind): Edge| {
-        let (before, after) = (side(front), side(behind));
-        at(front) + (at(behind) - at(front)) * (before / (before - after))
+    let offset_m = on_plane_m.dot(&normal) as f32;
+    let sides = Sides::of(points_m, normal.map(|c| c as f32).into(), offset_m);
+    let ring = |line: Line| {
+        // The surface is closed, so the last point repeats the first.
+        let points = line.into_iter().skip(1);
+        points.map(|p| Vector3::from(p.map(f64::from))).collect()
     };
-    let mut rings = Vec::new();
-    while let Some((&first, _)) = next.first_key_value() {
-        let (mut ring, mut edge) = (Vec::new(), first);
-        while let Some(to) = taken(&mut next, edge) {
-            ring.push(crossing(edge));
-            edge = to;
-            if edge == first {
-                break;
-            }
-        }
-        rings.push(ring);
-    }
-    rings
-}
-
-/// Removes one continuation from an edge.
-fn taken(next: &mut BTreeMap<Edge, Vec<Edge>>, edge: Edge) -> Option<Edge> {
-    let ways = next.get_mut(&edge)?;
-    let to = ways.pop();
-    if ways.is_empty() {
-        next.remove(&edge);
-    }
-    to
+    cut(points_m, triangles, &sides).into_iter().map(ring).collect()
 }
 
 /// Returns the part of a ring inside the square of this half side about the origin, closed along

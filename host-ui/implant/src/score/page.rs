@@ -203,6 +203,7 @@ fn seeds(score: &Score) -> Markup {
 
 fn seed(score: &Score, n: usize) -> Vec<Markup> {
     let (pair, cost) = (&score.implant.pairs[n], &score.costs[n]);
+    let off = pair.offset();
     let hole = pair.hole.map_or_else(|| "–".to_owned(), |h| h.to_string());
     let is_costly = cost.target_d90_gy > 0.5;
     let lost_gy = format::decimal(cost.target_d90_gy, 2);
@@ -211,9 +212,9 @@ fn seed(score: &Score, n: usize) -> Vec<Markup> {
         cell(n + 1),
         cell(pair.needle + 1),
         cell(hole),
-        cell(format!("{:.2}", pair.error_m() * 1e3)),
-        cell(format::signed_mm(pair.error_along_m())),
-        cell(format!("{:.2}", pair.error_across_m() * 1e3)),
+        cell(format!("{:.2}", off.distance_m() * 1e3)),
+        cell(format::signed_mm(off.along_m)),
+        cell(format!("{:.2}", off.across_m * 1e3)),
         html! { @if is_costly { span class="bad" { (lost_gy) } } @else { (lost_gy) } },
         cell(format::decimal(cost.target_v100_percent, 3)),
     ];

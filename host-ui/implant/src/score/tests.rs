@@ -47,7 +47,6 @@ fn pairs(off: &[usize]) -> Vec<SeedPair> {
             hole: None,
             planned,
             delivered,
-            direction: [0.0, 0.0, 1.0],
         }
     };
     places.enumerate().map(seed).collect()
@@ -160,8 +159,8 @@ fn an_update_is_in_the_debrief_with_its_contour_error() {
 fn the_only_misplaced_seed_has_the_whole_cost() {
     let (anatomy, kernel) = (anatomy(), kernel());
     let score = score(&[4], &anatomy, &kernel, &[]);
-    assert!((score.implant.pairs[4].error_along_m() - 6e-3).abs() < 1e-12);
-    assert!(score.implant.pairs[4].error_across_m() < 1e-12);
+    assert!((score.implant.pairs[4].offset().along_m - 6e-3).abs() < 1e-12);
+    assert!(score.implant.pairs[4].offset().across_m < 1e-12);
     let [mean, worst] = score.errors_m();
     assert!((mean - 6e-3 / 36.0).abs() < 1e-12 && (worst - 6e-3).abs() < 1e-12);
     // Dose of all seeds recomputed with this one on plan: the plan itself.

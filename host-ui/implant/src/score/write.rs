@@ -12,12 +12,13 @@ pub fn to_json(score: &Score) -> Value {
     let ras_mm = |p: [f64; 3]| frames.patient_from_scene(p).map(|c| c * 1e3);
     let [mean, worst] = score.errors_m();
     let seed = |(pair, cost): (&super::SeedPair, &super::Cost)| {
+        let off = pair.offset();
         json!({
             "needle": pair.needle + 1, "hole": pair.hole.map(|h| h.to_string()), "strength_u": pair.planned.strength_u,
             "planned_ras_mm": ras_mm(pair.planned.position_m), "delivered_ras_mm": ras_mm(pair.delivered.position_m),
             "axis_ras": pair.delivered.axis.map(|a| frames.patient_from_scene_direction(a)),
-            "error_mm": pair.error_m() * 1e3, "error_along_mm": pair.error_along_m() * 1e3,
-            "error_across_mm": pair.error_across_m() * 1e3,
+            "error_mm": off.distance_m() * 1e3, "error_along_mm": off.along_m * 1e3,
+            "error_across_mm": off.across_m * 1e3,
             "cost": {
                 "target_d90_gy": cost.target_d90_gy, "target_v100_percent": cost.target_v100_percent,
                 "urethra_d10_gy": cost.urethra_d10_gy, "urethra_d30_gy": cost.urethra_d30_gy,

@@ -1,7 +1,6 @@
 //! One needle through the gland and the seeds along it (paper fig. 6).
 
 use crate::patient::patient_axis;
-use crate::plan::ImplantPlan;
 use nalgebra::Vector3;
 use stylet_shm_schema::{HandMove, MAX_SEEDS, PlannedNeedle, Prescribed, Request, SceneHeader, StructureInfo, role};
 
@@ -16,52 +15,14 @@ const SPARED_M: f64 = 0.005;
 /// template.
 const ASIDE_M: f64 = 0.0025;
 
-/// Path of the needle and the seeds along it, scene frame.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NeedlePlan {
-    /// Start of the tip, outside the body, m.
-    pub entry_m: [f64; 3],
-    /// Unit vector from the entry into the gland.
-    pub direction: [f64; 3],
-    /// Seeds in the order of dropping: deepest first.
-    pub seeds_m: Vec<[f64; 3]>,
-    /// Prescription of the seeds, for other hosts.
-    pub prescribed: Prescribed,
-}
-
-impl NeedlePlan {
-    /// Creates a needle of a plan, counted from 0; `None` if it has no such needle.
-    pub fn of(plan: &ImplantPlan, number: usize) -> Option<Self> {
-        let needle = plan.needles.get(number)?;
-        Some(Self {
-            entry_m: needle.entry_m,
-            direction: needle.direction,
-            seeds_m: needle.seeds_m().collect(),
-            prescribed: plan.prescribed(number),
-        })
-    }
-
-    /// Returns the distance of a point from the entry, along the needle.
-    pub fn along_m(&self, point: [f64; 3]) -> f64 {
-        (Vector3::from(point) - Vector3::from(self.entry_m)).dot(&Vector3::from(self.direction))
-    }
-
-    /// Returns the seeds in the order in which they are dropped.
-    pub fn deepest_first(&self) -> Vec<[f64; 3]> {
-        let mut seeds = self.seeds_m.clone();
-        seeds.sort_by(|a, b| self.along_m(*b).total_cmp(&self.along_m(*a)));
-        seeds
-    }
-}
-
 /// Plans five seeds along one needle through the centre of the target.
-pub fn default_plan(scene: &SceneHeader) -> NeedlePlan {
+pub fn default_plan(scene: &SceneHeader) -> PlannedNeedle {
     plan_with_seeds(scene, SEEDS)
 }
 
-/// Like [`default_plan`], with 1 to [`MAX_SEEDS`] seeds. The needle comes from the perineum, which
+/// Like [`default_plan`], with 1 to [`MAX_SEEDS`] seeds, deepest first. The needle comes from the perineum, which
 /// is inferior; if a spared structure is in its way, it avoids the centre.
-pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> NeedlePlan {
+pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> PlannedNeedle {
     let direction = patient_axis(scene, 2, Vector3::z());
     let target = Box3::of(scene.target_lower_m, scene.target_upper_m);
     let body = Box3::of(scene.lower_m, scene.upper_m);
@@ -88,7 +49,7 @@ pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> NeedlePlan {
             (centre + direction * (half * (2.0 * share - 1.0))).into()
         })
         .collect();
-    NeedlePlan {
+    PlannedNeedle {
         entry_m: (centre - direction * out_m).into(),
         direction: direction.into(),
         seeds_m,
@@ -178,16 +139,6 @@ impl Box3 {
     }
 }
 
-/// Returns the request that publishes the plan to all hosts.
-pub fn plan_request(plan: &NeedlePlan) -> Request {
-    Request::SetPlan(Some(PlannedNeedle {
-        entry_m: plan.entry_m,
-        direction: plan.direction,
-        seeds_m: plan.seeds_m.clone(),
-        prescribed: plan.prescribed,
-    }))
-}
-
 /// Returns the request that moves the simulated hand to `tip_m`; m/s and m/s².
 pub fn move_request(tip_m: [f64; 3], direction: [f64; 3], speed: f64, acceleration: f64) -> Request {
     Request::MoveHand(HandMove {
@@ -222,7 +173,6 @@ mod tests {
         assert_eq!(plan.seeds_m.len(), 5);
         assert!(near(plan.seeds_m[0], [0.04, 0.04, 0.062]));
         assert!(near(plan.seeds_m[4], [0.04, 0.04, 0.038]));
-        assert!(near(plan.deepest_first()[0], plan.seeds_m[0]));
     }
 
     #[test]

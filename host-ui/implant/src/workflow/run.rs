@@ -2,7 +2,6 @@
 
 mod failure;
 
-use super::{NeedlePlan, plan_request};
 use crate::pairing;
 use crate::plan::stabilise::{Stabilising, first_left, shows_left};
 use crate::plan::{Drops, ImplantPlan};
@@ -13,7 +12,7 @@ use stylet_procedure::{
     Done, HandRequest, NeedleWay, Next, Observed, Pace, Patience, Procedure, Reply, Step, StepFailure, Waiting,
     needle_inside,
 };
-use stylet_shm_schema::{Event, EventKind, Fault, HapticState, NeedleAxis, RefusalCode, Request};
+use stylet_shm_schema::{Event, EventKind, Fault, HapticState, NeedleAxis, PlannedNeedle, RefusalCode, Request};
 
 /// Longest absence of a core that is tolerated: a busy machine may delay it.
 const ABSENT_LIMIT: Duration = Duration::from_secs(10);
@@ -28,7 +27,7 @@ const GOES_ON_AFTER: Duration = Duration::from_secs(2);
 #[derive(Clone, Debug, PartialEq)]
 pub struct NeedleTask {
     /// Plan.
-    pub plan: NeedlePlan,
+    pub plan: PlannedNeedle,
     /// Drops of its seeds.
     pub drops: Drops,
 }
@@ -37,20 +36,16 @@ impl NeedleTask {
     /// Creates a needle of a plan, counted from 0, with these drops; `None` if the plan has no such
     /// needle.
     pub fn of(plan: &ImplantPlan, number: usize, drops: Drops) -> Option<Self> {
-        let plan = NeedlePlan::of(plan, number)?;
+        let plan = plan.planned(number)?;
         Some(Self { plan, drops })
     }
 
     /// Creates a needle whose seeds are dropped at their planned places.
-    pub fn as_planned(plan: NeedlePlan) -> Self {
+    pub fn as_planned(plan: PlannedNeedle) -> Self {
         let drops = Drops {
             entry_m: plan.entry_m,
             direction: plan.direction,
-            along_m: plan
-                .deepest_first()
-                .into_iter()
-                .map(|seed| plan.along_m(seed))
-                .collect(),
+            along_m: plan.seeds_m.iter().map(|seed| plan.along_m(*seed)).collect(),
             retract_to_m: 0.0,
             strand_pitch_m: None,
         };
@@ -147,7 +142,7 @@ pub struct Run {
 
 impl Run {
     /// Creates a run of one needle, each seed dropped at its planned place.
-    pub fn new(plan: NeedlePlan, pace: Pace) -> Self {
+    pub fn new(plan: PlannedNeedle, pace: Pace) -> Self {
         Self::of_needles(vec![NeedleTask::as_planned(plan)], pace)
     }
 
@@ -242,7 +237,7 @@ impl Run {
     }
 
     /// Returns the plan of the needle in use.
-    pub fn plan(&self) -> Option<&NeedlePlan> {
+    pub fn plan(&self) -> Option<&PlannedNeedle> {
         self.tasks.get(self.needle()).map(|task| &task.plan)
     }
 
@@ -328,7 +323,7 @@ impl Run {
     fn send(&mut self, link: &mut Link, request: HandRequest) -> Result<u64, LinkError> {
         let asked = match request {
             HandRequest::Reset => Request::Reset,
-            HandRequest::PublishPlan { needle } => plan_request(&self.tasks[needle].plan),
+            HandRequest::PublishPlan { needle } => Request::SetPlan(Some(self.tasks[needle].plan.clone())),
             HandRequest::ExpectStabilising { number } => {
                 let needle = &self.stabilising[number].needle;
                 Request::ExpectNeedle(NeedleAxis {

@@ -134,7 +134,7 @@ fn a_plane_without_clicks_has_the_outline_of_the_ellipsoid() {
 #[test]
 fn with_few_planes_there_is_a_proposal_but_no_body() {
     let two = clicked(&[-5e-3, 5e-3], 6, 0.0, 0.0);
-    assert_eq!(Solid::of(&two).err(), Some(ContourError::Planes(2)));
+    assert_eq!(Solid::of(&two).err(), Some(ContourError(2)));
     let between = proposed_at(&two, 0.0).expect("a proposal");
     let beyond = proposed_at(&two, 0.02).expect("a proposal");
     let first = &two.outlines()[1].1;
@@ -143,7 +143,7 @@ fn with_few_planes_there_is_a_proposal_but_no_body() {
     assert!(proposed_at(&Contour::default(), 0.0).is_none());
     // Two points are no outline.
     let little = two.with(0.0, [0.01, 0.0]).with(0.0, [0.0, 0.01]);
-    assert_eq!(Solid::of(&little).err(), Some(ContourError::Planes(2)));
+    assert_eq!(Solid::of(&little).err(), Some(ContourError(2)));
 }
 
 /// Tests outlines that do not shrink towards an end: the gland ends half a plane farther.

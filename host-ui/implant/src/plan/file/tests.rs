@@ -1,7 +1,7 @@
 //! A plan that was written reads back equal; a broken one is refused with every problem.
 
 use super::*;
-use crate::readers::{SeedDefaults, read_seed_rows, read_seeds};
+use crate::readers::{SeedDefaults, read_seeds};
 
 /// Returns a quarter turn about x, and a shift: patient y is the scene's -z.
 fn frames() -> PatientFrame {
@@ -91,7 +91,7 @@ fn written_seeds_read_back_equal() {
     std::fs::create_dir_all(&folder).unwrap();
     let file = folder.join("seeds.csv");
     std::fs::write(&file, seeds_to_csv(&plan(), &frames())).unwrap();
-    let read = read_seeds(&file, SeedDefaults::default()).unwrap();
+    let read = read_seeds(&file, SeedDefaults::default()).unwrap().rows;
     for (a, b) in plan().seeds().iter().zip(&read) {
         let there = frames().patient_from_scene(a.position_m);
         assert!(
@@ -101,7 +101,7 @@ fn written_seeds_read_back_equal() {
         assert!((b.axis.unwrap()[1] + 1.0).abs() < 1e-9 && a.strength_u == b.strength_u);
     }
     let plan = plan();
-    let rows = read_seed_rows(&file, SeedDefaults::default()).unwrap();
+    let rows = read_seeds(&file, SeedDefaults::default()).unwrap();
     let imported = import(&file, rows, &frames(), plan.template, "6711", 145.0).unwrap();
     same(&plan, &imported);
     std::fs::remove_dir_all(&folder).unwrap();
@@ -111,7 +111,7 @@ fn written_seeds_read_back_equal() {
 fn imported(name: &str, csv: &str) -> Result<ImplantPlan, String> {
     let file = std::env::temp_dir().join(format!("stylet-plan-{name}-{}.csv", std::process::id()));
     std::fs::write(&file, csv).unwrap();
-    let rows = read_seed_rows(&file, SeedDefaults::default());
+    let rows = read_seeds(&file, SeedDefaults::default());
     std::fs::remove_file(&file).unwrap();
     let rows = rows.map_err(|why| why.to_string())?;
     import(&file, rows, &frames(), plan().template, "6711", 145.0).map_err(|why| why.to_string())

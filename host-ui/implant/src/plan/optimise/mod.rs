@@ -153,6 +153,4 @@ impl Proposal {
 }
 
 #[cfg(test)]
-pub(super) mod glands;
-#[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -1,13 +1,15 @@
 //! Plans of synthetic glands meet their limits, can be cancelled, and are reproducible.
 
+pub mod glands;
+
 use super::candidates::Candidates;
-use super::glands::{GLANDS, Gland, TEMPLATE, drawn};
 use super::robust::Trials;
 use super::*;
 use crate::plan::PlanError;
 use crate::plan::check::problems;
 use crate::plan::dose::DoseKernel;
 use crate::plan::dose::decay::Interval;
+use glands::{GLANDS, Gland, TEMPLATE, drawn};
 use std::ops::ControlFlow;
 use std::time::Instant;
 

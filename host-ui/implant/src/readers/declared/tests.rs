@@ -1,7 +1,6 @@
 //! Plans against sources that they are not made for.
 
 use super::*;
-use stylet_dose::Seed;
 
 fn declared() -> Declared {
     Declared {
@@ -13,15 +12,13 @@ fn declared() -> Declared {
     }
 }
 
-fn rows() -> Vec<SeedRow> {
-    let row = |(strength_u, strength_on)| SeedRow {
-        seed: Seed {
-            position_m: [0.0; 3],
-            axis: None,
-            strength_u,
-        },
+fn rows() -> Vec<PlanSeed> {
+    let row = |(strength_u, strength_on)| PlanSeed {
+        position_m: [0.0; 3],
+        axis: None,
+        strength_u,
         needle: None,
-        hole: None,
+        hole: String::new(),
         strength_on,
     };
     [
@@ -83,7 +80,7 @@ fn strengths_decay_to_the_day_of_the_implant() {
     let implant = DayOfImplant(Some(Date::constant(2026, 10, 31)));
     let note = implant.decay(&mut aged, Some(&declared()), &source).unwrap().unwrap();
     let left = (-60.0_f64 / 59.4).exp2();
-    let strengths: Vec<f64> = aged.iter().map(|r| r.seed.strength_u).collect();
+    let strengths: Vec<f64> = aged.iter().map(|r| r.strength_u).collect();
     assert!(
         (strengths[0] - 0.5 * left).abs() < 1e-12 && strengths[2] == 0.7,
         "{strengths:?}"
@@ -104,7 +101,7 @@ fn strengths_of_no_seed_are_refused_or_reported() {
     assert_eq!(strengths(&rows()).unwrap(), None);
     let with = |strength_u: f64| {
         let mut all = rows();
-        all[1].seed.strength_u = strength_u;
+        all[1].strength_u = strength_u;
         strengths(&all)
     };
     assert!(

@@ -41,10 +41,10 @@ fn seeds_of_a_plan_keep_needle_and_hole() {
     for name in ["plan.dcm", "plan", "PLAN.IMG"] {
         let path = folder.path().join(name);
         std::fs::write(&path, plan()).unwrap();
-        let file = read_seed_rows(&path, SeedDefaults::default()).unwrap();
+        let file = read_seeds(&path, SeedDefaults::default()).unwrap();
         assert!(file.declared.is_some(), "{name} is a plan");
-        let found: Vec<_> = file.rows.iter().map(|r| (r.needle, r.hole.as_deref())).collect();
-        assert_eq!(found, [(Some(3), Some("D4")), (Some(3), Some("D4")), (Some(1), None)]);
+        let found: Vec<_> = file.rows.iter().map(|r| (r.needle, r.hole.as_str())).collect();
+        assert_eq!(found, [(Some(3), "D4"), (Some(3), "D4"), (Some(1), "")]);
     }
 }
 
@@ -72,6 +72,6 @@ fn a_table_of_seeds_found_in_a_ct_is_read() {
         strength_u: Some(0.45),
         ..SeedDefaults::default()
     };
-    let seeds = read_seeds(&path, defaults).unwrap();
+    let seeds = read_seeds(&path, defaults).unwrap().rows;
     assert_eq!((seeds.len(), seeds[0].axis), (1, Some([0.0, 0.0, 1.0])));
 }

@@ -4,7 +4,7 @@ use super::*;
 
 /// Creates two needles with two seeds each, along z.
 fn tasks() -> Vec<NeedleTask> {
-    let needle = |x: f64| NeedlePlan {
+    let needle = |x: f64| PlannedNeedle {
         entry_m: [x, 0.0, 0.0],
         direction: [0.0, 0.0, 1.0],
         seeds_m: vec![[x, 0.0, 0.05], [x, 0.0, 0.04]],
