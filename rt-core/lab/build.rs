@@ -10,12 +10,7 @@ fn main() {
     println!("cargo:rustc-env=STYLET_TOOLCHAIN={}", toolchain());
     let out = std::env::var("OUT_DIR").expect("cargo sets OUT_DIR");
     let needs = locked(Path::new("../../Cargo.lock")).unwrap_or_default();
-    for (file, list) in [
-        ("dependencies.txt", dependencies(&needs)),
-        ("packages.txt", packages(&needs)),
-    ] {
-        std::fs::write(Path::new(&out).join(file), list).expect("OUT_DIR can be written");
-    }
+    std::fs::write(Path::new(&out).join("packages.txt"), packages(&needs)).expect("OUT_DIR can be written");
 }
 
 /// Returns the commit from the environment, else from git, else `unknown`: a source archive has neither.
@@ -102,14 +97,6 @@ fn needed(needs: &Needs, program: &str) -> BTreeSet<Package> {
 /// Returns the packages of some programs.
 fn of_programs(needs: &Needs, programs: &[&str]) -> BTreeSet<Package> {
     programs.iter().flat_map(|program| needed(needs, program)).collect()
-}
-
-/// Lists `name version` of each package that a measurement runs on, one a line.
-fn dependencies(needs: &Needs) -> String {
-    let all = of_programs(needs, &["rt-core", "stylet-bridge", "stylet-lab"]);
-    all.iter()
-        .map(|(name, version)| format!("{name} {version}\n"))
-        .collect()
 }
 
 /// Lists `name version programs licence` of each foreign package in the programs of either side, one a line.

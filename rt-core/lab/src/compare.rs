@@ -175,12 +175,9 @@ pub fn compare(
         return Ok(comparison);
     }
     let setup = Setup {
-        duration_ns: turn_ns,
         // Only the cost of the trace is measured with the trace.
         trace_over_ns: setup.trace_over_ns.filter(|_| against == Against::Untraced),
-        checkpoints: None,
-        toggle: None,
-        ..*setup
+        ..Setup::new(setup.options, turn_ns, setup.load, setup.folder)
     };
     for _ in 0..rounds {
         let measured: Measured = measure(&setup, interrupted)?;

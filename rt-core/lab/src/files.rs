@@ -1,5 +1,6 @@
 //! The files of a measurement: JSON, page and raw histograms, each with its digest.
 
+use crate::disk::DiskError;
 use crate::html;
 use crate::measure::Measured;
 use crate::plots::DrawError;
@@ -19,15 +20,13 @@ pub enum FilesError {
     Draw(#[from] DrawError),
     #[error("the histograms cannot be written: {0}")]
     Histograms(String),
-    #[error("the report cannot be written as JSON: {0}")]
-    Json(#[from] serde_json::Error),
     #[error(transparent)]
-    Write(#[from] stylet_write::WriteError),
+    Disk(#[from] DiskError),
 }
 
 /// Writes all three files into `folder`, each with its digest in the report.
 pub fn write(folder: &Path, report: &mut Report, measured: &Measured) -> Result<(), FilesError> {
-    let put = |name: &str, bytes: &[u8]| write_whole(&folder.join(name), bytes).map_err(FilesError::from);
+    let put = |name: &str, bytes: &[u8]| write_whole(&folder.join(name), bytes).map_err(DiskError::from);
     let raw = raw_histograms(report, measured)?;
     put(HISTOGRAMS, &raw)?;
     let page = html::page(report, measured)?;
@@ -41,10 +40,10 @@ pub fn write(folder: &Path, report: &mut Report, measured: &Measured) -> Result<
             sha256: sha256(page.as_bytes()),
         },
     ];
-    let json = serde_json::to_string_pretty(report)? + "\n";
+    let json = serde_json::to_string_pretty(report).map_err(DiskError::from)? + "\n";
     report.sha256 = sha256(json.as_bytes());
     put(JSON, json.replacen(NO_DIGEST, &report.sha256, 1).as_bytes())?;
-    put(PAGE, page.replacen(NO_DIGEST, &report.sha256, 1).as_bytes())
+    Ok(put(PAGE, page.replacen(NO_DIGEST, &report.sha256, 1).as_bytes())?)
 }
 
 /// Returns every histogram in the interval log format of HdrHistogram, nanoseconds, one tagged line each.

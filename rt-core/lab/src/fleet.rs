@@ -6,14 +6,16 @@ mod entry;
 mod page;
 mod table;
 
+use crate::disk::{self, DiskError};
 use crate::plots::DrawError;
+use crate::saved::NotCounted;
 use crate::verdict::Outcome;
 use clap::Args;
-use entry::{Entry, Unread};
+use entry::Entry;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stylet_text::printable_line;
-use stylet_write::{WriteError, write_whole};
+use stylet_write::write_whole;
 
 const PAGE: &str = "fleet.html";
 const TABLE: &str = "fleet.csv";
@@ -34,14 +36,9 @@ pub struct FleetArgs {
 /// The page cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum FleetError {
-    /// A folder cannot be read.
-    #[error("cannot read {}: {source}", .path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// Error of the system.
-        source: std::io::Error,
-    },
+    /// A folder cannot be read, or the page or the table not written.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
     /// Folder without a report.
     #[error(
         "no latency report found: expected report.json in a folder below the named ones, as `rt-core latency --out DIR` writes it{0}"
@@ -50,9 +47,6 @@ pub enum FleetError {
     /// The picture of a trend.
     #[error(transparent)]
     Draw(#[from] DrawError),
-    /// The page or the table cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
 }
 
 /// The reports of one PC, oldest first.
@@ -83,37 +77,34 @@ pub fn run(args: &FleetArgs) -> Result<u8, FleetError> {
     files.dedup();
     let (entries, unread) = read_all(&files);
     if entries.is_empty() {
-        let why: String = unread.iter().map(|u| format!("\n{}: {}", u.path, u.why)).collect();
+        let why: String = unread.iter().map(|u| format!("\n{u}")).collect();
         return Err(FleetError::None(why));
     }
     let table = table::csv(&entries);
     let pcs = by_pc(entries);
     let page = page::page(&pcs, &unread)?;
-    std::fs::create_dir_all(&args.out).map_err(|source| FleetError::Folder {
-        path: args.out.clone(),
-        source,
-    })?;
-    write_whole(&args.out.join(TABLE), table.as_bytes())?;
-    write_whole(&args.out.join(PAGE), page.as_bytes())?;
+    disk::make(&args.out)?;
+    let (table_file, page_file) = (args.out.join(TABLE), args.out.join(PAGE));
+    write_whole(&table_file, table.as_bytes()).map_err(DiskError::from)?;
+    write_whole(&page_file, page.as_bytes()).map_err(DiskError::from)?;
     for pc in &pcs {
         println!(
             "{:<14} {} ({}, latest of {})",
-            pc.latest().outcome.words(),
+            pc.latest().outcome().words(),
             printable_line(&pc.name),
             page::counted(pc.entries.len(), "report", "reports"),
-            printable_line(&pc.latest().made_at)
+            printable_line(&pc.latest().report.made_at)
         );
     }
     unread
         .iter()
-        .for_each(|u| println!("not counted    {}", printable_line(&format!("{}: {}", u.path, u.why))));
-    println!("{}", args.out.join(PAGE).display());
-    println!("{}", args.out.join(TABLE).display());
+        .for_each(|u| println!("not counted    {}", printable_line(&u.to_string())));
+    println!("{}\n{}", page_file.display(), table_file.display());
     Ok(exit_code(&pcs, &unread))
 }
 
-fn exit_code(pcs: &[Pc], unread: &[Unread]) -> u8 {
-    let any = |outcome| pcs.iter().any(|pc| pc.latest().outcome == outcome);
+fn exit_code(pcs: &[Pc], unread: &[NotCounted]) -> u8 {
+    let any = |outcome| pcs.iter().any(|pc| pc.latest().outcome() == outcome);
     if any(Outcome::Fail) {
         1
     } else if any(Outcome::NotMeasurable) || !unread.is_empty() {
@@ -124,14 +115,11 @@ fn exit_code(pcs: &[Pc], unread: &[Unread]) -> u8 {
 }
 
 /// Returns every report below `folder`; links to folders are not followed, since they may lead in a circle.
-fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FleetError> {
-    let failed = |source| FleetError::Folder {
-        path: folder.to_owned(),
-        source,
-    };
-    for entry in std::fs::read_dir(folder).map_err(failed)? {
-        let entry = entry.map_err(failed)?;
-        if entry.file_type().map_err(failed)?.is_dir() {
+fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), DiskError> {
+    let failed = DiskError::read(folder);
+    for entry in std::fs::read_dir(folder).map_err(&failed)? {
+        let entry = entry.map_err(&failed)?;
+        if entry.file_type().map_err(&failed)?.is_dir() {
             find(&entry.path(), files)?;
         } else if entry.file_name() == REPORT {
             files.push(entry.path());
@@ -140,15 +128,15 @@ fn find(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), FleetError> {
     Ok(())
 }
 
-fn read_all(files: &[PathBuf]) -> (Vec<Entry>, Vec<Unread>) {
-    let (mut entries, mut unread): (Vec<Entry>, Vec<Unread>) = (Vec::new(), Vec::new());
+fn read_all(files: &[PathBuf]) -> (Vec<Entry>, Vec<NotCounted>) {
+    let (mut entries, mut unread): (Vec<Entry>, Vec<NotCounted>) = (Vec::new(), Vec::new());
     for (i, file) in files.iter().enumerate() {
         if files.len() >= 100 && i % 100 == 0 {
             eprintln!("rt-core: report {} of {}", i + 1, files.len());
         }
         match entry::read(file) {
             // A copy of a report is the same measurement.
-            Ok(entry) if entries.iter().any(|e| e.digest == entry.digest) => unread.push(Unread {
+            Ok(entry) if entries.iter().any(|e| e.report.sha256 == entry.report.sha256) => unread.push(NotCounted {
                 path: entry.path,
                 why: "a copy of a report that is already counted".to_owned(),
             }),
@@ -156,7 +144,7 @@ fn read_all(files: &[PathBuf]) -> (Vec<Entry>, Vec<Unread>) {
             Err(why) => unread.push(why),
         }
     }
-    entries.sort_by(|a, b| (&a.pc, &a.made_at).cmp(&(&b.pc, &b.made_at)));
+    entries.sort_by(|a, b| (&a.pc, &a.report.made_at).cmp(&(&b.pc, &b.report.made_at)));
     (entries, unread)
 }
 

@@ -49,12 +49,11 @@ pub fn page(report: &Report, measured: &Measured) -> Result<String, DrawError> {
 
 fn header(r: &Report) -> Markup {
     let p = &r.protocol;
-    let load = format!("{:?}", p.load).to_lowercase();
     html! {
         header { h1 { "Latency report" } (badge(r.verdict.overall)) }
         p class="sub" {
             "Scene " b { (p.scene) } ", force loop at " b { (num(p.rate_hz)) " Hz" } ", tissue at " (num(p.tissue_rate_hz))
-            " Hz, " @if let Some(hz) = p.second_rate_hz { "second device at " (num(hz)) " Hz, " } "load " b { (load) } " (" (p.load_is) "), " b { (num(p.measured_s.round())) " s" } " measured, "
+            " Hz, " @if let Some(hz) = p.second_rate_hz { "second device at " (num(hz)) " Hz, " } "load " b { (p.load.name()) } " (" (p.load_is) "), " b { (num(p.measured_s.round())) " s" } " measured, "
             (p.insertions) " insertions. " (r.made_at) ", " (r.program) "."
         }
         @if let Some(whose) = whose(r) { p class="sub" { (whose) } }

@@ -2,6 +2,7 @@
 
 use crate::args::{ArgsError, LatencyArgs};
 use crate::compare::{Against, CompareError, compare};
+use crate::disk::{self, DiskError};
 use crate::external::{self, ExternalError};
 use crate::files::{self, FilesError};
 use crate::machine::Machine;
@@ -11,8 +12,6 @@ use crate::sign::{self, SignError};
 use crate::spin::{self, Spin, SpinError};
 use crate::verdict::{self, LimitsError, Outcome};
 use crate::whose::WhoseError;
-use std::io;
-use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use stylet_runtime::process::Options;
 
@@ -28,14 +27,9 @@ pub enum LatencyError {
     /// The limits of the verdict are invalid.
     #[error(transparent)]
     Limits(#[from] LimitsError),
-    /// The folder of the report.
-    #[error("cannot make {}: {why}", .folder.display())]
-    Folder {
-        /// The folder.
-        folder: PathBuf,
-        /// Error of the system.
-        why: io::Error,
-    },
+    /// The folder of the report, or the notes of the pin, cannot be written.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
     /// Nothing was measured.
     #[error(transparent)]
     Measure(#[from] MeasureError),
@@ -48,9 +42,6 @@ pub enum LatencyError {
     /// The capture of an instrument cannot be used.
     #[error(transparent)]
     External(#[from] ExternalError),
-    /// The notes of the pin cannot be written.
-    #[error(transparent)]
-    Toggles(#[from] stylet_write::WriteError),
     /// The report cannot be written.
     #[error(transparent)]
     Files(#[from] FilesError),
@@ -67,10 +58,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
     let mut options = args.options()?;
     let whose = args.whose.read()?;
     let limits = verdict::limits(options.haptic_period_ns, args.limits.as_deref(), &args.limit)?;
-    std::fs::create_dir_all(&args.out).map_err(|why| LatencyError::Folder {
-        folder: args.out.clone(),
-        why,
-    })?;
+    disk::make(&args.out)?;
     let mut spin_search = None;
     if args.spin_us == Spin::Auto {
         eprintln!("rt-core: looking for the smallest spin, trials of three seconds");
@@ -89,7 +77,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
     );
     let measured = measure(&setup, interrupted)?;
     if args.toggle.is_some() {
-        external::keep(&args.out, &measured.haptic.toggles)?;
+        external::keep(&args.out, &measured.haptic.toggles).map_err(DiskError::from)?;
     }
     if let Some(why) = measured.trace.as_ref().and_then(|t| t.absent.as_ref()) {
         eprintln!("rt-core: no causes: {why}");
@@ -133,13 +121,9 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
 
 fn setup_of<'a>(args: &'a LatencyArgs, options: &'a Options) -> Setup<'a> {
     Setup {
-        options,
-        duration_ns: args.duration,
-        load: args.load,
-        folder: &args.out,
         trace_over_ns: args.trace_over_ns(),
-        checkpoints: None,
         toggle: args.toggle,
+        ..Setup::new(options, args.duration, args.load, &args.out)
     }
 }
 

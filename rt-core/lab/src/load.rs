@@ -12,10 +12,11 @@ use stylet_shm_schema::Instance;
 use stylet_wall::packet::Socket;
 
 /// Load that runs next to the loops.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Load {
     /// Nothing
+    #[default]
     None,
     /// One process that computes for each core
     Cpu,
@@ -59,6 +60,11 @@ impl LoadProcess {
 }
 
 impl Load {
+    /// Returns its name on the command line.
+    pub(crate) fn name(self) -> String {
+        format!("{self:?}").to_lowercase()
+    }
+
     fn work(self, cores: usize) -> Vec<LoadProcess> {
         let some = |work: LoadProcess, count: usize| std::iter::repeat_n(work, count);
         match self {

@@ -44,6 +44,21 @@ pub struct Setup<'a> {
     pub toggle: Option<Pin>,
 }
 
+impl<'a> Setup<'a> {
+    /// Makes a run without trace, checkpoints and pin.
+    pub fn new(options: &'a Options, duration_ns: u64, load: Load, folder: &'a Path) -> Self {
+        Self {
+            options,
+            duration_ns,
+            load,
+            folder,
+            trace_over_ns: None,
+            checkpoints: None,
+            toggle: None,
+        }
+    }
+}
+
 /// Checkpoints of a long run; the names of the loops are `force` and `tissue`.
 pub struct Checkpoints<'a> {
     pub every: Duration,

@@ -1,7 +1,7 @@
 //! Provenance of a measurement: kernel, processor, program, settings as read back, dependencies.
 
 use crate::machine::{Machine, Throttle, core_list};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use stylet_hw::sim::hand::Hand;
 use stylet_runtime::process::{LoopReport, Options, RunReport};
@@ -45,10 +45,20 @@ pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
+/// Returns the present time, as every report writes it.
+pub fn now() -> String {
+    jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M:%S UTC").to_string()
+}
+
+/// Returns name and version of this program.
+pub fn program() -> String {
+    format!("rt-core {}", env!("CARGO_PKG_VERSION"))
+}
+
 /// One property of the machine or of the program, as reported by it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Fact {
-    pub group: &'static str,
+    pub group: String,
     pub name: String,
     pub value: String,
 }
@@ -62,11 +72,15 @@ pub struct Setting {
     pub met: bool,
 }
 
-/// A package that `rt-core` is built from, as locked.
+/// A foreign package of the programs, as locked; software of unknown provenance in the words of IEC 62304.
 #[derive(Clone, Debug, Serialize)]
-pub struct Dependency {
-    pub name: String,
-    pub version: String,
+pub struct Package {
+    pub name: &'static str,
+    pub version: &'static str,
+    /// Licence as declared by its author; `not known` if its sources were missing when this program was built.
+    pub licence: &'static str,
+    /// `rt-core`, `host-ui` or `both`.
+    pub of: &'static str,
     pub known_anomalies: Vec<&'static str>,
 }
 
@@ -90,22 +104,21 @@ const ANOMALIES: &[(&str, &str)] = &[
     ),
 ];
 
-/// Returns the known anomalies of a package.
-pub fn known_anomalies(package: &str) -> Vec<&'static str> {
-    let known = ANOMALIES.iter().filter(|(of, _)| *of == package);
-    known.map(|(_, what)| *what).collect()
-}
-
-pub fn dependencies() -> Vec<Dependency> {
-    let list = include_str!(concat!(env!("OUT_DIR"), "/dependencies.txt"));
-    let read = |line: &str| {
-        let (name, version) = line.split_once(' ')?;
-        Some(Dependency {
-            name: name.to_owned(),
-            version: version.to_owned(),
-            known_anomalies: known_anomalies(name),
+/// Returns all foreign packages of `rt-core` and `host-ui`.
+pub fn packages() -> Vec<Package> {
+    let read = |line: &'static str| {
+        let mut words = line.splitn(4, ' ');
+        let name = words.next()?;
+        let known = ANOMALIES.iter().filter(|(of, _)| *of == name);
+        Some(Package {
+            name,
+            version: words.next()?,
+            of: words.next()?,
+            licence: words.next()?,
+            known_anomalies: known.map(|(_, what)| *what).collect(),
         })
     };
+    let list = include_str!(concat!(env!("OUT_DIR"), "/packages.txt"));
     list.lines().filter_map(read).collect()
 }
 
@@ -124,107 +137,105 @@ pub fn stiffness_margin_n_per_m(period_ns: u64, delay_ns: f64) -> f64 {
     (hand + law) / ((period_ns as f64 / 2.0 + delay_ns) * 1e-9)
 }
 
-fn or_not_reported(value: Option<String>) -> String {
-    value
-        .filter(|v| !v.is_empty())
-        .unwrap_or_else(|| "not reported".to_owned())
-}
-
-/// Fields that the firmware reports about the PC; a serial number is readable with root's rights alone.
-const DMI: [(&str, &str); 6] = [
-    ("maker", "sys_vendor"),
-    ("model", "product_name"),
-    ("serial number", "product_serial"),
-    ("board", "board_name"),
-    ("firmware maker", "bios_vendor"),
-    ("firmware date", "bios_date"),
-];
-
-/// Properties that the machine reports about itself.
+/// Properties that the machine reports about itself; a serial number is readable with root's rights alone.
 pub fn facts(machine: &Machine, options: &Options) -> Vec<Fact> {
-    let mut facts = Vec::new();
-    let mut add = |group, name: &str, value: String| {
-        facts.push(Fact {
-            group,
-            name: name.to_owned(),
-            value,
-        });
+    let text = |path: &str| machine.text(path);
+    let dmi = |file: &str| text(&format!("sys/class/dmi/id/{file}"));
+    let reported = |value: Option<String>| {
+        value
+            .filter(|v| !v.is_empty())
+            .unwrap_or_else(|| "not reported".to_owned())
     };
-    let text = |path: &str| or_not_reported(machine.text(path));
-    add("Program", "toolchain", TOOLCHAIN.to_owned());
-    add("PC", "name", text("proc/sys/kernel/hostname"));
-    for (what, file) in DMI {
-        add("PC", what, text(&format!("sys/class/dmi/id/{file}")));
-    }
-    add("Kernel", "version", text("proc/version"));
-    add("Kernel", "preemption", machine.preemption().name().to_owned());
-    add("Kernel", "command line", text("proc/cmdline"));
-    add("Kernel", "real-time share", share(machine));
-    add(
-        "Kernel",
-        "real-time groups",
-        or_not_reported(machine.build_option("RT_GROUP_SCHED")),
-    );
-    add(
-        "Kernel",
-        "timer",
-        format!("CONFIG_HZ={}", or_not_reported(machine.build_option("HZ"))),
-    );
-    let cpu = |key| or_not_reported(machine.cpuinfo(0, key));
-    add("Processor", "model", cpu("model name"));
-    add("Processor", "microcode", cpu("microcode"));
-    add("Processor", "cores online", core_list(&machine.online_cores()));
-    add("Processor", "SMT", text("sys/devices/system/cpu/smt/control"));
-    add("Processor", "isolated cores", core_list(&machine.isolated_cores()));
-    add("Processor", "tickless cores", core_list(&machine.tickless_cores()));
-    let governor = text("sys/devices/system/cpu/cpuidle/current_governor");
-    let driver = text("sys/devices/system/cpu/cpuidle/current_driver");
-    add("Processor", "idle driver", format!("{driver}, governor {governor}"));
-    add("Processor", "clock source", or_not_reported(machine.clock_source()));
+    let hz = reported(machine.build_option("HZ"));
+    let idle = ["driver", "governor"].map(|of| reported(text(&format!("sys/devices/system/cpu/cpuidle/current_{of}"))));
     let hypervisor = machine.hypervisor().unwrap_or_else(|| "none found".to_owned());
-    add("Processor", "hypervisor", hypervisor);
-    add("Processor", "firmware", text("sys/class/dmi/id/bios_version"));
-    for (role, core) in [
+    let swaps = text("proc/swaps").map_or(0, |t| t.lines().count().saturating_sub(1));
+    let memory =
+        text("proc/meminfo").and_then(|t| Some(t.lines().next()?.trim_start_matches("MemTotal:").trim().to_owned()));
+    let of_machine = [
+        ("Program", "toolchain", Some(TOOLCHAIN.to_owned())),
+        ("PC", "name", text("proc/sys/kernel/hostname")),
+        ("PC", "maker", dmi("sys_vendor")),
+        ("PC", "model", dmi("product_name")),
+        ("PC", "serial number", dmi("product_serial")),
+        ("PC", "board", dmi("board_name")),
+        ("PC", "firmware maker", dmi("bios_vendor")),
+        ("PC", "firmware date", dmi("bios_date")),
+        ("Kernel", "version", text("proc/version")),
+        ("Kernel", "preemption", Some(machine.preemption().name().to_owned())),
+        ("Kernel", "command line", text("proc/cmdline")),
+        ("Kernel", "real-time share", Some(share(machine))),
+        ("Kernel", "real-time groups", machine.build_option("RT_GROUP_SCHED")),
+        ("Kernel", "timer", Some(format!("CONFIG_HZ={hz}"))),
+        ("Processor", "model", machine.cpuinfo(0, "model name")),
+        ("Processor", "microcode", machine.cpuinfo(0, "microcode")),
+        ("Processor", "cores online", Some(core_list(&machine.online_cores()))),
+        ("Processor", "SMT", text("sys/devices/system/cpu/smt/control")),
+        (
+            "Processor",
+            "isolated cores",
+            Some(core_list(&machine.isolated_cores())),
+        ),
+        (
+            "Processor",
+            "tickless cores",
+            Some(core_list(&machine.tickless_cores())),
+        ),
+        (
+            "Processor",
+            "idle driver",
+            Some(format!("{}, governor {}", idle[0], idle[1])),
+        ),
+        ("Processor", "clock source", machine.clock_source()),
+        ("Processor", "hypervisor", Some(hypervisor)),
+        ("Processor", "firmware", dmi("bios_version")),
+        ("Memory", "installed", memory),
+        ("Memory", "swap areas", Some(swaps.to_string())),
+        (
+            "Memory",
+            "huge pages",
+            text("sys/kernel/mm/transparent_hugepage/enabled"),
+        ),
+    ];
+    let fact = |group: &str, name: &str, value: String| Fact {
+        group: group.to_owned(),
+        name: name.to_owned(),
+        value,
+    };
+    let of_machine = of_machine.map(|(group, name, value)| fact(group, name, reported(value)));
+    let loops = [
         ("force loop", options.haptic_core),
         ("tissue step", options.tissue_core),
         (
             "second device's loop",
             options.second.as_ref().and_then(|second| second.core),
         ),
-    ] {
-        let Some(core) = core else { continue };
-        add(
-            "Cores in use",
-            &format!("core of the {role}"),
-            core_facts(machine, core),
-        );
-        let served = machine.interrupts_allowed_on(core);
-        let said: Vec<String> = served.iter().map(|(n, who)| format!("{n} {who}")).collect();
-        let said = if said.is_empty() {
-            "none".to_owned()
-        } else {
-            said.join(", ")
-        };
-        add("Cores in use", &format!("interrupts allowed on core {core}"), said);
+    ];
+    let of_cores = loops
+        .into_iter()
+        .filter_map(|(role, core)| Some((role, core?)))
+        .flat_map(|(role, core)| {
+            let served = machine.interrupts_allowed_on(core);
+            let served = list_or(served.iter().map(|(n, who)| format!("{n} {who}")), "none");
+            [
+                fact(
+                    "Cores in use",
+                    &format!("core of the {role}"),
+                    core_facts(machine, core),
+                ),
+                fact("Cores in use", &format!("interrupts allowed on core {core}"), served),
+            ]
+        });
+    of_machine.into_iter().chain(of_cores).collect()
+}
+
+fn list_or(all: impl Iterator<Item = String>, none: &str) -> String {
+    let all: Vec<String> = all.collect();
+    if all.is_empty() {
+        none.to_owned()
+    } else {
+        all.join(", ")
     }
-    let total = machine
-        .text("proc/meminfo")
-        .and_then(|t| t.lines().next().map(str::to_owned));
-    add(
-        "Memory",
-        "installed",
-        or_not_reported(total.map(|l| l.trim_start_matches("MemTotal:").trim().to_owned())),
-    );
-    let swaps = machine
-        .text("proc/swaps")
-        .map_or(0, |t| t.lines().count().saturating_sub(1));
-    add("Memory", "swap areas", swaps.to_string());
-    add(
-        "Memory",
-        "huge pages",
-        text("sys/kernel/mm/transparent_hugepage/enabled"),
-    );
-    facts
 }
 
 fn core_facts(machine: &Machine, core: usize) -> String {
@@ -232,12 +243,10 @@ fn core_facts(machine: &Machine, core: usize) -> String {
         .governor(core)
         .unwrap_or_else(|| "no frequency scaling seen".to_owned());
     let states = machine.idle_states(core);
-    let states: Vec<String> = states.iter().map(|(name, us)| format!("{name} {us} us")).collect();
-    let states = if states.is_empty() {
-        "not reported".to_owned()
-    } else {
-        states.join(", ")
-    };
+    let states = list_or(
+        states.iter().map(|(name, us)| format!("{name} {us} us")),
+        "not reported",
+    );
     let siblings = core_list(&machine.siblings(core));
     format!("{core}; governor: {governor}; sleep states: {states}; SMT siblings: {siblings}")
 }
@@ -349,18 +358,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn dependencies_are_those_of_the_lock_file_with_their_anomalies() {
-        let all = dependencies();
-        let iceoryx2 = all
-            .iter()
-            .find(|d| d.name == "iceoryx2")
-            .expect("rt-core is built on it");
+    fn packages_are_those_of_the_lock_file_with_their_anomalies() {
+        let all = packages();
+        assert!(all.len() > 100, "{}", all.len());
+        let of = |name: &str| {
+            all.iter()
+                .find(|p| p.name == name)
+                .unwrap_or_else(|| panic!("no {name}"))
+        };
+        let iceoryx2 = of("iceoryx2");
         assert!(iceoryx2.known_anomalies.iter().any(|a| a.contains("2008")));
+        assert_eq!((iceoryx2.of, iceoryx2.licence), ("both", "MIT OR Apache-2.0"));
+        assert_eq!(of("egui").of, "host-ui");
         assert!(
             all.iter()
-                .any(|d| d.name == "stylet-hw" && d.version == env!("CARGO_PKG_VERSION"))
+                .all(|p| !p.name.starts_with("stylet-") && p.name != "host-ui")
         );
-        assert!(all.iter().all(|d| d.name != "host-ui" && d.name != "egui"));
         let lock = include_str!("../../../Cargo.lock");
         assert!(lock.contains(&format!("name = \"iceoryx2\"\nversion = \"{}\"", iceoryx2.version)));
     }

@@ -2,20 +2,20 @@
 
 mod assemble;
 
-pub use assemble::{Parts, report};
+pub use assemble::{Parts, report, window_rows};
 
 use crate::bound::MissBound;
 use crate::compare::Comparison;
 use crate::extreme::Extremes;
 use crate::load::Load;
-use crate::provenance::{Dependency, Fact, ProgramDigest, Setting};
+use crate::provenance::{Fact, Package, ProgramDigest, Setting};
 use crate::spin::SpinSearch;
 use crate::summary::Summary;
 use crate::trace::TraceSection;
 use crate::verdict::{LimitResult, Outcome};
 use crate::watch::CoreWatch;
 use crate::whose::Whose;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Version of the format: incremented when a field changes its meaning or is removed.
 pub const SCHEMA: &str = "stylet.latency/1";
@@ -109,12 +109,15 @@ pub struct Late {
     pub cause: String,
 }
 
-#[derive(Clone, Debug, Serialize)]
+/// The worst of a window.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WindowRow {
+    /// Seconds into the run; in a campaign, since 1970.
     pub at_s: f64,
     pub worst_wake_us: f64,
     pub worst_work_us: f64,
     pub missed: u32,
+    pub ticks: u32,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -179,5 +182,6 @@ pub struct Report {
     pub spin_search: Option<SpinSearch>,
     pub settings: Vec<Setting>,
     pub facts: Vec<Fact>,
-    pub dependencies: Vec<Dependency>,
+    /// Foreign packages of `rt-core`, as locked.
+    pub dependencies: Vec<Package>,
 }

@@ -1,5 +1,7 @@
 //! Detached signatures of reports, made and checked by OpenSSH's `ssh-keygen -Y`, with keys that users already have.
 
+use crate::disk::DiskError;
+use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -15,13 +17,8 @@ pub enum SignError {
     #[error("ssh-keygen is not installed, and signatures need it: sudo apt-get install openssh-client")]
     Missing,
     /// A named file is missing or unreadable.
-    #[error("cannot read {}: {source}", .path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Error of the system.
-        source: io::Error,
-    },
+    #[error(transparent)]
+    Disk(#[from] DiskError),
     /// `ssh-keygen` does not run.
     #[error("ssh-keygen does not run: {0}")]
     Run(io::Error),
@@ -155,11 +152,8 @@ fn ask(what: &[&str], files: &[(&str, &Path)], signed: &Path) -> Result<Output, 
     command.stdin(input).output().map_err(not_run)
 }
 
-fn readable(path: &Path) -> Result<std::fs::File, SignError> {
-    std::fs::File::open(path).map_err(|source| SignError::File {
-        path: path.to_owned(),
-        source,
-    })
+fn readable(path: &Path) -> Result<File, DiskError> {
+    File::open(path).map_err(DiskError::read(path))
 }
 
 fn not_run(e: io::Error) -> SignError {

@@ -99,13 +99,7 @@ pub enum SpinError {
 
 /// Searches with trials of three seconds; `longest_us` is the longest spin that the kernel's share permits.
 pub fn search(setup: &Setup, longest_us: u64, interrupted: &AtomicBool) -> Result<SpinSearch, SpinError> {
-    let setup = Setup {
-        duration_ns: TRIAL_NS,
-        trace_over_ns: None,
-        checkpoints: None,
-        toggle: None,
-        ..*setup
-    };
+    let setup = Setup::new(setup.options, TRIAL_NS, setup.load, setup.folder);
     let theirs = compare::cyclictest_turn(&setup, interrupted)?;
     let at = |h: &Histogram<u64>, q| quantile_us(h, q);
     let (Some(p50), Some(p99)) = (at(&theirs, 0.5), at(&theirs, 0.99)) else {

@@ -5,7 +5,7 @@ use crate::measure::{Measured, switches_beyond_sleep};
 use crate::provenance::stiffness_margin_n_per_m;
 use crate::summary::{needed, quantile_us};
 use hdrhistogram::Histogram;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
 use stylet_runtime::process::LoopReport;
@@ -146,7 +146,7 @@ pub fn limits(period_ns: u64, file: Option<&Path>, given: &[String]) -> Result<L
 }
 
 /// Result of one limit, or of all together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Outcome {
     #[serde(rename = "PASS")]
     Pass,

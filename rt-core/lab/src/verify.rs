@@ -1,5 +1,6 @@
 //! Verifies that a saved report is unaltered, its signature, and its programs.
 
+use crate::disk::{self, DiskError};
 use crate::provenance::sha256;
 use crate::report::{JSON, NO_DIGEST};
 use crate::sign::{self, SignError};
@@ -22,29 +23,19 @@ pub struct VerifyArgs {
     pub binary: Vec<PathBuf>,
 }
 
-/// The report cannot be read.
-#[derive(Debug, thiserror::Error)]
-#[error("cannot read {}: {source}", .path.display())]
-pub struct ReadError {
-    /// `report.json`, or a program.
-    pub path: PathBuf,
-    /// Error of the system.
-    pub source: std::io::Error,
-}
-
 /// Checks the report, and prints every problem; without one, the signer.
 ///
 /// Returns 0 if the report is unaltered and meets the request, else 1.
 ///
 /// # Errors
 /// `report.json` or a named program cannot be read.
-pub fn run(args: &VerifyArgs) -> Result<u8, ReadError> {
+pub fn run(args: &VerifyArgs) -> Result<u8, DiskError> {
     let file = if args.report.is_dir() {
         args.report.join(JSON)
     } else {
         args.report.clone()
     };
-    let bytes = read(&file)?;
+    let bytes = disk::read(&file)?;
     // Damaged bytes may not be text; the file then differs from its digest.
     let text = String::from_utf8_lossy(&bytes);
     let folder = file.parent().unwrap_or(Path::new("."));
@@ -56,7 +47,7 @@ pub fn run(args: &VerifyArgs) -> Result<u8, ReadError> {
     }
     let report: Value = serde_json::from_str(&text).unwrap_or_default();
     for binary in &args.binary {
-        problems.extend(other_program(&report, binary, &sha256(&read(binary)?)));
+        problems.extend(other_program(&report, binary, &sha256(&disk::read(binary)?)));
     }
     for problem in &problems {
         println!("{}", printable(&problem.to_string()));
@@ -66,13 +57,6 @@ pub fn run(args: &VerifyArgs) -> Result<u8, ReadError> {
         notes.iter().for_each(|note| println!("{}", printable(note)));
     }
     Ok(u8::from(!problems.is_empty()))
-}
-
-fn read(path: &Path) -> Result<Vec<u8>, ReadError> {
-    std::fs::read(path).map_err(|source| ReadError {
-        path: path.to_owned(),
-        source,
-    })
 }
 
 /// Returns the signer of the report, or the problem with its signature.

@@ -1,5 +1,6 @@
 //! Operator, site and device of a measurement: command-line options, with defaults from a file of the site.
 
+use crate::disk::{self, DiskError};
 use crate::sign::{self, SignError};
 use clap::Args;
 use serde::{Deserialize, Serialize};
@@ -40,8 +41,8 @@ pub struct Whose {
 /// The options or the site's file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum WhoseError {
-    #[error("cannot read the site's file {}: {source}", .path.display())]
-    Read { path: PathBuf, source: std::io::Error },
+    #[error("the site's file: {0}")]
+    Disk(#[from] DiskError),
     #[error("{}: {source}\nexpected: operator, site, device_serial and sign, each with a text in quotes", .path.display())]
     Format {
         path: PathBuf,
@@ -87,10 +88,7 @@ impl WhoseArgs {
 }
 
 fn of_site(path: &Path) -> Result<Whose, WhoseError> {
-    let text = std::fs::read_to_string(path).map_err(|source| WhoseError::Read {
-        path: path.to_owned(),
-        source,
-    })?;
+    let text = disk::read_text(path)?;
     let mut whose: Whose = toml::from_str(&text).map_err(|source| WhoseError::Format {
         path: path.to_owned(),
         source: Box::new(source),
@@ -124,7 +122,7 @@ mod tests {
         assert!(why.contains("oprator") && why.contains("device_serial"), "{why}");
         std::fs::remove_file(&file).expect("removed");
         let why = args.read().expect_err("no such file").to_string();
-        assert!(why.contains("cannot read the site's file"), "{why}");
+        assert!(why.contains("cannot read"), "{why}");
         let empty = WhoseArgs {
             operator: Some("\n".to_owned()),
             ..WhoseArgs::default()

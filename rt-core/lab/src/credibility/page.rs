@@ -1,6 +1,9 @@
 //! The credibility file as a page; every id is a link target.
 
+use super::runs::Run;
+use super::tables::{Category, Hazard};
 use super::{Credibility, Traced};
+use crate::provenance::Package;
 use maud::{Markup, html};
 use std::collections::BTreeMap;
 use stylet_report::parts::{Column, cell, table};
@@ -44,59 +47,39 @@ fn link(id: &str) -> Markup {
 }
 
 fn hazards(c: &Credibility) -> Markup {
-    let held_by = |id: &str| {
-        let all: Vec<&Traced> = c
-            .requirements
-            .iter()
-            .filter(|r| r.requirement.hazards.contains(&id))
-            .collect();
-        html! { @for r in all { (link(r.requirement.id)) " " } }
+    let row = |h: &Hazard| {
+        let held_by = c.requirements.iter().filter(|r| r.requirement.hazards.contains(&h.id));
+        let held_by = html! { @for r in held_by { (link(&r.requirement.id)) " " } };
+        vec![
+            anchor(&h.id),
+            cell(&h.hazard),
+            cell(&h.situation),
+            cell(&h.harm),
+            held_by,
+        ]
     };
-    let rows: Vec<Vec<Markup>> = c
-        .hazards
-        .iter()
-        .map(|h| {
-            vec![
-                anchor(h.id),
-                cell(h.hazard),
-                cell(h.situation),
-                cell(h.harm),
-                held_by(h.id),
-            ]
-        })
-        .collect();
-    table(
-        &["id", "hazard", "situation", "harm", "held off by"],
-        &rows,
-        &[Column::Text; 5],
-    )
+    let rows: Vec<_> = c.hazards.iter().map(row).collect();
+    table(&["id", "hazard", "situation", "harm", "held off by"], &rows, &[])
 }
 
 fn requirements(c: &Credibility) -> Markup {
-    let rows: Vec<Vec<Markup>> = c
-        .requirements
-        .iter()
-        .map(|t| {
-            let r = t.requirement;
-            vec![
-                anchor(r.id),
-                cell(r.what),
-                html! { @for id in r.hazards { (link(id)) " " } },
-                html! {
-                    @for (file, test) in r.tests {
-                        div { code { (test) } br; span class="faint" { (file) } }
-                    }
-                },
-                html! {
-                    @if t.outcomes.is_empty() { span class="na" { "no run given" } }
-                    @for (run, outcome) in &t.outcomes {
-                        a href={ "#RUN-" (run) } { "run " (run) } ": " (outcome.to_lowercase()) br;
-                    }
-                },
-            ]
-        })
-        .collect();
-    let columns = [Column::Text, Column::Text, Column::Text, Column::Wide, Column::Text];
+    let row = |t: &Traced| {
+        let r = t.requirement;
+        vec![
+            anchor(&r.id),
+            cell(&r.what),
+            html! { @for id in &r.hazards { (link(id)) " " } },
+            html! { @for (file, test) in &r.tests { div { code { (test) } br; span class="faint" { (file) } } } },
+            html! {
+                @if t.outcomes.is_empty() { span class="na" { "no run given" } }
+                @for (run, outcome) in &t.outcomes {
+                    a href={ "#RUN-" (run) } { "run " (run) } ": " (outcome.to_lowercase()) br;
+                }
+            },
+        ]
+    };
+    let columns = [Column::Text, Column::Text, Column::Text, Column::Wide];
+    let rows: Vec<_> = c.requirements.iter().map(row).collect();
     table(&["id", "requirement", "hazards", "tests", "runs"], &rows, &columns)
 }
 
@@ -106,94 +89,77 @@ fn runs(c: &Credibility) -> Markup {
             p { "None was given. " code { "rt-core credibility --run DIR" } " takes the report of " code { "rt-core latency --out DIR" } "." }
         };
     }
-    let rows: Vec<Vec<Markup>> = c
-        .runs
-        .iter()
-        .enumerate()
-        .map(|(i, r)| {
-            let environment = if r.qualified { "qualified" } else { "not qualified" };
-            vec![
-                anchor(&format!("RUN-{}", i + 1)),
-                cell(&r.made_at),
-                cell(&r.protocol),
-                cell(&r.overall),
-                cell(environment),
-                html! { (r.file) br; span class="faint" { (r.sha256) } },
-            ]
-        })
-        .collect();
-    let columns = [
-        Column::Text,
-        Column::Text,
-        Column::Text,
-        Column::Text,
-        Column::Text,
-        Column::Wide,
-    ];
-    table(
-        &["id", "made", "measured", "verdict", "environment", "file and SHA-256"],
-        &rows,
-        &columns,
-    )
+    let row = |(i, r): (usize, &Run)| {
+        let environment = if r.qualified { "qualified" } else { "not qualified" };
+        vec![
+            anchor(&format!("RUN-{i}")),
+            cell(&r.made_at),
+            cell(&r.protocol),
+            cell(r.overall),
+            cell(environment),
+            html! { (r.file) br; span class="faint" { (r.sha256) } },
+        ]
+    };
+    let text = Column::Text;
+    let rows: Vec<_> = (1..).zip(&c.runs).map(row).collect();
+    let head = ["id", "made", "measured", "verdict", "environment", "file and SHA-256"];
+    table(&head, &rows, &[text, text, text, text, text, Column::Wide])
 }
 
 fn categories(c: &Credibility) -> Markup {
-    let rows: Vec<Vec<Markup>> = c
-        .categories
-        .iter()
-        .map(|k| {
-            vec![
-                cell(k.number),
-                cell(k.name),
-                html! { @for (what, place) in k.there { div { (what) " " span class="faint" { (place) } } } },
-                html! { @if k.missing.is_empty() { span class="na" { "nothing known" } } @else { (k.missing) } },
-            ]
-        })
-        .collect();
-    let columns = [Column::Number, Column::Text, Column::Text, Column::Text];
-    table(&["", "category", "what there is", "what is missing"], &rows, &columns)
+    let row = |k: &Category| {
+        vec![
+            cell(k.number),
+            cell(&k.name),
+            html! { @for (what, place) in &k.there { div { (what) " " span class="faint" { (place) } } } },
+            html! { @if k.missing.is_empty() { span class="na" { "nothing known" } } @else { (k.missing) } },
+        ]
+    };
+    let rows: Vec<_> = c.categories.iter().map(row).collect();
+    table(
+        &["", "category", "what there is", "what is missing"],
+        &rows,
+        &[Column::Number],
+    )
 }
 
 fn factors(c: &Credibility) -> Markup {
-    let rows: Vec<Vec<Markup>> = c
+    let rows: Vec<_> = c
         .factors
         .iter()
-        .map(|f| vec![cell(f.activity), cell(f.name), cell(f.what)])
+        .map(|f| vec![cell(&f.activity), cell(&f.name), cell(&f.what)])
         .collect();
-    table(&["activity", "factor", "state"], &rows, &[Column::Text; 3])
+    table(&["activity", "factor", "state"], &rows, &[])
 }
 
 fn packages(c: &Credibility) -> Markup {
     let mut licences: BTreeMap<&str, usize> = BTreeMap::new();
     for p in &c.packages {
-        *licences.entry(&p.licence).or_default() += 1;
+        *licences.entry(p.licence).or_default() += 1;
     }
     let mut licences: Vec<_> = licences.into_iter().collect();
     licences.sort_by_key(|(_, n)| std::cmp::Reverse(*n));
-    let counts: Vec<Vec<Markup>> = licences
+    let counts: Vec<_> = licences
         .iter()
         .map(|(licence, n)| vec![cell(licence), cell(n)])
         .collect();
-    let rows: Vec<Vec<Markup>> = c
-        .packages
-        .iter()
-        .map(|p| {
-            let known = p.known_anomalies.join(" ");
-            vec![
-                cell(&p.name),
-                cell(&p.version),
-                cell(&p.licence),
-                cell(p.of),
-                cell(known),
-            ]
-        })
-        .collect();
+    let row = |p: &Package| {
+        vec![
+            cell(p.name),
+            cell(p.version),
+            cell(p.licence),
+            cell(p.of),
+            cell(p.known_anomalies.join(" ")),
+        ]
+    };
+    let rows: Vec<_> = c.packages.iter().map(row).collect();
+    let text = Column::Text;
     html! {
         p { (c.packages.len()) " packages, as locked; licences as their authors declare them." }
-        div class="half" { (table(&["licence", "packages"], &counts, &[Column::Text, Column::Number])) }
+        div class="half" { (table(&["licence", "packages"], &counts, &[text, Column::Number])) }
         details {
             summary { "All packages, with what we know to be wrong with them" }
-            (table(&["package", "version", "licence", "program", "known anomalies"], &rows, &[Column::Text, Column::Text, Column::Text, Column::Text, Column::Wide]))
+            (table(&["package", "version", "licence", "program", "known anomalies"], &rows, &[text, text, text, text, Column::Wide]))
         }
     }
 }

@@ -1,8 +1,7 @@
-//! Changes from one report of a PC to the next, and common properties of passing PCs.
+//! Changes from one report of a PC to the next.
 
 use super::Pc;
 use super::entry::{Entry, Percentile};
-use crate::verdict::Outcome;
 
 /// A tail has grown if it is longer by more than this factor, and the intervals, if any, do not overlap.
 const GROWN: f64 = 1.25;
@@ -38,10 +37,8 @@ pub fn growths(pc: &Pc) -> Vec<Growth<'_>> {
 
 /// Compares the highest percentile that both reports have.
 fn growth<'a>(before: &'a Entry, after: &'a Entry) -> Option<Growth<'a>> {
-    let pairs = [("p99.9", before.p999, after.p999), ("p99", before.p99, after.p99)];
-    let (percentile, from, to) = pairs
-        .into_iter()
-        .find_map(|(name, a, b)| a.zip(b).map(|(a, b)| (name, a, b)))?;
+    let both = |name| Some((name, before.percentile(name)?, after.percentile(name)?));
+    let (percentile, from, to) = ["p99.9", "p99"].into_iter().find_map(both)?;
     has_grown(from, to).then(|| Growth {
         before,
         after,
@@ -79,45 +76,6 @@ fn changes(before: &Entry, after: &Entry) -> Vec<Change> {
         after: after.machine.get(name).cloned(),
     };
     names.into_iter().filter(differs).map(change).collect()
-}
-
-/// A value of every passing PC, and the others' values.
-#[derive(Debug, PartialEq, Eq)]
-pub struct Common {
-    pub what: String,
-    pub value: String,
-    /// Name and value of each PC that does not pass and differs.
-    pub others: Vec<(String, String)>,
-}
-
-/// Compares the latest reports; facts in which most other PCs differ come first.
-pub fn in_common(pcs: &[Pc]) -> Vec<Common> {
-    let (good, others): (Vec<&Pc>, Vec<&Pc>) = pcs.iter().partition(|pc| pc.latest().outcome == Outcome::Pass);
-    // A single PC has nothing to compare.
-    let Some((first, rest)) = good.split_first().filter(|(_, rest)| !rest.is_empty()) else {
-        return Vec::new();
-    };
-    let shared = first
-        .latest()
-        .machine
-        .iter()
-        .filter(|(what, value)| rest.iter().all(|pc| pc.latest().machine.get(*what) == Some(value)));
-    let mut found: Vec<Common> = shared
-        .map(|(what, value)| {
-            let differing = others.iter().filter_map(|pc| {
-                let other = pc.latest().machine.get(what)?;
-                (other != value).then(|| (pc.name.clone(), other.clone()))
-            });
-            Common {
-                what: what.clone(),
-                value: value.clone(),
-                others: differing.collect(),
-            }
-        })
-        .filter(|common| !common.others.is_empty())
-        .collect();
-    found.sort_by_key(|common| std::cmp::Reverse(common.others.len()));
-    found
 }
 
 #[cfg(test)]

@@ -1,23 +1,27 @@
 //! The page over all reports.
 
 use super::Pc;
-use super::change::{self, Change, Common, Growth};
-use super::entry::{Entry, Percentile, Unread};
+use super::change::{self, Change, Growth};
+use super::entry::{Entry, Percentile};
 use crate::html::badge;
 use crate::plots::{self, DrawError, TrendPoint};
+use crate::saved::NotCounted;
 use crate::verdict::Outcome;
 use maud::{Markup, PreEscaped, html};
 use stylet_report::parts::{Column, cards, cell, num, or_na, table};
 
 /// Returns the whole page, which is self-contained.
-pub fn page(pcs: &[Pc], unread: &[Unread]) -> Result<String, DrawError> {
+pub fn page(pcs: &[Pc], unread: &[NotCounted]) -> Result<String, DrawError> {
     let trends = trends(pcs)?;
     let growths: Vec<(&Pc, Growth)> = pcs
         .iter()
         .flat_map(|pc| change::growths(pc).into_iter().map(move |g| (pc, g)))
         .collect();
     let reports: usize = pcs.iter().map(|pc| pc.entries.len()).sum();
-    let times = || pcs.iter().flat_map(|pc| pc.entries.iter().map(|e| e.made_at.as_str()));
+    let times = || {
+        pcs.iter()
+            .flat_map(|pc| pc.entries.iter().map(|e| e.report.made_at.as_str()))
+    };
     let heading = format!("Latency of {}", counted(pcs.len(), "PC", "PCs"));
     let main = html! {
         header { h1 { (heading) } }
@@ -31,7 +35,6 @@ pub fn page(pcs: &[Pc], unread: &[Unread]) -> Result<String, DrawError> {
         h2 { "Trend of each PC" }
         (trends)
         (grown(&growths))
-        (common(pcs, &change::in_common(pcs)))
         (not_counted(unread))
         footer {
             "A tail counts as grown where p99.9 (else p99) is more than 1.25 times that of the previous report of the same PC, \
@@ -48,7 +51,7 @@ pub(super) fn counted(count: usize, one: &str, more: &str) -> String {
 }
 
 fn counts(pcs: &[Pc], grown: usize) -> Markup {
-    let with = |outcome| pcs.iter().filter(|pc| pc.latest().outcome == outcome).count();
+    let with = |outcome| pcs.iter().filter(|pc| pc.latest().outcome() == outcome).count();
     let all = [
         ("PC passes", "PCs pass", with(Outcome::Pass)),
         ("PC fails", "PCs fail", with(Outcome::Fail)),
@@ -59,24 +62,24 @@ fn counts(pcs: &[Pc], grown: usize) -> Markup {
 }
 
 fn overview(pcs: &[Pc]) -> Markup {
-    let us = |p: Option<Percentile>| or_na(p.map(|p| p.us));
+    let us = |e: &Entry, name: &str| or_na(e.percentile(name).map(|p| p.us));
     let row = |pc: &Pc| {
         let e = pc.latest();
         let kernel = e.machine.get("Kernel: version").map_or("", |v| kernel_release(v));
         vec![
-            badge(e.outcome),
-            html! { b { (pc.name) } br; span class="faint" { (e.made_at) } },
-            us(e.p50),
-            us(e.p99),
-            us(e.p999),
-            or_na(e.max_us),
-            cell(e.missed),
+            badge(e.outcome()),
+            html! { b { (pc.name) } br; span class="faint" { (e.report.made_at) } },
+            us(e, "p50"),
+            us(e, "p99"),
+            us(e, "p99.9"),
+            or_na(e.max_us()),
+            cell(e.report.haptic.counts.missed_deadlines),
             html! { (e.protocol.replace(" us", " \u{b5}s")) br; span class="faint" { (kernel) } },
-            cell(e.failed.join(", ")),
+            cell(e.failed().join(", ")),
         ]
     };
     let mut sorted: Vec<&Pc> = pcs.iter().collect();
-    let rank = |pc: &&Pc| match pc.latest().outcome {
+    let rank = |pc: &&Pc| match pc.latest().outcome() {
         Outcome::Fail => 0,
         Outcome::NotMeasurable => 1,
         Outcome::Pass => 2,
@@ -119,12 +122,9 @@ fn trends(pcs: &[Pc]) -> Result<Markup, DrawError> {
             continue;
         }
         // Short runs have no p99.9; a line shows a single percentile.
-        let (tail, of): (_, fn(&Entry) -> Option<Percentile>) = if same.iter().all(|e| e.p999.is_some()) {
-            ("p99.9", |e| e.p999)
-        } else {
-            ("p99", |e| e.p99)
-        };
-        let points: Vec<TrendPoint> = same.iter().map(|e| point(e, of(e))).collect();
+        let long = same.iter().all(|e| e.percentile("p99.9").is_some());
+        let tail = if long { "p99.9" } else { "p99" };
+        let points: Vec<TrendPoint> = same.iter().map(|e| point(e, e.percentile(tail))).collect();
         lines.push((pc.name.as_str(), protocol.replace(" us", " \u{b5}s"), tail, points));
     }
     let range_us = plots::trend_range_us(lines.iter().flat_map(|line| &line.3));
@@ -144,23 +144,23 @@ fn trends(pcs: &[Pc]) -> Result<Markup, DrawError> {
 }
 
 fn point(e: &Entry, tail: Option<Percentile>) -> TrendPoint {
-    let time = jiff::civil::DateTime::strptime("%Y-%m-%d %H:%M:%S UTC", &e.made_at).ok();
+    let time = jiff::civil::DateTime::strptime("%Y-%m-%d %H:%M:%S UTC", &e.report.made_at).ok();
     let seconds = time
         .and_then(|t| t.to_zoned(jiff::tz::TimeZone::UTC).ok())
         .map_or(0, |t| t.timestamp().as_second());
     TrendPoint {
         time_s: seconds as f64,
-        p50_us: e.p50.map(|p| p.us),
+        p50_us: e.percentile("p50").map(|p| p.us),
         tail_us: tail.map(|p| p.us),
         interval_us: tail.and_then(|p| p.interval_us),
-        passed: e.outcome == Outcome::Pass,
+        passed: e.outcome() == Outcome::Pass,
     }
 }
 
 fn grown(growths: &[(&Pc, Growth)]) -> Markup {
     let row = |(pc, g): &(&Pc, Growth)| {
         vec![
-            html! { b { (pc.name) } br; span class="faint" { (g.before.made_at) br; (g.after.made_at) } },
+            html! { b { (pc.name) } br; span class="faint" { (g.before.report.made_at) br; (g.after.report.made_at) } },
             cell(g.percentile),
             cell(format!("{} to {}", num(g.from_us), num(g.to_us))),
             changes(&g.changes),
@@ -187,31 +187,7 @@ fn changes(all: &[Change]) -> Markup {
     }
 }
 
-fn common(pcs: &[Pc], all: &[Common]) -> Markup {
-    let good: Vec<&str> = pcs
-        .iter()
-        .filter(|pc| pc.latest().outcome == Outcome::Pass)
-        .map(|pc| pc.name.as_str())
-        .collect();
-    let row = |c: &Common| {
-        let others = html! { @for (pc, value) in &c.others { div { (pc) ": " (value) } } };
-        vec![cell(&c.what), cell(&c.value), others]
-    };
-    let rows: Vec<Vec<Markup>> = all.iter().map(row).collect();
-    html! {
-        h2 { "What the PCs that pass have in common" }
-        @if good.len() < 2 {
-            p { "Fewer than two PCs pass." }
-        } @else if rows.is_empty() {
-            p { "Nothing that the other PCs do not have as well." }
-        } @else {
-            p class="faint" { "All of " (good.join(", ")) "; shown where another PC differs." }
-            (table(&["what", "PCs that pass", "others"], &rows, &[Column::Text, Column::Wide, Column::Wide]))
-        }
-    }
-}
-
-fn not_counted(unread: &[Unread]) -> Markup {
+fn not_counted(unread: &[NotCounted]) -> Markup {
     html! {
         @if !unread.is_empty() {
             h2 { "Files that are not counted" }

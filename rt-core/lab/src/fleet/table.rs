@@ -9,25 +9,27 @@ const HEAD: &str = "pc,made_at,verdict,protocol,measured_s,wake_p50_us,wake_p99_
 pub fn csv(entries: &[Entry]) -> String {
     let mut all = HEAD.to_owned();
     for e in entries {
+        let report = &e.report;
         let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
         let machine = |name: &str| e.machine.get(name).cloned().unwrap_or_default();
-        let interval = e.p999.and_then(|p| p.interval_us);
+        let us = |name: &str| number(e.percentile(name).map(|p| p.us));
+        let interval = e.percentile("p99.9").and_then(|p| p.interval_us);
         let cells = [
             e.pc.clone(),
-            e.made_at.clone(),
-            e.outcome.words().to_owned(),
+            report.made_at.clone(),
+            e.outcome().words().to_owned(),
             e.protocol.clone(),
-            e.measured_s.to_string(),
-            number(e.p50.map(|p| p.us)),
-            number(e.p99.map(|p| p.us)),
-            number(e.p999.map(|p| p.us)),
+            report.protocol.measured_s.to_string(),
+            us("p50"),
+            us("p99"),
+            us("p99.9"),
             number(interval.map(|i| i[0])),
             number(interval.map(|i| i[1])),
-            number(e.max_us),
-            e.missed.to_string(),
-            e.failed.join(" "),
-            e.operator.clone(),
-            e.site.clone(),
+            number(e.max_us()),
+            report.haptic.counts.missed_deadlines.to_string(),
+            e.failed().join(" "),
+            report.whose.operator.clone().unwrap_or_default(),
+            report.whose.site.clone().unwrap_or_default(),
             machine("Kernel: version"),
             machine("Processor: firmware"),
             machine("Program: version"),

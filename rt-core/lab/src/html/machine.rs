@@ -95,11 +95,11 @@ pub fn provenance(r: &Report) -> Markup {
         .collect();
     let facts = r.facts.iter();
     let facts: Vec<_> = facts
-        .map(|f| vec![cell(f.group), cell(&f.name), cell(&f.value)])
+        .map(|f| vec![cell(&f.group), cell(&f.name), cell(&f.value)])
         .collect();
     let packages = r.dependencies.iter();
     let packages: Vec<_> = packages
-        .map(|d| vec![cell(&d.name), cell(&d.version), cell(d.known_anomalies.join(" "))])
+        .map(|d| vec![cell(d.name), cell(d.version), cell(d.known_anomalies.join(" "))])
         .collect();
     let last_wide = [Column::Text, Column::Text, Column::Wide];
     html! {

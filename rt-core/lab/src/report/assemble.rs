@@ -57,8 +57,8 @@ pub fn report(parts: &Parts) -> Report {
         sha256: NO_DIGEST.to_owned(),
         sha256_is_of: "this file, with the 64 digits of sha256 as zeros",
         files: Vec::new(),
-        made_at: jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M:%S UTC").to_string(),
-        program: format!("rt-core {}", env!("CARGO_PKG_VERSION")),
+        made_at: provenance::now(),
+        program: provenance::program(),
         commit: provenance::COMMIT,
         command: std::env::args().collect(),
         whose: parts.whose.clone(),
@@ -113,7 +113,7 @@ pub fn report(parts: &Parts) -> Report {
             which_faults: host.faults.clone(),
         },
         stiffness: stiffness(&measured.haptic.due_to_output, period_ns),
-        windows: windows(measured),
+        windows: window_rows(&measured.haptic, measured.window_ns, 0.0),
         latest_wake_ups: latest(measured),
         trace: traced(measured),
         parts: parts_of_run(&measured.haptic, rate_hz),
@@ -124,7 +124,10 @@ pub fn report(parts: &Parts) -> Report {
         spin_search: parts.spin_search.clone(),
         settings: provenance::settings(parts.machine, options, &measured.run),
         facts: provenance::facts(parts.machine, options),
-        dependencies: provenance::dependencies(),
+        dependencies: provenance::packages()
+            .into_iter()
+            .filter(|package| package.of != "host-ui")
+            .collect(),
     }
 }
 
@@ -216,14 +219,15 @@ fn stiffness(delay: &Histogram<u64>, period_ns: u64) -> StiffnessSection {
     }
 }
 
-fn windows(measured: &Measured) -> Vec<WindowRow> {
-    let timing = &measured.haptic;
+/// Returns the worst of each window with a tick; `began_s` is the time of the first.
+pub fn window_rows(timing: &LoopTiming, window_ns: u64, began_s: f64) -> Vec<WindowRow> {
     let used = timing.windows.iter().enumerate().filter(|(_, w)| w.ticks > 0);
     used.map(|(i, w)| WindowRow {
-        at_s: i as f64 * measured.window_ns as f64 / 1e9,
+        at_s: began_s + i as f64 * window_ns as f64 / 1e9,
         worst_wake_us: w.worst_wake_ns as f64 / 1e3,
         worst_work_us: w.worst_work_ns as f64 / 1e3,
         missed: w.missed,
+        ticks: w.ticks,
     })
     .collect()
 }
