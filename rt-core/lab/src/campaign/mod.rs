@@ -6,32 +6,28 @@
 
 mod page;
 mod plan;
-mod progress;
 mod report;
 mod session;
 #[cfg(test)]
 mod tests;
 
+use crate::disk::{self, DiskError};
 use crate::measure::{Checkpoints, MeasureError, Setup, measure, period_ns};
 use crate::plots::DrawError;
 use clap::Args;
-use plan::{Part, Plan};
-use progress::Progress;
-use session::Store;
+use plan::{Plan, PlanError};
+use session::{FORCE, Store};
 use std::fs::File;
-use std::os::fd::AsRawFd;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use stylet_runtime::args::{OptionsError, RealTimeArgs};
 use stylet_runtime::process::Options;
 use stylet_runtime::rt::clock::Wait;
-use stylet_write::{WriteError, write_whole};
+use stylet_write::write_whole;
 
 const COPY: &str = "campaign.toml";
 const LOCK: &str = "campaign.lock";
-const REPORT: &str = "campaign.json";
-const PAGE: &str = "campaign.html";
 
 /// A campaign.
 #[derive(Args, Debug)]
@@ -58,17 +54,12 @@ pub struct CampaignArgs {
 /// Reason why a campaign does not run.
 #[derive(Debug, thiserror::Error)]
 pub enum CampaignError {
-    /// The file of the campaign, or one of its folder, cannot be read.
-    #[error("cannot read {}: {source}", .path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Error of the system.
-        source: std::io::Error,
-    },
-    /// All problems with the file, one per line.
-    #[error("{0}")]
-    Plan(String),
+    /// A file of the campaign cannot be read or written.
+    #[error(transparent)]
+    Disk(#[from] DiskError),
+    /// All problems with the file.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
     /// The folder belongs to another campaign.
     #[error("{} holds another campaign: its {COPY} differs from {}; expected the same file, or a new folder", .folder.display(), .file.display())]
     Other {
@@ -91,21 +82,12 @@ pub enum CampaignError {
     /// Options of the run.
     #[error(transparent)]
     Options(#[from] OptionsError),
-    /// A file cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
     /// The loops did not run.
     #[error(transparent)]
     Measure(#[from] MeasureError),
     /// A picture of the page cannot be drawn.
     #[error(transparent)]
     Draw(#[from] DrawError),
-    /// The report as JSON.
-    #[error(transparent)]
-    Json(#[from] serde_json::Error),
-    /// A checkpoint could not be written.
-    #[error("{0}")]
-    Unwritten(String),
 }
 
 /// Measures what is left and writes the report; 0 when the campaign is complete, 2 when it was interrupted before.
@@ -113,12 +95,9 @@ pub enum CampaignError {
 /// # Errors
 /// The file or a checkpoint is invalid, the folder is of another campaign or in use, or the loops do not run.
 pub fn run(args: &CampaignArgs, interrupted: &AtomicBool) -> Result<u8, CampaignError> {
-    let text = read(&args.file)?;
-    let plan = Plan::of(&text).map_err(|problems| CampaignError::Plan(problems.to_string()))?;
-    std::fs::create_dir_all(&args.out).map_err(|source| CampaignError::Read {
-        path: args.out.clone(),
-        source,
-    })?;
+    let text = disk::read_text(&args.file)?;
+    let plan = Plan::of(&text)?;
+    disk::make(&args.out)?;
     let _lock = lock(&args.out)?;
     let copy = args.out.join(COPY);
     match std::fs::read_to_string(&copy) {
@@ -129,26 +108,27 @@ pub fn run(args: &CampaignArgs, interrupted: &AtomicBool) -> Result<u8, Campaign
             });
         }
         Ok(_) => {}
-        Err(_) => write_whole(&copy, text.as_bytes())?,
+        Err(_) => write_whole(&copy, text.as_bytes()).map_err(DiskError::from)?,
     }
     let store = Store::open(&args.out)?;
     if !args.report {
         // After a restart of the PC, this process may have the number of an earlier session's.
         let options = args.real_time.options(&format!("lab-{}", std::process::id()))?;
-        measure_what_is_left(&plan, &store, &options, interrupted)?;
+        for number in 0..plan.parts.len() {
+            // SYNC: set by a signal handler; nothing but the flag is carried.
+            if !interrupted.load(Ordering::Acquire) {
+                measure_part(&plan, number, &store, &options, interrupted)?;
+            }
+        }
     }
     let report = report::report(&plan, &store)?;
-    let page = page::page(&report)?;
-    let json = serde_json::to_string_pretty(&report)? + "\n";
-    write_whole(&args.out.join(REPORT), json.as_bytes())?;
-    write_whole(&args.out.join(PAGE), page.as_bytes())?;
     println!(
         "{} of {} measured in {} sessions",
-        progress::time(report.measured_s),
-        progress::time(report.planned_s),
+        time(report.measured_s),
+        time(report.planned_s),
         report.sessions.len()
     );
-    println!("{}", args.out.join(PAGE).display());
+    disk::write_report(&args.out, "campaign", &report, &page::page(&report)?)?;
     if report.complete {
         return Ok(0);
     }
@@ -156,54 +136,33 @@ pub fn run(args: &CampaignArgs, interrupted: &AtomicBool) -> Result<u8, Campaign
     Ok(2)
 }
 
-fn read(path: &Path) -> Result<String, CampaignError> {
-    std::fs::read_to_string(path).map_err(|source| CampaignError::Read {
-        path: path.to_owned(),
-        source,
-    })
+/// Formats seconds, such as `7h 5m 10s`.
+fn time(seconds: f64) -> String {
+    format!("{:#}", jiff::SignedDuration::from_secs(seconds.max(0.0).round() as i64))
 }
 
 /// Locks the folder until the lock is dropped, or until this process ends.
 fn lock(folder: &Path) -> Result<File, CampaignError> {
     let path = folder.join(LOCK);
     let file = File::options().create(true).truncate(false).write(true).open(&path);
-    let file = file.map_err(|source| CampaignError::Read {
-        path: path.clone(),
-        source,
-    })?;
-    // SAFETY: a descriptor that is open.
-    match unsafe { libc::flock(file.as_raw_fd(), libc::LOCK_EX | libc::LOCK_NB) } {
-        0 => Ok(file),
-        _ => Err(CampaignError::InUse(folder.to_owned())),
-    }
+    let file = file.map_err(DiskError::read(&path))?;
+    file.try_lock().map_err(|_| CampaignError::InUse(folder.to_owned()))?;
+    Ok(file)
 }
 
-fn measure_what_is_left(
-    plan: &Plan,
-    store: &Store,
-    options: &Options,
-    interrupted: &AtomicBool,
-) -> Result<(), CampaignError> {
-    for (number, part) in plan.parts.iter().enumerate() {
-        let left_ns = store.left_ns(number, part)?;
-        // SYNC: set by a signal handler; nothing but the flag is carried.
-        if left_ns > 0 && !interrupted.load(Ordering::Acquire) {
-            session(plan, number, part, left_ns, store, options, interrupted)?;
-        }
-    }
-    Ok(())
-}
-
-/// Runs one session: the rest of one part.
-fn session(
+/// Measures the rest of one part in one session; prints a line at each checkpoint.
+fn measure_part(
     plan: &Plan,
     number: usize,
-    part: &Part,
-    left_ns: u64,
     store: &Store,
     options: &Options,
     interrupted: &AtomicBool,
 ) -> Result<(), CampaignError> {
+    let part = &plan.parts[number];
+    let left_ns = store.left_ns(number, part)?;
+    if left_ns == 0 {
+        return Ok(());
+    }
     let writer = store.begin(number)?;
     let progress = Progress::new(plan, store, number, left_ns)?;
     let options = Options {
@@ -217,25 +176,54 @@ fn session(
     let checkpoints = Checkpoints {
         every: Duration::from_nanos(plan.checkpoint_ns),
         window_ns: plan.window_ns,
-        take: &|name, timing| writer.put(name, timing, plan.window_ns),
+        take: &|name, timing| {
+            writer.put(name, timing, plan.window_ns);
+            if name == FORCE {
+                eprintln!("rt-core: {}", progress.line(timing.measured_ns() as f64 / 1e9));
+            }
+        },
     };
     let setup = Setup {
-        options: &options,
-        duration_ns: left_ns,
-        load: part.load,
-        folder: &store.folder,
-        trace_over_ns: None,
-        toggle: None,
         checkpoints: Some(&checkpoints),
+        ..Setup::new(&options, left_ns, part.load, &store.folder)
     };
-    let ended = AtomicBool::new(false);
-    let measured = std::thread::scope(|threads| {
-        threads.spawn(|| progress.show(&ended));
-        let measured = measure(&setup, interrupted);
-        // SYNC: nothing but the flag is carried.
-        ended.store(true, Ordering::Release);
-        measured
-    });
-    measured?;
-    writer.failed().map_or(Ok(()), |why| Err(CampaignError::Unwritten(why)))
+    measure(&setup, interrupted)?;
+    Ok(writer.ended()?)
+}
+
+/// One session within its campaign.
+struct Progress {
+    part: String,
+    left_s: f64,
+    /// Time measured before this session began, and total planned time.
+    before_s: f64,
+    planned_s: f64,
+}
+
+impl Progress {
+    fn new(plan: &Plan, store: &Store, number: usize, left_ns: u64) -> Result<Self, CampaignError> {
+        let mut before_s = 0.0;
+        for (i, part) in plan.parts.iter().enumerate() {
+            before_s += (part.duration_ns - store.left_ns(i, part)?) as f64 / 1e9;
+        }
+        let part = &plan.parts[number];
+        Ok(Self {
+            part: format!("part {} of {} ({})", number + 1, plan.parts.len(), part.name()),
+            left_s: left_ns as f64 / 1e9,
+            before_s,
+            planned_s: plan.planned_s(),
+        })
+    }
+
+    /// Returns the line after `passed_s` of the session.
+    fn line(&self, passed_s: f64) -> String {
+        let done_s = self.before_s + passed_s.min(self.left_s);
+        format!(
+            "{}: {} left; campaign {:.0} %, {} left",
+            self.part,
+            time(self.left_s - passed_s),
+            (100.0 * done_s / self.planned_s).floor(),
+            time(self.planned_s - done_s)
+        )
+    }
 }

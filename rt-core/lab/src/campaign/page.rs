@@ -1,7 +1,7 @@
 //! The page of a campaign.
 
-use super::progress::time;
 use super::report::{CampaignReport, LoopOfPart, PartReport};
+use super::time;
 use crate::html::times::time_table;
 use crate::plots::{self, BLUE, DrawError, MaximaPart, ORANGE, Series};
 use maud::{Markup, PreEscaped, html};
@@ -9,11 +9,11 @@ use stylet_report::parts::{Column, cell, num, or_na, table};
 
 /// Returns the whole page, which is self-contained.
 pub fn page(r: &CampaignReport) -> Result<String, DrawError> {
-    let title = if r.name.is_empty() {
-        "Latency campaign".to_owned()
-    } else {
-        format!("Latency campaign: {}", r.name)
-    };
+    let title = format!(
+        "Latency campaign{}{}",
+        if r.name.is_empty() { "" } else { ": " },
+        r.name
+    );
     let pictures = pictures(r)?;
     let main = html! {
         header { h1 { (title) } }
@@ -43,23 +43,13 @@ pub fn page(r: &CampaignReport) -> Result<String, DrawError> {
     Ok(stylet_report::page(&title, "", &main))
 }
 
-fn name(part: &PartReport) -> String {
-    let p = &part.part;
-    let spin = if p.spin_us > 0 {
-        format!(", spin {} \u{b5}s", p.spin_us)
-    } else {
-        String::new()
-    };
-    format!("{}, {} Hz{spin}", format!("{:?}", p.load).to_lowercase(), p.rate)
-}
-
 fn overview(r: &CampaignReport) -> Markup {
     let us = |l: &LoopOfPart, q: &str| or_na(l.wake.quantile(q).and_then(|q| q.us));
     let row = |(i, part): (usize, &PartReport)| {
         let f = &part.force;
         vec![
             cell(i + 1),
-            cell(name(part)),
+            cell(part.part.name()),
             cell(time(part.measured_s)),
             cell(part.sessions),
             us(f, "p50"),
@@ -97,7 +87,7 @@ fn overview(r: &CampaignReport) -> Markup {
 }
 
 fn pictures(r: &CampaignReport) -> Result<Markup, DrawError> {
-    let names: Vec<String> = r.parts.iter().map(name).collect();
+    let names: Vec<String> = r.parts.iter().map(|p| p.part.name()).collect();
     let measured = || r.parts.iter().zip(&names).filter(|(p, _)| !p.maxima.is_empty());
     if measured().next().is_none() {
         return Ok(Markup::default());
@@ -147,7 +137,7 @@ fn pictures(r: &CampaignReport) -> Result<Markup, DrawError> {
 fn of_part(i: usize, part: &PartReport) -> Markup {
     let of = |l: &LoopOfPart| [l.wake.clone(), l.work.clone(), l.due_to_output.clone()];
     html! {
-        h2 { "Part " (i + 1) ": " (name(part)) }
+        h2 { "Part " (i + 1) ": " (part.part.name()) }
         h3 { "Force loop" }
         (time_table(&of(&part.force)))
         h3 { "Tissue loop" }

@@ -4,73 +4,56 @@ use crate::args::{duration_ns, longest_spin_ns};
 use crate::load::Load;
 use crate::machine::Machine;
 use crate::measure::period_ns;
-use serde::{Deserialize, Serialize};
-
-/// Shortest useful window.
-const SHORTEST_WINDOW_NS: u64 = 1_000_000_000;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// One part: a load at a rate for a time.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Part {
+    #[serde(default)]
     pub load: Load,
+    #[serde(default = "kilohertz")]
     pub rate: u32,
+    #[serde(rename(deserialize = "duration"), deserialize_with = "time")]
     pub duration_ns: u64,
+    #[serde(default)]
     pub spin_us: u64,
 }
 
 /// All parts in order, with repetitions expanded.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Plan {
+    #[serde(default)]
     pub name: String,
+    #[serde(default = "once")]
+    repeat: usize,
+    #[serde(rename = "window", default = "five_minutes", deserialize_with = "time")]
     pub window_ns: u64,
+    #[serde(rename = "checkpoint", default = "a_minute", deserialize_with = "time")]
     pub checkpoint_ns: u64,
+    #[serde(rename = "part")]
     pub parts: Vec<Part>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawPlan {
-    #[serde(default)]
-    name: String,
-    #[serde(default = "once")]
-    repeat: u32,
-    #[serde(default = "five_minutes")]
-    window: String,
-    #[serde(default = "a_minute")]
-    checkpoint: String,
-    part: Vec<RawPart>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawPart {
-    #[serde(default = "no_load")]
-    load: Load,
-    #[serde(default = "kilohertz")]
-    rate: u32,
-    duration: String,
-    #[serde(default)]
-    spin_us: u64,
-}
-
-fn once() -> u32 {
+fn once() -> usize {
     1
 }
 
-fn five_minutes() -> String {
-    "5m".to_owned()
+fn five_minutes() -> u64 {
+    300_000_000_000
 }
 
-fn a_minute() -> String {
-    "1m".to_owned()
-}
-
-fn no_load() -> Load {
-    Load::None
+fn a_minute() -> u64 {
+    60_000_000_000
 }
 
 fn kilohertz() -> u32 {
     1_000
+}
+
+fn time<'de, D: Deserializer<'de>>(from: D) -> Result<u64, D::Error> {
+    duration_ns(&String::deserialize(from)?).map_err(serde::de::Error::custom)
 }
 
 /// Every problem with a file of a campaign, one per line.
@@ -79,57 +62,46 @@ fn kilohertz() -> u32 {
 pub struct PlanError(pub Vec<String>);
 
 impl Plan {
-    /// Returns the plan, or every problem with the file.
+    /// Returns the plan, or the problems with the file.
     pub fn of(text: &str) -> Result<Self, PlanError> {
-        let raw: RawPlan = toml::from_str(text).map_err(|e| PlanError(vec![e.to_string()]))?;
+        let once: Self = toml::from_str(text).map_err(|e| PlanError(vec![e.to_string()]))?;
         let mut problems = Vec::new();
-        let mut time = |key: &str, text: &str| {
-            duration_ns(text)
-                .map_err(|why| problems.push(format!("{key} = {text:?}: {why}")))
-                .unwrap_or(SHORTEST_WINDOW_NS)
-        };
-        let window_ns = time("window", &raw.window).max(SHORTEST_WINDOW_NS);
-        let checkpoint_ns = time("checkpoint", &raw.checkpoint);
-        let once: Vec<Part> = raw
-            .part
-            .iter()
-            .enumerate()
-            .map(|(i, p)| Part {
-                load: p.load,
-                rate: p.rate,
-                duration_ns: time(&format!("part {}: duration", i + 1), &p.duration),
-                spin_us: p.spin_us,
-            })
-            .collect();
-        if once.is_empty() || !(1..=1_000).contains(&raw.repeat) {
+        if once.parts.is_empty() || !(1..=1_000).contains(&once.repeat) {
             problems.push("expected at least one [[part]], and repeat between 1 and 1000".to_owned());
         }
-        for (i, part) in once.iter().enumerate() {
-            if !(500..=10_000).contains(&part.rate) {
-                problems.push(format!(
-                    "part {}: rate = {}: expected 500 to 10000 Hz",
-                    i + 1,
-                    part.rate
-                ));
+        for (i, part) in (1..).zip(&once.parts) {
+            let (rate, spin_us) = (part.rate, part.spin_us);
+            if !(500..=10_000).contains(&rate) {
+                problems.push(format!("part {i}: rate = {rate}: expected 500 to 10000 Hz"));
                 continue;
             }
-            let longest_us = longest_spin_ns(period_ns(part.rate), Machine::this().throttle()) / 1_000;
-            if part.spin_us > longest_us {
-                problems.push(format!(
-                    "part {}: spin_us = {}: at most {longest_us}",
-                    i + 1,
-                    part.spin_us
-                ));
+            let longest_us = longest_spin_ns(period_ns(rate), Machine::this().throttle()) / 1_000;
+            if spin_us > longest_us {
+                problems.push(format!("part {i}: spin_us = {spin_us}: at most {longest_us}"));
             }
         }
         if !problems.is_empty() {
             return Err(PlanError(problems));
         }
         Ok(Self {
-            name: raw.name,
-            window_ns,
-            checkpoint_ns,
-            parts: (0..raw.repeat).flat_map(|_| once.iter().cloned()).collect(),
+            parts: once.parts.repeat(once.repeat),
+            ..once
         })
+    }
+
+    /// Returns the time of all parts.
+    pub fn planned_s(&self) -> f64 {
+        self.parts.iter().map(|p| p.duration_ns as f64 / 1e9).sum()
+    }
+}
+
+impl Part {
+    pub fn name(&self) -> String {
+        let spin = if self.spin_us > 0 {
+            format!(", spin {} \u{b5}s", self.spin_us)
+        } else {
+            String::new()
+        };
+        format!("{}, {} Hz{spin}", self.load.name(), self.rate)
     }
 }

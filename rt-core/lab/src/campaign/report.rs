@@ -2,10 +2,11 @@
 
 use super::CampaignError;
 use super::plan::{Part, Plan};
-use super::session::{FORCE, Kept, Maximum, Store, TISSUE, join};
+use super::session::{Bins, FORCE, Kept, SessionRecord, Store, TISSUE, join};
 use crate::bound::{self, MissBound};
 use crate::machine::Machine;
 use crate::provenance;
+use crate::report::WindowRow;
 use crate::summary::{Summary, summary};
 use hdrhistogram::Histogram;
 use serde::Serialize;
@@ -36,7 +37,7 @@ pub struct PartReport {
     pub force: LoopOfPart,
     pub tissue: LoopOfPart,
     /// The worst of each window of the force loop, in the order of time.
-    pub maxima: Vec<Maximum>,
+    pub maxima: Vec<WindowRow>,
 }
 
 /// A session with its file.
@@ -76,38 +77,44 @@ pub fn report(plan: &Plan, store: &Store) -> Result<CampaignReport, CampaignErro
     }
     let mut parts = Vec::new();
     for (number, part) in plan.parts.iter().enumerate() {
-        let of_part = |all: &[Kept]| -> Vec<Kept> { all.iter().filter(|k| k.record.part == number).cloned().collect() };
+        let of_part = |all: &'_ [Kept]| -> Vec<SessionRecord> {
+            all.iter()
+                .map(|k| &k.record)
+                .filter(|record| record.part == number)
+                .cloned()
+                .collect()
+        };
         let (force, tissue) = (of_part(&force), of_part(&tissue));
         parts.push(PartReport {
-            part: part.clone(),
-            measured_s: force.iter().map(|k| k.record.measured_ns as f64 / 1e9).sum(),
+            part: *part,
+            measured_s: force.iter().map(|r| r.measured_ns as f64 / 1e9).sum(),
             sessions: force.len(),
             complete: store.left_ns(number, part)? == 0,
-            maxima: force.iter().flat_map(|k| k.record.maxima.iter().copied()).collect(),
+            maxima: force.iter().flat_map(|r| r.maxima.iter().cloned()).collect(),
             force: one_loop(&force, f64::from(part.rate)),
             tissue: one_loop(&tissue, 1e9 / stylet_runtime::rt::clock::TISSUE_PERIOD_NS as f64),
         });
     }
-    let session = |k: &Kept| SessionReport {
-        file: k.file.clone(),
-        sha256: k.sha256.clone(),
-        part: k.record.part,
-        began_s: k.record.began_s,
-        measured_s: k.record.measured_ns as f64 / 1e9,
-        boot: k.record.boot.clone(),
+    let session = |Kept { file, sha256, record }: Kept| SessionReport {
+        file,
+        sha256,
+        part: record.part,
+        began_s: record.began_s,
+        measured_s: record.measured_ns as f64 / 1e9,
+        boot: record.boot,
     };
     Ok(CampaignReport {
         schema: SCHEMA,
         name: plan.name.clone(),
-        made_at: jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M:%S UTC").to_string(),
-        program: format!("rt-core {}", env!("CARGO_PKG_VERSION")),
+        made_at: provenance::now(),
+        program: provenance::program(),
         commit: provenance::COMMIT,
         complete: parts.iter().all(|p| p.complete),
-        planned_s: plan.parts.iter().map(|p| p.duration_ns as f64 / 1e9).sum(),
+        planned_s: plan.planned_s(),
         measured_s: parts.iter().map(|p| p.measured_s).sum(),
         window_s: plan.window_ns as f64 / 1e9,
         parts,
-        sessions: force.iter().map(session).collect(),
+        sessions: force.into_iter().map(session).collect(),
         hypervisor: Machine::this().hypervisor(),
     })
 }
@@ -124,22 +131,19 @@ fn disjoint(store: &Store, sessions: &[Kept]) -> Result<(), CampaignError> {
     Ok(())
 }
 
-fn one_loop(sessions: &[Kept], rate_hz: f64) -> LoopOfPart {
-    let sum = |of: fn(&Kept) -> u64| sessions.iter().map(of).sum::<u64>();
-    let wake = join(sessions.iter().map(|k| &k.record.wake));
-    let (ticks, missed) = (sum(|k| k.record.ticks), sum(|k| k.record.missed));
+fn one_loop(sessions: &[SessionRecord], rate_hz: f64) -> LoopOfPart {
+    let sum = |of: fn(&SessionRecord) -> u64| sessions.iter().map(of).sum::<u64>();
+    let joined = |of: fn(&SessionRecord) -> &Bins| join(sessions.iter().map(of));
+    let wake = joined(|r| &r.wake);
+    let (ticks, missed) = (sum(|r| r.ticks), sum(|r| r.missed));
     LoopOfPart {
         wake: summary("wake-up", &wake, rate_hz),
-        work: summary("whole tick", &join(sessions.iter().map(|k| &k.record.work)), rate_hz),
-        due_to_output: summary(
-            "due to output",
-            &join(sessions.iter().map(|k| &k.record.due_to_output)),
-            rate_hz,
-        ),
+        work: summary("whole tick", &joined(|r| &r.work), rate_hz),
+        due_to_output: summary("due to output", &joined(|r| &r.due_to_output), rate_hz),
         ticks,
         missed_deadlines: missed,
-        overruns: sum(|k| k.record.overruns),
-        unmeasured: sum(|k| k.record.unmeasured),
+        overruns: sum(|r| r.overruns),
+        unmeasured: sum(|r| r.unmeasured),
         miss_bound: bound::of_misses(missed, ticks + missed, rate_hz),
         wake_times: wake,
     }

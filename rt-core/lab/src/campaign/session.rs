@@ -3,13 +3,15 @@
 use super::CampaignError;
 use super::plan::Part;
 use crate::collect::LoopTiming;
+use crate::disk::{self, DiskError};
 use crate::provenance::sha256;
+use crate::report::{self, WindowRow};
 use crate::sample::histogram;
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use stylet_write::write_whole;
+use stylet_write::{WriteError, write_whole};
 
 const SCHEMA: &str = "stylet.campaign-session/1";
 /// Shortfall with which a part still counts as complete: the run ends between two ticks.
@@ -17,17 +19,6 @@ const COMPLETE_NS: u64 = 500_000_000;
 /// Names of the loops in file names.
 pub const FORCE: &str = "force";
 pub const TISSUE: &str = "tissue";
-
-/// The worst of a window.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Maximum {
-    /// Seconds since 1970.
-    pub at_s: f64,
-    pub worst_wake_us: f64,
-    pub worst_work_us: f64,
-    pub missed: u32,
-    pub ticks: u32,
-}
 
 /// A histogram as values and their counts, nanoseconds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -40,7 +31,7 @@ impl Bins {
     }
 
     /// Adds them to a histogram.
-    pub fn add_to(&self, h: &mut Histogram<u64>) {
+    fn add_to(&self, h: &mut Histogram<u64>) {
         for &(value, count) in &self.0 {
             h.saturating_record_n(value, count);
         }
@@ -67,7 +58,7 @@ pub struct SessionRecord {
     pub wake: Bins,
     pub work: Bins,
     pub due_to_output: Bins,
-    pub maxima: Vec<Maximum>,
+    pub maxima: Vec<WindowRow>,
 }
 
 impl SessionRecord {
@@ -103,10 +94,7 @@ impl Store {
     /// Returns every session of one loop, in the order in which they were measured.
     pub fn records(&self, name: &str) -> Result<Vec<Kept>, CampaignError> {
         let ending = format!("-{name}.json");
-        let entries = std::fs::read_dir(&self.folder).map_err(|source| CampaignError::Read {
-            path: self.folder.clone(),
-            source,
-        })?;
+        let entries = std::fs::read_dir(&self.folder).map_err(DiskError::read(&self.folder))?;
         let names = entries.flatten().map(|e| e.file_name().to_string_lossy().into_owned());
         let mut names: Vec<String> = names
             .filter(|n| n.starts_with("part-") && n.ends_with(&ending))
@@ -117,7 +105,7 @@ impl Store {
 
     fn record(&self, file: String) -> Result<Kept, CampaignError> {
         let path = self.folder.join(&file);
-        let text = super::read(&path)?;
+        let text = disk::read_text(&path)?;
         let invalid = |why: String| CampaignError::Checkpoint {
             path: path.clone(),
             why,
@@ -157,16 +145,10 @@ impl Store {
             part,
             session: before.max().unwrap_or(0),
             boot: boot.trim().to_owned(),
-            began_s: now_s(),
+            began_s: jiff::Timestamp::now().as_duration().as_secs_f64(),
             failure: Mutex::new(None),
         })
     }
-}
-
-/// Seconds since 1970.
-pub fn now_s() -> f64 {
-    let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    since.map_or(0.0, |d| d.as_secs_f64())
 }
 
 /// Writes the checkpoints of a session; each replaces the one before, whole or not at all.
@@ -176,7 +158,7 @@ pub struct Writer {
     session: usize,
     boot: String,
     began_s: f64,
-    failure: Mutex<Option<String>>,
+    failure: Mutex<Option<WriteError>>,
 }
 
 impl Writer {
@@ -192,19 +174,11 @@ impl Writer {
         let text = serde_json::to_string(&record).unwrap_or_default();
         if let Err(why) = write_whole(&path, text.as_bytes()) {
             // The measurement continues: the next checkpoint may succeed.
-            *self.failure.lock().unwrap_or_else(|e| e.into_inner()) = Some(why.to_string());
+            *self.failure.lock().unwrap_or_else(|e| e.into_inner()) = Some(why);
         }
     }
 
     fn record(&self, timing: &LoopTiming, window_ns: u64) -> SessionRecord {
-        let used = timing.windows.iter().enumerate().filter(|(_, w)| w.ticks > 0);
-        let maxima = used.map(|(i, w)| Maximum {
-            at_s: self.began_s + i as f64 * window_ns as f64 / 1e9,
-            worst_wake_us: w.worst_wake_ns as f64 / 1e3,
-            worst_work_us: w.worst_work_ns as f64 / 1e3,
-            missed: w.missed,
-            ticks: w.ticks,
-        });
         SessionRecord {
             schema: SCHEMA.to_owned(),
             part: self.part,
@@ -220,13 +194,14 @@ impl Writer {
             wake: Bins::of(&timing.wake),
             work: Bins::of(&timing.work),
             due_to_output: Bins::of(&timing.due_to_output),
-            maxima: maxima.collect(),
+            maxima: report::window_rows(timing, window_ns, self.began_s),
         }
     }
 
-    /// Returns the reason why the last failed checkpoint could not be written.
-    pub fn failed(&self) -> Option<String> {
-        self.failure.lock().unwrap_or_else(|e| e.into_inner()).clone()
+    /// Returns the reason why a checkpoint could not be written.
+    pub fn ended(self) -> Result<(), DiskError> {
+        let failure = self.failure.into_inner().unwrap_or_else(|e| e.into_inner());
+        failure.map_or(Ok(()), |why| Err(why.into()))
     }
 }
 
