@@ -337,12 +337,18 @@ pub fn cores(list: &str) -> BTreeSet<usize> {
     all
 }
 
-/// Prints a set of cores as the kernel does.
+/// Prints a set of cores as the kernel does: `0-2,5`.
 pub fn core_list(cores: &BTreeSet<usize>) -> String {
-    let all: Vec<String> = cores.iter().map(ToString::to_string).collect();
-    if all.is_empty() {
-        "none".to_owned()
-    } else {
-        all.join(",")
+    let mut ranges: Vec<(usize, usize)> = Vec::new();
+    for &core in cores {
+        match ranges.last_mut() {
+            Some((_, last)) if *last + 1 == core => *last = core,
+            _ => ranges.push((core, core)),
+        }
+    }
+    let range = |(a, b): &(usize, usize)| if a == b { a.to_string() } else { format!("{a}-{b}") };
+    match ranges.is_empty() {
+        true => "none".to_owned(),
+        false => ranges.iter().map(range).collect::<Vec<String>>().join(","),
     }
 }

@@ -1,23 +1,19 @@
 //! Cores: their number, other users of the force loop's core, and their sleep states.
 
-use super::{Finding, FindingLevel};
+use super::Finding;
+use super::tunable::DEEP_US;
 use crate::machine::{Machine, core_list};
-
-/// Exit latency above which a sleep state shows in the wake-up latency.
-const DEEP_US: u64 = 20;
 
 pub fn count(machine: &Machine) -> Finding {
     match machine.online_cores().len() {
-        0 => Finding::new("cores", FindingLevel::Note, "the kernel does not report its cores", ""),
-        1 => Finding::new(
+        0 => Finding::note("cores", "the kernel does not report its cores", ""),
+        1 => Finding::blocker(
             "cores",
-            FindingLevel::Blocker,
             "one core: force loop, tissue and everything else share it",
             "use a PC with two cores or more",
         ),
-        n @ (2 | 3) => Finding::new(
+        n @ (2 | 3) => Finding::note(
             "cores",
-            FindingLevel::Note,
             format!("{n} cores: the tissue step shares its core with everything else"),
             "four or more leave a core to each loop",
         ),
@@ -32,9 +28,8 @@ pub fn isolation(machine: &Machine, core: usize) -> Finding {
         let also = if tickless { ", and without a periodic tick" } else { "" };
         return Finding::good("isolation", format!("core {core} is kept free of other threads{also}"));
     }
-    Finding::new(
+    Finding::warning(
         "isolation",
-        FindingLevel::Warning,
         format!(
             "core {core} is open to all threads (isolated cores: {})",
             core_list(&isolated)
@@ -86,7 +81,7 @@ pub fn interrupts(machine: &Machine, core: usize) -> Finding {
              the kernel command line keeps it so)"
         ));
     }
-    Finding::new("interrupts", FindingLevel::Warning, what, cure.join("\n"))
+    Finding::warning("interrupts", what, cure.join("\n"))
 }
 
 pub fn siblings(machine: &Machine, core: usize) -> Finding {
@@ -94,30 +89,11 @@ pub fn siblings(machine: &Machine, core: usize) -> Finding {
     if siblings.is_empty() {
         return Finding::good("SMT", format!("core {core} shares its execution units with no other"));
     }
-    Finding::new(
+    Finding::warning(
         "SMT",
-        FindingLevel::Warning,
         format!("core {core} shares its execution units with {}", core_list(&siblings)),
         "echo off | sudo tee /sys/devices/system/cpu/smt/control   (nosmt on the kernel command line keeps it so)",
     )
-}
-
-pub fn governor(machine: &Machine, core: usize) -> Finding {
-    match machine.governor(core).as_deref() {
-        None => Finding::new(
-            "governor",
-            FindingLevel::Note,
-            "the kernel shows no frequency scaling",
-            "",
-        ),
-        Some("performance") => Finding::good("governor", format!("core {core} runs at full speed (performance)")),
-        Some(other) => Finding::new(
-            "governor",
-            FindingLevel::Warning,
-            format!("core {core} changes its speed ({other})"),
-            "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor",
-        ),
-    }
 }
 
 pub fn sleep_states(machine: &Machine, core: usize) -> Finding {
@@ -129,18 +105,16 @@ pub fn sleep_states(machine: &Machine, core: usize) -> Finding {
         .map(|(name, us)| format!("{name} {us} us"))
         .collect();
     match (deep.is_empty(), can_ask) {
-        (false, true) => Finding::new(
+        (false, true) => Finding::note(
             "sleep states",
-            FindingLevel::Note,
             format!(
                 "core {core} may sleep deeply ({}); rt-core forbids it through /dev/cpu_dma_latency while it runs as root",
                 deep.join(", ")
             ),
             "to run without root: sudo chgrp users /dev/cpu_dma_latency && sudo chmod g+rw /dev/cpu_dma_latency",
         ),
-        (false, false) => Finding::new(
+        (false, false) => Finding::warning(
             "sleep states",
-            FindingLevel::Warning,
             format!(
                 "core {core} may sleep deeply ({}), and there is no /dev/cpu_dma_latency to forbid it",
                 deep.join(", ")
@@ -153,9 +127,8 @@ pub fn sleep_states(machine: &Machine, core: usize) -> Finding {
             "sleep states",
             format!("no deep sleep state is seen on core {core}, and /dev/cpu_dma_latency is there to forbid one"),
         ),
-        (true, false) => Finding::new(
+        (true, false) => Finding::note(
             "sleep states",
-            FindingLevel::Note,
             format!("no deep sleep state is seen on core {core}; there is no /dev/cpu_dma_latency"),
             "",
         ),

@@ -64,9 +64,8 @@ pub fn hidraw(machine: &Machine, usable: impl Fn(&Path) -> bool) -> Finding {
             format!("haptic devices on hidraw that may be used: {}", ours.len()),
         );
     }
-    Finding::new(
+    Finding::warning(
         "hidraw",
-        FindingLevel::Warning,
         format!(
             "a Touch is connected as a HID device, but may not be used: /{}",
             refused.join(", /")
@@ -82,9 +81,8 @@ pub fn hidraw(machine: &Machine, usable: impl Fn(&Path) -> bool) -> Finding {
 pub fn haptic(machine: &Machine) -> Finding {
     let found = connected(machine);
     if found.is_empty() {
-        return Finding::new(
+        return Finding::note(
             "devices",
-            FindingLevel::Note,
             "no haptic device is seen on FireWire or USB; without a Premium on a parallel port the simulated one is there",
             "",
         );

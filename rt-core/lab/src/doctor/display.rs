@@ -1,8 +1,8 @@
 //! Drawing programs that may run on the force loop's core. They move whole pictures inside the kernel, and a
 //! non-preemptible kernel makes the loop wait until one is done (docs/measurements.md).
 
-use super::tunable::{Tunable, as_kernel_prints};
-use super::{Finding, FindingLevel};
+use super::Finding;
+use super::tunable::Tunable;
 use crate::machine::{Machine, Process, core_list, cores};
 
 pub const CHECK: &str = "display";
@@ -70,13 +70,13 @@ pub fn servers(machine: &Machine, core: usize) -> Finding {
     );
     let elsewhere = elsewhere(machine, core);
     if elsewhere.is_empty() {
-        return Finding::new(CHECK, FindingLevel::Warning, what, "use a PC with two cores or more");
+        return Finding::warning(CHECK, what, "use a PC with two cores or more");
     }
     let cure: Vec<String> = found
         .iter()
         .map(|p| format!("sudo taskset -a -cp {elsewhere} {}", p.id))
         .collect();
-    Finding::new(CHECK, FindingLevel::Warning, what, cure.join("\n"))
+    Finding::warning(CHECK, what, cure.join("\n"))
 }
 
 /// Returns every other core; empty if there is none.
@@ -85,7 +85,7 @@ fn elsewhere(machine: &Machine, core: usize) -> String {
     elsewhere.remove(&core);
     match elsewhere.is_empty() {
         true => String::new(),
-        false => as_kernel_prints(&core_list(&elsewhere)),
+        false => core_list(&elsewhere),
     }
 }
 
@@ -107,7 +107,7 @@ pub fn settings(machine: &Machine, core: usize) -> Vec<Tunable> {
             began: machine.began(&path),
             wanted: match wanted.is_empty() {
                 true => elsewhere.clone(),
-                false => as_kernel_prints(&core_list(&wanted)),
+                false => core_list(&wanted),
             },
             path,
             now,

@@ -1,14 +1,13 @@
 //! Kernel: hypervisor, preemption, throttling, time source.
 
-use super::{Finding, FindingLevel};
+use super::Finding;
 use crate::machine::{Machine, Preemption, Throttle};
 
 pub fn hypervisor(machine: &Machine) -> Finding {
     match machine.hypervisor() {
         None => Finding::good("hypervisor", "runs on bare metal"),
-        Some(name) => Finding::new(
+        Some(name) => Finding::blocker(
             "hypervisor",
-            FindingLevel::Blocker,
             format!(
                 "this is a virtual machine ({name}): the host takes the core away for milliseconds, and steal time may not show it"
             ),
@@ -23,14 +22,14 @@ pub fn preemption(machine: &Machine) -> Finding {
     let real_time = "for a bounded tail, a PREEMPT_RT kernel: sudo apt-get install linux-image-rt-amd64, then restart";
     match model {
         Preemption::RealTime => Finding::good("preemption", what),
-        Preemption::Full => Finding::new("preemption", FindingLevel::Warning, what, real_time),
+        Preemption::Full => Finding::warning("preemption", what, real_time),
         _ => {
             let dynamic = machine
                 .text("proc/version")
                 .is_some_and(|v| v.contains("PREEMPT_DYNAMIC"));
             let now = "\nuntil then: echo full | sudo tee /sys/kernel/debug/sched/preempt   (or preempt=full on the kernel command line)";
             let cure = format!("{real_time}{}", if dynamic { now } else { "" });
-            Finding::new("preemption", FindingLevel::Warning, what, cure)
+            Finding::warning("preemption", what, cure)
         }
     }
 }
@@ -44,24 +43,21 @@ pub fn throttling(machine: &Machine) -> Finding {
                 share * 100.0
             ),
         ),
-        Some(Throttle::Share(share)) => Finding::new(
+        Some(Throttle::Share(share)) => Finding::warning(
             "throttling",
-            FindingLevel::Warning,
             format!(
                 "real-time threads are stopped after {:.0} % of each period",
                 share * 100.0
             ),
             "sudo sysctl kernel.sched_rt_runtime_us=950000 kernel.sched_rt_period_us=1000000",
         ),
-        Some(Throttle::Off) => Finding::new(
+        Some(Throttle::Off) => Finding::note(
             "throttling",
-            FindingLevel::Note,
             "throttling is off: a real-time thread that never sleeps hangs its core",
             "sudo sysctl kernel.sched_rt_runtime_us=950000",
         ),
-        None => Finding::new(
+        None => Finding::note(
             "throttling",
-            FindingLevel::Note,
             "the kernel does not report the share of real-time threads",
             "",
         ),
@@ -92,9 +88,8 @@ pub fn groups(machine: &Machine) -> Finding {
             .find_map(|c| machine.text(&format!("sys/fs/cgroup/{c}/{folder}cpu.rt_runtime_us")))
     });
     match runtime.as_deref() {
-        Some("0") => Finding::new(
+        Some("0") => Finding::blocker(
             "control group",
-            FindingLevel::Blocker,
             "the control group of this shell has no share for real-time threads, so SCHED_FIFO is refused even to root",
             "echo $$ | sudo tee /sys/fs/cgroup/cpu/cgroup.procs   (moves this shell to the root group)",
         ),
@@ -115,18 +110,12 @@ pub fn time_source(machine: &Machine) -> Finding {
         Some(good @ ("tsc" | "arch_sys_counter" | "kvm-clock")) => {
             Finding::good("time source", format!("{good}: read without a system call"))
         }
-        Some(slow) => Finding::new(
+        Some(slow) => Finding::warning(
             "time source",
-            FindingLevel::Warning,
             format!("{slow}: each look at the clock costs about a microsecond or more"),
             "echo tsc | sudo tee /sys/devices/system/clocksource/clocksource0/current_clocksource   (if it is refused, the \
              kernel does not trust this processor's tsc: see dmesg | grep -i tsc)",
         ),
-        None => Finding::new(
-            "time source",
-            FindingLevel::Note,
-            "the kernel does not report its time source",
-            "",
-        ),
+        None => Finding::note("time source", "the kernel does not report its time source", ""),
     }
 }

@@ -7,7 +7,6 @@ mod cores;
 mod devices;
 mod display;
 mod kernel;
-mod memory;
 mod mend;
 mod rights;
 mod shared;
@@ -69,6 +68,18 @@ impl Finding {
         }
     }
 
+    fn note(check: &'static str, what: impl Into<String>, cure: impl Into<String>) -> Self {
+        Self::new(check, FindingLevel::Note, what, cure)
+    }
+
+    fn warning(check: &'static str, what: impl Into<String>, cure: impl Into<String>) -> Self {
+        Self::new(check, FindingLevel::Warning, what, cure)
+    }
+
+    fn blocker(check: &'static str, what: impl Into<String>, cure: impl Into<String>) -> Self {
+        Self::new(check, FindingLevel::Blocker, what, cure)
+    }
+
     fn good(check: &'static str, what: impl Into<String>) -> Self {
         Self::new(check, FindingLevel::Good, what, "")
     }
@@ -89,19 +100,16 @@ pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Ve
         cores::interrupts(machine, haptic_core),
         display::servers(machine, haptic_core),
         cores::siblings(machine, haptic_core),
-        cores::governor(machine, haptic_core),
         cores::sleep_states(machine, haptic_core),
-        memory::swap(machine),
-        memory::huge_pages(machine),
+        shared::swap(machine),
         shared::space(machine, shared::free_bytes),
         shared::stale_services(machine),
         devices::haptic(machine),
         devices::hidraw(machine, devices::may_use),
-        tunable::energy_preference(machine, haptic_core),
         tunable::turbo(machine),
         tunable::tuned(machine),
     ];
-    findings.extend(tunable::findings(machine));
+    findings.extend(tunable::findings(machine, haptic_core));
     findings.extend(devices::driver(machine, here));
     findings
 }

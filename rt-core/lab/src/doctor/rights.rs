@@ -1,6 +1,6 @@
 //! Rights: real-time priority and locked memory.
 
-use super::{Finding, FindingLevel};
+use super::Finding;
 use crate::machine::Machine;
 use stylet_runtime::rt::arm;
 
@@ -24,7 +24,7 @@ pub fn priority(machine: &Machine) -> Finding {
             let limit = limit.unwrap_or(0);
             let what =
                 format!("real-time priorities up to {limit} are allowed, the force loop asks for {WANTED_PRIORITY}");
-            Finding::new("priority", FindingLevel::Blocker, what, arm::advice("grant it"))
+            Finding::blocker("priority", what, arm::advice("grant it"))
         }
     }
 }
@@ -48,7 +48,7 @@ pub fn memory_lock(machine: &Machine) -> Finding {
                 "only {} MiB may be locked; a page that is not locked can be taken away mid tick",
                 bytes.unwrap_or(0) >> 20
             );
-            Finding::new("memory lock", FindingLevel::Blocker, what, arm::advice("grant it"))
+            Finding::blocker("memory lock", what, arm::advice("grant it"))
         }
     }
 }

@@ -1,23 +1,32 @@
-//! Shared memory: free space, and remains of dead programs.
+//! Memory: swap; free space of shared memory, and remains of dead programs.
 
-use super::{Finding, FindingLevel};
+use super::Finding;
 use crate::machine::Machine;
 use std::collections::BTreeSet;
-use std::ffi::CString;
-use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 
 /// Shared memory of one core with six hosts and a large scene, with a margin.
 const WANTED_BYTES: u64 = 256 << 20;
 
+pub fn swap(machine: &Machine) -> Finding {
+    let table = machine.text("proc/swaps").unwrap_or_default();
+    let areas: Vec<&str> = table
+        .lines()
+        .skip(1)
+        .filter_map(|l| l.split_whitespace().next())
+        .collect();
+    if areas.is_empty() {
+        return Finding::good("swap", "no swap area is in use");
+    }
+    let areas = areas.join(", ");
+    let what = format!("swap is on ({areas}); rt-core locks its own pages, the window may still stall");
+    Finding::note("swap", what, "sudo swapoff -a")
+}
+
 /// Returns the free space where `path` lies.
 pub fn free_bytes(path: &Path) -> Option<u64> {
-    let path = CString::new(path.as_os_str().as_bytes()).ok()?;
-    // SAFETY: an all-zero statvfs is valid.
-    let mut space: libc::statvfs = unsafe { std::mem::zeroed() };
-    // SAFETY: `path` ends with a zero, `space` is valid for writes.
-    let done = unsafe { libc::statvfs(path.as_ptr(), &mut space) } == 0;
-    done.then(|| space.f_bavail as u64 * space.f_frsize as u64)
+    let space = rustix::fs::statvfs(path).ok()?;
+    Some(space.f_bavail * space.f_frsize)
 }
 
 pub fn space(machine: &Machine, free: impl Fn(&Path) -> Option<u64>) -> Finding {
@@ -25,9 +34,8 @@ pub fn space(machine: &Machine, free: impl Fn(&Path) -> Option<u64>) -> Finding 
         Some(bytes) if bytes >= WANTED_BYTES => {
             Finding::good("shared memory", format!("{} MiB free in /dev/shm", bytes >> 20))
         }
-        Some(bytes) => Finding::new(
+        Some(bytes) => Finding::blocker(
             "shared memory",
-            FindingLevel::Blocker,
             format!(
                 "only {} MiB free in /dev/shm; {} MiB are wanted",
                 bytes >> 20,
@@ -35,9 +43,8 @@ pub fn space(machine: &Machine, free: impl Fn(&Path) -> Option<u64>) -> Finding 
             ),
             "look with: ls -lS /dev/shm   or make it larger: sudo mount -o remount,size=1G /dev/shm",
         ),
-        None => Finding::new(
+        None => Finding::blocker(
             "shared memory",
-            FindingLevel::Blocker,
             "there is no /dev/shm",
             "sudo mount -t tmpfs -o size=1G tmpfs /dev/shm",
         ),
@@ -64,9 +71,8 @@ pub fn stale_services(machine: &Machine) -> Finding {
         .iter()
         .map(|s| format!("rm -r /dev/shm/{s} /dev/shm/{s}_*"))
         .collect();
-    Finding::new(
+    Finding::note(
         "stale services",
-        FindingLevel::Note,
         format!(
             "{} instances in /dev/shm that no program uses: {}{more}",
             stale.len(),

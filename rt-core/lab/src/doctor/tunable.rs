@@ -36,13 +36,14 @@ pub fn value(machine: &Machine, path: &str) -> Option<String> {
 
 const CPU: &str = "sys/devices/system/cpu";
 /// Exit latency, in microseconds, above which a sleep state shows in the wake-up latency.
-const DEEP_US: u64 = 20;
+pub const DEEP_US: u64 = 20;
 /// Seconds between two updates of the memory statistics; the default of 1 wakes a worker on every core each second.
 const STAT_INTERVAL: &str = "120";
 
-/// A setting examined by a check of this file.
+/// A setting with one wanted value, and its check.
 struct Quiet {
     check: &'static str,
+    /// With a `*` in place of the number of a core, if each core has its own.
     path: &'static str,
     wanted: &'static str,
     level: FindingLevel,
@@ -50,7 +51,7 @@ struct Quiet {
     bad: &'static str,
 }
 
-const QUIET: [Quiet; 5] = [
+const QUIET: [Quiet; 8] = [
     Quiet {
         check: "NMI watchdog",
         path: "proc/sys/kernel/nmi_watchdog",
@@ -91,36 +92,65 @@ const QUIET: [Quiet; 5] = [
         good: "PCIe links stay awake (ASPM performance)",
         bad: "PCIe links may sleep (ASPM): a FireWire or USB device on them answers later",
     },
+    Quiet {
+        check: "governor",
+        path: "sys/devices/system/cpu/cpu*/cpufreq/scaling_governor",
+        wanted: "performance",
+        level: FindingLevel::Warning,
+        good: "the core of the loop runs at full speed (performance)",
+        bad: "the core of the loop changes its speed",
+    },
+    Quiet {
+        check: "EPP",
+        path: "sys/devices/system/cpu/cpu*/cpufreq/energy_performance_preference",
+        wanted: "performance",
+        level: FindingLevel::Warning,
+        good: "the core of the loop prefers speed to energy",
+        bad: "the core of the loop weighs energy against speed",
+    },
+    Quiet {
+        check: "huge pages",
+        path: "sys/kernel/mm/transparent_hugepage/enabled",
+        wanted: "madvise",
+        level: FindingLevel::Note,
+        good: "pages are joined only where a program asks for it",
+        bad: "the kernel joins pages into huge ones by itself, and stops threads for it",
+    },
 ];
 
-/// Returns check and wanted value of a setting known only to this file.
+/// Returns check and wanted value of a setting of the table.
 pub fn quiet(path: &str) -> Option<(&'static str, &'static str)> {
-    let found = QUIET.iter().find(|q| q.path == path)?;
+    let is_its_path = |q: &&Quiet| match q.path.split_once('*') {
+        None => q.path == path,
+        Some((begin, end)) => {
+            let core = path.strip_prefix(begin).and_then(|rest| rest.strip_suffix(end));
+            core.is_some_and(|core| (1..=10).contains(&core.len()) && core.bytes().all(|b| b.is_ascii_digit()))
+        }
+    };
+    let found = QUIET.iter().find(is_its_path)?;
     Some((found.check, found.wanted))
 }
 
-/// Returns the findings on the settings known only to this file.
-pub fn findings(machine: &Machine) -> Vec<Finding> {
-    QUIET
-        .iter()
-        .map(|q| match value(machine, q.path) {
-            None => Finding::good(q.check, "this kernel has no such setting"),
-            Some(now) if met(q, &now) => Finding::good(q.check, q.good),
-            Some(now) => Finding::new(
-                q.check,
-                q.level,
-                format!("{} ({now})", q.bad),
-                format!("echo {} | sudo tee /{}", q.wanted, q.path),
-            ),
-        })
-        .collect()
+/// Returns the findings on the settings of the table, for the loop's core.
+pub fn findings(machine: &Machine, core: usize) -> Vec<Finding> {
+    let finding = |q: &Quiet| match value(machine, &q.path.replace('*', &core.to_string())) {
+        None => Finding::good(q.check, "this kernel has no such setting"),
+        Some(now) if met(q, &now) => Finding::good(q.check, q.good),
+        Some(now) => Finding::new(
+            q.check,
+            q.level,
+            format!("{} ({now})", q.bad),
+            format!("echo {} | sudo tee /{}", q.wanted, q.path),
+        ),
+    };
+    QUIET.iter().map(finding).collect()
 }
 
-/// True if a value is the wanted one; an interval may be longer.
+/// True if a value is the wanted one, or a better one.
 fn met(q: &Quiet, now: &str) -> bool {
-    let number = |text: &str| text.parse::<u64>().ok();
-    match (q.wanted == STAT_INTERVAL, number(now), number(q.wanted)) {
-        (true, Some(now), Some(wanted)) => now >= wanted,
+    match q.check {
+        "statistics" => now.parse::<u64>().is_ok_and(|now| now >= 120),
+        "huge pages" => now != "always",
         _ => now == q.wanted,
     }
 }
@@ -140,21 +170,17 @@ pub fn all(machine: &Machine, core: usize) -> Vec<Tunable> {
         }
     };
     for q in &QUIET {
-        // A value better than wanted stays.
-        let now = value(machine, q.path).filter(|now| met(q, now));
-        add(q.check, q.path.to_owned(), now.as_deref().unwrap_or(q.wanted));
-    }
-    for c in machine.online_cores() {
-        add(
-            "governor",
-            format!("{CPU}/cpu{c}/cpufreq/scaling_governor"),
-            "performance",
-        );
-        add(
-            "EPP",
-            format!("{CPU}/cpu{c}/cpufreq/energy_performance_preference"),
-            "performance",
-        );
+        let cores: Vec<usize> = if q.path.contains('*') {
+            machine.online_cores().into_iter().collect()
+        } else {
+            vec![core]
+        };
+        for core in cores {
+            let path = q.path.replace('*', &core.to_string());
+            // A value better than wanted stays.
+            let now = value(machine, &path).filter(|now| met(q, now));
+            add(q.check, path, now.as_deref().unwrap_or(q.wanted));
+        }
     }
     for state in machine.names(&format!("{CPU}/cpu{core}/cpuidle")) {
         let folder = format!("{CPU}/cpu{core}/cpuidle/{state}");
@@ -164,10 +190,6 @@ pub fn all(machine: &Machine, core: usize) -> Vec<Tunable> {
         if us.is_some_and(|us| us > DEEP_US) {
             add("sleep states", format!("{folder}/disable"), "1");
         }
-    }
-    let huge = "sys/kernel/mm/transparent_hugepage/enabled";
-    if value(machine, huge).as_deref() == Some("always") {
-        add("huge pages", huge.to_owned(), "madvise");
     }
     if matches!(machine.throttle(), Some(Throttle::Share(share)) if share < 0.9) {
         add("throttling", "proc/sys/kernel/sched_rt_runtime_us".to_owned(), "950000");
@@ -180,41 +202,10 @@ pub fn all(machine: &Machine, core: usize) -> Vec<Tunable> {
             let mut wanted = cores(&machine.text(&path).unwrap_or_default());
             wanted.remove(&core);
             let wanted = if wanted.is_empty() { &elsewhere } else { &wanted };
-            add("interrupts", path, &as_kernel_prints(&core_list(wanted)));
+            add("interrupts", path, &core_list(wanted));
         }
     }
     all
-}
-
-/// Writes `0,1,2` as `0-2`, so that the text read back is the text written.
-pub fn as_kernel_prints(list: &str) -> String {
-    let all: Vec<usize> = cores(list).into_iter().collect();
-    let mut ranges: Vec<(usize, usize)> = Vec::new();
-    for core in all {
-        match ranges.last_mut() {
-            Some((_, last)) if *last + 1 == core => *last = core,
-            _ => ranges.push((core, core)),
-        }
-    }
-    let words = ranges
-        .iter()
-        .map(|(a, b)| if a == b { a.to_string() } else { format!("{a}-{b}") });
-    words.collect::<Vec<String>>().join(",")
-}
-
-/// Returns the finding on the processor's preference for speed or energy.
-pub fn energy_preference(machine: &Machine, core: usize) -> Finding {
-    let path = format!("{CPU}/cpu{core}/cpufreq/energy_performance_preference");
-    match machine.text(&path).as_deref() {
-        None => Finding::good("EPP", "the processor has no energy preference"),
-        Some("performance") => Finding::good("EPP", format!("core {core} prefers speed to energy")),
-        Some(other) => Finding::new(
-            "EPP",
-            FindingLevel::Warning,
-            format!("core {core} weighs energy against speed ({other})"),
-            "echo performance | sudo tee /sys/devices/system/cpu/cpu*/cpufreq/energy_performance_preference",
-        ),
-    }
 }
 
 /// Examines turbo: fast, but its speed depends on heat and on other cores.
@@ -222,24 +213,16 @@ pub fn turbo(machine: &Machine) -> Finding {
     let off = "p50 is best with it, the same times again and again are had without it:";
     let no_turbo = machine.text(&format!("{CPU}/intel_pstate/no_turbo"));
     let boost = machine.text(&format!("{CPU}/cpufreq/boost"));
-    match (no_turbo.as_deref(), boost.as_deref()) {
-        (None, None) => Finding::good("turbo", "the kernel shows no turbo"),
+    let off_by = match (no_turbo.as_deref(), boost.as_deref()) {
+        (None, None) => return Finding::good("turbo", "the kernel shows no turbo"),
         (Some("1"), _) | (None, Some("0")) => {
-            Finding::good("turbo", "turbo is off: the speed does not depend on the heat")
+            return Finding::good("turbo", "turbo is off: the speed does not depend on the heat");
         }
-        (Some(_), _) => Finding::new(
-            "turbo",
-            FindingLevel::Note,
-            "turbo is on: the speed changes with heat and with other cores",
-            format!("{off} echo 1 | sudo tee /{CPU}/intel_pstate/no_turbo"),
-        ),
-        (None, Some(_)) => Finding::new(
-            "turbo",
-            FindingLevel::Note,
-            "turbo is on: the speed changes with heat and with other cores",
-            format!("{off} echo 0 | sudo tee /{CPU}/cpufreq/boost"),
-        ),
-    }
+        (Some(_), _) => format!("echo 1 | sudo tee /{CPU}/intel_pstate/no_turbo"),
+        (None, Some(_)) => format!("echo 0 | sudo tee /{CPU}/cpufreq/boost"),
+    };
+    let what = "turbo is on: the speed changes with heat and with other cores";
+    Finding::note("turbo", what, format!("{off} {off_by}"))
 }
 
 /// Profiles of tuned that do not save energy.
@@ -262,9 +245,8 @@ pub fn tuned(machine: &Machine) -> Finding {
     if fast {
         return Finding::good("tuned", format!("the profile of tuned is {profile}"));
     }
-    Finding::new(
+    Finding::warning(
         "tuned",
-        FindingLevel::Warning,
         format!("tuned sets this PC by its profile {profile:?}, which is not one for low latency"),
         "sudo tuned-adm profile realtime   (package tuned-profiles-realtime; else latency-performance)",
     )

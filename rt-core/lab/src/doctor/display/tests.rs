@@ -1,6 +1,7 @@
 //! An X server on the core of the force loop: named, moved and moved back; on preemptible kernels it is left alone.
 
 use super::*;
+use crate::doctor::FindingLevel;
 use crate::doctor::mend::file::{Changes, State};
 use crate::doctor::tests::{Fake, expect};
 use std::os::unix::process::CommandExt;

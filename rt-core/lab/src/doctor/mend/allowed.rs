@@ -57,17 +57,11 @@ fn is_numbered(text: &str, name: &str) -> bool {
 fn setting(path: &str) -> Option<Setting> {
     use Values::{Cores, Number, Word};
     let (check, values, wanted) = match path.split('/').collect::<Vec<_>>()[..] {
-        ["sys", "devices", "system", "cpu", core, "cpufreq", name] if is_numbered(core, "cpu") => match name {
-            "scaling_governor" => ("governor", Word, Some("performance")),
-            "energy_performance_preference" => ("EPP", Word, Some("performance")),
-            _ => return None,
-        },
         ["sys", "devices", "system", "cpu", core, "cpuidle", state, "disable"]
             if is_numbered(core, "cpu") && is_numbered(state, "state") =>
         {
             ("sleep states", Number, Some("1"))
         }
-        ["sys", "kernel", "mm", "transparent_hugepage", "enabled"] => ("huge pages", Word, Some("madvise")),
         ["proc", "sys", "kernel", "sched_rt_runtime_us"] => ("throttling", Number, Some("950000")),
         ["proc", "irq", number, "smp_affinity_list"] if is_number(number) => ("interrupts", Cores, None),
         ["proc", process, "task", thread, "status"] if is_number(process) && is_number(thread) => {

@@ -2,29 +2,26 @@
 
 mod allowed;
 pub(super) mod file;
-mod page;
 #[cfg(test)]
 mod tests;
 
 use super::display;
 use super::tunable::{self, Tunable};
 use crate::args::duration_ns;
+use crate::collect::LoopTiming;
+use crate::disk::{self, DiskError};
 use crate::load::Load;
 use crate::machine::Machine;
-use crate::measure::{MeasureError, Measured, Setup, measure};
-use crate::plots::DrawError;
-use crate::summary::{Summary, summary};
+use crate::measure::{MeasureError, Setup, measure};
+use crate::summary::{QUANTILES, quantile_us};
 use clap::Args;
 use file::Changes;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use stylet_runtime::args::{OptionsError, RealTimeArgs};
-use stylet_write::{WriteError, write_whole};
+use stylet_write::write_whole;
 
 const UNDO: &str = "undo.json";
-const REPORT: &str = "mend.json";
-const PAGE: &str = "mend.html";
 
 /// What the doctor is asked for.
 #[derive(Args, Debug)]
@@ -42,10 +39,10 @@ pub struct DoctorArgs {
     /// Nothing is kept over a restart.
     #[arg(long, conflicts_with = "undo")]
     apply: bool,
-    /// With --apply: change them, measure before and after, and write DIR/undo.json, mend.json and mend.html
+    /// With --apply: change them, print the loop's wake-ups before and after, and write DIR/undo.json
     #[arg(long, requires = "apply", requires = "out")]
     yes: bool,
-    /// With --apply: folder of the report and of undo.json
+    /// With --apply: folder of undo.json
     #[arg(long, value_name = "DIR", requires = "apply")]
     out: Option<PathBuf>,
     /// With --apply --yes: how long to measure before, and again after
@@ -74,27 +71,13 @@ pub enum MendError {
     NotUndone(PathBuf),
     /// A file cannot be written.
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Disk(#[from] DiskError),
     /// Options of the measurement.
     #[error(transparent)]
     Options(#[from] OptionsError),
     /// The measurement did not run.
     #[error(transparent)]
     Measure(#[from] MeasureError),
-    /// The folder of the report.
-    #[error("cannot make {}: {why}", .folder.display())]
-    Folder {
-        /// The folder.
-        folder: PathBuf,
-        /// Error of the system.
-        why: std::io::Error,
-    },
-    /// A picture of the page.
-    #[error(transparent)]
-    Draw(#[from] DrawError),
-    /// The report as JSON.
-    #[error(transparent)]
-    Json(#[from] serde_json::Error),
 }
 
 /// Examines, shows, changes or undoes; 0 when all was done, 1 when there is a blocker or a setting was refused.
@@ -150,43 +133,6 @@ fn dry_run(tunables: &[Tunable]) -> String {
     )
 }
 
-/// Wake-ups and own work of the force loop in one measurement.
-#[derive(Clone, Debug, Serialize)]
-pub struct Side {
-    pub wake: Summary,
-    pub work: Summary,
-    pub ticks: u64,
-    pub missed_deadlines: u64,
-    #[serde(skip)]
-    pub wake_times: hdrhistogram::Histogram<u64>,
-}
-
-impl Side {
-    fn of(measured: &Measured) -> Self {
-        let h = &measured.haptic;
-        Self {
-            wake: summary("wake-up", &h.wake, 1e3),
-            work: summary("whole tick", &h.work, 1e3),
-            ticks: h.ticks,
-            missed_deadlines: h.missed,
-            wake_times: h.wake.clone(),
-        }
-    }
-}
-
-/// The report of a change.
-#[derive(Serialize)]
-pub struct MendReport<'a> {
-    pub schema: &'static str,
-    pub made_at: String,
-    pub program: String,
-    pub core: usize,
-    pub measured_for_s: f64,
-    pub changes: &'a Changes,
-    pub before: Side,
-    pub after: Side,
-}
-
 fn mend(
     machine: &Machine,
     core: usize,
@@ -199,53 +145,37 @@ fn mend(
     if Changes::read(&undo).is_ok_and(|c| !c.is_undone()) {
         return Err(MendError::NotUndone(undo));
     }
-    std::fs::create_dir_all(out).map_err(|why| MendError::Folder {
-        folder: out.to_owned(),
-        why,
-    })?;
-    eprintln!("rt-core: measuring for {:.0} s before", duration_ns as f64 / 1e9);
-    let before = side(core, duration_ns, out, interrupted)?;
+    disk::make(out)?;
+    let put = |changes: &Changes| write_whole(&undo, changes.text().as_bytes()).map_err(DiskError::from);
+    let measured = |when: &str| {
+        eprintln!("rt-core: measuring for {:.0} s {when}", duration_ns as f64 / 1e9);
+        let options = RealTimeArgs::for_measurement(core).options(&format!("lab-{}", std::process::id()))?;
+        let setup = Setup::new(&options, duration_ns, Load::None, out);
+        Ok::<_, MendError>(measure(&setup, interrupted)?.haptic)
+    };
+    let before = measured("before")?;
     let mut changes = Changes::planned(tunables);
     // The undo data is on disk before anything changes.
-    write_whole(&undo, changes.text().as_bytes())?;
+    put(&changes)?;
     changes.apply(machine);
-    write_whole(&undo, changes.text().as_bytes())?;
+    put(&changes)?;
     print!("{}", changes.words());
-    eprintln!("rt-core: measuring for {:.0} s after", duration_ns as f64 / 1e9);
-    let after = side(core, duration_ns, out, interrupted)?;
-    let report = MendReport {
-        schema: "stylet.mend/1",
-        made_at: jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M:%S UTC").to_string(),
-        program: format!("rt-core {}", env!("CARGO_PKG_VERSION")),
-        core,
-        measured_for_s: duration_ns as f64 / 1e9,
-        changes: &changes,
-        before,
-        after,
-    };
-    let json = serde_json::to_string_pretty(&report)? + "\n";
-    write_whole(&out.join(REPORT), json.as_bytes())?;
-    let page = page::page(&report)?;
-    write_whole(&out.join(PAGE), page.as_bytes())?;
-    for (name, ratio) in page::ratios(&report.before.wake, &report.after.wake) {
-        println!("wake-up {name}: after over before {ratio}");
-    }
-    println!("{}", out.join(PAGE).display());
+    let after = measured("after")?;
+    print!("{}", compared(&before, &after));
     println!("undo with: sudo rt-core doctor --undo {}", undo.display());
     Ok(u8::from(changes.any_refused()))
 }
 
-fn side(core: usize, duration_ns: u64, folder: &Path, interrupted: &AtomicBool) -> Result<Side, MendError> {
-    let instance = format!("lab-{}", std::process::id());
-    let options = RealTimeArgs::for_measurement(core).options(&instance)?;
-    let setup = Setup {
-        options: &options,
-        duration_ns,
-        load: Load::None,
-        folder,
-        trace_over_ns: None,
-        toggle: None,
-        checkpoints: None,
-    };
-    Ok(Side::of(&measure(&setup, interrupted)?))
+/// Compares the wake-ups of two measurements; a percentile that one was too short for is missing.
+fn compared(before: &LoopTiming, after: &LoopTiming) -> String {
+    let mut out = String::from("\nwake-up, us        before     after     ratio\n");
+    let max = |t: &LoopTiming| Some(t.wake.max() as f64 / 1e3).filter(|_| !t.wake.is_empty());
+    let quantiles = QUANTILES.map(|(name, q)| (name, quantile_us(&before.wake, q), quantile_us(&after.wake, q)));
+    for (name, before, after) in quantiles.into_iter().chain([("max", max(before), max(after))]) {
+        if let (Some(before), Some(after)) = (before, after) {
+            out += &format!("{name:<14} {before:>10.1} {after:>9.1} {:>9.2}\n", after / before);
+        }
+    }
+    let missed = |t: &LoopTiming| format!("{} of {}", t.missed, t.ticks + t.missed);
+    out + &format!("deadlines missed: {} before, {} after\n", missed(before), missed(after))
 }
