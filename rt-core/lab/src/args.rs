@@ -54,11 +54,11 @@ pub struct LatencyArgs {
     /// parallel:0x378; needs root
     ///
     /// One instruction writes the register, at irregular times of 20 to 83 ticks, and the loop notes when:
-    /// DIR/toggles.csv. The addresses of the ports are in /proc/ioports. Record the pin with a logic analyser, or with
-    /// a sound card through a divider; record beside it what answers to it, then give the capture to --external.
+    /// DIR/toggles.csv. The addresses of the ports are in /proc/ioports. Record the pin with a logic analyser, and
+    /// beside it what answers to it, then give the capture to --external.
     #[arg(long, value_name = "PORT")]
     pub toggle: Option<Pin>,
-    /// Measure nothing: compare a capture of the pin (sigrok CSV or VCD, WAV) with the record of --toggle in DIR
+    /// Measure nothing: compare a capture of the pin (CSV of sigrok) with the record of --toggle in DIR
     #[arg(long, value_name = "FILE", conflicts_with_all = ["toggle", "trace", "compare"])]
     pub external: Option<PathBuf>,
     /// Input of the capture that shows when the handle moves, such as an accelerometer: delays after it are given as

@@ -128,16 +128,6 @@ pub fn delay(
             ),
         ),
         term(
-            "threshold",
-            'B',
-            (from.channel.rise_s.powi(2) + channel.rise_s.powi(2)).sqrt() / 12_f64.sqrt(),
-            format!(
-                "an edge lasts {:.2} and {:.2} us (rectangles)",
-                from.channel.rise_s * 1e6,
-                channel.rise_s * 1e6
-            ),
-        ),
-        term(
             "clock of the instrument",
             'B',
             mean_s * alignment.drift_u,

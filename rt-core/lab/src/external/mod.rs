@@ -1,8 +1,8 @@
 //! `rt-core latency --external FILE`: compares this program's measurement with an external instrument's.
 //!
-//! During a measurement with `--toggle` the force loop toggles a pin and notes the times. A logic analyser or a sound
-//! card records the pin and the responses to it. Afterwards the capture is read ([`capture`]), aligned with the notes
-//! by the pattern of the times between edges ([`align`]), and each delay is given with its uncertainty ([`budget`]).
+//! During a measurement with `--toggle` the force loop toggles a pin and notes the times. A logic analyser
+//! records the pin and the responses to it. Afterwards the capture is read ([`capture`]), aligned with the notes by the
+//! pattern of the times between edges ([`align`]), and each delay is given with its uncertainty ([`budget`]).
 
 mod align;
 mod budget;
@@ -12,6 +12,7 @@ mod page;
 mod tests;
 
 use crate::collect::ToggleTime;
+use crate::disk::{self, DiskError};
 use align::{Alignment, align};
 use budget::{Begins, Delay};
 use capture::{Capture, CaptureError};
@@ -21,8 +22,6 @@ use stylet_write::{WriteError, write_whole};
 
 /// Notes of the loop: times at which the pin was toggled.
 pub const TOGGLES: &str = "toggles.csv";
-const JSON: &str = "external.json";
-const PAGE: &str = "external.html";
 const HEAD: &str = "due_ns,before_ns,after_ns";
 
 /// The capture cannot be used.
@@ -46,7 +45,7 @@ pub enum ExternalError {
     },
     /// The results cannot be written.
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Disk(#[from] DiskError),
 }
 
 /// Result of the capture.
@@ -54,7 +53,6 @@ pub enum ExternalError {
 pub struct External {
     schema: &'static str,
     capture: String,
-    kind: &'static str,
     sample_us: f64,
     toggles: usize,
     edges: usize,
@@ -123,9 +121,6 @@ pub fn run(folder: &Path, file: &Path, motion: Option<&str>) -> Result<u8, Exter
     };
     let capture = capture::read(file).map_err(failed)?;
     let external = evaluate(&toggles, &capture, &file.display().to_string(), motion).map_err(failed)?;
-    let json = serde_json::to_string_pretty(&external).unwrap_or_default() + "\n";
-    write_whole(&folder.join(JSON), json.as_bytes())?;
-    write_whole(&folder.join(PAGE), page::page(&external).as_bytes())?;
     println!(
         "{} of {} edges are toggles of this run; clocks differ by {:.3} +- {:.3} ppm; edges lie within {:.2} us of our record",
         external.pairs, external.edges, external.drift_ppm, external.drift_expanded_ppm, external.pin_worst_us
@@ -140,7 +135,7 @@ pub fn run(folder: &Path, file: &Path, motion: Option<&str>) -> Result<u8, Exter
         );
     }
     external.without.iter().for_each(|why| println!("no delay: {why}"));
-    println!("{}", folder.join(PAGE).display());
+    disk::write_report(folder, "external", &external, &page::page(&external))?;
     Ok(0)
 }
 
@@ -183,7 +178,6 @@ fn evaluate(
     Ok(External {
         schema: "stylet.external/1",
         capture: name.to_owned(),
-        kind: capture.kind,
         sample_us: capture.step_s * 1e6,
         toggles: toggles.len(),
         edges: pin_channel.edges_s.len(),
@@ -209,16 +203,9 @@ fn delays(
 ) -> Result<(Vec<Delay>, Vec<String>), CaptureError> {
     let pin = &capture.channels[pin];
     let named = |name: &str| {
-        let names = || {
-            capture
-                .channels
-                .iter()
-                .map(|c| c.name.as_str())
-                .collect::<Vec<_>>()
-                .join(", ")
-        };
         let found = capture.channels.iter().find(|c| c.name == name && c.name != pin.name);
-        found.ok_or_else(|| format!("{name:?} is no input beside the pin; there are {}", names()))
+        let names: Vec<&str> = capture.channels.iter().map(|c| c.name.as_str()).collect();
+        found.ok_or_else(|| format!("{name:?} is no input beside the pin; there are {}", names.join(", ")))
     };
     let motion = motion.map(named).transpose()?.map(Begins::at_motion);
     let from_pin = Begins::at_pin(pin, alignment);

@@ -35,14 +35,15 @@ pub fn page(e: &External) -> String {
         .collect();
     let main = html! {
         header { h1 { "Capture of an instrument" } }
-        p class="sub" { (e.kind) ", " code { (e.capture) } "." }
+        p class="sub" { code { (e.capture) } "." }
         h2 { "Agreement with our clock" }
         div class="half" { (table(&["", ""], &rows, &[Column::Text, Column::Number])) }
         @for d in &e.delays { (delay(d)) }
         @for why in &e.without { p { "No delay: " (why) "." } }
         footer {
             "Uncertainties after the GUM (NIST TN 1297): each term is a standard uncertainty, the expanded one has a coverage \
-             factor of 2, about 95 %. What happens between the register and the plug is in no term: look it up for the port."
+             factor of 2, about 95 %. What happens between the register and the plug, and the time that an edge takes, are in no term: look them \
+             up for the port and the comparator."
         }
     };
     stylet_report::page("Capture of an instrument", "", &main)
