@@ -1,7 +1,7 @@
 //! Distributions of the results of insertions, and influences on their misplacement.
 
-use crate::dose::Scored;
-use stylet_insertions::{Insertion, Table};
+use crate::dose::{Covered, Scored};
+use stylet_insertions::{Insertion, Motion, Table};
 
 /// Sorted values of one quantity.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,58 +53,33 @@ impl Distribution {
 
 /// Returns all distributions, in the order of the page.
 pub fn figures(table: &Table, scored: &Scored) -> Vec<Distribution> {
-    let seeds = || {
+    let seeds = |n: usize| {
+        let all = table.rows.iter().flat_map(|row| &row.seeds);
+        all.filter_map(|seed| Some(seed.misplacement_mm()?[n])).collect()
+    };
+    let motions = |of: fn(&Motion) -> f64| {
         table
             .rows
             .iter()
-            .flat_map(|row| &row.seeds)
-            .filter_map(|seed| seed.misplacement_mm())
+            .filter_map(|row| row.outcome.as_ref().ok())
+            .map(of)
+            .collect()
     };
-    let motions = || table.rows.iter().filter_map(|row| row.outcome.as_ref().ok());
-    let implants = |of: fn(&crate::ImplantDose) -> f64| scored.implants.iter().map(of).collect::<Vec<_>>();
+    let implants = |of: fn(&Covered) -> f64| scored.implants.iter().map(|i| of(&i.delivered)).collect();
+    let (largest, percent) = ("Largest displacement of tissue", "% of the prescription");
     let all = [
-        Distribution::new("Seed misplacement", "mm", "seed", seeds().map(|m| m[0]).collect()),
-        Distribution::new(
-            "Along the needle, + too deep",
-            "mm",
-            "seed",
-            seeds().map(|m| m[1]).collect(),
-        ),
-        Distribution::new(
-            "Shift of the gland",
-            "mm",
-            "insertion",
-            motions().map(|m| m.target_shift_mm).collect(),
-        ),
-        Distribution::new(
-            "Largest displacement of tissue",
-            "mm",
-            "insertion",
-            motions().map(|m| m.largest_displacement_mm).collect(),
-        ),
-        Distribution::new(
-            "Peak force on the hand",
-            "N",
-            "insertion",
-            motions().map(|m| m.peak_force_n).collect(),
-        ),
-        Distribution::new(
-            "Duration of an insertion",
-            "s",
-            "insertion",
-            motions().map(|m| m.duration_s).collect(),
-        ),
-        Distribution::new(
-            "D90 of the implant",
-            "% of the prescription",
-            "implant",
-            implants(|i| i.delivered.d90_percent),
-        ),
+        Distribution::new("Seed misplacement", "mm", "seed", seeds(0)),
+        Distribution::new("Along the needle, + too deep", "mm", "seed", seeds(1)),
+        Distribution::new("Shift of the gland", "mm", "insertion", motions(|m| m.target_shift_mm)),
+        Distribution::new(largest, "mm", "insertion", motions(|m| m.largest_displacement_mm)),
+        Distribution::new("Peak force on the hand", "N", "insertion", motions(|m| m.peak_force_n)),
+        Distribution::new("Duration of an insertion", "s", "insertion", motions(|m| m.duration_s)),
+        Distribution::new("D90 of the implant", percent, "implant", implants(|c| c.d90_percent)),
         Distribution::new(
             "V100 of the implant",
             "% of the target",
             "implant",
-            implants(|i| i.delivered.v100_percent),
+            implants(|c| c.v100_percent),
         ),
     ];
     all.into_iter().filter(|d| !d.values.is_empty()).collect()

@@ -21,7 +21,6 @@ pub use error::PopulationError;
 pub use errors::{misplacement, turned};
 pub use figures::{Distribution, figures};
 pub use page::page;
-pub use published::{PUBLISHED, Published, Use};
 pub use shards::{Population, load};
 pub use tables::write_tables;
 

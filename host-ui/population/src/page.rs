@@ -1,6 +1,6 @@
 //! The page: every distribution with published values, dose, and provenance. Self-contained.
 
-use crate::dose::Scored;
+use crate::dose::{Covered, ImplantDose, Scored};
 use crate::error::PopulationError;
 use crate::figures::{Distribution, influences};
 use crate::picture;
@@ -151,29 +151,23 @@ fn dose(scored: &Scored) -> Markup {
         return html! {};
     }
     let count = scored.implants.len() as f64;
-    let share = |of: &dyn Fn(&crate::ImplantDose) -> bool| {
-        100.0 * scored.implants.iter().filter(|i| of(i)).count() as f64 / count
+    let reached = |percent: f64| {
+        let reach = scored.implants.iter().filter(|i| i.delivered.d90_percent >= percent);
+        format!("{:.1} %", 100.0 * reach.count() as f64 / count)
     };
-    let column = |of: fn(&crate::ImplantDose) -> f64| {
-        Distribution::new("", "%", "implant", scored.implants.iter().map(of).collect())
-    };
-    let row = |name: &str, planned: Distribution, delivered: Distribution| {
+    let row = |name: &str, of: fn(&Covered) -> f64| {
+        let column = |of_implant: &dyn Fn(&ImplantDose) -> f64| {
+            Distribution::new("", "%", "implant", scored.implants.iter().map(of_implant).collect())
+        };
+        let (planned, delivered) = (column(&|i| of(&i.planned)), column(&|i| of(&i.delivered)));
         let figures = [planned.mean(), delivered.mean(), delivered.deviation()];
         let percentiles = [5.0, 50.0, 95.0].map(|p| delivered.percentile(p));
         let values = figures.into_iter().chain(percentiles).map(|v| cell(value(v)));
         std::iter::once(cell(name)).chain(values).collect()
     };
     let rows = [
-        row(
-            "D90, % of the prescription",
-            column(|i| i.planned.d90_percent),
-            column(|i| i.delivered.d90_percent),
-        ),
-        row(
-            "V100, % of the target",
-            column(|i| i.planned.v100_percent),
-            column(|i| i.delivered.v100_percent),
-        ),
+        row("D90, % of the prescription", |c| c.d90_percent),
+        row("V100, % of the target", |c| c.v100_percent),
     ];
     html! {
         h2 { "Dose of the target" }
@@ -181,14 +175,14 @@ fn dose(scored: &Scored) -> Markup {
             "needles that only push or hold the gland are not part of it." }
         (parts::numbers(&["", "planned, mean", "delivered, mean", "SD", "p5", "median", "p95"], &rows))
         p {
-            "D90 is at least 90 % of the prescription in " b { (format!("{:.1} %", share(&|i| i.delivered.d90_percent >= 90.0))) }
-            " of the implants, and at least 100 % in " b { (format!("{:.1} %", share(&|i| i.delivered.d90_percent >= 100.0))) } "."
+            "D90 is at least 90 % of the prescription in " b { (reached(90.0)) }
+            " of the implants, and at least 100 % in " b { (reached(100.0)) } "."
         }
     }
 }
 
 fn what_goes_with_it(p: &Population) -> Markup {
-    let found: Vec<(String, f64)> = influences(&p.table).into_iter().collect();
+    let found = influences(&p.table);
     if found.is_empty() {
         return html! {};
     }
@@ -217,12 +211,12 @@ fn published_table() -> Markup {
     let row = |p: &Published| {
         let value = html! { (p.value) " " (p.unit) };
         vec![
-            cell(p.what),
+            cell(&p.what),
             value,
-            cell(p.how),
-            cell(p.source),
+            cell(&p.how),
+            cell(&p.source),
             cell(p.used.name()),
-            cell(p.note),
+            cell(&p.note),
         ]
     };
     let rows: Vec<_> = PUBLISHED.iter().map(row).collect();

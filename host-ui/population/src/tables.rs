@@ -6,7 +6,7 @@ use crate::figures::{Distribution, mean_misplacement_mm};
 use std::path::Path;
 use stylet_base::format::cell;
 use stylet_base::write_whole;
-use stylet_insertions::Table;
+use stylet_insertions::{MEASURED, Table};
 
 /// Writes insertions.csv, implants.csv and distributions.csv.
 ///
@@ -39,45 +39,32 @@ fn number(value: Option<f64>) -> String {
 fn insertions(table: &Table) -> Result<Vec<u8>, PopulationError> {
     let mut rows = csv::Writer::from_writer(Vec::new());
     let fixed = ["id", "scene", "plan", "implant", "needle", "hole", "tissue"];
-    let results = [
-        "peak_force_n",
-        "displacement_before_puncture_mm",
-        "largest_displacement_mm",
-        "target_shift_mm",
-        "duration_s",
-        "seeds",
-        "mean_misplacement_mm",
-        "failure",
-    ];
+    let ending = ["seeds", "mean_misplacement_mm", "failure"];
     let drawn = table.quantities.iter().map(String::as_str);
-    rows.write_record(
-        fixed
-            .into_iter()
-            .chain(drawn)
-            .chain(results)
-            .map(|name| cell(name).into_owned()),
-    )?;
+    let measured = MEASURED.map(|(name, _)| name);
+    let head = fixed.into_iter().chain(drawn).chain(measured).chain(ending);
+    rows.write_record(head.map(|name| cell(name).into_owned()))?;
     for row in &table.rows {
-        let m = row.outcome.as_ref().ok();
-        let mut record = vec![row.id.clone(), row.scene.clone(), row.plan.clone()];
-        record.extend([
-            row.implant.to_string(),
-            row.needle.to_string(),
-            row.hole.clone(),
-            row.tissue.clone(),
-        ]);
-        record.extend(row.drawn.iter().map(f64::to_string));
-        record.extend([
-            number(m.map(|m| m.peak_force_n)),
-            number(m.map(|m| m.displacement_before_puncture_mm)),
-            number(m.map(|m| m.largest_displacement_mm)),
-            number(m.map(|m| m.target_shift_mm)),
-            number(m.map(|m| m.duration_s)),
+        let m = row.outcome.as_ref();
+        let (implant, needle) = (row.implant.to_string(), row.needle.to_string());
+        let fixed = [
+            &row.id,
+            &row.scene,
+            &row.plan,
+            &implant,
+            &needle,
+            &row.hole,
+            &row.tissue,
+        ];
+        let ending = [
             row.seeds.len().to_string(),
             number(mean_misplacement_mm(row)),
-            row.outcome.as_ref().err().cloned().unwrap_or_default(),
-        ]);
-        rows.write_record(record.iter().map(|value| cell(value).into_owned()))?;
+            m.err().cloned().unwrap_or_default(),
+        ];
+        let measured = MEASURED.map(|(_, of)| number(m.ok().map(of)));
+        let drawn = row.drawn.iter().map(f64::to_string);
+        let record = fixed.into_iter().cloned().chain(drawn).chain(measured).chain(ending);
+        rows.write_record(record.map(|value| cell(&value).into_owned()))?;
     }
     bytes(rows)
 }
@@ -93,12 +80,8 @@ fn implants(scored: &Scored) -> Result<Vec<u8>, PopulationError> {
         "delivered_v100_percent",
     ])?;
     for i in &scored.implants {
-        let figures = [
-            i.planned.d90_percent,
-            i.delivered.d90_percent,
-            i.planned.v100_percent,
-            i.delivered.v100_percent,
-        ];
+        let (p, d) = (i.planned, i.delivered);
+        let figures = [p.d90_percent, d.d90_percent, p.v100_percent, d.v100_percent];
         let record = [cell(&i.id).into_owned(), i.seeds.to_string()].into_iter();
         rows.write_record(record.chain(figures.map(|f| f.to_string())))?;
     }

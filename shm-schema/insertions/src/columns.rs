@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 pub type Text = (&'static str, fn(&Insertion) -> &str);
 pub type Whole = (&'static str, fn(&Insertion) -> i32);
+/// Name and value of a result.
 pub type Measured = (&'static str, fn(&Motion) -> f64);
 
 /// Text columns, set in every row.
