@@ -16,7 +16,6 @@ pub mod credibility;
 mod disk;
 pub mod doctor;
 mod external;
-mod extreme;
 mod files;
 pub mod fleet;
 mod gaps;

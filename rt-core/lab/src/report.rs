@@ -6,10 +6,10 @@ pub use assemble::{Parts, report, window_rows};
 
 use crate::bound::MissBound;
 use crate::compare::Comparison;
-use crate::extreme::Extremes;
 use crate::load::Load;
 use crate::provenance::{Fact, Package, ProgramDigest, Setting};
 use crate::spin::SpinSearch;
+use crate::stationary::Stationarity;
 use crate::summary::Summary;
 use crate::trace::TraceSection;
 use crate::verdict::{LimitResult, Outcome};
@@ -17,7 +17,7 @@ use crate::watch::CoreWatch;
 use crate::whose::Whose;
 use serde::{Deserialize, Serialize};
 
-/// Version of the format: incremented when a field changes its meaning or is removed.
+/// Version of the format: incremented when a field changes its meaning, or one that `saved` reads is removed.
 pub const SCHEMA: &str = "stylet.latency/1";
 pub const JSON: &str = "report.json";
 pub const PAGE: &str = "report.html";
@@ -171,9 +171,9 @@ pub struct Report {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trace: Option<TraceSection>,
     /// Wake-ups of the force loop in equal parts of the run. Reports of older versions have neither this nor
-    /// `extremes`.
+    /// `stationarity`.
     pub parts: Vec<Summary>,
-    pub extremes: Extremes,
+    pub stationarity: Stationarity,
     pub gaps: GapSection,
     pub cores: Vec<CoreWatch>,
     pub comparison: Option<Comparison>,

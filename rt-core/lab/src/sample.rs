@@ -1,8 +1,6 @@
-//! Samples of a run kept with its histograms, for a later examination of dependence, change and the far tail.
+//! Samples of a run kept with its histograms, for a later examination of dependence and change.
 
 use hdrhistogram::Histogram;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
 /// Longest time that a histogram resolves; longer ones count as this.
 const LONGEST_NS: u64 = 10_000_000_000;
@@ -10,8 +8,6 @@ const LONGEST_NS: u64 = 10_000_000_000;
 const DIGITS: u8 = 3;
 /// Equal parts of the run with a histogram each.
 pub const PARTS: usize = 8;
-/// Latest wake-ups kept with their grid point.
-pub const LARGEST: usize = 2_000;
 /// Wake-ups kept in time order; at least half this number, except in short runs.
 const SERIES: usize = 16_384;
 
@@ -28,11 +24,8 @@ pub struct Sample {
     pub series: Vec<u64>,
     /// Ticks from one entry of the series to the next.
     pub stride: u64,
-    /// Grid points of the run so far, missed ones included.
-    pub grid: u64,
     part_grid: u64,
     ticks: u64,
-    largest: BinaryHeap<Reverse<(u64, u64)>>,
 }
 
 impl Sample {
@@ -42,16 +35,13 @@ impl Sample {
             parts: (0..PARTS).map(|_| histogram()).collect(),
             series: Vec::with_capacity(SERIES),
             stride: 1,
-            grid: 0,
             part_grid: grid.div_ceil(PARTS as u64).max(1),
             ticks: 0,
-            largest: BinaryHeap::with_capacity(LARGEST + 1),
         }
     }
 
     /// Takes a tick at the grid point `place` that woke `wake_ns` late.
     pub fn take(&mut self, place: u64, wake_ns: u64) {
-        self.grid = place + 1;
         if let Some(part) = self.parts.get_mut((place / self.part_grid) as usize) {
             part.saturating_record(wake_ns);
         }
@@ -65,12 +55,6 @@ impl Sample {
             }
         }
         self.ticks += 1;
-        if self.largest.len() < LARGEST {
-            self.largest.push(Reverse((wake_ns, place)));
-        } else if self.largest.peek().is_some_and(|least| wake_ns > least.0.0) {
-            self.largest.pop();
-            self.largest.push(Reverse((wake_ns, place)));
-        }
     }
 
     /// Keeps every second entry.
@@ -81,13 +65,6 @@ impl Sample {
         self.series.truncate(SERIES / 2);
         self.stride *= 2;
     }
-
-    /// Returns the latest wake-ups as (grid point, nanoseconds), in the order of time.
-    pub fn largest(&self) -> Vec<(u64, u64)> {
-        let mut all: Vec<(u64, u64)> = self.largest.iter().map(|Reverse((ns, place))| (*place, *ns)).collect();
-        all.sort_unstable();
-        all
-    }
 }
 
 #[cfg(test)]
@@ -96,7 +73,7 @@ mod tests {
     use stylet_random::Random;
 
     #[test]
-    fn series_is_every_so_manieth_tick_and_the_largest_are_those_of_a_sort() {
+    fn series_is_every_so_manieth_tick() {
         let mut random = Random(7);
         let all: Vec<u64> = (0..100_000).map(|_| random.draw() % 1_000_003).collect();
         let mut sample = Sample::new(100_000);
@@ -106,18 +83,12 @@ mod tests {
         assert_eq!(sample.stride, 8);
         let expected: Vec<u64> = all.iter().step_by(8).copied().collect();
         assert_eq!(sample.series, expected);
-        let mut sorted: Vec<u64> = all.clone();
-        sorted.sort_unstable_by(|a, b| b.cmp(a));
-        let mut kept: Vec<u64> = sample.largest().iter().map(|(_, ns)| *ns).collect();
-        assert!(sample.largest().iter().all(|(place, ns)| all[*place as usize] == *ns));
-        kept.sort_unstable_by(|a, b| b.cmp(a));
-        assert_eq!(kept, sorted[..LARGEST]);
     }
 
     #[test]
     fn parts_have_equal_shares_and_nothing_is_allocated_on_the_way() {
         let mut sample = Sample::new(80_000);
-        let room = (sample.series.capacity(), sample.largest.capacity());
+        let room = sample.series.capacity();
         for i in 0..80_000 {
             sample.take(i, i / 10_000 + 1);
         }
@@ -127,6 +98,6 @@ mod tests {
                 (10_000, i as u64 + 1, i as u64 + 1)
             );
         }
-        assert_eq!((sample.series.capacity(), sample.largest.capacity()), room);
+        assert_eq!(sample.series.capacity(), room);
     }
 }

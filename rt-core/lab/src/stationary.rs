@@ -27,7 +27,7 @@ impl TestResult {
     }
 
     /// Returns the result as a reason, with the limit.
-    pub fn said(&self) -> String {
+    fn said(&self) -> String {
         format!(
             "{}: distance {:.3}, p {:.1e}, below {LEVEL}",
             self.name, self.distance, self.p
@@ -139,7 +139,7 @@ fn parts(values: &[f64]) -> TestResult {
 }
 
 /// Makes Kolmogorov and Smirnov's test of two samples.
-pub fn two_samples(name: &'static str, a: &[f64], b: &[f64]) -> TestResult {
+fn two_samples(name: &'static str, a: &[f64], b: &[f64]) -> TestResult {
     let sorted = |of: &[f64]| {
         let mut all = of.to_vec();
         all.sort_unstable_by(f64::total_cmp);
@@ -163,23 +163,6 @@ pub fn two_samples(name: &'static str, a: &[f64], b: &[f64]) -> TestResult {
         1.0
     } else {
         kolmogorov(distance, n * m / (n + m))
-    };
-    TestResult { name, distance, p }
-}
-
-/// Returns the test of one sample in 0 to 1 against the uniform distribution.
-pub fn uniform(name: &'static str, values: &[f64]) -> TestResult {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let n = sorted.len() as f64;
-    let distances = sorted.iter().enumerate();
-    let distance = distances.fold(0.0_f64, |d, (i, &v)| {
-        d.max(v - i as f64 / n).max((i as f64 + 1.0) / n - v)
-    });
-    let p = if sorted.is_empty() {
-        1.0
-    } else {
-        kolmogorov(distance, n)
     };
     TestResult { name, distance, p }
 }
@@ -241,7 +224,6 @@ mod tests {
             .map(|&v| (below(&a, v) - below(&b, v)).abs())
             .fold(0.0, f64::max);
         assert!((two_samples("", &a, &b).distance - brute).abs() < 1e-12);
-        assert!((uniform("", &[0.1, 0.2, 0.9]).distance - 7.0 / 15.0).abs() < 1e-12);
     }
 
     #[test]

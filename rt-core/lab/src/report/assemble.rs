@@ -7,7 +7,6 @@ use super::{
 use crate::bound;
 use crate::collect::{LateTick, LoopTiming};
 use crate::compare::Comparison;
-use crate::extreme;
 use crate::gaps::GapReport;
 use crate::load::Load;
 use crate::machine::Machine;
@@ -15,6 +14,7 @@ use crate::measure::{Measured, WARM_UP_S, switches_beyond_sleep};
 use crate::provenance;
 use crate::sample::PARTS;
 use crate::spin::SpinSearch;
+use crate::stationary;
 use crate::summary::{Summary, quantile_us, summary};
 use crate::trace::TraceSection;
 use crate::verdict::{self, Limits};
@@ -117,7 +117,7 @@ pub fn report(parts: &Parts) -> Report {
         latest_wake_ups: latest(measured),
         trace: traced(measured),
         parts: parts_of_run(&measured.haptic, rate_hz),
-        extremes: extreme::examine(&measured.haptic.sample, rate_hz),
+        stationarity: stationary::examine(&measured.haptic.sample.series, measured.haptic.sample.stride),
         gaps: gap_section(measured),
         cores: measured.cores.clone(),
         comparison: parts.comparison.clone(),
