@@ -1,7 +1,7 @@
 //! `rt-core devices`: every back end, its parts that are present, its report without a force, and missing parts.
 
 use clap::Args;
-use serde::Serialize;
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::Duration;
@@ -41,7 +41,7 @@ pub struct DevicesArgs {
 }
 
 /// One back end.
-#[derive(Debug, Serialize)]
+#[derive(Debug)]
 struct Listed {
     /// Forms to write after `--device`.
     forms: Vec<String>,
@@ -50,14 +50,7 @@ struct Listed {
     untried: bool,
     /// A run can use it now.
     usable: bool,
-    findings: Vec<Line>,
-}
-
-#[derive(Debug, Serialize)]
-struct Line {
-    severity: &'static str,
-    what: String,
-    cure: String,
+    findings: Vec<Finding>,
 }
 
 /// Prints the list; returns 0.
@@ -69,7 +62,10 @@ pub fn run(args: &DevicesArgs) -> u8 {
         .map(|b| list(b, Path::new("/"), &libraries, !args.look_only))
         .collect();
     if args.json {
-        println!("{:#}", serde_json::json!({ "devices": listed }));
+        println!(
+            "{:#}",
+            json!({ "devices": listed.iter().map(as_json).collect::<Vec<_>>() })
+        );
     } else {
         listed.iter().for_each(|l| println!("{}", text(l)));
         println!("{BOTH_HANDS}");
@@ -81,11 +77,11 @@ fn list(backend: &Backend, root: &Path, libraries: &Libraries, try_it: bool) -> 
     let findings = match backend.kind {
         BackendKind::Simulated => simulated(),
         BackendKind::Phantom => phantom(root, libraries.libhd.as_deref(), try_it),
-        BackendKind::Replay => vec![Finding {
-            severity: Severity::Note,
-            what: "needs the file of a motion".to_owned(),
-            cure: "host-ui record --out S.mcap, then host-ui export S.mcap --motion FILE".to_owned(),
-        }],
+        BackendKind::Replay => vec![finding(
+            Severity::Note,
+            "needs the file of a motion",
+            "host-ui record --out S.mcap, then host-ui export S.mcap --motion FILE",
+        )],
         BackendKind::ForceDimension => force_dimension(root, libraries.libdrd.as_deref(), try_it),
         BackendKind::Haply => inverse3(libraries, try_it),
     };
@@ -97,7 +93,7 @@ fn list(backend: &Backend, root: &Path, libraries: &Libraries, try_it: bool) -> 
         help: backend.help,
         untried: backend.untried,
         usable,
-        findings: findings.into_iter().map(line).collect(),
+        findings,
     }
 }
 
@@ -107,8 +103,7 @@ fn simulated() -> Vec<Finding> {
         Ok(_) => (Severity::Good, "ready".to_owned()),
         Err(why) => (Severity::Problem, why.to_string()),
     };
-    let cure = String::new();
-    vec![Finding { severity, what, cure }]
+    vec![finding(severity, what, "")]
 }
 
 fn phantom(root: &Path, library: Option<&Path>, try_it: bool) -> Vec<Finding> {
@@ -132,20 +127,28 @@ fn force_dimension(root: &Path, library: Option<&Path>, try_it: bool) -> Vec<Fin
     findings
 }
 
+fn finding(severity: Severity, what: impl Into<String>, cure: &str) -> Finding {
+    Finding {
+        severity,
+        what: what.into(),
+        cure: cure.to_owned(),
+    }
+}
+
 /// Examines the service, which owns the device: files and cables alone show nothing.
 fn inverse3(libraries: &Libraries, try_it: bool) -> Vec<Finding> {
     match libraries.inverse_service() {
         Ok(service) if try_it => within_limit(move || haply::diagnose(&service)),
-        Ok(service) => vec![Finding {
-            severity: Severity::Note,
-            what: format!("the Inverse service at {service} was not asked"),
-            cure: "rt-core devices without --look-only asks it".to_owned(),
-        }],
-        Err(why) => vec![Finding {
-            severity: Severity::Problem,
-            what: why.to_string(),
-            cure: "correct --haply-url, or the variable STYLET_HAPLY_URL".to_owned(),
-        }],
+        Ok(service) => vec![finding(
+            Severity::Note,
+            format!("the Inverse service at {service} was not asked"),
+            "rt-core devices without --look-only asks it",
+        )],
+        Err(why) => vec![finding(
+            Severity::Problem,
+            why.to_string(),
+            "correct --haply-url, or the variable STYLET_HAPLY_URL",
+        )],
     }
 }
 
@@ -157,23 +160,27 @@ fn within_limit(trial: impl FnOnce() -> Vec<Finding> + Send + 'static) -> Vec<Fi
         let _ = found.send(trial());
     });
     findings.recv_timeout(TRIAL_LIMIT).unwrap_or_else(|_| {
-        vec![Finding {
-            severity: Severity::Problem,
-            what: "the driver does not answer".to_owned(),
-            cure: "check the device's power and cable, then try again".to_owned(),
-        }]
+        vec![finding(
+            Severity::Problem,
+            "the driver does not answer",
+            "check the device's power and cable, then try again",
+        )]
     })
 }
 
-fn line(finding: Finding) -> Line {
-    let severity = match finding.severity {
+fn word(severity: Severity) -> &'static str {
+    match severity {
         Severity::Good => "good",
         Severity::Note => "note",
         Severity::Warning => "warning",
         Severity::Problem => "missing",
-    };
-    let (what, cure) = (finding.what, finding.cure);
-    Line { severity, what, cure }
+    }
+}
+
+fn as_json(l: &Listed) -> Value {
+    let finding = |f: &Finding| json!({ "severity": word(f.severity), "what": f.what, "cure": f.cure });
+    let findings: Vec<Value> = l.findings.iter().map(finding).collect();
+    json!({ "forms": l.forms, "help": l.help, "untried": l.untried, "usable": l.usable, "findings": findings })
 }
 
 fn text(listed: &Listed) -> String {
@@ -187,7 +194,7 @@ fn text(listed: &Listed) -> String {
         out += "  Not tried on the device: Stylet's tests have only a fake of its driver.\n";
     }
     for f in &listed.findings {
-        out += &format!("  {:<8} {}\n", f.severity, f.what);
+        out += &format!("  {:<8} {}\n", word(f.severity), f.what);
         if !f.cure.is_empty() {
             out += &format!("  {:<8} -> {}\n", "", f.cure);
         }

@@ -43,6 +43,24 @@ impl Against {
             Self::Untraced => "without the trace",
         }
     }
+
+    /// Returns the heading of the comparison.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Cyclictest => "Beside cyclictest",
+            Self::Unloaded => "With and without the load",
+            Self::Untraced => "What tracing costs",
+        }
+    }
+
+    /// Returns the words for both sides.
+    pub fn sides(self) -> [&'static str; 2] {
+        match self {
+            Self::Cyclictest => ["ours", "cyclictest's"],
+            Self::Unloaded => ["with the load", "without it"],
+            Self::Untraced => ["with the trace", "without it"],
+        }
+    }
 }
 
 /// Wake-up latency of one turn, microseconds, in the order of the comparison's `names`.
@@ -92,44 +110,21 @@ pub enum CompareError {
     Histograms(String),
 }
 
-/// Reason why the reference program has no histogram.
+/// Reason why cyclictest gave no histogram.
 #[derive(Debug, thiserror::Error)]
 pub enum ToolError {
-    /// Program that is missing.
-    #[error("{program} is not installed: sudo apt-get install {package}")]
-    Missing {
-        /// The program.
-        program: &'static str,
-        /// Its Debian package.
-        package: &'static str,
-    },
-    /// Program that does not start.
-    #[error("{program} does not start: {why}")]
-    Start {
-        /// The program.
-        program: &'static str,
-        /// Error of the system.
-        why: io::Error,
-    },
-    /// Program that cannot be waited for, or whose file cannot be made.
-    #[error("{program}: {why}")]
-    Wait {
-        /// The program.
-        program: &'static str,
-        /// Error of the system.
-        why: io::Error,
-    },
-    /// Program that failed.
-    #[error("{program} failed: {said}")]
-    Failed {
-        /// The program.
-        program: &'static str,
-        /// First line of its output.
-        said: String,
-    },
-    /// The program ended without an error, but without a histogram in its file.
-    #[error("{0} wrote no histogram")]
-    NoHistogram(&'static str),
+    /// It is not installed.
+    #[error("cyclictest is not installed: sudo apt-get install rt-tests")]
+    Missing,
+    /// It does not start, or cannot be waited for.
+    #[error("cyclictest: {0}")]
+    Run(#[from] io::Error),
+    /// It failed; the first line of its output.
+    #[error("cyclictest failed: {0}")]
+    Failed(String),
+    /// It ended without an error, but without a histogram in its file.
+    #[error("cyclictest wrote no histogram")]
+    NoHistogram,
     /// A signal asked this program to end.
     #[error("interrupted")]
     Interrupted,
@@ -156,7 +151,7 @@ pub fn compare(
             (Against::Untraced, _, _) if setup.trace_over_ns.is_none() => {
                 Some("there is no trace to compare with; give --trace".to_owned())
             }
-            (_, None, _) => Some(missing(CYCLICTEST, "rt-tests").to_string()),
+            (_, None, _) => Some(ToolError::Missing.to_string()),
             (Against::Cyclictest, _, Load::Window) => {
                 Some("the window draws nothing without our loops; give --compare unloaded".to_owned())
             }
@@ -257,38 +252,29 @@ fn version() -> Option<String> {
         .map(|l| l.trim().to_owned())
 }
 
-const CYCLICTEST: &str = "cyclictest";
-
-fn missing(program: &'static str, package: &'static str) -> ToolError {
-    ToolError::Missing { program, package }
-}
-
 /// Runs one turn of cyclictest.
 pub fn cyclictest_turn(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
-    version().ok_or(missing(CYCLICTEST, "rt-tests"))?;
+    version().ok_or(ToolError::Missing)?;
     cyclictest(setup, interrupted)
 }
 
 fn cyclictest(setup: &Setup, interrupted: &AtomicBool) -> Result<Histogram<u64>, CompareError> {
     let load = Running::start(setup.load, &setup.options.instance, setup.folder)?;
     let file = setup.folder.join("cyclictest.tmp");
-    let mut child = Command::new(CYCLICTEST)
+    let mut child = Command::new("cyclictest")
         .args(arguments(setup.options, setup.duration_ns, &file))
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
-        .map_err(|why| ToolError::Start {
-            program: CYCLICTEST,
-            why,
-        })?;
-    let ended = wait(CYCLICTEST, &mut child, interrupted);
+        .map_err(ToolError::from)?;
+    let ended = wait(&mut child, interrupted);
     drop(load);
     // The ui load was in shared memory, and no core could clean up after it.
     setup.options.instance.sweep();
     let text = std::fs::read_to_string(&file).unwrap_or_default();
     let _ = std::fs::remove_file(&file);
     ended?;
-    Ok(read(&text).ok_or(ToolError::NoHistogram(CYCLICTEST))?)
+    Ok(read(&text).ok_or(ToolError::NoHistogram)?)
 }
 
 fn arguments(options: &Options, duration_ns: u64, file: &Path) -> Vec<String> {
@@ -307,20 +293,21 @@ fn arguments(options: &Options, duration_ns: u64, file: &Path) -> Vec<String> {
     arguments
 }
 
-fn wait(program: &'static str, child: &mut Child, interrupted: &AtomicBool) -> Result<(), ToolError> {
+fn wait(child: &mut Child, interrupted: &AtomicBool) -> Result<(), ToolError> {
     loop {
-        match child.try_wait() {
-            Ok(Some(status)) if status.success() => return Ok(()),
-            Ok(Some(_)) => {
-                let mut said = String::new();
-                if let Some(mut pipe) = child.stderr.take() {
-                    let _ = std::io::Read::read_to_string(&mut pipe, &mut said);
-                }
-                let first = said.lines().next().unwrap_or("no reason given").to_owned();
-                return Err(ToolError::Failed { program, said: first });
+        match child.try_wait()? {
+            Some(status) if status.success() => return Ok(()),
+            Some(_) => {
+                let said = child
+                    .stderr
+                    .take()
+                    .map(io::read_to_string)
+                    .transpose()?
+                    .unwrap_or_default();
+                let first = said.lines().next().unwrap_or("no reason given");
+                return Err(ToolError::Failed(first.to_owned()));
             }
-            Ok(None) => {}
-            Err(why) => return Err(ToolError::Wait { program, why }),
+            None => {}
         }
         // SYNC: set by a signal handler; nothing but the flag is carried.
         if interrupted.load(Ordering::Acquire) {

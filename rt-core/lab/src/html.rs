@@ -5,7 +5,6 @@ mod machine;
 mod steady;
 pub mod times;
 
-use crate::compare::Against;
 use crate::measure::Measured;
 use crate::plots::{self, BLUE, DrawError, ORANGE, Series};
 use crate::report::{NO_DIGEST, Report};
@@ -119,7 +118,7 @@ fn limits(r: &Report) -> Markup {
             or_na(j.value),
             cell(format!("{sign} {}", num(j.limit))),
             cell(j.unit.replace("us", "\u{b5}s")),
-            html! { (j.reason) br; span class="faint" { (micro(&short(&j.evidence))) } },
+            html! { (j.reason) br; span class="faint" { (micro(&j.evidence)) } },
         ]
     };
     let rows: Vec<Vec<Markup>> = r.verdict.limits.iter().map(row).collect();
@@ -138,82 +137,28 @@ fn limits(r: &Report) -> Markup {
     }
 }
 
-/// Shortens evidence: the reasons why the environment does not qualify appear once, at the top of the page.
-fn short(evidence: &str) -> String {
-    match (
-        evidence.strip_prefix("environment not qualified"),
-        evidence.rsplit_once("; "),
-    ) {
-        (Some(_), Some((_, own))) => format!("environment not qualified; {own}"),
-        _ => evidence.to_owned(),
-    }
-}
-
 fn pictures(r: &Report, m: &Measured) -> Result<Markup, DrawError> {
     let h = &m.haptic;
-    let wake = Series {
-        name: "force loop",
-        color: BLUE,
-        histogram: &h.wake,
-    };
-    let compared = r.comparison.as_ref().filter(|c| !c.rounds.is_empty());
-    let turns = compared.map(|c| {
-        let ours = Series {
-            name: "force loop",
-            color: BLUE,
-            histogram: &c.ours,
-        };
-        let theirs = Series {
-            name: c.against.name(),
-            color: ORANGE,
-            histogram: &c.others,
-        };
-        (c.against, [ours, theirs])
-    });
-    let own = Series {
-        name: "own work",
-        color: ORANGE,
-        histogram: &h.work,
-    };
+    let series = |name, color, histogram| Series { name, color, histogram };
+    let wake = || series("force loop", BLUE, &h.wake);
+    let own = series("own work", ORANGE, &h.work);
     let mut figures = vec![
-        (
-            "Wake-up of the force loop",
-            plots::wake_histogram(&[Series { ..wake }])?,
-        ),
+        ("Wake-up of the force loop", plots::wake_histogram(&[wake()])?),
         ("Where a force tick goes", plots::stages(h)?),
         ("Worst of each window", plots::windows(&h.windows, m.window_ns)?),
-        ("Cumulative tail", plots::tail(&[wake, own])?),
+        ("Cumulative tail", plots::tail(&[wake(), own])?),
         ("Where a tissue tick goes", plots::stages(&m.tissue)?),
     ];
-    match &turns {
-        Some((Against::Cyclictest, turns)) => {
-            figures.push(("Wake-up beside cyclictest, all turns", plots::wake_histogram(turns)?));
-        }
-        Some((Against::Unloaded, turns)) => {
-            figures.push((
-                "Wake-up with and without the load, all turns",
-                plots::wake_histogram(turns)?,
-            ));
-        }
-        Some((Against::Untraced, turns)) => {
-            figures.push((
-                "Wake-up with and without the trace, all turns",
-                plots::wake_histogram(turns)?,
-            ));
-        }
-        None => {
-            let seen = Series {
-                name: "tip moved to host saw it",
-                color: BLUE,
-                histogram: &m.host.tip_to_host,
-            };
-            let answered = Series {
-                name: "tip moved to tissue answered",
-                color: ORANGE,
-                histogram: &m.tissue.path,
-            };
-            figures.push(("From tip to tissue and host", plots::tail(&[seen, answered])?));
-        }
+    if let Some(c) = r.comparison.as_ref().filter(|c| !c.rounds.is_empty()) {
+        let turns = [
+            series("force loop", BLUE, &c.ours),
+            series(c.against.name(), ORANGE, &c.others),
+        ];
+        figures.push(("Wake-up on both sides, all turns", plots::wake_histogram(&turns)?));
+    } else {
+        let seen = series("tip moved to host saw it", BLUE, &m.host.tip_to_host);
+        let answered = series("tip moved to tissue answered", ORANGE, &m.tissue.path);
+        figures.push(("From tip to tissue and host", plots::tail(&[seen, answered])?));
     }
     Ok(html! {
         h2 { "Pictures" }
@@ -223,18 +168,4 @@ fn pictures(r: &Report, m: &Measured) -> Result<Markup, DrawError> {
             }
         }
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn reasons_are_not_repeated_in_each_row() {
-        assert_eq!(
-            short("environment not qualified: virtual machine (KVM); 60000 samples"),
-            "environment not qualified; 60000 samples"
-        );
-        assert_eq!(short("haptic 0; tissue 0"), "haptic 0; tissue 0");
-    }
 }

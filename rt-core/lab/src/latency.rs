@@ -85,11 +85,8 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
     let traced = measured.trace.as_ref().is_some_and(|t| t.absent.is_none());
     let comparison = match args.against().filter(|against| traced || *against != Against::Untraced) {
         Some(against) => {
-            let ours = match against {
-                Against::Unloaded | Against::Untraced => "with and ",
-                Against::Cyclictest => "with ",
-            };
-            eprintln!("rt-core: alternating {ours}{}, {} rounds", against.name(), args.rounds);
+            let [ours, theirs] = against.sides();
+            eprintln!("rt-core: alternating {ours} and {theirs}, {} rounds", args.rounds);
             Some(compare(&setup, against, args.rounds, interrupted)?)
         }
         None => None,
@@ -141,6 +138,9 @@ fn print_verdict(report: &Report) {
             j.unit
         );
     }
+    if !report.environment.qualified {
+        println!("environment not qualified: {}", report.environment.evidence.join("; "));
+    }
     for outlier in report.trace.iter().flat_map(|t| &t.outliers) {
         println!(
             "late at {:.3} s by {:.0} us: {}",
@@ -155,13 +155,9 @@ fn print_verdict(report: &Report) {
                 let said: Vec<String> = ratios
                     .map(|(name, r)| format!("{name} {}", r.map_or("n/a".to_owned(), |r| format!("{r:.2}"))))
                     .collect();
-                let over = match comparison.against {
-                    Against::Cyclictest => "ours over cyclictest",
-                    Against::Unloaded => "with the load over without it",
-                    Against::Untraced => "with the trace over without it",
-                };
+                let [ours, theirs] = comparison.against.sides();
                 println!(
-                    "{over}, median of {} rounds: {}",
+                    "{ours} over {theirs}, median of {} rounds: {}",
                     comparison.rounds.len(),
                     said.join(", ")
                 );

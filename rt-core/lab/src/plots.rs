@@ -106,12 +106,7 @@ pub fn wake_histogram(series: &[Series]) -> Result<String, DrawError> {
         let right = bin_us * 100.0;
         let counted: Vec<Vec<u64>> = series.iter().map(|s| bins(s.histogram, bin_us, 100)).collect();
         let top = counted.iter().flatten().copied().max().unwrap_or(1).max(1) as f64;
-        let mut chart = ChartBuilder::on(root)
-            .margin(10)
-            .margin_right(22)
-            .set_label_area_size(LabelAreaPosition::Left, 58)
-            .set_label_area_size(LabelAreaPosition::Bottom, 40)
-            .build_cartesian_2d(0.0..right, Decades(0.5..decade_above(top), number))?;
+        let mut chart = chart(root, 58).build_cartesian_2d(0.0..right, Decades(0.5..decade_above(top), number))?;
         mesh(&mut chart, "wake-up latency, \u{b5}s", "ticks in a bin")?;
         for (s, counts) in series.iter().zip(&counted) {
             let style = s.color.mix(0.75).filled();
@@ -160,12 +155,8 @@ pub fn stages(timing: &LoopTiming) -> Result<String, DrawError> {
         let us = |ns: u64| (ns as f64 / 1e3).max(0.01);
         let longest = rows.iter().map(|(_, h)| us(h.max())).fold(0.1, f64::max);
         let count = rows.len() as f64;
-        let mut chart = ChartBuilder::on(root)
-            .margin(10)
-            .margin_right(22)
-            .set_label_area_size(LabelAreaPosition::Left, 128)
-            .set_label_area_size(LabelAreaPosition::Bottom, 40)
-            .build_cartesian_2d(Decades(0.01..decade_above(longest), number), 0.0..count)?;
+        let mut chart =
+            chart(root, 128).build_cartesian_2d(Decades(0.01..decade_above(longest), number), 0.0..count)?;
         axes(&mut chart, ["microseconds: bar p50 to p99.9, point max", ""], |mesh| {
             mesh.disable_y_mesh().disable_y_axis();
         })?;
@@ -208,24 +199,17 @@ pub fn windows(windows: &[Window], window_ns: u64) -> Result<String, DrawError> 
         };
         let low = all().fold(f64::MAX, f64::min).min(1.0).log10().floor();
         let high = all().fold(1.0, f64::max);
-        let mut chart = ChartBuilder::on(root)
-            .margin(10)
-            .margin_right(22)
-            .set_label_area_size(LabelAreaPosition::Left, 58)
-            .set_label_area_size(LabelAreaPosition::Bottom, 40)
+        let mut chart = chart(root, 58)
             // The legend has the highest decade to itself.
             .build_cartesian_2d(0.0..right, Decades(10_f64.powf(low)..10.0 * decade_above(high), number))?;
         mesh(&mut chart, "time into the run, s", "worst in a window, \u{b5}s")?;
-        let wake: Vec<_> = used
-            .iter()
-            .map(|(t, w)| (*t + window_s / 2.0, us(w.worst_wake_ns)))
-            .collect();
-        let work: Vec<_> = used
-            .iter()
-            .map(|(t, w)| (*t + window_s / 2.0, us(w.worst_work_ns)))
-            .collect();
-        chart.draw_series(LineSeries::new(wake, BLUE.stroke_width(1)))?;
-        chart.draw_series(LineSeries::new(work, ORANGE.stroke_width(1)))?;
+        for (color, of) in [
+            (BLUE, (|w| w.worst_wake_ns) as fn(&Window) -> u64),
+            (ORANGE, |w| w.worst_work_ns),
+        ] {
+            let line = used.iter().map(|(t, w)| (*t + window_s / 2.0, us(of(w))));
+            chart.draw_series(LineSeries::new(line, color.stroke_width(1)))?;
+        }
         legend(root, &[("wake-up".to_owned(), BLUE), ("whole tick".to_owned(), ORANGE)])
     })
 }
@@ -238,15 +222,10 @@ pub fn tail(series: &[Series]) -> Result<String, DrawError> {
         let left = 10_f64.powi(shortest.max(0.1).log10().floor() as i32);
         let most = series.iter().map(|s| s.histogram.len()).max().unwrap_or(1).max(10) as f64;
         let least = 10_f64.powi((0.5 / most).log10().floor() as i32);
-        let mut chart = ChartBuilder::on(root)
-            .margin(10)
-            .margin_right(22)
-            .set_label_area_size(LabelAreaPosition::Left, 58)
-            .set_label_area_size(LabelAreaPosition::Bottom, 40)
-            .build_cartesian_2d(
-                Decades(left..decade_above(longest.max(left * 10.0)), number),
-                Decades(least..1.0, share),
-            )?;
+        let mut chart = chart(root, 58).build_cartesian_2d(
+            Decades(left..decade_above(longest.max(left * 10.0)), number),
+            Decades(least..1.0, share),
+        )?;
         mesh(&mut chart, "microseconds", "share of ticks above")?;
         for s in series {
             chart.draw_series(LineSeries::new(above(s.histogram), s.color.stroke_width(2)))?;
@@ -267,6 +246,16 @@ fn above(histogram: &Histogram<u64>) -> Vec<(f64, f64)> {
         left -= value.count_at_value() as f64;
     }
     line
+}
+
+/// Returns a chart with the usual margins; `left` is the width of the labels at its left.
+fn chart<'a, 'b>(root: &'a Canvas<'b>, left: i32) -> ChartBuilder<'a, 'b, SVGBackend<'b>> {
+    let mut chart = ChartBuilder::on(root);
+    chart.margin(10).margin_right(22);
+    chart
+        .set_label_area_size(LabelAreaPosition::Left, left)
+        .set_label_area_size(LabelAreaPosition::Bottom, 40);
+    chart
 }
 
 /// Draws axes whose x labels have as few decimals as possible.

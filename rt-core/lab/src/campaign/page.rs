@@ -3,7 +3,7 @@
 use super::report::{CampaignReport, LoopOfPart, PartReport};
 use super::time;
 use crate::html::times::time_table;
-use crate::plots::{self, BLUE, DrawError, MaximaPart, ORANGE, Series};
+use crate::plots::{self, DrawError, MaximaPart};
 use maud::{Markup, PreEscaped, html};
 use stylet_report::parts::{Column, cell, num, or_na, table};
 
@@ -106,31 +106,9 @@ fn pictures(r: &CampaignReport) -> Result<Markup, DrawError> {
         })
         .collect();
     let maxima = plots::maxima(&parts)?;
-    // The quietest and the loudest part show the range; all parts would overlap.
-    let median = |p: &PartReport| p.force.wake_times.value_at_quantile(0.99);
-    let least = measured().min_by_key(|(p, _)| median(p));
-    let most = measured().max_by_key(|(p, _)| median(p)).filter(|_| parts.len() > 1);
-    let series = |found: Option<(&PartReport, &String)>, color| {
-        found.map(|(p, name)| (name.clone(), color, p.force.wake_times.clone()))
-    };
-    let drawn: Vec<_> = [series(least, BLUE), series(most, ORANGE)]
-        .into_iter()
-        .flatten()
-        .collect();
-    let lines: Vec<Series> = drawn
-        .iter()
-        .map(|(name, color, histogram)| Series {
-            name,
-            color: *color,
-            histogram,
-        })
-        .collect();
-    let tail = plots::tail(&lines)?;
     Ok(html! {
         h2 { "Worst of each " (time(r.window_s)) }
         figure { (PreEscaped(maxima)) }
-        h2 { "Cumulative tail of the parts with the lowest and the highest p99" }
-        section class="figures" { figure { (PreEscaped(tail)) } }
     })
 }
 

@@ -8,7 +8,6 @@ use crate::machine::Machine;
 use crate::provenance;
 use crate::report::WindowRow;
 use crate::summary::{Summary, summary};
-use hdrhistogram::Histogram;
 use serde::Serialize;
 
 const SCHEMA: &str = "stylet.campaign/1";
@@ -24,8 +23,6 @@ pub struct LoopOfPart {
     pub overruns: u64,
     pub unmeasured: u64,
     pub miss_bound: MissBound,
-    #[serde(skip)]
-    pub wake_times: Histogram<u64>,
 }
 
 #[derive(Clone, Debug, Serialize)]
@@ -134,10 +131,9 @@ fn disjoint(store: &Store, sessions: &[Kept]) -> Result<(), CampaignError> {
 fn one_loop(sessions: &[SessionRecord], rate_hz: f64) -> LoopOfPart {
     let sum = |of: fn(&SessionRecord) -> u64| sessions.iter().map(of).sum::<u64>();
     let joined = |of: fn(&SessionRecord) -> &Bins| join(sessions.iter().map(of));
-    let wake = joined(|r| &r.wake);
     let (ticks, missed) = (sum(|r| r.ticks), sum(|r| r.missed));
     LoopOfPart {
-        wake: summary("wake-up", &wake, rate_hz),
+        wake: summary("wake-up", &joined(|r| &r.wake), rate_hz),
         work: summary("whole tick", &joined(|r| &r.work), rate_hz),
         due_to_output: summary("due to output", &joined(|r| &r.due_to_output), rate_hz),
         ticks,
@@ -145,6 +141,5 @@ fn one_loop(sessions: &[SessionRecord], rate_hz: f64) -> LoopOfPart {
         overruns: sum(|r| r.overruns),
         unmeasured: sum(|r| r.unmeasured),
         miss_bound: bound::of_misses(missed, ticks + missed, rate_hz),
-        wake_times: wake,
     }
 }

@@ -10,7 +10,12 @@ pub fn steady(r: &Report) -> Markup {
     let s = &r.stationarity;
     let row = |t: &TestResult| {
         let met = html! { @if t.rejects() { b { "no" } } @else { "yes" } };
-        vec![cell(t.name), cell(format!("{:.3}", t.distance)), cell(format!("{:.1e}", t.p)), met]
+        vec![
+            cell(t.name),
+            cell(format!("{:.3}", t.distance)),
+            cell(format!("{:.1e}", t.p)),
+            met,
+        ]
     };
     let rows: Vec<_> = s.tests.iter().map(row).collect();
     let head = ["Kolmogorov-Smirnov test", "distance", "p", "may be the same"];

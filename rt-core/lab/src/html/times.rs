@@ -63,11 +63,7 @@ pub fn comparison(r: &Report) -> Markup {
     let Some(c) = &r.comparison else {
         return Markup::default();
     };
-    let (title, heads) = match c.against {
-        Against::Cyclictest => ("Beside cyclictest", ["ours", "theirs"]),
-        Against::Unloaded => ("With and without the load", ["with", "without"]),
-        Against::Untraced => ("What tracing costs", ["with", "without"]),
-    };
+    let title = c.against.title();
     if let Some(why) = &c.absent {
         return html! { h2 { (title) } p { (why) } };
     }
@@ -81,7 +77,7 @@ pub fn comparison(r: &Report) -> Markup {
     rows.push([html! { b { "median" } }].into_iter().chain(median).collect());
     let mut head = vec![cell("round")];
     for name in c.names {
-        head.extend(heads.map(|whose| html! { (name) br; (whose) }));
+        head.extend(c.against.sides().map(|whose| html! { (name) br; (whose) }));
         head.push(cell("ratio"));
     }
     let turns = num(c.turn_s);
@@ -89,15 +85,10 @@ pub fn comparison(r: &Report) -> Markup {
         h2 { (title) }
         (table(&head, &rows, &vec![Column::Number; head.len()]))
         p class="faint" {
-            @match c.against {
-                Against::Cyclictest => {
-                    (c.tool) ", alternating (turns of " (turns) " s): same core, priority and interval, microseconds, both read \
-                     right after the sleep. The force loop does all its work, cyclictest sleeps only."
-                }
-                Against::Untraced => {
-                    "The same loops with and without the trace, alternating (turns of " (turns) " s), microseconds."
-                }
-                Against::Unloaded => { "The same loops, alternating (turns of " (turns) " s), microseconds." }
+            (c.tool) " Alternating, turns of " (turns) " s, microseconds."
+            @if c.against == Against::Cyclictest {
+                " Same core, priority and interval, both read right after the sleep. The force loop does all its work, \
+                 cyclictest sleeps only."
             }
             " Values past 1 ms are left out of p99 and p99.9."
         }

@@ -1,6 +1,6 @@
 //! The worst wake-up of each window over hours, part by part.
 
-use super::{Decades, decade_above, legend, number};
+use super::{Decades, chart, decade_above, legend, number};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use stylet_report::picture::{BLUE, DrawError, INK, ORANGE, axes, drawn, label};
@@ -42,12 +42,8 @@ pub fn maxima(parts: &[MaximaPart]) -> Result<String, DrawError> {
         let low = all().fold(10.0, f64::min).max(0.1).log10().floor();
         // The legend has the highest decade to itself.
         let high = 10.0 * decade_above(all().fold(10.0, f64::max));
-        let mut chart = ChartBuilder::on(root)
-            .margin(10)
-            .margin_right(22)
-            .set_label_area_size(LabelAreaPosition::Left, 58)
-            .set_label_area_size(LabelAreaPosition::Bottom, 40)
-            .build_cartesian_2d(0.0..end_s / unit_s, Decades(10_f64.powf(low)..high, number))?;
+        let mut chart =
+            chart(root, 58).build_cartesian_2d(0.0..end_s / unit_s, Decades(10_f64.powf(low)..high, number))?;
         let names = [&format!("{unit} of measurement"), "worst in a window, \u{b5}s"];
         axes(&mut chart, names, |mesh| {
             mesh.disable_x_mesh().x_label_formatter(&|v| number(*v));

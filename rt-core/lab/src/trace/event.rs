@@ -1,5 +1,7 @@
 //! Parses lines of the kernel's trace into events about the use of a core. Pure: text in, values out.
 
+use std::fmt;
+
 /// Something that interrupts threads.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Interruption {
@@ -11,6 +13,17 @@ pub enum Interruption {
     Softirq(String),
     /// The function of a timer that expired.
     Timer(String),
+}
+
+impl fmt::Display for Interruption {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Irq(n, name) => write!(f, "IRQ {n} ({name})"),
+            Self::Vector(name) => write!(f, "{name} interrupt"),
+            Self::Softirq(name) => write!(f, "softirq {name}"),
+            Self::Timer(function) => write!(f, "timer {function}"),
+        }
+    }
 }
 
 /// Part of an event used by the decoder.

@@ -23,22 +23,11 @@ use serde::Serialize;
 /// Late ticks kept with their trace; a later one replaces the least late.
 pub const KEPT: usize = 32;
 
-/// Row of the picture for an interval.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Lane {
-    Loop,
-    Threads,
-    Interrupts,
-    Idle,
-}
-
 /// Holder of the core over an interval, microseconds from the tick's deadline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TracePiece {
     pub from_us: f64,
     pub us: f64,
-    pub lane: Lane,
     pub who: String,
 }
 

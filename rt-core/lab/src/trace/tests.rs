@@ -244,6 +244,6 @@ fn pieces_of_a_kept_trace_cover_every_microsecond_once() {
         to_ns - from_ns
     );
     assert!(pieces.windows(2).all(|w| w[0].to_ns == w[1].from_ns));
-    let names = super::witness::picture(&pieces, from_ns);
+    let names = super::witness::holders(&pieces, from_ns);
     assert!(names.iter().any(|p| p.who == "IRQ 36 (virtio1-req.0)"), "{names:?}");
 }

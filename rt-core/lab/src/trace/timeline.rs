@@ -231,13 +231,8 @@ impl Walk {
             }
             return;
         }
-        let waker = match self.interruptions.first() {
-            Some(Interruption::Irq(n, name)) => format!("IRQ {n} ({name})"),
-            Some(Interruption::Softirq(name)) => format!("softirq {name}"),
-            Some(Interruption::Vector(name)) => format!("{name} interrupt"),
-            Some(Interruption::Timer(function)) => format!("timer {function}"),
-            _ => e.name.clone(),
-        };
+        let interruption = self.interruptions.first();
+        let waker = interruption.map_or_else(|| e.name.clone(), ToString::to_string);
         self.wakers.insert(task.pid, waker);
     }
 

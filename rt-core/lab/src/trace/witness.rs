@@ -4,7 +4,7 @@ use super::counters::{self, Counters};
 use super::event::{self, Event};
 use super::timeline::{self, Holder, Piece};
 use super::words::{self, Below};
-use super::{Counted, Instance, KEPT, Lane, Outlier, TracePiece, TraceSection, blame, tracefs};
+use super::{Counted, Instance, KEPT, Outlier, TracePiece, TraceSection, blame, tracefs};
 use crate::collect::LateTick;
 use crate::machine::Machine;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -26,10 +26,10 @@ pub struct Watched<'a> {
 const LOOK: Duration = Duration::from_millis(250);
 /// Length of events before a late tick that show the holder of the core at its deadline.
 const BEFORE_NS: u64 = 200_000_000;
-/// Margin of the picture before and after the tick, as a fraction of its lateness, at least 50 µs.
+/// Margin of the listed intervals before and after the tick, as a fraction of its lateness, at least 50 µs.
 const MARGIN: f64 = 0.4;
 const LEAST_MARGIN_NS: u64 = 50_000;
-/// Most intervals in one picture: the longest ones.
+/// Most intervals of one tick: the longest ones.
 const PIECES: usize = 250;
 
 struct Witness<'a> {
@@ -172,42 +172,32 @@ impl Witness<'_> {
             counted: counted.collect(),
             counted_over_ms: now.at_ns.saturating_sub(self.before.at_ns) as f64 / 1e6,
             system_management_interrupts: smi,
-            trace: picture(&around, tick.due_ns),
+            trace: holders(&around, tick.due_ns),
         })
     }
 }
 
-/// Returns the intervals as drawn: neighbours with one name are merged.
-pub(super) fn picture(pieces: &[Piece], due_ns: u64) -> Vec<TracePiece> {
-    let mut drawn: Vec<TracePiece> = Vec::new();
+/// Returns the holders of the core; neighbours with one name are merged.
+pub(super) fn holders(pieces: &[Piece], due_ns: u64) -> Vec<TracePiece> {
+    let mut all: Vec<TracePiece> = Vec::new();
     for piece in pieces {
-        let (lane, who) = match &piece.holder {
-            Holder::OwnLoop => (Lane::Loop, "the loop".to_owned()),
-            Holder::Idle(_) => (Lane::Idle, "idle".to_owned()),
-            Holder::Thread { task, .. } => (Lane::Threads, task.name.clone()),
-            Holder::Interruption(i) => (Lane::Interrupts, name_of(i)),
+        let who = match &piece.holder {
+            Holder::OwnLoop => "the loop".to_owned(),
+            Holder::Idle(_) => "idle".to_owned(),
+            Holder::Thread { task, .. } => task.name.clone(),
+            Holder::Interruption(i) => i.to_string(),
         };
         let from_us = (piece.from_ns as f64 - due_ns as f64) / 1e3;
         let us = piece.length_ns() as f64 / 1e3;
-        match drawn.last_mut() {
-            Some(last) if last.lane == lane && last.who == who => last.us += us,
-            _ => drawn.push(TracePiece { from_us, us, lane, who }),
+        match all.last_mut() {
+            Some(last) if last.who == who => last.us += us,
+            _ => all.push(TracePiece { from_us, us, who }),
         }
     }
-    if drawn.len() > PIECES {
-        let mut longest: Vec<f64> = drawn.iter().map(|p| p.us).collect();
+    if all.len() > PIECES {
+        let mut longest: Vec<f64> = all.iter().map(|p| p.us).collect();
         longest.sort_by(|a, b| b.total_cmp(a));
-        drawn.retain(|p| p.us > longest[PIECES]);
+        all.retain(|p| p.us > longest[PIECES]);
     }
-    drawn
-}
-
-fn name_of(i: &event::Interruption) -> String {
-    use event::Interruption::{Irq, Softirq, Timer, Vector};
-    match i {
-        Irq(n, name) => format!("IRQ {n} ({name})"),
-        Vector(name) => name.clone(),
-        Softirq(name) => format!("softirq {name}"),
-        Timer(function) => format!("timer {function}"),
-    }
+    all
 }
