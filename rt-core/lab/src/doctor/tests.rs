@@ -24,11 +24,7 @@ impl Fake {
     }
 
     pub(super) fn see(&self, check: impl Fn(&Machine) -> Finding) -> Finding {
-        self.of(check)
-    }
-
-    pub(super) fn of<T>(&self, read: impl FnOnce(&Machine) -> T) -> T {
-        read(&Machine::at(&self.0))
+        check(&Machine::at(&self.0))
     }
 }
 

@@ -10,8 +10,6 @@ pub struct Tunable {
     pub check: &'static str,
     /// Path without the leading slash.
     pub path: String,
-    /// Start time of the thread whose cores these are ([`Machine::began`]).
-    pub began: Option<u64>,
     pub now: String,
     pub wanted: String,
 }
@@ -22,11 +20,8 @@ impl Tunable {
     }
 }
 
-/// Returns the value in force: for `a [b] c` the word in brackets, for a thread its permitted cores.
+/// Returns the value in force: for `a [b] c` the word in brackets.
 pub fn value(machine: &Machine, path: &str) -> Option<String> {
-    if let Some(allowed) = machine.allowed_cores(path) {
-        return Some(allowed);
-    }
     let text = machine.text(path)?;
     let chosen = text
         .split_once('[')
@@ -163,7 +158,6 @@ pub fn all(machine: &Machine, core: usize) -> Vec<Tunable> {
             all.push(Tunable {
                 check,
                 path,
-                began: None,
                 now,
                 wanted: wanted.to_owned(),
             });

@@ -2,7 +2,7 @@
 //! its list.
 
 use super::file::{Change, State};
-use crate::doctor::{display, tunable};
+use crate::doctor::tunable;
 use crate::machine::Machine;
 use rustix::fs::{self, Mode, OFlags, ResolveFlags};
 use std::fs::File;
@@ -64,9 +64,6 @@ fn setting(path: &str) -> Option<Setting> {
         }
         ["proc", "sys", "kernel", "sched_rt_runtime_us"] => ("throttling", Number, Some("950000")),
         ["proc", "irq", number, "smp_affinity_list"] if is_number(number) => ("interrupts", Cores, None),
-        ["proc", process, "task", thread, "status"] if is_number(process) && is_number(thread) => {
-            (display::CHECK, Cores, None)
-        }
         _ => {
             let (check, wanted) = tunable::quiet(path)?;
             let values = if is_number(wanted) { Number } else { Word };
@@ -82,8 +79,7 @@ pub fn refusal(change: &Change) -> Option<String> {
     let Some(setting) = setting(&change.path) else {
         return Some(format!("/{named} is not a setting that the doctor makes"));
     };
-    let is_thread = setting.check == display::CHECK;
-    if change.check != setting.check || change.began.is_some() != is_thread {
+    if change.check != setting.check {
         return Some(format!("the doctor makes /{named} in another check"));
     }
     let other = |value: &str| setting.wanted.is_some_and(|wanted| wanted != value);
@@ -133,13 +129,6 @@ fn of_policy(sys: &OwnedFd, path: &str) -> Option<String> {
     let link = fs::readlinkat(sys, format!("{core}/cpufreq"), Vec::new()).ok()?;
     let policy = link.to_str().ok()?.strip_prefix("../cpufreq/")?;
     is_numbered(policy, "policy").then(|| format!("devices/system/cpu/cpufreq/{policy}/{name}"))
-}
-
-/// True if a thread's process still draws: no other is moved.
-pub fn is_drawing(machine: &Machine, path: &str) -> bool {
-    let process = path.split('/').nth(1).unwrap_or_default();
-    let name = machine.text(&format!("proc/{process}/comm"));
-    name.is_some_and(|name| display::DRAW.contains(&name.as_str()))
 }
 
 #[cfg(test)]

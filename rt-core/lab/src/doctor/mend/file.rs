@@ -28,13 +28,11 @@ pub enum State {
 
 /// One setting.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Change {
     pub check: String,
     /// Path without the leading slash.
     pub path: String,
-    /// Start time of a thread whose cores were changed, so that no other thread with its number gets them.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub began: Option<u64>,
     pub before: String,
     pub after: String,
     pub state: State,
@@ -48,13 +46,6 @@ pub struct Changes {
     /// Start of the PC: a restart undoes the changes by itself.
     boot: String,
     pub changes: Vec<Change>,
-}
-
-impl Change {
-    /// True if it changed a thread that has ended, even if another has its number now.
-    fn has_ended(&self, machine: &Machine) -> bool {
-        self.began.is_some() && machine.began(&self.path) != self.began
-    }
 }
 
 fn boot() -> String {
@@ -73,7 +64,6 @@ impl Changes {
                 .map(|t| Change {
                     check: t.check.to_owned(),
                     path: t.path.clone(),
-                    began: t.began,
                     before: t.now.clone(),
                     after: t.wanted.clone(),
                     state: State::Planned,
@@ -126,13 +116,9 @@ impl Changes {
     /// Writes each value and reads it back.
     pub fn apply(&mut self, machine: &Machine) {
         for change in &mut self.changes {
-            change.state = if change.has_ended(machine) {
-                State::Refused("the thread has ended".to_owned())
-            } else {
-                match put(machine, &change.path, &change.after) {
-                    Ok(()) => State::Applied,
-                    Err(why) => State::Refused(why),
-                }
+            change.state = match put(machine, &change.path, &change.after) {
+                Ok(()) => State::Applied,
+                Err(why) => State::Refused(why),
             };
         }
     }
@@ -145,12 +131,12 @@ impl Changes {
             if !matches!(change.state, State::Applied | State::Planned | State::Foreign(_)) {
                 continue;
             }
-            if let Err(why) = check(machine, change) {
-                change.state = State::Refused(why);
+            if let Err(why) = allowed::open(machine, &change.path) {
+                change.state = State::Refused(why.to_string());
                 continue;
             }
             let now = tunable::value(machine, &change.path).unwrap_or_default();
-            change.state = if now == change.before || change.has_ended(machine) {
+            change.state = if now == change.before {
                 State::Undone
             } else if now != change.after {
                 State::Foreign(now)
@@ -216,32 +202,19 @@ fn own_text(path: &Path, is_written: bool) -> io::Result<(String, File)> {
     Ok((text, file))
 }
 
-/// Checks that a setting may be written.
-fn check(machine: &Machine, change: &Change) -> Result<(), String> {
-    if change.began.is_none() {
-        return allowed::open(machine, &change.path)
-            .map(drop)
-            .map_err(|e| e.to_string());
-    }
-    if change.has_ended(machine) || allowed::is_drawing(machine, &change.path) {
-        return Ok(());
-    }
-    Err("the process does not draw: the doctor does not move it".to_owned())
-}
-
 fn put(machine: &Machine, path: &str, value: &str) -> Result<(), String> {
-    if machine.allowed_cores(path).is_some() {
-        machine.allow_cores(path, value).map_err(|e| e.to_string())?;
-    } else {
-        let mut file = allowed::open(machine, path).map_err(|e| e.to_string())?;
-        if !machine.is_this() {
-            // A kernel file has no length.
-            file.set_len(0).map_err(|e| e.to_string())?;
-        }
-        file.write_all(value.as_bytes()).map_err(|e| e.to_string())?;
-    }
+    write(machine, path, value).map_err(|e| e.to_string())?;
     match tunable::value(machine, path) {
         Some(now) if now == value => Ok(()),
         now => Err(format!("the kernel took it, and reports {:?}", now.unwrap_or_default())),
     }
+}
+
+fn write(machine: &Machine, path: &str, value: &str) -> io::Result<()> {
+    let mut file = allowed::open(machine, path)?;
+    if !machine.is_this() {
+        // A kernel file has no length.
+        file.set_len(0)?;
+    }
+    file.write_all(value.as_bytes())
 }

@@ -1,11 +1,10 @@
 //! `rt-core doctor --apply`: changes the settings that the doctor names, reversibly, and measures before and after.
 
 mod allowed;
-pub(super) mod file;
+mod file;
 #[cfg(test)]
 mod tests;
 
-use super::display;
 use super::tunable::{self, Tunable};
 use crate::args::duration_ns;
 use crate::collect::LoopTiming;
@@ -35,7 +34,7 @@ pub struct DoctorArgs {
     /// Show which settings of this PC --apply --yes would change, and change none
     ///
     /// Only settings that can be changed while the PC runs are among them: governor, sleep states of the force loop's
-    /// core, interrupts on it, display servers that may run on it, watchdogs, statistics, huge pages, PCIe power.
+    /// core, interrupts on it, watchdogs, statistics, huge pages, PCIe power.
     /// Nothing is kept over a restart.
     #[arg(long, conflicts_with = "undo")]
     apply: bool,
@@ -101,8 +100,7 @@ pub fn run(args: &DoctorArgs, interrupted: &AtomicBool) -> Result<u8, MendError>
     if !args.apply {
         return Ok(super::print(args.json, core));
     }
-    let mut tunables = tunable::all(&machine, core);
-    tunables.extend(display::settings(&machine, core));
+    let tunables = tunable::all(&machine, core);
     match (&args.out, args.yes) {
         (Some(out), true) => mend(&machine, core, &tunables, out, args.measure, interrupted),
         _ => {

@@ -252,15 +252,3 @@ fn a_list_that_another_could_write_is_refused() {
         Err(why) => println!("a list of another user was not tried: {why}"),
     }
 }
-
-#[test]
-fn a_thread_of_another_program_is_not_moved() {
-    let fake = Fake::new();
-    let own = std::process::id();
-    std::fs::create_dir_all(fake.path(&format!("proc/{own}"))).expect("made");
-    let path = format!("proc/{own}/task/{own}/status");
-    fake.put(&format!("proc/{own}/comm"), "Xorg\n");
-    assert!(super::is_drawing(&fake.machine, &path));
-    fake.put(&format!("proc/{own}/comm"), "sshd\n");
-    assert!(!super::is_drawing(&fake.machine, &path));
-}
