@@ -8,8 +8,12 @@ use clap::Args;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 use stylet_insertions::{Shard, Table, digest};
 use stylet_text::printable;
+
+/// Time between two lines of progress.
+const EVERY: Duration = Duration::from_secs(5);
 
 const HELP: &str = concat!(
     "Each insertion begins with tissue at rest and runs through the two ticks of the live simulator, in its own time. Its random\n\
@@ -53,7 +57,7 @@ impl StudyArgs {
             folder: self.out.clone(),
             jobs: self.jobs.unwrap_or(cores),
         };
-        let ended = run(&study, &order, stop, &Progress::shown())?;
+        let ended = run(&study, &order, stop, &Progress::new(EVERY))?;
         let file = order.shard.file(&order.folder);
         match ended {
             Ended::Before(table) => println!("finished before: {}\n{}", file.display(), printable(&summary(&table))),

@@ -60,22 +60,19 @@ pub fn run(study: &Study, order: &Order, stop: &AtomicBool, progress: &Progress)
     let done = parts.done()?;
     let range = order.shard.range(study.implant_count());
     let of = range.len();
-    let mut missing: Vec<Implant> = Vec::new();
-    let mut places = Vec::new();
-    for place in range.filter(|place| !done.contains_key(place)) {
-        missing.push(Implant::at(study, place));
-        places.push(place);
-    }
     // Those that share a body follow each other: building one takes longer than a needle.
     let mut queue: Vec<(u64, usize, Implant)> = Vec::new();
-    for (&implant, &place) in missing.iter().zip(&places) {
+    for place in range.filter(|place| !done.contains_key(place)) {
+        let implant = Implant::at(study, place);
         let stiffness = Drawn::of(study, implant, 0).get(Id::Stiffness);
         queue.push((stiffness.to_bits(), place, implant));
     }
     queue.sort_by_key(|&(stiffness, place, implant)| (implant.gland, stiffness, place));
     let kept: usize = done.values().map(Vec::len).sum();
-    let needles = |implant: &Implant| implant.gland(study).plan.needles.len();
-    progress.begin(kept, kept + missing.iter().map(needles).sum::<usize>());
+    let needles = queue
+        .iter()
+        .map(|(_, _, implant)| implant.gland(study).plan.needles.len());
+    progress.begin(kept, kept + needles.sum::<usize>());
     Shared {
         study,
         queue: &queue,
@@ -86,7 +83,6 @@ pub fn run(study: &Study, order: &Order, stop: &AtomicBool, progress: &Progress)
         progress,
     }
     .run_on(order.jobs)?;
-    progress.end();
     // SYNC: set by a signal handler; nothing but the flag is carried.
     if stop.load(Ordering::Relaxed) {
         let implants = parts.done()?.len();

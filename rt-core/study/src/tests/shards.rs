@@ -37,7 +37,14 @@ fn order(folder: &Path, number: u32, of: u32, jobs: usize) -> Order {
 }
 
 fn finished(study: &Study, order: &Order) -> Table {
-    match run(study, order, &AtomicBool::new(false), &Progress::silent()).expect("runs") {
+    match run(
+        study,
+        order,
+        &AtomicBool::new(false),
+        &Progress::new(std::time::Duration::MAX),
+    )
+    .expect("runs")
+    {
         Ended::Now { table, .. } => table,
         ended => panic!("{ended:?}"),
     }
@@ -106,7 +113,7 @@ fn a_shard_that_is_stopped_continues_with_what_is_missing_and_a_finished_one_is_
             }
             stop.store(true, Ordering::Relaxed);
         });
-        run(&study, &order, &stop, &Progress::silent()).expect("stops")
+        run(&study, &order, &stop, &Progress::new(std::time::Duration::MAX)).expect("stops")
     });
     let kept = parts(&under_way);
     assert!(
@@ -127,13 +134,19 @@ fn a_shard_that_is_stopped_continues_with_what_is_missing_and_a_finished_one_is_
             }
             stop.store(true, Ordering::Relaxed);
         });
-        run(&study, &order, &stop, &Progress::silent()).expect("stops")
+        run(&study, &order, &stop, &Progress::new(std::time::Duration::MAX)).expect("stops")
     });
     let again = parts(&under_way);
     for (name, before) in &kept {
         assert_eq!(Some(before), again.get(name), "{name} was not written again");
     }
-    let Ended::Now { table, kept } = run(&study, &order, &AtomicBool::new(false), &Progress::silent()).unwrap() else {
+    let Ended::Now { table, kept } = run(
+        &study,
+        &order,
+        &AtomicBool::new(false),
+        &Progress::new(std::time::Duration::MAX),
+    )
+    .unwrap() else {
         panic!("it was not finished");
     };
     assert_eq!((kept, table.rows.len()), (2 * again.len(), 18));
@@ -148,7 +161,13 @@ fn a_shard_that_is_stopped_continues_with_what_is_missing_and_a_finished_one_is_
     let written = std::fs::metadata(order.shard.file(&folder))
         .and_then(|m| m.modified())
         .unwrap();
-    let skipped = run(&study, &order, &AtomicBool::new(false), &Progress::silent()).unwrap();
+    let skipped = run(
+        &study,
+        &order,
+        &AtomicBool::new(false),
+        &Progress::new(std::time::Duration::MAX),
+    )
+    .unwrap();
     assert!(matches!(skipped, Ended::Before(found) if found == table));
     assert_eq!(
         std::fs::metadata(order.shard.file(&folder))
@@ -170,7 +189,7 @@ fn another_study_and_another_division_do_not_get_into_the_folder() {
             study,
             &order(&folder, 1, of, 1),
             &AtomicBool::new(false),
-            &Progress::silent(),
+            &Progress::new(std::time::Duration::MAX),
         )
     };
     let why = refused(&study, 2).expect_err("divided otherwise");
