@@ -6,7 +6,6 @@
 
 use rayon::prelude::*;
 use std::hint::black_box;
-use std::path::Path;
 use std::time::Instant;
 use stylet_benches::error::quantile;
 use stylet_dose::decay::Interval;
@@ -109,8 +108,7 @@ fn metrics(grid: &DoseGrid, structures: &[Structure]) -> Vec<f64> {
 }
 
 fn main() {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sources/i125_6711.toml");
-    let source = Source::read(&file).expect("our source is valid");
+    let source = Source::known("6711").expect("it comes with the program");
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let hundred = seeds(100);
     let bodies = structures();

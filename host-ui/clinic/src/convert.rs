@@ -18,7 +18,7 @@ use stylet_files::together;
 use stylet_files::{self as files, FileError, bytes, scene};
 use stylet_implant::plan::exchange::seeds_of_source;
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{DayOfImplant, Mapped, SeedDefaults, SeedFile, is_dose_volume, places_m, read_any_dose};
+use stylet_implant::readers::{DayOfImplant, Mapped, SeedDefaults, SeedFile, is_dose_volume, places_m, read_any_dose, read_source};
 
 const MAX_PLAN_BYTES: u64 = 4 << 20;
 
@@ -231,7 +231,7 @@ impl ConvertArgs {
     }
 
     fn source(&self) -> Result<Option<Source>, CommandError> {
-        Ok(self.source.as_deref().map(Source::read).transpose()?)
+        Ok(self.source.as_deref().map(read_source).transpose()?)
     }
 
     fn read_seeds(&self, source: Option<&Source>) -> Result<SeedFile, CommandError> {

@@ -141,7 +141,7 @@ impl PerturbArgs {
         new_folder(&c.out)?;
         let planned = judge.values(&judge.judge(kernel, plan.seeds));
         let task = LongTask::new(self.trials, "trials");
-        let trials = perturb::trials(&judge, kernel, plan, how, &stop, || task.advance(1));
+        let trials = perturb::trials(&judge, kernel, plan, how, || stop.asked(), || task.advance(1));
         drop(task);
         if trials.is_empty() {
             return Err("stopped before the first trial was done; nothing is written".into());

@@ -23,7 +23,7 @@ use stylet_implant::plan::{Anatomy, ImplantPlan, Template, check};
 use stylet_implant::plan::{file, seeds};
 use stylet_implant::procedure::{Connect, Live};
 use stylet_implant::provenance;
-use stylet_implant::readers::{DayOfImplant, Mapped, SeedDefaults, SeedFile};
+use stylet_implant::readers::{DayOfImplant, Mapped, SeedDefaults, SeedFile, read_source};
 use stylet_population as population;
 
 const DOSE_PITCH_M: f64 = 1e-3;
@@ -136,7 +136,7 @@ enum Wanted {
 
 impl PlanArgs {
     pub fn run(self) -> Result<(), CommandError> {
-        let source = Source::read(&self.source)?;
+        let source = read_source(&self.source)?;
         let identity = together(&[self.asked.file(), self.seeds.as_deref()], Shared::Frame)?;
         let (seeds, prescription_gy) = self.seeds(&source)?;
         let prescription_gy = prescription_gy.filter(|gy| (1e-3..=1e4).contains(gy)).ok_or_else(|| {

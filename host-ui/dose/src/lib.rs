@@ -29,7 +29,8 @@
 //!
 //! Lengths in m, time in s, dose in Gy, air kerma strength in U (1 U = 1 µGy m² h⁻¹); one frame for
 //! seeds, structures and grids, chosen by the caller. Water everywhere and no shielding of one seed
-//! by another, as in TG-43.
+//! by another, as in TG-43. No file is read and no signal caught here, so the crate builds for
+//! `wasm32-unknown-unknown`, too.
 #![warn(missing_docs)]
 
 pub mod criteria;

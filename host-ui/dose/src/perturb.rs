@@ -11,7 +11,6 @@ use super::kernel::DoseKernel;
 use super::report::Judge;
 use super::seed::Seed;
 use rayon::prelude::*;
-use stylet_base::interrupt::Interrupt;
 
 /// Random displacement of seeds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,20 +34,20 @@ pub struct Planned<'a> {
     pub swelling: Option<Swelling>,
 }
 
-/// Returns the values of every finished trial, by its number. `stop` ends the work early; `done` is
+/// Returns the values of every finished trial, by its number. The work ends early once `stop` returns true; `done` is
 /// called after each trial.
 pub fn trials(
     judge: &Judge,
     kernel: &DoseKernel,
     plan: Planned<'_>,
     how: Perturbation,
-    stop: &Interrupt,
+    stop: impl Fn() -> bool + Sync,
     done: impl Fn() + Sync,
 ) -> Vec<(usize, Vec<Option<f64>>)> {
     (0..how.trials)
         .into_par_iter()
         .filter_map(|trial| {
-            if stop.asked() {
+            if stop() {
                 return None;
             }
             let moved = moved(plan.seeds, plan.strands, how, trial);

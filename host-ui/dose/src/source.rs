@@ -5,16 +5,12 @@ use super::decay::days_to_s;
 use super::error::DoseError;
 use super::tg43::{Capsule, Tables};
 use read::Reader;
-use std::path::Path;
-use stylet_base::input;
 
 mod read;
 
 const M_PER_CM: f64 = 0.01;
 /// 1 cGy/h in Gy/s.
 const GY_PER_S_PER_CGY_PER_H: f64 = 0.01 / 3600.0;
-/// Largest size of a source file.
-const MAX_BYTES: u64 = 1 << 20;
 
 /// Model of a seed.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,17 +46,7 @@ impl Source {
         KNOWN.iter().filter_map(|text| Self::parse(text).ok())
     }
 
-    /// Reads and checks a file; the error names the file and lists every problem in it.
-    pub fn read(path: &Path) -> Result<Self, DoseError> {
-        let refused = |why: String| DoseError::SourceFile {
-            path: path.to_owned(),
-            why,
-        };
-        let text = input::read_text(path, MAX_BYTES).map_err(|why| refused(why.to_string()))?;
-        Self::parse(&text).map_err(|why| refused(why.to_string()))
-    }
-
-    /// Like [`Source::read`], from the text of the file.
+    /// Reads and checks the text of a source file; the error lists every problem in it.
     pub fn parse(text: &str) -> Result<Self, DoseError> {
         let table: toml::Table = text
             .parse()

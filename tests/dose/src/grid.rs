@@ -6,8 +6,9 @@ use stylet_dose::mesh::Mesh;
 use stylet_dose::{DoseGrid, DoseKernel, DosePoints, Seed, Source};
 
 fn kernel(name: &str) -> DoseKernel {
-    let file = stylet_test_kit::repository(&format!("sources/{name}.toml"));
-    DoseKernel::new(&Source::read(&file).expect("valid"), Interval::ALL)
+    let text = std::fs::read_to_string(stylet_test_kit::repository(&format!("sources/{name}.toml")));
+    let source = Source::parse(&text.expect("a source of ours can be read"));
+    DoseKernel::new(&source.expect("valid"), Interval::ALL)
 }
 
 /// Seeds off the voxel centres, each in another direction; every fifth without a direction.

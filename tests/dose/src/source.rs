@@ -1,6 +1,5 @@
 //! Source files: ours are consistent, and a bad one is refused with all of its errors.
 
-use std::path::Path;
 use stylet_dose::Source;
 use stylet_dose::tg43::Formalism;
 
@@ -97,13 +96,6 @@ fn files_that_are_no_sources_are_refused() {
     }
     let swapped = text("pd103_200").replace("g_line = [0.911", "g_line = [nan");
     assert!(Source::parse(&swapped).is_err_and(|e| e.to_string().contains("entry 1")));
-    let absent = Source::read(Path::new("/nowhere/source.toml"))
-        .expect_err("absent")
-        .to_string();
-    assert!(
-        absent.contains("/nowhere/source.toml") && absent.contains("check the path"),
-        "{absent}"
-    );
 }
 
 #[test]

@@ -12,9 +12,9 @@ struct Reference {
     two_d_gy: f64,
 }
 
-fn source(name: &str) -> Source {
-    let file = stylet_test_kit::repository(&format!("sources/{name}.toml"));
-    Source::read(&file).expect("a source of ours is valid")
+fn source(file: &str) -> Source {
+    let text = std::fs::read_to_string(stylet_test_kit::repository(&format!("sources/{file}.toml")));
+    Source::parse(&text.expect("a source of ours can be read")).expect("a source of ours is valid")
 }
 
 /// Written by tests/tests/dose/tg43_reference.py.

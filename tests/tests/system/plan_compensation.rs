@@ -39,8 +39,7 @@ struct Row {
 }
 
 fn first_plan(theatre: &Theatre) -> ImplantPlan {
-    let file = stylet_test_kit::repository("sources/i125_6711.toml");
-    let source = Source::read(&file).expect("our source is valid");
+    let source = Source::known("6711").expect("it comes with the program");
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let anatomy = Anatomy::of(&theatre.scene).expect("a closed target");
     let template = Template::before(&theatre.scene.header);

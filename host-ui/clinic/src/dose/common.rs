@@ -16,7 +16,7 @@ use stylet_dose::source::Source;
 use stylet_dose::structure::Structure;
 use stylet_files::dicom::plan::{Date, PlanSeed};
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{DayOfImplant, Declared, Mapped, SeedDefaults, contours, dose_seed, labels, places};
+use stylet_implant::readers::{DayOfImplant, Declared, Mapped, SeedDefaults, contours, dose_seed, labels, places, read_source};
 use stylet_population as population;
 
 /// Options of all commands that compute dose.
@@ -92,7 +92,7 @@ impl Common {
         if let Some(u) = self.strength_u {
             within("--strength-u", u, 0.0, 1e5)?;
         }
-        let source = Source::read(&self.source)?;
+        let source = read_source(&self.source)?;
         let is_taken_out = Nuclide::parse(&source.nuclide).is_some_and(|n| !n.is_of_permanent_seeds());
         if is_taken_out && self.to_days.is_none() {
             return Err(format!(

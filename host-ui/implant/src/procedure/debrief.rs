@@ -4,6 +4,7 @@ use super::Observations;
 use super::error::ProcedureError;
 use super::job::{self, Job, PlannedDrop};
 use crate::plan::{Anatomy, ImplantPlan};
+use crate::readers::read_source;
 use crate::score::{self, Implant, Motion, Score, SeedPair};
 use serde_json::Value;
 use std::path::Path;
@@ -96,7 +97,7 @@ pub fn source_of(implant: &ImplantPlan, asked: Option<&Path>) -> Result<Source, 
             ProcedureError::Input(format!("unknown source \"{model}\"; give --source FILE"))
         });
     };
-    let source = Source::read(path).map_err(|e| ProcedureError::Input(e.to_string()))?;
+    let source = read_source(path).map_err(|e| ProcedureError::Input(e.to_string()))?;
     let is_other = |planned: &Source| Nuclide::parse(&planned.nuclide) != Nuclide::parse(&source.nuclide);
     match of_plan.filter(is_other) {
         Some(planned) => Err(ProcedureError::Input(format!(

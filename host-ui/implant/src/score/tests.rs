@@ -24,8 +24,7 @@ fn anatomy() -> Anatomy {
 }
 
 fn kernel() -> DoseKernel {
-    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../sources/i125_6711.toml");
-    DoseKernel::new(&Source::read(&file).unwrap(), Interval::ALL)
+    DoseKernel::new(&Source::known("6711").unwrap(), Interval::ALL)
 }
 
 /// Returns a grid of seeds, those named in `off` deeper by 6 mm.

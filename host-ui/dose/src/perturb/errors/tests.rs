@@ -87,7 +87,7 @@ fn seeds_of_one_strand_share_their_correlated_errors() {
 /// other way.
 #[test]
 fn a_pure_shift_gives_the_dose_of_shifted_seeds() {
-    let source = Source::read(std::path::Path::new("../../sources/i125_6711.toml")).unwrap();
+    let source = Source::known("6711").unwrap();
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let shift_m = [2e-3, -1e-3, 3e-3];
     let errors = Errors {
