@@ -149,6 +149,11 @@ impl Link {
         &self.instance
     }
 
+    /// Time at which the heartbeat of the core last moved; `None` if it never did.
+    pub fn heard(&self) -> Option<Instant> {
+        self.pulse.moved
+    }
+
     /// Status of the core.
     pub fn status(&self) -> LinkStatus {
         let Some(moved) = self.pulse.moved else {

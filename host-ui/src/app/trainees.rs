@@ -11,11 +11,10 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use stylet_base::format;
 use stylet_host::link::{Link, LinkStatus};
-use stylet_host::moments::STOPPED;
-use stylet_host::roster::{Glance, Roster, Trainee};
+use stylet_host::roster::{self, Glance, Trainee};
 use stylet_implant::class;
 use stylet_implant::received::ReceivedProcedure;
-use stylet_shm_schema::{Mark, Request, flags};
+use stylet_shm_schema::flags;
 
 /// Time for which seeds still move with the tissue after the needle is out.
 const RESTS_AFTER: Duration = Duration::from_secs(3);
@@ -55,7 +54,6 @@ struct Seat {
 
 /// List of a window's trainees, and destination of their debriefs.
 pub(super) struct Trainees {
-    roster: Option<Roster>,
     all: Vec<Trainee>,
     pub(super) glances: Vec<Glance>,
     pub(super) followed: Option<usize>,
@@ -74,7 +72,6 @@ pub(super) struct Trainees {
 impl Trainees {
     pub(super) fn new(all: Vec<Trainee>, class: Option<PathBuf>, name: String) -> Self {
         Self {
-            roster: (!all.is_empty()).then(|| Roster::start(all.clone())),
             followed: (!all.is_empty()).then_some(0),
             seats: all.iter().map(Seat::new).collect(),
             all,
@@ -124,15 +121,14 @@ impl Seat {
 
 impl App {
     pub(super) fn take_trainees(&mut self) {
-        if let Some(roster) = &self.trainees.roster {
-            self.trainees.glances = roster.glances();
-        }
-        for number in 0..self.trainees.seats.len() {
-            let is_due = self.trainees.seats[number].take();
-            if is_due && self.trainees.class.is_some() {
-                self.trainees.due.push_back(number);
+        let list = &mut self.trainees;
+        for (number, seat) in list.seats.iter_mut().enumerate() {
+            if seat.take() && list.class.is_some() {
+                list.due.push_back(number);
             }
         }
+        let seats = list.all.iter().zip(&list.seats);
+        list.glances = seats.map(|(trainee, seat)| Glance::of(trainee, &seat.link)).collect();
         if self.trainees.seats.is_empty() && self.trainees.class.is_some() && !self.watches() {
             self.write_when_done();
         }
@@ -206,12 +202,12 @@ impl App {
     fn stop_trainee(&mut self, number: usize) {
         if self.trainees.followed == Some(number) {
             self.stop_run();
-            let text = STOPPED.to_owned();
-            self.send("Mark", &Request::Mark(Mark { text, before_s: 0.0 }));
-        } else if !self.trainees.roster.as_ref().is_some_and(|roster| roster.stop(number)) {
-            self.shown.note = Some(refusal(
-                "The hand could not be stopped: too many requests wait.".to_owned(),
-            ));
+        }
+        let Some(seat) = self.trainees.seats.get_mut(number) else {
+            return;
+        };
+        if let Err(why) = roster::stop(&mut seat.link) {
+            self.shown.note = Some(refusal(format!("The hand could not be stopped: {why}")));
         }
     }
 }

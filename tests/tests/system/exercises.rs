@@ -3,7 +3,7 @@
 use std::time::Duration;
 use stylet_host::link::Link;
 use stylet_host::moments::{Moment, MomentKind, STOPPED};
-use stylet_host::roster::{Glance, Roster, Trainee};
+use stylet_host::roster::{self, Glance, Trainee};
 use stylet_implant::workflow::{Pace, Run, RunStatus, Step, default_plan, move_request};
 use stylet_shm_schema::{Exercise, Mark, Phase, Request};
 use stylet_tests::witness::where_the_machine_runs;
@@ -151,11 +151,16 @@ fn a_list_of_trainees_sees_each_stops_one_hand_and_says_who_is_silent() {
         instance: fresh_instance(),
     };
     let named = ["Ida", "Otto"].into_iter().zip(&links).map(trainee).chain([nobody]);
-    let roster = Roster::start(named.collect());
-    let seen = |which: usize, is: &dyn Fn(&Glance) -> bool| {
-        until(Duration::from_secs(5), || roster.glances().get(which).is_some_and(is))
+    let mut seats: Vec<(Trainee, Link)> = named.map(|t| (t.clone(), Link::new(t.instance))).collect();
+    let glance = |seats: &mut [(Trainee, Link)], which: usize| {
+        let (trainee, link) = &mut seats[which];
+        link.poll();
+        Glance::of(trainee, link)
     };
-    assert!(seen(0, &|g| g.state.is_some()) && seen(1, &|g| g.state.is_some()));
+    let seen = |seats: &mut [(Trainee, Link)], which: usize, is: &dyn Fn(&Glance) -> bool| {
+        until(Duration::from_secs(5), || is(&glance(seats, which)))
+    };
+    assert!([0, 1].iter().all(|n| seen(&mut seats, *n, &|g| g.state.is_some())));
     for link in &mut links {
         let mut request = move_request([0.0, 0.0, -0.2], [0.0, 0.0, 1.0], 0.01, 2.0);
         if let (Request::MoveHand(hand), Some(state)) = (&mut request, link.state()) {
@@ -163,29 +168,34 @@ fn a_list_of_trainees_sees_each_stops_one_hand_and_says_who_is_silent() {
         }
         ask(link, &request).expect("taken");
     }
-    let tip_m = |which: usize| roster.glances()[which].state.map(|s| s.tip_in_scene_m);
     // The hand keeps moving only while its host polls.
-    let mut moves = |which: usize| {
-        let before = tip_m(which);
+    let mut moves = |seats: &mut [(Trainee, Link)], which: usize| {
+        let before = glance(seats, which).state.map(|s| s.tip_in_scene_m);
         until(Duration::from_millis(400), || {
             links.iter_mut().for_each(Link::poll);
             false
         });
-        tip_m(which) != before
+        glance(seats, which).state.map(|s| s.tip_in_scene_m) != before
     };
-    assert!(moves(0) && moves(1), "both hands are on their way");
-    assert!(roster.stop(1));
-    assert!(until(Duration::from_secs(5), || !moves(1)), "the hand goes on");
-    assert!(moves(0), "the other hand has stopped as well");
+    assert!(
+        moves(&mut seats, 0) && moves(&mut seats, 1),
+        "both hands are on their way"
+    );
+    roster::stop(&mut seats[1].1).expect("sent");
+    assert!(
+        until(Duration::from_secs(5), || !moves(&mut seats, 1)),
+        "the hand goes on"
+    );
+    assert!(moves(&mut seats, 0), "the other hand has stopped as well");
     let [first, mut second] = links;
     assert_eq!(words(&mut second), [(MomentKind::Mark, STOPPED.to_owned())]);
     drop((first, second));
-    assert!(roster.glances()[2].heard.is_none(), "nobody is there");
+    assert!(glance(&mut seats, 2).heard.is_none(), "nobody is there");
     let [killed, other] = cores;
     let _instance = killed.kill();
     let is_silent = |g: &Glance| g.heard.is_some_and(|at| at.elapsed() > Duration::from_millis(1500));
-    assert!(seen(0, &is_silent), "a dead core is heard");
-    assert!(!is_silent(&roster.glances()[1]), "a living one is not");
-    drop(roster);
+    assert!(seen(&mut seats, 0, &is_silent), "a dead core is heard");
+    assert!(!is_silent(&glance(&mut seats, 1)), "a living one is not");
+    drop(seats);
     drop(other);
 }
