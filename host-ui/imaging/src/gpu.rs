@@ -65,7 +65,8 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn uniform(&self, bytes: u64) -> wgpu::Buffer {
+    /// Creates a buffer for the uniforms of a pass.
+    pub fn uniform(&self, bytes: u64) -> wgpu::Buffer {
         self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("stylet imaging"),
             size: bytes,
@@ -74,22 +75,41 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn texture(
+    /// Creates a volume that is filled from here and read by passes.
+    pub fn volume(&self, dims: [u32; 3], format: wgpu::TextureFormat) -> wgpu::Texture {
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+        self.texture(dims, wgpu::TextureDimension::D3, 1, format, usage)
+    }
+
+    /// Creates a picture with this number of samples per pixel.
+    pub fn picture(
         &self,
-        dims: [u32; 3],
+        [width, height]: [u32; 2],
+        samples: u32,
+        format: wgpu::TextureFormat,
+        usage: wgpu::TextureUsages,
+    ) -> wgpu::Texture {
+        let dimension = wgpu::TextureDimension::D2;
+        self.texture([width, height, 1], dimension, samples, format, usage)
+    }
+
+    fn texture(
+        &self,
+        [width, height, depth_or_array_layers]: [u32; 3],
         dimension: wgpu::TextureDimension,
+        sample_count: u32,
         format: wgpu::TextureFormat,
         usage: wgpu::TextureUsages,
     ) -> wgpu::Texture {
         self.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("stylet imaging"),
             size: wgpu::Extent3d {
-                width: dims[0],
-                height: dims[1],
-                depth_or_array_layers: dims[2],
+                width,
+                height,
+                depth_or_array_layers,
             },
             mip_level_count: 1,
-            sample_count: 1,
+            sample_count,
             dimension,
             format,
             usage,
@@ -97,7 +117,8 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn write(&self, texture: &wgpu::Texture, bytes: &[u8], bytes_per_texel: u32) {
+    /// Fills a texture; returns the number of bytes sent.
+    pub fn write(&self, texture: &wgpu::Texture, bytes: &[u8], bytes_per_texel: u32) -> u64 {
         let size = texture.size();
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,
@@ -105,6 +126,7 @@ impl Gpu {
             rows_per_image: Some(size.height),
         };
         self.queue.write_texture(texture.as_image_copy(), bytes, layout, size);
+        bytes.len() as u64
     }
 
     /// Returns the content of a buffer, once the earlier passes are done.
@@ -148,7 +170,8 @@ impl Gpu {
         rows.flat_map(|row| row[..size.width as usize].to_vec()).collect()
     }
 
-    pub(crate) fn layout(&self, visibility: wgpu::ShaderStages, types: &[wgpu::BindingType]) -> wgpu::BindGroupLayout {
+    /// Creates the layout of bindings in this order.
+    pub fn layout(&self, visibility: wgpu::ShaderStages, types: &[wgpu::BindingType]) -> wgpu::BindGroupLayout {
         let entries: Vec<wgpu::BindGroupLayoutEntry> = (0..)
             .zip(types)
             .map(|(binding, ty)| wgpu::BindGroupLayoutEntry {
@@ -164,7 +187,8 @@ impl Gpu {
         })
     }
 
-    pub(crate) fn bind(&self, layout: &wgpu::BindGroupLayout, bound: &[wgpu::BindingResource<'_>]) -> wgpu::BindGroup {
+    /// Binds resources in this order.
+    pub fn bind(&self, layout: &wgpu::BindGroupLayout, bound: &[wgpu::BindingResource<'_>]) -> wgpu::BindGroup {
         let entries: Vec<wgpu::BindGroupEntry<'_>> = (0..)
             .zip(bound)
             .map(|(binding, resource)| wgpu::BindGroupEntry {
@@ -211,10 +235,13 @@ impl Gpu {
         })
     }
 
-    /// Creates a sampler, linear between texels and constant beyond the outermost.
-    pub(crate) fn clamped(&self) -> wgpu::Sampler {
+    /// Creates a sampler, linear between texels.
+    pub fn sampler(&self, beyond: wgpu::AddressMode) -> wgpu::Sampler {
         self.device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("stylet imaging"),
+            address_mode_u: beyond,
+            address_mode_v: beyond,
+            address_mode_w: beyond,
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
             ..Default::default()
@@ -232,26 +259,43 @@ impl Gpu {
     }
 }
 
-/// Bindings of a uniform, a buffer that is read, and one that is written.
-pub(crate) const UNIFORM: wgpu::BindingType = buffer(wgpu::BufferBindingType::Uniform);
+/// Returns the attachment of a pass that draws all of a picture.
+pub fn drawn_on(
+    view: &wgpu::TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+) -> Option<wgpu::RenderPassColorAttachment<'_>> {
+    Some(wgpu::RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations {
+            load,
+            store: wgpu::StoreOp::Store,
+        },
+    })
+}
+
+/// Binding of a uniform.
+pub const UNIFORM: wgpu::BindingType = buffer(wgpu::BufferBindingType::Uniform);
+/// Bindings of a buffer that is read, and of one that is written.
 pub(crate) const READ: wgpu::BindingType = buffer(wgpu::BufferBindingType::Storage { read_only: true });
 pub(crate) const WRITE: wgpu::BindingType = buffer(wgpu::BufferBindingType::Storage { read_only: false });
-/// Binding of a volume, and of its sampler.
-pub(crate) const VOLUME: wgpu::BindingType = wgpu::BindingType::Texture {
-    sample_type: wgpu::TextureSampleType::Float { filterable: true },
-    view_dimension: wgpu::TextureViewDimension::D3,
-    multisampled: false,
-};
-pub(crate) const SAMPLER: wgpu::BindingType = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-/// Usage of a texture that is filled from here and read by passes.
-pub(crate) const FILLED: wgpu::TextureUsages =
-    wgpu::TextureUsages::TEXTURE_BINDING.union(wgpu::TextureUsages::COPY_DST);
+/// Binding of a volume.
+pub const VOLUME: wgpu::BindingType = texture(wgpu::TextureViewDimension::D3, true);
+/// Binding of a picture.
+pub const PICTURE: wgpu::BindingType = texture(wgpu::TextureViewDimension::D2, true);
 /// Binding of numbers by column and row, read one by one.
-pub(crate) const GRID: wgpu::BindingType = wgpu::BindingType::Texture {
-    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-    view_dimension: wgpu::TextureViewDimension::D2,
-    multisampled: false,
-};
+pub(crate) const GRID: wgpu::BindingType = texture(wgpu::TextureViewDimension::D2, false);
+/// Binding of the sampler of a volume or a picture.
+pub const SAMPLER: wgpu::BindingType = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+
+const fn texture(view_dimension: wgpu::TextureViewDimension, filterable: bool) -> wgpu::BindingType {
+    wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable },
+        view_dimension,
+        multisampled: false,
+    }
+}
 
 const fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
     wgpu::BindingType::Buffer {
@@ -264,29 +308,49 @@ const fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
 /// Entry point of a shader, with the values of its constants.
 pub type Stage<'a> = (&'a str, &'a [(&'a str, f64)]);
 
-/// Pipeline whose vertices are made by its own shader.
+/// Pipeline that draws.
 pub struct Drawing<'a> {
-    /// Name in messages of the driver.
-    pub label: &'a str,
     /// Source of both shaders.
     pub wgsl: &'a str,
     /// Vertex shader.
     pub vertex: Stage<'a>,
     /// Fragment shader.
     pub fragment: Stage<'a>,
-    /// Format of the picture.
-    pub target: wgpu::TextureFormat,
+    /// Format of the picture, and its blending.
+    pub target: wgpu::ColorTargetState,
+    /// Vertices; none if the shader makes its own.
+    pub buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    /// Shape and culling.
+    pub primitive: wgpu::PrimitiveState,
+    /// Depth of the picture.
+    pub depth: Option<wgpu::DepthStencilState>,
+    /// Samples per pixel.
+    pub samples: u32,
 }
 
-impl Drawing<'_> {
+impl<'a> Drawing<'a> {
+    /// Returns triangles whose vertices are made by their own shader.
+    pub fn made_by_shader(wgsl: &'a str, vertex: Stage<'a>, fragment: Stage<'a>, target: wgpu::TextureFormat) -> Self {
+        Self {
+            wgsl,
+            vertex,
+            fragment,
+            target: target.into(),
+            buffers: &[],
+            primitive: Default::default(),
+            depth: None,
+            samples: 1,
+        }
+    }
+
     /// Creates the pipeline for bindings of this layout.
-    pub fn pipeline(&self, device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
+    pub fn pipeline(self, device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(self.label),
+            label: Some(self.fragment.0),
             source: wgpu::ShaderSource::Wgsl(self.wgsl.into()),
         });
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(self.label),
+            label: Some(self.fragment.0),
             bind_group_layouts: &[Some(layout)],
             immediate_size: 0,
         });
@@ -295,22 +359,25 @@ impl Drawing<'_> {
             ..Default::default()
         };
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(self.label),
+            label: Some(self.fragment.0),
             layout: Some(&layout),
             vertex: wgpu::VertexState {
                 module: &module,
                 entry_point: Some(self.vertex.0),
                 compilation_options: options(self.vertex),
-                buffers: &[],
+                buffers: self.buffers,
             },
-            primitive: Default::default(),
-            depth_stencil: None,
-            multisample: Default::default(),
+            primitive: self.primitive,
+            depth_stencil: self.depth,
+            multisample: wgpu::MultisampleState {
+                count: self.samples,
+                ..Default::default()
+            },
             fragment: Some(wgpu::FragmentState {
                 module: &module,
                 entry_point: Some(self.fragment.0),
                 compilation_options: options(self.fragment),
-                targets: &[Some(self.target.into())],
+                targets: &[Some(self.target)],
             }),
             multiview_mask: None,
             cache: None,

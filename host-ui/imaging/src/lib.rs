@@ -8,11 +8,11 @@
 
 mod body;
 pub mod fluoroscopy;
-mod gpu;
+pub mod gpu;
 mod tissue;
 pub mod ultrasound;
 pub mod xray;
 
 pub use body::{Body, Metal, NEEDLE_RADIUS_M, Needle, SEED_LENGTH_M, SEED_RADIUS_M, Seed};
-pub use gpu::{Drawing, Gpu, NoGpu};
+pub use gpu::{Gpu, NoGpu};
 pub use tissue::{OUTSIDE, Tissue, brightness};

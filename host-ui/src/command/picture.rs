@@ -161,9 +161,8 @@ impl PictureArgs {
             cranial: self.cranial.to_radians(),
             ..CArm::about(middle, header.patient().rotation().transpose())
         };
-        let mut scope = Fluoroscope::new(gpu);
-        let greys = scope.shoot(&arm, &Exposure::default(), body, field, metal).greys();
-        println!("air kerma: {:.0} uGy", scope.dose.air_kerma_gy * 1e6);
+        let greys = Fluoroscope::new(gpu).shoot(&arm, body, field, metal).greys();
+        println!("air kerma: {:.0} uGy", Exposure::default().air_kerma_gy(&arm) * 1e6);
         greys.into_iter().map(|g| [g, g, g, 255]).collect()
     }
 }

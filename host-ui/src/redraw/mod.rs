@@ -8,13 +8,14 @@ mod damage;
 
 use crate::cpu_time::thread_ns;
 use crate::view::driver::DriverCost;
-use crate::view::paste::{Paste, Pasted};
+use crate::view::paste::{Paste, Pasted, gpu_of};
 use damage::{Drawn, damage, window};
 use eframe::egui_wgpu::{RenderState, ScreenDescriptor};
 use eframe::wgpu;
 use egui::epaint::textures::TexturesDelta;
 use egui::epaint::{ClippedPrimitive, ClippedShape, Shape};
 use egui::{Color32, Context, FullOutput, Rect, TextureId};
+use stylet_imaging::gpu::drawn_on;
 
 /// Renderer that replaces the shapes of a frame by one that shows them.
 pub(crate) struct Redraw {
@@ -95,21 +96,9 @@ impl Redraw {
         if let Some(kept) = self.kept.take().filter(same) {
             return kept;
         }
-        let texture = self.state.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("stylet window"),
-            size: wgpu::Extent3d {
-                width: size[0],
-                height: size[1],
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: self.state.target_format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        let texture = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+        let texture = gpu_of(&self.state).picture(size, 1, self.state.target_format, usage);
+        let texture = texture.create_view(&Default::default());
         let whole = window(size, pixels_per_point);
         let nothing = ClippedShape::new(Rect::EVERYTHING, Shape::Noop);
         LastFrame {
@@ -152,24 +141,14 @@ impl Redraw {
             pixels_per_point: kept.pixels_per_point,
         };
         let (device, queue) = (&self.state.device, &self.state.queue);
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor {
-            label: Some("stylet window"),
-        });
+        let mut encoder = device.create_command_encoder(&Default::default());
         let mut renderer = self.state.renderer.write();
         let prepared = renderer.update_buffers(device, queue, &mut encoder, primitives, &screen);
         {
             let mut pass = encoder
                 .begin_render_pass(&wgpu::RenderPassDescriptor {
                     label: Some("stylet window"),
-                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                        view: &kept.texture,
-                        depth_slice: None,
-                        resolve_target: None,
-                        ops: wgpu::Operations {
-                            load: wgpu::LoadOp::Load,
-                            store: wgpu::StoreOp::Store,
-                        },
-                    })],
+                    color_attachments: &[drawn_on(&kept.texture, wgpu::LoadOp::Load)],
                     ..Default::default()
                 })
                 .forget_lifetime();

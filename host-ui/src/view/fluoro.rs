@@ -6,7 +6,7 @@ mod tools;
 mod words;
 
 use super::body::ShownBody;
-use super::paste::{Paste, Pasted};
+use super::paste::{Paste, Pasted, gpu_of};
 use super::slice;
 use crate::shown::Shown;
 use crate::theme::IMAGE;
@@ -36,13 +36,12 @@ const LOOK_AGAIN: Duration = Duration::from_millis(10);
 /// Patient: a run of the core and its scene.
 type Case = (u64, SceneId);
 
-/// Computed pulse, with the tube that it returns.
-type Pulse = (Fluoroscope, CArm, Vec<u8>);
-
 /// Tube, arm and screen.
 pub(super) struct FluoroView {
     screen: Option<Screen>,
-    tube: Option<Tube>,
+    tube: Option<Arc<Fluoroscope>>,
+    /// Pulse that is being computed: the arm, and the greys of its picture.
+    pulse: Option<Job<(CArm, Vec<u8>)>>,
     case: Option<(Case, Arc<Body>)>,
     held: Option<Held>,
     pub dose: DoseCounter,
@@ -72,11 +71,6 @@ struct Screen {
     paste: Paste,
 }
 
-enum Tube {
-    Ready(Box<Fluoroscope>),
-    AtWork(Job<Pulse>),
-}
-
 /// Last picture.
 struct Held {
     pasted: Pasted,
@@ -89,10 +83,7 @@ impl FluoroView {
     /// Creates the view. Without a graphics device that computes there are no pictures.
     pub fn new(state: Option<RenderState>) -> Self {
         let screen = state.and_then(|state| {
-            let gpu = Gpu {
-                device: state.device.clone(),
-                queue: state.queue.clone(),
-            };
+            let gpu = gpu_of(&state);
             gpu.computes().then(|| Screen {
                 gpu,
                 paste: Paste::new(&state),
@@ -101,6 +92,7 @@ impl FluoroView {
         Self {
             screen,
             tube: None,
+            pulse: None,
             case: None,
             held: None,
             dose: DoseCounter::default(),
@@ -123,7 +115,7 @@ impl FluoroView {
     pub fn begin_case(&mut self) {
         self.held = None;
         self.dose = DoseCounter::default();
-        self.tube = None;
+        self.pulse = None;
     }
 
     /// Draws the screen, and takes the next pulse while the beam is on.
@@ -152,7 +144,7 @@ impl FluoroView {
         if self.is_on() {
             self.begin_pulse(arm, shown, field);
         }
-        if self.is_on() || matches!(self.tube, Some(Tube::AtWork(_))) {
+        if self.is_on() || self.pulse.is_some() {
             ui.ctx().request_repaint_after(LOOK_AGAIN);
         }
         if self.screen.is_none() {
@@ -186,22 +178,19 @@ impl FluoroView {
     fn begin_pulse(&mut self, arm: CArm, shown: &Shown, field: &Field) {
         let exposure = Exposure::FLUOROSCOPY;
         let is_due = |held: &Held| held.at.elapsed().as_secs_f64() >= exposure.beam_s;
-        if matches!(self.tube, Some(Tube::AtWork(_))) || !self.held.as_ref().is_none_or(is_due) {
+        if self.pulse.is_some() || !self.held.as_ref().is_none_or(is_due) {
             return;
         }
         let (Some(screen), Some((_, body))) = (&self.screen, &self.case) else {
             return;
         };
         let (body, field, metal) = (Arc::clone(body), field.clone(), shown.metal());
-        let mut tube = match self.tube.take() {
-            Some(Tube::Ready(tube)) => *tube,
-            _ => Fluoroscope::new(screen.gpu.clone()),
-        };
-        self.tube = Some(Tube::AtWork(Job::begin("fluoroscopy", move |sender, _| {
-            let greys = tube.shoot(&arm, &exposure, &body, &field, &metal).greys();
+        let new = || Arc::new(Fluoroscope::new(screen.gpu.clone()));
+        let tube = Arc::clone(self.tube.get_or_insert_with(new));
+        self.pulse = Some(Job::begin("fluoroscopy", move |sender, _| {
             // The window may have closed, so the picture may have no receiver.
-            let _ = sender.send((tube, arm, greys));
-        })));
+            let _ = sender.send((arm, tube.shoot(&arm, &body, &field, &metal).greys()));
+        }));
         self.dose.count(&exposure, &arm);
         if let Some(held) = &mut self.held {
             held.at = Instant::now();
@@ -209,12 +198,12 @@ impl FluoroView {
     }
 
     fn take_pulse(&mut self) {
-        let Some(Tube::AtWork(job)) = &self.tube else { return };
+        let Some(job) = &self.pulse else { return };
         match job.poll() {
             JobUpdate::Pending => {}
-            JobUpdate::Ended => self.tube = None,
-            JobUpdate::Message((tube, arm, greys)) => {
-                self.tube = Some(Tube::Ready(Box::new(tube)));
+            JobUpdate::Ended => self.pulse = None,
+            JobUpdate::Message((arm, greys)) => {
+                self.pulse = None;
                 let at = self.held.take().map_or_else(Instant::now, |held| held.at);
                 self.held = self.screen.as_ref().and_then(|screen| screen.held(arm, &greys, at));
             }
@@ -228,30 +217,10 @@ impl Screen {
         if greys.len() != width as usize * height as usize {
             return None;
         }
-        let size = wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        };
-        let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("stylet fluoroscopy"),
-            size,
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba8Unorm,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+        let texture = self.gpu.picture(arm.pixels, 1, wgpu::TextureFormat::Rgba8Unorm, usage);
         let pixels: Vec<u8> = greys.iter().flat_map(|&grey| [grey, grey, grey, 255]).collect();
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(width * 4),
-            rows_per_image: Some(height),
-        };
-        self.gpu
-            .queue
-            .write_texture(texture.as_image_copy(), &pixels, layout, size);
+        self.gpu.write(&texture, &pixels, 4);
         let view = texture.create_view(&Default::default());
         Some(Held {
             pasted: self.paste.enlarged(&view),

@@ -9,15 +9,17 @@ mod targets;
 
 use super::driver::DriverCost;
 use super::marks::Marks;
-use super::paste::{Paste, Pasted};
+use super::paste::{Paste, Pasted, gpu_of};
 use super::uniforms::SceneUniform;
 use crate::dose_worker::IsodoseShell;
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
-use growing::{Growing, allocate};
-use pipelines::{Pipelines, pipelines};
+use growing::Growing;
+use pipelines::Pipelines;
 use std::mem::size_of;
 use std::ops::Range;
+use stylet_imaging::Gpu;
+use stylet_imaging::gpu::UNIFORM;
 use stylet_surfaces::mesh::SurfaceVertex;
 use stylet_surfaces::mesh::coarse::coarse;
 use targets::{FINE, ONE_SAMPLE, Targets};
@@ -43,8 +45,8 @@ struct Shell {
     material: Material,
 }
 
-pub struct Gpu {
-    state: RenderState,
+pub struct SceneGpu {
+    gpu: Gpu,
     layout: wgpu::BindGroupLayout,
     pipelines: Pipelines,
     /// Pipelines for `coarse`.
@@ -69,29 +71,18 @@ pub struct Gpu {
     pub driver: DriverCost,
 }
 
-impl Gpu {
-    pub fn new(state: RenderState) -> Self {
-        let device = &state.device;
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("stylet scene"),
-            entries: &[wgpu::BindGroupLayoutEntry {
-                binding: 0,
-                visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
-                ty: wgpu::BindingType::Buffer {
-                    ty: wgpu::BufferBindingType::Uniform,
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
-                },
-                count: None,
-            }],
-        });
+impl SceneGpu {
+    pub fn new(state: &RenderState) -> Self {
+        let gpu = gpu_of(state);
+        let device = &gpu.device;
+        let layout = gpu.layout(wgpu::ShaderStages::VERTEX_FRAGMENT, &[UNIFORM]);
         let vertex = wgpu::BufferUsages::VERTEX;
         Self {
-            pipelines: pipelines(device, &layout, FINE),
-            coarse_pipelines: pipelines(device, &layout, ONE_SAMPLE),
-            paste: Paste::new(&state),
+            pipelines: Pipelines::new(device, &layout, FINE),
+            coarse_pipelines: Pipelines::new(device, &layout, ONE_SAMPLE),
+            paste: Paste::new(state),
             surfaces: Vec::new(),
-            ghost: material(device, &layout),
+            ghost: material(&gpu, &layout),
             solids: [Growing::new(device, vertex), Growing::new(device, vertex)],
             lines: [Growing::new(device, vertex), Growing::new(device, vertex)],
             surface_vertices: Growing::new(device, vertex),
@@ -104,13 +95,13 @@ impl Gpu {
             shows_coarse: false,
             driver: DriverCost::default(),
             layout,
-            state,
+            gpu,
         }
     }
 
     /// Sets the indices of each surface, the body's first.
     pub fn set_scene(&mut self, rest: &[SurfaceVertex], surfaces: &[Vec<u32>]) {
-        self.driver.send(|| self.ghost_vertices.write(&self.state, rest));
+        self.driver.send(|| self.ghost_vertices.write(&self.gpu, rest));
         let mut indices: Vec<u32> = Vec::new();
         let mut add = |some: &[u32]| {
             let begun = indices.len() as u32;
@@ -128,47 +119,46 @@ impl Gpu {
             self.surfaces.push(Layer {
                 fine,
                 coarse,
-                material: material(&self.state.device, &self.layout),
+                material: material(&self.gpu, &self.layout),
             });
         }
-        self.driver.send(|| self.indices.write(&self.state, &indices));
+        self.driver.send(|| self.indices.write(&self.gpu, &indices));
     }
 
     pub fn set_surface(&mut self, vertices: &[SurfaceVertex]) {
-        self.driver.send(|| self.surface_vertices.write(&self.state, vertices));
+        self.driver.send(|| self.surface_vertices.write(&self.gpu, vertices));
     }
 
     /// Moves vertices of the same surface.
     pub fn move_surface(&mut self, vertices: &[SurfaceVertex], runs: Vec<Range<usize>>) {
         for run in runs {
             self.driver
-                .send(|| self.surface_vertices.write_run(&self.state, vertices, run));
+                .send(|| self.surface_vertices.write_run(&self.gpu, vertices, run));
         }
     }
 
     /// Sets vertices and indices of each isodose surface.
     pub fn set_shells(&mut self, shells: &[IsodoseShell]) {
-        let device = &self.state.device;
+        let device = &self.gpu.device;
         while self.shells.len() < shells.len() {
             self.shells.push(Shell {
                 vertices: Growing::new(device, wgpu::BufferUsages::VERTEX),
                 indices: Growing::new(device, wgpu::BufferUsages::INDEX),
-                material: material(device, &self.layout),
+                material: material(&self.gpu, &self.layout),
             });
         }
         self.shells.truncate(shells.len());
         for (shell, surface) in self.shells.iter_mut().zip(shells) {
-            self.driver
-                .send(|| shell.vertices.write(&self.state, &surface.vertices));
-            self.driver.send(|| shell.indices.write(&self.state, &surface.indices));
+            self.driver.send(|| shell.vertices.write(&self.gpu, &surface.vertices));
+            self.driver.send(|| shell.indices.write(&self.gpu, &surface.indices));
         }
     }
 
     /// Sets marks: `which` is 0 for those of the plan, 1 for those of the tick.
     pub fn set_marks(&mut self, which: usize, marks: &Marks) {
         self.driver
-            .send(|| self.solids[which].write(&self.state, &marks.triangles));
-        self.driver.send(|| self.lines[which].write(&self.state, &marks.lines));
+            .send(|| self.solids[which].write(&self.gpu, &marks.triangles));
+        self.driver.send(|| self.lines[which].write(&self.gpu, &marks.lines));
     }
 
     /// Sets the size in pixels. Returns true if the picture is new and must be drawn.
@@ -177,10 +167,10 @@ impl Gpu {
         if self.fine.as_ref().is_some_and(|t| t.size == size) {
             return false;
         }
-        self.fine = Some(Targets::new(&self.state, size, FINE, |picture| self.paste.of(picture)));
+        self.fine = Some(Targets::new(&self.gpu, size, FINE, |picture| self.paste.of(picture)));
         self.coarse = (!self.has_card).then(|| {
             let size = size.map(|side| side.div_ceil(2));
-            Targets::new(&self.state, size, ONE_SAMPLE, |picture| self.paste.enlarged(picture))
+            Targets::new(&self.gpu, size, ONE_SAMPLE, |picture| self.paste.enlarged(picture))
         });
         true
     }
@@ -233,7 +223,7 @@ impl Gpu {
         (looks, shells, ghost): (&[SceneUniform], &[SceneUniform], Option<&SceneUniform>),
         clear: [f64; 3],
     ) -> u64 {
-        let queue = &self.state.queue;
+        let queue = &self.gpu.queue;
         for (surface, look) in self.surfaces.iter().zip(looks) {
             queue.write_buffer(&surface.material.uniform, 0, bytemuck::bytes_of(look));
         }
@@ -244,12 +234,7 @@ impl Gpu {
         if let Some(ghost) = ghost.or(looks.first()) {
             queue.write_buffer(&self.ghost.uniform, 0, bytemuck::bytes_of(ghost));
         }
-        let mut encoder = self
-            .state
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
-                label: Some("stylet view"),
-            });
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = targets.begin(&mut encoder, clear);
             let pipelines = if self.shows_coarse {
@@ -326,15 +311,10 @@ fn draw_list(pass: &mut wgpu::RenderPass<'_>, pipeline: &wgpu::RenderPipeline, l
     }
 }
 
-fn material(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> Material {
-    let uniform = allocate(device, wgpu::BufferUsages::UNIFORM, size_of::<SceneUniform>() as u64);
-    let bind = device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("stylet scene"),
-        layout,
-        entries: &[wgpu::BindGroupEntry {
-            binding: 0,
-            resource: uniform.as_entire_binding(),
-        }],
-    });
-    Material { uniform, bind }
+fn material(gpu: &Gpu, layout: &wgpu::BindGroupLayout) -> Material {
+    let uniform = gpu.uniform(size_of::<SceneUniform>() as u64);
+    Material {
+        bind: gpu.bind(layout, &[uniform.as_entire_binding()]),
+        uniform,
+    }
 }

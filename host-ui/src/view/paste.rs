@@ -7,11 +7,12 @@ use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, RenderState}
 use eframe::wgpu;
 use egui::epaint::PaintCallback;
 use egui::{PaintCallbackInfo, Painter, Rect, Shape};
-use stylet_imaging::Drawing;
+use stylet_imaging::Gpu;
+use stylet_imaging::gpu::{Drawing, PICTURE, SAMPLER};
 
 /// Pipelines that put pictures into the window.
 pub struct Paste {
-    device: wgpu::Device,
+    gpu: Gpu,
     layout: wgpu::BindGroupLayout,
     between: wgpu::Sampler,
     /// Pipeline pixel for pixel.
@@ -34,6 +35,14 @@ struct Draw {
     picture: wgpu::BindGroup,
 }
 
+/// Returns the device of the window.
+pub fn gpu_of(state: &RenderState) -> Gpu {
+    Gpu {
+        device: state.device.clone(),
+        queue: state.queue.clone(),
+    }
+}
+
 impl Paste {
     /// Creates pipelines for textures with the screen's red, green and blue.
     pub fn new(state: &RenderState) -> Self {
@@ -46,34 +55,25 @@ impl Paste {
     }
 
     fn converting(state: &RenderState, to_light: bool) -> Self {
-        let device = &state.device;
-        let picture = wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Float { filterable: true },
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
+        let gpu = gpu_of(state);
+        let layout = gpu.layout(wgpu::ShaderStages::FRAGMENT, &[PICTURE, SAMPLER]);
+        let pipeline = |enlarges: bool| {
+            let [to_light, enlarges] = [to_light, enlarges].map(|is| f64::from(u8::from(is)));
+            let constants = [("TAKES_LIGHT", to_light), ("ENLARGES", enlarges)];
+            Drawing::made_by_shader(
+                include_str!("paste.wgsl"),
+                ("paste_vertex", &[]),
+                ("paste_fragment", &constants),
+                state.target_format,
+            )
+            .pipeline(&gpu.device, &layout)
         };
-        let sampler = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty,
-            count: None,
-        };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("stylet paste"),
-            entries: &[entry(0, picture), entry(1, sampler)],
-        });
-        let between = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("stylet paste"),
-            mag_filter: wgpu::FilterMode::Linear,
-            ..Default::default()
-        });
         Self {
-            exact: pipeline(device, &layout, state.target_format, [to_light, false]),
-            enlarging: pipeline(device, &layout, state.target_format, [to_light, true]),
+            exact: pipeline(false),
+            enlarging: pipeline(true),
             layout,
-            between,
-            device: device.clone(),
+            between: gpu.sampler(wgpu::AddressMode::ClampToEdge),
+            gpu,
         }
     }
 
@@ -88,23 +88,13 @@ impl Paste {
     }
 
     fn by(&self, pipeline: &wgpu::RenderPipeline, texture: &wgpu::TextureView) -> Pasted {
-        let picture = self.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("stylet paste"),
-            layout: &self.layout,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::TextureView(texture),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::Sampler(&self.between),
-                },
-            ],
-        });
+        let resources = [
+            wgpu::BindingResource::TextureView(texture),
+            wgpu::BindingResource::Sampler(&self.between),
+        ];
         let draw = Draw {
             pipeline: pipeline.clone(),
-            picture,
+            picture: self.gpu.bind(&self.layout, &resources),
         };
         Pasted {
             callback: Callback::new_paint_callback(Rect::NOTHING, draw.clone()),
@@ -138,26 +128,4 @@ impl CallbackTrait for Draw {
         pass.set_bind_group(0, &self.picture, &[]);
         pass.draw(0..3, 0..1);
     }
-}
-
-fn pipeline(
-    device: &wgpu::Device,
-    layout: &wgpu::BindGroupLayout,
-    window: wgpu::TextureFormat,
-    [to_light, enlarges]: [bool; 2],
-) -> wgpu::RenderPipeline {
-    Drawing {
-        label: "stylet paste",
-        wgsl: include_str!("paste.wgsl"),
-        vertex: ("paste_vertex", &[]),
-        fragment: (
-            "paste_fragment",
-            &[
-                ("TAKES_LIGHT", f64::from(u8::from(to_light))),
-                ("ENLARGES", f64::from(u8::from(enlarges))),
-            ],
-        ),
-        target: window,
-    }
-    .pipeline(device, layout)
 }

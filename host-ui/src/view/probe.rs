@@ -8,7 +8,7 @@ mod turns;
 
 use super::body::ShownBody;
 use super::free::free_of_banners;
-use super::paste::{Paste, Pasted};
+use super::paste::{Paste, Pasted, gpu_of};
 use super::slice::{ROOM_FOR_REASON, words};
 use crate::action::{Action, ProbeAction};
 use crate::shown::Shown;
@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 pub use picture::ProbePicture;
 use stylet_base::format;
 use stylet_imaging::ultrasound::{Plane, Pose, Probe, Scanner, Settings, View};
-use stylet_imaging::{Body, Gpu, Metal};
+use stylet_imaging::{Body, Metal};
 use stylet_implant::plan::{Hole, Template};
 use stylet_shm_schema::{SceneHeader, SceneId};
 use stylet_surfaces::field::Field;
@@ -64,18 +64,12 @@ pub(super) struct ProbeStand {
 impl ProbeView {
     /// Creates the view. Without a graphics device that computes there are no pictures.
     pub fn new(state: Option<RenderState>) -> Self {
-        let gpu = state.as_ref().map(|state| Gpu {
-            device: state.device.clone(),
-            queue: state.queue.clone(),
-        });
+        let state = state.filter(|state| gpu_of(state).computes());
         Self {
-            paste: state
-                .as_ref()
-                .filter(|_| gpu.as_ref().is_some_and(Gpu::computes))
-                .map(Paste::new),
-            panes: gpu.filter(Gpu::computes).map_or_else(Vec::new, |gpu| {
+            paste: state.as_ref().map(Paste::new),
+            panes: state.map_or_else(Vec::new, |state| {
                 let pane = |_| Pane {
-                    scanner: Scanner::new(gpu.clone()),
+                    scanner: Scanner::new(gpu_of(&state)),
                     scene: None,
                     drawn: None,
                     pasted: None,

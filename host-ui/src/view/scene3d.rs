@@ -4,7 +4,7 @@ use super::body::ShownBody;
 use super::camera::Camera;
 use super::collected::{collect_fixed, collect_live, moving_points};
 use super::driver::DriverCost;
-use super::gpu::Gpu;
+use super::gpu::SceneGpu;
 use super::kinds::{kinds, surfaces};
 use super::legend::Legend;
 use super::marks::Marks;
@@ -96,7 +96,7 @@ struct What {
 type PlanMarksKey = (SceneId, (u64, u64, usize), bool, bool);
 
 pub struct Scene3d {
-    gpu: Option<Gpu>,
+    gpu: Option<SceneGpu>,
     pub camera: Camera,
     pub look: Look,
     /// Scene of the surface on the card.
@@ -119,7 +119,7 @@ pub struct Scene3d {
 impl Scene3d {
     pub fn new(state: Option<RenderState>) -> Self {
         Self {
-            gpu: state.map(Gpu::new),
+            gpu: state.as_ref().map(SceneGpu::new),
             camera: Camera::default(),
             look: Look::default(),
             uploaded_scene: None,

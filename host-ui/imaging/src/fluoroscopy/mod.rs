@@ -8,7 +8,7 @@ pub use arm::CArm;
 pub use exposure::{DoseCounter, Exposure};
 
 use crate::body::{Body, Metal};
-use crate::gpu::{FILLED, Gpu, READ, SAMPLER, UNIFORM, VOLUME, WRITE};
+use crate::gpu::{Gpu, READ, SAMPLER, UNIFORM, VOLUME, WRITE};
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 use std::mem::size_of;
@@ -26,8 +26,6 @@ struct Shot([[f32; 4]; 8]);
 /// Picture: the transmitted share of the radiation for each pixel, row by row from the top.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Radiograph {
-    /// Number of pixels to the right and down.
-    pub pixels: [u32; 2],
     /// Transmission from 0 to 1.
     pub transmission: Vec<f32>,
 }
@@ -47,19 +45,16 @@ impl Radiograph {
     }
 }
 
-/// Fluoroscope that holds its last picture until the next.
+/// Renderer of radiographs.
 pub struct Fluoroscope {
     gpu: Gpu,
     layout: wgpu::BindGroupLayout,
     pipeline: [wgpu::ComputePipeline; 1],
     sampler: wgpu::Sampler,
-    /// Dose of all pictures so far.
-    pub dose: DoseCounter,
-    held: Option<Radiograph>,
 }
 
 impl Fluoroscope {
-    /// Creates a fluoroscope without picture and dose.
+    /// Creates a renderer on this device.
     pub fn new(gpu: Gpu) -> Self {
         let layout = gpu.layout(
             wgpu::ShaderStages::COMPUTE,
@@ -69,29 +64,13 @@ impl Fluoroscope {
         Self {
             pipeline: gpu.compute(&layout, include_str!("radiograph.wgsl"), ["radiograph"], &constants),
             layout,
-            sampler: gpu.clamped(),
-            dose: DoseCounter::default(),
-            held: None,
+            sampler: gpu.sampler(wgpu::AddressMode::ClampToEdge),
             gpu,
         }
     }
 
-    /// Returns the last picture.
-    pub fn held(&self) -> Option<&Radiograph> {
-        self.held.as_ref()
-    }
-
-    /// Takes one pulse: counts its dose, and holds its picture.
-    pub fn shoot(&mut self, arm: &CArm, exposure: &Exposure, body: &Body, field: &Field, metal: &Metal) -> &Radiograph {
-        self.dose.count(exposure, arm);
-        let transmission = self.transmission(arm, body, field, metal);
-        self.held.insert(Radiograph {
-            pixels: arm.pixels,
-            transmission,
-        })
-    }
-
-    fn transmission(&self, arm: &CArm, body: &Body, field: &Field, metal: &Metal) -> Vec<f32> {
+    /// Takes one picture.
+    pub fn shoot(&self, arm: &CArm, body: &Body, field: &Field, metal: &Metal) -> Radiograph {
         let gpu = &self.gpu;
         let storage = wgpu::BufferUsages::STORAGE;
         let per_m: Vec<f32> = body
@@ -103,12 +82,7 @@ impl Fluoroscope {
         let metal = gpu.filled(bytemuck::cast_slice(&metal::losses(arm, metal)), storage);
         let mut texels = Vec::new();
         field.texels(&mut texels);
-        let nodes = gpu.texture(
-            field.info.dims,
-            wgpu::TextureDimension::D3,
-            wgpu::TextureFormat::Rgba16Float,
-            FILLED,
-        );
+        let nodes = gpu.volume(field.info.dims, wgpu::TextureFormat::Rgba16Float);
         gpu.write(&nodes, bytemuck::cast_slice(&texels), 8);
         let nodes = nodes.create_view(&Default::default());
         let uniform = gpu.uniform(size_of::<Shot>() as u64);
@@ -135,7 +109,9 @@ impl Fluoroscope {
             pass.dispatch_workgroups(wide.div_ceil(8), high.div_ceil(8), 1);
         }
         gpu.queue.submit([encoder.finish()]);
-        gpu.read(&out)
+        Radiograph {
+            transmission: gpu.read(&out),
+        }
     }
 }
 

@@ -7,7 +7,7 @@ use super::marks::Marks;
 use super::{Plane, Probe, View};
 use crate::Tissue;
 use crate::body::{Body, Metal};
-use crate::gpu::{FILLED, Gpu};
+use crate::gpu::Gpu;
 use bytemuck::{Pod, Zeroable};
 use nalgebra::Vector3;
 use passes::{Buffers, Passes};
@@ -119,12 +119,9 @@ impl Scanner {
                 *slot = texel(&body.tissues[usize::from(label)]);
             }
         }
-        let (three, rgba) = (wgpu::TextureDimension::D3, wgpu::TextureFormat::Rgba8Unorm);
-        let tissues = self.gpu.texture(dims, three, rgba, FILLED);
+        let tissues = self.gpu.volume(dims, wgpu::TextureFormat::Rgba8Unorm);
         self.gpu.write(&tissues, bytemuck::cast_slice(&texels), 4);
-        let nodes = self
-            .gpu
-            .texture(field.info.dims, three, wgpu::TextureFormat::Rgba16Float, FILLED);
+        let nodes = self.gpu.volume(field.info.dims, wgpu::TextureFormat::Rgba16Float);
         self.body = Some(OnCard {
             tissues: tissues.create_view(&Default::default()),
             nodes,

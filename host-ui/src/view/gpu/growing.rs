@@ -1,10 +1,10 @@
 //! Buffers on the graphics card that grow with their content.
 
 use bytemuck::Pod;
-use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use std::mem::size_of;
 use std::ops::Range;
+use stylet_imaging::Gpu;
 
 /// Buffer that grows by doubling and is otherwise reused.
 pub struct Growing {
@@ -24,39 +24,38 @@ impl Growing {
     }
 
     /// Writes the elements; returns the number of bytes sent.
-    pub fn write<T: Pod>(&mut self, state: &RenderState, items: &[T]) -> u64 {
+    pub fn write<T: Pod>(&mut self, gpu: &Gpu, items: &[T]) -> u64 {
         let bytes: &[u8] = bytemuck::cast_slice(items);
         let size = bytes.len() as u64;
-        if size > state.device.limits().max_buffer_size {
+        if size > gpu.device.limits().max_buffer_size {
             // A scene that does not fit is not drawn; the rest of the window continues.
             self.len = 0;
             return 0;
         }
         if size > self.buffer.size() {
-            self.buffer = allocate(&state.device, self.usage, size.next_power_of_two());
+            self.buffer = allocate(&gpu.device, self.usage, size.next_power_of_two());
         }
         if size > 0 {
-            state.queue.write_buffer(&self.buffer, 0, bytes);
+            gpu.queue.write_buffer(&self.buffer, 0, bytes);
         }
         self.len = items.len() as u32;
         size
     }
 
     /// Writes some elements into a buffer that has as many as were written last.
-    pub fn write_run<T: Pod>(&mut self, state: &RenderState, items: &[T], run: Range<usize>) -> u64 {
+    pub fn write_run<T: Pod>(&mut self, gpu: &Gpu, items: &[T], run: Range<usize>) -> u64 {
         let part = items.get(run.clone()).unwrap_or_default();
         if items.len() != self.len as usize || part.is_empty() {
             return 0;
         }
         let bytes: &[u8] = bytemuck::cast_slice(part);
-        state
-            .queue
+        gpu.queue
             .write_buffer(&self.buffer, (run.start * size_of::<T>()) as u64, bytes);
         bytes.len() as u64
     }
 }
 
-pub fn allocate(device: &wgpu::Device, usage: wgpu::BufferUsages, size: u64) -> wgpu::Buffer {
+fn allocate(device: &wgpu::Device, usage: wgpu::BufferUsages, size: u64) -> wgpu::Buffer {
     device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("stylet view"),
         size,

@@ -1,8 +1,8 @@
 //! The textures of a picture.
 
 use crate::view::paste::Pasted;
-use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
+use stylet_imaging::Gpu;
 
 /// Format that egui accepts for an image that is already gamma-encoded.
 pub const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -23,28 +23,10 @@ pub struct Targets {
 }
 
 impl Targets {
-    pub fn new(
-        state: &RenderState,
-        size: [u32; 2],
-        samples: u32,
-        paste: impl Fn(&wgpu::TextureView) -> Pasted,
-    ) -> Self {
+    pub fn new(gpu: &Gpu, size: [u32; 2], samples: u32, paste: impl Fn(&wgpu::TextureView) -> Pasted) -> Self {
         let make = |format, samples, usage| {
-            let texture = state.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("stylet view"),
-                size: wgpu::Extent3d {
-                    width: size[0],
-                    height: size[1],
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: samples,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage,
-                view_formats: &[],
-            });
-            texture.create_view(&wgpu::TextureViewDescriptor::default())
+            let texture = gpu.picture(size, samples, format, usage);
+            texture.create_view(&Default::default())
         };
         let drawn = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let picture = make(COLOR, 1, drawn | wgpu::TextureUsages::TEXTURE_BINDING);
@@ -63,7 +45,6 @@ impl Targets {
             None => (&self.picture, None, wgpu::StoreOp::Store),
         };
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("stylet view"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                 view,
                 depth_slice: None,
@@ -81,9 +62,7 @@ impl Targets {
                 }),
                 stencil_ops: None,
             }),
-            timestamp_writes: None,
-            occlusion_query_set: None,
-            multiview_mask: None,
+            ..Default::default()
         })
     }
 }

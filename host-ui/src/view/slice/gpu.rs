@@ -1,25 +1,22 @@
 //! The slices on the graphics card: three small volumes, an image if there is one, and a texture
 //! for each slice.
 
-mod pipeline;
-mod texture;
-
 use super::plane::Plane;
 use super::speckle::{self, GRAIN_M, GRAINS, LARGEST_AMPLITUDE, LARGEST_LEVEL};
 use crate::view::driver::DriverCost;
-use crate::view::paste::{Paste, Pasted};
+use crate::view::paste::{Paste, Pasted, gpu_of};
 use bytemuck::{Pod, Zeroable};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use nalgebra::{Matrix3, Vector3};
-use pipeline::{layout, pipeline};
 use std::mem::size_of;
 use stylet_anatomy::PatientFrame;
 use stylet_files::Image;
 use stylet_host::link::SceneModel;
+use stylet_imaging::Gpu;
+use stylet_imaging::gpu::{Drawing, SAMPLER, UNIFORM, VOLUME, drawn_on};
 use stylet_shm_schema::GridInfo;
-use stylet_surfaces::field::Field;
-use texture::{extent, volume, write};
+use stylet_surfaces::field::{Field, SEEN_M, STEPS};
 
 const COLOR: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const GREY: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
@@ -94,7 +91,7 @@ struct Target {
 }
 
 pub struct SliceGpu {
-    state: RenderState,
+    gpu: Gpu,
     layout: wgpu::BindGroupLayout,
     tissue_pipeline: wgpu::RenderPipeline,
     image_pipeline: wgpu::RenderPipeline,
@@ -116,33 +113,29 @@ pub struct SliceGpu {
 }
 
 impl SliceGpu {
-    pub fn new(state: RenderState) -> Self {
-        let device = &state.device;
-        let layout = layout(device);
-        let sampler = |mode| {
-            device.create_sampler(&wgpu::SamplerDescriptor {
-                label: Some("stylet slice"),
-                address_mode_u: mode,
-                address_mode_v: mode,
-                address_mode_w: mode,
-                mag_filter: wgpu::FilterMode::Linear,
-                min_filter: wgpu::FilterMode::Linear,
-                ..Default::default()
-            })
+    pub fn new(state: &RenderState) -> Self {
+        let gpu = gpu_of(state);
+        let types = [UNIFORM, VOLUME, VOLUME, VOLUME, VOLUME, SAMPLER, SAMPLER];
+        let layout = gpu.layout(wgpu::ShaderStages::VERTEX_FRAGMENT, &types);
+        let constants = [("STEPS", f64::from(STEPS)), ("SEEN_M", f64::from(SEEN_M))];
+        let pipeline = |fragment| {
+            let vertex = ("slice_vertex", &constants[..]);
+            Drawing::made_by_shader(include_str!("slice.wgsl"), vertex, (fragment, &[]), COLOR)
+                .pipeline(&gpu.device, &layout)
         };
-        let grain = volume(&state, GREY, [GRAINS as u32; 3]);
+        let grain = gpu.volume([GRAINS as u32; 3], GREY);
         let grains = speckle::grain();
         let mut driver = DriverCost::default();
-        driver.send(|| write(&state, &grain, &grains, 1));
+        driver.send(|| gpu.write(&grain, &grains, 1));
         Self {
-            tissue_pipeline: pipeline(device, &layout, "slice_fragment"),
-            image_pipeline: pipeline(device, &layout, "image_fragment"),
-            paste: Paste::new(&state),
-            grain: grain.create_view(&wgpu::TextureViewDescriptor::default()),
-            clamped: sampler(wgpu::AddressMode::ClampToEdge),
-            repeated: sampler(wgpu::AddressMode::Repeat),
+            tissue_pipeline: pipeline("slice_fragment"),
+            image_pipeline: pipeline("image_fragment"),
+            paste: Paste::new(state),
+            grain: grain.create_view(&Default::default()),
+            clamped: gpu.sampler(wgpu::AddressMode::ClampToEdge),
+            repeated: gpu.sampler(wgpu::AddressMode::Repeat),
             image: None,
-            no_image: volume(&state, GREY, [1; 3]).create_view(&wgpu::TextureViewDescriptor::default()),
+            no_image: gpu.volume([1; 3], GREY).create_view(&Default::default()),
             layout,
             body: None,
             panes: Vec::new(),
@@ -150,7 +143,7 @@ impl SliceGpu {
             content: 0,
             texels: Vec::new(),
             driver,
-            state,
+            gpu,
         }
     }
 
@@ -159,7 +152,7 @@ impl SliceGpu {
         self.drop_panes();
         self.body = None;
         let (info, nodes_info) = (model.header.labels, model.header.nodes);
-        let longest = self.state.device.limits().max_texture_dimension_3d;
+        let longest = self.gpu.device.limits().max_texture_dimension_3d;
         let border = speckle::border_cells(info.spacing_m);
         let has_cells = |grid: &GridInfo, border: usize| {
             grid.dims
@@ -172,11 +165,11 @@ impl SliceGpu {
         let (dims, bytes) = speckle::brightness_volume(&model.header, &model.labels);
         let beam = scene_from_patient.column(1).normalize();
         let bytes = speckle::with_edges(&bytes, dims, info.spacing_m, beam.into());
-        let brightness = volume(&self.state, GREY, dims.map(|d| d as u32));
-        self.driver.send(|| write(&self.state, &brightness, &bytes, 1));
-        let nodes = volume(&self.state, wgpu::TextureFormat::Rgba16Float, nodes_info.dims);
+        let brightness = self.gpu.volume(dims.map(|d| d as u32), GREY);
+        self.driver.send(|| self.gpu.write(&brightness, &bytes, 1));
+        let nodes = self.gpu.volume(nodes_info.dims, wgpu::TextureFormat::Rgba16Float);
         self.body = Some(Body {
-            brightness: brightness.create_view(&wgpu::TextureViewDescriptor::default()),
+            brightness: brightness.create_view(&Default::default()),
             nodes,
             nodes_info,
             at_rest: false,
@@ -198,7 +191,7 @@ impl SliceGpu {
 
     /// Takes an image, and its greys to the card.
     pub fn set_image(&mut self, mut image: Image) -> Result<(), ImageError> {
-        let longest = self.state.device.limits().max_texture_dimension_3d;
+        let longest = self.gpu.device.limits().max_texture_dimension_3d;
         if let Some(side) = image.dims.iter().find(|&&side| side > longest as usize) {
             return Err(ImageError::TooLarge {
                 name: image.name,
@@ -207,9 +200,9 @@ impl SliceGpu {
             });
         }
         let greys = std::mem::take(&mut image.greys);
-        let texture = volume(&self.state, GREY, image.dims.map(|d| d as u32));
-        self.driver.send(|| write(&self.state, &texture, &greys, 1));
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let texture = self.gpu.volume(image.dims.map(|d| d as u32), GREY);
+        self.driver.send(|| self.gpu.write(&texture, &greys, 1));
+        let view = texture.create_view(&Default::default());
         self.image = Some(OnCard { image, view });
         self.drop_panes();
         Ok(())
@@ -227,7 +220,7 @@ impl SliceGpu {
         }
         field.texels(&mut self.texels);
         let bytes: &[u8] = bytemuck::cast_slice(&self.texels);
-        self.driver.send(|| write(&self.state, &body.nodes, bytes, 8));
+        self.driver.send(|| self.gpu.write(&body.nodes, bytes, 8));
         body.at_rest = field.at_rest;
         self.content += 1;
     }
@@ -252,7 +245,7 @@ impl SliceGpu {
         }
         let pane = &mut self.panes[number];
         if pane.target.as_ref().is_none_or(|t| t.size != size) {
-            pane.target = Some(target(&self.state, &self.paste, size));
+            pane.target = Some(target(&self.gpu, &self.paste, size));
             pane.drawn = None;
         }
         let target = pane.target.as_mut()?;
@@ -260,8 +253,8 @@ impl SliceGpu {
             pane.drawn = Some((uniform, self.content));
             let bytes = bytemuck::bytes_of(&uniform);
             self.driver.send(|| {
-                self.state.queue.write_buffer(&pane.uniform, 0, bytes);
-                draw(&self.state, &pipeline, &pane.bind, &target.view, cells);
+                self.gpu.queue.write_buffer(&pane.uniform, 0, bytes);
+                draw(&self.gpu, &pipeline, &pane.bind, &target.view, cells);
                 bytes.len() as u64
             });
             target.pasted.renew();
@@ -271,14 +264,8 @@ impl SliceGpu {
 
     fn pane(&self, target: Option<Target>) -> Option<Pane> {
         let body = self.body.as_ref()?;
-        let device = &self.state.device;
-        let uniform = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("stylet slice"),
-            size: size_of::<SliceUniform>() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let nodes = body.nodes.create_view(&wgpu::TextureViewDescriptor::default());
+        let uniform = self.gpu.uniform(size_of::<SliceUniform>() as u64);
+        let nodes = body.nodes.create_view(&Default::default());
         let view = wgpu::BindingResource::TextureView;
         let resources = [
             uniform.as_entire_binding(),
@@ -289,22 +276,9 @@ impl SliceGpu {
             wgpu::BindingResource::Sampler(&self.clamped),
             wgpu::BindingResource::Sampler(&self.repeated),
         ];
-        let entries: Vec<wgpu::BindGroupEntry<'_>> = resources
-            .into_iter()
-            .enumerate()
-            .map(|(binding, resource)| wgpu::BindGroupEntry {
-                binding: binding as u32,
-                resource,
-            })
-            .collect();
-        let bind = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("stylet slice"),
-            layout: &self.layout,
-            entries: &entries,
-        });
         Some(Pane {
+            bind: self.gpu.bind(&self.layout, &resources),
             uniform,
-            bind,
             target,
             drawn: None,
         })
@@ -335,18 +309,10 @@ fn uniform(body: &Body, plane: &Plane, cells: [u32; 2], image: Option<&Image>) -
     }
 }
 
-fn target(state: &RenderState, paste: &Paste, size: [u32; 2]) -> Target {
-    let texture = state.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("stylet slice"),
-        size: extent([size[0], size[1], 1]),
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: COLOR,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    });
-    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+fn target(gpu: &Gpu, paste: &Paste, size: [u32; 2]) -> Target {
+    let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+    let texture = gpu.picture(size, 1, COLOR, usage);
+    let view = texture.create_view(&Default::default());
     Target {
         size,
         pasted: paste.of(&view),
@@ -354,37 +320,16 @@ fn target(state: &RenderState, paste: &Paste, size: [u32; 2]) -> Target {
     }
 }
 
-fn draw(
-    state: &RenderState,
-    pipeline: &wgpu::RenderPipeline,
-    bind: &wgpu::BindGroup,
-    view: &wgpu::TextureView,
-    cells: [u32; 2],
-) {
-    let descriptor = wgpu::CommandEncoderDescriptor {
-        label: Some("stylet slice"),
-    };
-    let mut encoder = state.device.create_command_encoder(&descriptor);
+fn draw(gpu: &Gpu, pipeline: &wgpu::RenderPipeline, bind: &wgpu::BindGroup, view: &wgpu::TextureView, cells: [u32; 2]) {
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
     {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("stylet slice"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            depth_stencil_attachment: None,
-            timestamp_writes: None,
-            occlusion_query_set: None,
-            multiview_mask: None,
+            color_attachments: &[drawn_on(view, wgpu::LoadOp::Clear(wgpu::Color::BLACK))],
+            ..Default::default()
         });
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, bind, &[]);
         pass.draw(0..6 * cells[0] * cells[1], 0..1);
     }
-    state.queue.submit([encoder.finish()]);
+    gpu.queue.submit([encoder.finish()]);
 }

@@ -71,7 +71,7 @@ impl Slices {
     /// Creates slices on this graphics device; without one they show no tissue.
     pub fn new(state: Option<RenderState>) -> Self {
         Self {
-            gpu: state.map(SliceGpu::new),
+            gpu: state.as_ref().map(SliceGpu::new),
             scene: None,
             snapshot: None,
             scene_from_patient: Matrix3::identity(),

@@ -2,7 +2,7 @@
 
 use super::{LARGEST_IMPEDANCE, LARGEST_LOSS, PATCH_M, RANGE_DB, SCAN_BYTES, SHOT_BYTES, ZERO_BRIGHTNESS};
 use crate::Tissue;
-use crate::gpu::{Drawing, GRID, Gpu, READ, SAMPLER, UNIFORM, VOLUME};
+use crate::gpu::{Drawing, GRID, Gpu, READ, SAMPLER, UNIFORM, VOLUME, drawn_on};
 use crate::ultrasound::beams::Grid;
 use std::mem::size_of;
 use stylet_surfaces::field::{SEEN_M, STEPS};
@@ -74,11 +74,17 @@ impl Passes {
             ("SOFT_LOSS", f64::from(Tissue::SOFT.loss_db_per_cm_mhz)),
         ];
         Self {
-            scan: scan_pipeline(&gpu.device, &scan_layout),
+            scan: Drawing::made_by_shader(
+                include_str!("../scan.wgsl"),
+                ("scan_vertex", &[]),
+                ("scan_fragment", &[]),
+                COLOR,
+            )
+            .pipeline(&gpu.device, &scan_layout),
             compute: gpu.compute(&layout, include_str!("../ultrasound.wgsl"), ENTRIES, &constants),
             layout,
             scan_layout,
-            sampler: gpu.clamped(),
+            sampler: gpu.sampler(wgpu::AddressMode::ClampToEdge),
         }
     }
 
@@ -93,20 +99,13 @@ impl Passes {
         let [shot, scan] = [SHOT_BYTES, SCAN_BYTES].map(|bytes| gpu.uniform(bytes));
         let marks = gpu.storage(grid.count() as u64 * 2 * word);
         let powers = gpu.storage(u64::from(grid.samples) * word);
-        let two = wgpu::TextureDimension::D2;
         let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
         let beams = |format| {
             let usage = read | wgpu::TextureUsages::STORAGE_BINDING;
-            gpu.texture([grid.lines, grid.samples, 1], two, format, usage)
+            gpu.picture([grid.lines, grid.samples], 1, format, usage)
         };
         let levels = beams(LEVELS);
-        let [wide, high] = pixels;
-        let target = gpu.texture(
-            [wide, high, 1],
-            two,
-            COLOR,
-            read | wgpu::TextureUsages::RENDER_ATTACHMENT,
-        );
+        let target = gpu.picture(pixels, 1, COLOR, read | wgpu::TextureUsages::RENDER_ATTACHMENT);
         let view = |texture: &wgpu::Texture| texture.create_view(&Default::default());
         let (one, other, levels_view) = (view(&beams(BETWEEN)), view(&beams(BETWEEN)), view(&levels));
         let bind = [[&one, &other], [&other, &one]].map(|[before, after]| {
@@ -171,15 +170,7 @@ impl Passes {
             let view = buffers.target.create_view(&Default::default());
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("stylet ultrasound"),
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
+                color_attachments: &[drawn_on(&view, wgpu::LoadOp::Clear(wgpu::Color::BLACK))],
                 ..Default::default()
             });
             pass.set_pipeline(&self.scan);
@@ -199,15 +190,4 @@ fn written(format: wgpu::TextureFormat) -> wgpu::BindingType {
         format,
         view_dimension: wgpu::TextureViewDimension::D2,
     }
-}
-
-fn scan_pipeline(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> wgpu::RenderPipeline {
-    Drawing {
-        label: "stylet ultrasound",
-        wgsl: include_str!("../scan.wgsl"),
-        vertex: ("scan_vertex", &[]),
-        fragment: ("scan_fragment", &[]),
-        target: COLOR,
-    }
-    .pipeline(device, layout)
 }
