@@ -3,10 +3,11 @@
 use crate::Text;
 use bytemuck::{Pod, Zeroable};
 use num_enum::TryFromPrimitive;
+use serde::{Deserialize, Serialize};
 
 /// One event, written by the bridge.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable, Serialize, Deserialize)]
 pub struct Event {
     /// The run of the core.
     pub session_id: u64,
@@ -17,6 +18,7 @@ pub struct Event {
     /// Tick of the loop that saw it; 0 if the bridge did.
     pub tick: u64,
     /// [`EventKind`] by number.
+    #[serde(skip)]
     pub kind: u32,
     /// Seed index, fault number, 1 for a flight that was not saved, or unused, by kind.
     pub code: u32,

@@ -2,6 +2,7 @@
 
 use crate::{GridInfo, MAX_STRUCTURES, Text};
 use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
 use stylet_anatomy::PatientFrame;
 
 /// Role of a structure, as bits of [`StructureInfo::role`] and [`UploadStructure::role`].
@@ -18,20 +19,23 @@ pub mod role {
 
 /// One structure of the running scene.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable, Serialize, Deserialize)]
 pub struct StructureInfo {
     /// Label of its cells in the volume, 1 to 255.
     pub label: u32,
     /// Bits of [`role`].
     pub role: u32,
     /// Elements that belong to it.
+    #[serde(rename = "elements")]
     pub element_count: u32,
     /// First triangle of its surface; none if it is not drawn separately. All targets are drawn together as the first
     /// of them.
     pub first_triangle: u32,
     /// Number of triangles of its surface.
+    #[serde(rename = "triangles")]
     pub triangle_count: u32,
     /// Zero.
+    #[serde(skip)]
     pub reserved: u32,
     /// Bounding box at rest.
     pub lower_m: [f64; 3],
@@ -45,25 +49,33 @@ pub struct StructureInfo {
 /// cells of `labels`, four to a word, lowest byte first: 0 where there is no tissue, else one more than the index in
 /// `structures`.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable, Serialize, Deserialize)]
+#[serde(default)]
 pub struct SceneHeader {
     /// The run of the core.
+    #[serde(skip)]
     pub session_id: u64,
     /// Rises with each scene of a run, from 1.
     pub generation: u64,
     /// Elements along x, y, z.
     pub dims: [u32; 3],
     /// Elements of the body.
+    #[serde(rename = "elements")]
     pub element_count: u32,
     /// Elements at the surface of the body.
+    #[serde(rename = "surface_elements")]
     pub surface_element_count: u32,
     /// Vertices of the surface.
+    #[serde(rename = "vertices")]
     pub vertex_count: u32,
     /// Triangles of all surfaces.
+    #[serde(rename = "triangles")]
     pub triangle_count: u32,
     /// The body's triangles come first; those of its structures follow.
+    #[serde(rename = "body_triangles")]
     pub body_triangle_count: u32,
     /// Number of `structures` in use; at least one.
+    #[serde(skip)]
     pub structure_count: u32,
     /// Edge of the tissue model's elements, in edges of the elements here: 1, or more if those are too many for it.
     pub body_edge: u32,
@@ -88,6 +100,7 @@ pub struct SceneHeader {
     /// Name of the scene.
     pub name: Text<64>,
     /// The first `structure_count` are in use.
+    #[serde(skip)]
     pub structures: [StructureInfo; MAX_STRUCTURES],
 }
 

@@ -46,11 +46,13 @@ pub struct LeftNeedlePose {
 
 /// Header of the vertices of one tissue tick, written by the tissue thread.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
+#[serde(default)]
 pub struct SnapshotHeader {
     /// The run of the core.
     pub session_id: u64,
     /// Generation of the [`crate::SceneHeader`] that the vertices belong to.
+    #[serde(skip)]
     pub scene_generation: u64,
     /// Number of the tissue tick.
     pub tissue_tick: u64,
@@ -69,35 +71,47 @@ pub struct SnapshotHeader {
     /// Duration of the tick.
     pub work_ns: u64,
     /// Passes of the solver.
+    #[serde(skip)]
     pub passes: u32,
     /// Elements moved by the tick.
+    #[serde(skip)]
     pub moved_elements: u32,
     /// `u32::MAX` if the needle holds nothing.
+    #[serde(skip)]
     pub held_element: u32,
     /// [`crate::Phase`] by number.
     pub phase: u32,
     /// Vertices of the surface; they come first.
+    #[serde(skip)]
     pub vertex_count: u32,
     /// Nodes of the displacement grid; they follow the vertices.
+    #[serde(skip)]
     pub node_count: u32,
     /// Number of `seeds` in use.
+    #[serde(skip)]
     pub seed_count: u32,
     /// Number of `bend_m` in use; 0 for a needle that does not bend.
+    #[serde(skip)]
     pub bend_count: u32,
     /// Distance along the needle between points of `bend_m`, m.
     pub bend_spacing_m: f64,
     /// Displacements of the shaft from a rigid needle, scene frame, m: from the tip back to the hand.
+    #[serde(skip)]
     pub bend_m: [[f64; 3]; MAX_BEND_POINTS],
     /// Number of `left` in use.
+    #[serde(skip)]
     pub left_count: u32,
     /// Zero.
+    #[serde(skip)]
     pub reserved: u32,
     /// Displacement of the whole body by an exercise, from its place in the scene, m; vertices and displacements
     /// include it.
     pub body_moved_m: [f64; 3],
     /// Seeds in the order of the drops.
+    #[serde(skip)]
     pub seeds: [SeedPose; MAX_SEEDS],
     /// Needles that stay in, in the order in which they were left.
+    #[serde(skip)]
     pub left: [LeftNeedlePose; MAX_LEFT_NEEDLES],
 }
 

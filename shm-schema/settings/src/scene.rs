@@ -1,6 +1,7 @@
 //! Built-in scenes by name, and size limits of a scene.
 
 use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
 
 /// Scenes that the core can build without a file; a request to load one takes its index in this list.
 pub const BUILTIN_SCENES: [&str; 3] = ["paper", "pelvis", "full"];
@@ -13,11 +14,12 @@ pub const MAX_LABEL_CELLS: usize = 2 << 20;
 
 /// A regular grid over the body at rest, x fastest: node (i, j, k) lies at `origin_m + (i, j, k) spacing_m`.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
 pub struct GridInfo {
     /// Nodes along x, y, z; all zero for no grid.
     pub dims: [u32; 3],
     /// Zero.
+    #[serde(skip)]
     pub reserved: u32,
     /// Position of node (0, 0, 0), scene frame, m.
     pub origin_m: [f64; 3],

@@ -22,12 +22,6 @@ pub enum RecordError {
     /// The signals that end a recording cannot be handled.
     #[error("{0}")]
     Signals(String),
-    /// No thread could be started.
-    #[error("no thread could be started to write: {0}")]
-    NoThread(std::io::Error),
-    /// The writer thread panicked.
-    #[error("the recording ended by itself")]
-    Panicked,
     /// The recording lacks ticks or events.
     #[error(
         "{ticks} ticks are missing in {gaps} gaps, {in_core} of them lost in the core; {events} events are missing. \

@@ -2,12 +2,11 @@
 
 use super::error::RecordError;
 use super::read::read;
-use super::second;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stylet_base::{write_streamed, write_whole};
-use stylet_shm_schema::TickRecord;
 use stylet_shm_schema::motion::{Motion, MotionSample};
+use stylet_shm_schema::{SecondRecord, TickRecord};
 
 /// The period of the force loop's ideal grid.
 const PERIOD_NS: u64 = 1_000_000;
@@ -47,6 +46,7 @@ pub fn export(options: &Export) -> Result<(), RecordError> {
         println!("written: {}", path.display());
     }
     if let Some(path) = &options.motion {
+        let sample = |t: &TickRecord| sample(t.tip_in_scene_m, t.world_from_tool, t.buttons);
         let samples = recording.ticks.iter().map(|t| (t.session_id, t.due_ns, sample(t)));
         write_motion(path, samples, "--device")?;
     }
@@ -57,12 +57,12 @@ pub fn export(options: &Export) -> Result<(), RecordError> {
         return Err(RecordError::of_file(path, why));
     }
     if let Some(path) = &options.csv_2 {
-        write_streamed(path, |file| second::csv(&recording.second, file))?;
+        write_streamed(path, |file| csv_of_second(&recording.second, file))?;
         println!("written: {}", path.display());
     }
     if let Some(path) = &options.motion_2 {
-        let samples = recording.second.iter();
-        let samples = samples.map(|r| (r.session_id, r.due_ns, second::motion_sample(r)));
+        let sample = |r: &SecondRecord| sample(r.tip_in_scene_m, r.world_from_tool, r.buttons);
+        let samples = recording.second.iter().map(|r| (r.session_id, r.due_ns, sample(r)));
         write_motion(path, samples, "--device-2")?;
     }
     Ok(())
@@ -84,55 +84,27 @@ fn write_motion(
     Ok(())
 }
 
-fn sample(tick: &TickRecord) -> MotionSample {
+fn sample(tip_in_scene_m: [f64; 3], world_from_tool: [f64; 4], buttons: u32) -> MotionSample {
     MotionSample {
-        tip_in_scene_m: tick.tip_in_scene_m,
-        world_from_tool: tick.world_from_tool,
-        buttons: tick.buttons,
+        tip_in_scene_m,
+        world_from_tool,
+        buttons,
         reserved: 0,
     }
 }
 
-const COLUMNS: [&str; 34] = [
-    "session_id",
-    "tick",
-    "due_ns",
-    "wake_latency_ns",
-    "force_written_ns",
-    "work_ns",
-    "missed",
-    "phase",
-    "fault",
-    "flags",
-    "tip_x_m",
-    "tip_y_m",
-    "tip_z_m",
-    "force_x_n",
-    "force_y_n",
-    "force_z_n",
-    "depth_m",
-    "speed_m_per_s",
-    "membrane_n",
-    "guide_n",
-    "damping_n",
-    "friction_n",
-    "gravity_n",
-    "tissue_tick",
-    "tool_i",
-    "tool_j",
-    "tool_k",
-    "tool_w",
-    "buttons",
-    "deflection_x_m",
-    "deflection_y_m",
-    "deflection_z_m",
-    "missing_before",
-    "session_begins",
-];
+/// Columns of both tables.
+const TICK: &str = "session_id,tick,due_ns,wake_latency_ns,force_written_ns,work_ns,missed,phase,fault,flags,\
+    tip_x_m,tip_y_m,tip_z_m,force_x_n,force_y_n,force_z_n,depth_m,speed_m_per_s,\
+    membrane_n,guide_n,damping_n,friction_n,gravity_n,tissue_tick,tool_i,tool_j,tool_k,tool_w,buttons,\
+    deflection_x_m,deflection_y_m,deflection_z_m,missing_before,session_begins";
+const SECOND: &str = "session_id,tick,due_ns,wake_latency_ns,force_written_ns,work_ns,missed,fault,flags,buttons,\
+    tissue_tick,tip_x_m,tip_y_m,tip_z_m,tool_i,tool_j,tool_k,tool_w,force_x_n,force_y_n,force_z_n,\
+    torque_x_nm,torque_y_nm,torque_z_nm,contact_force_n";
 
 fn csv(ticks: &[TickRecord], file: &mut impl Write) -> std::io::Result<()> {
     let mut table = csv::Writer::from_writer(file);
-    table.write_record(COLUMNS)?;
+    table.write_record(TICK.split(','))?;
     let mut before: Option<&TickRecord> = None;
     for t in ticks {
         let same = before.filter(|b| b.session_id == t.session_id);
@@ -170,6 +142,36 @@ fn csv(ticks: &[TickRecord], file: &mut impl Write) -> std::io::Result<()> {
     table.flush()
 }
 
+fn csv_of_second(records: &[SecondRecord], file: &mut impl Write) -> std::io::Result<()> {
+    let mut table = csv::Writer::from_writer(file);
+    table.write_record(SECOND.split(','))?;
+    for r in records {
+        let whole = [
+            r.session_id,
+            r.tick,
+            r.due_ns,
+            r.wake_latency_ns,
+            r.force_written_ns,
+            r.work_ns,
+        ];
+        let small = [r.missed, r.fault, r.flags, r.buttons].map(u64::from);
+        let real = [
+            &r.tip_in_scene_m[..],
+            &r.world_from_tool,
+            &r.force_on_hand_n,
+            &r.torque_on_hand_nm,
+        ];
+        let row = whole.iter().chain(&small).chain([&r.tissue_tick]).map(u64::to_string);
+        let real = real
+            .into_iter()
+            .flatten()
+            .chain([&r.contact_force_n])
+            .map(f64::to_string);
+        table.write_record(row.chain(real))?;
+    }
+    table.flush()
+}
+
 /// Returns a hand's motion in the first session, on the grid of the force loop, from the session, due time and sample
 /// of each tick; and the number of samples that were held because the loop missed a deadline or the recording lacks a
 /// tick.
@@ -193,4 +195,25 @@ fn motion(ticks: impl Iterator<Item = (u64, u64, MotionSample)>) -> (Motion, usi
         last_due_ns = Some(due_ns);
     }
     (motion, filled)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    #[test]
+    fn a_tick_of_the_second_device_reads_back_to_the_same_bits() {
+        let mut record = SecondRecord::zeroed();
+        (record.tick, record.fault, record.flags) = (u64::MAX - 1, 9, 0b101);
+        record.tip_in_scene_m = [0.1, 1.0 / 3.0, -2e-17];
+        record.force_on_hand_n = [-0.0, f64::MIN_POSITIVE, 8.5];
+        let again: SecondRecord = serde_json::from_slice(&serde_json::to_vec(&record).unwrap()).expect("a tick");
+        assert_eq!(bytemuck::bytes_of(&again), bytemuck::bytes_of(&record));
+        let mut table = Vec::new();
+        csv_of_second(&[record], &mut table).unwrap();
+        let text = String::from_utf8(table).unwrap();
+        let counts: Vec<_> = text.lines().map(|line| line.split(',').count()).collect();
+        assert_eq!(counts, [25; 2]);
+    }
 }

@@ -1,232 +1,84 @@
-//! Messages of a recording: JSON, each kind with its JSON schema, so that any viewer of MCAP opens them.
-//!
-//! JSON rather than a binary form: 1 kHz of it costs one core a few per cent, zstd recovers most of its size (figures
-//! in CHANGELOG), and every reader has a parser. Numbers are written so that they read back to the same bits.
+//! Messages of a recording: what the core sends under the names of its fields, so that a recording outlives the layout
+//! of shared memory; a field unknown to the file takes its default.
 
-use super::{scene, setting};
-use crate::link::Snapshot;
+use crate::link::{SceneModel, Snapshot};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use bytemuck::Zeroable;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use stylet_shm_schema::{Event, EventKind, LeftNeedlePose, SeedPose, SnapshotHeader, Text, Vertex};
-
-/// Channel of a kind of message, with the name and text of its schema.
-pub struct Channel {
-    pub topic: &'static str,
-    pub schema: &'static str,
-    pub text: fn() -> Value,
-}
-
-pub const TICK: Channel = Channel {
-    topic: "/stylet/tick",
-    schema: "stylet.Tick",
-    text: tick_schema,
-};
-pub const EVENT: Channel = Channel {
-    topic: "/stylet/event",
-    schema: "stylet.Event",
-    text: event_schema,
-};
-pub const TISSUE: Channel = Channel {
-    topic: "/stylet/tissue",
-    schema: "stylet.Tissue",
-    text: tissue_schema,
-};
-/// The well-known schema of this name, which viewers can draw.
-pub const GLAND: Channel = Channel {
-    topic: "/stylet/gland",
-    schema: "foxglove.PointCloud",
-    text: gland_schema,
+use std::collections::BTreeMap;
+use stylet_shm_schema::{
+    Event, EventKind, LeftNeedlePose, MAX_STRUCTURES, PARAMETERS, ParametersInForce, PlanInForce, PlannedNeedle,
+    SCHEMA_VERSION, SceneHeader, SeedPose, Session, SnapshotHeader, StructureInfo, Vertex,
 };
 
-pub(super) fn vector(length: usize, unit: &str) -> Value {
-    json!({ "type": "array", "items": { "type": "number" }, "minItems": length, "maxItems": length, "description": unit })
-}
-
-fn number(unit: &str) -> Value {
-    json!({ "type": "number", "description": unit })
-}
-
-pub(super) fn whole(what: &str) -> Value {
-    json!({ "type": "integer", "minimum": 0, "description": what })
-}
-
-pub(super) fn object(title: &str, properties: Value) -> Value {
-    json!({
-        "$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, "type": "object",
-        "properties": properties,
-    })
-}
-
-fn tick_schema() -> Value {
-    object(
-        TICK.schema,
-        json!({
-            "session_id": whole("run of rt-core"), "tick": whole("of the force loop"),
-            "due_ns": whole("CLOCK_MONOTONIC, on the ideal grid"), "wake_latency_ns": whole("from due to awake"),
-            "force_written_ns": whole("from awake to force written"), "work_ns": whole("from awake to done"),
-            "missed": whole("deadlines skipped just before"), "phase": whole("0 outside, 1 contraction, 2 penetration, 3 retraction, 4 hold"),
-            "fault": whole("0 none"), "flags": whole("bits: 1 real-time, 2 engaged, 4 in contact, 8 punctured, 16 simulated device, 32 at goal, 64 gate acted, 128 waiting, 256 line needed, 512 line ready, 1024 tissue folded"),
-            "tip_in_scene_m": vector(3, "m"), "force_on_hand_n": vector(3, "N, after the gate"), "depth_m": number("m since the membrane"),
-            "speed_m_per_s": number("m/s along the path, inwards"),
-            "force_terms_n": vector(5, "N before the gate: membrane, guide, damping, friction, gravity"),
-            "tissue_tick": whole("of the tissue loop"), "world_from_tool": vector(4, "quaternion i, j, k, w"), "buttons": whole("one bit each"),
-            "tip_deflection_m": vector(3, "m, of a needle that bends, from where a rigid one would be"),
-            "folded_from_um": whole("displacement at the tip from which on the linear answer is folded, micrometres; 0: it is not"),
-        }),
-    )
-}
-
-fn event_schema() -> Value {
-    object(
-        EVENT.schema,
-        json!({
-            "session_id": whole("run of rt-core"), "sequence": whole("of the event"), "tick": whole("of the loop that reported it"),
-            "time_ns": whole("CLOCK_MONOTONIC"), "kind": { "type": "string" }, "code": whole("seed, fault or nothing, by kind"),
-            "value": number("m or nothing, by kind"), "position_m": vector(3, "m"), "text": { "type": "string" },
-        }),
-    )
+/// Writes a message under the names of its fields, in their alphabetical order.
+pub fn message(value: &impl Serialize) -> Value {
+    serde_json::to_value(value).unwrap_or_default()
 }
 
 /// An [`Event`] with the name of its kind.
 #[derive(Serialize, Deserialize)]
 struct NamedEvent {
-    session_id: u64,
-    sequence: u64,
-    tick: u64,
-    time_ns: u64,
     kind: String,
-    code: u32,
-    value: f64,
-    position_m: [f64; 3],
-    text: String,
+    #[serde(flatten)]
+    event: Event,
 }
 
-pub fn event(e: &Event) -> Value {
-    setting::message(&NamedEvent {
-        session_id: e.session_id,
-        sequence: e.sequence,
-        tick: e.tick,
-        time_ns: e.time_ns,
-        kind: EventKind::from_number(e.kind).map_or_else(String::new, |kind| format!("{kind:?}")),
-        code: e.code,
-        value: e.value,
-        position_m: e.position_m,
-        text: e.text.read(),
+pub fn event(event: &Event) -> Value {
+    message(&NamedEvent {
+        kind: EventKind::from_number(event.kind).map_or_else(String::new, |kind| format!("{kind:?}")),
+        event: *event,
     })
 }
 
 /// Reads an event; `None` for invalid bytes.
 pub fn event_of(data: &[u8]) -> Option<Event> {
-    let e: NamedEvent = serde_json::from_slice(data).ok()?;
+    let NamedEvent { kind, event } = serde_json::from_slice(data).ok()?;
     let kind = (1..64)
         .filter_map(EventKind::from_number)
-        .find(|kind| format!("{kind:?}") == e.kind)?;
-    let is_finite = e.value.is_finite() && e.position_m.iter().all(|c| c.is_finite());
+        .find(|known| format!("{known:?}") == kind)?;
+    let is_finite = event.value.is_finite() && event.position_m.iter().all(|c| c.is_finite());
     is_finite.then_some(Event {
-        session_id: e.session_id,
-        sequence: e.sequence,
-        time_ns: e.time_ns,
-        tick: e.tick,
         kind: kind as u32,
-        code: e.code,
-        value: e.value,
-        position_m: e.position_m,
-        text: Text::new(&e.text),
+        ..event
     })
 }
 
-fn tissue_schema() -> Value {
-    object(
-        TISSUE.schema,
-        json!({
-            "session_id": whole("run of rt-core"), "tissue_tick": whole("of the tissue loop"), "time_ns": whole("CLOCK_MONOTONIC"),
-            "tip_in_scene_m": vector(3, "m"), "needle_direction": vector(3, "unit vector to the tip"),
-            "bend_m": { "type": "array", "items": vector(3, "m, from where a rigid needle would be; from the tip back to the hand") },
-            "bend_spacing_m": number("m along the needle from one to the next"),
-            "body_moved_m": vector(3, "m, of all of the body from where the scene has it; seeds are in the body as the scene has it"),
-            "held_in_scene_m": vector(3, "m"), "held_element": { "type": ["integer", "null"] }, "phase": whole("as of a tick"),
-            "residual": number("of the model"), "max_displacement_m": number("m"), "work_ns": whole("of the tissue tick"),
-            "seeds": { "type": "array", "items": { "type": "object", "properties": {
-                "position_m": vector(3, "m"), "axis": vector(3, "unit vector"), "dropped_at_m": vector(3, "m"),
-            } } },
-            "needles_left_in": { "type": "array", "items": { "type": "object", "properties": {
-                "number": whole("of the needle"), "tip_m": vector(3, "m"), "direction": vector(3, "unit vector"),
-            } } },
-        }),
-    )
-}
-
-/// The fields of a [`SnapshotHeader`] that viewers need.
+/// A [`SnapshotHeader`] with its lists.
 #[derive(Serialize, Deserialize)]
 struct Tissue {
-    session_id: u64,
-    tissue_tick: u64,
-    time_ns: u64,
-    tip_in_scene_m: [f64; 3],
-    needle_direction: [f64; 3],
-    held_in_scene_m: [f64; 3],
+    #[serde(flatten)]
+    header: SnapshotHeader,
     held_element: Option<u32>,
-    phase: u32,
-    residual: f64,
-    max_displacement_m: f64,
-    work_ns: u64,
     seeds: Vec<SeedPose>,
     // Absent from recordings of earlier versions.
     #[serde(default)]
     needles_left_in: Vec<LeftNeedlePose>,
     #[serde(default)]
     bend_m: Vec<[f64; 3]>,
-    #[serde(default)]
-    bend_spacing_m: f64,
-    #[serde(default)]
-    body_moved_m: [f64; 3],
 }
 
 pub fn tissue(snapshot: &Snapshot) -> Value {
     let h = &snapshot.header;
-    setting::message(&Tissue {
-        session_id: h.session_id,
-        tissue_tick: h.tissue_tick,
-        time_ns: h.time_ns,
-        tip_in_scene_m: h.tip_in_scene_m,
-        needle_direction: h.needle_direction,
-        held_in_scene_m: h.held_in_scene_m,
+    message(&Tissue {
+        header: *h,
         held_element: (h.held_element != u32::MAX).then_some(h.held_element),
-        phase: h.phase,
-        residual: h.residual,
-        max_displacement_m: h.max_displacement_m,
-        work_ns: h.work_ns,
         seeds: h.seeds[..h.seed_count as usize].to_vec(),
         needles_left_in: h.left().to_vec(),
         bend_m: h.bends_m().to_vec(),
-        bend_spacing_m: h.bend_spacing_m,
-        body_moved_m: h.body_moved_m,
     })
 }
 
 /// Returns the header of a snapshot, with the fields that [`tissue`] keeps.
 pub fn tissue_of(data: &[u8]) -> Option<SnapshotHeader> {
-    let t: Tissue = serde_json::from_slice(data).ok()?;
-    let mut header = SnapshotHeader {
-        session_id: t.session_id,
-        tissue_tick: t.tissue_tick,
-        time_ns: t.time_ns,
-        tip_in_scene_m: t.tip_in_scene_m,
-        needle_direction: t.needle_direction,
-        held_in_scene_m: t.held_in_scene_m,
-        residual: t.residual,
-        max_displacement_m: t.max_displacement_m,
-        work_ns: t.work_ns,
-        held_element: t.held_element.unwrap_or(u32::MAX),
-        phase: t.phase,
-        bend_spacing_m: t.bend_spacing_m,
-        body_moved_m: t.body_moved_m,
-        ..SnapshotHeader::default()
-    };
-    header.seed_count = fill(&mut header.seeds, &t.seeds);
-    header.left_count = fill(&mut header.left, &t.needles_left_in);
-    header.bend_count = fill(&mut header.bend_m, &t.bend_m);
-    Some(header)
+    let mut t: Tissue = serde_json::from_slice(data).ok()?;
+    t.header.held_element = t.held_element.unwrap_or(u32::MAX);
+    t.header.seed_count = fill(&mut t.header.seeds, &t.seeds);
+    t.header.left_count = fill(&mut t.header.left, &t.needles_left_in);
+    t.header.bend_count = fill(&mut t.header.bend_m, &t.bend_m);
+    Some(t.header)
 }
 
 /// Copies as many as fit, and returns their number.
@@ -236,50 +88,161 @@ fn fill<T: Copy>(room: &mut [T], from: &[T]) -> u32 {
     count as u32
 }
 
-#[derive(Deserialize)]
-struct Gland {
-    data: String,
-}
-
-/// The vertices of [`gland`].
-pub fn gland_of(data: &[u8]) -> Option<Vec<[f32; 3]>> {
-    let gland: Gland = serde_json::from_slice(data).ok()?;
-    scene::places_of(&gland.data)
-}
-
-fn gland_schema() -> Value {
-    let point = |names: &[&str]| {
-        let fields = names.iter().map(|n| (n.to_string(), json!({ "type": "number" })));
-        json!({ "type": "object", "properties": fields.collect::<serde_json::Map<_, _>>() })
-    };
-    object(
-        GLAND.schema,
-        json!({
-            "timestamp": { "type": "object", "title": "time", "properties": { "sec": whole("s"), "nsec": whole("ns") } },
-            "frame_id": { "type": "string" },
-            "pose": { "type": "object", "properties": { "position": point(&["x", "y", "z"]), "orientation": point(&["x", "y", "z", "w"]) } },
-            "point_stride": whole("bytes from one point to the next"),
-            "fields": { "type": "array", "items": { "type": "object", "properties": {
-                "name": { "type": "string" }, "offset": whole("bytes"), "type": whole("7 is FLOAT32"),
-            } } },
-            "data": { "type": "string", "contentEncoding": "base64", "description": "surface vertices, m, scene frame" },
-        }),
-    )
-}
-
 /// Vertices of the deformed surface, in the order of the scene's rest surface.
 pub fn gland(snapshot: &Snapshot, time_ns: u64) -> Value {
-    use base64::Engine;
     const FLOAT32: u32 = 7;
-    let stride = size_of::<Vertex>();
     let fields = ["x", "y", "z"].iter().enumerate();
     let fields = fields.map(|(i, name)| json!({ "name": name, "offset": 4 * i, "type": FLOAT32 }));
-    let bytes: &[u8] = bytemuck::cast_slice(&snapshot.positions_m);
     json!({
         "timestamp": { "sec": time_ns / 1_000_000_000, "nsec": time_ns % 1_000_000_000 },
         "frame_id": "scene",
         "pose": { "position": { "x": 0.0, "y": 0.0, "z": 0.0 }, "orientation": { "x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0 } },
-        "point_stride": stride, "fields": fields.collect::<Vec<_>>(),
-        "data": base64::engine::general_purpose::STANDARD.encode(bytes),
+        "point_stride": size_of::<Vertex>(), "fields": fields.collect::<Vec<_>>(),
+        "data": places(&snapshot.positions_m),
     })
+}
+
+/// The vertices of [`gland`].
+pub fn gland_of(data: &[u8]) -> Option<Vec<[f32; 3]>> {
+    #[derive(Deserialize)]
+    struct Gland {
+        data: String,
+    }
+    let gland: Gland = serde_json::from_slice(data).ok()?;
+    places_of(&gland.data)
+}
+
+/// Encodes positions as three `f32` each, little-endian, base64.
+fn places(places_m: &[[f32; 3]]) -> String {
+    let bytes: Vec<u8> = places_m.iter().flatten().flat_map(|c| c.to_le_bytes()).collect();
+    STANDARD.encode(bytes)
+}
+
+fn places_of(text: &str) -> Option<Vec<[f32; 3]>> {
+    let bytes = STANDARD.decode(text).ok()?;
+    let coordinate = |w: &[u8]| f32::from_le_bytes([w[0], w[1], w[2], w[3]]);
+    let place = |p: &[u8]| [coordinate(&p[..4]), coordinate(&p[4..8]), coordinate(&p[8..])];
+    Some(bytes.chunks_exact(12).map(place).collect())
+}
+
+#[derive(Serialize, Deserialize)]
+struct Scene {
+    #[serde(flatten)]
+    header: SceneHeader,
+    structures: Vec<StructureInfo>,
+    /// Words that follow a `SceneHeader`, little-endian, base64.
+    words: String,
+}
+
+pub fn scene(model: &SceneModel) -> Value {
+    let words: Vec<u8> = model.words().iter().flat_map(|word| word.to_le_bytes()).collect();
+    message(&Scene {
+        header: model.header,
+        structures: model.header.structures().to_vec(),
+        words: STANDARD.encode(words),
+    })
+}
+
+/// Decodes a scene; `None` if it is inconsistent.
+pub fn scene_of(data: &[u8], session_id: u64) -> Option<SceneModel> {
+    let Scene {
+        mut header,
+        structures,
+        words,
+    } = serde_json::from_slice(data).ok()?;
+    if structures.len() > MAX_STRUCTURES {
+        return None;
+    }
+    header.session_id = session_id;
+    header.structure_count = fill(&mut header.structures, &structures);
+    let bytes = STANDARD.decode(words).ok()?;
+    let words = bytes
+        .chunks_exact(4)
+        .map(|w| u32::from_le_bytes([w[0], w[1], w[2], w[3]]));
+    SceneModel::of_words(&header, &words.collect::<Vec<_>>())
+}
+
+#[derive(Serialize, Deserialize)]
+struct Field {
+    scene_generation: u64,
+    /// Displacements in m, base64.
+    displacements: String,
+}
+
+pub fn field(snapshot: &Snapshot) -> Value {
+    message(&Field {
+        scene_generation: snapshot.header.scene_generation,
+        displacements: places(&snapshot.displacements_m),
+    })
+}
+
+/// Returns the generation of the scene, and the displacements.
+pub fn field_of(data: &[u8]) -> Option<(u64, Vec<[f32; 3]>)> {
+    let field: Field = serde_json::from_slice(data).ok()?;
+    Some((field.scene_generation, places_of(&field.displacements)?))
+}
+
+pub fn session_of(data: &[u8]) -> Option<Session> {
+    let session: Session = serde_json::from_slice(data).ok()?;
+    Some(Session {
+        schema_version: SCHEMA_VERSION,
+        period_ns: session.period_ns.max(1),
+        ..session
+    })
+}
+
+#[derive(Serialize, Deserialize)]
+struct Plan {
+    generation: u64,
+    scene_generation: u64,
+    #[serde(flatten)]
+    needle: PlannedNeedle,
+}
+
+pub fn plan(plan: &PlanInForce) -> Value {
+    message(&Plan {
+        generation: plan.generation,
+        scene_generation: plan.scene_generation,
+        needle: plan.needle(),
+    })
+}
+
+pub fn plan_of(data: &[u8], session_id: u64) -> Option<PlanInForce> {
+    let plan: Plan = serde_json::from_slice(data).ok()?;
+    Some(PlanInForce {
+        session_id,
+        generation: plan.generation,
+        scene_generation: plan.scene_generation,
+        ..PlanInForce::of(Some(&plan.needle))
+    })
+}
+
+#[derive(Serialize, Deserialize)]
+struct Parameters {
+    generation: u64,
+    effective_tick: u64,
+    values: BTreeMap<String, f64>,
+}
+
+pub fn parameters(in_force: &ParametersInForce) -> Value {
+    let value = |spec: &stylet_shm_schema::ParameterSpec| (spec.key.to_owned(), in_force.set.get(spec.id));
+    message(&Parameters {
+        generation: in_force.generation,
+        effective_tick: in_force.effective_tick,
+        values: PARAMETERS.iter().map(value).collect(),
+    })
+}
+
+pub fn parameters_of(data: &[u8], session_id: u64) -> Option<ParametersInForce> {
+    let p: Parameters = serde_json::from_slice(data).ok()?;
+    let mut in_force = ParametersInForce::zeroed();
+    (in_force.session_id, in_force.generation) = (session_id, p.generation);
+    in_force.effective_tick = p.effective_tick;
+    in_force.set = Default::default();
+    for spec in &PARAMETERS {
+        if let Some(&value) = p.values.get(spec.key) {
+            in_force.set.set(spec.id, value);
+        }
+    }
+    Some(in_force)
 }

@@ -1,10 +1,11 @@
 //! Records a session in MCAP: every record of the force loop, the tissue's snapshots, and events. Also exports such
 //! files.
 //!
-//! The link's thread takes what arrives in shared memory, another encodes and writes it. A disk may stall for five
-//! minutes before a tick is lost (72 MB, `link`), and a suspended program for 12 s (`service::RECORD_BUFFER`). Any loss
-//! is counted and listed for each kind of message.
+//! The link's thread takes what arrives in shared memory and keeps it while the disk stalls: five minutes of ticks
+//! (72 MB, `link`), and 12 s of them while the program is suspended (`service::RECORD_BUFFER`). Any loss is counted and
+//! listed for each kind of message.
 
+mod channels;
 mod error;
 mod export;
 mod gaps;
@@ -12,9 +13,6 @@ mod live;
 mod messages;
 mod played;
 mod read;
-mod scene;
-mod second;
-mod setting;
 mod stream;
 mod writer;
 
@@ -25,20 +23,19 @@ pub use played::{played, played_of};
 pub use read::{Recording, read};
 
 use crate::link::{Link, LinkStatus};
+use std::fs::File;
+use std::io::{BufWriter, Seek, Write};
 use std::path::PathBuf;
-use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::Request;
-use writer::{Item, Totals};
+use writer::{Totals, Writer};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 const FIND_LIMIT: Duration = Duration::from_secs(3);
 /// Time for a core that is being started at the same time to appear.
 const APPEAR_LIMIT: Duration = Duration::from_secs(1);
-/// Most items queued for the writer; beyond that the link's memory is used.
-const ITEMS_AHEAD: usize = 32;
 /// Delay between two kept snapshots, beyond the expected interval, that counts as a gap, s.
 const SNAPSHOT_LATE_S: f64 = 0.1;
 const PRINT_EVERY: Duration = Duration::from_secs(10);
@@ -69,23 +66,26 @@ pub fn run(options: &Options) -> Result<(), RecordError> {
     let stop = || interrupted.asked();
     let mut link = Link::for_recording(options.instance.clone());
     find_core(&mut link, stop)?;
-    let (send, receive) = mpsc::sync_channel(ITEMS_AHEAD);
-    let thread = std::thread::Builder::new().name("recording".to_owned());
-    let (name, writer) = match &options.to {
+    let (name, totals) = match &options.to {
         To::File(path) => {
-            let to = path.clone();
-            let writer = thread.spawn(move || writer::write_all(&to, &receive));
-            (path.display().to_string(), writer)
+            let failed = |why: mcap::McapError| RecordError::of_file(path, why);
+            let file = File::create(path)
+                .map_err(|e| RecordError::of_file(path, format!("{e}; choose another file with --out")))?;
+            let writer = Writer::of_file(BufWriter::new(file)).map_err(failed)?;
+            let mut totals = take(&mut link, options, stop, writer).map_err(failed)?;
+            totals.bytes = std::fs::metadata(path).map_or(0, |m| m.len());
+            (path.display().to_string(), totals)
         }
         To::Viewers(address) => {
-            let server = live::start(address)?;
-            (address.clone(), thread.spawn(move || server.send(&receive)))
+            let failed = |why: mcap::McapError| RecordError::Live(format!("it ended, or reads no more: {why}"));
+            let mut server = live::start(address)?;
+            let input = server.stdin.take();
+            let input = input.ok_or_else(|| RecordError::Live("it has no input".to_owned()))?;
+            let totals = Writer::of_program(input).and_then(|writer| take(&mut link, options, stop, writer));
+            let _ended = server.wait();
+            (address.clone(), totals.map_err(failed)?)
         }
     };
-    let writer = writer.map_err(RecordError::NoThread)?;
-    take(&mut link, options, stop, &send);
-    drop(send);
-    let totals = writer.join().map_err(|_| RecordError::Panicked)??;
     println!("{name}: {}", totals.words());
     totals.missing_words().iter().for_each(|line| println!("{line}"));
     totals.verdict()
@@ -129,58 +129,60 @@ struct Handed {
     settings: [Option<u64>; 3],
 }
 
-/// Takes arriving data and hands it to the writer; while the writer lags, the link keeps the data.
-fn take(link: &mut Link, options: &Options, stop: impl Fn() -> bool, to: &mpsc::SyncSender<Item>) {
+/// Writes arriving data; while the writer lags, the link keeps the data.
+fn take<W: Write + Seek>(
+    link: &mut Link,
+    options: &Options,
+    stop: impl Fn() -> bool,
+    mut to: Writer<W>,
+) -> mcap::McapResult<Totals> {
     let begun = Instant::now();
     let mut printed = begun;
     let mut handed = Handed::default();
-    let mut records = 0;
     while !stop() && options.duration.is_none_or(|d| begun.elapsed() < d) {
         link.poll();
-        let mut items = Vec::new();
-        handed.collect(link, options.snapshots_hz, &mut items);
-        for item in items {
-            if let Item::Records(new) = &item {
-                records += new.len();
-            }
-            // A writer that ended early returns its reason at the end.
-            if to.send(item).is_err() {
-                return;
-            }
-        }
+        handed.hand_over(link, options.snapshots_hz, &mut to)?;
+        to.flush()?;
         if matches!(link.status(), LinkStatus::Absent { .. }) && options.duration.is_none() {
-            return;
+            break;
         }
         if printed.elapsed() >= PRINT_EVERY {
             printed = Instant::now();
-            println!("{:5.0} s  {records} ticks", begun.elapsed().as_secs_f64());
+            println!(
+                "{:5.0} s  {} ticks",
+                begun.elapsed().as_secs_f64(),
+                to.totals.gaps.records()
+            );
         }
         std::thread::sleep(POLL_EVERY);
     }
+    to.finish()
 }
 
 impl Handed {
-    fn collect(&mut self, link: &mut Link, snapshots_hz: f64, items: &mut Vec<Item>) {
+    fn hand_over<W: Write + Seek>(
+        &mut self,
+        link: &mut Link,
+        snapshots_hz: f64,
+        to: &mut Writer<W>,
+    ) -> mcap::McapResult<()> {
         if let Some(session) = link.session().filter(|s| self.session != Some(s.session_id)) {
-            self.session = Some(session.session_id);
             // A run that begins during the recording had lost nothing.
             let lost_before = link.state().map_or(0, |s| s.records_lost);
-            self.lost_before = Some(self.lost_before.map_or(lost_before, |_| 0));
-            (self.event, self.tissue_tick, self.snapshot_ns, self.due_ns) = (0, 0, 0, 0);
-            self.settings = [None; 3];
-            items.push(Item::Session(Box::new(*session)));
+            *self = Self {
+                session: Some(session.session_id),
+                lost_before: Some(self.lost_before.map_or(lost_before, |_| 0)),
+                ..Self::default()
+            };
+            to.session(session)?;
         }
-        self.collect_settings(link, items);
-        let records = link.take_records();
-        if !records.is_empty() {
-            items.push(Item::Records(records));
-        }
-        let records = link.take_second_records();
-        if !records.is_empty() {
-            items.push(Item::SecondRecords(records));
-        }
+        self.hand_over_settings(link, to)?;
+        link.take_records().iter().try_for_each(|record| to.tick(record))?;
+        link.take_second_records()
+            .iter()
+            .try_for_each(|record| to.second(record))?;
         for event in link.events().iter().filter(|e| e.sequence > self.event) {
-            items.push(Item::Event(Box::new(*event)));
+            to.event(event)?;
         }
         self.event = link.events().back().map_or(self.event, |e| e.sequence);
         if let Some(snapshot) = link.snapshot().filter(|s| s.header.tissue_tick != self.tissue_tick) {
@@ -191,36 +193,36 @@ impl Handed {
                 let period_ns = (1e9 / snapshots_hz) as u64;
                 // Counted from the due time, so that the rate is the requested one whatever the core's is.
                 self.due_ns = (self.due_ns + period_ns).max(now_ns + period_ns / 2);
-                let late = self.snapshot_ns > 0 && since_s > 2.0 / snapshots_hz + SNAPSHOT_LATE_S;
-                items.extend(late.then_some(Item::SnapshotsMissing(since_s)));
+                if self.snapshot_ns > 0 && since_s > 2.0 / snapshots_hz + SNAPSHOT_LATE_S {
+                    to.totals.snapshot_gaps += 1;
+                    to.totals.snapshot_gaps_s += since_s;
+                }
                 self.snapshot_ns = now_ns;
-                items.extend(link.state().map(|state| Item::State(Box::new(*state))));
-                items.push(Item::Snapshot(Box::new(snapshot.clone())));
+                to.snapshot(link.state(), snapshot)?;
             } else {
-                items.push(Item::SnapshotLeftOut);
+                to.totals.snapshots_left_out += 1;
             }
         }
-        if let Some(state) = link.state() {
-            let before = self.lost_before.unwrap_or(0);
-            items.push(Item::LostInCore(state.records_lost.saturating_sub(before)));
-        }
+        let lost = link.state().map_or(0, |state| state.records_lost);
+        let lost = lost.saturating_sub(self.lost_before.unwrap_or(0));
+        to.totals.lost_in_core = to.totals.lost_in_core.max(lost);
+        Ok(())
     }
-}
 
-impl Handed {
-    /// Adds scene, plan and parameters that have changed.
-    fn collect_settings(&mut self, link: &Link, items: &mut Vec<Item>) {
+    /// Writes scene, plan and parameters that have changed.
+    fn hand_over_settings<W: Write + Seek>(&mut self, link: &Link, to: &mut Writer<W>) -> mcap::McapResult<()> {
         let [scene, plan, parameters] = &mut self.settings;
         let is_new = |last: &mut Option<u64>, generation: u64| last.replace(generation) != Some(generation);
         if let Some(now) = link.scene().filter(|now| is_new(scene, now.header.generation)) {
-            items.push(Item::Scene(now.clone()));
+            to.scene(now)?;
         }
         if let Some(now) = link.plan().filter(|now| is_new(plan, now.generation)) {
-            items.push(Item::Plan(Box::new(*now)));
+            to.plan(now)?;
         }
         if let Some(now) = link.parameters().filter(|now| is_new(parameters, now.generation)) {
-            items.push(Item::Parameters(Box::new(*now)));
+            to.parameters(now)?;
         }
+        Ok(())
     }
 }
 

@@ -1,10 +1,8 @@
 //! Reads a recording for a window: the core's messages, each with its time.
 
+use super::channels::Kind;
 use super::error::{RecordError, ShowError};
-use super::messages::{EVENT, GLAND, TICK, TISSUE, event_of, gland_of, tissue_of};
-use super::scene::{self, FIELD, SCENE};
-use super::second::SECOND;
-use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
+use super::messages;
 use super::stream;
 use crate::link::{Piece, Played, Snapshot};
 use std::path::Path;
@@ -51,14 +49,14 @@ impl Reader {
         }
         let damaged = || format!("a message of {topic} is damaged");
         let session_id = self.session.map_or(0, |session| session.session_id);
-        let piece = match topic {
-            t if t == SESSION.topic => {
+        let piece = match Kind::of(topic) {
+            Some(Kind::Session) => {
                 if self.session.is_none() {
-                    self.session = Some(setting::session_of(data).ok_or_else(damaged)?);
+                    self.session = Some(messages::session_of(data).ok_or_else(damaged)?);
                 }
                 return Ok(());
             }
-            t if t == TICK.topic => {
+            Some(Kind::Tick) => {
                 let record: TickRecord = serde_json::from_slice(data).map_err(|_| damaged())?;
                 if record.session_id != session_id {
                     return Err("another run of rt-core begins".to_owned());
@@ -66,44 +64,44 @@ impl Reader {
                 check::record(&record).map_err(|_| damaged())?;
                 Piece::Tick(Box::new(record))
             }
-            t if t == EVENT.topic => match event_of(data).filter(|e| e.session_id == session_id) {
+            Some(Kind::Event) => match messages::event_of(data).filter(|e| e.session_id == session_id) {
                 Some(event) => Piece::Event(Box::new(event)),
                 // Another version may have more kinds.
                 None => return Ok(()),
             },
-            t if t == SECOND.topic => {
+            Some(Kind::Second) => {
                 let record: Option<SecondRecord> = serde_json::from_slice(data).ok();
                 let record = record.filter(|r| r.session_id == session_id && check::second_record(r).is_ok());
                 Piece::Second(Box::new(record.ok_or_else(damaged)?))
             }
-            t if t == STATE.topic => {
+            Some(Kind::State) => {
                 let state = serde_json::from_slice(data)
                     .ok()
                     .filter(|state| check::state(state).is_ok());
                 Piece::State(Box::new(state.ok_or_else(damaged)?))
             }
-            t if t == SCENE.topic => {
+            Some(Kind::Scene) => {
                 self.has_scene = true;
-                Piece::Scene(Arc::new(scene::scene_of(data, session_id).ok_or_else(damaged)?))
+                Piece::Scene(Arc::new(messages::scene_of(data, session_id).ok_or_else(damaged)?))
             }
-            t if t == PLAN.topic => {
-                let plan = setting::plan_of(data, session_id).filter(|plan| check::plan(plan).is_ok());
+            Some(Kind::Plan) => {
+                let plan = messages::plan_of(data, session_id).filter(|plan| check::plan(plan).is_ok());
                 Piece::Plan(Box::new(plan.ok_or_else(damaged)?))
             }
-            t if t == PARAMETERS_CHANNEL.topic => {
-                let found = setting::parameters_of(data, session_id).filter(|p| check::parameters(p).is_ok());
+            Some(Kind::Parameters) => {
+                let found = messages::parameters_of(data, session_id).filter(|p| check::parameters(p).is_ok());
                 Piece::Parameters(Box::new(found.ok_or_else(damaged)?))
             }
-            t if t == TISSUE.topic => {
-                self.header = Some(tissue_of(data).ok_or_else(damaged)?);
+            Some(Kind::Tissue) => {
+                self.header = Some(messages::tissue_of(data).ok_or_else(damaged)?);
                 return Ok(());
             }
-            t if t == GLAND.topic => {
-                self.surface_m = gland_of(data).ok_or_else(damaged)?;
+            Some(Kind::Gland) => {
+                self.surface_m = messages::gland_of(data).ok_or_else(damaged)?;
                 return Ok(());
             }
-            t if t == FIELD.topic => {
-                let (scene_generation, displacements_m) = scene::field_of(data).ok_or_else(damaged)?;
+            Some(Kind::Field) => {
+                let (scene_generation, displacements_m) = messages::field_of(data).ok_or_else(damaged)?;
                 let header = self.header.take().ok_or_else(damaged)?;
                 let header = SnapshotHeader {
                     scene_generation,
@@ -113,7 +111,7 @@ impl Reader {
                 let snapshot = Snapshot::of_parts(header, surface_m, displacements_m);
                 Piece::Snapshot(Box::new(snapshot.ok_or_else(damaged)?))
             }
-            _ => return Ok(()),
+            None => return Ok(()),
         };
         self.pieces.push((time_ns, piece));
         Ok(())

@@ -1,9 +1,8 @@
 //! Reads a recording for an export.
 
+use super::channels::Kind;
 use super::error::RecordError;
 use super::gaps::Gaps;
-use super::messages::TICK;
-use super::second::SECOND;
 use super::stream;
 use std::path::Path;
 use stylet_shm_schema::{SecondRecord, TickRecord};
@@ -31,16 +30,17 @@ pub fn read(path: &Path) -> Result<Recording, RecordError> {
         cut_off: None,
     };
     let cut_off = stream::each(&bytes, |topic, _, data| {
-        if topic == TICK.topic {
-            let tick: TickRecord = serde_json::from_slice(data).map_err(|e| format!("invalid tick: {e}"))?;
-            if recording.gaps.record(tick.session_id, tick.tick) {
-                recording.ticks.push(tick);
+        match Kind::of(topic) {
+            Some(Kind::Tick) => {
+                let tick: TickRecord = serde_json::from_slice(data).map_err(|e| format!("invalid tick: {e}"))?;
+                if recording.gaps.record(tick.session_id, tick.tick) {
+                    recording.ticks.push(tick);
+                }
             }
-        }
-        if topic == SECOND.topic {
-            recording
+            Some(Kind::Second) => recording
                 .second
-                .extend(serde_json::from_slice::<SecondRecord>(data).ok());
+                .extend(serde_json::from_slice::<SecondRecord>(data).ok()),
+            _ => {}
         }
         Ok(())
     });

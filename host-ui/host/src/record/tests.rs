@@ -9,19 +9,8 @@ use stylet_shm_schema::{
     SecondRecord, Session, SnapshotHeader, Text, TickRecord,
 };
 
-fn ticks(range: std::ops::Range<u64>) -> Item {
-    let record = |tick| TickRecord {
-        session_id: 1,
-        tick,
-        ..TickRecord::zeroed()
-    };
-    Item::Records(range.map(record).collect())
-}
-
-fn event(sequence: u64) -> Item {
-    let mut event = Event::zeroed();
-    (event.session_id, event.sequence, event.kind) = (1, sequence, 1);
-    Item::Event(Box::new(event))
+fn writer(path: &std::path::Path) -> Writer<BufWriter<File>> {
+    Writer::of_file(BufWriter::new(File::create(path).unwrap())).unwrap()
 }
 
 /// A recording reported how many ticks it lacked, but not which; lost events and times without a snapshot went
@@ -29,19 +18,23 @@ fn event(sequence: u64) -> Item {
 #[test]
 fn what_a_recording_lacks_is_listed_for_each_kind() {
     let path = std::env::temp_dir().join(format!("stylet-lacks-{}.mcap", std::process::id()));
-    let (send, receive) = mpsc::sync_channel(ITEMS_AHEAD);
-    for item in [
-        ticks(100..200),
-        ticks(1_200..1_300),
-        event(4),
-        event(8),
-        Item::SnapshotsMissing(10.25),
-        Item::LostInCore(600),
-    ] {
-        send.send(item).unwrap();
+    let mut writer = writer(&path);
+    for tick in (100..200).chain(1_200..1_300) {
+        let record = TickRecord {
+            session_id: 1,
+            tick,
+            ..TickRecord::zeroed()
+        };
+        writer.tick(&record).unwrap();
     }
-    drop(send);
-    let totals = writer::write_all(&path, &receive).unwrap();
+    for sequence in [4, 8] {
+        let mut event = Event::zeroed();
+        (event.session_id, event.sequence, event.kind) = (1, sequence, 1);
+        writer.event(&event).unwrap();
+    }
+    (writer.totals.snapshot_gaps, writer.totals.snapshot_gaps_s) = (1, 10.25);
+    writer.totals.lost_in_core = 600;
+    let totals = writer.finish().unwrap();
     let _removed = std::fs::remove_file(&path);
     assert_eq!(
         totals.missing_words(),
@@ -94,8 +87,8 @@ fn marked() -> Event {
     event
 }
 
-/// Messages of one run of a core, with numbers that have no exact decimal fraction.
-fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
+/// Writes messages of one run of a core, with numbers that have no exact decimal fraction.
+fn recorded(name: &str) -> (PathBuf, TickRecord, HapticState, Snapshot) {
     let tick = |tick: u64| TickRecord {
         session_id: 1,
         tick,
@@ -132,18 +125,18 @@ fn said() -> (Vec<Item>, TickRecord, HapticState, Snapshot) {
     parameters.set.set(ParameterId::PunctureDepth, 7.5e-3);
     let mut session = Session::zeroed();
     (session.session_id, session.period_ns, session.device) = (1, 1_000_000, Text::new("hand"));
-    let items = vec![
-        Item::Session(Box::new(session)),
-        Item::Scene(Arc::new(scene())),
-        Item::Plan(Box::new(plan)),
-        Item::Parameters(Box::new(parameters)),
-        Item::Records((10..30).map(tick).collect()),
-        Item::SecondRecords((10..30).map(second_tick).collect()),
-        Item::State(Box::new(state)),
-        Item::Snapshot(Box::new(snapshot.clone())),
-        Item::Event(Box::new(marked())),
-    ];
-    (items, tick(29), state, snapshot)
+    let path = std::env::temp_dir().join(format!("stylet-{name}-{}.mcap", std::process::id()));
+    let mut writer = writer(&path);
+    writer.session(&session).unwrap();
+    writer.scene(&scene()).unwrap();
+    writer.plan(&plan).unwrap();
+    writer.parameters(&parameters).unwrap();
+    (10..30).for_each(|n| writer.tick(&tick(n)).unwrap());
+    (10..30).for_each(|n| writer.second(&second_tick(n)).unwrap());
+    writer.snapshot(Some(&state), &snapshot).unwrap();
+    writer.event(&marked()).unwrap();
+    writer.finish().unwrap();
+    (path, tick(29), state, snapshot)
 }
 
 fn second_tick(tick: u64) -> SecondRecord {
@@ -152,16 +145,6 @@ fn second_tick(tick: u64) -> SecondRecord {
     record.tip_in_scene_m = [1.0 / 3.0, 1e-3 * tick as f64, -0.0];
     record.world_from_tool = [0.0, 0.0, 0.0, 1.0];
     record
-}
-
-fn recorded(name: &str) -> (PathBuf, TickRecord, HapticState, Snapshot) {
-    let path = std::env::temp_dir().join(format!("stylet-{name}-{}.mcap", std::process::id()));
-    let (items, last, state, snapshot) = said();
-    let (send, receive) = mpsc::sync_channel(ITEMS_AHEAD);
-    items.into_iter().for_each(|item| send.send(item).unwrap());
-    drop(send);
-    writer::write_all(&path, &receive).unwrap();
-    (path, last, state, snapshot)
 }
 
 #[test]
@@ -280,4 +263,29 @@ fn a_recording_is_played_as_a_core_speaks() {
         first,
         "ticks went back within a run"
     );
+}
+
+/// Files that exist are the standard: names, order and digits of every message stay.
+#[test]
+fn messages_of_the_example_are_written_again_in_the_same_bytes() {
+    use super::channels::Kind;
+    let bytes = std::fs::read("../example/insertion.mcap").unwrap();
+    let mut counts = [0; 4];
+    stream::each(&bytes, |topic, _, data| {
+        let (which, again) = match Kind::of(topic) {
+            Some(Kind::Event) => (0, messages::event(&messages::event_of(data).unwrap())),
+            Some(Kind::Scene) => (1, messages::scene(&messages::scene_of(data, 1).unwrap())),
+            Some(Kind::Plan) => (2, messages::plan(&messages::plan_of(data, 1).unwrap())),
+            Some(Kind::Tissue) => {
+                let snapshot = Snapshot::of_parts(messages::tissue_of(data).unwrap(), Vec::new(), Vec::new());
+                (3, messages::tissue(&snapshot.unwrap()))
+            }
+            _ => return Ok(()),
+        };
+        counts[which] += 1;
+        assert_eq!(again.to_string(), std::str::from_utf8(data).unwrap(), "{topic}");
+        Ok(())
+    })
+    .unwrap();
+    assert!(counts.iter().all(|count| *count > 0), "{counts:?}");
 }

@@ -1,20 +1,16 @@
-//! The thread that encodes and writes.
+//! Encodes and writes messages, and counts what is lost.
 
-use super::error::RecordError;
+use super::channels::{CHANNELS, Kind};
 use super::gaps::{Gap, Gaps};
-use super::messages::{self, Channel, EVENT, GLAND, TICK, TISSUE};
-use super::scene::{self, FIELD, SCENE};
-use super::second::SECOND;
-use super::setting::{self, PARAMETERS_CHANNEL, PLAN, SESSION, STATE};
+use super::messages;
 use crate::link::{SceneModel, Snapshot};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
+use serde::Serialize;
+use serde_json::Value;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
-use std::path::Path;
 use std::process::ChildStdin;
-use std::sync::{Arc, mpsc};
 use stylet_shm_schema::{Event, HapticState, ParametersInForce, PlanInForce, SecondRecord, Session, TickRecord};
 
 /// Size of a chunk: a recording cut off by a crash lacks at most the last one, about two seconds.
@@ -23,26 +19,6 @@ const CHUNK_BYTES: u64 = 1 << 20;
 const GAPS_LISTED: usize = 1000;
 /// Most gaps listed in the terminal.
 const GAPS_PRINTED: usize = 10;
-
-/// An item from the receiving thread.
-pub enum Item {
-    Session(Box<Session>),
-    Records(Vec<TickRecord>),
-    SecondRecords(Vec<SecondRecord>),
-    Event(Box<Event>),
-    Scene(Arc<SceneModel>),
-    Plan(Box<PlanInForce>),
-    Parameters(Box<ParametersInForce>),
-    /// State when the snapshot after it was taken.
-    State(Box<HapticState>),
-    Snapshot(Box<Snapshot>),
-    /// A snapshot that was seen but not kept.
-    SnapshotLeftOut,
-    /// Time without a kept snapshot, s.
-    SnapshotsMissing(f64),
-    /// Records lost since the recording began, by the core's count.
-    LostInCore(u64),
-}
 
 /// Contents of a recording, and its losses.
 #[derive(Default)]
@@ -140,22 +116,8 @@ fn listed_gaps(gaps: &Gaps) -> String {
     listed.collect::<Vec<_>>().join(" ")
 }
 
-/// Channels by index.
-const CHANNELS: [&Channel; 11] = [
-    &TICK,
-    &EVENT,
-    &TISSUE,
-    &GLAND,
-    &SCENE,
-    &PLAN,
-    &PARAMETERS_CHANNEL,
-    &STATE,
-    &FIELD,
-    &SESSION,
-    &SECOND,
-];
-
-struct Writer<W: Write + Seek> {
+/// A recording that is being written.
+pub struct Writer<W: Write + Seek> {
     file: mcap::Writer<W>,
     channels: [u16; CHANNELS.len()],
     sequences: [u32; CHANNELS.len()],
@@ -163,51 +125,28 @@ struct Writer<W: Write + Seek> {
     newest_ns: u64,
     /// Offset from `CLOCK_MONOTONIC` to the time since 1970.
     epoch_ns: u64,
-    totals: Totals,
-}
-
-/// Writes until all senders are gone; the file is complete then.
-pub fn write_all(path: &Path, from: &mpsc::Receiver<Item>) -> Result<Totals, RecordError> {
-    let failed = |e: mcap::McapError| RecordError::of_file(path, e);
-    let file =
-        File::create(path).map_err(|e| RecordError::of_file(path, format!("{e}; choose another file with --out")))?;
-    let packed = mcap::WriteOptions::new()
-        .compression(Some(mcap::Compression::Zstd))
-        .chunk_size(Some(CHUNK_BYTES));
-    let mut writer = Writer::new(packed, BufWriter::new(file)).map_err(failed)?;
-    for item in from {
-        writer.item(item).map_err(failed)?;
-    }
-    let mut totals = writer.finish().map_err(failed)?;
-    totals.bytes = std::fs::metadata(path).map_or(0, |m| m.len());
-    Ok(totals)
-}
-
-/// Writes likewise to a program that shows the messages one by one.
-pub fn send_all(program: ChildStdin, from: &mpsc::Receiver<Item>) -> Result<Totals, RecordError> {
-    let failed = |e: mcap::McapError| RecordError::Live(format!("it ended, or reads no more: {e}"));
-    let plain = mcap::WriteOptions::new()
-        .compression(None)
-        .use_chunks(false)
-        .disable_seeking(true);
-    let mut writer = Writer::new(plain, NoSeek::new(BufWriter::new(program))).map_err(failed)?;
-    for item in from {
-        writer.item(item).map_err(failed)?;
-        writer.file.flush().map_err(failed)?;
-    }
-    writer.finish().map_err(failed)
+    /// True if the messages are read while they are written.
+    is_live: bool,
+    pub totals: Totals,
 }
 
 impl<W: Write + Seek> Writer<W> {
-    fn new(options: mcap::WriteOptions, to: W) -> mcap::McapResult<Self> {
+    /// Writes to a file.
+    pub fn of_file(file: W) -> mcap::McapResult<Self> {
+        let packed = mcap::WriteOptions::new()
+            .compression(Some(mcap::Compression::Zstd))
+            .chunk_size(Some(CHUNK_BYTES));
+        Self::new(packed, file, false)
+    }
+
+    fn new(options: mcap::WriteOptions, to: W, is_live: bool) -> mcap::McapResult<Self> {
         let mut file = options
             .library(concat!("stylet ", env!("CARGO_PKG_VERSION")))
             .create(to)?;
         let mut channels = [0; CHANNELS.len()];
         for (id, channel) in channels.iter_mut().zip(CHANNELS) {
-            let Channel { topic, schema, text } = channel;
-            let schema = file.add_schema(schema, "jsonschema", text().to_string().as_bytes())?;
-            *id = file.add_channel(schema, topic, "json", &BTreeMap::new())?;
+            let schema = file.add_schema(channel.2, "jsonschema", channel.text().as_bytes())?;
+            *id = file.add_channel(schema, channel.1, "json", &BTreeMap::new())?;
         }
         Ok(Self {
             file,
@@ -215,65 +154,67 @@ impl<W: Write + Seek> Writer<W> {
             sequences: [0; CHANNELS.len()],
             newest_ns: 0,
             epoch_ns: epoch_ns(),
+            is_live,
             totals: Totals::default(),
         })
     }
 
-    fn item(&mut self, item: Item) -> mcap::McapResult<()> {
-        match item {
-            Item::Session(session) => self.session(&session)?,
-            Item::Records(records) => {
-                for record in &records {
-                    if self.totals.gaps.record(record.session_id, record.tick) {
-                        let time_ns = record.due_ns + record.wake_latency_ns;
-                        self.message(0, time_ns, &serde_json::to_vec(record).unwrap_or_default())?;
-                    }
-                }
-            }
-            Item::SecondRecords(records) => {
-                for record in &records {
-                    if self.totals.second.record(record.session_id, record.tick) {
-                        self.message(
-                            10,
-                            record.due_ns + record.wake_latency_ns,
-                            &serde_json::to_vec(record).unwrap_or_default(),
-                        )?;
-                    }
-                }
-            }
-            Item::Event(event) => {
-                if self.totals.events.record(event.session_id, event.sequence) {
-                    self.message(1, event.time_ns, messages::event(&event).to_string().as_bytes())?;
-                }
-            }
-            Item::Scene(model) => self.between(4, &scene::scene(&model))?,
-            Item::Plan(plan) => self.between(5, &setting::plan(&plan))?,
-            Item::Parameters(parameters) => self.between(6, &setting::parameters(&parameters))?,
-            Item::State(state) => self.message(7, state.time_ns, setting::message(&*state).to_string().as_bytes())?,
-            Item::Snapshot(snapshot) => {
-                self.totals.snapshots += 1;
-                let time_ns = snapshot.header.time_ns;
-                self.message(2, time_ns, messages::tissue(&snapshot).to_string().as_bytes())?;
-                let gland = messages::gland(&snapshot, time_ns + self.epoch_ns);
-                self.message(3, time_ns, gland.to_string().as_bytes())?;
-                self.message(8, time_ns, scene::field(&snapshot).to_string().as_bytes())?;
-            }
-            Item::SnapshotLeftOut => self.totals.snapshots_left_out += 1,
-            Item::SnapshotsMissing(seconds) => {
-                self.totals.snapshot_gaps += 1;
-                self.totals.snapshot_gaps_s += seconds;
-            }
-            Item::LostInCore(count) => self.totals.lost_in_core = self.totals.lost_in_core.max(count),
+    pub fn tick(&mut self, record: &TickRecord) -> mcap::McapResult<()> {
+        match self.totals.gaps.record(record.session_id, record.tick) {
+            true => self.record(Kind::Tick, record.due_ns + record.wake_latency_ns, record),
+            false => Ok(()),
         }
-        Ok(())
     }
 
-    /// Writes a message without a time at the time of the one before it.
-    fn between(&mut self, channel: usize, message: &serde_json::Value) -> mcap::McapResult<()> {
-        self.message(channel, self.newest_ns, message.to_string().as_bytes())
+    pub fn second(&mut self, record: &SecondRecord) -> mcap::McapResult<()> {
+        match self.totals.second.record(record.session_id, record.tick) {
+            true => self.record(Kind::Second, record.due_ns + record.wake_latency_ns, record),
+            false => Ok(()),
+        }
     }
 
-    fn message(&mut self, channel: usize, time_ns: u64, data: &[u8]) -> mcap::McapResult<()> {
+    pub fn event(&mut self, event: &Event) -> mcap::McapResult<()> {
+        match self.totals.events.record(event.session_id, event.sequence) {
+            true => self.message(Kind::Event, event.time_ns, &messages::event(event)),
+            false => Ok(()),
+        }
+    }
+
+    pub fn scene(&mut self, model: &SceneModel) -> mcap::McapResult<()> {
+        self.message(Kind::Scene, self.newest_ns, &messages::scene(model))
+    }
+
+    pub fn plan(&mut self, plan: &PlanInForce) -> mcap::McapResult<()> {
+        self.message(Kind::Plan, self.newest_ns, &messages::plan(plan))
+    }
+
+    pub fn parameters(&mut self, in_force: &ParametersInForce) -> mcap::McapResult<()> {
+        self.message(Kind::Parameters, self.newest_ns, &messages::parameters(in_force))
+    }
+
+    /// Writes a snapshot, after the state when it was taken.
+    pub fn snapshot(&mut self, state: Option<&HapticState>, snapshot: &Snapshot) -> mcap::McapResult<()> {
+        if let Some(state) = state {
+            self.message(Kind::State, state.time_ns, &messages::message(state))?;
+        }
+        self.totals.snapshots += 1;
+        let time_ns = snapshot.header.time_ns;
+        self.message(Kind::Tissue, time_ns, &messages::tissue(snapshot))?;
+        let gland = messages::gland(snapshot, time_ns + self.epoch_ns);
+        self.message(Kind::Gland, time_ns, &gland)?;
+        self.message(Kind::Field, time_ns, &messages::field(snapshot))
+    }
+
+    fn message(&mut self, kind: Kind, time_ns: u64, message: &Value) -> mcap::McapResult<()> {
+        self.bytes(kind, time_ns, message.to_string().as_bytes())
+    }
+
+    fn record(&mut self, kind: Kind, time_ns: u64, record: &impl Serialize) -> mcap::McapResult<()> {
+        self.bytes(kind, time_ns, &serde_json::to_vec(record).unwrap_or_default())
+    }
+
+    fn bytes(&mut self, kind: Kind, time_ns: u64, data: &[u8]) -> mcap::McapResult<()> {
+        let channel = kind as usize;
         self.newest_ns = self.newest_ns.max(time_ns);
         self.sequences[channel] = self.sequences[channel].wrapping_add(1);
         let log_time = time_ns + self.epoch_ns;
@@ -286,9 +227,17 @@ impl<W: Write + Seek> Writer<W> {
         self.file.write_to_known_channel(&header, data)
     }
 
-    fn session(&mut self, session: &Session) -> mcap::McapResult<()> {
+    /// Sends all that was written to whoever reads it now.
+    pub fn flush(&mut self) -> mcap::McapResult<()> {
+        match self.is_live {
+            true => self.file.flush(),
+            false => Ok(()),
+        }
+    }
+
+    pub fn session(&mut self, session: &Session) -> mcap::McapResult<()> {
         self.newest_ns = self.newest_ns.max(session.time_ns);
-        self.between(9, &setting::message(session))?;
+        self.message(Kind::Session, self.newest_ns, &messages::message(session))?;
         let metadata = [
             ("session_id", session.session_id.to_string()),
             ("version", session.version.read()),
@@ -306,13 +255,25 @@ impl<W: Write + Seek> Writer<W> {
         })
     }
 
-    fn finish(mut self) -> mcap::McapResult<Totals> {
+    /// Completes the file.
+    pub fn finish(mut self) -> mcap::McapResult<Totals> {
         self.file.write_metadata(&Metadata {
             name: "stylet.totals".to_owned(),
             metadata: self.totals.metadata(),
         })?;
         self.file.finish()?;
         Ok(self.totals)
+    }
+}
+
+impl Writer<NoSeek<BufWriter<ChildStdin>>> {
+    /// Writes to a program that shows the messages one by one.
+    pub fn of_program(program: ChildStdin) -> mcap::McapResult<Self> {
+        let plain = mcap::WriteOptions::new()
+            .compression(None)
+            .use_chunks(false)
+            .disable_seeking(true);
+        Self::new(plain, NoSeek::new(BufWriter::new(program)), true)
     }
 }
 
