@@ -1,7 +1,7 @@
 //! Executes the operator's requests, after all panels are drawn.
 
 use super::drive::{BEFORE_ENTRY_M, Drive, Goal};
-use super::{App, Waiting, refusal};
+use super::{App, Waiting};
 use crate::action::Action;
 use crate::panel::rearm::Begin;
 use crate::panel::workflow::{Undo, next_action, undo_action};
@@ -35,7 +35,7 @@ impl App {
                     since: Instant::now(),
                 });
             }
-            Err(e) => self.shown.note = Some(refusal(format!("{what}: {e}"))),
+            Err(e) => self.refuse(format!("{what}: {e}")),
         }
     }
 
@@ -60,7 +60,7 @@ impl App {
     fn move_hand(&mut self, what: &'static str, to: Goal) {
         let goal = self.shown.place_near_path_m(to.depth_m, to.offset_m);
         let (Some(plan), Some(goal)) = (self.shown.plan, goal) else {
-            self.shown.note = Some(refusal(format!("{what}: plan the seeds first")));
+            self.refuse(format!("{what}: plan the seeds first"));
             return;
         };
         let request = move_request(goal, plan.direction, to.speed_m_per_s, self.pace.acceleration_m_per_s2);
@@ -73,7 +73,7 @@ impl App {
             Action::ToggleClass => self.class = !self.class,
             Action::Lease(request) => {
                 if let Err(e) = self.link.lease(&request) {
-                    self.shown.note = Some(refusal(format!("Needle: {e}")));
+                    self.refuse(format!("Needle: {e}"));
                 }
             }
             Action::OpenParameters => self.parameters.open = !self.parameters.open,
@@ -109,7 +109,7 @@ impl App {
             Action::Trainee(action) => self.act_on_trainees(action),
             Action::Watch(action) => self.act_on_recording(action),
             _ if self.watches() => {
-                self.shown.note = Some(refusal("This is a recording: close it to move the needle.".to_owned()));
+                self.refuse("This is a recording: close it to move the needle.");
             }
             // Instructors may mark and inject while a script or a trainee moves the needle.
             Action::Send(request @ (Request::Mark(_) | Request::BeginExercise(_) | Request::EndExercises)) => {
@@ -231,7 +231,7 @@ impl App {
             self.pulled_to_m = None;
             if wish != Wish::REST {
                 let why = "The needle follows the planned path: plan the seeds first.";
-                self.shown.note = Some(refusal(why.to_owned()));
+                self.refuse(why);
             }
             return;
         };

@@ -1,6 +1,6 @@
 //! A core that this window starts to replace one that has ended.
 
-use super::{App, refusal};
+use super::App;
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
@@ -38,7 +38,7 @@ impl App {
                     "Cannot start {}: {why}. Start rt-core in a terminal.",
                     program.display()
                 );
-                self.shown.note = Some(refusal(text));
+                self.refuse(text);
             }
         }
     }

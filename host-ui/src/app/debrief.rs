@@ -1,6 +1,6 @@
 //! The debrief as files: the page of `host-ui procedure`, from the data of the window.
 
-use super::{App, refusal};
+use super::App;
 use crate::planner;
 use crate::shown::{Note, SeedError, all_errors};
 use std::path::PathBuf;
@@ -76,7 +76,7 @@ impl App {
     /// Writes one debrief at a time.
     pub(super) fn write_debrief(&mut self, delivered: Result<Delivered, Failure>, folder: PathBuf) {
         if self.debrief.is_some() {
-            self.shown.note = Some(refusal("A debrief is being written: try again in a moment.".to_owned()));
+            self.refuse("A debrief is being written: try again in a moment.");
             return;
         }
         match delivered {
@@ -86,7 +86,7 @@ impl App {
                     let _ = messages.send(write(&delivered, folder));
                 }));
             }
-            Err(why) => self.shown.note = Some(refusal(why.to_string())),
+            Err(why) => self.refuse(why),
         }
     }
 
@@ -99,11 +99,8 @@ impl App {
         };
         self.debrief = None;
         self.shown.note = Some(match saved {
-            Ok(folder) => Note {
-                refused: false,
-                text: format!("Debrief saved as {}", folder.display()),
-            },
-            Err(why) => refusal(why.to_string()),
+            Ok(folder) => Note::done(format!("Debrief saved as {}", folder.display())),
+            Err(why) => Note::refusal(why),
         });
     }
 

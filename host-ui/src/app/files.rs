@@ -1,6 +1,6 @@
 //! Files that are chosen in a dialog.
 
-use super::{App, refusal};
+use super::App;
 use crate::action::{Action, PlanAction, WatchAction};
 use crate::dialog::{Picked, Purpose};
 use crate::panel::workflow::Progress;
@@ -21,7 +21,7 @@ impl App {
             Picked::File(path) => path,
             Picked::Nothing => return None,
             Picked::Failed(why) => {
-                self.shown.note = Some(refusal(format!("{}: {why}", purpose.title())));
+                self.refuse(format!("{}: {why}", purpose.title()));
                 return None;
             }
         };

@@ -289,6 +289,10 @@ impl App {
         ctx.with_plugin(|redraw: &mut Redraw| redraw.again(ctx));
     }
 
+    fn refuse(&mut self, why: impl ToString) {
+        self.shown.note = Some(Note::refusal(why));
+    }
+
     /// Replaces the devices of the system.
     pub fn use_controllers(&mut self, controllers: Controllers) {
         self.controllers = controllers;
@@ -389,10 +393,6 @@ impl eframe::App for App {
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
         self.settings.write(storage);
     }
-}
-
-fn refusal(text: String) -> Note {
-    Note { refused: true, text }
 }
 
 #[cfg(test)]

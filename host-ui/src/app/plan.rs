@@ -1,13 +1,11 @@
 //! Executes the operator's requests in a plan of many needles.
 
+use super::App;
 use super::drive::Drive;
-use super::{App, refusal};
 use crate::action::PlanAction;
 use crate::panel::rearm::Begin;
 use crate::panel::workflow::Progress;
-use crate::planner::Message;
 use crate::settings::Layout;
-use crate::shown::Note;
 use nalgebra::Vector3;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -35,12 +33,7 @@ impl App {
         if let (true, Some(scene), Some(snapshot)) = (self.draws(), self.link.scene(), self.link.snapshot()) {
             self.planner.take_review(scene, snapshot);
         }
-        if let Some(message) = self.planner.take_message() {
-            self.shown.note = Some(match message {
-                Message::Done(text) => Note { refused: false, text },
-                Message::Refused(why) => refusal(why),
-            });
-        }
+        self.shown.note = self.planner.take_message().or(self.shown.note.take());
         self.shown.planning = self.planner.planning();
         if self.run.is_none() && crate::panel::workflow::is_needle_done(&self.shown) {
             self.planner.finish_needle(self.shown.seeds.len());
@@ -208,7 +201,7 @@ impl App {
     fn start_over(&mut self) {
         (self.run_placed, self.run_lost) = (Placed::default(), Default::default());
         if self.planner.is_busy() {
-            self.shown.note = Some(refusal("Wait for the running task, or cancel it first.".to_owned()));
+            self.refuse("Wait for the running task, or cancel it first.");
             return;
         }
         let tasks = self.planner.tasks();

@@ -1,6 +1,6 @@
 //! Goals for the simulated hand that holds the probe, from keys, gamepad, pointer and stepper.
 
-use super::{App, refusal};
+use super::App;
 use crate::action::ProbeAction;
 use nalgebra::Vector3;
 use std::time::{Duration, Instant};
@@ -146,7 +146,7 @@ impl App {
 
     fn refuse_locked(&mut self) {
         let why = "The stepper's brake holds the probe: key B releases it, PgUp and PgDn step it.";
-        self.shown.note = Some(refusal(why.to_owned()));
+        self.refuse(why);
     }
 
     fn move_probe(&mut self, goal: &Pose, speed_m_per_s: f64) {

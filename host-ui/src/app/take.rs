@@ -1,8 +1,8 @@
 //! Takes the data that arrived since the last frame: records, answers, loaded files, the script's
 //! next action.
 
+use super::App;
 use super::drive::Drive;
-use super::{App, refusal};
 use crate::action::Action;
 use crate::dose_worker::DoseRequest;
 use crate::loader::Loaded;
@@ -128,13 +128,8 @@ impl App {
     fn take_pictures(&mut self) {
         match self.pictures.poll() {
             None => {}
-            Some(Ok(path)) => {
-                self.shown.note = Some(Note {
-                    refused: false,
-                    text: format!("Picture saved as {}", path.display()),
-                });
-            }
-            Some(Err(why)) => self.shown.note = Some(refusal(why.to_string())),
+            Some(Ok(path)) => self.shown.note = Some(Note::done(format!("Picture saved as {}", path.display()))),
+            Some(Err(why)) => self.refuse(why),
         }
     }
 
@@ -162,14 +157,14 @@ impl App {
                 false
             }
             Some(answer) => {
-                *note = Some(refusal(format!("{} refused: {}", w.what, answer.text)));
+                *note = Some(Note::refusal(format!("{} refused: {}", w.what, answer.text)));
                 false
             }
             None => {
                 let waited = w.since.elapsed();
                 if waited > ANSWER_WITHIN && note.as_ref().is_none_or(|note| !note.refused) {
                     let text = format!("{}: waiting for rt-core to answer, {} s", w.what, waited.as_secs());
-                    *note = Some(Note { refused: false, text });
+                    *note = Some(Note::done(text));
                 }
                 true
             }
@@ -295,14 +290,11 @@ impl App {
             self.follow_run(needle, status == RunStatus::Done);
             self.shown.note = match status {
                 RunStatus::Working => None,
-                RunStatus::Done => Some(Note {
-                    refused: false,
-                    text: match self.run_needles.len() {
-                        0 => format!("Done: {SCRIPTED_STEPS}."),
-                        n => format!("All {n} needles are done."),
-                    },
-                }),
-                RunStatus::Failed(why) => Some(refusal(format!("The run stopped: {why}"))),
+                RunStatus::Done => Some(Note::done(match self.run_needles.len() {
+                    0 => format!("Done: {SCRIPTED_STEPS}."),
+                    n => format!("All {n} needles are done."),
+                })),
+                RunStatus::Failed(why) => Some(Note::refusal(format!("The run stopped: {why}"))),
             };
             if self.shown.note.is_some() {
                 self.end_run();

@@ -1,8 +1,8 @@
 //! Several trainees in one window: the followed one, the state of each, and debriefs into the
 //! folder of a class.
 
+use super::App;
 use super::debrief::Delivered;
-use super::{App, refusal};
 use crate::action::TraineeAction;
 use crate::planner::Planner;
 use crate::shown::all_errors;
@@ -188,9 +188,7 @@ impl App {
             return;
         }
         if self.run.is_some() || self.watches() {
-            self.shown.note = Some(refusal(
-                "Stop the needles or close the recording first, then follow another.".to_owned(),
-            ));
+            self.refuse("Stop the needles or close the recording first, then follow another.");
             return;
         }
         self.trainees.followed = Some(number);
@@ -207,7 +205,7 @@ impl App {
             return;
         };
         if let Err(why) = roster::stop(&mut seat.link) {
-            self.shown.note = Some(refusal(format!("The hand could not be stopped: {why}")));
+            self.refuse(format!("The hand could not be stopped: {why}"));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A recording in the window instead of a core: everything is shown as it was, and nothing can be
 //! moved.
 
-use super::{App, refusal};
+use super::App;
 use crate::action::WatchAction;
 use crate::planner::Planner;
 use crate::shown::{Note, Watched};
@@ -76,12 +76,12 @@ impl App {
     pub(super) fn act_on_recording(&mut self, action: WatchAction) {
         match action {
             WatchAction::Example | WatchAction::File(_) if self.run.is_some() => {
-                self.shown.note = Some(refusal("Stop the needles first, then open a recording.".to_owned()));
+                self.refuse("Stop the needles first, then open a recording.");
             }
             // Its keys would no longer reach the core.
             WatchAction::Example | WatchAction::File(_) if self.shown.is_engaged() && !self.watches() => {
                 let why = "Turn the force off first (key D), then open a recording.";
-                self.shown.note = Some(refusal(why.to_owned()));
+                self.refuse(why);
             }
             WatchAction::Example => self.recording.read_example(),
             WatchAction::File(path) => self.recording.read(&path),
@@ -104,16 +104,14 @@ impl App {
         self.recording.reading = None;
         match read {
             Ok(played) => self.open_recording(name, played),
-            Err(why) => self.shown.note = Some(refusal(why.to_string())),
+            Err(why) => self.refuse(why),
         }
         self.show_recording();
     }
 
     fn open_recording(&mut self, name: String, played: Played) {
-        self.shown.note = played.cut_off.as_ref().map(|why| Note {
-            refused: false,
-            text: format!("{name} is shown up to its first error: {why}"),
-        });
+        let cut_off = |why: &String| Note::done(format!("{name} is shown up to its first error: {why}"));
+        self.shown.note = played.cut_off.as_ref().map(cut_off);
         self.change_link(|instance| Link::playing(instance, Arc::new(played)));
         self.recording.name = name;
         let planner = std::mem::take(&mut self.planner);

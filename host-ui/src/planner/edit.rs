@@ -1,6 +1,6 @@
 //! Changes of the plan, each one step to undo, and the limits on them.
 
-use super::{Failure, Message, NeedleProgress, Planner};
+use super::{Failure, NeedleProgress, Planner};
 use std::time::{Duration, Instant};
 use stylet_implant::plan::{History, Hole, ImplantPlan, Row, exchange};
 use stylet_shm_schema::MAX_SEEDS;
@@ -28,7 +28,7 @@ impl Planner {
         });
         match plan {
             Ok(plan) => self.put(plan),
-            Err(why) => self.message = Some(Message::Refused(why.to_string())),
+            Err(why) => self.refuse(why),
         }
     }
 
@@ -73,7 +73,7 @@ impl Planner {
                 self.drawn = Some((needle, Instant::now()));
                 self.change();
             }
-            Err(why) => self.message = Some(Message::Refused(why.to_string())),
+            Err(why) => self.refuse(why),
         }
     }
 
@@ -85,7 +85,7 @@ impl Planner {
             .and_then(|plan| self.can_be(plan))
         {
             Ok(plan) => self.put(plan),
-            Err(why) => self.message = Some(Message::Refused(why.to_string())),
+            Err(why) => self.refuse(why),
         }
     }
 
@@ -106,7 +106,7 @@ impl Planner {
             && let Err(why) = self.keeps(&before, history.now())
         {
             back(&mut history);
-            self.message = Some(Message::Refused(why.to_string()));
+            self.refuse(why);
         }
         self.history = Some(history);
         self.change();

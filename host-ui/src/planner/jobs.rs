@@ -1,7 +1,7 @@
-//! Background jobs of the planner: a first plan, its strength, compensation, files.
+//! Background jobs of the planner: a first plan, its strength, compensation, files. Each is refused while another runs.
 
-use super::Failure;
 use super::outlines::AnatomyOutlines;
+use super::{Failure, Planner, plan_message};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -25,8 +25,6 @@ const FIND_LIMIT: Duration = Duration::from_secs(10);
 const POLL_EVERY: Duration = Duration::from_millis(5);
 /// Number of plans to choose from.
 const PROPOSALS: usize = 3;
-pub(super) const FIRST_PLAN: &str = "Looking for a first plan";
-pub(super) const STUDY: &str = "Writing the DICOM study";
 
 /// Progress of a job, for display.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,133 +38,195 @@ pub struct JobProgress {
 /// Message from a job.
 pub(super) enum JobMessage {
     Progress(JobProgress),
-    Plan(Result<ImplantPlan, Failure>),
+    Plan(ImplantPlan),
     /// Proposed plans, with remarks on each.
     First(Vec<FirstPlan>),
     Compensated(Box<(Needle, Compensation)>),
-    Update(Result<Box<Proposed>, Failure>),
+    Update(Box<Proposed>),
     /// The last message, in words.
-    End(Result<String, Failure>),
+    End(String),
+    Failed(Failure),
 }
 
-pub(super) fn automatic(outlines: Arc<AnatomyOutlines>) -> Job<JobMessage> {
-    Job::begin("first plan", move |messages, interrupt| {
-        let report = |share: f32| {
-            let progress = JobProgress {
-                what: FIRST_PLAN.to_owned(),
-                share: Some(share),
-            };
-            let _ = messages.send(JobMessage::Progress(progress));
-            match interrupt.asked() {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
+/// Tells the window how far a job is.
+pub(super) struct Reporter<'a> {
+    what: &'static str,
+    messages: &'a Sender<JobMessage>,
+    interrupt: &'a Interrupt,
+}
+
+impl Reporter<'_> {
+    // The window may have closed; a message is then dropped.
+    fn send(&self, message: JobMessage) {
+        let _ = self.messages.send(message);
+    }
+
+    fn is_at(&self, what: String, share: f32) {
+        let share = Some(share);
+        self.send(JobMessage::Progress(JobProgress { what, share }));
+    }
+
+    /// Reports the completed share; breaks off if the job was cancelled.
+    pub fn report(&self, share: f32) -> ControlFlow<()> {
+        self.is_at(self.what.to_owned(), share);
+        match self.interrupt.asked() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    }
+}
+
+impl Planner {
+    /// Returns whether a job runs.
+    pub fn is_busy(&self) -> bool {
+        self.job.is_some()
+    }
+
+    /// Cancels the job.
+    pub fn cancel(&mut self) {
+        self.job = None;
+    }
+
+    /// Begins a job, whose work `prepare` returns; it ends with one message.
+    pub(super) fn begin_job<W>(
+        &mut self,
+        what: &'static str,
+        prepare: impl FnOnce(&Self, Arc<AnatomyOutlines>) -> Result<W, Failure>,
+    ) where
+        W: FnOnce(&Reporter<'_>) -> Result<JobMessage, Failure> + Send + 'static,
+    {
+        let work = match (&self.outlines, self.is_busy()) {
+            (_, true) => return,
+            (None, _) => Err("the scene's anatomy is not ready yet; try again in a moment".into()),
+            (Some(outlines), false) => prepare(self, outlines.clone()),
+        };
+        match work {
+            Ok(work) => {
+                let job = Job::begin("plan", move |messages, interrupt| {
+                    let reporter = Reporter {
+                        what,
+                        messages,
+                        interrupt,
+                    };
+                    reporter.send(work(&reporter).unwrap_or_else(JobMessage::Failed));
+                });
+                let progress = JobProgress {
+                    what: what.to_owned(),
+                    share: None,
+                };
+                self.job = Some((job, progress));
             }
-        };
-        let plan = || -> Result<Vec<FirstPlan>, Failure> {
-            let (source, prescription_gy) = exchange::usual()?;
-            let kernel = DoseKernel::new(&source, Interval::ALL);
-            let (template, anatomy) = (outlines.template, &outlines.anatomy);
-            let objectives = Objectives::new(&source, prescription_gy);
-            Ok(first::proposals(
-                template,
-                anatomy,
-                &kernel,
-                &source,
-                &objectives,
-                PROPOSALS,
-                report,
-            )?)
-        };
-        // The window may have closed; the answer is then dropped.
-        let _ = messages.send(match plan() {
-            Ok(found) => JobMessage::First(found),
-            Err(why) => JobMessage::Plan(Err(why)),
+            Err(why) => self.refuse(why),
+        }
+    }
+
+    /// Starts a search for a first plan.
+    pub fn automatic(&mut self) {
+        self.begin_job("Looking for a first plan", |_, outlines| {
+            Ok(move |reporter: &Reporter<'_>| {
+                let (source, prescription_gy) = exchange::usual()?;
+                let kernel = DoseKernel::new(&source, Interval::ALL);
+                let objectives = Objectives::new(&source, prescription_gy);
+                let report = |share| reporter.report(share);
+                let (template, anatomy) = (outlines.template, &outlines.anatomy);
+                let found = first::proposals(template, anatomy, &kernel, &source, &objectives, PROPOSALS, report)?;
+                Ok(JobMessage::First(found))
+            })
         });
-    })
-}
+    }
 
-/// Returns the strength with which the plan covers the target like a first plan.
-pub(super) fn strength(outlines: Arc<AnatomyOutlines>, plan: Arc<ImplantPlan>) -> Job<JobMessage> {
-    Job::begin("strength", move |messages, _| {
-        let scaled = || -> Result<ImplantPlan, Failure> {
-            let source = Source::known(&plan.source)
-                .ok_or_else(|| format!("source {} is unknown; set the strength by hand", plan.source))?;
-            let kernel = DoseKernel::new(&source, Interval::ALL);
-            let strength_u = first::strength_u(&plan, &outlines.anatomy, &kernel)?;
-            Ok(plan.with_strength(strength_u))
+    /// Takes one of the proposals of the last search.
+    pub fn choose(&mut self, number: usize) {
+        let Some(proposals) = self.proposals.clone().filter(|_| !self.is_busy()) else {
+            return;
         };
-        let _ = messages.send(JobMessage::Plan(scaled()));
-    })
-}
-
-pub(super) fn import(path: PathBuf, scene: Arc<SceneModel>, scene_file: Option<PathBuf>) -> Job<JobMessage> {
-    Job::begin("plan reader", move |messages, _| {
-        let plan = exchange::read(&path, &scene.header, scene_file.as_deref()).map_err(Failure::from);
-        let _ = messages.send(JobMessage::Plan(plan));
-    })
-}
-
-pub(super) fn export(
-    path: PathBuf,
-    plan: Arc<ImplantPlan>,
-    outlines: Arc<AnatomyOutlines>,
-    scene_file: Option<PathBuf>,
-) -> Job<JobMessage> {
-    Job::begin("plan writer", move |messages, _| {
-        let written = exchange::write(&path, &plan, &outlines.frames, scene_file.as_deref());
-        let saved = written.map(|()| format!("Plan saved as {}", path.display()));
-        let _ = messages.send(JobMessage::End(saved.map_err(Failure::from)));
-    })
-}
-
-/// Writes structure set, plan and dose of one study.
-pub(super) fn study(
-    folder: PathBuf,
-    plan: Arc<ImplantPlan>,
-    (scene, outlines): (Arc<SceneModel>, Arc<AnatomyOutlines>),
-    like: Option<PathBuf>,
-) -> Job<JobMessage> {
-    Job::begin("study writer", move |messages, interrupt| {
-        let report = |share: f32| {
-            let progress = JobProgress {
-                what: STUDY.to_owned(),
-                share: Some(share),
-            };
-            let _ = messages.send(JobMessage::Progress(progress));
-            match interrupt.asked() {
-                true => ControlFlow::Break(()),
-                false => ControlFlow::Continue(()),
+        let Some(found) = proposals.get(number) else { return };
+        match self.can_be(found.found.plan.clone()) {
+            Ok(plan) => {
+                self.put(plan);
+                self.message = plan_message(&found.notes);
             }
-        };
-        let written = study::write(&folder, &plan, (&scene, &outlines.anatomy), like.as_deref(), &report);
-        let end = match written {
-            Ok(notes) if notes.is_empty() => Ok(format!("Study saved as {}", folder.display())),
-            Ok(notes) => Ok(format!("Study saved as {}: {}", folder.display(), notes.join("; "))),
-            Err(why) => Err(Failure::from(why)),
-        };
-        let _ = messages.send(JobMessage::End(end));
-    })
+            Err(why) => self.refuse(why),
+        }
+    }
+
+    /// Starts to fit the strength of the seeds, so that the plan covers the target like a first plan.
+    pub fn fit_strength(&mut self) {
+        self.begin_job("Fitting the strength", |planner, outlines| {
+            let plan = planner.planned()?.clone();
+            Ok(move |_: &Reporter<'_>| {
+                let source = Source::known(&plan.source)
+                    .ok_or_else(|| format!("source {} is unknown; set the strength by hand", plan.source))?;
+                let kernel = DoseKernel::new(&source, Interval::ALL);
+                let strength_u = first::strength_u(&plan, &outlines.anatomy, &kernel)?;
+                Ok(JobMessage::Plan(plan.with_strength(strength_u)))
+            })
+        });
+    }
+
+    /// Starts to read a plan from a file.
+    pub fn import(&mut self, path: PathBuf, scene: Arc<SceneModel>, scene_file: Option<PathBuf>) {
+        self.begin_job("Reading the plan", |_, _| {
+            Ok(move |_: &Reporter<'_>| {
+                let plan = exchange::read(&path, &scene.header, scene_file.as_deref())?;
+                Ok(JobMessage::Plan(plan))
+            })
+        });
+    }
+
+    /// Starts to write the plan to a file.
+    pub fn export(&mut self, path: PathBuf, scene_file: Option<PathBuf>) {
+        self.begin_job("Writing the plan", |planner, outlines| {
+            let plan = planner.planned()?.clone();
+            Ok(move |_: &Reporter<'_>| {
+                exchange::write(&path, &plan, &outlines.frames, scene_file.as_deref())?;
+                Ok(JobMessage::End(format!("Plan saved as {}", path.display())))
+            })
+        });
+    }
+
+    /// Starts to write structure set, plan and dose. Patient and frame come from `like` if it is a
+    /// DICOM file.
+    pub fn export_study(&mut self, folder: PathBuf, scene: Arc<SceneModel>, like: Option<PathBuf>) {
+        self.begin_job("Writing the DICOM study", |planner, outlines| {
+            let plan = planner.planned()?.clone();
+            Ok(move |reporter: &Reporter<'_>| {
+                let report = |share| reporter.report(share);
+                let notes = study::write(&folder, &plan, (&scene, &outlines.anatomy), like.as_deref(), &report)?;
+                let notes = match notes.is_empty() {
+                    true => String::new(),
+                    false => format!(": {}", notes.join("; ")),
+                };
+                Ok(JobMessage::End(format!("Study saved as {}{notes}", folder.display())))
+            })
+        });
+    }
+
+    /// Compensates the needles that are not inserted yet, one after the other, through a separate link: the window
+    /// keeps its own.
+    pub fn compensate(&mut self, instance: Instance, pace: Pace) {
+        self.begin_job("Rehearsing", |planner, _| {
+            let begun = planner.progress.begun();
+            let left = planner.planned()?.needles.iter().skip(begun);
+            let needles: Vec<Needle> = left.filter(|n| !n.seeds.is_empty()).cloned().collect();
+            if needles.is_empty() {
+                return Err("no needle with seeds is left to rehearse".into());
+            }
+            Ok(move |reporter: &Reporter<'_>| compensate_all(instance, &needles, &pace, reporter))
+        });
+    }
 }
 
-/// Compensates one needle after the other, through a separate link: the window keeps its own.
-pub(super) fn compensation(instance: Instance, needles: Vec<Needle>, pace: Pace) -> Job<JobMessage> {
-    Job::begin("compensation", move |messages, interrupt| {
-        let end = all(instance, &needles, &pace, messages, interrupt);
-        let _ = messages.send(JobMessage::End(end));
-    })
-}
-
-fn all(
+fn compensate_all(
     instance: Instance,
     needles: &[Needle],
     pace: &Pace,
-    messages: &Sender<JobMessage>,
-    interrupt: &Interrupt,
-) -> Result<String, Failure> {
+    reporter: &Reporter<'_>,
+) -> Result<JobMessage, Failure> {
     let mut link = Link::new(instance);
     let begun = Instant::now();
     while link.scene().is_none() || link.state().is_none() {
-        if interrupt.asked() || begun.elapsed() > FIND_LIMIT {
+        if reporter.interrupt.asked() || begun.elapsed() > FIND_LIMIT {
             return Err("rt-core does not answer; check that it is running".into());
         }
         link.poll();
@@ -175,25 +235,22 @@ fn all(
     let mut failed = Vec::new();
     for (number, needle) in needles.iter().enumerate() {
         let name = needle.hole.map_or_else(|| format!("{}", number + 1), |h| h.to_string());
-        let progress = JobProgress {
-            what: format!("Rehearsing needle {} of {}, {name}", number + 1, needles.len()),
-            share: Some(number as f32 / needles.len() as f32),
-        };
-        let _ = messages.send(JobMessage::Progress(progress));
+        let what = format!("Rehearsing needle {} of {}, {name}", number + 1, needles.len());
+        reporter.is_at(what, number as f32 / needles.len() as f32);
         let mut rehearser = LinkRehearser {
             stabilising: &[],
             earlier: &[],
             link: &mut link,
-            interrupted: interrupt,
+            interrupted: reporter.interrupt,
         };
         match compensate(needle, pace, &Limits::default(), &mut rehearser) {
-            Ok(done) => drop(messages.send(JobMessage::Compensated(Box::new((needle.clone(), done))))),
-            Err(_) if interrupt.asked() => return Err("the compensation was cancelled".into()),
+            Ok(done) => reporter.send(JobMessage::Compensated(Box::new((needle.clone(), done)))),
+            Err(_) if reporter.interrupt.asked() => return Err("the compensation was cancelled".into()),
             Err(why) => failed.push(format!("needle {name}: {why}")),
         }
     }
     match failed.as_slice() {
-        [] => Ok(format!("{} needles compensated.", needles.len())),
+        [] => Ok(JobMessage::End(format!("{} needles compensated.", needles.len()))),
         _ => Err(format!("Not compensated: {}", failed.join("; ")).into()),
     }
 }

@@ -1,7 +1,7 @@
 //! A copy of the plan being inserted, next to the core's shared memory. A window that was closed or
 //! killed finds it again during the same run of the core, and it is deleted with the core.
 
-use super::{Message, Planner};
+use super::{Note, Planner};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use stylet_anatomy::PatientFrame;
@@ -91,7 +91,7 @@ impl Planner {
         {
             self.put(kept.plan);
             self.compensated = kept.compensated;
-            self.message = Some(Message::Done("The plan of this implant was restored.".to_owned()));
+            self.message = Some(Note::done("The plan of this implant was restored.".to_owned()));
         }
     }
 

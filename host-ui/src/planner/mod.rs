@@ -4,7 +4,6 @@
 //! Each frame passes new data in and takes the state for display; nothing here takes longer than a
 //! copy of the plan.
 
-mod begin;
 mod edit;
 mod jobs;
 mod kept;
@@ -43,11 +42,26 @@ type OutlinesJob = (SceneId, Template, Job<Result<AnatomyOutlines, Failure>>);
 
 /// Message for the operator.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Message {
-    /// Success.
-    Done(String),
-    /// Refusal or failure, with the reason.
-    Refused(String),
+pub struct Note {
+    /// True for a refusal or a failure, with its reason.
+    pub refused: bool,
+    /// Text of the message.
+    pub text: String,
+}
+
+impl Note {
+    /// Reports a success.
+    pub fn done(text: String) -> Self {
+        Self { refused: false, text }
+    }
+
+    /// Reports a refusal or a failure.
+    pub fn refusal(why: impl ToString) -> Self {
+        Self {
+            refused: true,
+            text: why.to_string(),
+        }
+    }
 }
 
 /// Plan of many needles and its background jobs.
@@ -81,7 +95,7 @@ pub struct Planner {
     implant: Option<Arc<Implant>>,
     shown_revision: u64,
     /// Message for the operator, reported once.
-    message: Option<Message>,
+    message: Option<Note>,
 }
 
 impl Planner {
@@ -96,8 +110,12 @@ impl Planner {
     }
 
     /// Returns a message for the operator, reported once.
-    pub fn take_message(&mut self) -> Option<Message> {
+    pub fn take_message(&mut self) -> Option<Note> {
         self.message.take()
+    }
+
+    fn refuse(&mut self, why: impl ToString) {
+        self.message = Some(Note::refusal(why));
     }
 
     /// Returns the state that a frame shows.
@@ -147,9 +165,7 @@ impl Planner {
         let of_scene = (scene.header.name.read(), scene.header.upper_m);
         if self.of_scene.as_ref() != Some(&of_scene) {
             if self.history.is_some() {
-                self.message = Some(Message::Refused(
-                    "The plan was for another scene and was discarded.".to_owned(),
-                ));
+                self.refuse("The plan was for another scene and was discarded.");
             }
             *self = Self {
                 of_scene: Some(of_scene),
@@ -179,7 +195,7 @@ impl Planner {
         let is_known = |g: &Arc<AnatomyOutlines>| g.scene == key && g.template == template;
         if !self.outlines.as_ref().is_some_and(is_known) && self.failed != Some((key, template)) {
             if self.outlines.as_ref().is_some_and(|g| g.scene != key) {
-                self.set_progress(NeedleProgress::default());
+                self.count_none();
                 self.compensated.clear();
             }
             let model = scene.clone();
@@ -192,7 +208,7 @@ impl Planner {
 
     fn no_outlines(&mut self, key: SceneId, template: Template, why: &str) {
         (self.outlines, self.outlining, self.failed) = (None, None, Some((key, template)));
-        self.message = Some(Message::Refused(format!("No plan can be made for this scene: {why}")));
+        self.refuse(format!("No plan can be made for this scene: {why}"));
     }
 
     fn take_problems(&mut self) {
@@ -232,40 +248,30 @@ impl Planner {
             *progress = now;
             news = job.poll();
         }
-        match news {
-            JobUpdate::Pending | JobUpdate::Message(JobMessage::Progress(_)) => {}
-            JobUpdate::Message(JobMessage::Plan(plan)) => {
-                self.job = None;
-                match plan.and_then(|plan| self.can_be(plan)) {
-                    Ok(plan) => self.put(plan),
-                    Err(why) => self.message = Some(Message::Refused(why.to_string())),
-                }
-            }
-            JobUpdate::Message(JobMessage::First(found)) => {
-                self.job = None;
+        let message = match news {
+            JobUpdate::Pending => return,
+            JobUpdate::Ended => return self.cancel(),
+            JobUpdate::Message(message) => message,
+        };
+        if let JobMessage::Compensated(done) = message {
+            self.compensated.retain(|(needle, _)| *needle != done.0);
+            self.compensated.push(*done);
+            return self.refresh();
+        }
+        self.job = None;
+        match message {
+            JobMessage::Plan(plan) => match self.can_be(plan) {
+                Ok(plan) => self.put(plan),
+                Err(why) => self.refuse(why),
+            },
+            JobMessage::First(found) => {
                 self.proposals = Some(Arc::new(found));
                 self.choose(0);
             }
-            JobUpdate::Message(JobMessage::Update(found)) => {
-                self.job = None;
-                match found {
-                    Ok(found) => self.take_update(*found),
-                    Err(why) => self.message = Some(Message::Refused(why.to_string())),
-                }
-            }
-            JobUpdate::Message(JobMessage::Compensated(done)) => {
-                self.compensated.retain(|(needle, _)| *needle != done.0);
-                self.compensated.push(*done);
-                self.refresh();
-            }
-            JobUpdate::Message(JobMessage::End(end)) => {
-                self.job = None;
-                self.message = Some(match end {
-                    Ok(text) => Message::Done(text),
-                    Err(why) => Message::Refused(why.to_string()),
-                });
-            }
-            JobUpdate::Ended => self.job = None,
+            JobMessage::Update(found) => self.take_update(*found),
+            JobMessage::End(text) => self.message = Some(Note::done(text)),
+            JobMessage::Failed(why) => self.refuse(why),
+            JobMessage::Progress(_) | JobMessage::Compensated(_) => {}
         }
     }
 
@@ -274,9 +280,10 @@ impl Planner {
         self.shown_revision = 0;
     }
 
-    fn set_progress(&mut self, progress: NeedleProgress) {
-        if self.progress != progress {
-            self.progress = progress;
+    fn advance(&mut self, advance: impl FnOnce(&mut NeedleProgress)) {
+        let before = self.progress.clone();
+        advance(&mut self.progress);
+        if self.progress != before {
             self.refresh();
         }
     }
@@ -307,23 +314,17 @@ impl Planner {
     /// Marks a needle as being inserted, with this number of seeds in the tissue.
     pub fn begin_needle(&mut self, number: usize, seeds: usize) {
         self.keep();
-        let mut progress = self.progress.clone();
-        progress.begin(number, seeds);
-        self.set_progress(progress);
+        self.advance(|progress| progress.begin(number, seeds));
     }
 
     /// Marks the inserted needle as done, with this number of seeds in the tissue.
     pub fn finish_needle(&mut self, seeds: usize) {
-        let mut progress = self.progress.clone();
-        progress.finish(seeds);
-        self.set_progress(progress);
+        self.advance(|progress| progress.finish(seeds));
     }
 
     /// Marks the inserted needle as planned again.
     pub fn step_back(&mut self) {
-        let mut progress = self.progress.clone();
-        progress.step_back();
-        self.set_progress(progress);
+        self.advance(NeedleProgress::step_back);
     }
 
     /// Restarts the implantation: no needle is inserted.
@@ -334,13 +335,13 @@ impl Planner {
 
     /// Marks no needle as inserted, in an implantation that continues: its updates are kept.
     pub fn count_none(&mut self) {
-        self.set_progress(NeedleProgress::default());
+        self.advance(|progress| *progress = NeedleProgress::default());
     }
 }
 
 /// Returns a message with the remarks on an automatic plan.
-fn plan_message(notes: &[String]) -> Option<Message> {
-    (!notes.is_empty()).then(|| Message::Done(format!("Automatic plan: {}.", notes.join("; "))))
+fn plan_message(notes: &[String]) -> Option<Note> {
+    (!notes.is_empty()).then(|| Note::done(format!("Automatic plan: {}.", notes.join("; "))))
 }
 
 #[cfg(test)]

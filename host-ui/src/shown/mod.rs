@@ -8,11 +8,12 @@ mod second;
 mod seeds;
 
 use crate::dose_worker::DoseResult;
+pub use crate::planner::Note;
 use crate::planner::Planning;
 pub use bend::Bend;
 pub use line::NeedleLine;
 use nalgebra::Vector3;
-pub use parts::{FrameCost, LoadState, Note, TipOnPath, Watched};
+pub use parts::{FrameCost, LoadState, TipOnPath, Watched};
 pub use second::{SecondHand, Stepper};
 pub use seeds::{SeedError, all_errors, own_errors};
 use std::sync::Arc;

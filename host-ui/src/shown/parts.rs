@@ -50,9 +50,3 @@ pub struct Watched {
     pub is_held: bool,
     pub has_ended: bool,
 }
-
-#[derive(Clone, Debug, PartialEq)]
-pub struct Note {
-    pub refused: bool,
-    pub text: String,
-}

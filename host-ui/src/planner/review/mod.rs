@@ -2,8 +2,8 @@
 
 mod assess;
 
-use super::jobs::{JobMessage, JobProgress};
-use super::{Message, Planner};
+use super::Planner;
+use super::jobs::{JobMessage, Reporter};
 use assess::{Assessed, Moment};
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -18,7 +18,6 @@ use stylet_shm_schema::SceneId;
 
 /// Distance within which a click selects a mark, m.
 const SAME_PLACE_M: f64 = 0.2e-3;
-pub(super) const UPDATE: &str = "Replanning the remaining needles";
 
 /// Drawing on the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -307,23 +306,13 @@ impl Planner {
         let moment = self.moment(snapshot);
         let (scene, snapshot) = (scene.clone(), snapshot.clone());
         self.review.proposed = None;
-        self.begin_job(UPDATE, move |_, outlines| {
+        self.begin_job("Replanning the remaining needles", move |_, outlines| {
             let moment = moment.ok_or("contour the gland in three planes first, with a seed in the tissue")?;
-            Ok(Job::begin("update of the plan", move |messages, interrupt| {
-                let report = |share: f32| {
-                    let progress = JobProgress {
-                        what: UPDATE.to_owned(),
-                        share: Some(share),
-                    };
-                    let _ = messages.send(JobMessage::Progress(progress));
-                    match interrupt.asked() {
-                        true => std::ops::ControlFlow::Break(()),
-                        false => std::ops::ControlFlow::Continue(()),
-                    }
-                };
-                let found = moment.update(&outlines.anatomy, &scene, &snapshot, &report);
-                let _ = messages.send(JobMessage::Update(found.map(Box::new)));
-            }))
+            Ok(move |reporter: &Reporter<'_>| {
+                let report = |share| reporter.report(share);
+                let found = moment.update(&outlines.anatomy, &scene, &snapshot, &report)?;
+                Ok(JobMessage::Update(Box::new(found)))
+            })
         });
     }
 
@@ -331,7 +320,7 @@ impl Planner {
         // Needles may have been inserted since.
         if found.update.begun != self.progress.begun() {
             let why = "A needle was inserted during planning; update the plan again.";
-            self.message = Some(Message::Refused(why.to_owned()));
+            self.refuse(why);
             return;
         }
         self.review.proposed = Some(Arc::new(found));
@@ -346,7 +335,7 @@ impl Planner {
             match self.can_be(proposed.update.plan.clone()) {
                 Ok(plan) => self.put(plan),
                 Err(why) => {
-                    self.message = Some(Message::Refused(why.to_string()));
+                    self.refuse(why);
                     self.review.proposed = Some(proposed);
                     return;
                 }

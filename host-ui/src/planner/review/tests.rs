@@ -120,7 +120,7 @@ fn an_update_that_undoes_an_inserted_needle_is_refused() {
     planner.begin_needle(1, 2);
     planner.take_update(proposed(1));
     assert!(planner.planning().review.update.is_none());
-    assert!(matches!(planner.take_message(), Some(Message::Refused(_))));
+    assert!(planner.take_message().is_some_and(|message| message.refused));
     // A click makes a pending update one of another contour.
     planner.take_update(proposed(2));
     planner.draw(Edit::Mark([0.0; 3]));
