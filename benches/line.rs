@@ -1,19 +1,18 @@
-//! The needle's line: cost and error of its columns, and a tick of its stations against sweeps alone.
+//! A tick of a needle's line: by sets against sweeps alone.
 //!
-//! `cargo bench -p stylet-benches --bench line`; after `--` the names of what to measure: `columns`, `pelvis`, `ticks`.
+//! `cargo bench -p stylet-benches --bench line`.
 
 use std::time::Instant;
 
 use stylet_benches::error::quantile;
-use stylet_dose::structure::Scatter;
+use stylet_random::Random;
 use stylet_sim::line::{
     ColumnQueue, Compliance, Line, LineInput, LineLayer, LineModel, LineOutput, LineSettings, LineState, MAX_STATIONS,
     StationSettings, Stations, TOLERANCE, step,
 };
-use stylet_sim::scene::{Scene, TissueKind};
-use stylet_sim::tissue::fem::batch::{BatchModel, BatchState, LOADS, NodeWeight, Progress};
+use stylet_sim::scene::Scene;
+use stylet_sim::tissue::fem::batch::BatchModel;
 use stylet_sim::tissue::fem::{FemModel, FemSettings, Integration, Material};
-use stylet_sim::tissue::{ElementField, FemTissue};
 
 /// Gland as patients have it, nearly incompressible; a centimetre of fat around it.
 const GLAND: Material = Material {
@@ -22,27 +21,11 @@ const GLAND: Material = Material {
     integration: Integration::MeanDilatation,
 };
 const FOUNDATION_PA_PER_M: f64 = 250e3;
-/// Residual that counts as solved.
-const EXACT: f64 = 1e-6;
-/// Axial columns of the bar in issue 16.
-const COLUMNS: usize = 35;
 
 fn main() {
-    let named: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let is_wanted = |name: &str| named.is_empty() || named.iter().any(|n| n == name);
-    if is_wanted("columns") {
-        let (model, stations) = paper();
-        columns("paper", &model, &stations);
-    }
-    if is_wanted("pelvis") {
-        let (model, stations) = pelvis();
-        columns("pelvis", &model, &stations);
-    }
-    if is_wanted("ticks") {
-        ticks("40 stations, made up", &made_up(40));
-        let (model, stations) = paper();
-        ticks("paper", &solved(&model, &stations));
-    }
+    ticks("40 stations, made up", &made_up(40));
+    let (model, stations) = paper();
+    ticks("paper", &solved(&model, &stations));
 }
 
 /// Makes a line through the middle of the gland, from the apex in.
@@ -62,141 +45,10 @@ fn paper() -> (BatchModel<f32>, Stations) {
     (model, stations)
 }
 
-/// Makes a line through the middle of the gland of the anatomical scene, on the body that its tissue is solved in.
-fn pelvis() -> (BatchModel<f32>, Stations) {
-    let scene = Scene::builtin("pelvis").expect("built in").for_tissue(TissueKind::Fem);
-    let tissue = FemTissue::<f32>::new(&scene).expect("valid");
-    let model = BatchModel::new(&tissue.model);
-    let (low, high) = scene.target_bounds_m();
-    let start = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.0];
-    let line = Line::into_body(&scene.lattice, start, [0.0, 0.0, 1.0]).expect("meets the body");
-    let stations = Stations::along(
-        &model,
-        line,
-        StationSettings::of_lattice(model.spacing_m()),
-        MAX_STATIONS,
-    );
-    (model, stations)
-}
-
 fn solved(model: &BatchModel<f32>, stations: &Stations) -> Compliance {
     let mut queue = ColumnQueue::new(model, stations, false, TOLERANCE);
     queue.prepare(model, usize::MAX);
     Compliance::of_columns(model, stations, queue.columns()).expect("all columns")
-}
-
-/// Returns the time of this thread on a processor, whatever else the machine does.
-fn processor_time_s() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux");
-    let first = text.split_whitespace().next().and_then(|n| n.parse::<f64>().ok());
-    first.expect("nanoseconds") * 1e-9
-}
-
-/// Solves in slices, as the program does: those are compiled where the kernels are.
-fn solve(state: &mut BatchState, model: &BatchModel<f32>, tolerance: f64) -> Progress {
-    loop {
-        let progress = state.advance(model);
-        if state.is_whole() && (progress.residual <= tolerance || progress.iterations >= 200) {
-            return progress;
-        }
-    }
-}
-
-/// Returns the root of the mean square of `a - b`, over that of `b`.
-fn rms(a: &ElementField, b: &ElementField) -> f64 {
-    let squares = |of: &dyn Fn(f32, f32) -> f32| -> f64 {
-        let pairs = a.0.iter().flatten().zip(b.0.iter().flatten());
-        pairs.map(|(a, b)| f64::from(of(*a, *b)).powi(2)).sum()
-    };
-    (squares(&|a, b| a - b) / squares(&|_, b| b)).sqrt()
-}
-
-/// Measures the time of columns, with the error of the compliance and of the fields against those that are solved.
-fn columns(name: &str, model: &BatchModel<f32>, stations: &Stations) {
-    println!(
-        "{name}: {} elements, {} stations; ms of processor time, least of 5 rounds",
-        model.element_count(),
-        stations.count()
-    );
-    let loads: Vec<_> = (0..COLUMNS)
-        .map(|n| stations.load(&stations.shaft[n % stations.count()], 0))
-        .collect();
-    let mut state = BatchState::new(model);
-    for count in [1, LOADS, COLUMNS] {
-        let mut least = f64::INFINITY;
-        for _ in 0..5 {
-            let start = processor_time_s();
-            for chunk in loads[..count].chunks(LOADS) {
-                let chunk: Vec<_> = chunk.iter().map(Vec::as_slice).collect();
-                state.begin(model, &chunk);
-                solve(&mut state, model, TOLERANCE);
-            }
-            least = least.min(processor_time_s() - start);
-        }
-        println!("  {count:2} columns {:7.1}", 1e3 * least);
-    }
-    let mut queue = ColumnQueue::new(model, stations, false, TOLERANCE);
-    let (mut slices, mut slowest, mut all) = (0, 0.0_f64, 0.0);
-    while !queue.progress().is_done() {
-        let start = processor_time_s();
-        queue.prepare(model, 1);
-        let took = processor_time_s() - start;
-        (slices, slowest, all) = (slices + 1, slowest.max(took), all + took);
-    }
-    println!(
-        "  all {} axial columns of the line {:.1}, in {slices} slices, the slowest {:.2}",
-        queue.progress().of,
-        1e3 * all,
-        1e3 * slowest
-    );
-    println!("  tolerance | cycles | residual | error of W | of a column's field, rms");
-    let exact = answers(model, &loads[..LOADS], EXACT);
-    for tolerance in [1e-1, TOLERANCE, 2e-2, 5e-3, 1e-3] {
-        let found = answers(model, &loads[..LOADS], tolerance);
-        let fields = found.fields.iter().zip(&exact.fields).map(|(a, b)| rms(a, b));
-        let compliance = found.compliance.iter().zip(&exact.compliance);
-        let off = compliance.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        let largest = exact.compliance.iter().copied().fold(0.0, f64::max);
-        println!(
-            "  {tolerance:9.1e} | {:6} | {:8.1e} | {:10.1e} | {:.1e}",
-            found.cycles,
-            found.residual,
-            off / largest,
-            fields.fold(0.0, f64::max)
-        );
-        assert!(
-            tolerance > TOLERANCE || off / largest < 2e-3,
-            "a wrong answer has no time"
-        );
-    }
-}
-
-struct Answers {
-    cycles: u32,
-    residual: f64,
-    compliance: Vec<f64>,
-    fields: Vec<ElementField>,
-}
-
-fn answers(model: &BatchModel<f32>, loads: &[Vec<NodeWeight>], to: f64) -> Answers {
-    let mut state = BatchState::new(model);
-    let slices: Vec<_> = loads.iter().map(Vec::as_slice).collect();
-    state.begin(model, &slices);
-    let progress = solve(&mut state, model, to);
-    let both = |a: usize, b: usize| 0.5 * (state.sample(a, &loads[b]) + state.sample(b, &loads[a]));
-    let field = |n: usize| {
-        let mut field = ElementField::zeros(model.element_count());
-        state.write(model, n, &mut field);
-        field
-    };
-    Answers {
-        cycles: progress.iterations,
-        residual: progress.residual,
-        compliance: (0..loads.len() * loads.len())
-            .map(|n| both(n / loads.len(), n % loads.len()))
-            .collect(),
-        fields: (0..loads.len()).map(field).collect(),
-    }
 }
 
 /// Returns a gland that moves as a whole and near the load.
@@ -215,7 +67,7 @@ fn made_up(stations: usize) -> Compliance {
 
 /// 20 s of a hand that goes in, back and on, at up to 200 mm/s.
 fn way(length_m: f64) -> Vec<f64> {
-    let mut random = Scatter::of_cell([3, 0, 0]);
+    let mut random = Random(3);
     let (mut tip_m, mut to_m, mut speed) = (0.0, 0.0, 1e-4);
     let mut places = Vec::new();
     for _ in 0..20_000 {
