@@ -1,7 +1,6 @@
-//! Bodies that are measured: the gland at any spacing, and the cube of the solved reference problem.
+//! The body that is measured: the gland at any spacing.
 
-use stylet_sim::limits::AxisLimits;
-use stylet_sim::scene::{Labels, Scene, Structure};
+use stylet_sim::scene::{Labels, Scene};
 
 /// Edge of the tip patch. Odd numbers of elements of 2.5, 1.5 and 1.0714 mm fill it exactly.
 pub const PATCH_M: f64 = 7.5e-3;
@@ -32,34 +31,8 @@ pub fn gland(spacing_m: f64) -> Scene {
     Scene::from_labels("gland", &labels).expect("as valid as the paper's")
 }
 
-/// Edge of the cube of the reference problem.
-pub const CUBE_M: f64 = 60e-3;
-
-/// Returns a cube of soft tissue on a fixed plate one element thick.
-pub fn cube(elements: usize) -> Scene {
-    let dims = [elements, elements, elements + 1];
-    let mut soft = Structure::soft("cube", 1);
-    (soft.material.young_pa, soft.material.poisson) = (30e3, 0.45);
-    let mut plate = Structure::soft("plate", 2);
-    plate.material.fixed = true;
-    plate.material.limits = Some(
-        [AxisLimits {
-            min_stretch: 0.5,
-            max_stretch: 2.0,
-            shear_deg: 26.0,
-        }; 3],
-    );
-    let labels = Labels {
-        dims,
-        spacing_m: CUBE_M / elements as f64,
-        cells: cells(dims).map(|[_, _, k]| if k == 0 { 2 } else { 1 }).collect(),
-        structures: vec![soft, plate],
-    };
-    Scene::from_labels("cube", &labels).expect("a block")
-}
-
 /// Iterates over all cells, x fastest.
-fn cells(dims: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+pub fn cells(dims: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
     let [nx, ny, nz] = dims;
     (0..nx * ny * nz).map(move |n| [n % nx, n / nx % ny, n / (nx * ny)])
 }

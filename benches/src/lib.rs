@@ -1,4 +1,4 @@
-//! Fixtures of the measurements: bodies, insertions, solvers to compare with, and the error of one run against another.
+//! Fixtures of the measurements: bodies, insertions, converged twins, and the error of one run against another.
 
 pub mod bodies;
 pub mod error;
@@ -8,7 +8,6 @@ pub mod machine;
 pub mod own;
 pub mod rig;
 pub mod session;
-pub mod solvers;
 pub mod twin;
 pub mod unfolded;
 pub mod wall;

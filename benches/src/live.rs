@@ -1,7 +1,7 @@
 //! The two loops through one insertion, as a scene ships, tick by tick against the converged solution of the same tick.
 
-use crate::error::{Field, MOVED, best_shift_m, field, norm};
-use crate::own::{LATE, OwnTwin};
+use crate::error::{Field, Spread, best_shift_m, field, largest_m};
+use crate::own::OwnTwin;
 use crate::session::{Session, axis_start};
 use crate::twin::{Mean, Twin, TwinSettings, default_forces};
 use crate::unfolded::Unfolded;
@@ -63,11 +63,8 @@ pub struct LiveTick {
 pub struct OwnTick {
     /// Largest displacement of an element, converged.
     pub largest_m: f64,
-    /// Distance of the elements that move from the converged ones of this tick and of those before it, RMS; of one tick
-    /// alone in a large body.
-    pub late_rms_m: [f64; LATE],
-    /// The same of a converged body that was at rest before this tick.
-    pub without_history_rms_m: f64,
+    /// Distance of the elements that move from the converged ones, RMS.
+    pub rms_m: f64,
     /// Force of the tip, as it ships and converged.
     pub tip_n: [f64; 2],
 }
@@ -297,18 +294,13 @@ impl<'a, 'b> Watch<'a, 'b> {
     fn compare_own(&mut self, shown: &Field) -> Option<OwnTick> {
         let own = self.twins.own.as_mut()?;
         let now = own.field();
-        let largest_m = now.iter().map(|&u| norm(u)).fold(0.0, f64::max);
-        let late_rms_m = std::array::from_fn(|ticks| {
-            let before = own.field_before(ticks);
-            let of = if ticks == 0 { Some(&now) } else { before };
-            of.map_or(f64::NAN, |of| rms_m(of, shown, largest_m))
-        });
-        let without_history_rms_m = rms_m(&now, &own.field_without_history(), largest_m);
+        let largest_m = largest_m(&now);
+        let mut spread = Spread::default();
+        spread.add_field(&now, |e| shown[e], largest_m);
         let lines = [&self.ships, &own.line.hand];
         Some(OwnTick {
             largest_m,
-            late_rms_m,
-            without_history_rms_m,
+            rms_m: spread.rms_m(),
             tip_n: lines.map(|line| line.state().tip().force_n),
         })
     }
@@ -326,43 +318,24 @@ impl<'a, 'b> Watch<'a, 'b> {
             let mean = self.mean.get_or_insert_with(|| Mean::over(body.lattice, &reference));
             mean.of(moved)
         };
-        let largest_m = converged.iter().map(|&u| norm(u)).fold(0.0, f64::max);
+        let largest_m = largest_m(&converged);
         if largest_m < LEAST_M {
             return None;
         }
         let shift_m = best_shift_m(&converged, largest_m);
-        let (mut squares, mut worst_m, mut count) = ([0.0; 3], 0.0_f64, 0.0);
-        let apart = |a: [f64; 3], b: [f64; 3]| norm([0, 1, 2].map(|c| a[c] - b[c]));
-        for (&there, &here) in converged
-            .iter()
-            .zip(&shown)
-            .filter(|(u, _)| norm(**u) > MOVED * largest_m)
-        {
-            for (square, other) in squares.iter_mut().zip([here, [0.0; 3], shift_m]) {
-                *square += apart(there, other).powi(2);
-            }
-            worst_m = worst_m.max(apart(there, here));
-            count += 1.0;
-        }
+        let (mut ships, mut nothing, mut shifted) = <(Spread, Spread, Spread)>::default();
+        ships.add_field(&converged, |e| shown[e], largest_m);
+        nothing.add_field(&converged, |_| [0.0; 3], largest_m);
+        shifted.add_field(&converged, |_| shift_m, largest_m);
         let lines = [&self.ships, &self.twins.fem.hand];
         let state = lines.map(|line| line.state());
         Some(LiveTick {
             largest_m,
-            rms_m: squares.map(|s| (s / count).sqrt()),
-            worst_m,
+            rms_m: [ships, nothing, shifted].map(|spread| spread.rms_m()),
+            worst_m: ships.max_m,
             tip_n: state.map(|s| s.tip().force_n),
             hand_n: state.map(|s| s.shaft_n().iter().sum::<f64>() + s.tip().force_n),
             own,
         })
     }
-}
-
-/// Returns the distance of two fields where the first moves, RMS.
-fn rms_m(of: &Field, shown: &Field, largest_m: f64) -> f64 {
-    let (mut square, mut count) = (0.0, 0.0_f64);
-    for (there, here) in of.iter().zip(shown).filter(|(u, _)| norm(**u) > MOVED * largest_m) {
-        square += norm([0, 1, 2].map(|a| there[a] - here[a])).powi(2);
-        count += 1.0;
-    }
-    (square / count.max(1.0)).sqrt()
 }

@@ -15,21 +15,13 @@ const MOST_STEPS: u32 = 20;
 const MOST_CALLS: usize = 60;
 /// The finest tolerance that limits are met to, in elements.
 const FINEST: f64 = 1e-4;
-/// Ticks that what ships may be late by, and is compared at.
-pub const LATE: usize = 4;
 
 /// The converged twin of a ChainMail session.
 pub struct OwnTwin {
     /// Its line: contact, friction and membranes, as in the force loop.
     pub line: Twin,
     tissue: ChainMailTissue,
-    /// A body that is at rest before each tick: what of the answer is history.
-    fresh: ChainMailTissue,
-    /// Fields of the last ticks, newest first; those of large bodies are not kept.
-    before: Vec<Field>,
     period_s: f64,
-    /// Steps and passes that the last tick took.
-    pub steps: u32,
 }
 
 impl OwnTwin {
@@ -54,24 +46,37 @@ impl OwnTwin {
             residual_tolerance: FINEST,
             ..TissueParameters::default()
         };
-        let tissue = ChainMailTissue::new(&scene, limits.validate().expect("valid"));
         OwnTwin {
             line,
-            fresh: tissue.clone(),
-            tissue,
-            before: Vec::new(),
+            tissue: ChainMailTissue::new(&scene, limits.validate().expect("valid")),
             period_s,
-            steps: 0,
         }
     }
 
-    /// Advances the tissue loop by one tick, after the line has had those of the force loop.
+    /// Advances the tissue loop by one tick, after the line has had those of the force loop: until nothing is left to
+    /// move, and large strain near the tip until it rests. The first step recovers by the period.
     pub fn step(&mut self) {
         let held = held(&self.tissue, &self.line.hand);
-        self.steps = settle(&mut self.tissue, &self.line, held, self.period_s);
-        if self.tissue.deformed().lattice.element_count() < 30_000 {
-            self.before.insert(0, field(&self.tissue.deformed()));
-            self.before.truncate(LATE);
+        let axis = self.line.hand.line().axes[0];
+        self.tissue.carry(Carry {
+            columns: self.line.columns(),
+            loads_n: self.line.hand.state().loads_n(),
+            shift: Shift::of_all(axis.map(|c| c * self.line.hand.whole_m())),
+            fields: &[],
+        });
+        for step in 0..MOST_STEPS {
+            let report = self.tissue.step(held, if step == 0 { self.period_s } else { 0.0 });
+            if report.converged && report.passes == 0 {
+                break;
+            }
+        }
+        if let Some(Held { element, .. }) = held {
+            let least = least_corner(&self.tissue.deformed(), element);
+            for _ in 0..MOST_CALLS {
+                if !self.tissue.unfold(element, least) {
+                    break;
+                }
+            }
         }
     }
 
@@ -79,44 +84,6 @@ impl OwnTwin {
     pub fn field(&self) -> Field {
         field(&self.tissue.deformed())
     }
-
-    /// Returns the displacements so many ticks ago, m.
-    pub fn field_before(&self, ticks: usize) -> Option<&Field> {
-        self.before.get(ticks)
-    }
-
-    /// Returns the displacements of a body that was at rest before this tick, m.
-    pub fn field_without_history(&mut self) -> Field {
-        let held = held(&self.tissue, &self.line.hand);
-        self.fresh.return_to_rest();
-        settle(&mut self.fresh, &self.line, held, self.period_s);
-        field(&self.fresh.deformed())
-    }
-}
-
-/// Steps until nothing is left to move, and large strain near the tip until it rests; the first recovers by the period.
-fn settle(tissue: &mut ChainMailTissue, line: &Twin, held: Option<Held>, period_s: f64) -> u32 {
-    let axis = line.hand.line().axes[0];
-    tissue.carry(Carry {
-        columns: line.columns(),
-        loads_n: line.hand.state().loads_n(),
-        shift: Shift::of_all(axis.map(|c| c * line.hand.whole_m())),
-        fields: &[],
-    });
-    let mut is_left = |step: &u32| {
-        let report = tissue.step(held, if *step == 0 { period_s } else { 0.0 });
-        !report.converged || report.passes > 0
-    };
-    let steps = (0..MOST_STEPS).take_while(&mut is_left).count() as u32;
-    if let Some(Held { element, .. }) = held {
-        let least = least_corner(&tissue.deformed(), element);
-        for _ in 0..MOST_CALLS {
-            if !tissue.unfold(element, least) {
-                break;
-            }
-        }
-    }
-    steps
 }
 
 /// Returns what the tissue loop holds: the material at the tip, at its place on the line.

@@ -1,7 +1,7 @@
 //! A twin's answer with the tissue near the tip solved for large strain until it rests, where what ships has a few
 //! steps a tick.
 
-use crate::error::{Field, norm};
+use crate::error::{Field, apart};
 use crate::twin::Twin;
 use stylet_sim::scene::Scene;
 use stylet_sim::tissue::{FemTissue, MaterialPoint, Shift, TissueModel, least_corner};
@@ -51,8 +51,8 @@ impl Unfolded {
             let body = self.tissue.deformed();
             let moved = |element: u32| body.displacement(element).map(|u| u * spacing_m);
             let now: Field = (0..last.len() as u32).map(moved).collect();
-            let apart = now.iter().zip(&last).map(|(a, b)| norm([0, 1, 2].map(|c| a[c] - b[c])));
-            farthest_m = apart.fold(0.0, f64::max);
+            let moved = now.iter().zip(&last).map(|(a, b)| apart(*a, *b));
+            farthest_m = moved.fold(0.0, f64::max);
             last = now;
             if farthest_m < RESTS * spacing_m {
                 break;

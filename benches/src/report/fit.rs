@@ -38,7 +38,7 @@ impl CostFunction for Cost<'_> {
         let mut model = chainmail(self.scene, &parameters);
         let errors = self.lessons.iter().map(|lesson| {
             let run = run(&mut model, &lesson.script, &[], lesson.travel_m, &lesson.reference);
-            run.error.rms_m() / lesson.travel_m
+            run.error.all.rms_m() / lesson.travel_m
         });
         Ok(errors.sum::<f64>() / self.lessons.len() as f64)
     }

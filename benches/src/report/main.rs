@@ -1,13 +1,9 @@
 //! `make report`: every tissue model over the same insertions; speed, error, and what to pick.
 
 mod budget;
-mod findings;
 mod fit;
 mod models;
 mod page;
-mod page_parts;
-mod passes;
-mod picture;
 mod runs;
 mod ships;
 mod table;
@@ -15,12 +11,13 @@ mod table;
 use clap::Parser;
 use fit::Lesson;
 use models::{converged, entries};
+use page::Refinement;
 use runs::{Reference, run};
 use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
 use stylet_benches::bodies::{SPACINGS_M, gland};
-use stylet_benches::error::norm;
+use stylet_benches::error::{apart, quantile, rms};
 use stylet_benches::insertions::{GLAND, Insertion, TICK_S};
 use stylet_benches::machine;
 use stylet_sim::scene::Scene;
@@ -48,17 +45,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let out = options.out.unwrap_or_else(|| machine::run_folder(&machine));
     std::fs::create_dir_all(&out)?;
 
+    let ships = ships::measure(options.rounds);
+    table::write(&ships, &out.join("as-it-ships.csv"))?;
     if options.ships {
-        ships::write(&ships::measure(options.rounds), &out.join("as-it-ships.csv"))?;
         return Ok(());
     }
-    let passes = passes::measure();
     let causes = budget::causes();
-    let ships = ships::measure(options.rounds);
-    ships::write(&ships, &out.join("as-it-ships.csv"))?;
     eprintln!("fitting ChainMail to the converged FEM ...");
     let fitted = fit_at(SPACINGS_M[1]);
-    eprintln!("fitted: {fitted:?}");
     let mut rows = Vec::new();
     for spacing_m in SPACINGS_M {
         let scene = gland(spacing_m);
@@ -67,18 +61,14 @@ fn main() -> Result<(), Box<dyn Error>> {
             rows.extend(measure(&scene, insertion, &fitted, options.rounds.max(1)));
         }
     }
-    let points = table::points(&rows);
     table::write(&rows, &out.join("speed-vs-error.csv"))?;
-    picture::draw(&points, &out.join("speed-vs-error.svg"))?;
-    let found = findings::Findings {
+    let found = page::Findings {
         machine: &machine,
-        rows: &rows,
-        points: &points,
+        points: &table::points(&rows),
         fitted: &fitted,
         refinement: &refinement(),
         ships: &ships,
         causes: &causes,
-        passes: &passes,
         seconds: start.elapsed().as_secs_f64(),
     };
     std::fs::write(out.join("README.md"), page::write(&found)?)?;
@@ -116,30 +106,26 @@ fn measure(scene: &Scene, insertion: &Insertion, fitted: &models::Fitted, rounds
         elements: scene.lattice.element_count(),
         without_model: reference.without_model(insertion.travel_m, &seeds),
     };
-    let named = entries.iter().zip(&runs);
-    named
-        .map(|(entry, runs)| row(&place, insertion, entry.family, &entry.setting, runs))
+    let with_runs = entries.iter().zip(&runs);
+    with_runs
+        .map(|(entry, runs)| row(&place, insertion, entry, runs))
         .collect()
 }
 
 /// Measures the error of the lattice itself: seeds of the converged FEM at each spacing against those of the finest.
-fn refinement() -> Vec<(f64, f64, f64)> {
+fn refinement() -> Vec<Refinement> {
     let ends: Vec<Vec<[f64; 3]>> = SPACINGS_M.map(|spacing_m| seeds_after_push(&gland(spacing_m))).into();
     let finest = ends.last().expect("spacings are given");
-    let apart = |seeds: &Vec<[f64; 3]>| {
-        let each: Vec<f64> = seeds
-            .iter()
-            .zip(finest)
-            .map(|(a, b)| norm([0, 1, 2].map(|c| a[c] - b[c])))
-            .collect();
-        let rms = (each.iter().map(|d| d * d).sum::<f64>() / each.len() as f64).sqrt();
-        (rms * 1e3, each.iter().fold(0.0, |m: f64, d| m.max(*d)) * 1e3)
+    let row = |(spacing_m, seeds): (&f64, &Vec<[f64; 3]>)| {
+        let pairs = seeds.iter().zip(finest);
+        let apart_m: Vec<f64> = pairs.map(|(a, b)| apart(*a, *b)).collect();
+        Refinement {
+            spacing_mm: spacing_m * 1e3,
+            rms_mm: rms(&apart_m) * 1e3,
+            largest_mm: quantile(&apart_m, 1.0) * 1e3,
+        }
     };
-    let rows = SPACINGS_M.iter().zip(&ends).map(|(spacing_m, seeds)| {
-        let (rms, largest) = apart(seeds);
-        (spacing_m * 1e3, rms, largest)
-    });
-    rows.collect()
+    SPACINGS_M.iter().zip(&ends).map(row).collect()
 }
 
 /// Returns the displacement of the same places of the gland at the end of the first insertion's push.

@@ -13,31 +13,9 @@ pub struct Fitted {
     pub relaxed: TissueParameters,
 }
 
-/// Models that differ only in a setting belong to one family; the picture draws a family in one colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Family {
-    Sweeps,
-    Relaxed,
-    Fem,
-    FemDouble,
-}
-
-impl Family {
-    pub const ALL: [Family; 4] = [Family::Sweeps, Family::Relaxed, Family::Fem, Family::FemDouble];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Family::Sweeps => "ChainMail, solved",
-            Family::Relaxed => "ChainMail, relaxed",
-            Family::Fem => "FEM, f32",
-            Family::FemDouble => "FEM, f64",
-        }
-    }
-}
-
 /// One model under one setting.
 pub struct Entry {
-    pub family: Family,
+    pub model_name: &'static str,
     pub setting: String,
     pub model: Box<dyn TissueModel>,
 }
@@ -62,12 +40,20 @@ pub fn chainmail(scene: &Scene, parameters: &TissueParameters) -> ChainMailTissu
 
 pub fn entries(scene: &Scene, fitted: &Fitted) -> Vec<Entry> {
     let mut entries = Vec::new();
-    let mut add = |family, setting: String, model: Box<dyn TissueModel>| {
-        entries.push(Entry { family, setting, model });
+    let mut add = |model_name, setting: String, model: Box<dyn TissueModel>| {
+        entries.push(Entry {
+            model_name,
+            setting,
+            model,
+        });
     };
     let paper = TissueParameters::default();
     for (name, parameters) in [("paper's limits", &paper), ("fitted limits", &fitted.limits)] {
-        add(Family::Sweeps, name.to_owned(), Box::new(chainmail(scene, parameters)));
+        add(
+            "ChainMail, solved",
+            name.to_owned(),
+            Box::new(chainmail(scene, parameters)),
+        );
     }
     for iterations in RELAXATIONS {
         let parameters = TissueParameters {
@@ -75,24 +61,24 @@ pub fn entries(scene: &Scene, fitted: &Fitted) -> Vec<Entry> {
             ..fitted.relaxed.clone()
         };
         let setting = format!("{iterations} iterations");
-        add(Family::Relaxed, setting, Box::new(chainmail(scene, &parameters)));
+        add("ChainMail, relaxed", setting, Box::new(chainmail(scene, &parameters)));
     }
     for tolerance in TOLERANCES {
         let mut fem = FemTissue::<f32>::new(scene).expect("valid materials");
         fem.settings.relative_tolerance = tolerance;
         fem.settings.max_cycles = 200;
-        add(Family::Fem, format!("tolerance {tolerance:.0e}"), Box::new(fem));
+        add("FEM, f32", format!("tolerance {tolerance:.0e}"), Box::new(fem));
     }
     let live = FemTissue::<f32>::new(scene).expect("valid materials");
     add(
-        Family::Fem,
+        "FEM, f32",
         "as off its line: one cycle a tick".to_owned(),
         Box::new(live),
     );
     for tolerance in [1e-3, 1e-6] {
         let mut fem = FemTissue::<f64>::new(scene).expect("valid materials");
         (fem.settings.relative_tolerance, fem.settings.max_cycles) = (tolerance, 1000);
-        add(Family::FemDouble, format!("tolerance {tolerance:.0e}"), Box::new(fem));
+        add("FEM, f64", format!("tolerance {tolerance:.0e}"), Box::new(fem));
     }
     entries
 }

@@ -1,41 +1,81 @@
-//! The page that says in words what was measured, and which model to pick for what.
+//! The page of a run: what was measured, in tables with a column for each field of their rows.
 
-use crate::findings::Findings;
-use crate::models::Family;
-use crate::page_parts::{causes, passes, what_ships};
-use crate::table::{Point, Row, pareto};
+use crate::budget::Cause;
+use crate::models::Fitted;
+use crate::ships::Ships;
+use crate::table::Point;
+use serde::Serialize;
+use std::error::Error;
 use std::fmt::Write as _;
 use stylet_benches::insertions::{GLAND, TICK_S};
 
-/// The error that is asked for, in percent of the tip's travel.
-const ASKED_PERCENT: f64 = 10.0;
+/// Everything that the page is written from.
+pub struct Findings<'a> {
+    pub machine: &'a [(String, String)],
+    pub points: &'a [Point],
+    pub fitted: &'a Fitted,
+    pub refinement: &'a [Refinement],
+    /// Shipped models against the converged solution of each tick.
+    pub ships: &'a [Ships],
+    /// Causes of the error of a needle's line.
+    pub causes: &'a [Cause],
+    pub seconds: f64,
+}
 
-pub fn write(found: &Findings) -> Result<String, std::fmt::Error> {
-    let mut text = String::from("# Speed against error of the tissue models\n\n");
+/// Distance of the seeds at one spacing from those at the finest.
+#[derive(Serialize)]
+pub struct Refinement {
+    pub spacing_mm: f64,
+    pub rms_mm: f64,
+    pub largest_mm: f64,
+}
+
+pub fn write(found: &Findings) -> Result<String, Box<dyn Error>> {
+    let mut text = String::from("# Speed against error of the tissue models\n");
+    let names = |fitted: bool| GLAND.iter().filter(move |i| i.fitted == fitted).map(|i| i.name);
+    let of_models = format!(
+        "The same insertions through every model, on the paper's gland cut at three spacings, in surroundings of the same stiffness. \
+         Error: distance from the converged finite elements (f64) on the same lattice, over the elements that they move by more than \
+         1 % of the tip's travel, every fourth tick of {} ms. Times are the least of equal rounds, interleaved. *Nothing moves* and \
+         *best shift* are the errors without a model, and of the body shifted as one piece by what fits each tick best. Means over \
+         the insertions {}; `speed-vs-error.csv` has each.",
+        TICK_S * 1e3,
+        names(false).collect::<Vec<_>>().join("; "),
+    );
+    section(&mut text, "Every model", &of_models, found.points)?;
     writeln!(
         text,
-        "The same needle insertions through every model, on the paper's gland cut at three spacings, in surroundings of the same\n\
-         stiffness. Error: distance from the converged FEM (f64) on the same lattice, over the elements that it moves by more than 1 % of\n\
-         the tip's travel, compared every fourth tick of {} ms. The tip patch is 7.5 mm wide at every spacing. Times are the least of\n\
-         equal rounds, interleaved. Insertions: {} ({} fitted to). `speed-vs-error.csv` holds every row.\n",
-        TICK_S * 1e3,
-        GLAND.map(|i| i.name).join("; "),
-        GLAND
-            .iter()
-            .filter(|i| i.fitted)
-            .map(|i| i.name)
-            .collect::<Vec<_>>()
-            .join("; ")
+        "Fitted at 1.5 mm to {}: {:?}",
+        names(true).collect::<Vec<_>>().join("; "),
+        found.fitted
     )?;
-    text.push_str("![Time of a tick against error](speed-vs-error.svg)\n\n");
-    choices(&mut text, found)?;
-    what_ships(&mut text, found)?;
-    causes(&mut text, found.causes)?;
-    passes(&mut text, found.passes)?;
-    all_points(&mut text, found.points)?;
-    fit(&mut text, found)?;
-    refinement(&mut text, found)?;
-    text.push_str("## Machine\n\n");
+    section(
+        &mut text,
+        "What ships",
+        "The two loops as a run has them, a steady hand along z: in, rest, half the way out. Every fourth tick of the tissue loop is \
+         compared with the converged solution of the same tick: every column of the same line solved to a residual of 1e-7 (1e-5 in \
+         `pelvis`) on the body that `--tissue fem` has, behind the same law of contact, on the tip's path of that session. Field: RMS \
+         distance over the elements that move, in percent of the tick's largest displacement. Forces: in percent of the insertion's \
+         largest. *Own*: ChainMail against itself with nothing left to do in any tick; finite elements are their own. Times of a tick \
+         on one thread, the tissue's with the force tick before it. Asked for: field within 1 %, force on the tip within 3 %.",
+        found.ships,
+    )?;
+    section(
+        &mut text,
+        "Causes of error",
+        "One needle through the middle of `paper` to 45 mm and half the way out, on one path, through one body and another that \
+         differ in one thing. Field: mean and worst of the ticks, in percent of the tick's largest displacement. Forces: RMS and \
+         worst, in percent of the largest. Linearity is of a patch that is pushed, not of a line, and of CalculiX alone: its worst \
+         is one node, and its force that of the patch.",
+        found.causes,
+    )?;
+    section(
+        &mut text,
+        "What the spacing costs",
+        "Converged finite elements at each spacing against the finest, at the seeds, at the end of the push.",
+        found.refinement,
+    )?;
+    text.push_str("\n## Machine\n\n");
     for (name, value) in found.machine {
         writeln!(text, "- {name}: {value}")?;
     }
@@ -43,171 +83,34 @@ pub fn write(found: &Findings) -> Result<String, std::fmt::Error> {
     Ok(text)
 }
 
-/// Returns the points at the finest spacing.
-fn finest(points: &[Point]) -> Vec<&Point> {
-    let least = points.iter().map(|p| p.spacing_mm).fold(f64::INFINITY, f64::min);
-    points.iter().filter(|p| p.spacing_mm == least).collect()
-}
-
-fn choices(text: &mut String, found: &Findings) -> std::fmt::Result {
-    let here = finest(found.points);
-    writeln!(
-        text,
-        "## Which to pick\n\nAt {:.2} mm, over the insertions held back. Without any model the error is {:.1} % where nothing moves, and {:.1} % \
-         where the body is shifted as one piece by what fits each tick best:\n",
-        here[0].spacing_mm, here[0].nothing_moves_percent, here[0].best_shift_percent
-    )?;
-    let of = |family: Family| here.iter().copied().filter(move |p| p.family == family);
-    let best = |family: Family| of(family).min_by(|a, b| a.rms_percent.total_cmp(&b.rms_percent));
-    let fastest_within = |family: Family, percent: f64| {
-        of(family)
-            .filter(|p| p.worst_rms_percent <= percent)
-            .min_by(|a, b| a.mean_us.total_cmp(&b.mean_us))
-    };
-    if let Some(p) = of(Family::Sweeps).min_by(|a, b| a.mean_us.total_cmp(&b.mean_us)) {
-        writeln!(
-            text,
-            "- **Feel of a membrane, many scenes at once, weak machines:** ChainMail, solved ({}): {:.0} us a tick, {:.1} % off. \
-             Its limits hold in every tick, but it answers to a limit of strain, not to forces.",
-            p.setting, p.mean_us, p.rms_percent
-        )?;
-    }
-    match fastest_within(Family::Relaxed, ASKED_PERCENT).or(best(Family::Relaxed)) {
-        Some(p) => writeln!(
-            text,
-            "- **{}:** ChainMail, relaxed, {}: {:.0} us a tick, {:.1} % off on average, {:.1} % in the worst \
-             insertion ({} {ASKED_PERCENT} %).",
-            match fastest_within(Family::Fem, 1.0) {
-                Some(fem) if fem.mean_us <= p.mean_us =>
-                    "For nothing but an even tick, as FEM within 1 % is faster on average",
-                _ => "Where seeds end, at little cost",
-            },
-            p.setting,
-            p.mean_us,
-            p.rms_percent,
-            p.worst_rms_percent,
-            if p.worst_rms_percent <= ASKED_PERCENT {
-                "within"
-            } else {
-                "more than"
-            }
-        )?,
-        None => text.push_str("- ChainMail, relaxed, was not run.\n"),
-    }
-    if let Some(p) = fastest_within(Family::Fem, 1.0) {
-        writeln!(
-            text,
-            "- **Forces and millimetres within 1 % of the converged solution on the same lattice:** FEM, f32, {}: {:.0} us a tick on average, p99 {:.0} us, {:.2} % off in the \
-             worst insertion.",
-            p.setting, p.mean_us, p.worst_p99_us, p.worst_rms_percent
-        )?;
-    }
-    if let (Some(single), Some(double)) = (best(Family::Fem), best(Family::FemDouble)) {
-        writeln!(
-            text,
-            "- **f64** is for reference: f32 at its tightest tolerance is {:.3} % off, f64 {:.4} %.",
-            single.rms_percent, double.rms_percent
-        )?;
-    }
-    for point in here.iter().filter(|p| p.rms_percent > p.best_shift_percent) {
-        writeln!(
-            text,
-            "- {}, {}: {:.1} % off, more than the best shift as one piece.",
-            point.family.name(),
-            point.setting,
-            point.rms_percent
-        )?;
-    }
-    text.push('\n');
-    if let (Some(relaxed), Some(fem)) = (
-        fastest_within(Family::Relaxed, ASKED_PERCENT).or(best(Family::Relaxed)),
-        fastest_within(Family::Fem, 1.0),
-    ) {
-        let tightest = best(Family::Fem).unwrap_or(fem);
-        writeln!(
-            text,
-            "Relaxed ChainMail ({}) takes {:.2} times as long as FEM within 1 % ({}), {:.2} times as long as FEM at {}. \
-             Springs are relaxed in every tick; FEM solves once for each patch of tissue that the tip holds, and adds up what it has in \
-             between. The solution is in the times here, mostly in their p99; a live loop works it out ahead, in idle ticks \
-             (`docs/adr/0008-two-tissue-models.md`). That is why a twentieth of its time cannot be had with an error like this one.\n",
-            relaxed.setting,
-            relaxed.mean_us / fem.mean_us,
-            fem.setting,
-            relaxed.mean_us / tightest.mean_us,
-            tightest.setting
-        )?;
+fn section(text: &mut String, title: &str, about: &str, rows: &[impl Serialize]) -> Result<(), Box<dyn Error>> {
+    write!(text, "\n## {title}\n\n{about}\n\n")?;
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    rows.iter().try_for_each(|row| writer.serialize(row))?;
+    let table = writer.into_inner()?;
+    for (n, row) in csv::ReaderBuilder::new()
+        .has_headers(false)
+        .from_reader(&table[..])
+        .records()
+        .enumerate()
+    {
+        let row = row?;
+        writeln!(text, "| {} |", row.iter().map(short).collect::<Vec<_>>().join(" | "))?;
+        if n == 0 {
+            writeln!(text, "{}|", "|---".repeat(row.len()))?;
+        }
     }
     Ok(())
 }
 
-fn all_points(text: &mut String, points: &[Point]) -> std::fmt::Result {
-    text.push_str("## All of it, insertions held back\n\n");
-    text.push_str("| spacing, mm | model | setting | mean, us | worst p99, us | RMS, % | nothing moves, % | best shift, % | worst RMS, % | worst max, % | seeds, mm | worst force on the tip, % | unmet ticks | on the front |\n");
-    text.push_str("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
-    for p in points {
-        let same: Vec<&Point> = points.iter().filter(|q| q.spacing_mm == p.spacing_mm).collect();
-        let front = pareto(&same).iter().any(|q| std::ptr::eq(*q, p));
-        writeln!(
-            text,
-            "| {:.2} | {} | {} | {:.0} | {:.0} | {:.3} | {:.1} | {:.1} | {:.3} | {:.1} | {:.3} | {} | {} | {} |",
-            p.spacing_mm,
-            p.family.name(),
-            p.setting,
-            p.mean_us,
-            p.worst_p99_us,
-            p.rms_percent,
-            p.nothing_moves_percent,
-            p.best_shift_percent,
-            p.worst_rms_percent,
-            p.worst_max_percent,
-            p.seed_rms_mm,
-            p.worst_tip_force_percent.map_or("-".to_owned(), |f| format!("{f:.2}")),
-            p.unconverged_ticks,
-            if front { "yes" } else { "" }
-        )?;
+/// Returns a number with as many digits as a reader compares, and anything else as it is.
+fn short(field: &str) -> String {
+    match field.parse::<f64>() {
+        Ok(value) if field.contains('.') => match value.abs() {
+            size if size >= 100.0 => format!("{value:.0}"),
+            size if size >= 1e-3 || size == 0.0 => format!("{value:.3}"),
+            _ => format!("{value:.0e}"),
+        },
+        _ => field.to_owned(),
     }
-    text.push('\n');
-    Ok(())
-}
-
-fn fit(text: &mut String, found: &Findings) -> std::fmt::Result {
-    let (l, r) = (&found.fitted.limits, &found.fitted.relaxed);
-    writeln!(
-        text,
-        "## The fit\n\nMade at 1.5 mm. Limits: stretch {:.3} to {:.3}, shear {:.1} deg, recovery {:.3} s. Relaxation: shear stiffness {:.3} of axial, \
-         surroundings {:.4} of axial.\n\nRMS error in % of the travel, fitted to and held back:\n",
-        l.min_stretch, l.max_stretch, l.shear_deg, l.recovery_time_s, r.shear_to_axial, r.foundation_to_axial
-    )?;
-    text.push_str("| insertion | fitted to | solved, fitted limits | relaxed, 16 iterations |\n|---|---|---|---|\n");
-    let at = |insertion: &str, family: Family, setting: &str| {
-        let fit_spacing = |row: &&Row| (row.spacing_mm - 1.5).abs() < 0.01 && row.insertion == insertion;
-        let row = found
-            .rows
-            .iter()
-            .filter(fit_spacing)
-            .find(|row| row.family == family && row.setting == setting);
-        row.map_or(f64::NAN, |row| row.rms_percent)
-    };
-    for insertion in GLAND {
-        writeln!(
-            text,
-            "| {} | {} | {:.1} | {:.1} |",
-            insertion.name,
-            if insertion.fitted { "yes" } else { "" },
-            at(insertion.name, Family::Sweeps, "fitted limits"),
-            at(insertion.name, Family::Relaxed, "16 iterations")
-        )?;
-    }
-    text.push('\n');
-    Ok(())
-}
-
-fn refinement(text: &mut String, found: &Findings) -> std::fmt::Result {
-    text.push_str("## What the spacing costs\n\nConverged FEM at each spacing against the finest, at the seeds, at the end of the push:\n\n");
-    text.push_str("| spacing, mm | RMS, mm | largest, mm |\n|---|---|---|\n");
-    for (spacing_mm, rms, largest) in found.refinement {
-        writeln!(text, "| {spacing_mm:.2} | {rms:.3} | {largest:.3} |")?;
-    }
-    text.push('\n');
-    Ok(())
 }

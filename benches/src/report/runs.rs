@@ -1,7 +1,7 @@
 //! One model through one insertion: its time, and its error against the converged FEM on the same lattice.
 
 use std::time::Instant;
-use stylet_benches::error::{Error, Field, best_shift_m, field, norm};
+use stylet_benches::error::{Error, Field, apart, best_shift_m, field, norm, quantile, rms};
 use stylet_benches::insertions::TICK_S;
 use stylet_sim::tissue::{Held, TissueModel};
 
@@ -39,7 +39,7 @@ impl Reference {
         for field in &self.fields {
             let shifts_m = [[0.0; 3], best_shift_m(field, travel_m)];
             for (error, shift_m) in errors.iter_mut().zip(shifts_m) {
-                error.add_field(field, |_| shift_m, travel_m, seeds);
+                error.add(field, |_| shift_m, travel_m, seeds);
             }
         }
         errors
@@ -82,7 +82,9 @@ pub fn run(model: &mut dyn TissueModel, script: &[Held], seeds: &[u32], travel_m
         run.residual = run.residual.max(report.residual);
         if is_compared(tick, script.len()) {
             let there = fields.next().expect("one field for each compared tick");
-            run.error.add(there, &model.deformed(), travel_m, seeds);
+            let body = model.deformed();
+            let moved_m = |e: usize| body.displacement(e as u32).map(|u| u * body.lattice.spacing_m);
+            run.error.add(there, moved_m, travel_m, seeds);
             forces_n.extend(report.tip_force_n);
         }
     }
@@ -92,8 +94,7 @@ pub fn run(model: &mut dyn TissueModel, script: &[Held], seeds: &[u32], travel_m
 
 fn force_error(forces_n: &[[f64; 3]], reference_n: &[[f64; 3]]) -> Option<[f64; 2]> {
     let largest_n = reference_n.iter().map(|&f| norm(f)).fold(0.0, f64::max);
-    let apart = |(a, b): (&[f64; 3], &[f64; 3])| norm([0, 1, 2].map(|c| a[c] - b[c])) / largest_n;
-    let off: Vec<f64> = forces_n.iter().zip(reference_n).map(apart).collect();
-    let rms = (off.iter().map(|d| d * d).sum::<f64>() / off.len() as f64).sqrt();
-    (!off.is_empty() && largest_n > 0.0).then(|| [rms, off.iter().copied().fold(0.0, f64::max)])
+    let pairs = forces_n.iter().zip(reference_n);
+    let off: Vec<f64> = pairs.map(|(a, b)| apart(*a, *b) / largest_n).collect();
+    (!off.is_empty() && largest_n > 0.0).then(|| [rms(&off), quantile(&off, 1.0)])
 }

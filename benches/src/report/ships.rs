@@ -1,7 +1,6 @@
 //! Shipped models, through the real loops, against the converged solution of each tick.
 
 use serde::Serialize;
-use std::path::Path;
 use stylet_benches::error::quantile;
 use stylet_benches::live::{Live, LiveCase, LiveTick, OwnTick, Theatre, Twins};
 use stylet_sim::scene::TissueKind;
@@ -35,12 +34,6 @@ pub struct Ships {
     pub own_field_worst_percent: f64,
     pub own_tip_p99_percent: f64,
     pub own_tip_worst_percent: f64,
-    /// Mean error against its own converged answer of one, two and three ticks before; against one without history:
-    /// ChainMail alone.
-    pub own_late_1_percent: f64,
-    pub own_late_2_percent: f64,
-    pub own_late_3_percent: f64,
-    pub own_without_history_percent: f64,
     pub haptic_p50_us: f64,
     pub haptic_p999_us: f64,
     pub tissue_p50_us: f64,
@@ -108,18 +101,8 @@ pub fn measure(rounds: usize) -> Vec<Ships> {
             let left_mm = twins.near_tip.left_m * 1e3;
             let row = row(case, kind, &live, prepared_s, twin.residual);
             eprintln!(
-                "  {}: field {:.2} % of {:.1} mm on average, {:.2} % at worst; beside its own {:.3} and {:.3} %, tip {:.3} %; {:.2}, {:.2}, {:.2} % by ticks before, {:.2} % by history; near the tip within {left_mm:.4} mm of rest",
-                row.tissue,
-                row.field_percent,
-                row.largest_mm,
-                row.field_worst_percent,
-                row.own_field_percent,
-                row.own_field_worst_percent,
-                row.own_tip_worst_percent,
-                row.own_late_1_percent,
-                row.own_late_2_percent,
-                row.own_late_3_percent,
-                row.own_without_history_percent
+                "  {}: field {:.2} % of {:.1} mm on average, {:.2} % at worst; near the tip within {left_mm:.4} mm of rest",
+                row.tissue, row.field_percent, row.largest_mm, row.field_worst_percent
             );
             rows.push(row);
         }
@@ -141,13 +124,15 @@ fn row(case: LiveCase, kind: TissueKind, live: &Live, prepared_s: f64, twin_resi
     };
     let (tip, hand) = (force(|t| t.tip_n), force(|t| t.hand_n));
     let own: Vec<OwnTick> = ticks.iter().filter_map(|t| t.own).collect();
-    let own_share = |of: &dyn Fn(&OwnTick) -> f64| own.iter().map(|t| 100.0 * of(t) / t.largest_m).collect::<Vec<_>>();
     let (own_field, own_tip) = if own.is_empty() {
         (field.clone(), tip.clone())
     } else {
         let peak_n = own.iter().map(|t| t.tip_n[1].abs()).fold(0.0, f64::max);
         let off = own.iter().map(|t| 100.0 * (t.tip_n[0] - t.tip_n[1]).abs() / peak_n);
-        (own_share(&|t| t.late_rms_m[0]), off.collect())
+        (
+            own.iter().map(|t| 100.0 * t.rms_m / t.largest_m).collect(),
+            off.collect(),
+        )
     };
     Ships {
         scene: case.scene,
@@ -172,10 +157,6 @@ fn row(case: LiveCase, kind: TissueKind, live: &Live, prepared_s: f64, twin_resi
         own_field_worst_percent: quantile(&own_field, 1.0),
         own_tip_p99_percent: quantile(&own_tip, 0.99),
         own_tip_worst_percent: quantile(&own_tip, 1.0),
-        own_late_1_percent: mean(&own_share(&|t| t.late_rms_m[1])),
-        own_late_2_percent: mean(&own_share(&|t| t.late_rms_m[2])),
-        own_late_3_percent: mean(&own_share(&|t| t.late_rms_m[3])),
-        own_without_history_percent: mean(&own_share(&|t| t.without_history_rms_m)),
         haptic_p50_us: quantile(&live.haptic_us, 0.5),
         haptic_p999_us: quantile(&live.haptic_us, 0.999),
         tissue_p50_us: quantile(&live.tissue_us, 0.5),
@@ -185,10 +166,4 @@ fn row(case: LiveCase, kind: TissueKind, live: &Live, prepared_s: f64, twin_resi
         columns_mb: live.column_bytes as f64 * 1e-6,
         twin_residual,
     }
-}
-
-pub fn write(rows: &[Ships], path: &Path) -> Result<(), csv::Error> {
-    let mut writer = csv::Writer::from_path(path)?;
-    rows.iter().try_for_each(|row| writer.serialize(row))?;
-    writer.flush().map_err(Into::into)
 }
