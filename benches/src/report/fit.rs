@@ -1,6 +1,6 @@
 //! ChainMail's settings fitted to the converged FEM, on the insertions that are meant for it.
 
-use crate::models::{Fitted, chainmail};
+use crate::models::chainmail;
 use crate::runs::{Reference, run};
 use argmin::core::{CostFunction, Executor};
 use argmin::solver::neldermead::NelderMead;
@@ -15,15 +15,12 @@ pub struct Lesson {
     pub reference: Reference,
 }
 
-/// Iterations of relaxation that the fit is made with.
-const FIT_ITERATIONS: u32 = 16;
 const MOST_EVALUATIONS: u64 = 80;
 
 /// Mean over the lessons of the RMS error in parts of the tip's travel; infinite for settings that are not valid.
 struct Cost<'a> {
     scene: &'a Scene,
     lessons: &'a [Lesson],
-    settings: fn(&[f64]) -> TissueParameters,
 }
 
 impl CostFunction for Cost<'_> {
@@ -31,7 +28,7 @@ impl CostFunction for Cost<'_> {
     type Output = f64;
 
     fn cost(&self, p: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        let parameters = (self.settings)(p);
+        let parameters = limits_of(p);
         if parameters.validate().is_err() {
             return Ok(f64::INFINITY);
         }
@@ -56,41 +53,21 @@ fn limits_of(p: &[f64]) -> TissueParameters {
     }
 }
 
-fn relaxed_of(p: &[f64]) -> TissueParameters {
-    TissueParameters {
-        relaxation_iterations: FIT_ITERATIONS,
-        shear_to_axial: p[0].exp(),
-        foundation_to_axial: p[1].exp(),
-        ..TissueParameters::default()
-    }
-}
-
-pub fn fit(scene: &Scene, lessons: &[Lesson]) -> Fitted {
-    let find = |settings: fn(&[f64]) -> TissueParameters, start: Vec<f64>, step: f64| {
-        let corner = |n: usize| {
-            let mut p = start.clone();
-            p[n] += step;
-            p
-        };
-        let simplex = std::iter::once(start.clone())
-            .chain((0..start.len()).map(corner))
-            .collect();
-        let solver = NelderMead::new(simplex).with_sd_tolerance(1e-5).expect("positive");
-        let cost = Cost {
-            scene,
-            lessons,
-            settings,
-        };
-        let found = Executor::new(cost, solver)
-            .configure(|state| state.max_iters(MOST_EVALUATIONS))
-            .run()
-            .expect("the cost is always defined");
-        settings(&found.state.best_param.unwrap_or(start))
+/// Fits limits and recovery.
+pub fn fit(scene: &Scene, lessons: &[Lesson]) -> TissueParameters {
+    let start = [0.3_f64, 0.5, 20.0, 0.5].map(f64::ln).to_vec();
+    let corner = |n: usize| {
+        let mut p = start.clone();
+        p[n] -= 0.4;
+        p
     };
-    let limits = [0.3_f64.ln(), 0.5_f64.ln(), 20.0_f64.ln(), 0.5_f64.ln()];
-    let relaxed = [0.25_f64.ln(), 0.02_f64.ln()];
-    Fitted {
-        limits: find(limits_of, limits.to_vec(), -0.4),
-        relaxed: find(relaxed_of, relaxed.to_vec(), 0.7),
-    }
+    let simplex = std::iter::once(start.clone()).chain((0..start.len()).map(corner));
+    let solver = NelderMead::new(simplex.collect())
+        .with_sd_tolerance(1e-5)
+        .expect("positive");
+    let found = Executor::new(Cost { scene, lessons }, solver)
+        .configure(|state| state.max_iters(MOST_EVALUATIONS))
+        .run()
+        .expect("the cost is always defined");
+    limits_of(&found.state.best_param.unwrap_or(start))
 }

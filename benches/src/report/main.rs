@@ -20,6 +20,7 @@ use stylet_benches::bodies::{SPACINGS_M, gland};
 use stylet_benches::error::{apart, quantile, rms};
 use stylet_benches::insertions::{GLAND, Insertion, TICK_S};
 use stylet_benches::machine;
+use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
 use stylet_sim::tissue::{Held, MaterialPoint, TissueModel};
 use table::{Row, Where, row};
@@ -76,7 +77,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn fit_at(spacing_m: f64) -> models::Fitted {
+fn fit_at(spacing_m: f64) -> TissueParameters {
     let scene = gland(spacing_m);
     let lessons = GLAND.iter().filter(|i| i.fitted).map(|insertion| {
         let script = insertion.script(&scene);
@@ -90,7 +91,7 @@ fn fit_at(spacing_m: f64) -> models::Fitted {
 }
 
 /// Runs every model through one insertion, round by round, so that a noisy machine disturbs all alike.
-fn measure(scene: &Scene, insertion: &Insertion, fitted: &models::Fitted, rounds: usize) -> Vec<Row> {
+fn measure(scene: &Scene, insertion: &Insertion, fitted: &TissueParameters, rounds: usize) -> Vec<Row> {
     let script: Vec<Held> = insertion.script(scene);
     let seeds = insertion.seeds(scene);
     let reference = Reference::of(&mut converged(scene), &script);

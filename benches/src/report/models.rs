@@ -4,15 +4,6 @@ use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::Scene;
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
 
-/// Result of the fit.
-#[derive(Clone, Debug)]
-pub struct Fitted {
-    /// Limits and recovery, without relaxation.
-    pub limits: TissueParameters,
-    /// Stiffness of links and surroundings, with relaxation.
-    pub relaxed: TissueParameters,
-}
-
 /// One model under one setting.
 pub struct Entry {
     pub model_name: &'static str,
@@ -20,8 +11,6 @@ pub struct Entry {
     pub model: Box<dyn TissueModel>,
 }
 
-/// Iterations of relaxation in a tick.
-const RELAXATIONS: [u32; 6] = [1, 2, 4, 8, 16, 32];
 /// Relative tolerances of FEM.
 const TOLERANCES: [f64; 5] = [1e-1, 3e-2, 1e-2, 1e-3, 1e-4];
 /// Tolerance of what counts as converged.
@@ -38,7 +27,7 @@ pub fn chainmail(scene: &Scene, parameters: &TissueParameters) -> ChainMailTissu
     ChainMailTissue::new(scene, parameters.validate().expect("fitted settings are valid"))
 }
 
-pub fn entries(scene: &Scene, fitted: &Fitted) -> Vec<Entry> {
+pub fn entries(scene: &Scene, fitted: &TissueParameters) -> Vec<Entry> {
     let mut entries = Vec::new();
     let mut add = |model_name, setting: String, model: Box<dyn TissueModel>| {
         entries.push(Entry {
@@ -48,20 +37,12 @@ pub fn entries(scene: &Scene, fitted: &Fitted) -> Vec<Entry> {
         });
     };
     let paper = TissueParameters::default();
-    for (name, parameters) in [("paper's limits", &paper), ("fitted limits", &fitted.limits)] {
+    for (name, parameters) in [("paper's limits", &paper), ("fitted limits", fitted)] {
         add(
             "ChainMail, solved",
             name.to_owned(),
             Box::new(chainmail(scene, parameters)),
         );
-    }
-    for iterations in RELAXATIONS {
-        let parameters = TissueParameters {
-            relaxation_iterations: iterations,
-            ..fitted.relaxed.clone()
-        };
-        let setting = format!("{iterations} iterations");
-        add("ChainMail, relaxed", setting, Box::new(chainmail(scene, &parameters)));
     }
     for tolerance in TOLERANCES {
         let mut fem = FemTissue::<f32>::new(scene).expect("valid materials");

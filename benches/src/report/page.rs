@@ -1,19 +1,19 @@
 //! The page of a run: what was measured, in tables with a column for each field of their rows.
 
 use crate::budget::Cause;
-use crate::models::Fitted;
 use crate::ships::Ships;
 use crate::table::Point;
 use serde::Serialize;
 use std::error::Error;
 use std::fmt::Write as _;
 use stylet_benches::insertions::{GLAND, TICK_S};
+use stylet_sim::limits::TissueParameters;
 
 /// Everything that the page is written from.
 pub struct Findings<'a> {
     pub machine: &'a [(String, String)],
     pub points: &'a [Point],
-    pub fitted: &'a Fitted,
+    pub fitted: &'a TissueParameters,
     pub refinement: &'a [Refinement],
     /// Shipped models against the converged solution of each tick.
     pub ships: &'a [Ships],

@@ -22,8 +22,6 @@ const SPEED_M_PER_S: f64 = 0.05;
 const PUNCTURE_M: f64 = 8e-3;
 const ROUNDS: usize = 3;
 const SEEDS: usize = 100;
-/// Iterations of relaxation whose cost is shown.
-const RELAXATION: u32 = 8;
 
 /// A part that takes longer than this in one round is measured over its first ticks only, and the table says so.
 const ROUND_LIMIT: Duration = Duration::from_secs(5);
@@ -174,12 +172,6 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, CostError> {
         let name = "  the same as one homogeneous structure".to_owned();
         models.push(chainmail(name, &one, &plain)?);
     }
-    let relaxed = TissueParameters {
-        relaxation_iterations: RELAXATION,
-        ..plain
-    };
-    let name = format!("  with relaxation, {RELAXATION} iterations (off by default)");
-    models.push(chainmail(name, scene, &relaxed)?);
     // In a coarser body the ticks below, in elements of the scene, would differ.
     let elastic = scene.clone().for_tissue(TissueKind::Fem);
     if elastic.coarseness() == 1 {

@@ -20,14 +20,6 @@ pub struct TissueParameters {
     pub recovery_time_s: f64,
     /// Largest violation of a limit that counts as none, in elements.
     pub residual_tolerance: f64,
-    /// Passes of elastic relaxation after each propagation; 0 for none, at no cost.
-    pub relaxation_iterations: u32,
-    /// Share of the way that a pass of relaxation takes: 1 for all, up to below 2 to go beyond, which converges faster.
-    pub relaxation_weight: f64,
-    /// Stiffness of a link across, over that along it.
-    pub shear_to_axial: f64,
-    /// Stiffness of the elastic foundation of each element (the surroundings), over that along a link.
-    pub foundation_to_axial: f64,
 }
 
 impl Default for TissueParameters {
@@ -39,10 +31,6 @@ impl Default for TissueParameters {
             shear_vert_deg: 26.565,
             recovery_time_s: 1.0,
             residual_tolerance: 1e-3,
-            relaxation_iterations: 0,
-            relaxation_weight: 1.6,
-            shear_to_axial: 0.25,
-            foundation_to_axial: 0.01,
         }
     }
 }
@@ -97,7 +85,6 @@ pub struct Limits {
     pub(crate) links: [LinkLimits; 3],
     pub(crate) recovery_time_s: f64,
     pub(crate) tolerance: f32,
-    pub(crate) relaxation: Option<Relaxation>,
 }
 
 impl Limits {
@@ -105,15 +92,6 @@ impl Limits {
     pub fn links(&self) -> &[LinkLimits; 3] {
         &self.links
     }
-}
-
-/// Elastic relaxation; stiffnesses over that along a link.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Relaxation {
-    pub iterations: u32,
-    pub weight: f32,
-    pub shear: f32,
-    pub foundation: f32,
 }
 
 impl TissueParameters {
@@ -128,12 +106,6 @@ impl TissueParameters {
             links: [horizontal, vertical, vertical],
             recovery_time_s: self.recovery_time_s,
             tolerance: self.residual_tolerance as f32,
-            relaxation: (self.relaxation_iterations > 0).then_some(Relaxation {
-                iterations: self.relaxation_iterations,
-                weight: self.relaxation_weight as f32,
-                shear: self.shear_to_axial as f32,
-                foundation: self.foundation_to_axial as f32,
-            }),
         }
     }
 }

@@ -29,7 +29,6 @@ impl TissueParameters {
             &format!("from {} to {} elements", tolerance.min, tolerance.max),
             "less is below what f32 can resolve",
         );
-        self.check_relaxation(&mut problems);
         problems.finish().map(|()| self.active())
     }
 
@@ -65,41 +64,5 @@ impl TissueParameters {
                 "lower an angle, or cells fold over",
             );
         }
-    }
-
-    fn check_relaxation(&self, problems: &mut Problems) {
-        let iterations = f64::from(self.relaxation_iterations);
-        problems.unless(
-            iterations <= 1000.0,
-            "relaxation_iterations",
-            iterations,
-            "at most 1000",
-            "each is a pass over the whole body in every tick",
-        );
-        let weight = self.relaxation_weight;
-        problems.unless(
-            weight > 0.0 && weight < 2.0,
-            "relaxation_weight",
-            weight,
-            "above 0 and below 2",
-            "from 2 on the body would swing up instead of coming to rest",
-        );
-        let along = "stiffness along a link is 1";
-        let (shear, foundation) = (self.shear_to_axial, self.foundation_to_axial);
-        let (of_shear, of_foundation) = ("from 0.001 to 1000", "from 0 to 1000");
-        problems.unless(
-            (1e-3..=1000.0).contains(&shear),
-            "shear_to_axial",
-            shear,
-            of_shear,
-            along,
-        );
-        problems.unless(
-            (0.0..=1000.0).contains(&foundation),
-            "foundation_to_axial",
-            foundation,
-            of_foundation,
-            along,
-        );
     }
 }

@@ -1,34 +1,23 @@
 //! The tissue models under test, and their bodies.
 
-use stylet_sim::limits::{Limits, TissueParameters};
+use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::{Labels, Scene, Structure};
 use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     ChainMail,
-    Relaxed,
     Fem,
 }
 
 impl Kind {
-    pub const ALL: [Kind; 3] = [Kind::ChainMail, Kind::Relaxed, Kind::Fem];
+    pub const ALL: [Kind; 2] = [Kind::ChainMail, Kind::Fem];
 
     pub fn name(self) -> &'static str {
         match self {
             Kind::ChainMail => "ChainMail",
-            Kind::Relaxed => "ChainMail, relaxed",
             Kind::Fem => "FEM",
         }
-    }
-
-    /// Limits of the model, with the case's settings and the model's own for the rest.
-    pub fn limits(self, parameters: &TissueParameters) -> Limits {
-        let mut parameters = parameters.clone();
-        if self == Kind::Relaxed {
-            parameters.relaxation_iterations = 8;
-        }
-        parameters.validate().expect("the case gives valid settings")
     }
 
     pub fn on(self, scene: &Scene, parameters: &TissueParameters) -> Box<dyn TissueModel> {
@@ -39,7 +28,10 @@ impl Kind {
                 fem.settings.max_cycles = 40;
                 Box::new(fem)
             }
-            Kind::ChainMail | Kind::Relaxed => Box::new(ChainMailTissue::new(scene, self.limits(parameters))),
+            Kind::ChainMail => {
+                let limits = parameters.validate().expect("the case gives valid settings");
+                Box::new(ChainMailTissue::new(scene, limits))
+            }
         }
     }
 }

@@ -40,44 +40,24 @@ pub(super) fn grip(model: &ChainMail, held: Option<Held>) -> (Option<Grip>, Held
 
 /// Puts what is held in place; what that moves is active. Whether anything was not there.
 pub(super) fn put(model: &ChainMail, state: &mut TissueState, grip: &Grip) -> bool {
-    let mut moved = false;
-    let [planes, rows] = planes_and_rows(model, grip);
-    for k in planes {
-        for j in rows.clone() {
-            moved |= put_row(model, state, grip, [j, k]);
-        }
-    }
-    moved
-}
-
-/// Returns the planes of what is held, and the rows of each.
-pub(super) fn planes_and_rows(model: &ChainMail, grip: &Grip) -> [std::ops::Range<usize>; 2] {
-    let [_, j, k] = model.lattice.cell(grip.element);
-    [
-        around(k, grip, model.lattice.dims[2]),
-        around(j, grip, model.lattice.dims[1]),
-    ]
-}
-
-fn around(centre: usize, grip: &Grip, count: usize) -> std::ops::Range<usize> {
-    centre.saturating_sub(grip.beside)..(centre + grip.beside + 1).min(count)
-}
-
-/// Puts what is held in one row of `planes_and_rows` in its place, as `put` does.
-pub(super) fn put_row(model: &ChainMail, state: &mut TissueState, grip: &Grip, [j, k]: [usize; 2]) -> bool {
-    let [held_i, ..] = model.lattice.cell(grip.element);
-    let part = model.part(grip.element);
-    let cells = around(held_i, grip, model.lattice.dims[0]);
+    let cell = model.lattice.cell(grip.element);
+    let [cells, rows, planes] = [0, 1, 2].map(|axis| {
+        let end = (cell[axis] + grip.beside + 1).min(model.lattice.dims[axis]);
+        cell[axis].saturating_sub(grip.beside)..end
+    });
     let wanted = Stretch {
         start: cells.start as u32,
         end: cells.end as u32,
     };
+    let part = model.part(grip.element);
     let mut moved = false;
-    for run in model.rows.numbers(j + model.lattice.dims[1] * k) {
-        if model.part_of_run(run) == part {
-            let of_run = model.rows.runs[run];
-            for n in elements(wanted.within(of_run.start_i, of_run.len)) {
-                moved |= put_one(model, state, of_run.first + n, run, grip.at, [j, k]);
+    for [j, k] in planes.flat_map(|k| rows.clone().map(move |j| [j, k])) {
+        for run in model.rows.numbers(j + model.lattice.dims[1] * k) {
+            if model.part_of_run(run) == part {
+                let of_run = model.rows.runs[run];
+                for n in elements(wanted.within(of_run.start_i, of_run.len)) {
+                    moved |= put_one(model, state, of_run.first + n, run, grip.at, [j, k]);
+                }
             }
         }
     }

@@ -8,7 +8,7 @@
 //!
 //! A step works on what moves: `activity` remembers which stretches those are, `sweep` follows them outward, `residual`
 //! verifies what a pass leaves, `project` is for what sweeps do not solve, `follow` for what fixed tissue does not let
-//! happen, `relax` makes the body elastic where that is asked for.
+//! happen.
 
 mod activity;
 mod along_x;
@@ -23,12 +23,9 @@ mod memory;
 mod model;
 mod project;
 mod propagate;
-mod relax;
 mod residual;
-mod segments;
 mod solve;
 mod spans;
-mod springs;
 mod state;
 mod sweep;
 #[cfg(test)]

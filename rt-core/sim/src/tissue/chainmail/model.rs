@@ -1,7 +1,6 @@
 //! Model of a ChainMail body: topology and limits, built once.
 
 use super::classes::Classes;
-use super::segments::Segments;
 use super::spans::{Links, Rows, links_along};
 use crate::limits::Limits;
 use crate::scene::{Lattice, Scene};
@@ -14,7 +13,6 @@ pub struct ChainMail {
     limits: Limits,
     pub(crate) classes: Classes,
     pub(crate) rows: Rows,
-    pub(crate) segments: Segments,
     /// Links along x, y and z.
     pub(crate) links: [Links; 3],
     /// First and one past the last occupied row j of each plane k.
@@ -49,7 +47,6 @@ impl ChainMail {
             part_is_fixed[part as usize] |= (run.first..run.end()).any(|e| classes.is_fixed(lattice.structure(e)));
         }
         ChainMail {
-            segments: Segments::of(scene, &rows, &classes),
             limits,
             links,
             rows_of_plane: rows_of_plane.collect(),
@@ -88,7 +85,7 @@ impl ChainMail {
         let links = self.links.iter().map(Links::bytes).sum::<usize>();
         let parts = size_of::<u32>() * self.part_of_run.capacity() + self.part_is_fixed.capacity();
         let planes = size_of::<[usize; 2]>() * self.rows_of_plane.capacity();
-        links + self.rows.bytes() + self.segments.bytes() + parts + planes
+        links + self.rows.bytes() + parts + planes
     }
 
     /// Runs the portable kernels, whatever the processor has.

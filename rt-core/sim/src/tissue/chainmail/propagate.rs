@@ -8,9 +8,10 @@ use super::sweep::Pass;
 use crate::tissue::{HeldOutcome, Solve, StepReport};
 
 /// Outward sweeps tried first.
-pub(super) const MAX_SWEEPS: u32 = 6;
+const MAX_SWEEPS: u32 = 6;
 /// Passes of projections tried after that.
-pub(super) const MAX_PROJECTIONS: u32 = 12;
+const MAX_PROJECTIONS: u32 = 12;
+
 /// Sweeps, then projects, then re-anchors, until the residual is within tolerance.
 pub(super) fn propagate<K: Loops>(
     model: &ChainMail,

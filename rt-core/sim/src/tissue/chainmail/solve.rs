@@ -5,7 +5,7 @@ use super::held::{self, Grip};
 use super::kernels::Portable;
 use super::loops::Loops;
 use super::model::ChainMail;
-use super::propagate::{MAX_SWEEPS, propagate};
+use super::propagate::propagate;
 use super::state::TissueState;
 use super::sweep::Pass;
 use crate::tissue::{Held, Solve, StepReport};
@@ -54,11 +54,11 @@ fn dispatch(model: &ChainMail, state: &mut TissueState, grip: Option<Grip>, repo
     solve::<Portable>(model, state, grip, report)
 }
 
-/// Puts the held element in place, brings the body into its limits, relaxes it and brings it there again.
+/// Puts the held element in place and brings the body into its limits.
 fn solve<K: Loops>(model: &ChainMail, state: &mut TissueState, mut grip: Option<Grip>, report: &mut StepReport) -> f32 {
     let farthest = grip.map_or(0.0, |g| g.at.iter().fold(0.0, |a: f32, c| a.max(c.abs())));
     let slack = slack(model, farthest.max(state.max_displacement));
-    let mut residual = match &mut grip {
+    let residual = match &mut grip {
         // A step can only be undone to a state that meets the limits.
         Some(grip) if model.part_is_fixed(model.part(grip.element)) && state.residual <= model.limits().tolerance => {
             follow::<K>(model, state, grip, slack, report)
@@ -70,15 +70,6 @@ fn solve<K: Loops>(model: &ChainMail, state: &mut TissueState, mut grip: Option<
         None if state.active.is_empty() => 0.0,
         None => Pass::new(model, state, [0; 3], slack).check::<K>(),
     };
-    if let Some(relaxation) = &model.limits().relaxation
-        && (grip.is_some() || state.max_displacement > 0.0)
-    {
-        for half in 0..2 * relaxation.iterations {
-            K::relax_rows(model, state, grip.as_ref(), relaxation, half as usize % 2);
-        }
-        report.passes += relaxation.iterations;
-        residual = settle::<K>(model, state, grip.as_ref(), slack, report);
-    }
     state.measure(model, K::largest_square);
     state.residual = residual.max(state.settled);
     state.residual
@@ -88,31 +79,4 @@ fn solve<K: Loops>(model: &ChainMail, state: &mut TissueState, mut grip: Option<
 fn slack(model: &ChainMail, farthest: f32) -> f32 {
     const LEAST: f32 = 1e-6;
     (LEAST + f32::EPSILON * farthest).min(0.25 * model.limits().tolerance)
-}
-
-/// Brings a body that is relaxed back into its limits.
-fn settle<K: Loops>(
-    model: &ChainMail,
-    state: &mut TissueState,
-    grip: Option<&Grip>,
-    slack: f32,
-    report: &mut StepReport,
-) -> f32 {
-    let middle = model.lattice.dims.map(|n| n / 2);
-    let centre = grip.map_or(middle, |g| model.lattice.cell(g.element));
-    let mut residual = Pass::new(model, state, centre, slack).check_all::<K>();
-    if residual <= model.limits().tolerance {
-        return residual;
-    }
-    if let Some(grip) = grip {
-        return propagate::<K>(model, state, grip, slack, report);
-    }
-    for _ in 0..MAX_SWEEPS {
-        residual = Pass::new(model, state, centre, slack).outward::<K>();
-        report.passes += 1;
-        if residual <= model.limits().tolerance {
-            break;
-        }
-    }
-    residual
 }

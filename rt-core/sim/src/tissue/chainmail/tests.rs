@@ -3,7 +3,6 @@
 mod carried;
 mod queue;
 mod reference;
-mod relax;
 mod scene;
 mod state;
 mod wander;

@@ -5,12 +5,9 @@
 
 mod clamp;
 mod lanes;
-mod relax;
 mod violation;
 
 use super::kernels::{Kernels, Scaled, Stretch};
-use super::segments::{LEFT, RIGHT, Segment};
-use super::springs::{RowSprings, Shares};
 
 /// Kernels for processors with AVX2 (`ChainMail::vectors`), and for no other.
 pub(crate) struct Avx2;
@@ -63,22 +60,6 @@ impl Kernels for Avx2 {
 #[inline(always)]
 fn shortest(u: &[&[f32]; 3]) -> usize {
     u[0].len().min(u[1].len()).min(u[2].len())
-}
-
-impl RowSprings for Avx2 {
-    #[inline(always)]
-    fn relax(u: &mut [f32], segment: &Segment, shares: &Shares) {
-        let end = |first: u32| first as usize + segment.len as usize;
-        let after = usize::from(segment.open & RIGHT == 0);
-        let ends_inside = end(segment.first) + after <= u.len() && segment.beside.iter().all(|&b| end(b) <= u.len());
-        let begins_inside = segment.open & LEFT != 0 || segment.first > 0;
-        if !ends_inside || !begins_inside {
-            return;
-        }
-        // SAFETY: the segment, its neighbours beside it and those in its row, where it has them, are inside `u`;
-        // AVX2 is there (type's doc).
-        unsafe { relax::relax(u.as_mut_ptr(), segment, shares) }
-    }
 }
 
 #[cfg(test)]

@@ -1,9 +1,8 @@
-//! The same sweeps and relaxation over every element in f64, plainly written: what f32, the scale and looking only
+//! The same sweeps over every element in f64, plainly written: what f32, the scale and looking only
 //! at what moves cost in error. Slow.
 
 use crate::tissue::Held;
 use crate::tissue::chainmail::ChainMail;
-use crate::tissue::chainmail::segments::{LEFT, RIGHT};
 
 /// Sweeps of one step, at most.
 const MAX_SWEEPS: usize = 50;
@@ -23,7 +22,7 @@ impl Reference {
         }
     }
 
-    /// Recovers, puts the held element in place, sweeps, relaxes and sweeps again; returns the residual in elements.
+    /// Recovers, puts the held element in place, and sweeps; returns the residual in elements.
     ///
     /// # Panics
     ///
@@ -35,14 +34,7 @@ impl Reference {
         let (rest, h) = (model.lattice.rest_m(held.element), model.lattice.spacing_m);
         let at = [0, 1, 2].map(|a| (held.position_m[a] - rest[a]) / h);
         self.u[held.element as usize] = at;
-        let mut residual = self.sweep(model, held.element);
-        if let Some(relaxation) = model.limits().relaxation {
-            for half in 0..2 * relaxation.iterations as usize {
-                self.relax(model, held.element, half % 2);
-            }
-            residual = self.sweep(model, held.element);
-        }
-        residual
+        self.sweep(model, held.element)
     }
 
     fn sweep(&mut self, model: &ChainMail, held: u32) -> f64 {
@@ -108,46 +100,6 @@ impl Reference {
             }
         }
         worst
-    }
-
-    /// Makes one half pass of relaxation, as `relax::half_pass`.
-    fn relax(&mut self, model: &ChainMail, held: u32, parity: usize) {
-        let Some(relaxation) = model.limits().relaxation else {
-            return;
-        };
-        let at = self.u[held as usize];
-        let [_, ny, nz] = model.lattice.dims;
-        let (shear, foundation) = (f64::from(relaxation.shear), f64::from(relaxation.foundation));
-        for (j, k) in (0..nz).flat_map(|k| (0..ny).map(move |j| (j, k))) {
-            if (j + k) % 2 != parity {
-                continue;
-            }
-            for segment in model.segments.of_row(j + ny * k) {
-                let first = segment.first as usize;
-                let mut left = self.u[first - usize::from(segment.open & LEFT == 0)];
-                for n in 0..segment.len as usize {
-                    let own = self.u[first + n];
-                    let is_last = n + 1 == segment.len as usize;
-                    let right = if is_last && segment.open & RIGHT != 0 {
-                        own
-                    } else {
-                        self.u[first + n + 1]
-                    };
-                    let beside = segment.beside.map(|b| self.u[b as usize + n]);
-                    for c in 0..3 {
-                        let k = [0, 1, 2].map(|axis| if axis == c { 1.0 } else { shear });
-                        let springs = 2.0 * (k[0] + k[1] + k[2]) + foundation;
-                        let pull = k[0] * (left[c] + right[c])
-                            + k[1] * (beside[0][c] + beside[1][c])
-                            + k[2] * (beside[2][c] + beside[3][c]);
-                        let part = f64::from(relaxation.weight) / (springs + 2.0 * k[0]);
-                        self.u[first + n][c] = own[c] + part * (pull - springs * own[c]);
-                    }
-                    left = own;
-                }
-                self.u[held as usize] = at;
-            }
-        }
     }
 }
 
