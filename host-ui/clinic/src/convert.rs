@@ -18,7 +18,9 @@ use stylet_files::together;
 use stylet_files::{self as files, FileError, bytes, scene};
 use stylet_implant::plan::exchange::seeds_of_source;
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{DayOfImplant, Mapped, SeedDefaults, SeedFile, is_dose_volume, places_m, read_any_dose, read_source};
+use stylet_implant::readers::{
+    DayOfImplant, Mapped, SeedDefaults, SeedFile, is_dose_volume, places_m, read_any_dose, read_source,
+};
 
 const MAX_PLAN_BYTES: u64 = 4 << 20;
 

@@ -16,7 +16,9 @@ use stylet_dose::source::Source;
 use stylet_dose::structure::Structure;
 use stylet_files::dicom::plan::{Date, PlanSeed};
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{DayOfImplant, Declared, Mapped, SeedDefaults, contours, dose_seed, labels, places, read_source};
+use stylet_implant::readers::{
+    DayOfImplant, Declared, Mapped, SeedDefaults, contours, dose_seed, labels, places, read_source,
+};
 use stylet_population as population;
 
 /// Options of all commands that compute dose.

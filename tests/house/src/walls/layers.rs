@@ -234,11 +234,7 @@ pub const LAYERS: &[Layer] = &[
     },
     Layer {
         folder: "host-ui/dose",
-        may_use: &[
-            "shm-schema/anatomy",
-            "shm-schema/report",
-            "shm-schema/random",
-        ],
+        may_use: &["shm-schema/anatomy", "shm-schema/report", "shm-schema/random"],
         never: &[WINDOW, PORTS, ARGUMENTS, PROGRAM, DEVICES, DICOM, SYSTEM],
         not_itself: &[],
     },
