@@ -130,7 +130,7 @@ impl Program {
         (Self::start(command), person)
     }
 
-    fn procedure(named: &Named) -> Self {
+    fn procedure(named: &Named, log: &Path) -> Self {
         let mut command = Command::new(program("host-ui"));
         command
             .args([
@@ -143,7 +143,7 @@ impl Program {
             ])
             .arg(scratch("motion").join("out"))
             .stdout(Stdio::null())
-            .stderr(File::create(words_of_procedure()).expect("written"));
+            .stderr(File::create(log).expect("written"));
         Self::start(&mut command)
     }
 
@@ -164,15 +164,13 @@ impl Drop for Program {
     }
 }
 
-fn words_of_procedure() -> PathBuf {
-    scratch("motion").with_extension("log")
-}
-
 /// The server, the operator's relay and its program, with what is needed to end them.
 struct Way {
     program: Program,
     relay: Program,
     server: Program,
+    /// What the program says of a failure.
+    log: PathBuf,
     cable: Proxy,
     /// Terminals and pipes of the relay and the server.
     persons: [Option<File>; 2],
@@ -226,10 +224,17 @@ impl Way {
                 (Program::start(&mut command), reader, None)
             }
         };
+        // A busy PC joins for longer than a procedure looks for a core.
+        assert!(
+            Host::new(far).sees_the_core(Duration::from_secs(40)),
+            "{end:?}: not joined"
+        );
+        let log = log.with_file_name("procedure");
         Self {
-            program: Program::procedure(far),
+            program: Program::procedure(far, &log),
             relay,
             server,
+            log,
             cable,
             persons: [its_person, person],
             _readers: [its_reader, reader],
@@ -299,7 +304,7 @@ fn trial(way: &mut Way, end: End, beside: &mut Host, after: Duration) -> Trial {
     beside.poll();
     beside.taken.clear();
     if !watch(beside, Duration::from_secs(40), moves) {
-        let words = std::fs::read_to_string(words_of_procedure());
+        let words = std::fs::read_to_string(&way.log);
         panic!("{end:?}: the needle does not move; its procedure said: {words:?}");
     }
     watch(beside, after, |_| false);
