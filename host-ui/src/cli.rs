@@ -13,8 +13,7 @@ use stylet_files::dicom::Shared;
 use stylet_files::together;
 use stylet_host::core_args::CoreArgs;
 use stylet_host::record;
-use stylet_host::roster::Trainee;
-use stylet_implant::class;
+use stylet_host::roster::{self, Trainee};
 use stylet_implant::procedure;
 use stylet_manual::{ManualArgs, Product};
 use stylet_shm_schema::Instance;
@@ -243,7 +242,7 @@ impl Cli {
 }
 
 fn name(text: &str) -> Result<String, String> {
-    match class::is_name(text) {
+    match roster::is_name(text) {
         true => Ok(text.to_owned()),
         false => Err("a name is 1 to 60 letters, digits, spaces, '-', '_' or '.', and begins with no '.'".to_owned()),
     }

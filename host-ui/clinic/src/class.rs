@@ -1,11 +1,11 @@
 //! The command `host-ui class`: comparison of trainees, and of each one's progress.
 
 use super::CommandError;
+use crate::trainees::{self, Class};
 use clap::Args;
 use std::path::PathBuf;
 use stylet_base::output::new_folder;
 use stylet_base::{write_streamed, write_whole};
-use stylet_implant::class::{self, Class};
 
 const HELP: &str = "\
 Reads DIR/NAME/DATE/score.json, which 'host-ui --class DIR --name NAME' writes at the end of each procedure. Folders of several rooms
@@ -33,10 +33,10 @@ impl ClassArgs {
     pub fn run(self) -> Result<(), CommandError> {
         let class = Class::read(&self.folders)?;
         new_folder(&self.out)?;
-        write_whole(&self.out.join("class.html"), class::page(&class).as_bytes())?;
+        write_whole(&self.out.join("class.html"), trainees::page(&class).as_bytes())?;
         let table = self.out.join("class.csv");
         write_streamed(&table, |file| {
-            class::write_table(&class, file).map_err(std::io::Error::other)
+            trainees::write_table(&class, file).map_err(std::io::Error::other)
         })?;
         for why in &class.left_out {
             println!("left out: {}", stylet_base::format::printable_line(why));

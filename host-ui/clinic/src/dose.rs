@@ -1,6 +1,7 @@
 //! The command `host-ui dose`.
 
 use super::CommandError;
+use crate::sheet::{self, Column, Implant, State};
 use clap::Args;
 use common::{Common, Loaded, within};
 use std::path::{Path, PathBuf};
@@ -15,7 +16,6 @@ use stylet_files::dicom::Shared;
 use stylet_files::together;
 use stylet_implant::provenance;
 use stylet_implant::readers::read_points;
-use stylet_implant::sheet::{self, Column, Implant, State};
 
 pub mod common;
 pub mod write;

@@ -3,6 +3,7 @@
 use super::CommandError;
 use super::dose::common::within;
 use super::dose::write;
+use crate::finder::{self, Found, Search};
 use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,6 @@ use stylet_files::dicom::{self, Shared};
 use stylet_files::image::read_values;
 use stylet_files::together;
 use stylet_files::{bytes, watched};
-use stylet_implant::finder::{self, Found, Search};
 use stylet_implant::provenance;
 
 /// Largest number of seeds in an implant.

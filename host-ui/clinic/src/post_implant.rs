@@ -4,6 +4,7 @@
 use super::CommandError;
 use super::dose::common::{Common, Loaded, within};
 use super::dose::{POINTS_FOR_DOSE, file_name, write};
+use crate::sheet::{self, Column, Implant, State};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use stylet_base::output::new_folder;
@@ -15,7 +16,6 @@ use stylet_files::dicom::Shared;
 use stylet_files::together;
 use stylet_implant::provenance;
 use stylet_implant::registration::RigidFit;
-use stylet_implant::sheet::{self, Column, Implant, State};
 
 const HELP: &str = "\
 Seeds are those of `host-ui dose --seeds`; those of a CT come from `host-ui find-seeds`. A state with structures of its own

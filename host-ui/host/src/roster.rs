@@ -2,6 +2,7 @@
 
 use crate::link::{Link, LinkError};
 use crate::moments::STOPPED;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::{HapticState, Mark, PlanInForce, Relayed, Request, Session};
@@ -13,6 +14,24 @@ pub struct Trainee {
     pub name: String,
     /// Instance of their core, or of a relay in its place.
     pub instance: Instance,
+}
+
+/// Longest name of a trainee, in bytes.
+const LONGEST_NAME: usize = 60;
+
+/// Returns whether a name is valid for a folder inside a class: not empty, not hidden, no path.
+pub fn is_name(name: &str) -> bool {
+    let is_plain = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_' | '.');
+    !name.is_empty()
+        && name.len() <= LONGEST_NAME
+        && name.trim() == name
+        && !name.starts_with('.')
+        && name.chars().all(is_plain)
+}
+
+/// Returns the folder for a debrief that is written now.
+pub fn folder_of(class: &Path, name: &str) -> PathBuf {
+    class.join(name).join(stylet_base::format::utc_now())
 }
 
 /// State of one trainee.
@@ -51,4 +70,19 @@ pub fn stop(link: &mut Link) -> Result<(), LinkError> {
     link.send(&Request::StopHand)?;
     let text = STOPPED.to_owned();
     link.send(&Request::Mark(Mark { text, before_s: 0.0 })).map(|_| ())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_valid_for_a_folder() {
+        for name in ["Otto", "Ida Ö.", "group_2-b"] {
+            assert!(is_name(name), "{name}");
+        }
+        for name in ["", ".hidden", "..", "a/b", " a", "a\nb", &"x".repeat(61)] {
+            assert!(!is_name(name), "{name:?}");
+        }
+    }
 }

@@ -2,8 +2,6 @@
 
 #![warn(missing_docs)]
 
-pub mod class;
-pub mod finder;
 pub mod intraoperative;
 pub mod linked;
 pub mod pairing;
@@ -15,5 +13,4 @@ pub mod readers;
 pub mod received;
 pub mod registration;
 pub mod score;
-pub mod sheet;
 pub mod workflow;

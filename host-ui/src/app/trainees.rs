@@ -12,7 +12,6 @@ use std::time::{Duration, Instant};
 use stylet_base::format;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_host::roster::{self, Glance, Trainee};
-use stylet_implant::class;
 use stylet_implant::received::ReceivedProcedure;
 use stylet_shm_schema::flags;
 
@@ -90,7 +89,7 @@ impl Trainees {
     }
 
     fn folder_of(&self, name: &str) -> Option<PathBuf> {
-        Some(class::folder_of(self.class.as_ref()?, name))
+        Some(roster::folder_of(self.class.as_ref()?, name))
     }
 }
 

@@ -302,7 +302,9 @@ fn hears_the_needle(address: &str) -> bool {
     let Ok(mut stream) = TcpStream::connect(address) else {
         return false;
     };
-    stream.set_read_timeout(Some(Duration::from_secs(1))).expect("a timeout");
+    stream
+        .set_read_timeout(Some(Duration::from_secs(1)))
+        .expect("a timeout");
     let (mut heard, mut bytes) = (Vec::new(), [0; 4096]);
     let end = Instant::now() + Duration::from_secs(2);
     while Instant::now() < end && heard.windows(9).all(|word| word != b"TRANSFORM") {

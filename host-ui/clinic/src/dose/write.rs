@@ -1,6 +1,8 @@
 //! Results as CSV, JSON and tables; the header of each column gives its unit.
 
 use crate::CommandError;
+use crate::finder::FoundSeed;
+use crate::sheet::{NotComputed, Row};
 use serde_json::{Value, json};
 use std::path::Path;
 use stylet_base::format::cell;
@@ -9,9 +11,7 @@ use stylet_dose::Dvh;
 use stylet_dose::criterion::CriterionCount;
 use stylet_dose::perturb::{PERCENTILES, Spread};
 use stylet_files::dicom::Identity;
-use stylet_implant::finder::FoundSeed;
 use stylet_implant::readers::seeds::{AXIS, FOUND, PLACE};
-use stylet_implant::sheet::{NotComputed, Row};
 
 pub fn json(path: &Path, value: &Value) -> Result<(), CommandError> {
     let text = serde_json::to_string_pretty(value)?;

@@ -336,6 +336,7 @@ pub const LAYERS: &[Layer] = &[
             "shm-schema",
             "shm-schema/anatomy",
             "shm-schema/manual",
+            "shm-schema/report",
         ],
         never: &[WINDOW, DEVICES],
         not_itself: &[PORTS, DICOM],

@@ -1,12 +1,12 @@
 //! A synthetic CT of a known implant: the seeds found in it.
 
 use super::{FinderError, Found, Search, find};
-use crate::pairing;
 use nalgebra::{Matrix3, Vector3};
 use phantom::Phantom;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, DosePoints, Dvh, Region, Seed, Source, Structure};
 use stylet_files::{VoxelFrame, VoxelValues};
+use stylet_implant::pairing;
 
 mod phantom;
 

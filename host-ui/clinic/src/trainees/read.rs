@@ -3,12 +3,10 @@
 use super::Attempt;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use stylet_base::format;
 use stylet_host::moments::{MomentKind, STOPPED};
 
 /// Largest size of a score.
 const MOST_BYTES: u64 = 16 << 20;
-const LONGEST_NAME: usize = 60;
 
 /// Error of folders that cannot be read, or are empty.
 #[derive(Debug, thiserror::Error)]
@@ -35,21 +33,6 @@ pub struct Class {
     pub left_out: Vec<String>,
     /// Files that were read.
     pub files: Vec<PathBuf>,
-}
-
-/// Returns whether a name is valid for a folder inside a class: not empty, not hidden, no path.
-pub fn is_name(name: &str) -> bool {
-    let is_plain = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_' | '.');
-    !name.is_empty()
-        && name.len() <= LONGEST_NAME
-        && name.trim() == name
-        && !name.starts_with('.')
-        && name.chars().all(is_plain)
-}
-
-/// Returns the folder for a debrief that is written now.
-pub fn folder_of(class: &Path, name: &str) -> PathBuf {
-    class.join(name).join(format::utc_now())
 }
 
 impl Class {

@@ -7,7 +7,7 @@ mod read;
 mod table;
 
 pub use page::page;
-pub use read::{Class, ClassError, folder_of, is_name};
+pub use read::Class;
 pub use table::write as write_table;
 
 /// Procedure of a trainee.
