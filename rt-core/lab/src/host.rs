@@ -152,6 +152,7 @@ impl Host {
         script: Script,
         pose_times: Arc<PoseTimes>,
         warm_up_ticks: u64,
+        moves_second: bool,
     ) -> Result<Self, HostError> {
         Ok(Self {
             warm_up_ticks,
@@ -162,7 +163,7 @@ impl Host {
             last_tick: 0,
             step: 0,
             renewed_ns: 0,
-            moves_second: false,
+            moves_second,
             report: HostReport {
                 tip_to_host: histogram(),
                 tissue_to_host: histogram(),
@@ -173,11 +174,6 @@ impl Host {
                 insertions: 0,
             },
         })
-    }
-
-    /// Moves the hand of a second device as well, if the run has one.
-    pub fn with_second(self, moves_second: bool) -> Self {
-        Self { moves_second, ..self }
     }
 
     /// Watches until `duration_ns` after the warm-up, or until `interrupted` or `stop`.

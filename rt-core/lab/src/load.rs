@@ -66,17 +66,15 @@ impl Load {
     }
 
     fn work(self, cores: usize) -> Vec<LoadProcess> {
-        let some = |work: LoadProcess, count: usize| std::iter::repeat_n(work, count);
         match self {
             Self::None | Self::Window => Vec::new(),
-            Self::Cpu => some(LoadProcess::Cpu, cores).collect(),
-            Self::Memory => some(LoadProcess::Memory, cores).collect(),
-            Self::Io => some(LoadProcess::Io, 2).collect(),
+            Self::Cpu => vec![LoadProcess::Cpu; cores],
+            Self::Memory => vec![LoadProcess::Memory; cores],
+            Self::Io => vec![LoadProcess::Io; 2],
             Self::Ui => vec![LoadProcess::Ui],
-            Self::All => some(LoadProcess::Cpu, cores)
-                .chain(some(LoadProcess::Memory, cores))
-                .chain(some(LoadProcess::Io, 2))
-                .chain([LoadProcess::Ui])
+            Self::All => [Self::Cpu, Self::Memory, Self::Io, Self::Ui]
+                .iter()
+                .flat_map(|l| l.work(cores))
                 .collect(),
         }
     }
@@ -87,22 +85,21 @@ impl Load {
             return "the operator's window, drawing without a pause".to_owned();
         }
         let all = self.work(cores);
-        let count = |work: LoadProcess| all.iter().filter(|w| **w == work).count();
-        let parts = [
-            (count(LoadProcess::Cpu), "computing"),
-            (count(LoadProcess::Memory), "streaming 64 MiB through memory"),
-            (count(LoadProcess::Io), "writing 4 MiB and syncing"),
-            (count(LoadProcess::Ui), "copying all that is published"),
+        let kinds = [
+            (LoadProcess::Cpu, "computing"),
+            (LoadProcess::Memory, "streaming 64 MiB through memory"),
+            (LoadProcess::Io, "writing 4 MiB and syncing"),
+            (LoadProcess::Ui, "copying all that is published"),
         ];
-        let said: Vec<String> = parts
+        let counted = kinds.map(|(kind, what)| (all.iter().filter(|w| **w == kind).count(), what));
+        let said: Vec<String> = counted
             .iter()
             .filter(|(n, _)| *n > 0)
             .map(|(n, what)| format!("{n} {what}"))
             .collect();
-        if said.is_empty() {
-            "nothing but the measurement".to_owned()
-        } else {
-            format!("processes of normal priority: {}", said.join(", "))
+        match said.is_empty() {
+            true => "nothing but the measurement".to_owned(),
+            false => format!("processes of normal priority: {}", said.join(", ")),
         }
     }
 }

@@ -5,7 +5,7 @@ mod threads;
 pub use threads::Process;
 
 use flate2::read::GzDecoder;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -234,16 +234,9 @@ impl Machine {
         found
     }
 
-    /// Interrupts served by `core` since start, all kinds.
-    pub fn interrupts_served(&self, core: usize) -> Option<u64> {
-        let table = self.text("proc/interrupts")?;
-        let mut lines = table.lines();
-        let column = lines
-            .next()?
-            .split_whitespace()
-            .position(|c| c == format!("CPU{core}"))?;
-        let count = |line: &str| line.split_whitespace().nth(column + 1)?.parse::<u64>().ok();
-        Some(lines.filter_map(count).sum())
+    /// Returns the interrupts that `core` served since the start, by number and name.
+    pub fn interrupts_served(&self, core: usize) -> BTreeMap<String, u64> {
+        interrupts(&self.text("proc/interrupts").unwrap_or_default(), core)
     }
 
     /// Returns the steal time of `core` as the kernel reports it, in seconds: time in which the hypervisor ran
@@ -323,6 +316,26 @@ impl Machine {
     pub fn exists(&self, path: &str) -> bool {
         Path::new(&self.path(path)).exists()
     }
+}
+
+/// Returns the column of `core` in `/proc/interrupts`, by number and name.
+pub fn interrupts(table: &str, core: usize) -> BTreeMap<String, u64> {
+    let mut lines = table.lines();
+    let head: Vec<&str> = lines.next().unwrap_or_default().split_whitespace().collect();
+    let Some(column) = head.iter().position(|c| *c == format!("CPU{core}")) else {
+        return BTreeMap::new();
+    };
+    let row = |line: &str| {
+        let (number, rest) = line.trim_start().split_once(':')?;
+        let count = rest.split_whitespace().nth(column)?.parse().ok()?;
+        let name: Vec<&str> = rest.split_whitespace().skip(head.len()).collect();
+        let name = match number.parse::<u32>() {
+            Ok(n) => format!("IRQ {n} ({})", name.last()?),
+            Err(_) => name.join(" ").to_lowercase(),
+        };
+        Some((name, count))
+    };
+    lines.filter_map(row).collect()
 }
 
 /// Reads a list of cores as the kernel prints it: `0-2,5`.

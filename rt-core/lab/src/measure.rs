@@ -210,9 +210,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
             });
         let host = threads.spawn(|| {
             let warm_up = warm_up_ticks(options.haptic_period_ns);
-            let host = Host::new(&options.instance, script, pose_times, warm_up);
-            let moves_second = options.second.is_some();
-            let host = host.map(|host| host.with_second(moves_second));
+            let host = Host::new(&options.instance, script, pose_times, warm_up, options.second.is_some());
             let report = host.and_then(|h| h.run(setup.duration_ns, || interrupted.load(Ordering::Acquire), stop));
             // SYNC: pairs with the acquire loads of bridge and watches; nothing but the flag is carried.
             stop.store(true, Ordering::Release);

@@ -18,7 +18,8 @@ pub struct CoreWatch {
 
 /// Reads the counters four times a second until `stop`.
 pub fn watch(machine: &Machine, core: usize, stop: &AtomicBool) -> CoreWatch {
-    let count = || (machine.steal_s(core), machine.interrupts_served(core));
+    let served = || machine.interrupts_served(core).into_values().reduce(|a, b| a + b);
+    let count = || (machine.steal_s(core), served());
     let (steal_before, served_before) = count();
     let mut seen = CoreWatch {
         core,

@@ -1,5 +1,6 @@
 //! A campaign that is killed three times ends as one report in which every second counts exactly once.
 
+use crate::sweep;
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -30,15 +31,6 @@ fn measured_s(out: &Path) -> f64 {
         record["measured_ns"].as_f64()
     };
     files.filter_map(|f| of(f.path())).sum::<f64>() / 1e9
-}
-
-/// Removes the files of a killed process from shared memory.
-fn sweep(process: u32) {
-    let left = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
-    for file in left.filter(|f| f.file_name().to_string_lossy().contains(&format!("_lab-{process}"))) {
-        let path = file.path();
-        let _ = std::fs::remove_file(&path).or_else(|_| std::fs::remove_dir_all(&path));
-    }
 }
 
 /// Kills the process after that progress; its loads follow their parent and end too.

@@ -1,6 +1,7 @@
 //! Every injected cause is named, and no other.
 
 use crate::inject::{ALL, Injection, NAME, Target};
+use crate::sweep;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -75,14 +76,6 @@ fn folder(name: &str) -> PathBuf {
     ))
 }
 
-/// Returns the causes of each late tick, longest first.
-fn causes(outliers: &[Value]) -> Vec<Vec<Value>> {
-    outliers
-        .iter()
-        .map(|o| o["causes"].as_array().expect("a list").clone())
-        .collect()
-}
-
 /// Returns whether no instance of an ended measurement is left in the kernel.
 fn instances_left(process: i32) -> bool {
     let mounts = std::fs::read_to_string("/proc/mounts").unwrap_or_default();
@@ -103,18 +96,10 @@ fn run(injection: &Injection) -> Result<(bool, String), String> {
     child.wait().expect("ours");
     injected?;
     let outliers = outliers(&out);
-    let named = causes(&outliers)
-        .iter()
-        .filter(|c| c.first().is_some_and(injection.is_named))
-        .count();
-    let example = outliers.iter().find(|o| {
-        o["causes"]
-            .as_array()
-            .is_some_and(|c| c.first().is_some_and(injection.is_named))
-    });
-    let example = example
-        .or(outliers.first())
-        .map_or("no late tick".to_owned(), |o| o["cause"].to_string());
+    let is_named = |o: &&Value| o["causes"].get(0).is_some_and(injection.is_named);
+    let named = outliers.iter().filter(is_named).count();
+    let example = outliers.iter().find(is_named).or(outliers.first());
+    let example = example.map_or("no late tick".to_owned(), |o| o["cause"].to_string());
     assert!(!instances_left(target.process));
     Ok((
         named >= 2,
@@ -127,15 +112,16 @@ fn undisturbed(seconds: u32) {
     let out = folder("undisturbed");
     let mut child = start(&out, seconds, 100);
     child.wait().expect("ours");
-    for (outlier, causes) in outliers(&out)
-        .iter()
-        .map(|o| (&o["cause"], o["causes"].as_array().expect("a list")))
-    {
-        for cause in causes {
+    for outlier in &outliers(&out) {
+        for cause in outlier["causes"].as_array().expect("a list") {
             let who = cause["who"].as_str().expect("a name");
             let kind = cause["kind"].as_str().expect("a kind");
             let injected = ["stopped", "throttled", "lost-priority", "same-priority", "timers"];
-            assert!(!who.starts_with(NAME) && !injected.contains(&kind), "{outlier}");
+            assert!(
+                !who.starts_with(NAME) && !injected.contains(&kind),
+                "{}",
+                outlier["cause"]
+            );
         }
     }
 }
@@ -202,13 +188,5 @@ fn a_killed_measurement_leaves_no_trace_instance() {
         std::thread::sleep(Duration::from_millis(20));
     }
     assert!(!instances_left(target.process));
-    let left = std::fs::read_dir("/dev/shm").into_iter().flatten().flatten();
-    for file in left.filter(|f| {
-        f.file_name()
-            .to_string_lossy()
-            .contains(&format!("_lab-{}", target.process))
-    }) {
-        let path = file.path();
-        let _ = std::fs::remove_file(&path).or_else(|_| std::fs::remove_dir_all(&path));
-    }
+    sweep(target.process as u32);
 }

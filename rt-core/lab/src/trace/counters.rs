@@ -19,7 +19,7 @@ pub struct Counters {
 
 /// Reads every counter of `core`.
 pub fn read(machine: &Machine, core: usize, at_ns: u64) -> Counters {
-    let mut named = interrupts(&machine.text("proc/interrupts").unwrap_or_default(), core);
+    let mut named = machine.interrupts_served(core);
     let mut add = |name: String, path: &str, key: Option<&str>| {
         let text = machine.text(path).unwrap_or_default();
         let value = match key {
@@ -67,26 +67,6 @@ fn smi(machine: &Machine, core: usize) -> Option<u64> {
     Some(u64::from_ne_bytes(bytes))
 }
 
-/// Returns the column of `core` in `/proc/interrupts`, by number and name.
-fn interrupts(table: &str, core: usize) -> BTreeMap<String, u64> {
-    let mut lines = table.lines();
-    let head: Vec<&str> = lines.next().unwrap_or_default().split_whitespace().collect();
-    let Some(column) = head.iter().position(|c| *c == format!("CPU{core}")) else {
-        return BTreeMap::new();
-    };
-    let row = |line: &str| {
-        let (number, rest) = line.trim_start().split_once(':')?;
-        let count = rest.split_whitespace().nth(column)?.parse().ok()?;
-        let name: Vec<&str> = rest.split_whitespace().skip(head.len()).collect();
-        let name = match number.parse::<u32>() {
-            Ok(n) => format!("IRQ {n} ({})", name.last()?),
-            Err(_) => name.join(" ").to_lowercase(),
-        };
-        Some((name, count))
-    };
-    lines.filter_map(row).collect()
-}
-
 impl Counters {
     /// Returns the system management interrupts since `before`.
     pub fn smi_since(&self, before: &Self) -> Option<u64> {
@@ -111,6 +91,7 @@ impl Counters {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::machine::interrupts;
 
     #[test]
     fn the_column_of_the_core_is_read_and_only_what_counted_is_named() {
