@@ -17,8 +17,6 @@ pub struct MissBound {
     pub at_most: Option<f64>,
     /// The same as misses per hour.
     pub at_most_per_hour: Option<f64>,
-    /// 3/n, valid only if nothing was missed.
-    pub rule_of_three: Option<f64>,
 }
 
 /// Returns the bound of `misses` in `of` grid points, `rate_hz` of them a second.
@@ -30,7 +28,6 @@ pub fn of_misses(misses: u64, of: u64, rate_hz: f64) -> MissBound {
         confidence: CONFIDENCE,
         at_most,
         at_most_per_hour: at_most.map(|p| p * rate_hz * 3600.0),
-        rule_of_three: (misses == 0 && of > 0).then(|| 3.0 / of as f64),
     }
 }
 
@@ -197,9 +194,9 @@ mod tests {
     #[test]
     fn no_miss_is_bounded_by_three_in_n() {
         let b = of_misses(0, 60_000, 1_000.0);
-        let (exact, three) = (b.at_most.expect("n > 0"), b.rule_of_three.expect("no miss"));
+        let (exact, three) = (b.at_most.expect("n > 0"), 3.0 / b.of as f64);
         assert!(exact < three && exact > 0.998 * three, "{exact} {three}");
         assert!(b.at_most_per_hour.is_some_and(|h| (h - exact * 3.6e6).abs() < 1e-9));
-        assert!(of_misses(0, 0, 1_000.0).at_most.is_none() && of_misses(2, 9, 1.0).rule_of_three.is_none());
+        assert!(of_misses(0, 0, 1_000.0).at_most.is_none());
     }
 }

@@ -9,7 +9,7 @@ mod table;
 use crate::disk::{self, DiskError};
 use crate::plots::DrawError;
 use crate::saved::NotCounted;
-use crate::verdict::Outcome;
+use crate::verdict::{self, Outcome};
 use clap::Args;
 use entry::Entry;
 use std::collections::BTreeMap;
@@ -104,13 +104,9 @@ pub fn run(args: &FleetArgs) -> Result<u8, FleetError> {
 }
 
 fn exit_code(pcs: &[Pc], unread: &[NotCounted]) -> u8 {
-    let any = |outcome| pcs.iter().any(|pc| pc.latest().outcome() == outcome);
-    if any(Outcome::Fail) {
-        1
-    } else if any(Outcome::NotMeasurable) || !unread.is_empty() {
-        2
-    } else {
-        0
+    match verdict::overall(pcs.iter().map(|pc| pc.latest().outcome())) {
+        Outcome::Pass if !unread.is_empty() => Outcome::NotMeasurable.exit_code(),
+        worst => worst.exit_code(),
     }
 }
 

@@ -298,11 +298,14 @@ impl Machine {
         self.text("sys/devices/system/clocksource/clocksource0/current_clocksource")
     }
 
-    /// Returns the soft limit of this process from `/proc/self/limits`; `None` for unlimited or not reported.
+    /// Returns the soft limit of this process from `/proc/self/limits`, the largest number for unlimited.
     pub fn limit(&self, name: &str) -> Option<u64> {
         let text = self.text("proc/self/limits")?;
         let line = text.lines().find_map(|l| l.strip_prefix(name))?;
-        line.split_whitespace().next()?.parse().ok()
+        match line.split_whitespace().next()? {
+            "unlimited" => Some(u64::MAX),
+            number => number.parse().ok(),
+        }
     }
 
     /// Returns whether this process has the capability with number `bit`.

@@ -145,15 +145,15 @@ pub fn limits(period_ns: u64, file: Option<&Path>, given: &[String]) -> Result<L
     Err(LimitsError(problems))
 }
 
-/// Result of one limit, or of all together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Result of one limit, or of all together; the worst is the greatest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Outcome {
     #[serde(rename = "PASS")]
     Pass,
-    #[serde(rename = "FAIL")]
-    Fail,
     #[serde(rename = "NOT MEASURABLE")]
     NotMeasurable,
+    #[serde(rename = "FAIL")]
+    Fail,
 }
 
 impl Outcome {
@@ -220,15 +220,8 @@ pub fn evaluate(limits: &Limits, measured: &Measured, period_ns: u64, qualified:
 }
 
 /// Returns the overall outcome: one failure fails all; otherwise an unmeasurable one leaves it open.
-pub fn overall(results: &[LimitResult]) -> Outcome {
-    let any = |outcome| results.iter().any(|j| j.outcome == outcome);
-    if any(Outcome::Fail) {
-        Outcome::Fail
-    } else if any(Outcome::NotMeasurable) || results.is_empty() {
-        Outcome::NotMeasurable
-    } else {
-        Outcome::Pass
-    }
+pub fn overall(outcomes: impl Iterator<Item = Outcome>) -> Outcome {
+    outcomes.max().unwrap_or(Outcome::NotMeasurable)
 }
 
 type Read = (Option<f64>, String);
@@ -335,24 +328,10 @@ mod tests {
         );
     }
 
-    fn result(outcome: Outcome) -> LimitResult {
-        LimitResult {
-            id: "",
-            name: "",
-            unit: "",
-            lower_bound: false,
-            limit: 0.0,
-            value: None,
-            outcome,
-            evidence: String::new(),
-            reason: "",
-        }
-    }
-
     #[test]
     fn one_failure_fails_all_and_one_open_limit_leaves_it_open() {
         use Outcome::*;
-        let of = |all: &[Outcome]| overall(&all.iter().map(|o| result(*o)).collect::<Vec<_>>());
+        let of = |all: &[Outcome]| overall(all.iter().copied());
         assert_eq!(of(&[Pass, Pass]), Pass);
         assert_eq!(of(&[Pass, NotMeasurable]), NotMeasurable);
         assert_eq!(of(&[NotMeasurable, Fail, Pass]), Fail);

@@ -6,36 +6,33 @@ use clap::Args;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
+/// Operator, site and device; fields without a value are missing in the report.
+#[derive(Args, Clone, Debug, Default, Serialize, Deserialize, PartialEq, Eq)]
+#[serde(deny_unknown_fields)]
+pub struct Whose {
+    /// Who measures; stands in the report
+    #[arg(long, value_name = "NAME")]
+    pub operator: Option<String>,
+    /// Where; stands in the report
+    #[arg(long, value_name = "NAME")]
+    pub site: Option<String>,
+    /// Serial number of the haptic device; stands in the report
+    #[arg(long, value_name = "SERIAL")]
+    pub device_serial: Option<String>,
+    /// Sign the report with this SSH key (ssh-keygen -t ed25519 makes one); the signature is report.json.sig
+    #[serde(skip_serializing)]
+    #[arg(long, value_name = "KEY")]
+    pub sign: Option<PathBuf>,
+}
+
 /// Whose measurement it is.
 #[derive(Args, Clone, Debug, Default)]
 pub struct WhoseArgs {
-    /// Who measures; stands in the report
-    #[arg(long, value_name = "NAME")]
-    operator: Option<String>,
-    /// Where; stands in the report
-    #[arg(long, value_name = "NAME")]
-    site: Option<String>,
-    /// Serial number of the haptic device; stands in the report
-    #[arg(long, value_name = "SERIAL")]
-    device_serial: Option<String>,
+    #[command(flatten)]
+    given: Whose,
     /// TOML file with defaults of these options: operator, site, device_serial, sign
     #[arg(long, value_name = "FILE")]
     site_file: Option<PathBuf>,
-    /// Sign the report with this SSH key (ssh-keygen -t ed25519 makes one); the signature is report.json.sig
-    #[arg(long, value_name = "KEY")]
-    sign: Option<PathBuf>,
-}
-
-/// The same in the report; fields without a value are missing.
-#[derive(Clone, Debug, Default, Serialize, Deserialize, PartialEq, Eq)]
-#[serde(deny_unknown_fields)]
-pub struct Whose {
-    pub operator: Option<String>,
-    pub site: Option<String>,
-    pub device_serial: Option<String>,
-    /// Key that signs the report.
-    #[serde(skip_serializing)]
-    pub sign: Option<PathBuf>,
 }
 
 /// The options or the site's file cannot be used.
@@ -61,11 +58,12 @@ impl WhoseArgs {
     /// Merges options with defaults; a key is checked before anything is measured.
     pub fn read(&self) -> Result<Whose, WhoseError> {
         let defaults = self.site_file.as_deref().map(of_site).transpose()?.unwrap_or_default();
+        let given = self.given.clone();
         let whose = Whose {
-            operator: self.operator.clone().or(defaults.operator),
-            site: self.site.clone().or(defaults.site),
-            device_serial: self.device_serial.clone().or(defaults.device_serial),
-            sign: self.sign.clone().or(defaults.sign),
+            operator: given.operator.or(defaults.operator),
+            site: given.site.or(defaults.site),
+            device_serial: given.device_serial.or(defaults.device_serial),
+            sign: given.sign.or(defaults.sign),
         };
         let names = [
             ("operator", &whose.operator),
@@ -108,9 +106,11 @@ mod tests {
         let file = std::env::temp_dir().join(format!("stylet-site-{}.toml", std::process::id()));
         std::fs::write(&file, "operator = \"A. Meyer\"\nsite = \"Room 3\"\n").expect("written");
         let args = WhoseArgs {
-            site: Some("Room 4".to_owned()),
+            given: Whose {
+                site: Some("Room 4".to_owned()),
+                ..Whose::default()
+            },
             site_file: Some(file.clone()),
-            ..WhoseArgs::default()
         };
         let whose = args.read().expect("all are names");
         assert_eq!(
@@ -124,8 +124,11 @@ mod tests {
         let why = args.read().expect_err("no such file").to_string();
         assert!(why.contains("cannot read"), "{why}");
         let empty = WhoseArgs {
-            operator: Some("\n".to_owned()),
-            ..WhoseArgs::default()
+            given: Whose {
+                operator: Some("\n".to_owned()),
+                ..Whose::default()
+            },
+            site_file: None,
         };
         assert!(empty.read().expect_err("no name").to_string().contains("--operator"));
     }

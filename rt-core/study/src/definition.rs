@@ -56,7 +56,10 @@ impl Study {
     /// # Errors
     /// Everything that is wrong with them.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
-        let text = read_text(path)?;
+        let text = std::fs::read_to_string(path).map_err(|source| StudyError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
         Self::of_text(&text, path.parent().unwrap_or(Path::new(""))).map_err(|problems| StudyError::Invalid {
             path: path.to_owned(),
             problems,
@@ -112,13 +115,6 @@ impl Study {
     pub fn implant_count(&self) -> usize {
         self.glands.len() * self.implants as usize
     }
-}
-
-fn read_text(path: &Path) -> Result<String, StudyError> {
-    std::fs::read_to_string(path).map_err(|source| StudyError::Read {
-        path: path.to_owned(),
-        source,
-    })
 }
 
 fn unknown(table: &Table, place: &str, known: &[&str], problems: &mut Vec<String>) {

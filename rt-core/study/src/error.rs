@@ -8,7 +8,7 @@ use stylet_write::WriteError;
 
 /// Everything that is wrong with a file: each with its key, what it is and what it may be.
 #[derive(Debug, thiserror::Error)]
-#[error("{} found\n  {}", counted(.0.len()), .0.join("\n  "))]
+#[error("problems:\n  {}", .0.join("\n  "))]
 pub struct Problems(pub Vec<String>);
 
 /// Error that stops a study; an insertion that fails is a result and does not.
@@ -76,11 +76,4 @@ pub enum StudyError {
     /// No thread could be started.
     #[error("a thread for the insertions cannot be started ({0}); give fewer --jobs")]
     Thread(std::io::Error),
-}
-
-fn counted(count: usize) -> String {
-    match count {
-        1 => "1 problem".to_owned(),
-        count => format!("{count} problems"),
-    }
 }

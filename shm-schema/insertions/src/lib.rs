@@ -12,7 +12,7 @@ mod folder;
 mod read;
 mod write;
 
-pub use columns::{MEASURED, SEED_COLUMNS, schema};
+pub use columns::MEASURED;
 pub use digest::digest;
 pub use error::TableError;
 pub use folder::{FILE_ENDING, Shard, shard_files, structures_file};

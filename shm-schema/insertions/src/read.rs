@@ -69,59 +69,52 @@ struct Column<T> {
 
 impl Group<'_> {
     fn rows(&self, quantities: &[String]) -> Result<Vec<Insertion>, ParquetError> {
-        let count = self.0.metadata().num_rows() as usize;
-        let mut texts = Vec::new();
-        for (name, _) in TEXTS {
-            texts.push(self.required::<ByteArrayType>(name)?.into_iter());
-        }
-        let mut wholes = Vec::new();
-        for (name, _) in WHOLES {
-            wholes.push(self.required::<Int32Type>(name)?.into_iter());
-        }
-        let mut numbers = Vec::new();
-        for name in [PRESCRIPTION].into_iter().chain(quantities.iter().map(String::as_str)) {
-            numbers.push(self.required::<DoubleType>(name)?.into_iter());
-        }
-        let mut measured = Vec::new();
-        for (name, _) in MEASURED {
-            measured.push(self.optional::<DoubleType>(name)?.into_iter());
-        }
-        let mut failures = self.optional::<ByteArrayType>(FAILURE)?.into_iter();
-        let mut seeds = self.seeds()?.into_iter();
-        let short = || ParquetError::General("a column is shorter than the file".to_owned());
-        let mut next_row = || {
-            let mut text = texts.iter_mut().map(|t| t.next().map(plain));
-            let mut text = || text.next().flatten();
-            let (id, scene, plan, hole, tissue, source) = (text()?, text()?, text()?, text()?, text()?, text()?);
-            let mut drawn = numbers.iter_mut().map(Iterator::next).collect::<Option<Vec<f64>>>()?;
-            let prescription_gy = drawn.remove(0);
-            let m = measured.iter_mut().map(Iterator::next).collect::<Option<Vec<_>>>()?;
-            let failure = failures.next()?.map(plain);
+        let texts = TEXTS.iter().map(|(name, _)| self.required::<ByteArrayType>(name));
+        let texts: Vec<_> = texts.collect::<Result<_, _>>()?;
+        let wholes = WHOLES.iter().map(|(name, _)| self.required::<Int32Type>(name));
+        let wholes: Vec<_> = wholes.collect::<Result<_, _>>()?;
+        let prescriptions = self.required::<DoubleType>(PRESCRIPTION)?;
+        let drawn = quantities.iter().map(|name| self.required::<DoubleType>(name));
+        let drawn: Vec<_> = drawn.collect::<Result<_, _>>()?;
+        let measured = MEASURED.iter().map(|(name, _)| self.optional::<DoubleType>(name));
+        let measured: Vec<_> = measured.collect::<Result<_, _>>()?;
+        let failures = self.optional::<ByteArrayType>(FAILURE)?;
+        let row = |(i, seeds): (usize, Vec<Seed>)| {
+            let text = |column: usize| Some(plain(texts[column].get(i)?));
+            let measured = measured.iter().map(|column| column.get(i).copied());
+            let measured = measured.collect::<Option<Vec<Option<f64>>>>()?;
+            let failure = failures.get(i)?.as_ref().map(plain);
             let motion = || {
                 Some(Motion {
-                    peak_force_n: m[0]?,
-                    displacement_before_puncture_mm: m[1]?,
-                    largest_displacement_mm: m[2]?,
-                    target_shift_mm: m[3]?,
-                    duration_s: m[4]?,
+                    peak_force_n: measured[0]?,
+                    displacement_before_puncture_mm: measured[1]?,
+                    largest_displacement_mm: measured[2]?,
+                    target_shift_mm: measured[3]?,
+                    duration_s: measured[4]?,
                 })
             };
             Some(Insertion {
-                id,
-                scene,
-                plan,
-                implant: wholes[0].next()?,
-                needle: wholes[1].next()?,
-                hole,
-                tissue,
-                source,
-                prescription_gy,
-                drawn,
+                id: text(0)?,
+                scene: text(1)?,
+                plan: text(2)?,
+                hole: text(3)?,
+                tissue: text(4)?,
+                source: text(5)?,
+                implant: *wholes[0].get(i)?,
+                needle: *wholes[1].get(i)?,
+                prescription_gy: *prescriptions.get(i)?,
+                drawn: drawn
+                    .iter()
+                    .map(|column| column.get(i).copied())
+                    .collect::<Option<_>>()?,
                 outcome: motion().ok_or_else(|| failure.unwrap_or_default()),
-                seeds: seeds.next()?,
+                seeds,
             })
         };
-        (0..count).map(|_| next_row().ok_or_else(short)).collect()
+        let rows: Option<Vec<Insertion>> = self.seeds()?.into_iter().enumerate().map(row).collect();
+        let short = || ParquetError::General("a column is shorter than the file".to_owned());
+        rows.filter(|rows| rows.len() as i64 == self.0.metadata().num_rows())
+            .ok_or_else(short)
     }
 
     fn column<T: DataType>(&self, path: &str) -> Result<Column<T::T>, ParquetError> {
@@ -204,6 +197,6 @@ impl Group<'_> {
     }
 }
 
-fn plain(text: ByteArray) -> String {
+fn plain(text: &ByteArray) -> String {
     String::from_utf8_lossy(text.data()).into_owned()
 }

@@ -110,7 +110,9 @@ pub fn run(args: &CampaignArgs, interrupted: &AtomicBool) -> Result<u8, Campaign
         Ok(_) => {}
         Err(_) => write_whole(&copy, text.as_bytes()).map_err(DiskError::from)?,
     }
-    let store = Store::open(&args.out)?;
+    let store = Store {
+        folder: args.out.clone(),
+    };
     if !args.report {
         // After a restart of the PC, this process may have the number of an earlier session's.
         let options = args.real_time.options(&format!("lab-{}", std::process::id()))?;

@@ -9,7 +9,7 @@ use crate::report::{self, WindowRow};
 use crate::sample::histogram;
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Mutex;
 use stylet_write::{WriteError, write_whole};
 
@@ -83,14 +83,6 @@ pub struct Store {
 }
 
 impl Store {
-    pub fn open(folder: &Path) -> Result<Self, CampaignError> {
-        let store = Self {
-            folder: folder.to_owned(),
-        };
-        store.records(FORCE)?;
-        Ok(store)
-    }
-
     /// Returns every session of one loop, in the order in which they were measured.
     pub fn records(&self, name: &str) -> Result<Vec<Kept>, CampaignError> {
         let ending = format!("-{name}.json");

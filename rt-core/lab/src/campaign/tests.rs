@@ -79,7 +79,7 @@ fn the_file_names_its_parts_and_every_problem() {
 fn sessions_of_a_part_add_up_and_what_is_left_is_measured() {
     let plan = Plan::of(FILE).expect("valid");
     let out = folder("sum");
-    let store = Store::open(&out).expect("empty");
+    let store = Store { folder: out.clone() };
     let left = |part: usize| store.left_ns(part, &plan.parts[part]).expect("readable") / 1_000_000_000;
     assert_eq!((left(0), left(1)), (10, 20));
     put(&store, 0, 1_000_000_000, 4);
@@ -107,7 +107,7 @@ fn sessions_of_a_part_add_up_and_what_is_left_is_measured() {
 fn two_sessions_of_one_moment_are_refused() {
     let plan = Plan::of(FILE).expect("valid");
     let out = folder("twice");
-    let store = Store::open(&out).expect("empty");
+    let store = Store { folder: out.clone() };
     put(&store, 0, 1_000_000_000, 4);
     put(&store, 1, 4_500_000_000, 4);
     let refused = report(&plan, &store).expect_err("half a second counts twice");
@@ -125,7 +125,7 @@ fn two_sessions_of_one_moment_are_refused() {
     }
     assert!(report(&plan, &store).is_ok());
     std::fs::write(&file, "{\"schema\":").expect("written");
-    assert!(matches!(Store::open(&out), Err(CampaignError::Checkpoint { .. })));
+    assert!(matches!(store.records(FORCE), Err(CampaignError::Checkpoint { .. })));
     std::fs::remove_dir_all(out).expect("ours");
 }
 

@@ -79,13 +79,8 @@ fn overview(pcs: &[Pc]) -> Markup {
         ]
     };
     let mut sorted: Vec<&Pc> = pcs.iter().collect();
-    let rank = |pc: &&Pc| match pc.latest().outcome() {
-        Outcome::Fail => 0,
-        Outcome::NotMeasurable => 1,
-        Outcome::Pass => 2,
-    };
     // Urgent entries first.
-    sorted.sort_by_key(rank);
+    sorted.sort_by_key(|pc| std::cmp::Reverse(pc.latest().outcome()));
     let rows: Vec<Vec<Markup>> = sorted.into_iter().map(row).collect();
     let head = [
         "outcome",

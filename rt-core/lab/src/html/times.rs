@@ -100,16 +100,7 @@ pub fn spin(r: &Report) -> Markup {
     let Some(s) = &r.spin_search else {
         return Markup::default();
     };
-    let row = |t: &crate::spin::Trial| {
-        let met = if t.met { "yes" } else { "no" };
-        vec![cell(t.spin_us), or_na(t.p50_us), or_na(t.p99_us), cell(met)]
-    };
-    let rows: Vec<Vec<Markup>> = s.trials.iter().map(row).collect();
-    html! {
-        h2 { "Spin before each deadline" }
-        div class="half" { (table(&["spin, \u{b5}s", "p50, \u{b5}s", "p99, \u{b5}s", "low enough"], &rows, &[Column::Number; 4])) }
-        p class="faint" { (micro(&s.words())) "." }
-    }
+    html! { h2 { "Spin before each deadline" } p { (micro(&s.words())) "." } }
 }
 
 pub fn late(r: &Report) -> Markup {

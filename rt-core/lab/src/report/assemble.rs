@@ -77,7 +77,7 @@ pub fn report(parts: &Parts) -> Report {
             insertions: host.insertions,
         },
         verdict: Verdict {
-            overall: verdict::overall(&limits),
+            overall: verdict::overall(limits.iter().map(|l| l.outcome)),
             limits,
         },
         environment: environment(&unqualified, measured),
