@@ -7,6 +7,7 @@ use crate::picture;
 use crate::published::{PUBLISHED, Published, published_in};
 use crate::shards::Population;
 use maud::{Markup, PreEscaped, html};
+use std::collections::BTreeMap;
 use stylet_base::format::printable;
 use stylet_report::parts::{self, Column, cell, num};
 
@@ -94,19 +95,13 @@ fn cards(figures: &[Distribution]) -> Markup {
 
 fn warnings(p: &Population, scored: &Scored) -> Markup {
     let [found, of] = p.shards;
-    let mut failures: Vec<&String> = p
-        .table
-        .rows
-        .iter()
-        .filter_map(|row| row.outcome.as_ref().err())
-        .collect();
-    failures.sort();
-    let failed = failures.len();
-    let mut reasons: Vec<(usize, &String)> = failures
-        .chunk_by(|a, b| a == b)
-        .map(|same| (same.len(), same[0]))
-        .collect();
-    reasons.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+    let mut reasons: BTreeMap<&String, usize> = BTreeMap::new();
+    for why in p.table.rows.iter().filter_map(|row| row.outcome.as_ref().err()) {
+        *reasons.entry(why).or_default() += 1;
+    }
+    let failed: usize = reasons.values().sum();
+    let mut reasons: Vec<_> = reasons.into_iter().collect();
+    reasons.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
     html! {
         @if found < of {
             p class="warning" { (found) " of " (of) " shards are finished: the page shows these alone." }
@@ -114,7 +109,7 @@ fn warnings(p: &Population, scored: &Scored) -> Markup {
         @if failed > 0 {
             p class="warning" {
                 "Failed insertions, in no distribution: " (thousands(failed)) " of " (thousands(p.table.rows.len())) ". "
-                @for (count, why) in reasons.iter().take(5) { (count) " \u{d7} \u{201c}" (printable(why)) "\u{201d}. " }
+                @for (why, count) in reasons.iter().take(5) { (count) " \u{d7} \u{201c}" (printable(why)) "\u{201d}. " }
             }
         }
         @if scored.incomplete > 0 {
