@@ -4,15 +4,13 @@ mod inbox;
 mod motion;
 mod player;
 mod ports;
-mod receive;
 mod received;
 mod receiver;
 mod second;
 mod thread;
 
-use inbox::{Pulse, RECORDS_KEPT};
+use inbox::{Inbox, Pulse, RECORDS_KEPT, Run};
 use motion::Motions;
-use receive::Latest;
 use receiver::Outgoing;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -35,7 +33,6 @@ const ABSENT_AFTER: Duration = Duration::from_secs(2);
 const CLASS_STAYS: Duration = Duration::from_secs(2);
 /// Shortest interval at which a window converts pictures of the tissue: converting costs more than receiving.
 const SNAPSHOTS_EVERY: Duration = Duration::from_millis(12);
-const EVENTS_KEPT: usize = 256;
 const ANSWERS_KEPT: usize = 256;
 const REHEARSALS_KEPT: usize = 8;
 /// Number of a command that needs no answer.
@@ -55,12 +52,10 @@ pub struct Link {
     host_id: u64,
     next_command_id: u64,
     pulse: Pulse,
-    latest: Latest,
-    state: Option<HapticState>,
+    run: Run,
     answers: BTreeMap<u64, Answer>,
     rehearsals: BTreeMap<u64, Box<Rehearsal>>,
     records: VecDeque<TickRecord>,
-    second_state: Option<SecondState>,
     second_records: VecDeque<SecondRecord>,
     invalid_dropped: u64,
     motions: Motions,
@@ -112,12 +107,10 @@ impl Link {
             host_id,
             next_command_id: 1,
             pulse: Pulse::default(),
-            latest: Latest::default(),
-            state: None,
+            run: Run::default(),
             answers: BTreeMap::new(),
             rehearsals: BTreeMap::new(),
             records: VecDeque::new(),
-            second_state: None,
             second_records: VecDeque::new(),
             invalid_dropped: 0,
             motions: Motions::default(),
@@ -185,7 +178,7 @@ impl Link {
         } else {
             format!(" --instance {name}")
         };
-        let what = if self.latest.session.is_some() {
+        let what = if self.run.session.is_some() {
             "rt-core has stopped"
         } else {
             "no rt-core is running"
@@ -195,17 +188,17 @@ impl Link {
 
     /// Present run of the core.
     pub fn session(&self) -> Option<&Session> {
-        self.latest.session.as_ref()
+        self.run.session.as_ref()
     }
 
     /// Last valid state.
     pub fn state(&self) -> Option<&HapticState> {
-        self.state.as_ref()
+        self.run.state.as_ref()
     }
 
     /// Last valid state of the second device; `None` in a run without one.
     pub fn second_state(&self) -> Option<&SecondState> {
-        self.second_state.as_ref()
+        self.run.second_state.as_ref()
     }
 
     /// Returns every record of the second device since the last call.
@@ -215,39 +208,35 @@ impl Link {
 
     /// The running scene.
     pub fn scene(&self) -> Option<&Arc<SceneModel>> {
-        self.latest.scene.get()
+        self.run.scene.as_ref()
     }
 
     /// Last snapshot of the running scene.
     pub fn snapshot(&self) -> Option<&Snapshot> {
-        let scene = self.latest.scene.get()?;
-        self.latest
-            .snapshot
-            .get()
-            .filter(|s| s.header.scene_id() == scene.header.id())
+        let scene = self.run.scene.as_ref()?;
+        let snapshot = self.run.snapshot.as_deref();
+        snapshot.filter(|s| s.header.scene_id() == scene.header.id())
     }
 
     /// The parameters in force.
     pub fn parameters(&self) -> Option<&ParametersInForce> {
-        self.latest.parameters.get()
+        self.run.parameters.as_ref()
     }
 
     /// The plan in force.
     pub fn plan(&self) -> Option<&PlanInForce> {
-        self.latest.plan.get()
+        self.run.plan.as_ref()
     }
 
     /// Connection to a core on another machine.
     pub fn relayed(&self) -> Option<&Relayed> {
-        let id = self.latest.id();
-        self.latest.relayed.as_ref().filter(|r| id == Some(r.session_id))
+        self.run.relayed.as_ref()
     }
 
     /// Members connected through a relay of this machine, while it reports them.
     pub fn class(&self) -> Option<&Class> {
-        let (came, class) = self.latest.class.as_ref()?;
-        let is_of_run = self.latest.id() == Some(class.session_id);
-        (is_of_run && came.elapsed() < CLASS_STAYS).then_some(class)
+        let (came, class) = self.run.class.as_ref()?;
+        (came.elapsed() < CLASS_STAYS).then_some(&**class)
     }
 
     /// Asks this machine's relay for the needle, or to hand it over. [`Link::class`] shows the result.
@@ -263,12 +252,12 @@ impl Link {
 
     /// Last 256 events of this run of the core.
     pub fn events(&self) -> &VecDeque<Event> {
-        &self.latest.events
+        &self.run.events
     }
 
     /// Number of events of this run that happened while this host was connected but did not reach it.
     pub fn events_unseen(&self) -> u64 {
-        self.latest.events_unseen
+        self.run.events_unseen
     }
 
     /// Returns the core's answer; once for each command.
@@ -284,6 +273,38 @@ impl Link {
     /// Number of invalid messages dropped from shared memory.
     pub fn invalid_dropped(&self) -> u64 {
         self.invalid_dropped
+    }
+
+    fn take(&mut self, inbox: Inbox) {
+        if self.run.id() != inbox.run.id() {
+            self.motions.forget();
+            self.answers.clear();
+            self.rehearsals.clear();
+            self.records.clear();
+            self.second_records.clear();
+        }
+        (self.pulse, self.run, self.invalid_dropped) = (inbox.pulse, inbox.run, inbox.invalid_dropped);
+        for rehearsal in inbox.rehearsals {
+            self.rehearsals.insert(rehearsal.command_id, rehearsal);
+            if self.rehearsals.len() > REHEARSALS_KEPT {
+                self.rehearsals.pop_first();
+            }
+        }
+        for (command_id, answer) in inbox.answers.into_iter().filter(|(id, _)| *id != UNANSWERED) {
+            self.motions.answered(command_id, &answer);
+            self.answers.insert(command_id, answer);
+            if self.answers.len() > ANSWERS_KEPT {
+                self.answers.pop_first();
+            }
+        }
+        self.run.events.iter().for_each(|event| self.motions.take(event));
+        let is_moving = |tick: u64, flags: u32| (tick, flags & flags::IN_MOTION != 0);
+        self.motions.seen([
+            self.run.state.map(|s| is_moving(s.tick, s.flags)),
+            self.run.second_state.map(|s| is_moving(s.tick, s.flags)),
+        ]);
+        join(&mut self.records, inbox.records);
+        join(&mut self.second_records, inbox.second_records);
     }
 
     /// Sends a request and returns its command id; its [`Answer`] comes later.
@@ -353,6 +374,13 @@ impl Link {
 
 #[cfg(test)]
 mod tests;
+
+/// Appends records in bounded memory, in case a host never takes them.
+fn join<T>(held: &mut VecDeque<T>, new: VecDeque<T>) {
+    held.extend(new);
+    let beyond = held.len().saturating_sub(RECORDS_KEPT);
+    held.drain(..beyond);
+}
 
 fn upload_structure(tissue: &Tissue) -> UploadStructure {
     let role = match tissue.role {

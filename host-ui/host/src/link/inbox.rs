@@ -1,23 +1,24 @@
-//! Data that the receiving thread has taken out of shared memory and the host has not taken yet, in bounded memory.
+//! Data that the receiving thread has taken out of shared memory, in bounded memory: the newest of each kind, and queues
+//! of what the host has not taken yet.
 //!
-//! Nothing here waits for the host. State keeps the latest value; events keep a bounded queue. Dropped data shows as a
-//! gap in the numbers of ticks and events, and is counted there.
+//! Nothing here waits for the host. Dropped data shows as a gap in the numbers of ticks and events, and is counted
+//! there.
 
-use super::{SceneModel, Snapshot};
+use super::{Answer, SceneModel, Snapshot};
 use std::collections::VecDeque;
+use std::mem::take;
 use std::sync::Arc;
 use std::time::Instant;
 use stylet_shm_schema::{
-    Class, Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Relayed, Reply, SecondRecord, SecondState,
-    Session, TickRecord,
+    Class, Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Relayed, SecondRecord, SecondState, Session,
+    TickRecord,
 };
 
 /// Most records queued for the host: five minutes at 1 kHz, 72 MB.
 pub const RECORDS_KEPT: usize = 300_000;
-/// Most events queued for the host: 1 MB.
-const EVENTS_KEPT: usize = 4096;
-/// Most replies queued for the host.
-const REPLIES_KEPT: usize = 1024;
+const EVENTS_KEPT: usize = 256;
+/// Most answers queued for the host.
+const ANSWERS_KEPT: usize = 1024;
 /// Most results of rehearsals queued for the host.
 const REHEARSALS_KEPT: usize = 8;
 
@@ -34,54 +35,98 @@ pub struct Pulse {
     pub trouble: Option<String>,
 }
 
-/// Data received since the host last took it.
-#[derive(Default)]
-pub struct Inbox {
-    pub pulse: Pulse,
+/// The newest data of each kind from one run of the core.
+#[derive(Clone, Default)]
+pub struct Run {
     pub session: Option<Session>,
     pub state: Option<HapticState>,
-    pub scene: Option<(u64, Arc<SceneModel>)>,
-    pub snapshot: Option<Snapshot>,
+    pub second_state: Option<SecondState>,
+    pub scene: Option<Arc<SceneModel>>,
+    pub snapshot: Option<Arc<Snapshot>>,
     pub parameters: Option<ParametersInForce>,
     pub plan: Option<PlanInForce>,
     pub relayed: Option<Relayed>,
     /// The class, with its time of arrival.
-    pub class: Option<(Instant, Box<Class>)>,
-    pub events: VecDeque<Event>,
+    pub class: Option<(Instant, Arc<Class>)>,
+    pub events: Arc<VecDeque<Event>>,
+    /// Numbers missing among the events.
+    pub events_unseen: u64,
+}
+
+impl Run {
+    pub fn id(&self) -> Option<u64> {
+        self.session.as_ref().map(|s| s.session_id)
+    }
+
+    /// Adds an event. History may be delivered twice when the ports are recreated.
+    fn put_event(&mut self, event: Event) {
+        let last = self.events.back().map(|last| last.sequence);
+        if last.is_some_and(|last| last >= event.sequence) {
+            return;
+        }
+        self.events_unseen += last.map_or(0, |last| event.sequence - last - 1);
+        keep(Arc::make_mut(&mut self.events), event, EVENTS_KEPT);
+    }
+}
+
+/// Data of the present run, with what the host has not taken yet.
+#[derive(Default)]
+pub struct Inbox {
+    pub pulse: Pulse,
+    pub run: Run,
+    /// Data of a run that is not announced yet, with its session.
+    next: (u64, Run),
     pub rehearsals: VecDeque<Box<Rehearsal>>,
-    /// Replies to this host.
-    pub replies: VecDeque<Reply>,
-    /// Commands and volumes that could not be sent, with the reason.
-    pub unsent: VecDeque<(u64, String)>,
+    /// Answers to this host, by their commands.
+    pub answers: VecDeque<(u64, Answer)>,
     pub records: VecDeque<TickRecord>,
-    pub second_state: Option<SecondState>,
     pub second_records: VecDeque<SecondRecord>,
     pub invalid_dropped: u64,
 }
 
 impl Inbox {
-    /// Takes all data; the connection's state is kept.
+    /// Empties the queues; the newest data is kept.
     pub fn take(&mut self) -> Self {
-        let pulse = self.pulse.clone();
-        std::mem::replace(
-            self,
-            Self {
-                pulse,
-                ..Self::default()
-            },
-        )
+        Self {
+            pulse: self.pulse.clone(),
+            run: self.run.clone(),
+            next: Default::default(),
+            rehearsals: take(&mut self.rehearsals),
+            answers: take(&mut self.answers),
+            records: take(&mut self.records),
+            second_records: take(&mut self.second_records),
+            invalid_dropped: self.invalid_dropped,
+        }
     }
 
     /// Begins another run of the core: all data of the last one is dropped.
     pub fn begin(&mut self, session: Session) {
-        self.session = Some(session);
-        self.state = None;
-        self.rehearsals.clear();
-        self.replies.clear();
-        self.unsent.clear();
-        self.records.clear();
-        self.second_state = None;
-        self.second_records.clear();
+        let (id, early) = take(&mut self.next);
+        let early = if id == session.session_id {
+            early
+        } else {
+            Run::default()
+        };
+        *self = Self {
+            pulse: take(&mut self.pulse),
+            run: Run {
+                session: Some(session),
+                ..early
+            },
+            invalid_dropped: self.invalid_dropped,
+            ..Self::default()
+        };
+    }
+
+    /// Returns the data of a run; one that is not announced yet waits for its announcement.
+    pub fn of(&mut self, session_id: u64) -> &mut Run {
+        if self.run.id() == Some(session_id) {
+            return &mut self.run;
+        }
+        if self.next.0 != session_id {
+            self.next = (session_id, Run::default());
+        }
+        &mut self.next.1
     }
 
     pub fn put_record(&mut self, record: TickRecord) {
@@ -93,19 +138,15 @@ impl Inbox {
     }
 
     pub fn put_event(&mut self, event: Event) {
-        keep(&mut self.events, event, EVENTS_KEPT);
+        self.of(event.session_id).put_event(event);
     }
 
-    pub fn put_reply(&mut self, reply: Reply) {
-        keep(&mut self.replies, reply, REPLIES_KEPT);
+    pub fn put_answer(&mut self, command_id: u64, answer: Answer) {
+        keep(&mut self.answers, (command_id, answer), ANSWERS_KEPT);
     }
 
     pub fn put_rehearsal(&mut self, rehearsal: Rehearsal) {
         keep(&mut self.rehearsals, Box::new(rehearsal), REHEARSALS_KEPT);
-    }
-
-    pub fn put_unsent(&mut self, command_id: u64, why: String) {
-        keep(&mut self.unsent, (command_id, why), REPLIES_KEPT);
     }
 }
 
@@ -114,25 +155,4 @@ fn keep<T>(queue: &mut VecDeque<T>, value: T, most: usize) {
         queue.pop_front();
     }
     queue.push_back(value);
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use bytemuck::Zeroable;
-
-    #[test]
-    fn a_host_that_takes_nothing_costs_bounded_memory_and_keeps_the_newest() {
-        let mut inbox = Inbox::default();
-        for tick in 0..RECORDS_KEPT as u64 + 10 {
-            let mut record = TickRecord::zeroed();
-            record.tick = tick;
-            inbox.put_record(record);
-        }
-        let taken = inbox.take();
-        assert_eq!(taken.records.len(), RECORDS_KEPT);
-        assert_eq!(taken.records.front().map(|r| r.tick), Some(10));
-        assert!(size_of::<TickRecord>() * RECORDS_KEPT <= 72_000_000);
-        assert!(inbox.take().records.is_empty(), "taken once");
-    }
 }

@@ -112,7 +112,6 @@ pub struct Player {
     /// Increased with each restart: ticks never go back within a run of the core.
     session: Session,
     next: usize,
-    state: Option<HapticState>,
     last: Option<TickRecord>,
     at: Duration,
     looked: Instant,
@@ -127,7 +126,6 @@ impl Player {
             playback,
             inbox,
             next: 0,
-            state: None,
             last: None,
             at: Duration::ZERO,
             looked: Instant::now(),
@@ -140,7 +138,7 @@ impl Player {
     fn begin(&mut self) {
         self.session.session_id = self.session.session_id.wrapping_add(1);
         (self.next, self.at) = (0, Duration::ZERO);
-        (self.state, self.last) = (None, None);
+        self.last = None;
         lock(&self.inbox).begin(self.session);
     }
 
@@ -167,9 +165,8 @@ impl Player {
             .filter(|(time_ns, _)| u128::from(*time_ns) <= self.at.as_nanos())
         {
             self.next += 1;
-            put(inbox, piece, self.session.session_id, (&mut self.state, &mut self.last));
+            put(inbox, piece, self.session.session_id, &mut self.last);
         }
-        inbox.state = self.state.or(inbox.state);
         if is_moving || now - self.beat >= BEAT {
             self.beat = now;
             (inbox.pulse.moved, inbox.pulse.looked) = (Some(now), Some(now));
@@ -180,26 +177,22 @@ impl Player {
 }
 
 /// Plays a message as of the run `session_id`; ticks update the state.
-fn put(
-    inbox: &mut Inbox,
-    piece: &Piece,
-    session_id: u64,
-    (state, last): (&mut Option<HapticState>, &mut Option<TickRecord>),
-) {
+fn put(inbox: &mut Inbox, piece: &Piece, session_id: u64, last: &mut Option<TickRecord>) {
+    let run = &mut inbox.run;
     match piece {
         Piece::Tick(tick) => {
             let mut record = **tick;
             record.session_id = session_id;
-            inbox.put_record(record);
-            if let Some(state) = state {
+            if let Some(state) = &mut run.state {
                 carry(&record, state);
             }
+            inbox.put_record(record);
             *last = Some(record);
         }
         Piece::Event(event) => inbox.put_event(Event { session_id, ..**event }),
         Piece::Second(record) => {
             let record = SecondRecord { session_id, ..**record };
-            inbox.second_state = Some(second::carry(&record, inbox.second_state.as_ref()));
+            run.second_state = Some(second::carry(&record, run.second_state.as_ref()));
             inbox.put_second_record(record);
         }
         Piece::State(found) => {
@@ -207,14 +200,12 @@ fn put(
             if let Some(record) = last {
                 carry(record, &mut found);
             }
-            *state = Some(found);
+            run.state = Some(found);
         }
-        Piece::Scene(scene) => inbox.scene = Some((session_id, Arc::new(scene.of_session(session_id)))),
-        Piece::Plan(plan) => {
-            inbox.plan = Some(PlanInForce { session_id, ..**plan });
-        }
+        Piece::Scene(scene) => run.scene = Some(Arc::new(scene.of_session(session_id))),
+        Piece::Plan(plan) => run.plan = Some(PlanInForce { session_id, ..**plan }),
         Piece::Parameters(parameters) => {
-            inbox.parameters = Some(ParametersInForce {
+            run.parameters = Some(ParametersInForce {
                 session_id,
                 ..**parameters
             });
@@ -222,7 +213,7 @@ fn put(
         Piece::Snapshot(snapshot) => {
             let mut snapshot = (**snapshot).clone();
             snapshot.header.session_id = session_id;
-            inbox.snapshot = Some(snapshot);
+            run.snapshot = Some(Arc::new(snapshot));
         }
     }
 }

@@ -22,6 +22,12 @@ pub enum LinkStatus {
     },
 }
 
+impl Default for LinkStatus {
+    fn default() -> Self {
+        Self::Absent { why: String::new() }
+    }
+}
+
 /// The rest surface of the running scene.
 #[derive(Clone, Debug)]
 pub struct SceneModel {

@@ -8,7 +8,7 @@ use super::motion::Renewals;
 use super::ports::Ports;
 use super::second::SecondEnds;
 use super::thread::lock;
-use super::{ABSENT_AFTER, SceneModel, Snapshot, UNANSWERED};
+use super::{ABSENT_AFTER, Answer, SceneModel, Snapshot, UNANSWERED};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 use stylet_ports::{self as service, Node, ServiceError, SlicePublisher, StateReader};
@@ -180,7 +180,7 @@ impl Passes {
                 }
             };
             if let Err(why) = sent {
-                lock(&self.inbox).put_unsent(id, why);
+                lock(&self.inbox).put_answer(id, Answer::unsent(why));
             }
         }
         let renewal = self.renewals.due(Instant::now());
@@ -250,42 +250,54 @@ impl Passes {
         // Before the replies: a host that has the reply to a rehearsal has its result.
         while let Some(rehearsal) = ports.rehearsals.receive() {
             match check::rehearsal(&rehearsal) {
-                Ok(()) if rehearsal.host_id == self.host_id => inbox.put_rehearsal(rehearsal),
+                Ok(()) if (Some(rehearsal.session_id), rehearsal.host_id) == (id, self.host_id) => {
+                    inbox.put_rehearsal(rehearsal)
+                }
                 Ok(()) => {}
                 Err(_) => invalid += 1,
             }
         }
         while let Some(reply) = ports.replies.receive() {
-            if reply.host_id == self.host_id {
-                inbox.put_reply(reply);
+            if (Some(reply.session_id), reply.host_id) == (id, self.host_id) {
+                match Answer::of_reply(&reply) {
+                    Some(answer) => inbox.put_answer(reply.command_id, answer),
+                    None => invalid += 1,
+                }
             }
         }
         while let Some(parameters) = ports.parameters.receive() {
             match check::parameters(&parameters) {
-                Ok(()) => inbox.parameters = Some(parameters),
+                Ok(()) => inbox.of(parameters.session_id).parameters = Some(parameters),
                 Err(_) => invalid += 1,
             }
         }
         while let Some(plan) = ports.plan.receive() {
             match check::plan(&plan) {
-                Ok(()) => inbox.plan = Some(plan),
+                Ok(()) => inbox.of(plan.session_id).plan = Some(plan),
                 Err(_) => invalid += 1,
             }
         }
         while let Some(relayed) = ports.relayed.receive() {
-            inbox.relayed = Some(relayed);
+            inbox.of(relayed.session_id).relayed = Some(relayed);
         }
         while let Some(class) = ports.class.receive() {
-            inbox.class = Some((Instant::now(), Box::new(class)));
+            let run = inbox.of(class.session_id);
+            run.class = Some((Instant::now(), Arc::new(class)));
         }
         for scene in scene {
             match scene {
-                Some(scene) => inbox.scene = Some(scene),
+                Some(scene) => {
+                    let run = inbox.of(scene.header.session_id);
+                    run.scene = Some(Arc::new(scene));
+                }
                 None => invalid += 1,
             }
         }
         match snapshot {
-            Some(Some(snapshot)) => inbox.snapshot = Some(snapshot),
+            Some(Some(snapshot)) => {
+                let run = inbox.of(snapshot.header.session_id);
+                run.snapshot = Some(Arc::new(snapshot));
+            }
             Some(None) => invalid += 1,
             None => {}
         }
@@ -306,7 +318,7 @@ impl Passes {
         }
         let Some(session) = newest else { return };
         match &self.session {
-            Some(old) if old.session_id == session.session_id => lock(&self.inbox).session = Some(session),
+            Some(old) if old.session_id == session.session_id => lock(&self.inbox).run.session = Some(session),
             Some(old) if old.started_ns > session.started_ns => return,
             // Everything of an earlier run is dropped before anything of the new one is opened.
             _ => {
@@ -346,7 +358,7 @@ impl Passes {
         match check::state(&state) {
             Ok(()) => {
                 self.tick = state.tick;
-                inbox.state = Some(state);
+                inbox.run.state = Some(state);
             }
             Err(_) => inbox.invalid_dropped += 1,
         }
@@ -381,12 +393,10 @@ impl Passes {
     }
 }
 
-/// Returns each scene with its run; `None` for an inconsistent one.
-fn receive_scene(ports: &Ports) -> Vec<Option<(u64, Arc<SceneModel>)>> {
-    let mut scenes = Vec::new();
-    while let Some(sample) = ports.scene.receive() {
-        let (header, words) = (*sample.header(), sample.values());
-        scenes.push(SceneModel::of_words(&header, words).map(|model| (header.session_id, Arc::new(model))));
-    }
+/// Returns each scene; `None` for an inconsistent one.
+fn receive_scene(ports: &Ports) -> Vec<Option<SceneModel>> {
+    let scenes = std::iter::from_fn(|| ports.scene.receive());
     scenes
+        .map(|sample| SceneModel::of_words(sample.header(), sample.values()))
+        .collect()
 }

@@ -59,7 +59,7 @@ impl SecondEnds {
         }
         if let Some(state) = self.board.as_ref().map(StateReader::read) {
             match check::second_state(&state) {
-                Ok(()) => inbox.second_state = Some(state),
+                Ok(()) => inbox.run.second_state = Some(state),
                 Err(_) => invalid += 1,
             }
         }

@@ -279,14 +279,14 @@ fn a_frame_of_three_seconds_loses_no_record() {
 /// Gaps in the numbers of the events were ignored.
 #[test]
 fn unseen_events_count_only_from_when_the_host_joined() {
-    let mut latest = Latest::default();
-    latest.begin(announce(1, 1));
+    let mut inbox = Inbox::default();
+    inbox.begin(announce(1, 1));
     for sequence in [7, 8, 8, 12] {
         let mut event = Event::zeroed();
         (event.session_id, event.sequence) = (1, sequence);
-        latest.put_event(event);
+        inbox.put_event(event);
     }
-    assert_eq!((latest.events.len(), latest.events_unseen), (3, 3));
+    assert_eq!((inbox.run.events.len(), inbox.run.events_unseen), (3, 3));
 }
 
 #[test]

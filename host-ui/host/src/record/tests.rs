@@ -265,9 +265,10 @@ fn a_recording_is_played_as_a_core_speaks() {
     );
 }
 
-/// Files that exist are the standard: names, order and digits of every message stay.
+/// Files that exist are the standard: names and digits of every field stay. An earlier version, which recorded the
+/// example, had fewer.
 #[test]
-fn messages_of_the_example_are_written_again_in_the_same_bytes() {
+fn messages_of_the_example_are_written_again_in_the_same_digits() {
     use super::channels::Kind;
     let bytes = std::fs::read("../example/insertion.mcap").unwrap();
     let mut counts = [0; 4];
@@ -283,7 +284,10 @@ fn messages_of_the_example_are_written_again_in_the_same_bytes() {
             _ => return Ok(()),
         };
         counts[which] += 1;
-        assert_eq!(again.to_string(), std::str::from_utf8(data).unwrap(), "{topic}");
+        let before: serde_json::Map<String, serde_json::Value> = serde_json::from_slice(data).unwrap();
+        for (name, value) in before {
+            assert_eq!(again[&name].to_string(), value.to_string(), "{topic} {name}");
+        }
         Ok(())
     })
     .unwrap();
