@@ -170,11 +170,8 @@ fn is_possible(variable: impl Fn(&str) -> Option<PathBuf>) -> bool {
 
 /// Adds the extension that selects a plan's format.
 fn with_ending(purpose: Purpose, path: PathBuf) -> PathBuf {
-    let ending = match purpose {
-        Purpose::SavePlan => "toml",
-        Purpose::SaveTable => "csv",
-        Purpose::SaveRtPlan => "dcm",
-        Purpose::Scene | Purpose::Image | Purpose::Recording | Purpose::ImportPlan => return path,
+    let [(_, [ending])] = purpose.formats() else {
+        return path;
     };
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
         return path;

@@ -9,7 +9,6 @@ const KEY: &str = "stylet.settings";
 pub const SCALES: [f32; 2] = [0.8, 2.0];
 /// Range of the air kerma strength of a seed (U).
 pub const STRENGTHS_U: [f64; 2] = [0.05, 5.0];
-const LONGEST_FILE_NAME: usize = 4096;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ThemeChoice {
@@ -46,13 +45,7 @@ impl Layout {
     }
 
     pub fn next(self) -> Self {
-        match self {
-            Self::Quad => Self::Solid,
-            Self::Solid => Self::Slices,
-            Self::Slices => Self::Probe,
-            Self::Probe => Self::Fluoroscopy,
-            Self::Fluoroscopy => Self::Quad,
-        }
+        Self::ALL[(self as usize + 1) % Self::ALL.len()]
     }
 }
 
@@ -62,8 +55,6 @@ pub struct Settings {
     pub theme: ThemeChoice,
     pub scale: f32,
     pub layout: Layout,
-    /// Volume that was loaded last.
-    pub last_file: String,
     /// Recent files, the newest first.
     pub recent: Vec<Recent>,
     /// Air kerma strength of each seed (U).
@@ -76,7 +67,6 @@ impl Default for Settings {
             theme: ThemeChoice::default(),
             scale: 1.0,
             layout: Layout::default(),
-            last_file: String::new(),
             recent: Vec::new(),
             seed_strength_u: 0.5,
         }
@@ -105,11 +95,14 @@ impl Settings {
         }
         self.scale = self.scale.clamp(SCALES[0], SCALES[1]);
         self.seed_strength_u = self.seed_strength_u.clamp(STRENGTHS_U[0], STRENGTHS_U[1]);
-        if self.last_file.len() > LONGEST_FILE_NAME {
-            self.last_file.clear();
-        }
         self.recent = recent::checked(self.recent);
         self
+    }
+
+    /// Returns the volume that was loaded last.
+    pub fn last_file(&self) -> &str {
+        let scene = self.recent.iter().find(|one| !one.is_image);
+        scene.map_or("", |one| &one.path)
     }
 
     pub fn apply(&self, ctx: &egui::Context) {
@@ -152,7 +145,6 @@ mod tests {
             theme: ThemeChoice::Light,
             scale: 1.25,
             layout: Layout::Slices,
-            last_file: "gland.nii.gz".to_owned(),
             recent: vec![Recent {
                 path: "gland.nii.gz".to_owned(),
                 is_image: false,

@@ -98,6 +98,17 @@ pub fn small(text: impl Into<String>) -> RichText {
     RichText::new(text).weak().small()
 }
 
+/// Button by its name, with a tooltip.
+pub struct Press<'a>(pub &'a str, pub &'a str);
+
+impl Press<'_> {
+    /// Draws the button; returns whether it was pressed.
+    pub fn ui(self, ui: &mut egui::Ui, can: bool) -> bool {
+        let button = ui.add_enabled(can, egui::Button::new(self.0));
+        button.on_hover_text(self.1).clicked()
+    }
+}
+
 /// Returns the colour for the shader: gamma-encoded, 0 to 1.
 pub fn rgba(color: egui::Color32, alpha: f32) -> [f32; 4] {
     let [r, g, b, _] = color.to_array();

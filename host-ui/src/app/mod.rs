@@ -268,7 +268,7 @@ impl App {
             pulled_to_m: None,
             pulled_goal_m: None,
             dismissed: (0, 0),
-            workflow: WorkflowState::with_file(&settings.last_file),
+            workflow: WorkflowState::with_file(settings.last_file()),
             settings,
             parameters: ParametersState::default(),
             help: false,

@@ -217,7 +217,6 @@ impl App {
 
     pub(super) fn load(&mut self, path: &Path, image: Option<PathBuf>) {
         if !self.shown.load.is_busy() {
-            self.settings.last_file = path.display().to_string();
             recent::remember(&mut self.settings.recent, absolute(path), false);
             self.scene_to_come = Some((path.to_owned(), String::new()));
             self.loader.begin_scene(path, self.label, image);

@@ -37,6 +37,25 @@ pub struct Banner {
     pub remedy: Option<(&'static str, Action)>,
 }
 
+impl Banner {
+    pub fn new(level: BannerLevel, title: &'static str, text: impl Into<String>) -> Self {
+        Self {
+            level,
+            title,
+            text: text.into(),
+            remedy: None,
+        }
+    }
+
+    /// Adds a remedy.
+    pub fn with(self, name: &'static str, action: Action) -> Self {
+        Self {
+            remedy: Some((name, action)),
+            ..self
+        }
+    }
+}
+
 /// Returns the banners, worst first. Without a core there is no banner about its force.
 pub fn banners(shown: &Shown) -> Vec<Banner> {
     let mut list = match &shown.watched {
@@ -49,31 +68,21 @@ pub fn banners(shown: &Shown) -> Vec<Banner> {
 
 /// Returns the banner of a recording, which replaces the problems of the recorded core.
 fn of_recording(watched: &Watched) -> Banner {
-    Banner {
-        level: BannerLevel::Info,
-        title: "A recording",
-        text: match watched.has_ended {
-            true => "End of recording. Close it, start rt-core, and insert a needle yourself.".to_owned(),
-            false => "Needle, force and tissue are shown as recorded; nothing can be moved.".to_owned(),
-        },
-        remedy: Some(("Close", Action::Watch(WatchAction::Close))),
-    }
+    let text = match watched.has_ended {
+        true => "End of recording. Close it, start rt-core, and insert a needle yourself.",
+        false => "Needle, force and tissue are shown as recorded; nothing can be moved.",
+    };
+    Banner::new(BannerLevel::Info, "A recording", text).with("Close", Action::Watch(WatchAction::Close))
 }
 
 /// Returns banners for devices that were unplugged or cannot be read.
 fn of_controllers(shown: &Shown) -> Vec<Banner> {
-    let banner = |title, text, remedy| Banner {
-        level: BannerLevel::Warn,
-        title,
-        text,
-        remedy,
-    };
     let unplugged = shown.disconnected.as_ref().map(|name| {
         let text = format!("{name}. The needle stays where it is; keys and mouse still move it.");
-        banner("Unplugged", text, Some(("Dismiss", Action::DismissDisconnected)))
+        Banner::new(BannerLevel::Warn, "Unplugged", text).with("Dismiss", Action::DismissDisconnected)
     });
     let denied = shown.controllers.denied.iter();
-    let denied = denied.map(|why| banner("A controller cannot be read", why.clone(), None));
+    let denied = denied.map(|why| Banner::new(BannerLevel::Warn, "A controller cannot be read", why));
     unplugged.into_iter().chain(denied).collect()
 }
 
@@ -84,30 +93,19 @@ fn of_core(shown: &Shown) -> Vec<Banner> {
             return shown.relayed.as_ref().map(of_line).into_iter().collect();
         }
         LinkStatus::Silent { since } => {
-            return vec![Banner {
-                level: BannerLevel::Bad,
-                title: "The core is silent",
-                text: format!(
-                    "No data from the core for {:.1} s; showing the last state.",
-                    since.as_secs_f64()
-                ),
-                remedy: None,
-            }];
+            let since_s = since.as_secs_f64();
+            let text = format!("No data from the core for {since_s:.1} s; showing the last state.");
+            return vec![Banner::new(BannerLevel::Bad, "The core is silent", text)];
         }
         LinkStatus::Live => {}
     }
     let mut list = Vec::new();
     let fault = shown.fault();
     if fault != Some(Fault::None) {
-        list.push(Banner {
-            level: BannerLevel::Bad,
-            title: "Fault: the force is off",
-            text: fault.map_or(
-                "rt-core reports a fault that this program does not know".to_owned(),
-                |f| sentence(f.message()),
-            ),
-            remedy: Some(("Re-arm", Action::Send(Request::Engage))),
-        });
+        let unknown = || "rt-core reports a fault that this program does not know".to_owned();
+        let text = fault.map_or_else(unknown, |f| sentence(f.message()));
+        let banner = Banner::new(BannerLevel::Bad, "Fault: the force is off", text);
+        list.push(banner.with("Re-arm", Action::Send(Request::Engage)));
     }
     list.extend(of_second(shown));
     if shown.state.is_some() && !shown.is_real_time() {
@@ -139,11 +137,10 @@ fn of_second(shown: &Shown) -> Option<Banner> {
             sentence(fault.map_or("it reports a fault that this program does not know", Fault::message))
         ),
     };
-    Some(Banner {
-        level: BannerLevel::Bad,
-        title: "Second device: its force is off",
-        text,
-        remedy: (fault != Some(Fault::LoopStopped)).then_some(("Re-arm both", Action::Send(Request::Engage))),
+    let banner = Banner::new(BannerLevel::Bad, "Second device: its force is off", text);
+    Some(match fault {
+        Some(Fault::LoopStopped) => banner,
+        _ => banner.with("Re-arm both", Action::Send(Request::Engage)),
     })
 }
 
@@ -152,62 +149,46 @@ fn of_line(line: &Relayed) -> Banner {
     let age_s = line.snapshot_age_ns as f64 * 1e-9;
     let (server, name) = (line.server.read(), line.name.read());
     if line.is_heard == 0 {
-        return Banner {
-            level: BannerLevel::Bad,
-            title: "No data from the relay",
-            text: format!(
-                "{server} has sent no data of {name} for {age_s:.1} s: the display is out of date, and requests are refused. The window continues \
-                 when the connection is restored."
-            ),
-            remedy: None,
-        };
+        let text = format!(
+            "{server} has sent no data of {name} for {age_s:.1} s: the display is out of date, and requests are refused. The window continues \
+             when the connection is restored."
+        );
+        return Banner::new(BannerLevel::Bad, "No data from the relay", text);
     }
     let operator = match (line.operates, line.operator.read()) {
         (1, _) => "You operate".to_owned(),
         (_, nobody) if nobody.is_empty() => "Nobody operates".to_owned(),
         (_, other) => format!("{} operates", capital(&other)),
     };
-    Banner {
-        level: BannerLevel::Info,
-        title: "Connected over a relay",
-        text: format!(
-            "{name}, {}, at {server}. {operator}. Shown {:.0} ms late, round trip {:.0} ms; {} records and {} snapshots lost.",
-            line.role.read(),
-            age_s * 1e3,
-            line.round_trip_ns as f64 * 1e-6,
-            line.records_lost,
-            line.snapshots_lost
-        ),
-        remedy: Some(("Members", Action::ToggleClass)),
-    }
+    let text = format!(
+        "{name}, {}, at {server}. {operator}. Shown {:.0} ms late, round trip {:.0} ms; {} records and {} snapshots lost.",
+        line.role.read(),
+        age_s * 1e3,
+        line.round_trip_ns as f64 * 1e-6,
+        line.records_lost,
+        line.snapshots_lost
+    );
+    Banner::new(BannerLevel::Info, "Connected over a relay", text).with("Members", Action::ToggleClass)
 }
 
 fn force_is_off(shown: &Shown) -> Option<Banner> {
     if !shown.is_engaged() {
-        return Some(Banner {
-            level: BannerLevel::Warn,
-            title: "The force is off",
-            text: "Motion is tracked, but no force is rendered. Key E turns it on.".to_owned(),
-            remedy: Some(("Turn it on", Action::Send(Request::Engage))),
-        });
+        let text = "Motion is tracked, but no force is rendered. Key E turns it on.";
+        let banner = Banner::new(BannerLevel::Warn, "The force is off", text);
+        return Some(banner.with("Turn it on", Action::Send(Request::Engage)));
     }
-    shown.is_waiting().then(|| Banner {
-        level: BannerLevel::Warn,
-        title: "The force is held back",
-        text: "It would start with a jump. Move the needle until the force is small, preferably outside the tissue."
-            .to_owned(),
-        remedy: None,
-    })
+    let text = "It would start with a jump. Move the needle until the force is small, preferably outside the tissue.";
+    shown
+        .is_waiting()
+        .then(|| Banner::new(BannerLevel::Warn, "The force is held back", text))
 }
 
 /// Names the faults that an instructor injected, so that a trainee does not suspect the machine.
 fn exercises(shown: &Shown) -> Vec<Banner> {
     let in_force = shown.session.map(|s| s.exercises).unwrap_or_default();
-    let banner = |exercise: Exercise| Banner {
-        level: BannerLevel::Warn,
-        title: "Exercise",
-        text: format!("{}. Injected by the instructor.", capital(&exercise.to_string())),
-        remedy: None,
+    let banner = |exercise: Exercise| {
+        let text = format!("{}. Injected by the instructor.", capital(&exercise.to_string()));
+        Banner::new(BannerLevel::Warn, "Exercise", text)
     };
     in_force.all().map(banner).collect()
 }
@@ -216,50 +197,41 @@ fn exercises(shown: &Shown) -> Vec<Banner> {
 /// accurate, and may be late.
 fn without_line(shown: &Shown) -> Option<Banner> {
     let is_missing = shown.needle_line() == Some(NeedleLine::Missing);
-    is_missing.then(|| Banner {
-        level: BannerLevel::Warn,
-        title: "No needle line",
-        text: match shown.lag() {
-            Some((lag_s, lag_m)) => format!(
-                "The tissue was not prepared for this needle, and its answer is {:.0} ms and {} behind: neither force nor seed positions are \
-                 reliable. Withdraw the needle, and wait for LINE READY.",
-                lag_s * 1e3,
-                stylet_base::format::length(lag_m)
-            ),
-            None => "The tissue was not prepared for this needle: its force follows the paper's law, and its seeds may rest up to 2 cm \
-                     from plan. Withdraw it, and wait for LINE READY."
-                .to_owned(),
-        },
-        remedy: None,
-    })
+    let text = match shown.lag() {
+        Some((lag_s, lag_m)) => format!(
+            "The tissue was not prepared for this needle, and its answer is {:.0} ms and {} behind: neither force nor seed positions are \
+             reliable. Withdraw the needle, and wait for LINE READY.",
+            lag_s * 1e3,
+            stylet_base::format::length(lag_m)
+        ),
+        None => "The tissue was not prepared for this needle: its force follows the paper's law, and its seeds may rest up to 2 cm \
+                 from plan. Withdraw it, and wait for LINE READY."
+            .to_owned(),
+    };
+    is_missing.then(|| Banner::new(BannerLevel::Warn, "No needle line", text))
 }
 
 /// Warns while the tissue is folded; results record from which displacement on it was.
 fn folded(shown: &Shown) -> Option<Banner> {
     let folded_from_m = shown.folded_from_m().filter(|_| shown.is_folded());
-    folded_from_m.map(|folded_from_m| Banner {
-        level: BannerLevel::Warn,
-        title: "Tissue folded",
-        text: format!(
+    folded_from_m.map(|folded_from_m| {
+        let text = format!(
             "The linear tissue model at the tip is folded beyond {:.1} mm of displacement. Until the load eases, force and positions \
              there are not realistic.",
             stylet_base::format::mm(folded_from_m)
-        ),
-        remedy: None,
+        );
+        Banner::new(BannerLevel::Warn, "Tissue folded", text)
     })
 }
 
 /// Returns the refusals until they are dismissed: the refused request may be another host's.
 fn refused(shown: &Shown) -> Option<Banner> {
-    (shown.refusals > 0).then(|| Banner {
-        level: BannerLevel::Info,
-        title: "Request refused",
-        text: match shown.last_refusal.as_str() {
-            "" => format!("{} requests", shown.refusals),
-            why => format!("{} requests; the last: {}", shown.refusals, why.replace('\n', "; ")),
-        },
-        remedy: Some(("Dismiss", Action::DismissRefusals)),
-    })
+    let text = match shown.last_refusal.as_str() {
+        "" => format!("{} requests", shown.refusals),
+        why => format!("{} requests; the last: {}", shown.refusals, why.replace('\n', "; ")),
+    };
+    let banner = Banner::new(BannerLevel::Info, "Request refused", text).with("Dismiss", Action::DismissRefusals);
+    (shown.refusals > 0).then_some(banner)
 }
 
 fn absent(shown: &Shown, why: &str) -> Banner {
@@ -268,15 +240,11 @@ fn absent(shown: &Shown, why: &str) -> Banner {
     } else {
         format!("{}{}", what_ended(shown), sentence(why))
     };
-    let remedy = match shown.session.is_some() && shown.relayed.is_none() {
-        true => ("Start it again", Action::StartCore),
-        false => ("Watch example", Action::Watch(WatchAction::Example)),
-    };
-    Banner {
-        level: BannerLevel::Bad,
-        title: "The simulator core is not running",
-        text,
-        remedy: (!shown.reads_recording).then_some(remedy),
+    let banner = Banner::new(BannerLevel::Bad, "The simulator core is not running", text);
+    match shown.session.is_some() && shown.relayed.is_none() {
+        _ if shown.reads_recording => banner,
+        true => banner.with("Start it again", Action::StartCore),
+        false => banner.with("Watch example", Action::Watch(WatchAction::Example)),
     }
 }
 
@@ -305,12 +273,7 @@ fn not_real_time(shown: &Shown) -> Banner {
         ("", false) => "Run rt-core doctor: it lists the problems and their remedies.".to_owned(),
         (advice, _) => advice.replace('\n', "  "),
     };
-    Banner {
-        level: BannerLevel::Warn,
-        title: "Not real-time",
-        text,
-        remedy: None,
-    }
+    Banner::new(BannerLevel::Warn, "Not real-time", text)
 }
 
 /// Largest share of the pictures under banners.

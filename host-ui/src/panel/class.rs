@@ -48,24 +48,18 @@ pub fn banners(shown: &Shown) -> Vec<Banner> {
     let mut list = Vec::new();
     let asked = class.asked.read();
     if hand(shown, class) == Hand::Held && !asked.is_empty() {
-        list.push(Banner {
-            level: BannerLevel::Warn,
-            title: "Request for the needle",
-            text: format!("{asked} asks to operate. The hand stops when you hand over."),
-            remedy: Some(("Hand over", Action::Lease(LeaseRequest::Give(asked)))),
-        });
+        let text = format!("{asked} asks to operate. The hand stops when you hand over.");
+        let banner = Banner::new(BannerLevel::Warn, "Request for the needle", text);
+        list.push(banner.with("Hand over", Action::Lease(LeaseRequest::Give(asked))));
     }
     if shown.relayed.is_none() {
-        list.push(Banner {
-            level: BannerLevel::Info,
-            title: "A class is watching",
-            text: format!(
-                "{} connected over the relay. {}",
-                members(class),
-                operates(shown, class)
-            ),
-            remedy: Some(("Members", Action::ToggleClass)),
-        });
+        let text = format!(
+            "{} connected over the relay. {}",
+            members(class),
+            operates(shown, class)
+        );
+        let banner = Banner::new(BannerLevel::Info, "A class is watching", text);
+        list.push(banner.with("Members", Action::ToggleClass));
     }
     list
 }

@@ -6,6 +6,7 @@ use crate::panel::workflow::job::job_ui;
 use crate::planner::{Edit, Implant, ReviewShown};
 use crate::shown::Shown;
 use crate::theme;
+use crate::theme::Press;
 use crate::view::state::Tool;
 use egui::{Button, RichText};
 use stylet_base::format;
@@ -258,22 +259,16 @@ fn update_ui(ui: &mut egui::Ui, shown: &Shown, missing: Option<String>, actions:
     }
     let free = shown.is_live() && !shown.running && missing.is_none();
     ui.horizontal_wrapped(|ui| {
-        let plan = ui.add_enabled(free, Button::new("Replan the remaining needles"));
         let hint = "Needles that are not inserted yet, through free holes, given the dose of the placed seeds";
-        if plan.on_hover_text(hint).clicked() {
-            actions.push(Action::Plan(PlanAction::Update));
-        }
+        let plan = Press("Replan the remaining needles", hint).ui(ui, free);
+        actions.extend(plan.then_some(Action::Plan(PlanAction::Update)));
         let can_rehearse = shown.is_live() && !shown.running && shown.planning.next_needle().is_some();
-        let compensate = ui.add_enabled(can_rehearse, Button::new("Compensate"));
         let hint = "Rehearses the remaining needles and shifts their drops so that seeds rest where they are planned";
-        if compensate.on_hover_text(hint).clicked() {
-            actions.push(Action::Plan(PlanAction::Compensate));
-        }
+        let compensate = Press("Compensate", hint).ui(ui, can_rehearse);
+        actions.extend(compensate.then_some(Action::Plan(PlanAction::Compensate)));
         if shown.planning.review.can_withdraw {
-            let withdraw = ui.add_enabled(!shown.running, Button::new("Withdraw the update"));
-            if withdraw.on_hover_text("Restores the plan before the update").clicked() {
-                actions.push(Action::Plan(PlanAction::WithdrawUpdate));
-            }
+            let withdraw = Press("Withdraw the update", "Restores the plan before the update").ui(ui, !shown.running);
+            actions.extend(withdraw.then_some(Action::Plan(PlanAction::WithdrawUpdate)));
         }
     });
 }
@@ -291,15 +286,9 @@ fn decision_ui(ui: &mut egui::Ui, proposed: &Proposed, actions: &mut Vec<Action>
         false => ui.label(RichText::new("The update is no better than continuing the plan.").color(tokens.warn)),
     };
     ui.horizontal(|ui| {
-        if ui
-            .button("Accept")
-            .on_hover_text("The plan of the remaining needles")
-            .clicked()
-        {
-            actions.push(Action::Plan(PlanAction::Decide(true)));
-        }
-        if ui.button("Keep the plan").on_hover_text("Continue as before").clicked() {
-            actions.push(Action::Plan(PlanAction::Decide(false)));
-        }
+        let pressed = Press("Accept", "The plan of the remaining needles").ui(ui, true);
+        actions.extend(pressed.then_some(Action::Plan(PlanAction::Decide(true))));
+        let pressed = Press("Keep the plan", "Continue as before").ui(ui, true);
+        actions.extend(pressed.then_some(Action::Plan(PlanAction::Decide(false))));
     });
 }

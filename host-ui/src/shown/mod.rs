@@ -30,7 +30,7 @@ use stylet_shm_schema::{
 /// Length of the path beyond the deepest seed, for the needle and for drawing.
 pub const PAST_LAST_SEED_M: f64 = 0.01;
 
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct Shown {
     pub instance: String,
     pub status: LinkStatus,
@@ -96,42 +96,8 @@ impl Shown {
     pub fn empty(instance: &str) -> Self {
         Self {
             instance: instance.to_owned(),
-            status: LinkStatus::Absent { why: String::new() },
-            session: None,
-            relayed: None,
-            class: None,
-            state: None,
-            second: None,
-            stepper: Stepper::default(),
-            scene: None,
-            plan: None,
-            parameters: None,
-            seeds: Vec::new(),
-            heard: Vec::new(),
-            body_moved_m: [0.0; 3],
-            bend: Bend::default(),
-            left: Vec::new(),
-            snapshot_residual: None,
-            invalid_dropped: 0,
-            running: false,
-            run_step: None,
-            run_needle: None,
-            run_waits: None,
-            continues_at: None,
-            note: None,
-            load: LoadState::Idle,
-            watched: None,
-            reads_recording: false,
-            dose: None,
-            dose_trouble: None,
-            planning: Planning::default(),
-            refusals: 0,
-            last_refusal: String::new(),
-            last_fault: String::new(),
-            controllers: Latest::default(),
             has_focus: true,
-            disconnected: None,
-            cost: FrameCost::default(),
+            ..Self::default()
         }
     }
 

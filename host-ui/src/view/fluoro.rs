@@ -37,6 +37,7 @@ const LOOK_AGAIN: Duration = Duration::from_millis(10);
 type Case = (u64, SceneId);
 
 /// Tube, arm and screen.
+#[derive(Default)]
 pub(super) struct FluoroView {
     screen: Option<Screen>,
     tube: Option<Arc<Fluoroscope>>,
@@ -91,14 +92,7 @@ impl FluoroView {
         });
         Self {
             screen,
-            tube: None,
-            pulse: None,
-            case: None,
-            held: None,
-            dose: DoseCounter::default(),
-            angles: Angles::default(),
-            is_switched_on: false,
-            is_key_held: false,
+            ..Self::default()
         }
     }
 

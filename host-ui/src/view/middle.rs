@@ -14,6 +14,7 @@ use crate::dose_worker::DoseResult;
 use crate::settings::Layout;
 use crate::shown::Shown;
 use crate::theme;
+use crate::theme::Press;
 use eframe::egui_wgpu::RenderState;
 use egui::{Pos2, Rect};
 use nalgebra::Vector3;
@@ -230,19 +231,13 @@ impl Middle {
                 .on_hover_text(format!("Key G: {name} in the slices, or simulated ultrasound"));
         }
         ui.menu_button("3D view", |ui| self.solid_menu(ui, shown, actions));
-        if ui
-            .button("Picture")
-            .on_hover_text("F12: saves the window as PNG")
-            .clicked()
-        {
-            actions.push(Action::SavePicture);
-        }
+        let pressed = Press("Picture", "F12: saves the window as PNG").ui(ui, true);
+        actions.extend(pressed.then_some(Action::SavePicture));
     }
 
     fn solid_menu(&mut self, ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
-        if ui.button("Reset view").on_hover_text("Key R").clicked() {
-            actions.push(Action::ResetView);
-        }
+        let pressed = Press("Reset view", "Key R").ui(ui, true);
+        actions.extend(pressed.then_some(Action::ResetView));
         for (number, preset) in Viewpoint::ALL.into_iter().enumerate() {
             let text = format!("{}  {}", number + 1, preset.name());
             if ui.button(text).clicked() {
@@ -302,62 +297,33 @@ fn places(rect: Rect, layout: Layout) -> Places {
         let [top, bottom] = [[y.min, middle.y - half], [middle.y + half, y.max]][row];
         Rect::from_min_max(Pos2::new(left, top), Pos2::new(right, bottom))
     };
+    let (mut solid, mut slices, mut probe, mut fluoro) = (None, Vec::new(), Vec::new(), None);
     match layout {
-        Layout::Quad => Places {
-            solid: Some(cell(1, 0)),
-            slices: vec![(axial, cell(0, 0)), (sagittal, cell(0, 1)), (coronal, cell(1, 1))],
-            probe: Vec::new(),
-            fluoro: None,
-        },
-        Layout::Solid => Places {
-            solid: Some(rect),
-            slices: Vec::new(),
-            probe: Vec::new(),
-            fluoro: None,
-        },
+        Layout::Quad => {
+            solid = Some(cell(1, 0));
+            slices = vec![(axial, cell(0, 0)), (sagittal, cell(0, 1)), (coronal, cell(1, 1))];
+        }
+        Layout::Solid => solid = Some(rect),
         Layout::Slices => {
             // The sagittal slice shows most of an insertion and gets the lower half.
             let lower = cell(0, 1).union(cell(1, 1));
-            Places {
-                solid: None,
-                slices: vec![(axial, cell(0, 0)), (coronal, cell(1, 0)), (sagittal, lower)],
-                probe: Vec::new(),
-                fluoro: None,
-            }
+            slices = vec![(axial, cell(0, 0)), (coronal, cell(1, 0)), (sagittal, lower)];
         }
-        Layout::Probe => Places {
-            solid: Some(cell(1, 0)),
-            slices: vec![(coronal, cell(1, 1))],
-            probe: vec![(View::Transverse, cell(0, 0)), (View::Sagittal, cell(0, 1))],
-            fluoro: None,
-        },
-        Layout::Fluoroscopy => Places {
-            solid: Some(cell(1, 1)),
-            slices: Vec::new(),
-            probe: vec![(View::Transverse, cell(0, 1))],
-            fluoro: Some(cell(0, 0).union(cell(1, 0))),
-        },
+        Layout::Probe => {
+            solid = Some(cell(1, 0));
+            slices = vec![(coronal, cell(1, 1))];
+            probe = vec![(View::Transverse, cell(0, 0)), (View::Sagittal, cell(0, 1))];
+        }
+        Layout::Fluoroscopy => {
+            solid = Some(cell(1, 1));
+            probe = vec![(View::Transverse, cell(0, 1))];
+            fluoro = Some(cell(0, 0).union(cell(1, 0)));
+        }
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use egui::Vec2;
-
-    #[test]
-    fn pictures_lie_in_the_window_and_not_over_each_other() {
-        let rect = Rect::from_min_size(Pos2::new(286.0, 70.0), Vec2::new(664.0, 730.0));
-        for layout in Layout::ALL {
-            let places = places(rect, layout);
-            let slices = places.slices.iter().map(|(_, r)| *r);
-            let probe = places.probe.iter().map(|(_, r)| *r);
-            let all: Vec<Rect> = slices.chain(probe).chain(places.solid).chain(places.fluoro).collect();
-            for (i, a) in all.iter().enumerate() {
-                assert!(rect.contains_rect(*a), "{layout:?}");
-                assert!(all[i + 1..].iter().all(|b| !a.intersects(*b)), "{layout:?}");
-                assert!(a.width() > 200.0 && a.height() > 200.0, "{layout:?}: {a:?}");
-            }
-        }
+    Places {
+        solid,
+        slices,
+        probe,
+        fluoro,
     }
 }

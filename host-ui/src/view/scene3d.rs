@@ -95,6 +95,7 @@ struct What {
 /// Scene, plans, template shown, dark colours.
 type PlanMarksKey = (SceneId, (u64, u64, usize), bool, bool);
 
+#[derive(Default)]
 pub struct Scene3d {
     gpu: Option<SceneGpu>,
     pub camera: Camera,
@@ -120,17 +121,7 @@ impl Scene3d {
     pub fn new(state: Option<RenderState>) -> Self {
         Self {
             gpu: state.as_ref().map(SceneGpu::new),
-            camera: Camera::default(),
-            look: Look::default(),
-            uploaded_scene: None,
-            surface: Surface::default(),
-            moved: 0,
-            changes: 0,
-            shells: 0,
-            drawn: None,
-            fixed: None,
-            marks: Marks::default(),
-            corner_m: None,
+            ..Self::default()
         }
     }
 

@@ -1,8 +1,8 @@
 //! Parameters as a file (TOML), in display units.
 
 use std::fmt::Write;
-use std::io;
 use std::path::{Path, PathBuf};
+use stylet_base::input::{InputError, read_text};
 use stylet_base::{WriteError, write_whole};
 use stylet_shm_schema::{PARAMETERS, ParameterSet};
 
@@ -16,23 +16,12 @@ pub enum PresetError {
     #[error(transparent)]
     Write(#[from] WriteError),
     /// The file could not be read.
-    #[error("{}: it cannot be read: {source}", .path.display())]
+    #[error("{}: {source}", .path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// Error of the operating system.
-        source: io::Error,
-    },
-    /// A folder or a device, which may be endless.
-    #[error("{}: it is not a regular file", .0.display())]
-    NotAFile(PathBuf),
-    /// Far larger than any preset.
-    #[error("{}: it has {bytes} bytes; a preset has a few thousand", .path.display())]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// Its size.
-        bytes: u64,
+        /// Reason.
+        source: InputError,
     },
     /// Its content is invalid, with one problem a line.
     #[error("{}: {problems}", .path.display())]
@@ -51,25 +40,12 @@ pub fn save(path: &Path, set: &ParameterSet) -> Result<(), PresetError> {
 
 /// Returns place in the table and SI value of each parameter in the file.
 pub fn load(path: &Path) -> Result<Vec<(usize, f64)>, PresetError> {
-    let path_buf = || path.to_owned();
-    let unread = |source| PresetError::Read {
-        path: path_buf(),
+    let text = read_text(path, MAX_BYTES).map_err(|source| PresetError::Read {
+        path: path.to_owned(),
         source,
-    };
-    let about = std::fs::metadata(path).map_err(unread)?;
-    if !about.is_file() {
-        return Err(PresetError::NotAFile(path_buf()));
-    }
-    let bytes = about.len();
-    if bytes > MAX_BYTES {
-        return Err(PresetError::TooLarge {
-            path: path_buf(),
-            bytes,
-        });
-    }
-    let text = std::fs::read_to_string(path).map_err(unread)?;
+    })?;
     read(&text).map_err(|problems| PresetError::Invalid {
-        path: path_buf(),
+        path: path.to_owned(),
         problems,
     })
 }

@@ -14,6 +14,7 @@ use crate::action::Action;
 use crate::recent::{Missing, Recent};
 use crate::shown::{SeedError, Shown, own_errors};
 use crate::theme;
+use crate::theme::Press;
 use egui::text::LayoutJob;
 use egui::{Align2, Button, FontId, RichText, Sense, Stroke, TextStyle, Vec2};
 pub use guide::Guide;
@@ -221,13 +222,8 @@ fn what(step: Progress, shown: &Shown) -> String {
 
 /// Draws the button of a step's main action.
 fn main_button(ui: &mut egui::Ui, (name, action): (&str, Action), ready: bool, actions: &mut Vec<Action>) {
-    if ui
-        .add_enabled(ready, Button::new(name))
-        .on_hover_text("Enter, while this step is next")
-        .clicked()
-    {
-        actions.push(action);
-    }
+    let pressed = Press(name, "Enter, while this step is next").ui(ui, ready);
+    actions.extend(pressed.then_some(action));
 }
 
 fn place_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Action>) {
@@ -264,13 +260,8 @@ fn insert_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Ac
 fn drop_ui(ui: &mut egui::Ui, shown: &Shown, ready: bool, actions: &mut Vec<Action>) {
     let live = shown.is_live() && !shown.running;
     ui.horizontal(|ui| {
-        if ui
-            .add_enabled(ready, Button::new("Drop seed"))
-            .on_hover_text("Space")
-            .clicked()
-        {
-            actions.push(Action::DropSeed);
-        }
+        let pressed = Press("Drop seed", "Space").ui(ui, ready);
+        actions.extend(pressed.then_some(Action::DropSeed));
         let next = shown.next_seed_m().filter(|_| !is_at_next_seed(shown));
         let to_next = ui.add_enabled(live && next.is_some(), Button::new("To the next place"));
         if let (true, Some(depth_m)) = (to_next.clicked(), next) {
@@ -297,10 +288,8 @@ fn retract_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         {
             actions.push(Action::Retract);
         }
-        let undo = ui.add_enabled(live && !shown.seeds.is_empty(), Button::new("Undo seed"));
-        if undo.on_hover_text("Ctrl+Z").clicked() {
-            actions.push(Action::Send(Request::UndoSeed));
-        }
+        let undo = Press("Undo seed", "Ctrl+Z").ui(ui, live && !shown.seeds.is_empty());
+        actions.extend(undo.then_some(Action::Send(Request::UndoSeed)));
         left::leave_ui(ui, shown, actions);
     });
     left::left_ui(ui, shown, actions);
@@ -310,27 +299,16 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let live = shown.is_live() && shown.watched.is_none();
         let engaged = shown.is_engaged();
-        if ui
-            .add_enabled(live && !engaged, Button::new("Engage force"))
-            .on_hover_text("Key E")
-            .clicked()
-        {
-            actions.push(Action::Send(Request::Engage));
-        }
-        if ui
-            .add_enabled(live && engaged, Button::new("Disengage"))
-            .on_hover_text("Key D")
-            .clicked()
-        {
-            actions.push(Action::Send(Request::Disengage));
-        }
-        let reset = ui.add_enabled(live, Button::new("Reset"));
-        if reset
-            .on_hover_text("Returns the tissue to rest, removes the seeds, and clears peaks and worst cases")
-            .clicked()
-        {
-            actions.push(Action::Send(Request::Reset));
-        }
+        let pressed = Press("Engage force", "Key E").ui(ui, live && !engaged);
+        actions.extend(pressed.then_some(Action::Send(Request::Engage)));
+        let pressed = Press("Disengage", "Key D").ui(ui, live && engaged);
+        actions.extend(pressed.then_some(Action::Send(Request::Disengage)));
+        let reset = Press(
+            "Reset",
+            "Returns the tissue to rest, removes the seeds, and clears peaks and worst cases",
+        )
+        .ui(ui, live);
+        actions.extend(reset.then_some(Action::Send(Request::Reset)));
     });
 }
 

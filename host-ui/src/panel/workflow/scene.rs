@@ -8,6 +8,7 @@ use crate::panel::field::path_ui;
 use crate::recent::Recent;
 use crate::shown::{LoadState, Shown};
 use crate::theme;
+use crate::theme::Press;
 use crate::words::Explained;
 use egui::{Button, RichText};
 use std::path::PathBuf;
@@ -98,13 +99,12 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
         if example.clicked() {
             actions.push(Action::Watch(WatchAction::Example));
         }
-        let other = ui.add_enabled(can_watch, Button::new("recording…"));
-        if other
-            .on_hover_text("A recording made by \"host-ui record\", or drop one on the window")
-            .clicked()
-        {
-            actions.push(Action::PickFile(Purpose::Recording));
-        }
+        let other = Press(
+            "recording…",
+            "A recording made by \"host-ui record\", or drop one on the window",
+        )
+        .ui(ui, can_watch);
+        actions.extend(other.then_some(Action::PickFile(Purpose::Recording)));
     });
     let entered = ui.horizontal(|ui| {
         let width = ui.available_width() - OPEN_WIDTH;

@@ -10,6 +10,7 @@ use crate::panel::workflow::job::job_ui;
 use crate::planner::Implant;
 use crate::shown::Shown;
 use crate::theme;
+use crate::theme::Press;
 use crate::words::Explained;
 use egui::{Button, DragValue};
 use std::path::PathBuf;
@@ -40,32 +41,23 @@ pub fn plan_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, read
 fn begin_ui(ui: &mut egui::Ui, shown: &Shown, (ready, free): (bool, bool), actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         main_button(ui, ("Plan five seeds", Action::PlanSeeds), ready, actions);
-        let undo = ui.add_enabled(
-            ready && undo_action(shown) == Some(Undo::Plan),
-            Button::new("Withdraw the plan"),
-        );
-        if undo.on_hover_text("Ctrl+Z").clicked() {
-            actions.push(Action::Undo);
-        }
+        let undo = Press("Withdraw the plan", "Ctrl+Z").ui(ui, ready && undo_action(shown) == Some(Undo::Plan));
+        actions.extend(undo.then_some(Action::Undo));
     });
     ui.label(theme::small("Or many needles through the template:"));
     ui.horizontal(|ui| {
         automatic_ui(ui, shown, free, actions);
-        let empty = ui.add_enabled(free && shown.planning.outlines.is_some(), Button::new("Empty plan"));
-        if empty.on_hover_text("Choose the holes yourself").clicked() {
-            actions.push(Action::Plan(PlanAction::Begin));
-        }
+        let empty = Press("Empty plan", "Choose the holes yourself").ui(ui, free && shown.planning.outlines.is_some());
+        actions.extend(empty.then_some(Action::Plan(PlanAction::Begin)));
     });
 }
 
 fn automatic_ui(ui: &mut egui::Ui, shown: &Shown, free: bool, actions: &mut Vec<Action>) {
     let can = free && shown.planning.outlines.is_some();
-    let response = ui.add_enabled(can, Button::new("Automatic plan"));
     let hint = "Needles, seeds and one strength that cover the target and keep the limits of urethra and rectum: three proposals to \
                 choose from";
-    if response.on_hover_text(hint).clicked() {
-        actions.push(Action::Plan(PlanAction::Automatic));
-    }
+    let response = Press("Automatic plan", hint).ui(ui, can);
+    actions.extend(response.then_some(Action::Plan(PlanAction::Automatic)));
 }
 
 fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, actions: &mut Vec<Action>) {
@@ -86,13 +78,8 @@ fn implant_ui(ui: &mut egui::Ui, shown: &Shown, implant: &Implant, free: bool, a
         } else {
             super::next_needle_ui(ui, shown, actions);
         }
-        let discard = ui.add_enabled(free, Button::new("Discard the plan"));
-        if discard
-            .on_hover_text("Back to one needle; save it first to keep it")
-            .clicked()
-        {
-            actions.push(Action::Plan(PlanAction::Discard));
-        }
+        let discard = Press("Discard the plan", "Back to one needle; save it first to keep it").ui(ui, free);
+        actions.extend(discard.then_some(Action::Plan(PlanAction::Discard)));
     });
     ui.horizontal(|ui| {
         ui.add_enabled_ui(waits, |ui| automatic_ui(ui, shown, free, actions));
@@ -152,13 +139,12 @@ fn strength_ui(ui: &mut egui::Ui, implant: &Implant, free: bool, actions: &mut V
         if response.changed() && strength_u != first.strength_u {
             actions.push(Action::Plan(PlanAction::SetStrength(strength_u)));
         }
-        let fit = ui.add_enabled(free, Button::new("Fit dose"));
-        if fit
-            .on_hover_text("The strength at which 96 % of the target gets the prescription")
-            .clicked()
-        {
-            actions.push(Action::Plan(PlanAction::FitStrength));
-        }
+        let fit = Press(
+            "Fit dose",
+            "The strength at which 96 % of the target gets the prescription",
+        )
+        .ui(ui, free);
+        actions.extend(fit.then_some(Action::Plan(PlanAction::FitStrength)));
     });
 }
 
@@ -198,10 +184,9 @@ fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bo
         if (import.clicked() || entered) && can_read {
             actions.push(Action::Plan(PlanAction::Import(PathBuf::from(path))));
         }
-        let export = ui.add_enabled(has_name && shown.planning.implant.is_some(), Button::new("Save"));
-        if export.on_hover_text("Writes to the file named at the left").clicked() {
-            actions.push(Action::Plan(PlanAction::Export(PathBuf::from(path))));
-        }
+        let export =
+            Press("Save", "Writes to the file named at the left").ui(ui, has_name && shown.planning.implant.is_some());
+        actions.extend(export.then(|| Action::Plan(PlanAction::Export(PathBuf::from(path)))));
         ui.add_enabled_ui(free, |ui| dialogs_ui(ui, shown, actions));
     });
     if shown.planning.implant.is_some() {
@@ -211,10 +196,8 @@ fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bo
 
 /// Draws the export of structure set, plan and dose.
 fn study_ui(ui: &mut egui::Ui, free: bool, actions: &mut Vec<Action>) {
-    let response = ui.add_enabled(free, Button::new("Save as DICOM study"));
     let hint = "Structure set, plan and dose that name each other, into a new folder; patient and frame are those of the scene's \
                 file where it is DICOM";
-    if response.on_hover_text(hint).clicked() {
-        actions.push(Action::Plan(PlanAction::ExportStudy));
-    }
+    let response = Press("Save as DICOM study", hint).ui(ui, free);
+    actions.extend(response.then_some(Action::Plan(PlanAction::ExportStudy)));
 }

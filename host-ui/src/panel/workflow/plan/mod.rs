@@ -12,6 +12,7 @@ use crate::action::{Action, PlanAction, Viewpoint};
 use crate::planner::Implant;
 use crate::shown::Shown;
 use crate::theme;
+use crate::theme::Press;
 pub(super) use card::plan_ui;
 use egui::Button;
 use stylet_implant::plan::{Hole, ImplantPlan};
@@ -90,21 +91,16 @@ fn head_ui(ui: &mut egui::Ui, implant: &Implant, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.heading("Needles");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            let redo = ui.add_enabled(implant.can_redo, Button::new("Redo"));
-            if redo.on_hover_text("Ctrl+Shift+Z").clicked() {
-                actions.push(Action::Redo);
-            }
-            let undo = ui.add_enabled(implant.can_undo, Button::new("Undo"));
-            if undo.on_hover_text("Ctrl+Z").clicked() {
-                actions.push(Action::Undo);
-            }
-            if ui
-                .button("Perineum view")
-                .on_hover_text("Turns the 3D view to look through the template, like this panel")
-                .clicked()
-            {
-                actions.push(Action::LookFrom(Viewpoint::Perineum));
-            }
+            let redo = Press("Redo", "Ctrl+Shift+Z").ui(ui, implant.can_redo);
+            actions.extend(redo.then_some(Action::Redo));
+            let undo = Press("Undo", "Ctrl+Z").ui(ui, implant.can_undo);
+            actions.extend(undo.then_some(Action::Undo));
+            let pressed = Press(
+                "Perineum view",
+                "Turns the 3D view to look through the template, like this panel",
+            )
+            .ui(ui, true);
+            actions.extend(pressed.then_some(Action::LookFrom(Viewpoint::Perineum)));
         });
     });
 }

@@ -6,6 +6,7 @@ use crate::action::{Action, PlanAction};
 use crate::planner::{Implant, NeedleState};
 use crate::shown::Shown;
 use crate::theme;
+use crate::theme::Press;
 use crate::words::Explained;
 use egui::{Button, DragValue};
 use stylet_base::format;
@@ -76,10 +77,8 @@ fn head_ui(ui: &mut egui::Ui, implant: &Implant, number: usize, can: bool, actio
                 .explained("sensitive");
         }
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            let remove = ui.add_enabled(can, Button::new("Remove"));
-            if remove.on_hover_text("Delete in the template").clicked() {
-                actions.push(Action::Plan(PlanAction::Remove(number)));
-            }
+            let remove = Press("Remove", "Delete in the template").ui(ui, can);
+            actions.extend(remove.then_some(Action::Plan(PlanAction::Remove(number))));
         });
     });
 }
