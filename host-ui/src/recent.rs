@@ -1,8 +1,7 @@
-//! Recent files, as the settings keep them, and which of them are missing.
+//! Recent files, as the settings keep them.
 
 use crate::dialog::Purpose;
 use serde::{Deserialize, Serialize};
-use stylet_base::job::{Job, JobUpdate};
 
 /// Number of files that are kept.
 pub const MOST: usize = 10;
@@ -39,34 +38,6 @@ pub fn checked(mut list: Vec<Recent>) -> Vec<Recent> {
     list
 }
 
-/// Search for missing files, on a separate thread, because they may lie on a share that does not
-/// answer.
-#[derive(Default)]
-pub struct Missing {
-    looking: Option<Job<Vec<Recent>>>,
-    found: Vec<Recent>,
-}
-
-impl Missing {
-    /// Starts a new search.
-    pub fn look(&mut self, list: &[Recent]) {
-        let list = list.to_vec();
-        self.looking = Some(Job::begin("recent files", move |answer, _| {
-            let missing = list.into_iter().filter(|one| !std::path::Path::new(&one.path).exists());
-            // The window may have closed; the answer is then dropped.
-            let _ = answer.send(missing.collect());
-        }));
-    }
-
-    /// Returns whether a file is missing, as far as known.
-    pub fn has(&mut self, one: &Recent) -> bool {
-        if let Some(JobUpdate::Message(found)) = self.looking.as_ref().map(Job::poll) {
-            (self.found, self.looking) = (found, None);
-        }
-        self.found.contains(one)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -85,23 +56,5 @@ mod tests {
             is_image: true,
         });
         assert_eq!(checked(list).len(), MOST);
-    }
-
-    #[test]
-    fn files_that_are_missing_are_found_without_waiting() {
-        let here = Recent {
-            path: env!("CARGO_MANIFEST_DIR").to_owned(),
-            is_image: false,
-        };
-        let not_here = Recent {
-            path: "/no/such/file.nrrd".to_owned(),
-            is_image: false,
-        };
-        let mut missing = Missing::default();
-        missing.look(&[here.clone(), not_here.clone()]);
-        while !missing.has(&not_here) {
-            std::thread::sleep(std::time::Duration::from_millis(2));
-        }
-        assert!(!missing.has(&here));
     }
 }

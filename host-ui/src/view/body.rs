@@ -1,9 +1,10 @@
-//! Present positions of the scene's drawn surfaces, computed once a frame for all pictures.
+//! Present positions of the scene's drawn surfaces and displacements of its tissue, once a frame for all pictures.
 
 use std::sync::Arc;
 use stylet_host::link::{SceneModel, Snapshot};
 use stylet_shm_schema::SceneId;
 use stylet_surfaces::bodies::Bodies;
+use stylet_surfaces::field::Field;
 
 /// Surfaces of the scene at the last snapshot.
 #[derive(Default)]
@@ -17,6 +18,9 @@ pub struct ShownBody {
     elements_m: Vec<[f32; 3]>,
     positions_m: Vec<[f32; 3]>,
     moved: u64,
+    /// Displacements in the last snapshot, and the number of their changes.
+    field: Field,
+    stirred: u64,
 }
 
 impl ShownBody {
@@ -34,6 +38,8 @@ impl ShownBody {
             self.elements_m.clone_from(&model.rest_m);
             self.positions_m.clone_from(&bodies.rest_m);
             self.moved += 1;
+            self.field = Field::rest(model.header.nodes);
+            self.stirred += 1;
         }
         let Some(snapshot) = snapshot else { return };
         let key = (snapshot.header.session_id, snapshot.header.tissue_tick);
@@ -41,6 +47,12 @@ impl ShownBody {
             return;
         }
         self.snapshot = Some(key);
+        if let Some(field) = Field::of(model.header.nodes, &snapshot.displacements_m)
+            && field != self.field
+        {
+            self.field = field;
+            self.stirred += 1;
+        }
         // Tissue at rest is also sent 200 times a second.
         if self.elements_m != snapshot.positions_m {
             self.elements_m.clone_from(&snapshot.positions_m);
@@ -85,5 +97,10 @@ impl ShownBody {
     /// Returns a number that grows whenever they move.
     pub fn moved(&self) -> u64 {
         self.moved
+    }
+
+    /// Returns the displacements of the tissue, and a number that grows whenever they change.
+    pub fn field(&self) -> (&Field, u64) {
+        (&self.field, self.stirred)
     }
 }

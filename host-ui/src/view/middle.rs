@@ -82,7 +82,7 @@ impl Middle {
     pub(crate) fn take(&mut self, shown: &Shown, model: Option<&Arc<SceneModel>>, snapshot: Option<&Snapshot>) {
         self.body.take(model, snapshot);
         self.solid.take(shown, &self.body);
-        self.slices.take(&self.body, snapshot, &mut self.view);
+        self.slices.take(&self.body, &mut self.view);
         if let Some(tip) = shown
             .tip_m()
             .filter(|tip| self.view.follow_tip && is_near_body(shown, tip))
@@ -167,7 +167,7 @@ impl Middle {
         }
         self.probe.forget_pictures();
         for (view, rect) in places.probe {
-            let seen = (shown, &self.body, self.slices.field());
+            let seen = (shown, &self.body, self.body.field().0);
             actions.extend(self.probe.picture_ui(ui, rect, view, seen));
             if let Some(picture) = self.probe.picture(view).filter(|_| layout == Layout::Probe) {
                 let (tool, review) = (self.view.tool, &shown.planning.review);
@@ -176,7 +176,7 @@ impl Middle {
         }
         match places.fluoro {
             Some(rect) => {
-                let seen = (shown, &self.body, self.slices.field());
+                let seen = (shown, &self.body, self.body.field().0);
                 self.fluoro.picture_ui(ui, rect, seen);
             }
             None => self.fluoro.release(),

@@ -9,7 +9,7 @@ mod turns;
 use super::body::ShownBody;
 use super::free::free_of_banners;
 use super::paste::{Paste, Pasted, gpu_of};
-use super::slice::{ROOM_FOR_REASON, words};
+use super::slice::{empty, reason};
 use crate::action::{Action, ProbeAction};
 use crate::shown::Shown;
 use crate::theme::IMAGE;
@@ -114,8 +114,8 @@ impl ProbeView {
         response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, &name));
         let painter = ui.painter_at(rect);
         let Some(model) = body.model().filter(|_| shown.scene.is_some()) else {
-            painter.rect_filled(rect, 0.0, IMAGE.background);
-            words(&painter, rect, &format!("{name}: no scene yet"), IMAGE.text);
+            let text = format!("{name}: no scene yet");
+            empty(&painter, rect, &text, (IMAGE.background, IMAGE.text));
             return None;
         };
         let action = self.dragged(&response, view, shown);
@@ -155,11 +155,8 @@ impl ProbeView {
                 return action;
             }
         }
-        painter.rect_filled(rect, 0.0, IMAGE.background);
-        if rect.height() >= ROOM_FOR_REASON {
-            let why = "No ultrasound: no wgpu device that computes, or the scene is too large for it";
-            words(&painter, rect, why, IMAGE.text);
-        }
+        let why = "No ultrasound: no wgpu device that computes, or the scene is too large for it";
+        reason(&painter, rect, why, (IMAGE.background, IMAGE.text));
         action
     }
 

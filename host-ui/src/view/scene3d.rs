@@ -11,6 +11,7 @@ use super::marks::Marks;
 use super::orientation::scene_from_patient;
 use super::paste::Pasted;
 use super::pick::pick;
+use super::slice::reason;
 use super::state::ViewState;
 use super::uniforms::{SceneUniform, section, shifted, tint, uniform};
 use crate::action::Viewpoint;
@@ -216,14 +217,10 @@ impl Scene3d {
                 legend.scale_bar();
                 legend.rows(&rows);
             }
-            None if rect.height() >= super::slice::ROOM_FOR_REASON => {
-                painter.rect_filled(rect, 0.0, tokens.background);
+            None => {
                 let text = "No 3D view: the window has no wgpu device. Install a Vulkan driver (mesa-vulkan-drivers) and start again; everything else \
                             works.";
-                super::slice::words(&painter, rect, text, tokens.weak);
-            }
-            None => {
-                painter.rect_filled(rect, 0.0, tokens.background);
+                reason(&painter, rect, text, (tokens.background, tokens.weak));
             }
         }
     }

@@ -11,7 +11,7 @@ mod run;
 pub(super) mod scene;
 
 use crate::action::Action;
-use crate::recent::{Missing, Recent};
+use crate::recent::Recent;
 use crate::shown::{SeedError, Shown, own_errors};
 use crate::theme;
 use crate::theme::Press;
@@ -31,9 +31,8 @@ use stylet_shm_schema::Request;
 pub struct WorkflowState {
     pub scene_path: String,
     pub plan: PlanState,
-    /// Recent files from the settings, and which of them are missing.
+    /// Recent files from the settings.
     pub recent: Vec<Recent>,
-    missing: Missing,
     /// Guide through the first insertion.
     pub guide: Guide,
     opened: Option<Progress>,

@@ -155,7 +155,7 @@ pub fn scene_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, act
 /// Draws the dialogs, and the recent files.
 fn open_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bool, actions: &mut Vec<Action>) {
     ui.add_enabled_ui(free, |ui| {
-        let menu = ui.menu_button("Open…", |ui| {
+        ui.menu_button("Open…", |ui| {
             for purpose in [Purpose::Scene, Purpose::Image] {
                 let can = purpose == Purpose::Scene || shown.scene.is_some();
                 if ui
@@ -173,24 +173,16 @@ fn open_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bo
                 recent_ui(ui, shown, state, &one, actions);
             }
         });
-        if menu.response.clicked() {
-            state.missing.look(&state.recent);
-        }
     });
 }
 
 fn recent_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, one: &Recent, actions: &mut Vec<Action>) {
-    let is_missing = state.missing.has(one);
     let path = PathBuf::from(&one.path);
     let name = path
         .file_name()
         .map_or(one.path.clone(), |name| name.to_string_lossy().into_owned());
-    let what = match (is_missing, one.is_image) {
-        (true, _) => " (missing)",
-        (false, true) => " (image)",
-        (false, false) => "",
-    };
-    let can = !is_missing && (!one.is_image || shown.scene.is_some());
+    let what = if one.is_image { " (image)" } else { "" };
+    let can = !one.is_image || shown.scene.is_some();
     let button = ui.add_enabled(can, Button::new(format!("{name}{what}")).truncate());
     let button = button.on_hover_text(&one.path).on_disabled_hover_text(&one.path);
     if button.clicked() {

@@ -20,21 +20,18 @@ use egui::{Color32, PointerButton, Pos2, Rect, Sense};
 pub use gpu::ImageError;
 use gpu::SliceGpu;
 use nalgebra::{Matrix3, Vector3};
-pub use overlay::words;
 use overlay::{Lines, Overlay};
+pub use overlay::{empty, reason, words};
 pub use plane::Plane;
 use std::sync::Arc;
 use stylet_files::Image;
-use stylet_host::link::{SceneModel, Snapshot};
+use stylet_host::link::SceneModel;
 use stylet_shm_schema::{SceneHeader, SceneId, Text};
 use stylet_surfaces::bodies::Bodies;
-use stylet_surfaces::field::Field;
 
 /// Initial view, in multiples of the target.
 const MARGIN: f64 = 1.45;
 const ZOOMS: [f64; 2] = [0.2, 12.0];
-/// Height below which a picture does not give the reason why it is empty.
-pub const ROOM_FOR_REASON: f32 = 170.0;
 /// Distance from the tip within which a drag pulls the needle, in points.
 const HANDLE: f32 = 16.0;
 const M_PER_SCROLLED_POINT: f64 = 0.05e-3;
@@ -49,11 +46,10 @@ struct Contour {
 pub(super) struct Slices {
     gpu: Option<SliceGpu>,
     scene: Option<SceneId>,
-    snapshot: Option<(u64, u64)>,
+    /// Number of the displacements on the card.
+    stirred: u64,
     scene_from_patient: Matrix3<f64>,
-    model: Option<Arc<SceneModel>>,
     contours: Vec<Contour>,
-    field: Field,
     /// Centre of all pictures, and their scale.
     middle_m: Vector3<f64>,
     extent_m: f64,
@@ -73,11 +69,9 @@ impl Slices {
         Self {
             gpu: state.as_ref().map(SliceGpu::new),
             scene: None,
-            snapshot: None,
+            stirred: 0,
             scene_from_patient: Matrix3::identity(),
-            model: None,
             contours: Vec::new(),
-            field: Field::default(),
             middle_m: Vector3::repeat(0.03),
             extent_m: 0.06,
             zoom: 1.0,
@@ -94,7 +88,7 @@ impl Slices {
     }
 
     /// Takes the data that arrived since the last frame.
-    pub fn take(&mut self, body: &ShownBody, snapshot: Option<&Snapshot>, view: &mut ViewState) {
+    pub fn take(&mut self, body: &ShownBody, view: &mut ViewState) {
         let (Some(model), Some(bodies)) = (body.model(), body.bodies()) else {
             return;
         };
@@ -105,27 +99,15 @@ impl Slices {
             self.take_scene(model);
             view.cursor_m = self.middle_m;
         }
-        let Some(snapshot) = snapshot else { return };
-        let key = (snapshot.header.session_id, snapshot.header.tissue_tick);
-        if self.snapshot == Some(key) || snapshot.positions_m.len() != model.rest_m.len() {
-            return;
+        let (field, stirred) = body.field();
+        if let Some(gpu) = self.gpu.as_mut().filter(|_| self.stirred != stirred) {
+            gpu.set_field(field);
         }
-        self.snapshot = Some(key);
-        if let Some(field) = Field::of(model.header.nodes, &snapshot.displacements_m)
-            && field != self.field
-        {
-            if let Some(gpu) = &mut self.gpu {
-                gpu.set_field(&field);
-            }
-            self.field = field;
-        }
+        self.stirred = stirred;
     }
 
-    fn take_scene(&mut self, model: &Arc<SceneModel>) {
-        self.snapshot = None;
+    fn take_scene(&mut self, model: &SceneModel) {
         self.scene_from_patient = scene_from_patient(&model.header);
-        self.model = Some(model.clone());
-        self.field = Field::rest(model.header.nodes);
         let (low, high) = (
             Vector3::from(model.header.target_lower_m),
             Vector3::from(model.header.target_upper_m),
@@ -152,11 +134,6 @@ impl Slices {
         gpu.set_image(image)?;
         self.image = Some((name, Text::new(scene)));
         Ok(())
-    }
-
-    /// Returns the displacements of the tissue in the last snapshot.
-    pub fn field(&self) -> &Field {
-        &self.field
     }
 
     /// Returns the name of the image that was loaded.
@@ -202,13 +179,8 @@ impl Slices {
         let action = self.steer(&response, &plane, shown, view);
         let painter = ui.painter_at(rect);
         if shown.scene.is_none() {
-            painter.rect_filled(rect, 0.0, IMAGE.background);
-            words(
-                &painter,
-                rect,
-                &format!("{}: no scene yet", orientation.name()),
-                IMAGE.text,
-            );
+            let text = format!("{}: no scene yet", orientation.name());
+            empty(&painter, rect, &text, (IMAGE.background, IMAGE.text));
             return None;
         }
         let scale = ui.ctx().pixels_per_point();
@@ -219,13 +191,9 @@ impl Slices {
             .and_then(|gpu| gpu.picture(number, &plane, scale, view.image))
         {
             Some(picture) => picture.paint(&painter, rect),
-            None if rect.height() >= ROOM_FOR_REASON => {
-                painter.rect_filled(rect, 0.0, IMAGE.background);
-                let why = "No slice: no wgpu device, or the scene is too large for it";
-                words(&painter, rect, why, IMAGE.text);
-            }
             None => {
-                painter.rect_filled(rect, 0.0, IMAGE.background);
+                let why = "No slice: no wgpu device, or the scene is too large for it";
+                reason(&painter, rect, why, (IMAGE.background, IMAGE.text));
             }
         }
         let dose = dose.filter(|_| view.isodose);
@@ -246,25 +214,9 @@ impl Slices {
         };
         overlay.draw(&self.lines[number], dose.is_some(), shift_m);
         if let Some(place) = response.hover_pos() {
-            overlay.tissue(&self.tissue_at(plane.in_scene(place)));
+            overlay.tissue(&tissue_at(body, plane.in_scene(place)));
         }
         action
-    }
-
-    /// Returns the name of the tissue at a place now; empty outside.
-    fn tissue_at(&self, place_m: Vector3<f64>) -> String {
-        let Some(model) = &self.model else { return String::new() };
-        let (grid, rest_m) = (&model.header.labels, self.field.rest_of_m(place_m));
-        let cell = [0, 1, 2].map(|a| ((rest_m[a] - grid.origin_m[a]) / grid.spacing_m).round());
-        let dims = grid.dims.map(f64::from);
-        if (0..3).any(|a| !(0.0..dims[a]).contains(&cell[a])) {
-            return String::new();
-        }
-        let [x, y, z] = cell.map(|c| c as usize);
-        let n = (z * grid.dims[1] as usize + y) * grid.dims[0] as usize + x;
-        let number = model.labels.get(n).map_or(0, |&label| usize::from(label));
-        let structure = number.checked_sub(1).and_then(|s| model.header.structures().get(s));
-        structure.map_or_else(String::new, |s| s.name.read())
     }
 
     /// Handles the wheel: it scrolls through the slices, and zooms with Ctrl.
@@ -308,6 +260,24 @@ impl Slices {
         }
         None
     }
+}
+
+/// Returns the name of the tissue at a place now; empty outside.
+fn tissue_at(body: &ShownBody, place_m: Vector3<f64>) -> String {
+    let Some(model) = body.model() else {
+        return String::new();
+    };
+    let (grid, rest_m) = (&model.header.labels, body.field().0.rest_of_m(place_m));
+    let cell = [0, 1, 2].map(|a| ((rest_m[a] - grid.origin_m[a]) / grid.spacing_m).round());
+    let dims = grid.dims.map(f64::from);
+    if (0..3).any(|a| !(0.0..dims[a]).contains(&cell[a])) {
+        return String::new();
+    }
+    let [x, y, z] = cell.map(|c| c as usize);
+    let n = (z * grid.dims[1] as usize + y) * grid.dims[0] as usize + x;
+    let number = model.labels.get(n).map_or(0, |&label| usize::from(label));
+    let structure = number.checked_sub(1).and_then(|s| model.header.structures().get(s));
+    structure.map_or_else(String::new, |s| s.name.read())
 }
 
 fn is_on_tip(plane: &Plane, shown: &Shown, place: Pos2) -> bool {

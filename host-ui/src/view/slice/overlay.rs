@@ -88,6 +88,19 @@ pub fn words(painter: &Painter, rect: Rect, text: &str, color: Color32) {
     painter.galley(at, galley, color);
 }
 
+/// Fills an empty picture with text in these colours: the background's, and the text's.
+pub fn empty(painter: &Painter, rect: Rect, text: &str, (background, ink): (Color32, Color32)) {
+    painter.rect_filled(rect, 0.0, background);
+    words(painter, rect, text, ink);
+}
+
+/// Fills an empty picture; gives the reason if there is room for it.
+pub fn reason(painter: &Painter, rect: Rect, why: &str, (background, ink): (Color32, Color32)) {
+    const ROOM: f32 = 170.0;
+    let why = if rect.height() >= ROOM { why } else { "" };
+    empty(painter, rect, why, (background, ink));
+}
+
 /// Size below which a picture has no room for every label.
 const ROOM_FOR_LEGEND: f32 = 170.0;
 const ROOM_FOR_UPPER_LETTER: f32 = 270.0;
