@@ -3,7 +3,7 @@
 //!
 //! A seed repeats the messages, not their times. `make hostile` runs for ten minutes.
 
-use crate::igtl::{Served, needle_of};
+use crate::igtl::Served;
 use bytemuck::Zeroable;
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
