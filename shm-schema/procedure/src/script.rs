@@ -148,14 +148,6 @@ impl Procedure {
         }
     }
 
-    /// Returns the script of one needle in tissue at rest, until the tissue rests again with the needle drawn back.
-    pub fn rehearsal(way: NeedleWay, pace: Pace) -> Self {
-        let mut ahead = VecDeque::from([(0, Operation::Engage)]);
-        ahead.extend(way.to_the_last_drop(0).map(|operation| (0, operation)));
-        ahead.extend([(0, Operation::Retract), (0, Operation::Settle)]);
-        Self::new(vec![way], pace, ahead)
-    }
-
     fn way(&self, needle: usize) -> Option<&NeedleWay> {
         self.ways
             .get(needle)

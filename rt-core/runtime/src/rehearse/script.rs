@@ -37,7 +37,7 @@ impl Script {
                 strand_pitch_m: None,
             }
         });
-        Self(Procedure::rehearsal_beside(way, pace, stabilising.collect()))
+        Self(Procedure::rehearsal(way, pace, stabilising.collect()))
     }
 
     /// Script of a needle, given those that already stay in.

@@ -34,18 +34,24 @@ impl Procedure {
         }
     }
 
-    /// As [`rehearsal`](Self::rehearsal), with needles that go in first and stay.
-    pub fn rehearsal_beside(way: NeedleWay, pace: Pace, stabilising: Vec<NeedleWay>) -> Self {
-        let mut rehearsal = Self::rehearsal(way, pace);
-        if !stabilising.is_empty() {
-            rehearsal.ahead.pop_front();
-            let mut ahead: VecDeque<_> = stay(1, stabilising.len()).collect();
-            ahead.push_back((0, Operation::PublishPlan));
-            ahead.append(&mut rehearsal.ahead);
-            rehearsal.ahead = ahead;
-            rehearsal.stabilising = stabilising;
+    /// Returns the script of one needle in tissue at rest, until the tissue rests again with the needle drawn back;
+    /// with needles that go in first and stay.
+    pub fn rehearsal(way: NeedleWay, pace: Pace, stabilising: Vec<NeedleWay>) -> Self {
+        let mut ahead: VecDeque<_> = stay(1, stabilising.len()).collect();
+        ahead.push_back((
+            0,
+            if ahead.is_empty() {
+                Operation::Engage
+            } else {
+                Operation::PublishPlan
+            },
+        ));
+        ahead.extend(way.to_the_last_drop(0).map(|operation| (0, operation)));
+        ahead.extend([(0, Operation::Retract), (0, Operation::Settle)]);
+        Self {
+            stabilising,
+            ..Self::new(vec![way], pace, ahead)
         }
-        rehearsal
     }
 
     /// Returns the script of one needle that goes to its first drop and out again without dropping a seed, in tissue

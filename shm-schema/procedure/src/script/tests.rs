@@ -138,7 +138,7 @@ fn a_drawn_back_needle_is_taken_out_except_in_a_rehearsal() {
     hand.go_through(&mut Procedure::of_needles(vec![way.clone()], Pace::default()), &[]);
     assert!(words(&hand.sent).ends_with(&["10 mm at 50 mm/s".to_owned(), "0 mm at 50 mm/s".to_owned()]));
     let mut hand = Obedient::new();
-    hand.go_through(&mut Procedure::rehearsal(way, Pace::default()), &[]);
+    hand.go_through(&mut Procedure::rehearsal(way, Pace::default(), Vec::new()), &[]);
     let sent = words(&hand.sent);
     assert_eq!(
         (sent[0].as_str(), sent.last().map(String::as_str)),
@@ -157,7 +157,10 @@ fn a_drop_outside_the_tissue_is_lost_and_the_next_one_is_dropped() {
 fn a_tip_resting_short_arrives_late_and_a_distant_one_never() {
     let mut after_s = Vec::new();
     for short_m in [0.0, 1.5e-3] {
-        let (mut hand, mut procedure) = (Obedient::new(), Procedure::rehearsal(way(), Pace::default()));
+        let (mut hand, mut procedure) = (
+            Obedient::new(),
+            Procedure::rehearsal(way(), Pace::default(), Vec::new()),
+        );
         while procedure.step() != Step::Insert {
             hand.step(&mut procedure, &[]).expect("obeys");
         }
@@ -172,7 +175,10 @@ fn a_tip_resting_short_arrives_late_and_a_distant_one_never() {
         (after_s[0] - 0.06).abs() < 5e-3 && (after_s[1] - 1.5).abs() < 5e-3,
         "{after_s:?}"
     );
-    let (mut hand, mut procedure) = (Obedient::new(), Procedure::rehearsal(way(), Pace::default()));
+    let (mut hand, mut procedure) = (
+        Obedient::new(),
+        Procedure::rehearsal(way(), Pace::default(), Vec::new()),
+    );
     let failure = loop {
         match hand.step(&mut procedure, &[]) {
             Ok(_) => hand.state.tip_in_scene_m[2] = -0.05,
@@ -225,7 +231,10 @@ fn nothing_is_sent_while_a_fault_stands_unless_somebody_asked_to_rearm() {
 
 #[test]
 fn a_rearming_procedure_ends_on_a_fault_only_after_engaging() {
-    let (mut hand, procedure) = (Obedient::new(), Procedure::rehearsal(way(), Pace::default()));
+    let (mut hand, procedure) = (
+        Obedient::new(),
+        Procedure::rehearsal(way(), Pace::default(), Vec::new()),
+    );
     let mut procedure = procedure.rearming();
     hand.state.fault = Fault::DeviceError as u32;
     assert!(hand.step(&mut procedure, &[]).is_ok() && hand.step(&mut procedure, &[]).is_ok());
@@ -342,7 +351,7 @@ fn stabilising_needles_go_in_first_stay_and_are_drawn_out_at_the_end() {
     assert_eq!(names.iter().filter(|name| **name == "Engage").count(), 1);
     assert_eq!(names.first(), Some(&"Reset"));
     // A rehearsal with them ends with both in.
-    let mut rehearsal = Procedure::rehearsal_beside(way(), Pace::default(), vec![beside(0.0), beside(0.02)]);
+    let mut rehearsal = Procedure::rehearsal(way(), Pace::default(), vec![beside(0.0), beside(0.02)]);
     let mut hand = Obedient::new();
     while hand.step(&mut rehearsal, &[]).expect("goes on") != Next::Done {}
     assert_eq!((hand.state.left_count, hand.state.seed_count), (2, 2));
