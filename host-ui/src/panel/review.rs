@@ -10,7 +10,7 @@ use crate::theme::Press;
 use crate::view::state::Tool;
 use egui::{Button, RichText};
 use stylet_base::format;
-use stylet_implant::intraoperative::{PLANES, Proposed, SeedsFrom};
+use stylet_implant::intraoperative::{PLANES, Reviewed, SeedsFrom};
 use stylet_implant::plan::optimise::{Figures, Measure};
 
 /// Draws the panel; `at_m` is the place of the transverse plane along the axis of the probe.
@@ -177,10 +177,10 @@ fn dose_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
             ui.end_row();
             let measures: Vec<Measure> = doses.continued.measures().collect();
             for row in &measures {
-                ui.label(row.name());
+                ui.label(row.name);
                 columns
                     .iter()
-                    .for_each(|figures| value_ui(ui, figures.as_ref(), row.name()));
+                    .for_each(|figures| value_ui(ui, figures.as_ref(), row.name));
                 ui.end_row();
             }
             ui.label("target V200");
@@ -222,7 +222,7 @@ fn rehearsed(implant: &Implant, begun: usize) -> Option<String> {
 
 /// Draws a value, in the warning colour if it violates its limit.
 fn value_ui(ui: &mut egui::Ui, figures: Option<&Figures>, name: &str) {
-    let measure = figures.and_then(|figures| figures.measures().find(|m| m.name() == name));
+    let measure = figures.and_then(|figures| figures.measures().find(|m| m.name == name));
     let Some(measure) = measure else {
         ui.label("");
         return;
@@ -273,8 +273,8 @@ fn update_ui(ui: &mut egui::Ui, shown: &Shown, missing: Option<String>, actions:
     });
 }
 
-fn decision_ui(ui: &mut egui::Ui, proposed: &Proposed, actions: &mut Vec<Action>) {
-    let [[needles, seeds], [new_needles, new_seeds]] = proposed.reviewed.left;
+fn decision_ui(ui: &mut egui::Ui, proposed: &Reviewed, actions: &mut Vec<Action>) {
+    let [[needles, seeds], [new_needles, new_seeds]] = proposed.left;
     ui.label(format!(
         "{} with {} remained; the update has {new_needles} with {new_seeds}.",
         counted(needles, "needle"),

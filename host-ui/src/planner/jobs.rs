@@ -12,7 +12,7 @@ use stylet_base::job::Job;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Source};
 use stylet_host::link::{Link, SceneModel};
-use stylet_implant::intraoperative::Proposed;
+use stylet_implant::intraoperative::Reviewed;
 use stylet_implant::linked::scene as study;
 use stylet_implant::plan::first::{self, FirstPlan};
 use stylet_implant::plan::optimise::Objectives;
@@ -42,7 +42,7 @@ pub(super) enum JobMessage {
     /// Proposed plans, with remarks on each.
     First(Vec<FirstPlan>),
     Compensated(Box<(Needle, Compensation)>),
-    Update(Box<Proposed>),
+    Update(Box<Reviewed>),
     /// The last message, in words.
     End(String),
     Failed(Failure),

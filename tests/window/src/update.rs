@@ -163,7 +163,7 @@ fn an_update_on_the_live_picture_is_in_the_debrief() {
         .update
         .expect("an update");
     assert_eq!(update.update.begun, BEFORE);
-    let agreement = update.reviewed.agreement.expect("two bodies");
+    let agreement = update.agreement.expect("two bodies");
     println!(
         "{:.1} s: Dice {:.3}, {:.2} mm; D90 {:.1} % now, {:.1} % carried on, {:.1} % updated; {:?} needles and seeds left",
         begun.elapsed().as_secs_f64(),
@@ -172,7 +172,7 @@ fn an_update_on_the_live_picture_is_in_the_debrief() {
         update.update.doses.now.d90,
         update.update.doses.continued.d90,
         update.update.updated.d90,
-        update.reviewed.left
+        update.left
     );
     assert!(agreement.dice > 0.9, "{agreement:?}");
     assert!(update.update.improves());

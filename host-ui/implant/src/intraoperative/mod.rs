@@ -16,4 +16,4 @@ pub use contour::{Clicks, Contour, Transverse};
 pub use marks::Marks;
 pub use outline::Outline;
 pub use solid::{ContourError, PLANES, Solid, proposed_at};
-pub use update::{Doses, Proposed, Reviewed, SeedsFrom, Situation, Update};
+pub use update::{Doses, Reviewed, SeedsFrom, Situation, Update};

@@ -75,8 +75,8 @@ pub struct Update {
 /// Findings and decision of the operator, for the debrief.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reviewed {
-    /// Number of needles inserted at that time.
-    pub begun: usize,
+    /// The update, with doses in the contoured gland.
+    pub update: Update,
     /// Number of seeds in the tissue.
     pub lying: usize,
     /// Source of the seeds' positions for the dose.
@@ -87,23 +87,10 @@ pub struct Reviewed {
     pub marked: [usize; 2],
     /// Mean and largest distance of a mark from its seed, m.
     pub residuals_m: Option<[f64; 2]>,
-    /// Doses of the previous plan, in the contoured gland.
-    pub doses: Doses,
-    /// Measures of the new plan, in the contoured gland.
-    pub updated: Figures,
     /// Remaining needles and seeds in the previous plan, and in the new one.
     pub left: [[usize; 2]; 2],
     /// True if the operator accepted the new plan.
     pub accepted: bool,
-}
-
-/// Update that waits for a decision, with its record for the debrief.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Proposed {
-    /// The update.
-    pub update: Update,
-    /// Findings; not accepted yet.
-    pub reviewed: Reviewed,
 }
 
 impl Situation<'_> {
@@ -166,7 +153,9 @@ impl Situation<'_> {
         let needles = USUAL_NEEDLES.max(plan.needles.len()).saturating_sub(begun.len()).max(1);
         let objectives = Objectives {
             needles,
-            ..Objectives::around_present(present, strength_u, self.source, plan.prescription_gy)
+            strengths_u: vec![strength_u],
+            present,
+            ..Objectives::new(self.source, plan.prescription_gy)
         };
         let search = Search::new(
             plan.template,

@@ -1,9 +1,11 @@
 //! Scores of implants with known errors, against a recomputed dose.
 
 use super::*;
-use crate::intraoperative::{Agreement, Doses, SeedsFrom};
+use crate::intraoperative::{Agreement, Doses, SeedsFrom, Update};
+use crate::plan::ImplantPlan;
 use crate::plan::anatomy::ball;
 use crate::plan::optimise::Figures;
+use crate::plan::optimise::tests::glands::TEMPLATE;
 use bytemuck::Zeroable;
 use stylet_anatomy::PatientFrame;
 use stylet_dose::decay::Interval;
@@ -113,8 +115,23 @@ fn an_update_is_in_the_debrief_with_its_contour_error() {
         d90,
         ..Figures::default()
     };
+    let doses = Doses {
+        now: figures(41.0),
+        continued: figures(88.25),
+    };
+    let plan = ImplantPlan {
+        template: TEMPLATE,
+        source: String::new(),
+        prescription_gy: 145.0,
+        needles: Vec::new(),
+    };
     score.implant.updates.push(Reviewed {
-        begun: 7,
+        update: Update {
+            plan,
+            begun: 7,
+            doses,
+            updated: figures(103.0),
+        },
         lying: 21,
         seeds_from: SeedsFrom::Marks,
         agreement: Some(Agreement {
@@ -125,11 +142,6 @@ fn an_update_is_in_the_debrief_with_its_contour_error() {
         }),
         marked: [19, 1],
         residuals_m: Some([1.24e-3, 3.9e-3]),
-        doses: Doses {
-            now: figures(41.0),
-            continued: figures(88.25),
-        },
-        updated: figures(103.0),
         left: [[8, 30], [7, 28]],
         accepted: true,
     });

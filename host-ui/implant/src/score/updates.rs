@@ -23,14 +23,18 @@ pub(super) fn section(updates: &[Reviewed]) -> Markup {
 }
 
 fn table(number: usize, update: &Reviewed) -> Markup {
-    let columns = [&update.doses.now, &update.doses.continued, &update.updated];
+    let columns = [
+        &update.update.doses.now,
+        &update.update.doses.continued,
+        &update.update.updated,
+    ];
     let value = |v: Option<f64>| cell(v.map_or_else(|| "not defined".to_owned(), |v| format::decimal(v, 1)));
     let row = |(name, of): (&str, Of)| [cell(name)].into_iter().chain(columns.map(|c| value(of(c)))).collect();
     let rows = MEASURES.map(row);
     html! {
         p {
             b { "Update " (number) ", " (if update.accepted { "taken" } else { "not taken" }) ": " }
-            "after " (update.begun) " needles and " (update.lying) " seeds, " (update.seeds_from.name()) ". "
+            "after " (update.update.begun) " needles and " (update.lying) " seeds, " (update.seeds_from.name()) ". "
             (left(update)) " " (contour(update)) " " (marks(update))
         }
         (numbers(&["Measure", "lay in the tissue", "plan if continued", "plan updated"], &rows))
@@ -89,7 +93,7 @@ pub(super) fn to_json(update: &Reviewed) -> Value {
         .left
         .map(|[needles, seeds]| json!({ "needles": needles, "seeds": seeds }));
     json!({
-        "needles_inserted": update.begun, "seeds_in_tissue": update.lying, "seeds": update.seeds_from.name(),
+        "needles_inserted": update.update.begun, "seeds_in_tissue": update.lying, "seeds": update.seeds_from.name(),
         "accepted": update.accepted, "left": before, "left_updated": after,
         "contour": update.agreement.map(|a| json!({
             "dice": a.dice, "mean_mm": a.mean_m * 1e3, "hausdorff_mm": a.hausdorff_m * 1e3,
@@ -97,6 +101,6 @@ pub(super) fn to_json(update: &Reviewed) -> Value {
         })),
         "marked": update.marked[0], "marks_without_seed": update.marked[1],
         "residual_mean_mm": update.residuals_m.map(|r| r[0] * 1e3), "residual_worst_mm": update.residuals_m.map(|r| r[1] * 1e3),
-        "now": figures(&update.doses.now), "continued": figures(&update.doses.continued), "updated": figures(&update.updated),
+        "now": figures(&update.update.doses.now), "continued": figures(&update.update.doses.continued), "updated": figures(&update.update.updated),
     })
 }

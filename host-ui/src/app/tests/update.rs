@@ -6,7 +6,7 @@ use crate::planner::{Drawn, JobProgress};
 use crate::settings::Layout;
 use crate::view::state::Tool;
 use std::sync::Arc;
-use stylet_implant::intraoperative::{Contour, Doses, Marks, Proposed, Reviewed, SeedsFrom, Solid, Update};
+use stylet_implant::intraoperative::{Contour, Doses, Marks, Reviewed, SeedsFrom, Solid, Update};
 use stylet_implant::plan::optimise::Figures;
 use stylet_shm_schema::SeedPose;
 
@@ -74,24 +74,19 @@ pub fn deciding(app: &mut App) {
         now: figures(),
         continued: figures(),
     };
-    app.shown.planning.review.update = Some(Arc::new(Proposed {
+    app.shown.planning.review.update = Some(Arc::new(Reviewed {
         update: Update {
             plan: implant.plan.clone(),
             begun: 12,
             doses,
             updated: figures(),
         },
-        reviewed: Reviewed {
-            begun: 12,
-            lying: 48,
-            seeds_from: SeedsFrom::Marks,
-            agreement: None,
-            marked: [36, 11],
-            residuals_m: None,
-            doses,
-            updated: figures(),
-            left: [[12, 123], [11, 112]],
-            accepted: false,
-        },
+        lying: 48,
+        seeds_from: SeedsFrom::Marks,
+        agreement: None,
+        marked: [36, 11],
+        residuals_m: None,
+        left: [[12, 123], [11, 112]],
+        accepted: false,
     }));
 }

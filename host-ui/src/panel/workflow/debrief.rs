@@ -33,7 +33,7 @@ fn updates_ui(ui: &mut egui::Ui, shown: &Shown) {
         let contour = update.agreement.map_or_else(String::new, |a| {
             format!(": contour Dice {:.2}, {:.1} mm off", a.dice, format::mm(a.mean_m))
         });
-        let text = format!("Plan {what} after needle {}{contour}", update.begun);
+        let text = format!("Plan {what} after needle {}{contour}", update.update.begun);
         let label = ui.add(egui::Label::new(theme::small(text)).truncate());
         label.on_hover_text("The gland contoured on the live picture, against the true gland at that moment");
     }

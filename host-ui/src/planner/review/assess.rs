@@ -9,9 +9,7 @@ use std::sync::Arc;
 use stylet_dose::decay::Interval;
 use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::{SceneModel, Snapshot};
-use stylet_implant::intraoperative::{
-    Agreement, Doses, Marks, Proposed, Reviewed, SeedsFrom, Situation, Solid, Transverse,
-};
+use stylet_implant::intraoperative::{Agreement, Doses, Marks, Reviewed, SeedsFrom, Situation, Solid, Transverse};
 use stylet_implant::plan::{Anatomy, Compensation, ImplantPlan, Needle};
 use stylet_surfaces::field::Field;
 
@@ -179,7 +177,7 @@ impl Moment {
         scene: &SceneModel,
         snapshot: &Snapshot,
         report: &dyn Fn(f32) -> ControlFlow<()>,
-    ) -> Result<Proposed, Failure> {
+    ) -> Result<Reviewed, Failure> {
         let source = self.source()?;
         let kernel = DoseKernel::new(&source, Interval::ALL);
         let [seen, truth] = self.anatomy(rest, scene, snapshot)?;
@@ -191,19 +189,16 @@ impl Moment {
             let needles = &plan.needles[self.begun..];
             [needles.len(), needles.iter().map(|n| n.seeds.len()).sum()]
         };
-        let reviewed = Reviewed {
-            begun: self.begun,
+        Ok(Reviewed {
             lying: self.lying.len(),
             seeds_from: self.seeds_from,
             agreement: Agreement::of(&seen.target, &truth.target),
             marked: [self.lying.len() - marks.without_mark(), marks.without_seed.len()],
             residuals_m: marks.residuals_m(),
-            doses: update.doses,
-            updated: update.updated,
             left: [left(&self.plan), left(&update.plan)],
             accepted: false,
-        };
-        Ok(Proposed { update, reviewed })
+            update,
+        })
     }
 }
 

@@ -11,7 +11,7 @@ use stylet_base::job::{Job, JobUpdate};
 use stylet_host::link::{SceneModel, Snapshot};
 use stylet_imaging::ultrasound::Pose;
 use stylet_implant::intraoperative::{
-    Contour, Doses, Marks, Outline, Proposed, Reviewed, SeedsFrom, Solid, Transverse, proposed_at,
+    Contour, Doses, Marks, Outline, Reviewed, SeedsFrom, Solid, Transverse, proposed_at,
 };
 use stylet_implant::plan::History;
 use stylet_shm_schema::SceneId;
@@ -84,7 +84,7 @@ pub(super) struct Review {
     assessed: Option<(Moment, Arc<Assessed>)>,
     assessing: Option<(Moment, Job<Result<Assessed, String>>)>,
     trouble: Option<(Moment, String)>,
-    proposed: Option<Arc<Proposed>>,
+    proposed: Option<Arc<Reviewed>>,
     reviewed: Vec<Reviewed>,
 }
 
@@ -110,7 +110,7 @@ pub struct ReviewShown {
     /// Reason why nothing can be assessed.
     pub trouble: Option<String>,
     /// Update that waits for a decision.
-    pub update: Option<Arc<Proposed>>,
+    pub update: Option<Arc<Reviewed>>,
     /// True if the last update was accepted and can be withdrawn.
     pub can_withdraw: bool,
     /// Updates so far, accepted or not.
@@ -316,7 +316,7 @@ impl Planner {
         });
     }
 
-    pub(super) fn take_update(&mut self, found: Proposed) {
+    pub(super) fn take_update(&mut self, found: Reviewed) {
         // Needles may have been inserted since.
         if found.update.begun != self.progress.begun() {
             let why = "A needle was inserted during planning; update the plan again.";
@@ -343,7 +343,7 @@ impl Planner {
         }
         self.review.reviewed.push(Reviewed {
             accepted: accept,
-            ..proposed.reviewed.clone()
+            ..Reviewed::clone(&proposed)
         });
     }
 
@@ -358,7 +358,7 @@ impl Planner {
     }
 
     pub(super) fn can_withdraw(&self) -> bool {
-        let is_last = |last: &Reviewed| last.accepted && last.begun == self.progress.begun();
+        let is_last = |last: &Reviewed| last.accepted && last.update.begun == self.progress.begun();
         self.review.reviewed.last().is_some_and(is_last) && self.history.as_ref().is_some_and(History::can_undo)
     }
 }

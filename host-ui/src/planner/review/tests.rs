@@ -57,7 +57,7 @@ fn each_click_is_a_step_and_a_drag_is_one() {
 }
 
 /// Creates an update in which the second needle loses a seed.
-fn proposed(begun: usize) -> Proposed {
+fn proposed(begun: usize) -> Reviewed {
     let doses = Doses {
         now: Figures::default(),
         continued: Figures::default(),
@@ -66,25 +66,20 @@ fn proposed(begun: usize) -> Proposed {
         d90: 101.0,
         ..Figures::default()
     };
-    Proposed {
+    Reviewed {
         update: Update {
             plan: planned().without_seed(1, 1).expect("its last"),
             begun,
             doses,
             updated,
         },
-        reviewed: Reviewed {
-            begun,
-            lying: 2,
-            seeds_from: SeedsFrom::Tissue,
-            agreement: None,
-            marked: [0, 0],
-            residuals_m: None,
-            doses,
-            updated,
-            left: [[1, 2], [1, 1]],
-            accepted: false,
-        },
+        lying: 2,
+        seeds_from: SeedsFrom::Tissue,
+        agreement: None,
+        marked: [0, 0],
+        residuals_m: None,
+        left: [[1, 2], [1, 1]],
+        accepted: false,
     }
 }
 

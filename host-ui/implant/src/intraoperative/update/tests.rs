@@ -178,7 +178,11 @@ fn the_dose_of_placed_seeds_counts_once() {
         seeds: present.seeds(),
         holes: vec!["F7".parse().unwrap()],
     };
-    let objectives = Objectives::around_present(present.clone(), 0.5, &source, 145.0);
+    let objectives = Objectives {
+        strengths_u: vec![0.5],
+        present: present.clone(),
+        ..Objectives::new(&source, 145.0)
+    };
     let search = Search::new(TEMPLATE, &anatomy, &kernel, "6711", &objectives, &proceed).unwrap();
     let found = search.find(&objectives, &proceed).unwrap();
     assert!(found.plan.needles.iter().all(|n| n.hole != Some("F7".parse().unwrap())));

@@ -31,7 +31,8 @@ pub struct Figures {
 /// Measure with its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measure {
-    name: &'static str,
+    /// Structure and measure, for display.
+    pub name: &'static str,
     /// Its value, percent.
     pub value: f64,
     /// Least and most, percent.
@@ -39,11 +40,6 @@ pub struct Measure {
 }
 
 impl Measure {
-    /// Returns structure and measure, for display.
-    pub fn name(&self) -> &'static str {
-        self.name
-    }
-
     /// Returns the excess over its limits, percent; 0 within them.
     pub fn beyond(&self) -> f64 {
         let [least, most] = self.limits;

@@ -81,16 +81,6 @@ impl Objectives {
             present: Present::default(),
         }
     }
-
-    /// Returns the usual objectives with seeds in the tissue already; those to be added have this
-    /// strength, U.
-    pub fn around_present(present: Present, strength_u: f64, source: &Source, prescription_gy: f64) -> Self {
-        Self {
-            strengths_u: vec![strength_u],
-            present,
-            ..Self::new(source, prescription_gy)
-        }
-    }
 }
 
 /// Returns the strengths on sale; for a source without a list, the same shares of the prescription
@@ -153,4 +143,4 @@ impl Proposal {
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+pub(crate) mod tests;
