@@ -18,9 +18,7 @@ use stylet_files::together;
 use stylet_files::{self as files, FileError, bytes, scene};
 use stylet_implant::plan::exchange::seeds_of_source;
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{
-    DayOfImplant, Mapped, SeedDefaults, SeedFile, is_dose_volume, places_m, read_any_dose, read_source,
-};
+use stylet_implant::readers::{Mapped, SeedDefaults, SeedFile, is_dose_volume, places_m, read_any_dose, read_source};
 
 const MAX_PLAN_BYTES: u64 = 4 << 20;
 
@@ -200,7 +198,7 @@ impl ConvertArgs {
                 .ok_or_else(|| format!("no source is known as \"{}\"; give --source FILE", declared.model))?,
             (None, None) => return Err("a plan needs --source FILE: DICOM has isotope and half-life in it".into()),
         };
-        let agreed = file.agree(&source, None, DayOfImplant(None));
+        let agreed = file.agree(&source, None, None);
         let (prescription_gy, notes) = agreed.map_err(|why| format!("{}: {why}", self.from.display()))?;
         seeds::report(&self.from, &notes);
         let identity = self.identity()?.unwrap_or_default().completed();

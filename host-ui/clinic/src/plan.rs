@@ -23,7 +23,7 @@ use stylet_implant::plan::{Anatomy, ImplantPlan, Template, check};
 use stylet_implant::plan::{file, seeds};
 use stylet_implant::procedure::{Connect, Live};
 use stylet_implant::provenance;
-use stylet_implant::readers::{DayOfImplant, Mapped, SeedDefaults, SeedFile, read_source};
+use stylet_implant::readers::{Mapped, SeedDefaults, SeedFile, read_source};
 use stylet_population as population;
 
 const DOSE_PITCH_M: f64 = 1e-3;
@@ -216,7 +216,7 @@ impl PlanArgs {
             columns: self.columns.clone(),
         };
         let mut seeds = seeds::read(path, defaults)?;
-        let agreed = seeds.agree(source, self.prescription_gy, DayOfImplant(self.implant_date));
+        let agreed = seeds.agree(source, self.prescription_gy, self.implant_date);
         let (prescription_gy, notes) = agreed.map_err(|why| format!("{}: {why}", path.display()))?;
         seeds::report(path, &notes);
         Ok((Some((path, seeds)), prescription_gy))

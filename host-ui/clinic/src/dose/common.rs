@@ -16,9 +16,7 @@ use stylet_dose::source::Source;
 use stylet_dose::structure::Structure;
 use stylet_files::dicom::plan::{Date, PlanSeed};
 use stylet_implant::plan::seeds;
-use stylet_implant::readers::{
-    DayOfImplant, Declared, Mapped, SeedDefaults, contours, dose_seed, labels, places, read_source,
-};
+use stylet_implant::readers::{Declared, Mapped, SeedDefaults, contours, dose_seed, labels, places, read_source};
 use stylet_population as population;
 
 /// Options of all commands that compute dose.
@@ -111,7 +109,7 @@ impl Common {
         };
         let mut file = seeds::read(path, defaults)?;
         let of_file = file.rows.clone();
-        let day = DayOfImplant(self.implant_date);
+        let day = self.implant_date;
         let agreed = file.agree(&source, self.prescription_gy, day);
         let (prescription_gy, notes) = agreed.map_err(|why| format!("{}: {why}", path.display()))?;
         seeds::report(path, &notes);

@@ -4,6 +4,7 @@ use super::needle::SEED_LENGTH_M;
 use super::template::{Hole, NotAHole};
 use std::path::{Path, PathBuf};
 use stylet_base::WriteError;
+use stylet_files::FileError;
 
 /// Reason why a plan cannot be made, changed, read or written; the text gives the remedy if there
 /// is one.
@@ -64,6 +65,9 @@ pub enum PlanError {
         /// Problem of the file.
         why: String,
     },
+    /// A file was refused, or belongs to another patient.
+    #[error(transparent)]
+    Refused(#[from] FileError),
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),

@@ -1,7 +1,7 @@
 //! Plans from and to files of all formats, by the file's extension.
 
 use super::{ImplantPlan, PlanError, Template, file, seeds};
-use crate::readers::{DayOfImplant, Declared, SeedDefaults};
+use crate::readers::{Declared, SeedDefaults};
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
 use stylet_base::format::printable;
@@ -28,7 +28,7 @@ pub fn usual() -> Result<(Source, f64), PlanError> {
 /// Reads a plan file (.toml), a table of seeds (.csv) or an RT Plan (.dcm), which must be of the
 /// patient and frame of the scene's file; the error names the file.
 pub fn read(path: &Path, scene: &SceneHeader, scene_file: Option<&Path>) -> Result<ImplantPlan, PlanError> {
-    together(&[scene_file, Some(path)], Shared::Frame).map_err(|e| PlanError::Invalid(vec![e.to_string()]))?;
+    together(&[scene_file, Some(path)], Shared::Frame)?;
     let patient = scene.patient();
     if has_ending(path, "toml") {
         return file::read(path, &patient);
@@ -44,7 +44,7 @@ pub fn read(path: &Path, scene: &SceneHeader, scene_file: Option<&Path>) -> Resu
         Some(declared) => source_of(declared).map_err(|e| PlanError::of_file(path, e))?,
         None => usual,
     };
-    let agreed = seeds.agree(&source, None, DayOfImplant(None));
+    let agreed = seeds.agree(&source, None, None);
     let (prescription_gy, notes) = agreed.map_err(|e| PlanError::of_file(path, e))?;
     seeds::report(path, &notes);
     let prescription_gy = prescription_gy.unwrap_or(usual_gy);
@@ -80,8 +80,7 @@ pub fn write(
     patient: &PatientFrame,
     scene_file: Option<&Path>,
 ) -> Result<(), PlanError> {
-    let identity = scene_file.map(Identity::of_path).transpose();
-    let identity = identity.map_err(|e| PlanError::Invalid(vec![e.to_string()]))?.flatten();
+    let identity = scene_file.map(Identity::of_path).transpose()?.flatten();
     let comments = identity.as_ref().map(Identity::comments).unwrap_or_default();
     let bytes = if has_ending(path, "toml") {
         let text = file::to_text(plan, patient).map_err(|e| PlanError::of_file(path, e))?;

@@ -14,7 +14,7 @@ pub fn read(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, PlanError> 
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         return of_plan_file(path);
     }
-    read_seeds(path, defaults).map_err(|e| PlanError::Invalid(vec![e.to_string()]))
+    Ok(read_seeds(path, defaults)?)
 }
 
 fn of_plan_file(path: &Path) -> Result<SeedFile, PlanError> {

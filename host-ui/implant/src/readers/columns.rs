@@ -175,53 +175,35 @@ pub(super) fn of_header(
     }
 }
 
-/// Recognises one column; `None` for an unknown one.
+/// Recognises one column; `None` for an unknown one, or a length without a unit.
 fn of_one(header: &str, known: &[&str], mapped: &[Mapped]) -> Result<Option<Column>, String> {
-    if let Some(wanted) = mapped.iter().find(|wanted| wanted.header == *header) {
-        let quantity = Quantity::of(&wanted.known);
-        let stated = stated(header).1.and_then(|unit| quantity.unit(&unit));
-        let own = (wanted.known == *header).then_some(1.0);
-        let plain = (quantity == Quantity::Plain).then_some(1.0);
-        let Some(factor) = wanted.factor.or(stated).or(own).or(plain) else {
-            return Err(format!(
-                "the column \"{}\" states no unit; give it, as in {}={}:mm",
-                shown(header),
-                wanted.known,
-                shown(header)
-            ));
-        };
-        return Ok(Some(Column {
-            name: wanted.known.clone(),
-            factor: if wanted.is_negated { -factor } else { factor },
-        }));
-    }
-    if known.contains(&header) {
-        return Ok(Some(Column {
-            name: header.to_owned(),
-            factor: 1.0,
-        }));
-    }
     let (words, unit) = stated(header);
-    let Some(name) = recognised(&words, unit.as_deref()).filter(|name| known.contains(name)) else {
+    let by_user = mapped.iter().find(|wanted| wanted.header == *header);
+    // A column that the user mapped from elsewhere is not taken from here.
+    let is_free = |name: &&str| known.contains(name) && !mapped.iter().any(|wanted| wanted.known == *name);
+    let ours = known.contains(&header).then_some(header);
+    let found = ours.or_else(|| recognised(&words, unit.as_deref()).filter(is_free));
+    let Some(name) = by_user.map(|wanted| wanted.known.as_str()).or(found) else {
         return Ok(None);
     };
-    // A column that the user mapped from elsewhere is not taken from here.
-    if mapped.iter().any(|wanted| wanted.known == name) {
-        return Ok(None);
-    }
     let quantity = Quantity::of(name);
-    match (quantity, unit.as_deref().and_then(|unit| quantity.unit(unit))) {
-        (Quantity::Plain, _) => Ok(Some(1.0)),
-        (_, Some(factor)) => Ok(Some(factor)),
-        // A length without a unit is ambiguous.
-        (_, None) => Ok(None),
-    }
-    .map(|factor| {
-        factor.map(|factor| Column {
+    let by_header = unit.and_then(|unit| quantity.unit(&unit));
+    let plain = (name == header || quantity == Quantity::Plain).then_some(1.0);
+    let factor = by_user.and_then(|wanted| wanted.factor).or(by_header).or(plain);
+    match (factor, by_user) {
+        (Some(factor), _) => Ok(Some(Column {
             name: name.to_owned(),
-            factor,
-        })
-    })
+            factor: match by_user {
+                Some(wanted) if wanted.is_negated => -factor,
+                _ => factor,
+            },
+        })),
+        (None, None) => Ok(None),
+        (None, Some(_)) => Err(format!(
+            "the column \"{0}\" states no unit; give it, as in {name}={0}:mm",
+            shown(header)
+        )),
+    }
 }
 
 /// Returns the words of a header, and the unit in brackets or after the last underscore or space:

@@ -125,19 +125,19 @@ impl Declared {
 }
 
 impl SeedFile {
-    /// Compares with source and options, and decays the strengths. Returns the prescription in Gy,
+    /// Compares with source and options, and decays the strengths to the day of the implant. Returns the prescription in Gy,
     /// and remarks.
     pub fn agree(
         &mut self,
         source: &Source,
         asked_gy: Option<f64>,
-        day: DayOfImplant,
+        implant: Option<Date>,
     ) -> Result<(Option<f64>, Vec<String>), Mismatch> {
         let declared = self.declared.as_ref();
         let mut notes = std::mem::take(&mut self.notes);
         notes.extend(declared.map_or(Ok(Vec::new()), |d| d.check(source))?);
         notes.extend(strengths(&self.rows)?);
-        notes.extend(day.decay(&mut self.rows, declared, source)?);
+        notes.extend(decay(implant, &mut self.rows, declared, source)?);
         let (prescription_gy, note) = prescription(asked_gy, declared, source);
         notes.extend(note);
         Ok((prescription_gy, notes))
@@ -191,69 +191,63 @@ fn prescription(asked_gy: Option<f64>, declared: Option<&Declared>, source: &Sou
     (Some(used), note)
 }
 
-/// Day of the implant, for the decay of a file's strengths.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DayOfImplant(pub Option<Date>);
-
-impl DayOfImplant {
-    /// Decays every strength with a date to the day of the implant. Without that day the strengths
-    /// stay, which is reported.
-    fn decay(
-        self,
-        rows: &mut [PlanSeed],
-        declared: Option<&Declared>,
-        source: &Source,
-    ) -> Result<Option<String>, Mismatch> {
-        let mut days: Vec<Date> = rows.iter().filter_map(|row| row.strength_on).collect();
-        days.sort_unstable();
-        let (Some(&first), Some(&last)) = (days.first(), days.last()) else {
-            let note = self.0.filter(|_| !rows.is_empty());
-            return Ok(note.map(|day| {
-                format!("it gives no day for the strengths, so they are assumed for the implant on {day}")
-            }));
-        };
-        let when = match first == last {
-            true => first.to_string(),
-            false => format!("{first} to {last}"),
-        };
-        let Some(implant) = self.0 else {
-            let old = declared.and_then(|d| d.planned_on).map_or_else(String::new, |planned| {
-                match days_between(last, planned) {
+/// Decays every strength with a date to the day of the implant. Without that day the strengths
+/// stay, which is reported.
+fn decay(
+    implant: Option<Date>,
+    rows: &mut [PlanSeed],
+    declared: Option<&Declared>,
+    source: &Source,
+) -> Result<Option<String>, Mismatch> {
+    let mut days: Vec<Date> = rows.iter().filter_map(|row| row.strength_on).collect();
+    days.sort_unstable();
+    let (Some(&first), Some(&last)) = (days.first(), days.last()) else {
+        let note = implant.filter(|_| !rows.is_empty());
+        return Ok(
+            note.map(|day| format!("it gives no day for the strengths, so they are assumed for the implant on {day}"))
+        );
+    };
+    let when = match first == last {
+        true => first.to_string(),
+        false => format!("{first} to {last}"),
+    };
+    let Some(implant) = implant else {
+        let old =
+            declared
+                .and_then(|d| d.planned_on)
+                .map_or_else(String::new, |planned| match days_between(last, planned) {
                     0 => " (the day of the plan)".to_owned(),
                     days if days < 0 => format!(" (the plan is of {planned}, {} days earlier)", -days),
                     days => format!(" (the plan is of {planned}, {days} days later)"),
-                }
-            });
-            return Ok(Some(format!(
-                "strengths are used as of their reference date {when}{old}; give --implant-date to let them decay to that day"
-            )));
-        };
-        for row in rows.iter_mut() {
-            let Some(strength_on) = row.strength_on else { continue };
-            let days = days_between(strength_on, implant);
-            let half_lives = days_to_s(f64::from(-days)) / source.half_life_s;
-            if days.abs() > MAX_DAYS || half_lives > MOST_HALF_LIVES_AHEAD {
-                return Err(Mismatch::Date {
-                    strength_on,
-                    implant,
-                    days,
                 });
-            }
-            row.strength_u *= left_after(days_to_s(f64::from(days)), source.half_life_s);
+        return Ok(Some(format!(
+            "strengths are used as of their reference date {when}{old}; give --implant-date to let them decay to that day"
+        )));
+    };
+    for row in rows.iter_mut() {
+        let Some(strength_on) = row.strength_on else { continue };
+        let days = days_between(strength_on, implant);
+        let half_lives = days_to_s(f64::from(-days)) / source.half_life_s;
+        if days.abs() > MAX_DAYS || half_lives > MOST_HALF_LIVES_AHEAD {
+            return Err(Mismatch::Date {
+                strength_on,
+                implant,
+                days,
+            });
         }
-        let ahead = days_between(implant, last);
-        let left = left_after(days_to_s(f64::from(-ahead)), source.half_life_s) * 100.0;
-        Ok(Some(match ahead > 0 {
-            true => format!(
-                "strengths of {when} are counted back to the implant on {implant}, {ahead} days before: {left:.1} % of the last one"
-            ),
-            false => {
-                format!("strengths of {when} decay to the implant on {implant}: {left:.1} % of the last one remain")
-            }
-        }))
+        row.strength_u *= left_after(days_to_s(f64::from(days)), source.half_life_s);
     }
+    let ahead = days_between(implant, last);
+    let left = left_after(days_to_s(f64::from(-ahead)), source.half_life_s) * 100.0;
+    Ok(Some(match ahead > 0 {
+        true => format!(
+            "strengths of {when} are counted back to the implant on {implant}, {ahead} days before: {left:.1} % of the last one"
+        ),
+        false => {
+            format!("strengths of {when} decay to the implant on {implant}: {left:.1} % of the last one remain")
+        }
+    }))
 }
-
 fn days_between(from: Date, to: Date) -> i32 {
     (to - from).get_days()
 }

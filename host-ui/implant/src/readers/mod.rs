@@ -11,7 +11,7 @@ mod source;
 mod table;
 
 pub use columns::{Mapped, NotAColumn};
-pub use declared::{DayOfImplant, Declared, Mismatch};
+pub use declared::{Declared, Mismatch};
 pub use grid::{at_gy, is_dose_volume, places_m, read_any_dose};
 pub use seeds::{SeedDefaults, SeedFile, dose_seed, read_seeds};
 pub use source::read_source;

@@ -77,8 +77,8 @@ fn the_plan_s_prescription_overrides_the_source_s() {
 fn strengths_decay_to_the_day_of_the_implant() {
     let source = Source::known("6711").unwrap();
     let mut aged = rows();
-    let implant = DayOfImplant(Some(Date::constant(2026, 10, 31)));
-    let note = implant.decay(&mut aged, Some(&declared()), &source).unwrap().unwrap();
+    let implant = Some(Date::constant(2026, 10, 31));
+    let note = decay(implant, &mut aged, Some(&declared()), &source).unwrap().unwrap();
     let left = (-60.0_f64 / 59.4).exp2();
     let strengths: Vec<f64> = aged.iter().map(|r| r.strength_u).collect();
     assert!(
@@ -87,12 +87,12 @@ fn strengths_decay_to_the_day_of_the_implant() {
     );
     assert!(note.contains("2026-09-01") && note.contains("49.7 %"), "{note}");
     let mut same = rows();
-    let note = DayOfImplant(None).decay(&mut same, Some(&declared()), &source).unwrap();
+    let note = decay(None, &mut same, Some(&declared()), &source).unwrap();
     assert_eq!(same, rows());
     let note = note.unwrap();
     assert!(note.contains("2026-09-01") && note.contains("60 days later"), "{note}");
-    let wrong = DayOfImplant(Some(Date::constant(2062, 10, 31)));
-    assert!(wrong.decay(&mut same, None, &source).is_err());
+    let wrong = Some(Date::constant(2062, 10, 31));
+    assert!(decay(wrong, &mut same, None, &source).is_err());
 }
 
 /// Guards against seeds of 0 U and 50 U that passed, and against strengths of years ahead.
@@ -122,22 +122,19 @@ fn strengths_of_no_seed_are_refused_or_reported() {
 #[test]
 fn a_reference_day_after_the_implant_is_told_or_refused() {
     let source = Source::known("6711").unwrap();
-    let on = |month: i8, day: i8| DayOfImplant(Some(Date::constant(2026, month, day)));
+    let on = |month: i8, day: i8| Some(Date::constant(2026, month, day));
     // The strengths are of 2026-09-01.
-    let note = on(8, 22).decay(&mut rows(), None, &source).unwrap().unwrap();
+    let note = decay(on(8, 22), &mut rows(), None, &source).unwrap().unwrap();
     assert!(
         note.contains("counted back to the implant on 2026-08-22, 10 days before: 112.4 %"),
         "{note}"
     );
-    let why = on(2, 1).decay(&mut rows(), None, &source).unwrap_err().to_string();
+    let why = decay(on(2, 1), &mut rows(), None, &source).unwrap_err().to_string();
     assert!(why.contains("2026-09-01, 212 days after the implant"), "{why}");
     let earlier = Declared {
         planned_on: Some(Date::constant(2026, 8, 22)),
         ..declared()
     };
-    let note = DayOfImplant(None)
-        .decay(&mut rows(), Some(&earlier), &source)
-        .unwrap()
-        .unwrap();
+    let note = decay(None, &mut rows(), Some(&earlier), &source).unwrap().unwrap();
     assert!(note.contains("2026-08-22, 10 days earlier"), "{note}");
 }
