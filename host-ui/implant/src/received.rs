@@ -185,16 +185,8 @@ impl ReceivedProcedure {
                 lost.push(planned);
                 continue;
             };
-            pairs.push(SeedPair {
-                needle: heard.needle,
-                hole: hole(planned.position_m, direction),
-                planned,
-                delivered: Seed {
-                    position_m: pose.position_m,
-                    axis: Some(pose.axis),
-                    ..planned
-                },
-            });
+            let hole = hole(planned.position_m, direction);
+            pairs.push(SeedPair::new((heard.needle, hole), planned, pose));
         }
         (pairs, lost)
     }

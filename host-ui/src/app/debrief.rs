@@ -12,7 +12,7 @@ use stylet_dose::{DoseKernel, Seed, Source};
 use stylet_host::link::{Link, SceneModel};
 use stylet_host::moments::Moment;
 use stylet_implant::intraoperative::Reviewed;
-use stylet_implant::plan::{Anatomy, ImplantPlan, exchange, file};
+use stylet_implant::plan::{Anatomy, Hole, ImplantPlan, exchange, file};
 use stylet_implant::provenance;
 use stylet_implant::received::ReceivedProcedure;
 use stylet_implant::score::{self, Implant, Motion, Score, SeedPair};
@@ -112,19 +112,12 @@ impl App {
         let (source, prescription_gy) = source_of(&implant.plan.source, implant.plan.prescription_gy)?;
         let (mut pairs, mut lost) = (Vec::new(), Vec::new());
         for (needle, row) in all_errors(&self.shown) {
-            let Some((pair, placed)) = self.pair(implant, needle, &row) else {
+            let Some((hole, planned, placed)) = self.pair(implant, needle, &row) else {
                 continue;
             };
             match placed {
-                Some(pose) => pairs.push(SeedPair {
-                    delivered: Seed {
-                        position_m: pose.position_m,
-                        axis: Some(pose.axis),
-                        ..pair.planned
-                    },
-                    ..pair
-                }),
-                None => lost.push(pair.planned),
+                Some(pose) => pairs.push(SeedPair::new((needle, hole), planned, &pose)),
+                None => lost.push(planned),
             }
         }
         Ok(Delivered {
@@ -142,24 +135,19 @@ impl App {
         })
     }
 
-    /// Returns a planned seed, as if it lay on plan, and the seed that was dropped for it.
-    fn pair(&self, implant: &planner::Implant, needle: usize, row: &SeedError) -> Option<(SeedPair, Option<SeedPose>)> {
+    /// Returns the hole of a planned seed, the seed, and the one that was dropped for it.
+    fn pair(
+        &self,
+        implant: &planner::Implant,
+        needle: usize,
+        row: &SeedError,
+    ) -> Option<(Option<Hole>, Seed, Option<SeedPose>)> {
         let shown = &self.shown;
         let of = implant.plan.needles.get(needle)?;
-        let seed = of.seeds.get(row.planned)?;
-        let planned = Seed {
-            position_m: of.at_m(seed.along_m),
-            axis: Some(of.direction),
-            strength_u: seed.strength_u,
-        };
-        let pair = SeedPair {
-            needle,
-            hole: of.hole,
-            planned,
-            delivered: planned,
-        };
+        let planned = of.dose_seeds().nth(row.planned)?;
         let own = shown.planning.progress.seeds_of(needle, shown.seeds.len());
-        Some((pair, row.placed.and_then(|n| shown.seeds[own].get(n)).copied()))
+        let placed = row.placed.and_then(|n| shown.seeds[own].get(n));
+        Some((of.hole, planned, placed.copied()))
     }
 }
 

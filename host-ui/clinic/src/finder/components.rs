@@ -1,6 +1,7 @@
 //! Connected voxels above the threshold, with their neighbours that hold the rest of the signal.
 
 use super::FinderError;
+use super::counts::median;
 use super::level::Level;
 use super::shape::Patch;
 use nalgebra::Vector3;
@@ -142,9 +143,7 @@ fn tissue_around(volume: &VoxelValues<f32>, level: &Level, voxels: &[usize]) -> 
     let around = patch.with_room(volume.dims, ROOM);
     let outside = around.into_iter().filter(|n| voxels.binary_search(n).is_err());
     let values = outside.map(|n| f64::from(volume.values[n])).filter(|v| v.is_finite());
-    let mut above: Vec<f64> = values.map(|value| value - level.tissue).collect();
-    above.sort_by(f64::total_cmp);
-    above.get(above.len() / 2).copied().unwrap_or(0.0)
+    median(values.map(|value| value - level.tissue).collect())
 }
 
 /// Returns the centre of a voxel, along the axes of the volume.
@@ -159,7 +158,7 @@ pub fn index([nx, ny, _]: [usize; 3], n: usize) -> [usize; 3] {
 }
 
 /// Returns up to 26 neighbours of a voxel, in the allowed directions.
-fn neighbours(volume: &VoxelValues<f32>, n: usize, along: [bool; 3]) -> impl Iterator<Item = usize> {
+pub fn neighbours(volume: &VoxelValues<f32>, n: usize, along: [bool; 3]) -> impl Iterator<Item = usize> {
     let dims = volume.dims;
     let at = index(dims, n);
     let range = move |a: usize| match along[a] {

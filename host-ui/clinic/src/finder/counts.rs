@@ -121,7 +121,8 @@ fn constrain(counts: &mut Counts, count: usize, most: f64) {
     }
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+/// Returns the upper median; 0 without values.
+pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

@@ -1,5 +1,6 @@
 //! Value of the tissue, its noise, and the threshold of seeds.
 
+use super::components::neighbours;
 use super::{FinderError, Search};
 use stylet_files::VoxelValues;
 
@@ -70,17 +71,12 @@ fn median(values: &mut [f32]) -> Option<f64> {
 
 /// Returns values of voxels above `least` that no neighbour exceeds, highest first.
 fn peaks(volume: &VoxelValues<f32>, least: f64) -> Vec<f64> {
-    let [nx, ny, nz] = volume.dims;
-    let at = |i: usize, j: usize, k: usize| volume.values[(k * ny + j) * nx + i];
-    let near = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
     let mut peaks = Vec::new();
     for (n, &value) in volume.values.iter().enumerate() {
         if !value.is_finite() || f64::from(value) < least {
             continue;
         }
-        let (i, j, k) = (n % nx, n / nx % ny, n / nx / ny);
-        let lower = near(k, nz).all(|c| near(j, ny).all(|b| near(i, nx).all(|a| at(a, b, c) <= value)));
-        if lower {
+        if neighbours(volume, n, [true; 3]).all(|near| volume.values[near] <= value) {
             peaks.push(f64::from(value));
         }
     }

@@ -145,12 +145,12 @@ pub fn find(volume: &VoxelValues<f32>, search: &Search) -> Result<Found, FinderE
     let (mut seeds, mut doubts) = (Vec::new(), Vec::new());
     for (n, (component, fit)) in components.iter().zip(&fits).enumerate() {
         let sure = counts.probability(n);
-        for seed in &fit.seeds {
+        for (seed, deviation_m) in &fit.seeds {
             seeds.push(FoundSeed {
                 position_m: place(seed.middle_m),
                 axis: to_the_head(&frame.directions, seed.axis),
                 confidence: (sure * fit.explained).clamp(0.0, 1.0),
-                deviation_m: seed.deviation_m,
+                deviation_m: *deviation_m,
                 together: fit.seeds.len(),
             });
         }
@@ -185,7 +185,7 @@ fn doubt(
     search: &Search,
 ) -> Option<(Vector3<f64>, String)> {
     let counted = fit.seeds.len();
-    let worst_m = fit.seeds.iter().map(|s| s.deviation_m).fold(0.0, f64::max);
+    let worst_m = fit.seeds.iter().map(|s| s.1).fold(0.0, f64::max);
     let why = if counted == 0 && signal > MOST_IN_ONE {
         "too large for seeds: left out".to_owned()
     } else if counted == 0 {
@@ -209,7 +209,7 @@ fn doubt(
 /// be, m.
 fn in_one_place(fit: &Fitted, search: &Search) -> Option<f64> {
     let seeds = &fit.seeds;
-    let pairs = (0..seeds.len()).flat_map(|b| (0..b).map(move |a| (&seeds[a], &seeds[b])));
+    let pairs = (0..seeds.len()).flat_map(|b| (0..b).map(move |a| (&seeds[a].0, &seeds[b].0)));
     let apart = pairs.filter_map(|(one, other)| {
         let off = other.middle_m - one.middle_m;
         let along = off.dot(&one.axis);

@@ -1,6 +1,7 @@
 //! Signal of a component once its seeds, its neighbours and the tissue around it are known.
 
 use super::components::Component;
+use super::counts::median;
 use super::shape::{Line, Patch};
 use super::split::Fitter;
 
@@ -38,12 +39,11 @@ impl Fitter<'_> {
         let own = self.of_lines(component, lines);
         let voxels = component.voxels.iter().zip(&component.excess).zip(&own);
         let dim = voxels.filter(|((n, _), own)| **own + others[**n] < DIM * self.level.noise);
-        let mut left: Vec<f64> = dim.map(|((n, excess), own)| excess - own - others[*n]).collect();
+        let left: Vec<f64> = dim.map(|((n, excess), own)| excess - own - others[*n]).collect();
         if left.len() < FEWEST_DIM {
             return component.tissue;
         }
-        left.sort_by(f64::total_cmp);
-        left[left.len() / 2]
+        median(left)
     }
 
     /// Returns the contribution of seeds to each voxel of a component.

@@ -3,7 +3,7 @@
 
 use super::Search;
 use super::components::{Component, place_m};
-use super::counts::Counts;
+use super::counts::{Counts, median};
 use super::level::Level;
 use super::settle::Fits;
 use super::shape::{Line, Look, Patch};
@@ -31,22 +31,12 @@ const CALIBRATED: usize = 10;
 /// Number of passes over all components.
 const SWEEPS: usize = 3;
 
-/// Seed of a fit; frame of the voxels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FittedSeed {
-    /// Centre.
-    pub middle_m: Vector3<f64>,
-    /// Unit vector.
-    pub axis: Vector3<f64>,
-    /// Standard deviation of its place, in m.
-    pub deviation_m: f64,
-}
-
 /// Fitted seeds of a component.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fitted {
-    /// Seeds; none for an object that is not a seed.
-    pub seeds: Vec<FittedSeed>,
+    /// Seeds, each with the standard deviation of its place, in m; none for an object that is not a
+    /// seed.
+    pub seeds: Vec<(Line, f64)>,
     /// Share of the squared signal that they explain.
     pub explained: f64,
 }
@@ -119,8 +109,7 @@ impl<'a> Fitter<'a> {
                 turns += lines[0].axis * lines[0].axis.transpose();
             }
             if cost < best.0 && !amounts.is_empty() {
-                amounts.sort_by(f64::total_cmp);
-                let signal = look.signal * amounts[amounts.len() / 2];
+                let signal = look.signal * median(amounts);
                 best = (cost, Look { blur_m, signal, ..look }, turns);
             }
         }
@@ -344,10 +333,9 @@ impl<'a> Fitter<'a> {
         let spread = (of_voxels / task.data.len().max(1) as f64).max(1.0);
         let covariance = normal.try_inverse();
         let variance = |n: usize| covariance.as_ref().map_or(f64::INFINITY, |c| c[(n, n)]) * spread;
-        let seed = |(n, line): (usize, &Line)| FittedSeed {
-            middle_m: line.middle_m,
-            axis: line.axis,
-            deviation_m: (0..3).map(|a| variance(PARAMETERS * n + a)).sum::<f64>().sqrt() * M_PER_MM,
+        let seed = |(n, line): (usize, &Line)| {
+            let square = (0..3).map(|a| variance(PARAMETERS * n + a)).sum::<f64>();
+            (*line, square.sqrt() * M_PER_MM)
         };
         Fitted {
             seeds: lines.iter().enumerate().map(seed).collect(),

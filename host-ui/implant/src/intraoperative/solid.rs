@@ -7,7 +7,7 @@
 use super::contour::{Contour, Transverse};
 use super::outline::{DIRECTIONS, Outline};
 use crate::plan::PlanError;
-use crate::plan::anatomy::{Body, body_of};
+use crate::plan::anatomy::Body;
 
 /// Number of planes with an outline that a body needs.
 pub const PLANES: usize = 3;
@@ -208,7 +208,7 @@ impl Solid {
             }
             faces.push([last, at(rings - 1, n), at(rings - 1, n + 1)]);
         }
-        body_of(name, &corners_m, &faces)
+        Body::new(name, &corners_m, &faces)
     }
 }
 

@@ -34,7 +34,7 @@ pub struct Body {
 
 impl Body {
     /// Creates a structure. The mesh must be closed.
-    fn new(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Self, PlanError> {
+    pub fn new(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Self, PlanError> {
         Ok(Self {
             name: name.to_owned(),
             mesh: Mesh::new(points_m, triangles).map_err(|why| PlanError::Surface {
@@ -111,6 +111,13 @@ impl Body {
             was_inside = inside;
         }
         pieces
+    }
+
+    /// Returns the pieces of the whole line from a place outside.
+    pub fn all_pieces_m(&self, from_m: [f64; 3], direction: [f64; 3]) -> Vec<[f64; 2]> {
+        let ((low, high), from) = (self.bounds_m(), Vector3::from(from_m));
+        let (low, high) = (Vector3::from(low), Vector3::from(high));
+        self.pieces_m(from_m, direction, (high - low).norm() + (low - from).norm())
     }
 
     /// Returns whether a point or one of eight around it, across `direction`, lies inside.
@@ -249,11 +256,6 @@ fn body(scene: &SceneModel, name: &str, triangles: &[[u32; 3]]) -> Result<Body, 
     let out = |(p, n): (&Vector3<f64>, &Vector3<f64>)| (p + n.try_normalize(1e-30).unwrap_or_default() * half_m).into();
     let moved: Vec<[f64; 3]> = points_m.iter().zip(&normals).map(out).collect();
     Body::new(name, &moved, &corners)
-}
-
-/// Creates a body from a closed surface that is not the core's.
-pub fn body_of(name: &str, points_m: &[[f64; 3]], triangles: &[[usize; 3]]) -> Result<Body, PlanError> {
-    Body::new(name, points_m, triangles)
 }
 
 /// Creates a ball of triangles, for tests and for scenes without files.

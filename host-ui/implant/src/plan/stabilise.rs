@@ -80,10 +80,7 @@ pub fn stabilising(template: &Template, anatomy: &Anatomy, needles: &[Needle], c
 
 fn at_hole(template: &Template, anatomy: &Anatomy, hole: Hole) -> Option<Stabilising> {
     let (entry_m, direction) = (template.hole_m(hole), template.inwards);
-    let (low, high) = anatomy.target.bounds_m();
-    let reach_m =
-        (Vector3::from(high) - Vector3::from(low)).norm() + (Vector3::from(low) - Vector3::from(entry_m)).norm();
-    let pieces = anatomy.target.pieces_m(entry_m, direction, reach_m);
+    let pieces = anatomy.target.all_pieces_m(entry_m, direction);
     let (first, last) = (pieces.first()?[0], pieces.last()?[1]);
     if last - first < LEAST_M {
         return None;

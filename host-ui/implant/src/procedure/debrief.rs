@@ -41,19 +41,8 @@ pub fn write(
             strength_u: drop.strength_u?,
         })
     };
-    let pair = |(drop, pose): (&PlannedDrop, &SeedPose)| {
-        let planned = planned(drop)?;
-        Some(SeedPair {
-            needle: drop.needle,
-            hole: drop.hole,
-            planned,
-            delivered: Seed {
-                position_m: pose.position_m,
-                axis: Some(pose.axis),
-                ..planned
-            },
-        })
-    };
+    let pair =
+        |(drop, pose): (&PlannedDrop, &SeedPose)| Some(SeedPair::new((drop.needle, drop.hole), planned(drop)?, pose));
     let anatomy = Anatomy::of(scene)?;
     let kernel = DoseKernel::new(&source, Interval::ALL);
     let score = Score::of(Implant {

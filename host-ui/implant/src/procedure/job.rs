@@ -49,7 +49,9 @@ pub fn placed<'a>(
 pub struct Job {
     /// Plan; `None` without a plan file: one needle as the scene suggests.
     pub implant: Option<ImplantPlan>,
-    /// Needles, in their order.
+    /// Needles with seeds, in their order.
+    pub needles: Vec<Needle>,
+    /// Their plans and drops.
     pub tasks: Vec<NeedleTask>,
     /// Compensations by the number of the needle, if requested and possible.
     pub compensations: BTreeMap<usize, Compensation>,
@@ -63,6 +65,7 @@ impl Job {
         let plan = plan_with_seeds(&scene.header, seeds);
         Self {
             implant: None,
+            needles: vec![needle_of(&plan)],
             tasks: vec![NeedleTask::as_planned(plan)],
             compensations: BTreeMap::new(),
             stabilising: Vec::new(),
@@ -93,6 +96,7 @@ impl Job {
             NeedleTask::of(&plan, number, drops)
         };
         Ok(Self {
+            needles: plan.needles.iter().filter(|n| !n.seeds.is_empty()).cloned().collect(),
             tasks: plan.needles.iter().enumerate().filter_map(task).collect(),
             implant: Some(plan),
             compensations: BTreeMap::new(),
@@ -104,15 +108,11 @@ impl Job {
     /// is room for fewer.
     pub fn stabilise(&mut self, scene: &SceneModel, count: usize) -> Result<(), ProcedureError> {
         let anatomy = Anatomy::of(scene)?;
-        let template = match &self.implant {
-            Some(plan) => plan.template,
-            None => Template::before(&scene.header),
+        let (template, needles) = match &self.implant {
+            Some(plan) => (plan.template, &plan.needles),
+            None => (Template::before(&scene.header), &self.needles),
         };
-        let needles: Vec<Needle> = match &self.implant {
-            Some(plan) => plan.needles.clone(),
-            None => self.tasks.iter().map(|task| needle_of(&task.plan)).collect(),
-        };
-        self.stabilising = stabilising(&template, &anatomy, &needles, count);
+        self.stabilising = stabilising(&template, &anatomy, needles, count);
         let holes: Vec<String> = self.stabilising.iter().map(|s| s.hole.to_string()).collect();
         println!(
             "stabilising needles: {}",
@@ -135,18 +135,13 @@ impl Job {
         // Later needles find the effects of earlier ones on those that stay in.
         let mut earlier = Vec::new();
         for (number, task) in self.tasks.iter_mut().enumerate() {
-            let needle = match &self.implant {
-                Some(plan) => plan.needles.iter().filter(|n| !n.seeds.is_empty()).nth(number).cloned(),
-                None => None,
-            };
-            let needle = needle.unwrap_or_else(|| needle_of(&task.plan));
             let mut rehearser = LinkRehearser {
                 link,
                 interrupted,
                 stabilising: &beside,
                 earlier: &earlier,
             };
-            let done = match compensate(&needle, pace, &Limits::default(), &mut rehearser) {
+            let done = match compensate(&self.needles[number], pace, &Limits::default(), &mut rehearser) {
                 Ok(done) => done,
                 Err(why) if interrupted.asked() => return Err(why.into()),
                 Err(why) => {
@@ -178,23 +173,18 @@ impl Job {
 
     /// Returns the planned seeds in the order of the drops.
     pub fn planned(&self) -> Vec<PlannedDrop> {
-        let needles = || {
-            self.implant
-                .iter()
-                .flat_map(|p| p.needles.iter().filter(|n| !n.seeds.is_empty()))
-        };
         let of_task = |(number, task): (usize, &NeedleTask)| {
-            let needle = needles().nth(number);
+            let needle = &self.needles[number];
             let rehearsed = self.compensations.get(&number);
             let drop = |(i, planned_m): (usize, [f64; 3])| PlannedDrop {
                 rehearsed_m: rehearsed
                     .and_then(|c| c.after_m.get(i))
                     .map(|off_m| [0, 1, 2].map(|a| planned_m[a] + off_m[a])),
                 needle: number,
-                hole: needle.and_then(|n| n.hole),
+                hole: needle.hole,
                 planned_m,
                 direction: task.plan.direction,
-                strength_u: needle.and_then(|n| n.seeds.get(i)).map(|s| s.strength_u),
+                strength_u: self.implant.as_ref().map(|_| needle.seeds[i].strength_u),
             };
             task.plan
                 .seeds_m

@@ -19,7 +19,7 @@ use stylet_dose::report::{Judge, Verdict};
 use stylet_dose::{DoseKernel, Seed};
 use stylet_host::moments::Moment;
 use stylet_report::picture::DrawError;
-use stylet_shm_schema::TickRecord;
+use stylet_shm_schema::{SeedPose, TickRecord};
 pub use trace::Trace;
 pub use write::{to_json, write};
 
@@ -40,6 +40,21 @@ pub struct SeedPair {
 }
 
 impl SeedPair {
+    /// Creates the pair of a planned seed and the one that was dropped for it.
+    pub fn new((needle, hole): (usize, Option<Hole>), planned: Seed, pose: &SeedPose) -> Self {
+        let delivered = Seed {
+            position_m: pose.position_m,
+            axis: Some(pose.axis),
+            ..planned
+        };
+        Self {
+            needle,
+            hole,
+            planned,
+            delivered,
+        }
+    }
+
     /// Returns the offset of the delivered seed from the planned one.
     pub fn offset(&self) -> SeedOffset {
         let direction = self.planned.axis.unwrap_or_default();

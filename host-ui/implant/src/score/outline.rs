@@ -48,7 +48,7 @@ pub fn clipped(ring: &[Place], half: f64) -> Vec<Place> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::anatomy::{ball, body_of};
+    use crate::plan::anatomy::ball;
 
     /// Returns the outline in mm, as in the picture: across is x, up is y.
     fn drawn(body: &Body, half_mm: f64) -> Vec<Vec<Place>> {
@@ -115,7 +115,7 @@ mod tests {
             points_m.extend(points.iter().map(|p| p.map(f64::from)));
             triangles.extend(corners.iter().map(|t| t.map(|n| n as usize + before)));
         }
-        let body = body_of("nerves", &points_m, &triangles).expect("closed");
+        let body = Body::new("nerves", &points_m, &triangles).expect("closed");
         let found = drawn(&body, 20.0);
         assert_eq!(found.len(), 2);
         for ring in &found {

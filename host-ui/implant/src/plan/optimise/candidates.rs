@@ -60,10 +60,8 @@ impl Candidates {
 
     fn add(&mut self, hole: Hole, anatomy: &Anatomy) {
         let (entry_m, inwards) = (self.template.hole_m(hole), self.template.inwards);
-        let (low, high) = anatomy.target.bounds_m();
-        let length_m = farthest_m(&self.template, low, high);
         let longest = |a: &[f64; 2], b: &[f64; 2]| (a[1] - a[0]).total_cmp(&(b[1] - b[0]));
-        let pieces = anatomy.target.pieces_m(entry_m, inwards, length_m);
+        let pieces = anatomy.target.all_pieces_m(entry_m, inwards);
         let Some([from_m, to_m]) = pieces.into_iter().max_by(longest) else {
             return;
         };
@@ -160,14 +158,4 @@ fn is_inside(template: &Template, anatomy: &Anatomy, place_m: [f64; 3]) -> bool 
             .target
             .contains([0, 1, 2].map(|a| place_m[a] + across[a] * INSIDE_M))
     })
-}
-
-/// Returns the distance from the template's face to the far side of a box.
-fn farthest_m(template: &Template, low: [f64; 3], high: [f64; 3]) -> f64 {
-    let depth_m = |corner: usize| {
-        let at = |a: usize| if corner >> a & 1 == 0 { low[a] } else { high[a] };
-        let along = (0..3).map(|a| (at(a) - template.middle_m[a]) * template.inwards[a]);
-        along.sum::<f64>()
-    };
-    (0..8).map(depth_m).fold(0.0, f64::max)
 }

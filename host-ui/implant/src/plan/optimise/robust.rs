@@ -88,25 +88,25 @@ impl Trials {
             .copied()
     }
 
-    /// Returns the distance of the requested D90, with the reserve of a search, below 90 % of the
-    /// prescription, as a share of that; 0 if it is not below.
+    /// Returns the requested D90 with the reserve of a search, Gy; `None` if nothing is required.
+    fn asked_gy(&self, which: Statistic) -> Option<f64> {
+        match which {
+            Statistic::Planned => None,
+            Statistic::Expected => Some(self.expected_gy()),
+            Statistic::KeptBy(share) => Some(self.kept_by_gy((share + AIMED_ABOVE).min(1.0)).unwrap_or(0.0)),
+        }
+    }
+
+    /// Returns the distance of the requested D90 below 90 % of the prescription, as a share of that;
+    /// 0 if it is not below.
     pub fn shortfall(&self, which: Statistic, prescription_gy: f64) -> f64 {
-        let gy = match which {
-            Statistic::Planned => return 0.0,
-            Statistic::Expected => self.expected_gy(),
-            Statistic::KeptBy(share) => self.kept_by_gy((share + AIMED_ABOVE).min(1.0)).unwrap_or(0.0),
-        };
-        (1.0 - gy / (KEPT * prescription_gy)).max(0.0)
+        let short = |gy: f64| (1.0 - gy / (KEPT * prescription_gy)).max(0.0);
+        self.asked_gy(which).map_or(0.0, short)
     }
 
     /// Returns the factor of the strength that gives the requested D90, with a small reserve;
     /// `None` if nothing is required or without dose.
     pub fn strengthening(&self, which: Statistic, prescription_gy: f64) -> Option<f64> {
-        let gy = match which {
-            Statistic::Planned => None,
-            Statistic::Expected => Some(self.expected_gy()),
-            Statistic::KeptBy(share) => self.kept_by_gy((share + AIMED_ABOVE).min(1.0)),
-        };
-        Some(KEPT * prescription_gy / gy.filter(|gy| *gy > 0.0)?)
+        Some(KEPT * prescription_gy / self.asked_gy(which).filter(|gy| *gy > 0.0)?)
     }
 }

@@ -1,7 +1,7 @@
 //! Irregular glands with urethra, rectum and, in some, a pubic arch in the way: twelve fixed ones,
 //! and any number of random ones.
 
-use crate::plan::anatomy::{Body, ball, body_of};
+use crate::plan::anatomy::{Body, ball};
 use crate::plan::{Anatomy, PITCH_M, Template};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -75,7 +75,7 @@ fn deformed(name: &str, to_m: impl Fn([f64; 3]) -> [f64; 3]) -> Body {
     let (points, triangles) = unit.surface();
     let points_m: Vec<[f64; 3]> = points.iter().map(|p| to_m(p.map(f64::from))).collect();
     let corners: Vec<[usize; 3]> = triangles.iter().map(|t| t.map(|i| i as usize)).collect();
-    body_of(name, &points_m, &corners).expect("as closed as a ball")
+    Body::new(name, &points_m, &corners).expect("as closed as a ball")
 }
 
 /// Returns a rod with flat ends from one place to another, about `[across, along]` m thick.
