@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Instant;
 
-use crate::device::{DeviceFault, DeviceInfo};
+use crate::device::DeviceInfo;
 use crate::drd::ffi::Api;
 use crate::drd::servo::Servo;
 use crate::drd::session::{ConnectionError, Description, Session};
@@ -14,8 +14,6 @@ use crate::driver_thread::keeper::{self, Connect};
 use crate::driver_thread::serving;
 use crate::driver_thread::shared::Shared;
 
-/// Time between two checks of a running device.
-const CHECK_EVERY: Duration = Duration::from_millis(20);
 /// Silence after which a servo loop counts as waiting in a call of the SDK.
 const SILENT_FOR: Duration = Duration::from_millis(250);
 const CALIBRATION_EVERY: Duration = Duration::from_millis(50);
@@ -79,27 +77,12 @@ impl Connect for Connector {
     }
 
     fn watch(&mut self, keeper: &mut Keeper, running: &Running) -> Option<String> {
-        let (mut ticks, mut since) = (0, Instant::now());
-        while !keeper.stopped() {
-            let now = self.shared.ticks();
-            if now != ticks {
-                (ticks, since) = (now, Instant::now());
-            }
-            if let Some(code) = self.shared.errors.lost() {
-                let why = match code {
-                    0 => "by its own status".to_owned(),
-                    code => ConnectionError::Call("the servo loop", code).to_string(),
-                };
-                return Some(format!("the device is lost: {why}"));
-            }
-            if since.elapsed() > SILENT_FOR || running.servo.as_ref().is_none_or(JoinHandle::is_finished) {
-                self.shared.errors.set_lost();
-                self.shared.fault.set(Some(DeviceFault::TimedOut));
-                return Some(HANGS.to_owned());
-            }
-            thread::park_timeout(CHECK_EVERY);
-        }
-        None
+        let runs = || running.servo.as_ref().is_some_and(|servo| !servo.is_finished());
+        let loss = |code| match code {
+            0 => "by its own status".to_owned(),
+            code => ConnectionError::Call("the servo loop", code).to_string(),
+        };
+        keeper::watch(keeper, &self.shared, SILENT_FOR, runs, loss, HANGS)
     }
 
     /// Ends the servo thread, which leaves zero force, and closes the device. If the servo thread

@@ -5,10 +5,16 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
 use std::sync::{Arc, mpsc};
 use std::thread::{self, Thread};
+use std::time::Instant;
+
+use crate::device::DeviceFault;
+use crate::driver_thread::shared::Shared;
 
 /// Receiver of messages for the operator.
 pub type Report = Box<dyn Fn(&str) + Send>;
 
+/// Time between two checks of a running device.
+const CHECK_EVERY: Duration = Duration::from_millis(20);
 /// Time between two attempts to connect.
 const RETRY_EVERY: Duration = Duration::from_millis(500);
 /// Longest wait for the thread to end; a driver that hangs is abandoned.
@@ -139,6 +145,35 @@ impl<C: Connect> Keeper<C> {
             let _ = first.send(Ok(description));
         }
     }
+}
+
+/// Waits until the servo loop reports a loss, makes no tick for `silent_for`, or no longer `runs`; returns the reason.
+/// Returns `None` when the thread must end.
+pub fn watch<C: Connect>(
+    keeper: &Keeper<C>,
+    shared: &Shared,
+    silent_for: Duration,
+    runs: impl Fn() -> bool,
+    loss: impl Fn(u32) -> String,
+    silence: &str,
+) -> Option<String> {
+    let (mut ticks, mut since) = (0, Instant::now());
+    while !keeper.stopped() {
+        let now = shared.ticks();
+        if now != ticks {
+            (ticks, since) = (now, Instant::now());
+        }
+        if let Some(code) = shared.errors.lost() {
+            return Some(format!("the device is lost: {}", loss(code)));
+        }
+        if since.elapsed() > silent_for || !runs() {
+            shared.errors.set_lost();
+            shared.fault.set(Some(DeviceFault::TimedOut));
+            return Some(silence.to_owned());
+        }
+        thread::park_timeout(CHECK_EVERY);
+    }
+    None
 }
 
 impl Drop for KeeperThread {

@@ -44,11 +44,18 @@ pub fn start<S: Serve>(name: &str, mut servo: S, shared: &Arc<Shared>) -> Option
     };
     let thread = thread::Builder::new().name(name.to_owned()).spawn(serve).ok()?;
     let granted = granted.recv_timeout(ARMED_LIMIT).ok();
-    let begun = Instant::now();
-    while matches!(granted, Some(Ok(_))) && shared.fault.get().is_some() && begun.elapsed() < FIRST_SAMPLE_LIMIT {
-        thread::park_timeout(Duration::from_millis(1));
+    if matches!(granted, Some(Ok(_))) {
+        wait_for_sample(shared);
     }
     Some(Started { thread, granted })
+}
+
+/// Waits for the first sample, so that the opener finds one, unless there is a fault.
+pub fn wait_for_sample(shared: &Shared) {
+    let begun = Instant::now();
+    while shared.fault.get().is_some() && begun.elapsed() < FIRST_SAMPLE_LIMIT {
+        thread::park_timeout(Duration::from_millis(1));
+    }
 }
 
 /// Calls `tick` with the end of its period until `shared` no longer serves; false when it panicked.

@@ -26,8 +26,8 @@ impl Shared {
     /// Lets the next servo thread serve. Called by the keeper before it starts that thread.
     pub fn serve(&self) {
         self.errors.clear_lost();
-        // SYNC: relaxed; starting the thread publishes it.
-        self.serve.store(true, Ordering::Relaxed);
+        // SYNC: release pairs with the acquire in `serves`: what the keeper wrote before is visible to a thread that serves.
+        self.serve.store(true, Ordering::Release);
     }
 
     /// Ends the servo thread after its tick. Called by the keeper.
@@ -51,8 +51,8 @@ impl Shared {
 
     /// Returns whether the servo thread continues. Called by the servo thread.
     pub fn serves(&self) -> bool {
-        // SYNC: relaxed; the partner is `request_release`.
-        self.serve.load(Ordering::Relaxed) && !self.errors.is_lost()
+        // SYNC: acquire pairs with the release in `serve`.
+        self.serve.load(Ordering::Acquire) && !self.errors.is_lost()
     }
 
     /// Counts a tick; returns how many came before. Called by the servo thread.

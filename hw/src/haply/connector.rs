@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 use std::sync::Arc;
-use std::thread::{self, JoinHandle};
+use std::thread::JoinHandle;
 
 use crate::driver_thread::keeper::{self, Connect};
 use crate::driver_thread::serving;
@@ -11,9 +11,6 @@ use crate::haply::servo::{Servo, loss};
 use crate::haply::session::{self, ConnectionError, Description, Wanted};
 use crate::haply::socket::{NoSocket, Service, Socket};
 use crate::haply::wire::Wire;
-
-/// Time between two checks of a running device.
-const CHECK_EVERY: Duration = Duration::from_millis(20);
 
 /// Owner of the connection; see the module.
 pub struct Connector {
@@ -77,17 +74,11 @@ impl Connect for Connector {
     }
 
     fn watch(&mut self, keeper: &mut Keeper, connection: &Connection) -> Option<String> {
-        while !keeper.stopped() {
-            if let Some(code) = self.shared.errors.lost() {
-                return Some(format!("the device is lost: {}", loss::text(code)));
-            }
-            let ended = !matches!(connection, Connection::Served(servo) if !servo.is_finished());
-            if ended {
-                return Some(ConnectionError::NoServo.to_string());
-            }
-            thread::park_timeout(CHECK_EVERY);
-        }
-        None
+        let runs = || matches!(connection, Connection::Served(servo) if !servo.is_finished());
+        let loss = |code| loss::text(code).to_owned();
+        let silence = ConnectionError::NoServo.to_string();
+        // None of its calls blocks.
+        keeper::watch(keeper, &self.shared, Duration::MAX, runs, loss, &silence)
     }
 
     /// Ends the servo thread, which leaves zero force, and closes the connection. None of its calls

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use crate::device::{DeviceFault, DeviceInfo};
 use crate::driver_thread::keeper::{self, Connect};
+use crate::driver_thread::serving;
 use crate::libhd::calibrate::{self, Calibration};
 use crate::libhd::device::PhantomConfig;
 use crate::libhd::exchange::Served;
@@ -14,13 +15,10 @@ use crate::libhd::ffi::Api;
 use crate::libhd::servo::Servo;
 use crate::libhd::session::{ConnectionError, Description, Session};
 
-/// Time between two checks of a running device.
-const CHECK_EVERY: Duration = Duration::from_millis(20);
 /// Silence after which a servo loop is stopped and restarted.
 const SILENT_FOR: Duration = Duration::from_millis(250);
 const CALIBRATION_EVERY: Duration = Duration::from_millis(50);
 const FIRST_CALL_LIMIT: Duration = Duration::from_secs(2);
-const FIRST_SAMPLE_LIMIT: Duration = Duration::from_millis(100);
 /// Longest wait for the callback to write zero before the scheduler stops.
 const RELEASE_LIMIT: Duration = Duration::from_millis(50);
 
@@ -65,50 +63,31 @@ impl Connect for Connector {
     }
 
     fn watch(&mut self, keeper: &mut Keeper, session: &Session) -> Option<String> {
-        let shared = &self.servo.shared;
-        let (mut calls, mut since) = (0, Instant::now());
-        while !keeper.stopped() {
-            let now = shared.calls();
-            if now != calls {
-                (calls, since) = (now, Instant::now());
-            }
-            if let Some(code) = shared.errors.lost() {
-                return Some(format!(
-                    "the device is lost: {}",
-                    ConnectionError::Call("the servo loop", code)
-                ));
-            }
-            if since.elapsed() > SILENT_FOR || !session.is_scheduled() {
-                shared.errors.set_lost();
-                shared.fault.set(Some(DeviceFault::TimedOut));
-                return Some("the driver's servo loop has stopped; restarting it".to_owned());
-            }
-            thread::park_timeout(CHECK_EVERY);
-        }
-        None
+        let loss = |code| ConnectionError::Call("the servo loop", code).to_string();
+        let silence = "the driver's servo loop has stopped; restarting it";
+        let shared = &self.servo.exchange.shared;
+        keeper::watch(keeper, shared, SILENT_FOR, || session.is_scheduled(), loss, silence)
     }
 
     /// Writes zero force, if callbacks still arrive; then stops the scheduler and disables the device.
     fn release(&mut self, _keeper: &mut Keeper, session: Session) {
-        let shared = &self.servo.shared;
-        let before = shared.released();
-        shared.request_release();
+        let exchange = &self.servo.exchange;
+        let before = exchange.released();
+        exchange.shared.request_release();
         let start = Instant::now();
         while session.is_running() && start.elapsed() < RELEASE_LIMIT {
             // The first of them may have begun before the request.
-            if shared.released() > before + 1 {
+            if exchange.released() > before + 1 {
                 break;
             }
             thread::park_timeout(Duration::from_millis(1));
         }
         session.close();
-        if shared.fault.get().is_none() {
-            shared.fault.set(Some(DeviceFault::NotConnected));
-        }
+        exchange.shared.released();
     }
 
     fn not_connected(&self) {
-        self.servo.shared.fault.set(Some(DeviceFault::NotConnected));
+        self.servo.exchange.shared.not_connected();
     }
 }
 
@@ -134,7 +113,7 @@ impl Connector {
                 Calibration::Done => return Ok(true),
                 Calibration::Updated => {}
                 Calibration::NeedsOperator(what_to_do) => {
-                    self.servo.shared.fault.set(Some(DeviceFault::NotCalibrated));
+                    self.servo.exchange.shared.fault.set(Some(DeviceFault::NotCalibrated));
                     keeper.report(what_to_do);
                     keeper.opened(description.clone());
                 }
@@ -147,11 +126,10 @@ impl Connector {
     /// Starts the servo loop and waits for its first callback; returns the rights that its thread
     /// was granted.
     fn start(&self, session: &mut Session) -> Result<String, ConnectionError> {
-        let shared = &self.servo.shared;
         let armed = || self.servo.armed.lock().unwrap_or_else(PoisonError::into_inner).take();
         let _ = armed();
         let torques = self.info.is_some_and(|info| info.peak_torque_nm > 0.0);
-        shared.serve(Served {
+        self.servo.exchange.serve(Served {
             handle: session.handle,
             torques,
         });
@@ -162,20 +140,11 @@ impl Connector {
         while start.elapsed() < FIRST_CALL_LIMIT {
             if let Some(granted) = armed() {
                 let granted = granted.map_err(ConnectionError::NotArmed)?;
-                self.wait_for_sample();
+                serving::wait_for_sample(&self.servo.exchange.shared);
                 return Ok(granted);
             }
             thread::park_timeout(Duration::from_millis(1));
         }
         Err(ConnectionError::NoCallback)
-    }
-
-    /// Waits for the sample of the first callback, so that the opener finds one, unless there is a
-    /// fault.
-    fn wait_for_sample(&self) {
-        let start = Instant::now();
-        while self.servo.shared.fault.get().is_some() && start.elapsed() < FIRST_SAMPLE_LIMIT {
-            thread::park_timeout(Duration::from_millis(1));
-        }
     }
 }

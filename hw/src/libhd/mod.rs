@@ -42,6 +42,5 @@ mod session;
 
 pub use device::{OpenError, Phantom, PhantomConfig};
 pub use diagnose::diagnose;
-pub use exchange::Readings;
 pub use ffi::Api;
 pub use session::{ConnectionError, Description};

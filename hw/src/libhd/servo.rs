@@ -8,16 +8,18 @@ use core::cell::UnsafeCell;
 use core::ffi::c_void;
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use crate::convert::{metres_from_millimetres, millinewton_metres_from_newton_metres, pose_from_column_major_mm};
+use crate::convert::{millinewton_metres_from_newton_metres, pose_from_column_major_mm};
 use crate::device::{DeviceFault, Sample, Wrench};
 use crate::driver_thread::arm::{Arm, ArmError};
 use crate::driver_thread::ends::ServoEnd;
 use crate::driver_thread::hold::Hold;
+use crate::driver_thread::shared::Shared;
 use crate::libhd::errors::{self, Response};
-use crate::libhd::exchange::{Served, Shared};
+use crate::libhd::exchange::{Exchange, Served};
 use crate::libhd::ffi::{Api, CALLBACK_CONTINUE, CALLBACK_DONE, parameter};
 use crate::libhd::frame::{gimbal_torque_nm, within_joint_limits};
 use crate::libhd::model::GIMBAL_TORQUE_LIMITS_NM;
@@ -34,7 +36,7 @@ const MAX_ERRORS_PER_TICK: usize = 16;
 /// Callback and its state. Lives until the process ends, because a driver may call once more after
 /// it was stopped.
 pub struct Servo {
-    pub shared: Shared,
+    pub exchange: Exchange,
     /// Result of arming the newest servo thread, until the connector takes it.
     pub armed: std::sync::Mutex<Option<Result<String, ArmError>>>,
     busy: AtomicBool,
@@ -63,9 +65,9 @@ pub struct State {
 }
 
 impl Servo {
-    pub fn new(inner: Inner) -> Self {
+    pub fn new(inner: Inner, shared: Arc<Shared>) -> Self {
         Self {
-            shared: Shared::default(),
+            exchange: Exchange::new(shared),
             armed: std::sync::Mutex::new(None),
             busy: AtomicBool::new(false),
             inner: UnsafeCell::new(inner),
@@ -91,8 +93,8 @@ impl Servo {
         if let Err(payload) = result {
             // Dropping the payload could unwind once more.
             core::mem::forget(payload);
-            inner.lose(&servo.shared, DeviceFault::Driver);
-            inner.write_zero(&servo.shared);
+            inner.lose(&servo.exchange.shared, DeviceFault::Driver);
+            inner.write_zero(&servo.exchange);
         }
         // SYNC: release pairs with the acquire swap above.
         servo.busy.store(false, Ordering::Release);
@@ -103,32 +105,31 @@ impl Servo {
 impl Inner {
     /// Runs one servo tick, in the order of the data.
     fn tick(&mut self, servo: &Servo) {
-        let shared = &servo.shared;
-        let calls = shared.count_call();
+        let exchange = &servo.exchange;
+        let shared = &*exchange.shared;
+        let calls = shared.count_tick();
         // Checked before `take_arm`, so that only an armed thread serves, and again after arming,
         // which takes time.
-        let may_serve = shared.served().is_some();
-        if shared.take_arm() {
+        let may_serve = exchange.served().is_some();
+        if exchange.take_arm() {
             self.begin(servo);
         }
-        let Some(served) = shared.served().filter(|_| may_serve) else {
-            self.write_zero(shared);
+        let Some(served) = exchange.served().filter(|_| may_serve) else {
+            self.write_zero(exchange);
             self.discard_errors();
-            shared.count_released();
+            exchange.count_released();
             return;
         };
         // SAFETY: the handle is the driver's own.
         unsafe { (self.api.hdBeginFrame)(served.handle) };
-        let transform = self.read_pose(shared);
-        self.read_temperature(shared, calls);
+        let transform = self.read_pose();
+        self.read_temperature(calls);
         let wrench = self.state.hold.wrench(self.end.commands.read(), self.servo_hz);
         self.exert(served, &wrench, &transform);
         // SAFETY: the handle is the driver's own.
         unsafe { (self.api.hdEndFrame)(served.handle) };
         self.drain_errors(shared);
         shared.fault.set(self.state.hold.end_tick(self.servo_hz));
-        // SAFETY: no preconditions.
-        shared.note_callback_s(unsafe { (self.api.hdGetSchedulerTimeStamp)() });
     }
 
     /// Begins the first tick of a servo thread.
@@ -141,12 +142,12 @@ impl Inner {
         let granted = (self.arm)();
         if granted.is_err() {
             // A thread without its rights exerts no force, until the connector stops it.
-            self.lose(&servo.shared, DeviceFault::Driver);
+            self.lose(&servo.exchange.shared, DeviceFault::Driver);
         }
         *servo.armed.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(granted);
     }
 
-    fn read_pose(&mut self, shared: &Shared) -> [f64; 16] {
+    fn read_pose(&mut self) -> [f64; 16] {
         let (mut transform, mut velocity, mut buttons) = ([0.0; 16], [0.0; 3], 0);
         // SAFETY: each buffer has the size that the interface states for its parameter.
         unsafe {
@@ -154,12 +155,10 @@ impl Inner {
             (self.api.hdGetDoublev)(parameter::VELOCITY, velocity.as_mut_ptr());
             (self.api.hdGetIntegerv)(parameter::BUTTONS, &mut buttons);
         }
-        let speed = metres_from_millimetres(&Vector3::from(velocity)).norm();
         match pose_from_column_major_mm(&transform) {
-            Some((tip_in_device, device_from_stylus)) if speed.is_finite() => {
+            Some((tip_in_device, device_from_stylus)) if velocity.iter().all(|v| v.is_finite()) => {
                 let (tip_in_world, world_from_tool) = self.placement.pose(&tip_in_device, &device_from_stylus);
                 self.state.sequence += 1;
-                shared.note_speed_m_per_s(speed);
                 self.end.samples.write(Some(Sample {
                     tip_in_world,
                     world_from_tool,
@@ -172,13 +171,12 @@ impl Inner {
         transform
     }
 
-    fn read_temperature(&mut self, shared: &Shared, calls: u64) {
+    fn read_temperature(&mut self, calls: u64) {
         if calls.is_multiple_of(TICKS_BETWEEN_TEMPERATURES) {
             let mut motors = [0.0; 6];
             // SAFETY: the driver writes three or six numbers.
             unsafe { (self.api.hdGetDoublev)(parameter::MOTOR_TEMPERATURE, motors.as_mut_ptr()) };
             let warmest = motors.iter().copied().fold(0.0, f64::max);
-            shared.note_temperature(warmest);
             self.state.hot = warmest >= if self.state.hot { COOL } else { HOT };
         }
         if self.state.hot {
@@ -247,8 +245,8 @@ impl Inner {
     }
 
     /// Writes zero force and torque, whatever the state of the device.
-    fn write_zero(&self, shared: &Shared) {
-        let served = shared.last_served();
+    fn write_zero(&self, exchange: &Exchange) {
+        let served = exchange.last_served();
         let zero = [0.0; 3];
         // SAFETY: the handle is the driver's own, three numbers each.
         unsafe {

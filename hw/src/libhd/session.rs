@@ -6,6 +6,7 @@ use std::ffi::CString;
 
 use crate::device::DeviceInfo;
 use crate::driver_thread::arm::ArmError;
+use crate::driver_thread::served::Described;
 use crate::libhd::errors;
 use crate::libhd::ffi::{
     Api, Callback, Enum, Handle, INVALID_HANDLE, PRIORITY_MAX, Schedule, WAIT_CHECK_STATUS, capability, parameter,
@@ -71,6 +72,12 @@ pub struct Description {
     pub library: String,
     /// Number of axes with a motor: 6 means torques.
     pub output_dof: c_int,
+}
+
+impl Described for Description {
+    fn info(&self) -> DeviceInfo {
+        self.info
+    }
 }
 
 impl fmt::Display for Description {

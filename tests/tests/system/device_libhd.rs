@@ -83,7 +83,6 @@ fn pose_and_force_change_frames_and_units_as_stated() {
             .zip(expected)
             .all(|(sent, want)| (sent - want).abs() < 1e-12)
     }));
-    assert!(device.readings().speed_m_per_s.is_finite());
 }
 
 #[test]
@@ -344,7 +343,6 @@ fn warm_motors_turn_the_force_off_until_they_have_cooled() {
     fake.control.temperature_milli.store(960, Relaxed);
     assert!(drive(&mut device, &push(), LONG, |s| *s == Err(DeviceFault::Overheated)));
     assert!(drive(&mut device, &push(), LONG, |_| fake.control.force() == [0.0; 3]));
-    assert!((device.readings().temperature - 0.96).abs() < 1e-9);
     // Below the limit, above the one for resuming.
     fake.control.temperature_milli.store(900, Relaxed);
     let back = drive(&mut device, &push(), Duration::from_millis(1200), Result::is_ok);
