@@ -3,11 +3,11 @@
 use crate::columns::{self, FAILURE, MEASURED, PRESCRIPTION, SEED_COLUMNS, SEEDS, TEXTS, WHOLES};
 use crate::write::{DEFINITION, FINGERPRINT, QUANTITIES, STUDY};
 use crate::{About, Insertion, Motion, Seed, Table, TableError};
-use parquet::column::reader::get_typed_column_reader;
-use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int32Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::FileMetaData;
-use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::{Field, Row};
+use std::collections::HashMap;
 use std::fs::File;
 use std::path::Path;
 
@@ -44,9 +44,8 @@ fn decode(file: File) -> Result<Table, ParquetError> {
             .collect(),
         rows: Vec::new(),
     };
-    for n in 0..reader.num_row_groups() {
-        let group = Group(reader.get_row_group(n)?);
-        table.rows.extend(group.rows(&table.quantities)?);
+    for row in reader.get_row_iter(None)? {
+        table.rows.push(insertion(row?, &table.quantities)?);
     }
     Ok(table)
 }
@@ -58,145 +57,109 @@ fn noted(about: &FileMetaData, key: &str) -> Result<String, ParquetError> {
         .ok_or_else(|| ParquetError::General(format!("it does not note {key}")))
 }
 
-struct Group<'a>(Box<dyn RowGroupReader + 'a>);
+/// The values of one row, or of one seed, by column.
+struct Columns(HashMap<String, Field>);
 
-/// Non-null values, with the definition and repetition level of each entry.
-struct Column<T> {
-    values: Vec<T>,
-    defined: Vec<i16>,
-    repeated: Vec<i16>,
-}
-
-impl Group<'_> {
-    fn rows(&self, quantities: &[String]) -> Result<Vec<Insertion>, ParquetError> {
-        let texts = TEXTS.iter().map(|(name, _)| self.required::<ByteArrayType>(name));
-        let texts: Vec<_> = texts.collect::<Result<_, _>>()?;
-        let wholes = WHOLES.iter().map(|(name, _)| self.required::<Int32Type>(name));
-        let wholes: Vec<_> = wholes.collect::<Result<_, _>>()?;
-        let prescriptions = self.required::<DoubleType>(PRESCRIPTION)?;
-        let drawn = quantities.iter().map(|name| self.required::<DoubleType>(name));
-        let drawn: Vec<_> = drawn.collect::<Result<_, _>>()?;
-        let measured = MEASURED.iter().map(|(name, _)| self.optional::<DoubleType>(name));
-        let measured: Vec<_> = measured.collect::<Result<_, _>>()?;
-        let failures = self.optional::<ByteArrayType>(FAILURE)?;
-        let row = |(i, seeds): (usize, Vec<Seed>)| {
-            let text = |column: usize| Some(plain(texts[column].get(i)?));
-            let measured = measured.iter().map(|column| column.get(i).copied());
-            let measured = measured.collect::<Option<Vec<Option<f64>>>>()?;
-            let failure = failures.get(i)?.as_ref().map(plain);
-            let motion = || {
-                Some(Motion {
-                    peak_force_n: measured[0]?,
-                    displacement_before_puncture_mm: measured[1]?,
-                    largest_displacement_mm: measured[2]?,
-                    target_shift_mm: measured[3]?,
-                    duration_s: measured[4]?,
-                })
-            };
-            Some(Insertion {
-                id: text(0)?,
-                scene: text(1)?,
-                plan: text(2)?,
-                hole: text(3)?,
-                tissue: text(4)?,
-                source: text(5)?,
-                implant: *wholes[0].get(i)?,
-                needle: *wholes[1].get(i)?,
-                prescription_gy: *prescriptions.get(i)?,
-                drawn: drawn
-                    .iter()
-                    .map(|column| column.get(i).copied())
-                    .collect::<Option<_>>()?,
-                outcome: motion().ok_or_else(|| failure.unwrap_or_default()),
-                seeds,
-            })
-        };
-        let rows: Option<Vec<Insertion>> = self.seeds()?.into_iter().enumerate().map(row).collect();
-        let short = || ParquetError::General("a column is shorter than the file".to_owned());
-        rows.filter(|rows| rows.len() as i64 == self.0.metadata().num_rows())
-            .ok_or_else(short)
+impl Columns {
+    fn of(row: Row) -> Self {
+        Self(row.into_columns().into_iter().collect())
     }
 
-    fn column<T: DataType>(&self, path: &str) -> Result<Column<T::T>, ParquetError> {
-        let about = self.0.metadata();
-        let place = about.columns().iter().position(|c| c.column_path().string() == path);
-        let place = place.ok_or_else(|| ParquetError::General(format!("it has no column {path}")))?;
-        let found = about.column(place).column_type();
-        if found != T::get_physical_type() {
-            return Err(ParquetError::General(format!(
-                "column {path} holds {found}; it must hold {}",
-                T::get_physical_type()
-            )));
+    /// Returns the value of a column; `None` if it is null.
+    fn optional<T>(&mut self, name: &str, typed: fn(Field) -> Option<T>) -> Result<Option<T>, ParquetError> {
+        let value = self.0.remove(name).ok_or_else(|| wrong("it has no column", name))?;
+        if value == Field::Null {
+            return Ok(None);
         }
-        let mut reader = get_typed_column_reader::<T>(self.0.get_column_reader(place)?);
-        let mut column = Column {
-            values: Vec::new(),
-            defined: Vec::new(),
-            repeated: Vec::new(),
-        };
-        loop {
-            let (records, _, _) = reader.read_records(
-                about.num_rows() as usize,
-                Some(&mut column.defined),
-                Some(&mut column.repeated),
-                &mut column.values,
-            )?;
-            if records == 0 {
-                return Ok(column);
-            }
-        }
+        typed(value)
+            .map(Some)
+            .ok_or_else(|| wrong("it holds another type in column", name))
     }
 
-    fn required<T: DataType>(&self, path: &str) -> Result<Vec<T::T>, ParquetError> {
-        Ok(self.column::<T>(path)?.values)
-    }
-
-    fn optional<T: DataType>(&self, path: &str) -> Result<Vec<Option<T::T>>, ParquetError> {
-        let column = self.column::<T>(path)?;
-        let mut values = column.values.into_iter();
-        Ok(column
-            .defined
-            .iter()
-            .map(|&d| if d == 1 { values.next() } else { None })
-            .collect())
-    }
-
-    /// Returns the seeds of each row.
-    fn seeds(&self) -> Result<Vec<Vec<Seed>>, ParquetError> {
-        let mut rows: Vec<Vec<[Option<f64>; SEED_COLUMNS.len()]>> = Vec::new();
-        for (field, name) in SEED_COLUMNS.iter().enumerate() {
-            let column = self.column::<DoubleType>(&format!("{SEEDS}.list.element.{name}"))?;
-            let full = if field < columns::PLANNED { 1 } else { 2 };
-            let mut values = column.values.into_iter();
-            let (mut row, mut place) = (0, 0);
-            for (n, (&defined, &repeated)) in column.defined.iter().zip(&column.repeated).enumerate() {
-                if repeated == 0 {
-                    row += usize::from(n > 0);
-                    place = 0;
-                }
-                if rows.len() <= row {
-                    rows.push(Vec::new());
-                }
-                if defined == 0 {
-                    continue;
-                }
-                if rows[row].len() <= place {
-                    rows[row].push([None; SEED_COLUMNS.len()]);
-                }
-                rows[row][place][field] = if defined == full { values.next() } else { None };
-                place += 1;
-            }
-        }
-        let lacks = || ParquetError::General("a seed lacks its planned place".to_owned());
-        let of_row = |row: Vec<_>| {
-            row.into_iter()
-                .map(|seed| columns::seed_of(seed).ok_or_else(lacks))
-                .collect()
-        };
-        rows.into_iter().map(of_row).collect()
+    fn required<T>(&mut self, name: &str, typed: fn(Field) -> Option<T>) -> Result<T, ParquetError> {
+        self.optional(name, typed)?
+            .ok_or_else(|| wrong("it lacks a value in column", name))
     }
 }
 
-fn plain(text: &ByteArray) -> String {
-    String::from_utf8_lossy(text.data()).into_owned()
+fn insertion(row: Row, quantities: &[String]) -> Result<Insertion, ParquetError> {
+    let mut row = Columns::of(row);
+    let [id, scene, plan, hole, tissue, source] = TEXTS.map(|(name, _)| row.required(name, text));
+    let [implant, needle] = WHOLES.map(|(name, _)| row.required(name, whole));
+    let [m0, m1, m2, m3, m4] = MEASURED.map(|(name, _)| row.optional(name, double));
+    let m = [m0?, m1?, m2?, m3?, m4?];
+    let motion = || {
+        Some(Motion {
+            peak_force_n: m[0]?,
+            displacement_before_puncture_mm: m[1]?,
+            largest_displacement_mm: m[2]?,
+            target_shift_mm: m[3]?,
+            duration_s: m[4]?,
+        })
+    };
+    let failure = row.optional(FAILURE, text)?;
+    let drawn = quantities.iter().map(|name| row.required(name, double));
+    Ok(Insertion {
+        drawn: drawn.collect::<Result<_, _>>()?,
+        id: id?,
+        scene: scene?,
+        plan: plan?,
+        implant: implant?,
+        needle: needle?,
+        hole: hole?,
+        tissue: tissue?,
+        source: source?,
+        prescription_gy: row.required(PRESCRIPTION, double)?,
+        outcome: motion().ok_or_else(|| failure.unwrap_or_default()),
+        seeds: row
+            .required(SEEDS, seeds)?
+            .into_iter()
+            .map(seed)
+            .collect::<Result<_, _>>()?,
+    })
+}
+
+fn seed(row: Row) -> Result<Seed, ParquetError> {
+    let mut row = Columns::of(row);
+    let mut values = [None; SEED_COLUMNS.len()];
+    for (value, name) in values.iter_mut().zip(SEED_COLUMNS) {
+        *value = row.optional(name, double)?;
+    }
+    columns::seed_of(values).ok_or_else(|| wrong("a seed lacks its planned place in column", SEEDS))
+}
+
+fn text(value: Field) -> Option<String> {
+    match value {
+        Field::Str(text) => Some(text),
+        _ => None,
+    }
+}
+
+fn whole(value: Field) -> Option<i32> {
+    match value {
+        Field::Int(whole) => Some(whole),
+        _ => None,
+    }
+}
+
+fn double(value: Field) -> Option<f64> {
+    match value {
+        Field::Double(double) => Some(double),
+        _ => None,
+    }
+}
+
+fn seeds(value: Field) -> Option<Vec<Row>> {
+    let Field::ListInternal(list) = value else {
+        return None;
+    };
+    let row = |seed: &Field| match seed {
+        Field::Group(row) => Some(row.clone()),
+        _ => None,
+    };
+    list.elements().iter().map(row).collect()
+}
+
+fn wrong(what: &str, name: &str) -> ParquetError {
+    ParquetError::General(format!("{what} {name}"))
 }
