@@ -112,6 +112,23 @@ fn host_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
 // `history`: number of past values that a joining host receives; `again`: the same for a host that rejoins after the
 // ports were recreated.
 macro_rules! service {
+    (@receiver $receiver:ty, by $who:ident, history $history:expr, again $again:expr) => {
+        /// Returns a receiver.
+        pub fn subscriber(node: &Node) -> Result<$receiver, ServiceError> {
+            open(node)?
+                .subscriber_builder()
+                .history_request(if node.is_again() { $again } else { $history })
+                .create()
+                .map(<$receiver>::new)
+                .map_err(|e| By::$who.subscriber_failed(NAME, e))
+        }
+
+        /// Returns a monitor of connections.
+        pub fn watch(node: &Node) -> Result<Watch, ServiceError> {
+            let service = open(node)?;
+            Ok(Watch::new(move || service.dynamic_config().into()))
+        }
+    };
     ($(#[$doc:meta])* $module:ident: $value:ty, by $who:ident, history $history:expr, again $again:expr, buffer $buffer:expr) => {
         $(#[$doc])*
         pub mod $module {
@@ -142,21 +159,7 @@ macro_rules! service {
                     .map_err(|e| By::$who.publisher_failed(NAME, e))
             }
 
-            /// Returns a receiver.
-            pub fn subscriber(node: &Node) -> Result<Subscriber<$value>, ServiceError> {
-                open(node)?
-                    .subscriber_builder()
-                    .history_request(if node.is_again() { $again } else { $history })
-                    .create()
-                    .map(Subscriber::new)
-                    .map_err(|e| By::$who.subscriber_failed(NAME, e))
-            }
-
-            /// Returns a monitor of connections.
-            pub fn watch(node: &Node) -> Result<Watch, ServiceError> {
-                let service = open(node)?;
-                Ok(Watch::new(move || service.dynamic_config().into()))
-            }
+            service!(@receiver Subscriber<$value>, by $who, history $history, again $again);
         }
     };
     (
@@ -201,21 +204,7 @@ macro_rules! service {
                 .map_err(|e| By::$who.publisher_failed(NAME, e))
             }
 
-            /// Returns a receiver.
-            pub fn subscriber(node: &Node) -> Result<SliceSubscriber<$value, $header>, ServiceError> {
-                open(node)?
-                    .subscriber_builder()
-                    .history_request(if node.is_again() { $again } else { $history })
-                    .create()
-                    .map(SliceSubscriber::new)
-                    .map_err(|e| By::$who.subscriber_failed(NAME, e))
-            }
-
-            /// Returns a monitor of connections.
-            pub fn watch(node: &Node) -> Result<Watch, ServiceError> {
-                let service = open(node)?;
-                Ok(Watch::new(move || service.dynamic_config().into()))
-            }
+            service!(@receiver SliceSubscriber<$value, $header>, by $who, history $history, again $again);
         }
     };
 }

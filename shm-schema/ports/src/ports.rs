@@ -29,13 +29,13 @@ impl SendError {
 pub struct Publisher<T>(Box<dyn Sends<T>>);
 
 /// Receives single values.
-pub struct Subscriber<T>(Box<dyn Receives<T>>);
+pub struct Subscriber<T>(Box<dyn Fn() -> Option<(u128, T)>>);
 
 /// Sends slices under a header.
 pub struct SlicePublisher<T, H>(Box<dyn SendsSlices<T, H>>);
 
 /// Receives slices under a header.
-pub struct SliceSubscriber<T, H>(Box<dyn ReceivesSlices<T, H>>);
+pub struct SliceSubscriber<T, H>(Box<dyn Fn() -> Option<Slice<T, H>>>);
 
 /// A slice in shared memory, read in place.
 pub struct Slice<T, H>(Box<dyn Held<T, H>>);
@@ -48,18 +48,10 @@ trait Sends<T> {
     fn connect(&self);
 }
 
-trait Receives<T> {
-    fn receive(&self) -> Option<(u128, T)>;
-}
-
 trait SendsSlices<T, H> {
     fn send(&self, header: &H, values: &[T]) -> Result<usize, SendError>;
     fn loan(&self, length: usize) -> Option<Loan<T, H>>;
     fn connect(&self);
-}
-
-trait ReceivesSlices<T, H> {
-    fn receive(&self) -> Option<Slice<T, H>>;
 }
 
 trait Held<T, H> {
@@ -80,13 +72,6 @@ impl<T: Pod + Debug> Sends<T> for publisher::Publisher<Ipc, Wire<T>, ()> {
     fn connect(&self) {
         // A host that cannot be connected now is connected next time.
         let _ = self.update_connections();
-    }
-}
-
-impl<T: Pod + Debug> Receives<T> for subscriber::Subscriber<Ipc, Wire<T>, ()> {
-    fn receive(&self) -> Option<(u128, T)> {
-        let sample = self.receive().ok().flatten()?;
-        Some((sample.origin().value(), sample.0))
     }
 }
 
@@ -143,16 +128,6 @@ where
     }
 }
 
-impl<T, H> ReceivesSlices<T, H> for subscriber::Subscriber<Ipc, [Wire<T>], Wire<H>>
-where
-    T: Pod + Debug,
-    H: Pod + Debug,
-{
-    fn receive(&self) -> Option<Slice<T, H>> {
-        Some(Slice(Box::new(self.receive().ok().flatten()?)))
-    }
-}
-
 impl<T, H> Held<T, H> for Sample<Ipc, [Wire<T>], Wire<H>>
 where
     T: Pod + Debug,
@@ -206,7 +181,10 @@ impl<T> Subscriber<T> {
     where
         T: Pod + Debug,
     {
-        Self(Box::new(port))
+        Self(Box::new(move || {
+            let sample = port.receive().ok().flatten()?;
+            Some((sample.origin().value(), sample.0))
+        }))
     }
 
     /// Returns the next value; `None` if there is none or it cannot be read.
@@ -216,7 +194,7 @@ impl<T> Subscriber<T> {
 
     /// As `receive`, with the number of the sending port, which no program can choose.
     pub fn receive_from(&self) -> Option<(u128, T)> {
-        self.0.receive()
+        (self.0)()
     }
 }
 
@@ -261,12 +239,12 @@ impl<T, H> SliceSubscriber<T, H> {
         T: Pod + Debug,
         H: Pod + Debug,
     {
-        Self(Box::new(port))
+        Self(Box::new(move || Some(Slice(Box::new(port.receive().ok().flatten()?)))))
     }
 
     /// Returns the next slice; `None` if there is none or it cannot be read.
     pub fn receive(&self) -> Option<Slice<T, H>> {
-        self.0.receive()
+        (self.0)()
     }
 }
 
