@@ -88,9 +88,4 @@ pub enum ReplyStatus {
     Refused = 2,
 }
 
-impl ReplyStatus {
-    /// Returns the status; `None` if this build does not know the number.
-    pub fn from_number(number: u32) -> Option<Self> {
-        Self::try_from(number).ok()
-    }
-}
+numbered!(ReplyStatus);

@@ -72,9 +72,4 @@ pub enum EventKind {
     SecondRearmed = 21,
 }
 
-impl EventKind {
-    /// Returns the kind; `None` if this build does not know the number.
-    pub fn from_number(number: u32) -> Option<Self> {
-        Self::try_from(number).ok()
-    }
-}
+numbered!(EventKind);

@@ -30,6 +30,40 @@
 
 use std::time::Duration;
 
+/// Makes an enum of stable numbers, each with its text for people.
+macro_rules! coded {
+    ($(#[$about:meta])* $name:ident: $($(#[$doc:meta])* $code:ident = $number:literal, $message:literal;)+) => {
+        $(#[$about])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, num_enum::TryFromPrimitive)]
+        #[repr(u32)]
+        pub enum $name {
+            $($(#[$doc])* $code = $number,)+
+        }
+
+        numbered!($name);
+
+        impl $name {
+            /// Returns the text for people.
+            pub fn message(self) -> &'static str {
+                match self {
+                    $(Self::$code => $message,)+
+                }
+            }
+        }
+    };
+}
+
+macro_rules! numbered {
+    ($name:ty) => {
+        impl $name {
+            /// Returns the value of a number; `None` if this build does not know it.
+            pub fn from_number(number: u32) -> Option<Self> {
+                Self::try_from(number).ok()
+            }
+        }
+    };
+}
+
 pub mod affinity;
 pub mod check;
 mod class;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// One tick, as seen by hosts. Written only by the second device's thread, on a board that exists in a run with a
 /// second device.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
 pub struct SecondState {
     /// Ticks since the loop began; 0 means that no tick has run.
     pub tick: u64,

@@ -2,7 +2,7 @@
 
 use crate::DeadlineTotals;
 use bytemuck::{Pod, Zeroable};
-use num_enum::TryFromPrimitive;
+use num_enum::{IntoPrimitive, TryFromPrimitive};
 use serde::{Deserialize, Serialize};
 
 /// One tick, as seen by the operator's program. Written only by the haptic thread.
@@ -156,12 +156,9 @@ pub enum Phase {
     Hold = 4,
 }
 
-impl Phase {
-    /// Returns the phase; `None` if this build does not know the number.
-    pub fn from_number(number: u32) -> Option<Self> {
-        Self::try_from(number).ok()
-    }
+numbered!(Phase);
 
+impl Phase {
     /// Name shown to users.
     pub fn name(self) -> &'static str {
         match self {
@@ -174,69 +171,38 @@ impl Phase {
     }
 }
 
-/// Reason why the force is off, by stable number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, TryFromPrimitive)]
-#[repr(u32)]
-pub enum Fault {
+coded!(
+    /// Reason why the force is off, by stable number.
+    #[derive(IntoPrimitive, Serialize, Deserialize)]
+    #[serde(try_from = "u32", into = "u32")]
+    Fault:
+
     /// The force may be on.
-    None = 0,
+    None = 0, "no fault";
     /// The device does not answer.
-    DeviceSilent = 1,
+    DeviceSilent = 1, "the device stopped answering; check its cable, then re-arm";
     /// The device reported an error.
-    DeviceError = 2,
+    DeviceError = 2, "the device reported an error; check it, then re-arm";
     /// The device reported a position that is not a number.
-    NonFiniteInput = 3,
+    NonFiniteInput = 3, "the device sent a position that is not a number; re-arm to go on";
     /// The force law gave a value that is not a number.
-    NonFiniteForce = 4,
+    NonFiniteForce = 4, "the force law gave a value that is not a number; reset the parameters, then re-arm";
     /// No answer of the tissue loop for 100 ms.
-    TissueStale = 5,
+    TissueStale = 5, "the tissue step is late by more than 100 ms; lower the load on its core, then re-arm";
     /// The tissue's constraints were not met.
-    TissueUnsolved = 6,
+    TissueUnsolved = 6, "the tissue constraints could not be met; draw needle or probe back, then re-arm";
     /// 20 deadlines missed in a row.
-    OverrunStreak = 7,
+    OverrunStreak = 7, "the force loop missed 20 deadlines in a row; lower the load on its core, then re-arm";
     /// The force loop has stopped unasked.
-    LoopStopped = 8,
+    LoopStopped = 8, "the force loop stood still for too long; lower the load on its core, then re-arm";
     /// The device is disconnected.
-    DeviceLost = 9,
+    DeviceLost = 9, "the device is not connected; check power and cable, wait until it is found again, then re-arm";
     /// The device is not calibrated.
     DeviceNotCalibrated = 10,
+        "the device is not calibrated: stylus into the inkwell, or arm in neutral pose and press its button; then \
+         re-arm";
     /// The motors are too warm.
-    DeviceWarm = 11,
+    DeviceWarm = 11, "the motors of the device are too warm; let them cool for some minutes, then re-arm";
     /// The device stopped at one of its limits.
-    DeviceStopped = 12,
-}
-
-impl Fault {
-    /// Returns the fault; `None` if this build does not know the number.
-    pub fn from_number(number: u32) -> Option<Self> {
-        Self::try_from(number).ok()
-    }
-
-    /// Message shown to users.
-    pub fn message(self) -> &'static str {
-        match self {
-            Self::None => "no fault",
-            Self::DeviceSilent => "the device stopped answering; check its cable, then re-arm",
-            Self::DeviceError => "the device reported an error; check it, then re-arm",
-            Self::NonFiniteInput => "the device sent a position that is not a number; re-arm to go on",
-            Self::NonFiniteForce => {
-                "the force law gave a value that is not a number; reset the parameters, then re-arm"
-            }
-            Self::TissueStale => "the tissue step is late by more than 100 ms; lower the load on its core, then re-arm",
-            Self::TissueUnsolved => "the tissue constraints could not be met; draw needle or probe back, then re-arm",
-            Self::OverrunStreak => {
-                "the force loop missed 20 deadlines in a row; lower the load on its core, then re-arm"
-            }
-            Self::LoopStopped => "the force loop stood still for too long; lower the load on its core, then re-arm",
-            Self::DeviceLost => {
-                "the device is not connected; check power and cable, wait until it is found again, then re-arm"
-            }
-            Self::DeviceNotCalibrated => {
-                "the device is not calibrated: stylus into the inkwell, or arm in neutral pose and press its button; then \
-                 re-arm"
-            }
-            Self::DeviceWarm => "the motors of the device are too warm; let them cool for some minutes, then re-arm",
-            Self::DeviceStopped => "the device stopped itself at a limit of force or speed; move slower, then re-arm",
-        }
-    }
-}
+    DeviceStopped = 12, "the device stopped itself at a limit of force or speed; move slower, then re-arm";
+);

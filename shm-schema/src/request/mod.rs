@@ -31,68 +31,51 @@ pub const VALID_RANGE_S: [f64; 2] = [0.02, 0.3];
 /// One request of a host. The numbers are stable: [`CommandKind`] is derived from them, and [`Command::kind`] carries
 /// them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, EnumDiscriminants)]
-#[strum_discriminants(name(CommandKind), derive(TryFromPrimitive))]
+#[strum_discriminants(name(CommandKind), derive(TryFromPrimitive), allow(missing_docs))]
 #[strum_discriminants(doc = "Kind of a [`Request`] by stable number, as [`Command::kind`] carries it.")]
 #[repr(u32)]
 pub enum Request {
     /// Change parameters. With the reply all are in force, or none.
-    #[strum_discriminants(doc = "[`Request::SetParameters`]")]
     SetParameters(Vec<ParameterChange>) = 1,
     /// Publish a plan to all hosts; `None` withdraws it.
-    #[strum_discriminants(doc = "[`Request::SetPlan`]")]
     SetPlan(Option<PlannedNeedle>) = 2,
     /// Set the goal of the simulated hand.
-    #[strum_discriminants(doc = "[`Request::MoveHand`]")]
     MoveHand(HandMove) = 3,
     /// Leave a seed at the tip.
-    #[strum_discriminants(doc = "[`Request::DropSeed`]")]
     DropSeed {
         /// For needles loaded with strands: pitch between seed centres, m, within [`STRAND_PITCH_RANGE_M`]. The seed is
         /// joined to the one dropped before it if that lies behind it on the same needle at about this pitch.
         strand_pitch_m: Option<f64>,
     } = 4,
     /// Turn the force on; also re-arms after a fault.
-    #[strum_discriminants(doc = "[`Request::Engage`]")]
     Engage = 5,
     /// Ramp the force to zero.
-    #[strum_discriminants(doc = "[`Request::Disengage`]")]
     Disengage = 6,
     /// Bring the tissue to rest, remove the seeds, clear peaks and worst cases.
-    #[strum_discriminants(doc = "[`Request::Reset`]")]
     Reset = 7,
     /// Run a built-in scene, by its index in [`crate::BUILTIN_SCENES`].
-    #[strum_discriminants(doc = "[`Request::LoadBuiltinScene`]")]
     LoadBuiltinScene(u32) = 8,
     /// Remove the last seed.
-    #[strum_discriminants(doc = "[`Request::UndoSeed`]")]
     UndoSeed = 9,
     /// End `rt-core`.
-    #[strum_discriminants(doc = "[`Request::Shutdown`]")]
     Shutdown = 10,
     /// Write the flight recording of both loops to disk.
-    #[strum_discriminants(doc = "[`Request::SaveFlight`]")]
     SaveFlight = 11,
     /// Simulate one needle ahead of time, from rest, in a separate body; a [`crate::Rehearsal`] is sent before the
     /// reply.
-    #[strum_discriminants(doc = "[`Request::Rehearse`]")]
     Rehearse(NeedleRehearsal) = 12,
     /// Stop the simulated hand as fast as it can; only the core knows where that is. In a run with a second device,
     /// stop both hands.
-    #[strum_discriminants(doc = "[`Request::StopHand`]")]
     StopHand = 13,
     /// Announce the needle after the planned one, so that the core can prepare for it.
-    #[strum_discriminants(doc = "[`Request::ExpectNeedle`]")]
     ExpectNeedle(NeedleAxis) = 14,
     /// Leave the needle where it is; the hand is empty until it is out of the tissue, and takes a new one there.
     /// Refused if the tip is in no tissue or presses on a membrane, if the needle has no line, and beyond
     /// [`crate::MAX_LEFT_NEEDLES`].
-    #[strum_discriminants(doc = "[`Request::LeaveNeedle`]")]
     LeaveNeedle = 15,
     /// Take a needle that stays in, by its number, with the hand at its tip.
-    #[strum_discriminants(doc = "[`Request::TakeNeedle`]")]
     TakeNeedle(u32) = 16,
     /// Draw out a needle that stays in, without the hand.
-    #[strum_discriminants(doc = "[`Request::DrawNeedle`]")]
     DrawNeedle {
         /// Its number.
         number: u32,
@@ -100,28 +83,22 @@ pub enum Request {
         speed_m_per_s: f64,
     } = 17,
     /// Add a moment with a few words to the events.
-    #[strum_discriminants(doc = "[`Request::Mark`]")]
     Mark(Mark) = 18,
     /// Inject a fault for a trainee to find; replaces one of the same kind.
-    #[strum_discriminants(doc = "[`Request::BeginExercise`]")]
     BeginExercise(Exercise) = 19,
     /// Remove all injected faults. A reset does so as well.
-    #[strum_discriminants(doc = "[`Request::EndExercises`]")]
     EndExercises = 20,
     /// Keep this host's motions going: both hands and needles being drawn out. A motion whose host is not heard within
     /// the promised time brakes, resumes if the host is heard within 0.3 s, and is given up after that
     /// ([`crate::EventKind::MotionGivenUp`]). A request that begins a motion promises 20 ms. A valid one is not
     /// answered.
-    #[strum_discriminants(doc = "[`Request::KeepMoving`]")]
     KeepMoving {
         /// Time for which the motion continues without another of these, s, within [`VALID_RANGE_S`].
         valid_s: f64,
     } = 21,
     /// Set the goal of the simulated hand that holds the second device.
-    #[strum_discriminants(doc = "[`Request::MoveSecondHand`]")]
     MoveSecondHand(ProbeMove) = 30,
     /// Stop that hand, but not the needle's.
-    #[strum_discriminants(doc = "[`Request::StopSecondHand`]")]
     StopSecondHand = 31,
 }
 
