@@ -121,7 +121,7 @@ impl Theatre {
         let begun = Instant::now();
         let line = body
             .expect("has lines")
-            .prepare(1, self.start.into(), [0.0, 0.0, 1.0], false, &mut || true)
+            .prepare(1, self.start.into(), [0.0, 0.0, 1.0], false, &[], &mut || true)
             .expect("through the gland");
         (line, begun.elapsed().as_secs_f64())
     }

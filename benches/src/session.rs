@@ -165,11 +165,11 @@ impl Session {
             acceleration_m_per_s2: 20.0 * speed_m_per_s.max(0.05),
         };
         let order = HapticOrder::Hand {
-            ticket: 0,
             goal,
+            up: None,
             promise: None,
         };
-        let _ = self.loops.control.haptic_orders.push(order);
+        let _ = self.loops.control.haptic_orders.push((0, order));
     }
 
     /// Advances the force loop by one tick, and the tissue loop where a tick is due.
@@ -194,7 +194,7 @@ impl Session {
 
     /// Returns the number of the fault that turned the force off; 0 for none.
     pub fn fault(&self) -> u32 {
-        self.loops.haptic.state.fault
+        self.loops.haptic.memory.state.fault
     }
 
     /// Returns the largest residual so far, over what the tip's patch needs.
@@ -219,7 +219,7 @@ impl Session {
 
     /// Returns the state of the force chain.
     pub fn chain(&self) -> &ChainState {
-        self.loops.haptic.chain()
+        &self.loops.haptic.memory.chain
     }
 
     /// Returns the newest answer of the tissue.

@@ -1,14 +1,13 @@
 //! Rehearsals without processes: the core's own, called from the host's planner.
 
-use nalgebra::Vector3;
 use std::sync::atomic::AtomicBool;
 use stylet_host::link::SceneModel;
 use stylet_hw::DeviceInfo;
 use stylet_implant::plan::rehearse::{Drops, RehearsalError, Rehearser, Rest};
 use stylet_implant::workflow::Pace;
 use stylet_runtime::control::ScenePicture;
-use stylet_runtime::rehearse::{NeedleRun, RehearseError, Stage};
-use stylet_shm_schema::ParameterSet;
+use stylet_runtime::rehearse::{RehearseError, Stage};
+use stylet_shm_schema::{NeedleRehearsal, ParameterSet};
 use stylet_sim::scene::TissueKind;
 use stylet_sim::scene::{Labels, Scene, SceneSource};
 
@@ -48,9 +47,9 @@ impl Theatre {
 impl Rehearser for Theatre {
     fn rehearse(&mut self, drops: &Drops, pace: &Pace) -> Result<Rest, RehearsalError> {
         self.rehearsals += 1;
-        let run = NeedleRun {
-            entry_m: drops.entry_m.into(),
-            direction: drops.direction.into(),
+        let run = NeedleRehearsal {
+            entry_m: drops.entry_m,
+            direction: drops.direction,
             insert_m_per_s: pace.insert_m_per_s,
             retract_m_per_s: pace.retract_m_per_s,
             approach_m_per_s: pace.approach_m_per_s,
@@ -59,7 +58,7 @@ impl Rehearser for Theatre {
             strand_pitch_m: drops.strand_pitch_m,
             stabilising: Vec::new(),
             earlier: Vec::new(),
-            drops_m: drops.drops_m().map(Vector3::from).collect(),
+            drops_m: drops.drops_m().collect(),
         };
         let done = self
             .stage

@@ -77,9 +77,10 @@ pub trait Device: Send {
 }
 
 /// Name and limits of a device.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DeviceInfo {
-    /// Name for display and records.
+    /// Name for display; left out where the figures are saved.
+    #[serde(skip)]
     pub name: &'static str,
     /// Largest force for a short time.
     pub peak_force_n: f64,

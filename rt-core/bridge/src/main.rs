@@ -149,8 +149,8 @@ impl Bridge {
         if let Some(state) = self.state.as_mut().and_then(Reader::take) {
             self.ports.state.write(&state);
         }
-        if let (Some(port), Some(state)) = (&self.ports.second, self.second_state.as_mut().and_then(Reader::take)) {
-            port.state.write(&state);
+        if let (Some(board), Some(state)) = (&self.ports.second, self.second_state.as_mut().and_then(Reader::take)) {
+            board.write(&state);
         }
         self.ports.send_snapshot();
         self.ports.forward(socket)?;

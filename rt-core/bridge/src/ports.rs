@@ -1,10 +1,11 @@
 //! Every port of the core, and the data through each.
 
+use bytemuck::{AnyBitPattern, Pod};
 use std::os::fd::{AsFd, BorrowedFd};
+use std::rc::Rc;
 use std::time::Instant;
 use stylet_ports::{
-    self as service, Node, Publisher, SendError, ServiceError, SlicePublisher, SliceSubscriber, StateWriter,
-    Subscriber, Watch,
+    self as service, Node, Publisher, ServiceError, SlicePublisher, SliceSubscriber, StateWriter, Subscriber, Watch,
 };
 use stylet_shm_schema::*;
 use stylet_wall::board::Reader;
@@ -23,21 +24,60 @@ const MAX_TAKEN: usize = 8192;
 /// of milliseconds.
 const STOPS_EVERY: usize = 64;
 
-/// One port for each service of the core; see [`service`].
+/// A service of the core, and the packets that go out through it.
+struct Outlet {
+    kind: Kind,
+    /// Connects new hosts and drops those that have disconnected.
+    connect: Box<dyn Fn()>,
+    /// Sends a packet to every host. A message without room reaches none: hosts see a gap in the numbers.
+    publish: Box<dyn Fn(Packet)>,
+}
+
+impl Outlet {
+    /// Single values.
+    fn values<T: AnyBitPattern>(kind: Kind, port: Publisher<T>) -> Self {
+        let port = Rc::new(port);
+        let connected = Rc::clone(&port);
+        Self {
+            kind,
+            connect: Box::new(move || connected.connect()),
+            publish: Box::new(move |packet| {
+                let _ = packet.value().map(|value| port.send(value));
+            }),
+        }
+    }
+
+    /// Slices, which `send` makes from a packet.
+    fn slices<T: 'static, H: 'static>(
+        kind: Kind,
+        port: SlicePublisher<T, H>,
+        send: impl Fn(&SlicePublisher<T, H>, Packet) + 'static,
+    ) -> Self {
+        let port = Rc::new(port);
+        let connected = Rc::clone(&port);
+        Self {
+            kind,
+            connect: Box::new(move || connected.connect()),
+            publish: Box::new(move |packet| send(&port, packet)),
+        }
+    }
+
+    /// Records of one run.
+    fn records<T: Pod>(kind: Kind, port: SlicePublisher<T, u64>, session_id: u64) -> Self {
+        Self::slices(kind, port, move |port, packet| {
+            let _ = port.send(&session_id, &packet.values());
+        })
+    }
+}
+
+/// Every port of the core; see [`service`].
 pub struct Ports {
     session_id: u64,
-    session: Publisher<Session>,
-    events: Publisher<Event>,
-    parameters: Publisher<ParametersInForce>,
-    plan: Publisher<PlanInForce>,
-    replies: Publisher<Reply>,
-    rehearsals: Publisher<Rehearsal>,
-    records: SlicePublisher<TickRecord, u64>,
+    outlets: Vec<Outlet>,
     snapshots: SlicePublisher<Vertex, SnapshotHeader>,
     /// Source of the scene's snapshots, and their length.
     shown: Option<(Reader<SnapshotHeader, Vertex>, usize)>,
     viewers: Watch,
-    scene: SlicePublisher<u32, SceneHeader>,
     commands: Subscriber<Command>,
     stops: Subscriber<Command>,
     uploads: SliceSubscriber<u8, UploadHeader>,
@@ -48,42 +88,48 @@ pub struct Ports {
     taken: Taken,
     /// The latest tick.
     pub state: StateWriter<HapticState>,
-    /// Present in a run with a second device.
-    pub second: Option<Second>,
+    /// The latest tick of the second device, in a run with one.
+    pub second: Option<StateWriter<SecondState>>,
     /// Dropped last.
     pub node: Node,
-}
-
-/// Ports of the second device.
-pub struct Second {
-    /// Its latest tick.
-    pub state: StateWriter<SecondState>,
-    records: SlicePublisher<SecondRecord, u64>,
 }
 
 impl Ports {
     pub fn new(epoch: &Epoch, start: &Start) -> Result<Self, ServiceError> {
         let node = Node::open(epoch.clone())?;
         let (session_id, length, words) = (start.session_id, start.snapshot_len as usize, start.word_count as usize);
-        let second = (start.has_second == 1).then(|| {
-            Ok::<_, ServiceError>(Second {
-                state: StateWriter::create(&node, session_id)?,
-                records: service::second_records::publisher(&node, MAX_BATCH)?,
-            })
-        });
+        let mut outlets = vec![
+            Outlet::values(Kind::Session, service::session::publisher(&node)?),
+            Outlet::values(Kind::Event, service::events::publisher(&node)?),
+            Outlet::values(Kind::Parameters, service::parameters::publisher(&node)?),
+            Outlet::values(Kind::Plan, service::plan::publisher(&node)?),
+            Outlet::values(Kind::Reply, service::replies::publisher(&node)?),
+            Outlet::values(Kind::Rehearsal, service::rehearsals::publisher(&node)?),
+            Outlet::records(
+                Kind::Records,
+                service::records::publisher(&node, MAX_BATCH)?,
+                session_id,
+            ),
+            Outlet::slices(Kind::Scene, service::scene::publisher(&node, words)?, |port, packet| {
+                let header = packet.value();
+                let words = packet.memory.and_then(|memory| unsealed(memory, usize::MAX).ok());
+                if let (Some(header), Some(words)) = (header, words) {
+                    let _ = port.send(&header, &words);
+                }
+            }),
+        ];
+        let mut second = None;
+        if start.has_second == 1 {
+            second = Some(StateWriter::create(&node, session_id)?);
+            let records = service::second_records::publisher(&node, MAX_BATCH)?;
+            outlets.push(Outlet::records(Kind::SecondRecords, records, session_id));
+        }
         Ok(Self {
             session_id,
-            session: service::session::publisher(&node)?,
-            events: service::events::publisher(&node)?,
-            parameters: service::parameters::publisher(&node)?,
-            plan: service::plan::publisher(&node)?,
-            replies: service::replies::publisher(&node)?,
-            rehearsals: service::rehearsals::publisher(&node)?,
-            records: service::records::publisher(&node, MAX_BATCH)?,
+            outlets,
             snapshots: service::snapshots::publisher(&node, length)?,
             shown: None,
             viewers: service::snapshots::watch(&node)?,
-            scene: service::scene::publisher(&node, words)?,
             commands: service::commands::subscriber(&node)?,
             stops: service::stops::subscriber(&node)?,
             uploads: service::uploads::subscriber(&node)?,
@@ -91,7 +137,7 @@ impl Ports {
             taken: Taken::new(),
             refused: 0,
             state: StateWriter::create(&node, session_id)?,
-            second: second.transpose()?,
+            second,
             node,
         })
     }
@@ -103,44 +149,15 @@ impl Ports {
 
     /// Connects new hosts and drops those that have disconnected.
     pub fn connect(&self) {
-        self.session.connect();
-        self.events.connect();
-        self.parameters.connect();
-        self.plan.connect();
-        self.replies.connect();
-        self.rehearsals.connect();
-        self.records.connect();
+        self.outlets.iter().for_each(|outlet| (outlet.connect)());
         self.snapshots.connect();
-        self.scene.connect();
-        if let Some(second) = &self.second {
-            second.records.connect();
-        }
     }
 
     /// Publishes a packet of the force process to every host.
     pub fn publish(&self, packet: Packet) {
-        // A message without room reaches no host: hosts see a gap in the numbers.
-        let _sent = match packet.kind {
-            Kind::Session => send(&self.session, &packet),
-            Kind::Parameters => send(&self.parameters, &packet),
-            Kind::Plan => send(&self.plan, &packet),
-            Kind::Event => send(&self.events, &packet),
-            Kind::Reply => send(&self.replies, &packet),
-            Kind::Rehearsal => send(&self.rehearsals, &packet),
-            Kind::Records => self.records.send(&self.session_id, &packet.values::<TickRecord>()),
-            Kind::SecondRecords => match &self.second {
-                Some(second) => second.records.send(&self.session_id, &packet.values::<SecondRecord>()),
-                None => Ok(0),
-            },
-            Kind::Scene => match (packet.value::<SceneHeader>(), packet.memory) {
-                (Some(header), Some(memory)) => match unsealed::<u32>(memory, usize::MAX) {
-                    Ok(words) => self.scene.send(&header, &words),
-                    Err(_) => Ok(0),
-                },
-                _ => Ok(0),
-            },
-            _ => Ok(0),
-        };
+        if let Some(outlet) = self.outlets.iter().find(|outlet| outlet.kind == packet.kind) {
+            (outlet.publish)(packet);
+        }
     }
 
     /// Copies snapshots from `memory` from now on.
@@ -220,7 +237,12 @@ impl Ports {
         if answers {
             let asker = (command.host_id, command.command_id);
             let refusal = RefusalCode::TooManyRequests.into();
-            let _ = self.replies.send(Reply::new(self.session_id, asker, Err(&refusal)));
+            let reply = Reply::new(self.session_id, asker, Err(&refusal));
+            self.publish(Packet {
+                kind: Kind::Reply,
+                memory: None,
+                bytes: bytemuck::bytes_of(&reply).to_vec(),
+            });
         }
     }
 }
@@ -256,10 +278,6 @@ impl Taken {
         self.answered += 1;
         self.answered <= MAX_ANSWERED
     }
-}
-
-fn send<T: bytemuck::AnyBitPattern>(port: &Publisher<T>, packet: &Packet) -> Result<usize, SendError> {
-    packet.value().map_or(Ok(0), |value| port.send(value))
 }
 
 #[cfg(test)]

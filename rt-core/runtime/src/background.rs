@@ -1,6 +1,8 @@
 //! Threads without real-time priority: those that answer hosts come before hosts and before long work.
 
 use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{Builder, JoinHandle};
 
 /// Nice value of the control thread and of the bridge: a stop must reach the loops while other hosts flood both.
@@ -20,6 +22,55 @@ pub fn spawn<T: Send + 'static>(name: &str, work: impl FnOnce() -> T + Send + 's
         let _ = rustix::process::setpriority_process(None, ORDINARY);
         work()
     })
+}
+
+/// Long work that ends early when it is dropped or told to stop.
+pub struct Task<T> {
+    thread: JoinHandle<T>,
+    stop: StopOnDrop,
+}
+
+struct StopOnDrop(Arc<AtomicBool>);
+
+impl Drop for StopOnDrop {
+    fn drop(&mut self) {
+        // SYNC: read by the thread; nothing but the flag is carried.
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+impl<T: Send + 'static> Task<T> {
+    /// Starts work that polls whether to stop.
+    pub fn spawn(name: &str, work: impl FnOnce(&AtomicBool) -> T + Send + 'static) -> io::Result<Self> {
+        let stop = Arc::<AtomicBool>::default();
+        let stopped = Arc::clone(&stop);
+        Ok(Self {
+            thread: spawn(name, move || work(&stopped))?,
+            stop: StopOnDrop(stop),
+        })
+    }
+
+    /// Tells the work to stop.
+    pub fn stop(&self) {
+        // SYNC: as in `drop`.
+        self.stop.0.store(true, Ordering::Relaxed);
+    }
+
+    /// True once the work has ended.
+    pub fn is_finished(&self) -> bool {
+        self.thread.is_finished()
+    }
+
+    /// Returns the result; `None` if the work panicked.
+    pub fn result(self) -> Option<T> {
+        self.thread.join().ok()
+    }
+}
+
+/// True while work that polls this flag goes on.
+pub fn goes_on(stop: &AtomicBool) -> bool {
+    // SYNC: nothing but the flag is carried.
+    !stop.load(Ordering::Relaxed)
 }
 
 #[cfg(test)]

@@ -84,21 +84,9 @@ impl LineBody {
         Self::of_source(&source.stiffened(factor)?, tissue)
     }
 
-    /// Solves for the line of a needle on this axis in the scene frame, and across it if the needle `bends`. `goes_on`
-    /// is polled between slices of work.
+    /// Solves for the line of a needle on this axis in the scene frame, and across it if the needle `bends`, that may
+    /// come into use beside those of `others`. `goes_on` is polled between slices of work.
     pub fn prepare(
-        &self,
-        generation: u64,
-        tip_m: [f64; 3],
-        direction: [f64; 3],
-        bends: bool,
-        goes_on: &mut dyn FnMut() -> bool,
-    ) -> Result<ReadyLine, NoLine> {
-        self.prepare_beside(generation, tip_m, direction, bends, &[], goes_on)
-    }
-
-    /// Solves for a line that may come into use beside those of `others`.
-    pub fn prepare_beside(
         &self,
         generation: u64,
         tip_m: [f64; 3],

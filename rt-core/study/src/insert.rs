@@ -10,8 +10,8 @@ use std::sync::atomic::AtomicBool;
 use stylet_hw::{DeviceInfo, Hand};
 use stylet_insertions::{Insertion, Motion, Rest, Seed};
 use stylet_procedure::Pace;
-use stylet_runtime::rehearse::{NeedleRun, RehearseError, Rehearsed, Stage};
-use stylet_shm_schema::ParameterSet;
+use stylet_runtime::rehearse::{RehearseError, Rehearsed, Stage};
+use stylet_shm_schema::{NeedleRehearsal, ParameterSet};
 use stylet_sim::scene::SceneSource;
 
 /// A body that is kept from one implant to the next where both have the same.
@@ -95,7 +95,7 @@ pub fn implant(
 }
 
 /// Returns the needle as really held: at the template's hole by what misses it, turned about its entry.
-fn run(needle: &Needle, drawn: &Drawn) -> NeedleRun {
+fn run(needle: &Needle, drawn: &Drawn) -> NeedleRehearsal {
     let (right, anterior) = across(&needle.direction);
     let missed_mm = right * drawn.get(Id::EntryRight) + anterior * drawn.get(Id::EntryAnterior);
     let tilt = |id: Id| drawn.get(id).to_radians().tan();
@@ -103,9 +103,9 @@ fn run(needle: &Needle, drawn: &Drawn) -> NeedleRun {
     let direction = turned.normalize();
     let entry_m = (needle.entry_mm + missed_mm) * 1e-3;
     let pace = Pace::default();
-    NeedleRun {
-        entry_m,
-        direction,
+    NeedleRehearsal {
+        entry_m: entry_m.into(),
+        direction: direction.into(),
         insert_m_per_s: drawn.get(Id::Insert) * 1e-3,
         retract_m_per_s: drawn.get(Id::Retract) * 1e-3,
         approach_m_per_s: pace.approach_m_per_s,
@@ -117,7 +117,7 @@ fn run(needle: &Needle, drawn: &Drawn) -> NeedleRun {
         drops_m: needle
             .seeds
             .iter()
-            .map(|(along_mm, _)| entry_m + direction * (along_mm * 1e-3))
+            .map(|(along_mm, _)| (entry_m + direction * (along_mm * 1e-3)).into())
             .collect(),
     }
 }

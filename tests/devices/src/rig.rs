@@ -119,11 +119,11 @@ impl<F: FakeDevice> Rig<F> {
         self.move_to(OUTSIDE_M);
         for _ in 0..3000 {
             let seen = self.tick();
-            if seen.fault() == Fault::None && self.haptic.state.flags & stylet_shm_schema::flags::ENGAGED != 0 {
+            if seen.fault() == Fault::None && self.haptic.memory.state.flags & stylet_shm_schema::flags::ENGAGED != 0 {
                 break;
             }
             if self.control.haptic_orders.slots() > 1 {
-                let _ = self.control.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
+                let _ = self.control.haptic_orders.push((0, HapticOrder::Engage));
             }
         }
         for _ in 0..250 {

@@ -70,8 +70,8 @@ mod tests {
     use super::*;
     use std::sync::atomic::AtomicBool;
     use stylet_hw::DeviceInfo;
-    use stylet_runtime::rehearse::{NeedleRun, Rehearsed, Stage};
-    use stylet_shm_schema::ParameterSet;
+    use stylet_runtime::rehearse::{Rehearsed, Stage};
+    use stylet_shm_schema::{NeedleRehearsal, ParameterSet};
     use stylet_sim::scene::{SceneSource, TissueKind};
 
     /// Takes a needle along the middle of the paper's gland to half its depth, drops a seed there, and draws it out.
@@ -79,9 +79,9 @@ mod tests {
         let source = SceneSource::Builtin("paper".to_owned());
         let (low_m, high_m) = source.build().expect("built in").lattice.bounds_m();
         let middle_m = (Vector3::from(low_m) + Vector3::from(high_m)) / 2.0;
-        let run = NeedleRun {
-            entry_m: Vector3::new(middle_m.x, middle_m.y, low_m[2] - 0.01),
-            direction: Vector3::z(),
+        let run = NeedleRehearsal {
+            entry_m: [middle_m.x, middle_m.y, low_m[2] - 0.01],
+            direction: [0.0, 0.0, 1.0],
             insert_m_per_s: 0.05,
             retract_m_per_s: 0.05,
             approach_m_per_s: 0.1,
@@ -90,7 +90,7 @@ mod tests {
             strand_pitch_m: None,
             stabilising: Vec::new(),
             earlier: Vec::new(),
-            drops_m: vec![middle_m],
+            drops_m: vec![middle_m.into()],
         };
         let mut stage = Stage::build(&source, tissue, DeviceInfo::phantom_premium_1_5()).expect("built in");
         let rehearse = stage.rehearse(&run, &ParameterSet::default(), &AtomicBool::new(false));

@@ -211,7 +211,7 @@ fn a_part_that_one_corner_holds_is_refused_or_stays_in_reach() {
         let body = LineBody::of_source(&source, kind)
             .expect("can be solved")
             .expect("has lines");
-        let line = body.prepare(1, [13e-3, 11e-3, -5e-3], [0.0, 0.0, 1.0], false, &mut || true);
+        let line = body.prepare(1, [13e-3, 11e-3, -5e-3], [0.0, 0.0, 1.0], false, &[], &mut || true);
         let (happened, met) = match line {
             Err(why) => (format!("refused: {why}"), true),
             Ok(line) => {
@@ -283,7 +283,7 @@ fn a_line_through_a_hard_body_is_near_the_converged_one() {
         .expect("can be solved")
         .expect("has lines");
     let line = body
-        .prepare(1, [21e-3, 24e-3, -5e-3], [0.0, 0.0, 1.0], false, &mut || true)
+        .prepare(1, [21e-3, 24e-3, -5e-3], [0.0, 0.0, 1.0], false, &[], &mut || true)
         .expect("through the gland");
     let settings = |tolerance: f64| TwinSettings {
         stations: StationSettings::of_lattice(scene.body.spacing_m),

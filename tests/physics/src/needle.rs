@@ -50,7 +50,7 @@ impl Theatre {
         let body = LineBody::of_source(source, tissue).expect("can be solved");
         let line = body
             .expect("has lines")
-            .prepare(1, start.into(), [0.0, 0.0, 1.0], false, &mut || true);
+            .prepare(1, start.into(), [0.0, 0.0, 1.0], false, &[], &mut || true);
         Self {
             world: Some(Box::new(world)),
             start,

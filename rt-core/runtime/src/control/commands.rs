@@ -1,18 +1,17 @@
 //! Carries out the requests of hosts: as orders to the loops or as background work.
 
 use super::Control;
-use super::link::EventDetails;
-use super::requests::{hand_goal, needle_run};
+use super::link::event_now;
 use super::second::Second;
 use super::wall::{Asked, MOST_PACKETS};
-use crate::rt::exchange::{HapticOrder, Moved, Ticket, TissueOrder, TissueStep};
-use crate::rt::second::SecondOrder;
+use crate::rt::exchange::{HapticOrder, Moved, Ticket, TissueOrder, TissueStep, hand_order};
 use crate::rt::tissue_tape::LeftTape;
 use stylet_shm_schema::{
     Command, EventKind, ParameterChange, PlanInForce, PlannedNeedle, Refusal, RefusalCode, Request,
 };
 use stylet_sim::active::activate;
 use stylet_sim::line::LeftNeedles;
+use stylet_wall::packet::Kind;
 
 /// Slots of the force loop's ring reserved for requests that end a motion or a force.
 const KEPT_FOR_STOPS: usize = 16;
@@ -68,9 +67,8 @@ impl Control {
                 Ok(())
             }
             Request::MoveHand(hand) => {
-                let goal = hand_goal(&hand);
                 let promise = self.first_promise(ticket, Moved::Needle);
-                self.order_haptic(HapticOrder::Hand { ticket, goal, promise })
+                self.order_haptic(ticket, hand_order(&hand, None, promise))
             }
             Request::ExpectNeedle(axis) => {
                 self.lines.expect_next(axis.entry_m, axis.direction);
@@ -79,20 +77,17 @@ impl Control {
             }
             Request::LeaveNeedle => {
                 self.make_room_for_left();
-                self.order_haptic(HapticOrder::LeaveNeedle { ticket })
+                self.order_haptic(ticket, HapticOrder::LeaveNeedle)
             }
-            Request::TakeNeedle(number) => self.order_haptic(HapticOrder::TakeNeedle {
-                ticket,
-                number: u64::from(number),
-            }),
+            Request::TakeNeedle(number) => self.order_haptic(ticket, HapticOrder::TakeNeedle(number.into())),
             Request::DrawNeedle { number, speed_m_per_s } => {
                 let promise = self.first_promise(ticket, Moved::DrawnNeedle);
-                self.order_haptic(HapticOrder::DrawNeedle {
-                    ticket,
-                    number: u64::from(number),
+                let order = HapticOrder::DrawNeedle {
+                    number: number.into(),
                     speed_m_per_s,
                     promise,
-                })
+                };
+                self.order_haptic(ticket, order)
             }
             Request::Mark(mark) => {
                 self.mark(ticket, &mark);
@@ -101,20 +96,13 @@ impl Control {
             Request::BeginExercise(exercise) => self.begin_exercise(ticket, exercise),
             Request::EndExercises => self.end_exercises(ticket),
             Request::MoveSecondHand(hand) => self.move_second_hand(ticket, &hand),
-            Request::StopSecondHand => self.stop_second_hand(ticket),
-            Request::StopHand => {
-                self.order_second(SecondOrder::StopHand { ticket: 0 });
-                self.order_haptic(HapticOrder::StopHand { ticket })
-            }
+            Request::StopSecondHand => self.ask_second(ticket, HapticOrder::StopHand),
+            Request::StopHand => self.order_both(ticket, HapticOrder::StopHand),
             Request::Engage => {
-                self.order_second(SecondOrder::Engage);
                 let _ = self.loops.tissue_orders.push(TissueOrder::Armed);
-                self.order_haptic(HapticOrder::Engage { ticket })
+                self.order_both(ticket, HapticOrder::Engage)
             }
-            Request::Disengage => {
-                self.order_second(SecondOrder::Disengage);
-                self.order_haptic(HapticOrder::Disengage { ticket })
-            }
+            Request::Disengage => self.order_both(ticket, HapticOrder::Disengage),
             Request::DropSeed { strand_pitch_m } => self.order_tissue(ticket, TissueStep::DropSeed { strand_pitch_m }),
             Request::UndoSeed => self.order_tissue(ticket, TissueStep::UndoSeed),
             Request::Reset => self.reset(ticket),
@@ -123,7 +111,7 @@ impl Control {
             }
             Request::Rehearse(run) => self.refuse_uncounted(ticket, |this| {
                 let (set, generation) = (this.parameters.in_force.set, this.scene.generation());
-                this.rehearsals.begin(ticket, needle_run(&run), set, generation)
+                this.rehearsals.begin(ticket, run, set, generation)
             }),
             Request::SaveFlight => {
                 let taken = self.flights.request(ticket);
@@ -145,12 +133,18 @@ impl Control {
         Ok(())
     }
 
-    pub(super) fn order_haptic(&mut self, order: HapticOrder) -> Result<(), Refusal> {
-        let is_stop = matches!(order, HapticOrder::StopHand { .. } | HapticOrder::Disengage { .. });
+    /// Orders the same from the loops of both hands; the needle's answers.
+    fn order_both(&mut self, ticket: Ticket, order: HapticOrder) -> Result<(), Refusal> {
+        self.order_second(0, order);
+        self.order_haptic(ticket, order)
+    }
+
+    pub(super) fn order_haptic(&mut self, ticket: Ticket, order: HapticOrder) -> Result<(), Refusal> {
+        let is_stop = matches!(order, HapticOrder::StopHand | HapticOrder::Disengage);
         if !is_stop && self.loops.haptic_orders.slots() <= KEPT_FOR_STOPS {
             return Err(RefusalCode::TooManyRequests.into());
         }
-        let pushed = self.loops.haptic_orders.push(order);
+        let pushed = self.loops.haptic_orders.push((ticket, order));
         pushed.map_err(|_| RefusalCode::TooManyRequests.into())
     }
 
@@ -160,13 +154,7 @@ impl Control {
     }
 
     /// Orders a change from every loop, or from none. The request is answered once all have carried it out.
-    fn order_all(
-        &mut self,
-        ticket: Ticket,
-        haptic: HapticOrder,
-        step: TissueStep,
-        second: Option<SecondOrder>,
-    ) -> Result<(), Refusal> {
+    fn order_all(&mut self, ticket: Ticket, order: HapticOrder, step: TissueStep) -> Result<(), Refusal> {
         let loops = &mut self.loops;
         let has_room = |second: &Second| second.orders.slots() > 0;
         // Only the loops take orders out, so the rings keep this room.
@@ -176,11 +164,11 @@ impl Control {
         if !room {
             return Err(RefusalCode::TooManyRequests.into());
         }
-        let answers = self.second.as_ref().is_some_and(|second| second.shared(ticket) != 0);
-        self.link.answers.await_loops(ticket, 2 + usize::from(answers));
-        let _ = loops.haptic_orders.push(haptic);
+        let of_second = self.second.as_ref().map_or(0, |second| second.shared(ticket));
+        self.link.answers.await_loops(ticket, 2 + usize::from(of_second != 0));
+        let _ = loops.haptic_orders.push((ticket, order));
         let _ = loops.tissue_orders.push(TissueOrder::Step(ticket, step));
-        second.into_iter().for_each(|order| self.order_second(order));
+        self.order_second(of_second, order);
         Ok(())
     }
 
@@ -192,11 +180,8 @@ impl Control {
             self.link.report_invalid(&refusal);
             refusal
         })?;
-        let generation = self.parameters.next_generation();
-        let bends = active.force.bending.is_on();
-        let haptic = HapticOrder::Parameters {
-            ticket,
-            generation,
+        let order = HapticOrder::Parameters {
+            generation: self.parameters.next_generation(),
             needle: active.needle,
             force: active.force,
         };
@@ -204,12 +189,14 @@ impl Control {
             limits: active.limits,
             migration: active.migration,
         };
-        let gate = |second: &Second| second.gate_order(ticket, generation, &active.force.gate);
-        let second = self.second.as_ref().map(gate);
-        self.order_all(ticket, haptic, step, second)?;
-        self.parameters.ordered(generation, set);
-        self.lines.take_bending(bends);
+        self.order_all(ticket, order, step)?;
+        self.parameters.ordered(ticket, set);
+        self.lines.take_bending(active.force.bending.is_on());
         Ok(())
+    }
+
+    pub(super) fn announce_parameters(&mut self) {
+        self.link.wall.keep(Kind::Parameters, &self.parameters.in_force);
     }
 
     fn set_plan(&mut self, plan: Option<&PlannedNeedle>) {
@@ -218,7 +205,7 @@ impl Control {
         self.plan.generation = if plan.is_some() { generation } else { 0 };
         self.plan.session_id = self.link.session.session_id;
         self.plan.scene_generation = self.scene.generation();
-        self.link.wall.plan(self.plan);
+        self.link.wall.keep(Kind::Plan, &self.plan);
         self.lines
             .expect_planned(plan.map(|plan| (plan.entry_m, plan.direction)));
     }
@@ -235,13 +222,10 @@ impl Control {
     }
 
     fn reset(&mut self, ticket: Ticket) -> Result<(), Refusal> {
-        let second = self.second.as_ref().map(|second| SecondOrder::Reset {
-            ticket: second.shared(ticket),
-        });
-        self.order_all(ticket, HapticOrder::Reset { ticket }, TissueStep::Reset, second)?;
+        self.order_all(ticket, HapticOrder::Reset, TissueStep::Reset)?;
         self.lines.forget_tracks();
         self.forget_exercises();
-        self.link.event(EventKind::Reset, EventDetails::now());
+        self.link.event(event_now(EventKind::Reset));
         Ok(())
     }
 }

@@ -1,10 +1,10 @@
 //! Marks and instructor-injected faults, from the request to the broadcast event.
 
 use super::Control;
-use super::link::EventDetails;
+use super::link::{event_at, event_now};
 use crate::rt::clock;
 use crate::rt::exchange::{HapticOrder, Ticket};
-use stylet_shm_schema::{EventKind, Exercise, ExercisesInForce, Mark, Refusal, RefusalCode};
+use stylet_shm_schema::{Event, EventKind, Exercise, ExercisesInForce, Mark, Refusal, RefusalCode, Text};
 
 impl Control {
     pub(super) fn mark(&mut self, ticket: Ticket, mark: &Mark) {
@@ -13,17 +13,16 @@ impl Control {
         self.link.send_records(&mut self.loops.records);
         let newest = self.newest_tick().unwrap_or(0);
         let tick = newest.saturating_sub(before_ns / self.link.session.period_ns.max(1));
-        let details = EventDetails {
-            text: &mark.text,
-            ..EventDetails::at(tick, clock::now_ns().saturating_sub(before_ns))
-        };
-        self.link.event(EventKind::Mark, details);
+        self.link.event(Event {
+            text: Text::new(&mark.text),
+            ..event_at(EventKind::Mark, tick, clock::now_ns().saturating_sub(before_ns))
+        });
         self.link.answer(ticket, Ok(tick));
     }
 
     pub(super) fn begin_exercise(&mut self, ticket: Ticket, exercise: Exercise) -> Result<(), Refusal> {
         match exercise {
-            Exercise::DeviceLost => self.order_haptic(HapticOrder::LoseDevice { ticket, lost: true })?,
+            Exercise::DeviceLost => self.order_haptic(ticket, HapticOrder::LoseDevice(true))?,
             Exercise::BodyMoved { by_m } => self.move_body(ticket, by_m)?,
             Exercise::StiffTissue { .. } if !self.tissue.has_lines() => {
                 return Err(RefusalCode::TissueWithoutStiffness.into());
@@ -34,18 +33,17 @@ impl Control {
             }
         }
         self.link.session.exercises.put(exercise);
-        let details = EventDetails {
+        self.link.event(Event {
             code: exercise.number(),
             value: exercise.value(),
-            text: &exercise.to_string(),
-            ..EventDetails::now()
-        };
-        self.link.event(EventKind::ExerciseBegun, details);
+            text: Text::new(&exercise.to_string()),
+            ..event_now(EventKind::ExerciseBegun)
+        });
         Ok(())
     }
 
     fn move_body(&mut self, ticket: Ticket, to_m: [f64; 3]) -> Result<(), Refusal> {
-        self.order_haptic(HapticOrder::MoveBody { ticket, to_m })?;
+        self.order_haptic(ticket, HapticOrder::MoveBody(to_m))?;
         self.lines.move_body(to_m);
         Ok(())
     }
@@ -56,7 +54,7 @@ impl Control {
             return Err(RefusalCode::TooManyRequests.into());
         }
         self.move_body(0, [0.0; 3])?;
-        self.order_haptic(HapticOrder::LoseDevice { ticket, lost: false })?;
+        self.order_haptic(ticket, HapticOrder::LoseDevice(false))?;
         self.forget_exercises();
         Ok(())
     }
@@ -66,7 +64,7 @@ impl Control {
         self.lines.move_body([0.0; 3]);
         self.lines.stiffen(1.0);
         if std::mem::take(&mut self.link.session.exercises) != ExercisesInForce::default() {
-            self.link.event(EventKind::ExercisesEnded, EventDetails::now());
+            self.link.event(event_now(EventKind::ExercisesEnded));
         }
     }
 }

@@ -3,11 +3,11 @@
 use super::line_archive::LineArchive;
 use crate::background;
 use crate::replay::file::{Flight, FlightError};
-use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
-use crate::rt::haptic_tape::{HapticFlight, HapticTape};
+use crate::rt::exchange::Ticket;
+use crate::rt::haptic_tape::HapticTape;
 use crate::rt::recorder::{Tape, TapePort};
-use crate::rt::second::{SecondFlight, SecondOrder, SecondTape};
-use crate::rt::tissue_tape::{TissueFlight, TissueTape};
+use crate::rt::second::SecondTape;
+use crate::rt::tissue_tape::TissueTape;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
@@ -62,29 +62,19 @@ struct Wanted {
 }
 
 struct Gathering {
-    wanted: Wanted,
+    kind: &'static str,
+    ticket: Option<Ticket>,
     since: Instant,
-    haptic: Option<Option<HapticFlight>>,
-    tissue: Option<Option<TissueFlight>>,
-    /// Without a second device there is no tape to wait for.
-    second: Option<Option<SecondFlight>>,
-}
-
-/// Port of the second device's tapes.
-pub type SecondTapes = TapePort<SecondTape>;
-
-/// Order rings of every recorded loop.
-pub struct Orders<'a> {
-    pub haptic: &'a mut rtrb::Producer<HapticOrder>,
-    pub tissue: &'a mut rtrb::Producer<TissueOrder>,
-    pub second: Option<&'a mut rtrb::Producer<SecondOrder>>,
+    /// Tapes of the force loop, the tissue loop and the second device's loop that have come or need not come.
+    has: [bool; 3],
+    flight: Flight,
 }
 
 /// The control thread's side of flight recordings.
 pub struct FlightKeeper {
     haptic: TapePort<HapticTape>,
     tissue: TapePort<TissueTape>,
-    second: Option<SecondTapes>,
+    second: Option<TapePort<SecondTape>>,
     folder: PathBuf,
     /// Part common to every recording of this run.
     common: Flight,
@@ -96,7 +86,7 @@ pub struct FlightKeeper {
 
 impl FlightKeeper {
     pub fn new(
-        (haptic, tissue, second): (TapePort<HapticTape>, TapePort<TissueTape>, Option<SecondTapes>),
+        (haptic, tissue, second): (TapePort<HapticTape>, TapePort<TissueTape>, Option<TapePort<SecondTape>>),
         folder: PathBuf,
         common: Flight,
     ) -> Self {
@@ -144,13 +134,12 @@ impl FlightKeeper {
         room
     }
 
-    /// Runs one pass of the control thread; returns the recordings written since the last.
-    pub fn pass(&mut self, scene_generation: u64, orders: Orders<'_>, lines: &LineArchive) -> Option<Saved> {
+    /// Runs one pass of the control thread; returns a recording written since the last. `hand_over` orders the tapes of
+    /// all loops.
+    pub fn pass(&mut self, scene_generation: u64, lines: &LineArchive, hand_over: impl FnOnce()) -> Option<Saved> {
         self.take_tapes(scene_generation);
-        if let Some(gathering) = self
-            .gathering
-            .take_if(|g| g.is_whole() || g.since.elapsed() > GATHER_LIMIT)
-        {
+        let is_over = |g: &mut Gathering| g.is_whole() || g.since.elapsed() > GATHER_LIMIT;
+        if let Some(gathering) = self.gathering.take_if(is_over) {
             self.write(gathering, lines);
         }
         let now = Instant::now();
@@ -158,45 +147,54 @@ impl FlightKeeper {
             && let Some(at) = self.queue.iter().position(|w| w.due <= now)
             && let Some(wanted) = self.queue.remove(at)
         {
-            // A ring that is full leaves its loop out.
-            let _ = orders.haptic.push(HapticOrder::HandOverTape);
-            let _ = orders.tissue.push(TissueOrder::HandOverTape);
-            if let Some(second) = orders.second {
-                let _ = second.push(SecondOrder::HandOverTape);
-            }
-            self.gathering = Some(Gathering::new(wanted, self.second.is_some()));
+            hand_over();
+            self.gather(wanted.kind, wanted.reason, wanted.ticket);
         }
         self.written.1.try_recv().ok()
     }
 
+    fn gather(&mut self, kind: &'static str, reason: String, ticket: Option<Ticket>) {
+        self.gathering = Some(Gathering {
+            kind,
+            ticket,
+            since: Instant::now(),
+            has: [false, false, self.second.is_none()],
+            flight: Flight {
+                reason,
+                ..self.common.clone()
+            },
+        });
+    }
+
     fn take_tapes(&mut self, scene_generation: u64) {
+        let mut gathering = self.gathering.as_mut();
         while let Ok(tape) = self.haptic.taken.pop() {
-            if let Some(gathering) = &mut self.gathering {
-                gathering.haptic = Some(tape.flight());
+            if let Some(gathering) = &mut gathering {
+                (gathering.flight.haptic, gathering.has[0]) = (tape.flight(), true);
             }
             let _ = self.haptic.back.push(tape);
-        }
-        while let Some(Ok(tape)) = self.second.as_mut().map(|second| second.taken.pop()) {
-            if let Some(gathering) = &mut self.gathering {
-                gathering.second = Some(tape.flight());
-            }
-            let _ = self.second.as_mut().map(|second| second.back.push(tape));
         }
         while let Ok(tape) = self.tissue.taken.pop() {
             // A tape of an earlier scene is dropped here.
             if tape.is_for(scene_generation) {
-                if let Some(gathering) = &mut self.gathering {
-                    gathering.tissue = Some(tape.flight());
+                if let Some(gathering) = &mut gathering {
+                    (gathering.flight.tissue, gathering.has[1]) = (tape.flight(), true);
                 }
                 let _ = self.tissue.back.push(tape);
             }
         }
+        let Some(second) = &mut self.second else { return };
+        while let Ok(tape) = second.taken.pop() {
+            if let Some(gathering) = &mut gathering {
+                (gathering.flight.second, gathering.has[2]) = (tape.longest(), true);
+            }
+            let _ = second.back.push(tape);
+        }
     }
 
     fn write(&mut self, gathering: Gathering, lines: &LineArchive) {
-        let path = self.next_path(gathering.wanted.kind);
-        let ticket = gathering.wanted.ticket;
-        let (flight, sender) = (gathering.into_flight(&self.common, lines), self.written.0.clone());
+        let (path, ticket, sender) = (self.next_path(gathering.kind), gathering.ticket, self.written.0.clone());
+        let flight = gathering.into_flight(lines);
         let spawned = background::spawn("flight-writer", move || {
             let result = save(&flight, &path);
             // The receiver is gone once the control thread has ended.
@@ -208,20 +206,12 @@ impl FlightKeeper {
         }
     }
 
-    /// Saves the last recording, after both loops have ended and handed over their tapes.
+    /// Saves the last recording, after all loops have ended and handed over their tapes.
     pub fn save_at_end(&mut self, scene_generation: u64, lines: &LineArchive) -> Result<PathBuf, SaveError> {
-        let reason = "rt-core ended".to_owned();
-        let wanted = Wanted {
-            kind: "exit",
-            reason,
-            due: Instant::now(),
-            ticket: None,
-        };
-        self.gathering = Some(Gathering::new(wanted, self.second.is_some()));
+        self.gather("exit", "rt-core ended".to_owned(), None);
         self.take_tapes(scene_generation);
-        let path = self.next_path("exit");
         match self.gathering.take() {
-            Some(gathering) if gathering.haptic.is_some() => save(&gathering.into_flight(&self.common, lines), &path),
+            Some(gathering) if gathering.has[0] => self.save_now(gathering, lines),
             _ => Err(SaveError::NothingRecorded),
         }
     }
@@ -235,26 +225,21 @@ impl FlightKeeper {
         reason: &str,
         limit: Duration,
     ) -> Result<PathBuf, SaveError> {
-        let reason = reason.to_owned();
-        let due = Instant::now();
-        let wanted = Wanted {
-            kind: "fault",
-            reason,
-            due,
-            ticket: None,
-        };
-        let mut gathering = Gathering::new(wanted, self.second.is_some());
-        while !gathering.is_whole() && due.elapsed() < limit {
+        self.gather("fault", reason.to_owned(), None);
+        let begun = Instant::now();
+        let is_over = |g: &mut Gathering| g.is_whole() || begun.elapsed() >= limit;
+        loop {
+            if let Some(gathering) = self.gathering.take_if(is_over) {
+                return self.save_now(gathering, lines);
+            }
             std::thread::sleep(Duration::from_millis(2));
-            self.gathering = Some(gathering);
             self.take_tapes(scene_generation);
-            let Some(taken) = self.gathering.take() else {
-                return Err(SaveError::NothingRecorded);
-            };
-            gathering = taken;
         }
-        let path = self.next_path("fault");
-        save(&gathering.into_flight(&self.common, lines), &path)
+    }
+
+    fn save_now(&mut self, gathering: Gathering, lines: &LineArchive) -> Result<PathBuf, SaveError> {
+        let path = self.next_path(gathering.kind);
+        save(&gathering.into_flight(lines), &path)
     }
 
     fn next_path(&mut self, kind: &str) -> PathBuf {
@@ -269,30 +254,13 @@ impl FlightKeeper {
 }
 
 impl Gathering {
-    fn new(wanted: Wanted, has_second: bool) -> Self {
-        Self {
-            wanted,
-            since: Instant::now(),
-            haptic: None,
-            tissue: None,
-            second: (!has_second).then_some(None),
-        }
-    }
-
     fn is_whole(&self) -> bool {
-        self.haptic.is_some() && self.tissue.is_some() && self.second.is_some()
+        self.has == [true; 3]
     }
 
-    fn into_flight(self, common: &Flight, lines: &LineArchive) -> Flight {
-        let (haptic, tissue) = (self.haptic.flatten(), self.tissue.flatten());
-        Flight {
-            reason: self.wanted.reason,
-            lines: lines.of(haptic.as_ref(), tissue.as_ref()),
-            haptic,
-            tissue,
-            second: self.second.flatten(),
-            ..common.clone()
-        }
+    fn into_flight(mut self, lines: &LineArchive) -> Flight {
+        self.flight.lines = lines.of(self.flight.haptic.as_ref(), self.flight.tissue.as_ref());
+        self.flight
     }
 }
 

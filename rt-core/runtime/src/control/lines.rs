@@ -5,14 +5,13 @@
 //! and of the one after it are solved ahead and kept until a needle arrives.
 
 use super::line_archive::{Half, LineArchive};
-use crate::background;
+use crate::background::{Task, goes_on};
 use crate::lines::{LineBody, NoLine};
 use crate::rt::exchange::TissueOrder;
 use crate::rt::wiring::ControlPorts;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::{TickRecord, flags};
 use stylet_sim::line::{HandLine, Line, ReadyLine, Track};
@@ -42,12 +41,6 @@ struct Kept {
     line: ReadyLine,
 }
 
-struct LineTask {
-    axis: Line,
-    thread: JoinHandle<Finished>,
-    stop: Arc<AtomicBool>,
-}
-
 /// The control thread's side of lines.
 pub struct LinePreparer {
     source: Arc<SceneSource>,
@@ -55,7 +48,7 @@ pub struct LinePreparer {
     body: Option<(u64, LineBody)>,
     /// Axis of the needle, and since when.
     steady: Option<(Line, Instant)>,
-    under_way: Option<LineTask>,
+    under_way: Option<(Line, Task<Finished>)>,
     /// Axis of the line handed over last, and when.
     handed_over: Option<(Line, Instant)>,
     /// Axes without a line: no tissue there, or none that can be solved for.
@@ -237,7 +230,7 @@ impl LinePreparer {
     }
 
     fn is_under_way(&self, axis: &Line) -> bool {
-        self.under_way.as_ref().is_some_and(|task| same(&task.axis, axis))
+        self.under_way.as_ref().is_some_and(|(of, _)| same(of, axis))
     }
 
     fn has_answer(&self, axis: &Line) -> bool {
@@ -269,19 +262,15 @@ impl LinePreparer {
         let stiffness = self.stiffness;
         let waiting = self.kept.iter().map(|kept| &kept.line.stations);
         let others: Vec<_> = self.archive.in_use().chain(waiting).cloned().collect();
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopped = Arc::clone(&stop);
-        let work = move || {
+        let work = move |stop: &AtomicBool| {
             let body = match kept {
                 Some((_, body)) => Ok(Some(body)),
                 None => LineBody::of_stiffened(&source, stiffness, tissue),
             };
-            // SYNC: nothing but the flag is carried.
-            let mut goes_on = || !stopped.load(Ordering::Relaxed);
             let (body, line) = match body {
                 Ok(Some(body)) => {
-                    let line =
-                        body.prepare_beside(generation, axis.entry_m, axis.axes[0], bends, &others, &mut goes_on);
+                    let mut goes_on = || goes_on(stop);
+                    let line = body.prepare(generation, axis.entry_m, axis.axes[0], bends, &others, &mut goes_on);
                     (Some(body), line)
                 }
                 Ok(None) => (None, Err(stylet_sim::line::LineError::NoTissue.into())),
@@ -296,24 +285,20 @@ impl LinePreparer {
             }
         };
         // The thread could not be started; the next pass tries again.
-        if let Ok(thread) = background::spawn("needle-line", work) {
-            self.under_way = Some(LineTask { axis, thread, stop });
-        }
+        self.under_way = Task::spawn("needle-line", work).ok().map(|task| (axis, task));
     }
 
     fn give_up(&mut self) {
-        if let Some(work) = &self.under_way {
-            // SYNC: read by the thread; nothing but the flag is carried.
-            work.stop.store(true, Ordering::Relaxed);
+        if let Some((_, task)) = &self.under_way {
+            task.stop();
         }
     }
 
     fn take(&mut self, scene_generation: u64, loops: &mut ControlPorts) {
-        let Some(work) = self.under_way.take_if(|work| work.thread.is_finished()) else {
+        let Some((axis, task)) = self.under_way.take_if(|(_, task)| task.is_finished()) else {
             return;
         };
-        let axis = work.axis;
-        let Ok(finished) = work.thread.join() else {
+        let Some(finished) = task.result() else {
             self.do_without(axis);
             return;
         };
@@ -349,12 +334,6 @@ impl LinePreparer {
         let _ = loops.tissue_orders.push(TissueOrder::Line(body));
         let _ = loops.lines.push(hand);
         self.handed_over = Some((axis, Instant::now()));
-    }
-}
-
-impl Drop for LinePreparer {
-    fn drop(&mut self) {
-        self.give_up();
     }
 }
 

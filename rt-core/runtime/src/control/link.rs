@@ -5,6 +5,7 @@ use super::wall::Wall;
 use crate::rt::clock;
 use crate::rt::exchange::Ticket;
 use stylet_shm_schema::{Event, EventKind, Refusal, Reply, Session, Text, TickRecord};
+use stylet_wall::packet::Kind;
 
 const ANNOUNCE_NS: u64 = 200_000_000;
 
@@ -19,32 +20,18 @@ pub struct Link {
     bridge_lost: Option<String>,
 }
 
-/// The fields of an event that depend on its kind.
-pub struct EventDetails<'a> {
-    pub code: u32,
-    pub value: f64,
-    pub position_m: [f64; 3],
-    pub tick: u64,
-    pub time_ns: u64,
-    pub text: &'a str,
+/// Returns an event that the control thread saw just now.
+pub fn event_now(kind: EventKind) -> Event {
+    event_at(kind, 0, clock::now_ns())
 }
 
-impl EventDetails<'_> {
-    /// Details of an event that the control thread saw just now.
-    pub fn now() -> Self {
-        Self::at(0, clock::now_ns())
-    }
-
-    /// Details of an event that a loop saw at `tick`.
-    pub fn at(tick: u64, time_ns: u64) -> Self {
-        Self {
-            code: 0,
-            value: 0.0,
-            position_m: [0.0; 3],
-            tick,
-            time_ns,
-            text: "",
-        }
+/// Returns an event that a loop saw at `tick`.
+pub fn event_at(kind: EventKind, tick: u64, time_ns: u64) -> Event {
+    Event {
+        tick,
+        time_ns,
+        kind: kind as u32,
+        ..bytemuck::Zeroable::zeroed()
     }
 }
 
@@ -68,11 +55,10 @@ impl Link {
         if let Some(why) = lost.filter(|why| self.bridge_lost.as_ref() != Some(why)) {
             self.bridge_lost = Some(why.clone());
             eprintln!("rt-core: the bridge to the hosts is started anew: {why}");
-            let details = EventDetails {
-                text: &why,
-                ..EventDetails::now()
-            };
-            self.event(EventKind::BridgeRestarted, details);
+            self.event(Event {
+                text: Text::new(&why),
+                ..event_now(EventKind::BridgeRestarted)
+            });
         }
         if self.wall.is_open() {
             self.bridge_lost = None;
@@ -81,17 +67,14 @@ impl Link {
         if now_ns - self.announced_ns >= ANNOUNCE_NS {
             self.announced_ns = now_ns;
             self.session.time_ns = now_ns;
-            self.send_session();
+            // Its count of refusals includes those of the bridge.
+            let refused = self.session.refused + self.wall.refused();
+            let session = Session {
+                refused,
+                ..self.session
+            };
+            self.wall.keep(Kind::Session, &session);
         }
-    }
-
-    /// Sends the session. Its count of refusals includes those of the bridge.
-    fn send_session(&mut self) {
-        let refused = self.session.refused + self.wall.refused();
-        self.wall.session(Session {
-            refused,
-            ..self.session
-        });
     }
 
     /// Returns the newest record of the force loop.
@@ -105,19 +88,17 @@ impl Link {
         self.wall.send_records(false);
     }
 
-    pub fn event(&mut self, kind: EventKind, details: EventDetails<'_>) {
+    /// Sends an event of this run.
+    pub fn event(&mut self, event: Event) {
         self.events += 1;
-        self.wall.event(Event {
-            session_id: self.session.session_id,
-            sequence: self.events,
-            time_ns: details.time_ns,
-            tick: details.tick,
-            kind: kind as u32,
-            code: details.code,
-            value: details.value,
-            position_m: details.position_m,
-            text: Text::new(details.text),
-        });
+        self.wall.keep(
+            Kind::Event,
+            &Event {
+                session_id: self.session.session_id,
+                sequence: self.events,
+                ..event
+            },
+        );
     }
 
     /// Answers a request with the first force-loop tick that used the change, or with a refusal.
@@ -144,7 +125,7 @@ impl Link {
 
     pub fn reply(&mut self, asker: Asker, result: Result<u64, &Refusal>) {
         let reply = Reply::new(self.session.session_id, asker, result);
-        self.wall.reply(reply);
+        self.wall.keep(Kind::Reply, &reply);
     }
 
     /// Refuses a request that has no ticket yet.
@@ -160,12 +141,9 @@ impl Link {
     }
 
     pub fn report_invalid(&mut self, refusal: &Refusal) {
-        self.event(
-            EventKind::InvalidRefused,
-            EventDetails {
-                text: &refusal.text,
-                ..EventDetails::now()
-            },
-        );
+        self.event(Event {
+            text: Text::new(&refusal.text),
+            ..event_now(EventKind::InvalidRefused)
+        });
     }
 }

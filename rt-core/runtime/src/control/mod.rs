@@ -9,14 +9,12 @@ mod flight;
 mod line_archive;
 mod lines;
 mod link;
-mod loader;
 mod movers;
 mod notices;
 mod parameters;
 mod picture;
 mod probe;
 mod rehearsals;
-mod requests;
 mod scenes;
 mod second;
 mod supervisor;
@@ -24,28 +22,30 @@ mod upload;
 mod wall;
 
 use crate::replay::file::Flight;
+use crate::rt::exchange::{HapticOrder, TissueOrder};
+use crate::rt::second::SecondControlPorts;
 use crate::rt::wiring::{ControlPorts, TapePorts};
+use flight::FlightKeeper;
 pub use flight::SaveError;
-use flight::{FlightKeeper, Orders};
 use lines::LinePreparer;
-use link::{EventDetails, Link};
-use loader::SceneLoader;
+use link::{Link, event_now};
 use parameters::ParameterChanges;
 pub use picture::{ScenePicture, SnapshotBoard, snapshot_board};
 use probe::ProbePreparer;
 use rehearsals::RehearsalRunner;
+use scenes::RunningScene;
 use second::Second;
-pub use second::SecondSetup;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::{EventKind, PlanInForce, Refusal, RefusalCode, Rehearsal, Session};
+use stylet_shm_schema::{Event, EventKind, PlanInForce, Refusal, RefusalCode, Rehearsal, Session, Text};
 use stylet_sim::scene::SceneSource;
 use stylet_sim::tissue::TissueSpec;
+use stylet_wall::packet::Kind;
 pub(crate) use supervisor::LOOP_ENDED;
 use supervisor::Supervisor;
-pub use wall::{Boards, BridgeError, Wall, program};
+pub use wall::{BridgeError, Wall, program};
 
 const PASS: Duration = Duration::from_millis(2);
 
@@ -68,21 +68,14 @@ pub struct ControlSetup {
     pub tissue: TissueSpec,
     /// Source of the first scene.
     pub source: Arc<SceneSource>,
-    /// Second device, if the run has one.
-    pub second: Option<SecondSetup>,
+    /// Second device, if the run has one, and the ends of its rings.
+    pub second: Option<(DeviceInfo, SecondControlPorts)>,
     /// Folder of the flight recordings.
     pub flight_folder: PathBuf,
     /// Folder of the saved probe answers.
     pub probe_folder: Option<PathBuf>,
     /// Part common to every flight recording.
     pub flight: Flight,
-}
-
-/// The running scene, as sent to hosts.
-struct RunningScene {
-    picture: ScenePicture,
-    /// The next scene, from the order to the tissue loop until it runs.
-    next: Option<(ScenePicture, Arc<SceneSource>, SnapshotBoard)>,
 }
 
 /// State of the control thread.
@@ -96,7 +89,6 @@ pub struct Control {
     parameters: ParameterChanges,
     plan: PlanInForce,
     scene: RunningScene,
-    loader: SceneLoader,
     rehearsals: RehearsalRunner,
     lines: LinePreparer,
     /// Present in a run whose second hand holds the probe.
@@ -117,8 +109,8 @@ impl Control {
         plan.session_id = session_id;
         let parameters = ParameterChanges::new(session_id);
         let mut link = Link::new(wall, setup.session);
-        link.wall.parameters(parameters.in_force);
-        link.wall.plan(plan);
+        link.wall.keep(Kind::Parameters, &parameters.in_force);
+        link.wall.keep(Kind::Plan, &plan);
         setup.picture.show(&mut link.wall, Some(setup.snapshots));
         let (second, second_tapes) = setup.second.map(|second| Second::new(second, is_real_time)).unzip();
         let tapes = (haptic, tissue, second_tapes);
@@ -130,11 +122,7 @@ impl Control {
             tissue: setup.tissue,
             parameters,
             plan,
-            scene: RunningScene {
-                picture: setup.picture,
-                next: None,
-            },
-            loader: SceneLoader::default(),
+            scene: RunningScene::new(setup.picture),
             probe: second
                 .is_some()
                 .then(|| ProbePreparer::new(Arc::clone(&setup.source), setup.tissue, setup.probe_folder)),
@@ -212,27 +200,25 @@ impl Control {
 
     fn serve_flights(&mut self) {
         let generation = self.scene.generation();
-        let orders = Orders {
-            haptic: &mut self.loops.haptic_orders,
-            tissue: &mut self.loops.tissue_orders,
-            second: self.second.as_mut().map(|second| &mut second.orders),
-        };
-        let Some(saved) = self.flights.pass(generation, orders, self.lines.archive()) else {
-            return;
-        };
+        let (loops, second) = (&mut self.loops, &mut self.second);
+        let saved = self.flights.pass(generation, self.lines.archive(), || {
+            // A ring that is full leaves its loop out.
+            let _ = loops.haptic_orders.push((0, HapticOrder::HandOverTape));
+            let _ = loops.tissue_orders.push(TissueOrder::HandOverTape);
+            let second = second.as_mut().map(|second| &mut second.orders);
+            let _ = second.map(|orders| orders.push((0, HapticOrder::HandOverTape)));
+        });
+        let Some(saved) = saved else { return };
         let result = saved.result.map_err(|why| why.to_string());
         let (code, text) = match &result {
             Ok(path) => (0, path.display().to_string()),
             Err(why) => (1, why.clone()),
         };
-        self.link.event(
-            EventKind::FlightSaved,
-            EventDetails {
-                code,
-                text: &text,
-                ..EventDetails::now()
-            },
-        );
+        self.link.event(Event {
+            code,
+            text: Text::new(&text),
+            ..event_now(EventKind::FlightSaved)
+        });
         if let Some(ticket) = saved.ticket {
             let refusal = result.err().map(|why| Refusal::new(RefusalCode::FlightNotSaved, why));
             self.link.answer(ticket, refusal.as_ref().map_or(Ok(0), Err));
@@ -251,7 +237,7 @@ impl Control {
                 command_id,
                 ..**result
             };
-            self.link.wall.rehearsal(rehearsal);
+            self.link.wall.keep(Kind::Rehearsal, &rehearsal);
         }
         self.link.answer(ended.ticket, ended.outcome.as_ref().map(|_| 0));
     }

@@ -3,7 +3,6 @@
 use super::Control;
 use crate::rt::exchange::{HapticOrder, Moved, Ticket};
 use crate::rt::motion_lease::Promise;
-use crate::rt::second::SecondOrder;
 
 /// State for each kind of [`Moved`].
 #[derive(Default)]
@@ -38,10 +37,10 @@ impl Control {
         let [needle, second, drawn] = std::mem::take(&mut self.movers.promises);
         // One order renews both motions of the needle's loop.
         for promise in [needle, drawn.filter(|_| drawn != needle)].into_iter().flatten() {
-            let _ = self.loops.haptic_orders.push(HapticOrder::KeepMoving(promise));
+            let _ = self.loops.haptic_orders.push((0, HapticOrder::KeepMoving(promise)));
         }
         if let Some(promise) = second {
-            self.order_second(SecondOrder::KeepMoving(promise));
+            self.order_second(0, HapticOrder::KeepMoving(promise));
         }
     }
 }

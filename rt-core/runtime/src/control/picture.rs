@@ -6,7 +6,7 @@ use stylet_anatomy::PatientFrame;
 use stylet_shm_schema::*;
 use stylet_sim::scene::{Role, Scene, Structure, label_grid};
 use stylet_wall::board::Writer;
-use stylet_wall::packet::{BoardSize, sealed};
+use stylet_wall::packet::{BoardSize, Kind, sealed};
 
 /// Board of a scene's snapshots.
 pub type SnapshotBoard = (BoardSize, OwnedFd);
@@ -42,8 +42,11 @@ impl ScenePicture {
 
     /// Shows the picture to hosts, with the board of its snapshots if that is new.
     pub(super) fn show(&self, wall: &mut Wall, snapshots: Option<SnapshotBoard>) {
+        if let Some((size, board)) = snapshots {
+            wall.keep_with(Kind::Snapshots, bytemuck::bytes_of(&size), Some(board));
+        }
         match sealed("stylet-scene", &self.words) {
-            Ok(words) => wall.scene(self.header, words, snapshots),
+            Ok(words) => wall.keep_with(Kind::Scene, bytemuck::bytes_of(&self.header), Some(words)),
             Err(why) => eprintln!("rt-core: the scene cannot be shown: {why}"),
         }
     }

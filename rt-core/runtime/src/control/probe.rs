@@ -1,7 +1,7 @@
 //! Solves in the background for the answers of the ultrasound probe, once per scene of a run whose second hand holds
 //! it.
 
-use crate::background;
+use crate::background::{Task, goes_on};
 use crate::lines::{LineBody, NoProbe};
 use crate::rt::exchange::TissueOrder;
 use crate::rt::outside::OutsideTape;
@@ -9,23 +9,13 @@ use crate::rt::probe_tape::ProbeTape;
 use crate::rt::wiring::ControlPorts;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
+use std::sync::atomic::AtomicBool;
 use stylet_sim::probe::{BodyProbe, NoWall, ProbeShape};
 use stylet_sim::scene::SceneSource;
 use stylet_sim::tissue::TissueSpec;
 
 /// A probe, and its report to the user.
-struct Found {
-    probe: BodyProbe,
-    said: Option<String>,
-}
-
-struct Task {
-    scene_generation: u64,
-    thread: JoinHandle<Result<Found, NoProbe>>,
-    stop: Arc<AtomicBool>,
-}
+type Found = (BodyProbe, Option<String>);
 
 /// The control thread's side of the probe.
 pub struct ProbePreparer {
@@ -33,7 +23,7 @@ pub struct ProbePreparer {
     tissue: TissueSpec,
     /// Folder of saved answers, which took minutes to solve.
     kept_in: Option<PathBuf>,
-    under_way: Option<Task>,
+    under_way: Option<(u64, Task<Result<Found, NoProbe>>)>,
     /// The scene has its probe, or cannot have one.
     is_settled: bool,
     /// The force loop has room to record the probe's effect on its line.
@@ -56,7 +46,9 @@ impl ProbePreparer {
     pub fn change_scene(&mut self, source: Arc<SceneSource>) {
         self.source = source;
         self.is_settled = false;
-        self.give_up();
+        if let Some((_, task)) = &self.under_way {
+            task.stop();
+        }
     }
 
     /// Frees returned memory, hands over a finished probe, and begins a missing one. Returns its report once.
@@ -65,18 +57,18 @@ impl ProbePreparer {
         if self.is_settled {
             return None;
         }
-        let Some(task) = self.under_way.take_if(|task| task.thread.is_finished()) else {
+        let Some((generation, task)) = self.under_way.take_if(|(_, task)| task.is_finished()) else {
             if self.under_way.is_none() {
                 self.begin(scene_generation);
             }
             return None;
         };
-        if task.scene_generation != scene_generation {
+        if generation != scene_generation {
             return None;
         }
         self.is_settled = true;
-        match task.thread.join() {
-            Ok(Ok(Found { probe, said })) => {
+        match task.result() {
+            Some(Ok((probe, said))) => {
                 if !std::mem::replace(&mut self.has_sent_room, true) {
                     let _ = loops.outside_rooms.push(OutsideTape::new());
                 }
@@ -87,37 +79,19 @@ impl ProbePreparer {
                 });
                 said
             }
-            Ok(Err(why)) => Some(format!("the probe presses nothing in this scene: {why}")),
-            Err(_) => Some("the probe presses nothing: the thread that solved for it has panicked".to_owned()),
+            Some(Err(why)) => Some(format!("the probe presses nothing in this scene: {why}")),
+            None => Some("the probe presses nothing: the thread that solved for it has panicked".to_owned()),
         }
     }
 
     fn begin(&mut self, scene_generation: u64) {
         let (source, tissue, kept_in) = (Arc::clone(&self.source), self.tissue, self.kept_in.clone());
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopped = Arc::clone(&stop);
-        let work = move || {
+        let work = move |stop: &AtomicBool| {
             let body = LineBody::of_source(&source, tissue)?.ok_or(NoWall::NoForces)?;
-            // SYNC: nothing but the flag is carried.
-            find(&body, &source, kept_in.as_deref(), &mut |_| {
-                !stopped.load(Ordering::Relaxed)
-            })
+            find(&body, &source, kept_in.as_deref(), &mut |_| goes_on(stop))
         };
         // The thread could not be started; the next pass tries again.
-        if let Ok(thread) = background::spawn("probe", work) {
-            self.under_way = Some(Task {
-                scene_generation,
-                thread,
-                stop,
-            });
-        }
-    }
-
-    fn give_up(&mut self) {
-        if let Some(task) = &self.under_way {
-            // SYNC: read by the thread; nothing but the flag is carried.
-            task.stop.store(true, Ordering::Relaxed);
-        }
+        self.under_way = Task::spawn("probe", work).ok().map(|task| (scene_generation, task));
     }
 }
 
@@ -132,7 +106,7 @@ fn find(
     let kept = kept_in.map(|folder| body.kept_probe(shape, folder)).transpose();
     let mut said = None;
     match kept.map(Option::flatten) {
-        Ok(Some(probe)) => return Ok(Found { probe, said }),
+        Ok(Some(probe)) => return Ok((probe, said)),
         Ok(None) => {}
         Err(why) => said = Some(format!("the probe that was kept is not used: {why}")),
     }
@@ -147,7 +121,7 @@ fn find(
             )
         });
     }
-    Ok(Found { probe, said })
+    Ok((probe, said))
 }
 
 /// Command line that solves for a scene's probe.
@@ -157,11 +131,5 @@ fn command_for(source: &SceneSource) -> String {
         SceneSource::Labels { .. } => {
             "'rt-core probe --flight FILE', with a flight recording of this scene,".to_owned()
         }
-    }
-}
-
-impl Drop for ProbePreparer {
-    fn drop(&mut self) {
-        self.give_up();
     }
 }

@@ -1,13 +1,13 @@
 //! Runs rehearsals for hosts: one at a time, in the background, while the scene keeps running.
 
-use crate::background;
-use crate::rehearse::{NeedleRun, RehearseError, Rehearsed, Stage, timed};
+use crate::background::Task;
+use crate::rehearse::{RehearseError, Rehearsed, Stage};
 use crate::rt::exchange::Ticket;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 use stylet_hw::DeviceInfo;
-use stylet_shm_schema::{MAX_SEEDS, ParameterSet, Refusal, RefusalCode, Rehearsal};
+use stylet_shm_schema::{MAX_SEEDS, NeedleRehearsal, ParameterSet, Refusal, RefusalCode, Rehearsal};
 use stylet_sim::scene::SceneSource;
 use stylet_sim::tissue::TissueSpec;
 
@@ -35,8 +35,7 @@ pub struct RehearsalRunner {
     device: DeviceInfo,
     /// Body of the running scene; `None` before its first rehearsal, and while one runs.
     stage: Option<(u64, Stage)>,
-    under_way: Option<(Ticket, JoinHandle<Finished>)>,
-    stop: Arc<AtomicBool>,
+    under_way: Option<(Ticket, Task<Finished>)>,
 }
 
 impl RehearsalRunner {
@@ -47,7 +46,6 @@ impl RehearsalRunner {
             device,
             stage: None,
             under_way: None,
-            stop: Arc::new(AtomicBool::new(false)),
         }
     }
 
@@ -61,7 +59,7 @@ impl RehearsalRunner {
     pub fn begin(
         &mut self,
         ticket: Ticket,
-        run: NeedleRun,
+        run: NeedleRehearsal,
         set: ParameterSet,
         scene_generation: u64,
     ) -> Result<(), Refusal> {
@@ -73,14 +71,14 @@ impl RehearsalRunner {
             .take()
             .filter(|(generation, _)| *generation == scene_generation);
         let (source, tissue, device) = (Arc::clone(&self.source), self.tissue, self.device);
-        let stop = Arc::clone(&self.stop);
-        let work = move || {
+        let work = move |stop: &AtomicBool| {
             let stage = kept.map_or_else(|| Stage::build(&source, tissue, device), |(_, stage)| Ok(stage));
             let (stage, outcome, wall_ns) = match stage {
                 Ok(mut stage) => {
                     stage.seeds_and_forces_alone();
-                    let (outcome, wall_ns) = timed(|| stage.rehearse(&run, &set, &stop));
-                    (Some(stage), outcome, wall_ns)
+                    let begun = Instant::now();
+                    let outcome = stage.rehearse(&run, &set, stop);
+                    (Some(stage), outcome, begun.elapsed().as_nanos() as u64)
                 }
                 Err(why) => (None, Err(why), 0),
             };
@@ -91,16 +89,16 @@ impl RehearsalRunner {
                 stage,
             }
         };
-        let thread = background::spawn("rehearsal", work);
+        let task = Task::spawn("rehearsal", work);
         let failed = |_| Refusal::new(RefusalCode::Internal, "no thread could be started to rehearse");
-        self.under_way = Some((ticket, thread.map_err(failed)?));
+        self.under_way = Some((ticket, task.map_err(failed)?));
         Ok(())
     }
 
     /// Returns a rehearsal that has ended since the last call.
     pub fn take(&mut self, scene_generation: u64) -> Option<Ended> {
-        let (ticket, thread) = self.under_way.take_if(|(_, thread)| thread.is_finished())?;
-        let Ok(finished) = thread.join() else {
+        let (ticket, task) = self.under_way.take_if(|(_, task)| task.is_finished())?;
+        let Some(finished) = task.result() else {
             let outcome = Err(Refusal::new(RefusalCode::Internal, PANICKED));
             return Some(Ended { ticket, outcome });
         };
@@ -114,13 +112,6 @@ impl RehearsalRunner {
                 .map(|r| message(&r, finished.scene_generation, finished.wall_ns))
                 .map_err(Refusal::from),
         })
-    }
-}
-
-impl Drop for RehearsalRunner {
-    fn drop(&mut self) {
-        // SYNC: read by the rehearsal's thread; nothing but the flag is carried.
-        self.stop.store(true, Ordering::Relaxed);
     }
 }
 

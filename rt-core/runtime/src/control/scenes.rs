@@ -1,20 +1,54 @@
 //! Takes a scene from the host's request until it runs.
 
 use super::answers::Asker;
-use super::link::EventDetails;
-use super::loader::{Loaded, Wanted};
-use super::picture::{ScenePicture, snapshot_board};
-use super::{Control, RunningScene, upload};
+use super::link::event_now;
+use super::picture::{ScenePicture, SnapshotBoard, snapshot_board};
+use super::{Control, upload};
+use crate::background::Task;
 use crate::rt::exchange::{Ticket, TissueOrder};
 use crate::rt::tissue_tape::TissueTape;
 use crate::rt::world::World;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use stylet_anatomy::PatientFrame;
-use stylet_shm_schema::{BUILTIN_SCENES, EventKind, Refusal, RefusalCode, Text, UploadHeader};
+use stylet_shm_schema::{BUILTIN_SCENES, Event, EventKind, Refusal, RefusalCode, Text, UploadHeader};
 use stylet_sim::active::activate;
 use stylet_sim::scene::{Scene, SceneSource};
+use stylet_wall::packet::Kind;
+
+/// A requested scene.
+pub(super) struct Wanted {
+    ticket: Ticket,
+    name: String,
+    patient: PatientFrame,
+}
+
+type BuiltScene = (Box<Scene>, SceneSource);
+
+/// A scene from the order to the tissue loop until it runs.
+pub(super) struct NextScene {
+    ticket: Ticket,
+    picture: ScenePicture,
+    source: Arc<SceneSource>,
+    snapshots: SnapshotBoard,
+}
+
+/// The running scene, as sent to hosts, and the one that follows it.
+pub(super) struct RunningScene {
+    picture: ScenePicture,
+    loading: Option<(Wanted, Task<Result<BuiltScene, Refusal>>)>,
+    next: Option<NextScene>,
+}
 
 impl RunningScene {
+    pub(super) fn new(picture: ScenePicture) -> Self {
+        Self {
+            picture,
+            loading: None,
+            next: None,
+        }
+    }
+
     pub(super) fn generation(&self) -> u64 {
         self.picture.header.generation
     }
@@ -64,29 +98,34 @@ impl Control {
         }
     }
 
+    /// Builds a scene on a separate thread, one at a time; the running scene stays until the next one is ready.
     fn load(
         &mut self,
         wanted: Wanted,
         build: impl FnOnce() -> Result<(Scene, SceneSource), Refusal> + Send + 'static,
     ) -> Result<(), Refusal> {
-        if self.scene.next.is_some() {
+        if self.scene.next.is_some() || self.scene.loading.is_some() {
             return Err(RefusalCode::SceneLoading.into());
         }
-        self.loader.begin(wanted, build)
+        let work = move |_: &AtomicBool| build().map(|(scene, source)| (Box::new(scene), source));
+        let failed = |_| Refusal::new(RefusalCode::Internal, "no thread could be started to load the scene");
+        self.scene.loading = Some((wanted, Task::spawn("scene-loader", work).map_err(failed)?));
+        Ok(())
     }
 
     pub(super) fn take_loaded(&mut self) {
-        if let Some(loaded) = self.loader.take() {
-            let ticket = loaded.wanted.ticket;
-            if let Err(refusal) = self.order_scene(loaded) {
+        let loaded = self.scene.loading.take_if(|(_, task)| task.is_finished());
+        if let Some((wanted, task)) = loaded {
+            let ticket = wanted.ticket;
+            let built = task.result().unwrap_or(Err(RefusalCode::Internal.into()));
+            if let Err(refusal) = built.and_then(|scene| self.order_scene(wanted, scene)) {
                 self.link.answer(ticket, Err(&refusal));
             }
         }
     }
 
     /// Orders a built scene from the tissue loop.
-    fn order_scene(&mut self, Loaded { wanted, scene }: Loaded) -> Result<(), Refusal> {
-        let (scene, source) = scene?;
+    fn order_scene(&mut self, wanted: Wanted, (scene, source): BuiltScene) -> Result<(), Refusal> {
         // Changes already ordered reach the tissue loop before the scene does.
         let active = activate(&self.parameters.with(&[]), &self.device)?;
         let (generation, session_id) = (self.scene.generation() + 1, self.link.session.session_id);
@@ -108,33 +147,35 @@ impl Control {
             let why = "too many requests at once; load the scene again";
             return Err(Refusal::new(RefusalCode::TooManyRequests, why));
         }
-        self.scene.next = Some((picture, source, snapshots));
+        self.scene.next = Some(NextScene {
+            ticket: wanted.ticket,
+            picture,
+            source,
+            snapshots,
+        });
         Ok(())
     }
 
-    /// Records that the tissue loop runs the next scene from `tick` on.
-    pub(super) fn scene_taken_up(&mut self, generation: u64, tick: u64) {
-        if let Some((picture, source, snapshots)) = self.scene.next.take() {
-            self.scene.picture = picture;
-            self.lines.change_scene(Arc::clone(&source));
-            if let Some(probe) = &mut self.probe {
-                probe.change_scene(Arc::clone(&source));
-            }
-            self.rehearsals.change_scene(source);
-            self.scene.picture.show(&mut self.link.wall, Some(snapshots));
-            self.plan = bytemuck::Zeroable::zeroed();
-            self.plan.session_id = self.link.session.session_id;
-            self.link.wall.plan(self.plan);
+    /// Takes up the next scene, if the tissue loop runs it from `tick` on by that ticket.
+    pub(super) fn take_up_scene(&mut self, ticket: Ticket, tick: u64) {
+        let Some(next) = self.scene.next.take_if(|next| next.ticket == ticket) else {
+            return;
+        };
+        self.scene.picture = next.picture;
+        self.lines.change_scene(Arc::clone(&next.source));
+        if let Some(probe) = &mut self.probe {
+            probe.change_scene(Arc::clone(&next.source));
         }
-        let name = self.scene.picture.header.name.read();
-        self.link.event(
-            EventKind::SceneLoaded,
-            EventDetails {
-                code: generation as u32,
-                tick,
-                text: &name,
-                ..EventDetails::now()
-            },
-        );
+        self.rehearsals.change_scene(next.source);
+        self.scene.picture.show(&mut self.link.wall, Some(next.snapshots));
+        self.plan = bytemuck::Zeroable::zeroed();
+        self.plan.session_id = self.link.session.session_id;
+        self.link.wall.keep(Kind::Plan, &self.plan);
+        self.link.event(Event {
+            code: self.scene.generation() as u32,
+            tick,
+            text: Text::new(&self.scene.picture.header.name.read()),
+            ..event_now(EventKind::SceneLoaded)
+        });
     }
 }

@@ -4,10 +4,10 @@
 //! motors the process ends, and the device's own watchdog, or the closing of its port, removes the force. A simulated
 //! device has no motors: the fault is reported, and the run continues with the force off when the loop resumes.
 
-use super::link::EventDetails;
+use super::link::event_now;
 use super::{Control, LoopStopped};
 use crate::rt::exchange::HapticOrder;
-use stylet_shm_schema::{EventKind, Fault};
+use stylet_shm_schema::{Event, EventKind, Fault, Text};
 
 /// Passes of the control thread without one tick of the loop; 2 ms and more each.
 ///
@@ -65,21 +65,18 @@ impl Control {
                 true => Fault::LoopStopped.message(),
                 false => LOOP_ENDED,
             };
-            self.link.event(
-                EventKind::FaultRaised,
-                EventDetails {
-                    code: Fault::LoopStopped as u32,
-                    text,
-                    ..EventDetails::now()
-                },
-            );
+            self.link.event(Event {
+                code: Fault::LoopStopped as u32,
+                text: Text::new(text),
+                ..event_now(EventKind::FaultRaised)
+            });
             if !self.supervisor.is_simulated {
                 return Err(LoopStopped);
             }
             eprintln!("rt-core: {text}");
             self.supervisor.owes_order = true;
         }
-        if self.supervisor.owes_order && self.order_haptic(HapticOrder::StoodStill).is_ok() {
+        if self.supervisor.owes_order && self.order_haptic(0, HapticOrder::StoodStill).is_ok() {
             self.supervisor.owes_order = false;
         }
         Ok(())

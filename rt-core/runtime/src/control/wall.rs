@@ -12,7 +12,7 @@ mod outbox;
 pub use child::program;
 use child::{Running, SILENT_AFTER};
 use journal::Journal;
-use kept::{Kept, keep};
+use kept::Kept;
 pub use outbox::Outbox;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::collections::VecDeque;
@@ -24,7 +24,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use stylet_shm_schema::*;
-use stylet_wall::packet::{Alive, BoardSize, Kind, Socket, Start, unsealed};
+use stylet_wall::packet::{Alive, Kind, Socket, Start, unsealed};
 
 /// Most packets of the bridge taken in one pass; the rest wait in its socket.
 pub const MOST_PACKETS: usize = 256;
@@ -33,9 +33,6 @@ const COMPLAINTS_EVERY: Duration = Duration::from_millis(100);
 const SHORTEST_EPOCH: Duration = Duration::from_secs(2);
 const FIRST_START: Duration = Duration::from_secs(20);
 const RETRY_EVERY: Duration = Duration::from_millis(200);
-const EVENTS_KEPT: usize = 64;
-const REPLIES_KEPT: usize = 128;
-const REHEARSALS_KEPT: usize = 8;
 /// Largest volume that a host may send, in cells.
 const MOST_CELLS: usize = 64 << 20;
 
@@ -58,14 +55,6 @@ pub enum BridgeError {
     Failed(String),
 }
 
-/// Boards of the loops, for each new bridge.
-pub struct Boards {
-    /// Board of the force loop.
-    pub state: OwnedFd,
-    /// Board of the second device's loop.
-    pub second_state: Option<OwnedFd>,
-}
-
 /// A request of a host.
 pub enum Asked {
     /// A request as plain data.
@@ -79,7 +68,6 @@ pub struct Wall {
     running: Option<Running>,
     outbox: Outbox,
     kept: Kept,
-    start: Start,
     program: PathBuf,
     /// Records of the force loop.
     pub records: Journal<TickRecord>,
@@ -102,24 +90,18 @@ pub struct Wall {
 }
 
 impl Wall {
-    /// Starts the first bridge and waits until its ports are open.
-    pub fn new(owned: Owned, start: Start, boards: Boards, is_watched: Arc<AtomicBool>) -> Result<Self, BridgeError> {
+    /// Starts the first bridge, with the boards of the force loop and of the second device's loop, and waits until its
+    /// ports are open.
+    pub fn new(
+        owned: Owned,
+        start: Start,
+        (state, second_state): (OwnedFd, Option<OwnedFd>),
+        is_watched: Arc<AtomicBool>,
+    ) -> Result<Self, BridgeError> {
         let mut wall = Self {
             running: None,
             outbox: Outbox::default(),
-            kept: Kept {
-                state: Rc::new(boards.state),
-                second_state: boards.second_state.map(Rc::new),
-                snapshots: None,
-                session: None,
-                scene: None,
-                parameters: None,
-                plan: None,
-                events: VecDeque::with_capacity(EVENTS_KEPT),
-                replies: VecDeque::with_capacity(REPLIES_KEPT),
-                rehearsals: VecDeque::with_capacity(REHEARSALS_KEPT),
-            },
-            start,
+            kept: Kept::default(),
             program: program(),
             records: Journal::new(Kind::Records),
             second_records: Journal::new(Kind::SecondRecords),
@@ -132,6 +114,11 @@ impl Wall {
             dying: Vec::new(),
             owned,
         };
+        wall.keep(Kind::Start, &start);
+        wall.keep_with(Kind::State, &[], Some(state));
+        if let Some(board) = second_state {
+            wall.keep_with(Kind::SecondState, &[], Some(board));
+        }
         wall.spawn()?;
         let begun = Instant::now();
         while !wall.is_open() {
@@ -203,49 +190,16 @@ impl Wall {
         self.second_records.send(&mut self.outbox, at_once);
     }
 
-    /// Announces the session.
-    pub fn session(&mut self, session: Session) {
-        self.kept.session = Some(session);
-        self.outbox.put(Kind::Session, bytemuck::bytes_of(&session), None);
+    /// Sends a value to the bridge, and keeps it for the next one.
+    pub fn keep<T: bytemuck::Pod>(&mut self, kind: Kind, value: &T) {
+        self.keep_with(kind, bytemuck::bytes_of(value), None);
     }
 
-    /// Announces the parameters in force.
-    pub fn parameters(&mut self, parameters: ParametersInForce) {
-        self.kept.parameters = Some(parameters);
-        self.outbox.put(Kind::Parameters, bytemuck::bytes_of(&parameters), None);
-    }
-
-    /// Announces the plan in force.
-    pub fn plan(&mut self, plan: PlanInForce) {
-        self.kept.plan = Some(plan);
-        self.outbox.put(Kind::Plan, bytemuck::bytes_of(&plan), None);
-    }
-
-    /// Sends an event.
-    pub fn event(&mut self, event: Event) {
-        keep(&mut self.kept.events, event, EVENTS_KEPT);
-        self.outbox.put(Kind::Event, bytemuck::bytes_of(&event), None);
-    }
-
-    /// Answers a request.
-    pub fn reply(&mut self, reply: Reply) {
-        keep(&mut self.kept.replies, reply, REPLIES_KEPT);
-        self.outbox.put(Kind::Reply, bytemuck::bytes_of(&reply), None);
-    }
-
-    /// Sends the result of a rehearsal.
-    pub fn rehearsal(&mut self, rehearsal: Rehearsal) {
-        self.outbox.put(Kind::Rehearsal, bytemuck::bytes_of(&rehearsal), None);
-        keep(&mut self.kept.rehearsals, Box::new(rehearsal), REHEARSALS_KEPT);
-    }
-
-    /// Shows a scene, whose words are in `words`, and the board of its snapshots.
-    pub fn scene(&mut self, header: SceneHeader, words: OwnedFd, snapshots: Option<(BoardSize, OwnedFd)>) {
-        if let Some((size, memory)) = snapshots {
-            self.kept.snapshots = Some((size, Rc::new(memory)));
-        }
-        self.kept.scene = Some((Box::new(header), Rc::new(words)));
-        self.kept.tell_scene(&mut self.outbox);
+    /// As [`keep`](Self::keep), with the memory that belongs to the value.
+    pub fn keep_with(&mut self, kind: Kind, bytes: &[u8], memory: Option<OwnedFd>) {
+        let packet = (kind, bytes.to_vec(), memory.map(Rc::new));
+        self.outbox.put(packet.clone());
+        self.kept.put(packet);
     }
 
     fn spawn(&mut self) -> Result<(), BridgeError> {
@@ -272,8 +226,7 @@ impl Wall {
             socket: Some(socket),
             ..Outbox::default()
         };
-        self.outbox.put(Kind::Start, bytemuck::bytes_of(&self.start), None);
-        self.kept.tell(&mut self.outbox);
+        self.kept.packets().for_each(|packet| self.outbox.put(packet.clone()));
         self.records.rewind();
         self.second_records.rewind();
         Ok(())

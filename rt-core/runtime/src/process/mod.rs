@@ -187,17 +187,17 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
     let kernel = setup::lock_memory(options)?;
     let (session_id, info, second_info) = (setup.session_id, setup.info, setup.second_info);
     let is_watched = Arc::default();
-    let shown = setup.show(owned, &is_watched)?;
+    let (wall, (state, second_state)) = setup.show(owned, &is_watched)?;
     let loops = setup
-        .body
+        .bodies
         .into_loops(options, session_id, &setup.source, probes, &is_watched);
-    let second = loops.second.zip(shown.second_state);
-    let (second_loop, second_control) = second.map(setup::SecondLoops::join).unzip();
-    let threads = Threads::start(options, (loops.haptic, shown.state), loops.tissue, second_loop)?;
+    let (second, second_ports) = loops.second.unzip();
+    let second = second.zip(second_state);
+    let threads = Threads::start(options, (loops.haptic, state), loops.tissue, second)?;
     let devices = (&info, second_info.as_ref());
     let session = session::session(options, session_id, devices, &threads, kernel.unlocked.as_deref());
     let mut control = Control::new(
-        shown.wall,
+        wall,
         loops.control,
         loops.tapes,
         ControlSetup {
@@ -207,7 +207,7 @@ pub fn run_with(options: &Options, probes: Option<Probes>, stop: &Arc<AtomicBool
             snapshots: setup.snapshots,
             tissue: options.tissue,
             source: setup.source,
-            second: second_control,
+            second: second_info.zip(second_ports),
             flight_folder: options.flight_folder.clone(),
             probe_folder: options.probe_folder.clone(),
             flight: session::flight(options, session_id, devices),

@@ -15,6 +15,7 @@ pub(super) fn session(
     threads: &Threads,
     unlocked: Option<&str>,
 ) -> Session {
+    let [haptic, tissue, of_second] = threads.grants();
     Session {
         session_id,
         exercises: Default::default(),
@@ -25,9 +26,9 @@ pub(super) fn session(
         period_ns: options.haptic_period_ns,
         tissue_period_ns: TISSUE_PERIOD_NS,
         second_period_ns: options.second.as_ref().map_or(0, |second| second.period_ns),
-        haptic: threads.haptic_grant(),
-        tissue: threads.tissue_grant(),
-        second: threads.second_grant().unwrap_or_default(),
+        haptic,
+        tissue,
+        second: of_second,
         memory_locked: u32::from(unlocked.is_none()),
         no_rt_asked: u32::from(options.no_rt_asked),
         refused: 0,
@@ -50,7 +51,7 @@ pub(super) fn flight(
         session_id,
         reason: String::new(),
         device_name: device.name.to_owned(),
-        device: device.into(),
+        device: *device,
         haptic_period_s: options.haptic_period_ns as f64 / 1e9,
         tissue_period_s: TISSUE_PERIOD_NS as f64 / 1e9,
         lines: Vec::new(),
@@ -58,7 +59,7 @@ pub(super) fn flight(
         tissue: None,
         second_device: second.map(|(device, options)| SecondFigures {
             device_name: device.name.to_owned(),
-            device: device.into(),
+            device: *device,
             period_s: options.period_ns as f64 / 1e9,
         }),
         second: None,

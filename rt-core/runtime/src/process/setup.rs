@@ -1,7 +1,7 @@
 //! Prepares a run before its threads start: scene, device, shared memory, locked memory, and both loops.
 
 use super::{Options, RunError, SecondOptions};
-use crate::control::{Boards, ScenePicture, SecondSetup, SnapshotBoard, Wall, snapshot_board};
+use crate::control::{ScenePicture, SnapshotBoard, Wall, snapshot_board};
 use crate::device;
 use crate::rt::arm::{self, Ask, CoresAwake};
 use crate::rt::clock::{self, TISSUE_PERIOD_NS, TISSUE_PHASE, Wait};
@@ -22,7 +22,7 @@ use stylet_sim::scene::{Scene, SceneSource};
 use stylet_wall::board::Writer;
 use stylet_wall::packet::Start;
 
-/// Scene and device with their properties.
+/// Scene and devices of a run, before its memory is locked.
 pub(super) struct Setup {
     pub session_id: u64,
     pub info: DeviceInfo,
@@ -30,50 +30,28 @@ pub(super) struct Setup {
     pub picture: ScenePicture,
     pub snapshots: SnapshotBoard,
     pub source: Arc<SceneSource>,
-    pub body: Body,
+    pub bodies: Bodies,
 }
 
-/// Bodies that the loops will own.
-pub(super) struct Body {
+/// What the loops will own.
+pub(super) struct Bodies {
     device: Box<dyn Device>,
     second: Option<Box<dyn Device>>,
     active: Active,
     world: Box<World>,
 }
 
-/// Both loops, and the control thread's ends of their rings.
+/// All loops, and the control thread's ends of their rings.
 pub(super) struct Loops {
     pub haptic: HapticLoop,
     pub tissue: TissueLoop,
+    pub second: Option<(SecondLoop, SecondControlPorts)>,
     pub control: ControlPorts,
     pub tapes: TapePorts,
-    pub second: Option<SecondLoops>,
 }
 
-/// The second device's loop, and the control thread's ends of its rings.
-pub(super) struct SecondLoops {
-    own: SecondLoop,
-    info: DeviceInfo,
-    control: SecondControlPorts,
-}
-
-impl SecondLoops {
-    /// Splits into the part for its thread and the part for the control thread.
-    pub fn join((loops, board): (Self, Writer<SecondState>)) -> ((SecondLoop, Writer<SecondState>), SecondSetup) {
-        let setup = SecondSetup {
-            device: loops.info,
-            ports: loops.control,
-        };
-        ((loops.own, board), setup)
-    }
-}
-
-/// The wall to the hosts, and the boards that the loops write.
-pub(super) struct Shown {
-    pub wall: Wall,
-    pub state: Writer<HapticState>,
-    pub second_state: Option<Writer<SecondState>>,
-}
+/// Boards that the loops of both devices write.
+pub(super) type Boards = (Writer<HapticState>, Option<Writer<SecondState>>);
 
 /// Grants of the kernel to the whole process.
 pub(super) struct KernelGrants {
@@ -117,7 +95,7 @@ impl Setup {
             picture,
             snapshots,
             source: Arc::new(SceneSource::Builtin(options.scene.clone())),
-            body: Body {
+            bodies: Bodies {
                 device,
                 second,
                 world,
@@ -126,8 +104,8 @@ impl Setup {
         })
     }
 
-    /// Makes the boards and starts the control thread.
-    pub fn show(&self, owned: Owned, is_watched: &Arc<AtomicBool>) -> Result<Shown, RunError> {
+    /// Makes the boards and starts the bridge.
+    pub fn show(&self, owned: Owned, is_watched: &Arc<AtomicBool>) -> Result<(Wall, Boards), RunError> {
         let (state, memory) = Writer::new("stylet-state", 0).map_err(RunError::Board)?;
         let second = self.second_info.map(|_| Writer::new("stylet-second-state", 0));
         let (second_state, second_memory) = second.transpose().map_err(RunError::Board)?.unzip();
@@ -137,15 +115,8 @@ impl Setup {
             word_count: self.picture.word_count() as u64,
             has_second: u64::from(self.second_info.is_some()),
         };
-        let boards = Boards {
-            state: memory,
-            second_state: second_memory,
-        };
-        Ok(Shown {
-            wall: Wall::new(owned, start, boards, Arc::clone(is_watched))?,
-            state,
-            second_state,
-        })
+        let wall = Wall::new(owned, start, (memory, second_memory), Arc::clone(is_watched))?;
+        Ok((wall, (state, second_state)))
     }
 }
 
@@ -163,14 +134,14 @@ fn open_second(options: &Options, second: &SecondOptions, scene: &Scene) -> Resu
         .map_err(RunError::SecondDevice)
 }
 
-impl Body {
+impl Bodies {
     /// `source` is the source of the scene.
     pub fn into_loops(
         self,
         options: &Options,
         session_id: u64,
         source: &Arc<SceneSource>,
-        probes: Option<Probes>,
+        mut probes: Option<Probes>,
         is_watched: &Arc<AtomicBool>,
     ) -> Loops {
         let info = self.device.info();
@@ -192,21 +163,18 @@ impl Body {
             let (ports, tissue, control) = second::wire(Capacities::RUN, Some(tape));
             wiring.tissue.second = Some(tissue);
             let mut own = SecondLoop::new(session_id, device, ports, &memory, seconds(second.period_ns));
-            own.wait = Wait::at_period(second.period_ns);
-            SecondLoops { own, info, control }
+            own.device.wait = Wait::at_period(second.period_ns);
+            own.device.probe = probes.as_mut().and_then(|probes| probes.second.take()).map(Box::new);
+            (own, control)
         });
         let period_s = seconds(options.haptic_period_ns);
         let mut haptic = HapticLoop::new(session_id, self.device, wiring.haptic, &memory, period_s);
-        haptic.wait = options.wait;
+        haptic.device.wait = options.wait;
         let period_s = seconds(TISSUE_PERIOD_NS);
         let mut tissue = TissueLoop::new(session_id, wiring.tissue, self.world, period_s);
-        let mut second = second;
         tissue.phase_ns = clock::phase_ns(TISSUE_PHASE, options.haptic_period_ns);
         if let Some(probes) = probes {
-            if let Some(second) = &mut second {
-                second.own.probe = probes.second.map(Box::new);
-            }
-            haptic.probe = Some(Box::new(probes.haptic));
+            haptic.device.probe = Some(Box::new(probes.haptic));
             tissue.probe = Some(Box::new(probes.tissue));
         }
         Loops {

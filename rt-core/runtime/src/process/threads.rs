@@ -2,7 +2,7 @@
 
 use super::{LoopReport, Options, RunError, RunReport};
 use crate::rt::arm::{self, Armed, Ask, Usage};
-use crate::rt::device_loop::{self, DeviceLoop};
+use crate::rt::device_loop::{self, Counts, DeviceLoop};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::second::SecondLoop;
 use crate::rt::tissue::TissueLoop;
@@ -67,19 +67,10 @@ impl Threads {
         })
     }
 
-    /// Grants of the force loop's thread.
-    pub fn haptic_grant(&self) -> ThreadReport {
-        self.haptic.granted
-    }
-
-    /// Grants of the tissue loop's thread.
-    pub fn tissue_grant(&self) -> ThreadReport {
-        self.tissue.granted
-    }
-
-    /// Grants of the second device's thread.
-    pub fn second_grant(&self) -> Option<ThreadReport> {
-        self.second.as_ref().map(|second| second.granted)
+    /// Grants of the threads of force loop, tissue loop and second device.
+    pub fn grants(&self) -> [ThreadReport; 3] {
+        let second = self.second.as_ref().map(|second| second.granted);
+        [self.haptic.granted, self.tissue.granted, second.unwrap_or_default()]
     }
 
     /// Asks all loops to end.
@@ -101,18 +92,14 @@ impl Threads {
 }
 
 fn run_tissue(mut tissue: TissueLoop, armed: &Armed, end: &AtomicBool) -> LoopReport {
-    let start = Usage::now();
-    let sleeps = tissue.run(armed, end);
-    let usage = Usage::now().since(start);
+    let (start, sleeps) = (Usage::now(), tissue.run(armed, end));
     let r = tissue.response();
-    LoopReport {
-        thread: armed.report,
+    let counts = Counts {
         ticks: r.tick,
         since_start: r.since_start,
         since_armed: r.since_armed,
-        sleeps,
-        usage,
-    }
+    };
+    report(armed, start, sleeps, counts)
 }
 
 fn run_with_device<L: DeviceLoop>(
@@ -123,17 +110,18 @@ fn run_with_device<L: DeviceLoop>(
 ) -> LoopReport {
     let mut publish = |state: &L::State| board.write(|shown, _| *shown = *state);
     publish(device_loop.state());
-    let start = Usage::now();
-    let sleeps = device_loop::run(&mut device_loop, armed, end, publish);
-    let usage = Usage::now().since(start);
-    let counts = device_loop.counts();
+    let (start, sleeps) = (Usage::now(), device_loop::run(&mut device_loop, armed, end, publish));
+    report(armed, start, sleeps, device_loop.counts())
+}
+
+fn report(armed: &Armed, start: Usage, sleeps: u64, counts: Counts) -> LoopReport {
     LoopReport {
+        usage: Usage::now().since(start),
         thread: armed.report,
         ticks: counts.ticks,
         since_start: counts.since_start,
         since_armed: counts.since_armed,
         sleeps,
-        usage,
     }
 }
 

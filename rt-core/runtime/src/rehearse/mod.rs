@@ -10,6 +10,7 @@ mod scatter;
 mod script;
 mod standing;
 
+use crate::background::goes_on;
 use crate::lines::{LineBody, NoLine};
 use crate::rt::world::World;
 use motion::{Motion, TargetElements};
@@ -19,12 +20,11 @@ use scatter::Scatter;
 use script::Script;
 use standing::Standing;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::sync::atomic::AtomicBool;
 use stylet_hw::{DeviceInfo, Hand};
 use stylet_shm_schema::{
-    MAX_LEFT_NEEDLES, MAX_SEEDS, NeedleAxis, ParameterProblems, ParameterSet, Reason, Refusal, RefusalCode, SeedPose,
-    StabilisingNeedle, flags,
+    MAX_LEFT_NEEDLES, MAX_SEEDS, NeedleAxis, NeedleRehearsal, ParameterProblems, ParameterSet, Reason, Refusal,
+    RefusalCode, SeedPose, flags,
 };
 use stylet_sim::active::{Active, activate};
 use stylet_sim::line::{LineError, LineStations, ReadyLine};
@@ -91,33 +91,6 @@ impl From<RehearseError> for Refusal {
             text: error.to_string(),
         }
     }
-}
-
-/// One validated needle in the scene frame.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NeedleRun {
-    /// Entry of the needle into the body, m.
-    pub entry_m: Vector3<f64>,
-    /// Direction of the needle, unit vector.
-    pub direction: Vector3<f64>,
-    /// Speed of the hand to the first drop, m/s.
-    pub insert_m_per_s: f64,
-    /// Speed of the hand after the first drop, m/s.
-    pub retract_m_per_s: f64,
-    /// Speed of the hand to the entry, m/s.
-    pub approach_m_per_s: f64,
-    /// Acceleration of the hand, m/s².
-    pub acceleration_m_per_s2: f64,
-    /// Depth to which the tip is drawn back, from the entry along the needle, m.
-    pub retract_to_m: f64,
-    /// Pitch between seed centres, m, if they form one strand.
-    pub strand_pitch_m: Option<f64>,
-    /// Needles that go in first and stay in.
-    pub stabilising: Vec<StabilisingNeedle>,
-    /// Needles that came and went before this one.
-    pub earlier: Vec<StabilisingNeedle>,
-    /// Positions of the drops in their order, m.
-    pub drops_m: Vec<Vector3<f64>>,
 }
 
 /// The result of a rehearsal.
@@ -193,7 +166,12 @@ impl Stage {
     }
 
     /// Solves a line at rest for each needle, the one that leaves seeds last; none if the tissue needs none.
-    fn lines(&mut self, run: &NeedleRun, bends: bool, stop: &AtomicBool) -> Result<Vec<ReadyLine>, RehearseError> {
+    fn lines(
+        &mut self,
+        run: &NeedleRehearsal,
+        bends: bool,
+        stop: &AtomicBool,
+    ) -> Result<Vec<ReadyLine>, RehearseError> {
         let Some(body) = &self.lines else {
             return match run.stabilising.is_empty() {
                 true => Ok(Vec::new()),
@@ -201,8 +179,8 @@ impl Stage {
             };
         };
         let own = NeedleAxis {
-            entry_m: run.entry_m.into(),
-            direction: run.direction.into(),
+            entry_m: run.entry_m,
+            direction: run.direction,
         };
         let stabilising = run.stabilising.iter().map(|needle| NeedleAxis {
             entry_m: needle.entry_m,
@@ -217,11 +195,10 @@ impl Stage {
             .count();
         self.kept.truncate(same);
         for (number, axis) in wanted.iter().enumerate().skip(same) {
-            // SYNC: set by the control thread when it ends; nothing but the flag is carried.
-            let mut goes_on = || !stop.load(Ordering::Relaxed);
+            let mut goes_on = || goes_on(stop);
             let others: Vec<_> = self.kept.iter().map(|(.., line)| line.stations.clone()).collect();
             let generation = number as u64 + 1;
-            let line = body.prepare_beside(generation, axis.entry_m, axis.direction, bends, &others, &mut goes_on);
+            let line = body.prepare(generation, axis.entry_m, axis.direction, bends, &others, &mut goes_on);
             self.kept.push((*axis, bends, line.map_err(stopped)?));
         }
         Ok(self.kept.iter().map(|(.., line)| line.clone()).collect())
@@ -231,23 +208,21 @@ impl Stage {
     fn line_beside(
         &self,
         generation: u64,
-        run: &NeedleRun,
+        run: &NeedleRehearsal,
         bends: bool,
         others: &[Arc<LineStations>],
         stop: &AtomicBool,
     ) -> Result<ReadyLine, RehearseError> {
         let body = self.lines.as_ref().ok_or(RehearseError::NoneStaysIn)?;
-        // SYNC: as above.
-        let mut goes_on = || !stop.load(Ordering::Relaxed);
-        let (entry_m, direction) = (run.entry_m.into(), run.direction.into());
-        let line = body.prepare_beside(generation, entry_m, direction, bends, others, &mut goes_on);
+        let mut goes_on = || goes_on(stop);
+        let line = body.prepare(generation, run.entry_m, run.direction, bends, others, &mut goes_on);
         line.map_err(stopped)
     }
 
     /// Rehearses from rest under these parameters; fails early when `stop` is set.
     pub fn rehearse(
         &mut self,
-        run: &NeedleRun,
+        run: &NeedleRehearsal,
         set: &ParameterSet,
         stop: &AtomicBool,
     ) -> Result<Rehearsed, RehearseError> {
@@ -272,7 +247,7 @@ impl Stage {
     }
 
     /// Returns loops over the body at rest; [`Rig::into_world`] returns the body.
-    fn rig(&mut self, run: &NeedleRun, active: &Active) -> Result<Rig, RehearseError> {
+    fn rig(&mut self, run: &NeedleRehearsal, active: &Active) -> Result<Rig, RehearseError> {
         let mut world = self.world.take().ok_or(RehearseError::BodyLost)?;
         world.tissue.return_to_rest();
         world.set_limits(active.limits.clone());
@@ -290,33 +265,23 @@ fn stopped(why: NoLine) -> RehearseError {
 
 fn perform(
     rig: &mut Rig,
-    run: &NeedleRun,
+    run: &NeedleRehearsal,
     (mut script, mut motion): (Script, Motion),
     stop: &AtomicBool,
 ) -> Result<Rehearsed, RehearseError> {
-    let mut displacement_before_puncture_m = 0.0_f64;
-    let (mut punctured, mut contact_s) = (false, None);
-    let mut deflection_m = 0.0_f64;
-    while !script.is_at_needle() {
-        // SYNC: as below.
-        if stop.load(Ordering::Relaxed) {
-            return Err(RehearseError::Stopped);
-        }
-        if rig.seconds() > LONGEST_S {
-            return Err(RehearseError::TooLong);
-        }
-        rig.tick();
-        script.advance(rig)?;
+    if !script.is_at_needle() {
+        drive(rig, stop, |rig, _| {
+            script.advance(rig)?;
+            Ok(script.is_at_needle())
+        })?;
     }
     motion.begin(rig.deformed());
     rig.forget_peaks();
+    let (mut displacement_before_puncture_m, mut deflection_m) = (0.0_f64, 0.0_f64);
+    let (mut punctured, mut contact_s) = (false, None);
     let mut dropped_after_s = Vec::new();
-    while rig.seconds() < LONGEST_S {
-        // SYNC: set by the control thread when it ends; nothing but the flag is carried.
-        if stop.load(Ordering::Relaxed) {
-            return Err(RehearseError::Stopped);
-        }
-        if rig.tick() {
+    drive(rig, stop, |rig, has_tissue_moved| {
+        if has_tissue_moved {
             motion.look(rig.displacement_m(), rig.deformed());
         }
         let state = rig.state();
@@ -331,33 +296,40 @@ fn perform(
         if !punctured {
             displacement_before_puncture_m = displacement_before_puncture_m.max(rig.displacement_m());
         }
-        if script.advance(rig)? {
-            let simulated_s = rig.seconds();
-            return Ok(Rehearsed {
-                // Needles that stay in displace the tissue until they are drawn out, and seeds are planned in tissue at
-                // rest.
-                seeds: match run.stabilising.is_empty() {
-                    true => rig.seeds(),
-                    false => rig.seeds_at_rest(),
-                },
-                dropped_after_s,
-                peak_force_n: rig.state().peak_force_n,
-                displacement_before_puncture_m,
-                largest_displacement_m: motion.largest_m,
-                target_shift_m: motion.target_m,
-                deflection_m,
-                simulated_s,
-            });
+        script.advance(rig)
+    })?;
+    Ok(Rehearsed {
+        // Needles that stay in displace the tissue until they are drawn out, and seeds are planned in tissue at rest.
+        seeds: match run.stabilising.is_empty() {
+            true => rig.seeds(),
+            false => rig.seeds_at_rest(),
+        },
+        dropped_after_s,
+        peak_force_n: rig.state().peak_force_n,
+        displacement_before_puncture_m,
+        largest_displacement_m: motion.largest_m,
+        target_shift_m: motion.target_m,
+        deflection_m,
+        simulated_s: rig.seconds(),
+    })
+}
+
+/// Ticks until `advance` returns true; it is told whether the tissue loop ticked too.
+fn drive(
+    rig: &mut Rig,
+    stop: &AtomicBool,
+    mut advance: impl FnMut(&mut Rig, bool) -> Result<bool, RehearseError>,
+) -> Result<(), RehearseError> {
+    while rig.seconds() < LONGEST_S {
+        if !goes_on(stop) {
+            return Err(RehearseError::Stopped);
+        }
+        let has_tissue_moved = rig.tick();
+        if advance(rig, has_tissue_moved)? {
+            return Ok(());
         }
     }
     Err(RehearseError::TooLong)
-}
-
-/// Measures the wall-clock time of `work`, for the host.
-pub fn timed<T>(work: impl FnOnce() -> T) -> (T, u64) {
-    let begun = Instant::now();
-    let done = work();
-    (done, begun.elapsed().as_nanos() as u64)
 }
 
 #[cfg(test)]

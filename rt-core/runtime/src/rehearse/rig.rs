@@ -1,12 +1,12 @@
 //! Drives the stepped loops in a rehearsal: a simulated device, orders, and refusals.
 
-use super::NeedleRun;
-use crate::rt::exchange::{HapticOrder, Notice, TissueOrder, TissueStep};
+use crate::rt::exchange::{HapticOrder, Notice, TissueOrder, TissueStep, hand_order};
 use crate::rt::haptic_tape::HapticMemory;
 use crate::rt::world::World;
 use crate::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
-use stylet_hw::{DeviceInfo, Hand, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
-use stylet_shm_schema::{HandMove, HapticState, RefusalCode, SeedPose};
+use nalgebra::Vector3;
+use stylet_hw::{DeviceInfo, Hand, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_shm_schema::{HandMove, HapticState, NeedleRehearsal, RefusalCode, SeedPose};
 use stylet_sim::active::Active;
 use stylet_sim::line::{LeftNeedles, LeftRecord, ReadyLine};
 use stylet_sim::tissue::Deformed;
@@ -22,15 +22,16 @@ pub struct Rig {
 }
 
 impl Rig {
-    pub fn new(world: Box<World>, active: &Active, (device, hand): (&DeviceInfo, Hand), run: &NeedleRun) -> Self {
+    pub fn new(world: Box<World>, active: &Active, (device, hand): (&DeviceInfo, Hand), run: &NeedleRehearsal) -> Self {
+        let direction = Vector3::from(run.direction);
         let phantom = SimulatedPhantom::new(SimulatedPhantomConfig {
             info: DeviceInfo {
                 simulated: true,
                 ..*device
             },
             hand,
-            start_tip_in_world: run.entry_m - run.direction * RUN_UP_M,
-            start_direction: run.direction,
+            start_tip_in_world: Vector3::from(run.entry_m) - direction * RUN_UP_M,
+            start_direction: direction,
             ..SimulatedPhantomConfig::default()
         });
         let memory = HapticMemory::new(device, (active.needle, active.force), 0);
@@ -115,12 +116,12 @@ impl Rig {
 
     pub fn engage(&mut self) {
         // Both rings are emptied before the script continues, and are never full.
-        let _ = self.loops.control.haptic_orders.push(HapticOrder::Engage { ticket: 0 });
+        let _ = self.loops.control.haptic_orders.push((0, HapticOrder::Engage));
     }
 
     #[cfg(test)]
     pub fn reset(&mut self) {
-        let _ = self.loops.control.haptic_orders.push(HapticOrder::Reset { ticket: 0 });
+        let _ = self.loops.control.haptic_orders.push((0, HapticOrder::Reset));
         let _ = self
             .loops
             .control
@@ -129,30 +130,16 @@ impl Rig {
     }
 
     pub fn leave_needle(&mut self) {
-        let _ = self
-            .loops
-            .control
-            .haptic_orders
-            .push(HapticOrder::LeaveNeedle { ticket: 0 });
+        let _ = self.loops.control.haptic_orders.push((0, HapticOrder::LeaveNeedle));
     }
 
     /// Forgets the peaks of stabilising needles, which do not count for this needle.
     pub fn forget_peaks(&mut self) {
-        self.loops.haptic.state.peak_force_n = 0.0;
+        self.loops.haptic.memory.state.peak_force_n = 0.0;
     }
 
     pub fn move_hand(&mut self, hand: &HandMove) {
-        let goal = HandGoal {
-            tip_in_world: hand.tip_m.into(),
-            direction: hand.direction.into(),
-            speed_m_per_s: hand.speed_m_per_s,
-            acceleration_m_per_s2: hand.acceleration_m_per_s2,
-        };
-        let _ = self.loops.control.haptic_orders.push(HapticOrder::Hand {
-            ticket: 0,
-            goal,
-            promise: None,
-        });
+        let _ = self.loops.control.haptic_orders.push((0, hand_order(hand, None, None)));
     }
 
     pub fn drop_seed(&mut self, strand_pitch_m: Option<f64>) {
@@ -161,7 +148,7 @@ impl Rig {
     }
 
     pub fn state(&self) -> &HapticState {
-        &self.loops.haptic.state
+        &self.loops.haptic.memory.state
     }
 
     pub fn seeds(&self) -> Vec<SeedPose> {
@@ -176,12 +163,11 @@ impl Rig {
     #[cfg(test)]
     pub fn draw_needle(&mut self, number: u64) {
         let order = HapticOrder::DrawNeedle {
-            ticket: 0,
             number,
             speed_m_per_s: 0.05,
             promise: None,
         };
-        let _ = self.loops.control.haptic_orders.push(order);
+        let _ = self.loops.control.haptic_orders.push((0, order));
     }
 
     #[cfg(test)]

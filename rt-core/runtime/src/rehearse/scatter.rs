@@ -1,10 +1,9 @@
 //! Scatter of a needle about its planned axis before it meets tissue: offset at the hole, and deflection by template
 //! and skin.
 
-use super::NeedleRun;
 use nalgebra::Vector3;
 use sha2::{Digest, Sha256};
-use stylet_shm_schema::{ParameterId, ParameterSet};
+use stylet_shm_schema::{NeedleRehearsal, ParameterId, ParameterSet};
 
 /// Standard deviations in each direction across the needle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,8 +26,8 @@ impl Scatter {
 
     /// Returns the needle as it goes in. The numbers depend only on the seed and on the planned axis, so neither the
     /// order of needles nor earlier rehearsals matter.
-    pub fn apply(&self, run: &NeedleRun) -> NeedleRun {
-        let along = run.direction;
+    pub fn apply(&self, run: &NeedleRehearsal) -> NeedleRehearsal {
+        let (planned_m, along) = (Vector3::from(run.entry_m), Vector3::from(run.direction));
         let least = along.iamin();
         let mut other = Vector3::zeros();
         other[least] = 1.0;
@@ -37,23 +36,24 @@ impl Scatter {
         let [a, b, c, d] = self.normals(run);
         let beside_m = (across[0] * a + across[1] * b) * self.entry_m;
         let turned = along + across[0] * (c * self.deflection_rad).tan() + across[1] * (d * self.deflection_rad).tan();
-        let (entry_m, direction) = (run.entry_m + beside_m, turned.normalize());
-        let moved = |drop_m: &Vector3<f64>| entry_m + direction * (drop_m - run.entry_m).dot(&along);
-        NeedleRun {
-            entry_m,
-            direction,
+        let (entry_m, direction) = (planned_m + beside_m, turned.normalize());
+        let moved = |drop_m: &[f64; 3]| {
+            let depth_m = (Vector3::from(*drop_m) - planned_m).dot(&along);
+            (entry_m + direction * depth_m).into()
+        };
+        NeedleRehearsal {
+            entry_m: entry_m.into(),
+            direction: direction.into(),
             drops_m: run.drops_m.iter().map(moved).collect(),
-            stabilising: run.stabilising.clone(),
-            earlier: run.earlier.clone(),
-            ..*run
+            ..run.clone()
         }
     }
 
     /// Draws four normally distributed numbers.
-    fn normals(&self, run: &NeedleRun) -> [f64; 4] {
+    fn normals(&self, run: &NeedleRehearsal) -> [f64; 4] {
         let mut hash = Sha256::new();
         hash.update(self.seed.to_le_bytes());
-        for value in run.entry_m.iter().chain(run.direction.iter()) {
+        for value in run.entry_m.iter().chain(&run.direction) {
             hash.update(value.to_le_bytes());
         }
         let digest: [u8; 32] = hash.finalize().into();
@@ -73,10 +73,10 @@ impl Scatter {
 mod tests {
     use super::*;
 
-    fn run(x_m: f64) -> NeedleRun {
-        NeedleRun {
-            entry_m: Vector3::new(x_m, 0.02, 0.0),
-            direction: Vector3::z(),
+    fn run(x_m: f64) -> NeedleRehearsal {
+        NeedleRehearsal {
+            entry_m: [x_m, 0.02, 0.0],
+            direction: [0.0, 0.0, 1.0],
             insert_m_per_s: 0.05,
             retract_m_per_s: 0.05,
             approach_m_per_s: 0.1,
@@ -85,7 +85,7 @@ mod tests {
             strand_pitch_m: None,
             stabilising: Vec::new(),
             earlier: Vec::new(),
-            drops_m: vec![Vector3::new(x_m, 0.02, 0.08)],
+            drops_m: vec![[x_m, 0.02, 0.08]],
         }
     }
 
@@ -104,15 +104,14 @@ mod tests {
         let first = scatter(1.0).apply(&planned);
         assert_eq!(first, scatter(1.0).apply(&planned));
         assert_ne!(first, scatter(2.0).apply(&planned));
+        let apart = |to: [f64; 3], from: [f64; 3]| Vector3::from(to) - Vector3::from(from);
         assert_ne!(
-            first.entry_m - planned.entry_m,
-            scatter(1.0).apply(&run(0.02)).entry_m - run(0.02).entry_m
+            apart(first.entry_m, planned.entry_m),
+            apart(scatter(1.0).apply(&run(0.02)).entry_m, run(0.02).entry_m)
         );
-        assert!((first.direction.norm() - 1.0).abs() < 1e-12);
-        assert!(
-            ((first.drops_m[0] - first.entry_m).norm() - 0.08).abs() < 1e-12,
-            "as deep as planned"
-        );
+        assert!((Vector3::from(first.direction).norm() - 1.0).abs() < 1e-12);
+        let depth_m = apart(first.drops_m[0], first.entry_m).norm();
+        assert!((depth_m - 0.08).abs() < 1e-12, "as deep as planned");
     }
 
     /// Moreira 2018: 6.3 mm median over 188 insertions; the depth of 80 mm is assumed here.
@@ -121,8 +120,8 @@ mod tests {
         let mut beside_mm: Vec<f64> = (0..20_000)
             .map(|n| {
                 let planned = run(1e-6 * f64::from(n));
-                let off = scatter(1.0).apply(&planned).drops_m[0] - planned.drops_m[0];
-                1e3 * off.x.hypot(off.y)
+                let (now, then) = (scatter(1.0).apply(&planned).drops_m[0], planned.drops_m[0]);
+                1e3 * (now[0] - then[0]).hypot(now[1] - then[1])
             })
             .collect();
         beside_mm.sort_by(f64::total_cmp);

@@ -1,18 +1,19 @@
 //! Drives the procedure over the ticks of a rehearsal, in simulated time.
 
+use super::RehearseError;
 use super::rig::Rig;
-use super::{NeedleRun, RehearseError};
 use nalgebra::Vector3;
 use stylet_procedure::{HandRequest, NeedleWay, Next, Observed, Pace, Procedure, Reply};
+use stylet_shm_schema::NeedleRehearsal;
 
 pub struct Script(Procedure);
 
 impl Script {
-    fn way(run: &NeedleRun) -> (NeedleWay, Pace) {
+    fn way(run: &NeedleRehearsal) -> (NeedleWay, Pace) {
         let way = NeedleWay {
-            entry_m: run.entry_m,
-            direction: run.direction,
-            drops_m: run.drops_m.clone(),
+            entry_m: run.entry_m.into(),
+            direction: run.direction.into(),
+            drops_m: run.drops_m.iter().map(|&drop| drop.into()).collect(),
             retract_to_m: run.retract_to_m,
             strand_pitch_m: run.strand_pitch_m,
         };
@@ -25,7 +26,7 @@ impl Script {
         (way, pace)
     }
 
-    pub fn new(run: &NeedleRun) -> Self {
+    pub fn new(run: &NeedleRehearsal) -> Self {
         let (way, pace) = Self::way(run);
         let stabilising = run.stabilising.iter().map(|needle| {
             let (entry_m, direction) = (Vector3::from(needle.entry_m), Vector3::from(needle.direction));
@@ -41,8 +42,8 @@ impl Script {
     }
 
     /// Script of a needle, given those that already stay in.
-    pub fn beside(run: &NeedleRun) -> Self {
-        let alone = NeedleRun {
+    pub fn beside(run: &NeedleRehearsal) -> Self {
+        let alone = NeedleRehearsal {
             stabilising: Vec::new(),
             ..run.clone()
         };
@@ -50,7 +51,7 @@ impl Script {
     }
 
     /// Script of a needle that comes and goes without dropping a seed.
-    pub fn pass(run: &NeedleRun) -> Self {
+    pub fn pass(run: &NeedleRehearsal) -> Self {
         let (way, pace) = Self::way(run);
         Self(Procedure::pass(way, pace))
     }

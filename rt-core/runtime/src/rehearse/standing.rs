@@ -1,13 +1,12 @@
 //! State of needles that stay in after earlier needles: each needle that comes and goes drags them, and they hold the
 //! tissue elsewhere from then on.
 
-use super::rig::Rig;
 use super::script::Script;
-use super::{LONGEST_S, Motion, NeedleRun, RehearseError, Rehearsed, Stage, perform};
+use super::{Motion, RehearseError, Rehearsed, Stage, drive, perform};
 use nalgebra::Vector3;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use stylet_hw::Hand;
-use stylet_shm_schema::{ParameterSet, StabilisingNeedle};
+use stylet_shm_schema::{NeedleRehearsal, ParameterSet, StabilisingNeedle};
 use stylet_sim::active::Active;
 use stylet_sim::line::{LeftRecord, ReadyLine};
 
@@ -38,7 +37,7 @@ impl Stage {
     /// theirs and the needle's.
     pub(super) fn rehearse_after(
         &mut self,
-        run: &NeedleRun,
+        run: &NeedleRehearsal,
         set: &ParameterSet,
         active: &Active,
         mut lines: Vec<ReadyLine>,
@@ -63,7 +62,7 @@ impl Stage {
     /// Returns their state after all earlier needles.
     fn standing(
         &mut self,
-        run: &NeedleRun,
+        run: &NeedleRehearsal,
         set: &ParameterSet,
         active: &Active,
         lines: &[ReadyLine],
@@ -113,7 +112,7 @@ impl Stage {
     /// Inserts the needles that stay in, and takes the hand out again.
     fn put_in(
         &mut self,
-        run: &NeedleRun,
+        run: &NeedleRehearsal,
         active: &Active,
         lines: &[ReadyLine],
         stop: &AtomicBool,
@@ -121,7 +120,7 @@ impl Stage {
         let mut rig = self.rig(run, active)?;
         rig.take_lines_of_many(lines.to_vec());
         let mut script = Script::new(run);
-        let done = drive(&mut rig, stop, |rig| {
+        let done = drive(&mut rig, stop, |rig, _| {
             script.advance(rig)?;
             Ok(script.is_at_needle())
         });
@@ -133,18 +132,17 @@ impl Stage {
     /// Moves one needle to its depth and out again, with those that stay in place.
     fn come_and_go(
         &mut self,
-        (run, needle): (&NeedleRun, &StabilisingNeedle),
+        (run, needle): (&NeedleRehearsal, &StabilisingNeedle),
         active: &Active,
         lines: &[ReadyLine],
         before: &LeftRecord,
         stop: &AtomicBool,
     ) -> Result<LeftRecord, RehearseError> {
-        let direction = Vector3::from(needle.direction);
-        let entry_m = Vector3::from(needle.entry_m);
-        let run = NeedleRun {
-            entry_m,
-            direction,
-            drops_m: vec![entry_m + direction * needle.depth_m],
+        let to_m = Vector3::from(needle.entry_m) + Vector3::from(needle.direction) * needle.depth_m;
+        let run = NeedleRehearsal {
+            entry_m: needle.entry_m,
+            direction: needle.direction,
+            drops_m: vec![to_m.into()],
             stabilising: Vec::new(),
             earlier: Vec::new(),
             ..run.clone()
@@ -162,29 +160,10 @@ impl Stage {
         if rig.stand(lines, before) {
             rig.take_lines(vec![own]);
             let mut script = Script::pass(&run);
-            done = drive(&mut rig, stop, |rig| script.advance(rig));
+            done = drive(&mut rig, stop, |rig, _| script.advance(rig));
         }
         let record = rig.standing();
         self.world = Some(rig.into_world());
         done.map(|()| record)
     }
-}
-
-/// Ticks until `advance` returns true.
-fn drive(
-    rig: &mut Rig,
-    stop: &AtomicBool,
-    mut advance: impl FnMut(&mut Rig) -> Result<bool, RehearseError>,
-) -> Result<(), RehearseError> {
-    while rig.seconds() < LONGEST_S {
-        // SYNC: set by the control thread when it ends; nothing but the flag is carried.
-        if stop.load(Ordering::Relaxed) {
-            return Err(RehearseError::Stopped);
-        }
-        rig.tick();
-        if advance(rig)? {
-            return Ok(());
-        }
-    }
-    Err(RehearseError::TooLong)
 }

@@ -60,51 +60,6 @@ enum Problem {
     Decoding(postcard::Error),
 }
 
-/// Properties of the device that the gate and the estimator use; fields as in [`DeviceInfo`].
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct DeviceFigures {
-    /// Largest force, N.
-    pub peak_force_n: f64,
-    /// Largest force that can be held indefinitely, N.
-    pub continuous_force_n: f64,
-    /// Largest torque, N m.
-    pub peak_torque_nm: f64,
-    /// Stiffness up to which the device is stable, N/m.
-    pub max_stiffness_n_per_m: f64,
-    /// Resolution of the position sensors at the tip, m.
-    pub position_step_m: f64,
-    /// No hardware.
-    pub simulated: bool,
-}
-
-impl From<&DeviceInfo> for DeviceFigures {
-    fn from(info: &DeviceInfo) -> Self {
-        Self {
-            peak_force_n: info.peak_force_n,
-            continuous_force_n: info.continuous_force_n,
-            peak_torque_nm: info.peak_torque_nm,
-            max_stiffness_n_per_m: info.max_stiffness_n_per_m,
-            position_step_m: info.position_step_m,
-            simulated: info.simulated,
-        }
-    }
-}
-
-impl DeviceFigures {
-    /// Returns the device's properties as the loops use them.
-    pub fn info(&self) -> DeviceInfo {
-        DeviceInfo {
-            name: "device of the recording",
-            peak_force_n: self.peak_force_n,
-            continuous_force_n: self.continuous_force_n,
-            peak_torque_nm: self.peak_torque_nm,
-            max_stiffness_n_per_m: self.max_stiffness_n_per_m,
-            position_step_m: self.position_step_m,
-            simulated: self.simulated,
-        }
-    }
-}
-
 /// The last ticks of both loops.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Flight {
@@ -116,8 +71,8 @@ pub struct Flight {
     pub reason: String,
     /// Name of the device.
     pub device_name: String,
-    /// Properties of the device.
-    pub device: DeviceFigures,
+    /// Properties of the device, without its name.
+    pub device: DeviceInfo,
     /// Time between two ticks of the force loop, s.
     pub haptic_period_s: f64,
     /// Time between two ticks of the tissue loop, s.
@@ -140,8 +95,8 @@ pub struct Flight {
 pub struct SecondFigures {
     /// Name of the device.
     pub device_name: String,
-    /// Properties of the device.
-    pub device: DeviceFigures,
+    /// Properties of the device, without its name.
+    pub device: DeviceInfo,
     /// Time between two ticks of its loop, s.
     pub period_s: f64,
 }

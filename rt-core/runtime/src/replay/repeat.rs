@@ -3,7 +3,9 @@
 use super::file::Flight;
 use super::lines::{LinesAgain, hand_line};
 use crate::lines::{NoLine, NoProbe};
-use crate::rt::exchange::{HapticOrder, TissueOrder};
+use crate::rt::device_tape::DeviceEntry;
+use crate::rt::exchange::{HapticOrder, Ticket, TissueOrder};
+use crate::rt::hand::DeviceAnswer;
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticEntry, HapticFlight, HapticTape};
 use crate::rt::line_loads::AllLoads;
@@ -13,11 +15,12 @@ use crate::rt::tissue::TissueLoop;
 use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueFlight, TissueMemory, TissueTape};
 use crate::rt::wiring::{Capacities, Wiring};
 use crate::rt::world::World;
+use std::iter::Peekable;
 use std::sync::Arc;
 use stylet_hw::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
-use stylet_shm_schema::TickRecord;
+use stylet_shm_schema::{DeadlineTotals, TickRecord};
 use stylet_sim::line::LeftNeedles;
-use stylet_sim::tissue::TissueError;
+use stylet_sim::tissue::{Held, TissueError};
 
 /// The result of repeating one loop.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -56,18 +59,18 @@ impl Repeated {
 /// A device that returns the recorded answers.
 pub(super) struct RecordedDevice {
     info: DeviceInfo,
-    answers: std::vec::IntoIter<(Result<Sample, DeviceFault>, bool)>,
+    answers: std::vec::IntoIter<DeviceAnswer>,
     write_failed: bool,
 }
 
 impl RecordedDevice {
-    /// Pairs each answer with whether the force was refused after it.
-    pub fn new(info: DeviceInfo, answers: Vec<(Result<Sample, DeviceFault>, bool)>) -> Self {
-        Self {
+    pub fn boxed<R, T>(info: DeviceInfo, ticks: &[DeviceEntry<R, T>]) -> Box<Self> {
+        let answers: Vec<_> = ticks.iter().map(|tick| tick.answer).collect();
+        Box::new(Self {
             info,
             answers: answers.into_iter(),
             write_failed: false,
-        }
+        })
     }
 }
 
@@ -77,9 +80,9 @@ impl Device for RecordedDevice {
     }
 
     fn read(&mut self, _dt_s: f64) -> Result<Sample, DeviceFault> {
-        let (read, write_failed) = self.answers.next().unwrap_or((Err(DeviceFault::NotConnected), true));
-        self.write_failed = write_failed;
-        read
+        let answer = self.answers.next().unwrap_or_default();
+        self.write_failed = answer.write_failed;
+        answer.read
     }
 
     fn write(&mut self, _wrench: &Wrench) -> Result<(), DeviceFault> {
@@ -109,10 +112,9 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
         mut control,
         ..
     } = Wiring::new(capacities(recorded.orders.len()), Some(tape), None);
-    let answers = recorded.ticks.iter().map(|e| (e.read, e.write_failed)).collect();
-    let device = RecordedDevice::new(flight.device.info(), answers);
+    let device = RecordedDevice::boxed(flight.device, &recorded.ticks);
     let (session_id, period_s) = (flight.session_id, flight.haptic_period_s);
-    let mut again = HapticLoop::new(session_id, Box::new(device), ports, &recorded.memory, period_s);
+    let mut again = HapticLoop::new(session_id, device, ports, &recorded.memory, period_s);
     if let Some(state) = &recorded.line_state {
         let generation = recorded.memory.line;
         let mut line = hand_line(flight, generation)?;
@@ -132,31 +134,45 @@ pub fn haptic(flight: &Flight, recorded: &HapticFlight) -> Result<Repeated, Repe
     let mut lines = recorded.lines.iter().peekable();
     let mut outside = recorded.outside.iter().peekable();
     for (index, entry) in recorded.ticks.iter().enumerate() {
-        while let Some((_, line)) = lines.next_if(|(tick, _)| *tick == index as u64) {
+        for line in at(&mut lines, index) {
             let _ = control.lines.push(hand_line(flight, *line)?);
         }
-        while let Some((_, order)) = orders.next_if(|(tick, _)| *tick == index as u64) {
-            // Handing over a tape does not affect the loop.
-            if !matches!(order, HapticOrder::HandOverTape) {
-                let _ = control.haptic_orders.push(*order);
-            }
-        }
+        at(&mut orders, index).for_each(|order| push_order(&mut control.haptic_orders, *order));
         // Without a probe on a line, the loop must find no input here rather than that of an older tick.
         let of_lines = tissue.outside.input_buffer_mut();
         of_lines.clear();
-        while let Some((_, of_line)) = outside.next_if(|(tick, _)| *tick == index as u64) {
+        for of_line in at(&mut outside, index) {
             if let Some(line) = of_lines.add() {
                 *line = *of_line;
             }
         }
         tissue.outside.publish();
-        tissue.response.write(entry.tissue);
+        tissue.response.write(entry.response);
         again.tick(entry.record.due_ns, entry.woke_ns, entry.record.missed);
         while control.haptic_notices.pop().is_ok() {}
         while control.old_hand_lines.pop().is_ok() {}
         found.count(index, control.records.pop().is_ok_and(|record| is_same(&record, entry)));
     }
     Ok(found)
+}
+
+/// Returns the values of that tick.
+pub(super) fn at<'a, T: 'a>(
+    values: &mut Peekable<impl Iterator<Item = &'a (u64, T)>>,
+    index: usize,
+) -> impl Iterator<Item = &'a T> {
+    std::iter::from_fn(move || {
+        values
+            .next_if(|(tick, _)| *tick == index as u64)
+            .map(|(_, value)| value)
+    })
+}
+
+/// Handing over a tape does not affect the loop.
+pub(super) fn push_order(orders: &mut rtrb::Producer<(Ticket, HapticOrder)>, order: HapticOrder) {
+    if order != HapticOrder::HandOverTape {
+        let _ = orders.push((0, order));
+    }
 }
 
 /// Returns capacities with room for all orders of the recording in one tick.
@@ -221,7 +237,7 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
         ..
     } = Wiring::new(capacities(recorded.orders.len()), None, Some(tape));
     let mut again = TissueLoop::new(flight.session_id, ports, world()?, flight.tissue_period_s);
-    let before = match recorded.memory.response.line {
+    let before = match recorded.memory.state.response.line {
         0 => None,
         line => Some(lines.take(line).ok_or(RepeatError::NoLine(line))?),
     };
@@ -237,12 +253,7 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
             return Err(RepeatError::OtherProbe);
         }
     }
-    let mut all = AllLoads {
-        line: recorded.memory.loads,
-        ..AllLoads::default()
-    };
-    *haptic.loads.input_buffer_mut() = all;
-    haptic.loads.publish();
+    let mut all = AllLoads::default();
     let mut compare = Bodies {
         reference,
         found: Repeated {
@@ -251,7 +262,6 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
             ..Repeated::default()
         },
     };
-    let mut loads = recorded.loads.iter().peekable();
     let mut left = recorded.left.iter().peekable();
     let mut orders = recorded.orders.iter().peekable();
     let mut probe = recorded.probe.iter().peekable();
@@ -259,20 +269,13 @@ pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -
         if let Some((_, memory)) = recorded.middle.as_ref().filter(|(tick, _)| *tick == index as u64) {
             compare.positions(&again, memory);
         }
-        while let Some((_, order)) = orders.next_if(|(tick, _)| *tick == index as u64) {
+        for order in at(&mut orders, index) {
             let _ = control.tissue_orders.push(order_of(order, &mut lines)?);
         }
-        while let Some((_, loads)) = loads.next_if(|(tick, _)| *tick == index as u64) {
-            all.line = *loads;
-            *haptic.loads.input_buffer_mut() = all;
-            haptic.loads.publish();
-        }
-        while let Some((_, left)) = left.next_if(|(tick, _)| *tick == index as u64) {
-            all.left = *left;
-            *haptic.loads.input_buffer_mut() = all;
-            haptic.loads.publish();
-        }
-        let pressed = probe.next_if(|(tick, _)| *tick == index as u64).map(|(_, entry)| entry);
+        all.line = entry.loads;
+        at(&mut left, index).for_each(|left| all.left = *left);
+        haptic.loads.write(all);
+        let pressed = at(&mut probe, index).last();
         if let Some(entry) = pressed {
             again.move_probe(entry.pose);
         }
@@ -305,29 +308,21 @@ fn order_of(order: &TapedOrder, lines: &mut LinesAgain) -> Result<TissueOrder, R
     })
 }
 
-/// True if every bit is the same, except the durations of work.
+/// True if every bit is the same, except what depends on the clock.
 fn same_step(again: &TissueLoop, entry: &TissueEntry) -> bool {
-    let bits = |v: &[f64]| v.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-    let response = |r: &TissueResponse| {
-        let numbers = bits(&[r.worst_residual, r.least_corner, r.folded_from_m]);
-        let places = [r.contact_in_scene, r.path_direction, r.solved_tip_in_scene].map(|v| bits(v.as_slice()));
-        (
-            r.time_ns,
-            r.tick,
-            r.contact,
-            r.line,
-            (r.seed_count, r.outside),
-            (r.unsolved, r.solved_ns),
-            numbers,
-            places,
-        )
+    let bits = |response: &TissueResponse, held: Option<Held>, residual: f64| {
+        let without_times = TissueResponse {
+            worst_work_ns: 0,
+            worst_wake_ns: 0,
+            missed: 0,
+            since_start: DeadlineTotals::default(),
+            since_armed: DeadlineTotals::default(),
+            ..*response
+        };
+        postcard::to_stdvec(&(without_times, held, residual)).ok()
     };
     let (held, residual) = again.last_step();
-    let place =
-        |held: Option<stylet_sim::tissue::Held>| held.map(|h| (h.element, bits(&h.position_m), h.patch_m.to_bits()));
-    response(again.response()) == response(&entry.response)
-        && place(held) == place(entry.held)
-        && residual.to_bits() == entry.residual.to_bits()
+    bits(again.response(), held, residual) == bits(&entry.response, entry.held, entry.residual)
 }
 
 /// True if the probe pushes the hand with the same bits.

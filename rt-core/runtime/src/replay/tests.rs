@@ -1,6 +1,6 @@
 //! An insertion on a needle line, recorded and repeated: by both loops, stepped, in a small elastic body.
 
-use super::file::{DeviceFigures, Flight};
+use super::file::Flight;
 use super::lines::{LineProgress, solve_again};
 use super::repeat::{self, RepeatError};
 use crate::lines::LineBody;
@@ -12,7 +12,7 @@ use crate::stepped::{HAPTIC_TICKS_PER_TISSUE_TICK, SteppedLoops};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
+use stylet_hw::{Device, DeviceInfo, HandGoal, SimulatedPhantom, SimulatedPhantomConfig};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::line::{LineSource, NeedleBending, PronyTerm, ReadyLine};
@@ -29,7 +29,7 @@ struct Recorded {
     entry_m: Vector3<f64>,
     line: ReadyLine,
     kept: Vec<LineSource>,
-    figures: DeviceFigures,
+    figures: DeviceInfo,
     force: ForceParameters,
     heap_calls: u64,
 }
@@ -57,14 +57,21 @@ impl Recorded {
         let (low, high) = scene.lattice.bounds_m();
         let entry_m = Vector3::new((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0 + above_m, low[2]);
         let body = LineBody::of_source(&source, tissue).expect("valid").expect("has lines");
-        let line = body.prepare(1, entry_m.into(), [0.0, 0.0, 1.0], force.bending.is_on(), &mut || true);
+        let line = body.prepare(
+            1,
+            entry_m.into(),
+            [0.0, 0.0, 1.0],
+            force.bending.is_on(),
+            &[],
+            &mut || true,
+        );
         let limits = TissueParameters::default().validate().expect("valid");
         let world = Box::new(World::new(scene, tissue, limits, 1).expect("valid"));
         let device = SimulatedPhantom::new(SimulatedPhantomConfig {
             start_tip_in_world: entry_m - Vector3::z() * 0.008,
             ..SimulatedPhantomConfig::default()
         });
-        let figures = DeviceFigures::from(&device.info());
+        let figures = device.info();
         let parameters = (NeedleParameters::default(), ForceParameters::default());
         let memory = HapticMemory::new(&device.info(), parameters, 0);
         let tapes = (
@@ -84,7 +91,7 @@ impl Recorded {
     }
 
     fn haptic(&mut self, order: HapticOrder) {
-        self.loops.control.haptic_orders.push(order).expect("room");
+        self.loops.control.haptic_orders.push((0, order)).expect("room");
     }
 
     /// Gives both loops the line under that number.
@@ -105,8 +112,8 @@ impl Recorded {
             acceleration_m_per_s2: 1.0,
         };
         self.haptic(HapticOrder::Hand {
-            ticket: 0,
             goal,
+            up: None,
             promise: None,
         });
     }
@@ -125,13 +132,12 @@ impl Recorded {
     /// Two lines, one after the other, with changes of parameters, a seed and turns between. Ends with the needle in
     /// tissue.
     fn insert(&mut self) {
-        self.haptic(HapticOrder::Engage { ticket: 0 });
+        self.haptic(HapticOrder::Engage);
         self.give_line(1);
         self.run(0.1);
         self.go(5e-3);
         self.run(1.9);
         self.haptic(HapticOrder::Parameters {
-            ticket: 0,
             generation: 2,
             needle: NeedleParameters::default(),
             force: ForceParameters {
@@ -267,9 +273,9 @@ fn a_recorded_insertion_of_a_needle_that_bends_repeats_in_every_bit() {
         let tissue = flight.tissue.expect("recorded");
         assert!(
             tissue
-                .loads
+                .ticks
                 .iter()
-                .any(|(_, loads)| loads.across_n()[0].iter().any(|f| *f != 0.0))
+                .any(|tick| tick.loads.across_n()[0].iter().any(|f| *f != 0.0))
         );
     }
 }
@@ -308,7 +314,7 @@ fn repeats_in_every_bit(kind: TissueKind, force: &ForceParameters) -> Flight {
     );
     assert_eq!(haptic.lines.iter().map(|l| l.1).collect::<Vec<_>>(), [2]);
     let tissue = flight.tissue.as_ref().expect("recorded");
-    assert!(tissue.memory.loads.is_any() && tissue.memory.in_by_line && tissue.middle.is_some());
+    assert!(tissue.memory.state.loads.is_any() && tissue.memory.state.in_by_line && tissue.middle.is_some());
     assert!(
         tissue.memory.body.iter().any(|&byte| byte != 0),
         "tissue that is not at rest"
@@ -336,8 +342,8 @@ fn repeats_in_every_bit(kind: TissueKind, force: &ForceParameters) -> Flight {
 fn what_was_changed_is_found(flight: &Flight) {
     let mut other = flight.clone();
     let tissue = other.tissue.as_mut().expect("recorded");
-    let late = tissue.loads.last_mut().expect("on a line");
-    late.1.loads_n[0] += 0.1;
+    let mut ticks = tissue.ticks.iter_mut().rev();
+    ticks.find(|tick| tick.loads.is_any()).expect("on a line").loads.loads_n[0] += 0.1;
     let tissue = other.tissue.as_ref().expect("recorded");
     let lines = solve_again(&other, tissue, None, &mut |_| {}).expect("solved");
     let found = repeat::tissue(&other, tissue, lines).expect("can be run");

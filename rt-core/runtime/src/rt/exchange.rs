@@ -7,7 +7,7 @@ use crate::rt::world::World;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use stylet_hw::HandGoal;
-use stylet_shm_schema::{Fault, RefusalCode};
+use stylet_shm_schema::{Fault, HandMove, RefusalCode};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::Limits;
 use stylet_sim::line::BodyLine;
@@ -18,76 +18,51 @@ use stylet_sim::probe::BodyProbe;
 /// Number that links an order to the host's request; 0 if no answer is expected.
 pub type Ticket = u64;
 
-/// Orders from the control thread to the haptic loop.
+/// Orders from the control thread to a loop that owns a device. Each comes with a [`Ticket`].
 // Copied through a ring: a box would be freed in the loop.
 #[allow(clippy::large_enum_variant)]
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum HapticOrder {
     /// Use these parameters from this tick on.
     Parameters {
-        /// Number of the request.
-        ticket: Ticket,
         /// Rises with each change of a run.
         generation: u64,
         /// The needle and its effect on tissue.
         needle: NeedleParameters,
-        /// The terms of the force.
+        /// The terms of the force. The second device uses those of the gate.
         force: ForceParameters,
     },
     /// Move the simulated hand to a goal.
     Hand {
-        /// Number of the request.
-        ticket: Ticket,
         /// Place, direction, speed and acceleration.
         goal: HandGoal,
+        /// Direction of the tool's +y; `None`: the hand does not roll it.
+        up: Option<Vector3<f64>>,
         /// Promise of the host; without one the motion needs no renewal.
         promise: Option<Promise>,
     },
+    /// Hold the simulated hand where it is.
+    StopHand,
     /// Turn the force on; re-arms after a fault.
-    Engage {
-        /// Number of the request.
-        ticket: Ticket,
-    },
+    Engage,
     /// Ramp the force out.
-    Disengage {
-        /// Number of the request.
-        ticket: Ticket,
-    },
-    /// An exercise: treat the device as lost, or restore it.
-    LoseDevice {
-        /// Number of the request.
-        ticket: Ticket,
-        /// Lost from this tick on.
-        lost: bool,
-    },
-    /// An exercise: move the body to this offset from its place in the scene, scene frame, m.
-    MoveBody {
-        /// Number of the request.
-        ticket: Ticket,
-        /// Reached at the pace of a patient.
-        to_m: [f64; 3],
-    },
+    Disengage,
     /// End the contact, clear peaks and counters, and undo exercises.
-    Reset {
-        /// Number of the request.
-        ticket: Ticket,
-    },
+    Reset,
+    /// Renew what this host moves.
+    KeepMoving(Promise),
+    /// Hand the flight recording over; a new one begins once the tape is back.
+    HandOverTape,
+    /// To the needle alone, as all that follow. An exercise: treat the device as lost from this tick on, or restore it.
+    LoseDevice(bool),
+    /// An exercise: move the body to this offset from its place in the scene, scene frame, m, at the pace of a patient.
+    MoveBody([f64; 3]),
     /// Leave the needle where it is.
-    LeaveNeedle {
-        /// Number of the request.
-        ticket: Ticket,
-    },
-    /// Take a needle that stays in.
-    TakeNeedle {
-        /// Number of the request.
-        ticket: Ticket,
-        /// Number of its line.
-        number: u64,
-    },
+    LeaveNeedle,
+    /// Take a needle that stays in, by the number of its line.
+    TakeNeedle(u64),
     /// Draw out a needle that stays in.
     DrawNeedle {
-        /// Number of the request.
-        ticket: Ticket,
         /// Number of its line.
         number: u64,
         /// Speed of the needle.
@@ -95,17 +70,22 @@ pub enum HapticOrder {
         /// As for a goal.
         promise: Option<Promise>,
     },
-    /// Renew what this host moves.
-    KeepMoving(Promise),
     /// The loop made no tick within the supervisor's patience: the force stays off until the operator re-arms.
     StoodStill,
-    /// Hand the flight recording over; a new one begins once the tape is back.
-    HandOverTape,
-    /// Hold the simulated hand where it is.
-    StopHand {
-        /// Number of the request.
-        ticket: Ticket,
-    },
+}
+
+/// Returns the order to move a hand.
+pub fn hand_order(hand: &HandMove, up: Option<[f64; 3]>, promise: Option<Promise>) -> HapticOrder {
+    HapticOrder::Hand {
+        goal: HandGoal {
+            tip_in_world: hand.tip_m.into(),
+            direction: hand.direction.into(),
+            speed_m_per_s: hand.speed_m_per_s,
+            acceleration_m_per_s2: hand.acceleration_m_per_s2,
+        },
+        up: up.map(Vector3::from),
+        promise,
+    }
 }
 
 /// Orders to the tissue loop that a flight recording repeats unchanged.
@@ -161,7 +141,7 @@ pub enum TissueOrder {
     },
 }
 
-/// Events that either loop reports to the control thread, once each.
+/// Report of a loop to the control thread.
 #[derive(Clone, Copy, Debug)]
 pub enum Notice {
     /// An order was carried out.
@@ -178,87 +158,54 @@ pub enum Notice {
         /// The loop's reason.
         why: RefusalCode,
     },
-    /// Parameters are in use.
-    ParametersActive {
-        /// Number of the request.
-        ticket: Ticket,
-        /// Rises with each change of a run.
-        generation: u64,
-        /// Tick of the loop, from 1.
-        tick: u64,
-    },
-    /// The tip has met the body.
-    Contact {
+    /// Something happened, once.
+    Event {
         /// Tick of the loop, from 1.
         tick: u64,
         /// `CLOCK_MONOTONIC`, ns.
         time_ns: u64,
-        /// Place of the tip, scene frame, m.
-        position_m: Vector3<f64>,
+        /// The event.
+        what: Happened,
     },
+}
+
+impl Notice {
+    /// Returns the answer to an order of that tick.
+    pub fn answer(ticket: Ticket, tick: u64, result: Result<(), RefusalCode>) -> Self {
+        match result {
+            Ok(()) => Self::Done { ticket, tick },
+            Err(why) => Self::Refused { ticket, why },
+        }
+    }
+}
+
+/// Events in a loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Happened {
+    /// The tip has met the body at this place, scene frame, m.
+    Contact(Vector3<f64>),
     /// A membrane gave way.
     Puncture {
-        /// Tick of the loop, from 1.
-        tick: u64,
-        /// `CLOCK_MONOTONIC`, ns.
-        time_ns: u64,
         /// Depth of the tip behind the membrane at rest, m.
         depth_m: f64,
         /// Place of the tip, scene frame, m.
         position_m: Vector3<f64>,
     },
     /// The tip has left the body.
-    LeftTissue {
-        /// Tick of the loop, from 1.
-        tick: u64,
-        /// `CLOCK_MONOTONIC`, ns.
-        time_ns: u64,
-    },
+    LeftTissue,
     /// A seed was dropped.
     Seed {
-        /// Tick of the loop, from 1.
-        tick: u64,
-        /// `CLOCK_MONOTONIC`, ns.
-        time_ns: u64,
         /// Number of the seed, from 0.
         index: u32,
         /// Place of the tip, scene frame, m.
         position_m: Vector3<f64>,
     },
     /// The first fault since the force was armed.
-    Fault {
-        /// Tick of the loop, from 1.
-        tick: u64,
-        /// `CLOCK_MONOTONIC`, ns.
-        time_ns: u64,
-        /// The cause.
-        fault: Fault,
-    },
+    Fault(Fault),
     /// The force was armed again after a fault.
-    Rearmed {
-        /// Tick of the loop, from 1.
-        tick: u64,
-        /// `CLOCK_MONOTONIC`, ns.
-        time_ns: u64,
-    },
-    /// The host that ordered a motion fell silent, and the motion was given up.
-    MotionGivenUp {
-        /// Tick of the loop, from 1.
-        tick: u64,
-        /// `CLOCK_MONOTONIC`, ns.
-        time_ns: u64,
-        /// The moving object.
-        what: Moved,
-    },
-    /// Another scene runs.
-    WorldSwapped {
-        /// Number of the request.
-        ticket: Ticket,
-        /// Rises with each change of a run.
-        generation: u64,
-        /// Tick of the loop, from 1.
-        tick: u64,
-    },
+    Rearmed,
+    /// The host that ordered a motion fell silent, and the motion of this was given up.
+    MotionGivenUp(Moved),
 }
 
 /// Objects that hosts move, by stable number.

@@ -1,26 +1,22 @@
 //! The haptic loop's flight recording, written each tick.
 
+use crate::rt::device_tape::{CHECKPOINTS, DeviceEntry, DeviceFlight, DeviceTape};
 use crate::rt::exchange::HapticOrder;
-use crate::rt::motion_lease::Motions;
+use crate::rt::hand::HandMemory;
+use crate::rt::motion_lease::MotionLease;
 use crate::rt::outside::{LineOutside, OutsideTape};
 use crate::rt::pose::TipPose;
 use crate::rt::put_in::PutIn;
-use crate::rt::recorder::{FLIGHT_TICKS, Last, Tape, complete_from};
+use crate::rt::recorder::{Last, Tape};
 use crate::rt::response::TissueResponse;
-use crate::rt::taped::pod;
-use crate::rt::watchdog::Watchdog;
 use serde::{Deserialize, Serialize};
-use stylet_hw::{DeviceFault, DeviceInfo, HandGoal, Sample};
+use stylet_hw::DeviceInfo;
 use stylet_shm_schema::{HapticState, TickRecord, flags};
 use stylet_sim::force::ForceParameters;
 use stylet_sim::force::chain::{ChainParameters, ChainState};
 use stylet_sim::line::{LeftNeedles, LeftRecord, LineState};
 use stylet_sim::needle::NeedleParameters;
 
-/// Ticks between two checkpoints.
-const CHECKPOINT_EVERY: u64 = 256;
-const CHECKPOINTS: usize = FLIGHT_TICKS / CHECKPOINT_EVERY as usize + 2;
-const ORDERS: usize = 4096;
 /// Most line changes on a tape. Each needle stood before its line for a while: fewer than one in 60 ms.
 const LINES: usize = 128;
 
@@ -31,16 +27,14 @@ pub struct HapticMemory {
     pub parameters: ChainParameters,
     /// State of the force chain.
     pub chain: ChainState,
-    /// Last good sample of the device.
-    pub sample: Option<Sample>,
     /// Number of the contact in use.
     pub contact: u64,
     /// Last pose handed to the tissue loop.
     pub pose: TipPose,
-    /// Goal of the simulated hand.
-    pub goal: Option<HandGoal>,
-    /// Leases of motions ordered by hosts.
-    pub motions: Motions,
+    /// The hand that holds the needle.
+    pub hand: HandMemory,
+    /// Lease of all needles being drawn out.
+    pub drawing: MotionLease,
     /// Number of the needle line in use; 0 for none. Its state is kept separately.
     pub line: u64,
     /// Generation of the probe displacement last applied to the line.
@@ -49,12 +43,9 @@ pub struct HapticMemory {
     pub on_line: bool,
     /// The hand holds no needle. The record of those that stay in is kept separately.
     pub is_hand_empty: bool,
-    /// Watchdog with its latched fault.
-    pub watchdog: Watchdog,
     /// Instructor-injected faults.
     pub put_in: PutIn,
     /// State shown to hosts.
-    #[serde(with = "pod")]
     pub state: HapticState,
 }
 
@@ -68,16 +59,14 @@ impl HapticMemory {
         Self {
             parameters: ChainParameters { needle, force },
             chain: ChainState::new(info),
-            sample: None,
             contact: 0,
             pose: TipPose::default(),
-            goal: None,
-            motions: Motions::default(),
+            hand: HandMemory::default(),
+            drawing: MotionLease::default(),
             line: 0,
             outside: 0,
             on_line: false,
             is_hand_empty: false,
-            watchdog: Watchdog::default(),
             put_in: PutIn::default(),
             state,
         }
@@ -85,31 +74,14 @@ impl HapticMemory {
 }
 
 /// Input and output of one tick.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-pub struct HapticEntry {
-    /// When the tick began, `CLOCK_MONOTONIC`, ns.
-    pub woke_ns: u64,
-    /// The device's answer to the read.
-    pub read: Result<Sample, DeviceFault>,
-    /// The device rejected the force.
-    pub write_failed: bool,
-    /// Response of the tissue loop that the tick used.
-    pub tissue: TissueResponse,
-    /// The record that the tick made.
-    #[serde(with = "pod")]
-    pub record: TickRecord,
-}
+pub type HapticEntry = DeviceEntry<TissueResponse, TickRecord>;
 
 /// The last ticks of the haptic loop. Numbers count from the first tick on the tape.
 pub struct HapticTape {
-    /// The last ticks.
-    pub ticks: Last<HapticEntry>,
-    /// Orders, each with the number of the tick that applied it.
-    pub orders: Last<(u64, HapticOrder)>,
+    /// Ticks, orders, checkpoints.
+    pub device: DeviceTape<HapticMemory, TissueResponse, TickRecord>,
     /// Numbers of needle lines, each with the number of the tick that applied it.
-    pub lines: Last<(u64, u64)>,
-    /// Checkpoints, each with the number of the tick that follows it.
-    pub checkpoints: Last<(u64, HapticMemory)>,
+    lines: Last<(u64, u64)>,
     /// State of the line at each checkpoint; without stations if there was none.
     line_states: Last<LineState>,
     /// The needles that stay in, at each checkpoint.
@@ -121,32 +93,18 @@ pub struct HapticTape {
 impl HapticTape {
     /// A blank tape for a loop that begins with `memory`.
     pub fn new(memory: &HapticMemory) -> Self {
-        let blank = HapticEntry {
-            woke_ns: 0,
-            read: Err(DeviceFault::NotConnected),
-            write_failed: false,
-            tissue: TissueResponse::default(),
-            record: bytemuck::Zeroable::zeroed(),
-        };
         Self {
-            ticks: Last::new(&blank, CHECKPOINTS * CHECKPOINT_EVERY as usize),
-            orders: Last::new(&(0, HapticOrder::HandOverTape), ORDERS),
+            device: DeviceTape::new(memory),
             lines: Last::new(&(0, 0), LINES),
-            checkpoints: Last::new(&(0, *memory), CHECKPOINTS),
             line_states: Last::of_slots((0..CHECKPOINTS).map(|_| LineState::with_room()).collect()),
             left: Last::of_slots((0..CHECKPOINTS).map(|_| LeftRecord::with_room()).collect()),
             outside: None,
         }
     }
 
-    /// True if the next tick needs a checkpoint.
-    pub fn is_checkpoint_due(&self) -> bool {
-        self.ticks.next().is_multiple_of(CHECKPOINT_EVERY)
-    }
-
     /// Saves the state before the next tick, with that of the line, if any, and of needles that stay in.
     pub fn checkpoint(&mut self, memory: HapticMemory, line: Option<&LineState>, left: Option<&LeftNeedles>) {
-        self.checkpoints.push((self.ticks.next(), memory));
+        self.device.checkpoint(memory);
         if let Some(slot) = self.line_states.advance() {
             match line {
                 Some(state) => slot.copy_from(state),
@@ -163,7 +121,7 @@ impl HapticTape {
 
     /// Records that the current tick changes the line.
     pub fn line(&mut self, generation: u64) {
-        self.lines.push((self.ticks.next(), generation));
+        self.lines.push((self.device.ticks.next(), generation));
     }
 
     /// True if there is no room yet for the probe's displacement of the line.
@@ -178,60 +136,42 @@ impl HapticTape {
 
     /// Records the probe's displacement of a line from the current tick on.
     pub fn outside(&mut self, outside: &LineOutside) {
-        let tick = self.ticks.next();
+        let tick = self.device.ticks.next();
         if let Some(tape) = &mut self.outside {
             tape.0.push((tick, *outside));
         }
     }
 
-    /// Records an order of the current tick.
-    pub fn order(&mut self, order: HapticOrder) {
-        self.orders.push((self.ticks.next(), order));
-    }
-
     /// Returns the longest repeatable stretch: from the oldest checkpoint after which nothing was overwritten.
     pub fn flight(&self) -> Option<HapticFlight> {
-        let complete = complete_from(&self.orders).max(complete_from(&self.lines));
-        let complete = complete.max(self.outside.as_ref().map_or(0, |outside| complete_from(&outside.0)));
-        let possible = self.ticks.first().max(complete)..self.ticks.next();
-        let points = self
-            .checkpoints
-            .since(0)
-            .zip(self.line_states.since(0))
-            .zip(self.left.since(0));
-        let (((first, memory), line_state), left) =
-            points.into_iter().find(|(((tick, _), _), _)| possible.contains(tick))?;
-        let orders = self.orders.since(0).filter(|(tick, _)| tick >= first);
-        let lines = self.lines.since(0).filter(|(tick, _)| tick >= first);
-        let outside = self.outside.iter().flat_map(|outside| outside.0.since(0));
-        let outside = outside.filter(|(tick, _)| tick >= first);
+        let outside = self.outside.as_ref().map(|outside| &outside.0);
+        let complete = outside.map_or(0, Last::complete_from).max(self.lines.complete_from());
+        let possible = self.device.possible(complete);
+        let states = self.line_states.since(0).zip(self.left.since(0));
+        let mut points = self.device.checkpoints.since(0).zip(states);
+        let (point, (line_state, left)) = points.find(|((tick, _), _)| possible.contains(tick))?;
+        let DeviceFlight { memory, ticks, orders } = self.device.flight(point);
         Some(HapticFlight {
-            memory: *memory,
-            ticks: self.ticks.since(*first).copied().collect(),
-            orders: orders.map(|(tick, order)| (tick - first, *order)).collect(),
+            memory,
+            ticks,
+            orders,
             left: left.clone(),
             line_state: (memory.line != 0).then(|| line_state.clone()),
-            lines: lines.map(|(tick, line)| (tick - first, *line)).collect(),
-            outside: outside.map(|(tick, outside)| (tick - first, *outside)).collect(),
+            lines: self.lines.counted_from(point.0),
+            outside: outside.map(|outside| outside.counted_from(point.0)).unwrap_or_default(),
         })
     }
 }
 
 impl Tape for HapticTape {
     fn clear(&mut self) {
-        self.ticks.clear();
-        self.orders.clear();
+        self.device.clear();
         self.lines.clear();
-        self.checkpoints.clear();
         self.line_states.clear();
         self.left.clear();
         if let Some(outside) = &mut self.outside {
             outside.0.clear();
         }
-    }
-
-    fn is_for(&self, _scene_generation: u64) -> bool {
-        true
     }
 }
 

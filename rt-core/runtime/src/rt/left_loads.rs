@@ -1,11 +1,13 @@
 //! Loads of needles that stay in on the body, for the tissue loop.
 
+use crate::rt::taped;
+use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
-use serde_big_array::BigArray;
 use stylet_sim::line::{LeftNeedle, LeftShare, MAX_LEFT, MAX_LEFT_LOADS, MAX_STATIONS};
 
-/// Forces of one needle.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Forces of one needle; unused ones are zero.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable, Serialize, Deserialize)]
 pub struct NeedleLoads {
     /// Number of its line.
     pub generation: u64,
@@ -17,33 +19,23 @@ pub struct NeedleLoads {
     stations: u32,
     tip_first: u32,
     tip_count: u32,
-    #[serde(with = "BigArray")]
+    #[serde(with = "taped")]
     loads_n: [f64; MAX_LEFT_LOADS],
-}
-
-impl Default for NeedleLoads {
-    fn default() -> Self {
-        Self {
-            generation: 0,
-            tip_m: 0.0,
-            of_line: 0,
-            stations: 0,
-            tip_first: 0,
-            tip_count: 0,
-            loads_n: [0.0; MAX_LEFT_LOADS],
-        }
-    }
 }
 
 impl NeedleLoads {
     fn set(&mut self, needle: &LeftNeedle, share: &LeftShare<'_>) {
         let (first, weights) = share.tip;
         let room = self.loads_n.len() - share.shaft_n.len().min(self.loads_n.len());
-        self.generation = share.generation;
-        self.tip_m = needle.held_m();
-        self.of_line = share.stations as u32;
-        self.stations = share.shaft_n.len() as u32;
-        (self.tip_first, self.tip_count) = (first as u32, weights.len().min(room) as u32);
+        *self = Self {
+            generation: share.generation,
+            tip_m: needle.held_m(),
+            of_line: share.stations as u32,
+            stations: share.shaft_n.len() as u32,
+            tip_first: first as u32,
+            tip_count: weights.len().min(room) as u32,
+            loads_n: [0.0; MAX_LEFT_LOADS],
+        };
         let all = share
             .shaft_n
             .iter()
@@ -78,28 +70,13 @@ impl NeedleLoads {
         let count = (self.stations + self.tip_count) as usize;
         self.loads_n.iter().take(count).any(|load_n| *load_n != 0.0)
     }
-
-    fn is_same(&self, other: &Self) -> bool {
-        let numbers = |n: &Self| {
-            (
-                n.generation,
-                n.tip_m.to_bits(),
-                n.of_line,
-                n.stations,
-                n.tip_first,
-                n.tip_count,
-            )
-        };
-        let count = (self.stations + self.tip_count) as usize;
-        let pairs = self.loads_n.iter().zip(&other.loads_n).take(count);
-        numbers(self) == numbers(other) && pairs.into_iter().all(|(a, b)| a.to_bits() == b.to_bits())
-    }
 }
 
 /// Forces of all of them in the newest tick.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable, Serialize, Deserialize)]
 pub struct LeftLoads {
-    count: u32,
+    count: u64,
     needles: [NeedleLoads; MAX_LEFT],
 }
 
@@ -122,17 +99,10 @@ impl LeftLoads {
             self.count += 1;
         }
     }
+}
 
-    /// Copies the loads in use.
-    pub fn copy_from(&mut self, other: &Self) {
-        self.count = other.count;
-        for (slot, needle) in self.needles.iter_mut().zip(other.needles()) {
-            *slot = *needle;
-        }
-    }
-
-    /// True if every bit is the same.
-    pub fn is_same(&self, other: &Self) -> bool {
-        self.count == other.count && self.needles().iter().zip(other.needles()).all(|(a, b)| a.is_same(b))
+impl Default for LeftLoads {
+    fn default() -> Self {
+        Self::zeroed()
     }
 }

@@ -1,6 +1,7 @@
 //! Forces on a prepared line, for the tissue loop's columns.
 
 use crate::rt::left_loads::LeftLoads;
+use crate::rt::taped;
 use serde::{Deserialize, Serialize};
 use stylet_sim::line::MAX_STATIONS;
 use stylet_sim::line::beam::{BentNeedle, MAX_ACROSS};
@@ -19,7 +20,6 @@ pub struct AllLoads {
 
 /// Forces of the newest tick on a line.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-#[serde(into = "TapedLoads", from = "TapedLoads")]
 pub struct LineLoads {
     /// Generation of their line; 0 if the needle is on none.
     pub generation: u64,
@@ -38,6 +38,7 @@ pub struct LineLoads {
     /// Number of `loads_n` in use.
     pub count: usize,
     /// Shaft of each station, then tip at each, then stations across in each direction.
+    #[serde(with = "taped")]
     pub loads_n: [f64; MOST],
 }
 
@@ -56,33 +57,6 @@ impl BentTip {
     /// Rest position of the material at the tip, across the line, m.
     pub fn material_m(&self) -> [f64; 2] {
         [0, 1].map(|side| self.across_m[side] - self.displacement_m[side])
-    }
-
-    fn bits(&self) -> [u64; 20] {
-        let n = &self.needle;
-        let pairs = [
-            n.grip,
-            n.hand_m,
-            n.hand_slope,
-            n.hole_n,
-            n.tip_n,
-            self.across_m,
-            self.displacement_m,
-        ];
-        let own = [
-            n.bending_stiffness_n_m2,
-            n.length_m,
-            n.tip_m,
-            n.hole_m,
-            n.first_m,
-            n.spacing_m,
-        ];
-        let mut all = [0; 20];
-        let values = pairs.iter().flatten().chain(&own);
-        all.iter_mut()
-            .zip(values)
-            .for_each(|(slot, value)| *slot = value.to_bits());
-        all
     }
 }
 
@@ -113,24 +87,6 @@ impl LineLoads {
     pub fn is_any(&self) -> bool {
         self.loads_n().iter().any(|load_n| *load_n != 0.0)
     }
-
-    /// True if every bit is the same.
-    pub fn is_same(&self, other: &Self) -> bool {
-        let bits = |loads: &Self| {
-            (
-                loads.generation,
-                loads.in_tissue,
-                loads.tip_material_m.to_bits(),
-                loads.tip_displacement_m.to_bits(),
-                loads.whole_m.to_bits(),
-                loads.bent.map(|bent| bent.bits()),
-                loads.across,
-                loads.count,
-            )
-        };
-        let pairs = self.loads_n().iter().zip(other.loads_n());
-        bits(self) == bits(other) && pairs.into_iter().all(|(a, b)| a.to_bits() == b.to_bits())
-    }
 }
 
 impl Default for LineLoads {
@@ -146,60 +102,5 @@ impl Default for LineLoads {
             count: 0,
             loads_n: [0.0; MOST],
         }
-    }
-}
-
-/// Loads as stored in a flight recording: few stations are in contact.
-#[derive(Serialize, Deserialize)]
-struct TapedLoads {
-    generation: u64,
-    in_tissue: bool,
-    tip_material_m: f64,
-    tip_displacement_m: f64,
-    whole_m: f64,
-    bent: Option<BentTip>,
-    across: usize,
-    count: usize,
-    /// Nonzero loads, each with its index.
-    loads_n: Vec<(u16, f64)>,
-}
-
-impl From<LineLoads> for TapedLoads {
-    fn from(loads: LineLoads) -> Self {
-        let numbered = (0_u16..).zip(loads.loads_n().iter().copied());
-        Self {
-            generation: loads.generation,
-            in_tissue: loads.in_tissue,
-            tip_material_m: loads.tip_material_m,
-            tip_displacement_m: loads.tip_displacement_m,
-            whole_m: loads.whole_m,
-            bent: loads.bent,
-            across: loads.across,
-            count: loads.count,
-            loads_n: numbered.filter(|(_, load_n)| load_n.to_bits() != 0).collect(),
-        }
-    }
-}
-
-impl From<TapedLoads> for LineLoads {
-    /// Indices outside any line are dropped.
-    fn from(taped: TapedLoads) -> Self {
-        let mut loads = Self {
-            generation: taped.generation,
-            in_tissue: taped.in_tissue,
-            tip_material_m: taped.tip_material_m,
-            tip_displacement_m: taped.tip_displacement_m,
-            whole_m: taped.whole_m,
-            bent: taped.bent,
-            across: taped.across.min(MAX_ACROSS),
-            count: taped.count.min(MOST),
-            ..Self::default()
-        };
-        for (place, load_n) in taped.loads_n {
-            if let Some(slot) = loads.loads_n.get_mut(usize::from(place)) {
-                *slot = load_n;
-            }
-        }
-        loads
     }
 }

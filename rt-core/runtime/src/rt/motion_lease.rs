@@ -71,15 +71,6 @@ pub enum MotionLease {
     },
 }
 
-/// Leases of the force loop's motions.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Motions {
-    /// Lease of the hand.
-    pub hand: MotionLease,
-    /// Lease of all needles being drawn out.
-    pub drawing: MotionLease,
-}
-
 /// Action required in the tick in which a lease changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lapse {

@@ -3,16 +3,17 @@
 
 use crate::rt::line_loads::MOST;
 use crate::rt::recorder::{FLIGHT_TICKS, Last};
+use crate::rt::taped;
 use serde::{Deserialize, Serialize};
 use stylet_sim::line::MAX_LEFT;
 
 /// Displacement of the rows of one line, m.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(into = "TapedOutside", from = "TapedOutside")]
 pub struct LineOutside {
     /// Number of the line.
     pub generation: u64,
     count: usize,
+    #[serde(with = "taped")]
     rows_m: [f64; MOST],
 }
 
@@ -35,7 +36,7 @@ impl LineOutside {
 
     /// Sets the displacement of that line by `write`, which returns the number of rows.
     pub fn set(&mut self, generation: u64, write: impl FnOnce(&mut [f64]) -> usize) {
-        self.generation = generation;
+        (self.generation, self.rows_m) = (generation, [0.0; MOST]);
         self.count = write(&mut self.rows_m).min(MOST);
     }
 }
@@ -73,36 +74,6 @@ impl Outside {
         let line = self.lines.get_mut(self.count)?;
         self.count += 1;
         Some(line)
-    }
-}
-
-/// Displacement as stored in a flight recording.
-#[derive(Serialize, Deserialize)]
-struct TapedOutside {
-    generation: u64,
-    rows_m: Vec<f64>,
-}
-
-impl From<LineOutside> for TapedOutside {
-    fn from(outside: LineOutside) -> Self {
-        Self {
-            generation: outside.generation,
-            rows_m: outside.rows_m().to_vec(),
-        }
-    }
-}
-
-impl From<TapedOutside> for LineOutside {
-    /// Rows outside any line are dropped.
-    fn from(taped: TapedOutside) -> Self {
-        let mut outside = Self::default();
-        outside.set(taped.generation, |rows_m| {
-            for (slot, row_m) in rows_m.iter_mut().zip(&taped.rows_m) {
-                *slot = *row_m;
-            }
-            taped.rows_m.len()
-        });
-        outside
     }
 }
 

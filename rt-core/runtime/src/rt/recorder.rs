@@ -78,21 +78,31 @@ impl<T> Last<T> {
     }
 }
 
-/// Returns the first tick from which every order is held; each order is paired with its tick number.
-pub fn complete_from<T>(orders: &Last<(u64, T)>) -> u64 {
-    if orders.first() == 0 {
-        return 0;
+impl<T: Clone> Last<(u64, T)> {
+    /// Returns the first tick from which every value is held; each value is paired with its tick number.
+    pub fn complete_from(&self) -> u64 {
+        if self.first() == 0 {
+            return 0;
+        }
+        // The values of the oldest tick held may be incomplete.
+        self.get(self.first()).map_or(0, |(tick, _)| tick + 1)
     }
-    // The orders of the oldest tick held may be incomplete.
-    orders.get(orders.first()).map_or(0, |(tick, _)| tick + 1)
+
+    /// Returns the values of tick `first` and later, with their ticks counted from it.
+    pub fn counted_from(&self, first: u64) -> Vec<(u64, T)> {
+        let values = self.since(0).filter(|(tick, _)| *tick >= first);
+        values.map(|(tick, value)| (tick - first, value.clone())).collect()
+    }
 }
 
 /// A tape that a loop and the control thread exchange.
 pub trait Tape {
     /// Clears the tape without allocating.
     fn clear(&mut self);
-    /// True if the tape was made for this scene of a run.
-    fn is_for(&self, scene_generation: u64) -> bool;
+    /// True if the tape was made for this scene of a run; only the tissue's depends on it.
+    fn is_for(&self, _scene_generation: u64) -> bool {
+        true
+    }
 }
 
 /// The loop's end: its current tape, and the two rings on which tapes travel.

@@ -1,6 +1,5 @@
 //! The tissue loop's response to the force loop.
 
-use crate::rt::taped::pod;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use stylet_shm_schema::DeadlineTotals;
@@ -44,10 +43,8 @@ pub struct TissueResponse {
     /// Deadlines missed so far.
     pub missed: u64,
     /// Totals since the loop began; no reset clears them.
-    #[serde(with = "pod")]
     pub since_start: DeadlineTotals,
     /// Totals since the force was last turned on.
-    #[serde(with = "pod")]
     pub since_armed: DeadlineTotals,
     /// Seeds in the tissue.
     pub seed_count: u32,

@@ -3,27 +3,23 @@
 
 use crate::rt::arm::Armed;
 use crate::rt::clock::{self, Grid, Wait};
-use crate::rt::contact::Contact;
-use crate::rt::exchange::{Notice, Ticket, TissueOrder, TissueStep};
-use crate::rt::layers_met::LayersMet;
+use crate::rt::exchange::{Happened, Notice, Ticket, TissueOrder, TissueStep};
 use crate::rt::left_loads::LeftLoads;
-use crate::rt::line_loads::LineLoads;
-use crate::rt::pose::TipPose;
 use crate::rt::probe_tape::ProbeTape;
 use crate::rt::response::TissueResponse;
 use crate::rt::seed::{self, Seed};
 use crate::rt::timing::Probe;
-use crate::rt::tissue_tape::{LeftTape, TapedOrder};
+use crate::rt::tissue_tape::{LeftTape, TapedOrder, TissueState};
 use crate::rt::wiring::TissuePorts;
 use crate::rt::world::World;
 use last_carry::LastCarry;
 use nalgebra::Vector3;
 use std::sync::atomic::{AtomicBool, Ordering};
-use stylet_shm_schema::{DeadlineTotals, MAX_SEEDS, SeedPose};
+use stylet_shm_schema::{DeadlineTotals, MAX_SEEDS, RefusalCode, SeedPose};
 use stylet_sim::force::LocalResponse;
 use stylet_sim::line::{BodyLine, MAX_LEFT};
-use stylet_sim::probe::{BodyProbe, ProbePose};
-use stylet_sim::tissue::{Carried, Deformed, Held, MaterialPoint, StepReport};
+use stylet_sim::probe::BodyProbe;
+use stylet_sim::tissue::{Carried, Deformed, MaterialPoint, StepReport};
 
 mod contact;
 mod flight;
@@ -42,36 +38,22 @@ pub struct TissueLoop {
     session_id: u64,
     ports: TissuePorts,
     world: Box<World>,
+    state: TissueState,
     seeds: Vec<Seed>,
-    contact: Option<Contact>,
-    contacts: u64,
     /// Columns of the prepared line.
     line: Option<Box<BodyLine>>,
-    /// The needle is in tissue along the line.
-    in_by_line: bool,
-    /// Forces on the line that the last tick used.
-    loads: LineLoads,
     /// Columns of needles that stay in, and all of their loads in this tick.
     left: Vec<left::LeftBody>,
     left_loads: LeftLoads,
     /// Room to record them, until the tape is there.
     left_room: Option<Box<LeftTape>>,
     last_carry: LastCarry,
-    /// The ultrasound probe in this scene, and its pose.
+    /// The ultrasound probe in this scene.
     pressed: Option<Box<BodyProbe>>,
-    probe_pose: Option<ProbePose>,
     answered: second::Answered,
     /// Room to record it, until the tape is there.
     probe_room: Option<Box<ProbeTape>>,
-    /// Its displacement of the line was shown to the force loop.
-    is_outside_shown: bool,
-    layers: LayersMet,
-    /// The tip has been outside since the last contact.
-    clear: bool,
-    held: Option<Held>,
-    pose: TipPose,
     report: Option<StepReport>,
-    response: TissueResponse,
     shown: snapshot::Shown,
     /// Present in a measurement.
     pub probe: Option<Box<Probe>>,
@@ -97,27 +79,17 @@ impl TissueLoop {
             session_id,
             ports,
             world,
+            state: TissueState::default(),
             seeds: Vec::with_capacity(MAX_SEEDS),
-            contact: None,
-            contacts: 0,
             line: None,
-            in_by_line: false,
-            loads: LineLoads::default(),
             left: Vec::with_capacity(MAX_LEFT),
             left_loads: LeftLoads::default(),
             left_room: None,
             last_carry: LastCarry::new(),
             pressed: None,
-            probe_pose: None,
             answered: second::Answered::default(),
             probe_room: None,
-            is_outside_shown: false,
-            layers: LayersMet::default(),
-            clear: true,
-            held: None,
-            pose: TipPose::default(),
             report: None,
-            response: TissueResponse::default(),
             shown: snapshot::Shown::default(),
             probe: None,
             period_s,
@@ -134,7 +106,7 @@ impl TissueLoop {
 
     /// The last response to the force loop.
     pub fn response(&self) -> &TissueResponse {
-        &self.response
+        &self.state.response
     }
 
     /// The loop's scene.
@@ -188,7 +160,7 @@ impl TissueLoop {
     }
 
     fn count(&mut self, missed: u32, wake_latency_ns: u64) {
-        let response = &mut self.response;
+        let response = &mut self.state.response;
         response.missed += u64::from(missed);
         response.worst_wake_ns = response.worst_wake_ns.max(wake_latency_ns);
         response.since_start.add(missed, wake_latency_ns);
@@ -200,12 +172,12 @@ impl TissueLoop {
         self.checkpoint();
         self.follow_left();
         self.take_orders();
-        let before = self.pose;
-        self.pose = *self.ports.pose.read();
+        let before = self.state.pose;
+        self.state.pose = *self.ports.pose.read();
         self.follow_second();
         self.follow_probe();
         self.mark();
-        let travel = self.pose.held_travel_m - before.held_travel_m;
+        let travel = self.state.pose.held_travel_m - before.held_travel_m;
         let on_line = self.step_on_line();
         if on_line.is_none() {
             self.leave_line();
@@ -227,7 +199,7 @@ impl TissueLoop {
         self.look_ahead(travel);
         self.mark();
         if let Some(probe) = &mut self.probe {
-            probe.output_for_pose(self.response.tick, self.pose.time_ns);
+            probe.output_for_pose(self.state.response.tick, self.state.pose.time_ns);
         }
         self.publish_snapshot(woke_ns, &report);
     }
@@ -237,15 +209,17 @@ impl TissueLoop {
             match order {
                 TissueOrder::Step(ticket, step) => {
                     self.tape_order(TapedOrder::Step(step.clone()));
-                    self.carry_out(ticket, step);
+                    let result = self.carry_out(step);
+                    self.answer(ticket, result);
                 }
                 TissueOrder::World { ticket, world, tape } => {
-                    self.swap(ticket, world);
+                    self.swap(world);
+                    self.answer(ticket, Ok(()));
                     self.ports.flight.replace(tape);
                     self.checkpoint();
                 }
                 TissueOrder::LeftRoom(room) => self.left_room = self.left_room.take().or(Some(room)),
-                TissueOrder::Armed => self.response.since_armed = DeadlineTotals::default(),
+                TissueOrder::Armed => self.state.response.since_armed = DeadlineTotals::default(),
                 TissueOrder::HandOverTape => self.hand_over_tape(),
                 TissueOrder::Probe {
                     generation,
@@ -262,21 +236,26 @@ impl TissueLoop {
         }
     }
 
-    fn carry_out(&mut self, ticket: Ticket, step: TissueStep) {
-        let tick = self.response.tick;
+    fn carry_out(&mut self, step: TissueStep) -> Result<(), RefusalCode> {
         match step {
             TissueStep::Parameters { limits, migration } => {
                 self.world.set_limits(limits);
                 self.world.migration = migration;
-                self.notify(Notice::Done { ticket, tick });
             }
-            TissueStep::DropSeed { strand_pitch_m } => self.drop_seed(ticket, strand_pitch_m),
-            TissueStep::UndoSeed => self.undo_seed(ticket),
-            TissueStep::Reset => {
-                self.reset();
-                self.notify(Notice::Done { ticket, tick });
-            }
+            TissueStep::DropSeed { strand_pitch_m } => return self.drop_seed(strand_pitch_m),
+            TissueStep::UndoSeed => return self.undo_seed(),
+            TissueStep::Reset => self.reset(),
         }
+        Ok(())
+    }
+
+    fn answer(&mut self, ticket: Ticket, result: Result<(), RefusalCode>) {
+        self.notify(Notice::answer(ticket, self.state.response.tick, result));
+    }
+
+    fn happened(&mut self, what: Happened) {
+        let (tick, time_ns) = (self.state.response.tick, self.state.pose.time_ns);
+        self.notify(Notice::Event { tick, time_ns, what });
     }
 
     fn notify(&mut self, notice: Notice) {
@@ -290,22 +269,22 @@ impl TissueLoop {
         self.reset_probe();
         self.seeds.clear();
         self.end_contact();
-        self.response.worst_residual = 0.0;
-        self.response.worst_work_ns = 0;
-        self.response.worst_wake_ns = 0;
-        self.response.missed = 0;
-        self.response.seed_count = 0;
+        self.state.response.worst_residual = 0.0;
+        self.state.response.worst_work_ns = 0;
+        self.state.response.worst_wake_ns = 0;
+        self.state.response.missed = 0;
+        self.state.response.seed_count = 0;
     }
 
     fn end_contact(&mut self) {
-        self.contact = None;
-        self.layers.end();
-        self.held = None;
-        self.clear = false;
-        self.response.contact = 0;
+        self.state.contact = None;
+        self.state.layers.end();
+        self.state.held = None;
+        self.state.clear = false;
+        self.state.response.contact = 0;
     }
 
-    fn swap(&mut self, ticket: Ticket, world: Box<World>) {
+    fn swap(&mut self, world: Box<World>) {
         let old = std::mem::replace(&mut self.world, world);
         self.last_carry.forget();
         // The ring has room for every world on its way; if not, leak it rather than free it here.
@@ -317,21 +296,15 @@ impl TissueLoop {
         self.drop_probe();
         self.leave_line();
         self.seeds.clear();
-        self.response.seed_count = 0;
+        self.state.response.seed_count = 0;
         self.end_contact();
-        let (generation, tick) = (self.world.generation, self.response.tick);
-        self.notify(Notice::WorldSwapped {
-            ticket,
-            generation,
-            tick,
-        });
     }
 
     fn respond(&mut self, woke_ns: u64, report: &StepReport) {
-        let (contact, held) = (self.contact, self.held.is_some());
+        let (contact, held) = (self.state.contact, self.state.held.is_some());
         let local = self.local_response(report);
         let may_be_felt = self.world.tissue.may_be_felt(report);
-        let response = &mut self.response;
+        let response = &mut self.state.response;
         response.tick += 1;
         response.time_ns = woke_ns;
         response.contact = contact.map_or(0, |c| c.number);
@@ -341,8 +314,8 @@ impl TissueLoop {
         }
         response.local = local;
         if report.converged {
-            response.solved_ns = self.pose.time_ns;
-            response.solved_tip_in_scene = self.pose.tip_in_scene;
+            response.solved_ns = self.state.pose.time_ns;
+            response.solved_tip_in_scene = self.state.pose.tip_in_scene;
         }
         response.worst_residual = response.worst_residual.max(report.residual);
         // Limits tightened over free tissue are met as it recovers; no force depends on it.
@@ -355,9 +328,9 @@ impl TissueLoop {
     fn displacement_at_tip_m(&self, held: u32, report: &StepReport) -> Vector3<f64> {
         let body = self.world.tissue.deformed();
         // A body that computes forces answers with the displacement of its held element.
-        let is_between = self.pose.punctured && report.tip_force_n.is_none();
+        let is_between = self.state.pose.punctured && report.tip_force_n.is_none();
         let at_tip = is_between
-            .then(|| self.locate(&self.pose.tip_in_scene, Some(held)))
+            .then(|| self.locate(&self.state.pose.tip_in_scene, Some(held)))
             .flatten();
         let point = at_tip.unwrap_or(MaterialPoint::centre(held));
         point.displacement_m(&body).into()
@@ -365,12 +338,12 @@ impl TissueLoop {
 
     /// Returns the local response that the haptic loop extrapolates at its own rate; none while nothing is held.
     fn local_response(&self, report: &StepReport) -> LocalResponse {
-        let Some(held) = self.held else {
+        let Some(held) = self.state.held else {
             return LocalResponse::default();
         };
         LocalResponse {
-            tick: self.response.tick + 1,
-            travel_m: self.pose.held_travel_m,
+            tick: self.state.response.tick + 1,
+            travel_m: self.state.pose.held_travel_m,
             displacement_m: self.displacement_at_tip_m(held.element, report),
             force_n: report.tip_force_n.map(Vector3::from),
         }

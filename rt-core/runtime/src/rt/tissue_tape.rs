@@ -7,10 +7,11 @@ use crate::rt::left_loads::{LeftLoads, NeedleLoads};
 use crate::rt::line_loads::LineLoads;
 use crate::rt::pose::TipPose;
 use crate::rt::probe_tape::{ProbeEntry, ProbeTape};
-use crate::rt::recorder::{Last, Tape, complete_from};
+use crate::rt::recorder::{Last, Tape};
 use crate::rt::response::TissueResponse;
 use crate::rt::seed::Seed;
 use crate::rt::world::World;
+use bytemuck::bytes_of;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use stylet_shm_schema::MAX_SEEDS;
@@ -46,11 +47,9 @@ pub enum TapedOrder {
     },
 }
 
-/// All state of the tissue loop between ticks.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct TissueMemory {
-    /// Seeds in the tissue.
-    pub seeds: Vec<Seed>,
+/// State of the tissue loop between ticks, apart from that of the body, and what lies in it.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct TissueState {
     /// The present contact.
     pub contact: Option<Contact>,
     /// Contacts so far.
@@ -59,10 +58,6 @@ pub struct TissueMemory {
     pub in_by_line: bool,
     /// Forces on the line in the last tick.
     pub loads: LineLoads,
-    /// Needles that stay in: the loads behind each one's share of the body.
-    pub left: Vec<NeedleLoads>,
-    /// The probe.
-    pub probe: ProbeMemory,
     /// Pose of the second hand's probe.
     pub probe_pose: Option<ProbePose>,
     /// Its displacement of the line was shown to the force loop.
@@ -77,6 +72,37 @@ pub struct TissueMemory {
     pub pose: TipPose,
     /// Response of the last tick.
     pub response: TissueResponse,
+}
+
+impl Default for TissueState {
+    fn default() -> Self {
+        Self {
+            contact: None,
+            contacts: 0,
+            in_by_line: false,
+            loads: LineLoads::default(),
+            probe_pose: None,
+            is_outside_shown: false,
+            layers: LayersMet::default(),
+            clear: true,
+            held: None,
+            pose: TipPose::default(),
+            response: TissueResponse::default(),
+        }
+    }
+}
+
+/// All state of the tissue loop between ticks.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct TissueMemory {
+    /// Apart from the body.
+    pub state: TissueState,
+    /// Seeds in the tissue.
+    pub seeds: Vec<Seed>,
+    /// Needles that stay in: the loads behind each one's share of the body.
+    pub left: Vec<NeedleLoads>,
+    /// The probe.
+    pub probe: ProbeMemory,
     /// Limits in use.
     pub limits: Limits,
     /// Migration of seeds.
@@ -92,6 +118,8 @@ pub struct TissueEntry {
     pub woke_ns: u64,
     /// Pose that the tick used.
     pub pose: TipPose,
+    /// Forces on a needle line that the tick used.
+    pub loads: LineLoads,
     /// The element that the tick held.
     pub held: Option<Held>,
     /// Largest violation of a limit after the step, in elements.
@@ -118,9 +146,7 @@ pub struct TissueTape {
     pub ticks: Last<TissueEntry>,
     /// Orders, each with the number of the tick that applied it.
     pub orders: Last<(u64, TapedOrder)>,
-    /// Forces on a needle line, each with the number of the first tick that used them.
-    loads: Last<(u64, LineLoads)>,
-    /// Those of needles that stay in; allocated when the first is left.
+    /// Loads of needles that stay in; allocated when the first is left.
     left: Option<Box<LeftTape>>,
     /// Poses of the probe; allocated once there is one.
     probe: Option<Box<ProbeTape>>,
@@ -142,20 +168,10 @@ impl TissueTape {
         let tissue = world.spec.built_in;
         let not_kept = body_len == 0 || body_len > MAX_BODY_BYTES || tissue.is_none();
         let memory = || TissueMemory {
+            state: TissueState::default(),
             seeds: Vec::with_capacity(MAX_SEEDS),
-            contact: None,
-            contacts: 0,
-            in_by_line: false,
-            loads: LineLoads::default(),
             left: Vec::with_capacity(MAX_LEFT),
             probe: ProbeMemory::default(),
-            probe_pose: None,
-            is_outside_shown: false,
-            layers: LayersMet::default(),
-            clear: true,
-            held: None,
-            pose: TipPose::default(),
-            response: TissueResponse::default(),
             limits: world.limits.clone(),
             migration: world.migration,
             body: vec![0; if not_kept { 0 } else { body_len }],
@@ -163,17 +179,16 @@ impl TissueTape {
         let blank = TissueEntry {
             woke_ns: 0,
             pose: TipPose::default(),
+            loads: LineLoads::default(),
             held: None,
             residual: 0.0,
             response: TissueResponse::default(),
         };
-        let room = |is_needed: bool| if is_needed { TAPE_TICKS } else { 1 };
         Self {
             scene_generation: world.generation,
             scene,
-            ticks: Last::new(&blank, room(!not_kept)),
+            ticks: Last::new(&blank, if not_kept { 1 } else { TAPE_TICKS }),
             orders: Last::new(&(0, TapedOrder::Step(TissueStep::Reset)), ORDERS),
-            loads: Last::new(&(0, LineLoads::default()), room(!not_kept && world.spec.has_lines())),
             left: None,
             probe: None,
             checkpoints: [(0, memory()), (0, memory())],
@@ -200,13 +215,6 @@ impl TissueTape {
         Some(&mut slot.1)
     }
 
-    /// Records the forces on a needle line in the current tick, if they have changed.
-    pub fn loads(&mut self, loads: &LineLoads) {
-        if !self.loads.newest().is_some_and(|(_, newest)| newest.is_same(loads)) {
-            self.loads.push((self.ticks.next(), *loads));
-        }
-    }
-
     /// Takes room for the loads of needles that stay in.
     pub fn take_left_room(&mut self, room: &mut Option<Box<LeftTape>>) {
         if self.left.is_none() {
@@ -218,11 +226,12 @@ impl TissueTape {
     pub fn left_loads(&mut self, loads: &LeftLoads) {
         let tick = self.ticks.next();
         if let Some(left) = &mut self.left
-            && !left.0.newest().is_some_and(|(_, newest)| newest.is_same(loads))
-            && let Some(slot) = left.0.advance()
+            && !left
+                .0
+                .newest()
+                .is_some_and(|(_, newest)| bytes_of(newest) == bytes_of(loads))
         {
-            slot.0 = tick;
-            slot.1.copy_from(loads);
+            left.0.push((tick, *loads));
         }
     }
 
@@ -262,22 +271,21 @@ impl TissueTape {
         if self.not_kept || next == 0 {
             return None;
         }
-        let complete = complete_from(&self.orders).max(complete_from(&self.loads));
-        let complete = complete.max(self.left.as_ref().map_or(0, |left| complete_from(&left.0)));
-        let complete = complete.max(self.probe.as_ref().map_or(0, |probe| complete_from(&probe.entries)));
+        let (probe, left) = (self.probe.as_ref(), self.left.as_ref());
+        let complete = self
+            .orders
+            .complete_from()
+            .max(left.map_or(0, |left| left.0.complete_from()));
+        let complete = complete.max(probe.map_or(0, |probe| probe.entries.complete_from()));
         let possible = self.ticks.first().max(complete)..next;
         let written = self.checkpoints.iter().take(self.points);
         let mut points: Vec<&(u64, TissueMemory)> = written.filter(|(tick, _)| possible.contains(tick)).collect();
         points.sort_by_key(|(tick, _)| *tick);
         let (first, memory) = points.first()?;
-        let loads = self.loads.since(0).filter(|(tick, _)| tick >= first);
-        let orders = self.orders.since(0).filter(|(tick, _)| tick >= first);
-        let probe = self.probe.iter().flat_map(|probe| probe.entries.since(0));
-        let probe = probe.filter(|(tick, _)| tick >= first);
-        let left = self.left.iter().flat_map(|left| left.0.since(0)).copied();
-        // Values from before the stretch persist in it.
-        let (before, left): (Vec<_>, Vec<_>) = left.partition(|(tick, _)| tick < first);
-        let before = before.last().map(|(_, loads)| (0, *loads));
+        // Loads from before the stretch persist in it.
+        let before = left.and_then(|left| left.0.since(0).take_while(|(tick, _)| tick < first).last());
+        let before = before.map(|(_, loads)| (0, *loads));
+        let left = left.map(|left| left.0.counted_from(*first)).unwrap_or_default();
         Some(TissueFlight {
             scene: (*self.scene).clone(),
             tissue: self.tissue?,
@@ -285,13 +293,11 @@ impl TissueTape {
             middle: points.get(1).map(|(tick, memory)| (tick - first, memory.clone())),
             end: self.end.clone(),
             ticks: self.ticks.since(*first).copied().collect(),
-            orders: orders.map(|(tick, order)| (tick - first, order.clone())).collect(),
-            loads: loads.map(|(tick, loads)| (tick - first, *loads)).collect(),
-            probe: probe.map(|(tick, entry)| (tick - first, *entry)).collect(),
-            left: before
-                .into_iter()
-                .chain(left.into_iter().map(|(tick, loads)| (tick - first, loads)))
-                .collect(),
+            orders: self.orders.counted_from(*first),
+            probe: probe
+                .map(|probe| probe.entries.counted_from(*first))
+                .unwrap_or_default(),
+            left: before.into_iter().chain(left).collect(),
         })
     }
 }
@@ -300,7 +306,6 @@ impl Tape for TissueTape {
     fn clear(&mut self) {
         self.ticks.clear();
         self.orders.clear();
-        self.loads.clear();
         if let Some(left) = &mut self.left {
             left.0.clear();
         }
@@ -333,9 +338,7 @@ pub struct TissueFlight {
     pub ticks: Vec<TissueEntry>,
     /// Orders, each with the index of the tick that applied it.
     pub orders: Vec<(u64, TapedOrder)>,
-    /// Forces on a needle line, each with the index of the first tick that used them.
-    pub loads: Vec<(u64, LineLoads)>,
-    /// Those of needles that stay in, likewise.
+    /// Loads of needles that stay in, each with the index of the first tick that used them.
     pub left: Vec<(u64, LeftLoads)>,
     /// Poses of the probe, with the index of each tick.
     pub probe: Vec<(u64, ProbeEntry)>,
@@ -344,7 +347,7 @@ pub struct TissueFlight {
 impl TissueFlight {
     /// Numbers of the loop's lines, in order.
     pub fn line_numbers(&self) -> impl Iterator<Item = u64> {
-        let before = self.memory.response.line;
+        let before = self.memory.state.response.line;
         let first = (before != 0).then_some(before);
         let taken = self.orders.iter().filter_map(|(_, order)| match order {
             TapedOrder::Line { generation } => Some(*generation),
@@ -373,8 +376,8 @@ impl TissueFlight {
         {
             return true;
         }
-        let all = self.loads.iter().map(|(_, loads)| loads).chain([&self.memory.loads]);
-        all.into_iter()
+        let all = self.ticks.iter().map(|tick| &tick.loads);
+        all.chain([&self.memory.state.loads])
             .any(|loads| loads.generation == generation && loads.is_any())
     }
 }

@@ -4,7 +4,6 @@
 //! fault, on a linear ramp. The first fault is kept until the operator re-arms. A haptic loop that stops altogether
 //! cannot watch itself: `control/supervisor.rs` detects it.
 
-use crate::rt::taped::fault_code;
 use serde::{Deserialize, Serialize};
 use stylet_hw::DeviceFault;
 use stylet_shm_schema::Fault;
@@ -35,7 +34,6 @@ pub struct Watched {
 /// Watchdog of a haptic loop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Watchdog {
-    #[serde(with = "fault_code")]
     fault: Fault,
     silent: u32,
     streak: u32,

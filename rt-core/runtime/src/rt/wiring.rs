@@ -1,7 +1,7 @@
 //! Every ring and triple buffer between the two loops and the control thread, all made here in one call.
 
 pub use crate::rt::capacities::Capacities;
-use crate::rt::exchange::{HapticOrder, Notice, TissueOrder};
+use crate::rt::exchange::{HapticOrder, Notice, Ticket, TissueOrder};
 use crate::rt::haptic_tape::HapticTape;
 use crate::rt::line_loads::AllLoads;
 use crate::rt::outside::{Outside, OutsideTape};
@@ -37,7 +37,7 @@ pub struct HapticPorts {
     /// Room to record it.
     pub outside_rooms: rtrb::Consumer<Box<OutsideTape>>,
     /// Orders of the control thread.
-    pub orders: rtrb::Consumer<HapticOrder>,
+    pub orders: rtrb::Consumer<(Ticket, HapticOrder)>,
     /// Notices to the control thread.
     pub notices: rtrb::Producer<Notice>,
     /// One record for each tick, to the control thread.
@@ -87,7 +87,7 @@ pub struct ControlPorts {
     /// Records of the force loop.
     pub records: rtrb::Consumer<TickRecord>,
     /// Orders to the force loop.
-    pub haptic_orders: rtrb::Producer<HapticOrder>,
+    pub haptic_orders: rtrb::Producer<(Ticket, HapticOrder)>,
     /// Notices of the force loop.
     pub haptic_notices: rtrb::Consumer<Notice>,
     /// Orders to the tissue loop.

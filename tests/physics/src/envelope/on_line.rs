@@ -54,14 +54,14 @@ impl Theatre {
         let body = LineBody::of_source(source, tissue)
             .expect("can be solved")
             .expect("has lines");
-        let line = body.prepare(1, start.into(), [0.0, 0.0, 1.0], false, &mut || true);
+        let line = body.prepare(1, start.into(), [0.0, 0.0, 1.0], false, &[], &mut || true);
         let mut line = line.expect("through the gland");
         if tissue == TissueKind::Fem {
             // The felt force has full resolution; the drawn body does not matter here.
             let light = LineBody::of_source(source, TissueKind::ChainMail).expect("can be solved");
             let light = light
                 .expect("has lines")
-                .prepare(1, start.into(), [0.0, 0.0, 1.0], false, &mut || true);
+                .prepare(1, start.into(), [0.0, 0.0, 1.0], false, &[], &mut || true);
             line.body.answer = light.expect("through the gland").body.answer;
         }
         Self {

@@ -55,7 +55,7 @@ fn insert(
         .expect("can be solved")
         .expect("has lines");
     let line = body
-        .prepare(1, point.into(), direction.into(), false, &mut || true)
+        .prepare(1, point.into(), direction.into(), false, &[], &mut || true)
         .expect("through the body");
     let entry = Vector3::from(line.hand.line().entry_m);
     let start = entry - direction * BEFORE_M;

@@ -220,7 +220,7 @@ fn what_a_body_rests_on_goes_from_nothing_to_a_table() {
         assert!(moved_m[1] < moved_m[0], "{moved_m:?}");
         let body = LineBody::of_source(&block(gland, Vec::new(), Beyond::Free), kind);
         let body = body.expect("can be solved").expect("has lines");
-        let line = body.prepare(1, [28e-3, 28e-3, -5e-3], [0.0, 0.0, 1.0], false, &mut || true);
+        let line = body.prepare(1, [28e-3, 28e-3, -5e-3], [0.0, 0.0, 1.0], false, &[], &mut || true);
         let why = line.err().map(|why| why.to_string());
         println!("{kind:?}, nothing on all sides: {why:?}");
         assert!(why.is_some(), "a body that nothing holds has no answer");

@@ -66,8 +66,8 @@ impl<T: bytemuck::Pod> Journal<T> {
             if count == 0 || !(count == MAX_BATCH || is_due) || outbox.is_waiting() {
                 return;
             }
-            let batch: Vec<T> = self.records.range(from..from + count).copied().collect();
-            outbox.put(self.kind, bytemuck::cast_slice(&batch), None);
+            let batch = self.records.range(from..from + count).flat_map(bytemuck::bytes_of);
+            outbox.put((self.kind, batch.copied().collect(), None));
             self.next += count as u64;
             self.sent_ns = clock::now_ns();
         }

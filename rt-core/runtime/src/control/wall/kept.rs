@@ -1,69 +1,42 @@
-//! State replayed to each new bridge: the newest of each state, and the last events and answers.
+//! Packets replayed to each new bridge: the newest of each state, and the last events and answers.
 
-use super::outbox::Outbox;
+use super::outbox::Outgoing;
 use std::collections::VecDeque;
-use std::os::fd::OwnedFd;
-use std::rc::Rc;
-use stylet_shm_schema::*;
-use stylet_wall::packet::{BoardSize, Kind};
+use stylet_wall::packet::Kind;
 
-/// State replayed to each new bridge.
-pub struct Kept {
-    pub state: Rc<OwnedFd>,
-    pub second_state: Option<Rc<OwnedFd>>,
-    pub snapshots: Option<(BoardSize, Rc<OwnedFd>)>,
-    pub session: Option<Session>,
-    pub scene: Option<(Box<SceneHeader>, Rc<OwnedFd>)>,
-    pub parameters: Option<ParametersInForce>,
-    pub plan: Option<PlanInForce>,
-    pub events: VecDeque<Event>,
-    pub replies: VecDeque<Reply>,
-    pub rehearsals: VecDeque<Box<Rehearsal>>,
-}
+/// Kinds in the order in which a bridge gets them, each with the number of packets kept.
+const KEPT: [(Kind, usize); 11] = [
+    (Kind::Start, 1),
+    (Kind::State, 1),
+    (Kind::SecondState, 1),
+    (Kind::Session, 1),
+    (Kind::Snapshots, 1),
+    (Kind::Scene, 1),
+    (Kind::Parameters, 1),
+    (Kind::Plan, 1),
+    (Kind::Event, 64),
+    (Kind::Rehearsal, 8),
+    (Kind::Reply, 128),
+];
+
+/// Packets by kind.
+#[derive(Default)]
+pub struct Kept([VecDeque<Outgoing>; KEPT.len()]);
 
 impl Kept {
-    /// Sends everything to a new bridge.
-    pub fn tell(&self, outbox: &mut Outbox) {
-        outbox.put(Kind::State, &[], Some(&self.state));
-        if let Some(board) = &self.second_state {
-            outbox.put(Kind::SecondState, &[], Some(board));
-        }
-        if let Some(session) = &self.session {
-            outbox.put(Kind::Session, bytemuck::bytes_of(session), None);
-        }
-        self.tell_scene(outbox);
-        if let Some(parameters) = &self.parameters {
-            outbox.put(Kind::Parameters, bytemuck::bytes_of(parameters), None);
-        }
-        if let Some(plan) = &self.plan {
-            outbox.put(Kind::Plan, bytemuck::bytes_of(plan), None);
-        }
-        for event in &self.events {
-            outbox.put(Kind::Event, bytemuck::bytes_of(event), None);
-        }
-        for rehearsal in &self.rehearsals {
-            outbox.put(Kind::Rehearsal, bytemuck::bytes_of(&**rehearsal), None);
-        }
-        for reply in &self.replies {
-            outbox.put(Kind::Reply, bytemuck::bytes_of(reply), None);
+    /// Keeps a packet; the oldest of its kind makes room.
+    pub fn put(&mut self, packet: Outgoing) {
+        for ((kind, most), queue) in KEPT.iter().zip(&mut self.0) {
+            if *kind == packet.0 {
+                queue.truncate(most - 1);
+                queue.push_front(packet);
+                return;
+            }
         }
     }
 
-    /// Sends the running scene and its snapshot board.
-    pub fn tell_scene(&self, outbox: &mut Outbox) {
-        if let Some((size, board)) = &self.snapshots {
-            outbox.put(Kind::Snapshots, bytemuck::bytes_of(size), Some(board));
-        }
-        if let Some((header, words)) = &self.scene {
-            outbox.put(Kind::Scene, bytemuck::bytes_of(&**header), Some(words));
-        }
+    /// Returns all packets in the order for a new bridge, of each kind the oldest first.
+    pub fn packets(&self) -> impl Iterator<Item = &Outgoing> {
+        self.0.iter().flat_map(|queue| queue.iter().rev())
     }
-}
-
-/// Keeps the last `most`.
-pub fn keep<T>(queue: &mut VecDeque<T>, value: T, most: usize) {
-    if queue.len() >= most {
-        queue.pop_front();
-    }
-    queue.push_back(value);
 }

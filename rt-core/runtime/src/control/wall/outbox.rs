@@ -5,10 +5,13 @@ use std::os::fd::{AsFd, OwnedFd};
 use std::rc::Rc;
 use stylet_wall::packet::{Kind, Packet, Socket};
 
+/// A packet for the bridge: kind, bytes, and memory that goes with it.
+pub type Outgoing = (Kind, Vec<u8>, Option<Rc<OwnedFd>>);
+
 /// Packets that the bridge has not yet taken.
 #[derive(Default)]
 pub struct Outbox {
-    pub(super) waiting: VecDeque<(Kind, Vec<u8>, Option<Rc<OwnedFd>>)>,
+    pub(super) waiting: VecDeque<Outgoing>,
     pub(super) socket: Option<Socket>,
     /// The other end is closed.
     pub(super) is_closed: bool,
@@ -16,9 +19,9 @@ pub struct Outbox {
 
 impl Outbox {
     /// Sends, or queues until there is room. Does nothing without a bridge: a new one gets the whole state.
-    pub fn put(&mut self, kind: Kind, bytes: &[u8], memory: Option<&Rc<OwnedFd>>) {
+    pub fn put(&mut self, packet: Outgoing) {
         if self.socket.is_some() {
-            self.waiting.push_back((kind, bytes.to_vec(), memory.map(Rc::clone)));
+            self.waiting.push_back(packet);
             self.flush();
         }
     }

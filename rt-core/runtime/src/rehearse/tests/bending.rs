@@ -91,7 +91,11 @@ fn scatter_moves_a_rehearsed_needle_reproducibly_by_seed() {
     assert_eq!(first, stage.rehearse(&run, &set, &stop).expect("goes through"));
     set.set(ParameterId::ScatterSeed, 2.0);
     let second = stage.rehearse(&run, &set, &stop).expect("goes through");
-    let beside = |r: &Rehearsed| (Vector3::from(r.seeds[0].position_m) - run.drops_m[0]).xy().norm();
+    let beside = |r: &Rehearsed| {
+        (Vector3::from(r.seeds[0].position_m) - Vector3::from(run.drops_m[0]))
+            .xy()
+            .norm()
+    };
     println!("{:.2} and {:.2} mm beside", 1e3 * beside(&first), 1e3 * beside(&second));
     assert!(beside(&first) > 0.2e-3 && (beside(&first) - beside(&second)).abs() > 0.1e-3);
 }

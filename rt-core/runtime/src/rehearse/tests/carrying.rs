@@ -7,14 +7,14 @@ use stylet_sim::line::BodyAnswer;
 /// A body, a needle into it, and the force-loop ticks until it is in at 50 mm/s. Then it rests.
 struct Theatre {
     stage: Stage,
-    run: NeedleRun,
+    run: NeedleRehearsal,
     going: usize,
 }
 
 impl Theatre {
     fn paper() -> Self {
-        let run = NeedleRun {
-            drops_m: vec![needle().entry_m + Vector3::z() * 0.04],
+        let run = NeedleRehearsal {
+            drops_m: vec![(Vector3::from(needle().entry_m) + Vector3::z() * 0.04).into()],
             ..needle()
         };
         Theatre {
@@ -29,12 +29,12 @@ impl Theatre {
         let paper = Self::paper();
         let source = SceneSource::Builtin("pelvis".to_owned());
         let scene = source.build().expect("built in");
-        let before_m = paper.run.entry_m.z - (scene.lattice.bounds_m().0[2] - 0.01);
+        let before_m = paper.run.entry_m[2] - (scene.lattice.bounds_m().0[2] - 0.01);
         let stage = Stage::build(&source, TissueKind::ChainMail, DeviceInfo::phantom_premium_1_5());
         Theatre {
             stage: stage.expect("built in"),
-            run: NeedleRun {
-                entry_m: paper.run.entry_m - Vector3::z() * before_m,
+            run: NeedleRehearsal {
+                entry_m: (Vector3::from(paper.run.entry_m) - Vector3::z() * before_m).into(),
                 ..paper.run
             },
             going: paper.going + (before_m / 0.05 * 1e3) as usize,
@@ -66,8 +66,8 @@ fn session(theatre: &mut Theatre, way: Way) -> (Vec<(usize, f64)>, Vec<[u64; 3]>
     rig.take_lines(lines);
     rig.engage();
     rig.move_hand(&stylet_shm_schema::HandMove {
-        tip_m: run.drops_m[0].into(),
-        direction: run.direction.into(),
+        tip_m: run.drops_m[0],
+        direction: run.direction,
         speed_m_per_s: run.insert_m_per_s,
         acceleration_m_per_s2: run.acceleration_m_per_s2,
     });

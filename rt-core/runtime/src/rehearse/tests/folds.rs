@@ -62,7 +62,7 @@ struct Insertion {
     widest_m: f64,
 }
 
-fn insertion(stage: &mut Stage, run: &NeedleRun, set: &ParameterSet) -> Insertion {
+fn insertion(stage: &mut Stage, run: &NeedleRehearsal, set: &ParameterSet) -> Insertion {
     let stop = AtomicBool::new(false);
     let active = activate(set, &stage.device).expect("valid");
     let lines = stage.lines(run, false, &stop).expect("a line");
@@ -79,14 +79,15 @@ fn insertion(stage: &mut Stage, run: &NeedleRun, set: &ParameterSet) -> Insertio
     };
     let mut before: Vec<[f64; 3]> = Vec::new();
     // In to the first drop, at rest, and part of the way out.
-    let way_m = (run.drops_m[0] - run.entry_m).norm();
+    let (entry_m, direction) = (Vector3::from(run.entry_m), Vector3::from(run.direction));
+    let way_m = (Vector3::from(run.drops_m[0]) - entry_m).norm();
     let inwards = (1e3 * way_m / run.insert_m_per_s) as usize + 400;
     for n in 0..inwards + 800 {
         if n == 0 || n == inwards {
             let depth_m = if n == 0 { way_m } else { way_m - 25e-3 };
             rig.move_hand(&HandMove {
-                tip_m: (run.entry_m + run.direction * depth_m).into(),
-                direction: run.direction.into(),
+                tip_m: (entry_m + direction * depth_m).into(),
+                direction: run.direction,
                 speed_m_per_s: run.insert_m_per_s,
                 acceleration_m_per_s2: run.acceleration_m_per_s2,
             });
@@ -98,7 +99,7 @@ fn insertion(stage: &mut Stage, run: &NeedleRun, set: &ParameterSet) -> Insertio
             done.moved_m.push(rig.displacement_m());
             let body = rig.deformed();
             let count = body.lattice.element_count() as u32;
-            let along = (0..30).map(|n| run.entry_m + run.direction * (4e-3 * f64::from(n)));
+            let along = (0..30).map(|n| entry_m + direction * (4e-3 * f64::from(n)));
             let elements = along.filter_map(|place_m| body.lattice.element_at_rest(place_m.into()));
             let of_corners = elements.map(|element| least_corner(&body, element));
             done.around = of_corners.fold(done.around, f64::min);
@@ -124,7 +125,7 @@ fn most(of: &[f64]) -> f64 {
 }
 
 /// Runs linear and corrected alternately.
-fn both(scene: &str, kind: TissueKind, run: &NeedleRun, set: &ParameterSet, rounds: usize) -> [Insertion; 2] {
+fn both(scene: &str, kind: TissueKind, run: &NeedleRehearsal, set: &ParameterSet, rounds: usize) -> [Insertion; 2] {
     let source = SceneSource::Builtin(scene.to_owned());
     let mut stage = Stage::build(&source, kind, DeviceInfo::phantom_premium_1_5()).expect("built in");
     let mut found: [Option<Insertion>; 2] = [None, None];
@@ -177,7 +178,7 @@ fn pushed_far() -> ParameterSet {
     set
 }
 
-fn no_cell_folds(scene: &str, kind: TissueKind, run: &NeedleRun, rounds: usize) {
+fn no_cell_folds(scene: &str, kind: TissueKind, run: &NeedleRehearsal, rounds: usize) {
     for set in [ParameterSet::default(), pushed_far()] {
         let [linear, large] = both(scene, kind, run, &set, rounds);
         // The force is the linear body's.
@@ -226,7 +227,7 @@ fn fold_correction_changes_no_seed_and_no_force_of_a_rehearsal() {
 }
 
 /// A needle into the gland of `pelvis`, off its centre.
-fn needle_in_pelvis() -> NeedleRun {
+fn needle_in_pelvis() -> NeedleRehearsal {
     let pelvis = stylet_sim::scene::Scene::builtin("pelvis").expect("built in");
     let is_target = |e: &u32| {
         let structure = usize::from(pelvis.lattice.structure(*e));
@@ -236,9 +237,9 @@ fn needle_in_pelvis() -> NeedleRun {
     let places: Vec<_> = of_target.map(|e| Vector3::from(pelvis.lattice.rest_m(e))).collect();
     let middle = places.iter().sum::<Vector3<f64>>() / places.len() as f64;
     let skin_m = pelvis.lattice.bounds_m().0[2];
-    NeedleRun {
-        entry_m: Vector3::new(middle.x + 6e-3, middle.y, skin_m - 5e-3),
-        drops_m: vec![middle + Vector3::new(6e-3, 0.0, 5e-3)],
+    NeedleRehearsal {
+        entry_m: [middle.x + 6e-3, middle.y, skin_m - 5e-3],
+        drops_m: vec![(middle + Vector3::new(6e-3, 0.0, 5e-3)).into()],
         ..needle()
     }
 }
@@ -265,9 +266,9 @@ fn times_and_folds_of_finite_elements_in_both_scenes() {
 #[test]
 fn no_cell_folds_before_the_far_side_of_a_body_of_finite_elements() {
     let entry_m = Vector3::new(73e-3, 54.3e-3, 86.9e-3);
-    let run = NeedleRun {
-        entry_m,
-        drops_m: vec![entry_m + 58e-3 * Vector3::z()],
+    let run = NeedleRehearsal {
+        entry_m: entry_m.into(),
+        drops_m: vec![(entry_m + Vector3::z() * 58e-3).into()],
         ..needle()
     };
     let [linear, large] = both("paper", TissueKind::Fem, &run, &ParameterSet::default(), 1);

@@ -3,17 +3,17 @@
 use super::*;
 
 /// Four needles about the centre, 40 mm deep.
-pub(super) fn stabilised(count: usize) -> NeedleRun {
+pub(super) fn stabilised(count: usize) -> NeedleRehearsal {
     let run = needle();
     let at = |n: usize| {
         let (sine, cosine) = (std::f64::consts::FRAC_PI_2 * (n as f64 + 0.5)).sin_cos();
         StabilisingNeedle {
-            entry_m: (run.entry_m + Vector3::new(cosine, sine, 0.0) * 10e-3).into(),
+            entry_m: (Vector3::from(run.entry_m) + Vector3::new(cosine, sine, 0.0) * 10e-3).into(),
             direction: [0.0, 0.0, 1.0],
             depth_m: 0.04,
         }
     };
-    NeedleRun {
+    NeedleRehearsal {
         stabilising: (0..count).map(at).collect(),
         ..run
     }
@@ -21,7 +21,7 @@ pub(super) fn stabilised(count: usize) -> NeedleRun {
 
 /// Mean displacement of the target along the needle in each tissue tick, m, from the start of the needle that drops
 /// seeds; the first is due to the others.
-fn shifts_m(stage: &mut Stage, run: &NeedleRun) -> (Vec<f64>, Rehearsed) {
+fn shifts_m(stage: &mut Stage, run: &NeedleRehearsal) -> (Vec<f64>, Rehearsed) {
     let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
     let rehearsed = stage.rehearse(run, &set, &stop).expect("goes through");
     let active = activate(&set, &stage.device).expect("valid");
@@ -85,7 +85,7 @@ fn the_gland_moves_less_between_four_stabilising_needles() {
 fn off_mm(run: &Rehearsed) -> Vec<f64> {
     let pairs = run.seeds.iter().zip(needle().drops_m);
     pairs
-        .map(|(seed, drop)| ((seed.position_m[2] - drop.z) * 1e5).round() / 100.0)
+        .map(|(seed, drop)| ((seed.position_m[2] - drop[2]) * 1e5).round() / 100.0)
         .collect()
 }
 
@@ -109,7 +109,7 @@ fn a_needle_goes_in_across_the_way_of_one_that_stays_in() {
         let mut run = needle();
         // They meet 30 mm behind the entry.
         let direction = Vector3::new(-0.012, 0.0, 0.03).normalize();
-        let entry_m = run.entry_m + Vector3::x() * 0.012;
+        let entry_m = Vector3::from(run.entry_m) + Vector3::x() * 0.012;
         run.stabilising = vec![StabilisingNeedle {
             entry_m: entry_m.into(),
             direction: direction.into(),

@@ -17,7 +17,7 @@ fn seeds_migrate_towards_the_entry_where_it_is_asked_for() {
     }
     // A strand holds its seeds.
     let mut strand = needle();
-    strand.strand_pitch_m = Some(strand.drops_m[0].z - strand.drops_m[1].z);
+    strand.strand_pitch_m = Some(strand.drops_m[0][2] - strand.drops_m[1][2]);
     let held = stage.rehearse(&strand, &set, &stop).expect("goes through");
     set.set(ParameterId::MigratingShare, 0.0);
     assert_eq!(

@@ -12,10 +12,11 @@ use stylet_sim::scene::TissueKind;
 fn needles_do_not_know_each_other(tissue: TissueKind) {
     let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
     let needles = [[0.0, 0.0], [0.006, -0.004], [-0.009, 0.002]].map(|[x, y]| {
-        let (mut run, across) = (needle(), Vector3::new(x, y, 0.0));
-        run.entry_m += across;
-        run.direction = Vector3::new(0.02 * x.signum(), 0.0, 1.0).normalize();
-        let along = |drop: &Vector3<f64>| run.entry_m + run.direction * (drop.z - run.entry_m.z);
+        let mut run = needle();
+        let entry_m = Vector3::from(run.entry_m) + Vector3::new(x, y, 0.0);
+        let direction = Vector3::new(0.02 * x.signum(), 0.0, 1.0).normalize();
+        (run.entry_m, run.direction) = (entry_m.into(), direction.into());
+        let along = |drop: &[f64; 3]| (entry_m + direction * (drop[2] - entry_m.z)).into();
         run.drops_m = run.drops_m.iter().map(along).collect();
         run
     });

@@ -16,7 +16,7 @@ impl Digest {
 
 /// Digests tip, force, torque, depth, speed and displacement of every tick, then the seeds and the largest force. Adds
 /// every 200th tick and the seeds to a trace.
-fn digest(stage: &mut Stage, run: &NeedleRun, case: f64, trace: &mut Vec<Vec<f64>>) -> u64 {
+fn digest(stage: &mut Stage, run: &NeedleRehearsal, case: f64, trace: &mut Vec<Vec<f64>>) -> u64 {
     let active = activate(&ParameterSet::default(), &stage.device).expect("valid");
     let mut world = stage.world.take().expect("given back");
     world.tissue.return_to_rest();
@@ -60,16 +60,16 @@ fn digest(stage: &mut Stage, run: &NeedleRun, case: f64, trace: &mut Vec<Vec<f64
 }
 
 /// A needle through a scene's target, that far off its centre, with three drops.
-fn through(scene: &str, speed_m_per_s: f64, beside_m: f64) -> (Stage, NeedleRun) {
+fn through(scene: &str, speed_m_per_s: f64, beside_m: f64) -> (Stage, NeedleRehearsal) {
     let source = SceneSource::Builtin(scene.to_owned());
     let stage = Stage::build(&source, TissueKind::Paper, DeviceInfo::phantom_premium_1_5()).expect("built in");
     let built = stylet_sim::scene::Scene::builtin(scene).expect("built in");
     let (low, high) = built.target_bounds_m();
     let (outside, _) = built.lattice.bounds_m();
     let (x, y) = ((low[0] + high[0]) / 2.0 + beside_m, (low[1] + high[1]) / 2.0);
-    let at = |share: f64| Vector3::new(x, y, low[2] + share * (high[2] - low[2]));
-    let run = NeedleRun {
-        entry_m: Vector3::new(x, y, outside[2] - 0.01),
+    let at = |share: f64| [x, y, low[2] + share * (high[2] - low[2])];
+    let run = NeedleRehearsal {
+        entry_m: [x, y, outside[2] - 0.01],
         insert_m_per_s: speed_m_per_s,
         retract_m_per_s: speed_m_per_s,
         drops_m: [0.8, 0.5, 0.2].map(at).to_vec(),

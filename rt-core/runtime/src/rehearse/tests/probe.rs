@@ -1,9 +1,9 @@
 //! The ultrasound probe in both loops: it moves the gland, the needle and the seeds, and releases them.
 
 use super::*;
-use crate::rt::exchange::TissueOrder;
+use crate::rt::exchange::{HapticOrder, TissueOrder};
 use crate::rt::pose::TipPose;
-use crate::rt::second::{SecondLoop, SecondMemory, SecondOrder, gate_of, wire};
+use crate::rt::second::{SecondLoop, SecondMemory, gate_of, wire};
 use crate::rt::tissue::TissueLoop;
 use crate::rt::wiring::{Capacities, Wiring};
 use std::time::Instant;
@@ -16,7 +16,7 @@ const BALANCED_M: f64 = 7e-3;
 
 struct Theatre {
     stage: Stage,
-    run: NeedleRun,
+    run: NeedleRehearsal,
     probe: BodyProbe,
 }
 
@@ -40,10 +40,10 @@ impl Theatre {
         let (low, high) = scene.target_bounds_m();
         let (outside, _) = scene.lattice.bounds_m();
         let middle = [0, 1, 2].map(|a| 0.5 * (low[a] + high[a]));
-        let entry_m = Vector3::new(middle[0] + 8e-3, middle[1] - 5e-3, outside[2] - 10e-3);
-        let run = NeedleRun {
+        let entry_m = [middle[0] + 8e-3, middle[1] - 5e-3, outside[2] - 10e-3];
+        let run = NeedleRehearsal {
             entry_m,
-            drops_m: vec![Vector3::new(entry_m.x, entry_m.y, middle[2] + 10e-3)],
+            drops_m: vec![[entry_m[0], entry_m[1], middle[2] + 10e-3]],
             ..needle()
         };
         Theatre { stage, run, probe }
@@ -66,8 +66,8 @@ impl Theatre {
     /// Moves the hand to the first drop.
     fn insert(&self, rig: &mut Rig) {
         rig.move_hand(&stylet_shm_schema::HandMove {
-            tip_m: self.run.drops_m[0].into(),
-            direction: self.run.direction.into(),
+            tip_m: self.run.drops_m[0],
+            direction: self.run.direction,
             speed_m_per_s: self.run.insert_m_per_s,
             acceleration_m_per_s2: self.run.acceleration_m_per_s2,
         });
@@ -223,14 +223,14 @@ fn the_second_hand_presses_the_gland_and_feels_it() {
             acceleration_m_per_s2: 2.0,
         };
         for order in [
-            SecondOrder::Engage,
-            SecondOrder::Hand {
-                ticket: 0,
+            HapticOrder::Engage,
+            HapticOrder::Hand {
                 goal,
+                up: None,
                 promise: None,
             },
         ] {
-            assert!(control.orders.push(order).is_ok());
+            assert!(control.orders.push((0, order)).is_ok());
         }
         let mut wrench = stylet_hw::Wrench::zero();
         for n in 0..ticks {

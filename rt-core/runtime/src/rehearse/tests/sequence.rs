@@ -17,18 +17,18 @@ const OFF_M: [[f64; 2]; 8] = [
     [4e-3, -8e-3],
 ];
 
-fn way(run: &NeedleRun) -> NeedleWay {
+fn way(run: &NeedleRehearsal) -> NeedleWay {
     NeedleWay {
-        entry_m: run.entry_m,
-        direction: run.direction,
-        drops_m: run.drops_m.clone(),
+        entry_m: run.entry_m.into(),
+        direction: run.direction.into(),
+        drops_m: run.drops_m.iter().map(|&drop| drop.into()).collect(),
         retract_to_m: run.retract_to_m,
         strand_pitch_m: run.strand_pitch_m,
     }
 }
 
 /// Seeds of all needles, once those that stayed in are out.
-fn carried_out(stage: &mut Stage, runs: &[NeedleRun]) -> Vec<SeedPose> {
+fn carried_out(stage: &mut Stage, runs: &[NeedleRehearsal]) -> Vec<SeedPose> {
     let (set, stop) = (ParameterSet::default(), AtomicBool::new(false));
     let stabilising = runs[0].stabilising.clone();
     let mut lines = stage.lines(&runs[0], false, &stop).expect("lines");
@@ -36,14 +36,7 @@ fn carried_out(stage: &mut Stage, runs: &[NeedleRun]) -> Vec<SeedPose> {
     let body = stage.lines.as_ref().expect("a body");
     for (n, run) in runs.iter().enumerate().skip(1) {
         let generation = (stabilising.len() + 1 + n) as u64;
-        let line = body.prepare_beside(
-            generation,
-            run.entry_m.into(),
-            run.direction.into(),
-            false,
-            &others,
-            &mut || true,
-        );
+        let line = body.prepare(generation, run.entry_m, run.direction, false, &others, &mut || true);
         lines.push(line.expect("a line"));
     }
     let active = activate(&set, &stage.device).expect("valid");
@@ -112,14 +105,19 @@ fn most(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
 }
 
-fn runs(count: usize, needles: usize) -> Vec<NeedleRun> {
+fn runs(count: usize, needles: usize) -> Vec<NeedleRehearsal> {
     let run = stabilised(count);
     let beside = |[x, y]: &[f64; 2]| {
         let off = Vector3::new(*x, *y, 0.0);
-        NeedleRun {
-            entry_m: run.entry_m + off,
+        NeedleRehearsal {
+            entry_m: (Vector3::from(run.entry_m) + off).into(),
             // The shallowest lies outside a gland that other needles hold.
-            drops_m: run.drops_m.iter().take(2).map(|d| d + off).collect(),
+            drops_m: run
+                .drops_m
+                .iter()
+                .take(2)
+                .map(|&d| (Vector3::from(d) + off).into())
+                .collect(),
             ..run.clone()
         }
     };
@@ -127,11 +125,11 @@ fn runs(count: usize, needles: usize) -> Vec<NeedleRun> {
 }
 
 /// The needle as one that comes and goes.
-fn pass(run: &NeedleRun) -> StabilisingNeedle {
+fn pass(run: &NeedleRehearsal) -> StabilisingNeedle {
     StabilisingNeedle {
-        entry_m: run.entry_m.into(),
-        direction: run.direction.into(),
-        depth_m: (run.drops_m[0] - run.entry_m).norm(),
+        entry_m: run.entry_m,
+        direction: run.direction,
+        depth_m: (Vector3::from(run.drops_m[0]) - Vector3::from(run.entry_m)).norm(),
     }
 }
 
@@ -144,7 +142,7 @@ fn check(kind: TissueKind, counts: &[usize], needles: usize) {
         let runs = runs(count, needles);
         let mut rehearse = |earlier: &dyn Fn(usize) -> Vec<StabilisingNeedle>| {
             let each = runs.iter().enumerate().map(|(n, run)| {
-                let run = NeedleRun {
+                let run = NeedleRehearsal {
                     earlier: earlier(n),
                     ..run.clone()
                 };

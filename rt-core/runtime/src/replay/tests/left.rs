@@ -17,9 +17,8 @@ impl Recorded {
     }
 
     pub(super) fn make_room_to_leave(&mut self) {
-        self.haptic(HapticOrder::Engage { ticket: 0 });
+        self.haptic(HapticOrder::Engage);
         self.haptic(HapticOrder::Parameters {
-            ticket: 0,
             generation: 2,
             needle: NeedleParameters::default(),
             force: ForceParameters {
@@ -44,7 +43,7 @@ impl Recorded {
         let body = LineBody::of_source(source, kind).expect("valid").expect("has lines");
         let entry_m = self.entry_m + Vector3::x() * apart_m;
         let others = [self.line.stations.clone()];
-        let line = body.prepare_beside(generation, entry_m.into(), [0.0, 0.0, 1.0], false, &others, &mut || {
+        let line = body.prepare(generation, entry_m.into(), [0.0, 0.0, 1.0], false, &others, &mut || {
             true
         });
         line.expect("through the block")
@@ -67,11 +66,11 @@ impl Recorded {
     }
 
     pub(super) fn has(&self, flag: u32) -> bool {
-        self.loops.haptic.state.flags & flag != 0
+        self.loops.haptic.memory.state.flags & flag != 0
     }
 
     pub(super) fn left_count(&self) -> u32 {
-        self.loops.haptic.state.left_count
+        self.loops.haptic.memory.state.left_count
     }
 
     /// Runs for that time and returns the refusals.
@@ -97,7 +96,7 @@ impl Recorded {
         self.run(0.1);
         self.go(12e-3);
         self.run(1.6);
-        self.haptic(HapticOrder::LeaveNeedle { ticket: 0 });
+        self.haptic(HapticOrder::LeaveNeedle);
         self.run(0.05);
         assert!(self.left_count() == 1 && self.has(flags::HAND_EMPTY) && !self.has(flags::IN_CONTACT));
         self.go(-8e-3);
@@ -127,7 +126,6 @@ fn a_recording_with_a_needle_that_stays_in_repeats_in_every_bit() {
         run.go_beside(APART_M, 7e-3);
         run.run(2.0);
         run.haptic(HapticOrder::DrawNeedle {
-            ticket: 0,
             number: 1,
             speed_m_per_s: 0.02,
             promise: None,
@@ -166,7 +164,7 @@ fn a_needle_is_taken_up_again_where_it_was_left_and_comes_out_by_hand() {
         let mut run = Recorded::with_left(kind);
         run.leave_first();
         let held = run.loops.tissue.displacement_m();
-        let take = HapticOrder::TakeNeedle { ticket: 0, number: 1 };
+        let take = HapticOrder::TakeNeedle(1);
         run.haptic(take);
         assert_eq!(run.refusals(0.01), [RefusalCode::NotAtNeedle]);
         // The hand returns empty: no contact, no force.
@@ -189,13 +187,12 @@ fn a_needle_is_taken_up_again_where_it_was_left_and_comes_out_by_hand() {
             "{kind:?}"
         );
         run.haptic(HapticOrder::DrawNeedle {
-            ticket: 0,
             number: 1,
             speed_m_per_s: 0.02,
             promise: None,
         });
-        run.haptic(HapticOrder::LeaveNeedle { ticket: 0 });
-        run.haptic(HapticOrder::LeaveNeedle { ticket: 0 });
+        run.haptic(HapticOrder::LeaveNeedle);
+        run.haptic(HapticOrder::LeaveNeedle);
         let refused = run.refusals(0.05);
         assert_eq!(
             refused,
@@ -254,7 +251,7 @@ fn a_track_is_met_again_after_another_needle() {
     run.run(0.6);
     run.give(&again);
     run.run(0.1);
-    run.loops.haptic.state.peak_force_n = 0.0;
+    run.loops.haptic.memory.state.peak_force_n = 0.0;
     run.go_beside(0.4e-3, 9e-3);
     run.run(1.5);
     let again_n = run.peak_n();
@@ -264,7 +261,7 @@ fn a_track_is_met_again_after_another_needle() {
 
 impl Recorded {
     fn peak_n(&self) -> f64 {
-        self.loops.haptic.state.peak_force_n
+        self.loops.haptic.memory.state.peak_force_n
     }
 
     fn line_track(&self) -> Option<stylet_sim::line::Track> {
@@ -279,7 +276,6 @@ fn a_needle_that_is_drawn_waits_for_its_host() {
     run.leave_first();
     let promise = Promise::first(7);
     run.haptic(HapticOrder::DrawNeedle {
-        ticket: 0,
         number: 1,
         speed_m_per_s: 0.05,
         promise: Some(promise),

@@ -15,12 +15,12 @@ fn a_flight_in_which_hosts_fall_silent_repeats_bit_by_bit() {
             acceleration_m_per_s2: 1.0,
         };
         run.haptic(HapticOrder::Hand {
-            ticket: 0,
             goal,
+            up: None,
             promise: Some(promise),
         });
     };
-    run.haptic(HapticOrder::Engage { ticket: 0 });
+    run.haptic(HapticOrder::Engage);
     run.give_line(1);
     run.run(0.1);
     to(&mut run, 5e-3);

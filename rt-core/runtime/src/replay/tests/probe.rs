@@ -101,7 +101,7 @@ impl Recorded {
 fn a_recording_with_a_probe_repeats_in_every_bit() {
     for kind in [TissueKind::Fem, TissueKind::ChainMail] {
         let mut run = Recorded::with_probe(kind);
-        run.haptic(HapticOrder::Engage { ticket: 0 });
+        run.haptic(HapticOrder::Engage);
         run.give_line(1);
         run.run(0.1);
         run.go(14e-3);
@@ -140,7 +140,7 @@ fn a_recording_with_probe_and_staying_needle_repeats_bit_for_bit() {
         run.press([16e-3, 16e-3], 0.1);
         run.go(14e-3);
         run.press([16e-3, 16e-3], 1.6);
-        run.haptic(HapticOrder::LeaveNeedle { ticket: 0 });
+        run.haptic(HapticOrder::LeaveNeedle);
         run.press([16e-3, 16e-3], 0.1);
         assert!(run.left_count() == 1 && run.has(flags::HAND_EMPTY));
         run.go(-8e-3);

@@ -8,7 +8,7 @@ use stylet_sim::needle::Phase;
 impl HapticLoop {
     /// True if the needle bends but its line was prepared for a rigid one.
     pub(super) fn lacks_beam(&self) -> bool {
-        let bends = self.parameters.force.bending.is_on();
+        let bends = self.memory.parameters.force.bending.is_on();
         bends && self.line.as_ref().is_some_and(|line| !line.can_bend())
     }
 
@@ -25,10 +25,10 @@ impl HapticLoop {
     /// Returns the age in ns of the pose that the tissue has answered, and the travel of the tip since, in contact
     /// without a line. On a line the force belongs to this tick.
     pub(super) fn lag(&self, woke_ns: u64, tissue: &TissueResponse, phase: Phase) -> (u64, f64) {
-        if self.on_line || phase == Phase::Outside || tissue.solved_ns == 0 {
+        if self.memory.on_line || phase == Phase::Outside || tissue.solved_ns == 0 {
             return (0, 0.0);
         }
-        let far_m = (self.pose.tip_in_scene - tissue.solved_tip_in_scene).norm();
+        let far_m = (self.memory.pose.tip_in_scene - tissue.solved_tip_in_scene).norm();
         (woke_ns.saturating_sub(tissue.solved_ns), far_m)
     }
 }

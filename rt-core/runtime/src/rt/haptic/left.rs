@@ -1,7 +1,6 @@
 //! Needles that stay in: leaves them, takes them again, draws them out, and ticks those left.
 
 use super::HapticLoop;
-use crate::rt::exchange::{Notice, Ticket};
 use crate::rt::left_loads::LeftLoads;
 use crate::rt::line_loads::LineLoads;
 use crate::rt::motion_lease::Promise;
@@ -20,8 +19,6 @@ const OUT_WITHIN_M: f64 = 1e-3;
 pub(super) struct Left {
     /// Room for them, once the first is left.
     pub needles: Option<Box<LeftNeedles>>,
-    /// The hand holds no needle.
-    pub is_hand_empty: bool,
     /// The tissue loop was last shown some loads.
     pub is_shown: bool,
 }
@@ -66,18 +63,10 @@ impl Left {
 }
 
 impl HapticLoop {
-    pub(super) fn leave_needle(&mut self, ticket: Ticket) {
-        let notice = match self.try_to_leave() {
-            Ok(()) => self.done(ticket),
-            Err(why) => Notice::Refused { ticket, why },
-        };
-        self.notify(notice);
-    }
-
-    fn try_to_leave(&mut self) -> Result<(), RefusalCode> {
+    pub(super) fn leave_needle(&mut self) -> Result<(), RefusalCode> {
         let line = self.line.as_ref().filter(|line| line.is_in_tissue());
-        let Some(line) = line.filter(|_| self.on_line) else {
-            let in_other_contact = self.contact > self.pose.released_contact;
+        let Some(line) = line.filter(|_| self.memory.on_line) else {
+            let in_other_contact = self.memory.contact > self.memory.pose.released_contact;
             return Err(if in_other_contact {
                 RefusalCode::NeedleWithoutLine
             } else {
@@ -97,27 +86,19 @@ impl HapticLoop {
             self.line = Some(line);
             return Err(RefusalCode::NoRoomToLeave);
         }
-        self.left.is_hand_empty = true;
-        self.chain.end_contact();
-        self.pose.released_contact = self.contact;
-        self.on_line = false;
+        self.memory.is_hand_empty = true;
+        self.memory.chain.end_contact();
+        self.memory.pose.released_contact = self.memory.contact;
+        self.memory.on_line = false;
         Ok(())
     }
 
     /// Takes the needle at whose tip the hand is, as it was held.
-    pub(super) fn take_needle(&mut self, ticket: Ticket, generation: u64) {
-        let notice = match self.try_to_take(generation) {
-            Ok(()) => self.done(ticket),
-            Err(why) => Notice::Refused { ticket, why },
-        };
-        self.notify(notice);
-    }
-
-    fn try_to_take(&mut self, generation: u64) -> Result<(), RefusalCode> {
+    pub(super) fn take_needle(&mut self, generation: u64) -> Result<(), RefusalCode> {
         if self.line.as_ref().is_some_and(|line| line.is_in_tissue()) {
             return Err(RefusalCode::NeedleInTissue);
         }
-        let sample = self.sample.ok_or(RefusalCode::NotAtNeedle)?;
+        let sample = self.memory.hand.sample.ok_or(RefusalCode::NotAtNeedle)?;
         let needles = self.left.any_mut().ok_or(RefusalCode::NoLeftNeedle)?;
         let needle = needles
             .needles()
@@ -139,42 +120,31 @@ impl HapticLoop {
             let _ = self.ports.old_lines.push(old);
         }
         self.left.pair(self.line.as_deref());
-        self.left.is_hand_empty = false;
-        self.on_line = true;
+        self.memory.is_hand_empty = false;
+        self.memory.on_line = true;
         Ok(())
     }
 
     pub(super) fn draw_needle(
         &mut self,
-        ticket: Ticket,
         generation: u64,
         speed_m_per_s: f64,
         promise: Option<Promise>,
-    ) {
-        let needles = self.left.any_mut();
-        let notice = match needles.is_some_and(|needles| needles.draw_out(generation, speed_m_per_s)) {
-            true => {
-                self.begin_drawing(promise);
-                self.done(ticket)
-            }
-            false => Notice::Refused {
-                ticket,
-                why: RefusalCode::NoLeftNeedle,
-            },
-        };
-        self.notify(notice);
-    }
-
-    fn done(&self, ticket: Ticket) -> Notice {
-        let tick = self.state.tick + 1;
-        Notice::Done { ticket, tick }
+    ) -> Result<(), RefusalCode> {
+        let mut needles = self.left.any_mut();
+        let is_there = needles
+            .as_mut()
+            .is_some_and(|needles| needles.draw_out(generation, speed_m_per_s));
+        is_there
+            .then(|| self.begin_drawing(promise))
+            .ok_or(RefusalCode::NoLeftNeedle)
     }
 
     /// Returns needles that are out, and those whose columns the tissue loop lacks, to be freed.
     pub(super) fn look_after_left(&mut self, sample: &Sample, tissue: &TissueResponse) {
         let Some(needles) = self.left.any_mut() else {
             // A tip in tissue without a contact must come out before it meets tissue.
-            self.left.is_hand_empty = false;
+            self.memory.is_hand_empty = false;
             return;
         };
         let is_known = |generation: u64| tissue.line == generation || tissue.left.contains(&generation);
@@ -193,12 +163,12 @@ impl HapticLoop {
                 self.left.pair(self.line.as_deref());
             }
         }
-        self.left.is_hand_empty = self.is_hand_empty(sample);
+        self.memory.is_hand_empty = self.is_hand_empty(sample);
     }
 
     /// True on the way of a needle that stays in, and until the hand is out after one was left.
     fn is_hand_empty(&self, sample: &Sample) -> bool {
-        if self.on_line && self.line.as_ref().is_some_and(|line| line.is_in_tissue()) {
+        if self.memory.on_line && self.line.as_ref().is_some_and(|line| line.is_in_tissue()) {
             return false;
         }
         let Some(needles) = &self.left.needles else {
@@ -208,12 +178,12 @@ impl HapticLoop {
         let is_on = |line: &HandLine| line.is_met_by(tip, &direction);
         let is_in = |line: &HandLine| line.along_m(tip) > -OUT_WITHIN_M;
         needles.needles().iter().any(|needle| is_on(needle.line()))
-            || (self.left.is_hand_empty && needles.needles().iter().any(|needle| is_in(needle.line())))
+            || (self.memory.is_hand_empty && needles.needles().iter().any(|needle| is_in(needle.line())))
     }
 
     /// Steps them. Their loads go out with those of the moving needle, or from here if there is none.
     pub(super) fn step_left(&mut self) {
-        let period_s = self.period_s;
+        let period_s = self.device.period_s;
         if let Some(needles) = self.left.any_mut() {
             needles.step_alone(period_s);
         } else if !self.left.is_shown {
@@ -239,7 +209,7 @@ impl HapticLoop {
                 }
             }
         }
-        self.left.is_hand_empty = false;
+        self.memory.is_hand_empty = false;
         self.left.pair(self.line.as_deref());
     }
 }

@@ -27,10 +27,10 @@ impl HapticLoop {
 
     /// Follows the probe's displacement of the lines in this tissue tick. Costs one comparison without a probe.
     pub(super) fn follow_outside(&mut self, tissue: &TissueResponse) {
-        if tissue.outside == self.outside {
+        if tissue.outside == self.memory.outside {
             return;
         }
-        self.outside = tissue.outside;
+        self.memory.outside = tissue.outside;
         let outside = self.ports.outside.read();
         if let Some(tape) = self.ports.flight.tape() {
             if tape.lacks_outside_room()
@@ -40,7 +40,7 @@ impl HapticLoop {
             }
             outside.lines().iter().for_each(|line| tape.outside(line));
         }
-        let ticks = (TISSUE_PERIOD_S / self.period_s).round() as u32;
+        let ticks = (TISSUE_PERIOD_S / self.device.period_s).round() as u32;
         for of_line in outside.lines() {
             let (generation, rows_m) = (of_line.generation, of_line.rows_m());
             match self.line.as_mut().filter(|line| line.generation == generation) {
@@ -61,7 +61,7 @@ impl HapticLoop {
             return;
         }
         if let Ok(mut next) = self.ports.lines.pop() {
-            next.set_forces(&self.parameters.layer_forces());
+            next.set_forces(&self.memory.parameters.layer_forces());
             if let Some(tape) = self.ports.flight.tape() {
                 tape.line(next.generation);
             }
@@ -80,9 +80,9 @@ impl HapticLoop {
     /// must come from outside: a tip in tissue without a contact, as after a reset, is not felt until it has been out.
     /// A line without columns in the tissue loop does not count; a needle held by it is released.
     pub(super) fn is_on_line(&mut self, sample: &Sample, tissue: &TissueResponse) -> bool {
-        let in_other_contact = tissue.contact > self.pose.released_contact;
-        let was_on_line = self.on_line;
-        if self.left.is_hand_empty {
+        let in_other_contact = tissue.contact > self.memory.pose.released_contact;
+        let was_on_line = self.memory.on_line;
+        if self.memory.is_hand_empty {
             return false;
         }
         let others = self.left.needles.as_deref().filter(|others| !others.is_empty());
@@ -107,43 +107,45 @@ impl HapticLoop {
     pub(super) fn respond_on_line(&mut self, sample: &Sample) -> Option<ChainOutput> {
         let line = self.line.as_mut()?;
         let output = step_on_line(
-            &self.parameters,
-            &self.info,
-            &mut self.chain,
+            &self.memory.parameters,
+            &self.device.info,
+            &mut self.memory.chain,
             sample,
             line,
             self.left.any_mut(),
-            self.period_s,
+            self.device.period_s,
         );
         let state = line.state();
-        let buffer = self.ports.loads.input_buffer_mut();
-        let loads = &mut buffer.line;
-        loads.generation = line.generation;
-        loads.in_tissue = line.is_in_tissue();
-        loads.tip_material_m = state.tip().material_m;
-        loads.tip_displacement_m = line.tip_displacement_m();
-        loads.whole_m = line.whole_m();
-        loads.bent = output.bent.as_ref().map(bent_tip);
         let across = match output.bent {
             Some(_) => [line.across_loads_n(0), line.across_loads_n(1)],
             None => [&[][..]; 2],
         };
-        loads.across = across[0].len();
+        let buffer = self.ports.loads.input_buffer_mut();
+        let loads = &mut buffer.line;
+        *loads = LineLoads {
+            generation: line.generation,
+            in_tissue: line.is_in_tissue(),
+            tip_material_m: state.tip().material_m,
+            tip_displacement_m: line.tip_displacement_m(),
+            whole_m: line.whole_m(),
+            bent: output.bent.as_ref().map(bent_tip),
+            across: across[0].len(),
+            ..LineLoads::default()
+        };
         let wanted = state.loads_n().iter().chain(across[0]).chain(across[1]);
-        loads.count = 0;
         for (slot, load) in loads.loads_n.iter_mut().zip(wanted) {
             *slot = *load;
             loads.count += 1;
         }
         self.left.show(&mut buffer.left);
         self.ports.loads.publish();
-        self.on_line = true;
+        self.memory.on_line = true;
         Some(output)
     }
 
     /// Takes the needle off its line.
     pub(super) fn leave_line(&mut self) {
-        if std::mem::take(&mut self.on_line) {
+        if std::mem::take(&mut self.memory.on_line) {
             let buffer = self.ports.loads.input_buffer_mut();
             buffer.line = LineLoads::default();
             self.left.show(&mut buffer.left);

@@ -1,95 +1,86 @@
 //! Orders to the force loop, taken at the start of a tick.
 
 use super::HapticLoop;
-use crate::rt::exchange::{HapticOrder, Notice, Ticket};
+use crate::rt::exchange::{Happened, HapticOrder, Notice};
+use crate::rt::put_in::PutIn;
 use stylet_shm_schema::{DeadlineTotals, Fault, RefusalCode};
 use stylet_sim::force::chain::ChainParameters;
 
 impl HapticLoop {
     pub(super) fn take_orders(&mut self) {
-        while let Ok(order) = self.ports.orders.pop() {
-            let tick = self.state.tick + 1;
+        while let Ok((ticket, order)) = self.ports.orders.pop() {
             if let Some(tape) = self.ports.flight.tape() {
-                tape.order(order);
+                tape.device.order(order);
             }
-            match order {
-                HapticOrder::Parameters {
-                    ticket,
-                    generation,
-                    needle,
-                    force,
-                } => {
-                    self.parameters = ChainParameters { needle, force };
-                    let forces = self.parameters.layer_forces();
-                    if let Some(line) = &mut self.line {
-                        line.set_forces(&forces);
-                    }
-                    if let Some(left) = self.left.any_mut() {
-                        left.set_forces(&forces);
-                    }
-                    self.state.parameters_generation = generation;
-                    self.notify(Notice::ParametersActive {
-                        ticket,
-                        generation,
-                        tick,
-                    });
-                }
-                HapticOrder::Hand { ticket, goal, promise } if goal.is_valid() => {
-                    self.begin_motion(goal, promise);
-                    self.notify(Notice::Done { ticket, tick });
-                }
-                HapticOrder::Hand { ticket, .. } => self.notify(Notice::Refused {
-                    ticket,
-                    why: RefusalCode::BadGoal,
-                }),
-                HapticOrder::StopHand { ticket } => {
-                    self.stop_motion();
-                    self.notify(Notice::Done { ticket, tick });
-                }
-                HapticOrder::Engage { ticket } => self.engage(ticket, tick),
-                HapticOrder::Disengage { ticket } => {
-                    self.chain.gate.release();
-                    self.notify(Notice::Done { ticket, tick });
-                }
-                HapticOrder::LeaveNeedle { ticket } => self.leave_needle(ticket),
-                HapticOrder::TakeNeedle { ticket, number } => self.take_needle(ticket, number),
-                HapticOrder::DrawNeedle {
-                    ticket,
-                    number,
-                    speed_m_per_s,
-                    promise,
-                } => self.draw_needle(ticket, number, speed_m_per_s, promise),
-                HapticOrder::KeepMoving(promise) => self.keep_moving(&promise),
-                HapticOrder::LoseDevice { ticket, lost } => self.lose_device(ticket, lost, tick),
-                HapticOrder::MoveBody { ticket, to_m } => self.move_body(ticket, to_m, tick),
-                HapticOrder::Reset { ticket } => self.reset(ticket, tick),
-                HapticOrder::StoodStill => self.raise(Fault::LoopStopped),
-                HapticOrder::HandOverTape => self.ports.flight.hand_over(),
+            let tick = self.memory.state.tick + 1;
+            let result = self.carry_out(order);
+            if ticket != 0 || result.is_err() {
+                self.notify(Notice::answer(ticket, tick, result));
             }
         }
     }
 
-    fn engage(&mut self, ticket: Ticket, tick: u64) {
-        if self.watchdog.rearm() {
-            let time_ns = self.state.time_ns;
-            self.notify(Notice::Rearmed { tick, time_ns });
+    fn carry_out(&mut self, order: HapticOrder) -> Result<(), RefusalCode> {
+        match order {
+            HapticOrder::Parameters {
+                generation,
+                needle,
+                force,
+            } => {
+                self.memory.parameters = ChainParameters { needle, force };
+                let forces = self.memory.parameters.layer_forces();
+                if let Some(line) = &mut self.line {
+                    line.set_forces(&forces);
+                }
+                if let Some(left) = self.left.any_mut() {
+                    left.set_forces(&forces);
+                }
+                self.memory.state.parameters_generation = generation;
+            }
+            HapticOrder::Hand { goal, up, promise } if goal.is_valid() => {
+                self.memory.hand.begin_motion(&mut self.device, goal, up, promise);
+            }
+            HapticOrder::Hand { .. } => return Err(RefusalCode::BadGoal),
+            HapticOrder::StopHand => self.stop_motion(),
+            HapticOrder::Engage => self.engage(),
+            HapticOrder::Disengage => self.memory.chain.gate.release(),
+            HapticOrder::LeaveNeedle => return self.leave_needle(),
+            HapticOrder::TakeNeedle(number) => return self.take_needle(number),
+            HapticOrder::DrawNeedle {
+                number,
+                speed_m_per_s,
+                promise,
+            } => return self.draw_needle(number, speed_m_per_s, promise),
+            HapticOrder::KeepMoving(promise) => self.keep_moving(&promise),
+            HapticOrder::LoseDevice(lost) => self.memory.put_in.device_lost = lost,
+            HapticOrder::MoveBody(to_m) => self.memory.put_in.body_to_m = to_m.into(),
+            HapticOrder::Reset => self.reset(),
+            HapticOrder::StoodStill => self.raise(Fault::LoopStopped),
+            HapticOrder::HandOverTape => self.ports.flight.hand_over(),
         }
-        self.state.since_armed = DeadlineTotals::default();
-        self.chain.gate.engage();
-        self.notify(Notice::Done { ticket, tick });
+        Ok(())
     }
 
-    fn reset(&mut self, ticket: Ticket, tick: u64) {
+    fn engage(&mut self) {
+        if self.memory.hand.watchdog.rearm() {
+            self.happened(Happened::Rearmed);
+        }
+        self.memory.state.since_armed = DeadlineTotals::default();
+        self.memory.chain.gate.engage();
+    }
+
+    fn reset(&mut self) {
         self.end_contact();
-        self.take_faults_out();
-        self.state.peak_force_n = 0.0;
-        self.state.missed_deadlines = 0;
-        self.state.worst_wake_ns = 0;
-        self.state.worst_work_ns = 0;
-        self.state.worst_residual = 0.0;
-        self.state.worst_tissue_work_ns = 0;
-        self.state.worst_lag_ns = 0;
-        self.state.worst_lag_m = 0.0;
-        self.notify(Notice::Done { ticket, tick });
+        // No needle is in tissue now, so the body may jump back.
+        self.memory.put_in = PutIn::default();
+        let state = &mut self.memory.state;
+        state.peak_force_n = 0.0;
+        state.missed_deadlines = 0;
+        state.worst_wake_ns = 0;
+        state.worst_work_ns = 0;
+        state.worst_residual = 0.0;
+        state.worst_tissue_work_ns = 0;
+        state.worst_lag_ns = 0;
+        state.worst_lag_m = 0.0;
     }
 }

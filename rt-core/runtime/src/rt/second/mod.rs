@@ -3,28 +3,27 @@
 //! The other hand's loop has its own thread, rate, watchdog, gate and limits, under the contract of every loop here. It
 //! shares nothing with the needle's loop: a failure of one leaves the other running.
 
-mod motion;
 mod orders;
 mod ports;
 mod record;
 mod response;
 mod tape;
 
-pub use ports::{SecondControlPorts, SecondOrder, SecondPorts, SecondPose, SecondTissuePorts, wire};
+pub use ports::{SecondControlPorts, SecondPorts, SecondPose, SecondTissuePorts, wire};
 pub use response::{Felt, ProbeResponse};
 pub use tape::{SecondEntry, SecondFlight, SecondMemory, SecondTape};
 
-use crate::rt::clock::{self, SECOND_PHASE, Wait};
-use crate::rt::device_loop::{self, Counts, DeviceLoop, Reading};
-use crate::rt::exchange::Notice;
-use crate::rt::timing::Probe;
+use crate::rt::clock::{self, SECOND_PHASE};
+use crate::rt::device_loop::{Counts, DeviceLoop};
+use crate::rt::exchange::{Happened, HapticOrder, Moved, Notice};
+use crate::rt::hand::HandDevice;
 use crate::rt::watchdog::{Watched, at_gate};
 use nalgebra::Vector3;
-use stylet_hw::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
+use stylet_hw::{Device, DeviceInfo, Sample, Wrench};
 use stylet_shm_schema::{Fault, SecondState};
 use stylet_sim::force::{ForceFault, GateInput, GateParameters, Motion, gate};
 
-/// Stages of this tick, as [`Probe`] times them.
+/// Stages of this tick, as [`Probe`](crate::rt::timing::Probe) times them.
 pub const SECOND_STAGES: &[&str] = &[
     "orders",
     "device read",
@@ -32,22 +31,14 @@ pub const SECOND_STAGES: &[&str] = &[
     "write",
     "publish and record",
 ];
-/// The mark at which the device read begins.
-const READ_MARK: usize = 0;
-
 /// State of the second device's thread.
 pub struct SecondLoop {
     session_id: u64,
-    device: Box<dyn Device>,
-    info: DeviceInfo,
+    /// The device.
+    pub device: HandDevice,
     ports: SecondPorts,
     /// Includes the state shown to hosts, with the counters.
     memory: SecondMemory,
-    /// Present in a measurement.
-    pub probe: Option<Box<Probe>>,
-    /// Wait of the loop for each deadline.
-    pub wait: Wait,
-    period_s: f64,
 }
 
 /// Output of one tick.
@@ -79,52 +70,39 @@ impl SecondLoop {
     ) -> Self {
         Self {
             session_id,
-            info: device.info(),
-            device,
+            device: HandDevice::new(device, period_s),
             ports,
             memory: *memory,
-            probe: None,
-            wait: Wait::default(),
-            period_s,
-        }
-    }
-
-    fn mark(&mut self) {
-        if let Some(probe) = &mut self.probe {
-            probe.mark();
         }
     }
 
     /// Runs one tick, in the order of the data.
     pub fn tick(&mut self, due_ns: u64, woke_ns: u64, missed: u32) -> SecondOutput {
-        if let Some(tape) = self.ports.flight.begin_tick(0) {
-            tape.begin_tick(&self.memory);
+        if let Some(tape) = self.ports.flight.begin_tick(0)
+            && tape.is_checkpoint_due()
+        {
+            tape.checkpoint(self.memory);
         }
         self.take_orders();
         self.watch_motion();
-        self.mark();
-        let (answer, reading) = self.read();
-        self.mark();
+        self.device.mark();
+        let sample = self.read();
+        self.device.mark();
         let response = *self.ports.response.read();
         self.watch(woke_ns, missed, &response);
-        let output = self.respond(&reading.sample, &response);
-        self.mark();
-        let write_failed = self.device.write(&output.wrench).is_err();
-        if write_failed {
+        let output = self.respond(&sample, &response);
+        self.device.mark();
+        if self.device.write(&output.wrench) {
             self.raise(Fault::DeviceError);
         }
         let written_ns = clock::now_ns();
-        self.mark();
-        if let Some(probe) = &mut self.probe {
-            probe.output_since_mark(READ_MARK);
-        }
-        self.hand_over_pose(woke_ns, &reading.sample, &output);
+        self.device.mark_output();
+        self.hand_over_pose(woke_ns, &sample, &output);
         let record = self.record(due_ns, [woke_ns, written_ns], missed, &response, &output);
         if let Some(tape) = self.ports.flight.tape() {
             tape.ticks.push(SecondEntry {
                 woke_ns,
-                read: answer,
-                write_failed,
+                answer: self.device.answer,
                 response,
                 record,
             });
@@ -132,34 +110,41 @@ impl SecondLoop {
         output
     }
 
+    /// Brakes a motion whose lease has lapsed.
+    fn watch_motion(&mut self) {
+        let (hand, velocity) = (&mut self.memory.hand, self.memory.estimator.velocity_m_per_s());
+        if let Some(what) = hand.watch_motion(&mut self.device, hand.sample, velocity, Moved::SecondHand) {
+            self.happened(what);
+        }
+    }
+
+    fn happened(&mut self, what: Happened) {
+        let (tick, time_ns) = (self.memory.state.tick + 1, self.memory.state.time_ns);
+        self.notify(Notice::Event { tick, time_ns, what });
+    }
+
     fn notify(&mut self, notice: Notice) {
         // A full ring means that the control thread has ended: its notices are not needed.
         let _ = self.ports.notices.push(notice);
     }
 
-    fn read(&mut self) -> (Result<Sample, DeviceFault>, Reading) {
-        let answer = self.device.read(self.period_s);
-        let reading = device_loop::judge(answer, self.memory.sample);
-        if let Some(fault) = reading.fault {
-            self.raise(fault);
-        }
-        if let Some(fault) = self.memory.watchdog.sample(reading.is_repeated) {
-            self.raise(fault);
-        }
-        (answer, reading)
+    fn read(&mut self) -> Sample {
+        let answer = self.device.read();
+        let (sample, faults) = self.memory.hand.judge(answer);
+        faults.into_iter().flatten().for_each(|fault| self.raise(fault));
+        sample
     }
 
     fn raise(&mut self, fault: Fault) {
         self.memory.gate.trip(at_gate(fault));
-        if self.memory.watchdog.raise(fault) {
-            let (tick, time_ns) = (self.memory.state.tick + 1, self.memory.state.time_ns);
-            self.notify(Notice::Fault { tick, time_ns, fault });
+        if self.memory.hand.watchdog.raise(fault) {
+            self.happened(Happened::Fault(fault));
         }
     }
 
     /// Runs the watchdog over the tissue loop and this one.
     fn watch(&mut self, woke_ns: u64, missed: u32, response: &ProbeResponse) {
-        let fault = self.memory.watchdog.tick(&Watched {
+        let fault = self.memory.hand.watchdog.tick(&Watched {
             woke_ns,
             missed,
             tissue_ns: response.time_ns,
@@ -176,11 +161,12 @@ impl SecondLoop {
         let memory = &mut self.memory;
         let tip = sample.tip_in_world;
         let moved_m = memory
+            .hand
             .sample
             .map_or(Vector3::zeros(), |before| tip - before.tip_in_world);
-        let velocity_m_per_s = memory.estimator.update(&tip, self.period_s);
+        let velocity_m_per_s = memory.estimator.update(&tip, self.device.period_s);
         // The scale of the force also scales the spring.
-        let most = self.info.max_stiffness_n_per_m / memory.gate_parameters.force_scale.max(1e-3);
+        let most = self.device.info.max_stiffness_n_per_m / memory.gate_parameters.force_scale.max(1e-3);
         let felt = response.at(&tip, &sample.world_from_tool, most);
         let input = GateInput {
             wanted: felt.wrench,
@@ -189,13 +175,13 @@ impl SecondLoop {
             motion: Motion {
                 moved_m,
                 velocity_m_per_s,
-                position_step_m: self.info.position_step_m,
-                dt_s: self.period_s,
+                position_step_m: self.device.info.position_step_m,
+                dt_s: self.device.period_s,
             },
         };
-        let output = gate::step(&memory.gate_parameters, &self.info, &mut memory.gate, &input);
-        memory.sample = Some(*sample);
-        let is_new = output.fault == Some(ForceFault::NonFiniteForce) && memory.watchdog.fault() == Fault::None;
+        let output = gate::step(&memory.gate_parameters, &self.device.info, &mut memory.gate, &input);
+        memory.hand.sample = Some(*sample);
+        let is_new = output.fault == Some(ForceFault::NonFiniteForce) && memory.hand.watchdog.fault() == Fault::None;
         if is_new {
             self.raise(Fault::NonFiniteForce);
         }
@@ -218,6 +204,7 @@ impl SecondLoop {
 
 impl DeviceLoop for SecondLoop {
     type State = SecondState;
+    const PHASE: f64 = SECOND_PHASE;
 
     fn state(&self) -> &SecondState {
         &self.memory.state
@@ -231,16 +218,8 @@ impl DeviceLoop for SecondLoop {
         }
     }
 
-    fn period_s(&self) -> f64 {
-        self.period_s
-    }
-
-    fn wait(&self) -> Wait {
-        self.wait
-    }
-
-    fn phase(&self) -> f64 {
-        SECOND_PHASE
+    fn device(&mut self) -> &mut HandDevice {
+        &mut self.device
     }
 
     fn ramp_out_ticks(&self) -> u32 {
@@ -250,7 +229,7 @@ impl DeviceLoop for SecondLoop {
     fn release_for_the_end(&mut self) {
         self.memory.gate.release();
         if let Some(tape) = self.ports.flight.tape() {
-            tape.order(SecondOrder::Disengage);
+            tape.order(HapticOrder::Disengage);
         }
     }
 
@@ -258,12 +237,8 @@ impl DeviceLoop for SecondLoop {
         self.tick(due_ns, woke_ns, missed);
     }
 
-    fn probe(&mut self) -> Option<&mut Probe> {
-        self.probe.as_deref_mut()
-    }
-
     fn end(&mut self) {
-        let _ = self.device.write(&Wrench::zero());
+        self.device.end();
         self.ports.flight.hand_over();
     }
 }

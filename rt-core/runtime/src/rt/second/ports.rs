@@ -3,14 +3,11 @@
 use super::response::ProbeResponse;
 use super::tape::SecondTape;
 use crate::rt::capacities::Capacities;
-use crate::rt::exchange::{Notice, Ticket};
-use crate::rt::motion_lease::Promise;
+use crate::rt::exchange::{HapticOrder, Notice, Ticket};
 use crate::rt::recorder::{Recorder, TapePort, recorder};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use stylet_hw::HandGoal;
 use stylet_shm_schema::SecondRecord;
-use stylet_sim::force::GateParameters;
 
 /// The newest pose of the second device, once in each tick of its loop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,49 +33,6 @@ impl Default for SecondPose {
     }
 }
 
-/// Orders from the control thread to the second device's loop.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum SecondOrder {
-    /// Use these settings of the gate from this tick on.
-    Gate {
-        /// Number of the request.
-        ticket: Ticket,
-        /// Rises with each change of a run.
-        generation: u64,
-        /// The settings.
-        gate: GateParameters,
-    },
-    /// Move the simulated hand to a goal.
-    Hand {
-        /// Number of the request.
-        ticket: Ticket,
-        /// Place, direction, speed and acceleration.
-        goal: HandGoal,
-        /// Promise of the host; without one the motion needs no renewal.
-        promise: Option<Promise>,
-    },
-    /// Hold the simulated hand where it is.
-    StopHand {
-        /// Number of the request.
-        ticket: Ticket,
-    },
-    /// Renew what this host moves.
-    KeepMoving(Promise),
-    /// Turn the force on; re-arms after a fault.
-    Engage,
-    /// Ramp the force out.
-    Disengage,
-    /// Clear peaks and counters.
-    Reset {
-        /// Number of the request.
-        ticket: Ticket,
-    },
-    /// Hand the flight recording over; a new one begins once the tape is back.
-    HandOverTape,
-    /// Direction of the tool's +y with the next goal; `None`: the simulated hand does not roll it.
-    Up(Option<Vector3<f64>>),
-}
-
 /// Ends of the second device's loop.
 pub struct SecondPorts {
     /// Newest pose, to the tissue loop.
@@ -86,7 +40,7 @@ pub struct SecondPorts {
     /// Newest response of the tissue loop.
     pub response: triple_buffer::Output<ProbeResponse>,
     /// Orders of the control thread.
-    pub orders: rtrb::Consumer<SecondOrder>,
+    pub orders: rtrb::Consumer<(Ticket, HapticOrder)>,
     /// Notices to the control thread.
     pub notices: rtrb::Producer<Notice>,
     /// One record for each tick, to the control thread.
@@ -106,7 +60,7 @@ pub struct SecondTissuePorts {
 /// Ends of the control thread.
 pub struct SecondControlPorts {
     /// Orders to the loop.
-    pub orders: rtrb::Producer<SecondOrder>,
+    pub orders: rtrb::Producer<(Ticket, HapticOrder)>,
     /// Notices of the loop.
     pub notices: rtrb::Consumer<Notice>,
     /// Records of the loop.

@@ -2,7 +2,6 @@
 
 use super::{ProbeResponse, SecondLoop, SecondOutput};
 use crate::rt::clock;
-use crate::rt::device_loop::is_at_goal;
 use crate::rt::motion_lease::MotionLease;
 use stylet_shm_schema::{SecondRecord, flags};
 
@@ -16,9 +15,10 @@ impl SecondLoop {
         let always = flags::REAL_TIME | flags::SIMULATED_DEVICE;
         let memory = &self.memory;
         let speed = output.velocity_m_per_s.norm();
-        let at_goal = memory
+        let hand = &memory.hand;
+        let at_goal = hand
             .sample
-            .is_some_and(|sample| is_at_goal(memory.goal, &sample.tip_in_world, speed));
+            .is_some_and(|sample| hand.is_at_goal(&sample.tip_in_world, speed));
         let bit = |set: bool, flag: u32| if set { flag } else { 0 };
         (memory.state.flags & always)
             | bit(memory.gate.engaged(), flags::ENGAGED)
@@ -26,7 +26,7 @@ impl SecondLoop {
             | bit(response.touches, flags::IN_CONTACT)
             | bit(at_goal, flags::AT_GOAL)
             | bit(gate_acted, flags::GATE_ACTED)
-            | bit(memory.motion != MotionLease::Free, flags::IN_MOTION)
+            | bit(hand.motion != MotionLease::Free, flags::IN_MOTION)
     }
 
     pub(super) fn record(
@@ -45,7 +45,7 @@ impl SecondLoop {
         let s = &mut memory.state;
         s.tick += 1;
         s.time_ns = woke_ns;
-        if let Some(sample) = &memory.sample {
+        if let Some(sample) = &memory.hand.sample {
             s.tip_in_scene_m = sample.tip_in_world.into();
             s.world_from_tool = sample.world_from_tool.coords.into();
             s.buttons = sample.buttons;
@@ -62,7 +62,7 @@ impl SecondLoop {
         s.probe_edge_um = response.edge_um;
         (s.gate_counts, s.gate_interventions) = (gate_counts, interventions);
         (s.energy_j, s.warmth_n) = (memory.gate.passivity().energy_j(), memory.gate.warmth_n());
-        s.fault = memory.watchdog.fault() as u32;
+        s.fault = memory.hand.watchdog.fault() as u32;
         s.flags = now_flags;
         let work_ns = clock::now_ns().saturating_sub(woke_ns);
         s.worst_work_ns = s.worst_work_ns.max(work_ns);

@@ -6,7 +6,6 @@ use crate::replay;
 use crate::replay::file::{Flight, SecondFigures};
 use crate::rt::breaking::{BreakingDevice, Cause};
 use crate::rt::capacities::Capacities;
-use crate::rt::exchange::Moved;
 use crate::rt::motion_lease::Promise;
 use crate::rt::watchdog::{OVERRUN_STREAK, SILENT_SAMPLES, STALE_TISSUE_NS};
 use nalgebra::SMatrix;
@@ -59,8 +58,8 @@ impl Rig {
         self.cause.store(cause as u32, Ordering::Relaxed);
     }
 
-    fn order(&mut self, order: SecondOrder) {
-        self.control.orders.push(order).expect("room");
+    fn order(&mut self, order: HapticOrder) {
+        self.control.orders.push((1, order)).expect("room");
     }
 
     fn answer(&mut self) {
@@ -106,23 +105,26 @@ impl Rig {
 
     /// Presses 5 mm into the wall and holds.
     fn press(&mut self) -> f64 {
-        self.order(SecondOrder::Engage);
+        self.order(HapticOrder::Engage);
         self.order(to_depth(0.005));
         self.run(1500).last().map_or(0.0, force_n)
     }
 
     fn faults(&self) -> Vec<Fault> {
         let fault = |notice: &Notice| match notice {
-            Notice::Fault { fault, .. } => Some(*fault),
+            Notice::Event {
+                what: Happened::Fault(fault),
+                ..
+            } => Some(*fault),
             _ => None,
         };
         self.seen.iter().filter_map(fault).collect()
     }
 }
 
-fn to_depth(depth_m: f64) -> SecondOrder {
-    SecondOrder::Hand {
-        ticket: 2,
+fn to_depth(depth_m: f64) -> HapticOrder {
+    HapticOrder::Hand {
+        up: None,
         promise: None,
         goal: HandGoal {
             tip_in_world: Vector3::new(0.0, 0.0, depth_m),
@@ -158,7 +160,7 @@ fn the_hand_feels_the_contact_smoothly_between_two_steps_of_the_tissue() {
         .fold(0.0, f64::max);
     // The gate may add its full damping where the contact has returned all the energy that it took.
     let damping = GateParameters::default().passivity.max_damping_n_s_per_m;
-    let most = 0.02 * (damping + STIFFNESS_N_PER_M * 1e-3) + STIFFNESS_N_PER_M * rig.second.info.position_step_m;
+    let most = 0.02 * (damping + STIFFNESS_N_PER_M * 1e-3) + STIFFNESS_N_PER_M * rig.second.device.info.position_step_m;
     assert!(jump < most, "{jump} N in a tick, of {most} N");
     assert_eq!(out.last().map(force_n), Some(0.0), "nothing sticks");
 }
@@ -208,17 +210,17 @@ fn a_recorded_flight_repeats_bit_by_bit() {
     rig.order(to_depth(-0.003));
     rig.run(400);
     rig.press();
-    rig.order(SecondOrder::HandOverTape);
+    rig.order(HapticOrder::HandOverTape);
     rig.run(2);
-    let flight = rig.control.tapes.taken.pop().expect("handed over").flight();
+    let flight = rig.control.tapes.taken.pop().expect("handed over").longest();
     let recorded = flight.expect("ticks");
-    let info = rig.second.info;
+    let info = rig.second.device.info;
     let file = Flight {
         version: String::new(),
         session_id: 1,
         reason: String::new(),
         device_name: String::new(),
-        device: (&info).into(),
+        device: info,
         haptic_period_s: 1e-3,
         tissue_period_s: 5e-3,
         lines: Vec::new(),
@@ -226,7 +228,7 @@ fn a_recorded_flight_repeats_bit_by_bit() {
         tissue: None,
         second_device: Some(SecondFigures {
             device_name: String::new(),
-            device: (&info).into(),
+            device: info,
             period_s: 1e-3,
         }),
         second: None,
@@ -271,17 +273,17 @@ fn a_hand_stops_within_5_mm_of_host_silence_and_resumes_when_heard() {
     let promise = Promise::first(7);
     let mut rig = Rig::new();
     let mut move_on = to_depth(-0.3);
-    if let SecondOrder::Hand { goal, promise: of, .. } = &mut move_on {
+    if let HapticOrder::Hand { goal, up, promise: of } = &mut move_on {
+        *up = Some(Vector3::x());
         (goal.speed_m_per_s, goal.acceleration_m_per_s2) = (0.123, 2.0);
         (goal.direction, *of) = (Vector3::new(0.0, 1.0, 1.0).normalize(), Some(promise));
     }
-    rig.order(SecondOrder::Up(Some(Vector3::x())));
     rig.order(move_on);
     for _ in 0..30 {
-        rig.order(SecondOrder::KeepMoving(promise));
+        rig.order(HapticOrder::KeepMoving(promise));
         rig.run(5);
     }
-    rig.order(SecondOrder::KeepMoving(promise));
+    rig.order(HapticOrder::KeepMoving(promise));
     let silent = rig.run(300);
     let way_m = |from: &SecondRecord, to: &SecondRecord| {
         (Vector3::from(to.tip_in_scene_m) - Vector3::from(from.tip_in_scene_m)).norm()
@@ -290,7 +292,7 @@ fn a_hand_stops_within_5_mm_of_host_silence_and_resumes_when_heard() {
     assert!((1e-3..5e-3).contains(&way_m(first, last)), "{} m", way_m(first, last));
     assert!(way_m(&silent[150], last) < 1.5e-4, "at rest");
     assert_eq!(silent[40].world_from_tool, last.world_from_tool, "turns no more");
-    rig.order(SecondOrder::KeepMoving(promise));
+    rig.order(HapticOrder::KeepMoving(promise));
     let on = rig.run(20);
     assert!(
         on[19].world_from_tool != last.world_from_tool && way_m(last, &on[19]) > 1e-5,
@@ -300,14 +302,14 @@ fn a_hand_stops_within_5_mm_of_host_silence_and_resumes_when_heard() {
     let given_up = |notice: &&Notice| {
         matches!(
             notice,
-            Notice::MotionGivenUp {
-                what: Moved::SecondHand,
+            Notice::Event {
+                what: Happened::MotionGivenUp(Moved::SecondHand),
                 ..
             }
         )
     };
     assert_eq!(rig.seen.iter().filter(given_up).count(), 1);
-    rig.order(SecondOrder::KeepMoving(promise));
+    rig.order(HapticOrder::KeepMoving(promise));
     let after = rig.run(100);
     assert!(way_m(&after[0], &after[99]) < 1.5e-4, "a new goal is needed");
 }

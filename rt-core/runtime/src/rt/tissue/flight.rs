@@ -3,70 +3,26 @@
 use super::TissueLoop;
 use super::left::LeftBody;
 use crate::rt::probe_tape::ProbeEntry;
-use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueMemory, TissueTape};
+use crate::rt::tissue_tape::{TapedOrder, TissueEntry, TissueMemory, TissueState, TissueTape};
 use stylet_sim::line::BodyLine;
 use stylet_sim::probe::{BodyProbe, ProbeMemory};
 use stylet_sim::tissue::{Deformed, Held};
 
 impl TissueLoop {
-    /// Names every field, so that no new one is forgotten. Allocates nothing: `to` was made for this body.
+    /// Copies all state but that of the lines, which `state.response` names. Allocates nothing: `to` was made for this
+    /// body.
     fn copy_memory(&self, to: &mut TissueMemory) {
-        let Self {
-            session_id: _,
-            ports: _,
-            world,
-            seeds,
-            contact,
-            contacts,
-            // Stored by number, in the response.
-            line: _,
-            in_by_line,
-            loads,
-            left,
-            left_loads: _,
-            left_room: _,
-            // Skipping it gives the same bits.
-            last_carry: _,
-            pressed,
-            probe_pose,
-            // The second hand's response is on its loop's tape.
-            answered: _,
-            probe_room: _,
-            is_outside_shown,
-            layers,
-            clear,
-            held,
-            pose,
-            report: _,
-            // No force depends on the last snapshot.
-            shown: _,
-            response,
-            probe: _,
-            period_s: _,
-            phase_ns: _,
-        } = self;
-        to.seeds.clear();
-        to.seeds.extend_from_slice(seeds);
-        to.contact = *contact;
-        to.contacts = *contacts;
-        to.in_by_line = *in_by_line;
-        to.loads = *loads;
+        to.state = self.state;
+        to.seeds.clone_from(&self.seeds);
         to.left.clear();
-        to.left.extend(left.iter().map(|left| left.used));
-        match pressed {
+        to.left.extend(self.left.iter().map(|left| left.used));
+        match &self.pressed {
             Some(pressed) => pressed.save(&mut to.probe),
             None => to.probe.clear(),
         }
-        to.probe_pose = *probe_pose;
-        to.is_outside_shown = *is_outside_shown;
-        to.layers = *layers;
-        to.clear = *clear;
-        to.held = *held;
-        to.pose = *pose;
-        to.response = *response;
-        to.limits.clone_from(&world.limits);
-        to.migration = world.migration;
-        world.tissue.save(&mut to.body);
+        to.limits.clone_from(&self.world.limits);
+        to.migration = self.world.migration;
+        self.world.tissue.save(&mut to.body);
     }
 
     /// Continues from the memory of another loop, with its line and those of needles that stayed in.
@@ -78,20 +34,9 @@ impl TissueLoop {
             body.stay(used);
             self.left.push(body);
         }
-        self.seeds.clear();
-        self.seeds.extend_from_slice(&memory.seeds);
-        self.contact = memory.contact;
-        self.contacts = memory.contacts;
+        self.state = memory.state;
+        self.seeds.clone_from(&memory.seeds);
         self.line = line;
-        self.in_by_line = memory.in_by_line;
-        self.loads = memory.loads;
-        self.probe_pose = memory.probe_pose;
-        self.is_outside_shown = memory.is_outside_shown;
-        self.layers = memory.layers;
-        self.clear = memory.clear;
-        self.held = memory.held;
-        self.pose = memory.pose;
-        self.response = memory.response;
         self.world.set_limits(memory.limits.clone());
         self.world.migration = memory.migration;
         self.world.tissue.load(&memory.body);
@@ -121,7 +66,7 @@ impl TissueLoop {
 
     /// Results of the last tick to compare: the held element and the residual.
     pub fn last_step(&self) -> (Option<Held>, f64) {
-        (self.held, self.report.map_or(0.0, |r| r.residual))
+        (self.state.held, self.report.map_or(0.0, |r| r.residual))
     }
 
     pub(super) fn checkpoint(&mut self) {
@@ -142,7 +87,13 @@ impl TissueLoop {
     }
 
     pub(super) fn tape(&mut self, woke_ns: u64, residual: f64) {
-        let (pose, held, response) = (self.pose, self.held, self.response);
+        let TissueState {
+            pose,
+            loads,
+            held,
+            response,
+            ..
+        } = self.state;
         if self.left_room.is_some()
             && let Some(tape) = self.ports.flight.tape()
         {
@@ -151,11 +102,11 @@ impl TissueLoop {
         self.give_probe_room();
         self.tape_probe();
         if let Some(tape) = self.ports.flight.tape() {
-            tape.loads(&self.loads);
             tape.left_loads(&self.left_loads);
             tape.ticks.push(TissueEntry {
                 woke_ns,
                 pose,
+                loads,
                 held,
                 residual,
                 response,
@@ -172,7 +123,7 @@ impl TissueLoop {
     }
 
     fn tape_probe(&mut self) {
-        if let (Some(pressed), Some(pose)) = (&self.pressed, self.probe_pose)
+        if let (Some(pressed), Some(pose)) = (&self.pressed, self.state.probe_pose)
             && let Some(tape) = self.ports.flight.tape()
         {
             let wrench = pressed.response().wrench.0;

@@ -2,6 +2,7 @@
 
 use super::TissueLoop;
 use crate::rt::left_loads::{LeftLoads, NeedleLoads};
+use bytemuck::Zeroable;
 use stylet_sim::line::{BodyAnswer, BodyLine, MAX_LEFT};
 use stylet_sim::tissue::{Carry, ElementField, Shift, StepReport};
 
@@ -42,7 +43,7 @@ impl TissueLoop {
     /// columns here, and one taken again gets them back.
     pub(super) fn follow_left(&mut self) {
         let loads = self.ports.loads.read();
-        self.loads = loads.line;
+        self.state.loads = loads.line;
         if self.left.is_empty() && loads.left.needles().is_empty() {
             return;
         }
@@ -60,7 +61,7 @@ impl TissueLoop {
         }
         // A needle that stays in moves the body little in one tick: one of them is summed in each.
         let count = self.left.len().max(1) as u64;
-        let due = (self.response.tick % count) as usize;
+        let due = (self.state.response.tick % count) as usize;
         for (n, left) in self.left.iter_mut().enumerate() {
             let loads = loads
                 .left
@@ -75,31 +76,31 @@ impl TissueLoop {
             }
         }
         self.name_left();
-        self.left_loads.copy_from(&loads.left);
+        self.left_loads = loads.left;
     }
 
     /// Begins with needles that stay in under these loads, each with its columns. Call before the first tick.
     pub fn begin_beside(&mut self, lines: Vec<Box<BodyLine>>, loads: &LeftLoads) {
         for line in lines.into_iter().take(MAX_LEFT) {
             if let Some(of_line) = loads.needles().iter().find(|n| n.generation == line.generation) {
-                let used = NeedleLoads::default();
+                let used = NeedleLoads::zeroed();
                 let mut left = LeftBody { line, used };
                 left.stay(of_line);
                 self.left.push(left);
             }
         }
         self.name_left();
-        self.left_loads.copy_from(loads);
+        self.left_loads = *loads;
         // The force loop gives up needles whose columns this loop does not name.
-        self.ports.response.write(self.response);
+        self.ports.response.write(self.state.response);
     }
 
     fn take_from_left(&mut self, at: usize) {
         let LeftBody { line, .. } = self.left.remove(at);
         self.last_carry.forget();
-        if line.generation == self.loads.generation {
+        if line.generation == self.state.loads.generation {
             self.drop_line();
-            self.response.line = line.generation;
+            self.state.response.line = line.generation;
             self.line = Some(line);
         } else {
             self.free(line);
@@ -118,11 +119,11 @@ impl TissueLoop {
             return;
         }
         if let Some(line) = self.line.take() {
-            self.response.line = 0;
+            self.state.response.line = 0;
             self.leave_line();
             let mut left = LeftBody {
                 line,
-                used: NeedleLoads::default(),
+                used: NeedleLoads::zeroed(),
             };
             left.stay(needle);
             self.left.push(left);
@@ -131,8 +132,8 @@ impl TissueLoop {
     }
 
     fn name_left(&mut self) {
-        self.response.left = [0; MAX_LEFT];
-        for (slot, left) in self.response.left.iter_mut().zip(&self.left) {
+        self.state.response.left = [0; MAX_LEFT];
+        for (slot, left) in self.state.response.left.iter_mut().zip(&self.left) {
             *slot = left.line.generation;
         }
     }
@@ -166,7 +167,7 @@ impl TissueLoop {
     /// Steps a tick in which no needle moves on a line.
     pub(super) fn step_off_line(&mut self) -> StepReport {
         match self.besides() {
-            None => self.world.tissue.step(self.held, self.period_s),
+            None => self.world.tissue.step(self.state.held, self.period_s),
             Some(Besides::Added) => self.with_left(|this, fields| {
                 let tissue = &mut this.world.tissue;
                 tissue.displace(&[], &[], Shift::default());
@@ -177,7 +178,7 @@ impl TissueLoop {
                 if !this.last_carry.is_again(0, &[], [0.0; 3]) {
                     this.world.tissue.carry(Carry { fields, ..Carry::NOT });
                 }
-                this.world.tissue.step(this.held, this.period_s)
+                this.world.tissue.step(this.state.held, this.period_s)
             }),
         }
     }

@@ -2,7 +2,7 @@
 //! of a coarser body while the tip holds the element that it presses on.
 
 use super::TissueLoop;
-use crate::rt::exchange::Notice;
+use crate::rt::exchange::Happened;
 use crate::rt::line_loads::{BentTip, LineLoads};
 use nalgebra::Vector3;
 use stylet_sim::line::{BodyAnswer, BodyLine, Line};
@@ -11,14 +11,14 @@ use stylet_sim::tissue::{Carry, Held, MaterialPoint, Shift, StepReport};
 impl TissueLoop {
     /// Takes the columns of a new line; the old ones are returned to be freed.
     pub(super) fn take_line(&mut self, line: Box<BodyLine>) {
-        if self.in_by_line {
+        if self.state.in_by_line {
             // The force loop keeps the line that it is on; the control thread sends another when it sees that this one
             // is unused.
             self.free(line);
             return;
         }
         self.drop_line();
-        self.response.line = line.generation;
+        self.state.response.line = line.generation;
         self.line = Some(line);
         // Its number may have belonged to another line.
         self.last_carry.forget();
@@ -32,7 +32,7 @@ impl TissueLoop {
 
     /// Drops the line: its body is replaced.
     pub(super) fn drop_line(&mut self) {
-        self.response.line = 0;
+        self.state.response.line = 0;
         if let Some(old) = self.line.take() {
             self.free(old);
         }
@@ -48,7 +48,7 @@ impl TissueLoop {
 
     /// Steps a tick on the line; `None` if the needle is on none that this loop has.
     pub(super) fn step_on_line(&mut self) -> Option<StepReport> {
-        let loads = self.loads;
+        let loads = self.state.loads;
         // Taken out meanwhile, so that it can move the body.
         let line = self.line.take_if(|line| line.generation == loads.generation)?;
         let axis = line.line;
@@ -97,7 +97,7 @@ impl TissueLoop {
         let report = report?;
         let entry = Vector3::from(axis.entry_m);
         let direction = Vector3::from(axis.axes[0]);
-        if self.contact.is_some() {
+        if self.state.contact.is_some() {
             self.end_contact();
         }
         self.meet_on_line(&loads, entry, direction);
@@ -131,28 +131,22 @@ impl TissueLoop {
 
     /// Takes the needle off its line: a reported contact ends.
     pub(super) fn leave_line(&mut self) {
-        if std::mem::take(&mut self.in_by_line) {
+        if std::mem::take(&mut self.state.in_by_line) {
             // Needles that stay in keep carrying the body, and so does the probe.
             if self.besides().is_none() {
                 self.world.tissue.carry(Carry::NOT);
             }
             self.last_carry.forget();
-            let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
-            self.notify(Notice::LeftTissue { tick, time_ns });
+            self.happened(Happened::LeftTissue);
         }
     }
 
     fn meet_on_line(&mut self, loads: &LineLoads, entry: Vector3<f64>, direction: Vector3<f64>) {
-        if loads.in_tissue && !self.in_by_line {
-            self.in_by_line = true;
-            self.response.contact_in_scene = entry;
-            self.response.path_direction = direction;
-            let (tick, time_ns) = (self.response.tick, self.pose.time_ns);
-            self.notify(Notice::Contact {
-                tick,
-                time_ns,
-                position_m: entry,
-            });
+        if loads.in_tissue && !self.state.in_by_line {
+            self.state.in_by_line = true;
+            self.state.response.contact_in_scene = entry;
+            self.state.response.path_direction = direction;
+            self.happened(Happened::Contact(entry));
         } else if !loads.in_tissue {
             self.leave_line();
         }
@@ -161,7 +155,7 @@ impl TissueLoop {
     /// Returns the material at the tip of the last pose and `behind_m` behind it, along the line; `None` if the needle
     /// is in no tissue along one.
     pub(super) fn material_on_line(&self, behind_m: f64) -> Option<[Option<MaterialPoint>; 2]> {
-        let loads = &self.loads;
+        let loads = &self.state.loads;
         let line = self.line.as_ref().filter(|line| line.generation == loads.generation)?;
         let tip_m = loads.tip_material_m;
         if !loads.in_tissue {

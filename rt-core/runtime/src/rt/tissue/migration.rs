@@ -22,7 +22,7 @@ impl TissueLoop {
     /// Moves loose migrating seeds back along their tracks with every needle that leaves the tissue.
     pub(super) fn migrate(&mut self) {
         let Migration { share, speed_m_per_s } = self.world.migration;
-        if share <= 0.0 || self.in_by_line {
+        if share <= 0.0 || self.state.in_by_line {
             return;
         }
         let by_m = speed_m_per_s * self.period_s;

@@ -9,7 +9,7 @@ use stylet_sim::tissue::Carry;
 impl TissueLoop {
     /// Sets the probe's pose from the next tick on.
     pub fn move_probe(&mut self, pose: ProbePose) {
-        self.probe_pose = Some(pose);
+        self.state.probe_pose = Some(pose);
     }
 
     /// Response to the probe in the last tick; `None` in a scene without one.
@@ -60,7 +60,7 @@ impl TissueLoop {
     /// Solves the contact of this tick. Needles displace the wall as well, and the probe their surroundings: one table
     /// with this tick's loads serves both.
     pub(super) fn follow_probe(&mut self) {
-        let (Some(pressed), Some(pose)) = (&mut self.pressed, self.probe_pose) else {
+        let (Some(pressed), Some(pose)) = (&mut self.pressed, self.state.probe_pose) else {
             return;
         };
         let was_displaced = pressed.displaces();
@@ -70,8 +70,8 @@ impl TissueLoop {
             moves || left.iter().any(|left| left.line.generation == generation)
         });
         if let Some(line) = line {
-            let loads = if line.generation == self.loads.generation {
-                self.loads.loads_n()
+            let loads = if line.generation == self.state.loads.generation {
+                self.state.loads.loads_n()
             } else {
                 &[]
             };
@@ -95,7 +95,7 @@ impl TissueLoop {
     fn show_outside(&mut self) {
         let Some(pressed) = &self.pressed else { return };
         let is_pressed = pressed.response().contacts > 0;
-        if is_pressed || self.is_outside_shown {
+        if is_pressed || self.state.is_outside_shown {
             let outside = self.ports.outside.input_buffer_mut();
             outside.clear();
             let moves = self.line.iter().map(|line| line.generation);
@@ -105,8 +105,8 @@ impl TissueLoop {
                 }
             }
             self.ports.outside.publish();
-            self.response.outside += 1;
-            self.is_outside_shown = is_pressed;
+            self.state.response.outside += 1;
+            self.state.is_outside_shown = is_pressed;
         }
     }
 }

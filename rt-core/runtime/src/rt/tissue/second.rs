@@ -48,15 +48,15 @@ impl TissueLoop {
         let pose = second.pose.read();
         if pose.time_ns > 0 {
             let axis = pose.world_from_tool * Vector3::z();
-            let tip_in_body = moved(pose.tip_in_scene, -self.pose.body_moved_m);
-            self.probe_pose = ProbePose::new(tip_in_body.into(), axis.into()).or(self.probe_pose);
+            let tip_in_body = moved(pose.tip_in_scene, -self.state.pose.body_moved_m);
+            self.state.probe_pose = ProbePose::new(tip_in_body.into(), axis.into()).or(self.state.probe_pose);
         }
     }
 
     /// Answers the second device. Stamped in every tick, so that its loop detects late tissue. Does nothing without a
     /// second device.
     pub(super) fn answer_second(&mut self, woke_ns: u64) {
-        let tick = self.response.tick;
+        let tick = self.state.response.tick;
         let Some(second) = &mut self.ports.second else { return };
         // The pose that this tick has used: the buffer is not read again.
         let pose = second.pose.output_buffer();

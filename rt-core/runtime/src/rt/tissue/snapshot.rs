@@ -46,12 +46,12 @@ impl TissueLoop {
 
     pub(super) fn publish_snapshot(&mut self, woke_ns: u64, report: &StepReport) {
         let work_ns = clock::now_ns().saturating_sub(woke_ns);
-        self.response.worst_work_ns = self.response.worst_work_ns.max(work_ns);
+        self.state.response.worst_work_ns = self.state.response.worst_work_ns.max(work_ns);
         let now = Shown {
-            tick: self.response.tick,
-            tip_in_scene: self.pose.tip_in_scene.into(),
-            body_moved: self.pose.body_moved_m.into(),
-            direction: self.pose.direction.into(),
+            tick: self.state.response.tick,
+            tip_in_scene: self.state.pose.tip_in_scene.into(),
+            body_moved: self.state.pose.body_moved_m.into(),
+            direction: self.state.pose.direction.into(),
             seeds: self.seeds.len(),
             left: self.left.len(),
             scene_generation: self.world.generation,
@@ -110,18 +110,18 @@ impl TissueLoop {
         *header = SnapshotHeader {
             session_id: self.session_id,
             scene_generation: self.world.generation,
-            tissue_tick: self.response.tick,
+            tissue_tick: self.state.response.tick,
             time_ns: woke_ns,
-            tip_in_scene_m: self.in_scene(self.pose.tip_in_scene.into()),
-            needle_direction: self.pose.direction.into(),
-            held_in_scene_m: self.held.map_or([0.0; 3], |h| self.in_scene(h.position_m)),
+            tip_in_scene_m: self.in_scene(self.state.pose.tip_in_scene.into()),
+            needle_direction: self.state.pose.direction.into(),
+            held_in_scene_m: self.state.held.map_or([0.0; 3], |h| self.in_scene(h.position_m)),
             residual: report.residual,
             max_displacement_m: f64::from(report.max_displacement) * spacing_m,
             work_ns,
             passes: report.passes,
             moved_elements: report.moved,
-            held_element: self.held.map_or(u32::MAX, |h| h.element),
-            phase: self.pose.phase.code(),
+            held_element: self.state.held.map_or(u32::MAX, |h| h.element),
+            phase: self.state.pose.phase.code(),
             vertex_count: vertex_count as u32,
             node_count: self.world.scene.nodes.elements.len() as u32,
             bend_count: 0,
@@ -129,7 +129,7 @@ impl TissueLoop {
             bend_m: [[0.0; 3]; MAX_BEND_POINTS],
             left_count: self.left.len() as u32,
             reserved: 0,
-            body_moved_m: self.pose.body_moved_m.into(),
+            body_moved_m: self.state.pose.body_moved_m.into(),
             seed_count: self.seeds.len() as u32,
             seeds: [bytemuck::Zeroable::zeroed(); MAX_SEEDS],
             left: [bytemuck::Zeroable::zeroed(); MAX_LEFT],
@@ -151,7 +151,7 @@ impl TissueLoop {
 
     /// Converts a point of the body, which an exercise may have moved, to the scene frame.
     fn in_scene(&self, place_m: [f64; 3]) -> [f64; 3] {
-        let by_m = self.pose.body_moved_m;
+        let by_m = self.state.pose.body_moved_m;
         [0, 1, 2].map(|a| {
             if by_m[a] == 0.0 {
                 place_m[a]
@@ -162,7 +162,7 @@ impl TissueLoop {
     }
 
     fn move_with_body(&self, surface_m: &mut [[f32; 3]], displacements_m: &mut [[f32; 3]]) {
-        let by_m = self.pose.body_moved_m;
+        let by_m = self.state.pose.body_moved_m;
         if by_m == Vector3::zeros() {
             return;
         }
@@ -173,13 +173,13 @@ impl TissueLoop {
 
     /// Fills in points along a bent needle.
     fn fill_bend(&self, header: &mut SnapshotHeader) {
-        let (Some(bent), Some(line)) = (self.loads.bent, &self.line) else {
+        let (Some(bent), Some(line)) = (self.state.loads.bent, &self.line) else {
             return;
         };
         header.bend_count = MAX_BEND_POINTS as u32;
         header.bend_spacing_m = bent.needle.length_m / (MAX_BEND_POINTS - 1) as f64;
         for (n, bend_m) in header.bend_m.iter_mut().enumerate() {
-            let off_m = self.loads.deflection_m(n as f64 * header.bend_spacing_m);
+            let off_m = self.state.loads.deflection_m(n as f64 * header.bend_spacing_m);
             *bend_m = [0, 1, 2].map(|a| off_m[0] * line.line.axes[1][a] + off_m[1] * line.line.axes[2][a]);
         }
     }

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::rt::breaking::{BreakingDevice, Cause};
-use crate::rt::exchange::{HapticOrder, Notice};
+use crate::rt::exchange::{Happened, HapticOrder, Notice};
 use crate::rt::haptic::HapticLoop;
 use crate::rt::haptic_tape::{HapticMemory, HapticTape};
 use crate::rt::response::TissueResponse;
@@ -68,7 +68,6 @@ impl Rig {
             ..ForceParameters::default()
         };
         self.order(HapticOrder::Parameters {
-            ticket: 0,
             generation: 2,
             needle: NeedleParameters::default(),
             force,
@@ -76,7 +75,7 @@ impl Rig {
     }
 
     fn order(&mut self, order: HapticOrder) {
-        self.control.haptic_orders.push(order).expect("room");
+        self.control.haptic_orders.push((1, order)).expect("room");
     }
 
     fn tick(&mut self) -> TickRecord {
@@ -109,7 +108,7 @@ impl Rig {
 
     /// Presses 6 mm into the membrane and holds: some 4 N.
     fn press(&mut self) -> Vec<TickRecord> {
-        self.order(HapticOrder::Engage { ticket: 1 });
+        self.order(HapticOrder::Engage);
         self.order(to_depth(0.006));
         let pressed = self.run(1500);
         let last = force_n(pressed.last().expect("ticks"));
@@ -120,7 +119,7 @@ impl Rig {
 
 fn to_depth(depth_m: f64) -> HapticOrder {
     HapticOrder::Hand {
-        ticket: 2,
+        up: None,
         promise: None,
         goal: HandGoal {
             tip_in_world: Vector3::new(0.0, 0.0, depth_m),
@@ -202,7 +201,7 @@ fn every_cause_ramps_the_force_out_in_time_and_the_operator_can_rearm() {
         let reported = rig
             .seen
             .iter()
-            .filter(|n| matches!(n, Notice::Fault { fault: f, .. } if *f == fault))
+            .filter(|n| matches!(n, Notice::Event { what, .. } if *what == Happened::Fault(fault)))
             .count();
         assert_eq!(reported, 1, "{cause:?} is reported once");
 
@@ -216,7 +215,7 @@ fn every_cause_ramps_the_force_out_in_time_and_the_operator_can_rearm() {
         // Out of the tissue, where the model requests no force; re-armed; and in again.
         rig.order(to_depth(-0.01));
         record.extend(rig.run(2500));
-        rig.order(HapticOrder::Engage { ticket: 3 });
+        rig.order(HapticOrder::Engage);
         record.extend(rig.run(300));
         rig.order(to_depth(0.006));
         record.extend(rig.run(1500));
@@ -224,7 +223,13 @@ fn every_cause_ramps_the_force_out_in_time_and_the_operator_can_rearm() {
         assert_eq!(last.fault, 0, "{cause:?}");
         assert_ne!(last.flags & flags::ENGAGED, 0, "{cause:?}: not on after re-arming");
         assert!(force_n(last) > 0.5, "{cause:?}: {} N after re-arming", force_n(last));
-        assert!(rig.seen.iter().any(|n| matches!(n, Notice::Rearmed { .. })));
+        assert!(rig.seen.iter().any(|n| matches!(
+            n,
+            Notice::Event {
+                what: Happened::Rearmed,
+                ..
+            }
+        )));
         assert_no_step(&record, &format!("{cause:?}"));
     }
 }

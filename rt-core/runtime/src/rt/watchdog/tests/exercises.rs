@@ -18,7 +18,7 @@ fn a_device_that_counts_as_lost_is_felt_as_one_that_is() {
     });
     let set = |runs: &mut [Rig; 2], lost: bool| {
         runs[0].set(if lost { Cause::Lost } else { Cause::Nothing });
-        runs[1].order(HapticOrder::LoseDevice { ticket: 5, lost });
+        runs[1].order(HapticOrder::LoseDevice(lost));
     };
     set(&mut runs, true);
     let [real, exercise] = runs.each_mut().map(|rig| rig.run(400));
@@ -29,14 +29,14 @@ fn a_device_that_counts_as_lost_is_felt_as_one_that_is() {
     assert!(zero <= RAMP_OUT_TICKS as usize, "{zero} ticks to zero");
     // Re-armed while lost, it is lost again.
     for rig in &mut runs {
-        rig.order(HapticOrder::Engage { ticket: 3 });
+        rig.order(HapticOrder::Engage);
         let last = *rig.run(50).last().expect("ticks");
         assert_eq!((last.fault, last.flags & flags::ENGAGED), (Fault::DeviceLost as u32, 0));
     }
     set(&mut runs, false);
     for rig in &mut runs {
         assert_ne!(rig.run(50).last().expect("ticks").fault, 0, "kept until re-armed");
-        rig.order(HapticOrder::Engage { ticket: 4 });
+        rig.order(HapticOrder::Engage);
         assert_eq!(rig.run(50).last().expect("ticks").fault, 0);
     }
 }
@@ -48,10 +48,7 @@ fn a_body_shift_moves_the_needle_in_the_body_but_not_hand_or_goal() {
     rig.order(to_depth(-0.01));
     let before = *rig.run(1500).last().expect("ticks");
     assert_ne!(before.flags & flags::AT_GOAL, 0);
-    rig.order(HapticOrder::MoveBody {
-        ticket: 5,
-        to_m: [0.003, 0.0, -0.004],
-    });
+    rig.order(HapticOrder::MoveBody([0.003, 0.0, -0.004]));
     let mut in_body_m = Vector3::from(before.tip_in_scene_m);
     for _ in 0..1100 {
         let record = rig.tick();
@@ -66,7 +63,7 @@ fn a_body_shift_moves_the_needle_in_the_body_but_not_hand_or_goal() {
     let off_m = Vector3::from(rig.tick().tip_in_scene_m) - in_body_m;
     assert!((off_m - Vector3::new(0.003, 0.0, -0.004)).norm() < 1e-9, "{off_m}");
     assert_ne!(rig.tick().flags & flags::AT_GOAL, 0);
-    rig.order(HapticOrder::Reset { ticket: 6 });
+    rig.order(HapticOrder::Reset);
     let record = rig.tick();
     let pose = *rig.tissue_ports.pose.read();
     assert_eq!(record.tip_in_scene_m, <[f64; 3]>::from(pose.tip_in_scene));

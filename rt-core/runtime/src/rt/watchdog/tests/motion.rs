@@ -11,7 +11,7 @@ const MINE: Promise = Promise {
 
 fn away(promise: Promise) -> HapticOrder {
     HapticOrder::Hand {
-        ticket: 2,
+        up: None,
         promise: Some(promise),
         goal: HandGoal {
             tip_in_world: Vector3::new(0.0, 0.0, -0.4),
@@ -36,7 +36,10 @@ impl Rig {
 
     fn given_up(&self) -> Vec<Moved> {
         let what = |notice: &Notice| match notice {
-            Notice::MotionGivenUp { what, .. } => Some(*what),
+            Notice::Event {
+                what: Happened::MotionGivenUp(what),
+                ..
+            } => Some(*what),
             _ => None,
         };
         self.seen.iter().filter_map(what).collect()
@@ -89,7 +92,7 @@ fn a_goal_is_given_up_after_long_host_silence_until_a_new_one() {
     rig.order(away(MINE));
     assert!(way_m(&rig.move_on(MINE, 200)) > 0.01);
     // A stop ends the lease with the goal.
-    rig.order(HapticOrder::StopHand { ticket: 3 });
+    rig.order(HapticOrder::StopHand);
     rig.run(600);
     assert_eq!(rig.given_up(), [Moved::Needle], "said once");
 }
@@ -112,7 +115,7 @@ fn a_hand_at_its_goal_needs_no_host() {
 #[test]
 fn a_needle_that_presses_on_a_membrane_stays_where_it_is() {
     let mut rig = Rig::new();
-    rig.order(HapticOrder::Engage { ticket: 1 });
+    rig.order(HapticOrder::Engage);
     let mut press = to_depth(0.02);
     if let HapticOrder::Hand { promise, .. } = &mut press {
         *promise = Some(MINE);
