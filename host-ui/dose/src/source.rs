@@ -1,10 +1,10 @@
-//! A source file (TOML), checked; all problems are reported at once.
+//! A source file (TOML), checked; all wrong values are reported at once.
 
 use super::curve::{Curve, Table};
 use super::decay::days_to_s;
 use super::error::DoseError;
 use super::tg43::{Capsule, Tables};
-use read::Reader;
+use read::{Anisotropy1d, Anisotropy2d, Model, Problems, Radial, SourceFile};
 
 mod read;
 
@@ -48,12 +48,11 @@ impl Source {
 
     /// Reads and checks the text of a source file; the error lists every problem in it.
     pub fn parse(text: &str) -> Result<Self, DoseError> {
-        let table: toml::Table = text
-            .parse()
-            .map_err(|e| DoseError::Source(format!("it is not TOML: {e}")))?;
-        let mut reader = Reader::new(&table);
-        let source = build(&mut reader);
-        reader.finish().map(|()| source)
+        let file: SourceFile =
+            toml::from_str(text).map_err(|e| DoseError::Source(format!("it is no source file: {e}")))?;
+        let mut problems = Problems::default();
+        let source = build(file, &mut problems);
+        problems.finish().map(|()| source)
     }
 
     /// Returns the total dose of 1 U at 1 cm from the middle of the source, perpendicular to its
@@ -64,106 +63,142 @@ impl Source {
     }
 }
 
-fn build(r: &mut Reader) -> Source {
-    let model = r.text("source", "model");
-    let nuclide = r.text("source", "nuclide");
-    let half_life_days = r.number("source", "half_life_days", 1e-3, 1e6);
-    let constant = r.number("source", "dose_rate_constant", 1e-3, 100.0);
-    let length_cm = r.optional("source", "active_length_cm", 0.0, 10.0).unwrap_or(0.0);
-    r.fixed("source", "r0_cm", 1.0);
-    r.fixed("source", "theta0_deg", 90.0);
-    let radii_cm = r.rising("radial", "r_cm", 1e-3, 100.0);
-    // A line source needs g_L and a point source g_P, because their geometry functions differ.
-    let (used, other) = if length_cm > 0.0 {
-        ("g_line", "g_point")
-    } else {
-        ("g_point", "g_line")
-    };
-    let radial = r.column("radial", used, radii_cm.len(), 1e-12, 100.0);
-    if r.has("radial", other) {
-        r.column("radial", other, radii_cm.len(), 1e-12, 100.0);
+fn build(file: SourceFile, problems: &mut Problems) -> Source {
+    let of = file.source;
+    for (key, text) in [("model", &of.model), ("nuclide", &of.nuclide)] {
+        if text.trim().is_empty() {
+            problems.add(format!("[source] {key} must be a name in quotes"));
+        }
     }
-    let ln_radial = curve(&radii_cm, radial.iter().map(|g| g.ln()).collect());
-    r.must_be_one(used, "r = 1 cm", ln_radial.as_ref().map(|c| c.held(M_PER_CM).exp()));
-    let capsule = capsule(r, length_cm, radii_cm.first().copied());
+    for (key, value, least, most) in [
+        ("half_life_days", Some(of.half_life_days), 1e-3, 1e6),
+        ("dose_rate_constant", Some(of.dose_rate_constant), 1e-3, 100.0),
+        ("active_length_cm", Some(of.active_length_cm), 0.0, 10.0),
+        ("physical_length_cm", of.physical_length_cm, 1e-3, 10.0),
+        ("physical_diameter_cm", of.physical_diameter_cm, 1e-3, 10.0),
+        // The reference point of TG-43.
+        ("r0_cm", of.r0_cm, 1.0, 1.0),
+        ("theta0_deg", of.theta0_deg, 90.0, 90.0),
+        (
+            "strength_per_activity_u_per_mci",
+            of.strength_per_activity_u_per_mci,
+            1e-3,
+            100.0,
+        ),
+        ("prescription_gy", of.prescription_gy, 1e-3, 1e4),
+    ] {
+        problems.within(&format!("[source] {key}"), value, least, most);
+    }
+    if of.physical_length_cm.is_some_and(|l| l <= of.active_length_cm) {
+        problems.add("[source] physical_length_cm is not more than active_length_cm".to_owned());
+    }
     Source {
-        model,
-        nuclide,
-        half_life_s: days_to_s(half_life_days),
+        half_life_s: days_to_s(of.half_life_days),
         tables: Tables {
-            dose_rate_constant_gy_per_s: constant * GY_PER_S_PER_CGY_PER_H,
-            active_length_m: length_cm * M_PER_CM,
-            capsule,
-            ln_radial: ln_radial.unwrap_or(Curve {
-                at: vec![0.0],
-                values: vec![0.0],
-            }),
-            anisotropy_1d: anisotropy_1d(r),
-            anisotropy_2d: anisotropy_2d(r),
+            dose_rate_constant_gy_per_s: of.dose_rate_constant * GY_PER_S_PER_CGY_PER_H,
+            active_length_m: of.active_length_cm * M_PER_CM,
+            capsule: capsule(&of, file.radial.r_cm.first().copied()),
+            ln_radial: ln_radial(file.radial, of.active_length_cm > 0.0, problems),
+            anisotropy_1d: file.anisotropy_1d.and_then(|table| anisotropy_1d(table, problems)),
+            anisotropy_2d: file.anisotropy_2d.and_then(|table| anisotropy_2d(table, problems)),
         },
-        strength_per_activity_u_per_mci: r.optional("source", "strength_per_activity_u_per_mci", 1e-3, 100.0),
-        prescription_gy: r.optional("source", "prescription_gy", 1e-3, 1e4),
+        model: of.model,
+        nuclide: of.nuclide,
+        strength_per_activity_u_per_mci: of.strength_per_activity_u_per_mci,
+        prescription_gy: of.prescription_gy,
     }
 }
 
-/// Reads the capsule. Without its size, uses the smallest radius with data, around the active line
+/// Returns the capsule. Without its size, uses the smallest radius with data, around the active line
 /// and beyond its ends.
-fn capsule(r: &mut Reader, active_cm: f64, smallest_radius_cm: Option<f64>) -> Capsule {
-    let length = r.optional("source", "physical_length_cm", 1e-3, 10.0);
-    let diameter = r.optional("source", "physical_diameter_cm", 1e-3, 10.0);
-    if length.is_some_and(|l| l <= active_cm) {
-        r.problem("[source] physical_length_cm is not more than active_length_cm".to_owned());
-    }
-    let radius_cm = diameter.map_or(smallest_radius_cm.unwrap_or(0.1), |d| d / 2.0);
+fn capsule(of: &Model, smallest_radius_cm: Option<f64>) -> Capsule {
+    let radius_cm = of
+        .physical_diameter_cm
+        .map_or(smallest_radius_cm.unwrap_or(0.1), |d| d / 2.0);
+    let half_cm = of
+        .physical_length_cm
+        .map_or(of.active_length_cm / 2.0 + radius_cm, |l| l / 2.0);
     Capsule {
         radius_m: radius_cm * M_PER_CM,
-        half_length_m: length.map_or(active_cm / 2.0 + radius_cm, |l| l / 2.0) * M_PER_CM,
+        half_length_m: half_cm * M_PER_CM,
     }
 }
 
-fn anisotropy_1d(r: &mut Reader) -> Option<Curve> {
-    if !r.has_table("anisotropy_1d") {
-        return None;
+/// Returns ln g over r. A line source needs g_L and a point source g_P, because their geometry functions differ.
+fn ln_radial(table: Radial, is_line: bool, problems: &mut Problems) -> Curve {
+    problems.rising("[radial] r_cm", &table.r_cm, 1e-3, 100.0);
+    for (name, g) in [("g_line", &table.g_line), ("g_point", &table.g_point)] {
+        let g = g.iter();
+        g.for_each(|g| problems.column(&format!("[radial] {name}"), g, ("r_cm", table.r_cm.len()), 1e-12, 100.0));
     }
-    let radii_cm = r.rising("anisotropy_1d", "r_cm", 1e-3, 100.0);
-    let values = r.column("anisotropy_1d", "phi_an", radii_cm.len(), 1e-3, 10.0);
-    curve(&radii_cm, values)
+    let (name, used) = match is_line {
+        true => ("g_line", table.g_line),
+        false => ("g_point", table.g_point),
+    };
+    let ln_g = used.map(|g| g.iter().map(|g| g.ln()).collect());
+    match ln_g.and_then(|ln_g| curve(&table.r_cm, ln_g)) {
+        Some(ln_radial) => {
+            problems.must_be_one(name, "r = 1 cm", ln_radial.held(M_PER_CM).exp());
+            ln_radial
+        }
+        None => {
+            problems.add(format!("[radial] {name} must be a list of numbers, one for each r_cm"));
+            Curve {
+                at: vec![0.0],
+                values: vec![0.0],
+            }
+        }
+    }
 }
 
-fn anisotropy_2d(r: &mut Reader) -> Option<Table> {
-    if !r.has_table("anisotropy_2d") {
-        return None;
+fn anisotropy_1d(table: Anisotropy1d, problems: &mut Problems) -> Option<Curve> {
+    problems.rising("[anisotropy_1d] r_cm", &table.r_cm, 1e-3, 100.0);
+    let radii = ("r_cm", table.r_cm.len());
+    problems.column("[anisotropy_1d] phi_an", &table.phi_an, radii, 1e-3, 10.0);
+    curve(&table.r_cm, table.phi_an)
+}
+
+fn anisotropy_2d(table: Anisotropy2d, problems: &mut Problems) -> Option<Table> {
+    problems.rising("[anisotropy_2d] r_cm", &table.r_cm, 1e-3, 100.0);
+    problems.rising("[anisotropy_2d] theta_deg", &table.theta_deg, 0.0, 180.0);
+    let (radii, angles) = (table.r_cm.len(), table.theta_deg.len());
+    if table.f.len() != radii {
+        problems.add(format!(
+            "[anisotropy_2d] F has {} rows and r_cm {radii} entries",
+            table.f.len()
+        ));
     }
-    let radii_cm = r.rising("anisotropy_2d", "r_cm", 1e-3, 100.0);
-    let angles_deg = r.rising("anisotropy_2d", "theta_deg", 0.0, 180.0);
-    let values = r.matrix("anisotropy_2d", "F", radii_cm.len(), angles_deg.len(), 0.0, 10.0);
-    if let (Some(&first), Some(&last)) = (angles_deg.first(), angles_deg.last())
+    for (row, number) in table.f.iter().zip(1..) {
+        let name = format!("[anisotropy_2d] F, row {number}");
+        problems.column(&name, row, ("theta_deg", angles), 0.0, 10.0);
+    }
+    if let (Some(&first), Some(&last)) = (table.theta_deg.first(), table.theta_deg.last())
         && (first != 0.0 || (last != 90.0 && last != 180.0))
     {
-        r.problem(format!(
+        problems.add(format!(
             "[anisotropy_2d] theta_deg goes from {first} to {last}; it must go from 0 to 90 or to 180"
         ));
     }
-    if radii_cm.is_empty() || values.len() != radii_cm.len() * angles_deg.len() {
+    let values = table.f.concat();
+    if values.is_empty() || values.len() != radii * angles {
         return None;
     }
-    let table = Table {
-        rows_at: in_m(&radii_cm),
-        columns_at: angles_deg,
+    let f = Table {
+        rows_at: in_m(&table.r_cm),
+        columns_at: table.theta_deg,
         values,
     };
-    for (row, &r_m) in table.rows_at.iter().enumerate() {
-        let at = format!("r = {} cm, theta = 90 deg", radii_cm[row]);
-        r.must_be_one("F", &at, Some(table.held(r_m, 90.0)));
+    for (r_cm, &r_m) in table.r_cm.iter().zip(&f.rows_at) {
+        problems.must_be_one("F", &format!("r = {r_cm} cm, theta = 90 deg"), f.held(r_m, 90.0));
     }
-    Some(table)
+    Some(f)
 }
 
 fn in_m(cm: &[f64]) -> Vec<f64> {
     cm.iter().map(|r| r * M_PER_CM).collect()
 }
 
-/// Creates a curve; `None` if the two do not fit, which the reader has reported already.
+/// Creates a curve; `None` if the two do not fit.
 fn curve(radii_cm: &[f64], values: Vec<f64>) -> Option<Curve> {
     (!values.is_empty() && values.len() == radii_cm.len()).then(|| Curve {
         at: in_m(radii_cm),

@@ -60,22 +60,19 @@ fn the_mean_over_directions_of_f_is_phi_an() {
 }
 
 #[test]
-fn every_problem_of_a_file_is_reported_at_once() {
+fn every_wrong_value_of_a_file_is_reported_at_once() {
     let bad = text("i125_6711")
         .replace("half_life_days = 59.40", "half_life_days = -3")
-        .replace("dose_rate_constant", "dose_rate_constand")
         .replace("phi_an = [0.973, ", "phi_an = [")
-        .replace("g_line = [1.055, 1.078", "g_line = [1.055, \"x\"")
+        .replace("g_line = [1.055, 1.078", "g_line = [1.055, nan")
         .replace("theta_deg = [0, 5", "theta_deg = [5, 5")
         .replace("r0_cm = 1.0", "r0_cm = 2.0");
     let reported = Source::parse(&bad).expect_err("it is bad").to_string();
     println!("{reported}");
     for part in [
         "half_life_days = -3",
-        "dose_rate_constand is not known",
-        "dose_rate_constant is missing",
         "phi_an has 5",
-        "g_line, entry 2 must be a number",
+        "g_line, entry 2 = NaN",
         "theta_deg must rise; 5 is followed by 5",
         "r0_cm = 2",
     ] {
@@ -93,6 +90,21 @@ fn files_that_are_no_sources_are_refused() {
         "\u{0}",
     ] {
         assert!(Source::parse(bad).is_err(), "{bad:?} was taken");
+    }
+    for (of, by, expected) in [
+        (
+            "dose_rate_constant",
+            "dose_rate_constand",
+            "unknown field `dose_rate_constand`",
+        ),
+        ("half_life_days", "# half_life_days", "missing field `half_life_days`"),
+        ("g_line = [0.911", "g_line = [\"x\"", "expected f64"),
+        ("g_line", "g_point", "g_line must be a list"),
+    ] {
+        let why = Source::parse(&text("pd103_200").replace(of, by))
+            .expect_err("bad")
+            .to_string();
+        assert!(why.contains(expected), "{expected}: {why}");
     }
     let swapped = text("pd103_200").replace("g_line = [0.911", "g_line = [nan");
     assert!(Source::parse(&swapped).is_err_and(|e| e.to_string().contains("entry 1")));
