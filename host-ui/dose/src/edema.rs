@@ -45,7 +45,7 @@ impl Swelling {
     /// for all time.
     pub fn dose_gy(self, kernel: &DoseKernel, seeds: &[Seed], points: &DosePoints) -> Vec<f64> {
         self.edema
-            .dose_at_gy(kernel, self.half_life_s, f64::INFINITY, seeds, points)
+            .dose_gy(kernel, self.half_life_s, f64::INFINITY, seeds, points)
     }
 }
 
@@ -77,18 +77,6 @@ impl Edema {
     /// Computes the total dose of seeds at points (Gy), both at their positions `seen_s` after the
     /// implant; `kernel` is for all time.
     pub fn dose_gy(
-        self,
-        kernel: &DoseKernel,
-        half_life_s: f64,
-        seen_s: f64,
-        seeds: &[Seed],
-        points_m: &[[f64; 3]],
-    ) -> Vec<f64> {
-        self.dose_at_gy(kernel, half_life_s, seen_s, seeds, &DosePoints::new(points_m))
-    }
-
-    /// Like [`Edema::dose_gy`], at prepared points.
-    pub fn dose_at_gy(
         self,
         kernel: &DoseKernel,
         half_life_s: f64,
@@ -143,8 +131,9 @@ mod tests {
             axis: None,
             strength_u: 0.5,
         }];
-        let moving = edema.dose_gy(&kernel, source.half_life_s, days_to_s(seen_days), &seeds, &POINTS_M);
-        (moving, DosePoints::new(&POINTS_M).of_seeds_gy(&kernel, &seeds))
+        let points = DosePoints::new(&POINTS_M);
+        let moving = edema.dose_gy(&kernel, source.half_life_s, days_to_s(seen_days), &seeds, &points);
+        (moving, points.of_seeds_gy(&kernel, &seeds))
     }
 
     /// Returns the dose relative to that of the final geometry: the sum over n of C(-2/3, n) Mⁿ /

@@ -88,12 +88,15 @@ pub struct Column {
 impl Column {
     /// Computes the dose of a state, with its edema if one is given.
     pub fn of(implant: &Implant, kernel: &DoseKernel, state: State, edema: Option<Edema>) -> Self {
-        let dose = |structure: &Structure| match edema {
-            Some(edema) => {
-                let half_life_s = implant.source.half_life_s;
-                edema.dose_gy(kernel, half_life_s, state.seen_s, &state.seeds, &structure.points_m)
+        let dose = |structure: &Structure| {
+            let points = DosePoints::new(&structure.points_m);
+            match edema {
+                Some(edema) => {
+                    let half_life_s = implant.source.half_life_s;
+                    edema.dose_gy(kernel, half_life_s, state.seen_s, &state.seeds, &points)
+                }
+                None => points.of_seeds_gy(kernel, &state.seeds),
             }
-            None => DosePoints::new(&structure.points_m).of_seeds_gy(kernel, &state.seeds),
         };
         let (mut histograms, mut sectors) = (Vec::new(), Vec::new());
         for (n, structure) in state.structures.iter().enumerate() {
