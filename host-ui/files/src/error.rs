@@ -31,6 +31,12 @@ pub enum ContentError {
     Invalid(String),
 }
 
+/// Formats the reason why the content of a file is refused.
+macro_rules! invalid {
+    ($($words:tt)*) => { $crate::error::ContentError::Invalid(format!($($words)*)) };
+}
+pub(crate) use invalid;
+
 impl From<InputError> for ContentError {
     fn from(why: InputError) -> Self {
         Self::Unreadable(why.to_string())

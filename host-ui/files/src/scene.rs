@@ -1,7 +1,5 @@
-//! Scene files (TOML): a volume, materials of its structures, needle, device and plan; all problems
-//! are reported at once.
-
-mod keys;
+//! Scene files (TOML): a volume, materials of its structures, needle, device and plan. All wrong values are reported at
+//! once.
 
 use super::bytes::{file_name, whole};
 use super::error::FileError;
@@ -9,7 +7,7 @@ use super::open::read_voxels;
 use super::progress::Progress;
 use super::volume::{LabelVolume, Tissue, Voxels, role_and_material};
 use crate::error::ContentError;
-use keys::Keys;
+use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use stylet_anatomy::{Beyond, Material, Role, Surroundings};
 
@@ -27,7 +25,7 @@ pub struct SceneFile {
     /// file.
     pub image: Option<PathBuf>,
     /// Structures; if empty, those named in the volume.
-    pub structures: Vec<Part>,
+    structures: Vec<Part>,
     /// Speed of insertion, in m/s.
     pub insert_m_per_s: Option<f64>,
     /// Speed of retraction, in m/s.
@@ -38,35 +36,89 @@ pub struct SceneFile {
     pub plan: Option<PathBuf>,
 }
 
-/// Selection of a structure in the volume.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Pick {
-    /// By its label.
-    Label(u8),
-    /// By its name.
-    Name(String),
+/// Structure of the scene; omitted fields are inferred from its name.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Part {
+    /// Label by which it is found in the volume.
+    label: Option<u8>,
+    /// Name by which it is found in the volume.
+    name: Option<String>,
+    /// Name in the scene instead of that in the volume.
+    called: Option<String>,
+    role: Option<Aim>,
+    young_kpa: Option<f64>,
+    poisson: Option<f64>,
+    /// Shortest and longest link as a share of the length at rest.
+    stretch: Option<[f64; 2]>,
+    shear_deg: Option<f64>,
+    /// True if it never moves.
+    fixed: Option<bool>,
+    surroundings: Option<Around>,
 }
 
-/// Structure of the scene; omitted fields are inferred from its name.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Part {
-    /// Selection in the volume.
-    pub pick: Pick,
-    /// Name in the scene instead of that in the volume.
-    pub called: Option<String>,
-    /// Role; an inner `None` leaves the structure out.
-    pub role: Option<Option<Role>>,
-    /// Young's modulus, in Pa.
-    pub young_pa: Option<f64>,
-    /// Poisson's ratio.
-    pub poisson: Option<f64>,
-    /// Limits of links along x, y, z: shortest and longest as a share of the rest length, and shear
-    /// in rad.
-    pub limits: Option<[[f64; 3]; 3]>,
-    /// True if it never moves.
-    pub fixed: Option<bool>,
-    /// Support at the outside of the body.
-    pub surroundings: Option<Surroundings>,
+/// Role of a structure by its word in the file.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Aim {
+    Target,
+    Spare,
+    Tissue,
+    #[serde(rename = "leave out")]
+    LeftOut,
+}
+
+/// Support at the outside of the body: one word for all faces, or six for those towards -x, +x, -y, +y, -z, +z.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(untagged, expecting = "must be a word, or a list of six words")]
+enum Around {
+    All(String),
+    Faces([String; 6]),
+}
+
+impl Around {
+    fn surroundings(&self) -> Option<Surroundings> {
+        let faces = match self {
+            Self::All(word) => return Beyond::of_name(word).map(Surroundings::all),
+            Self::Faces(words) => words.iter().map(|word| Beyond::of_name(word)),
+        };
+        let faces: Option<Vec<Beyond>> = faces.collect();
+        faces.and_then(|faces| faces.try_into().ok()).map(Surroundings)
+    }
+}
+
+/// Content of a scene file in its tables.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Tables {
+    name: Option<String>,
+    volume: Referred,
+    image: Option<Referred>,
+    #[serde(default)]
+    structure: Vec<Part>,
+    #[serde(default)]
+    needle: Speeds,
+    device: Option<Device>,
+    plan: Option<Referred>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Referred {
+    file: PathBuf,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Speeds {
+    insert_mm_per_s: Option<f64>,
+    retract_mm_per_s: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Device {
+    name: String,
 }
 
 /// Returns whether a file is a scene file, the only format here that is recognised by its name.
@@ -101,137 +153,36 @@ pub fn load(path: &Path, progress: &Progress) -> Result<(SceneFile, LabelVolume)
 
 /// Parses the text of a scene file.
 pub fn parse(text: &str) -> Result<SceneFile, ContentError> {
-    let root: toml::Table = text.parse().map_err(|e| format!("it is not TOML: {e}"))?;
+    let tables: Tables = toml::from_str(text).map_err(|e| format!("it is no scene file: {e}"))?;
     let mut problems = Vec::new();
-    let mut top = Keys::new(&root, String::new(), &mut problems);
-    top.only(&["name", "volume", "image", "structure", "needle", "device", "plan"]);
-    let name = top.text("name");
-    let volume = top.table("volume", |k| {
-        k.only(&["file"]);
-        k.path("file")
-    });
-    let image = top.table("image", |k| {
-        k.only(&["file"]);
-        k.path("file")
-    });
-    let needle = top.table("needle", |k| {
-        k.only(&["insert_mm_per_s", "retract_mm_per_s"]);
-        Some(["insert_mm_per_s", "retract_mm_per_s"].map(|key| k.number(key, 0.1, 500.0).map(|v| v * 1e-3)))
-    });
-    let device = top.table("device", |k| {
-        k.only(&["name"]);
-        k.text("name")
-    });
-    let plan = top.table("plan", |k| {
-        k.only(&["file"]);
-        k.path("file")
-    });
-    let structures = top.tables("structure", MAX_STRUCTURES, part);
-    let absent = !root.contains_key("volume");
-    if absent || (volume.is_none() && problems.is_empty()) {
-        problems.push("[volume] file is missing: the label volume to run".to_owned());
+    let mut check = |name: &str, value: Option<f64>, least: f64, most: f64| {
+        if value.is_some_and(|v| !(least..=most).contains(&v)) {
+            problems.push(format!("{name} must be a number from {least} to {most}"));
+        }
+    };
+    let Speeds {
+        insert_mm_per_s,
+        retract_mm_per_s,
+    } = tables.needle;
+    check("[needle] insert_mm_per_s", insert_mm_per_s, 0.1, 500.0);
+    check("[needle] retract_mm_per_s", retract_mm_per_s, 0.1, 500.0);
+    if tables.structure.len() > MAX_STRUCTURES {
+        problems.push(format!("it has more than {MAX_STRUCTURES} structures"));
+    }
+    for (part, number) in tables.structure.iter().zip(1..) {
+        problems.extend(part.problems().map(|why| format!("[[structure]] {number}: {why}")));
     }
     ContentError::all(problems)?;
-    let [insert_m_per_s, retract_m_per_s] = needle.unwrap_or_default();
     Ok(SceneFile {
-        name,
-        volume: volume.ok_or("[volume] file is missing")?,
-        image,
-        structures,
-        insert_m_per_s,
-        retract_m_per_s,
-        device,
-        plan,
+        name: tables.name,
+        volume: tables.volume.file,
+        image: tables.image.map(|image| image.file),
+        structures: tables.structure,
+        insert_m_per_s: insert_mm_per_s.map(|v| v * 1e-3),
+        retract_m_per_s: retract_mm_per_s.map(|v| v * 1e-3),
+        device: tables.device.map(|device| device.name),
+        plan: tables.plan.map(|plan| plan.file),
     })
-}
-
-fn part(k: &mut Keys) -> Option<Part> {
-    k.only(&[
-        "label",
-        "name",
-        "called",
-        "role",
-        "young_kpa",
-        "poisson",
-        "stretch",
-        "shear_deg",
-        "fixed",
-        "surroundings",
-    ]);
-    let label = k.number("label", 1.0, 255.0);
-    if label.is_some_and(|l| l.fract() != 0.0) {
-        k.problem("label", "must be a whole number");
-    }
-    let pick = match (label, k.text("name")) {
-        (Some(label), None) => Some(Pick::Label(label as u8)),
-        (None, Some(name)) => Some(Pick::Name(name)),
-        (Some(_), Some(_)) => {
-            k.problem(
-                "label",
-                "and name are both there; give the one by which the structure is found, and its name as \"called\"",
-            );
-            None
-        }
-        (None, None) => {
-            k.problem(
-                "label",
-                "or name is missing: by which the structure is found in the volume",
-            );
-            None
-        }
-    };
-    let role = match k.text("role").as_deref() {
-        None => None,
-        Some("target") => Some(Some(Role::Target)),
-        Some("spare") => Some(Some(Role::Spare)),
-        Some("tissue") => Some(Some(Role::Tissue)),
-        Some("leave out") => Some(None),
-        Some(_) => {
-            k.problem("role", "must be \"target\", \"spare\", \"tissue\" or \"leave out\"");
-            None
-        }
-    };
-    let stretch = k.numbers::<2>("stretch", 0.01, 100.0);
-    let shear_deg = k.number("shear_deg", 0.1, 89.0);
-    if stretch.is_some() != shear_deg.is_some() {
-        k.problem("stretch", "and shear_deg belong together: give both or none");
-    }
-    if stretch.is_some_and(|[short, long]| !(short < 1.0 && long > 1.0)) {
-        k.problem(
-            "stretch",
-            "must be [below 1, above 1]: shortest and longest as a share of the length at rest",
-        );
-    }
-    let limits = stretch
-        .zip(shear_deg)
-        .map(|([short, long], deg)| [[short, long, deg.to_radians()]; 3]);
-    Some(Part {
-        called: k.text("called"),
-        role,
-        young_pa: k.number("young_kpa", 0.01, 1e8).map(|v| v * 1e3),
-        poisson: k.number("poisson", 0.0, Material::MAX_POISSON),
-        limits,
-        fixed: k.yes("fixed"),
-        surroundings: surroundings(k),
-        pick: pick?,
-    })
-}
-
-/// Reads one word for all faces, or six for those towards -x, +x, -y, +y, -z, +z of the scene.
-fn surroundings(k: &mut Keys) -> Option<Surroundings> {
-    let words = k.words("surroundings")?;
-    let beyond: Option<Vec<Beyond>> = words.iter().map(|word| Beyond::of_name(word)).collect();
-    let found = beyond.and_then(|beyond| match beyond.as_slice() {
-        [all] => Some(Surroundings::all(*all)),
-        each => <[Beyond; 6]>::try_from(each).ok().map(Surroundings),
-    });
-    if found.is_none() {
-        k.problem(
-            "surroundings",
-            "must be \"fat\", \"free\" or \"fixed\", or a list of six of them, for the faces towards -x, +x, -y, +y, -z, +z",
-        );
-    }
-    found
 }
 
 impl SceneFile {
@@ -253,57 +204,99 @@ impl SceneFile {
         }
         ContentError::all(problems)?;
         if tissues.is_empty() {
-            return Err(ContentError::Invalid("all structures are left out".to_owned()));
+            return Err("all structures are left out".into());
         }
         Ok(tissues)
     }
 }
 
 impl Part {
+    /// Returns what is wrong with its values.
+    fn problems(&self) -> impl Iterator<Item = &'static str> {
+        let within = |value: Option<f64>, least: f64, most: f64| value.is_none_or(|v| (least..=most).contains(&v));
+        let [short, long] = self.stretch.unwrap_or([0.5, 2.0]);
+        let rules = [
+            (
+                self.label.is_some() != self.name.is_some(),
+                "give either label or name: by which the structure is found in the volume; its own name is \"called\"",
+            ),
+            (self.label != Some(0), "label must be a number from 1 to 255"),
+            (
+                within(self.young_kpa, 0.01, 1e8),
+                "young_kpa must be a number from 0.01 to 100000000",
+            ),
+            (
+                within(self.poisson, 0.0, Material::MAX_POISSON),
+                "poisson must be a number from 0 to just below 0.5",
+            ),
+            (
+                self.stretch.is_some() == self.shear_deg.is_some(),
+                "stretch and shear_deg belong together: give both or none",
+            ),
+            (
+                (0.01..1.0).contains(&short) && long > 1.0 && long <= 100.0,
+                "stretch must be [below 1, above 1]: shortest and longest as a share of the length at rest",
+            ),
+            (
+                within(self.shear_deg, 0.1, 89.0),
+                "shear_deg must be a number from 0.1 to 89",
+            ),
+            (
+                self.surroundings
+                    .as_ref()
+                    .is_none_or(|words| words.surroundings().is_some()),
+                "surroundings must be \"fat\", \"free\" or \"fixed\", or a list of six of them",
+            ),
+        ];
+        rules.into_iter().filter(|(holds, _)| !holds).map(|(_, why)| why)
+    }
+
     fn find(&self, voxels: &Voxels) -> Result<u8, ContentError> {
-        match &self.pick {
-            Pick::Label(label) if voxels.labels.contains(label) => Ok(*label),
-            Pick::Label(label) => Err(ContentError::Invalid(format!(
-                "the volume has no voxel with label {label}"
-            ))),
-            Pick::Name(name) => {
-                let found = voxels.names.iter().find(|(_, n)| n.eq_ignore_ascii_case(name));
-                found.map(|(label, _)| *label).ok_or_else(|| {
-                    let names: Vec<&str> = voxels.names.values().map(String::as_str).collect();
-                    let there = if names.is_empty() {
-                        "no names; give label = N".to_owned()
-                    } else {
-                        names.join(", ")
-                    };
-                    format!("the volume has no structure \"{name}\"; it has {there}").into()
-                })
-            }
+        if let Some(label) = self.label {
+            let is_there = voxels.labels.contains(&label);
+            return is_there
+                .then_some(label)
+                .ok_or_else(|| format!("the volume has no voxel with label {label}").into());
         }
+        let name = self.name.as_deref().unwrap_or_default();
+        let found = voxels.names.iter().find(|(_, n)| n.eq_ignore_ascii_case(name));
+        found.map(|(label, _)| *label).ok_or_else(|| {
+            let names: Vec<&str> = voxels.names.values().map(String::as_str).collect();
+            let there = if names.is_empty() {
+                "no names; give label = N".to_owned()
+            } else {
+                names.join(", ")
+            };
+            format!("the volume has no structure \"{name}\"; it has {there}").into()
+        })
     }
 
     /// Returns the tissue of a label; `None` if it is left out.
     fn tissue(&self, label: u8, voxels: &Voxels) -> Option<Tissue> {
-        let picked = match &self.pick {
-            Pick::Name(name) => Some(name.clone()),
-            Pick::Label(_) => voxels.names.get(&label).cloned(),
-        };
-        let name = self
-            .called
-            .clone()
-            .or(picked)
-            .unwrap_or_else(|| format!("label {label}"));
+        let of_volume = || voxels.names.get(&label).cloned();
+        let name = self.called.clone().or_else(|| self.name.clone()).or_else(of_volume);
+        let name = name.unwrap_or_else(|| format!("label {label}"));
         let (role, material) = role_and_material(&name);
-        let role = self.role.unwrap_or(Some(role))?;
+        let role = match self.role {
+            None => role,
+            Some(Aim::Target) => Role::Target,
+            Some(Aim::Spare) => Role::Spare,
+            Some(Aim::Tissue) => Role::Tissue,
+            Some(Aim::LeftOut) => return None,
+        };
+        let limits = self.stretch.zip(self.shear_deg);
+        let limits = limits.map(|([short, long], deg)| [[short, long, deg.to_radians()]; 3]);
+        let surroundings = self.surroundings.as_ref().and_then(Around::surroundings);
         Some(Tissue {
             label,
             name,
             role,
             material: Material {
-                young_pa: self.young_pa.unwrap_or(material.young_pa),
+                young_pa: self.young_kpa.map_or(material.young_pa, |kpa| kpa * 1e3),
                 poisson: self.poisson.unwrap_or(material.poisson),
-                limits: self.limits.or(material.limits),
+                limits: limits.or(material.limits),
                 fixed: self.fixed.unwrap_or(material.fixed),
-                surroundings: self.surroundings.unwrap_or(material.surroundings),
+                surroundings: surroundings.unwrap_or(material.surroundings),
             },
         })
     }

@@ -63,7 +63,7 @@ fn structures_get_the_materials_of_the_file() {
     let wrong = parse(&FULL.replace("\"fixed\"]", "\"fixed\", \"air\"]"))
         .unwrap_err()
         .to_string();
-    assert!(wrong.contains("six of them"), "{wrong}");
+    assert!(wrong.contains("list of six words"), "{wrong}");
     let volume = LabelVolume::from_tissues(&voxels(), tissues, "v".to_owned(), &Progress::default()).unwrap();
     let cells = |label: u8| volume.cells.iter().filter(|&&c| c == label).count();
     assert_eq!([1, 2, 3, 4].map(cells), [16, 16, 0, 0]);
@@ -78,46 +78,62 @@ fn structures_get_the_materials_of_the_file() {
 }
 
 #[test]
-fn every_problem_of_a_scene_file_is_reported_at_once() {
+fn every_wrong_value_of_a_scene_file_is_reported_at_once() {
     let wrong = r#"
-nmae = "x"
 [volume]
+file = "a"
 [[structure]]
-role = "targte"
+role = "spare"
 [[structure]]
-label = 300
-young_kpa = "soft"
+label = 0
 stretch = [1.2, 0.8]
 [[structure]]
 label = 1
 name = "Prostate"
 poisson = 0.5
+shear_deg = 90
+[[structure]]
+label = 2
+young_kpa = 0
 [needle]
-speed = 3
 insert_mm_per_s = 9000
-[device]
-name = 7
+retract_mm_per_s = nan
 "#;
     let why = parse(wrong).unwrap_err().to_string();
     for expected in [
-        "nmae is not known",
-        "[volume] file is missing",
-        "[[structure]] 1: label or name is missing",
-        "[[structure]] 1: role must be",
+        "[[structure]] 1: give either label or name",
         "[[structure]] 2: label must be a number from 1 to 255",
-        "[[structure]] 2: young_kpa must be a number",
         "[[structure]] 2: stretch and shear_deg belong together",
-        "[[structure]] 3: label and name are both there",
+        "[[structure]] 2: stretch must be",
+        "[[structure]] 3: give either label or name",
         "[[structure]] 3: poisson must be",
-        "[needle] speed is not known",
+        "[[structure]] 3: shear_deg must be",
+        "[[structure]] 4: young_kpa must be",
         "[needle] insert_mm_per_s must be a number from 0.1 to 500",
-        "[device] name must be a text",
+        "[needle] retract_mm_per_s must be a number",
     ] {
         assert!(why.contains(expected), "{expected}:\n{why}");
     }
-    assert!(parse("").unwrap_err().to_string().contains("[volume] file is missing"));
-    assert!(parse("volume = 3").unwrap_err().to_string().contains("must be a table"));
-    assert!(parse("= 3").unwrap_err().to_string().contains("not TOML"));
+}
+
+#[test]
+fn a_misspelt_scene_file_is_refused_with_the_line() {
+    for (wrong, expected) in [
+        ("", "missing field `volume`"),
+        ("volume = 3", "line 1"),
+        ("= 3", "line 1"),
+        ("nmae = \"x\"\n[volume]\nfile = \"a\"", "unknown field `nmae`"),
+        ("[volume]\nfile = \"a\"\n[needle]\nspeed = 3", "unknown field `speed`"),
+        ("[volume]\nfile = \"a\"\n[device]\nname = 7", "line 4"),
+        ("[volume]\nfile = \"a\"\n[[structure]]\nlabel = 300", "line 4"),
+        (
+            "[volume]\nfile = \"a\"\n[[structure]]\nrole = \"targte\"",
+            "unknown variant `targte`",
+        ),
+    ] {
+        let why = parse(wrong).unwrap_err().to_string();
+        assert!(why.contains(expected), "{expected}:\n{why}");
+    }
 }
 
 #[test]
