@@ -14,14 +14,14 @@ pub fn smallest_wins(
     names: &BTreeMap<u8, String>,
     of_voxel: impl Fn(usize, &mut Vec<u8>),
 ) -> Settled {
-    let mut sizes = [0_u64; 256];
+    let mut sizes = [0_usize; 256];
     let mut found = Vec::new();
     for voxel in 0..count {
         found.clear();
         of_voxel(voxel, &mut found);
         found.iter().for_each(|&l| sizes[usize::from(l)] += 1);
     }
-    let mut taken = [0_u64; 256];
+    let mut taken = [0_usize; 256];
     let mut labels = vec![0_u8; count];
     let mut also = Vec::new();
     for (voxel, label) in labels.iter_mut().enumerate() {
@@ -37,21 +37,29 @@ pub fn smallest_wins(
             also.push((l, voxel as u32));
         });
     }
-    let lost: Vec<String> = names
-        .iter()
-        .filter(|(label, _)| taken[usize::from(**label)] > 0)
-        .map(|(label, name)| {
-            let (taken, size) = (taken[usize::from(*label)], sizes[usize::from(*label)]);
-            format!("{name} ({taken} of {size} voxels) {}", in_cc(taken as f64 * voxel_m3))
+    let each = names.iter().map(|(label, name)| {
+        let label = usize::from(*label);
+        (name.clone(), taken[label], sizes[label])
+    });
+    let warning = lost(each, voxel_m3);
+    (labels, also, warning)
+}
+
+/// Returns what structures lost to smaller ones, in words: name, voxels taken and voxels of each.
+pub fn lost(structures: impl Iterator<Item = (String, usize, usize)>, voxel_m3: f64) -> Option<String> {
+    let lost: Vec<String> = structures
+        .filter(|(_, taken, _)| *taken > 0)
+        .map(|(name, taken, size)| {
+            let cc = in_cc(taken as f64 * voxel_m3);
+            format!("{name} ({taken} of {size} voxels) {cc}")
         })
         .collect();
-    let warning = (!lost.is_empty()).then(|| {
+    (!lost.is_empty()).then(|| {
         format!(
             "structures overlap, and where they do the smaller one has the voxel; others have it taken from them: {}",
             lost.join(", ")
         )
-    });
-    (labels, also, warning)
+    })
 }
 
 /// Formats a lost volume for a note; small ones with more digits.

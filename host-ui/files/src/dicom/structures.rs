@@ -19,7 +19,7 @@ use super::Identity;
 use super::checked::Object;
 use super::images::{self, Grid};
 use super::values::{items, needed, text};
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use contours::Drawn;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
@@ -47,10 +47,8 @@ pub struct Contoured {
 impl Contoured {
     /// Returns the unit vector across the plane of its largest contour.
     fn normal(&self) -> Result<Vector3<f64>, ContentError> {
-        let largest = self.contours.iter().map(|c| area_vector(c));
-        let largest = largest.max_by(|a, b| a.norm().total_cmp(&b.norm()));
-        let normal = largest.and_then(|a| a.try_normalize(1e-12));
-        normal.ok_or_else(|| ContentError::Invalid(format!("the contours of {} enclose no area", short(&self.name))))
+        let normal = normal_of(self.contours.iter());
+        normal.ok_or_else(|| invalid!("the contours of {} enclose no area", short(&self.name)))
     }
 
     /// Returns the smallest distance between two of its planes, m; infinite for one plane.
@@ -76,28 +74,22 @@ pub struct StructureSet {
     pub notes: Vec<String>,
 }
 
-/// Returns whether contours of one plane are nested, so that the inner ones are holes.
-fn nested(contours: &[Vec<Vector3<f64>>]) -> bool {
-    let largest = contours.iter().map(|c| area_vector(c));
-    let largest = largest.max_by(|a, b| a.norm().total_cmp(&b.norm()));
-    let Some(normal) = largest.and_then(|a| a.try_normalize(1e-12)) else {
-        return false;
-    };
-    planes::flat(contours, normal)
-        .iter()
-        .any(|polygons| polygons.len() > planes::MOST_NESTED || any_in_another(polygons))
+/// Returns the unit vector across the plane of the largest contour.
+fn normal_of<'a>(contours: impl Iterator<Item = &'a Vec<Vector3<f64>>>) -> Option<Vector3<f64>> {
+    let areas = contours.map(|c| area_vector(c));
+    let largest = areas.max_by(|a, b| a.norm().total_cmp(&b.norm()));
+    largest.and_then(|area| area.try_normalize(1e-12))
 }
 
-/// Returns whether polygons are nested. Loops along voxels may touch at corners, but never along an
-/// edge.
-fn any_in_another(polygons: &[Vec<[f64; 2]>]) -> bool {
-    let middle = |p: &[[f64; 2]]| [0, 1].map(|a| (p[0][a] + p[1 % p.len()][a]) / 2.0);
-    let is_in = |n: usize| {
-        let others = polygons.iter().enumerate().filter(move |(other, _)| *other != n);
-        let middle = middle(&polygons[n]);
-        others.into_iter().any(|(_, polygon)| solid::encloses(polygon, middle))
+/// Returns whether contours of one plane are nested, so that the inner ones are holes.
+fn nested(contours: &[Vec<Vector3<f64>>]) -> bool {
+    let Some(normal) = normal_of(contours.iter()) else {
+        return false;
     };
-    (0..polygons.len()).any(is_in)
+    let planes = planes::flat(contours, &planes::axes_of(normal));
+    planes
+        .iter()
+        .any(|(_, polygons)| polygons.len() > planes::MOST_NESTED || planes::depths(polygons).any(|depth| depth > 0))
 }
 
 /// Reads a structure set and the images in its folder.
@@ -112,10 +104,10 @@ impl StructureSet {
     /// Reads the structures of a DICOM object; the error lists every problem.
     pub fn of(object: &Object) -> Result<Self, ContentError> {
         if object.sop_class != uids::RT_STRUCTURE_SET_STORAGE {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "it is DICOM of another kind (SOP class {}); a segmentation is an RT Structure Set",
                 short(&object.sop_class)
-            )));
+            ));
         }
         let data = &object.data;
         let rois = Rois::of(data)?;
@@ -144,15 +136,13 @@ impl StructureSet {
             } else {
                 notes.join("; ")
             };
-            return Err(ContentError::Invalid(format!(
-                "it contains no structure with a volume: {why}"
-            )));
+            return Err(invalid!("it contains no structure with a volume: {why}"));
         }
         if structures.len() > MAX_STRUCTURES {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "it contains {} structures; at most {MAX_STRUCTURES} are supported",
                 structures.len()
-            )));
+            ));
         }
         let (series, images) = references(data);
         Ok(Self {
@@ -197,15 +187,8 @@ impl StructureSet {
     /// not their centres, lie along the outermost contours.
     fn grid_around(&self) -> Result<Grid, ContentError> {
         let points = || self.structures.iter().flat_map(|s| s.contours.iter().flatten());
-        let largest = self
-            .structures
-            .iter()
-            .flat_map(|s| &s.contours)
-            .map(|c| area_vector(c))
-            .max_by(|a, b| a.norm().total_cmp(&b.norm()));
-        let normal = largest
-            .and_then(|a| a.try_normalize(1e-12))
-            .ok_or("its contours enclose no area")?;
+        let normal =
+            normal_of(self.structures.iter().flat_map(|s| &s.contours)).ok_or("its contours enclose no area")?;
         // Along the patient's axes if the planes allow it.
         let right = (Vector3::x() - normal * normal.x).try_normalize(0.5);
         let across = right

@@ -1,7 +1,7 @@
 //! Contours of one plane against each other: a copy counts once, and contours that overlap in part
 //! are one body.
 
-use super::planes::{axes_of, first_of};
+use super::planes::{Polygon, area, by_height, height_m, in_mm};
 use super::{Contoured, SAME_PLANE_M};
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay_rule::OverlayRule;
@@ -23,8 +23,6 @@ const HOLE_OF_OUTER: f64 = 0.8;
 /// Most contours of a plane that are compared.
 const MOST: usize = 64;
 
-/// Polygon in its plane, m.
-type Polygon = Vec<[f64; 2]>;
 /// Height of a plane, m, and an area in it, m², or a length, m.
 type At = (f64, f64);
 
@@ -41,28 +39,21 @@ pub struct Overlaps {
 
 /// Removes copies and unites contours that overlap in part, unless the file says that overlaps
 /// are holes.
-pub fn settle(structure: &mut Contoured, normal: Vector3<f64>, is_exclusive: bool) -> Overlaps {
-    let axes = axes_of(normal);
-    let mut contours: Vec<(f64, Vec<Vector3<f64>>)> = std::mem::take(&mut structure.contours)
-        .into_iter()
-        .map(|corners| (corners[0].dot(&normal), corners))
-        .collect();
-    contours.sort_by(|a, b| a.0.total_cmp(&b.0));
+pub fn settle(structure: &mut Contoured, axes: &Matrix3<f64>, is_exclusive: bool) -> Overlaps {
+    let contours = std::mem::take(&mut structure.contours).into_iter();
+    let contours = contours.map(|corners| (height_m(&corners, axes), corners)).collect();
     let mut found = Overlaps::default();
-    for of_plane in contours.chunk_by(|a, b| b.0 - a.0 < SAME_PLANE_M) {
-        let corners = of_plane.iter().map(|(_, corners)| corners.clone());
-        match of_plane.len() {
-            1 => structure.contours.extend(corners),
-            2..=MOST => {
-                let mut plane = Plane::of(of_plane, &axes);
-                plane.settle(is_exclusive, &mut found);
-                structure.contours.extend(plane.contours.into_iter().map(|c| c.corners));
-            }
-            _ => {
-                found.unchecked_m.push(of_plane[0].0);
-                structure.contours.extend(corners);
-            }
+    for (height_m, of_plane) in by_height(contours, SAME_PLANE_M) {
+        if (2..=MOST).contains(&of_plane.len()) {
+            let mut plane = Plane::of(height_m, of_plane, axes);
+            plane.settle(is_exclusive, &mut found);
+            structure.contours.extend(plane.contours.into_iter().map(|c| c.corners));
+            continue;
         }
+        if of_plane.len() > MOST {
+            found.unchecked_m.push(height_m);
+        }
+        structure.contours.extend(of_plane);
     }
     found
 }
@@ -70,11 +61,7 @@ pub fn settle(structure: &mut Contoured, normal: Vector3<f64>, is_exclusive: boo
 impl Overlaps {
     /// Returns remarks; `usual_m` is the distance between planes.
     pub fn notes(&self, name: &str, usual_m: f64) -> Vec<String> {
-        let planes = |at: &[At]| {
-            let mut heights: Vec<String> = at.iter().map(|(m, _)| format!("{:.1}", m * 1e3)).collect();
-            heights.dedup();
-            format!("planes at {} mm", first_of(&heights))
-        };
+        let planes = |at: &[At]| format!("planes at {} mm", in_mm(at.iter().map(|(m, _)| *m)));
         let cc = |at: &[At]| at.iter().map(|(_, m2)| m2 * usual_m * 1e6).sum::<f64>();
         let mut notes = Vec::new();
         if !self.united.is_empty() {
@@ -99,10 +86,9 @@ impl Overlaps {
             ));
         }
         if !self.unchecked_m.is_empty() {
-            let heights: Vec<String> = self.unchecked_m.iter().map(|m| format!("{:.1}", m * 1e3)).collect();
             notes.push(format!(
                 "{name}: planes at {} mm have more than {MOST} contours, whose overlaps are holes",
-                first_of(&heights)
+                in_mm(self.unchecked_m.iter().copied())
             ));
         }
         notes
@@ -135,15 +121,15 @@ enum Pair {
 }
 
 impl<'a> Plane<'a> {
-    fn of(contours: &[(f64, Vec<Vector3<f64>>)], axes: &'a Matrix3<f64>) -> Self {
-        let flat = |(_, corners): &(f64, Vec<Vector3<f64>>)| {
+    fn of(height_m: f64, contours: Vec<Vec<Vector3<f64>>>, axes: &'a Matrix3<f64>) -> Self {
+        let flat = |corners: Vec<Vector3<f64>>| {
             let in_plane = corners.iter().map(|p| axes.tr_mul(p));
-            Flat::of(in_plane.map(|p| [p.x, p.y]).collect(), corners.clone())
+            Flat::of(in_plane.map(|p| [p.x, p.y]).collect(), corners)
         };
         Self {
-            height_m: contours[0].0,
+            height_m,
             axes,
-            contours: contours.iter().map(flat).collect(),
+            contours: contours.into_iter().map(flat).collect(),
         }
     }
 
@@ -263,17 +249,9 @@ impl Flat {
 /// Returns the area of a combination of two polygons.
 fn area_m2(one: &Polygon, other: &Polygon, rule: OverlayRule) -> f64 {
     let shapes = one.overlay(other, rule, FillRule::EvenOdd);
-    let signed = |polygon: &[[f64; 2]]| {
-        let next = polygon.iter().cycle().skip(1);
-        let origin = polygon.first().copied().unwrap_or_default();
-        let part = |(a, b): (&[f64; 2], &[f64; 2])| {
-            (a[0] - origin[0]) * (b[1] - origin[1]) - (b[0] - origin[0]) * (a[1] - origin[1])
-        };
-        polygon.iter().zip(next).map(part).sum::<f64>() / 2.0
-    };
     // The first contour of a shape is its outline; the others are holes.
     let of_shape = |shape: &Vec<Polygon>| {
-        let areas: Vec<f64> = shape.iter().map(|polygon| signed(polygon).abs()).collect();
+        let areas: Vec<f64> = shape.iter().map(|polygon| area(polygon)).collect();
         areas
             .first()
             .map_or(0.0, |first| 2.0 * first - areas.iter().sum::<f64>())

@@ -1,21 +1,21 @@
-//! Duplicate contours count once, and missing planes are reported with the volume at stake.
+//! Contours plane by plane. Duplicates count once, and missing planes are reported with the volume at stake.
 
 use super::super::super::element::short;
 use super::solid::encloses;
-use super::{Contoured, SAME_PLANE_M, area_vector, overlaps};
+use super::{Contoured, SAME_PLANE_M, overlaps};
 use nalgebra::{Matrix3, Vector3};
-use std::collections::{BTreeSet, HashSet};
 
 /// Distance, in usual distances, beyond which planes between two contours are missing.
 const WIDE: f64 = 1.5;
 /// Largest gap, in usual distances, that missing planes explain; beyond it there are two bodies.
 pub const WIDEST: f64 = 3.5;
-/// Distance below which two corners are the same.
-const SAME_CORNER_M: f64 = 1e-6;
 /// Most contours of one plane whose nesting is checked.
 pub const MOST_NESTED: usize = 32;
 /// Most gaps that a note lists.
 const LISTED: usize = 4;
+
+/// Polygon in its plane.
+pub type Polygon = Vec<[f64; 2]>;
 
 /// Plane of a structure: its height along the normal (m), and the area that its contours enclose
 /// (m²).
@@ -27,57 +27,25 @@ struct Plane {
 /// Removes duplicate contours and unites those that overlap in part, unless the file says that
 /// overlaps are holes; returns irregularities in words.
 pub fn tidy(structure: &mut Contoured, is_exclusive: bool) -> Vec<String> {
-    let largest = structure.contours.iter().map(|c| area_vector(c));
-    let largest = largest.max_by(|a, b| a.norm().total_cmp(&b.norm()));
-    let Some(normal) = largest.and_then(|a| a.try_normalize(1e-12)) else {
+    let Ok(normal) = structure.normal() else {
         return Vec::new();
     };
     // Upwards, so that heights of axial planes are the patient's z.
-    let normal = if normal[normal.iamax()] < 0.0 { -normal } else { normal };
-    let mut twice_m = without_duplicates(structure, normal);
-    let overlaps = overlaps::settle(structure, normal, is_exclusive);
-    twice_m.extend(&overlaps.copies_m);
-    let planes = planes(structure, normal);
-    let mut notes = Vec::new();
+    let axes = axes_of(if normal[normal.iamax()] < 0.0 { -normal } else { normal });
+    let overlaps = overlaps::settle(structure, &axes, is_exclusive);
+    let plane = |(height_m, polygons): (f64, Vec<Polygon>)| Plane {
+        height_m,
+        area_m2: enclosed(&polygons),
+    };
+    let planes: Vec<Plane> = flat(&structure.contours, &axes).into_iter().map(plane).collect();
     let name = short(&structure.name);
-    if !twice_m.is_empty() {
-        notes.push(duplicates(&name, &twice_m, &planes));
+    let mut notes = Vec::new();
+    if !overlaps.copies_m.is_empty() {
+        notes.push(duplicates(&name, &overlaps.copies_m, &planes));
     }
     notes.extend(overlaps.notes(&name, usual_m(&planes).unwrap_or_default()));
     notes.extend(distances(&name, &planes));
     notes
-}
-
-/// Removes duplicates; returns the height of each removed contour.
-fn without_duplicates(structure: &mut Contoured, normal: Vector3<f64>) -> Vec<f64> {
-    let (mut seen, mut twice_m) = (HashSet::new(), Vec::new());
-    structure.contours.retain(|contour| {
-        let is_new = seen.insert(shape(contour));
-        if !is_new {
-            twice_m.push(contour[0].dot(&normal));
-        }
-        is_new
-    });
-    twice_m
-}
-
-/// Returns a normal form of a contour, independent of its start, its direction, and a repeated
-/// first corner.
-fn shape(contour: &[Vector3<f64>]) -> Vec<[i64; 3]> {
-    let corner = |p: &Vector3<f64>| [p.x, p.y, p.z].map(|v| (v / SAME_CORNER_M).round() as i64);
-    let mut corners: Vec<[i64; 3]> = contour.iter().map(corner).collect();
-    corners.dedup();
-    while corners.len() > 1 && corners.first() == corners.last() {
-        corners.pop();
-    }
-    let from_least = |corners: &mut Vec<[i64; 3]>| {
-        let least = (0..corners.len()).min_by_key(|&i| corners[i]).unwrap_or(0);
-        corners.rotate_left(least);
-    };
-    let mut reversed: Vec<[i64; 3]> = corners.iter().rev().copied().collect();
-    from_least(&mut corners);
-    from_least(&mut reversed);
-    corners.min(reversed)
 }
 
 /// Returns two axes within planes of this normal, and the normal.
@@ -91,60 +59,70 @@ pub fn axes_of(normal: Vector3<f64>) -> Matrix3<f64> {
     Matrix3::from_columns(&[across, normal.cross(&across), normal])
 }
 
-/// Returns the contours plane by plane, as polygons in their plane.
-pub fn flat(contours: &[Vec<Vector3<f64>>], normal: Vector3<f64>) -> Vec<Vec<Vec<[f64; 2]>>> {
-    let axes = axes_of(normal);
-    let mut by_height: Vec<&Vec<Vector3<f64>>> = contours.iter().filter(|c| !c.is_empty()).collect();
-    let height = |c: &Vec<Vector3<f64>>| c[0].dot(&normal);
-    by_height.sort_by(|a, b| height(a).total_cmp(&height(b)));
-    let polygon = |c: &&Vec<Vector3<f64>>| c.iter().map(|p| axes.tr_mul(p)).map(|p| [p.x, p.y]).collect();
-    by_height
-        .chunk_by(|a, b| height(b) - height(a) < SAME_PLANE_M)
-        .map(|of_plane| of_plane.iter().map(polygon).collect())
-        .collect()
+/// Returns the mean height of a contour along the third axis.
+pub fn height_m(contour: &[Vector3<f64>], axes: &Matrix3<f64>) -> f64 {
+    contour.iter().map(|p| axes.column(2).dot(p)).sum::<f64>() / contour.len() as f64
 }
 
-fn planes(structure: &Contoured, normal: Vector3<f64>) -> Vec<Plane> {
-    let mut contours: Vec<(f64, &Vec<Vector3<f64>>)> =
-        structure.contours.iter().map(|c| (c[0].dot(&normal), c)).collect();
-    contours.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let axes = axes_of(normal);
-    contours
-        .chunk_by(|a, b| b.0 - a.0 < SAME_PLANE_M)
-        .map(|of_plane| {
-            let flat = |c: &Vec<Vector3<f64>>| -> Vec<[f64; 2]> {
-                c.iter().map(|p| axes.tr_mul(p)).map(|p| [p.x, p.y]).collect()
-            };
-            let polygons: Vec<_> = of_plane.iter().take(MOST_NESTED).map(|(_, c)| flat(c)).collect();
-            let areas = of_plane.iter().enumerate().map(|(n, (_, contour))| {
-                let Some(corner) = polygons.get(n).map(|p| p[0]) else {
-                    return area_vector(contour).norm();
-                };
-                let others = polygons.iter().enumerate().filter(|(other, _)| *other != n);
-                let depth = others.filter(|(_, polygon)| encloses(polygon, corner)).count();
-                // A contour inside another one is a hole of it.
-                area_vector(contour).norm() * if depth % 2 == 0 { 1.0 } else { -1.0 }
-            });
-            Plane {
-                height_m: of_plane[0].0,
-                area_m2: areas.sum::<f64>().max(0.0),
-            }
-        })
-        .collect()
+/// Groups items by their heights, lowest first; `same` is the distance below which two are in one plane.
+pub fn by_height<T>(mut items: Vec<(f64, T)>, same: f64) -> Vec<(f64, Vec<T>)> {
+    items.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut planes: Vec<(f64, Vec<T>)> = Vec::new();
+    for (height, item) in items {
+        match planes.last_mut() {
+            Some((of_plane, items)) if height - *of_plane < same => items.push(item),
+            _ => planes.push((height, vec![item])),
+        }
+    }
+    planes
+}
+
+/// Returns the contours plane by plane, as polygons in their plane.
+pub fn flat(contours: &[Vec<Vector3<f64>>], axes: &Matrix3<f64>) -> Vec<(f64, Vec<Polygon>)> {
+    let polygon = |c: &Vec<Vector3<f64>>| c.iter().map(|p| axes.tr_mul(p)).map(|p| [p.x, p.y]).collect();
+    let drawn = contours.iter().filter(|c| !c.is_empty());
+    by_height(drawn.map(|c| (height_m(c, axes), polygon(c))).collect(), SAME_PLANE_M)
+}
+
+/// Returns in how many others of its plane each polygon lies. Loops along voxels may touch at corners, but never along
+/// an edge.
+pub fn depths(polygons: &[Polygon]) -> impl Iterator<Item = usize> {
+    polygons.iter().enumerate().map(|(n, p)| {
+        let middle = [0, 1].map(|a| (p[0][a] + p[1 % p.len()][a]) / 2.0);
+        let others = polygons.iter().enumerate().filter(|(other, _)| *other != n);
+        others.filter(|(_, polygon)| encloses(polygon, middle)).count()
+    })
+}
+
+/// Returns the area of a polygon.
+pub fn area(polygon: &[[f64; 2]]) -> f64 {
+    let next = polygon.iter().cycle().skip(1);
+    let origin = polygon.first().copied().unwrap_or_default();
+    let part = |(a, b): (&[f64; 2], &[f64; 2])| {
+        (a[0] - origin[0]) * (b[1] - origin[1]) - (b[0] - origin[0]) * (a[1] - origin[1])
+    };
+    polygon.iter().zip(next).map(part).sum::<f64>().abs() / 2.0
+}
+
+/// Returns the area that the polygons of a plane enclose; one inside another one is a hole of it.
+fn enclosed(polygons: &[Polygon]) -> f64 {
+    if polygons.len() > MOST_NESTED {
+        return polygons.iter().map(|polygon| area(polygon)).sum();
+    }
+    let signed = |(polygon, depth): (&Polygon, usize)| area(polygon) * if depth % 2 == 0 { 1.0 } else { -1.0 };
+    polygons.iter().zip(depths(polygons)).map(signed).sum::<f64>().max(0.0)
 }
 
 fn duplicates(name: &str, twice_m: &[f64], planes: &[Plane]) -> String {
-    let in_um: BTreeSet<i64> = twice_m.iter().map(|m| (m * 1e6).round() as i64).collect();
     let usual_m = usual_m(planes).unwrap_or_default();
     let touched = planes
         .iter()
         .filter(|p| twice_m.iter().any(|m| (m - p.height_m).abs() < SAME_PLANE_M));
     let cc: f64 = touched.map(|p| p.area_m2 * usual_m * 1e6).sum();
-    let heights: Vec<String> = in_um.iter().map(|um| format!("{:.1}", *um as f64 * 1e-3)).collect();
     format!(
         "{name}: {} of its contours are there twice and are counted once (planes at {} mm, {cc:.1} cc)",
         twice_m.len(),
-        first_of(&heights)
+        in_mm(twice_m.iter().copied())
     )
 }
 
@@ -198,8 +176,15 @@ fn distances(name: &str, planes: &[Plane]) -> Vec<String> {
     vec![text]
 }
 
+/// Returns heights of planes, rising, each once.
+pub fn in_mm(heights_m: impl Iterator<Item = f64>) -> String {
+    let mut heights: Vec<String> = heights_m.map(|m| format!("{:.1}", m * 1e3)).collect();
+    heights.dedup();
+    first_of(&heights)
+}
+
 /// Returns the first of several texts, and how many more there are.
-pub fn first_of(all: &[String]) -> String {
+fn first_of(all: &[String]) -> String {
     let mut text = all.iter().take(LISTED).cloned().collect::<Vec<_>>().join(", ");
     if all.len() > LISTED {
         text += &format!(" and {} more", all.len() - LISTED);

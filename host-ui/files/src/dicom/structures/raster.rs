@@ -2,13 +2,12 @@
 //! plane of the slice.
 
 use super::super::super::element::short;
-use super::super::super::overlap::in_cc;
+use super::super::super::overlap;
 use super::super::images::Grid;
-use super::planes::WIDEST;
+use super::planes::{Polygon, WIDEST, by_height};
 use super::solid::Solid;
 use super::{Contoured, SAME_PLANE_M};
 use crate::error::ContentError;
-use nalgebra::Vector3;
 use std::ops::Range;
 
 /// Number of lines across each row of voxels along which coverage is measured.
@@ -74,32 +73,17 @@ pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<Str
             }
         }
     }
-    let lost: Vec<String> = structures
-        .iter()
-        .enumerate()
-        .filter(|(s, _)| taken[s + 1] > 0)
-        .map(|(s, c)| {
-            let cc = in_cc(taken[s + 1] as f64 * grid.frame.spacing_m.iter().product::<f64>());
-            format!("{} ({} of {} voxels) {cc}", short(&c.name), taken[s + 1], sizes[s])
-        })
-        .collect();
     let mut notes: Vec<String> = structures
         .iter()
         .zip(&sizes)
         .filter(|(_, size)| **size == 0)
         .map(|(c, _)| format!("{} covers no voxel of the images", short(&c.name)))
         .collect();
-    if !lost.is_empty() {
-        notes.push(format!(
-            "structures overlap, and where they do the smaller one has the voxel; others have it taken from them: {}",
-            lost.join(", ")
-        ));
-    }
+    let lost = structures.iter().zip(&taken[1..]).zip(&sizes);
+    let lost = lost.map(|((structure, taken), size)| (short(&structure.name), *taken, *size));
+    notes.extend(overlap::lost(lost, grid.frame.spacing_m.iter().product()));
     Ok((labels, notes))
 }
-
-/// Corners of polygons in columns and rows.
-pub type Polygons = Vec<Vec<[f64; 2]>>;
 
 fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
     let Some(planes) = planes(structure, grid) else {
@@ -136,18 +120,7 @@ fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec
 /// points in it do.
 fn runs_of_solid(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
     let solid = Solid::across(structure, grid.frame.spacing_m[2])?;
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for corner in 0..8 {
-        let corner = Vector3::from([0, 1, 2].map(|a| match corner >> a & 1 {
-            0 => solid.lower_m[a],
-            _ => solid.upper_m[a],
-        }));
-        let at = grid.frame.index_of(corner);
-        (low, high) = (
-            [0, 1, 2].map(|a| low[a].min(at[a])),
-            [0, 1, 2].map(|a| high[a].max(at[a])),
-        );
-    }
+    let [low, high] = solid.extent(&grid.frame);
     let range = |a: usize| {
         let first = low[a].floor().clamp(0.0, grid.dims[a] as f64) as usize;
         first..(high[a].ceil() + 1.0).clamp(0.0, grid.dims[a] as f64) as usize
@@ -187,7 +160,7 @@ fn runs_of_solid(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> R
 
 /// Returns the contours by the height of their plane, in slices; `None` if they do not lie in the
 /// slices.
-pub fn planes(structure: &Contoured, grid: &Grid) -> Option<Vec<(f64, Polygons)>> {
+pub fn planes(structure: &Contoured, grid: &Grid) -> Option<Vec<(f64, Vec<Polygon>)>> {
     let step_m = grid.frame.spacing_m[2];
     let mut placed = Vec::new();
     for contour in &structure.contours {
@@ -197,17 +170,9 @@ pub fn planes(structure: &Contoured, grid: &Grid) -> Option<Vec<(f64, Polygons)>
         if off_m > 10.0 * SAME_PLANE_M {
             return None;
         }
-        placed.push((height, corners.into_iter().map(|[x, y, _]| [x, y]).collect::<Vec<_>>()));
+        placed.push((height, corners.into_iter().map(|[x, y, _]| [x, y]).collect()));
     }
-    placed.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut planes: Vec<(f64, Polygons)> = Vec::new();
-    for (height, polygon) in placed {
-        match planes.last_mut() {
-            Some((h, polygons)) if (height - *h) * step_m < SAME_PLANE_M => polygons.push(polygon),
-            _ => planes.push((height, vec![polygon])),
-        }
-    }
-    Some(planes)
+    Some(by_height(placed, SAME_PLANE_M / step_m))
 }
 
 /// Returns the slab of each plane: half-way to its neighbours, but no farther than half of the
@@ -232,7 +197,7 @@ pub fn slabs(heights: &[f64], single: f64) -> Vec<[f64; 2]> {
 
 /// Fills by the even-odd rule: the overlap of two contours of a plane is a hole, and so is the end
 /// of a keyhole.
-fn fill(polygons: &Polygons, [columns, rows]: [usize; 2], scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
+fn fill(polygons: &[Polygon], [columns, rows]: [usize; 2], scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
     let mut crossed: Vec<(u32, f64)> = Vec::new();
     for polygon in polygons {
         let next = polygon.iter().cycle().skip(1);

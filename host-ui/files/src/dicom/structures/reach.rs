@@ -8,7 +8,6 @@ use super::raster::{planes, slabs};
 use super::solid::Solid;
 use crate::element::voxel_count;
 use crate::error::ContentError;
-use nalgebra::Vector3;
 
 /// Share of a voxel by which a contour may reach beyond a centre; rounding is not more.
 const ROUNDED: f64 = 1e-6;
@@ -37,25 +36,14 @@ pub fn continued(grid: Grid, structures: &[Contoured]) -> Result<Grid, ContentEr
 
 /// Returns the lowest and the highest corner of a structure, in voxels.
 fn extent(structure: &Contoured, grid: &Grid) -> Result<[[f64; 3]; 2], ContentError> {
+    let Some(planes) = planes(structure, grid) else {
+        return Ok(Solid::across(structure, grid.frame.spacing_m[2])?.extent(&grid.frame));
+    };
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     let mut take = |at: [f64; 3], axes: std::ops::Range<usize>| {
         for a in axes {
             (low[a], high[a]) = (low[a].min(at[a]), high[a].max(at[a]));
         }
-    };
-    let Some(planes) = planes(structure, grid) else {
-        let solid = Solid::across(structure, grid.frame.spacing_m[2])?;
-        for n in 0..8 {
-            let corner = [0, 1, 2].map(|a| {
-                if n >> a & 1 == 0 {
-                    solid.lower_m[a]
-                } else {
-                    solid.upper_m[a]
-                }
-            });
-            take(grid.frame.index_of(Vector3::from(corner)), 0..3);
-        }
-        return Ok([low, high]);
     };
     let corners = structure.contours.iter().flatten();
     corners.for_each(|corner| take(grid.frame.index_of(*corner), 0..2));

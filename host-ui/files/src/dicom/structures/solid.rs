@@ -2,10 +2,11 @@
 //! drawn, independent of overlaps.
 
 use super::super::super::element::short;
-use super::planes::axes_of;
+use super::super::super::frame::VoxelFrame;
+use super::planes::{Polygon, axes_of, flat, height_m};
 use super::raster::slabs;
 use super::{Contoured, SAME_PLANE_M, StructureSet};
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use nalgebra::{Matrix3, Vector3};
 
 /// Body in RAS, m.
@@ -26,7 +27,7 @@ pub struct Solid {
 struct Plane {
     from_m: f64,
     to_m: f64,
-    polygons: Vec<Vec<[f64; 2]>>,
+    polygons: Vec<Polygon>,
 }
 
 impl StructureSet {
@@ -41,34 +42,20 @@ impl Solid {
     /// Creates the body of a structure, whose planes may lie in any direction; `usual_m` is the
     /// thickness of a single plane.
     pub fn of(structure: &Contoured, usual_m: f64) -> Result<Self, ContentError> {
-        let normal = structure.normal()?;
-        let axes = axes_of(normal);
-        let mut drawn: Vec<(f64, Vec<[f64; 2]>)> = Vec::new();
-        for contour in &structure.contours {
-            let corners: Vec<Vector3<f64>> = contour.iter().map(|p| axes.transpose() * p).collect();
-            let height = corners.iter().map(|c| c.z).sum::<f64>() / corners.len() as f64;
-            let off_m = corners.iter().map(|c| (c.z - height).abs()).fold(0.0, f64::max);
-            if off_m > 10.0 * SAME_PLANE_M {
-                return Err(ContentError::Invalid(format!(
-                    "{}: a contour is {:.2} mm off the planes of its others; draw all of a structure in one direction",
-                    short(&structure.name),
-                    off_m * 1e3
-                )));
-            }
-            drawn.push((height, corners.iter().map(|c| [c.x, c.y]).collect()));
+        let axes = axes_of(structure.normal()?);
+        let off_m = structure.contours.iter().flat_map(|contour| {
+            let height_m = height_m(contour, &axes);
+            contour.iter().map(move |p| (axes.column(2).dot(p) - height_m).abs())
+        });
+        let off_m = off_m.fold(0.0, f64::max);
+        if off_m > 10.0 * SAME_PLANE_M {
+            return Err(invalid!(
+                "{}: a contour is {:.2} mm off the planes of its others; draw all of a structure in one direction",
+                short(&structure.name),
+                off_m * 1e3
+            ));
         }
-        drawn.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut heights: Vec<f64> = Vec::new();
-        let mut polygons: Vec<Vec<Vec<[f64; 2]>>> = Vec::new();
-        for (height, polygon) in drawn {
-            match (heights.last(), polygons.last_mut()) {
-                (Some(last), Some(of_plane)) if height - last < SAME_PLANE_M => of_plane.push(polygon),
-                _ => {
-                    heights.push(height);
-                    polygons.push(vec![polygon]);
-                }
-            }
-        }
+        let (heights, polygons): (Vec<f64>, Vec<_>) = flat(&structure.contours, &axes).into_iter().unzip();
         let planes = slabs(&heights, usual_m).into_iter().zip(polygons);
         let planes: Vec<Plane> = planes
             .map(|([from_m, to_m], polygons)| Plane { from_m, to_m, polygons })
@@ -87,6 +74,18 @@ impl Solid {
     pub fn across(structure: &Contoured, single_m: f64) -> Result<Self, ContentError> {
         let own_m = structure.plane_distance_m()?;
         Self::of(structure, if own_m.is_finite() { own_m } else { single_m })
+    }
+
+    /// Returns the lowest and the highest indices of voxels that the box around it reaches.
+    pub fn extent(&self, frame: &VoxelFrame) -> [[f64; 3]; 2] {
+        let of_box = [self.lower_m, self.upper_m];
+        let corners = (0..8).map(|n| frame.index_of(Vector3::from([0, 1, 2].map(|a| of_box[n >> a & 1][a]))));
+        corners.fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], at| {
+            [
+                [0, 1, 2].map(|a| low[a].min(at[a])),
+                [0, 1, 2].map(|a| high[a].max(at[a])),
+            ]
+        })
     }
 
     /// Returns whether a place (RAS, m) lies inside.
