@@ -1,7 +1,7 @@
 //! The numbers in a volume's data, as labels or greys; memory grows only with the actual data.
 
 use super::progress::{Progress, Stage};
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use std::io::Read;
 
 /// Most voxels of a volume; a larger one is not a prostate.
@@ -88,17 +88,14 @@ impl Element {
 pub fn voxel_count(dims: &[u64]) -> Result<usize, ContentError> {
     let size = || dims.iter().map(u64::to_string).collect::<Vec<_>>().join(" x ");
     if dims.contains(&0) {
-        return Err(ContentError::Invalid(format!(
-            "its size is {} voxels; each side must be at least 1",
-            size()
-        )));
+        return Err(invalid!("its size is {} voxels; each side must be at least 1", size()));
     }
     match dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(d)) {
         Some(n) if n <= MAX_VOXELS => Ok(n as usize),
-        _ => Err(ContentError::Invalid(format!(
+        _ => Err(invalid!(
             "its header claims {} voxels, more than {MAX_VOXELS} in all; crop it to the gland",
             size()
-        ))),
+        )),
     }
 }
 
@@ -113,9 +110,9 @@ pub fn must_hold(needed: u64, have: u64, packed: bool) -> Result<(), ContentErro
     if needed <= most {
         return Ok(());
     }
-    Err(ContentError::Invalid(format!(
+    Err(invalid!(
         "it is truncated or its header is wrong: the header requires {needed} bytes and the {have} bytes present cannot hold them; copy or export it again"
-    )))
+    ))
 }
 
 /// Conversion of each number, and receiver of progress.
@@ -163,13 +160,85 @@ impl<V> Sink<'_, V> {
     /// Returns an empty list that grows with the actual data.
     fn values(&self, count: usize) -> Result<Vec<V>, ContentError> {
         if count > self.most {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "it has {count} voxels, more than {}; crop it to the gland",
                 self.most
-            )));
+            ));
         }
         Ok(Vec::with_capacity(count.min(CHUNK_BYTES)))
     }
+}
+
+/// Storage of the values of a volume.
+#[derive(Clone, Copy, Debug)]
+pub struct Stored {
+    /// Type of a value.
+    pub element: Element,
+    /// Order of its bytes.
+    pub endian: Endian,
+    /// Number of values.
+    pub count: usize,
+}
+
+impl Stored {
+    fn bytes(self) -> u64 {
+        (self.count * self.element.bytes()) as u64
+    }
+
+    /// Reads values behind `skip` bytes, or at the end of the data if `skip` is -1; nothing may follow them.
+    pub fn raw<V>(self, data: &[u8], skip: i64, sink: Sink<V>) -> Result<Vec<V>, ContentError> {
+        let needed = self.bytes();
+        let data = match skip {
+            -1 => &data[data.len().saturating_sub(needed as usize)..],
+            n => data.get(n as usize..).unwrap_or_default(),
+        };
+        let have = data.len() as u64;
+        must_hold(needed, have, false)?;
+        if have > needed {
+            return Err(invalid!(
+                "the header asks for {needed} bytes and {have} are there: header and data do not belong together; export it again"
+            ));
+        }
+        read_values(data, self.element, self.endian, self.count, [1.0, 0.0], sink)
+    }
+
+    /// Reads the values of a stream, behind `skip` bytes; `packed` bytes hold them, and nothing may follow them.
+    pub fn packed<V>(
+        self,
+        mut from: impl Read,
+        packed: usize,
+        skip: u64,
+        sink: Sink<V>,
+    ) -> Result<Vec<V>, ContentError> {
+        must_hold(self.bytes().saturating_add(skip), packed as u64, true)?;
+        skip_bytes(&mut from, skip)?;
+        let values = read_values(&mut from, self.element, self.endian, self.count, [1.0, 0.0], sink)?;
+        match from.read(&mut [0]) {
+            Ok(0) => Ok(values),
+            Ok(_) => {
+                Err("its data continue beyond the size in its header: header and data do not belong together".into())
+            }
+            Err(e) => Err(format!("it is damaged ({e}); copy or export it again").into()),
+        }
+    }
+
+    /// Reads values in text form.
+    pub fn text<V>(self, text: &[u8], sink: Sink<V>) -> Result<Vec<V>, ContentError> {
+        must_hold(self.count as u64, text.len() as u64, false)?;
+        values_from_text(text, self.count, sink)
+    }
+}
+
+/// Skips bytes of a stream.
+pub fn skip_bytes(from: &mut impl Read, count: u64) -> Result<(), ContentError> {
+    std::io::copy(&mut from.by_ref().take(count), &mut std::io::sink())
+        .map_err(|e| format!("it is truncated or damaged ({e}); copy or export it again"))?;
+    Ok(())
+}
+
+/// Reads numbers separated by spaces; `None` if one of the words is no number.
+pub fn parsed<T: std::str::FromStr>(text: &str) -> Option<Vec<T>> {
+    text.split_whitespace().map(|word| word.parse().ok()).collect()
 }
 
 /// Reads exactly `count` values, each the stored number times `slope` plus `intercept`.
@@ -196,8 +265,7 @@ pub fn read_values<V>(
     Ok(values)
 }
 
-/// Like [`read_values`], from numbers in text form.
-pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, ContentError> {
+fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, ContentError> {
     let text = std::str::from_utf8(text).map_err(|_| "its numbers are not text".to_owned())?;
     let words = text
         .split(|c: char| c.is_ascii_whitespace() || c == ',')
@@ -205,9 +273,9 @@ pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<V
     let mut values = sink.values(count)?;
     for word in words {
         if values.len() == count {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "it contains more than the {count} values of its size; export it again"
-            )));
+            ));
         }
         let value: f64 = word
             .parse()
@@ -220,10 +288,10 @@ pub fn values_from_text<V>(text: &[u8], count: usize, sink: Sink<V>) -> Result<V
     if values.len() == count {
         return Ok(values);
     }
-    Err(ContentError::Invalid(format!(
+    Err(invalid!(
         "it is truncated: {} of {count} values are there; copy or export it again",
         values.len()
-    )))
+    ))
 }
 
 /// Converts a number to a label; returns an error unless it is a whole number from 0 to 255.
@@ -232,9 +300,9 @@ pub fn label_of(value: f64) -> Result<u8, ContentError> {
     if (value - whole).abs() < 1e-3 && (0.0..=255.0).contains(&whole) {
         return Ok(whole as u8);
     }
-    Err(ContentError::Invalid(format!(
+    Err(invalid!(
         "it contains the value {value}; a segmentation has whole numbers 0 to 255. Is this the image instead of its labels?"
-    )))
+    ))
 }
 
 /// Shortens a foreign text, keeping enough to recognise it.

@@ -4,11 +4,10 @@ mod header;
 pub mod write;
 
 use super::DataReader;
-use super::element::{Sink, must_hold, read_values, values_from_text, voxel_count};
+use super::element::{Sink, Stored, short, voxel_count};
 use super::frame::VoxelFrame;
-use super::nrrd::nothing_left;
 use super::volume::VoxelValues;
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use flate2::read::ZlibDecoder;
 use header::Header;
 use nalgebra::{Matrix3, Vector3};
@@ -55,53 +54,32 @@ pub fn read<V>(bytes: &[u8], data_file: DataReader, sink: Sink<V>) -> Result<Vox
 }
 
 fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, ContentError> {
-    let size = (count * h.element.bytes()) as u64;
-    if !h.binary {
-        must_hold(count as u64, data.len() as u64, false)?;
-        return values_from_text(data, count, sink);
-    }
-    if h.compressed {
-        if h.header_bytes != 0 {
-            return Err(ContentError::Invalid(
-                "its data are packed and yet have a HeaderSize; write it again".to_owned(),
-            ));
-        }
-        must_hold(size, data.len() as u64, true)?;
-        let mut from = ZlibDecoder::new(data);
-        let values = read_values(&mut from, h.element, h.endian, count, [1.0, 0.0], sink)?;
-        nothing_left(from)?;
-        return Ok(values);
-    }
-    let data = match h.header_bytes {
-        // The data are the end of the file, after any header.
-        -1 => &data[data.len().saturating_sub(size as usize)..],
-        n => data.get(n as usize..).unwrap_or_default(),
+    let stored = Stored {
+        element: h.element,
+        endian: h.endian,
+        count,
     };
-    must_hold(size, data.len() as u64, false)?;
-    if data.len() as u64 > size {
-        return Err(ContentError::Invalid(format!(
-            "the header asks for {size} bytes and {} are there: header and data do not belong together; write it again",
-            data.len()
-        )));
+    match (h.binary, h.compressed) {
+        (false, _) => stored.text(data, sink),
+        (true, false) => stored.raw(data, h.header_bytes, sink),
+        (true, true) if h.header_bytes == 0 => stored.packed(ZlibDecoder::new(data), data.len(), 0, sink),
+        (true, true) => Err("its data are packed and yet have a HeaderSize; write it again".into()),
     }
-    read_values(data, h.element, h.endian, count, [1.0, 0.0], sink)
 }
 
 /// Returns the frame in RAS, m; the file is in LPS, mm.
 fn frame(h: &Header) -> Result<VoxelFrame, ContentError> {
-    let lettered = h.letters.as_deref().and_then(axes_of_letters);
     let mut warning = None;
-    let directions = match (h.directions, lettered) {
-        (Some(directions), lettered) => {
-            if lettered.is_some_and(|l| !same_octants(&l, &directions)) {
-                warning = Some(format!(
-                    "AnatomicalOrientation = {} contradicts TransformMatrix, which is used",
-                    h.letters.as_deref().unwrap_or_default()
-                ));
-            }
-            directions
+    let directions = match (h.directions, h.letters.as_deref()) {
+        (Some(directions), _) => directions,
+        // The origins of the axes: left, posterior and superior are positive.
+        (None, Some("RAI")) => Matrix3::identity(),
+        (None, Some(letters)) => {
+            return Err(invalid!(
+                "its AnatomicalOrientation {} stands without a TransformMatrix; write it with one",
+                short(letters)
+            ));
         }
-        (None, Some(lettered)) => lettered,
         (None, None) => {
             warning = Some(
                 "the file does not give the patient's orientation; its axes are taken as left, posterior, superior"
@@ -114,46 +92,12 @@ fn frame(h: &Header) -> Result<VoxelFrame, ContentError> {
     let turned = Matrix3::from_columns(&[0, 1, 2].map(|a| ras_from_lps(columns.column(a).into())));
     let origin = ras_from_lps(Vector3::from(h.origin_mm) * 1e-3);
     let mut frame = VoxelFrame::new(turned, origin, "TransformMatrix and ElementSpacing")?;
-    if h.directions.is_some() {
-        let off = h.directions.map_or(0.0, |d| {
-            (0..3).map(|a| (d.column(a).norm() - 1.0).abs()).fold(0.0, f64::max)
-        });
-        if off > 1e-3 {
-            return Err(ContentError::Invalid(
-                "its TransformMatrix scales as well as it turns; write it with unit vectors".to_owned(),
-            ));
-        }
+    let scales = |axis: usize| h.directions.is_some_and(|d| (d.column(axis).norm() - 1.0).abs() > 1e-3);
+    if (0..3).any(scales) {
+        return Err("its TransformMatrix scales as well as it turns; write it with unit vectors".into());
     }
     frame.warning = warning;
     Ok(frame)
-}
-
-/// Returns the axes by letters, which name the origin of each: RAI points left, posterior,
-/// superior.
-fn axes_of_letters(letters: &str) -> Option<Matrix3<f64>> {
-    let mut axes = Matrix3::zeros();
-    let mut seen = [false; 3];
-    for (column, letter) in letters.chars().enumerate() {
-        let (row, sign) = match letter {
-            'R' => (0, 1.0),
-            'L' => (0, -1.0),
-            'A' => (1, 1.0),
-            'P' => (1, -1.0),
-            'I' => (2, 1.0),
-            'S' => (2, -1.0),
-            _ => return None,
-        };
-        if column > 2 || std::mem::replace(&mut seen[row], true) {
-            return None;
-        }
-        axes[(row, column)] = sign;
-    }
-    (seen == [true; 3]).then_some(axes)
-}
-
-/// Returns whether the main direction of each axis agrees with the letters.
-fn same_octants(lettered: &Matrix3<f64>, directions: &Matrix3<f64>) -> bool {
-    (0..3).all(|a| lettered.column(a).dot(&directions.column(a)) > 0.5)
 }
 
 #[cfg(test)]

@@ -3,9 +3,9 @@
 pub mod write;
 
 use super::affine::voxel_frame;
-use super::element::{Element, Endian, Sink, must_hold, read_values, voxel_count};
+use super::element::{Element, Endian, Sink, must_hold, read_values, skip_bytes, voxel_count};
 use super::volume::VoxelValues;
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use flate2::read::MultiGzDecoder;
 use nifti::{Endianness, NiftiHeader, NiftiType};
 use std::io::Read;
@@ -40,9 +40,7 @@ pub fn read<V>(bytes: &[u8], sink: Sink<V>) -> Result<VoxelValues<V>, ContentErr
     let count = voxel_count(&dims.map(|d| d as u64))?;
     must_hold((data_at + count * element.bytes()) as u64, bytes.len() as u64, packed)?;
     let frame = voxel_frame(&header)?;
-    let skipped = (data_at - HEADER_BYTES) as u64;
-    std::io::copy(&mut from.by_ref().take(skipped), &mut std::io::sink())
-        .map_err(|e| format!("it is truncated or damaged ({e}); copy or export it again"))?;
+    skip_bytes(&mut from, (data_at - HEADER_BYTES) as u64)?;
     let endian = if header.endianness == Endianness::Big {
         Endian::Big
     } else {
@@ -58,17 +56,15 @@ fn read_header(from: &mut dyn Read, file_bytes: usize) -> Result<NiftiHeader, Co
         .read_to_end(&mut start)
         .map_err(|e| format!("it is gzip data that cannot be unpacked ({e}); copy or export it again"))?;
     if declared_size(&start) == Some(540) {
-        return Err(ContentError::Invalid("it is NIfTI-2; convert it to NIfTI-1".to_owned()));
+        return Err("it is NIfTI-2; convert it to NIfTI-1".into());
     }
     if start.len() < HEADER_BYTES {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "it is truncated: {file_bytes} bytes, and the header alone needs {HEADER_BYTES}; copy or export it again"
-        )));
+        ));
     }
     if start.ends_with(b"ni1\0") {
-        return Err(ContentError::Invalid(
-            "it is the header of a .hdr/.img pair; convert it to one .nii file".to_owned(),
-        ));
+        return Err("it is the header of a .hdr/.img pair; convert it to one .nii file".into());
     }
     if !start.ends_with(b"n+1\0") {
         return Err(
@@ -83,22 +79,22 @@ fn read_header(from: &mut dyn Read, file_bytes: usize) -> Result<NiftiHeader, Co
 fn checked_dims(h: &NiftiHeader) -> Result<[usize; 3], ContentError> {
     let rank = usize::from(h.dim[0]);
     if !(3..=7).contains(&rank) {
-        return Err(ContentError::Invalid(format!(
-            "it has {rank} dimensions; a segmentation has 3"
-        )));
+        return Err(invalid!("it has {rank} dimensions; a segmentation has 3"));
     }
     let dims = [1, 2, 3].map(|a| usize::from(h.dim[a]));
     if dims.contains(&0) || dims.iter().any(|&d| d > 32767) {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "its size is {} x {} x {} voxels; each must be 1 to 32767",
-            dims[0], dims[1], dims[2]
-        )));
+            dims[0],
+            dims[1],
+            dims[2]
+        ));
     }
     if h.dim[4..=rank].iter().any(|&d| d != 1) {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "it contains a series of volumes ({:?}); take one volume out of it",
             &h.dim[1..=rank]
-        )));
+        ));
     }
     Ok(dims)
 }
@@ -116,10 +112,10 @@ fn element(h: &NiftiHeader) -> Result<Element, ContentError> {
         Ok(NiftiType::Float32) => Element::F32,
         Ok(NiftiType::Float64) => Element::F64,
         _ => {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "its data type is number {}; labels must be whole numbers (uint8 is best)",
                 h.datatype
-            )));
+            ));
         }
     })
 }
@@ -128,10 +124,10 @@ fn data_at(h: &NiftiHeader) -> Result<usize, ContentError> {
     if (352.0..=MAX_VOX_OFFSET).contains(&h.vox_offset) {
         return Ok(h.vox_offset as usize);
     }
-    Err(ContentError::Invalid(format!(
+    Err(invalid!(
         "its voxels begin at byte {}; expected 352 or a little more",
         h.vox_offset
-    )))
+    ))
 }
 
 /// Returns the scaling; in the standard, a slope of 0 means none.

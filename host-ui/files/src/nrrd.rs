@@ -5,18 +5,14 @@ pub mod segments;
 pub mod write;
 
 use super::DataReader;
-use super::element::{Element, Endian, Sink, must_hold, read_values, values_from_text, voxel_count};
+use super::element::{Element, Endian, Sink, Stored, voxel_count};
 use super::frame::VoxelFrame;
 use super::volume::{VoxelValues, Voxels};
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use flate2::read::MultiGzDecoder;
 use header::{Axis, Header};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
-use std::io::Read;
-
-/// Most bytes that a "byte skip" of -1 skips.
-const MAX_BEFORE_END: u64 = 1 << 20;
 
 /// Returns whether the bytes begin like an NRRD file.
 pub fn is_nrrd(bytes: &[u8]) -> bool {
@@ -37,10 +33,10 @@ pub fn read_image<V>(bytes: &[u8], data_file: DataReader, sink: Sink<V>) -> Resu
     let (header, voxels) = open(bytes, data_file, sink)?;
     match list_axis(&header)? {
         None => Ok(voxels),
-        Some(list) => Err(ContentError::Invalid(format!(
+        Some(list) => Err(invalid!(
             "it has {} values for each voxel; save one of them as a volume",
             header.sizes[list]
-        ))),
+        )),
     }
 }
 
@@ -72,96 +68,28 @@ fn open<V>(bytes: &[u8], data_file: DataReader, sink: Sink<V>) -> Result<(Header
 
 fn read_data<V>(h: &Header, data: &[u8], count: usize, sink: Sink<V>) -> Result<Vec<V>, ContentError> {
     let encoding = h.encoding.as_str();
-    let endian = h.endian.unwrap_or(Endian::Little);
-    if h.element.bytes() > 1 && h.endian.is_none() && ["raw", "gzip", "gz", "hex"].contains(&encoding) {
+    let is_text = ["ascii", "text", "txt"].contains(&encoding);
+    if h.element.bytes() > 1 && h.endian.is_none() && !is_text {
         return Err("it does not say in which order the bytes of a number are: the field \"endian\" is missing".into());
     }
-    let skipped = skip_lines(data, h.line_skip)?;
-    let size = (count * h.element.bytes()) as u64;
-    let identity = [1.0, 0.0];
+    let data = skip_lines(data, h.line_skip)?;
+    let stored = Stored {
+        element: h.element,
+        endian: h.endian.unwrap_or(Endian::Little),
+        count,
+    };
     match encoding {
-        "raw" => {
-            let data = match h.byte_skip {
-                // The data are the end of the file, after any header.
-                -1 => &skipped[skipped.len().saturating_sub(size as usize)..],
-                n => skipped.get(n as usize..).unwrap_or_default(),
-            };
-            exactly(size, data.len() as u64)?;
-            read_values(data, h.element, endian, count, identity, sink)
-        }
+        _ if is_text => stored.text(data, sink),
+        "raw" => stored.raw(data, h.byte_skip, sink),
         "gzip" | "gz" => {
-            if h.byte_skip == -1 {
-                let end = unpacked_end(skipped, size)?;
-                return read_values(end.as_slice(), h.element, endian, count, identity, sink);
-            }
-            must_hold(size.saturating_add(h.byte_skip as u64), skipped.len() as u64, true)?;
-            let mut from = MultiGzDecoder::new(skipped);
-            std::io::copy(&mut from.by_ref().take(h.byte_skip as u64), &mut std::io::sink())
-                .map_err(|e| format!("it is truncated or damaged ({e}); copy or export it again"))?;
-            let values = read_values(&mut from, h.element, endian, count, identity, sink)?;
-            nothing_left(from)?;
-            Ok(values)
+            let skip =
+                u64::try_from(h.byte_skip).map_err(|_| "its data are packed, and its byte skip is -1; unpack them")?;
+            stored.packed(MultiGzDecoder::new(data), data.len(), skip, sink)
         }
-        "ascii" | "text" | "txt" => {
-            must_hold(count as u64, skipped.len() as u64, false)?;
-            values_from_text(skipped, count, sink)
-        }
-        "hex" => {
-            let bytes = unhex(skipped)?;
-            exactly(size, bytes.len() as u64)?;
-            read_values(bytes.as_slice(), h.element, endian, count, identity, sink)
-        }
-        "bzip2" | "bz2" => Err(ContentError::Invalid(
-            "its data are packed with bzip2; save it with gzip or raw encoding".to_owned(),
-        )),
-        other => Err(ContentError::Invalid(format!(
-            "its encoding \"{}\" is not known; save it with gzip, raw, text or hex encoding",
+        other => Err(invalid!(
+            "its encoding \"{}\" is not read; save it with gzip, raw or text encoding",
             super::element::short(other)
-        ))),
-    }
-}
-
-/// Returns the last bytes of packed data; a header of another format may precede them.
-fn unpacked_end(packed: &[u8], size: u64) -> Result<Vec<u8>, ContentError> {
-    must_hold(size, packed.len() as u64, true)?;
-    let mut all = Vec::new();
-    MultiGzDecoder::new(packed)
-        .take(size + MAX_BEFORE_END + 1)
-        .read_to_end(&mut all)
-        .map_err(|e| format!("it is truncated or damaged ({e}); copy or export it again"))?;
-    let before = (all.len() as u64).checked_sub(size);
-    match before {
-        Some(before) if before <= MAX_BEFORE_END => Ok(all.split_off(before as usize)),
-        Some(_) => Err(ContentError::Invalid(format!(
-            "its data have more than {MAX_BEFORE_END} bytes before those that its size requires"
-        ))),
-        None => Err(ContentError::Invalid(format!(
-            "it is truncated: {} of {size} bytes are there; copy or export it again",
-            all.len()
-        ))),
-    }
-}
-
-fn exactly(needed: u64, have: u64) -> Result<(), ContentError> {
-    must_hold(needed, have, false)?;
-    if have > needed {
-        return Err(ContentError::Invalid(format!(
-            "the header asks for {needed} bytes and {have} are there: header and data do not belong together; export it again"
-        )));
-    }
-    Ok(())
-}
-
-/// Refuses a stream that is longer than the header says: it belongs to another volume.
-pub(super) fn nothing_left(mut from: impl Read) -> Result<(), ContentError> {
-    match from.read(&mut [0]) {
-        Ok(0) => Ok(()),
-        Ok(_) => Err(ContentError::Invalid(
-            "its data continue beyond the size in its header: header and data do not belong together".to_owned(),
         )),
-        Err(e) => Err(ContentError::Invalid(format!(
-            "it is damaged ({e}); copy or export it again"
-        ))),
     }
 }
 
@@ -176,20 +104,6 @@ fn skip_lines(mut data: &[u8], lines: usize) -> Result<&[u8], ContentError> {
     Ok(data)
 }
 
-fn unhex(text: &[u8]) -> Result<Vec<u8>, ContentError> {
-    let digit = |b: u8| (b as char).to_digit(16).map(|d| d as u8);
-    let digits: Option<Vec<u8>> = text
-        .iter()
-        .filter(|b| !b.is_ascii_whitespace())
-        .map(|&b| digit(b))
-        .collect();
-    let digits = digits.ok_or("its data contain a character that is not a hexadecimal digit")?;
-    if digits.len() % 2 == 1 {
-        return Err(ContentError::Invalid("its data have half a byte too many".to_owned()));
-    }
-    Ok(digits.chunks_exact(2).map(|d| d[0] << 4 | d[1]).collect())
-}
-
 const NO_SPACE: &str = "the file names no anatomical space; its axes are taken as right, anterior, superior";
 
 /// Returns the frame in RAS, m.
@@ -200,10 +114,10 @@ fn frame(h: &Header, space: [usize; 3]) -> Result<VoxelFrame, ContentError> {
         Some("left-posterior-superior" | "lps") => ([-1.0, -1.0, 1.0], true),
         Some("scanner-xyz" | "3d-right-handed" | "3d-left-handed") | None => ([1.0, 1.0, 1.0], false),
         Some(other) => {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "its space \"{}\" is not an anatomical space; save it as left-posterior-superior or right-anterior-superior",
                 super::element::short(other)
-            )));
+            ));
         }
     };
     let flip = Matrix3::from_diagonal(&Vector3::from(flip));

@@ -1,9 +1,10 @@
 //! The lines before the data of a MetaImage file, checked; every problem is reported.
 
-use super::super::element::{Element, Endian, short};
+use super::super::element::{Element, Endian, parsed, short};
 use crate::error::ContentError;
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
+use std::str::FromStr;
 
 const MAX_HEADER_BYTES: usize = 1 << 20;
 
@@ -51,9 +52,7 @@ impl Header {
                 problems.push(format!("{} is there twice", short(key.trim())));
             }
             if bytes.len() - after.len() > MAX_HEADER_BYTES {
-                return Err(ContentError::Invalid(
-                    "its header has no end; copy or export it again".to_owned(),
-                ));
+                return Err("its header has no end; copy or export it again".into());
             }
             rest = after;
         }
@@ -76,80 +75,57 @@ impl<'a> Fields<'a> {
         names.iter().find_map(|n| self.fields.get(n)).copied()
     }
 
-    fn wrong(&mut self, names: &[&str], expected: &str) {
-        let value = self
-            .get(names)
-            .map_or("missing".to_owned(), |v| format!("\"{}\"", short(v)));
-        self.problems
-            .push(format!("{} is {value}; it must be {expected}", names[0]));
-    }
-
-    fn yes(&mut self, names: &[&str], otherwise: bool) -> bool {
-        match self.get(names).map(str::to_ascii_lowercase).as_deref() {
-            None => otherwise,
-            Some("true" | "t" | "1") => true,
-            Some("false" | "f" | "0") => false,
-            Some(_) => {
-                self.wrong(names, "True or False");
-                otherwise
-            }
-        }
-    }
-
-    fn numbers<const N: usize>(&mut self, names: &[&str]) -> Option<[f64; N]> {
+    /// Reads a field; reports one that is not as expected.
+    fn read<T>(&mut self, names: &[&str], expected: &str, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
         let text = self.get(names)?;
-        let numbers: Option<Vec<f64>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
-        let numbers = numbers.and_then(|n| <[f64; N]>::try_from(n).ok());
-        if numbers.is_none() {
-            self.wrong(names, &format!("{N} numbers"));
+        let value = parse(text);
+        if value.is_none() {
+            let why = format!("{} is \"{}\"; it must be {expected}", names[0], short(text));
+            self.problems.push(why);
         }
-        numbers
+        value
+    }
+
+    /// Like [`Fields::read`]; reports a missing field, too.
+    fn needed<T>(&mut self, names: &[&str], expected: &str, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
+        if self.get(names).is_none() {
+            let why = format!("{} is missing; it must be {expected}", names[0]);
+            self.problems.push(why);
+        }
+        self.read(names, expected, parse)
+    }
+
+    fn yes(&mut self, names: &[&str]) -> Option<bool> {
+        self.read(names, "True or False", |text| {
+            match text.to_ascii_lowercase().as_str() {
+                "true" | "t" | "1" => Some(true),
+                "false" | "f" | "0" => Some(false),
+                _ => None,
+            }
+        })
     }
 }
 
+fn exactly<T: FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
+    parsed(text)?.try_into().ok()
+}
+
 fn build(r: &mut Fields) -> Option<Header> {
-    if r.get(&["ObjectType"]).is_some_and(|t| !t.eq_ignore_ascii_case("Image")) {
-        r.wrong(&["ObjectType"], "Image");
-    }
-    if r.get(&["NDims"]) != Some("3") {
-        r.wrong(&["NDims"], "3");
-    }
-    let text = r.get(&["DimSize"]).unwrap_or_default();
-    let sizes: Option<Vec<u64>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
-    let sizes = sizes.and_then(|s| <[u64; 3]>::try_from(s).ok());
-    if sizes.is_none() {
-        r.wrong(&["DimSize"], "3 whole numbers");
-    }
-    let element = r.get(&["ElementType"]).and_then(element);
-    if element.is_none() {
-        r.wrong(&["ElementType"], "a type of whole numbers such as MET_UCHAR");
-    }
-    if r.get(&["ElementNumberOfChannels"]).is_some_and(|n| n != "1") {
-        r.wrong(&["ElementNumberOfChannels"], "1: labels are single numbers");
-    }
-    let order = ["ElementByteOrderMSB", "BinaryDataByteOrderMSB"];
-    let endian = if r.yes(&order, false) {
-        Endian::Big
-    } else {
-        Endian::Little
-    };
-    let matrix = r.numbers::<9>(&["TransformMatrix", "Orientation", "Rotation"]);
-    let origin_mm = r.numbers(&["Offset", "Position", "Origin"]).unwrap_or_default();
-    let sides = ["ElementSpacing", "ElementSize"];
-    let spacing_mm = r.numbers(&sides);
-    if r.get(&sides).is_none() {
-        r.wrong(&sides, "3 numbers");
-    }
-    let header_bytes = match r.get(&["HeaderSize"]).map(str::parse::<i64>) {
-        None => 0,
-        Some(Ok(n)) if (-1..=1 << 40).contains(&n) => n,
-        Some(_) => {
-            r.wrong(&["HeaderSize"], "a whole number from -1");
-            0
-        }
-    };
-    let binary = r.yes(&["BinaryData"], true);
-    let compressed = r.yes(&["CompressedData"], false);
+    let is = |expected: &'static str| move |text: &str| text.eq_ignore_ascii_case(expected).then_some(());
+    r.read(&["ObjectType"], "Image", is("Image"));
+    r.needed(&["NDims"], "3", is("3"));
+    let sizes = r.needed(&["DimSize"], "3 whole numbers", exactly);
+    let element = r.needed(&["ElementType"], "a type of whole numbers such as MET_UCHAR", element);
+    r.read(&["ElementNumberOfChannels"], "1: labels are single numbers", is("1"));
+    let is_big = r.yes(&["ElementByteOrderMSB", "BinaryDataByteOrderMSB"]);
+    let matrix = r.read(&["TransformMatrix", "Orientation", "Rotation"], "9 numbers", exactly);
+    let origin_mm = r.read(&["Offset", "Position", "Origin"], "3 numbers", exactly);
+    let spacing_mm = r.needed(&["ElementSpacing", "ElementSize"], "3 numbers", exactly);
+    let header_bytes = r.read(&["HeaderSize"], "a whole number from -1", |text| {
+        text.parse().ok().filter(|n| (-1..=1 << 40).contains(n))
+    });
+    let binary = r.yes(&["BinaryData"]).unwrap_or(true);
+    let compressed = r.yes(&["CompressedData"]).unwrap_or(false);
     let data_file = r.get(&["ElementDataFile"]).unwrap_or_default().to_owned();
     if data_file.starts_with("LIST") || data_file.contains(['%', '*']) {
         r.problems
@@ -162,15 +138,18 @@ fn build(r: &mut Fields) -> Option<Header> {
     Some(Header {
         sizes: sizes?,
         element: element?,
-        endian,
+        endian: match is_big {
+            Some(true) => Endian::Big,
+            _ => Endian::Little,
+        },
         binary,
         compressed,
         // Each three of them are an axis.
-        directions: matrix.map(|m| Matrix3::from_column_slice(&m)),
+        directions: matrix.map(|m: [f64; 9]| Matrix3::from_column_slice(&m)),
         letters,
-        origin_mm,
+        origin_mm: origin_mm.unwrap_or_default(),
         spacing_mm: spacing_mm?,
-        header_bytes,
+        header_bytes: header_bytes.unwrap_or_default(),
         data_file,
     })
 }

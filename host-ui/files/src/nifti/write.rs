@@ -2,7 +2,7 @@
 //! names of structures.
 
 use super::super::volume::Voxels;
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use flate2::{Compression, write::GzEncoder};
 use std::io::Write;
 
@@ -14,10 +14,10 @@ const DATA_AT: usize = 352;
 /// Returns the bytes of the file, packed. Offsets in the header are the standard's.
 pub fn bytes(v: &Voxels) -> Result<Vec<u8>, ContentError> {
     if v.dims.iter().any(|&d| d > 32767) {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "NIfTI-1 holds at most 32767 voxels along an axis, and there are {:?}",
             v.dims
-        )));
+        ));
     }
     let mut b = vec![0_u8; DATA_AT];
     let mut put = |at: usize, bytes: &[u8]| b[at..at + bytes.len()].copy_from_slice(bytes);

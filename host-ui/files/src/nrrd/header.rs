@@ -1,8 +1,8 @@
 //! The text before the data of an NRRD file, checked field by field; every problem is reported.
 
-use super::super::element::{Element, Endian, short};
+use super::super::element::{Element, Endian, parsed, short};
 use super::{Pairs, element};
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 
 /// Largest header; Slicer keeps much in it, but not more.
 const MAX_HEADER_BYTES: usize = 4 << 20;
@@ -101,49 +101,31 @@ impl Header {
             .filter(|&a| !matches!(self.axes.get(a), None | Some(Axis::None)))
             .collect();
         in_space.try_into().map_err(|_| {
-            ContentError::Invalid(format!(
+            invalid!(
                 "it has {} axes ({:?}) and does not say which three are those of space; save one volume of it",
                 self.sizes.len(),
                 self.sizes
-            ))
+            )
         })
     }
 }
 
 /// Returns the lines up to the first empty one.
 fn lines(bytes: &[u8]) -> Result<(Vec<&str>, &[u8]), ContentError> {
-    let (mut lines, mut rest) = (Vec::new(), bytes);
-    loop {
-        let Some(end) = rest.iter().take(MAX_HEADER_BYTES).position(|&b| b == b'\n') else {
-            // A detached header may just end.
-            if rest.len() < MAX_HEADER_BYTES && !lines.is_empty() {
-                if !rest.is_empty() {
-                    lines.push(text(rest)?);
-                }
-                return Ok((lines, &[]));
-            }
-            return Err(ContentError::Invalid(
-                "its header has no end; copy or export it again".to_owned(),
-            ));
-        };
-        let line = text(&rest[..end])?;
-        rest = &rest[end + 1..];
-        if line.is_empty() {
-            return Ok((lines, rest));
-        }
-        lines.push(line);
-        if bytes.len() - rest.len() > MAX_HEADER_BYTES {
-            return Err(ContentError::Invalid(
-                "its header has no end; copy or export it again".to_owned(),
-            ));
+    let (mut lines, mut end) = (Vec::new(), 0);
+    for line in bytes[..bytes.len().min(MAX_HEADER_BYTES)].split_inclusive(|&b| b == b'\n') {
+        end += line.len();
+        let line = std::str::from_utf8(line).map_err(|_| "its header is not text; copy or export it again")?;
+        match line.trim_end_matches(['\r', '\n']) {
+            "" => return Ok((lines, &bytes[end..])),
+            line => lines.push(line),
         }
     }
-}
-
-fn text(line: &[u8]) -> Result<&str, ContentError> {
-    std::str::from_utf8(line)
-        .map(|l| l.trim_end_matches('\r'))
-        .map_err(|_| "its header is not text; copy or export it again".into())
+    // A detached header may just end.
+    if end < bytes.len() || lines.is_empty() {
+        return Err("its header has no end; copy or export it again".into());
+    }
+    Ok((lines, &[]))
 }
 
 struct Fields<'a> {
@@ -157,150 +139,112 @@ impl<'a> Fields<'a> {
         Some(self.fields.swap_remove(at).1)
     }
 
-    fn needed(&mut self, names: &[&str]) -> &'a str {
-        self.take(names).unwrap_or_else(|| {
-            self.problems.push(format!("the field \"{}\" is missing", names[0]));
-            ""
-        })
+    /// Reads a field; reports one that is not as expected.
+    fn read<T>(&mut self, names: &[&str], expected: &str, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
+        let text = self.take(names)?;
+        let value = parse(text);
+        if value.is_none() {
+            let why = format!("{}: \"{}\" is not {expected}", names[0], short(text));
+            self.problems.push(why);
+        }
+        value
     }
 
-    fn wrong(&mut self, field: &str, value: &str, expected: &str) {
-        self.problems
-            .push(format!("{field}: \"{}\" is not {expected}", short(value)));
+    /// Like [`Fields::read`]; reports a missing field, too.
+    fn needed<T>(&mut self, name: &str, expected: &str, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
+        if !self.fields.iter().any(|(n, _)| n == name) {
+            self.problems.push(format!("the field \"{name}\" is missing"));
+        }
+        self.read(&[name], expected, parse)
     }
 }
 
 fn build(r: &mut Fields, pairs: Pairs) -> Option<Header> {
-    let type_name = r.needed(&["type"]).to_ascii_lowercase();
-    let element = element(&type_name);
-    if element.is_none() && !type_name.is_empty() {
-        r.wrong("type", &type_name, "a type of whole numbers");
-    }
-    let dimension = r.needed(&["dimension"]);
-    let dimension: usize = dimension
-        .parse()
-        .ok()
-        .filter(|d| (3..=MAX_DIMENSION).contains(d))
-        .unwrap_or_else(|| {
-            if !dimension.is_empty() {
-                r.wrong("dimension", dimension, "3, or 4 with layers of segments");
-            }
-            0
-        });
-    let encoding = r.needed(&["encoding"]).to_ascii_lowercase();
-    let endian = match r.take(&["endian"]).map(str::to_ascii_lowercase).as_deref() {
-        None => None,
-        Some("little") => Some(Endian::Little),
-        Some("big") => Some(Endian::Big),
-        Some(other) => {
-            r.wrong("endian", other, "\"little\" or \"big\"");
-            None
-        }
-    };
-    let sizes = sizes(r, dimension);
-    let space = r.take(&["space"]).map(str::to_ascii_lowercase);
-    if let Some(text) = r.take(&["space dimension"])
-        && text != "3"
-    {
-        r.wrong("space dimension", text, "3");
-    }
-    let axes = axes(r, dimension);
-    let origin = r.take(&["space origin"]).and_then(|text| {
-        let origin = vectors(text).filter(|v| v.len() == 1).and_then(|v| v[0]);
-        if origin.is_none() {
-            r.wrong("space origin", text, "one vector such as (0,0,0)");
-        }
-        origin
+    let element = r.needed("type", "a type of whole numbers", |text| {
+        element(&text.to_ascii_lowercase())
     });
-    let units_m = units(r);
-    let kinds = words(r.take(&["kinds"]).unwrap_or_default());
-    if r.take(&["centers", "centerings"])
-        .is_some_and(|c| words(c).iter().any(|w| w.eq_ignore_ascii_case("node")))
-    {
-        r.problems
-            .push("its samples are at nodes and not in cells; save it with cell centering".to_owned());
-    }
-    let data_file = r.take(&["data file", "datafile"]).map(str::to_owned);
-    let line_skip = whole(r, &["line skip", "lineskip"], 0).unwrap_or_default() as usize;
-    let byte_skip = whole(r, &["byte skip", "byteskip"], -1).unwrap_or_default();
-    for name in ["axis mins", "axismins", "axis maxs", "axismaxs"] {
-        // Another way to place the volume, which nobody uses for patients.
-        if let Some(text) = r.take(&[name])
-            && words(text).iter().any(|w| !w.eq_ignore_ascii_case("nan"))
-        {
-            r.problems.push(format!(
-                "\"{name}\" is not read; save the volume with \"space directions\""
-            ));
+    let dimension = r.needed("dimension", "3, or 4 with layers of segments", |text| {
+        text.parse().ok().filter(|d| (3..=MAX_DIMENSION).contains(d))
+    });
+    let fits = |count: usize| dimension.is_none_or(|dimension| dimension == count);
+    let all = |what: &str| format!("{} {what}", dimension.unwrap_or_default());
+    let encoding = r.needed("encoding", "an encoding", |text| Some(text.to_ascii_lowercase()));
+    let endian = r.read(&["endian"], "\"little\" or \"big\"", |text| {
+        match text.to_ascii_lowercase().as_str() {
+            "little" => Some(Endian::Little),
+            "big" => Some(Endian::Big),
+            _ => None,
         }
-    }
+    });
+    let sizes = r.needed("sizes", &all("whole numbers"), |text| {
+        parsed(text).filter(|sizes: &Vec<u64>| fits(sizes.len()))
+    });
+    let space = r.take(&["space"]).map(str::to_ascii_lowercase);
+    r.read(&["space dimension"], "3", |text| (text == "3").then_some(()));
+    let spacings = r.read(&["spacings"], &all("numbers"), |text| {
+        let axis = |s: f64| if s.is_nan() { Axis::None } else { Axis::Spacing(s) };
+        let spacings = parsed(text).filter(|spacings| fits(spacings.len()))?;
+        Some(spacings.into_iter().map(axis).collect())
+    });
+    let directions = r.read(
+        &["space directions"],
+        &all("vectors such as (1,0,0), or none"),
+        |text| {
+            let directions = vectors(text).filter(|vectors| fits(vectors.len()))?;
+            Some(
+                directions
+                    .into_iter()
+                    .map(|v| v.map_or(Axis::None, Axis::Direction))
+                    .collect(),
+            )
+        },
+    );
+    let origin = r.read(&["space origin"], "one vector such as (0,0,0)", |text| {
+        match vectors(text)?.as_slice() {
+            [origin] => *origin,
+            _ => None,
+        }
+    });
+    let units_m = r.read(&["space units"], "three of \"mm\", \"cm\", \"m\", \"um\"", units);
+    let kinds = words(r.take(&["kinds"]).unwrap_or_default());
+    // Nodes would lie half a voxel beside the cells.
+    r.read(
+        &["centers", "centerings"],
+        "cell: save it with cell centering",
+        |text| {
+            let is_node = |word: &String| word.eq_ignore_ascii_case("node");
+            (!words(text).iter().any(is_node)).then_some(())
+        },
+    );
+    let data_file = r.take(&["data file", "datafile"]).map(str::to_owned);
+    let whole = |text: &str, least: i64| text.parse().ok().filter(|n| (least..=1 << 40).contains(n));
+    let line_skip = r.read(&["line skip", "lineskip"], "a whole number from 0", |text| {
+        whole(text, 0)
+    });
+    let byte_skip = r.read(&["byte skip", "byteskip"], "a whole number from -1", |text| {
+        whole(text, -1)
+    });
     r.fields.retain(|(name, _)| !UNUSED.contains(&name.as_str()));
-    let unknown: Vec<String> = r
+    let unknown = r
         .fields
         .iter()
-        .map(|(name, _)| format!("\"{}\" is not a field of NRRD", short(name)))
-        .collect();
+        .map(|(name, _)| format!("the field \"{}\" is not read", short(name)));
     r.problems.extend(unknown);
     Some(Header {
         element: element?,
-        encoding,
+        encoding: encoding?,
         endian,
-        sizes,
-        axes,
+        sizes: sizes?,
+        axes: directions.or(spacings).unwrap_or_default(),
         space,
         origin,
-        units_m,
+        units_m: units_m.unwrap_or([1e-3; 3]),
         kinds,
         data_file,
-        line_skip,
-        byte_skip,
+        line_skip: line_skip.unwrap_or_default() as usize,
+        byte_skip: byte_skip.unwrap_or_default(),
         pairs,
     })
-}
-
-fn sizes(r: &mut Fields, dimension: usize) -> Vec<u64> {
-    let text = r.needed(&["sizes"]);
-    let sizes: Option<Vec<u64>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
-    match sizes {
-        Some(sizes) if sizes.len() == dimension || dimension == 0 => sizes,
-        _ => {
-            r.wrong("sizes", text, &format!("{dimension} whole numbers"));
-            Vec::new()
-        }
-    }
-}
-
-fn axes(r: &mut Fields, dimension: usize) -> Vec<Axis> {
-    let spacings = r.take(&["spacings"]);
-    if let Some(text) = r.take(&["space directions"]) {
-        return match vectors(text).filter(|v| v.len() == dimension || dimension == 0) {
-            Some(vectors) => vectors
-                .into_iter()
-                .map(|v| v.map_or(Axis::None, Axis::Direction))
-                .collect(),
-            None => {
-                r.wrong(
-                    "space directions",
-                    text,
-                    &format!("{dimension} vectors such as (1,0,0), or none"),
-                );
-                Vec::new()
-            }
-        };
-    }
-    let Some(text) = spacings else {
-        return Vec::new();
-    };
-    let spacings: Option<Vec<f64>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
-    match spacings {
-        Some(all) if all.len() == dimension || dimension == 0 => {
-            let axis = |s: f64| if s.is_nan() { Axis::None } else { Axis::Spacing(s) };
-            all.into_iter().map(axis).collect()
-        }
-        _ => {
-            r.wrong("spacings", text, &format!("{dimension} numbers"));
-            Vec::new()
-        }
-    }
 }
 
 /// Parses vectors; `none` and vectors of NaN are not spatial axes.
@@ -322,24 +266,16 @@ fn vectors(text: &str) -> Option<Vec<Option<[f64; 3]>>> {
     Some(all)
 }
 
-fn units(r: &mut Fields) -> [f64; 3] {
-    let Some(text) = r.take(&["space units"]) else {
-        return [1e-3; 3];
+fn units(text: &str) -> Option<[f64; 3]> {
+    let unit = |word: &String| match word.to_ascii_lowercase().as_str() {
+        "mm" | "millimeter" | "millimetre" | "" => Some(1e-3),
+        "cm" => Some(1e-2),
+        "m" => Some(1.0),
+        "um" | "\u{b5}m" | "micron" | "microns" => Some(1e-6),
+        _ => None,
     };
-    let units: Option<Vec<f64>> = words(text)
-        .iter()
-        .map(|w| match w.to_ascii_lowercase().as_str() {
-            "mm" | "millimeter" | "millimetre" | "" => Some(1e-3),
-            "cm" => Some(1e-2),
-            "m" => Some(1.0),
-            "um" | "\u{b5}m" | "micron" | "microns" => Some(1e-6),
-            _ => None,
-        })
-        .collect();
-    units.and_then(|u| <[f64; 3]>::try_from(u).ok()).unwrap_or_else(|| {
-        r.wrong("space units", text, "three of \"mm\", \"cm\", \"m\", \"um\"");
-        [1e-3; 3]
-    })
+    let units: Option<Vec<f64>> = words(text).iter().map(unit).collect();
+    units?.try_into().ok()
 }
 
 /// Splits words with or without quotation marks.
@@ -355,13 +291,4 @@ fn words(text: &str) -> Vec<String> {
         rest = after.trim_start();
     }
     all
-}
-
-fn whole(r: &mut Fields, names: &[&str], least: i64) -> Option<i64> {
-    let text = r.take(names)?;
-    let number = text.parse().ok().filter(|n| (least..=1 << 40).contains(n));
-    if number.is_none() {
-        r.wrong(names[0], text, &format!("a whole number from {least}"));
-    }
-    number
 }

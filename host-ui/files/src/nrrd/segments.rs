@@ -6,7 +6,7 @@ use super::super::overlap;
 use super::super::volume::Voxels;
 use super::Pairs;
 use super::header::Header;
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use std::collections::BTreeMap;
 
 const MAX_SEGMENTS: usize = 255;
@@ -23,12 +23,12 @@ pub fn names(pairs: &Pairs) -> Result<BTreeMap<u8, String>, ContentError> {
     let mut names = BTreeMap::new();
     for segment in segments(pairs)? {
         if let Some(other) = names.insert(segment.value, segment.name.clone()) {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "its segments \"{}\" and \"{}\" both have label {}; save the segmentation again",
                 short(&other),
                 short(&segment.name),
                 segment.value
-            )));
+            ));
         }
     }
     Ok(names)
@@ -57,10 +57,10 @@ fn segments(pairs: &Pairs) -> Result<Vec<Segment>, ContentError> {
         };
         let value = number("LabelValue", n + 1, 255)? as u8;
         if value == 0 {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "its segment \"{}\" has label 0, which is the background",
                 short(&name)
-            )));
+            ));
         }
         all.push(Segment {
             name,
@@ -68,9 +68,7 @@ fn segments(pairs: &Pairs) -> Result<Vec<Segment>, ContentError> {
             layer: number("Layer", 0, MAX_SEGMENTS)?,
         });
     }
-    Err(ContentError::Invalid(format!(
-        "it has more than {MAX_SEGMENTS} segments"
-    )))
+    Err(invalid!("it has more than {MAX_SEGMENTS} segments"))
 }
 
 /// Returns one label for each segment; an overlap goes to the smaller segment.
@@ -85,26 +83,27 @@ pub fn flatten(
     let segments = segments(&h.pairs)?;
     let kind = h.kinds.get(list).map_or("?", String::as_str);
     if segments.is_empty() {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "it contains {layers} volumes (an axis of kind {kind}) without segments that identify them; save one volume of it"
-        )));
+        ));
     }
     if let Some(s) = segments.iter().find(|s| s.layer >= layers) {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "its segment \"{}\" is in layer {} of {layers}",
             short(&s.name),
             s.layer
-        )));
+        ));
     }
     // The label of each value of each layer, counted from 1 in the order of the segments.
     let mut label_of = vec![[0_u8; 256]; layers];
     for (segment, label) in segments.iter().zip(1_u8..=255) {
         let place = &mut label_of[segment.layer][usize::from(segment.value)];
         if *place != 0 {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "two segments have label {} in layer {}",
-                segment.value, segment.layer
-            )));
+                segment.value,
+                segment.layer
+            ));
         }
         *place = label;
     }

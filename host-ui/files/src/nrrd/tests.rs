@@ -24,7 +24,7 @@ fn why(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn text_hex_and_raw_hold_the_same_labels() {
+fn text_and_raw_hold_the_same_labels() {
     let good = read(GOOD.as_bytes(), &no_file).unwrap();
     assert_eq!(
         (good.labels.as_slice(), good.dims),
@@ -32,9 +32,6 @@ fn text_hex_and_raw_hold_the_same_labels() {
     );
     assert_eq!(good.frame.spacing_m, [1e-3, 2e-3, 3e-3]);
     assert_eq!(good.frame.origin_m, Vector3::new(1e-3, 2e-3, 3e-3));
-    let hex = with("text", "hex");
-    let hex = String::from_utf8(hex).unwrap().replace("0 1 2 3\n", "00 01\n02 03");
-    assert_eq!(read(hex.as_bytes(), &no_file).unwrap(), good);
     let head = String::from_utf8(with("encoding: text", "encoding: raw\nline skip: 1\nbyte skip: 2")).unwrap();
     let mut raw = head.replace("0 1 2 3\n", "a comment\nxx").into_bytes();
     raw.extend([0, 1, 2, 3]);
@@ -45,11 +42,10 @@ fn text_hex_and_raw_hold_the_same_labels() {
     end.extend([0, 1, 2, 3]);
     assert_eq!(read(&end, &no_file).unwrap(), good);
     let big = with("uchar", "unsigned short\nendian: big");
-    let big = String::from_utf8(big)
-        .unwrap()
-        .replace("text", "hex")
-        .replace("0 1 2 3", "0000000100020003");
-    assert_eq!(read(big.as_bytes(), &no_file).unwrap(), good);
+    let big = String::from_utf8(big).unwrap().replace("text", "raw");
+    let mut big = big.replace("0 1 2 3\n", "").into_bytes();
+    big.extend([0, 0, 0, 1, 0, 2, 0, 3]);
+    assert_eq!(read(&big, &no_file).unwrap(), good);
 }
 
 #[test]
@@ -76,10 +72,14 @@ fn each_wrong_header_is_refused_with_its_reason() {
         ("0 1 2 3", "0 1 2 x", "contains \"x\""),
         ("uchar", "block", "a type of whole numbers"),
         ("uchar", "double\nendian: middle", "\"little\" or \"big\""),
-        ("encoding: text", "encoding: bz2", "bzip2"),
-        ("encoding: text", "encoding: zip", "encoding \"zip\" is not known"),
+        ("encoding: text", "encoding: bz2", "encoding \"bz2\" is not read"),
+        ("encoding: text", "encoding: zip", "encoding \"zip\" is not read"),
         ("encoding: text", "encoding: raw", "8 are there"),
-        ("encoding: text", "encoding: text\nfoo: 1", "\"foo\" is not a field"),
+        (
+            "encoding: text",
+            "encoding: text\nfoo: 1",
+            "the field \"foo\" is not read",
+        ),
         ("encoding: text", "what is this", "neither a field nor a comment"),
         (
             "encoding: text",
@@ -115,11 +115,11 @@ fn each_wrong_header_is_refused_with_its_reason() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     let two = why(&with("type: uchar\n", "centers: node node node\n"));
     assert!(
-        two.contains("2 problems") && two.contains("\"type\" is missing") && two.contains("at nodes"),
+        two.contains("2 problems") && two.contains("\"type\" is missing") && two.contains("cell centering"),
         "{two}"
     );
     assert!(why(b"NRRD0004\n\xff\xfe\n\n").contains("not text"));
-    assert!(why(b"NRRD0004").contains("header"));
+    assert!(why(b"NRRD0004").contains("\"type\" is missing"));
 }
 
 /// Checks a bound: a few bytes of gzip may stand for any size, so unpacking stops at the size in
@@ -139,17 +139,6 @@ fn packed_data_are_unpacked_no_further_than_the_header_asks() {
         file
     };
     assert!(why(&file("2 2 1")).contains("continue beyond"));
-    let to_end = |sizes: &str| {
-        let bytes = file(sizes);
-        let at = bytes.windows(9).position(|w| w == b"encoding:").unwrap();
-        [&bytes[..at], b"byte skip: -1\n".as_slice(), &bytes[at..]].concat()
-    };
-    assert!(why(&to_end("2 2 1")).contains("more than 1048576 bytes before"));
-    assert_eq!(
-        read(&to_end("1000 1000 49"), &no_file).unwrap().labels.len(),
-        49_000_000
-    );
-    assert!(why(&to_end("1000 1000 51")).contains("it is truncated"));
     assert!(why(&file("1000 1000 200")).contains("the header requires 200000000 bytes"));
     assert_eq!(read(&file("1000 1000 50"), &no_file).unwrap().labels.len(), 50_000_000);
 }
