@@ -1,7 +1,7 @@
 //! The bytes of files: regular files only, bounded, with progress; and whole files written at once.
 
 use super::element::short;
-use super::error::ContentError;
+use super::error::{ContentError, invalid};
 use super::progress::{Progress, Stage};
 use std::io::Read;
 use std::path::{Component, Path};
@@ -61,11 +61,11 @@ pub fn data_file(header: &Path, name: &str, progress: &Progress) -> Result<Vec<u
     let mut parts = Path::new(name).components();
     let inside = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
     if !inside {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "its data are in \"{}\"; only a file in the same folder is read",
             short(name)
-        )));
+        ));
     }
     let path = header.with_file_name(name);
-    whole(&path, progress).map_err(|why| ContentError::Invalid(format!("its data file {}: {why}", path.display())))
+    whole(&path, progress).map_err(|why| invalid!("its data file {}: {why}", path.display()))
 }

@@ -1,7 +1,7 @@
 //! The identity of a file of any format: of DICOM its own, of tables, plans and NRRD the lines
 //! that were written with them.
 
-use super::dicom::{self, Agreed, COLUMNS, Identity, Shared};
+use super::dicom::{self, Agreed, Identity, Shared};
 use super::report::report;
 use super::{FileError, Progress, bytes, scene};
 use std::path::Path;
@@ -53,8 +53,7 @@ impl Identity {
             let scene = scene::read(path).ok();
             return scene.map_or(Ok(None), |scene| Self::of_path(&path.with_file_name(scene.volume)));
         }
-        let of_lines = Self::of_parts(|name| line(&head, name));
-        Ok(of_lines.or_else(|| of_columns(&head)))
+        Ok(Self::of_parts(|name| line(&head, name)))
     }
 
     /// Returns comment lines for a table or a plan.
@@ -88,34 +87,6 @@ pub fn lines_of(path: &Path) -> impl Fn(&str) -> Option<String> {
     let head = bytes::start(path, HEAD_BYTES).unwrap_or_default();
     let head = String::from_utf8_lossy(&head).into_owned();
     move |name| line(&head, name).map(str::to_owned)
-}
-
-/// Reads columns of the first row of a table, in which earlier versions wrote the parts.
-fn of_columns(head: &str) -> Option<Identity> {
-    let mut lines = head.lines().filter(|line| !line.starts_with('#'));
-    let (header, row) = (lines.next()?, lines.next()?);
-    if !header.contains(COLUMNS[1]) {
-        return None;
-    }
-    let (names, parts) = (fields(header), fields(row));
-    Identity::of_parts(|name| {
-        let place = names.iter().position(|of| of == name)?;
-        parts.get(place).map(String::as_str)
-    })
-}
-
-/// Splits a line of a table at the commas outside of quotation marks.
-fn fields(line: &str) -> Vec<String> {
-    let mut fields = vec![String::new()];
-    let mut is_quoted = false;
-    for c in line.chars() {
-        match c {
-            '"' => is_quoted = !is_quoted,
-            ',' if !is_quoted => fields.push(String::new()),
-            _ => fields.last_mut().into_iter().for_each(|field| field.push(c)),
-        }
-    }
-    fields.iter().map(|field| field.trim().to_owned()).collect()
 }
 
 /// Returns the identity of the first DICOM file of a folder, by name.

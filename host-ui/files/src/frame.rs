@@ -1,6 +1,6 @@
 //! The place of a file's voxels in the patient (RAS, m), for any format.
 
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use nalgebra::{Matrix3, Vector3};
 
 /// Largest cosine between two axes; beyond it they are sheared.
@@ -25,23 +25,25 @@ impl VoxelFrame {
     /// of the first voxel (RAS, m); `source` is the file's term for them.
     pub fn new(columns_m: Matrix3<f64>, origin_m: Vector3<f64>, source: &str) -> Result<Self, ContentError> {
         if !columns_m.iter().chain(origin_m.iter()).all(|v| v.is_finite()) {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "its {source} contains a value that is not a number; write the file again with a valid orientation"
-            )));
+            ));
         }
         let spacing_m: [f64; 3] = [0, 1, 2].map(|a| columns_m.column(a).norm());
         if spacing_m.iter().any(|s| !(1e-5..=0.1).contains(s)) {
             let mm = spacing_m.map(|s| s * 1e3);
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "its {source} gives voxels of {:.4} x {:.4} x {:.4} mm; each side must be 0.01 to 100 mm",
-                mm[0], mm[1], mm[2]
-            )));
+                mm[0],
+                mm[1],
+                mm[2]
+            ));
         }
         if origin_m.amax() > 10.0 {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "its {source} puts the first voxel {:.1} m from the origin; at most 10 m is accepted",
                 origin_m.amax()
-            )));
+            ));
         }
         let raw = Matrix3::from_columns(&[0, 1, 2].map(|a| columns_m.column(a) / spacing_m[a]));
         let worst = [(0, 1), (0, 2), (1, 2)]
@@ -49,10 +51,10 @@ impl VoxelFrame {
             .into_iter()
             .fold(0.0, f64::max);
         if worst > SHEAR {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "its {source} is sheared (axes {:.2} deg off a right angle); resample it to a rectangular grid first",
                 worst.min(1.0).asin().to_degrees()
-            )));
+            ));
         }
         Ok(Self {
             directions: nearest_orthonormal(raw),

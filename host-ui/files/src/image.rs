@@ -3,7 +3,7 @@
 use super::bytes::{data_file, file_name, whole};
 use super::dicom::series;
 use super::element::Sink;
-use super::error::{ContentError, FileError};
+use super::error::{ContentError, FileError, invalid};
 use super::frame::VoxelFrame;
 use super::open::Format;
 use super::volume::VoxelValues;
@@ -76,10 +76,10 @@ impl Image {
         if beside_m == 0.0 {
             return Ok(());
         }
-        Err(ContentError::Invalid(format!(
+        Err(invalid!(
             "it ends {:.0} mm before the middle of the gland; is it of this patient, and in the same frame?",
             beside_m * 1e3
-        )))
+        ))
     }
 
     /// Returns the distance of a place in the scene from the image (m); 0 inside.
@@ -137,9 +137,7 @@ fn range(values: &[f32]) -> Result<[f32; 2], ContentError> {
             return Ok([low, high]);
         }
     }
-    Err(ContentError::Invalid(
-        "all its voxels have the same value, so there is nothing to show".to_owned(),
-    ))
+    Err("all its voxels have the same value, so there is nothing to show".into())
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::bytes::{data_file, folder, whole};
 use super::element::Sink;
-use super::error::{ContentError, FileError};
+use super::error::{ContentError, FileError, invalid};
 use super::progress::Progress;
 use super::volume::Voxels;
 use super::{dicom, metaimage, nifti, nrrd};
@@ -51,9 +51,9 @@ pub fn read_voxels(path: &Path, progress: &Progress) -> Result<Voxels, FileError
         Some(Format::Nrrd) => nrrd::read(&bytes, &data, sink),
         Some(Format::Nifti) => nifti::read(&bytes, sink).map(|v| v.named(BTreeMap::new())),
         Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink).map(|v| v.named(BTreeMap::new())),
-        None => Err(ContentError::Invalid(format!(
+        None => Err(invalid!(
             "its format is not supported; supported are {FORMATS}; export the segmentation as one of them"
-        ))),
+        )),
     };
     voxels.map_err(refused)
 }

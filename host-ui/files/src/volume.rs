@@ -5,7 +5,7 @@ mod movable;
 
 use super::frame::VoxelFrame;
 use super::progress::{Progress, Stage};
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use cover::{covered, covers};
 use movable::movable;
 use nalgebra::{Matrix3, Vector3};
@@ -228,10 +228,7 @@ impl LabelVolume {
             let volume = Self::resampled(voxels, keep, bounds, h, progress)?;
             if let Some((dims, origin, cells)) = volume.filter(|v| tissue(&v.2) <= MAX_TISSUE) {
                 if tissue(&cells) == 0 {
-                    return Err(ContentError::Invalid(format!(
-                        "the tissue is thinner than its elements of {:.2} mm",
-                        h * 1e3
-                    )));
+                    return Err(invalid!("the tissue is thinner than its elements of {:.2} mm", h * 1e3));
                 }
                 let mut warnings: Vec<String> = voxels.frame.warning.iter().chain(&voxels.overlap).cloned().collect();
                 if h > finest {

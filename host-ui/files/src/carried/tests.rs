@@ -32,14 +32,6 @@ fn lines_of_tables_and_headers_keep_the_identity() {
     }
     std::fs::write(&path, header).unwrap();
     assert_eq!(Identity::of_path(&path).unwrap(), None);
-    // As written by earlier versions.
-    let columns = "x_mm,dicom_patient_id,dicom_study,dicom_frame_of_reference\n1,\"P, 1\",1.2,1.3\n";
-    std::fs::write(&path, columns).unwrap();
-    let read = Identity::of_path(&path).unwrap().unwrap();
-    assert_eq!(
-        (read.patient_id.as_str(), read.frame_of_reference.as_str()),
-        ("P, 1", "1.3")
-    );
 }
 
 /// A line feed in a name would begin a line with another identity.

@@ -1,11 +1,12 @@
 //! Objects with attributes removed, emptied, doubled or contradicted: each answer is that of the
 //! unchanged object, a refusal, or comes with a note that names the attribute.
 
+use super::super::element::Endian;
 use super::dose::{DoseImage, DoseKind, DoseOf};
 use super::structures::StructureSet;
 use super::structures::write::{Outlined, Written};
 use super::values::items;
-use super::write::{sequence, string};
+use super::write::sequence;
 use super::{Identity, checked, dose, plan, structures};
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::header::Header;
@@ -175,7 +176,7 @@ fn of_plan(object: &checked::Object, _: &[u8]) -> Answer {
 }
 
 fn of_dose(object: &checked::Object, pixels: &[u8]) -> Answer {
-    let dose = dose::of(object, pixels, false).map_err(|why| why.to_string())?;
+    let dose = dose::of(object, pixels, Endian::Little).map_err(|why| why.to_string())?;
     let dims = dose.dims.map(|d| d as f64);
     let figures = [dims.as_slice(), &dose.origin_m, &dose.spacing_m, &dose.dose_gy].concat();
     Ok((figures, dose.notes))
@@ -285,6 +286,6 @@ fn damaged_attributes_are_harmless_refused_or_named() {
     );
     // A change that must be found.
     let mut object = checked::read(&structures::write::bytes(&set).unwrap()).unwrap();
-    object.data.put(string(tags::ROI_CONTOUR_SEQUENCE, VR::LO, ""));
+    object.data.put(sequence(tags::ROI_CONTOUR_SEQUENCE, Vec::new()));
     assert!(of_structures(&object, &[]).is_err());
 }

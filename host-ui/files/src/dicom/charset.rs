@@ -3,7 +3,7 @@
 
 use super::super::element::short;
 use super::values::name;
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use dicom_core::header::Header;
 use dicom_core::value::{InMemFragment, PrimitiveValue, Value};
 use dicom_core::{Tag, VR};
@@ -39,7 +39,7 @@ const TEXTS: [Tag; 22] = [
 
 /// Character set of the upper half of the bytes.
 #[derive(Clone, Copy)]
-enum Upper {
+pub enum Upper {
     None,
     Latin1,
     One(&'static Encoding),
@@ -60,20 +60,16 @@ enum Lower {
 pub enum Sets {
     /// One without escapes, for all bytes.
     Whole(&'static Encoding),
-    /// Sets that escapes change; the initial one.
-    Changing(Upper0),
+    /// Sets that escapes change; the initial one of the upper half.
+    Changing(Upper),
     /// A term that is not known here.
     Unknown(String),
 }
 
-/// Initial set of the upper half.
-#[derive(Clone, Copy)]
-pub struct Upper0(Upper);
-
 impl Sets {
     /// Returns the sets of a file that declares none.
     pub fn none() -> Self {
-        Self::Changing(Upper0(Upper::None))
+        Self::Changing(Upper::None)
     }
 
     /// Returns the sets of the terms of an element, separated by backslashes.
@@ -97,61 +93,46 @@ impl Sets {
             };
             initial.get_or_insert(set);
         }
-        Self::Changing(Upper0(initial.unwrap_or(Upper::None)))
+        Self::Changing(initial.unwrap_or(Upper::None))
     }
 }
 
+/// Sets of the upper half: their number in ISO_IR, their escape, and their decoder. The letters of 148 and 1254 are the
+/// same from A0 on.
+const UPPER: [(&str, &[u8], Upper); 14] = [
+    ("13", b")I", Upper::One(encoding::SHIFT_JIS)),
+    ("58", b"$)A", Upper::Two(encoding::GBK)),
+    ("100", b"-A", Upper::Latin1),
+    ("101", b"-B", Upper::One(encoding::ISO_8859_2)),
+    ("109", b"-C", Upper::One(encoding::ISO_8859_3)),
+    ("110", b"-D", Upper::One(encoding::ISO_8859_4)),
+    ("126", b"-F", Upper::One(encoding::ISO_8859_7)),
+    ("127", b"-G", Upper::One(encoding::ISO_8859_6)),
+    ("138", b"-H", Upper::One(encoding::ISO_8859_8)),
+    ("144", b"-L", Upper::One(encoding::ISO_8859_5)),
+    ("148", b"-M", Upper::One(encoding::WINDOWS_1254)),
+    ("149", b"$)C", Upper::Two(encoding::EUC_KR)),
+    ("166", b"-T", Upper::One(encoding::WINDOWS_874)),
+    ("203", b"-b", Upper::One(encoding::ISO_8859_15)),
+];
+const LOWER: [(&[u8], Lower); 5] = [
+    (b"(B", Lower::Ascii),
+    (b"(J", Lower::Ascii),
+    (b"$B", Lower::Jis208),
+    (b"$@", Lower::Jis208),
+    (b"$(D", Lower::Jis212),
+];
+
 fn of_number(number: &str) -> Option<Upper> {
-    Some(match number {
-        "13" => Upper::One(encoding::SHIFT_JIS),
-        "58" => Upper::Two(encoding::GBK),
-        "100" => Upper::Latin1,
-        "101" => Upper::One(encoding::ISO_8859_2),
-        "109" => Upper::One(encoding::ISO_8859_3),
-        "110" => Upper::One(encoding::ISO_8859_4),
-        "126" => Upper::One(encoding::ISO_8859_7),
-        "127" => Upper::One(encoding::ISO_8859_6),
-        "138" => Upper::One(encoding::ISO_8859_8),
-        "144" => Upper::One(encoding::ISO_8859_5),
-        // The same letters from A0 on.
-        "148" => Upper::One(encoding::WINDOWS_1254),
-        "149" => Upper::Two(encoding::EUC_KR),
-        "166" => Upper::One(encoding::WINDOWS_874),
-        "203" => Upper::One(encoding::ISO_8859_15),
-        _ => return None,
-    })
+    UPPER.iter().find(|(of, ..)| *of == number).map(|(.., set)| *set)
 }
 
 /// Returns the lower or the upper set after an escape, and the length of the escape.
 fn escape(rest: &[u8]) -> Option<(Result<Lower, Upper>, usize)> {
-    let upper = |number: &str| of_number(number).map(Err);
-    let (set, length) = match rest {
-        [b'(', b'B' | b'J', ..] => (Ok(Lower::Ascii), 2),
-        [b'$', b'B' | b'@', ..] => (Ok(Lower::Jis208), 2),
-        [b'$', b'(', b'D', ..] => (Ok(Lower::Jis212), 3),
-        [b'$', b')', b'C', ..] => (upper("149")?, 3),
-        [b'$', b')', b'A', ..] => (upper("58")?, 3),
-        [b')', b'I', ..] => (upper("13")?, 2),
-        [b'-', letter, ..] => {
-            let number = match letter {
-                b'A' => "100",
-                b'B' => "101",
-                b'C' => "109",
-                b'D' => "110",
-                b'F' => "126",
-                b'G' => "127",
-                b'H' => "138",
-                b'L' => "144",
-                b'M' => "148",
-                b'T' => "166",
-                b'b' => "203",
-                _ => return None,
-            };
-            (upper(number)?, 2)
-        }
-        _ => return None,
-    };
-    Some((set, length))
+    let lower = LOWER.iter().map(|(escape, set)| (*escape, Ok(*set)));
+    let mut all = lower.chain(UPPER.iter().map(|(_, escape, set)| (*escape, Err(*set))));
+    let (escape, set) = all.find(|(escape, _)| rest.starts_with(escape))?;
+    Some((set, escape.len()))
 }
 
 /// Decodes one element; `None` if its bytes are not of the sets. At a delimiter the initial set is
@@ -163,7 +144,7 @@ fn decoded(bytes: &[u8], sets: &Sets, is_name: bool) -> Option<String> {
     let initial = match sets {
         Sets::Whole(set) => return strictly(set, bytes),
         Sets::Unknown(_) => return None,
-        Sets::Changing(Upper0(initial)) => *initial,
+        Sets::Changing(initial) => *initial,
     };
     let (mut lower, mut upper) = (Lower::Ascii, initial);
     let (mut text, mut at) = (String::new(), 0);
@@ -241,10 +222,10 @@ fn decode_value(
             ),
             _ => name(tags::SPECIFIC_CHARACTER_SET),
         };
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "{} has letters that are not of {set}; export it again with the character set of its names",
             name(tag)
-        )));
+        ));
     };
     *value = PrimitiveValue::Str(text).into();
     Ok(())

@@ -1,8 +1,9 @@
 //! A DICOM file as an object. Lengths and depth are checked first, because the parser allocates the
 //! length that an element claims.
 
+use super::super::element::Endian;
 use super::parse::parse;
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::{Tag, VR};
 use dicom_dictionary_std::{StandardDataDictionary, tags, uids};
@@ -53,9 +54,7 @@ fn syntax(bytes: &[u8]) -> Result<(Syntax, usize), ContentError> {
         return Ok((Syntax::of(&uid)?, from));
     }
     if !is_bare(bytes) {
-        return Err(ContentError::Invalid(
-            "it has no DICM at byte 128, so it is not a DICOM file; export it again".to_owned(),
-        ));
+        return Err("it has no DICM at byte 128, so it is not a DICOM file; export it again".into());
     }
     let letters = [bytes[4], bytes[5]];
     let explicit = VR::from_binary(letters).is_some();
@@ -79,8 +78,8 @@ pub fn read_head(bytes: &[u8]) -> Result<Object, ContentError> {
     Ok(before(bytes, tags::ROI_CONTOUR_SEQUENCE)?.0)
 }
 
-/// Like [`read`]; also returns the bytes of the pixels, and whether their numbers are big-endian.
-pub fn read_with_pixels(bytes: &[u8]) -> Result<(Object, &[u8], bool), ContentError> {
+/// Like [`read`]; also returns the bytes of the pixels, and the order of their bytes.
+pub fn read_with_pixels(bytes: &[u8]) -> Result<(Object, &[u8], Endian), ContentError> {
     let (object, mut walk) = before(bytes, FIRST_PIXELS)?;
     if walk.at >= bytes.len() {
         return Err("it has no pixels; export it again".into());
@@ -89,16 +88,20 @@ pub fn read_with_pixels(bytes: &[u8]) -> Result<(Object, &[u8], bool), ContentEr
     if head.length == UNDEFINED {
         return Err("its pixels are compressed; export it without compression".into());
     }
-    Ok((object, walk.value(&head)?, walk.syntax == Syntax::ExplicitBig))
+    let endian = match walk.syntax {
+        Syntax::ExplicitBig => Endian::Big,
+        _ => Endian::Little,
+    };
+    Ok((object, walk.value(&head)?, endian))
 }
 
 /// Reads everything before the first pixels, or before `last`.
 fn before(bytes: &[u8], last: Tag) -> Result<(Object, Walk<'_>), ContentError> {
     let values = bytes.iter().filter(|&&b| b == b'\\').count();
     if values > MAX_VALUES {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "it has {values} values in lists, more than {MAX_VALUES}; export fewer structures"
-        )));
+        ));
     }
     let (syntax, at) = syntax(bytes)?;
     let elements = 0;
@@ -144,10 +147,10 @@ impl Syntax {
             packed if packed.starts_with("1.2.840.10008.1.2.4.") || packed == uids::RLE_LOSSLESS => {
                 Ok(Self::ExplicitLittle)
             }
-            other => Err(ContentError::Invalid(format!(
+            other => Err(invalid!(
                 "its transfer syntax {} is not read; export it as explicit VR little endian",
                 super::super::element::short(other)
-            ))),
+            )),
         }
     }
 }
@@ -218,9 +221,7 @@ impl<'a> Walk<'a> {
     fn content(&mut self, head: &Head, end: usize, depth: usize) -> Result<(), ContentError> {
         self.elements += 1;
         if self.elements > MAX_ELEMENTS {
-            return Err(ContentError::Invalid(format!(
-                "it has more than {MAX_ELEMENTS} elements"
-            )));
+            return Err(invalid!("it has more than {MAX_ELEMENTS} elements"));
         }
         let nested = head.vr == VR::SQ || (self.syntax == Syntax::ImplicitLittle && head.length == UNDEFINED);
         if nested {
@@ -231,55 +232,46 @@ impl<'a> Walk<'a> {
 
     fn sequence(&mut self, head: &Head, end: usize, depth: usize) -> Result<(), ContentError> {
         if depth > MAX_DEPTH {
-            return Err(ContentError::Invalid(format!(
-                "its sequences are nested more than {MAX_DEPTH} deep"
-            )));
+            return Err(invalid!("its sequences are nested more than {MAX_DEPTH} deep"));
         }
-        let sequence_end = self.end_of(head, end)?;
-        while self.at < sequence_end.unwrap_or(end) {
-            let item = self.head()?;
-            if item.tag == SEQUENCE_END && sequence_end.is_none() && item.length == 0 {
-                return Ok(());
-            }
+        self.inside(head, end, SEQUENCE_END, |walk, item, end| {
             if item.tag != ITEM {
-                return Err(ContentError::Invalid(format!(
+                return Err(invalid!(
                     "in the sequence {} there is {} where an item must be",
-                    head.tag, item.tag
-                )));
+                    head.tag,
+                    item.tag
+                ));
             }
-            self.item(&item, sequence_end.unwrap_or(end), depth)?;
-        }
-        match sequence_end {
-            Some(_) => self.within(head.tag, end),
-            None => Err(ContentError::Invalid(format!("the sequence {} has no end", head.tag))),
-        }
+            walk.inside(item, end, ITEM_END, |walk, head, end| walk.content(head, end, depth))
+        })
     }
 
-    fn item(&mut self, item: &Head, end: usize, depth: usize) -> Result<(), ContentError> {
-        let item_end = self.end_of(item, end)?;
-        while self.at < item_end.unwrap_or(end) {
+    /// Walks through the parts of an element, up to its own end or its delimiter.
+    fn inside(
+        &mut self,
+        of: &Head,
+        end: usize,
+        delimiter: Tag,
+        part: impl Fn(&mut Self, &Head, usize) -> Result<(), ContentError>,
+    ) -> Result<(), ContentError> {
+        let own_end = match of.length {
+            UNDEFINED => None,
+            length => Some(self.at + length as usize),
+        };
+        if own_end.is_some_and(|own| own > end) {
+            return Err(self.too_long(of, end).into());
+        }
+        while self.at < own_end.unwrap_or(end) {
             let head = self.head()?;
-            if head.tag == ITEM_END && item_end.is_none() && head.length == 0 {
+            if head.tag == delimiter && own_end.is_none() && head.length == 0 {
                 return Ok(());
             }
-            self.content(&head, item_end.unwrap_or(end), depth)?;
+            part(self, &head, own_end.unwrap_or(end))?;
         }
-        match item_end {
-            Some(_) => self.within(item.tag, end),
-            None => Err(ContentError::Invalid("an item of a sequence has no end".to_owned())),
+        match own_end {
+            Some(_) => self.within(of.tag, end),
+            None => Err(invalid!("the element {} has no end", of.tag)),
         }
-    }
-
-    /// Returns the end of an element; `None` if a delimiter marks it.
-    fn end_of(&self, head: &Head, end: usize) -> Result<Option<usize>, ContentError> {
-        if head.length == UNDEFINED {
-            return Ok(None);
-        }
-        let own = self.at + head.length as usize;
-        if own > end {
-            return Err(self.too_long(head, end).into());
-        }
-        Ok(Some(own))
     }
 
     fn too_long(&self, head: &Head, end: usize) -> String {
@@ -295,24 +287,21 @@ impl<'a> Walk<'a> {
         if self.at <= end {
             return Ok(());
         }
-        Err(ContentError::Invalid(format!(
-            "it is damaged: the element {tag} is longer than its parent"
-        )))
+        Err(invalid!("it is damaged: the element {tag} is longer than its parent"))
     }
 
     fn value(&mut self, head: &Head) -> Result<&'a [u8], ContentError> {
         if head.length == UNDEFINED {
-            return Err(ContentError::Invalid(format!(
-                "the element {} ({}) has no length",
-                head.tag, head.vr
-            )));
+            return Err(invalid!("the element {} ({}) has no length", head.tag, head.vr));
         }
         // The parser takes whole numbers only, and would continue in the middle of the value.
         if !head.length.is_multiple_of(size_of_number(head.vr)) {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "it is damaged: the element {} ({}) has {} bytes, no whole number of values",
-                head.tag, head.vr, head.length
-            )));
+                head.tag,
+                head.vr,
+                head.length
+            ));
         }
         let value = self.bytes.get(self.at..self.at + head.length as usize);
         let value = value.ok_or_else(|| self.too_long(head, self.bytes.len()))?;

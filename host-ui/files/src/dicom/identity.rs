@@ -3,6 +3,7 @@
 use super::checked::Object;
 use super::values::{items, text};
 use super::write::{new_uid, now};
+use dicom_core::Tag;
 use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
 use std::ops::Range;
@@ -11,7 +12,7 @@ use std::ops::Range;
 const MOST: usize = 200;
 
 /// Names of the parts in other formats, in the order of `fields`.
-pub const COLUMNS: [&str; 12] = [
+const NAMES: [&str; 12] = [
     "dicom_patient_name",
     "dicom_patient_id",
     "dicom_birth_date",
@@ -26,13 +27,29 @@ pub const COLUMNS: [&str; 12] = [
     "dicom_position_reference",
 ];
 
-/// Places of the parts of a patient, a study and a frame among [`COLUMNS`].
+/// Their attributes, in the same order.
+const TAGS: [Tag; 12] = [
+    tags::PATIENT_NAME,
+    tags::PATIENT_ID,
+    tags::PATIENT_BIRTH_DATE,
+    tags::PATIENT_SEX,
+    tags::STUDY_INSTANCE_UID,
+    tags::STUDY_DATE,
+    tags::STUDY_TIME,
+    tags::STUDY_ID,
+    tags::ACCESSION_NUMBER,
+    tags::REFERRING_PHYSICIAN_NAME,
+    tags::FRAME_OF_REFERENCE_UID,
+    tags::POSITION_REFERENCE_INDICATOR,
+];
+
+/// Places of the parts of a patient, a study and a frame among [`NAMES`].
 const PATIENT: Range<usize> = 0..4;
 const STUDY: Range<usize> = 4..10;
 const FRAME: Range<usize> = 10..12;
 
 /// Patient, study and frame of a file; a text is empty if the file omits it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Identity {
     /// Name of the patient.
     pub patient_name: String,
@@ -67,37 +84,22 @@ impl Identity {
         Self {
             patient_name: "Stylet^Simulation".to_owned(),
             patient_id: "STYLET".to_owned(),
-            birth_date: String::new(),
-            sex: String::new(),
             study: new_uid(),
             study_date,
             study_time,
-            study_id: String::new(),
-            accession_number: String::new(),
-            referring_physician: String::new(),
             frame_of_reference: new_uid(),
-            position_reference: String::new(),
+            ..Self::default()
         }
     }
 
     /// Returns the identity of a DICOM object.
     pub fn of(object: &Object) -> Self {
-        let data = &object.data;
-        let of = |tag| text(data, tag).unwrap_or_default();
-        Self {
-            patient_name: of(tags::PATIENT_NAME),
-            patient_id: of(tags::PATIENT_ID),
-            birth_date: of(tags::PATIENT_BIRTH_DATE),
-            sex: of(tags::PATIENT_SEX),
-            study: of(tags::STUDY_INSTANCE_UID),
-            study_date: of(tags::STUDY_DATE),
-            study_time: of(tags::STUDY_TIME),
-            study_id: of(tags::STUDY_ID),
-            accession_number: of(tags::ACCESSION_NUMBER),
-            referring_physician: of(tags::REFERRING_PHYSICIAN_NAME),
-            frame_of_reference: frame_of_reference(data).unwrap_or_default(),
-            position_reference: of(tags::POSITION_REFERENCE_INDICATOR),
+        let mut found = Self::default();
+        for (field, tag) in found.fields().into_iter().zip(TAGS) {
+            *field = text(&object.data, tag).unwrap_or_default();
         }
+        found.frame_of_reference = frame_of_reference(&object.data).unwrap_or_default();
+        found
     }
 
     /// Returns the identity with a new study and a new frame where it has none, to write DICOM.
@@ -129,18 +131,24 @@ impl Identity {
         self
     }
 
+    /// Returns all attributes with their texts.
+    pub(super) fn attributes(&self) -> Vec<(Tag, String)> {
+        let mut copy = self.clone();
+        TAGS.into_iter().zip(copy.fields().map(std::mem::take)).collect()
+    }
+
     /// Returns each part that is not empty, with its name in other formats.
     pub fn parts(&self) -> Vec<(&'static str, String)> {
         let mut copy = self.clone();
-        let all = COLUMNS.into_iter().zip(copy.fields());
+        let all = NAMES.into_iter().zip(copy.fields());
         let filled = all.filter(|(_, field)| !field.is_empty());
         filled.map(|(name, field)| (name, printed(field))).collect()
     }
 
     /// Creates an identity from its parts by their names; `None` if there is none.
     pub(crate) fn of_parts<'a>(part: impl Fn(&str) -> Option<&'a str>) -> Option<Self> {
-        let mut found = Self::new();
-        for (name, field) in COLUMNS.into_iter().zip(found.fields()) {
+        let mut found = Self::default();
+        for (name, field) in NAMES.into_iter().zip(found.fields()) {
             *field = printed(part(name).unwrap_or_default());
         }
         let is_uid = |uid: &str| uid.chars().all(|c| c.is_ascii_digit() || c == '.');
@@ -172,12 +180,6 @@ impl Identity {
 
 fn printed(part: &str) -> String {
     part.chars().filter(|c| !c.is_control()).take(MOST).collect()
-}
-
-impl Default for Identity {
-    fn default() -> Self {
-        Self::new()
-    }
 }
 
 /// Returns the frame of reference. A structure set names it with its structures, or only in the

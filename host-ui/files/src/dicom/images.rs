@@ -3,9 +3,10 @@
 use super::super::element::voxel_count;
 use super::super::frame::VoxelFrame;
 use super::super::{Progress, bytes};
-use super::values::{exactly, name, needed, text};
-use super::{Identity, Shared, agree, checked};
-use crate::error::ContentError;
+use super::pixels::{self, Plane};
+use super::values::{name, text};
+use super::{Identity, Object, Shared, agree, checked};
+use crate::error::{ContentError, invalid};
 use dicom_dictionary_std::tags;
 use nalgebra::{Matrix3, Vector3};
 use std::path::{Path, PathBuf};
@@ -47,57 +48,35 @@ pub struct Slice {
     /// Steps from column to column, and from row to row.
     steps: [Vector3<f64>; 2],
     /// Number of columns, rows.
-    size: [u64; 2],
+    size: [usize; 2],
 }
 
-/// Reads the slice in a file; `None` for anything else.
-pub fn slice(file: &[u8]) -> Option<Result<(String, Slice), ContentError>> {
-    let object = checked::is_dicom(file).then(|| checked::read(file).ok())??;
-    let series = text(&object.data, tags::SERIES_INSTANCE_UID)?;
-    object.data.get(tags::IMAGE_POSITION_PATIENT)?;
-    object.data.get(tags::ROWS)?;
+/// Returns the slice of an object; `None` for one that is no image with a place.
+pub fn slice(object: &Object) -> Option<Result<Slice, ContentError>> {
     let data = &object.data;
-    let read = || {
-        let [x, y, z] = exactly(data, tags::IMAGE_POSITION_PATIENT)?.ok_or("no position")?;
-        let [a, b, c, d, e, f] = exactly(data, tags::IMAGE_ORIENTATION_PATIENT)?.ok_or("no orientation")?;
-        let [between_rows, between_columns] = exactly(data, tags::PIXEL_SPACING)?.ok_or("no pixel spacing")?;
-        let size = [tags::COLUMNS, tags::ROWS].map(|t| needed(data, t, 1.0, 65535.0));
-        let [columns, rows] = size;
-        Ok::<_, ContentError>(Slice {
-            uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_default(),
-            sop_class: object.sop_class.clone(),
-            series: series.clone(),
-            study: text(data, tags::STUDY_INSTANCE_UID).unwrap_or_default(),
-            identity: Identity::of(&object),
-            corner: Vector3::new(x, y, z),
-            steps: [
-                Vector3::new(a, b, c) * between_columns,
-                Vector3::new(d, e, f) * between_rows,
-            ],
-            size: [columns? as u64, rows? as u64],
-        })
+    data.get(tags::IMAGE_POSITION_PATIENT)?;
+    data.get(tags::ROWS)?;
+    let series = text(data, tags::SERIES_INSTANCE_UID)?;
+    let plane = || Ok((Plane::of(data, data, data)?, pixels::size(data)?));
+    let of_series = |(plane, size)| Slice {
+        uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_default(),
+        sop_class: object.sop_class.clone(),
+        ..Slice::new((series, Identity::of(object)), &plane, size)
     };
-    let read = read();
-    Some(read.map(|slice| (series, slice)))
+    Some(plane().map(of_series))
 }
 
 impl Slice {
-    /// Creates a slice of a series; corner in LPS, mm, steps from column to column and from row to
-    /// row, columns and rows.
-    pub(super) fn new(
-        (series, identity): (String, Identity),
-        corner: Vector3<f64>,
-        steps: [Vector3<f64>; 2],
-        size: [u64; 2],
-    ) -> Self {
+    /// Creates a slice of a series; `size` is the number of columns, rows.
+    pub(super) fn new((series, identity): (String, Identity), plane: &Plane, size: [usize; 2]) -> Self {
         Self {
             uid: String::new(),
             sop_class: String::new(),
             series,
             study: identity.study.clone(),
             identity,
-            corner,
-            steps,
+            corner: plane.corner,
+            steps: plane.steps(),
             size,
         }
     }
@@ -109,7 +88,7 @@ impl Slice {
 
     /// Returns the number of its pixels.
     pub(super) fn pixels(&self) -> usize {
-        self.size[0] as usize * self.size[1] as usize
+        self.size[0] * self.size[1]
     }
 
     /// Returns the image that a contour lies in; corners in RAS, m.
@@ -167,10 +146,11 @@ fn slices_of(folder: &Path, wanted: impl Fn(&Slice) -> bool) -> Result<Vec<Slice
         if !begins_as_dicom(&path) {
             continue;
         }
-        let Some(read) = bytes::whole(&path, &Progress::default()).ok().and_then(|b| slice(&b)) else {
+        let object = bytes::whole(&path, &Progress::default()).and_then(|file| checked::read(&file));
+        let Some(read) = object.ok().and_then(|object| slice(&object)) else {
             continue;
         };
-        let (_, slice) = read.map_err(|why| format!("the image {}: {why}", path.display()))?;
+        let slice = read.map_err(|why| format!("the image {}: {why}", path.display()))?;
         if wanted(&slice) {
             found.push(slice);
         }
@@ -179,7 +159,7 @@ fn slices_of(folder: &Path, wanted: impl Fn(&Slice) -> bool) -> Result<Vec<Slice
 }
 
 /// Returns whether a file begins like DICOM. Reads only its start, so that large files cost little.
-pub(super) fn begins_as_dicom(path: &Path) -> bool {
+pub(crate) fn begins_as_dicom(path: &Path) -> bool {
     bytes::start(path, 160).is_some_and(|start| checked::is_dicom(&start))
 }
 
@@ -209,9 +189,7 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
         together(&slice.identity, &first.identity, "another of its images")?;
     }
     if !slices.iter().all(alike) {
-        return Err(ContentError::Invalid(
-            "the images of its series differ in size, spacing or orientation; export one series".to_owned(),
-        ));
+        return Err("the images of its series differ in size, spacing or orientation; export one series".into());
     }
     slices.sort_by(|a, b| a.corner.dot(&normal).total_cmp(&b.corner.dot(&normal)));
     let heights: Vec<f64> = slices.iter().map(|s| s.corner.dot(&normal)).collect();
@@ -224,16 +202,16 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
     let most_off = heights.iter().enumerate().map(off).fold(0.0, f64::max);
     let repeated = heights.windows(2).filter(|w| w[1] - w[0] < 1e-3).count();
     if repeated > 0 {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "{repeated} of the {count} images of its series are there twice; keep one series"
-        )));
+        ));
     }
     let is_rounded = most_off <= ROUNDED_MM && most_off < step / 4.0;
     if most_off > UNEVEN * step && !is_rounded {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "the {count} images of its series do not lie at even distances (on average {step:.3} mm, off by up to {most_off:.3} mm): \
              some are missing, or their distances differ"
-        )));
+        ));
     }
     let across = (slices[count - 1].corner - slices[0].corner) / (count - 1) as f64;
     let columns = Matrix3::from_columns(&[first.steps[0], first.steps[1], across].map(|c| ras_from_lps(c) * 1e-3));
@@ -244,12 +222,9 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
             name(tags::IMAGE_POSITION_PATIENT)
         ));
     }
-    let dims = [first.size[0], first.size[1], count as u64];
-    voxel_count(&dims)?;
-    Ok(Some(Grid {
-        dims: dims.map(|d| d as usize),
-        frame,
-    }))
+    let dims = [first.size[0], first.size[1], count];
+    voxel_count(&dims.map(|d| d as u64))?;
+    Ok(Some(Grid { dims, frame }))
 }
 
 #[cfg(test)]

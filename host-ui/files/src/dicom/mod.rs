@@ -11,6 +11,7 @@ pub mod dose;
 mod identity;
 pub mod images;
 mod parse;
+mod pixels;
 pub mod plan;
 pub mod series;
 pub mod structures;
@@ -19,7 +20,7 @@ mod write;
 
 pub use agree::{Agreed, Shared, agree};
 pub use checked::{Object, is_dicom, read, read_head};
-pub use identity::{COLUMNS, Identity};
+pub use identity::Identity;
 pub use write::new_uid;
 
 /// SOP class of an RT Dose.
@@ -30,9 +31,9 @@ pub const RT_PLAN: &str = dicom_dictionary_std::uids::RT_PLAN_STORAGE;
 /// Checks the frame of an image series made of one file twice, one slice apart, to test the reader
 /// alone.
 pub fn image_geometry(bytes: &[u8]) -> Result<(), ContentError> {
-    let Some(read) = images::slice(bytes) else {
+    let Some(read) = checked::read(bytes).ok().and_then(|object| images::slice(&object)) else {
         return Ok(());
     };
-    let (_, slice) = read?;
+    let slice = read?;
     images::grid(vec![slice.clone(), slice]).map(|_| ())
 }

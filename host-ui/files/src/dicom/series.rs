@@ -2,17 +2,17 @@
 
 use super::super::Progress;
 use super::super::bytes;
-use super::super::element::{Element, Endian, MAX_IMAGE_VOXELS, Sink, read_values, short};
+use super::super::element::{Endian, MAX_IMAGE_VOXELS, short};
 use super::super::progress::Stage;
 use super::super::volume::VoxelValues;
 use super::images::{self, Slice};
-use super::values::{items, name, needed, number, numbers, text};
+use super::pixels::{self, Pixel, Plane};
+use super::values::{items, name, needed, number, text};
 use super::{Identity, Object, checked};
-use crate::error::{ContentError, FileError};
+use crate::error::{ContentError, FileError, invalid};
 use dicom_core::Tag;
 use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
-use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -32,17 +32,22 @@ pub fn read(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, FileEr
 }
 
 fn of_path(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, ContentError> {
-    let mut frames = match path.is_dir() {
-        true => of_folder(path, progress)?,
+    let frames = match path.is_dir() {
+        true => of_folder(path, None, progress)?,
         false => {
             let file = bytes::whole(path, progress)?;
-            let (object, pixels, endian) = opened(&file)?;
+            let (object, pixels, endian) = checked::read_with_pixels(&file)?;
             match is_enhanced(&object) {
                 true => enhanced(&object, pixels, endian, progress)?,
                 false => rest_of_series(path, &object, progress)?,
             }
         }
     };
+    volume(frames)
+}
+
+/// Returns the volume of the slices of one series, in any order.
+fn volume(mut frames: Vec<Frame>) -> Result<VoxelValues<f32>, ContentError> {
     let slices: Vec<Slice> = frames.iter().map(|frame| frame.slice.clone()).collect();
     let grid = images::grid(slices)?.ok_or("it is one slice alone; a volume has at least two")?;
     let [columns, rows, _] = grid.dims;
@@ -64,22 +69,19 @@ fn of_path(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, Content
 pub fn modality(path: &Path) -> Result<Option<(String, String)>, FileError> {
     let files = match path.is_dir() {
         true => dicom_files(path).map_err(|why| FileError::of(path, why))?,
-        false if images::begins_as_dicom(path) => vec![path.to_owned()],
-        false => Vec::new(),
+        false => vec![path.to_owned()],
     };
-    for file in files {
-        let Ok(content) = bytes::whole(&file, &Progress::default()) else {
-            continue;
-        };
-        let Ok(object) = checked::read_head(&content) else {
-            continue;
-        };
-        let of = |tag: Tag| text(&object.data, tag).unwrap_or_default();
-        if object.data.get(tags::ROWS).is_some() {
-            return Ok(Some((of(tags::MODALITY), of(tags::RESCALE_TYPE))));
-        }
-    }
-    Ok(None)
+    let of_image = |file: &PathBuf| {
+        let content = bytes::whole(file, &Progress::default()).ok()?;
+        let data = checked::read_head(&content).ok()?.data;
+        data.get(tags::ROWS)?;
+        let of = |tag: Tag| text(&data, tag).unwrap_or_default();
+        Some((of(tags::MODALITY), of(tags::RESCALE_TYPE)))
+    };
+    Ok(files
+        .iter()
+        .filter(|file| images::begins_as_dicom(file))
+        .find_map(of_image))
 }
 
 /// One slice with its values, row by row.
@@ -95,15 +97,16 @@ fn dicom_files(folder: &Path) -> Result<Vec<PathBuf>, ContentError> {
     paths.retain(|path| images::begins_as_dicom(path));
     paths.sort();
     if paths.len() > MAX_FILES {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "it has {} DICOM files; at most {MAX_FILES} are read",
             paths.len()
-        )));
+        ));
     }
     Ok(paths)
 }
 
-fn of_folder(folder: &Path, progress: &Progress) -> Result<Vec<Frame>, ContentError> {
+/// Returns the slices of the only series of a folder, or of the series `wanted`.
+fn of_folder(folder: &Path, wanted: Option<&str>, progress: &Progress) -> Result<Vec<Frame>, ContentError> {
     let paths = dicom_files(folder)?;
     let mut series: BTreeMap<String, (Vec<PathBuf>, String)> = BTreeMap::new();
     let mut unread: Vec<String> = Vec::new();
@@ -133,26 +136,27 @@ fn of_folder(folder: &Path, progress: &Progress) -> Result<Vec<Frame>, ContentEr
             entry.0.push(path.clone());
         }
     }
-    let mut series: Vec<(Vec<PathBuf>, String)> = series.into_values().collect();
     if let Some(why) = unread.first() {
         // One of them may be a slice of the series.
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "{} of its {} DICOM files cannot be read, so an image may be missing: {why}",
             unread.len(),
             paths.len()
-        )));
+        ));
     }
+    series.retain(|uid, _| wanted.is_none_or(|wanted| wanted == uid));
+    let mut series: Vec<(Vec<PathBuf>, String)> = series.into_values().collect();
     let Some((paths, _)) = series.pop() else {
         return Err("it contains no DICOM image series; choose another folder".into());
     };
     if !series.is_empty() {
         let mut all: Vec<String> = series.iter().map(|(p, about)| one_of_several(p, about)).collect();
         all.push(one_of_several(&paths, "the last"));
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "it contains {} series; give a file of the one you mean:\n  {}",
             all.len(),
             all.join("\n  ")
-        )));
+        ));
     }
     frames_of(&paths, progress)
 }
@@ -167,34 +171,18 @@ fn rest_of_series(path: &Path, object: &Object, progress: &Progress) -> Result<V
     if object.data.get(tags::IMAGE_POSITION_PATIENT).is_none() {
         return Err(unplaced(object));
     }
-    let series = text(&object.data, tags::SERIES_INSTANCE_UID);
-    let mut paths = Vec::new();
-    for other in dicom_files(bytes::folder(path))? {
-        let Ok(file) = bytes::whole(&other, &Progress::default()) else {
-            continue;
-        };
-        let of_series = checked::read(&file).map(|o| text(&o.data, tags::SERIES_INSTANCE_UID));
-        let of_series = of_series.map_err(|why| {
-            why.within(format_args!(
-                "{} in its folder cannot be read, so an image may be missing",
-                other.display()
-            ))
-        })?;
-        if of_series == series {
-            paths.push(other);
-        }
-    }
-    frames_of(&paths, progress)
+    let series = text(&object.data, tags::SERIES_INSTANCE_UID).unwrap_or_default();
+    of_folder(bytes::folder(path), Some(&series), progress)
 }
 
 /// Explains why an image without a place in the patient is refused.
 fn unplaced(object: &Object) -> ContentError {
     let modality = text(&object.data, tags::MODALITY).unwrap_or_default();
-    ContentError::Invalid(format!(
+    invalid!(
         "its {} image does not give its position in the patient ({}); export a volume with a position, or as NRRD",
         short(&modality),
         name(tags::IMAGE_POSITION_PATIENT)
-    ))
+    )
 }
 
 fn frames_of(paths: &[PathBuf], progress: &Progress) -> Result<Vec<Frame>, ContentError> {
@@ -203,120 +191,72 @@ fn frames_of(paths: &[PathBuf], progress: &Progress) -> Result<Vec<Frame>, Conte
         progress.report(Stage::Voxels, n, paths.len())?;
         let within = |why: ContentError| why.within(path.display());
         let file = bytes::whole(path, &Progress::default())?;
-        let (object, pixels, endian) = opened(&file).map_err(within)?;
+        let (object, pixels, endian) = checked::read_with_pixels(&file).map_err(within)?;
         if is_enhanced(&object) {
             frames.extend(enhanced(&object, pixels, endian, progress).map_err(within)?);
             continue;
         }
-        let (_, slice) = images::slice(&file).ok_or_else(|| unplaced(&object))?.map_err(within)?;
-        let pixel = Pixel::of(&object.data).map_err(within)?;
-        let scale = scale_of(&object.data).map_err(within)?;
-        check_size(slice.pixels(), paths.len())?;
-        let values = pixel.values(pixels, endian, slice.pixels(), scale).map_err(within)?;
-        frames.push(Frame { slice, values });
+        let frame = frame_of(&object, pixels, endian).map_err(within)?;
+        check_size(frame.values.len(), paths.len())?;
+        frames.push(frame);
     }
     Ok(frames)
 }
 
-fn opened(file: &[u8]) -> Result<(Object, &[u8], Endian), ContentError> {
-    let (object, pixels, is_big_endian) = checked::read_with_pixels(file)?;
-    Ok((object, pixels, if is_big_endian { Endian::Big } else { Endian::Little }))
+/// Reads the slice in an object.
+fn frame_of(object: &Object, pixels: &[u8], endian: Endian) -> Result<Frame, ContentError> {
+    let slice = images::slice(object).ok_or_else(|| unplaced(object))??;
+    let scale = scale_of(Some(&object.data), &modality_of(object)?)?;
+    let values = Pixel::of(&object.data)?.values(pixels, endian, slice.pixels())?;
+    Ok(Frame {
+        slice,
+        values: scaled(values, scale),
+    })
+}
+
+fn modality_of(object: &Object) -> Result<String, ContentError> {
+    let missing = || {
+        invalid!(
+            "{} is missing, so the meaning of its values is not known",
+            name(tags::MODALITY)
+        )
+    };
+    text(&object.data, tags::MODALITY).ok_or_else(missing)
 }
 
 fn is_enhanced(object: &Object) -> bool {
     object.data.get(tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE).is_some()
 }
 
-/// Returns slope and intercept from the stored number to the value.
-fn scale_of(data: &InMemDicomObject) -> Result<[f64; 2], ContentError> {
-    if text(data, tags::MODALITY).as_deref() == Some("CT") {
-        for tag in [tags::RESCALE_SLOPE, tags::RESCALE_INTERCEPT] {
-            number(data, tag)?.ok_or_else(|| format!("{} is missing, so its values are not in HU", name(tag)))?;
+/// Returns slope and intercept from the stored number to the value; only values of a CT must have them.
+fn scale_of(data: Option<&InMemDicomObject>, modality: &str) -> Result<[f64; 2], ContentError> {
+    let given = |tag: Tag| data.map_or(Ok(None), |data| number(data, tag));
+    match (given(tags::RESCALE_SLOPE)?, given(tags::RESCALE_INTERCEPT)?) {
+        (Some(0.0), _) => Err(invalid!("{} is 0", name(tags::RESCALE_SLOPE))),
+        (Some(slope), Some(intercept)) => Ok([slope, intercept]),
+        (None, None) if modality != "CT" => Ok([1.0, 0.0]),
+        (slope, _) => {
+            let missing = if slope.is_none() {
+                tags::RESCALE_SLOPE
+            } else {
+                tags::RESCALE_INTERCEPT
+            };
+            Err(invalid!("{} is missing, so its values are not in HU", name(missing)))
         }
     }
-    let slope = number(data, tags::RESCALE_SLOPE)?.unwrap_or(1.0);
-    let intercept = number(data, tags::RESCALE_INTERCEPT)?.unwrap_or(0.0);
-    if slope == 0.0 {
-        return Err(ContentError::Invalid(format!("{} is 0", name(tags::RESCALE_SLOPE))));
-    }
-    Ok([slope, intercept])
+}
+
+fn scaled(values: Vec<f64>, [slope, intercept]: [f64; 2]) -> Vec<f32> {
+    let scaled = |value: f64| (value * slope + intercept) as f32;
+    values.into_iter().map(scaled).collect()
 }
 
 fn check_size(of_slice: usize, slices: usize) -> Result<(), ContentError> {
     match of_slice.saturating_mul(slices) {
         0..=MAX_IMAGE_VOXELS => Ok(()),
-        count => Err(ContentError::Invalid(format!(
+        count => Err(invalid!(
             "it has {count} voxels, more than {MAX_IMAGE_VOXELS}; export a part of it"
-        ))),
-    }
-}
-
-/// Storage of a pixel.
-struct Pixel {
-    element: Element,
-    /// Significant bits, and whether the highest of them is a sign.
-    stored: u32,
-    is_signed: bool,
-}
-
-impl Pixel {
-    fn of(data: &InMemDicomObject) -> Result<Self, ContentError> {
-        let samples = number(data, tags::SAMPLES_PER_PIXEL)?.unwrap_or(1.0);
-        let kind = text(data, tags::PHOTOMETRIC_INTERPRETATION).unwrap_or_else(|| "MONOCHROME2".to_owned());
-        if samples != 1.0 || kind != "MONOCHROME2" {
-            return Err(ContentError::Invalid(format!(
-                "its pixels are {} with {samples} values each; images with one grey a pixel (MONOCHROME2) are read",
-                short(&kind)
-            )));
-        }
-        let bits = needed(data, tags::BITS_ALLOCATED, 1.0, 64.0)?;
-        let is_signed = number(data, tags::PIXEL_REPRESENTATION)?.unwrap_or(0.0) == 1.0;
-        let element = match (bits as u32, is_signed) {
-            (8, _) => Element::U8,
-            (16, _) => Element::U16,
-            (32, _) => Element::U32,
-            _ => {
-                return Err(ContentError::Invalid(format!(
-                    "its pixels have {bits} bits; 8, 16 and 32 are read"
-                )));
-            }
-        };
-        let stored = number(data, tags::BITS_STORED)?.unwrap_or(bits);
-        let high = number(data, tags::HIGH_BIT)?.unwrap_or(stored - 1.0);
-        if !(1.0..=bits).contains(&stored) || high != stored - 1.0 {
-            return Err(ContentError::Invalid(format!(
-                "{stored} of its {bits} bits count, up to bit {high}; images whose bits begin at the lowest are read"
-            )));
-        }
-        Ok(Self {
-            element,
-            stored: stored as u32,
-            is_signed,
-        })
-    }
-
-    /// Reads the values of this number of pixels.
-    fn values(
-        &self,
-        pixels: &[u8],
-        endian: Endian,
-        count: usize,
-        [slope, intercept]: [f64; 2],
-    ) -> Result<Vec<f32>, ContentError> {
-        let progress = Progress::default();
-        let raw = read_values(pixels, self.element, endian, count, [1.0, 0.0], Sink::exact(&progress))?;
-        // Bits above the significant ones may hold overlays.
-        let kept = (1_u64 << self.stored) - 1;
-        let sign = 1_u64 << (self.stored - 1);
-        let value = |raw: f64| {
-            let bits = raw as u64 & kept;
-            let number = match self.is_signed && bits & sign != 0 {
-                true => bits as f64 - (kept + 1) as f64,
-                false => bits as f64,
-            };
-            (number * slope + intercept) as f32
-        };
-        Ok(raw.into_iter().map(value).collect())
+        )),
     }
 }
 
@@ -326,70 +266,46 @@ fn enhanced(object: &Object, pixels: &[u8], endian: Endian, progress: &Progress)
     let count = needed(data, tags::NUMBER_OF_FRAMES, 1.0, MAX_FRAMES)? as usize;
     let own = items(data, tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE);
     if own.len() != count {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "it says {count} frames and describes {}; export it again",
             own.len()
-        )));
+        ));
     }
     let shared = items(data, tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE).first();
-    let size = [tags::COLUMNS, tags::ROWS].map(|tag| needed(data, tag, 1.0, 65_535.0));
-    let [columns, rows] = size;
-    let size = [columns? as u64, rows? as u64];
+    let size = pixels::size(data)?;
     let pixel = Pixel::of(data)?;
-    let of_frame = size[0] as usize * size[1] as usize;
+    let of_frame = size[0] * size[1];
     check_size(of_frame, count)?;
-    let bytes = of_frame * pixel.element.bytes();
+    let bytes = of_frame * pixel.bytes();
     let series = text(data, tags::SERIES_INSTANCE_UID).unwrap_or_default();
+    let modality = modality_of(object)?;
     let mut frames = Vec::new();
     for (n, groups) in own.iter().enumerate() {
         progress.report(Stage::Voxels, n, count)?;
         let group = |sequence: Tag| {
-            let of = |groups: &'_ InMemDicomObject| items(groups, sequence).first().cloned();
+            let of = |groups: &InMemDicomObject| items(groups, sequence).first().cloned();
             of(groups).or_else(|| shared.and_then(of))
         };
-        let three = |sequence: Tag, tag: Tag| match group(sequence) {
-            Some(item) => numbers(&item, tag),
-            None => Ok(None),
-        };
-        let missing = |tag: Tag| ContentError::Invalid(format!("{} of frame {} is missing", name(tag), n + 1));
-        let place = three(tags::PLANE_POSITION_SEQUENCE, tags::IMAGE_POSITION_PATIENT)?;
-        let turn = three(tags::PLANE_ORIENTATION_SEQUENCE, tags::IMAGE_ORIENTATION_PATIENT)?;
-        let pitch = three(tags::PIXEL_MEASURES_SEQUENCE, tags::PIXEL_SPACING)?;
-        let (Some(&[x, y, z]), Some(&[a, b, c, d, e, f]), Some(&[between_rows, between_columns])) =
-            (place.as_deref(), turn.as_deref(), pitch.as_deref())
-        else {
-            return Err(match (&place, &turn) {
-                (None, _) if items(groups, tags::PLANE_POSITION_VOLUME_SEQUENCE).is_empty() => {
-                    missing(tags::IMAGE_POSITION_PATIENT)
-                }
-                (None, _) => {
-                    "its frames are positioned relative to the probe, not the patient; export it as NRRD".into()
-                }
-                (_, None) => missing(tags::IMAGE_ORIENTATION_PATIENT),
-                _ => missing(tags::PIXEL_SPACING),
-            });
-        };
+        let attributes = |sequence: Tag| group(sequence).unwrap_or_else(InMemDicomObject::new_empty);
+        let place = attributes(tags::PLANE_POSITION_SEQUENCE);
+        let is_relative = !items(groups, tags::PLANE_POSITION_VOLUME_SEQUENCE).is_empty();
+        if is_relative && place.get(tags::IMAGE_POSITION_PATIENT).is_none() {
+            return Err("its frames are positioned relative to the probe, not the patient; export it as NRRD".into());
+        }
+        let [turn, spacing] = [tags::PLANE_ORIENTATION_SEQUENCE, tags::PIXEL_MEASURES_SEQUENCE].map(attributes);
+        let plane = Plane::of(&place, &turn, &spacing);
+        let plane = plane.map_err(|why| why.within(format_args!("frame {}", n + 1)))?;
         let scale = group(tags::PIXEL_VALUE_TRANSFORMATION_SEQUENCE);
-        let scale = scale.as_ref().map_or(Ok([1.0, 0.0]), scale_of)?;
+        let scale = scale_of(scale.as_ref(), &modality)?;
         let raw = pixels.get(n * bytes..(n + 1) * bytes).ok_or_else(|| {
-            ContentError::Invalid(format!(
+            invalid!(
                 "it is truncated: frame {} of {count} is missing; copy or export it again",
                 n + 1
-            ))
+            )
         })?;
-        let slice = Slice::new(
-            (series.clone(), Identity::of(object)),
-            Vector3::new(x, y, z),
-            [
-                Vector3::new(a, b, c) * between_columns,
-                Vector3::new(d, e, f) * between_rows,
-            ],
-            size,
-        );
-        frames.push(Frame {
-            slice,
-            values: pixel.values(raw, endian, of_frame, scale)?,
-        });
+        let values = scaled(pixel.values(raw, endian, of_frame)?, scale);
+        let slice = Slice::new((series.clone(), Identity::of(object)), &plane, size);
+        frames.push(Frame { slice, values });
     }
     Ok(frames)
 }

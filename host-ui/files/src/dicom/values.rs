@@ -1,7 +1,7 @@
 //! Values from a DICOM object, as checked text and numbers.
 
 use super::super::element::short;
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use dicom_core::Tag;
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::value::{PrimitiveValue, Value};
@@ -43,7 +43,7 @@ pub fn numbers(object: &InMemDicomObject, tag: Tag) -> Result<Option<Vec<f64>>, 
     };
     let wrong = || {
         let shown = short(&shown);
-        ContentError::Invalid(format!("{} is \"{shown}\", which is not a list of numbers", name(tag)))
+        invalid!("{} is \"{shown}\", which is not a list of numbers", name(tag))
     };
     let values = element.to_multi_float64().map_err(|_| wrong())?;
     if values.iter().all(|v| v.is_finite()) {
@@ -63,18 +63,20 @@ pub fn exactly<const N: usize>(object: &InMemDicomObject, tag: Tag) -> Result<Op
         .map_err(|_| format!("{} has {count} values; it must have {N}", name(tag)).into())
 }
 
+/// Returns mandatory numbers.
+pub fn given<const N: usize>(object: &InMemDicomObject, tag: Tag) -> Result<[f64; N], ContentError> {
+    exactly(object, tag)?.ok_or_else(|| format!("{} is missing", name(tag)).into())
+}
+
 pub fn number(object: &InMemDicomObject, tag: Tag) -> Result<Option<f64>, ContentError> {
     Ok(exactly::<1>(object, tag)?.map(|[v]| v))
 }
 
 /// Returns a mandatory number within limits.
 pub fn needed(object: &InMemDicomObject, tag: Tag, least: f64, most: f64) -> Result<f64, ContentError> {
-    match number(object, tag)? {
-        Some(v) if (least..=most).contains(&v) => Ok(v),
-        Some(v) => Err(ContentError::Invalid(format!(
-            "{} is {v}; allowed are {least} to {most}",
-            name(tag)
-        ))),
-        None => Err(ContentError::Invalid(format!("{} is missing", name(tag)))),
+    let [v] = given(object, tag)?;
+    match (least..=most).contains(&v) {
+        true => Ok(v),
+        false => Err(invalid!("{} is {v}; allowed are {least} to {most}", name(tag))),
     }
 }

@@ -2,9 +2,10 @@
 
 use super::Identity;
 use crate::error::ContentError;
+use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::value::{DataSetSequence, PrimitiveValue};
 use dicom_core::{DataElement, Length, Tag, VR};
-use dicom_dictionary_std::{tags, uids};
+use dicom_dictionary_std::{StandardDataDictionary, tags, uids};
 use dicom_object::{FileMetaTableBuilder, InMemDicomObject};
 use std::hash::{BuildHasher, Hasher, RandomState};
 
@@ -17,8 +18,24 @@ pub fn new_uid() -> String {
     format!("2.25.{}", (random() << 64 | random()).max(1))
 }
 
-pub fn string(tag: Tag, vr: VR, value: &str) -> DataElement<InMemDicomObject> {
-    DataElement::new(tag, vr, PrimitiveValue::from(value))
+/// Returns a text of the kind that the standard gives its tag, cut to the length of that kind.
+pub fn string(tag: Tag, value: &str) -> DataElement<InMemDicomObject> {
+    let most = match kind(tag) {
+        VR::SH => 16,
+        VR::LO => 64,
+        _ => usize::MAX,
+    };
+    whole_string(tag, &value.chars().take(most).collect::<String>())
+}
+
+/// Like [`string`], of any length.
+fn whole_string(tag: Tag, value: &str) -> DataElement<InMemDicomObject> {
+    DataElement::new(tag, kind(tag), PrimitiveValue::from(value))
+}
+
+fn kind(tag: Tag) -> VR {
+    let known = StandardDataDictionary.by_tag(tag);
+    known.map_or(VR::UN, |entry| entry.vr().relaxed())
 }
 
 /// Writes numbers as text, within the 16 characters available.
@@ -46,13 +63,13 @@ fn decimal(value: f64) -> String {
 /// Returns one item that refers to another object by its class and its UID.
 pub fn reference(sop_class: &str, uid: &str) -> InMemDicomObject {
     item([
-        string(tags::REFERENCED_SOP_CLASS_UID, VR::UI, sop_class),
-        string(tags::REFERENCED_SOP_INSTANCE_UID, VR::UI, uid),
+        string(tags::REFERENCED_SOP_CLASS_UID, sop_class),
+        string(tags::REFERENCED_SOP_INSTANCE_UID, uid),
     ])
 }
 
 pub fn whole(tag: Tag, value: usize) -> DataElement<InMemDicomObject> {
-    string(tag, VR::IS, &value.to_string())
+    string(tag, &value.to_string())
 }
 
 pub fn sequence(tag: Tag, items: Vec<InMemDicomObject>) -> DataElement<InMemDicomObject> {
@@ -66,36 +83,24 @@ pub fn item(elements: impl IntoIterator<Item = DataElement<InMemDicomObject>>) -
 /// Returns the modules of patient, study, series, frame and equipment.
 pub fn common(sop_class: &str, modality: &str, of: &Identity) -> InMemDicomObject {
     let (date, time) = now();
-    item([
-        string(tags::SPECIFIC_CHARACTER_SET, VR::CS, "ISO_IR 192"),
-        string(tags::SOP_CLASS_UID, VR::UI, sop_class),
-        string(tags::SOP_INSTANCE_UID, VR::UI, &new_uid()),
-        string(tags::STUDY_DATE, VR::DA, &of.study_date),
-        string(tags::STUDY_TIME, VR::TM, &of.study_time),
-        string(tags::INSTANCE_CREATION_DATE, VR::DA, &date),
-        string(tags::INSTANCE_CREATION_TIME, VR::TM, &time),
-        string(tags::ACCESSION_NUMBER, VR::SH, &of.accession_number),
-        string(tags::MODALITY, VR::CS, modality),
-        string(tags::MANUFACTURER, VR::LO, "Stylet"),
-        string(
-            tags::MANUFACTURER_MODEL_NAME,
-            VR::LO,
-            "Stylet simulator, not for treatment",
-        ),
-        string(tags::SOFTWARE_VERSIONS, VR::LO, env!("CARGO_PKG_VERSION")),
-        string(tags::REFERRING_PHYSICIAN_NAME, VR::PN, &of.referring_physician),
-        string(tags::OPERATORS_NAME, VR::PN, ""),
-        string(tags::PATIENT_NAME, VR::PN, &of.patient_name),
-        string(tags::PATIENT_ID, VR::LO, &of.patient_id),
-        string(tags::PATIENT_BIRTH_DATE, VR::DA, &of.birth_date),
-        string(tags::PATIENT_SEX, VR::CS, &of.sex),
-        string(tags::STUDY_INSTANCE_UID, VR::UI, &of.study),
-        string(tags::SERIES_INSTANCE_UID, VR::UI, &new_uid()),
-        string(tags::STUDY_ID, VR::SH, &of.study_id),
-        string(tags::SERIES_NUMBER, VR::IS, "1"),
-        string(tags::FRAME_OF_REFERENCE_UID, VR::UI, &of.frame_of_reference),
-        string(tags::POSITION_REFERENCE_INDICATOR, VR::LO, &of.position_reference),
-    ])
+    let mut object = item([
+        string(tags::SPECIFIC_CHARACTER_SET, "ISO_IR 192"),
+        string(tags::SOP_CLASS_UID, sop_class),
+        string(tags::SOP_INSTANCE_UID, &new_uid()),
+        string(tags::INSTANCE_CREATION_DATE, &date),
+        string(tags::INSTANCE_CREATION_TIME, &time),
+        string(tags::MODALITY, modality),
+        string(tags::MANUFACTURER, "Stylet"),
+        string(tags::MANUFACTURER_MODEL_NAME, "Stylet simulator, not for treatment"),
+        string(tags::SOFTWARE_VERSIONS, env!("CARGO_PKG_VERSION")),
+        string(tags::OPERATORS_NAME, ""),
+        string(tags::SERIES_INSTANCE_UID, &new_uid()),
+        string(tags::SERIES_NUMBER, "1"),
+    ]);
+    for (tag, value) in of.attributes() {
+        object.put(whole_string(tag, &value));
+    }
+    object
 }
 
 /// Returns date and time of UTC in DICOM format.

@@ -43,9 +43,8 @@ pub struct SeedFile {
 /// Reads a table of seeds or a DICOM RT Plan, which gives the strengths itself. A table has the
 /// columns
 /// `x_mm,y_mm,z_mm[,axis_x,axis_y,axis_z][,strength_u|activity_mci][,strength_date][,needle][,hole]`,
-/// and those of [`dicom::COLUMNS`], which are skipped. It may also have columns that state their quantity and unit,
-/// such as "Pos X (cm)", or any columns that [`SeedDefaults::columns`] names. Commas, semicolons or
-/// tabs separate them.
+/// and those of `find-seeds`. It may also have columns that state their quantity and unit, such as "Pos X (cm)", or any
+/// columns that [`SeedDefaults::columns`] names. Commas, semicolons or tabs separate them.
 pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileError> {
     let is_plan = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
     if is_plan {
@@ -56,7 +55,6 @@ pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileE
         &AXIS,
         &["strength_u", "activity_mci", "strength_date", "needle", "hole"],
         &FOUND,
-        &dicom::COLUMNS,
     ]
     .concat();
     let row = |row: &Row| {

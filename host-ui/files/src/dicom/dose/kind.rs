@@ -2,7 +2,7 @@
 
 use super::super::super::element::short;
 use super::super::values::{name, text};
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
 
@@ -56,12 +56,12 @@ impl DoseKind {
                 Ok(known[0].to_owned())
             }
             Some(value) if known.contains(&value.as_str()) => Ok(value),
-            Some(value) => Err(ContentError::Invalid(format!(
+            Some(value) => Err(invalid!(
                 "{} is \"{}\"; it must be one of {}",
                 name(tag),
                 short(&value),
                 known.join(", ")
-            ))),
+            )),
         };
         let kind = Self {
             dose_type: one(tags::DOSE_TYPE, &TYPES)?,
@@ -108,12 +108,12 @@ impl DoseKind {
         if self.dose_type == other.dose_type {
             return Ok(());
         }
-        Err(ContentError::Invalid(format!(
+        Err(invalid!(
             "{} is {}, and that of the other dose {}; give doses of one type",
             name(tags::DOSE_TYPE),
             other.dose_type,
             self.dose_type
-        )))
+        ))
     }
 
     /// Refuses to write what only refers to a part of a plan: the references to it are not kept.
@@ -121,11 +121,11 @@ impl DoseKind {
         if self.summation == PLAN {
             return Ok(());
         }
-        Err(ContentError::Invalid(format!(
+        Err(invalid!(
             "{} is {}, and only the dose of a whole plan is written as RT Dose; convert it to .nrrd or .csv",
             name(tags::DOSE_SUMMATION_TYPE),
             self.summation
-        )))
+        ))
     }
 
     /// Returns comment lines for a table; none for the dose of a plan.

@@ -1,12 +1,13 @@
 //! A dose from DICOM: any even grid along the patient's axes, whatever the directions of its rows
 //! and frames.
 
-use super::super::super::element::{short, voxel_count};
-use super::super::values::{exactly, items, name, needed, number, numbers, text};
+use super::super::super::element::{Endian, short, voxel_count};
+use super::super::pixels::{self, Pixel, Plane};
+use super::super::values::{items, name, needed, number, numbers, text};
 use super::super::{Object, checked};
 use super::DoseKind;
 use crate::VoxelValues;
-use crate::error::{ContentError, FileError};
+use crate::error::{ContentError, FileError, invalid};
 use crate::progress::Progress;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
@@ -47,45 +48,39 @@ pub struct ReadDose {
 pub fn of_file(path: &Path) -> Result<ReadDose, FileError> {
     let refused = |why| FileError::of(path, why);
     let bytes = crate::bytes::whole(path, &Progress::default()).map_err(refused)?;
-    let (object, pixels, is_big_endian) = checked::read_with_pixels(&bytes).map_err(refused)?;
-    of(&object, pixels, is_big_endian).map_err(refused)
+    let (object, pixels, endian) = checked::read_with_pixels(&bytes).map_err(refused)?;
+    of(&object, pixels, endian).map_err(refused)
 }
 
-pub(in crate::dicom) fn of(object: &Object, pixels: &[u8], is_big_endian: bool) -> Result<ReadDose, ContentError> {
+pub(in crate::dicom) fn of(object: &Object, pixels: &[u8], endian: Endian) -> Result<ReadDose, ContentError> {
     if object.sop_class != uids::RT_DOSE_STORAGE {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "it is DICOM of another kind (SOP class {}); a dose is an RT Dose",
             short(&object.sop_class)
-        )));
+        ));
     }
     let data = &object.data;
     let units = text(data, tags::DOSE_UNITS).unwrap_or_default();
     if units != "GY" {
         let units = short(&units);
-        return Err(ContentError::Invalid(format!(
-            "its dose is in \"{units}\"; only doses in GY are read"
-        )));
+        return Err(invalid!("its dose is in \"{units}\"; only doses in GY are read"));
     }
     let grid = Layout::of(data)?;
-    let raw = values(data, pixels, is_big_endian, grid.counts.iter().product())?;
+    let raw = Pixel::of(data)?
+        .whole()?
+        .values(pixels, endian, grid.counts.iter().product())?;
     let scaling = needed(data, tags::DOSE_GRID_SCALING, f64::MIN_POSITIVE, 1e12)?;
     let first = |tag| {
         let item = items(data, tag).first()?;
         text(item, tags::REFERENCED_SOP_INSTANCE_UID)
     };
-    let (kind, mut notes) = DoseKind::of(data)?;
-    let dose_gy: Vec<f64> = grid.in_order(&raw).map(|value| value * scaling).collect();
-    notes.extend(negative(&dose_gy));
+    let (kind, notes) = DoseKind::of(data)?;
+    let values: Vec<f64> = raw.iter().map(|value| value * scaling).collect();
     Ok(ReadDose {
-        kind,
-        notes,
         uid: text(data, tags::SOP_INSTANCE_UID).unwrap_or_default(),
         plan: first(tags::REFERENCED_RT_PLAN_SEQUENCE),
         structure_set: first(tags::REFERENCED_STRUCTURE_SET_SEQUENCE),
-        dims: grid.dims(),
-        origin_m: grid.origin_m(),
-        spacing_m: grid.spacing_m(),
-        dose_gy,
+        ..grid.dose(&values, kind, notes)
     })
 }
 
@@ -94,29 +89,11 @@ pub fn of_volume(volume: &VoxelValues<f64>, kind: DoseKind) -> Result<ReadDose, 
     let frame = &volume.frame;
     let steps = [0, 1, 2].map(|a| frame.directions.column(a) * frame.spacing_m[a]);
     let grid = Layout::along(volume.dims, frame.origin_m, steps)?;
-    let dose_gy: Vec<f64> = grid.in_order(&volume.values).collect();
-    if !dose_gy.iter().all(|gy| gy.is_finite()) {
+    if !volume.values.iter().all(|gy| gy.is_finite()) {
         return Err("it contains a value that is not a number; write it again".into());
     }
-    let mut notes: Vec<String> = frame.warning.iter().cloned().collect();
-    notes.extend(kind.remarks());
-    notes.extend(negative(&dose_gy));
-    Ok(ReadDose {
-        kind,
-        notes,
-        uid: String::new(),
-        plan: None,
-        structure_set: None,
-        dims: grid.dims(),
-        origin_m: grid.origin_m(),
-        spacing_m: grid.spacing_m(),
-        dose_gy,
-    })
-}
-
-fn negative(dose_gy: &[f64]) -> Option<String> {
-    let lowest = dose_gy.iter().copied().fold(0.0, f64::min);
-    (lowest < 0.0).then(|| format!("it has negative doses, the lowest of {lowest:.3} Gy"))
+    let notes = frame.warning.iter().cloned().chain(kind.remarks()).collect();
+    Ok(grid.dose(&volume.values, kind, notes))
 }
 
 /// Layout of a file's voxels in the patient: columns, rows and frames, in this order, each with an
@@ -134,29 +111,23 @@ struct Layout {
 
 impl Layout {
     fn of(data: &InMemDicomObject) -> Result<Self, ContentError> {
-        let missing = |tag| ContentError::Invalid(format!("{} is missing", name(tag)));
-        let count = |tag| needed(data, tag, 1.0, 65535.0).map(|n| n as usize);
         let frames = match text(data, tags::NUMBER_OF_FRAMES) {
-            Some(_) => count(tags::NUMBER_OF_FRAMES)?,
+            Some(_) => needed(data, tags::NUMBER_OF_FRAMES, 1.0, 65535.0)? as usize,
             None => 1,
         };
-        let counts = [count(tags::COLUMNS)?, count(tags::ROWS)?, frames];
+        let [columns, rows] = pixels::size(data)?;
+        let counts = [columns, rows, frames];
         voxel_count(&counts.map(|c| c as u64))?;
-        let tag = tags::IMAGE_POSITION_PATIENT;
-        let first: [f64; 3] = exactly(data, tag)?.ok_or_else(|| missing(tag))?;
-        let tag = tags::IMAGE_ORIENTATION_PATIENT;
-        let [a, b, c, d, e, f] = exactly(data, tag)?.ok_or_else(|| missing(tag))?;
-        let tag = tags::PIXEL_SPACING;
-        let [between_rows, between_columns] = exactly(data, tag)?.ok_or_else(|| missing(tag))?;
-        let (row, column) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
-        let across = row.cross(&column);
+        let plane = Plane::of(data, data, data)?;
+        let across = plane.directions[0].cross(&plane.directions[1]);
+        let [along_rows, along_columns] = plane.steps();
         let steps = [
-            row * between_columns,
-            column * between_rows,
-            across * frame_step_mm(data, frames, Vector3::from(first), across)?,
+            along_rows,
+            along_columns,
+            across * frame_step_mm(data, frames, plane.corner, across)?,
         ];
         let in_ras = |mm: Vector3<f64>| ras_from_lps(mm) * 1e-3;
-        Self::along(counts, in_ras(Vector3::from(first)), steps.map(in_ras))
+        Self::along(counts, in_ras(plane.corner), steps.map(in_ras))
     }
 
     /// Creates a layout from the counts, the centre of the first voxel and the steps along columns,
@@ -184,6 +155,26 @@ impl Layout {
             steps_m,
             first_m,
         })
+    }
+
+    /// Returns the dose of values in the order of the file.
+    fn dose(&self, values: &[f64], kind: DoseKind, mut notes: Vec<String>) -> ReadDose {
+        let dose_gy: Vec<f64> = self.in_order(values).collect();
+        let lowest = dose_gy.iter().copied().fold(0.0, f64::min);
+        if lowest < 0.0 {
+            notes.push(format!("it has negative doses, the lowest of {lowest:.3} Gy"));
+        }
+        ReadDose {
+            kind,
+            notes,
+            uid: String::new(),
+            plan: None,
+            structure_set: None,
+            dims: self.dims(),
+            origin_m: self.origin_m(),
+            spacing_m: self.spacing_m(),
+            dose_gy,
+        }
     }
 
     /// Reorders columns, rows and frames to the patient's x, y, z.
@@ -231,11 +222,11 @@ fn frame_step_mm(
     across: Vector3<f64>,
 ) -> Result<f64, ContentError> {
     if frames == 1 {
-        let thickness = exactly::<1>(data, tags::SLICE_THICKNESS)?.map(|[mm]| mm);
+        let thickness = number(data, tags::SLICE_THICKNESS)?;
         return Ok(thickness.filter(|mm| *mm > 0.0).unwrap_or(1.0));
     }
     let offsets = numbers(data, tags::GRID_FRAME_OFFSET_VECTOR)?.unwrap_or_default();
-    let refused = |why: String| ContentError::Invalid(format!("{} {why}", name(tags::GRID_FRAME_OFFSET_VECTOR)));
+    let refused = |why: String| invalid!("{} {why}", name(tags::GRID_FRAME_OFFSET_VECTOR));
     if offsets.len() != frames {
         return Err(refused(format!("has {} values for {frames} frames", offsets.len())));
     }
@@ -256,57 +247,4 @@ fn frame_step_mm(
         true => -step,
         false => step,
     })
-}
-
-/// Returns the stored numbers, unscaled.
-fn values(data: &InMemDicomObject, pixels: &[u8], is_big_endian: bool, count: usize) -> Result<Vec<f64>, ContentError> {
-    let bits = needed(data, tags::BITS_ALLOCATED, 1.0, 64.0)?;
-    if ![16.0, 32.0].contains(&bits) {
-        return Err(ContentError::Invalid(format!(
-            "its doses have {bits} bits; 16 and 32 are read"
-        )));
-    }
-    let is_signed = needed(data, tags::PIXEL_REPRESENTATION, 0.0, 1.0)? == 1.0;
-    for (tag, whole) in [
-        (tags::BITS_STORED, bits),
-        (tags::HIGH_BIT, bits - 1.0),
-        (tags::SAMPLES_PER_PIXEL, 1.0),
-    ] {
-        if let Some(value) = number(data, tag)?.filter(|value| *value != whole) {
-            return Err(ContentError::Invalid(format!(
-                "{} is {value}; doses of {bits} bits have {whole}",
-                name(tag)
-            )));
-        }
-    }
-    let size = bits as usize / 8;
-    // One byte more makes an odd length even.
-    if pixels.len() > (count * size).next_multiple_of(2) {
-        return Err(ContentError::Invalid(format!(
-            "{count} voxels need {} bytes, and {} are there: NumberOfFrames, Rows or Columns are not those of its pixels",
-            count * size,
-            pixels.len()
-        )));
-    }
-    if pixels.len() < count * size {
-        return Err(ContentError::Invalid(format!(
-            "it is truncated: {count} voxels need {} bytes, and {} are there; copy or export it again",
-            count * size,
-            pixels.len()
-        )));
-    }
-    let value = |bytes: &[u8]| {
-        let mut b = [0_u8; 4];
-        b[..size].copy_from_slice(bytes);
-        if is_big_endian {
-            b[..size].reverse();
-        }
-        let unsigned = u32::from_le_bytes(b);
-        match (is_signed, size) {
-            (false, _) => f64::from(unsigned),
-            (true, 2) => f64::from(unsigned as u16 as i16),
-            (true, _) => f64::from(unsigned as i32),
-        }
-    };
-    Ok(pixels.chunks_exact(size).take(count).map(value).collect())
 }

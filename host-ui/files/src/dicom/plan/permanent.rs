@@ -3,7 +3,7 @@
 use super::super::super::element::short;
 use super::super::values::{items, name, number, text};
 use super::PlanSource;
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
 use stylet_base::nuclide::Nuclide;
@@ -15,13 +15,13 @@ pub fn is_brachytherapy(data: &InMemDicomObject) -> Result<(), ContentError> {
     let beams = items(data, tags::BEAM_SEQUENCE).len();
     match text(data, tags::BRACHY_TREATMENT_TECHNIQUE) {
         Some(_) => Ok(()),
-        None if beams > 0 => Err(ContentError::Invalid(format!(
+        None if beams > 0 => Err(invalid!(
             "it is a plan of {beams} external beams; a seed plan is one of brachytherapy"
-        ))),
-        None => Err(ContentError::Invalid(format!(
+        )),
+        None => Err(invalid!(
             "{} is missing, so it is not a brachytherapy plan",
             name(tags::BRACHY_TREATMENT_TECHNIQUE)
-        ))),
+        )),
     }
 }
 
@@ -35,9 +35,9 @@ pub fn check(
     let technique = text(data, tags::BRACHY_TREATMENT_TECHNIQUE).unwrap_or_default();
     let kind = text(data, tags::BRACHY_TREATMENT_TYPE).unwrap_or_default();
     let refused = |why: String| {
-        Err(ContentError::Invalid(format!(
+        Err(invalid!(
             "{why}: sources that are taken out again; only permanent implants are read"
-        )))
+        ))
     };
     let is_permanent = technique == "PERMANENT";
     let is_by_hand = ["MANUAL", "LDR"].contains(&kind.as_str());

@@ -2,7 +2,7 @@
 
 use super::super::values::{items, name, number, text};
 use super::PlannedOn;
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
 
@@ -35,10 +35,10 @@ pub fn of(data: &InMemDicomObject) -> Result<(Option<f64>, Vec<String>), Content
             continue;
         }
         if !(LEAST_GY..=MOST_GY).contains(&gy) {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "{} is {gy}; allowed are {LEAST_GY} to {MOST_GY} Gy: is it in cGy? Correct it in the planning system",
                 name(tags::TARGET_PRESCRIPTION_DOSE)
-            )));
+            ));
         }
         all.push(gy);
     }

@@ -6,7 +6,7 @@ use super::super::checked::Object;
 use super::super::values::{exactly, items, name, needed, number, text};
 use super::super::write::new_uid;
 use super::{Date, PlanSeed, PlanSource, SeedPlan, permanent, prescription, setups};
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use dicom_core::Tag;
 use dicom_dictionary_std::{tags, uids};
 use dicom_object::InMemDicomObject;
@@ -25,10 +25,10 @@ const SAME_HALF_LIFE: f64 = 0.01;
 /// Reads an RT Plan of permanent seeds; the error lists every problem.
 pub fn of(object: &Object) -> Result<SeedPlan, ContentError> {
     if object.sop_class != uids::RT_PLAN_STORAGE {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "it is DICOM of another kind (SOP class {}); a plan is an RT Plan",
             short(&object.sop_class)
-        )));
+        ));
     }
     let data = &object.data;
     permanent::is_brachytherapy(data)?;
@@ -48,9 +48,7 @@ pub fn of(object: &Object) -> Result<SeedPlan, ContentError> {
     }
     ContentError::all(problems)?;
     if seeds.is_empty() {
-        return Err(ContentError::Invalid(
-            "it contains no seed: no channel has a control point with a position".to_owned(),
-        ));
+        return Err("it contains no seed: no channel has a control point with a position".into());
     }
     let (source, of_models) = one_model(sources)?;
     notes.extend(of_models);
@@ -103,10 +101,10 @@ fn sources(
     }
     ContentError::all(problems)?;
     if all.is_empty() {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "{} has no source that a channel uses",
             name(tags::SOURCE_SEQUENCE)
-        )));
+        ));
     }
     Ok(all)
 }
@@ -148,10 +146,7 @@ fn source(item: &InMemDicomObject, notes: &mut Vec<String>) -> Result<Source, Co
 
 fn number_within(item: &InMemDicomObject, most: f64) -> Result<f64, ContentError> {
     match number(item, tags::ACTIVE_SOURCE_LENGTH)? {
-        Some(v) if !(0.0..=most).contains(&v) => Err(ContentError::Invalid(format!(
-            "{} is {v}",
-            name(tags::ACTIVE_SOURCE_LENGTH)
-        ))),
+        Some(v) if !(0.0..=most).contains(&v) => Err(invalid!("{} is {v}", name(tags::ACTIVE_SOURCE_LENGTH))),
         v => Ok(v.unwrap_or_default()),
     }
 }
@@ -164,11 +159,11 @@ fn one_model(sources: Vec<Source>) -> Result<(PlanSource, Vec<String>), ContentE
     for other in all {
         let as_long = (other.half_life_days / first.half_life_days - 1.0).abs() < SAME_HALF_LIFE;
         if other.isotope != first.isotope || !as_long {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "it mixes seeds of {} and {}; only plans of one isotope are read",
                 short(&first.isotope),
                 short(&other.isotope)
-            )));
+            ));
         }
         if other.model != first.model {
             notes.push(format!(

@@ -1,7 +1,7 @@
 //! Application setups that a plan applies: those that a fraction group names.
 
 use super::super::values::{items, name, needed, number};
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
 
@@ -21,10 +21,10 @@ pub fn of(data: &InMemDicomObject) -> Result<(Vec<&InMemDicomObject>, Vec<String
             _ => needed(setup, tags::APPLICATION_SETUP_NUMBER, 0.0, 1e9)?,
         };
         if all.iter().any(|(other, _)| *other == setup_number) {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "{} {setup_number} is given twice",
                 name(tags::APPLICATION_SETUP_NUMBER)
-            )));
+            ));
         }
         all.push((setup_number, setup));
     }
@@ -60,10 +60,10 @@ pub fn of(data: &InMemDicomObject) -> Result<(Vec<&InMemDicomObject>, Vec<String
         return Ok((all.into_iter().map(|(_, setup)| setup).collect(), notes));
     }
     if let Some(missing) = referred.iter().find(|number| !all.iter().any(|(of, _)| of == *number)) {
-        return Err(ContentError::Invalid(format!(
+        return Err(invalid!(
             "{} names application setup {missing}, which is missing",
             name(tags::REFERENCED_BRACHY_APPLICATION_SETUP_NUMBER)
-        )));
+        ));
     }
     let (used, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|(number, _)| referred.contains(number));
     notes.extend(others.iter().map(|(number, setup)| {

@@ -208,7 +208,7 @@ fn doubled(sequence: dicom_core::Tag, tag: dicom_core::Tag, value: &str) -> Resu
     let mut object = checked::read(&bytes(&plan(4)).unwrap()).unwrap();
     let mut all = items(&object.data, sequence).to_vec();
     let mut copy = all[0].clone();
-    copy.put(string(tag, dicom_core::VR::IS, value));
+    copy.put(string(tag, value));
     all.push(copy);
     object.data.put(written(sequence, all));
     of(&object).map_err(|why| why.to_string())

@@ -22,9 +22,7 @@ type Element = dicom_core::DataElement<InMemDicomObject>;
 /// Returns the bytes of the file.
 pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
     if plan.seeds.is_empty() {
-        return Err(ContentError::Invalid(
-            "a plan without seeds cannot be written".to_owned(),
-        ));
+        return Err("a plan without seeds cannot be written".into());
     }
     let mut strengths: Vec<Strength> = plan.seeds.iter().map(Strength::of).collect();
     strengths.sort_by(Strength::cmp);
@@ -32,33 +30,29 @@ pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
     let (today, time) = now();
     let planned_on = plan.planned_on.map_or_else(|| today.clone(), digits);
     let mut object = common(uids::RT_PLAN_STORAGE, "RTPLAN", &plan.identity);
-    object.put(string(tags::SOP_INSTANCE_UID, VR::UI, &plan.uid));
-    object.put(string(
-        tags::RT_PLAN_LABEL,
-        VR::SH,
-        &plan.label.chars().take(16).collect::<String>(),
-    ));
-    object.put(string(tags::RT_PLAN_DATE, VR::DA, &planned_on));
-    object.put(string(tags::RT_PLAN_TIME, VR::TM, &time));
+    object.put(string(tags::SOP_INSTANCE_UID, &plan.uid));
+    object.put(string(tags::RT_PLAN_LABEL, &plan.label));
+    object.put(string(tags::RT_PLAN_DATE, &planned_on));
+    object.put(string(tags::RT_PLAN_TIME, &time));
     match &plan.structure_set {
         Some(set) => {
-            object.put(string(tags::RT_PLAN_GEOMETRY, VR::CS, "PATIENT"));
+            object.put(string(tags::RT_PLAN_GEOMETRY, "PATIENT"));
             let set = reference(uids::RT_STRUCTURE_SET_STORAGE, &set.uid);
             object.put(sequence(tags::REFERENCED_STRUCTURE_SET_SEQUENCE, vec![set]));
         }
         // PATIENT would need a structure set.
         None => {
-            object.put(string(tags::RT_PLAN_GEOMETRY, VR::CS, "TREATMENT_DEVICE"));
+            object.put(string(tags::RT_PLAN_GEOMETRY, "TREATMENT_DEVICE"));
         }
     }
-    object.put(string(tags::APPROVAL_STATUS, VR::CS, "UNAPPROVED"));
+    object.put(string(tags::APPROVAL_STATUS, "UNAPPROVED"));
     if let Some(gy) = plan.prescription_gy {
         let target = plan.structure_set.as_ref().and_then(|set| set.target);
         let kind = if target.is_some() { "VOLUME" } else { "SITE" };
         let mut reference = item([
             whole(tags::DOSE_REFERENCE_NUMBER, DOSE_REFERENCE),
-            string(tags::DOSE_REFERENCE_STRUCTURE_TYPE, VR::CS, kind),
-            string(tags::DOSE_REFERENCE_TYPE, VR::CS, "TARGET"),
+            string(tags::DOSE_REFERENCE_STRUCTURE_TYPE, kind),
+            string(tags::DOSE_REFERENCE_TYPE, "TARGET"),
             decimals(tags::TARGET_PRESCRIPTION_DOSE, &[gy]),
         ]);
         if let Some(number) = target {
@@ -75,9 +69,9 @@ pub fn bytes(plan: &SeedPlan) -> Result<Vec<u8>, ContentError> {
         sequence(tags::REFERENCED_BRACHY_APPLICATION_SETUP_SEQUENCE, vec![referenced]),
     ]);
     object.put(sequence(tags::FRACTION_GROUP_SEQUENCE, vec![group]));
-    object.put(string(tags::BRACHY_TREATMENT_TECHNIQUE, VR::CS, "PERMANENT"));
-    object.put(string(tags::BRACHY_TREATMENT_TYPE, VR::CS, "MANUAL"));
-    let machine = item([string(tags::TREATMENT_MACHINE_NAME, VR::SH, "")]);
+    object.put(string(tags::BRACHY_TREATMENT_TECHNIQUE, "PERMANENT"));
+    object.put(string(tags::BRACHY_TREATMENT_TYPE, "MANUAL"));
+    let machine = item([string(tags::TREATMENT_MACHINE_NAME, "")]);
     object.put(sequence(tags::TREATMENT_MACHINE_SEQUENCE, vec![machine]));
     let sources = strengths
         .iter()
@@ -122,26 +116,18 @@ fn source(plan: &SeedPlan, number: usize, strength: &Strength, (today, now): (&s
     let time = if strength.on.is_some() { "000000" } else { now };
     item([
         whole(tags::SOURCE_NUMBER, number),
-        string(tags::SOURCE_TYPE, VR::CS, "LINE"),
-        string(tags::SOURCE_MANUFACTURER, VR::LO, &s.manufacturer),
-        string(
-            tags::SOURCE_MODEL_ID,
-            VR::SH,
-            &s.model.chars().take(16).collect::<String>(),
-        ),
-        string(
-            tags::SOURCE_DESCRIPTION,
-            VR::LO,
-            &s.model.chars().take(64).collect::<String>(),
-        ),
+        string(tags::SOURCE_TYPE, "LINE"),
+        string(tags::SOURCE_MANUFACTURER, &s.manufacturer),
+        string(tags::SOURCE_MODEL_ID, &s.model),
+        string(tags::SOURCE_DESCRIPTION, &s.model),
         decimals(tags::ACTIVE_SOURCE_LENGTH, &[s.active_length_m * 1e3]),
-        string(tags::SOURCE_ISOTOPE_NAME, VR::LO, &s.isotope),
+        string(tags::SOURCE_ISOTOPE_NAME, &s.isotope),
         decimals(tags::SOURCE_ISOTOPE_HALF_LIFE, &[s.half_life_days]),
-        string(tags::SOURCE_STRENGTH_UNITS, VR::CS, "AIR_KERMA_RATE"),
+        string(tags::SOURCE_STRENGTH_UNITS, "AIR_KERMA_RATE"),
         // In uGy/h at 1 m, which is U.
         decimals(tags::REFERENCE_AIR_KERMA_RATE, &[strength.u]),
-        string(tags::SOURCE_STRENGTH_REFERENCE_DATE, VR::DA, &date),
-        string(tags::SOURCE_STRENGTH_REFERENCE_TIME, VR::TM, time),
+        string(tags::SOURCE_STRENGTH_REFERENCE_DATE, &date),
+        string(tags::SOURCE_STRENGTH_REFERENCE_TIME, time),
     ])
 }
 
@@ -153,10 +139,10 @@ fn setup(plan: &SeedPlan, strengths: &[Strength]) -> InMemDicomObject {
         let source = strengths.partition_point(|s| s.cmp(&Strength::of(seed)).is_lt()) + 1;
         let mut channel = item([
             whole(tags::CHANNEL_NUMBER, number),
-            string(tags::CHANNEL_LENGTH, VR::DS, ""),
+            string(tags::CHANNEL_LENGTH, ""),
             decimals(tags::CHANNEL_TOTAL_TIME, &[mean_life_s]),
-            string(tags::SOURCE_MOVEMENT_TYPE, VR::CS, "FIXED"),
-            string(tags::TRANSFER_TUBE_NUMBER, VR::IS, ""),
+            string(tags::SOURCE_MOVEMENT_TYPE, "FIXED"),
+            string(tags::TRANSFER_TUBE_NUMBER, ""),
             whole(tags::REFERENCED_SOURCE_NUMBER, source),
             whole(tags::NUMBER_OF_CONTROL_POINTS, 2),
             decimals(tags::FINAL_CUMULATIVE_TIME_WEIGHT, &[100.0]),
@@ -175,7 +161,7 @@ fn setup(plan: &SeedPlan, strengths: &[Strength]) -> InMemDicomObject {
     }
     let total_kerma: f64 = plan.seeds.iter().map(|s| s.strength_u * mean_life_s / 3600.0).sum();
     item([
-        string(tags::APPLICATION_SETUP_TYPE, VR::CS, "PERINEAL"),
+        string(tags::APPLICATION_SETUP_TYPE, "PERINEAL"),
         whole(tags::APPLICATION_SETUP_NUMBER, SETUP),
         decimals(tags::TOTAL_REFERENCE_AIR_KERMA, &[total_kerma]),
         sequence(tags::CHANNEL_SEQUENCE, channels),
@@ -186,14 +172,10 @@ fn setup(plan: &SeedPlan, strengths: &[Strength]) -> InMemDicomObject {
 fn applicator(number: u32, hole: &str) -> [Element; 5] {
     [
         whole(tags::SOURCE_APPLICATOR_NUMBER, number as usize),
-        string(
-            tags::SOURCE_APPLICATOR_ID,
-            VR::SH,
-            &hole.chars().take(16).collect::<String>(),
-        ),
-        string(tags::SOURCE_APPLICATOR_TYPE, VR::CS, "RIGID"),
+        string(tags::SOURCE_APPLICATOR_ID, hole),
+        string(tags::SOURCE_APPLICATOR_TYPE, "RIGID"),
         decimals(tags::SOURCE_APPLICATOR_LENGTH, &[NEEDLE_LENGTH_MM]),
-        string(tags::REFERENCED_ROI_NUMBER, VR::IS, ""),
+        string(tags::REFERENCED_ROI_NUMBER, ""),
     ]
 }
 

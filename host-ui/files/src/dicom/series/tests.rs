@@ -6,7 +6,7 @@ use super::*;
 use dicom_core::value::PrimitiveValue;
 use dicom_core::{DataElement, VR};
 use dicom_dictionary_std::uids;
-use nalgebra::{Rotation3, Unit};
+use nalgebra::{Rotation3, Unit, Vector3};
 use stylet_anatomy::ras_from_lps;
 
 const COLUMNS: usize = 7;
@@ -67,9 +67,9 @@ fn image(series: &str, pixels: Vec<u8>) -> InMemDicomObject {
     };
     let mut object = common(uids::CT_IMAGE_STORAGE, "CT", &identity);
     for element in [
-        string(tags::SERIES_INSTANCE_UID, VR::UI, series),
+        string(tags::SERIES_INSTANCE_UID, series),
         short(tags::SAMPLES_PER_PIXEL, 1),
-        string(tags::PHOTOMETRIC_INTERPRETATION, VR::CS, "MONOCHROME2"),
+        string(tags::PHOTOMETRIC_INTERPRETATION, "MONOCHROME2"),
         short(tags::ROWS, ROWS as u16),
         short(tags::COLUMNS, COLUMNS as u16),
         short(tags::BITS_ALLOCATED, 16),
@@ -178,8 +178,8 @@ fn multi_frame(order: &[usize]) -> InMemDicomObject {
         sequence(tags::PIXEL_VALUE_TRANSFORMATION_SEQUENCE, vec![values]),
     ]);
     for element in [
-        string(tags::SOP_CLASS_UID, VR::UI, uids::ENHANCED_MR_IMAGE_STORAGE),
-        string(tags::NUMBER_OF_FRAMES, VR::IS, &order.len().to_string()),
+        string(tags::SOP_CLASS_UID, uids::ENHANCED_MR_IMAGE_STORAGE),
+        string(tags::NUMBER_OF_FRAMES, &order.len().to_string()),
         sequence(tags::SHARED_FUNCTIONAL_GROUPS_SEQUENCE, vec![shared]),
         sequence(tags::PER_FRAME_FUNCTIONAL_GROUPS_SEQUENCE, own.collect()),
     ] {
@@ -202,7 +202,7 @@ fn an_enhanced_image_is_the_same_volume_in_one_file() {
     std::fs::write(&path, &short).unwrap();
     assert!(read(&path, &Progress::default()).is_err());
     let mut object = multi_frame(&[0, 1, 2]);
-    object.put(string(tags::NUMBER_OF_FRAMES, VR::IS, "4"));
+    object.put(string(tags::NUMBER_OF_FRAMES, "4"));
     let path = put(folder.path(), "enhanced", object);
     let why = read(&path, &Progress::default()).unwrap_err().to_string();
     assert!(why.contains("says 4 frames and describes 3"), "{why}");
@@ -222,7 +222,7 @@ fn unreadable_files_are_refused_with_a_reason() {
         object.put(element);
         refused(object)
     };
-    let why = with(string(tags::PHOTOMETRIC_INTERPRETATION, VR::CS, "RGB"));
+    let why = with(string(tags::PHOTOMETRIC_INTERPRETATION, "RGB"));
     assert!(why.contains("RGB"), "{why}");
     let why = with(short(tags::BITS_ALLOCATED, 12));
     assert!(why.contains("12 bits"), "{why}");

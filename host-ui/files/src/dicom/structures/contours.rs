@@ -4,7 +4,7 @@
 use super::super::super::element::short;
 use super::super::values::{items, name, number, numbers, text};
 use super::{Contoured, SAME_PLANE_M, area_vector, planes};
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
 use nalgebra::Vector3;
@@ -55,16 +55,14 @@ impl Drawn {
         }
         let values = numbers(contour, tags::CONTOUR_DATA)?.unwrap_or_default();
         if values.len() % 3 != 0 {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "{} has {} values; each corner of a contour has three",
                 name(tags::CONTOUR_DATA),
                 values.len()
-            )));
+            ));
         }
         if let Some(far) = values.iter().find(|v| v.abs() > MAX_MM) {
-            return Err(ContentError::Invalid(format!(
-                "a corner is at {far} mm; at most {MAX_MM} mm is accepted"
-            )));
+            return Err(invalid!("a corner is at {far} mm; at most {MAX_MM} mm is accepted"));
         }
         let corner = |p: &[f64]| ras_from_lps(Vector3::new(p[0], p[1], p[2])) * 1e-3;
         let mut corners: Vec<_> = values.chunks_exact(3).map(corner).collect();
@@ -86,10 +84,10 @@ impl Drawn {
         let off = corners.iter().map(|p| (p - corners[0]).dot(&normal).abs());
         let off_m = off.fold(0.0, f64::max);
         if off_m > 10.0 * SAME_PLANE_M {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "a contour called planar is {:.2} mm off its plane",
                 off_m * 1e3
-            )));
+            ));
         }
         self.is_exclusive &= kind == EXCLUSIVE;
         self.structure.contours.push(corners);

@@ -4,7 +4,7 @@
 use super::super::super::element::short;
 use super::super::values::{items, name, needed, text};
 use super::Contoured;
-use crate::error::ContentError;
+use crate::error::{ContentError, invalid};
 use dicom_dictionary_std::tags;
 use dicom_object::InMemDicomObject;
 
@@ -22,24 +22,24 @@ impl Rois {
             let shown = short(roi_name.as_deref().unwrap_or("a structure without a name"));
             if let Some((_, other)) = all.iter().find(|(n, other)| *n == number && *other != roi_name) {
                 let other = short(other.as_deref().unwrap_or("a structure without a name"));
-                return Err(ContentError::Invalid(format!(
+                return Err(invalid!(
                     "{} {number} is given twice, to {other} and to {shown}, so it is not known whose contours are whose; \
                      export it again",
                     name(tags::ROI_NUMBER)
-                )));
+                ));
             }
             frames.extend(text(roi, tags::REFERENCED_FRAME_OF_REFERENCE_UID).map(|uid| (shown, uid)));
             all.push((number, roi_name));
         }
         let first = frames.first();
         if let Some((one, other)) = first.and_then(|one| Some((one, frames.iter().find(|f| f.1 != one.1)?))) {
-            return Err(ContentError::Invalid(format!(
+            return Err(invalid!(
                 "it is in two frames of reference: {} in {}, {} in {}; export structures of one frame",
                 one.0,
                 short(&one.1),
                 other.0,
                 short(&other.1)
-            )));
+            ));
         }
         Ok(Self(all))
     }

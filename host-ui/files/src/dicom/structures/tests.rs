@@ -45,7 +45,6 @@ type Drawing<'a> = (usize, &'a str, &'a str, Vec<Vec<Vector3<f64>>>);
 /// Returns a structure set as it is read from a file.
 fn object(structures: &[Drawing]) -> Object {
     use super::super::write::{decimals, item, sequence, string, whole};
-    use dicom_core::VR;
     let v = Voxels {
         dims: [1, 1, 1],
         labels: vec![1],
@@ -60,12 +59,11 @@ fn object(structures: &[Drawing]) -> Object {
             .flat_map(|p| [-p.x * 1e3, -p.y * 1e3, p.z * 1e3])
             .collect::<Vec<_>>()
     };
-    let roi =
-        |(number, name, ..): &Drawing| item([whole(tags::ROI_NUMBER, *number), string(tags::ROI_NAME, VR::LO, name)]);
+    let roi = |(number, name, ..): &Drawing| item([whole(tags::ROI_NUMBER, *number), string(tags::ROI_NAME, name)]);
     let drawn = |(number, _, kind, contours): &Drawing| {
         let contour = |c: &Vec<Vector3<f64>>| {
             item([
-                string(tags::CONTOUR_GEOMETRIC_TYPE, VR::CS, kind),
+                string(tags::CONTOUR_GEOMETRIC_TYPE, kind),
                 decimals(tags::CONTOUR_DATA, &mm(c)),
             ])
         };

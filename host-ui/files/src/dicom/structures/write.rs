@@ -66,9 +66,7 @@ pub fn of_voxels(v: &Voxels) -> Result<Vec<Outlined>, ContentError> {
         })
         .collect();
     if all.is_empty() {
-        return Err(ContentError::Invalid(
-            "every voxel is 0, so there is no structure to write".to_owned(),
-        ));
+        return Err("every voxel is 0, so there is no structure to write".into());
     }
     Ok(all)
 }
@@ -90,21 +88,17 @@ pub fn bytes(set: &Written) -> Result<Vec<u8>, ContentError> {
     let numbered = || set.structures.iter().zip(1_usize..);
     let (date, time) = now();
     let mut object = common(uids::RT_STRUCTURE_SET_STORAGE, "RTSTRUCT", of);
-    object.put(string(tags::SOP_INSTANCE_UID, VR::UI, set.uid));
-    object.put(string(tags::STRUCTURE_SET_LABEL, VR::SH, "Stylet"));
-    object.put(string(tags::STRUCTURE_SET_DATE, VR::DA, &date));
-    object.put(string(tags::STRUCTURE_SET_TIME, VR::TM, &time));
+    object.put(string(tags::SOP_INSTANCE_UID, set.uid));
+    object.put(string(tags::STRUCTURE_SET_LABEL, "Stylet"));
+    object.put(string(tags::STRUCTURE_SET_DATE, &date));
+    object.put(string(tags::STRUCTURE_SET_TIME, &time));
     object.put(sequence(tags::REFERENCED_FRAME_OF_REFERENCE_SEQUENCE, vec![frame(set)]));
     let roi = |(structure, number): (&Outlined, usize)| {
         item([
             whole(tags::ROI_NUMBER, number),
-            string(tags::REFERENCED_FRAME_OF_REFERENCE_UID, VR::UI, &of.frame_of_reference),
-            string(
-                tags::ROI_NAME,
-                VR::LO,
-                &structure.name.chars().take(64).collect::<String>(),
-            ),
-            string(tags::ROI_GENERATION_ALGORITHM, VR::CS, ""),
+            string(tags::REFERENCED_FRAME_OF_REFERENCE_UID, &of.frame_of_reference),
+            string(tags::ROI_NAME, &structure.name),
+            string(tags::ROI_GENERATION_ALGORITHM, ""),
         ])
     };
     object.put(sequence(
@@ -130,17 +124,16 @@ pub fn bytes(set: &Written) -> Result<Vec<u8>, ContentError> {
             whole(tags::REFERENCED_ROI_NUMBER, number),
             string(
                 tags::RTROI_INTERPRETED_TYPE,
-                VR::CS,
                 Organ::of_name(&structure.name).map_or("", Organ::dicom_type),
             ),
-            string(tags::ROI_INTERPRETER, VR::PN, ""),
+            string(tags::ROI_INTERPRETER, ""),
         ])
     };
     object.put(sequence(
         tags::RTROI_OBSERVATIONS_SEQUENCE,
         numbered().map(observed).collect(),
     ));
-    object.put(string(tags::APPROVAL_STATUS, VR::CS, "UNAPPROVED"));
+    object.put(string(tags::APPROVAL_STATUS, "UNAPPROVED"));
     let contours = set.structures.iter().flat_map(|s| &s.contours);
     match contours.into_iter().any(|c| c.len() > MOST_CORNERS) {
         true => implicit_bytes(object),
@@ -151,13 +144,13 @@ pub fn bytes(set: &Written) -> Result<Vec<u8>, ContentError> {
 /// Returns the frame of reference, and the study and the series of the images in it.
 fn frame(set: &Written) -> InMemDicomObject {
     let of = set.identity;
-    let mut frame = item([string(tags::FRAME_OF_REFERENCE_UID, VR::UI, &of.frame_of_reference)]);
+    let mut frame = item([string(tags::FRAME_OF_REFERENCE_UID, &of.frame_of_reference)]);
     let Some(first) = set.images.first() else {
         return frame;
     };
     let images = set.images.iter().map(|i| reference(&i.sop_class, &i.uid)).collect();
     let series = item([
-        string(tags::SERIES_INSTANCE_UID, VR::UI, &first.series),
+        string(tags::SERIES_INSTANCE_UID, &first.series),
         sequence(tags::CONTOUR_IMAGE_SEQUENCE, images),
     ]);
     let mut study = reference(STUDY_CLASS, &first.study);
@@ -178,7 +171,7 @@ fn drawn(structure: &Outlined, images: &[Slice]) -> Vec<InMemDicomObject> {
             <[f64; 3]>::from(lps)
         });
         let mut contour = item([
-            string(tags::CONTOUR_GEOMETRIC_TYPE, VR::CS, kind),
+            string(tags::CONTOUR_GEOMETRIC_TYPE, kind),
             whole(tags::NUMBER_OF_CONTOUR_POINTS, corners.len()),
             decimals(tags::CONTOUR_DATA, &points.collect::<Vec<_>>()),
         ]);

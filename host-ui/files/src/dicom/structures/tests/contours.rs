@@ -3,7 +3,6 @@
 
 use super::super::super::write::string;
 use super::*;
-use dicom_core::VR;
 
 const KIND: &str = "CLOSED_PLANAR";
 /// Beside every centre and edge of a voxel, or errors of all quadrants would add up.
@@ -158,7 +157,7 @@ fn a_number_for_two_structures_is_refused_and_a_name_is_reported() {
     let mut split = object(&[(1, "Prostate", KIND, one()), (2, "Rectum", KIND, other())]);
     let items_of = |split: &Object| items(&split.data, tags::ROI_CONTOUR_SEQUENCE).to_vec();
     let mut drawn = items_of(&split);
-    drawn[1].put(string(tags::REFERENCED_ROI_NUMBER, VR::IS, "1"));
+    drawn[1].put(string(tags::REFERENCED_ROI_NUMBER, "1"));
     split
         .data
         .put(super::super::super::write::sequence(tags::ROI_CONTOUR_SEQUENCE, drawn));
@@ -177,7 +176,7 @@ fn structures_in_two_frames_are_refused() {
         object.data.remove_element(tags::FRAME_OF_REFERENCE_UID);
         let mut rois = items(&object.data, tags::STRUCTURE_SET_ROI_SEQUENCE).to_vec();
         for (roi, frame) in rois.iter_mut().zip(frames) {
-            roi.put(string(tags::REFERENCED_FRAME_OF_REFERENCE_UID, VR::UI, frame));
+            roi.put(string(tags::REFERENCED_FRAME_OF_REFERENCE_UID, frame));
         }
         object.data.put(super::super::super::write::sequence(
             tags::STRUCTURE_SET_ROI_SEQUENCE,
@@ -192,9 +191,7 @@ fn structures_in_two_frames_are_refused() {
     );
     assert!(StructureSet::of(&with_frames(["1.2.3", "1.2.3"])).is_ok());
     let mut contradicted = with_frames(["1.2.3", "1.2.3"]);
-    contradicted
-        .data
-        .put(string(tags::FRAME_OF_REFERENCE_UID, VR::UI, "1.2.4"));
+    contradicted.data.put(string(tags::FRAME_OF_REFERENCE_UID, "1.2.4"));
     assert!(
         refused(&contradicted).contains("the file in 1.2.4"),
         "{}",
@@ -258,7 +255,7 @@ fn attributes_that_contradict_contours_are_named() {
     let mut object = object(&[(1, "Prostate", KIND, body(|k| vec![polygon(k, MIDDLE, RADIUS, 60)]))]);
     let mut rois = items(&object.data, tags::ROI_CONTOUR_SEQUENCE).to_vec();
     let mut contours = items(&rois[0], tags::CONTOUR_SEQUENCE).to_vec();
-    contours[2].put(string(tags::NUMBER_OF_CONTOUR_POINTS, VR::IS, "61"));
+    contours[2].put(string(tags::NUMBER_OF_CONTOUR_POINTS, "61"));
     rois[0].put(super::super::super::write::sequence(tags::CONTOUR_SEQUENCE, contours));
     object
         .data

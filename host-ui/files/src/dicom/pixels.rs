@@ -1,0 +1,138 @@
+//! Pixels of an image or a dose, and the plane of an image in the patient.
+
+use super::super::Progress;
+use super::super::element::{Element, Endian, Sink, read_values, short};
+use super::values::{given, name, needed, number, text};
+use crate::error::{ContentError, invalid};
+use dicom_dictionary_std::tags;
+use dicom_object::InMemDicomObject;
+use nalgebra::Vector3;
+
+/// Place and directions of an image (LPS, mm).
+#[derive(Clone, Debug)]
+pub struct Plane {
+    /// Centre of the first pixel.
+    pub corner: Vector3<f64>,
+    /// Directions from column to column, and from row to row.
+    pub directions: [Vector3<f64>; 2],
+    /// Distances of columns, and of rows.
+    pub pitch: [f64; 2],
+}
+
+impl Plane {
+    /// Reads position, orientation and spacing, which enhanced images have in three groups.
+    pub fn of(
+        place: &InMemDicomObject,
+        turn: &InMemDicomObject,
+        spacing: &InMemDicomObject,
+    ) -> Result<Self, ContentError> {
+        let corner: [f64; 3] = given(place, tags::IMAGE_POSITION_PATIENT)?;
+        let [a, b, c, d, e, f] = given(turn, tags::IMAGE_ORIENTATION_PATIENT)?;
+        let [between_rows, between_columns] = given(spacing, tags::PIXEL_SPACING)?;
+        Ok(Self {
+            corner: corner.into(),
+            directions: [Vector3::new(a, b, c), Vector3::new(d, e, f)],
+            pitch: [between_columns, between_rows],
+        })
+    }
+
+    /// Returns the steps from column to column, and from row to row.
+    pub fn steps(&self) -> [Vector3<f64>; 2] {
+        [0, 1].map(|n| self.directions[n] * self.pitch[n])
+    }
+}
+
+/// Returns the numbers of columns and rows.
+pub fn size(data: &InMemDicomObject) -> Result<[usize; 2], ContentError> {
+    let [columns, rows] = [tags::COLUMNS, tags::ROWS].map(|tag| needed(data, tag, 1.0, 65_535.0));
+    Ok([columns? as usize, rows? as usize])
+}
+
+/// Storage of a pixel.
+pub struct Pixel {
+    element: Element,
+    /// Significant bits, and whether the highest of them is a sign.
+    stored: u32,
+    is_signed: bool,
+}
+
+impl Pixel {
+    /// Reads the storage of greys.
+    pub fn of(data: &InMemDicomObject) -> Result<Self, ContentError> {
+        let samples = number(data, tags::SAMPLES_PER_PIXEL)?.unwrap_or(1.0);
+        let kind = text(data, tags::PHOTOMETRIC_INTERPRETATION).unwrap_or_else(|| "MONOCHROME2".to_owned());
+        if samples != 1.0 || kind != "MONOCHROME2" {
+            return Err(invalid!(
+                "its pixels are {} with {samples} values each; images with one grey a pixel (MONOCHROME2) are read",
+                short(&kind)
+            ));
+        }
+        let bits = needed(data, tags::BITS_ALLOCATED, 1.0, 64.0)?;
+        let element = match bits as u32 {
+            8 => Element::U8,
+            16 => Element::U16,
+            32 => Element::U32,
+            _ => {
+                return Err(invalid!("its pixels have {bits} bits; 8, 16 and 32 are read"));
+            }
+        };
+        let stored = number(data, tags::BITS_STORED)?.unwrap_or(bits);
+        let high = number(data, tags::HIGH_BIT)?.unwrap_or(stored - 1.0);
+        if !(1.0..=bits).contains(&stored) || high != stored - 1.0 {
+            return Err(invalid!(
+                "{stored} of its {bits} bits count, up to bit {high}; images whose bits begin at the lowest are read"
+            ));
+        }
+        Ok(Self {
+            element,
+            stored: stored as u32,
+            is_signed: number(data, tags::PIXEL_REPRESENTATION)?.unwrap_or(0.0) == 1.0,
+        })
+    }
+
+    /// Returns the bytes of one pixel.
+    pub fn bytes(&self) -> usize {
+        self.element.bytes()
+    }
+
+    /// Refuses pixels of which not all bits count.
+    pub fn whole(self) -> Result<Self, ContentError> {
+        let bits = 8 * self.bytes() as u32;
+        match self.stored == bits {
+            true => Ok(self),
+            false => Err(invalid!(
+                "{} is {}; doses of {bits} bits have {bits}",
+                name(tags::BITS_STORED),
+                self.stored
+            )),
+        }
+    }
+
+    /// Returns the stored numbers of all pixels; `count` of them must be there.
+    pub fn values(&self, pixels: &[u8], endian: Endian, count: usize) -> Result<Vec<f64>, ContentError> {
+        let (needed, have) = (count * self.bytes(), pixels.len());
+        // One byte more makes an odd length even.
+        if have < needed || have > needed.next_multiple_of(2) {
+            let why = match have < needed {
+                true => "it is truncated; copy or export it again",
+                false => "NumberOfFrames, Rows or Columns are not those of its pixels",
+            };
+            return Err(invalid!(
+                "{count} pixels need {needed} bytes, and {have} are there: {why}"
+            ));
+        }
+        let progress = Progress::default();
+        let raw = read_values(pixels, self.element, endian, count, [1.0, 0.0], Sink::exact(&progress))?;
+        // Bits above the significant ones may hold overlays.
+        let kept = (1_u64 << self.stored) - 1;
+        let sign = 1_u64 << (self.stored - 1);
+        let value = |raw: f64| {
+            let bits = raw as u64 & kept;
+            match self.is_signed && bits & sign != 0 {
+                true => bits as f64 - (kept + 1) as f64,
+                false => bits as f64,
+            }
+        };
+        Ok(raw.into_iter().map(value).collect())
+    }
+}
