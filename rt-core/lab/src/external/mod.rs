@@ -116,7 +116,8 @@ fn read_toggles(folder: &Path) -> Result<Vec<ToggleTime>, ExternalError> {
 pub fn run(folder: &Path, file: &Path, motion: Option<&str>) -> Result<u8, ExternalError> {
     let toggles = read_toggles(folder)?;
     let failed = |why| ExternalError::Capture {
-        path: file.to_owned(),
+        // With its folder, in which it may be missing.
+        path: std::path::absolute(file).unwrap_or_else(|_| file.to_owned()),
         why,
     };
     let capture = capture::read(file).map_err(failed)?;

@@ -182,3 +182,14 @@ fn files_that_are_no_captures_are_refused_with_their_reason() {
             .contains("no row")
     );
 }
+
+/// Guards against a bare name, which does not tell in which folder the file is missing.
+#[test]
+fn a_missing_capture_is_named_with_its_folder() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let toggles = format!("{}\n1,2,3\n", super::HEAD);
+    std::fs::write(folder.path().join(super::TOGGLES), toggles).expect("written");
+    let why = super::run(folder.path(), "absent.csv".as_ref(), None).expect_err("absent");
+    let here = std::env::current_dir().expect("a folder").join("absent.csv");
+    assert!(why.to_string().starts_with(&here.display().to_string()), "{why}");
+}
