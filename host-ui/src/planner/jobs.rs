@@ -38,7 +38,8 @@ pub struct JobProgress {
 /// Message from a job.
 pub(super) enum JobMessage {
     Progress(JobProgress),
-    Plan(ImplantPlan),
+    /// A plan, with remarks.
+    Plan(ImplantPlan, Vec<String>),
     /// Proposed plans, with remarks on each.
     First(Vec<FirstPlan>),
     Compensated(Box<(Needle, Compensation)>),
@@ -144,7 +145,7 @@ impl Planner {
         match self.can_be(found.found.plan.clone()) {
             Ok(plan) => {
                 self.put(plan);
-                self.message = plan_message(&found.notes);
+                self.message = plan_message("Automatic plan", &found.notes);
             }
             Err(why) => self.refuse(why),
         }
@@ -159,7 +160,7 @@ impl Planner {
                     .ok_or_else(|| format!("source {} is unknown; set the strength by hand", plan.source))?;
                 let kernel = DoseKernel::new(&source, Interval::ALL);
                 let strength_u = first::strength_u(&plan, &outlines.anatomy, &kernel)?;
-                Ok(JobMessage::Plan(plan.with_strength(strength_u)))
+                Ok(JobMessage::Plan(plan.with_strength(strength_u), Vec::new()))
             })
         });
     }
@@ -168,8 +169,8 @@ impl Planner {
     pub fn import(&mut self, path: PathBuf, scene: Arc<SceneModel>, scene_file: Option<PathBuf>) {
         self.begin_job("Reading the plan", |_, _| {
             Ok(move |_: &Reporter<'_>| {
-                let plan = exchange::read(&path, &scene.header, scene_file.as_deref())?;
-                Ok(JobMessage::Plan(plan))
+                let (plan, notes) = exchange::read(&path, &scene.header, scene_file.as_deref())?;
+                Ok(JobMessage::Plan(plan, notes))
             })
         });
     }

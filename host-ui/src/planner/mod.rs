@@ -260,8 +260,11 @@ impl Planner {
         }
         self.job = None;
         match message {
-            JobMessage::Plan(plan) => match self.can_be(plan) {
-                Ok(plan) => self.put(plan),
+            JobMessage::Plan(plan, notes) => match self.can_be(plan) {
+                Ok(plan) => {
+                    self.put(plan);
+                    self.message = plan_message("The plan was read", &notes);
+                }
                 Err(why) => self.refuse(why),
             },
             JobMessage::First(found) => {
@@ -339,9 +342,9 @@ impl Planner {
     }
 }
 
-/// Returns a message with the remarks on an automatic plan.
-fn plan_message(notes: &[String]) -> Option<Note> {
-    (!notes.is_empty()).then(|| Note::done(format!("Automatic plan: {}.", notes.join("; "))))
+/// Returns a message with the remarks on a plan.
+fn plan_message(what: &str, notes: &[String]) -> Option<Note> {
+    (!notes.is_empty()).then(|| Note::done(format!("{what}: {}.", notes.join("; "))))
 }
 
 #[cfg(test)]

@@ -121,3 +121,20 @@ fn a_proposal_is_taken_as_one_change_and_goes_with_the_plan() {
     planner.discard();
     assert!(planner.planning().proposals.is_none());
 }
+
+/// Guards against remarks that stood only on standard error.
+#[test]
+fn remarks_on_an_imported_plan_are_shown() {
+    let mut planner = Planner::default();
+    let job = Job::begin("plan reader", |messages, _| {
+        let notes = vec!["its technique is missing".to_owned()];
+        let _ = messages.send(JobMessage::Plan(planned(), notes));
+    });
+    let what = "Reading the plan".to_owned();
+    planner.job = Some((job, JobProgress { what, share: None }));
+    while planner.job.is_some() {
+        planner.take_job();
+    }
+    let expected = Note::done("The plan was read: its technique is missing.".to_owned());
+    assert_eq!(planner.take_message(), Some(expected));
+}

@@ -80,11 +80,16 @@ pub struct PlanSeed {
     pub strength_on: Option<Date>,
 }
 
-/// Reads the DICOM plan in the file at `path`; prints its notes to standard error.
-pub fn open(path: &Path) -> Result<SeedPlan, FileError> {
+/// Reads the DICOM plan in the file at `path`.
+pub fn of_file(path: &Path) -> Result<SeedPlan, FileError> {
     let refused = |why| FileError::of(path, why);
     let bytes = crate::bytes::whole(path, &Progress::default()).map_err(refused)?;
-    let plan = super::read(&bytes).and_then(|o| of(&o)).map_err(refused)?;
+    super::read(&bytes).and_then(|object| of(&object)).map_err(refused)
+}
+
+/// Like [`of_file`]; prints the notes to standard error.
+pub fn open(path: &Path) -> Result<SeedPlan, FileError> {
+    let plan = of_file(path)?;
     report(path, &plan.notes);
     Ok(plan)
 }

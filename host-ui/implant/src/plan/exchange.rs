@@ -7,9 +7,9 @@ use stylet_anatomy::PatientFrame;
 use stylet_base::format::printable;
 use stylet_dose::Source;
 use stylet_dose::decay::s_to_days;
+use stylet_files::agreed;
 use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
 use stylet_files::dicom::{Identity, Shared, new_uid};
-use stylet_files::together;
 use stylet_shm_schema::SceneHeader;
 
 /// Model of the source for files that name none.
@@ -26,12 +26,17 @@ pub fn usual() -> Result<(Source, f64), PlanError> {
 }
 
 /// Reads a plan file (.toml), a table of seeds (.csv) or an RT Plan (.dcm), which must be of the
-/// patient and frame of the scene's file; the error names the file.
-pub fn read(path: &Path, scene: &SceneHeader, scene_file: Option<&Path>) -> Result<ImplantPlan, PlanError> {
-    together(&[scene_file, Some(path)], Shared::Frame)?;
+/// patient and frame of the scene's file; the error names the file. Also returns remarks for the user.
+pub fn read(
+    path: &Path,
+    scene: &SceneHeader,
+    scene_file: Option<&Path>,
+) -> Result<(ImplantPlan, Vec<String>), PlanError> {
+    let together = agreed(&[scene_file, Some(path)], Shared::Frame)?;
+    let mut notes: Vec<String> = together.notes.into_iter().map(|(_, note)| note).collect();
     let patient = scene.patient();
     if has_ending(path, "toml") {
-        return file::read(path, &patient);
+        return Ok((file::read(path, &patient)?, notes));
     }
     let (usual, usual_gy) = usual()?;
     let defaults = SeedDefaults {
@@ -44,18 +49,13 @@ pub fn read(path: &Path, scene: &SceneHeader, scene_file: Option<&Path>) -> Resu
         Some(declared) => source_of(declared).map_err(|e| PlanError::of_file(path, e))?,
         None => usual,
     };
-    let agreed = seeds.agree(&source, None, None);
-    let (prescription_gy, notes) = agreed.map_err(|e| PlanError::of_file(path, e))?;
-    seeds::report(path, &notes);
+    let of_seeds = seeds.agree(&source, None, None);
+    let (prescription_gy, of_seeds) = of_seeds.map_err(|e| PlanError::of_file(path, e))?;
+    notes.extend(of_seeds);
     let prescription_gy = prescription_gy.unwrap_or(usual_gy);
-    file::import(
-        path,
-        seeds,
-        &patient,
-        Template::before(scene),
-        &source.model,
-        prescription_gy,
-    )
+    let template = Template::before(scene);
+    let plan = file::import(path, seeds, &patient, template, &source.model, prescription_gy)?;
+    Ok((plan, notes))
 }
 
 /// Returns the source that the plan declares, or another one of its nuclide, among those that need

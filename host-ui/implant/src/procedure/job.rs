@@ -6,6 +6,7 @@ use crate::pairing;
 use crate::plan::compensate::summary_m;
 use crate::plan::exchange;
 use crate::plan::rehearse::{Drops, LinkRehearser};
+use crate::plan::seeds;
 use crate::plan::stabilise::{Stabilising, stabilising};
 use crate::plan::{Anatomy, Compensation, Hole, ImplantPlan, Limits, Needle, Template, check, compensate};
 use crate::workflow::{NeedleTask, Pace, plan_with_seeds};
@@ -76,7 +77,8 @@ impl Job {
     /// scene's file. Doubtful content
     /// is reported and not refused.
     pub fn from_file(path: &Path, scene: &SceneModel, scene_file: Option<&Path>) -> Result<Self, ProcedureError> {
-        let plan = exchange::read(path, &scene.header, scene_file)?;
+        let (plan, notes) = exchange::read(path, &scene.header, scene_file)?;
+        seeds::report(path, &notes);
         if plan.seed_count() == 0 || plan.seed_count() > MAX_SEEDS {
             return Err(ProcedureError::Input(format!(
                 "{}: {} seeds; 1 to {MAX_SEEDS} can be placed",

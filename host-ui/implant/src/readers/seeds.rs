@@ -8,7 +8,7 @@ use std::path::Path;
 use stylet_dose::Seed;
 use stylet_files::dicom;
 use stylet_files::dicom::plan::{Date, PlanSeed, SeedPlan};
-use stylet_files::{FileError, bytes};
+use stylet_files::{FileError, bytes, report};
 
 const MAX_U: f64 = 1e5;
 /// Columns of the direction.
@@ -48,7 +48,7 @@ pub struct SeedFile {
 pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileError> {
     let is_plan = bytes::start(path, START_BYTES).is_some_and(|start| dicom::is_dicom(&start));
     if is_plan {
-        return Ok(of_plan(dicom::plan::open(path)?));
+        return Ok(of_plan(dicom::plan::of_file(path)?));
     }
     let known = [
         PLACE.as_slice(),
@@ -77,8 +77,7 @@ pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileE
 
 fn of_plan(plan: SeedPlan) -> SeedFile {
     SeedFile {
-        // They were reported when it was opened.
-        notes: Vec::new(),
+        notes: plan.notes,
         declared: Some(Declared {
             model: plan.source.model,
             isotope: plan.source.isotope,
