@@ -6,8 +6,8 @@ use super::dose::{DoseImage, DoseKind, DoseOf};
 use super::structures::StructureSet;
 use super::structures::write::{Outlined, Written};
 use super::values::items;
-use super::write::sequence;
-use super::{Identity, checked, dose, plan, structures};
+use super::write::{bytes as file_bytes, sequence};
+use super::{Identity, checked, dose, plan, series, structures};
 use dicom_core::dictionary::{DataDictionary, DataDictionaryEntry};
 use dicom_core::header::Header;
 use dicom_core::value::{PrimitiveValue, Value};
@@ -182,6 +182,20 @@ fn of_dose(object: &checked::Object, pixels: &[u8]) -> Answer {
     Ok((figures, dose.notes))
 }
 
+/// Reads a damaged slice of a CT together with the whole one beside it.
+fn of_image(object: &checked::Object, pixels: &[u8]) -> Answer {
+    let beside = file_bytes(series::tests::slice("2.25.4", 1)).unwrap();
+    let (beside, its_pixels, endian) = checked::read_with_pixels(&beside).unwrap();
+    let frames = [(object, pixels), (&beside, its_pixels)];
+    let frames = frames.map(|(object, pixels)| series::frame_of(object, pixels, endian));
+    let frames: Result<Vec<series::Frame>, _> = frames.into_iter().collect();
+    let volume = frames.and_then(series::volume).map_err(|why| why.to_string())?;
+    let mut figures = volume.dims.map(|d| d as f64).to_vec();
+    figures.extend(volume.values.iter().map(|value| f64::from(*value)));
+    figures.extend(volume.frame.columns_m().iter().chain(&volume.frame.origin_m));
+    Ok((figures, volume.frame.warning.into_iter().collect()))
+}
+
 /// Returns how many answers were equal, refused, noted, and the silent ones in words.
 fn tried(name: &str, content: &[u8], answer: fn(&checked::Object, &[u8]) -> Answer) -> ([usize; 3], Vec<String>) {
     let object = || checked::read(content).unwrap();
@@ -266,6 +280,11 @@ fn damaged_attributes_are_harmless_refused_or_named() {
         ),
         ("plan", plan::bytes(&plan::tests::plan(5)).unwrap(), of_plan),
         ("dose", dose::bytes(&image, &of).unwrap(), of_dose),
+        (
+            "image",
+            file_bytes(series::tests::slice("2.25.4", 0)).unwrap(),
+            of_image,
+        ),
     ] {
         let (counts, found) = tried(name, &content, answer);
         println!(

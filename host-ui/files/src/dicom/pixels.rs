@@ -76,9 +76,9 @@ impl Pixel {
                 return Err(invalid!("its pixels have {bits} bits; 8, 16 and 32 are read"));
             }
         };
-        let stored = number(data, tags::BITS_STORED)?.unwrap_or(bits);
+        let stored = needed(data, tags::BITS_STORED, 1.0, bits)?;
         let high = number(data, tags::HIGH_BIT)?.unwrap_or(stored - 1.0);
-        if !(1.0..=bits).contains(&stored) || high != stored - 1.0 {
+        if high != stored - 1.0 {
             return Err(invalid!(
                 "{stored} of its {bits} bits count, up to bit {high}; images whose bits begin at the lowest are read"
             ));
@@ -86,7 +86,7 @@ impl Pixel {
         Ok(Self {
             element,
             stored: stored as u32,
-            is_signed: number(data, tags::PIXEL_REPRESENTATION)?.unwrap_or(0.0) == 1.0,
+            is_signed: needed(data, tags::PIXEL_REPRESENTATION, 0.0, 1.0)? == 1.0,
         })
     }
 

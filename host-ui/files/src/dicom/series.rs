@@ -47,7 +47,7 @@ fn of_path(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, Content
 }
 
 /// Returns the volume of the slices of one series, in any order.
-fn volume(mut frames: Vec<Frame>) -> Result<VoxelValues<f32>, ContentError> {
+pub(super) fn volume(mut frames: Vec<Frame>) -> Result<VoxelValues<f32>, ContentError> {
     let slices: Vec<Slice> = frames.iter().map(|frame| frame.slice.clone()).collect();
     let grid = images::grid(slices)?.ok_or("it is one slice alone; a volume has at least two")?;
     let [columns, rows, _] = grid.dims;
@@ -85,7 +85,7 @@ pub fn modality(path: &Path) -> Result<Option<(String, String)>, FileError> {
 }
 
 /// One slice with its values, row by row.
-struct Frame {
+pub(super) struct Frame {
     slice: Slice,
     values: Vec<f32>,
 }
@@ -204,7 +204,7 @@ fn frames_of(paths: &[PathBuf], progress: &Progress) -> Result<Vec<Frame>, Conte
 }
 
 /// Reads the slice in an object.
-fn frame_of(object: &Object, pixels: &[u8], endian: Endian) -> Result<Frame, ContentError> {
+pub(super) fn frame_of(object: &Object, pixels: &[u8], endian: Endian) -> Result<Frame, ContentError> {
     let slice = images::slice(object).ok_or_else(|| unplaced(object))??;
     let scale = scale_of(Some(&object.data), &modality_of(object)?)?;
     let values = Pixel::of(&object.data)?.values(pixels, endian, slice.pixels())?;
@@ -311,4 +311,4 @@ fn enhanced(object: &Object, pixels: &[u8], endian: Endian, progress: &Progress)
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

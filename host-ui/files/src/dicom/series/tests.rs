@@ -83,7 +83,8 @@ fn image(series: &str, pixels: Vec<u8>) -> InMemDicomObject {
     object
 }
 
-fn slice(series: &str, k: usize) -> InMemDicomObject {
+/// Returns the slice `k` of a CT.
+pub fn slice(series: &str, k: usize) -> InMemDicomObject {
     let mut object = image(series, pixels(k));
     for element in [
         decimals(tags::IMAGE_POSITION_PATIENT, place_mm(0, 0, k).as_slice()),
