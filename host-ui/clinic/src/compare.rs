@@ -17,8 +17,9 @@ use stylet_implant::readers::{at_gy, places_m, read_any_dose};
 const USUAL_THRESHOLD_PERCENT: f64 = 10.0;
 
 const HELP: &str = "\
-Doses are RT Dose (.dcm), dose_grid.csv of host-ui dose, or NRRD in Gy, of one patient, frame of reference and type. The second one is interpolated linearly at every voxel of the first;
-voxels outside of it are counted and left out.
+Doses are RT Dose (.dcm), dose_grid.csv of host-ui dose, or NRRD, NIfTI-1 or MetaImage in Gy, of one patient, frame of
+reference and type. The second one is interpolated linearly at every voxel of the first; voxels outside of it are counted
+and left out.
 
 With --gamma the share of voxels whose gamma index is at most 1 is reported too (Low et al. 1998). It takes a dose difference in
 percent and a distance in mm, and searches in three dimensions, between voxels, up to a gamma of 2. The percents refer to --of-gy

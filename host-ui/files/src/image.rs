@@ -1,7 +1,7 @@
 //! The image under a segmentation, or another of the same patient: greys for the slices.
 
 use super::bytes::{data_file, file_name, whole};
-use super::dicom::series;
+use super::dicom::{images, series};
 use super::element::Sink;
 use super::error::{ContentError, FileError, invalid};
 use super::frame::VoxelFrame;
@@ -96,19 +96,22 @@ impl Image {
 /// Reads the values of an image unchanged, from a file or a folder's DICOM series, such as
 /// Hounsfield units; the error names the file.
 pub fn read_values(path: &Path, progress: &Progress) -> Result<VoxelValues<f32>, FileError> {
-    if path.is_dir() {
+    if path.is_dir() || images::begins_as_dicom(path) {
         return series::read(path, progress);
     }
+    read_volume(path, Sink::greys(progress), progress)
+}
+
+/// Reads the values of a volume in one file that is not DICOM; the error names the file.
+pub fn read_volume<V>(path: &Path, sink: Sink<V>, progress: &Progress) -> Result<VoxelValues<V>, FileError> {
     let refused = |why: ContentError| FileError::of(path, why);
     let bytes = whole(path, progress).map_err(refused)?;
-    let sink = Sink::greys(progress);
     let data = |name: &str| data_file(path, name, progress);
     let values = match Format::of(&bytes) {
         Some(Format::Nrrd) => nrrd::read_image(&bytes, &data, sink),
         Some(Format::Nifti) => nifti::read(&bytes, sink),
         Some(Format::MetaImage) => metaimage::read(&bytes, &data, sink),
-        Some(Format::Dicom) => return series::read(path, progress),
-        None => Err(
+        Some(Format::Dicom) | None => Err(
             "its format is not supported for images; supported are a DICOM series (its folder, or a file of it), NIfTI-1 (.nii, .nii.gz), NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd)"
                 .into(),
         ),

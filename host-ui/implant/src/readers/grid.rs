@@ -3,7 +3,8 @@
 use super::table::{self, LineError, PLACE};
 use std::path::Path;
 use stylet_files::dicom::dose::{DoseKind, ReadDose};
-use stylet_files::{FileError, Progress, Sink, bytes, dicom, lines_of, nrrd};
+use stylet_files::open::Format;
+use stylet_files::{FileError, Progress, Sink, bytes, dicom, image, lines_of, nrrd};
 
 /// Number of bytes that distinguish a DICOM file from a table.
 const START_BYTES: u64 = 160;
@@ -49,16 +50,13 @@ pub fn at_gy(dose: &ReadDose, place_m: [f64; 3]) -> Option<f64> {
     Some((0..8).map(corner).sum())
 }
 
-/// Reads a dose from an RT Dose, an NRRD volume or a table, detected by the content.
+/// Reads a dose from an RT Dose, a volume (NRRD, NIfTI, MetaImage) or a table, detected by the content.
 pub fn read_any_dose(path: &Path) -> Result<ReadDose, FileError> {
-    let start = bytes::start(path, START_BYTES).unwrap_or_default();
-    if dicom::is_dicom(&start) {
-        return dicom::dose::of_file(path);
-    }
     let kind = DoseKind::of_lines(lines_of(path));
-    match nrrd::is_nrrd(&start) {
-        true => read_volume(path, kind),
-        false => read_table(path, kind),
+    match Format::of(&bytes::start(path, START_BYTES).unwrap_or_default()) {
+        Some(Format::Dicom) => dicom::dose::of_file(path),
+        Some(_) => read_volume(path, kind),
+        None => read_table(path, kind),
     }
 }
 
@@ -70,10 +68,8 @@ pub fn is_dose_volume(path: &Path) -> bool {
 
 fn read_volume(path: &Path, kind: DoseKind) -> Result<ReadDose, FileError> {
     let refused = |why| FileError::of(path, why);
-    let content = bytes::whole(path, &Progress::default()).map_err(refused)?;
     let progress = Progress::default();
-    let data = |name: &str| bytes::data_file(path, name, &progress);
-    let volume = nrrd::read_image(&content, &data, Sink::exact(&progress)).map_err(refused)?;
+    let volume = image::read_volume(path, Sink::exact(&progress), &progress)?;
     let mut dose = dicom::dose::of_volume(&volume, kind).map_err(refused)?;
     if !is_dose_volume(path) {
         dose.notes
@@ -130,4 +126,45 @@ fn grid_of(rows: &[([f64; 3], f64)], kind: DoseKind) -> Option<ReadDose> {
         plan: None,
         structure_set: None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Vector3};
+    use std::collections::BTreeMap;
+    use stylet_files::{VoxelFrame, Voxels};
+
+    /// Guards against doses that could be compared as NRRD and not in the other formats of volumes.
+    #[test]
+    fn every_format_of_volumes_holds_the_same_dose() {
+        let steps = Matrix3::from_diagonal(&Vector3::new(2e-3, 2.5e-3, 3e-3));
+        let voxels = Voxels {
+            dims: [3, 4, 2],
+            labels: (0..24).map(|n| 10 * n).collect(),
+            frame: VoxelFrame::new(steps, Vector3::new(0.01, -0.02, 0.03), "test").unwrap(),
+            names: BTreeMap::new(),
+            also: Vec::new(),
+            overlap: None,
+        };
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["dose.nrrd", "dose.nii.gz", "dose.mha"] {
+            let path = folder.path().join(name);
+            stylet_files::convert::write_labels(&voxels, &path, None).unwrap();
+            let dose = read_any_dose(&path).unwrap();
+            assert_eq!(dose.dims, voxels.dims, "{name}");
+            assert_eq!(
+                dose.dose_gy,
+                (0..24).map(|n| f64::from(10 * n)).collect::<Vec<_>>(),
+                "{name}"
+            );
+            let (origin, expected) = (dose.origin_m, [0.01, -0.02, 0.03]);
+            assert!(
+                (0..3).all(|a| (origin[a] - expected[a]).abs() < 1e-8),
+                "{name}: {origin:?}"
+            );
+            assert!((dose.spacing_m[1] - 2.5e-3).abs() < 1e-9, "{name}");
+            assert!(dose.notes.iter().any(|note| note.contains("taken as Gy")), "{name}");
+        }
+    }
 }
