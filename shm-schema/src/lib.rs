@@ -104,8 +104,8 @@ pub use rehearsal::Rehearsal;
 pub use relayed::Relayed;
 pub use request::{
     ACCELERATION_RANGE_M_PER_S2, CommandKind, HandMove, LEFT_DEPTH_RANGE_M, MARK_BEFORE_RANGE_S, Mark, NeedleAxis,
-    NeedleRehearsal, ParameterChange, ProbeMove, RETRACT_RANGE_M, Request, RequestError, RequestErrors,
-    SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M, StabilisingNeedle, VALID_RANGE_S,
+    NeedleRehearsal, ParameterChange, ProbeMove, RETRACT_RANGE_M, Request, SPEED_RANGE_M_PER_S, STRAND_PITCH_RANGE_M,
+    StabilisingNeedle, VALID_RANGE_S,
 };
 pub use scene::{SceneHeader, SceneId, StructureInfo, UploadHeader, UploadStructure, role};
 pub use second::{SecondRecord, SecondState};

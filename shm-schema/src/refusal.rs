@@ -127,8 +127,3 @@ impl From<RefusalCode> for Refusal {
         Self::new(code, code.message())
     }
 }
-
-pub(crate) fn lines(problems: &[impl std::fmt::Display]) -> String {
-    let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
-    lines.join("\n")
-}

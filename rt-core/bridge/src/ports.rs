@@ -2,7 +2,6 @@
 
 use bytemuck::{AnyBitPattern, Pod};
 use std::os::fd::{AsFd, BorrowedFd};
-use std::rc::Rc;
 use std::time::Instant;
 use stylet_ports::{
     self as service, Node, Publisher, ServiceError, SlicePublisher, SliceSubscriber, StateWriter, Subscriber, Watch,
@@ -24,50 +23,38 @@ const MAX_TAKEN: usize = 8192;
 /// of milliseconds.
 const STOPS_EVERY: usize = 64;
 
-/// A service of the core, and the packets that go out through it.
-struct Outlet {
-    kind: Kind,
-    /// Connects new hosts and drops those that have disconnected.
-    connect: Box<dyn Fn()>,
-    /// Sends a packet to every host. A message without room reaches none: hosts see a gap in the numbers.
-    publish: Box<dyn Fn(Packet)>,
+/// A service of the core: sends a packet to every host or, given none, connects new hosts and drops those that have
+/// disconnected. A packet without room reaches none: hosts see a gap in the numbers.
+type Outlet = (Kind, Box<dyn Fn(Option<Packet>)>);
+
+fn values<T: AnyBitPattern>(kind: Kind, port: Publisher<T>) -> Outlet {
+    let serve = move |packet: Option<Packet>| match packet {
+        Some(packet) => drop(packet.value().map(|value| port.send(value))),
+        None => port.connect(),
+    };
+    (kind, Box::new(serve))
 }
 
-impl Outlet {
-    /// Single values.
-    fn values<T: AnyBitPattern>(kind: Kind, port: Publisher<T>) -> Self {
-        let port = Rc::new(port);
-        let connected = Rc::clone(&port);
-        Self {
-            kind,
-            connect: Box::new(move || connected.connect()),
-            publish: Box::new(move |packet| {
-                let _ = packet.value().map(|value| port.send(value));
-            }),
-        }
-    }
+fn records<T: Pod>(kind: Kind, port: SlicePublisher<T, u64>, session_id: u64) -> Outlet {
+    let serve = move |packet: Option<Packet>| match packet {
+        Some(packet) => drop(port.send(&session_id, &packet.values())),
+        None => port.connect(),
+    };
+    (kind, Box::new(serve))
+}
 
-    /// Slices, which `send` makes from a packet.
-    fn slices<T: 'static, H: 'static>(
-        kind: Kind,
-        port: SlicePublisher<T, H>,
-        send: impl Fn(&SlicePublisher<T, H>, Packet) + 'static,
-    ) -> Self {
-        let port = Rc::new(port);
-        let connected = Rc::clone(&port);
-        Self {
-            kind,
-            connect: Box::new(move || connected.connect()),
-            publish: Box::new(move |packet| send(&port, packet)),
+fn scene(port: SlicePublisher<u32, SceneHeader>) -> Outlet {
+    let serve = move |packet: Option<Packet>| {
+        let Some(packet) = packet else {
+            return port.connect();
+        };
+        let header = packet.value();
+        let words = packet.memory.and_then(|memory| unsealed(memory, usize::MAX).ok());
+        if let (Some(header), Some(words)) = (header, words) {
+            let _ = port.send(&header, &words);
         }
-    }
-
-    /// Records of one run.
-    fn records<T: Pod>(kind: Kind, port: SlicePublisher<T, u64>, session_id: u64) -> Self {
-        Self::slices(kind, port, move |port, packet| {
-            let _ = port.send(&session_id, &packet.values());
-        })
-    }
+    };
+    (Kind::Scene, Box::new(serve))
 }
 
 /// Every port of the core; see [`service`].
@@ -99,30 +86,24 @@ impl Ports {
         let node = Node::open(epoch.clone())?;
         let (session_id, length, words) = (start.session_id, start.snapshot_len as usize, start.word_count as usize);
         let mut outlets = vec![
-            Outlet::values(Kind::Session, service::session::publisher(&node)?),
-            Outlet::values(Kind::Event, service::events::publisher(&node)?),
-            Outlet::values(Kind::Parameters, service::parameters::publisher(&node)?),
-            Outlet::values(Kind::Plan, service::plan::publisher(&node)?),
-            Outlet::values(Kind::Reply, service::replies::publisher(&node)?),
-            Outlet::values(Kind::Rehearsal, service::rehearsals::publisher(&node)?),
-            Outlet::records(
+            values(Kind::Session, service::session::publisher(&node)?),
+            values(Kind::Event, service::events::publisher(&node)?),
+            values(Kind::Parameters, service::parameters::publisher(&node)?),
+            values(Kind::Plan, service::plan::publisher(&node)?),
+            values(Kind::Reply, service::replies::publisher(&node)?),
+            values(Kind::Rehearsal, service::rehearsals::publisher(&node)?),
+            records(
                 Kind::Records,
                 service::records::publisher(&node, MAX_BATCH)?,
                 session_id,
             ),
-            Outlet::slices(Kind::Scene, service::scene::publisher(&node, words)?, |port, packet| {
-                let header = packet.value();
-                let words = packet.memory.and_then(|memory| unsealed(memory, usize::MAX).ok());
-                if let (Some(header), Some(words)) = (header, words) {
-                    let _ = port.send(&header, &words);
-                }
-            }),
+            scene(service::scene::publisher(&node, words)?),
         ];
         let mut second = None;
         if start.has_second == 1 {
             second = Some(StateWriter::create(&node, session_id)?);
-            let records = service::second_records::publisher(&node, MAX_BATCH)?;
-            outlets.push(Outlet::records(Kind::SecondRecords, records, session_id));
+            let port = service::second_records::publisher(&node, MAX_BATCH)?;
+            outlets.push(records(Kind::SecondRecords, port, session_id));
         }
         Ok(Self {
             session_id,
@@ -149,14 +130,14 @@ impl Ports {
 
     /// Connects new hosts and drops those that have disconnected.
     pub fn connect(&self) {
-        self.outlets.iter().for_each(|outlet| (outlet.connect)());
+        self.outlets.iter().for_each(|(_, serve)| serve(None));
         self.snapshots.connect();
     }
 
     /// Publishes a packet of the force process to every host.
     pub fn publish(&self, packet: Packet) {
-        if let Some(outlet) = self.outlets.iter().find(|outlet| outlet.kind == packet.kind) {
-            (outlet.publish)(packet);
+        if let Some((_, serve)) = self.outlets.iter().find(|(kind, _)| *kind == packet.kind) {
+            serve(Some(packet));
         }
     }
 

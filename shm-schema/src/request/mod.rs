@@ -2,9 +2,7 @@
 
 mod verify;
 
-pub use verify::{RequestError, RequestErrors};
-
-use crate::{Command, Exercise, ParameterId, PlannedNeedle};
+use crate::{Command, Exercise, ParameterId, PlannedNeedle, Reason, Refusal, RefusalCode};
 use bytemuck::Zeroable;
 use num_enum::TryFromPrimitive;
 use serde::{Deserialize, Serialize};
@@ -207,24 +205,34 @@ impl Request {
 
     /// Encodes the request into the record that crosses the process. Checks only that it fits: [`Request::decode`]
     /// validates everything.
-    pub fn encode(&self, host_id: u64, command_id: u64) -> Result<Command, RequestErrors> {
+    pub fn encode(&self, host_id: u64, command_id: u64) -> Result<Command, Refusal> {
         let mut command = Command::zeroed();
         (command.host_id, command.command_id, command.kind) = (host_id, command_id, self.kind() as u32);
         let packed = postcard::to_slice(self, &mut command.payload);
-        command.length = packed.map_err(|_| RequestError::TooLong { kind: self.kind() })?.len() as u32;
+        let too_long = |_| {
+            let text = format!("the {:?} command names more than fits into one request", self.kind());
+            Refusal::new(RefusalCode::WrongCount, text)
+        };
+        command.length = packed.map_err(too_long)?.len() as u32;
         Ok(command)
     }
 
     /// Decodes a record of any bytes and validates every value. Limits of parameters are checked by
     /// [`crate::ParameterSet::problems`], which needs the other parameters.
-    pub fn decode(command: &Command) -> Result<Self, RequestErrors> {
+    pub fn decode(command: &Command) -> Result<Self, Refusal> {
         let number = command.kind;
-        let kind = CommandKind::try_from(number).map_err(|_| RequestError::UnknownCommand(number))?;
+        let kind = CommandKind::try_from(number).map_err(|_| Refusal {
+            reasons: vec![Reason::new(RefusalCode::UnknownCommand, number)],
+            text: format!("command number {number} is not known; host and core differ"),
+        })?;
         let payload = command.payload.get(..command.length as usize);
         let unpacked = payload.and_then(|payload| postcard::take_from_bytes::<Self>(payload).ok());
         match unpacked {
             Some((request, [])) if request.kind() == kind => request.verified(),
-            _ => Err(RequestError::Malformed { kind }.into()),
+            _ => {
+                let text = format!("the {kind:?} command cannot be read; host and core differ");
+                Err(Refusal::new(RefusalCode::Malformed, text))
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Every request survives the record, and no bytes are mistaken for another request.
 
 use super::*;
-use crate::{BUILTIN_SCENES, COMMAND_BYTES, MAX_SEEDS, PARAMETERS, Prescribed, Reason, RefusalCode, Text};
+use crate::{BUILTIN_SCENES, COMMAND_BYTES, MAX_SEEDS, PARAMETERS, Prescribed, Text};
 
 fn needle(seeds: usize) -> PlannedNeedle {
     PlannedNeedle {
@@ -120,8 +120,7 @@ fn all() -> Vec<Request> {
 
 fn reasons(request: &Request) -> Vec<RefusalCode> {
     let command = request.encode(1, 1).expect("fits");
-    let errors = Request::decode(&command).expect_err("invalid");
-    let refusal = crate::Refusal::from(errors);
+    let refusal = Request::decode(&command).expect_err("invalid");
     assert!(!refusal.text.is_empty());
     refusal.reasons.iter().filter_map(Reason::code).collect()
 }
@@ -155,8 +154,8 @@ fn the_longest_rehearsal_fits_and_one_needle_more_is_refused() {
         reasons(&longest(crate::MAX_EARLIER_NEEDLES + 1)),
         [RefusalCode::WrongCount]
     );
-    let error = longest(200).encode(1, 1).expect_err("does not fit").0;
-    assert!(matches!(error[..], [RequestError::TooLong { .. }]));
+    let error = longest(200).encode(1, 1).expect_err("does not fit");
+    assert_eq!(error.reasons[0].code(), Some(RefusalCode::WrongCount));
 }
 
 #[test]
@@ -184,9 +183,9 @@ fn damaged_records_never_panic_and_what_is_accepted_survives() {
                 let again = request.encode(0, 0).expect("came out of a record");
                 assert_eq!(Request::decode(&again), Ok(request));
             }
-            Err(errors) => {
+            Err(refusal) => {
                 refused += 1;
-                assert!(!crate::Refusal::from(errors).reasons.is_empty());
+                assert!(!refusal.reasons.is_empty());
             }
         }
     }
@@ -196,26 +195,16 @@ fn damaged_records_never_panic_and_what_is_accepted_survives() {
 #[test]
 fn unknown_numbers_false_lengths_and_another_kind_are_refused() {
     let ones: Command = bytemuck::pod_read_unaligned(&[0xff; size_of::<Command>()]);
-    assert_eq!(
-        Request::decode(&ones),
-        Err(RequestError::UnknownCommand(u32::MAX).into())
-    );
+    let why = |command: &Command| Request::decode(command).expect_err("refused").reasons;
+    assert_eq!(why(&ones), [Reason::new(RefusalCode::UnknownCommand, u32::MAX)]);
+    let malformed = [Reason::new(RefusalCode::Malformed, Reason::NO_SUBJECT)];
     let good = Request::TakeNeedle(7).encode(1, 1).expect("fits");
-    let kind = CommandKind::TakeNeedle;
     for length in [0, good.length - 1, good.length + 1, COMMAND_BYTES as u32 + 1, u32::MAX] {
         let bad = Command { length, ..good };
-        assert_eq!(
-            Request::decode(&bad),
-            Err(RequestError::Malformed { kind }.into()),
-            "{length}"
-        );
+        assert_eq!(why(&bad), malformed, "{length}");
     }
-    let kind = CommandKind::Engage;
-    let other = Command {
-        kind: kind as u32,
-        ..good
-    };
-    assert_eq!(Request::decode(&other), Err(RequestError::Malformed { kind }.into()));
+    let kind = CommandKind::Engage as u32;
+    assert_eq!(why(&Command { kind, ..good }), malformed);
 }
 
 #[test]

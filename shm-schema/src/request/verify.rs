@@ -8,153 +8,61 @@ use crate::{
     Text,
 };
 
-/// One problem with a request.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RequestError {
-    /// No request has this number.
-    #[error("command number {0} is not known; host and core differ")]
-    UnknownCommand(u32),
-    /// The payload is not a request of that kind.
-    #[error("the {kind:?} command cannot be read; host and core differ")]
-    Malformed {
-        /// Kind of the request.
-        kind: CommandKind,
-    },
-    /// The request does not fit into a record.
-    #[error("the {kind:?} command names more than fits into one request")]
-    TooLong {
-        /// Kind of the request.
-        kind: CommandKind,
-    },
-    /// A list has too many or too few entries.
-    #[error("{count} {what} came; there must be {least} to {most}")]
-    Count {
-        /// Name of the entries.
-        what: &'static str,
-        /// Number received.
-        count: usize,
-        /// Smallest number.
-        least: usize,
-        /// Largest number.
-        most: usize,
-    },
-    /// A position is farther out than [`MAX_COORDINATE_M`].
-    #[error("the place {0:?} must be within {MAX_COORDINATE_M} m")]
-    TooFar([f64; 3]),
-    /// A direction is not a unit vector.
-    #[error("the direction {0:?} is not a unit vector")]
-    NotUnit([f64; 3]),
-    /// A value is outside its limits.
-    #[error("{what} is {value}; it must be {low} to {high}")]
-    OutOfLimits {
-        /// Name of the quantity with its unit.
-        what: &'static str,
-        /// The value received.
-        value: f64,
-        /// Smallest value.
-        low: f64,
-        /// Largest value.
-        high: f64,
-    },
-    /// Needles are numbered from 1 on.
-    #[error("no needle has the number 0")]
-    NoNeedle,
-    /// The words cannot be shown, or are empty.
-    #[error("the words are empty, or no UTF-8 of one line in {MARK_BYTES} bytes")]
-    InvalidText,
-    /// No built-in scene has this number.
-    #[error("there is no built-in scene number {number}; from 0 they are {}", BUILTIN_SCENES.join(", "))]
-    UnknownScene {
-        /// The number received.
-        number: u32,
-    },
-}
-
-impl RequestError {
-    /// Returns the reason for a reply.
-    pub fn reason(&self) -> Reason {
-        let alone = |code| Reason::new(code, Reason::NO_SUBJECT);
-        match *self {
-            Self::UnknownCommand(number) => Reason::new(RefusalCode::UnknownCommand, number),
-            Self::Malformed { .. } => alone(RefusalCode::Malformed),
-            Self::TooLong { .. } => alone(RefusalCode::WrongCount),
-            Self::Count { count, .. } => Reason::new(RefusalCode::WrongCount, u32::try_from(count).unwrap_or(u32::MAX)),
-            Self::TooFar(_) => alone(RefusalCode::PlaceTooFar),
-            Self::NotUnit(_) => alone(RefusalCode::NotUnitDirection),
-            Self::OutOfLimits { .. } => alone(RefusalCode::ValueOutOfLimits),
-            Self::NoNeedle => Reason::new(RefusalCode::NoLeftNeedle, 0),
-            Self::UnknownScene { number } => Reason::new(RefusalCode::UnknownScene, number),
-            Self::InvalidText => alone(RefusalCode::InvalidText),
-        }
-    }
-}
-
-/// All problems with one request; at least one.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{}", crate::refusal::lines(.0))]
-pub struct RequestErrors(pub Vec<RequestError>);
-
-impl From<RequestError> for RequestErrors {
-    fn from(error: RequestError) -> Self {
-        Self(vec![error])
-    }
-}
-
-impl From<RequestErrors> for Refusal {
-    fn from(errors: RequestErrors) -> Self {
-        Self {
-            reasons: errors.0.iter().map(RequestError::reason).collect(),
-            text: errors.to_string(),
-        }
-    }
-}
+const NONE: u32 = Reason::NO_SUBJECT;
 
 impl Request {
     /// Returns the request, or every reason against it.
-    pub(super) fn verified(self) -> Result<Self, RequestErrors> {
-        let mut verify = Verify::default();
-        verify.request(&self);
-        match verify.0.is_empty() {
+    pub(super) fn verified(self) -> Result<Self, Refusal> {
+        let Verify { reasons, lines } = Verify::of(&self);
+        let text = lines.join("\n");
+        match reasons.is_empty() {
             true => Ok(self),
-            false => Err(RequestErrors(verify.0)),
+            false => Err(Refusal { reasons, text }),
         }
     }
 }
 
-/// Collects the errors of one request.
+/// Reasons against one request, and a line of text for each.
 #[derive(Default)]
-struct Verify(Vec<RequestError>);
+struct Verify {
+    reasons: Vec<Reason>,
+    lines: Vec<String>,
+}
 
 impl Verify {
-    fn request(&mut self, request: &Request) {
+    fn of(request: &Request) -> Self {
+        let mut this = Self::default();
         match request {
-            Request::SetParameters(changes) => self.parameters(changes),
-            Request::SetPlan(Some(needle)) => self.planned(needle),
-            Request::MoveHand(hand) => self.hand(hand),
+            Request::SetParameters(changes) => this.parameters(changes),
+            Request::SetPlan(Some(needle)) => this.planned(needle),
+            Request::MoveHand(hand) => this.hand(hand),
             Request::MoveSecondHand(probe) => {
-                self.hand(&probe.hand);
-                probe.up.iter().for_each(|up| self.direction(up));
+                this.hand(&probe.hand);
+                probe.up.iter().for_each(|up| this.direction(up));
             }
-            Request::DropSeed { strand_pitch_m } => self.pitch(*strand_pitch_m),
+            Request::DropSeed { strand_pitch_m } => this.pitch(*strand_pitch_m),
             Request::LoadBuiltinScene(number) => {
-                let (number, is_known) = (*number, (*number as usize) < BUILTIN_SCENES.len());
-                self.ensure(is_known, || RequestError::UnknownScene { number });
+                let is_known = (*number as usize) < BUILTIN_SCENES.len();
+                this.ensure(is_known, (RefusalCode::UnknownScene, *number), || {
+                    let known = BUILTIN_SCENES.join(", ");
+                    format!("there is no built-in scene number {number}; from 0 they are {known}")
+                });
             }
-            Request::Rehearse(run) => self.rehearsal(run),
-            Request::ExpectNeedle(axis) => self.axis(&axis.entry_m, &axis.direction),
-            Request::TakeNeedle(number) => self.number(*number),
+            Request::Rehearse(run) => this.rehearsal(run),
+            Request::ExpectNeedle(axis) => this.axis(&axis.entry_m, &axis.direction),
+            Request::TakeNeedle(number) => this.number(*number),
             Request::DrawNeedle { number, speed_m_per_s } => {
-                self.number(*number);
-                self.within("the speed in m/s", *speed_m_per_s, SPEED_RANGE_M_PER_S);
+                this.number(*number);
+                this.within("the speed in m/s", *speed_m_per_s, SPEED_RANGE_M_PER_S);
             }
             Request::Mark(mark) => {
-                self.within("the time before the request in s", mark.before_s, MARK_BEFORE_RANGE_S);
+                this.within("the time before the request in s", mark.before_s, MARK_BEFORE_RANGE_S);
                 let words = Text::<MARK_BYTES>::new(&mark.text);
                 let can_be_shown = words.exact() == Some(&mark.text) && !mark.text.trim().is_empty();
-                self.ensure(can_be_shown, || RequestError::InvalidText);
+                this.text(can_be_shown);
             }
-            Request::BeginExercise(exercise) => self.exercise(*exercise),
-            Request::KeepMoving { valid_s } => self.within("the promised time in s", *valid_s, VALID_RANGE_S),
+            Request::BeginExercise(exercise) => this.exercise(*exercise),
+            Request::KeepMoving { valid_s } => this.within("the promised time in s", *valid_s, VALID_RANGE_S),
             Request::SetPlan(None)
             | Request::Engage
             | Request::Disengage
@@ -167,6 +75,7 @@ impl Verify {
             | Request::EndExercises
             | Request::StopSecondHand => {}
         }
+        this
     }
 
     fn parameters(&mut self, changes: &[ParameterChange]) {
@@ -188,7 +97,7 @@ impl Verify {
         }
         self.within("the strength of a seed in U", of.strength_u, SEED_STRENGTH_RANGE_U);
         self.within("the prescribed dose in Gy", of.dose_gy, PRESCRIPTION_RANGE_GY);
-        self.ensure(of.source.exact().is_some(), || RequestError::InvalidText);
+        self.text(of.source.exact().is_some());
     }
 
     fn rehearsal(&mut self, run: &NeedleRehearsal) {
@@ -242,7 +151,9 @@ impl Verify {
     }
 
     fn number(&mut self, number: u32) {
-        self.ensure(number > 0, || RequestError::NoNeedle);
+        self.ensure(number > 0, (RefusalCode::NoLeftNeedle, 0), || {
+            "no needle has the number 0".to_owned()
+        });
     }
 
     fn axis(&mut self, place_m: &[f64; 3], direction: &[f64; 3]) {
@@ -254,35 +165,45 @@ impl Verify {
     fn places(&mut self, places_m: &[[f64; 3]]) {
         for place_m in places_m {
             let is_near = place_m.iter().all(|c| c.abs() <= MAX_COORDINATE_M);
-            self.ensure(is_near, || RequestError::TooFar(*place_m));
+            self.ensure(is_near, (RefusalCode::PlaceTooFar, NONE), || {
+                format!("the place {place_m:?} must be within {MAX_COORDINATE_M} m")
+            });
         }
     }
 
     fn direction(&mut self, direction: &[f64; 3]) {
-        self.ensure(is_unit(direction), || RequestError::NotUnit(*direction));
+        self.ensure(is_unit(direction), (RefusalCode::NotUnitDirection, NONE), || {
+            format!("the direction {direction:?} is not a unit vector")
+        });
     }
 
     fn within(&mut self, what: &'static str, value: f64, [low, high]: [f64; 2]) {
-        self.ensure((low..=high).contains(&value), || RequestError::OutOfLimits {
-            what,
-            value,
-            low,
-            high,
-        });
+        self.ensure(
+            (low..=high).contains(&value),
+            (RefusalCode::ValueOutOfLimits, NONE),
+            || format!("{what} is {value}; it must be {low} to {high}"),
+        );
     }
 
     fn count(&mut self, what: &'static str, count: usize, least: usize, most: usize) {
-        self.ensure((least..=most).contains(&count), || RequestError::Count {
-            what,
-            count,
-            least,
-            most,
+        let subject = u32::try_from(count).unwrap_or(u32::MAX);
+        self.ensure(
+            (least..=most).contains(&count),
+            (RefusalCode::WrongCount, subject),
+            || format!("{count} {what} came; there must be {least} to {most}"),
+        );
+    }
+
+    fn text(&mut self, can_be_shown: bool) {
+        self.ensure(can_be_shown, (RefusalCode::InvalidText, NONE), || {
+            format!("the words are empty, or no UTF-8 of one line in {MARK_BYTES} bytes")
         });
     }
 
-    fn ensure(&mut self, holds: bool, error: impl FnOnce() -> RequestError) {
+    fn ensure(&mut self, holds: bool, (code, subject): (RefusalCode, u32), text: impl FnOnce() -> String) {
         if !holds {
-            self.0.push(error());
+            self.reasons.push(Reason::new(code, subject));
+            self.lines.push(text());
         }
     }
 }

@@ -52,7 +52,7 @@ impl Control {
                     self.link.answer(ticket, Err(&refusal));
                 }
             }
-            Err(errors) => self.link.refuse_invalid(asker, &errors.into()),
+            Err(refusal) => self.link.refuse_invalid(asker, &refusal),
         }
         false
     }
