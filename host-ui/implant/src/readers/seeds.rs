@@ -8,7 +8,7 @@ use std::path::Path;
 use stylet_dose::Seed;
 use stylet_files::dicom;
 use stylet_files::dicom::plan::{Date, PlanSeed, SeedPlan};
-use stylet_files::{FileError, bytes, report};
+use stylet_files::{FileError, bytes};
 
 const MAX_U: f64 = 1e5;
 /// Columns of the direction.
