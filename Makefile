@@ -8,7 +8,7 @@ SIMULATOR = --bin rt-core --bin stylet-bridge --bin host-ui
 PRODUCTS = --bin stylet-lab --bin stylet-study --bin stylet-clinic --bin stylet-igtl
 SHIPPED := $(or $(CARGO_TARGET_DIR),target)/release
 
-.PHONY: attributes deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
+.PHONY: attributes second-reader deny loom wall senders floods hostile compensation envelope procedure-test live live-test help run test test-all build products build-release package package-test picture example report causes ratios igtl-test relay relay-class relay-faults relay-fuzz relay-test fuzz soak force-pictures clean book deps-run deps-package deps-package-test deps-soak deps-test
 
 help: ## List the targets
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/'
@@ -118,6 +118,12 @@ live-test: build live ## Watch 'host-ui record --live' for LIVE_SECONDS (60) wit
 
 attributes: ## Read 10,000 objects of each kind with damaged attributes; a wrong figure without a note fails
 	STYLET_ATTRIBUTES=$(or $(OBJECTS),10000) $(CARGO) test --profile quick -p stylet-files --lib damaged_attributes -- --nocapture
+
+second-reader: products ## Compare what Stylet reads with pydicom, ITK, dcmtk, nibabel and dicompyler on 200 generated objects (about ten minutes), then time them
+	@docs/tools/need dcmtk python3-venv time
+	python3 -m venv $(BIN)/second-reader && $(BIN)/second-reader/bin/pip install -q -r tests/oracles/clinic/requirements.txt
+	$(BIN)/second-reader/bin/python tests/oracles/clinic/run.py $(BIN)/host-ui $(BIN)/second-reader/objects
+	$(BIN)/second-reader/bin/python tests/oracles/clinic/times.py $(BIN)/host-ui $(BIN)/second-reader/times
 
 fuzz: ## Fuzz each file reader for FUZZ_SECONDS (600) seconds
 	docs/tools/fuzz
