@@ -191,7 +191,8 @@ def second(found, path, kind, how, frame, labels):
 def check(stylet, rng, root, kind, n, variant, how):
     found = Object(kind, f"{kind}{n:02}", variant)
     frame, labels = volume(rng, how.get("mirror"))
-    if "letters" in how:  # the sides at which the axes begin, as ITK writes them; MetaIO's own page says where they end
+    found.may_refuse = "letters" in how
+    if found.may_refuse:  # the sides at which the axes begin, as ITK writes them; MetaIO's own page says where they end
         frame.directions = np.diag([-1.0, -1.0, 1.0])
     write = {"NRRD": as_nrrd, "NIfTI": as_nifti, "MetaImage": as_meta}[kind]
     path = write(root / f"{found.name}{'.nrrd' if kind == 'NRRD' else '.mha' if kind == 'MetaImage' else '.nii'}", frame, labels, how)
