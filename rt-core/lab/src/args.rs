@@ -128,12 +128,7 @@ impl LatencyArgs {
         }
         Ok(options)
     }
-}
 
-/// A tick is late once it has used this fraction of its period before its end.
-const LATE_SHARE: u64 = 5;
-
-impl LatencyArgs {
     /// Returns the lateness from which the trace names the cause of a tick; `None` without a trace.
     pub fn trace_over_ns(&self) -> Option<u64> {
         let default_ns = measure::period_ns(self.rate) / LATE_SHARE;
@@ -154,6 +149,8 @@ impl LatencyArgs {
     }
 }
 
+/// A tick is late once it has used this fraction of its period before its end.
+const LATE_SHARE: u64 = 5;
 /// Fraction of a core kept free for the loop itself and for everything else of real-time priority.
 const SHARE_KEPT_FREE: f64 = 0.15;
 

@@ -315,10 +315,6 @@ impl Machine {
         let mask = mask.and_then(|m| u64::from_str_radix(m.trim(), 16).ok()).unwrap_or(0);
         mask >> bit & 1 == 1
     }
-
-    pub fn exists(&self, path: &str) -> bool {
-        Path::new(&self.path(path)).exists()
-    }
 }
 
 /// Returns the column of `core` in `/proc/interrupts`, by number and name.

@@ -97,7 +97,7 @@ pub fn siblings(machine: &Machine, core: usize) -> Finding {
 }
 
 pub fn sleep_states(machine: &Machine, core: usize) -> Finding {
-    let can_ask = machine.exists("dev/cpu_dma_latency");
+    let can_ask = machine.path("dev/cpu_dma_latency").exists();
     let states = machine.idle_states(core);
     let deep: Vec<String> = states
         .iter()
