@@ -31,23 +31,73 @@ impl<T> DerefMut for Eight<T> {
 
 /// Arithmetic on eight numbers at once. [`Number::Wide`] may be used in functions alone that are compiled for AVX2 or
 /// more.
-pub trait Vector<T>: Copy {
+pub trait Vector<T: Number>: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// Loads eight numbers from memory.
     fn load(from: &[T; LANES]) -> Self;
     /// Stores eight numbers to memory.
     fn store(self, to: &mut [T; LANES]);
     /// Repeats a number eight times.
     fn splat(value: T) -> Self;
-    /// Returns the eight sums.
-    fn add(self, other: Self) -> Self;
-    /// Returns the eight differences.
-    fn sub(self, other: Self) -> Self;
-    /// Returns the eight products.
-    fn mul(self, other: Self) -> Self;
+
+    /// Returns the numbers as they lie in memory.
+    #[inline(always)]
+    fn numbers(self) -> [T; LANES] {
+        let mut numbers = [T::default(); LANES];
+        self.store(&mut numbers);
+        numbers
+    }
+
+    /// Loads as many numbers as there are, at most eight; zeros for the others.
+    #[inline(always)]
+    fn load_first(from: &[T]) -> Self {
+        Self::load(&std::array::from_fn(|n| from.get(n).copied().unwrap_or_default()))
+    }
+
+    /// Stores as many numbers as there is room for, at most eight.
+    #[inline(always)]
+    fn store_first(self, to: &mut [T]) {
+        to.iter_mut().zip(self.numbers()).for_each(|(to, number)| *to = number);
+    }
+
+    /// Returns the numbers that are less than those of `other`, and those of `other` elsewhere.
+    #[inline(always)]
+    fn lesser(self, other: Self) -> Self {
+        let (a, b) = (self.numbers(), other.numbers());
+        Self::load(&std::array::from_fn(|n| if a[n] < b[n] { a[n] } else { b[n] }))
+    }
+
+    /// Returns the numbers that are greater than those of `other`, and those of `other` elsewhere.
+    #[inline(always)]
+    fn greater(self, other: Self) -> Self {
+        let (a, b) = (self.numbers(), other.numbers());
+        Self::load(&std::array::from_fn(|n| if a[n] > b[n] { a[n] } else { b[n] }))
+    }
+
+    /// Returns the sizes of the numbers.
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.greater(Self::splat(T::default()) - self)
+    }
+
+    /// Returns which numbers are greater than those of `other`, a bit each.
+    #[inline(always)]
+    fn above(self, other: Self) -> u32 {
+        let (a, b) = (self.numbers(), other.numbers());
+        (0..LANES).fold(0, |bits, n| bits | u32::from(a[n] > b[n]) << n)
+    }
+
+    /// Returns the numbers of `yes` where the bit is set, those of `no` elsewhere.
+    #[inline(always)]
+    fn select(bits: u32, yes: Self, no: Self) -> Self {
+        let (yes, no) = (yes.numbers(), no.numbers());
+        Self::load(&std::array::from_fn(
+            |n| if bits >> n & 1 == 1 { yes[n] } else { no[n] },
+        ))
+    }
 }
 
 /// A number type with registers for eight of it.
-pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+pub trait Number: Copy + Default + PartialOrd + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// Vector type for functions that are compiled for AVX2 or more.
     type Wide: Vector<Self>;
 }
@@ -67,16 +117,28 @@ impl<T: Number> Vector<T> for Eight<T> {
     fn splat(value: T) -> Self {
         Eight([value; LANES])
     }
+}
+
+impl<T: Number> Add for Eight<T> {
+    type Output = Self;
 
     #[inline(always)]
     fn add(self, other: Self) -> Self {
         Eight(std::array::from_fn(|n| self.0[n] + other.0[n]))
     }
+}
+
+impl<T: Number> Sub for Eight<T> {
+    type Output = Self;
 
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         Eight(std::array::from_fn(|n| self.0[n] - other.0[n]))
     }
+}
+
+impl<T: Number> Mul for Eight<T> {
+    type Output = Self;
 
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -98,6 +160,7 @@ impl Number for f64 {
 mod wide {
     use super::{LANES, Number, Vector};
     use std::arch::x86_64::*;
+    use std::ops::{Add, Mul, Sub};
 
     /// Eight numbers of 32 bits in one register.
     #[derive(Clone, Copy)]
@@ -115,10 +178,39 @@ mod wide {
         type Wide = Double;
     }
 
+    macro_rules! operators {
+        ($($trait:ident $method:ident $single:ident $double:ident,)*) => {$(
+            impl $trait for Single {
+                type Output = Self;
+
+                #[inline(always)]
+                fn $method(self, other: Self) -> Self {
+                    // SAFETY: AVX2 is there (trait's doc), here and below.
+                    Single(unsafe { $single(self.0, other.0) })
+                }
+            }
+
+            impl $trait for Double {
+                type Output = Self;
+
+                #[inline(always)]
+                fn $method(self, other: Self) -> Self {
+                    // SAFETY: as above.
+                    unsafe { Double($double(self.0, other.0), $double(self.1, other.1)) }
+                }
+            }
+        )*};
+    }
+    operators! {
+        Add add _mm256_add_ps _mm256_add_pd,
+        Sub sub _mm256_sub_ps _mm256_sub_pd,
+        Mul mul _mm256_mul_ps _mm256_mul_pd,
+    }
+
     impl Vector<f32> for Single {
         #[inline(always)]
         fn load(from: &[f32; LANES]) -> Self {
-            // SAFETY: eight numbers; AVX2 is there (trait's doc), here and below.
+            // SAFETY: eight numbers.
             Single(unsafe { _mm256_loadu_ps(from.as_ptr()) })
         }
 
@@ -135,21 +227,37 @@ mod wide {
         }
 
         #[inline(always)]
-        fn add(self, other: Self) -> Self {
+        fn lesser(self, other: Self) -> Self {
             // SAFETY: as above.
-            Single(unsafe { _mm256_add_ps(self.0, other.0) })
+            Single(unsafe { _mm256_min_ps(self.0, other.0) })
         }
 
         #[inline(always)]
-        fn sub(self, other: Self) -> Self {
+        fn greater(self, other: Self) -> Self {
             // SAFETY: as above.
-            Single(unsafe { _mm256_sub_ps(self.0, other.0) })
+            Single(unsafe { _mm256_max_ps(self.0, other.0) })
         }
 
         #[inline(always)]
-        fn mul(self, other: Self) -> Self {
+        fn abs(self) -> Self {
             // SAFETY: as above.
-            Single(unsafe { _mm256_mul_ps(self.0, other.0) })
+            Single(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+        }
+
+        #[inline(always)]
+        fn above(self, other: Self) -> u32 {
+            // SAFETY: as above.
+            unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0)) as u32 }
+        }
+
+        #[inline(always)]
+        fn select(bits: u32, yes: Self, no: Self) -> Self {
+            // SAFETY: as above.
+            unsafe {
+                let lane = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+                let is_set = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(bits as i32), lane), lane);
+                Single(_mm256_blendv_ps(no.0, yes.0, _mm256_castsi256_ps(is_set)))
+            }
         }
     }
 
@@ -157,7 +265,7 @@ mod wide {
         #[inline(always)]
         fn load(from: &[f64; LANES]) -> Self {
             let (low, high) = from.split_at(4);
-            // SAFETY: four numbers each; AVX2 is there (trait's doc), here and below.
+            // SAFETY: four numbers each.
             unsafe { Double(_mm256_loadu_pd(low.as_ptr()), _mm256_loadu_pd(high.as_ptr())) }
         }
 
@@ -176,24 +284,6 @@ mod wide {
             // SAFETY: as above.
             let one = unsafe { _mm256_set1_pd(value) };
             Double(one, one)
-        }
-
-        #[inline(always)]
-        fn add(self, other: Self) -> Self {
-            // SAFETY: as above.
-            unsafe { Double(_mm256_add_pd(self.0, other.0), _mm256_add_pd(self.1, other.1)) }
-        }
-
-        #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            // SAFETY: as above.
-            unsafe { Double(_mm256_sub_pd(self.0, other.0), _mm256_sub_pd(self.1, other.1)) }
-        }
-
-        #[inline(always)]
-        fn mul(self, other: Self) -> Self {
-            // SAFETY: as above.
-            unsafe { Double(_mm256_mul_pd(self.0, other.0), _mm256_mul_pd(self.1, other.1)) }
         }
     }
 }
@@ -263,21 +353,32 @@ mod tests {
     use crate::simd::Simd;
 
     in_vectors! {
-        fn mixed<T: Number, V>(a: &Eight<T>, b: &Eight<T>, c: T, to: &mut Eight<T>) {
-            let (a, b) = (V::load(a), V::load(b));
-            a.add(b).mul(V::splat(c)).sub(a.mul(b)).store(to);
+        fn mixed<T: Number, V>(a: &Eight<T>, b: &Eight<T>, c: T, to: &mut [Eight<T>; 3]) {
+            let (a, b, c) = (V::load(a), V::load(b), V::splat(c));
+            ((a + b) * c - a * b).store(&mut to[0]);
+            V::select((a * c).above(b) ^ 0b110, a.lesser(b).greater(c), b.abs()).store(&mut to[1]);
+            V::load_first(&to[0][..5]).store_first(&mut to[2][1..]);
         }
     }
 
     fn agrees<T: Number + PartialEq + std::fmt::Debug>(of: fn(f64) -> T) {
         let a = Eight(std::array::from_fn(|n| of(1.0 / (n as f64 + 0.3))));
         let b = Eight(std::array::from_fn(|n| of((n as f64 - 3.7) * 1e5)));
+        let c = of(0.1);
         for simd in Simd::all() {
-            let mut c = Eight([of(0.0); LANES]);
-            mixed(simd, &a, &b, of(0.1), &mut c);
+            let mut to = [Eight([of(0.0); LANES]); 3];
+            mixed(simd, &a, &b, c, &mut to);
             for n in 0..LANES {
-                assert_eq!(c.0[n], (a.0[n] + b.0[n]) * of(0.1) - a.0[n] * b.0[n], "{simd:?}");
+                let (a, b) = (a.0[n], b.0[n]);
+                assert_eq!(to[0].0[n], (a + b) * c - a * b, "{simd:?}");
+                let is_yes = (a * c > b) != [1, 2].contains(&n);
+                let least = if a < b { a } else { b };
+                let size = if b < of(0.0) { of(0.0) - b } else { b };
+                let clamped = if least > c { least } else { c };
+                assert_eq!(to[1].0[n], if is_yes { clamped } else { size }, "{simd:?} {n}");
             }
+            assert_eq!(to[2].0[1..6], to[0].0[..5], "{simd:?}");
+            assert_eq!(to[2].0[6..], [of(0.0); 2], "{simd:?}");
         }
     }
 

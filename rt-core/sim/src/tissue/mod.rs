@@ -40,7 +40,6 @@ mod model;
 mod parts;
 mod point;
 mod spec;
-mod violation;
 
 pub use ahead::element_ahead;
 pub use carried::{Carried, CarriedField, Carry, Shift};
@@ -54,4 +53,3 @@ pub use large::LargeStrain;
 pub use model::{Held, HeldOutcome, REACH, Solve, StepReport, TissueModel};
 pub use point::MaterialPoint;
 pub use spec::{BuildTissue, TissueError, TissueSpec};
-pub use violation::largest_violation;

@@ -22,10 +22,6 @@ pub const LONGER: &[(&str, &str)] = &[
         "one walk through the plan in the window, step after step",
     ),
     ("src/doctor/tests.rs", "one machine after another over one fixture"),
-    (
-        "chainmail/avx2.rs",
-        "vector kernels that share their lanes and constants",
-    ),
 ];
 
 /// Checks that tests stand at the end of `name.rs`, in `name/tests.rs`, or below `name/tests/`.

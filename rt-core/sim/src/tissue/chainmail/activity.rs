@@ -105,10 +105,6 @@ impl Active {
         count
     }
 
-    pub fn bytes(&self) -> usize {
-        size_of::<Stretch>() * (self.of_run.len() + self.rows.len())
-    }
-
     /// Returns its parts, as bytes.
     pub fn memory(&self) -> [&[u8]; 3] {
         [

@@ -1,13 +1,14 @@
 //! The part of a sweep inside a run: elements outward from the held column, each after its inner neighbour.
 
-use super::kernels::{self, Kernels, LOWER, Pin, Scaled, Stretch, UPPER};
+use super::kernels::{self, LOWER, Pin, Scaled, Stretch, UPPER};
 use super::spans::Span;
 use super::sweep::Pass;
+use crate::simd::Vector;
 
 impl Pass<'_> {
     /// Moves the elements of a run outward from the held column; says which moved.
     #[inline(always)]
-    pub fn along_x<K: Kernels>(&mut self, run: usize, row: usize) -> Stretch {
+    pub fn along_x<V: Vector<f32>>(&mut self, run: usize, row: usize) -> Stretch {
         self.state.keep(self.model, run);
         let of_run = self.model.rows.runs[run];
         let first = of_run.first as usize;
@@ -22,26 +23,26 @@ impl Pass<'_> {
                 .max(start)
                 .max((active.start as usize).saturating_sub(1));
             let links = [from, (span.lo + span.len) as usize, reach];
-            moved = moved.with(self.up::<K>(span, links));
+            moved = moved.with(self.up::<V>(span, links));
         }
         for span in spans.iter().rev().filter(|s| s.lo_run as usize == run) {
             let reach = (active.with(moved).start as usize).saturating_sub(1);
             let end = ((span.lo + span.len) as usize).min(start).min(active.end as usize);
             let links = [span.lo as usize, end, reach];
-            moved = moved.with(self.down::<K>(span, links));
+            moved = moved.with(self.down::<V>(span, links));
         }
         moved
     }
 
     /// Handles links `from..end` of a run upward, from `from` to `reach` or as far as something moves.
     #[inline(always)]
-    fn up<K: Kernels>(&mut self, span: &Span, [from, end, reach]: [usize; 3]) -> Stretch {
+    fn up<V: Vector<f32>>(&mut self, span: &Span, [from, end, reach]: [usize; 3]) -> Stretch {
         let l = self.limits(span.class, 0);
         let mut u = self.state.u.each_mut().map(Vec::as_mut_slice);
         let mut moved = Stretch::EMPTY;
         let (mut link, stop) = (from, end.min(reach));
         while link < stop {
-            link = K::first_violated(&l, &u.each_ref().map(|c| &**c), link, stop);
+            link = kernels::first_violated::<V>(&l, &u.each_ref().map(|c| &**c), link, stop);
             if link >= stop {
                 break;
             }
@@ -67,13 +68,13 @@ impl Pass<'_> {
 
     /// Handles links `start..end` of a run downward, from `end` to `reach` or as far as something moves.
     #[inline(always)]
-    fn down<K: Kernels>(&mut self, span: &Span, [start, end, reach]: [usize; 3]) -> Stretch {
+    fn down<V: Vector<f32>>(&mut self, span: &Span, [start, end, reach]: [usize; 3]) -> Stretch {
         let l = self.limits(span.class, 0);
         let mut u = self.state.u.each_mut().map(Vec::as_mut_slice);
         let mut moved = Stretch::EMPTY;
         let (mut past, stop) = (end, start.max(reach));
         while past > stop {
-            past = K::past_last_violated(&l, &u.each_ref().map(|c| &**c), stop, past);
+            past = kernels::past_last_violated::<V>(&l, &u.each_ref().map(|c| &**c), stop, past);
             if past <= stop {
                 break;
             }

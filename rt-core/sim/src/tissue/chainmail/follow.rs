@@ -4,7 +4,6 @@
 
 use super::held::{self, Grip};
 use super::kernels;
-use super::loops::Loops;
 use super::model::ChainMail;
 use super::propagate::{Patience, sweep};
 use super::state::TissueState;
@@ -17,7 +16,7 @@ const SHORTER_TRIES: i32 = 3;
 const FIRST_SHORTER: f32 = 1.0;
 
 /// Moves the held elements toward their target, as far as sweeps can follow; `grip` then has the distance.
-pub(super) fn follow<K: Loops>(
+pub(super) fn follow(
     model: &ChainMail,
     state: &mut TissueState,
     grip: &mut Grip,
@@ -35,7 +34,7 @@ pub(super) fn follow<K: Loops>(
             grip.at = [0, 1, 2].map(|a| from[a] + way[a] * (length / asked));
         }
         held::put(model, state, grip);
-        let residual = sweep::<K>(model, state, grip, slack, Patience::WhileItHelps, report);
+        let residual = sweep(model, state, grip, slack, Patience::WhileItHelps, report);
         if residual <= model.limits().tolerance {
             state.end_trial();
             return residual;
@@ -48,5 +47,5 @@ pub(super) fn follow<K: Loops>(
     }
     state.end_trial();
     grip.at = from;
-    Pass::new(model, state, model.lattice.cell(grip.element), slack).check::<K>()
+    Pass::new(model, state, model.lattice.cell(grip.element), slack).check()
 }

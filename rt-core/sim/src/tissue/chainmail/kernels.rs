@@ -1,8 +1,12 @@
-//! The arithmetic of one link, and of many in a row: portable loops; `avx2` has the same arithmetic eight at a time.
+//! The arithmetic of one link, and of many in a row, eight at a time.
 //!
 //! Components come in the order along, side, side: the link's axis first, then the two other axes.
+//!
+//! Nothing here panics, since it runs inside a tick. Stretches that do not lie in the components are cut, or left alone
+//! where a part of them means nothing; those of a model lie inside its state, which `TissueState::fits` verifies.
 
 use crate::limits::LinkLimits;
+use crate::simd::{LANES, Vector, in_vectors};
 use bytemuck::{Pod, Zeroable};
 
 /// Links whose outer end is the upper one; `LOWER` where it is the lower one.
@@ -151,85 +155,182 @@ pub(crate) fn at(u: &[&mut [f32]; 3], e: usize) -> [f32; 3] {
     [u[0][e], u[1][e], u[2][e]]
 }
 
-/// The passes' loops over links.
-///
-/// Called inside a tick with the stretches of a model on a state that fits it, so that all lie inside the components.
-///
-/// `u` has the component along the links first. Links join element `inner + n` to `outer + n` (or `lo + n` to
-/// `hi + n`); the two stretches do not overlap unless stated.
-pub(crate) trait Kernels {
-    /// Moves the outer end of each link into its limits; says which, counted from 0.
-    fn clamp<const OUTER: bool>(l: &Scaled, u: &mut [&mut [f32]; 3], inner: usize, outer: usize, n: usize) -> Stretch;
-
-    /// Returns the largest violation; zero if there is none. The stretches may overlap (links along x).
-    fn violation(l: &Scaled, u: &[&[f32]; 3], lo: usize, hi: usize, n: usize) -> f32;
-
-    /// Returns the first of the links between consecutive elements `start..end` and the next that is violated by more
-    /// than the slack, or `end`.
-    fn first_violated(l: &Scaled, u: &[&[f32]; 3], start: usize, end: usize) -> usize;
-
-    /// Returns one past the last such link, or `start`.
-    fn past_last_violated(l: &Scaled, u: &[&[f32]; 3], start: usize, end: usize) -> usize;
-
-    /// Returns the largest square of a displacement.
-    fn largest_square(u: &[&[f32]; 3], start: usize, end: usize) -> f32;
+/// Limits of a link in every lane.
+struct Lanes<V> {
+    low: V,
+    high: V,
+    tan: V,
+    rest: V,
+    slack: V,
 }
 
-/// Returns the largest violation of one link; negative inside its limits.
-#[inline(always)]
-pub(crate) fn link_violation(l: &Scaled, lo: [f32; 3], hi: [f32; 3]) -> f32 {
-    let along = hi[0] - lo[0];
-    let stretch = greater(l.low - along, along - l.high);
-    let side = greater((hi[1] - lo[1]).abs(), (hi[2] - lo[2]).abs());
-    greater(stretch, side - l.tan * (l.rest + along))
-}
-
-pub(crate) struct Portable;
-
-#[inline(always)]
-fn violation_between(l: &Scaled, u: &[&[f32]; 3], lo: usize, hi: usize) -> f32 {
-    link_violation(l, u.map(|c| c[lo]), u.map(|c| c[hi]))
-}
-
-impl Kernels for Portable {
-    fn clamp<const OUTER: bool>(l: &Scaled, u: &mut [&mut [f32]; 3], inner: usize, outer: usize, n: usize) -> Stretch {
-        let mut hull = Stretch::EMPTY;
-        for e in 0..n {
-            let (new, moved) = clamped_outer::<OUTER>(l, at(u, inner + e), at(u, outer + e));
-            if moved {
-                for (component, value) in u.iter_mut().zip(new) {
-                    component[outer + e] = value;
-                }
-                hull = hull.with(Stretch {
-                    start: e as u32,
-                    end: e as u32 + 1,
-                });
-            }
+impl<V: Vector<f32>> Lanes<V> {
+    #[inline(always)]
+    fn of(l: &Scaled) -> Self {
+        Lanes {
+            low: V::splat(l.low),
+            high: V::splat(l.high),
+            tan: V::splat(l.tan),
+            rest: V::splat(l.rest),
+            slack: V::splat(l.slack),
         }
-        hull
     }
+}
 
-    fn violation(l: &Scaled, u: &[&[f32]; 3], lo: usize, hi: usize, n: usize) -> f32 {
-        (0..n).fold(0.0, |worst, e| greater(violation_between(l, u, lo + e, hi + e), worst))
-    }
+/// Loads eight values, zeros for those past the end: whole vectors even where some lanes are not meant.
+#[inline(always)]
+fn load<V: Vector<f32>>(c: &[f32], at: usize) -> V {
+    let from = c.get(at..).unwrap_or_default();
+    from.first_chunk().map_or_else(|| V::load_first(from), V::load)
+}
 
-    fn first_violated(l: &Scaled, u: &[&[f32]; 3], start: usize, end: usize) -> usize {
-        let mut links = start..end;
-        links
-            .find(|&e| violation_between(l, u, e, e + 1) > l.slack)
-            .unwrap_or(end)
+/// Stores what fits. A store of some lanes holds up the loads that follow, so it is kept for the end of a component.
+#[inline(always)]
+fn store<V: Vector<f32>>(c: &mut [f32], at: usize, value: V) {
+    let to = c.get_mut(at..).unwrap_or_default();
+    match to.first_chunk_mut() {
+        Some(all) => value.store(all),
+        None => value.store_first(to),
     }
+}
 
-    fn past_last_violated(l: &Scaled, u: &[&[f32]; 3], start: usize, end: usize) -> usize {
-        let mut links = (start..end).rev();
-        let last = links.find(|&e| violation_between(l, u, e, e + 1) > l.slack);
-        last.map_or(start, |e| e + 1)
-    }
+/// Returns the bits of the first `n` lanes, of all from eight on.
+#[inline(always)]
+fn first(n: usize) -> u32 {
+    (1 << n.min(LANES)) - 1
+}
 
-    fn largest_square(u: &[&[f32]; 3], start: usize, end: usize) -> f32 {
-        let square = |e: usize| u[0][e] * u[0][e] + u[1][e] * u[1][e] + u[2][e] * u[2][e];
-        (start..end).fold(0.0, |largest, e| greater(square(e), largest))
+#[inline(always)]
+fn shortest(u: &[&[f32]; 3]) -> usize {
+    u[0].len().min(u[1].len()).min(u[2].len())
+}
+
+/// Moves the outer end of each link `inner + n` to `outer + n` into its limits; says which, counted from 0. The two
+/// stretches do not overlap.
+#[inline(always)]
+pub(crate) fn clamp_all<V: Vector<f32>, const OUTER: bool>(
+    l: &Scaled,
+    [a, b, c]: &mut [&mut [f32]; 3],
+    inner: usize,
+    outer: usize,
+    n: usize,
+) -> Stretch {
+    let len = a.len().min(b.len()).min(c.len());
+    let n = n.min(len.saturating_sub(inner.max(outer)));
+    let l = Lanes::<V>::of(l);
+    let mut hull = Stretch::EMPTY;
+    for e in (0..n).step_by(LANES) {
+        let (from, to) = (inner + e, outer + e);
+        let (ia, oa): (V, V) = (load(a, from), load(a, to));
+        let d = if OUTER == UPPER { oa - ia } else { ia - oa };
+        let along = d.greater(l.low).lesser(l.high);
+        let new = if OUTER == UPPER { ia + along } else { ia - along };
+        let shear = l.tan * (l.rest + along);
+        let (ob, oc) = (load::<V>(b, to), load::<V>(c, to));
+        let (new_b, moved_b) = clamp_side(&l, shear, load(b, from), ob);
+        let (new_c, moved_c) = clamp_side(&l, shear, load(c, from), oc);
+        let moved_a = (d - along).abs().above(l.slack);
+        let live = first(n - e);
+        let moved = (moved_a | moved_b | moved_c) & live;
+        if moved != 0 {
+            store(a, to, V::select(moved_a & live, new, oa));
+            store(b, to, V::select(moved_b & live, new_b, ob));
+            store(c, to, V::select(moved_c & live, new_c, oc));
+            hull = hull.with(Stretch {
+                start: e as u32 + moved.trailing_zeros(),
+                end: e as u32 + 32 - moved.leading_zeros(),
+            });
+        }
     }
+    hull
+}
+
+#[inline(always)]
+fn clamp_side<V: Vector<f32>>(l: &Lanes<V>, shear: V, inner: V, outer: V) -> (V, u32) {
+    let d = outer - inner;
+    let kept = d.greater(V::splat(0.0) - shear).lesser(shear);
+    (inner + kept, (d - kept).abs().above(l.slack))
+}
+
+/// Returns the violations of eight links; negative inside their limits.
+#[inline(always)]
+fn violations<V: Vector<f32>>(l: &Lanes<V>, u: &[&[f32]; 3], lo: usize, hi: usize) -> V {
+    let [along, b, c] = [
+        load::<V>(u[0], hi) - load::<V>(u[0], lo),
+        load::<V>(u[1], hi) - load::<V>(u[1], lo),
+        load::<V>(u[2], hi) - load::<V>(u[2], lo),
+    ];
+    let stretch = (l.low - along).greater(along - l.high);
+    stretch.greater(b.abs().greater(c.abs()) - l.tan * (l.rest + along))
+}
+
+/// Returns the largest of the first `n` numbers that `of` gives, eight at a time; zero if none is above.
+#[inline(always)]
+fn largest<V: Vector<f32>>(n: usize, of: impl Fn(usize) -> V) -> f32 {
+    let zero = V::splat(0.0);
+    let mut most = zero;
+    for e in (0..n).step_by(LANES) {
+        let found = of(e);
+        let found = if n - e < LANES {
+            V::select(first(n - e), found, zero)
+        } else {
+            found
+        };
+        most = found.greater(most);
+    }
+    let mut lanes = [0.0; LANES];
+    most.store(&mut lanes);
+    lanes.into_iter().fold(0.0, greater)
+}
+
+/// Returns the largest violation of the links `lo + n` to `hi + n`; zero if there is none. The stretches may overlap.
+#[inline(always)]
+pub(crate) fn violation<V: Vector<f32>>(l: &Scaled, u: &[&[f32]; 3], lo: usize, hi: usize, n: usize) -> f32 {
+    let n = n.min(shortest(u).saturating_sub(lo.max(hi)));
+    let l = Lanes::<V>::of(l);
+    largest(n, |e| violations(&l, u, lo + e, hi + e))
+}
+
+/// Returns the first of the links between consecutive elements `start..end` and the next that is violated by more than
+/// the slack, or `end`.
+#[inline(always)]
+pub(crate) fn first_violated<V: Vector<f32>>(l: &Scaled, u: &[&[f32]; 3], start: usize, end: usize) -> usize {
+    let l = Lanes::<V>::of(l);
+    let start = if end < shortest(u) { start } else { end };
+    for e in (start..end).step_by(LANES) {
+        let found = violations(&l, u, e, e + 1).above(l.slack) & first(end - e);
+        if found != 0 {
+            return e + found.trailing_zeros() as usize;
+        }
+    }
+    end
+}
+
+/// Returns one past the last such link, or `start`.
+#[inline(always)]
+pub(crate) fn past_last_violated<V: Vector<f32>>(l: &Scaled, u: &[&[f32]; 3], start: usize, end: usize) -> usize {
+    let l = Lanes::<V>::of(l);
+    let mut past = if end < shortest(u) { end } else { start };
+    while past > start {
+        let e = past.saturating_sub(LANES).max(start);
+        let found = violations(&l, u, e, e + 1).above(l.slack) & first(past - e);
+        if found != 0 {
+            return e + 32 - found.leading_zeros() as usize;
+        }
+        past = e;
+    }
+    start
+}
+
+in_vectors! {
+/// Returns the largest square of a displacement.
+fn largest_square<V: Vector<f32>>(u: &[&[f32]; 3], start: usize, end: usize) -> f32 {
+    let n = end.min(shortest(u)).saturating_sub(start);
+    largest(n, |e| {
+        let [x, y, z]: [V; 3] = [load(u[0], start + e), load(u[1], start + e), load(u[2], start + e)];
+        x * x + y * y + z * z
+    })
+}
 }
 
 /// Part of a violation that each end of a link gives. Half each is the projection; up to the whole each still
@@ -289,3 +390,6 @@ pub(crate) fn feasible_factor(l: &Scaled, d: [f32; 3], tolerance: f32) -> f32 {
     }
     factor
 }
+
+#[cfg(test)]
+mod tests;

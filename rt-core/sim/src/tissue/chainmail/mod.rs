@@ -12,13 +12,10 @@
 
 mod activity;
 mod along_x;
-#[cfg(target_arch = "x86_64")]
-mod avx2;
 mod classes;
 mod follow;
 mod held;
 mod kernels;
-mod loops;
 mod memory;
 mod model;
 mod project;
@@ -31,7 +28,6 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use kernels::{Scaled, link_violation, ordered};
 pub use model::ChainMail;
 pub use solve::step;
 pub use state::TissueState;

@@ -4,6 +4,7 @@ use super::classes::Classes;
 use super::spans::{Links, Rows, links_along};
 use crate::limits::Limits;
 use crate::scene::{Lattice, Scene};
+use crate::simd::Simd;
 use std::sync::Arc;
 
 /// Topology and limits; only the limits ever change.
@@ -21,8 +22,7 @@ pub struct ChainMail {
     part_of_run: Vec<u32>,
     /// Each part, whether something in it is fixed.
     part_is_fixed: Vec<bool>,
-    /// Set where the processor has AVX2.
-    pub(crate) vectors: bool,
+    pub(crate) simd: Simd,
 }
 
 impl ChainMail {
@@ -52,7 +52,7 @@ impl ChainMail {
             rows_of_plane: rows_of_plane.collect(),
             part_of_run,
             part_is_fixed,
-            vectors: vectors(),
+            simd: Simd::detect(),
             classes,
             rows,
             lattice,
@@ -80,18 +80,10 @@ impl ChainMail {
         self.limits = limits;
     }
 
-    /// Returns the size of the model without the scene's lattice, in bytes.
-    pub fn bytes(&self) -> usize {
-        let links = self.links.iter().map(Links::bytes).sum::<usize>();
-        let parts = size_of::<u32>() * self.part_of_run.capacity() + self.part_is_fixed.capacity();
-        let planes = size_of::<[usize; 2]>() * self.rows_of_plane.capacity();
-        links + self.rows.bytes() + parts + planes
-    }
-
     /// Runs the portable kernels, whatever the processor has.
     #[cfg(test)]
     pub fn without_vectors(mut self) -> Self {
-        self.vectors = false;
+        self.simd = Simd::Portable;
         self
     }
 
@@ -110,13 +102,6 @@ impl ChainMail {
     pub(crate) fn part_is_fixed(&self, part: u32) -> bool {
         self.part_is_fixed[part as usize]
     }
-}
-
-fn vectors() -> bool {
-    #[cfg(target_arch = "x86_64")]
-    return is_x86_feature_detected!("avx2");
-    #[cfg(not(target_arch = "x86_64"))]
-    false
 }
 
 /// Numbers the connected parts of a body, for each run: all elements of a run are connected.

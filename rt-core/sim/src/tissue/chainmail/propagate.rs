@@ -1,7 +1,6 @@
 //! Brings a body back into its limits around what is held: sweeps, then projections, then re-anchoring.
 
 use super::held::{self, Grip};
-use super::loops::Loops;
 use super::model::ChainMail;
 use super::state::TissueState;
 use super::sweep::Pass;
@@ -13,7 +12,7 @@ const MAX_SWEEPS: u32 = 6;
 const MAX_PROJECTIONS: u32 = 12;
 
 /// Sweeps, then projects, then re-anchors, until the residual is within tolerance.
-pub(super) fn propagate<K: Loops>(
+pub(super) fn propagate(
     model: &ChainMail,
     state: &mut TissueState,
     grip: &Grip,
@@ -21,9 +20,9 @@ pub(super) fn propagate<K: Loops>(
     report: &mut StepReport,
 ) -> f32 {
     let tolerance = model.limits().tolerance;
-    let mut residual = sweep::<K>(model, state, grip, slack, Patience::ToTheLast, report);
+    let mut residual = sweep(model, state, grip, slack, Patience::ToTheLast, report);
     if residual > tolerance {
-        residual = project::<K>(model, state, grip, slack, report);
+        residual = project(model, state, grip, slack, report);
     }
     if residual > tolerance {
         if model.part_is_fixed(model.part(grip.element)) {
@@ -31,7 +30,7 @@ pub(super) fn propagate<K: Loops>(
         }
         let mut pass = Pass::new(model, state, model.lattice.cell(grip.element), slack);
         pass.reanchor(grip.element as usize);
-        residual = pass.check_all::<K>();
+        residual = pass.check_all();
         report.passes += 1;
         report.solve = Solve::Reanchored;
     }
@@ -46,7 +45,7 @@ pub(super) enum Patience {
     WhileItHelps,
 }
 
-pub(super) fn sweep<K: Loops>(
+pub(super) fn sweep(
     model: &ChainMail,
     state: &mut TissueState,
     grip: &Grip,
@@ -62,7 +61,7 @@ pub(super) fn sweep<K: Loops>(
             break;
         }
         let before = residual;
-        residual = Pass::new(model, state, held_cell, slack).outward::<K>();
+        residual = Pass::new(model, state, held_cell, slack).outward();
         // A patch with holes in it can be reached from outside, and bone pushes back; put back, it is active again.
         let may_be_reached = grip.beside > 0 || model.classes.any_fixed();
         if may_be_reached && held::put(model, state, grip) {
@@ -79,19 +78,13 @@ pub(super) fn sweep<K: Loops>(
 }
 
 /// Passes of projections over the whole body.
-fn project<K: Loops>(
-    model: &ChainMail,
-    state: &mut TissueState,
-    grip: &Grip,
-    slack: f32,
-    report: &mut StepReport,
-) -> f32 {
+fn project(model: &ChainMail, state: &mut TissueState, grip: &Grip, slack: f32, report: &mut StepReport) -> f32 {
     let mut residual = f32::INFINITY;
     for number in 0..MAX_PROJECTIONS {
         let mut pass = Pass::new(model, state, [0; 3], slack);
         pass.project(number.is_multiple_of(2));
         held::put(model, pass.state, grip);
-        residual = pass.check_all::<K>();
+        residual = pass.check_all();
         report.passes += 1;
         report.solve = report.solve.max(Solve::Projections);
         if residual <= model.limits().tolerance {

@@ -1,25 +1,32 @@
 //! Residual of a pass: verifies links that moved, and finds what stays active.
 
-use super::kernels::{self, Kernels, Stretch};
-use super::loops::Loops;
+use super::kernels::{self, Stretch};
 use super::spans::Span;
 use super::sweep::{Inner, Pass};
+use crate::simd::{Vector, in_vectors};
 
 /// Slacks up to which a violation counts as none: the links' stretch and shear may each be off by one.
 const CLEAN: f32 = 2.0;
 
+in_vectors! {
+/// Verifies the links of one run.
+fn check_run<V: Vector<f32>>(pass: &mut Pass, run: usize, j: usize, k: usize) {
+    pass.check_run::<V>(run, j, k);
+}
+}
+
 impl Pass<'_> {
     /// Checks every link, as after a pass that may have moved any element.
-    pub fn check_all<K: Loops>(&mut self) -> f32 {
+    pub fn check_all(&mut self) -> f32 {
         let (rows, ny) = (&self.model.rows, self.model.lattice.dims[1]);
         self.state.active.add_all(rows, ny);
         self.state.moved.add_all(rows, ny);
         self.state.settled = 0.0;
-        self.check::<K>()
+        self.check()
     }
 
     /// Checks every link at an active stretch; only what is outside its limits stays active.
-    pub fn check<K: Loops>(&mut self) -> f32 {
+    pub fn check(&mut self) -> f32 {
         let ny = self.model.lattice.dims[1];
         let planes = self.state.active.planes();
         for k in planes.start..planes.end.max(planes.start) {
@@ -27,7 +34,7 @@ impl Pass<'_> {
             for j in rows.start..rows.end.max(rows.start) {
                 let row = j as usize + ny * k as usize;
                 for run in self.model.rows.numbers(row) {
-                    K::check_run(self, run, j as usize, k as usize);
+                    check_run(self.model.simd, self, run, j as usize, k as usize);
                 }
             }
         }
@@ -35,7 +42,7 @@ impl Pass<'_> {
     }
 
     #[inline(always)]
-    pub(super) fn check_run<K: Kernels>(&mut self, run: usize, j: usize, k: usize) {
+    fn check_run<V: Vector<f32>>(&mut self, run: usize, j: usize, k: usize) {
         let active = self.state.active.of_run(run);
         if active.is_empty() {
             return;
@@ -51,17 +58,17 @@ impl Pass<'_> {
         let [x, y, z] = &self.model.links;
         for span in x.below(row).iter().filter(|s| s.lo_run as usize == run) {
             let links = along_x.within(span.lo, span.len);
-            worst = worst.max(self.violation::<K>(0, span, links));
+            worst = worst.max(self.violation::<V>(0, span, links));
         }
         for (axis, below, above) in [
             (1, y.below(row), y.below(row + 1)),
             (2, z.below(row), z.below(row + ny)),
         ] {
             for span in below.iter().filter(|s| s.hi_run as usize == run) {
-                worst = worst.max(self.violation::<K>(axis, span, active.within(span.hi, span.len)));
+                worst = worst.max(self.violation::<V>(axis, span, active.within(span.hi, span.len)));
             }
             for span in above.iter().filter(|s| s.lo_run as usize == run) {
-                worst = worst.max(self.violation::<K>(axis, span, active.within(span.lo, span.len)));
+                worst = worst.max(self.violation::<V>(axis, span, active.within(span.lo, span.len)));
             }
         }
         if worst <= CLEAN * self.slack {
@@ -84,7 +91,7 @@ impl Pass<'_> {
 
     /// Checks the links along z that moved after they were handled, and those along y.
     #[inline(always)]
-    pub fn check_late<K: Kernels>(&mut self, [y, z]: [(&[Span], Option<Inner>); 2], row: usize) {
+    pub fn check_late<V: Vector<f32>>(&mut self, [y, z]: [(&[Span], Option<Inner>); 2], row: usize) {
         let mut worst = 0.0_f32;
         for (axis, (spans, inner)) in [(2, z), (1, y)] {
             for span in spans {
@@ -96,7 +103,7 @@ impl Pass<'_> {
                     2 => self.state.late[0][run].with(self.state.late[1][run]),
                     _ => self.state.late[1][run],
                 };
-                worst = worst.max(self.violation::<K>(axis, span, moved.within(first, span.len)));
+                worst = worst.max(self.violation::<V>(axis, span, moved.within(first, span.len)));
             }
         }
         let clean = worst <= CLEAN * self.slack;
@@ -117,13 +124,13 @@ impl Pass<'_> {
 
     /// Returns the largest violation of some links of a span.
     #[inline(always)]
-    pub fn violation<K: Kernels>(&self, axis: usize, span: &Span, links: Stretch) -> f32 {
+    pub fn violation<V: Vector<f32>>(&self, axis: usize, span: &Span, links: Stretch) -> f32 {
         if links.is_empty() {
             return 0.0;
         }
         let l = self.limits(span.class, axis);
         let u = kernels::ordered(axis, self.state.u.each_ref().map(Vec::as_slice));
         let (lo, hi) = ((span.lo + links.start) as usize, (span.hi + links.start) as usize);
-        K::violation(&l, &u, lo, hi, links.len() as usize)
+        kernels::violation::<V>(&l, &u, lo, hi, links.len() as usize)
     }
 }

@@ -2,8 +2,6 @@
 
 use super::follow::follow;
 use super::held::{self, Grip};
-use super::kernels::Portable;
-use super::loops::Loops;
 use super::model::ChainMail;
 use super::propagate::propagate;
 use super::state::TissueState;
@@ -30,7 +28,7 @@ pub fn step(model: &ChainMail, state: &mut TissueState, held: Option<Held>, dt_s
     }
     state.recover(model, kept_fraction(model, dt_s));
     state.moved.clear(&model.rows, model.lattice.dims[1]);
-    let residual = dispatch(model, state, grip, &mut report);
+    let residual = solve(model, state, grip, &mut report);
     report.residual = f64::from(residual);
     report.moved = state.moved.element_count(&model.rows, model.lattice.dims[1]);
     report.max_displacement = state.max_displacement;
@@ -46,31 +44,23 @@ fn kept_fraction(model: &ChainMail, dt_s: f64) -> f64 {
     }
 }
 
-fn dispatch(model: &ChainMail, state: &mut TissueState, grip: Option<Grip>, report: &mut StepReport) -> f32 {
-    #[cfg(target_arch = "x86_64")]
-    if model.vectors {
-        return solve::<super::avx2::Avx2>(model, state, grip, report);
-    }
-    solve::<Portable>(model, state, grip, report)
-}
-
 /// Puts the held element in place and brings the body into its limits.
-fn solve<K: Loops>(model: &ChainMail, state: &mut TissueState, mut grip: Option<Grip>, report: &mut StepReport) -> f32 {
+fn solve(model: &ChainMail, state: &mut TissueState, mut grip: Option<Grip>, report: &mut StepReport) -> f32 {
     let farthest = grip.map_or(0.0, |g| g.at.iter().fold(0.0, |a: f32, c| a.max(c.abs())));
     let slack = slack(model, farthest.max(state.max_displacement));
     let residual = match &mut grip {
         // A step can only be undone to a state that meets the limits.
         Some(grip) if model.part_is_fixed(model.part(grip.element)) && state.residual <= model.limits().tolerance => {
-            follow::<K>(model, state, grip, slack, report)
+            follow(model, state, grip, slack, report)
         }
         Some(grip) => {
             held::put(model, state, grip);
-            propagate::<K>(model, state, grip, slack, report)
+            propagate(model, state, grip, slack, report)
         }
         None if state.active.is_empty() => 0.0,
-        None => Pass::new(model, state, [0; 3], slack).check::<K>(),
+        None => Pass::new(model, state, [0; 3], slack).check(),
     };
-    state.measure(model, K::largest_square);
+    state.measure(model);
     state.residual = residual.max(state.settled);
     state.residual
 }

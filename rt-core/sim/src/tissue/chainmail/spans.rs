@@ -35,10 +35,6 @@ impl Links {
         }
     }
 
-    pub fn bytes(&self) -> usize {
-        size_of::<Span>() * self.spans.capacity() + size_of::<u32>() * self.groups.capacity()
-    }
-
     pub fn all(&self) -> &[Span] {
         &self.spans
     }
@@ -79,10 +75,6 @@ impl Rows {
 
     pub fn count(&self) -> usize {
         self.first.len().saturating_sub(1)
-    }
-
-    pub fn bytes(&self) -> usize {
-        size_of::<Run>() * self.runs.capacity() + size_of::<u32>() * self.first.capacity()
     }
 
     /// Returns the run that an element is in.

@@ -1,7 +1,7 @@
 //! State of a body: displacements times a scale, so that recovery is one multiplication.
 
 use super::activity::Active;
-use super::kernels::Stretch;
+use super::kernels::{Stretch, largest_square};
 use super::model::ChainMail;
 use crate::tissue::{Carried, Deformed};
 
@@ -85,12 +85,7 @@ impl TissueState {
         }
     }
 
-    /// Returns the displacement from rest along `axis` (0 to 2) of all elements; `scale` times these is in elements.
-    pub fn displacement(&self, axis: usize) -> &[f32] {
-        self.u.get(axis).map_or(&[], Vec::as_slice)
-    }
-
-    /// Returns how many elements a unit of `displacement` is.
+    /// Returns how many elements a unit of `u` is.
     pub fn scale(&self) -> f32 {
         self.scale as f32
     }
@@ -105,11 +100,6 @@ impl TissueState {
             carried: Carried::Not,
             reach: 1.0 + stretch + self.max_displacement,
         }
-    }
-
-    /// Returns the centre of an element in the scene frame; the last element's for a number past the end.
-    pub fn position_m(&self, model: &ChainMail, element: u32) -> [f64; 3] {
-        self.deformed(model).position_m(element)
     }
 
     /// Returns every element to its place at rest, at once.
@@ -127,26 +117,6 @@ impl TissueState {
     pub fn disturb(&mut self, model: &ChainMail) {
         self.active.add_all(&model.rows, model.lattice.dims[1]);
         (self.settled, self.residual) = (0.0, f32::INFINITY);
-    }
-
-    /// Becomes `other`, a state of the same model, without allocating.
-    ///
-    /// # Panics
-    ///
-    /// If the other is of another model.
-    pub fn copy_from(&mut self, other: &TissueState) {
-        for (mine, theirs) in self.u.iter_mut().zip(&other.u) {
-            mine.copy_from_slice(theirs);
-        }
-        self.active.copy_from(&other.active);
-        self.next.copy_from(&other.next);
-        self.moved.copy_from(&other.moved);
-        self.run_square.copy_from_slice(&other.run_square);
-        self.plane_square.copy_from_slice(&other.plane_square);
-        self.scale = other.scale;
-        self.max_displacement = other.max_displacement;
-        self.settled = other.settled;
-        self.residual = other.residual;
     }
 
     /// Begins a trial: from here on motion can be undone; nothing may have moved in this step.
@@ -196,15 +166,6 @@ impl TissueState {
             self.active.copy_from(&self.trial.active);
         }
         self.settled = self.trial.settled;
-    }
-
-    /// Returns the size of the state, in bytes.
-    pub fn bytes(&self) -> usize {
-        let floats = self.u.iter().map(Vec::len).sum::<usize>() + self.run_square.len() + self.plane_square.len();
-        let floats = floats + self.trial.before.iter().map(Vec::len).sum::<usize>();
-        let stretches = self.late.iter().map(Vec::len).sum::<usize>();
-        let active = [&self.active, &self.next, &self.moved].map(Active::bytes);
-        size_of::<f32>() * floats + size_of::<Stretch>() * stretches + active.iter().sum::<usize>()
     }
 
     /// Puts an element `u` elements from rest; whether it was not there. The caller looks after its links.
@@ -259,8 +220,8 @@ impl TissueState {
         self.scale = 1.0;
     }
 
-    /// Takes the largest displacement again, from what this step has moved; `square` gives that of a stretch.
-    pub(crate) fn measure(&mut self, model: &ChainMail, square: impl Fn(&[&[f32]; 3], usize, usize) -> f32) {
+    /// Takes the largest displacement again, from what this step has moved.
+    pub(crate) fn measure(&mut self, model: &ChainMail) {
         let ny = model.lattice.dims[1];
         let u = self.u.each_ref().map(Vec::as_slice);
         let planes = self.moved.planes();
@@ -270,7 +231,8 @@ impl TissueState {
                 for run in model.rows.numbers(j as usize + ny * k as usize) {
                     if !self.moved.of_run(run).is_empty() {
                         let of_run = &model.rows.runs[run];
-                        self.run_square[run] = square(&u, of_run.first as usize, of_run.end() as usize);
+                        self.run_square[run] =
+                            largest_square(model.simd, &u, of_run.first as usize, of_run.end() as usize);
                     }
                 }
             }

@@ -4,11 +4,11 @@
 //! outward from the held column. Each element is moved after its inner neighbours, and what moves is active
 //! for those that come after it: a sweep goes as far as something moves. A fixed element is always the inner end.
 
-use super::kernels::{self, Kernels, LOWER, Pin, Scaled, Stretch, UPPER};
-use super::loops::Loops;
+use super::kernels::{self, LOWER, Pin, Scaled, Stretch, UPPER};
 use super::model::ChainMail;
 use super::spans::Span;
 use super::state::TissueState;
+use crate::simd::{Vector, in_vectors};
 
 /// Data and scale of a pass.
 pub(super) struct Pass<'a> {
@@ -27,6 +27,14 @@ pub(super) struct Pass<'a> {
 pub(super) enum Inner {
     Below,
     Above,
+}
+
+in_vectors! {
+/// Sweeps one plane. Compiled once for each set of instructions and called: inlined wherever they are used, the loops
+/// over rows were some hundred copies, and 50 of the 52 s that this crate took to compile.
+fn plane<V: Vector<f32>>(pass: &mut Pass, k: usize, inner_z: Option<Inner>) {
+    pass.plane::<V>(k, inner_z);
+}
 }
 
 impl<'a> Pass<'a> {
@@ -48,35 +56,35 @@ impl<'a> Pass<'a> {
     }
 
     /// Makes one outward sweep. Leaves active what is still violated; returns the largest violation, in elements.
-    pub fn outward<K: Loops>(&mut self) -> f32 {
+    pub fn outward(&mut self) -> f32 {
         let nz = self.model.lattice.dims[2];
-        let held_k = self.held_cell[2];
+        let (simd, held_k) = (self.model.simd, self.held_cell[2]);
         let planes = self.state.active.planes();
         if planes.start as usize <= held_k && held_k < planes.end as usize {
-            K::plane(self, held_k, None);
+            plane(simd, self, held_k, None);
         }
         for k in (held_k + 1).max(planes.start as usize)..nz {
             if k >= planes.end as usize && self.state.active.rows(k - 1).is_empty() {
                 break;
             }
-            K::plane(self, k, Some(Inner::Below));
+            plane(simd, self, k, Some(Inner::Below));
         }
         for k in (0..held_k.min(planes.end as usize)).rev() {
             if k < planes.start as usize && self.state.active.rows(k + 1).is_empty() {
                 break;
             }
-            K::plane(self, k, Some(Inner::Above));
+            plane(simd, self, k, Some(Inner::Above));
         }
         if self.model.classes.any_fixed() {
             // Inner elements have moved too, whose links were already handled.
-            self.check::<K>()
+            self.check()
         } else {
             self.finish()
         }
     }
 
     #[inline(always)]
-    pub(super) fn plane<K: Kernels>(&mut self, k: usize, inner_z: Option<Inner>) {
+    fn plane<V: Vector<f32>>(&mut self, k: usize, inner_z: Option<Inner>) {
         let held_j = self.held_cell[1];
         let [first, end] = self.model.rows_of_plane[k];
         let own = self.state.active.rows(k);
@@ -88,12 +96,12 @@ impl<'a> Pass<'a> {
         let is_in = |j: usize| rows.start as usize <= j && j < rows.end as usize;
         let mut moving = false;
         if (first..end).contains(&held_j) && is_in(held_j) {
-            moving = self.row::<K>(held_j, k, None, inner_z);
+            moving = self.row::<V>(held_j, k, None, inner_z);
         }
         let held_row_moves = moving;
         for j in first.max(held_j + 1)..end {
             if is_in(j) || moving {
-                moving = self.row::<K>(j, k, Some(Inner::Below), inner_z);
+                moving = self.row::<V>(j, k, Some(Inner::Below), inner_z);
             } else if j >= rows.end as usize {
                 break;
             }
@@ -101,7 +109,7 @@ impl<'a> Pass<'a> {
         moving = held_row_moves;
         for j in (first..end.min(held_j)).rev() {
             if is_in(j) || moving {
-                moving = self.row::<K>(j, k, Some(Inner::Above), inner_z);
+                moving = self.row::<V>(j, k, Some(Inner::Above), inner_z);
             } else if j < rows.start as usize {
                 break;
             }
@@ -110,7 +118,7 @@ impl<'a> Pass<'a> {
 
     /// Handles the links of a row with its inner neighbours and in itself; returns whether anything in it is active.
     #[inline(always)]
-    fn row<K: Kernels>(&mut self, j: usize, k: usize, inner_y: Option<Inner>, inner_z: Option<Inner>) -> bool {
+    fn row<V: Vector<f32>>(&mut self, j: usize, k: usize, inner_y: Option<Inner>, inner_z: Option<Inner>) -> bool {
         let model = self.model;
         let ny = model.lattice.dims[1];
         let row = j + ny * k;
@@ -121,17 +129,17 @@ impl<'a> Pass<'a> {
         };
         let (y_spans, z_spans) = (spans_of(1, 1, inner_y), spans_of(2, ny, inner_z));
         for span in z_spans {
-            self.push::<K>(2, span, inner_z == Some(Inner::Below), row);
+            self.push::<V>(2, span, inner_z == Some(Inner::Below), row);
         }
         for span in y_spans {
-            self.push::<K>(1, span, inner_y == Some(Inner::Below), row);
+            self.push::<V>(1, span, inner_y == Some(Inner::Below), row);
         }
         let mut is_active = false;
         let mut late = false;
         for run in model.rows.numbers(row) {
             if !self.state.active.of_run(run).is_empty() {
                 is_active = true;
-                let moved = self.along_x::<K>(run, row);
+                let moved = self.along_x::<V>(run, row);
                 if !moved.is_empty() {
                     self.state.active.add(run, moved);
                     self.state.moved.add(run, moved);
@@ -145,7 +153,7 @@ impl<'a> Pass<'a> {
             self.state.moved.add_row(j, k);
         }
         if late {
-            self.check_late::<K>([(y_spans, inner_y), (z_spans, inner_z)], row);
+            self.check_late::<V>([(y_spans, inner_y), (z_spans, inner_z)], row);
         }
         is_active
     }
@@ -160,7 +168,7 @@ impl<'a> Pass<'a> {
 
     /// Moves the outer ends of a span into their limits.
     #[inline(always)]
-    fn push<K: Kernels>(&mut self, axis: usize, span: &Span, upper: bool, row: usize) {
+    fn push<V: Vector<f32>>(&mut self, axis: usize, span: &Span, upper: bool, row: usize) {
         let links = self.touched(span);
         if links.is_empty() {
             return;
@@ -178,9 +186,9 @@ impl<'a> Pass<'a> {
         self.state.keep(self.model, run);
         let mut u = kernels::ordered(axis, self.state.u.each_mut().map(Vec::as_mut_slice));
         let moved = if moves_hi {
-            K::clamp::<UPPER>(&l, &mut u, lo, hi, n).from(hi as u32)
+            kernels::clamp_all::<V, UPPER>(&l, &mut u, lo, hi, n).from(hi as u32)
         } else {
-            K::clamp::<LOWER>(&l, &mut u, hi, lo, n).from(lo as u32)
+            kernels::clamp_all::<V, LOWER>(&l, &mut u, hi, lo, n).from(lo as u32)
         };
         if moved.is_empty() {
             return;

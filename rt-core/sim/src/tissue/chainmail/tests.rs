@@ -5,14 +5,16 @@ mod queue;
 mod reference;
 mod scene;
 mod state;
+mod violation;
 mod wander;
 
 use super::*;
 use crate::limits::TissueParameters;
 use crate::scene::Labels;
 use crate::scene::test_bodies;
-use crate::tissue::{Held, HeldOutcome, Solve, largest_violation};
+use crate::tissue::{Held, HeldOutcome, Solve};
 use stylet_random::Random;
+use violation::largest_violation;
 use wander::{held_at, model_of, model_with, oracle_violation, paper, smallest_corner, wander};
 
 #[test]

@@ -1,16 +1,16 @@
 //! Claims about structures: their own limits, fixed ones, and patches of held elements.
 
 use super::state::Walk;
-use super::{held_at, model_of, model_with, smallest_corner};
+use super::{held_at, model_of, model_with, smallest_corner, violation::largest_violation};
 use crate::limits::{AxisLimits, TissueParameters, folding};
 use crate::scene::test_bodies;
+use crate::tissue::HeldOutcome;
 use crate::tissue::chainmail::*;
-use crate::tissue::{HeldOutcome, largest_violation};
 use stylet_random::Random;
 
 fn positions(model: &ChainMail, state: &TissueState) -> Vec<[f64; 3]> {
     let elements = 0..model.element_count() as u32;
-    elements.map(|e| state.position_m(model, e)).collect()
+    elements.map(|e| state.deformed(model).position_m(e)).collect()
 }
 
 /// Returns the largest violation by positions in f64, with the rule for structures written out again.
@@ -66,7 +66,7 @@ fn walk_about(labels: &crate::scene::Labels, per_tick: f64, seed: u64) -> [u32; 
         );
         outcomes[usize::from(report.held == HeldOutcome::Limited)] += 1;
         if report.held == HeldOutcome::Followed {
-            let now = state.position_m(&model, held.element);
+            let now = state.deformed(&model).position_m(held.element);
             assert!(
                 (0..3).all(|a| (now[a] - held.position_m[a]).abs() < 1e-8),
                 "tick {tick}: not followed"

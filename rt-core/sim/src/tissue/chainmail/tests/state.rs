@@ -1,10 +1,10 @@
-//! Claims about the state: same bytes, no heap, copies, scale, new limits.
+//! Claims about the state: same bytes, no heap, scale, new limits.
 
-use super::{held_at, model_of, paper, reference::Reference};
+use super::{held_at, model_of, paper, reference::Reference, violation::largest_violation};
 use crate::limits::TissueParameters;
 use crate::scene::test_bodies;
+use crate::tissue::HeldOutcome;
 use crate::tissue::chainmail::*;
-use crate::tissue::{HeldOutcome, largest_violation};
 use stylet_heap as heap;
 use stylet_random::Random;
 
@@ -65,26 +65,7 @@ fn vectors_and_portable_loops_give_the_same_bytes() {
 }
 
 #[test]
-fn copy_of_a_state_goes_on_with_the_same_bytes() {
-    let model = model_of(&test_bodies::with_hole());
-    let (mut state, mut copy) = (TissueState::at_rest(&model), TissueState::at_rest(&model));
-    let mut walk = Walk::new(9);
-    let mut run = |states: &mut [&mut TissueState], ticks: std::ops::Range<u32>| {
-        for tick in ticks {
-            let held = walk.next(&model, states[0], tick, 0.5);
-            for state in states.iter_mut() {
-                step(&model, state, Some(held), 5e-3);
-            }
-        }
-    };
-    run(&mut [&mut state], 0..100);
-    copy.copy_from(&state);
-    run(&mut [&mut state, &mut copy], 100..200);
-    assert!(bits(&state) == bits(&copy));
-}
-
-#[test]
-fn steps_copies_and_new_limits_do_not_touch_the_heap() {
+fn steps_and_new_limits_do_not_touch_the_heap() {
     let wider = TissueParameters {
         max_stretch: 2.0,
         ..TissueParameters::default()
@@ -93,7 +74,6 @@ fn steps_copies_and_new_limits_do_not_touch_the_heap() {
         let scene = Scene::from_labels("test", &labels).expect("valid");
         let mut tissue = ChainMailTissue::new(&scene, TissueParameters::default().validate().expect("valid"));
         let limits = [TissueParameters::default(), wider.clone()].map(|p| p.validate().expect("valid"));
-        let mut copy = tissue.state.clone();
         let mut walk = Walk::new(1);
         let mut solves = [0; 4];
         let calls = heap::calls_of_this_thread();
@@ -102,7 +82,6 @@ fn steps_copies_and_new_limits_do_not_touch_the_heap() {
             held.patch_m = if tick % 3 == 0 { 4e-3 } else { 0.0 };
             let report = tissue.step((tick % 50 < 40).then_some(held), 5e-3);
             solves[report.solve as usize] += 1;
-            copy.copy_from(&tissue.state);
             if tick % 100 == 0 {
                 // A clone of limits without structures in it is flat.
                 tissue.set_limits(limits[tick as usize / 100 % 2].clone());
@@ -252,14 +231,4 @@ fn step_that_moves_nothing_reports_the_same_again() {
     assert_eq!((again.moved, again.passes), (0, 0));
     assert_eq!(again.max_displacement, first.max_displacement);
     assert!(bits(&state) == before);
-}
-
-#[test]
-fn model_and_state_take_at_most_sixty_bytes_an_element() {
-    let model = paper();
-    let state = TissueState::at_rest(&model);
-    let per_element = |bytes: usize| bytes as f64 / model.element_count() as f64;
-    let (of_model, of_state) = (per_element(model.bytes()), per_element(state.bytes()));
-    println!("model {of_model:.1}, state {of_state:.1} bytes an element");
-    assert!(of_model + of_state <= 60.0);
 }

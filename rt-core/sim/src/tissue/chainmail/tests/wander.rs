@@ -1,9 +1,10 @@
 //! Fixtures of the claims: bodies, a needle that wanders, and oracles that share no code with the step.
 
+use super::violation::largest_violation;
 use crate::limits::TissueParameters;
 use crate::scene::{Labels, Scene};
 use crate::tissue::chainmail::{ChainMail, TissueState, step};
-use crate::tissue::{Held, HeldOutcome, Solve, largest_violation};
+use crate::tissue::{Held, HeldOutcome, Solve};
 use stylet_random::Random;
 
 pub(super) fn model_with(labels: &Labels, parameters: &TissueParameters) -> ChainMail {
@@ -38,13 +39,13 @@ pub(super) fn oracle_violation(model: &ChainMail, state: &TissueState, parameter
     let h = model.lattice().spacing_m;
     let mut worst = 0.0_f64;
     for element in 0..model.element_count() as u32 {
-        let x = state.position_m(model, element);
+        let x = state.deformed(model).position_m(element);
         let around = model.lattice().neighbours(element);
         for a in 0..3 {
             let Some(neighbour) = around[2 * a + 1] else {
                 continue;
             };
-            let y = state.position_m(model, neighbour);
+            let y = state.deformed(model).position_m(neighbour);
             let d = [0, 1, 2].map(|n| (y[n] - x[n]) / h);
             let angle = [parameters.shear_deg, parameters.shear_vert_deg][usize::from(a > 0)];
             let shear = angle.to_radians().tan() * d[a];
@@ -68,7 +69,7 @@ pub(super) fn smallest_corner(model: &ChainMail, state: &TissueState, residual: 
     let lattice = model.lattice();
     let mut smallest = f64::INFINITY;
     for element in 0..model.element_count() as u32 {
-        let x = state.position_m(model, element);
+        let x = state.deformed(model).position_m(element);
         let around = lattice.neighbours(element);
         for corner in 0..8 {
             let sides = [0, 1, 2].map(|axis| corner >> axis & 1);
@@ -84,7 +85,7 @@ pub(super) fn smallest_corner(model: &ChainMail, state: &TissueState, residual: 
                 let l = model.classes.limits(link.map_or(0, |(class, _)| class), axis);
                 tangents[axis] = f64::from(l.tan) + residual / (1.0 + f64::from(l.low) - residual);
                 longest *= 1.0 + f64::from(l.high) + residual;
-                let y = state.position_m(model, neighbour);
+                let y = state.deformed(model).position_m(neighbour);
                 let sign = if sides[axis] == 1 { 1.0 } else { -1.0 };
                 nalgebra::Vector3::from([0, 1, 2].map(|n| sign * (y[n] - x[n]) / lattice.spacing_m))
             });
