@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use super::grid::Grid;
 use super::grip::{Grip, Iteration};
-use super::guess::superpose;
 use super::lanes::{add_scaled, dot, keep_free, keep_opposite, scale_and_add};
 use super::model::FemModel;
 use super::multigrid::{FEW_CYCLES, Stage};
@@ -276,8 +275,9 @@ impl<T: Real> Grip<T> {
     }
 
     /// Returns the elastic energy: half of displacement times force, over elements and springs.
+    #[cfg(test)]
     pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
-        superpose(&self.responses[..self.count], 1.0, &mut self.multigrid.stages[0].x);
+        super::guess::superpose(&self.responses[..self.count], 1.0, &mut self.multigrid.stages[0].x);
         self.answer_to_x(model, 0..model.levels[0].grid.nodes[2]);
         let Stage { x, r, .. } = &self.multigrid.stages[0];
         let work = |(x, r): (&Vec<T>, &Vec<T>)| x.iter().zip(r).map(|(&x, &r)| (x * r).to_f64()).sum::<f64>();

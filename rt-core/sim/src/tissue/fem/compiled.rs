@@ -1,7 +1,7 @@
 //! The solver in each number type, compiled in this crate: generic functions are compiled again by every crate that
-//! calls them.
+//! calls them, which takes a while where they step or build a body.
 
-use super::batch::{BatchModel, BatchState, NodeWeight, Progress};
+use super::batch::{BatchModel, BatchState, Progress};
 use super::material::{FemProblem, FemSettings};
 use super::model::FemModel;
 use super::real::Real;
@@ -10,95 +10,52 @@ use super::state::FemState;
 use crate::scene::Lattice;
 use std::sync::Arc;
 
-/// A number type with a solver compiled for it.
-pub trait Compiled: Real {
-    /// Makes a model as [`FemModel::coarser`], with fixed nodes as in [`FemModel::with_fixed_nodes`].
+/// Declares a trait of these functions with one type, and implements it for each number type by functions of this
+/// crate.
+macro_rules! compiled {
+    ($(fn $name:ident($($argument:ident: $type:ty),*) -> $result:ty = $by:expr;)*) => {
+        /// A number type with a solver compiled for it; its functions are called by those of the same arguments.
+        pub trait Compiled: Real {
+            $(
+                #[doc(hidden)]
+                fn $name($($argument: $type),*) -> $result;
+            )*
+        }
+
+        compiled!(@ f32 => $(fn $name($($argument: $type),*) -> $result = $by;)*);
+        compiled!(@ f64 => $(fn $name($($argument: $type),*) -> $result = $by;)*);
+    };
+    (@ $t:ty => $(fn $name:ident($($argument:ident: $type:ty),*) -> $result:ty = $by:expr;)*) => {
+        impl Compiled for $t {
+            $(fn $name($($argument: $type),*) -> $result {
+                $by($($argument),*)
+            })*
+        }
+    };
+}
+
+compiled! {
     fn model(
         lattice: &Lattice,
         of: &Arc<Lattice>,
         settings: &FemSettings,
-        is_fixed: &dyn Fn([f64; 3]) -> bool,
-    ) -> Result<FemModel<Self>, Vec<FemProblem>>;
-    /// Calls [`FemState::at_rest`].
-    fn at_rest(model: &FemModel<Self>) -> FemState<Self>;
-    /// Calls [`step`].
+        is_fixed: &dyn Fn([f64; 3]) -> bool
+    ) -> Result<FemModel<Self>, Vec<FemProblem>> = FemModel::of_lattice;
     fn step(
         model: &FemModel<Self>,
         state: &mut FemState<Self>,
         held: Option<TipPatch>,
-        settings: &SolveSettings,
-    ) -> FemReport;
-    /// Calls [`prepare`].
-    fn prepare(model: &FemModel<Self>, state: &mut FemState<Self>, next: Option<TipPatch>, settings: &SolveSettings);
-    /// Calls [`FemState::strain_energy_j`].
-    fn strain_energy_j(state: &mut FemState<Self>, model: &FemModel<Self>) -> f64;
-    /// Calls [`BatchModel::new`].
-    fn batch_model(model: &FemModel<Self>) -> BatchModel<Self>;
-    /// Calls [`BatchState::new`].
-    fn batch_state(model: &BatchModel<Self>) -> BatchState<Self>;
-    /// Calls [`BatchState::begin`].
-    fn begin(state: &mut BatchState<Self>, model: &BatchModel<Self>, loads: &[&[NodeWeight]]);
-    /// Calls [`BatchState::advance`].
-    fn advance(state: &mut BatchState<Self>, model: &BatchModel<Self>) -> Progress;
+        settings: &SolveSettings
+    ) -> FemReport = solve::step_held;
+    fn prepare(
+        model: &FemModel<Self>,
+        state: &mut FemState<Self>,
+        next: Option<TipPatch>,
+        settings: &SolveSettings
+    ) -> () = solve::prepare_next;
+    fn batch_model(model: &FemModel<Self>) -> BatchModel<Self> = BatchModel::of_model;
+    fn advance(state: &mut BatchState<Self>, model: &BatchModel<Self>) -> Progress = BatchState::do_slice;
 }
-
-macro_rules! compiled {
-    ($($t:ty),*) => {$(
-        impl Compiled for $t {
-            fn model(
-                lattice: &Lattice,
-                of: &Arc<Lattice>,
-                settings: &FemSettings,
-                is_fixed: &dyn Fn([f64; 3]) -> bool,
-            ) -> Result<FemModel<$t>, Vec<FemProblem>> {
-                FemModel::of_lattice(lattice, of, settings, is_fixed)
-            }
-
-            fn at_rest(model: &FemModel<$t>) -> FemState<$t> {
-                FemState::of_model(model)
-            }
-
-            fn step(
-                model: &FemModel<$t>,
-                state: &mut FemState<$t>,
-                held: Option<TipPatch>,
-                settings: &SolveSettings,
-            ) -> FemReport {
-                solve::step_held(model, state, held, settings)
-            }
-
-            fn prepare(
-                model: &FemModel<$t>,
-                state: &mut FemState<$t>,
-                next: Option<TipPatch>,
-                settings: &SolveSettings,
-            ) {
-                solve::prepare_next(model, state, next, settings);
-            }
-
-            fn strain_energy_j(state: &mut FemState<$t>, model: &FemModel<$t>) -> f64 {
-                state.grip.strain_energy_j(model)
-            }
-
-            fn batch_model(model: &FemModel<$t>) -> BatchModel<$t> {
-                BatchModel::of_model(model)
-            }
-
-            fn batch_state(model: &BatchModel<$t>) -> BatchState<$t> {
-                BatchState::of_model(model)
-            }
-
-            fn begin(state: &mut BatchState<$t>, model: &BatchModel<$t>, loads: &[&[NodeWeight]]) {
-                state.take_up(model, loads);
-            }
-
-            fn advance(state: &mut BatchState<$t>, model: &BatchModel<$t>) -> Progress {
-                state.do_slice(model)
-            }
-        }
-    )*};
-}
-compiled!(f32, f64);
 
 impl<T: Compiled> FemModel<T> {
     /// Makes the body of a lattice, or returns every problem with the settings.
@@ -119,18 +76,6 @@ impl<T: Compiled> FemModel<T> {
     /// stiff as the cells in it are on average, also where part of it is no tissue.
     pub fn coarser(lattice: &Lattice, of: &Arc<Lattice>, settings: &FemSettings) -> Result<Self, Vec<FemProblem>> {
         T::model(lattice, of, settings, &|_| false)
-    }
-}
-
-impl<T: Compiled> FemState<T> {
-    /// Returns the body at rest.
-    pub fn at_rest(model: &FemModel<T>) -> Self {
-        T::at_rest(model)
-    }
-
-    /// Returns the elastic energy, in body and springs.
-    pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
-        T::strain_energy_j(self, model)
     }
 }
 
@@ -165,16 +110,6 @@ impl<T: Compiled> BatchModel<T> {
 }
 
 impl<T: Compiled> BatchState<T> {
-    /// Makes room for eight answers.
-    pub fn new(model: &BatchModel<T>) -> Self {
-        T::batch_state(model)
-    }
-
-    /// Begins at most eight loads; those past the eighth are ignored, as are nodes that do not move.
-    pub fn begin(&mut self, model: &BatchModel<T>, loads: &[&[NodeWeight]]) {
-        T::begin(self, model, loads);
-    }
-
     /// Does one slice of work; its cost is that of one pass over one level.
     pub fn advance(&mut self, model: &BatchModel<T>) -> Progress {
         T::advance(self, model)

@@ -8,6 +8,7 @@
 use super::lanes::{LANES, each, lanes, lanes_mut};
 use super::material::{Integration, Material};
 use super::real::Real;
+use std::ops::{Add, Mul, Sub};
 
 /// Elements done at once; their scratch stays in the first-level cache.
 pub(super) const CHUNK: usize = 64;
@@ -60,9 +61,14 @@ impl Stiffness {
     }
 }
 
-/// Returns sums and differences of four corners of a row: 1, y, z, yz.
+/// A number, or a vector of them: each is computed with alike.
+pub(super) trait Lane: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {}
+
+impl<A: Copy + Add<Output = A> + Sub<Output = A> + Mul<Output = A>> Lane for A {}
+
+/// Returns sums and differences of four corners of a face: 1, y, z, yz.
 #[inline(always)]
-fn across<T: Real>([a, b, c, d]: [T; 4]) -> [T; 4] {
+pub(super) fn across<A: Lane>([a, b, c, d]: [A; 4]) -> [A; 4] {
     let (low, high) = (a + b, c + d);
     let (low_y, high_y) = (b - a, d - c);
     [low + high, low_y + high_y, high - low, high_y - low_y]
@@ -70,26 +76,74 @@ fn across<T: Real>([a, b, c, d]: [T; 4]) -> [T; 4] {
 
 /// Applies the transpose of `across`.
 #[inline(always)]
-fn corners<T: Real>([one, y, z, yz]: [T; 4]) -> [T; 4] {
+pub(super) fn corners<A: Lane>([one, y, z, yz]: [A; 4]) -> [A; 4] {
     let (low, high) = (one - z, one + z);
     let (low_y, high_y) = (y - yz, y + yz);
     [low - low_y, low + low_y, high - high_y, high + high_y]
 }
 
-/// 1, y, z, yz of one component, even and odd in x.
-struct Modes<T> {
-    even: [T; 4],
-    odd: [T; 4],
+/// 1, y, z, yz of x, y, z on one face.
+pub(super) type Face<A> = [[A; 4]; 3];
+
+/// Returns the factors that [`element`] multiplies with, from `mean`, `varying` and `shear`; the last is zero.
+#[inline(always)]
+pub(super) fn factors<T: Real>([mean, varying, shear]: [T; 3]) -> [T; 7] {
+    let third = T::of(1.0 / 3.0);
+    let m1 = shear * third;
+    let last = (varying + m1 + m1 + m1 + m1) * third;
+    [mean, varying, shear, m1, T::of(2.0) * shear, last, T::ZERO]
+}
+
+/// Returns the forces of an element in modes of a face, the part even in x and the odd one, from the displacements of
+/// its nearer and its farther face. Those even in x and constant on the face are zero.
+///
+/// Three terms are added in their order where `IN_ORDER`, else the last two first: results keep their bits by it.
+#[inline(always)]
+pub(super) fn element<A: Lane, const IN_ORDER: bool>(
+    near: &Face<A>,
+    far: &Face<A>,
+    [l0, l1, m0, m1, normal, last, zero]: [A; 7],
+) -> (Face<A>, Face<A>) {
+    let even = |c: usize, m: usize| near[c][m] + far[c][m];
+    let odd = |c: usize, m: usize| far[c][m] - near[c][m];
+    let sum = |a: A, b: A, c: A| if IN_ORDER { a + b + c } else { a + (b + c) };
+    let (u1, v2, w3) = (odd(0, 0), even(1, 1), even(2, 2));
+    let dilatation = l0 * sum(u1, v2, w3);
+    let xy = m0 * (even(0, 1) + odd(1, 0));
+    let xz = m0 * (even(0, 2) + odd(2, 0));
+    let yz = m0 * (even(1, 2) + even(2, 1));
+    // Dilatation that varies along x, y, z.
+    let (vx, wx) = (odd(1, 1), odd(2, 2));
+    let (uy, wy) = (odd(0, 1), even(2, 3));
+    let (uz, vz) = (odd(0, 2), even(1, 3));
+    let along_x = l1 * (vx + wx);
+    let along_y = l1 * (uy + wy);
+    let along_z = l1 * (uz + vz);
+    let (ut, vt, wt) = (even(0, 3), odd(1, 2), odd(2, 1));
+    let twist = sum(ut, vt, wt);
+    (
+        [
+            [zero, xy, xz, m1 * (ut + twist)],
+            [zero, dilatation + normal * v2, yz, along_z + m0 * vz],
+            [zero, yz, dilatation + normal * w3, along_y + m0 * wy],
+        ],
+        [
+            [
+                dilatation + normal * u1,
+                along_y + m0 * uy,
+                along_z + m0 * uz,
+                last * odd(0, 3),
+            ],
+            [xy, along_x + m0 * vx, m1 * (vt + twist), last * odd(1, 3)],
+            [xz, m1 * (wt + twist), along_x + m0 * wx, last * odd(2, 3)],
+        ],
+    )
 }
 
 #[inline(always)]
-fn modes<T: Real>(lines: &[&[T]; 4], e: usize) -> Modes<T> {
-    let near = across([lines[0][e], lines[1][e], lines[2][e], lines[3][e]]);
-    let far = across([lines[0][e + 1], lines[1][e + 1], lines[2][e + 1], lines[3][e + 1]]);
-    Modes {
-        even: [near[0] + far[0], near[1] + far[1], near[2] + far[2], near[3] + far[3]],
-        odd: [far[0] - near[0], far[1] - near[1], far[2] - near[2], far[3] - near[3]],
-    }
+fn face<T: Real>(lines: &[[&[T]; 4]; 3], e: usize) -> Face<T> {
+    let component = |[a, b, c, d]: &[&[T]; 4]| across([a[e], b[e], c[e], d[e]]);
+    [component(&lines[0]), component(&lines[1]), component(&lines[2])]
 }
 
 /// Computes the forces of `count` times `LANES` elements in a row, at most `CHUNK`, from the displacements of the four
@@ -104,44 +158,12 @@ pub(super) fn forces<'a, T: Real>(
     let n = count.min(CHUNK / LANES) * LANES;
     let (mean, varying, shear) = (&mean[..n], &varying[..n], &shear[..n]);
     let cut = |[a, b, c, d]: [&'a [T]; 4]| [&a[..n + 1], &b[..n + 1], &c[..n + 1], &d[..n + 1]];
-    let (ul, vl, wl) = (cut(ul), cut(vl), cut(wl));
-    let (two, third) = (T::of(2.0), T::of(1.0 / 3.0));
+    let lines = [cut(ul), cut(vl), cut(wl)];
     for e in 0..n {
-        let (u, v, w) = (modes(&ul, e), modes(&vl, e), modes(&wl, e));
-        let (m0, l0, l1) = (shear[e], mean[e], varying[e]);
-        let m1 = m0 * third;
-        let dilatation = l0 * (u.odd[0] + v.even[1] + w.even[2]);
-        let (xy, xz, yz) = (
-            m0 * (u.even[1] + v.odd[0]),
-            m0 * (u.even[2] + w.odd[0]),
-            m0 * (v.even[2] + w.even[1]),
-        );
-        // Dilatation that varies along x, y, z.
-        let along_x = l1 * (v.odd[1] + w.odd[2]);
-        let along_y = l1 * (u.odd[1] + w.even[3]);
-        let along_z = l1 * (u.odd[2] + v.even[3]);
-        let twist = u.even[3] + v.odd[2] + w.odd[1];
-        let last = (l1 + m1 + m1 + m1 + m1) * third;
-        let normal = two * m0;
-        let fu = Modes {
-            even: [T::ZERO, xy, xz, m1 * (u.even[3] + twist)],
-            odd: [
-                dilatation + normal * u.odd[0],
-                along_y + m0 * u.odd[1],
-                along_z + m0 * u.odd[2],
-                last * u.odd[3],
-            ],
-        };
-        let fv = Modes {
-            even: [T::ZERO, dilatation + normal * v.even[1], yz, along_z + m0 * v.even[3]],
-            odd: [xy, along_x + m0 * v.odd[1], m1 * (v.odd[2] + twist), last * v.odd[3]],
-        };
-        let fw = Modes {
-            even: [T::ZERO, yz, dilatation + normal * w.even[2], along_y + m0 * w.even[3]],
-            odd: [xz, m1 * (w.odd[1] + twist), along_x + m0 * w.odd[2], last * w.odd[3]],
-        };
-        for (component, f) in [fu, fv, fw].into_iter().enumerate() {
-            let (even, odd) = (corners(f.even), corners(f.odd));
+        let stiffness = factors([mean[e], varying[e], shear[e]]);
+        let (even, odd) = element::<T, true>(&face(&lines, e), &face(&lines, e + 1), stiffness);
+        for component in 0..3 {
+            let (even, odd) = (corners(even[component]), corners(odd[component]));
             for corner in 0..4 {
                 scratch[4 * component + corner][LANES + e] = even[corner];
                 scratch[12 + 4 * component + corner][LANES + e] = odd[corner];

@@ -21,7 +21,8 @@ pub struct FemState<T = f32> {
 }
 
 impl<T: Real> FemState<T> {
-    pub(super) fn of_model(model: &FemModel<T>) -> Self {
+    /// Returns the body at rest.
+    pub fn at_rest(model: &FemModel<T>) -> Self {
         FemState {
             displacement: std::array::from_fn(|_| touched(model.element_count(), 0.0)),
             max_displacement: 0.0,
@@ -42,6 +43,12 @@ impl<T: Real> FemState<T> {
         let e = (element as usize).min(self.displacement[0].len().saturating_sub(1));
         let u = [0, 1, 2].map(|a| self.displacement[a].get(e).copied().map_or(0.0, f64::from));
         [0, 1, 2].map(|a| rest[a] + model.lattice.spacing_m * u[a])
+    }
+
+    /// Returns the elastic energy, in body and springs.
+    #[cfg(test)]
+    pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
+        self.grip.strain_energy_j(model)
     }
 
     /// Returns the displacement of the node at `corner`, counted in cells from the scene's origin, in metres; `None`

@@ -9,6 +9,7 @@ use std::ops::Range;
 use super::level::{BatchLevel, Run};
 use super::{LOADS, Node};
 use crate::simd::{Eight, Vector, in_vectors};
+use crate::tissue::fem::hexahedron::{Face, across, corners, element, factors};
 use crate::tissue::fem::real::Real;
 
 /// Operation on the forces of a plane of nodes; no later plane needs this `x`.
@@ -82,29 +83,10 @@ pub(super) fn answer<T: Real, V: Vector<T>>(forces: &Eight<T>, spring: T, x: V) 
     V::load(forces).add(V::splat(spring).mul(x))
 }
 
-/// Returns sums and differences of four corners of a face: 1, y, z, yz.
-#[inline(always)]
-fn across<T: Real, V: Vector<T>>([a, b, c, d]: [V; 4]) -> [V; 4] {
-    let (low, high) = (a.add(b), c.add(d));
-    let (low_y, high_y) = (b.sub(a), d.sub(c));
-    [low.add(high), low_y.add(high_y), high.sub(low), high_y.sub(low_y)]
-}
-
-/// Applies the transpose of `across`.
-#[inline(always)]
-fn corners<T: Real, V: Vector<T>>([one, y, z, yz]: [V; 4]) -> [V; 4] {
-    let (low, high) = (one.sub(z), one.add(z));
-    let (low_y, high_y) = (y.sub(yz), y.add(yz));
-    [low.sub(low_y), low.add(low_y), high.sub(high_y), high.add(high_y)]
-}
-
-/// 1, y, z, yz of x, y, z on one face.
-type Face<V> = [[V; 4]; 3];
-
 #[inline(always)]
 fn face<T: Real, V: Vector<T>>(lines: &[&[Node<T>]; 4], e: usize) -> Face<V> {
     let [a, b, c, d] = [&lines[0][e], &lines[1][e], &lines[2][e], &lines[3][e]];
-    let component = |n: usize| across::<T, V>([V::load(&a[n]), V::load(&b[n]), V::load(&c[n]), V::load(&d[n])]);
+    let component = |n: usize| across([V::load(&a[n]), V::load(&b[n]), V::load(&c[n]), V::load(&d[n])]);
     [component(0), component(1), component(2)]
 }
 
@@ -131,16 +113,16 @@ fn add_run<T: Real, V: Vector<T>>(
     let mut carried = [[V::splat(T::ZERO); 4]; 3];
     for (e, &stiffness) in stiffness.iter().enumerate() {
         let far = face::<T, V>(&lines, e + 1);
-        let (even, odd) = element::<T, V>(&near, &far, stiffness);
+        let (even, odd) = element::<V, false>(&near, &far, factors(stiffness).map(V::splat));
         for component in 0..3 {
             let [before, even, odd] = [carried[component], even[component], odd[component]];
-            let forces = corners::<T, V>([
-                before[0].sub(odd[0]),
-                before[1].add(even[1].sub(odd[1])),
-                before[2].add(even[2].sub(odd[2])),
-                before[3].add(even[3].sub(odd[3])),
+            let forces = corners([
+                before[0] - odd[0],
+                before[1] + (even[1] - odd[1]),
+                before[2] + (even[2] - odd[2]),
+                before[3] + (even[3] - odd[3]),
             ]);
-            carried[component] = [odd[0], even[1].add(odd[1]), even[2].add(odd[2]), even[3].add(odd[3])];
+            carried[component] = [odd[0], even[1] + odd[1], even[2] + odd[2], even[3] + odd[3]];
             add_to::<T, V>(&mut a[e][component], forces[0]);
             add_to::<T, V>(&mut b[e][component], forces[1]);
             add_to::<T, V>(&mut c[e][component], forces[2]);
@@ -149,7 +131,7 @@ fn add_run<T: Real, V: Vector<T>>(
         near = far;
     }
     for (component, carried) in carried.into_iter().enumerate() {
-        let forces = corners::<T, V>(carried);
+        let forces = corners(carried);
         add_to::<T, V>(&mut a[len][component], forces[0]);
         add_to::<T, V>(&mut b[len][component], forces[1]);
         add_to::<T, V>(&mut c[len][component], forces[2]);
@@ -167,50 +149,4 @@ fn two_lines<N>(plane: &mut [N], at: [usize; 2], len: usize) -> [&mut [N]; 2] {
 #[inline(always)]
 fn add_to<T: Real, V: Vector<T>>(to: &mut Eight<T>, more: V) {
     V::load(to).add(more).store(to);
-}
-
-/// Parts of the forces even and odd in x, as `hexahedron::forces` has them; those even in x and constant on the face
-/// are zero.
-#[inline(always)]
-fn element<T: Real, V: Vector<T>>(near: &Face<V>, far: &Face<V>, [mean, varying, shear]: [T; 3]) -> (Face<V>, Face<V>) {
-    let even = |c: usize, m: usize| near[c][m].add(far[c][m]);
-    let odd = |c: usize, m: usize| far[c][m].sub(near[c][m]);
-    let third = T::of(1.0 / 3.0);
-    let thirds = shear * third;
-    let (m0, m1, l0, l1) = (V::splat(shear), V::splat(thirds), V::splat(mean), V::splat(varying));
-    let (u1, v2, w3) = (odd(0, 0), even(1, 1), even(2, 2));
-    let dilatation = l0.mul(u1.add(v2.add(w3)));
-    let normal = V::splat(T::of(2.0) * shear);
-    let xy = m0.mul(even(0, 1).add(odd(1, 0)));
-    let xz = m0.mul(even(0, 2).add(odd(2, 0)));
-    let yz = m0.mul(even(1, 2).add(even(2, 1)));
-    let (vx, wx) = (odd(1, 1), odd(2, 2));
-    let (uy, wy) = (odd(0, 1), even(2, 3));
-    let (uz, vz) = (odd(0, 2), even(1, 3));
-    let along_x = l1.mul(vx.add(wx));
-    let along_y = l1.mul(uy.add(wy));
-    let along_z = l1.mul(uz.add(vz));
-    let (ut, vt, wt) = (even(0, 3), odd(1, 2), odd(2, 1));
-    let twist = ut.add(vt.add(wt));
-    let last = V::splat((varying + thirds + thirds + thirds + thirds) * third);
-    let zero = V::splat(T::ZERO);
-    let plus = |a: V, s: V, b: V| a.add(s.mul(b));
-    let twisted = |a: V| m1.mul(a.add(twist));
-    (
-        [
-            [zero, xy, xz, twisted(ut)],
-            [zero, plus(dilatation, normal, v2), yz, plus(along_z, m0, vz)],
-            [zero, yz, plus(dilatation, normal, w3), plus(along_y, m0, wy)],
-        ],
-        [
-            [
-                plus(dilatation, normal, u1),
-                plus(along_y, m0, uy),
-                plus(along_z, m0, uz),
-                last.mul(odd(0, 3)),
-            ],
-            [xy, plus(along_x, m0, vx), twisted(vt), last.mul(odd(1, 3))],
-            [xz, twisted(wt), plus(along_x, m0, wx), last.mul(odd(2, 3))],
-        ],
-    )
 }

@@ -51,7 +51,8 @@ pub struct BatchState<T = f32> {
 }
 
 impl<T: Real> BatchState<T> {
-    pub(in super::super) fn of_model(model: &BatchModel<T>) -> Self {
+    /// Makes room for eight answers.
+    pub fn new(model: &BatchModel<T>) -> Self {
         let zeros = || vec![nothing(); model.node_count()];
         let last = model.levels.len() - 1;
         let mut slices = Vec::new();
@@ -88,7 +89,8 @@ impl<T: Real> BatchState<T> {
         (nodes + 3 * self.u.len()) * size_of::<Node<T>>()
     }
 
-    pub(in super::super) fn take_up(&mut self, model: &BatchModel<T>, loads: &[&[NodeWeight]]) {
+    /// Begins at most eight loads; those past the eighth are ignored, as are nodes that do not move.
+    pub fn begin(&mut self, model: &BatchModel<T>, loads: &[&[NodeWeight]]) {
         let r = &mut self.stages[0].b;
         for field in [&mut self.u, &mut *r, &mut self.p, &mut self.q] {
             field.fill(nothing());
