@@ -24,63 +24,57 @@ pub struct Insertion {
     pub fitted: bool,
 }
 
-const STRAIGHT: [f64; 3] = [0.0, 0.0, 1.0];
+/// Straight in, slowly, and half the way back.
+const SLOWLY: Insertion = Insertion {
+    name: "",
+    start_mm: [0.0; 3],
+    direction: [0.0, 0.0, 1.0],
+    travel_m: 5e-3,
+    speed_m_per_s: 0.05,
+    passes_on: false,
+    fitted: false,
+};
 
 /// Insertions that are measured in the gland.
 pub const GLAND: [Insertion; 6] = [
     Insertion {
         name: "middle, 5 mm",
         start_mm: [0.0, 0.0, -6.0],
-        direction: STRAIGHT,
-        travel_m: 5e-3,
-        speed_m_per_s: 0.05,
-        passes_on: false,
         fitted: true,
+        ..SLOWLY
     },
     Insertion {
         name: "side, 3 mm",
         start_mm: [9.0, 2.0, -4.0],
-        direction: STRAIGHT,
         travel_m: 3e-3,
-        speed_m_per_s: 0.05,
-        passes_on: false,
         fitted: true,
+        ..SLOWLY
     },
     Insertion {
         name: "base, 7 mm",
         start_mm: [-5.0, -3.0, 6.0],
-        direction: STRAIGHT,
         travel_m: 7e-3,
-        speed_m_per_s: 0.05,
-        passes_on: false,
-        fitted: false,
+        ..SLOWLY
     },
     Insertion {
         name: "oblique, 4 mm",
         start_mm: [4.0, 5.0, -8.0],
         direction: [-0.342_020_143_325_668_7, 0.0, 0.939_692_620_785_908_4],
         travel_m: 4e-3,
-        speed_m_per_s: 0.05,
-        passes_on: false,
-        fitted: false,
+        ..SLOWLY
     },
     Insertion {
         name: "fast, 5 mm",
         start_mm: [0.0, -5.0, 0.0],
-        direction: STRAIGHT,
-        travel_m: 5e-3,
         speed_m_per_s: 0.28,
-        passes_on: false,
-        fitted: false,
+        ..SLOWLY
     },
     Insertion {
         name: "passing on",
         start_mm: [-3.0, 3.0, -8.0],
-        direction: STRAIGHT,
         travel_m: 4e-3,
-        speed_m_per_s: 0.05,
         passes_on: true,
-        fitted: false,
+        ..SLOWLY
     },
 ];
 

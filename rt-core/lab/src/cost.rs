@@ -155,23 +155,14 @@ struct Timed {
     spec: TissueSpec,
 }
 
-/// Returns the whole scene, and what single parts of it add.
+/// Returns the models that the scene is timed with.
 fn models(scene: &Scene) -> Result<Vec<Timed>, CostError> {
-    let chainmail = |name: String, scene: &Scene, parameters: &TissueParameters| -> Result<Timed, CostError> {
-        let limits = parameters.validate().map_err(CostError::Tissue)?;
-        Ok(Timed {
-            name,
-            model: Box::new(ChainMailTissue::new(scene, limits)),
-            spec: TissueKind::ChainMail.into(),
-        })
-    };
-    let plain = TissueParameters::default();
-    let mut models = vec![chainmail("tissue step, as the scene is".to_owned(), scene, &plain)?];
-    if scene.structures.len() > 1 {
-        let one = scene.homogeneous();
-        let name = "  the same as one homogeneous structure".to_owned();
-        models.push(chainmail(name, &one, &plain)?);
-    }
+    let limits = TissueParameters::default().validate().map_err(CostError::Tissue)?;
+    let mut models = vec![Timed {
+        name: "tissue step, as the scene is".to_owned(),
+        model: Box::new(ChainMailTissue::new(scene, limits)),
+        spec: TissueKind::ChainMail.into(),
+    }];
     // In a coarser body the ticks below, in elements of the scene, would differ.
     let elastic = scene.clone().for_tissue(TissueKind::Fem);
     if elastic.coarseness() == 1 {

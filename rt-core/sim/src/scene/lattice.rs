@@ -178,14 +178,6 @@ impl Lattice {
         &self.structures
     }
 
-    /// Returns the same cells as one structure.
-    pub fn homogeneous(&self) -> Lattice {
-        Lattice {
-            structures: Vec::new(),
-            ..self.clone()
-        }
-    }
-
     /// Returns the volume of all elements at rest, m^3.
     pub fn volume_m3(&self) -> f64 {
         self.element_count() as f64 * self.spacing_m.powi(3)

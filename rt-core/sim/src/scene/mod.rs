@@ -122,20 +122,6 @@ impl Scene {
         self
     }
 
-    /// Returns the same cells as one structure, without the surfaces of its parts.
-    pub fn homogeneous(&self) -> Scene {
-        let structures = vec![Structure::soft("tissue", 1)];
-        let lattice = Arc::new(self.lattice.homogeneous());
-        Scene {
-            surface: Surface::of(&lattice, &structures),
-            structures,
-            body: Arc::clone(&lattice),
-            lattice,
-            ..self.clone()
-        }
-        .with_body(usize::MAX)
-    }
-
     /// Returns how many cells of the lattice lie along the edge of an element of the body.
     pub fn coarseness(&self) -> u32 {
         (self.body.spacing_m / self.lattice.spacing_m).round() as u32
