@@ -44,10 +44,6 @@ impl Purpose {
         }
     }
 
-    fn is_for_writing(self) -> bool {
-        Self::SAVES.contains(&self)
-    }
-
     /// Returns the names of the formats, each with its file extensions.
     fn formats(self) -> &'static [(&'static str, &'static [&'static str])] {
         match self {
@@ -71,16 +67,8 @@ impl Purpose {
     }
 }
 
-/// Result of a dialog.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Picked {
-    /// With a file.
-    File(PathBuf),
-    /// Closed without one.
-    Nothing,
-    /// It never opened.
-    Failed(DialogError),
-}
+/// Result of a dialog: a file, or none if it was closed.
+type Picked = Result<Option<PathBuf>, DialogError>;
 
 /// Error of a dialog that could not be opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -126,7 +114,7 @@ impl Dialogs {
         let (purpose, picked) = match job.poll() {
             JobUpdate::Pending => return None,
             JobUpdate::Message(picked) => (*purpose, picked),
-            JobUpdate::Ended => (*purpose, Picked::Failed(DialogError::Ended)),
+            JobUpdate::Ended => (*purpose, Err(DialogError::Ended)),
         };
         self.open = None;
         Some((purpose, picked))
@@ -135,7 +123,7 @@ impl Dialogs {
 
 fn pick(purpose: Purpose, folder: Option<PathBuf>) -> Picked {
     if !is_possible(|name| std::env::var_os(name).map(PathBuf::from)) {
-        return Picked::Failed(DialogError::NoDesktop);
+        return Err(DialogError::NoDesktop);
     }
     let mut dialog = rfd::FileDialog::new().set_title(purpose.title());
     for (name, endings) in purpose.formats() {
@@ -145,15 +133,15 @@ fn pick(purpose: Purpose, folder: Option<PathBuf>) -> Picked {
         dialog = dialog.set_directory(folder);
     }
     let begun = Instant::now();
-    let picked = if purpose.is_for_writing() {
+    let picked = if Purpose::SAVES.contains(&purpose) {
         dialog.save_file()
     } else {
         dialog.pick_file()
     };
     match picked {
-        Some(path) => Picked::File(with_ending(purpose, path)),
-        None if begun.elapsed() < OPENS_WITHIN => Picked::Failed(DialogError::NotOpened),
-        None => Picked::Nothing,
+        Some(path) => Ok(Some(with_ending(purpose, path))),
+        None if begun.elapsed() < OPENS_WITHIN => Err(DialogError::NotOpened),
+        None => Ok(None),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The operator's program: the window, and the command line over the same code.
 //!
 //! The modules of the window depend on each other in one direction: `app` → `redraw`, `panel` → `view`, `keyboard` →
-//! `shown`, `action` → `planner`, `dose_worker`, `loader` → `theme`, `settings`, `words` → `recent` → `dialog`.
+//! `shown`, `action` → `planner`, `dose_worker`, `loader` → `theme`, `settings`, `words` → `recent`, `dialog`.
 
 #![warn(missing_docs)]
 

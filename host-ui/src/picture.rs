@@ -14,9 +14,6 @@ const FOLDER: &str = "out/pictures";
 /// Error of a picture that could not be saved.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// No thread could be started to write it.
-    #[error("no thread to write a picture: {0}")]
-    NoThread(io::Error),
     /// The pixels could not be encoded as PNG.
     #[error("the picture cannot be encoded: {0}")]
     Encode(String),
@@ -50,14 +47,8 @@ impl Pictures {
         let done = self.done.clone();
         ctx.request_screenshot(move |image| {
             let writer = std::thread::Builder::new().name("picture".to_owned());
-            let failed = done.clone();
-            let spawned = writer.spawn(move || {
-                // The window may have closed; the answer is then dropped.
-                let _ = done.send(save(&image, Path::new(FOLDER)));
-            });
-            if let Err(e) = spawned {
-                let _ = failed.send(Err(PictureError::NoThread(e)));
-            }
+            // Without a thread there is no picture; the window may also have closed, and the answer is then dropped.
+            let _spawned = writer.spawn(move || done.send(save(&image, Path::new(FOLDER))));
         });
     }
 

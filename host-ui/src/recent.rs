@@ -1,6 +1,5 @@
 //! Recent files, as the settings keep them.
 
-use crate::dialog::Purpose;
 use serde::{Deserialize, Serialize};
 
 /// Number of files that are kept.
@@ -14,13 +13,6 @@ pub struct Recent {
     pub path: String,
     /// True if it was opened as an image, not as a scene.
     pub is_image: bool,
-}
-
-impl Recent {
-    /// Returns the purpose for which it was opened.
-    pub fn purpose(&self) -> Purpose {
-        if self.is_image { Purpose::Image } else { Purpose::Scene }
-    }
 }
 
 /// Puts a file first, once.

@@ -98,6 +98,19 @@ pub fn small(text: impl Into<String>) -> RichText {
     RichText::new(text).weak().small()
 }
 
+/// Names a widget for screen readers and tests.
+pub fn named<S: ToString>(response: &egui::Response, role: egui::accesskit::Role, name: impl Fn() -> S) {
+    response.widget_info(|| egui::WidgetInfo::labeled(role, response.enabled(), name()));
+}
+
+/// Writes the heads of a table's columns.
+pub fn heads<const N: usize>(ui: &mut egui::Ui, names: [&str; N]) {
+    for name in names {
+        ui.label(small(name));
+    }
+    ui.end_row();
+}
+
 /// Button by its name, with a tooltip.
 pub struct Press<'a>(pub &'a str, pub &'a str);
 

@@ -38,6 +38,11 @@ impl Explained for egui::Response {
     }
 }
 
+/// Returns a number of things, such as "1 seed" or "2 seeds".
+pub fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
 /// Returns the text as a sentence.
 pub fn sentence(text: &str) -> String {
     match text {

@@ -13,7 +13,7 @@ pub struct CoreArgs {
     pub instance: Instance,
     /// What to run instead of rt-core's scene: paper, pelvis or full, which are built in, or a volume: NIfTI-1, NRRD,
     /// MetaImage, DICOM RT Structure Set, or a scene file (.toml)
-    #[arg(long, value_name = "SCENE", value_parser = choice)]
+    #[arg(long, value_name = "SCENE")]
     pub scene: Option<SceneChoice>,
     /// Which label of the volume is the gland [default: all but 0]
     #[arg(long, value_name = "N", requires = "scene")]
@@ -36,9 +36,9 @@ pub enum SceneChoice {
     File(PathBuf),
 }
 
-impl SceneChoice {
+impl From<&str> for SceneChoice {
     /// Parses a name; a file takes precedence over a built-in scene of the same name.
-    pub fn named(name: &str) -> Self {
+    fn from(name: &str) -> Self {
         let path = PathBuf::from(name);
         let number = BUILTIN_SCENES.iter().position(|scene| *scene == name);
         match number.filter(|_| !path.exists()) {
@@ -46,7 +46,9 @@ impl SceneChoice {
             None => Self::File(path),
         }
     }
+}
 
+impl SceneChoice {
     /// Returns the file of the scene; `None` for a built-in one.
     pub fn file(&self) -> Option<&Path> {
         match self {
@@ -56,19 +58,15 @@ impl SceneChoice {
     }
 }
 
-fn choice(name: &str) -> Result<SceneChoice, String> {
-    Ok(SceneChoice::named(name))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_name_is_a_built_in_scene_and_a_path_a_file() {
-        assert_eq!(SceneChoice::named("pelvis"), SceneChoice::BuiltIn(1));
+        assert_eq!(SceneChoice::from("pelvis"), SceneChoice::BuiltIn(1));
         for path in ["./pelvis", "gland.nii", "pelvis.nii.gz"] {
-            assert_eq!(SceneChoice::named(path).file(), Some(Path::new(path)));
+            assert_eq!(SceneChoice::from(path).file(), Some(Path::new(path)));
         }
     }
 }

@@ -75,11 +75,6 @@ impl Link {
         Self::with_snapshots_every(instance, SNAPSHOTS_EVERY)
     }
 
-    /// Returns a link that converts every snapshot, for a recording.
-    pub fn for_recording(instance: Instance) -> Self {
-        Self::with_snapshots_every(instance, Duration::ZERO)
-    }
-
     /// Plays a recording as if from a core; every request is refused.
     pub fn playing(instance: Instance, played: Arc<Played>) -> Self {
         let playback = Playback::of(&played);
@@ -92,7 +87,8 @@ impl Link {
         self.playback.as_ref()
     }
 
-    /// Limits the rate at which pictures of the tissue are taken; everything else is taken as it arrives.
+    /// Limits the rate at which pictures of the tissue are taken, unless it is zero; everything else is taken as it
+    /// arrives.
     pub fn with_snapshots_every(instance: Instance, every: Duration) -> Self {
         let host_id = random_host_id();
         let receiver = Receiver::start(instance.clone(), host_id, every);

@@ -186,8 +186,8 @@ impl App {
     /// its answer is ignored.
     fn cancel_load(&mut self) {
         self.loader.cancel();
-        self.uploading = None;
-        self.image_to_come = None;
+        self.files.uploading = None;
+        self.files.image_to_come = None;
         self.shown.load = LoadState::Idle;
     }
 
@@ -277,31 +277,21 @@ fn changed(mut set: ParameterSet, changes: &[ParameterChange]) -> Result<Paramet
     }
 }
 
+/// Returns a name for those requests that panels and keys send as they are.
 fn request_name(request: &Request) -> &'static str {
     match request {
-        Request::SetParameters(_) => "Parameters",
-        Request::SetPlan(_) => "Plan",
         Request::MoveHand(_) => "Needle",
-        Request::DropSeed { .. } => "Drop seed",
         Request::Engage => "Engage force",
         Request::Disengage => "Disengage",
         Request::Reset => "Reset",
-        Request::LoadBuiltinScene(_) => "Built-in scene",
         Request::UndoSeed => "Undo seed",
-        Request::Shutdown => "Shutdown",
-        Request::SaveFlight => "Flight recording",
-        Request::Rehearse(_) => "Rehearsal",
-        Request::StopHand => "Stop",
-        Request::KeepMoving { .. } => "Motion",
-        Request::MoveSecondHand(_) => "Second hand",
-        Request::StopSecondHand => "Stop second hand",
-        Request::ExpectNeedle(_) => "Next needle",
         Request::LeaveNeedle => "Leave needle",
         Request::TakeNeedle(_) => "Resume needle",
         Request::DrawNeedle { .. } => "Withdraw needle",
         Request::Mark(_) => "Mark",
         Request::BeginExercise(_) => "Exercise",
         Request::EndExercises => "End of exercises",
+        _ => "Request",
     }
 }
 

@@ -105,34 +105,24 @@ impl App {
     }
 
     fn delivered(&self) -> Result<Delivered, Failure> {
+        let mut delivered = Delivered::of_heard(&self.link, &self.heard, self.planned_as(), None)?;
         let Some(implant) = &self.shown.planning.implant else {
-            return Delivered::of_heard(&self.link, &self.heard, self.planned_as(), None);
+            return Ok(delivered);
         };
-        let scene = self.link.scene().ok_or("there is no scene yet")?.clone();
-        let (source, prescription_gy) = source_of(&implant.plan.source, implant.plan.prescription_gy)?;
-        let (mut pairs, mut lost) = (Vec::new(), Vec::new());
+        (delivered.source, delivered.prescription_gy) = source_of(&implant.plan.source, implant.plan.prescription_gy)?;
+        delivered.title = format!("Scene {}", delivered.scene.header.name.read());
+        (delivered.pairs, delivered.lost) = (Vec::new(), Vec::new());
         for (needle, row) in all_errors(&self.shown) {
             let Some((hole, planned, placed)) = self.pair(implant, needle, &row) else {
                 continue;
             };
             match placed {
-                Some(pose) => pairs.push(SeedPair::new((needle, hole), planned, &pose)),
-                None => lost.push(planned),
+                Some(pose) => delivered.pairs.push(SeedPair::new((needle, hole), planned, &pose)),
+                None => delivered.lost.push(planned),
             }
         }
-        Ok(Delivered {
-            title: format!("Scene {}", scene.header.name.read()),
-            scene,
-            source,
-            prescription_gy,
-            pairs,
-            lost,
-            motion: self.heard.trace().motion(),
-            records: self.heard.trace().records().to_vec(),
-            moments: self.heard.own_moments(),
-            updates: self.planner.reviewed().to_vec(),
-            plan: Some(implant.plan.clone()),
-        })
+        (delivered.updates, delivered.plan) = (self.planner.reviewed().to_vec(), Some(implant.plan.clone()));
+        Ok(delivered)
     }
 
     /// Returns the hole of a planned seed, the seed, and the one that was dropped for it.

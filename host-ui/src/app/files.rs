@@ -1,9 +1,28 @@
-//! Files that are chosen in a dialog.
+//! Files of the scene, and those that are chosen in a dialog.
 
 use super::App;
 use crate::action::{Action, PlanAction, WatchAction};
-use crate::dialog::{Picked, Purpose};
+use crate::dialog::Purpose;
 use crate::panel::workflow::Progress;
+use std::path::PathBuf;
+use stylet_files::Image;
+use stylet_host::core_args::SceneChoice;
+
+/// Files of the scene, from their names to the core.
+#[derive(Default)]
+pub(super) struct SceneFiles {
+    pub label: Option<u8>,
+    /// Scene from the command line, until it is read.
+    pub first_scene: Option<SceneChoice>,
+    pub first_image: Option<PathBuf>,
+    pub uploading: Option<(u64, String)>,
+    /// File that is being read or sent as the next scene, and file of the present scene if this
+    /// window sent it, each with its scene's name.
+    pub scene_to_come: Option<(PathBuf, String)>,
+    pub scene_file: Option<(PathBuf, String)>,
+    /// Image to show once the scene of this name is loaded.
+    pub image_to_come: Option<(Image, String)>,
+}
 
 impl App {
     pub(super) fn pick_file(&mut self, purpose: Purpose) {
@@ -18,9 +37,8 @@ impl App {
     pub(super) fn picked_file(&mut self) -> Option<Action> {
         let (purpose, picked) = self.dialogs.poll()?;
         let path = match picked {
-            Picked::File(path) => path,
-            Picked::Nothing => return None,
-            Picked::Failed(why) => {
+            Ok(path) => path?,
+            Err(why) => {
                 self.refuse(format!("{}: {why}", purpose.title()));
                 return None;
             }

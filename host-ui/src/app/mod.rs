@@ -37,12 +37,11 @@ use stylet_base::format;
 use stylet_base::job::Job;
 use stylet_base::lines::Lines;
 use stylet_controllers::{Controllers, ProbeWish, SLOW, System, Wish};
-use stylet_files::Image;
 use stylet_host::core_args::SceneChoice;
 use stylet_host::link::{Link, LinkStatus};
 use stylet_host::roster::Trainee;
 use stylet_implant::received::ReceivedProcedure;
-use stylet_implant::workflow::{NeedleTask, Pace, Placed, Run};
+use stylet_implant::workflow::{Pace, Run};
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::affinity::Left;
 
@@ -91,10 +90,6 @@ struct Waiting {
 pub struct App {
     link: Link,
     started_core: Option<core::StartedCore>,
-    label: Option<u8>,
-    /// Scene from the command line, until it is read.
-    first_scene: Option<SceneChoice>,
-    first_image: Option<PathBuf>,
     shown: Shown,
     middle: Middle,
     dose: DoseWorker,
@@ -109,24 +104,13 @@ pub struct App {
     summed_up: Instant,
     loader: Loader,
     dialogs: Dialogs,
-    uploading: Option<(u64, String)>,
-    /// File that is being read or sent as the next scene, and file of the present scene if this
-    /// window sent it, each with its scene's name.
-    scene_to_come: Option<(PathBuf, String)>,
-    scene_file: Option<(PathBuf, String)>,
-    /// Image to show once the scene of this name is loaded.
-    image_to_come: Option<(Image, String)>,
+    files: files::SceneFiles,
     run: Option<Run>,
     /// True if the core was absent in the last frame.
     was_absent: bool,
     /// Run that waits for a person to re-arm.
     asks_rearm: Option<Begin>,
-    /// Needles of the plan that the script inserts.
-    run_needles: Vec<usize>,
-    /// Needles and seeds in the tissue when the script began or continued.
-    run_placed: Placed,
-    /// Needles of a stopped script, and its drops that left no seed.
-    run_lost: (Vec<NeedleTask>, Vec<usize>),
+    script: plan::Script,
     placed_found: Instant,
     planner: Planner,
     recording: watch::Recording,
@@ -223,12 +207,9 @@ impl App {
         Self {
             link: Link::new(options.instance),
             started_core: None,
-            label: options.label,
-            first_scene: options.scene,
-            first_image: options.image,
             shown,
             middle: Middle::new(cc.wgpu_render_state.clone()),
-            dose: DoseWorker::new(),
+            dose: DoseWorker::default(),
             pictures: Pictures::default(),
             applied: None,
             history: History::default(),
@@ -237,16 +218,16 @@ impl App {
             summed_up: Instant::now(),
             loader: Loader::default(),
             dialogs: Dialogs::default(),
-            uploading: None,
-            scene_to_come: None,
-            scene_file: None,
-            image_to_come: None,
+            files: files::SceneFiles {
+                label: options.label,
+                first_scene: options.scene,
+                first_image: options.image,
+                ..Default::default()
+            },
             run: None,
             was_absent: true,
             asks_rearm: None,
-            run_needles: Vec::new(),
-            run_placed: Placed::default(),
-            run_lost: Default::default(),
+            script: plan::Script::default(),
             placed_found: Instant::now(),
             planner,
             recording: watch::Recording::beginning_with(options.watch),

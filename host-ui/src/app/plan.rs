@@ -17,6 +17,17 @@ use stylet_shm_schema::{PlannedNeedle, Prescribed, Request, Text};
 /// Period of the search for placed seeds, which compares every planned drop with every seed.
 const FIND_PLACED_EVERY: Duration = Duration::from_millis(300);
 
+/// Part of the plan that a script inserts.
+#[derive(Default)]
+pub(super) struct Script {
+    /// Needles of the plan.
+    pub needles: Vec<usize>,
+    /// Needles and seeds in the tissue when the script began or continued.
+    pub placed: Placed,
+    /// Needles of a stopped script, and its drops that left no seed.
+    pub lost: (Vec<NeedleTask>, Vec<usize>),
+}
+
 impl App {
     /// Returns whether undo acts on the plan, which it does while the plan is edited.
     pub(super) fn edits_plan(&self) -> bool {
@@ -88,7 +99,7 @@ impl App {
     pub(super) fn scene_file(&self) -> Option<PathBuf> {
         // Another window may have loaded another scene since.
         let name = self.link.scene()?.header.name.read();
-        let file = self.scene_file.as_ref().filter(|(_, of)| *of == name);
+        let file = self.files.scene_file.as_ref().filter(|(_, of)| *of == name);
         file.map(|(path, _)| path.clone())
     }
 
@@ -120,7 +131,7 @@ impl App {
     fn placed(&self, tasks: &[NeedleTask]) -> Placed {
         let dropped_at_m: Vec<[f64; 3]> = self.shown.seeds.iter().map(|seed| seed.dropped_at_m).collect();
         // Another plan numbers its needles differently.
-        let (of, lost) = &self.run_lost;
+        let (of, lost) = &self.script.lost;
         let lost = if of == tasks { &lost[..] } else { &[] };
         Placed::find(tasks, &dropped_at_m, self.shown.tip_m(), lost)
     }
@@ -184,14 +195,14 @@ impl App {
         self.planner.count_none();
         self.mark_placed(&numbers, &placed);
         self.run = Some(Run::continuing(tasks, self.pace, &placed));
-        (self.run_needles, self.run_placed) = (numbers, placed);
+        (self.script.needles, self.script.placed) = (numbers, placed);
         self.drive = Drive::default();
     }
 
     /// Ends the script; its drops without a seed are kept for a later continuation.
     pub(super) fn end_run(&mut self) {
         if let Some(run) = self.run.take() {
-            self.run_lost = (run.tasks().to_vec(), run.lost().to_vec());
+            self.script.lost = (run.tasks().to_vec(), run.lost().to_vec());
         }
         (self.shown.run_waits, self.placed_found) = (None, Instant::now());
     }
@@ -199,7 +210,7 @@ impl App {
     /// Starts over: all needles of the plan from a reset, or one needle through the middle without
     /// a plan.
     fn start_over(&mut self) {
-        (self.run_placed, self.run_lost) = (Placed::default(), Default::default());
+        (self.script.placed, self.script.lost) = (Placed::default(), Default::default());
         if self.planner.is_busy() {
             self.refuse("Wait for the running task, or cancel it first.");
             return;
@@ -208,11 +219,11 @@ impl App {
         if !tasks.is_empty() {
             self.planner.restart();
             let (numbers, tasks) = tasks.into_iter().unzip();
-            self.run_needles = numbers;
+            self.script.needles = numbers;
             self.run = Some(Run::of_needles(tasks, self.pace));
             self.drive = Drive::default();
         } else if let Some(scene) = &self.shown.scene {
-            self.run_needles.clear();
+            self.script.needles.clear();
             self.run = Some(Run::new(self.by_hand(default_plan(scene)), self.pace));
             self.drive = Drive::default();
         }
@@ -234,15 +245,15 @@ impl App {
 
     /// Advances the plan's progress with the script.
     pub(super) fn follow_run(&mut self, at: usize, is_done: bool) {
-        let Some(&number) = self.run_needles.get(at) else {
+        let Some(&number) = self.script.needles.get(at) else {
             return;
         };
         let progress = self.planner.progress();
         if progress.begun() != number + 1 {
-            let begins = at == 0 && self.run_placed == Placed::default();
+            let begins = at == 0 && self.script.placed == Placed::default();
             let seeds = if begins { 0 } else { self.shown.seeds.len() };
             // Seeds that were placed before the script continued belong to this needle.
-            let seeds = seeds.saturating_sub(self.run_placed.seeds_of(at));
+            let seeds = seeds.saturating_sub(self.script.placed.seeds_of(at));
             self.planner.begin_needle(number, seeds);
         }
         if is_done {

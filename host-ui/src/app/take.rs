@@ -138,8 +138,8 @@ impl App {
             self.parameters.forget();
             self.waiting.clear();
             self.drive.forget();
-            if self.uploading.take().is_some() {
-                self.image_to_come = None;
+            if self.files.uploading.take().is_some() {
+                self.files.image_to_come = None;
                 self.shown.load = LoadState::Refused("rt-core ended before it replied".to_owned());
             }
             return;
@@ -169,12 +169,12 @@ impl App {
                 true
             }
         });
-        let answer = self.uploading.as_ref().and_then(|(id, _)| self.link.reply(*id));
-        if let (Some(answer), Some((_, name))) = (answer, self.uploading.clone()) {
-            self.uploading = None;
-            let image = self.image_to_come.take();
+        let answer = self.files.uploading.as_ref().and_then(|(id, _)| self.link.reply(*id));
+        if let (Some(answer), Some((_, name))) = (answer, self.files.uploading.clone()) {
+            self.files.uploading = None;
+            let image = self.files.image_to_come.take();
             if answer.accepted {
-                self.scene_file = self.scene_to_come.take();
+                self.files.scene_file = self.files.scene_to_come.take();
             }
             self.shown.load = match answer.accepted {
                 true => LoadState::Loaded(format!("{name} is the scene now")),
@@ -188,11 +188,11 @@ impl App {
 
     fn take_scene_file(&mut self) {
         if self.shown.is_live()
-            && let Some(scene) = self.first_scene.take()
+            && let Some(scene) = self.files.first_scene.take()
         {
             match scene {
                 SceneChoice::File(path) => {
-                    let image = self.first_image.take();
+                    let image = self.files.first_image.take();
                     self.load(&path, image);
                 }
                 SceneChoice::BuiltIn(number) => self.load_builtin(number),
@@ -202,8 +202,8 @@ impl App {
             None => {}
             Some(Err(why)) => self.shown.load = LoadState::Refused(why.to_string()),
             Some(Ok(Loaded::Scene(volume, image))) => {
-                self.image_to_come = image.map(|image| (image, volume.name.clone()));
-                if let Some((_, name)) = &mut self.scene_to_come {
+                self.files.image_to_come = image.map(|image| (image, volume.name.clone()));
+                if let Some((_, name)) = &mut self.files.scene_to_come {
                     name.clone_from(&volume.name);
                 }
                 self.upload(&volume);
@@ -218,8 +218,8 @@ impl App {
     pub(super) fn load(&mut self, path: &Path, image: Option<PathBuf>) {
         if !self.shown.load.is_busy() {
             recent::remember(&mut self.settings.recent, absolute(path), false);
-            self.scene_to_come = Some((path.to_owned(), String::new()));
-            self.loader.begin_scene(path, self.label, image);
+            self.files.scene_to_come = Some((path.to_owned(), String::new()));
+            self.loader.begin_scene(path, self.files.label, image);
         }
     }
 
@@ -273,7 +273,7 @@ impl App {
             Err(e) => LoadState::Refused(e.to_string()),
             Ok(id) => {
                 let text = format!("sending {}", volume.name);
-                self.uploading = Some((id, name));
+                self.files.uploading = Some((id, name));
                 LoadState::Sending(text)
             }
         };
@@ -285,11 +285,11 @@ impl App {
             let needle = run.needle();
             self.shown.run_step = Some(run.step());
             self.shown.run_waits = Some(run.waiting());
-            self.shown.run_needle = (self.run_needles.len() > 1).then_some((needle, self.run_needles.len()));
+            self.shown.run_needle = (self.script.needles.len() > 1).then_some((needle, self.script.needles.len()));
             self.follow_run(needle, status == RunStatus::Done);
             self.shown.note = match status {
                 RunStatus::Working => None,
-                RunStatus::Done => Some(Note::done(match self.run_needles.len() {
+                RunStatus::Done => Some(Note::done(match self.script.needles.len() {
                     0 => format!("Done: {SCRIPTED_STEPS}."),
                     n => format!("All {n} needles are done."),
                 })),

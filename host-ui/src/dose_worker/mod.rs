@@ -157,10 +157,10 @@ pub struct DoseWorker {
     lost: bool,
 }
 
-impl DoseWorker {
+impl Default for DoseWorker {
     /// Starts the thread. If that fails there is no dose, and [`DoseWorker::trouble`] gives the
     /// reason.
-    pub fn new() -> Self {
+    fn default() -> Self {
         let (tasks, work) = channel();
         let (done, results) = channel();
         let spawned = std::thread::Builder::new()
@@ -176,7 +176,9 @@ impl DoseWorker {
             lost: spawned.is_err(),
         }
     }
+}
 
+impl DoseWorker {
     /// Returns the newest result, while it answers the last request.
     pub fn latest(&self) -> Option<&Arc<DoseResult>> {
         self.latest.as_ref()
@@ -228,12 +230,6 @@ impl DoseWorker {
         };
         self.computing = self.tasks.send(task).is_ok();
         self.requested = Some((key, request.clone()));
-    }
-}
-
-impl Default for DoseWorker {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

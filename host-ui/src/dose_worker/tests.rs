@@ -49,7 +49,7 @@ fn wait(worker: &mut DoseWorker, scene: &Arc<SceneModel>, poses: &[SeedPose]) ->
 #[test]
 fn the_shell_of_a_seed_lies_where_the_formula_gives_that_dose() {
     let (scene, poses) = (scene(), [pose(0.02)]);
-    let mut worker = DoseWorker::new();
+    let mut worker = DoseWorker::default();
     let picture = wait(&mut worker, &scene, &poses);
     let source = Source::parse(include_str!("../../../sources/i125_6711.toml")).expect("checked in");
     let kernel = DoseKernel::new(&source, Interval::ALL);
@@ -78,7 +78,7 @@ fn the_shell_of_a_seed_lies_where_the_formula_gives_that_dose() {
 #[test]
 fn dose_is_recomputed_only_when_seeds_change() {
     let scene = scene();
-    let mut worker = DoseWorker::new();
+    let mut worker = DoseWorker::default();
     let first = wait(&mut worker, &scene, &[pose(0.02)]).number;
     let same = wait(&mut worker, &scene, &[pose(0.0201)]).number;
     assert_eq!(first, same, "a tenth of a millimetre");

@@ -6,7 +6,7 @@ use crate::shown::{NeedleLine, SecondHand, Shown, Watched};
 use crate::theme;
 use crate::theme::Tokens;
 use crate::view::free::BANNERS;
-use crate::words::{capital, sentence};
+use crate::words::{capital, counted, sentence};
 use egui::{Color32, Rect, RichText};
 use stylet_host::link::LinkStatus;
 use stylet_shm_schema::{Exercise, Fault, Relayed, Request};
@@ -259,8 +259,7 @@ fn what_ended(shown: &Shown) -> String {
     };
     let kept = match shown.seeds.len() {
         0 => String::new(),
-        1 => "The plan and 1 seed remain on display. ".to_owned(),
-        n => format!("The plan and {n} seeds remain on display. "),
+        n => format!("The plan and {} remain on display. ", counted(n, "seed")),
     };
     fault + &kept
 }

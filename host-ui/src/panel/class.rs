@@ -134,10 +134,7 @@ fn list_ui(ui: &mut egui::Ui, shown: &Shown) -> Option<Action> {
         .striped(true)
         .spacing([14.0, 6.0]);
     rows.show(ui, |ui| {
-        for head in ["name", "role", "round trip", "lost", "last heard"] {
-            ui.label(theme::small(head));
-        }
-        ui.end_row();
+        theme::heads(ui, ["name", "role", "round trip", "lost", "last heard"]);
         for member in class.members() {
             let given = member_ui(ui, member, gives && member.name.read() != class.operator.read());
             action = given.or(action.take());

@@ -176,10 +176,8 @@ fn tension_ui(ui: &mut egui::Ui, shown: &Shown) {
     let edge = rect.left() + 0.8 * rect.width();
     ui.painter()
         .vline(edge, rect.y_range(), egui::Stroke::new(1.0, tokens.weak));
-    response.widget_info(|| {
-        let text = format!("Membrane tension {words}");
-        egui::WidgetInfo::labeled(egui::accesskit::Role::ProgressIndicator, true, text)
-    });
+    let name = || format!("Membrane tension {words}");
+    theme::named(&response, egui::accesskit::Role::ProgressIndicator, name);
 }
 
 fn title(ui: &mut egui::Ui, name: &str, value: &str, color: Color32) -> egui::Response {
@@ -200,10 +198,7 @@ fn timing_ui(ui: &mut egui::Ui, shown: &Shown, history: &History) {
         .min_col_width(48.0)
         .spacing([6.0, 2.0])
         .show(ui, |ui| {
-            for head in ["last 60 s", "p50", "p99", "p99.9", "max"] {
-                ui.label(theme::small(head));
-            }
-            ui.end_row();
+            theme::heads(ui, ["last 60 s", "p50", "p99", "p99.9", "max"]);
             percentile_row(ui, "wake-up", &history.timing.wake);
             percentile_row(ui, "tick work", &history.timing.work);
         });

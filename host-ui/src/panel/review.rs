@@ -8,6 +8,7 @@ use crate::shown::Shown;
 use crate::theme;
 use crate::theme::Press;
 use crate::view::state::Tool;
+use crate::words::counted;
 use egui::{Button, RichText};
 use stylet_base::format;
 use stylet_implant::intraoperative::{PLANES, Reviewed, SeedsFrom};
@@ -137,10 +138,6 @@ fn marks_ui(ui: &mut egui::Ui, shown: &Shown) {
     }
 }
 
-fn counted(count: usize, what: &str) -> String {
-    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
-}
-
 fn dose_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
     let review = &shown.planning.review;
     ui.horizontal(|ui| {
@@ -171,10 +168,7 @@ fn dose_ui(ui: &mut egui::Ui, shown: &Shown, actions: &mut Vec<Action>) {
         .striped(true)
         .spacing([10.0, 3.0])
         .show(ui, |ui| {
-            for head in ["%", "now", "if continued", "updated"] {
-                ui.label(theme::small(head));
-            }
-            ui.end_row();
+            theme::heads(ui, ["%", "now", "if continued", "updated"]);
             let measures: Vec<Measure> = doses.continued.measures().collect();
             for row in &measures {
                 ui.label(row.name);

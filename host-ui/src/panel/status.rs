@@ -252,9 +252,8 @@ fn force_ui(ui: &mut egui::Ui, shown: &Shown) {
         let x = rect.left() + rect.width() * share(peak);
         painter.vline(x, rect.y_range(), egui::Stroke::new(1.5, tokens.text));
     }
-    response.widget_info(|| {
-        egui::WidgetInfo::labeled(egui::accesskit::Role::ProgressIndicator, true, format!("Force {label}"))
-    });
+    let name = || format!("Force {label}");
+    theme::named(&response, egui::accesskit::Role::ProgressIndicator, name);
     response.on_hover_text(format!("Peak since the last reset: {}", format::force(peak)));
     // Outside the bar: no text colour is legible on both of its parts.
     let size = Vec2::new(106.0, ui.spacing().interact_size.y);

@@ -151,10 +151,7 @@ fn list_ui(ui: &mut egui::Ui, glances: &[Glance], followed: Option<usize>, width
         .striped(true)
         .spacing([12.0, 4.0])
         .show(ui, |ui| {
-            for head in ["trainee", "needle", "force", "seeds", "heard", "", ""] {
-                ui.label(theme::small(head));
-            }
-            ui.end_row();
+            theme::heads(ui, ["trainee", "needle", "force", "seeds", "heard", "", ""]);
             for (number, glance) in glances.iter().enumerate() {
                 asked = row_ui(ui, (number, glance), followed == Some(number), widths).or(asked.take());
                 ui.end_row();

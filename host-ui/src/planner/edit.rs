@@ -17,7 +17,7 @@ impl Planner {
 
     /// Begins an empty plan.
     pub fn begin(&mut self) {
-        let (Some(outlines), None) = (&self.outlines, &self.history) else {
+        let (Some(outlines), None) = (&self.planning.outlines, &self.history) else {
             return;
         };
         let plan = exchange::usual().map(|(source, prescription_gy)| ImplantPlan {
@@ -34,19 +34,20 @@ impl Planner {
 
     /// Discards the plan; one needle remains.
     pub fn discard(&mut self) {
-        (self.history, self.job, self.problems, self.proposals) = (None, None, None, None);
-        if let (Some(folder), Some(outlines)) = (&self.kept_in, &self.outlines) {
+        self.cancel();
+        (self.history, self.problems, self.planning.proposals) = (None, None, None);
+        if let (Some(folder), Some(outlines)) = (&self.kept_in, &self.planning.outlines) {
             // Usually there is no file.
             let _removed = std::fs::remove_file(super::kept::path_of(folder, outlines.scene));
         }
         self.compensated.clear();
-        self.progress = NeedleProgress::default();
+        self.planning.progress = NeedleProgress::default();
         self.change();
     }
 
     /// Adds a needle through the hole, with as many seeds as fill the target behind it.
     pub fn add(&mut self, hole: Hole) {
-        let piece = self.outlines.as_ref().and_then(|g| g.piece_m(hole));
+        let piece = self.planning.outlines.as_ref().and_then(|g| g.piece_m(hole));
         let strength_u = |plan: &ImplantPlan| {
             let seeds = plan.needles.iter().flat_map(|n| &n.seeds);
             seeds.map(|s| s.strength_u).next().unwrap_or(STRENGTH_U)
@@ -133,7 +134,7 @@ impl Planner {
     }
 
     fn keeps(&self, before: &ImplantPlan, after: &ImplantPlan) -> Result<(), Failure> {
-        let begun = self.progress.begun();
+        let begun = self.planning.progress.begun();
         let first = |plan: &ImplantPlan| plan.needles.iter().take(begun).cloned().collect::<Vec<_>>();
         if begun > 0 && first(before) != first(after) {
             return Err(format!("{begun} needles are already inserted; only those after them can be changed").into());

@@ -85,7 +85,7 @@ impl Planner {
 
     /// Cancels the job.
     pub fn cancel(&mut self) {
-        self.job = None;
+        (self.job, self.planning.job) = (None, None);
     }
 
     /// Begins a job, whose work `prepare` returns; it ends with one message.
@@ -96,7 +96,7 @@ impl Planner {
     ) where
         W: FnOnce(&Reporter<'_>) -> Result<JobMessage, Failure> + Send + 'static,
     {
-        let work = match (&self.outlines, self.is_busy()) {
+        let work = match (&self.planning.outlines, self.is_busy()) {
             (_, true) => return,
             (None, _) => Err("the scene's anatomy is not ready yet; try again in a moment".into()),
             (Some(outlines), false) => prepare(self, outlines.clone()),
@@ -111,11 +111,11 @@ impl Planner {
                     };
                     reporter.send(work(&reporter).unwrap_or_else(JobMessage::Failed));
                 });
-                let progress = JobProgress {
+                self.planning.job = Some(JobProgress {
                     what: what.to_owned(),
                     share: None,
-                };
-                self.job = Some((job, progress));
+                });
+                self.job = Some(job);
             }
             Err(why) => self.refuse(why),
         }
@@ -138,7 +138,7 @@ impl Planner {
 
     /// Takes one of the proposals of the last search.
     pub fn choose(&mut self, number: usize) {
-        let Some(proposals) = self.proposals.clone().filter(|_| !self.is_busy()) else {
+        let Some(proposals) = self.planning.proposals.clone().filter(|_| !self.is_busy()) else {
             return;
         };
         let Some(found) = proposals.get(number) else { return };
@@ -207,7 +207,7 @@ impl Planner {
     /// keeps its own.
     pub fn compensate(&mut self, instance: Instance, pace: Pace) {
         self.begin_job("Rehearsing", |planner, _| {
-            let begun = planner.progress.begun();
+            let begun = planner.planning.progress.begun();
             let left = planner.planned()?.needles.iter().skip(begun);
             let needles: Vec<Needle> = left.filter(|n| !n.seeds.is_empty()).cloned().collect();
             if needles.is_empty() {

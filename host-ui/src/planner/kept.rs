@@ -73,7 +73,7 @@ impl Planner {
 
     /// Takes a plan that another window of this run of the core has begun to insert.
     pub(super) fn take_kept(&mut self) {
-        let (Some(folder), Some(outlines)) = (&self.kept_in, &self.outlines) else {
+        let (Some(folder), Some(outlines)) = (&self.kept_in, &self.planning.outlines) else {
             return;
         };
         if self.looked.as_ref().is_none_or(|(scene, _)| *scene != outlines.scene) {
@@ -97,7 +97,7 @@ impl Planner {
 
     /// Writes the plan for another window, on a separate thread.
     pub(super) fn keep(&self) {
-        if let (Some(folder), Some(outlines), Some(plan)) = (&self.kept_in, &self.outlines, self.plan()) {
+        if let (Some(folder), Some(outlines), Some(plan)) = (&self.kept_in, &self.planning.outlines, self.plan()) {
             let (path, frames) = (path_of(folder, outlines.scene), outlines.frames);
             let kept = KeptPlan {
                 plan: plan.clone(),

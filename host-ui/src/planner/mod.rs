@@ -13,6 +13,7 @@ mod review;
 mod shown;
 
 use jobs::JobMessage;
+#[cfg(test)]
 pub(crate) use jobs::JobProgress;
 use kept::KeptPlan;
 pub(crate) use needles::NeedleProgress;
@@ -29,7 +30,6 @@ use std::time::Instant;
 use stylet_base::job::{Job, JobUpdate};
 use stylet_host::link::SceneModel;
 use stylet_implant::plan::check::{Problem, problems};
-use stylet_implant::plan::first::FirstPlan;
 use stylet_implant::plan::{Compensation, Drops, History, ImplantPlan, Needle, Template};
 use stylet_implant::workflow::NeedleTask;
 use stylet_shm_schema::SceneId;
@@ -67,7 +67,8 @@ impl Note {
 /// Plan of many needles and its background jobs.
 #[derive(Default)]
 pub struct Planner {
-    outlines: Option<Arc<AnatomyOutlines>>,
+    /// State that a frame shows.
+    planning: Planning,
     outlining: Option<OutlinesJob>,
     /// Scene and template whose outlines could not be computed.
     failed: Option<(SceneId, Template)>,
@@ -79,20 +80,16 @@ pub struct Planner {
     problems: Option<Arc<Vec<Problem>>>,
     checking: Option<(u64, Checked)>,
     checked: u64,
-    job: Option<(Job<JobMessage>, JobProgress)>,
+    job: Option<Job<JobMessage>>,
     /// Folder in which the plan is kept for another window; none if not given.
     kept_in: Option<PathBuf>,
     /// Scene for which a kept plan was looked for, and the search.
     looked: Option<(SceneId, Job<KeptPlan>)>,
     /// Needles at their rehearsal, with their compensation.
     compensated: Vec<(Needle, Compensation)>,
-    /// Proposals of the last automatic plan.
-    proposals: Option<Arc<Vec<FirstPlan>>>,
-    progress: NeedleProgress,
     review: Review,
     /// Needle whose seeds were changed last, and the time.
     drawn: Option<(usize, Instant)>,
-    implant: Option<Arc<Implant>>,
     shown_revision: u64,
     /// Message for the operator, reported once.
     message: Option<Note>,
@@ -106,7 +103,7 @@ impl Planner {
 
     /// Returns the progress of its needles.
     pub fn progress(&self) -> &NeedleProgress {
-        &self.progress
+        &self.planning.progress
     }
 
     /// Returns a message for the operator, reported once.
@@ -121,12 +118,8 @@ impl Planner {
     /// Returns the state that a frame shows.
     pub fn planning(&self) -> Planning {
         Planning {
-            outlines: self.outlines.clone(),
-            implant: self.implant.clone(),
-            job: self.job.as_ref().map(|(_, progress)| progress.clone()),
-            progress: self.progress.clone(),
-            proposals: self.proposals.clone(),
             review: self.review.shown(self.can_withdraw()),
+            ..self.planning.clone()
         }
     }
 
@@ -137,7 +130,7 @@ impl Planner {
         self.take_kept();
         self.take_job();
         self.take_problems();
-        if self.progress.is_undone(seeds) {
+        if self.planning.progress.is_undone(seeds) {
             self.restart();
         }
         self.show();
@@ -146,14 +139,14 @@ impl Planner {
     fn show(&mut self) {
         if self.shown_revision != self.revision {
             self.shown_revision = self.revision;
-            self.implant = self.history.as_ref().map(|history| {
+            self.planning.implant = self.history.as_ref().map(|history| {
                 let checked = self.problems.clone().filter(|_| self.checked == self.revision);
-                let old = self.implant.as_ref().and_then(|i| i.problems.clone());
+                let old = self.planning.implant.as_ref().and_then(|i| i.problems.clone());
                 Arc::new(Implant::of(
                     self.revision,
                     history,
                     checked.or(old),
-                    &self.progress,
+                    &self.planning.progress,
                     &self.compensated,
                 ))
             });
@@ -180,7 +173,7 @@ impl Planner {
             match job.poll() {
                 JobUpdate::Pending => {}
                 JobUpdate::Message(Ok(outlines)) => {
-                    self.outlines = Some(Arc::new(outlines));
+                    self.planning.outlines = Some(Arc::new(outlines));
                     self.outlining = None;
                     self.change();
                 }
@@ -193,8 +186,8 @@ impl Planner {
             .plan()
             .map_or_else(|| Template::before(&scene.header), |p| p.template);
         let is_known = |g: &Arc<AnatomyOutlines>| g.scene == key && g.template == template;
-        if !self.outlines.as_ref().is_some_and(is_known) && self.failed != Some((key, template)) {
-            if self.outlines.as_ref().is_some_and(|g| g.scene != key) {
+        if !self.planning.outlines.as_ref().is_some_and(is_known) && self.failed != Some((key, template)) {
+            if self.planning.outlines.as_ref().is_some_and(|g| g.scene != key) {
                 self.count_none();
                 self.compensated.clear();
             }
@@ -207,7 +200,7 @@ impl Planner {
     }
 
     fn no_outlines(&mut self, key: SceneId, template: Template, why: &str) {
-        (self.outlines, self.outlining, self.failed) = (None, None, Some((key, template)));
+        (self.planning.outlines, self.outlining, self.failed) = (None, None, Some((key, template)));
         self.refuse(format!("No plan can be made for this scene: {why}"));
     }
 
@@ -227,7 +220,7 @@ impl Planner {
                 JobUpdate::Ended => self.checking = None,
             }
         }
-        let (Some(outlines), Some(plan)) = (&self.outlines, self.plan()) else {
+        let (Some(outlines), Some(plan)) = (&self.planning.outlines, self.plan()) else {
             return;
         };
         if self.checked == self.revision || self.checking.is_some() {
@@ -241,11 +234,11 @@ impl Planner {
     }
 
     fn take_job(&mut self) {
-        let Some((job, progress)) = &mut self.job else { return };
+        let Some(job) = &self.job else { return };
         let mut news = job.poll();
         // Of several messages about progress only the last counts.
         while let JobUpdate::Message(JobMessage::Progress(now)) = news {
-            *progress = now;
+            self.planning.job = Some(now);
             news = job.poll();
         }
         let message = match news {
@@ -258,7 +251,7 @@ impl Planner {
             self.compensated.push(*done);
             return self.refresh();
         }
-        self.job = None;
+        self.cancel();
         match message {
             JobMessage::Plan(plan, notes) => match self.can_be(plan) {
                 Ok(plan) => {
@@ -268,7 +261,7 @@ impl Planner {
                 Err(why) => self.refuse(why),
             },
             JobMessage::First(found) => {
-                self.proposals = Some(Arc::new(found));
+                self.planning.proposals = Some(Arc::new(found));
                 self.choose(0);
             }
             JobMessage::Update(found) => self.take_update(*found),
@@ -284,9 +277,9 @@ impl Planner {
     }
 
     fn advance(&mut self, advance: impl FnOnce(&mut NeedleProgress)) {
-        let before = self.progress.clone();
-        advance(&mut self.progress);
-        if self.progress != before {
+        let before = self.planning.progress.clone();
+        advance(&mut self.planning.progress);
+        if self.planning.progress != before {
             self.refresh();
         }
     }

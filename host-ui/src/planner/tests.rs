@@ -106,7 +106,7 @@ fn a_proposal_is_taken_as_one_change_and_goes_with_the_plan() {
     let mut planner = planner();
     let of = planned();
     let all = proposals(&of);
-    planner.proposals = Some(all.clone());
+    planner.planning.proposals = Some(all.clone());
     planner.choose(2);
     assert_eq!(planner.plan(), Some(&all[2].found.plan));
     planner.undo();

@@ -16,6 +16,17 @@ pub struct SeedError {
     pub across_m: f64,
 }
 
+impl SeedError {
+    fn new(planned: usize, placed: Option<usize>, offset: Option<SeedOffset>) -> Self {
+        Self {
+            planned,
+            placed,
+            along_m: offset.map_or(0.0, |o| o.along_m),
+            across_m: offset.map_or(0.0, |o| o.across_m),
+        }
+    }
+}
+
 /// Returns one row for each planned seed, paired with the nearest drop.
 pub fn seed_errors(planned: &[PlannedSeed], placed: &[SeedPose], direction: [f64; 3]) -> Vec<SeedError> {
     let planned_m: Vec<_> = planned.iter().map(|p| p.position_m).collect();
@@ -74,13 +85,7 @@ fn heard_rows(shown: &Shown) -> impl Iterator<Item = (usize, SeedError)> {
         let pose = seed.placed.and_then(|place| shown.seeds.get(place));
         let direction = seed.planned.axis.unwrap_or_default();
         let offset = pose.map(|pose| SeedOffset::of(seed.planned.position_m, pose.position_m, direction));
-        let row = SeedError {
-            planned: before.1 - 1,
-            placed: seed.placed,
-            along_m: offset.map_or(0.0, |o| o.along_m),
-            across_m: offset.map_or(0.0, |o| o.across_m),
-        };
-        (seed.needle, row)
+        (seed.needle, SeedError::new(before.1 - 1, seed.placed, offset))
     })
 }
 
@@ -99,12 +104,7 @@ fn rows(
     let row = |(number, (target, pair)): (usize, (&PlannedSeed, Option<usize>))| {
         let seed = pair.and_then(|n| placed.get(n));
         let offset = seed.map(|seed| SeedOffset::of(target.position_m, seed.position_m, direction));
-        SeedError {
-            planned: number,
-            placed: pair,
-            along_m: offset.map_or(0.0, |o| o.along_m),
-            across_m: offset.map_or(0.0, |o| o.across_m),
-        }
+        SeedError::new(number, pair, offset)
     };
     planned.iter().zip(pairs).enumerate().map(row).collect()
 }

@@ -9,18 +9,20 @@ use stylet_surfaces::field::Field;
 /// Surfaces of the scene at the last snapshot.
 #[derive(Default)]
 pub struct ShownBody {
-    model: Option<Arc<SceneModel>>,
+    /// Scene that is shown; `None` before the first one.
+    pub model: Option<Arc<SceneModel>>,
     scene: Option<SceneId>,
     /// Scene whose surfaces a thread makes, or has made.
     making: Option<SceneId>,
     snapshot: Option<(u64, u64)>,
     /// Positions of the elements at the surface of the lattice.
     elements_m: Vec<[f32; 3]>,
-    positions_m: Vec<[f32; 3]>,
-    moved: u64,
-    /// Displacements in the last snapshot, and the number of their changes.
-    field: Field,
-    stirred: u64,
+    /// Present positions of the vertices, and a number that grows whenever they move.
+    pub positions_m: Vec<[f32; 3]>,
+    pub moved: u64,
+    /// Displacements in the last snapshot, and a number that grows whenever they change.
+    pub field: Field,
+    pub stirred: u64,
 }
 
 impl ShownBody {
@@ -79,28 +81,8 @@ impl ShownBody {
         }
     }
 
-    /// Returns the scene that is shown; `None` before the first one.
-    pub fn model(&self) -> Option<&Arc<SceneModel>> {
-        self.model.as_ref()
-    }
-
     /// Returns the surfaces at rest; `None` before the first scene.
     pub fn bodies(&self) -> Option<&Bodies> {
         self.model.as_ref().map(|model| model.bodies())
-    }
-
-    /// Returns the present positions of their vertices.
-    pub fn positions_m(&self) -> &[[f32; 3]] {
-        &self.positions_m
-    }
-
-    /// Returns a number that grows whenever they move.
-    pub fn moved(&self) -> u64 {
-        self.moved
-    }
-
-    /// Returns the displacements of the tissue, and a number that grows whenever they change.
-    pub fn field(&self) -> (&Field, u64) {
-        (&self.field, self.stirred)
     }
 }

@@ -5,7 +5,7 @@ use super::probe::ProbePicture;
 use super::state::Tool;
 use crate::action::{Action, PlanAction};
 use crate::planner::{Edit, ReviewShown};
-use crate::theme::IMAGE;
+use crate::theme::{self, IMAGE};
 use egui::{Key, Painter, PointerButton, Pos2, Sense, Shape, Stroke, Vec2};
 use nalgebra::{Vector2, Vector3};
 use stylet_imaging::ultrasound::View;
@@ -43,21 +43,21 @@ impl Drawing {
     ) -> Vec<Action> {
         let Some(frame) = review.frame else { return Vec::new() };
         let over = Over {
-            painter: ui.painter_at(picture.rect()),
+            painter: ui.painter_at(picture.rect),
             picture,
             review,
             frame,
-            at_m: frame.in_plane_m(picture.plane().pose.middle_m).1,
+            at_m: frame.in_plane_m(picture.plane.pose.middle_m).1,
         };
-        let transverse = picture.view() == View::Transverse;
+        let transverse = picture.plane.view == View::Transverse;
         let tool = tool.filter(|tool| transverse || *tool == Tool::Seeds);
         let mut edits = Vec::new();
         let mut near = None;
         if let Some(tool) = tool {
-            let id = ui.scope_id().with(("drawing", picture.view().name()));
-            let response = ui.interact(picture.rect(), id, Sense::click_and_drag());
-            let name = format!("Draw in the {} picture", picture.view().name().to_lowercase());
-            response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Canvas, true, &name));
+            let id = ui.scope_id().with(("drawing", picture.plane.view.name()));
+            let response = ui.interact(picture.rect, id, Sense::click_and_drag());
+            let name = format!("Draw in the {} picture", picture.plane.view.name().to_lowercase());
+            theme::named(&response, egui::accesskit::Role::Canvas, || &name);
             near = response.hover_pos().and_then(|at| over.near(tool, at));
             edits = self.edits(ui, &response, tool, &over);
         }

@@ -9,11 +9,11 @@ use super::body::ShownBody;
 use super::paste::{Paste, Pasted, gpu_of};
 use super::slice;
 use crate::shown::Shown;
-use crate::theme::IMAGE;
+use crate::theme::{self, IMAGE};
 use eframe::egui_wgpu::RenderState;
 use eframe::wgpu;
 use egui::emath::GuiRounding as _;
-use egui::{Pos2, Rect, Sense, Vec2};
+use egui::{Rect, Sense, Vec2};
 use nalgebra::Vector3;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -116,13 +116,13 @@ impl FluoroView {
     pub fn picture_ui(&mut self, ui: &mut egui::Ui, rect: Rect, (shown, body, field): (&Shown, &ShownBody, &Field)) {
         let response = ui.interact(rect, ui.scope_id().with("fluoroscopy"), Sense::drag());
         let name = "C-arm screen";
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, name));
+        theme::named(&response, egui::accesskit::Role::Image, || name);
         let by = response.drag_delta();
         self.angles
             .turn(f64::from(by.x) / POINTS_PER_DEG, f64::from(-by.y) / POINTS_PER_DEG);
         let painter = ui.painter_at(rect);
         painter.rect_filled(rect, 0.0, IMAGE.background);
-        let Some(model) = body.model().filter(|_| shown.scene.is_some()) else {
+        let Some(model) = body.model.as_ref().filter(|_| shown.scene.is_some()) else {
             self.release();
             slice::words(&painter, rect, &format!("{name}: no scene yet"), IMAGE.text);
             return;
@@ -222,9 +222,4 @@ impl Screen {
             at,
         })
     }
-}
-
-/// Returns a point at an offset from the corner of a rectangle.
-fn inside(corner: Pos2, by: [f32; 2]) -> Pos2 {
-    corner + Vec2::from(by)
 }

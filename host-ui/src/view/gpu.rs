@@ -48,9 +48,8 @@ struct Shell {
 pub struct SceneGpu {
     gpu: Gpu,
     layout: wgpu::BindGroupLayout,
-    pipelines: Pipelines,
-    /// Pipelines for `coarse`.
-    coarse_pipelines: Pipelines,
+    /// Pipelines of the fine picture, and of the coarse one.
+    pipelines: [Pipelines; 2],
     paste: Paste,
     /// Surface of the body, then those inside it.
     surfaces: Vec<Layer>,
@@ -65,8 +64,8 @@ pub struct SceneGpu {
     /// True with a graphics card; without one, moving pictures have a quarter of the pixels and
     /// fewer triangles.
     has_card: bool,
-    fine: Option<Targets>,
-    coarse: Option<Targets>,
+    /// The fine picture, and the coarse one.
+    targets: [Option<Targets>; 2],
     shows_coarse: bool,
     pub driver: DriverCost,
 }
@@ -78,8 +77,7 @@ impl SceneGpu {
         let layout = gpu.layout(wgpu::ShaderStages::VERTEX_FRAGMENT, &[UNIFORM]);
         let vertex = wgpu::BufferUsages::VERTEX;
         Self {
-            pipelines: Pipelines::new(device, &layout, FINE),
-            coarse_pipelines: Pipelines::new(device, &layout, ONE_SAMPLE),
+            pipelines: [FINE, ONE_SAMPLE].map(|samples| Pipelines::new(device, &layout, samples)),
             paste: Paste::new(state),
             surfaces: Vec::new(),
             ghost: material(&gpu, &layout),
@@ -90,8 +88,7 @@ impl SceneGpu {
             indices: Growing::new(device, wgpu::BufferUsages::INDEX),
             shells: Vec::new(),
             has_card: state.adapter.get_info().device_type != wgpu::DeviceType::Cpu,
-            fine: None,
-            coarse: None,
+            targets: [None, None],
             shows_coarse: false,
             driver: DriverCost::default(),
             layout,
@@ -164,20 +161,21 @@ impl SceneGpu {
     /// Sets the size in pixels. Returns true if the picture is new and must be drawn.
     pub fn resize(&mut self, size: [u32; 2]) -> bool {
         let size = size.map(|side| side.clamp(1, LARGEST_SIDE));
-        if self.fine.as_ref().is_some_and(|t| t.size == size) {
+        if self.targets[0].as_ref().is_some_and(|t| t.size == size) {
             return false;
         }
-        self.fine = Some(Targets::new(&self.gpu, size, FINE, |picture| self.paste.of(picture)));
-        self.coarse = (!self.has_card).then(|| {
+        let fine = Targets::new(&self.gpu, size, FINE, |picture| self.paste.of(picture));
+        let coarse = (!self.has_card).then(|| {
             let size = size.map(|side| side.div_ceil(2));
             Targets::new(&self.gpu, size, ONE_SAMPLE, |picture| self.paste.enlarged(picture))
         });
+        self.targets = [Some(fine), coarse];
         true
     }
 
     /// Returns the picture that was drawn last.
     pub fn picture(&self) -> Option<Pasted> {
-        let shown = if self.shows_coarse { &self.coarse } else { &self.fine };
+        let shown = &self.targets[usize::from(self.shows_coarse)];
         shown.as_ref().map(|t| t.pasted.clone())
     }
 
@@ -197,23 +195,16 @@ impl SceneGpu {
         ghost: Option<&SceneUniform>,
         (clear, moves): ([f64; 3], bool),
     ) {
-        self.shows_coarse = moves && self.coarse.is_some();
-        let drawn = if self.shows_coarse {
-            &mut self.coarse
-        } else {
-            &mut self.fine
+        self.shows_coarse = moves && self.targets[1].is_some();
+        let which = usize::from(self.shows_coarse);
+        let Some(mut targets) = self.targets[which].take() else {
+            return;
         };
-        let Some(mut targets) = drawn.take() else { return };
         let mut driver = self.driver;
         driver.send(|| self.send_picture(&targets, (looks, shells, ghost), clear));
         self.driver = driver;
         targets.pasted.renew();
-        let drawn = if self.shows_coarse {
-            &mut self.coarse
-        } else {
-            &mut self.fine
-        };
-        *drawn = Some(targets);
+        self.targets[which] = Some(targets);
     }
 
     /// Sends the picture; returns the number of bytes.
@@ -237,11 +228,7 @@ impl SceneGpu {
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         {
             let mut pass = targets.begin(&mut encoder, clear);
-            let pipelines = if self.shows_coarse {
-                &self.coarse_pipelines
-            } else {
-                &self.pipelines
-            };
+            let pipelines = &self.pipelines[usize::from(self.shows_coarse)];
             pass.set_bind_group(0, &self.ghost.bind, &[]);
             for list in &self.solids {
                 draw_list(&mut pass, &pipelines.solid, list);

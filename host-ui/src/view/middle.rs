@@ -105,7 +105,7 @@ impl Middle {
     /// Returns the place of the transverse plane along the probe's axis, m.
     pub(crate) fn transverse_at_m(&self, shown: &Shown) -> Option<f64> {
         let (frame, picture) = (shown.planning.review.frame?, self.probe.picture(View::Transverse)?);
-        Some(frame.in_plane_m(picture.plane().pose.middle_m).1)
+        Some(frame.in_plane_m(picture.plane.pose.middle_m).1)
     }
 
     /// Returns the dose that fluoroscopy has cost this patient.
@@ -167,7 +167,7 @@ impl Middle {
         }
         self.probe.forget_pictures();
         for (view, rect) in places.probe {
-            let seen = (shown, &self.body, self.body.field().0);
+            let seen = (shown, &self.body, &self.body.field);
             actions.extend(self.probe.picture_ui(ui, rect, view, seen));
             if let Some(picture) = self.probe.picture(view).filter(|_| layout == Layout::Probe) {
                 let (tool, review) = (self.view.tool, &shown.planning.review);
@@ -176,7 +176,7 @@ impl Middle {
         }
         match places.fluoro {
             Some(rect) => {
-                let seen = (shown, &self.body, self.body.field().0);
+                let seen = (shown, &self.body, &self.body.field);
                 self.fluoro.picture_ui(ui, rect, seen);
             }
             None => self.fluoro.release(),
@@ -325,5 +325,27 @@ fn places(rect: Rect, layout: Layout) -> Places {
         slices,
         probe,
         fluoro,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::Vec2;
+
+    #[test]
+    fn pictures_lie_in_the_window_and_not_over_each_other() {
+        let rect = Rect::from_min_size(Pos2::new(286.0, 70.0), Vec2::new(664.0, 730.0));
+        for layout in Layout::ALL {
+            let places = places(rect, layout);
+            let slices = places.slices.iter().map(|(_, r)| *r);
+            let probe = places.probe.iter().map(|(_, r)| *r);
+            let all: Vec<Rect> = slices.chain(probe).chain(places.solid).chain(places.fluoro).collect();
+            for (i, a) in all.iter().enumerate() {
+                assert!(rect.contains_rect(*a), "{layout:?}");
+                assert!(all[i + 1..].iter().all(|b| !a.intersects(*b)), "{layout:?}");
+                assert!(a.width() > 200.0 && a.height() > 200.0, "{layout:?}: {a:?}");
+            }
+        }
     }
 }

@@ -38,6 +38,15 @@ impl Orientation {
         }
     }
 
+    /// Returns the patient axis across the slice: right, anterior, superior.
+    pub(super) fn across(self) -> usize {
+        match self {
+            Self::Axial => 2,
+            Self::Sagittal => 0,
+            Self::Coronal => 1,
+        }
+    }
+
     /// Returns the letters of left, right, top and bottom.
     pub fn letters(self) -> [&'static str; 4] {
         match self {

@@ -12,7 +12,7 @@ use super::paste::{Paste, Pasted, gpu_of};
 use super::slice::{empty, reason};
 use crate::action::{Action, ProbeAction};
 use crate::shown::Shown;
-use crate::theme::IMAGE;
+use crate::theme::{self, IMAGE};
 use eframe::egui_wgpu::RenderState;
 use egui::{Align2, FontId, Pos2, Rect, Sense, Vec2};
 use nalgebra::Vector3;
@@ -53,14 +53,6 @@ pub(super) struct ProbeView {
     turns: Turns,
 }
 
-/// Pose of a picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ProbeStand {
-    pub pose: Pose,
-    /// True in the hand that holds the second device, false on the window's own stepper.
-    pub is_in_hand: bool,
-}
-
 impl ProbeView {
     /// Creates the view. Without a graphics device that computes there are no pictures.
     pub fn new(state: Option<RenderState>) -> Self {
@@ -97,13 +89,9 @@ impl ProbeView {
 
     /// Returns the pose of the probe: in the hand that holds the second device, or on the stepper
     /// without one.
-    pub fn stand(&self, shown: &Shown, scene: &SceneHeader) -> ProbeStand {
+    fn pose(&self, shown: &Shown, scene: &SceneHeader) -> Pose {
         let on_stepper = || self.knobs.stepper(&Pose::of_scene(scene));
-        let in_hand = shown.probe_pose();
-        ProbeStand {
-            pose: in_hand.unwrap_or_else(on_stepper),
-            is_in_hand: in_hand.is_some(),
-        }
+        shown.probe_pose().unwrap_or_else(on_stepper)
     }
 
     /// Draws one plane; returns the requests of the pointer.
@@ -111,17 +99,16 @@ impl ProbeView {
         let (shown, body, field) = seen;
         let response = ui.interact(rect, ui.scope_id().with(view.name()), Sense::click_and_drag());
         let name = format!("{} ultrasound", view.name());
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, &name));
+        theme::named(&response, egui::accesskit::Role::Image, || &name);
         let painter = ui.painter_at(rect);
-        let Some(model) = body.model().filter(|_| shown.scene.is_some()) else {
+        let Some(model) = body.model.as_ref().filter(|_| shown.scene.is_some()) else {
             let text = format!("{name}: no scene yet");
             empty(&painter, rect, &text, (IMAGE.background, IMAGE.text));
             return None;
         };
         let action = self.dragged(&response, view, shown);
-        let stand = self.stand(shown, &model.header);
         let plane = Plane {
-            pose: stand.pose,
+            pose: self.pose(shown, &model.header),
             view,
             probe: Probe::default(),
             depth_m: self.knobs.depth_mm * 1e-3,
@@ -143,10 +130,14 @@ impl ProbeView {
                 ui.ctx().request_repaint();
             }
             if let (Some(pasted), Some((drawn, ..))) = (&pane.pasted, &pane.drawn) {
-                let picture = ProbePicture::new(*drawn, rect, !is_old);
+                let picture = ProbePicture {
+                    plane: *drawn,
+                    rect,
+                    is_live: !is_old,
+                };
                 pane.shown = Some(picture);
                 pasted.paint(&painter, rect);
-                self.over(&painter, &picture, stand, &model.header);
+                self.over(&painter, &picture, (shown, plane.pose), &model.header);
                 return action;
             }
             if is_old {
@@ -182,8 +173,14 @@ impl ProbeView {
     }
 
     /// Draws title, depths and template.
-    fn over(&self, painter: &egui::Painter, picture: &ProbePicture, stand: ProbeStand, scene: &SceneHeader) {
-        let (plane, rect) = (picture.plane(), picture.rect());
+    fn over(
+        &self,
+        painter: &egui::Painter,
+        picture: &ProbePicture,
+        (shown, pose): (&Shown, Pose),
+        scene: &SceneHeader,
+    ) {
+        let (plane, rect) = (&picture.plane, picture.rect);
         if self.knobs.template && plane.view == View::Transverse {
             let template = Template::before(scene);
             for hole in Hole::all() {
@@ -193,8 +190,12 @@ impl ProbeView {
                 }
             }
         }
-        let (way_m, turn_rad) = stand.pose.way_and_turn(&Pose::of_scene(scene));
-        let whose = if stand.is_in_hand { "Hand 2" } else { "Stepper" };
+        let (way_m, turn_rad) = pose.way_and_turn(&Pose::of_scene(scene));
+        let whose = if shown.probe_pose().is_some() {
+            "Hand 2"
+        } else {
+            "Stepper"
+        };
         let (name, way, turn) = (plane.view.name(), format::length(way_m), turn_rad.to_degrees());
         // Avoid a minus before a zero.
         let turn = if turn.abs() < 0.05 { 0.0 } else { turn };

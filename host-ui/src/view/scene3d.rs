@@ -160,7 +160,7 @@ impl Scene3d {
     }
 
     pub fn take(&mut self, shown: &Shown, body: &ShownBody) {
-        let (Some(model), Some(bodies)) = (body.model(), body.bodies()) else {
+        let (Some(model), Some(bodies)) = (&body.model, body.bodies()) else {
             return;
         };
         let scene_key = model.header.id();
@@ -174,11 +174,11 @@ impl Scene3d {
                 gpu.set_surface(self.surface.vertices());
             }
         }
-        if self.moved == body.moved() {
+        if self.moved == body.moved {
             return;
         }
-        self.moved = body.moved();
-        let runs = self.surface.move_to(body.positions_m());
+        self.moved = body.moved;
+        let runs = self.surface.move_to(&body.positions_m);
         self.changes += u64::from(!runs.is_empty());
         if let Some(gpu) = self.gpu.as_mut().filter(|_| !runs.is_empty()) {
             gpu.move_surface(self.surface.vertices(), runs);
@@ -194,9 +194,11 @@ impl Scene3d {
     ) {
         let tokens = theme::of(ui);
         let response = ui.interact(rect, ui.scope_id().with("scene3d"), Sense::click_and_drag());
-        response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, "View of gland, needle and seeds")
-        });
+        theme::named(
+            &response,
+            egui::accesskit::Role::Image,
+            || "View of gland, needle and seeds",
+        );
         self.steer(ui, &response, rect, (body, view));
         let dose = dose.filter(|_| view.isodose);
         let painter = ui.painter_at(rect);

@@ -1,13 +1,12 @@
 //! Uniforms of the three-dimensional picture's shader.
 
 use super::camera::Camera;
-use super::orientation::{Orientation, scene_from_patient};
+use super::orientation::scene_from_patient;
 use super::state::ViewState;
 use crate::shown::Shown;
 use crate::theme;
 use bytemuck::{Pod, Zeroable};
 use egui::Color32;
-use nalgebra::Vector3;
 
 const LIGHT: [f32; 4] = [-0.48, 0.78, -0.40, 0.0];
 
@@ -30,12 +29,7 @@ pub fn section(camera: &Camera, view: &ViewState, shown: &Shown) -> [f32; 4] {
     let (Some(orientation), Some(scene)) = (view.section, &shown.scene) else {
         return [0.0; 4];
     };
-    let axis = match orientation {
-        Orientation::Axial => Vector3::z(),
-        Orientation::Sagittal => Vector3::x(),
-        Orientation::Coronal => Vector3::y(),
-    };
-    let normal = (scene_from_patient(scene) * axis).map(|c| c as f32);
+    let normal = scene_from_patient(scene).column(orientation.across()).map(|c| c as f32);
     let cursor = view.cursor_m.map(|c| c as f32);
     let normal = if (camera.eye_m() - cursor).dot(&normal) < 0.0 {
         -normal

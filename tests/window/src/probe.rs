@@ -26,7 +26,7 @@ fn off(a: &Pose, b: &Pose) -> f64 {
 
 /// Returns the pose of the visible picture.
 fn seen(app: &App) -> Option<Pose> {
-    app.middle().probe_picture(View::Transverse).map(|p| p.plane().pose)
+    app.middle().probe_picture(View::Transverse).map(|p| p.plane.pose)
 }
 
 fn open(layout: &str, options: &[&str]) -> Driven {

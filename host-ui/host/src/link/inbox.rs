@@ -156,3 +156,24 @@ fn keep<T>(queue: &mut VecDeque<T>, value: T, most: usize) {
     }
     queue.push_back(value);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::Zeroable;
+
+    #[test]
+    fn a_host_that_takes_nothing_costs_bounded_memory_and_keeps_the_newest() {
+        let mut inbox = Inbox::default();
+        for tick in 0..RECORDS_KEPT as u64 + 10 {
+            let mut record = TickRecord::zeroed();
+            record.tick = tick;
+            inbox.put_record(record);
+        }
+        let taken = inbox.take();
+        assert_eq!(taken.records.len(), RECORDS_KEPT);
+        assert_eq!(taken.records.front().map(|r| r.tick), Some(10));
+        assert!(size_of::<TickRecord>() * RECORDS_KEPT <= 72_000_000);
+        assert!(inbox.take().records.is_empty(), "taken once");
+    }
+}

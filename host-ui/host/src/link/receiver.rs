@@ -55,7 +55,7 @@ pub struct Passes {
     /// Time since which ports cannot be made although a core is running.
     failing: Option<Instant>,
     board_tried: Option<Instant>,
-    pub snapshots_every: Duration,
+    snapshots_every: Duration,
     snapshot_taken: Option<Instant>,
     cleaned: Instant,
     beat: Option<(u64, u64)>,
@@ -63,7 +63,12 @@ pub struct Passes {
 }
 
 impl Passes {
-    pub fn new(instance: Instance, host_id: u64, inbox: Arc<Mutex<Inbox>>, asked: mpsc::Receiver<Outgoing>) -> Self {
+    pub fn new(
+        (instance, host_id): (Instance, u64),
+        snapshots_every: Duration,
+        inbox: Arc<Mutex<Inbox>>,
+        asked: mpsc::Receiver<Outgoing>,
+    ) -> Self {
         Self {
             board: None,
             second: SecondEnds::default(),
@@ -82,7 +87,7 @@ impl Passes {
             connect_failed: None,
             failing: None,
             board_tried: None,
-            snapshots_every: Duration::ZERO,
+            snapshots_every,
             snapshot_taken: None,
             cleaned: Instant::now(),
             beat: None,
@@ -239,43 +244,40 @@ impl Passes {
                 }
             }
         }
-        while let Some(event) = ports.events.receive() {
+        let is_event = |event: &Event| {
             let finite = event.value.is_finite() && event.position_m.iter().all(|c| c.is_finite());
-            if finite && EventKind::from_number(event.kind).is_some() {
-                inbox.put_event(event);
-            } else {
-                invalid += 1;
-            }
+            finite && EventKind::from_number(event.kind).is_some()
+        };
+        for event in valid(|| ports.events.receive(), is_event, &mut invalid) {
+            inbox.put_event(event);
         }
         // Before the replies: a host that has the reply to a rehearsal has its result.
-        while let Some(rehearsal) = ports.rehearsals.receive() {
-            match check::rehearsal(&rehearsal) {
-                Ok(()) if (Some(rehearsal.session_id), rehearsal.host_id) == (id, self.host_id) => {
-                    inbox.put_rehearsal(rehearsal)
-                }
-                Ok(()) => {}
-                Err(_) => invalid += 1,
+        let is_own = |session_id: u64, host_id: u64| (Some(session_id), host_id) == (id, self.host_id);
+        for rehearsal in valid(
+            || ports.rehearsals.receive(),
+            |r| check::rehearsal(r).is_ok(),
+            &mut invalid,
+        ) {
+            if is_own(rehearsal.session_id, rehearsal.host_id) {
+                inbox.put_rehearsal(rehearsal);
             }
         }
         while let Some(reply) = ports.replies.receive() {
-            if (Some(reply.session_id), reply.host_id) == (id, self.host_id) {
-                match Answer::of_reply(&reply) {
-                    Some(answer) => inbox.put_answer(reply.command_id, answer),
-                    None => invalid += 1,
-                }
+            match Answer::of_reply(&reply) {
+                _ if !is_own(reply.session_id, reply.host_id) => {}
+                Some(answer) => inbox.put_answer(reply.command_id, answer),
+                None => invalid += 1,
             }
         }
-        while let Some(parameters) = ports.parameters.receive() {
-            match check::parameters(&parameters) {
-                Ok(()) => inbox.of(parameters.session_id).parameters = Some(parameters),
-                Err(_) => invalid += 1,
-            }
+        for p in valid(
+            || ports.parameters.receive(),
+            |p| check::parameters(p).is_ok(),
+            &mut invalid,
+        ) {
+            inbox.of(p.session_id).parameters = Some(p);
         }
-        while let Some(plan) = ports.plan.receive() {
-            match check::plan(&plan) {
-                Ok(()) => inbox.of(plan.session_id).plan = Some(plan),
-                Err(_) => invalid += 1,
-            }
+        for plan in valid(|| ports.plan.receive(), |p| check::plan(p).is_ok(), &mut invalid) {
+            inbox.of(plan.session_id).plan = Some(plan);
         }
         while let Some(relayed) = ports.relayed.receive() {
             inbox.of(relayed.session_id).relayed = Some(relayed);
@@ -284,22 +286,15 @@ impl Passes {
             let run = inbox.of(class.session_id);
             run.class = Some((Instant::now(), Arc::new(class)));
         }
-        for scene in scene {
-            match scene {
-                Some(scene) => {
-                    let run = inbox.of(scene.header.session_id);
-                    run.scene = Some(Arc::new(scene));
-                }
-                None => invalid += 1,
-            }
+        let inconsistent = scene.iter().filter(|scene| scene.is_none()).count();
+        invalid += inconsistent as u64 + u64::from(matches!(snapshot, Some(None)));
+        for scene in scene.into_iter().flatten() {
+            let run = inbox.of(scene.header.session_id);
+            run.scene = Some(Arc::new(scene));
         }
-        match snapshot {
-            Some(Some(snapshot)) => {
-                let run = inbox.of(snapshot.header.session_id);
-                run.snapshot = Some(Arc::new(snapshot));
-            }
-            Some(None) => invalid += 1,
-            None => {}
+        if let Some(snapshot) = snapshot.flatten() {
+            let run = inbox.of(snapshot.header.session_id);
+            run.snapshot = Some(Arc::new(snapshot));
         }
         inbox.invalid_dropped += invalid;
     }
@@ -399,4 +394,11 @@ fn receive_scene(ports: &Ports) -> Vec<Option<SceneModel>> {
     scenes
         .map(|sample| SceneModel::of_words(sample.header(), sample.values()))
         .collect()
+}
+
+/// Returns the valid ones of all that arrived; counts the others.
+fn valid<T>(receive: impl FnMut() -> Option<T>, is_valid: impl Fn(&T) -> bool, invalid: &mut u64) -> Vec<T> {
+    let (valid, others): (Vec<T>, Vec<T>) = std::iter::from_fn(receive).partition(is_valid);
+    *invalid += others.len() as u64;
+    valid
 }

@@ -28,8 +28,7 @@ impl Receiver {
         let into = Arc::clone(&inbox);
         // Made by the thread, as the ports are.
         let make = move || {
-            let mut passes = Passes::new(instance, host_id, into, asked);
-            passes.snapshots_every = snapshots_every;
+            let mut passes = Passes::new((instance, host_id), snapshots_every, into, asked);
             move || {
                 passes.pass();
                 PASS

@@ -64,7 +64,7 @@ pub struct Options {
 pub fn run(options: &Options) -> Result<(), RecordError> {
     let interrupted = Interrupt::on_signals().map_err(|e| RecordError::Signals(e.to_string()))?;
     let stop = || interrupted.asked();
-    let mut link = Link::for_recording(options.instance.clone());
+    let mut link = Link::with_snapshots_every(options.instance.clone(), Duration::ZERO);
     find_core(&mut link, stop)?;
     let (name, totals) = match &options.to {
         To::File(path) => {

@@ -276,8 +276,8 @@ fn row_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut ParametersState, index: 
     ui.horizontal(|ui| {
         let changed = (value - spec.default).abs() > 1e-9 * spec.default.abs().max(1e-12);
         let reset = ui.add_enabled(changed && shown.is_live(), Button::new("Reset").small());
-        reset.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::accesskit::Role::Button, changed, format!("Reset {}", spec.label))
+        theme::named(&reset, egui::accesskit::Role::Button, || {
+            format!("Reset {}", spec.label)
         });
         if reset
             .on_hover_text(format!("Back to {} {}", plain(spec.default * scale), spec.unit))

@@ -151,10 +151,7 @@ pub fn seeds_ui(ui: &mut egui::Ui, shown: &Shown, rows: &[(usize, SeedError)]) {
                 .min_col_width(52.0)
                 .spacing([8.0, 2.0])
                 .show(ui, |ui| {
-                    for head in ["seed", "along", "across", "total"] {
-                        ui.label(theme::small(head));
-                    }
-                    ui.end_row();
+                    theme::heads(ui, ["seed", "along", "across", "total"]);
                     rows.iter()
                         .for_each(|(needle, row)| seed_row_ui(ui, has_many.then_some(*needle), row));
                 });

@@ -125,7 +125,7 @@ fn head_ui(ui: &mut egui::Ui, (step, now): (Progress, Progress), shown: &Shown) 
     let size = Vec2::new(ui.available_width(), 24.0);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     let name = format!("{}  {}", step.number(), step.name());
-    response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Button, true, &name));
+    theme::named(&response, egui::accesskit::Role::Button, || &name);
     if response.hovered() || response.has_focus() {
         ui.painter().rect_filled(rect, 4.0, tokens.widget);
     }

@@ -186,9 +186,9 @@ fn recent_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, one: &
     let button = ui.add_enabled(can, Button::new(format!("{name}{what}")).truncate());
     let button = button.on_hover_text(&one.path).on_disabled_hover_text(&one.path);
     if button.clicked() {
-        actions.push(match one.purpose() {
-            Purpose::Image => Action::LoadImage(path),
-            _ => {
+        actions.push(match one.is_image {
+            true => Action::LoadImage(path),
+            false => {
                 state.scene_path.clone_from(&one.path);
                 Action::LoadScene(path)
             }

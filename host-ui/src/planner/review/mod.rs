@@ -75,17 +75,13 @@ const TAKEN_OVER: usize = 8;
 /// State of the review, for one scene.
 #[derive(Default)]
 pub(super) struct Review {
+    shown: ReviewShown,
     scene: Option<SceneId>,
-    frame: Option<Transverse>,
     history: History<Drawn>,
-    solid: Option<Arc<Solid>>,
-    seeds_from: SeedsFrom,
-    /// Last assessment, and the one in progress.
-    assessed: Option<(Moment, Arc<Assessed>)>,
+    /// Moment of the last assessment, of the one in progress, and of one that failed.
+    assessed: Option<Moment>,
     assessing: Option<(Moment, Job<Result<Assessed, String>>)>,
-    trouble: Option<(Moment, String)>,
-    proposed: Option<Arc<Reviewed>>,
-    reviewed: Vec<Reviewed>,
+    failed: Option<Moment>,
 }
 
 /// State of the review that a frame shows.
@@ -135,20 +131,10 @@ impl ReviewShown {
 
 impl Review {
     pub(super) fn shown(&self, can_withdraw: bool) -> ReviewShown {
-        let assessed = self.assessed.as_ref().map(|(_, assessed)| assessed);
         ReviewShown {
-            frame: self.frame,
-            drawn: self.history.now().clone(),
-            solid: self.solid.clone(),
-            seeds_from: self.seeds_from,
-            doses: assessed.map(|a| a.doses),
-            volume_m3: assessed.map(|a| a.volume_m3),
-            marks: assessed.map_or_else(Marks::default, |a| a.marks.clone()),
             is_assessing: self.assessing.is_some(),
-            trouble: self.trouble.as_ref().map(|(_, why)| why.clone()),
-            update: self.proposed.clone(),
             can_withdraw,
-            reviewed: self.reviewed.clone(),
+            ..self.shown.clone()
         }
     }
 
@@ -200,8 +186,8 @@ impl Review {
 
     /// Begins another implantation; the drawing stays.
     pub(super) fn restart(&mut self) {
-        self.reviewed.clear();
-        self.proposed = None;
+        self.shown.reviewed.clear();
+        self.shown.update = None;
     }
 
     fn step(&mut self, step: fn(&mut History<Drawn>) -> bool) {
@@ -211,9 +197,10 @@ impl Review {
     }
 
     fn redraw(&mut self) {
-        self.solid = Solid::of(&self.history.now().contour).ok().map(Arc::new);
+        self.shown.drawn = self.history.now().clone();
+        self.shown.solid = Solid::of(&self.shown.drawn.contour).ok().map(Arc::new);
         // It was made for another contour.
-        self.proposed = None;
+        self.shown.update = None;
     }
 }
 
@@ -225,12 +212,12 @@ impl Planner {
 
     /// Chooses the seeds for the dose of a moment.
     pub fn set_seeds_from(&mut self, seeds_from: SeedsFrom) {
-        (self.review.seeds_from, self.review.proposed) = (seeds_from, None);
+        (self.review.shown.seeds_from, self.review.shown.update) = (seeds_from, None);
     }
 
     /// Returns the updates of the plan in this scene.
     pub fn reviewed(&self) -> &[Reviewed] {
-        &self.review.reviewed
+        &self.review.shown.reviewed
     }
 
     /// Takes the data that arrived since the last frame; assesses the drawing if it, the plan or
@@ -246,19 +233,23 @@ impl Planner {
             };
             self.review = Review {
                 scene: Some(scene.header.id()),
-                frame: Some(frame),
+                shown: ReviewShown {
+                    frame: Some(frame),
+                    ..ReviewShown::default()
+                },
                 ..Review::default()
             };
         }
         self.take_assessed();
         let Some(moment) = self.moment(snapshot) else { return };
-        let review = &mut self.review;
-        let is_known = review.assessed.as_ref().is_some_and(|(of, _)| of.is_as(&moment))
-            || review.trouble.as_ref().is_some_and(|(of, _)| of.is_as(&moment));
-        if is_known || review.assessing.is_some() {
+        let review = &self.review;
+        let mut known = review.assessed.iter().chain(&review.failed);
+        if known.any(|of| of.is_as(&moment)) || review.assessing.is_some() {
             return;
         }
-        let Some(outlines) = self.outlines.clone() else { return };
+        let Some(outlines) = self.planning.outlines.clone() else {
+            return;
+        };
         let (scene, snapshot) = (scene.clone(), snapshot.clone());
         let of = moment.clone();
         let job = Job::begin("assessment", move |messages, _| {
@@ -269,31 +260,32 @@ impl Planner {
     }
 
     fn take_assessed(&mut self) {
-        let Some((moment, job)) = &self.review.assessing else {
-            return;
+        let review = &mut self.review;
+        let found = match review.assessing.as_ref().map(|(_, job)| job.poll()) {
+            None | Some(JobUpdate::Pending) => return,
+            Some(JobUpdate::Message(found)) => found,
+            Some(JobUpdate::Ended) => Err("the dose could not be computed".to_owned()),
         };
-        let moment = moment.clone();
-        match job.poll() {
-            JobUpdate::Pending => return,
-            JobUpdate::Message(Ok(found)) => {
-                self.review.assessed = Some((moment, Arc::new(found)));
-                self.review.trouble = None;
+        let moment = review.assessing.take().map(|(moment, _)| moment);
+        match found {
+            Ok(found) => {
+                (review.assessed, review.failed, review.shown.trouble) = (moment, None, None);
+                (review.shown.doses, review.shown.volume_m3) = (Some(found.doses), Some(found.volume_m3));
+                review.shown.marks = found.marks;
             }
-            JobUpdate::Message(Err(why)) => self.review.trouble = Some((moment, why)),
-            JobUpdate::Ended => self.review.trouble = Some((moment, "the dose could not be computed".to_owned())),
+            Err(why) => (review.failed, review.shown.trouble) = (moment, Some(why)),
         }
-        self.review.assessing = None;
     }
 
     /// Returns the moment to assess; `None` without a plan, a seed or a contoured gland.
     fn moment(&self, snapshot: &Snapshot) -> Option<Moment> {
         let review = &self.review;
-        let (plan, solid, frame) = (self.plan()?, review.solid.clone()?, review.frame?);
+        let (plan, solid, frame) = (self.plan()?, review.shown.solid.clone()?, review.shown.frame?);
         Moment::of(
             plan,
-            (&self.progress, &self.compensated),
+            (&self.planning.progress, &self.compensated),
             (solid, frame),
-            (review.history.now(), review.seeds_from),
+            (review.history.now(), review.shown.seeds_from),
             snapshot,
         )
     }
@@ -305,7 +297,7 @@ impl Planner {
         };
         let moment = self.moment(snapshot);
         let (scene, snapshot) = (scene.clone(), snapshot.clone());
-        self.review.proposed = None;
+        self.review.shown.update = None;
         self.begin_job("Replanning the remaining needles", move |_, outlines| {
             let moment = moment.ok_or("contour the gland in three planes first, with a seed in the tissue")?;
             Ok(move |reporter: &Reporter<'_>| {
@@ -318,17 +310,17 @@ impl Planner {
 
     pub(super) fn take_update(&mut self, found: Reviewed) {
         // Needles may have been inserted since.
-        if found.update.begun != self.progress.begun() {
+        if found.update.begun != self.planning.progress.begun() {
             let why = "A needle was inserted during planning; update the plan again.";
             self.refuse(why);
             return;
         }
-        self.review.proposed = Some(Arc::new(found));
+        self.review.shown.update = Some(Arc::new(found));
     }
 
     /// Accepts the pending update or rejects it; either is recorded for the debrief.
     pub fn decide(&mut self, accept: bool) {
-        let Some(proposed) = self.review.proposed.take() else {
+        let Some(proposed) = self.review.shown.update.take() else {
             return;
         };
         if accept {
@@ -336,12 +328,12 @@ impl Planner {
                 Ok(plan) => self.put(plan),
                 Err(why) => {
                     self.refuse(why);
-                    self.review.proposed = Some(proposed);
+                    self.review.shown.update = Some(proposed);
                     return;
                 }
             }
         }
-        self.review.reviewed.push(Reviewed {
+        self.review.shown.reviewed.push(Reviewed {
             accepted: accept,
             ..Reviewed::clone(&proposed)
         });
@@ -351,15 +343,15 @@ impl Planner {
     pub fn withdraw_update(&mut self) {
         if self.can_withdraw() {
             self.undo();
-            if let Some(last) = self.review.reviewed.last_mut() {
+            if let Some(last) = self.review.shown.reviewed.last_mut() {
                 last.accepted = false;
             }
         }
     }
 
     pub(super) fn can_withdraw(&self) -> bool {
-        let is_last = |last: &Reviewed| last.accepted && last.update.begun == self.progress.begun();
-        self.review.reviewed.last().is_some_and(is_last) && self.history.as_ref().is_some_and(History::can_undo)
+        let is_last = |last: &Reviewed| last.accepted && last.update.begun == self.planning.progress.begun();
+        self.review.shown.reviewed.last().is_some_and(is_last) && self.history.as_ref().is_some_and(History::can_undo)
     }
 }
 

@@ -1,6 +1,7 @@
 //! The switch of the beam and the angles of the arm.
 
 use super::{CRANIAL_DEG, FluoroView, ORBITAL_DEG};
+use crate::theme::Press;
 use egui::{Key, Modifiers};
 
 /// Step of the keys, degrees.
@@ -11,29 +12,12 @@ impl FluoroView {
     pub fn tools_ui(&mut self, ui: &mut egui::Ui) {
         let beam = ui.toggle_value(&mut self.is_switched_on, "X-ray");
         beam.on_hover_text("Key X while held: 8 pulses a second; afterwards the last image is held");
-        angle_ui(
-            ui,
-            (
-                "Orbital",
-                ORBITAL_DEG,
-                "Ctrl with left, right: the detector about the patient, to his left",
-            ),
-            &mut self.angles.orbital,
-        );
-        angle_ui(
-            ui,
-            (
-                "Cranial",
-                CRANIAL_DEG,
-                "Ctrl with up, down: the detector towards his head",
-            ),
-            &mut self.angles.cranial,
-        );
-        let case = ui.button("New case");
-        if case
-            .on_hover_text("Sets the dose to zero and clears the screen; another scene does so too")
-            .clicked()
-        {
+        let hint = "Ctrl with left, right: the detector about the patient, to his left";
+        angle_ui(ui, "Orbital", ORBITAL_DEG, hint, &mut self.angles.orbital);
+        let hint = "Ctrl with up, down: the detector towards his head";
+        angle_ui(ui, "Cranial", CRANIAL_DEG, hint, &mut self.angles.cranial);
+        let hint = "Sets the dose to zero and clears the screen; another scene does so too";
+        if Press("New case", hint).ui(ui, true) {
             self.begin_case();
         }
         self.keys(ui);
@@ -59,7 +43,7 @@ impl FluoroView {
     }
 }
 
-fn angle_ui(ui: &mut egui::Ui, (name, most, hint): (&str, f64, &str), degrees: &mut f64) {
+fn angle_ui(ui: &mut egui::Ui, name: &str, most: f64, hint: &str, degrees: &mut f64) {
     let drag = egui::DragValue::new(degrees)
         .range(-most..=most)
         .speed(0.5)

@@ -1,6 +1,6 @@
 //! Text over a picture of the C-arm: its technique, its age, and the dose spent.
 
-use super::{FluoroView, inside};
+use super::FluoroView;
 use crate::theme::IMAGE;
 use crate::view::free::free_of_banners;
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Vec2};
@@ -14,10 +14,7 @@ const SIDES_DEG: f64 = 60.0;
 
 impl FluoroView {
     pub(super) fn words_over(&self, painter: &Painter, rect: Rect, square: Rect, arm: CArm) {
-        let text = |at, align, words: &str, color| backed(painter, at, align, words, color);
-        let name = "Fluoroscopy";
         let free = free_of_banners(painter.ctx(), rect);
-        text(inside(free.left_top(), [9.0, 6.0]), Align2::LEFT_TOP, name, IMAGE.text);
         let (sign, color) = match &self.held {
             _ if self.is_on() => ("X-RAY ON".to_owned(), IMAGE.beam),
             Some(held) => {
@@ -32,33 +29,27 @@ impl FluoroView {
             }
             None => ("No image yet. Hold X to expose.".to_owned(), IMAGE.text),
         };
-        text(
-            inside(rect.right_bottom(), [-9.0, -6.0]),
-            Align2::RIGHT_BOTTOM,
-            &sign,
-            color,
-        );
         let spent = format!("{}\n{}", angles(&arm), spent(&self.dose));
-        text(
-            inside(rect.left_bottom(), [9.0, -6.0]),
-            Align2::LEFT_BOTTOM,
-            &spent,
-            IMAGE.text,
-        );
+        let name = "Fluoroscopy".to_owned();
+        let mut texts = vec![
+            (free.left_top(), [9.0, 6.0], Align2::LEFT_TOP, name, IMAGE.text),
+            (rect.right_bottom(), [-9.0, -6.0], Align2::RIGHT_BOTTOM, sign, color),
+            (rect.left_bottom(), [9.0, -6.0], Align2::LEFT_BOTTOM, spent, IMAGE.text),
+        ];
         let shown = self.held.as_ref().map_or(arm, |held| held.arm);
         if self.held.is_some() && shown.orbital.to_degrees().abs() <= SIDES_DEG {
-            text(
-                inside(square.left_center(), [6.0, 0.0]),
-                Align2::LEFT_CENTER,
-                "R",
-                IMAGE.text,
-            );
-            text(
-                inside(square.right_center(), [-6.0, 0.0]),
+            let (right, left) = ("R".to_owned(), "L".to_owned());
+            texts.push((square.left_center(), [6.0, 0.0], Align2::LEFT_CENTER, right, IMAGE.text));
+            texts.push((
+                square.right_center(),
+                [-6.0, 0.0],
                 Align2::RIGHT_CENTER,
-                "L",
+                left,
                 IMAGE.text,
-            );
+            ));
+        }
+        for (corner, by, align, words, color) in texts {
+            backed(painter, corner + Vec2::from(by), align, &words, color);
         }
     }
 }

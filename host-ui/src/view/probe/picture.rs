@@ -2,44 +2,21 @@
 
 use egui::{Pos2, Rect, Vec2};
 use nalgebra::{Vector2, Vector3};
-use stylet_imaging::ultrasound::{Plane, View};
+use stylet_imaging::ultrasound::Plane;
 
 /// Picture of the probe in the window, which maps places of the window to places of the scene and
 /// back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbePicture {
-    /// Plane of the visible picture, not of one that is still being computed.
-    plane: Plane,
-    rect: Rect,
-    is_live: bool,
+    /// Plane of the visible picture, not of one that is still being computed; scene frame.
+    pub plane: Plane,
+    /// Place of the picture, points of the window.
+    pub rect: Rect,
+    /// True if it shows probe, tissue and metal of this frame; otherwise it is from an earlier one.
+    pub is_live: bool,
 }
 
 impl ProbePicture {
-    pub(super) fn new(plane: Plane, rect: Rect, is_live: bool) -> Self {
-        Self { plane, rect, is_live }
-    }
-
-    /// Returns which of the probe's two planes it is.
-    pub fn view(&self) -> View {
-        self.plane.view
-    }
-
-    /// Returns the plane, scene frame.
-    pub fn plane(&self) -> &Plane {
-        &self.plane
-    }
-
-    /// Returns the place of the picture, points of the window.
-    pub fn rect(&self) -> Rect {
-        self.rect
-    }
-
-    /// Returns whether it shows probe, tissue and metal of this frame; otherwise it is from an
-    /// earlier one.
-    pub fn is_live(&self) -> bool {
-        self.is_live
-    }
-
     /// Returns the place in the plane under a place of the window, scene frame, m; `None` outside
     /// the picture and beyond its beams.
     pub fn place_m(&self, at: Pos2) -> Option<Vector3<f64>> {
@@ -79,7 +56,7 @@ impl ProbePicture {
 mod tests {
     use super::*;
     use nalgebra::UnitQuaternion;
-    use stylet_imaging::ultrasound::{Pose, Probe};
+    use stylet_imaging::ultrasound::{Pose, Probe, View};
 
     fn picture(view: View) -> ProbePicture {
         let probe = Probe::default();
@@ -93,7 +70,8 @@ mod tests {
         };
         // One and a half pixels to a point.
         let rect = Rect::from_min_size(Pos2::new(286.0, 70.0), Vec2::new(440.0, 480.0));
-        ProbePicture::new(plane, rect, true)
+        let is_live = true;
+        ProbePicture { plane, rect, is_live }
     }
 
     #[test]
@@ -116,9 +94,9 @@ mod tests {
     #[test]
     fn the_middle_beam_goes_up_from_the_middle_of_the_lower_edge() {
         let picture = picture(View::Transverse);
-        let pose = picture.plane().pose;
+        let pose = picture.plane.pose;
         let deep = picture.at(pose.middle_m + pose.up * 40e-3);
-        assert!((deep.x - picture.rect().center().x).abs() < 1e-3, "{deep}");
+        assert!((deep.x - picture.rect.center().x).abs() < 1e-3, "{deep}");
         assert!(picture.sees(pose.middle_m + pose.up * 40e-3));
         assert!(!picture.sees(pose.middle_m + pose.up * 5e-3), "in the probe");
         assert!(!picture.sees(pose.middle_m + pose.up * 71e-3), "too deep");

@@ -11,10 +11,7 @@ const ASIDE: f32 = 6.0;
 
 /// Returns height in the window and depth (mm) of each tick.
 fn ticks(picture: &ProbePicture) -> impl Iterator<Item = (f32, u32)> {
-    let (plane, count) = (
-        *picture.plane(),
-        (picture.plane().depth_m * 1e3 + 1e-6) as u32 / TICK_MM,
-    );
+    let (plane, count) = (picture.plane, (picture.plane.depth_m * 1e3 + 1e-6) as u32 / TICK_MM);
     (0..=count).map(move |n| {
         let depth_mm = n * TICK_MM;
         let from_axis_m = plane.probe.radius_m + f64::from(depth_mm) * 1e-3;
@@ -27,7 +24,7 @@ fn ticks(picture: &ProbePicture) -> impl Iterator<Item = (f32, u32)> {
 
 /// Draws the scale within `free`, the uncovered part of the picture.
 pub(super) fn draw(painter: &egui::Painter, picture: &ProbePicture, free: Rect) {
-    let right = picture.rect().right() - ASIDE;
+    let right = picture.rect.right() - ASIDE;
     let color = IMAGE.text.gamma_multiply(0.75);
     for (y, depth_mm) in ticks(picture).filter(|(y, _)| free.y_range().shrink(1.0).contains(*y)) {
         let is_long = depth_mm.is_multiple_of(2 * TICK_MM);

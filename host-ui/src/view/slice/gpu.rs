@@ -104,8 +104,6 @@ pub struct SliceGpu {
     no_image: wgpu::TextureView,
     body: Option<Body>,
     panes: Vec<Pane>,
-    /// Textures of panes of earlier scenes, for reuse.
-    targets: Vec<Option<Target>>,
     /// Number that grows with each new content of the volumes.
     content: u64,
     texels: Vec<[u16; 4]>,
@@ -139,7 +137,6 @@ impl SliceGpu {
             layout,
             body: None,
             panes: Vec::new(),
-            targets: Vec::new(),
             content: 0,
             texels: Vec::new(),
             driver,
@@ -183,9 +180,9 @@ impl SliceGpu {
         self.set_field(&Field::rest(nodes_info));
     }
 
-    /// Drops bindings to the volumes; textures are reused.
+    /// Drops bindings to the volumes.
     fn drop_panes(&mut self) {
-        self.targets = self.panes.drain(..).map(|pane| pane.target).collect();
+        self.panes.clear();
         self.content += 1;
     }
 
@@ -239,8 +236,7 @@ impl SliceGpu {
         }
         .clone();
         while self.panes.len() <= number {
-            let old = self.targets.get_mut(self.panes.len()).and_then(Option::take);
-            let pane = self.pane(old)?;
+            let pane = self.pane()?;
             self.panes.push(pane);
         }
         let pane = &mut self.panes[number];
@@ -262,7 +258,7 @@ impl SliceGpu {
         Some(target.pasted.clone())
     }
 
-    fn pane(&self, target: Option<Target>) -> Option<Pane> {
+    fn pane(&self) -> Option<Pane> {
         let body = self.body.as_ref()?;
         let uniform = self.gpu.uniform(size_of::<SliceUniform>() as u64);
         let nodes = body.nodes.create_view(&Default::default());
@@ -279,7 +275,7 @@ impl SliceGpu {
         Some(Pane {
             bind: self.gpu.bind(&self.layout, &resources),
             uniform,
-            target,
+            target: None,
             drawn: None,
         })
     }

@@ -14,7 +14,7 @@ use super::state::ViewState;
 use crate::action::Action;
 use crate::dose_worker::DoseResult;
 use crate::shown::Shown;
-use crate::theme::IMAGE;
+use crate::theme::{self, IMAGE};
 use eframe::egui_wgpu::RenderState;
 use egui::{Color32, PointerButton, Pos2, Rect, Sense};
 pub use gpu::ImageError;
@@ -89,7 +89,7 @@ impl Slices {
 
     /// Takes the data that arrived since the last frame.
     pub fn take(&mut self, body: &ShownBody, view: &mut ViewState) {
-        let (Some(model), Some(bodies)) = (body.model(), body.bodies()) else {
+        let (Some(model), Some(bodies)) = (&body.model, body.bodies()) else {
             return;
         };
         let key = model.header.id();
@@ -99,7 +99,7 @@ impl Slices {
             self.take_scene(model);
             view.cursor_m = self.middle_m;
         }
-        let (field, stirred) = body.field();
+        let (field, stirred) = (&body.field, body.stirred);
         if let Some(gpu) = self.gpu.as_mut().filter(|_| self.stirred != stirred) {
             gpu.set_field(field);
         }
@@ -168,10 +168,8 @@ impl Slices {
     ) -> Option<Action> {
         let id = ui.scope_id().with(orientation.name());
         let response = ui.interact(rect, id, Sense::click_and_drag());
-        response.widget_info(|| {
-            let name = format!("{} slice", orientation.name());
-            egui::WidgetInfo::labeled(egui::accesskit::Role::Image, true, name)
-        });
+        let name = || format!("{} slice", orientation.name());
+        theme::named(&response, egui::accesskit::Role::Image, name);
         if response.hovered() {
             self.scroll(ui, orientation, view, rect);
         }
@@ -199,7 +197,7 @@ impl Slices {
         let dose = dose.filter(|_| view.isodose);
         // One slice a frame, so that no frame waits for all three.
         let pass = ui.ctx().cumulative_pass_nr();
-        let surface = (body.positions_m(), body.moved());
+        let surface = (&body.positions_m[..], body.moved);
         let shift_m = dose.map_or([0.0; 3], |d| d.shift_m(shown.body_moved_m));
         let may_cut_dose = self.dose_cut_in != pass;
         if self.lines[number].update(&plane, surface, &self.contours, (dose, shift_m), may_cut_dose) {
@@ -264,10 +262,10 @@ impl Slices {
 
 /// Returns the name of the tissue at a place now; empty outside.
 fn tissue_at(body: &ShownBody, place_m: Vector3<f64>) -> String {
-    let Some(model) = body.model() else {
+    let Some(model) = &body.model else {
         return String::new();
     };
-    let (grid, rest_m) = (&model.header.labels, body.field().0.rest_of_m(place_m));
+    let (grid, rest_m) = (&model.header.labels, body.field.rest_of_m(place_m));
     let cell = [0, 1, 2].map(|a| ((rest_m[a] - grid.origin_m[a]) / grid.spacing_m).round());
     let dims = grid.dims.map(f64::from);
     if (0..3).any(|a| !(0.0..dims[a]).contains(&cell[a])) {

@@ -145,7 +145,11 @@ impl Overlay<'_> {
 
     fn isodose(&self, level: usize, line: &cut::Line, shift_m: [f64; 3]) {
         let (stroke, [dash, gap]) = (Stroke::new(1.4, IMAGE.isodose[level]), DASHES[level]);
-        let points = self.points(line, shift_m);
+        self.dashed(self.points(line, shift_m), stroke, [dash, gap]);
+    }
+
+    /// Draws a line; one without gaps is solid.
+    fn dashed(&self, points: Vec<Pos2>, stroke: Stroke, [dash, gap]: [f32; 2]) {
         if gap > 0.0 {
             self.painter.extend(Shape::dashed_line(&points, stroke, dash, gap));
         } else {
@@ -331,11 +335,8 @@ impl Overlay<'_> {
         let Some(scene) = &self.shown.scene else {
             return String::new();
         };
-        let (axis, letter) = match self.orientation {
-            Orientation::Axial => (2, "S"),
-            Orientation::Sagittal => (0, "R"),
-            Orientation::Coronal => (1, "A"),
-        };
+        let axis = self.orientation.across();
+        let letter = ["R", "A", "S"][axis];
         let in_patient = scene.patient().patient_from_scene(self.plane.middle_m.into())[axis];
         format!("{letter} {}", format::length(in_patient))
     }

@@ -24,7 +24,7 @@ fn step(driven: &mut Driven, key: Key) {
     driven.until("the picture", |app| {
         app.middle()
             .probe_picture(View::Transverse)
-            .is_some_and(|picture| picture.is_live())
+            .is_some_and(|picture| picture.is_live)
     });
 }
 
@@ -48,7 +48,7 @@ fn edge(driven: &Driven) -> Vec<Pos2> {
     let target = &outlines.anatomy.target;
     let (low, high) = target.bounds_m();
     let middle = (Vector3::from(low) + Vector3::from(high)) / 2.0;
-    let plane = picture.plane();
+    let plane = picture.plane;
     let middle = middle - plane.normal() * plane.in_beams(middle).off_plane_m;
     let on_edge = |n: usize| {
         let (sine, cosine) = ((n as f64 + 0.25) / CLICKS as f64 * std::f64::consts::TAU).sin_cos();

@@ -11,7 +11,7 @@ use crate::planner::Implant;
 use crate::shown::Shown;
 use crate::theme;
 use crate::theme::Press;
-use crate::words::Explained;
+use crate::words::{Explained, counted};
 use egui::{Button, DragValue};
 use std::path::PathBuf;
 use stylet_base::format;
@@ -116,8 +116,7 @@ fn compensated_ui(ui: &mut egui::Ui, implant: &Implant) {
         format::mm(mean),
         match sensitive {
             0 => String::new(),
-            1 => "; 1 seed sensitive".to_owned(),
-            n => format!("; {n} seeds sensitive"),
+            n => format!("; {} sensitive", counted(n, "seed")),
         }
     );
     super::weak_line(ui, text).explained("sensitive");
@@ -172,9 +171,8 @@ fn file_ui(ui: &mut egui::Ui, shown: &Shown, state: &mut WorkflowState, free: bo
     ui.horizontal(|ui| {
         let width = ui.available_width() - BESIDE_FIELD;
         let field = path_ui(ui, "plan file", &mut state.plan.path, "plan file", width);
-        field.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::accesskit::Role::TextInput, true, "Plan file: .toml, .csv or .dcm")
-        });
+        let name = || "Plan file: .toml, .csv or .dcm";
+        theme::named(&field, egui::accesskit::Role::TextInput, name);
         let field = field.on_hover_text(".toml holds all of a plan; .csv and .dcm (RT Plan) its seeds");
         let path = state.plan.path.trim();
         let has_name = free && !path.is_empty();

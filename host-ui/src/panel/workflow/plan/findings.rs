@@ -4,6 +4,7 @@ use super::{PlanState, name_of};
 use crate::dose_worker::{DoseOf, DoseResult, Figure};
 use crate::planner::Implant;
 use crate::theme;
+use crate::words::counted;
 use egui::{FontId, RichText, Sense};
 use stylet_implant::plan::check::Problem;
 
@@ -23,11 +24,7 @@ pub fn findings_ui(ui: &mut egui::Ui, dose: Option<&DoseResult>, implant: &Impla
         ui.label(RichText::new(text).color(tokens.good));
         return;
     }
-    let what = match count {
-        1 => "1 problem".to_owned(),
-        n => format!("{n} problems"),
-    };
-    ui.label(RichText::new(what).color(tokens.warn));
+    ui.label(RichText::new(counted(count, "problem")).color(tokens.warn));
     ui.spacing_mut().item_spacing.y = 2.0;
     let height = ui.available_height().max(30.0);
     egui::ScrollArea::vertical()
@@ -59,7 +56,7 @@ fn finding_ui(ui: &mut egui::Ui, implant: &Implant, problem: &Problem, state: &m
     let (id, rect) = ui.allocate_space(galley.size());
     if ui.clip_rect().expand(0.5).contains_rect(rect) {
         let response = ui.interact(rect, id, Sense::click());
-        response.widget_info(|| egui::WidgetInfo::labeled(egui::accesskit::Role::Button, ui.is_enabled(), &text));
+        theme::named(&response, egui::accesskit::Role::Button, || &text);
         if response.hovered() || response.has_focus() {
             ui.painter().rect_filled(rect.expand(1.0), 2.0, tokens.widget);
         }

@@ -13,6 +13,7 @@ use crate::planner::Implant;
 use crate::shown::Shown;
 use crate::theme;
 use crate::theme::Press;
+use crate::words::counted;
 pub(super) use card::plan_ui;
 use egui::Button;
 use stylet_implant::plan::{Hole, ImplantPlan};
@@ -118,9 +119,8 @@ fn summary(implant: &Implant) -> String {
         _ if most - least < 5e-4 => format!(" of {most:.3} U"),
         _ => format!(" of {least:.3} to {most:.3} U"),
     };
-    let needles = plan.needles.len();
-    let plural = if needles == 1 { "" } else { "s" };
-    format!("{needles} needle{plural}, {} seeds{strength}", implant.seeds.len())
+    let needles = counted(plan.needles.len(), "needle");
+    format!("{needles}, {} seeds{strength}", implant.seeds.len())
 }
 
 /// Returns the hole, such as "E5", or the number of a needle held by hand.

@@ -41,14 +41,8 @@ pub fn template_ui(
     };
     steer(ui, &response, implant, state, actions);
     let hovered = holes_ui(ui, &response, &board, implant, state);
-    response.widget_info(|| {
-        let what = hole_text(implant, state.hole);
-        egui::WidgetInfo::labeled(
-            egui::accesskit::Role::Grid,
-            ui.is_enabled(),
-            format!("Template, {what}"),
-        )
-    });
+    let name = || format!("Template, {}", hole_text(implant, state.hole));
+    theme::named(&response, egui::accesskit::Role::Grid, name);
     let look = Look {
         painter: ui.painter_at(rect.expand(2.0)),
         board: &board,
@@ -156,9 +150,7 @@ fn holes_ui(
     for hole in Hole::all() {
         let rect = Rect::from_center_size(board.at(hole), Vec2::splat(board.pitch));
         let response = ui.interact(rect, template.id.with(hole), Sense::CLICK);
-        response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::accesskit::Role::Button, ui.is_enabled(), hole_text(implant, hole))
-        });
+        theme::named(&response, egui::accesskit::Role::Button, || hole_text(implant, hole));
         if response.hovered() {
             hovered = Some(hole);
         }
