@@ -130,8 +130,7 @@ fn remarks_on_an_imported_plan_are_shown() {
         let notes = vec!["its technique is missing".to_owned()];
         let _ = messages.send(JobMessage::Plan(planned(), notes));
     });
-    let what = "Reading the plan".to_owned();
-    planner.job = Some((job, JobProgress { what, share: None }));
+    planner.job = Some(job);
     while planner.job.is_some() {
         planner.take_job();
     }

@@ -298,3 +298,32 @@ print(json.dumps(rows))
         assert!((gy - expected).abs() < 1e-6, "{row}: {expected}");
     }
 }
+
+/// Files that other programs read otherwise than Stylet did, without a word: 88,919 Gy in place of 80 Gy, and frames
+/// 6 mm away. The same dose in little endian is read.
+#[test]
+fn doses_that_programs_read_differently_are_refused() {
+    let read = |name: &str| {
+        let path = stylet_test_kit::repository("tests/oracles/clinic/disagreements").join(name);
+        dicom::dose::of_file(&path)
+            .map(|dose| dose.dose_gy.iter().copied().fold(0.0, f64::max))
+            .map_err(|why| why.to_string())
+    };
+    let largest_gy = read("dose_little_endian_32.dcm").expect("readable");
+    assert!((largest_gy - 80.0).abs() < 1e-3, "{largest_gy}");
+    for (name, reason) in [
+        ("dose_big_endian_32_words.dcm", "32 bits in big endian"),
+        ("dose_big_endian_32_numpy.dcm", "32 bits in big endian"),
+        (
+            "dose_absolute_coronal.dcm",
+            "no meaning in this ImageOrientationPatient",
+        ),
+        (
+            "dose_absolute_feet_first.dcm",
+            "no meaning in this ImageOrientationPatient",
+        ),
+    ] {
+        let why = read(name).expect_err(name);
+        assert!(why.contains(reason), "{name}: {why}");
+    }
+}

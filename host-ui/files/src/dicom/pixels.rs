@@ -110,6 +110,13 @@ impl Pixel {
 
     /// Returns the stored numbers of all pixels; `count` of them must be there.
     pub fn values(&self, pixels: &[u8], endian: Endian, count: usize) -> Result<Vec<f64>, ContentError> {
+        // OW swaps the bytes of each word of 16 bits (PS3.5 6.2); other programs swap all four bytes.
+        if self.element == Element::U32 && endian == Endian::Big {
+            return Err(
+                "its pixels have 32 bits in big endian, which programs write in different orders; export it as explicit VR little endian"
+                    .into(),
+            );
+        }
         let (needed, have) = (count * self.bytes(), pixels.len());
         // One byte more makes an odd length even.
         if have < needed || have > needed.next_multiple_of(2) {

@@ -146,12 +146,12 @@ fn of_folder(folder: &Path, wanted: Option<&str>, progress: &Progress) -> Result
     }
     series.retain(|uid, _| wanted.is_none_or(|wanted| wanted == uid));
     let mut series: Vec<(Vec<PathBuf>, String)> = series.into_values().collect();
-    let Some((paths, _)) = series.pop() else {
+    let Some((paths, about)) = series.pop() else {
         return Err("it contains no DICOM image series; choose another folder".into());
     };
     if !series.is_empty() {
         let mut all: Vec<String> = series.iter().map(|(p, about)| one_of_several(p, about)).collect();
-        all.push(one_of_several(&paths, "the last"));
+        all.push(one_of_several(&paths, &about));
         return Err(invalid!(
             "it contains {} series; give a file of the one you mean:\n  {}",
             all.len(),

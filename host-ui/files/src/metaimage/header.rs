@@ -78,6 +78,14 @@ impl<'a> Fields<'a> {
     /// Reads a field; reports one that is not as expected.
     fn read<T>(&mut self, names: &[&str], expected: &str, parse: impl FnOnce(&str) -> Option<T>) -> Option<T> {
         let text = self.get(names)?;
+        let differs = |name: &&&str| self.fields.get(**name).is_some_and(|other| *other != text);
+        if let Some(other) = names.iter().find(differs) {
+            let why = format!(
+                "{other} says otherwise than its synonym, \"{}\"; keep one of both",
+                short(text)
+            );
+            self.problems.push(why);
+        }
         let value = parse(text);
         if value.is_none() {
             let why = format!("{} is \"{}\"; it must be {expected}", names[0], short(text));

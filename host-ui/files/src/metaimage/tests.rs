@@ -57,6 +57,7 @@ fn each_wrong_header_is_refused_with_its_reason() {
         ("DimSize = 2 2 1", "DimSize = 2 -2 1", "3 whole numbers"),
         ("NDims = 3", "NDims = 2", "NDims is \"2\""),
         ("NDims = 3", "NDims = 3\nNDims = 3", "there twice"),
+        ("NDims = 3", "NDims = 3\nOrigin = 1 2 4", "Origin says otherwise"),
         ("Image", "Tube", "ObjectType is \"Tube\""),
         ("MET_UCHAR", "MET_STRING", "a type of whole numbers"),
         ("MET_UCHAR", "MET_UCHAR\nElementNumberOfChannels = 3", "single numbers"),

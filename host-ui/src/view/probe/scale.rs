@@ -69,7 +69,8 @@ mod tests {
                 pixels: [660, 720],
             };
             let rect = Rect::from_min_size(Pos2::new(10.0, 70.0), Vec2::new(330.0, 360.0));
-            let picture = ProbePicture::new(plane, rect, true);
+            let is_live = true;
+            let picture = ProbePicture { plane, rect, is_live };
             let all: Vec<_> = ticks(&picture).collect();
             assert_eq!(all.len(), 13);
             for (y, depth_mm) in all {

@@ -238,13 +238,17 @@ fn frame_step_mm(
             offsets[0]
         )));
     }
+    // PS3.3 C.8.8.3.2 gives heights a meaning only in planes across z whose normal points to the head.
+    if absolute && across.z < 1.0 - OBLIQUE {
+        return Err(refused(
+            "gives heights, which have no meaning in this ImageOrientationPatient; export distances from the first frame"
+                .to_owned(),
+        ));
+    }
     let step = (offsets[frames - 1] - offsets[0]) / (frames - 1) as f64;
     let is_even = |(n, offset): (usize, &f64)| (offset - offsets[0] - step * n as f64).abs() <= UNEVEN * step.abs();
     if step == 0.0 || !offsets.iter().enumerate().all(is_even) {
         return Err(refused("does not go in even steps; export an even grid".to_owned()));
     }
-    Ok(match absolute && across.z < 0.0 {
-        true => -step,
-        false => step,
-    })
+    Ok(step)
 }
