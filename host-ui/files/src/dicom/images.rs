@@ -137,15 +137,13 @@ fn together(of: &Identity, other: &Identity, other_is: &str) -> Result<Vec<Strin
 }
 
 fn slices_of(folder: &Path, wanted: impl Fn(&Slice) -> bool) -> Result<Vec<Slice>, ContentError> {
-    let Ok(entries) = std::fs::read_dir(folder) else {
-        return Ok(Vec::new());
-    };
     let mut found = Vec::new();
-    for entry in entries.flatten().take(MAX_FILES) {
-        let path = entry.path();
-        if !begins_as_dicom(&path) {
-            continue;
-        }
+    let paths = if folder.is_dir() {
+        dicom_files(folder)?
+    } else {
+        Vec::new()
+    };
+    for path in paths {
         let object = bytes::whole(&path, &Progress::default()).and_then(|file| checked::read(&file));
         let Some(read) = object.ok().and_then(|object| slice(&object)) else {
             continue;
@@ -156,6 +154,21 @@ fn slices_of(folder: &Path, wanted: impl Fn(&Slice) -> bool) -> Result<Vec<Slice
         }
     }
     Ok(found)
+}
+
+/// Returns the files of a folder that begin like DICOM.
+pub(super) fn dicom_files(folder: &Path) -> Result<Vec<PathBuf>, ContentError> {
+    let entries = std::fs::read_dir(folder).map_err(|why| ContentError::Unreadable(why.to_string()))?;
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    paths.retain(|path| begins_as_dicom(path));
+    paths.sort();
+    if paths.len() > MAX_FILES {
+        return Err(invalid!(
+            "it has {} DICOM files; at most {MAX_FILES} are read",
+            paths.len()
+        ));
+    }
+    Ok(paths)
 }
 
 /// Returns whether a file begins like DICOM. Reads only its start, so that large files cost little.

@@ -16,8 +16,6 @@ use dicom_object::InMemDicomObject;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Most files of a series; a usual one has some hundreds.
-const MAX_FILES: usize = 4096;
 /// Most frames of one file.
 const MAX_FRAMES: f64 = 65_535.0;
 
@@ -68,7 +66,7 @@ pub(super) fn volume(mut frames: Vec<Frame>) -> Result<VoxelValues<f32>, Content
 /// a folder; `None` if it is not DICOM.
 pub fn modality(path: &Path) -> Result<Option<(String, String)>, FileError> {
     let files = match path.is_dir() {
-        true => dicom_files(path).map_err(|why| FileError::of(path, why))?,
+        true => images::dicom_files(path).map_err(|why| FileError::of(path, why))?,
         false => vec![path.to_owned()],
     };
     let of_image = |file: &PathBuf| {
@@ -90,24 +88,9 @@ pub(super) struct Frame {
     values: Vec<f32>,
 }
 
-/// Returns the files of a folder that begin like DICOM.
-fn dicom_files(folder: &Path) -> Result<Vec<PathBuf>, ContentError> {
-    let entries = std::fs::read_dir(folder).map_err(|why| ContentError::Unreadable(why.to_string()))?;
-    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    paths.retain(|path| images::begins_as_dicom(path));
-    paths.sort();
-    if paths.len() > MAX_FILES {
-        return Err(invalid!(
-            "it has {} DICOM files; at most {MAX_FILES} are read",
-            paths.len()
-        ));
-    }
-    Ok(paths)
-}
-
 /// Returns the slices of the only series of a folder, or of the series `wanted`.
 fn of_folder(folder: &Path, wanted: Option<&str>, progress: &Progress) -> Result<Vec<Frame>, ContentError> {
-    let paths = dicom_files(folder)?;
+    let paths = images::dicom_files(folder)?;
     let mut series: BTreeMap<String, (Vec<PathBuf>, String)> = BTreeMap::new();
     let mut unread: Vec<String> = Vec::new();
     for (n, path) in paths.iter().enumerate() {

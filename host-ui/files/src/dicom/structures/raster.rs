@@ -15,8 +15,8 @@ const LINES: usize = 4;
 /// Most crossings of lines and edges in one file; a pelvis on fine images has some million.
 const MAX_CROSSINGS: f64 = 1e7;
 /// Most voxels checked and painted in one file; a whole pelvis has some ten million.
-const MAX_VOXELS_TOUCHED: usize = 150_000_000;
-const MAX_RUNS: usize = 20_000_000;
+const MAX_VOXELS_TOUCHED: f64 = 1.5e8;
+const MAX_RUNS: f64 = 2e7;
 
 /// Range of columns, the end exclusive, in a row of a slice.
 #[derive(Clone, Copy)]
@@ -26,35 +26,32 @@ struct Run {
     to: u32,
 }
 
-/// Work done so far, which is limited for each file.
+/// Share of the work allowed for a file that is done so far.
 #[derive(Default)]
-struct Scratch {
-    crossings: f64,
-    voxels: usize,
-    runs: usize,
-}
+struct Work(f64);
 
-impl Scratch {
-    fn check(&self) -> Result<(), ContentError> {
-        if self.crossings <= MAX_CROSSINGS && self.voxels <= MAX_VOXELS_TOUCHED && self.runs <= MAX_RUNS {
-            return Ok(());
+impl Work {
+    fn spend(&mut self, count: f64, most: f64) -> Result<(), ContentError> {
+        self.0 += count / most;
+        match self.0 <= 1.0 {
+            true => Ok(()),
+            false => Err(
+                "its contours are too large or too many to be drawn; export fewer structures, or ones with fewer corners"
+                    .into(),
+            ),
         }
-        Err(
-            "its contours are too large or too many to be drawn; export fewer structures, or ones with fewer corners"
-                .into(),
-        )
     }
 }
 
 /// Returns the labels 1, 2, ... of the structures in their order, and their overlaps in words.
 pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<String>), ContentError> {
-    let mut scratch = Scratch::default();
+    let mut work = Work::default();
     let mut all = Vec::new();
     for structure in structures {
-        all.push(runs(structure, grid, &mut scratch)?);
+        all.push(runs(structure, grid, &mut work)?);
     }
-    scratch.voxels += all.iter().flatten().map(|r| (r.to - r.from) as usize).sum::<usize>();
-    scratch.check()?;
+    let painted: u32 = all.iter().flatten().map(|r| r.to - r.from).sum();
+    work.spend(f64::from(painted), MAX_VOXELS_TOUCHED)?;
     let sizes: Vec<usize> = all
         .iter()
         .map(|runs| runs.iter().map(|r| (r.to - r.from) as usize).sum())
@@ -85,9 +82,9 @@ pub fn labels(structures: &[Contoured], grid: &Grid) -> Result<(Vec<u8>, Vec<Str
     Ok((labels, notes))
 }
 
-fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
+fn runs(structure: &Contoured, grid: &Grid, work: &mut Work) -> Result<Vec<Run>, ContentError> {
     let Some(planes) = planes(structure, grid) else {
-        return runs_of_solid(structure, grid, scratch);
+        return runs_of_solid(structure, grid, work);
     };
     let heights: Vec<f64> = planes.iter().map(|(h, _)| *h).collect();
     let mut runs = Vec::new();
@@ -101,11 +98,10 @@ fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec
         );
         for slice in first as usize..last.max(0.0) as usize {
             if covered.is_none() {
-                covered = Some(fill(&plane.1, [grid.dims[0], grid.dims[1]], scratch)?);
+                covered = Some(fill(&plane.1, [grid.dims[0], grid.dims[1]], work)?);
             }
             let covered = covered.as_deref().unwrap_or_default();
-            scratch.runs += covered.len();
-            scratch.check()?;
+            work.spend(covered.len() as f64, MAX_RUNS)?;
             let base = (slice * grid.dims[1]) as u32;
             runs.extend(covered.iter().map(|r| Run {
                 row: base + r.row,
@@ -118,15 +114,15 @@ fn runs(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec
 
 /// Rasterises contours across the slices: a voxel belongs to the enclosed body if five of nine
 /// points in it do.
-fn runs_of_solid(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
+fn runs_of_solid(structure: &Contoured, grid: &Grid, work: &mut Work) -> Result<Vec<Run>, ContentError> {
     let solid = Solid::across(structure, grid.frame.spacing_m[2])?;
     let [low, high] = solid.extent(&grid.frame);
     let range = |a: usize| {
         let first = low[a].floor().clamp(0.0, grid.dims[a] as f64) as usize;
         first..(high[a].ceil() + 1.0).clamp(0.0, grid.dims[a] as f64) as usize
     };
-    scratch.voxels += (0..3).map(|a| range(a).len()).product::<usize>();
-    scratch.check()?;
+    let touched: usize = (0..3).map(|a| range(a).len()).product();
+    work.spend(touched as f64, MAX_VOXELS_TOUCHED)?;
     let holds = |at: [usize; 3]| {
         let part = |n: usize| {
             let place = [0, 1, 2].map(|a| at[a] as f64 + if n >> a & 1 == 0 { -0.25 } else { 0.25 });
@@ -153,8 +149,7 @@ fn runs_of_solid(structure: &Contoured, grid: &Grid, scratch: &mut Scratch) -> R
             }
         }
     }
-    scratch.runs += runs.len();
-    scratch.check()?;
+    work.spend(runs.len() as f64, MAX_RUNS)?;
     Ok(runs)
 }
 
@@ -197,12 +192,12 @@ pub fn slabs(heights: &[f64], single: f64) -> Vec<[f64; 2]> {
 
 /// Fills by the even-odd rule: the overlap of two contours of a plane is a hole, and so is the end
 /// of a keyhole.
-fn fill(polygons: &[Polygon], [columns, rows]: [usize; 2], scratch: &mut Scratch) -> Result<Vec<Run>, ContentError> {
+fn fill(polygons: &[Polygon], [columns, rows]: [usize; 2], work: &mut Work) -> Result<Vec<Run>, ContentError> {
     let mut crossed: Vec<(u32, f64)> = Vec::new();
     for polygon in polygons {
         let next = polygon.iter().cycle().skip(1);
         for (a, b) in polygon.iter().zip(next) {
-            cross(*a, *b, rows, &mut crossed, scratch)?;
+            cross(*a, *b, rows, &mut crossed, work)?;
         }
     }
     crossed.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
@@ -212,8 +207,7 @@ fn fill(polygons: &[Polygon], [columns, rows]: [usize; 2], scratch: &mut Scratch
         for line in of_row.chunk_by(|a, b| a.0 == b.0) {
             covered.add_line(line);
         }
-        scratch.voxels += covered.touched.len();
-        scratch.check()?;
+        work.spend(covered.touched.len() as f64, MAX_VOXELS_TOUCHED)?;
         covered.take_row(of_row[0].0 / LINES as u32, &mut runs);
     }
     Ok(runs)
@@ -225,15 +219,14 @@ fn cross(
     b: [f64; 2],
     rows: usize,
     crossed: &mut Vec<(u32, f64)>,
-    scratch: &mut Scratch,
+    work: &mut Work,
 ) -> Result<(), ContentError> {
     let (low, high) = if a[1] <= b[1] { (a, b) } else { (b, a) };
     let line_of = |y: f64| (y + 0.5) * LINES as f64 - 0.5;
     let most = (rows * LINES) as f64;
     let first = line_of(low[1]).ceil().clamp(0.0, most);
     let last = line_of(high[1]).ceil().clamp(0.0, most);
-    scratch.crossings += last - first;
-    scratch.check()?;
+    work.spend(last - first, MAX_CROSSINGS)?;
     for line in first as usize..last as usize {
         let y = (line as f64 + 0.5) / LINES as f64 - 0.5;
         let share = (y - low[1]) / (high[1] - low[1]);
