@@ -3,8 +3,8 @@
 //! Recovery breaks no limit, so a link between elements that the solver has not moved stays as good as it was: only
 //! links at active stretches are swept and checked.
 
-use super::kernels::Stretch;
 use super::spans::Rows;
+use super::stretch::Stretch;
 
 /// A stretch for each run, and which rows and planes have any.
 #[derive(Clone, Debug)]
@@ -53,12 +53,8 @@ impl Active {
 
     #[inline(always)]
     pub fn add_row(&mut self, j: usize, k: usize) {
-        let one = |n: usize| Stretch {
-            start: n as u32,
-            end: n as u32 + 1,
-        };
-        self.rows[k] = self.rows[k].with(one(j));
-        self.planes = self.planes.with(one(k));
+        self.rows[k] = self.rows[k].with(Stretch::one(j));
+        self.planes = self.planes.with(Stretch::one(k));
     }
 
     /// Activates everything in these rows of cells.
@@ -76,24 +72,18 @@ impl Active {
 
     /// Calls `f` for each row that may have active runs.
     pub fn for_each_row(&self, mut f: impl FnMut(usize, usize)) {
-        for k in self.planes.start..self.planes.end.max(self.planes.start) {
-            let rows = self.rows[k as usize];
-            for j in rows.start..rows.end.max(rows.start) {
-                f(j as usize, k as usize);
-            }
+        for k in self.planes.numbers() {
+            self.rows[k].numbers().for_each(|j| f(j, k));
         }
     }
 
     /// Forgets everything.
     pub fn clear(&mut self, rows: &Rows, ny: usize) {
-        for k in self.planes.start..self.planes.end.max(self.planes.start) {
-            let in_plane = self.rows[k as usize];
-            for j in in_plane.start..in_plane.end.max(in_plane.start) {
-                for run in rows.numbers(j as usize + ny * k as usize) {
-                    self.of_run[run] = Stretch::EMPTY;
-                }
+        for k in self.planes.numbers() {
+            for j in self.rows[k].numbers() {
+                self.of_run[rows.numbers(j + ny * k)].fill(Stretch::EMPTY);
             }
-            self.rows[k as usize] = Stretch::EMPTY;
+            self.rows[k] = Stretch::EMPTY;
         }
         self.planes = Stretch::EMPTY;
     }

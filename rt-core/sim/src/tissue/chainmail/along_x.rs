@@ -1,7 +1,8 @@
 //! The part of a sweep inside a run: elements outward from the held column, each after its inner neighbour.
 
-use super::kernels::{self, LOWER, Pin, Scaled, Stretch, UPPER};
+use super::kernels::{self, LOWER, Pin, Scaled, UPPER};
 use super::spans::Span;
+use super::stretch::Stretch;
 use super::sweep::Pass;
 use crate::simd::Vector;
 
@@ -59,7 +60,7 @@ impl Pass<'_> {
                     break;
                 }
                 [u[0][link], u[1][link], u[2][link]] = new;
-                moved = moved.with(one(link));
+                moved = moved.with(Stretch::one(link));
                 inner = new;
             }
         }
@@ -91,19 +92,11 @@ impl Pass<'_> {
                     break;
                 }
                 [u[0][past], u[1][past], u[2][past]] = new;
-                moved = moved.with(one(past));
+                moved = moved.with(Stretch::one(past));
                 inner = new;
             }
         }
         moved
-    }
-}
-
-#[inline(always)]
-fn one(element: usize) -> Stretch {
-    Stretch {
-        start: element as u32,
-        end: element as u32 + 1,
     }
 }
 
@@ -114,5 +107,5 @@ fn move_one<const OUTER: bool>(l: &Scaled, u: &mut [&mut [f32]; 3], inner: usize
         return Stretch::EMPTY;
     }
     [u[0][outer], u[1][outer], u[2][outer]] = new;
-    one(outer)
+    Stretch::one(outer)
 }

@@ -1,8 +1,8 @@
 //! The elements that a needle holds: one, or a cube of them.
 
-use super::kernels::Stretch;
 use super::model::ChainMail;
 use super::state::TissueState;
+use super::stretch::Stretch;
 use crate::tissue::{Held, HeldOutcome, REACH};
 
 /// A held element and where it goes, in elements from rest.
@@ -55,17 +55,13 @@ pub(super) fn put(model: &ChainMail, state: &mut TissueState, grip: &Grip) -> bo
         for run in model.rows.numbers(j + model.lattice.dims[1] * k) {
             if model.part_of_run(run) == part {
                 let of_run = model.rows.runs[run];
-                for n in elements(wanted.within(of_run.start_i, of_run.len)) {
-                    moved |= put_one(model, state, of_run.first + n, run, grip.at, [j, k]);
+                for n in wanted.within(of_run.start_i, of_run.len).numbers() {
+                    moved |= put_one(model, state, of_run.first + n as u32, run, grip.at, [j, k]);
                 }
             }
         }
     }
     moved
-}
-
-fn elements(stretch: Stretch) -> std::ops::Range<u32> {
-    stretch.start.min(stretch.end)..stretch.end
 }
 
 fn put_one(
@@ -83,10 +79,7 @@ fn put_one(
     if !state.put(element as usize, at) {
         return false;
     }
-    let one = Stretch {
-        start: element,
-        end: element + 1,
-    };
+    let one = Stretch::one(element as usize);
     state.active.add(run, one);
     state.active.add_row(j, k);
     state.moved.add(run, one);

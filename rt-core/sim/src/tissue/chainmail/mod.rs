@@ -24,6 +24,7 @@ mod residual;
 mod solve;
 mod spans;
 mod state;
+mod stretch;
 mod sweep;
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,8 @@
 //! Residual of a pass: verifies links that moved, and finds what stays active.
 
-use super::kernels::{self, Stretch};
+use super::kernels;
 use super::spans::Span;
+use super::stretch::Stretch;
 use super::sweep::{Inner, Pass};
 use crate::simd::{Vector, in_vectors};
 
@@ -28,13 +29,10 @@ impl Pass<'_> {
     /// Checks every link at an active stretch; only what is outside its limits stays active.
     pub fn check(&mut self) -> f32 {
         let ny = self.model.lattice.dims[1];
-        let planes = self.state.active.planes();
-        for k in planes.start..planes.end.max(planes.start) {
-            let rows = self.state.active.rows(k as usize);
-            for j in rows.start..rows.end.max(rows.start) {
-                let row = j as usize + ny * k as usize;
-                for run in self.model.rows.numbers(row) {
-                    check_run(self.model.simd, self, run, j as usize, k as usize);
+        for k in self.state.active.planes().numbers() {
+            for j in self.state.active.rows(k).numbers() {
+                for run in self.model.rows.numbers(j + ny * k) {
+                    check_run(self.model.simd, self, run, j, k);
                 }
             }
         }

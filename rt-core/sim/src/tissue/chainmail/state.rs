@@ -1,8 +1,9 @@
 //! State of a body: displacements times a scale, so that recovery is one multiplication.
 
 use super::activity::Active;
-use super::kernels::{Stretch, largest_square};
+use super::kernels::largest_square;
 use super::model::ChainMail;
+use super::stretch::Stretch;
 use crate::tissue::{Carried, Deformed};
 
 /// Displacements from rest of all elements, one array for each axis; and what the last step left to look at.
@@ -225,10 +226,9 @@ impl TissueState {
         let ny = model.lattice.dims[1];
         let u = self.u.each_ref().map(Vec::as_slice);
         let planes = self.moved.planes();
-        for k in planes.start..planes.end.max(planes.start) {
-            let rows = self.moved.rows(k as usize);
-            for j in rows.start..rows.end.max(rows.start) {
-                for run in model.rows.numbers(j as usize + ny * k as usize) {
+        for k in planes.numbers() {
+            for j in self.moved.rows(k).numbers() {
+                for run in model.rows.numbers(j + ny * k) {
                     if !self.moved.of_run(run).is_empty() {
                         let of_run = &model.rows.runs[run];
                         self.run_square[run] =
@@ -236,11 +236,9 @@ impl TissueState {
                     }
                 }
             }
-            let [first, end] = model.rows_of_plane[k as usize];
-            let runs = model
-                .rows
-                .numbers_of_rows(first + ny * k as usize, end + ny * k as usize);
-            self.plane_square[k as usize] = largest(&self.run_square[runs]);
+            let [first, end] = model.rows_of_plane[k];
+            let runs = model.rows.numbers_of_rows(first + ny * k, end + ny * k);
+            self.plane_square[k] = largest(&self.run_square[runs]);
         }
         if !planes.is_empty() {
             self.max_displacement = largest(&self.plane_square).sqrt() * self.scale();

@@ -4,10 +4,11 @@
 //! outward from the held column. Each element is moved after its inner neighbours, and what moves is active
 //! for those that come after it: a sweep goes as far as something moves. A fixed element is always the inner end.
 
-use super::kernels::{self, LOWER, Pin, Scaled, Stretch, UPPER};
+use super::kernels::{self, LOWER, Pin, Scaled, UPPER};
 use super::model::ChainMail;
 use super::spans::Span;
 use super::state::TissueState;
+use super::stretch::Stretch;
 use crate::simd::{Vector, in_vectors};
 
 /// Data and scale of a pass.
