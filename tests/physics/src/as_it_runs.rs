@@ -9,7 +9,7 @@ use stylet_runtime::lines::LineBody;
 use stylet_sim::line::{HandLine, StationSettings};
 use stylet_sim::scene::{Labels, Role, Scene, SceneSource, Structure, TissueKind};
 use stylet_sim::tissue::fem::batch::{BatchModel, BatchState, NodeWeight};
-use stylet_sim::tissue::fem::{FemModel, FemSettings, Integration, Material, SolveSettings, TipPatch};
+use stylet_sim::tissue::fem::{FemModel, FemSettings, Integration, Material, SolveSettings};
 use stylet_sim::tissue::{FemTissue, Held, TissueModel};
 
 /// Largest error of a tick that is accepted.
@@ -17,14 +17,6 @@ const FIELD_PERCENT: f64 = 1.0;
 const TIP_PERCENT: f64 = 3.0;
 
 const OBLIQUE: [f64; 3] = [0.1, -0.05, 0.993_730_345_745_5];
-
-fn held(patch: TipPatch) -> Held {
-    Held {
-        element: patch.element,
-        position_m: patch.position_m,
-        patch_m: patch.edge_m,
-    }
-}
 
 /// Runs a needle off its line; returns the worst tick against the converged solution of the same tick, field in percent
 /// of the patch's travel and force on the tip in percent of the insertion's largest; ticks whose answer is not rendered.
@@ -41,8 +33,8 @@ fn off_its_line(nu: f64, way: Way, depth_m: f64) -> ([f64; 2], [f64; 2], usize, 
     let largest_n = solved.iter().map(|s| length(s.tip_force_n)).fold(0.0, f64::max);
     let (mut field, mut tip, mut unfit) = (Vec::new(), Vec::new(), 0);
     for (tick, solved) in ticks.iter().zip(&solved) {
-        let report = tissue.step(tick.held.map(held), PERIOD_S);
-        tissue.prepare(tick.next.map(held));
+        let report = tissue.step(tick.held, PERIOD_S);
+        tissue.prepare(tick.next);
         if tick.held.is_none() {
             continue;
         }

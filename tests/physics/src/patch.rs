@@ -3,7 +3,8 @@
 
 use stylet_sim::needle::{NeedleParameters, Phase, transmission};
 use stylet_sim::scene::Lattice;
-use stylet_sim::tissue::fem::{self, FemModel, FemState, SolveSettings, TipPatch};
+use stylet_sim::tissue::Held;
+use stylet_sim::tissue::fem::{self, FemModel, FemState, SolveSettings};
 use stylet_sim::tissue::{Carried, Deformed, element_ahead};
 
 /// Period of the tissue loop.
@@ -21,9 +22,9 @@ const APPROACH: usize = 10;
 /// Patch held in one tick, and the one that the tip reaches next on a straight path.
 pub struct PatchTick {
     /// Present patch.
-    pub held: Option<TipPatch>,
+    pub held: Option<Held>,
     /// Patch that work ahead prepares.
-    pub next: Option<TipPatch>,
+    pub next: Option<Held>,
     /// Displacement of the held patch from rest.
     pub by_m: f64,
 }
@@ -51,10 +52,10 @@ pub fn insertion(lattice: &Lattice, way: Way, depth_m: f64) -> Vec<PatchTick> {
         entry = at(-1e-4, entry);
     }
     let step_m = speed_m_per_s * PERIOD_S;
-    let patch = |element: u32, by_m: f64| TipPatch {
+    let patch = |element: u32, by_m: f64| Held {
         element,
         position_m: at(by_m, lattice.rest_m(element)),
-        edge_m: PATCH_M,
+        patch_m: PATCH_M,
     };
     // The loop's prediction, not the script's future. The body moves with the patch: relative to it, at rest.
     let still = vec![0.0; lattice.element_count()];

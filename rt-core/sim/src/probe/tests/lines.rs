@@ -59,7 +59,7 @@ fn probe_and_line_displace_each_other_reciprocally() {
     let (mut square, mut off) = (0.0, 0.0);
     for (n, row_m) in rows_m.iter().enumerate().take(stations) {
         let place_m = line.body.line.point_m((n as f64 + 0.5) * 4e-3, [0.0; 2]);
-        let element = fixture.body.element_at(place_m).expect("in the body");
+        let element = fixture.body.lattice().element_at_rest(place_m).expect("in the body");
         let own_m: f64 = (0..3)
             .map(|c| axis[c] * f64::from(probe.share().0[c][element as usize]))
             .sum();

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::grid::Grid;
 use super::grip::{Grip, Iteration};
-use super::lanes::{add_scaled, dot, keep_free, keep_opposite, scale_and_add};
+use super::lanes::{dot, update, where_free};
 use super::model::FemModel;
 use super::multigrid::{FEW_CYCLES, Stage};
 use super::real::Real;
@@ -25,7 +25,7 @@ impl<T: Real> LineOp<T> for Opposite<'_, T> {
         let inverse = &self.inverse_diagonal[at.clone()];
         for (b, force) in self.b.iter_mut().zip(forces) {
             let b = &mut b[at.clone()];
-            keep_opposite(inverse, force, b);
+            where_free(inverse, force, b, |force| -force);
             self.square += dot(b, b);
         }
     }
@@ -45,7 +45,7 @@ impl<T: Real> LineOp<T> for Answer<'_, T> {
         for (kept, force) in self.forces.iter_mut().zip(forces) {
             // The residual on free nodes, in the line that the forces go to afterwards.
             let kept = &mut kept[at.clone()];
-            keep_free(inverse, force, kept);
+            where_free(inverse, force, kept, |force| force);
             self.square += dot(kept, kept);
             kept.copy_from_slice(force);
         }
@@ -68,7 +68,7 @@ vectorised! {
 fn scale_and_add_fields<T>(grid: &Grid, a: T, x: &Field<T>, y: &mut Field<T>) {
     for at in grid.node_spans() {
         for (x, y) in x.iter().zip(y.iter_mut()) {
-            scale_and_add(a, &x[at.clone()], &mut y[at.clone()]);
+            update(&x[at.clone()], &mut y[at.clone()], |x, y| x + a * y);
         }
     }
 }
@@ -81,8 +81,8 @@ fn advance_fields<T>(grid: &Grid, alpha: T, p: &Field<T>, q: &Field<T>, u: &mut 
     for at in grid.node_spans() {
         for c in 0..3 {
             let r = &mut r[c][at.clone()];
-            add_scaled(alpha, &p[c][at.clone()], &mut u[c][at.clone()]);
-            add_scaled(-alpha, &q[c][at.clone()], r);
+            update(&p[c][at.clone()], &mut u[c][at.clone()], |p, u| u + alpha * p);
+            update(&q[c][at.clone()], r, |q, r| r + -alpha * q);
             square += dot(r, r);
         }
     }
@@ -191,7 +191,6 @@ impl<T: Real> Grip<T> {
             q: &mut self.q,
             inverse_diagonal: &multigrid.stages[0].inverse_diagonal,
             dot: 0.0,
-            square: 0.0,
         };
         sweep(level, &mut self.p, &mut multigrid.work, 0..level.grid.nodes[2], &mut op);
         op.dot

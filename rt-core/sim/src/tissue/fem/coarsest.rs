@@ -51,7 +51,6 @@ impl<T: Real> Coarsest<T> {
                 q: &mut self.answer,
                 inverse_diagonal,
                 dot: 0.0,
-                square: 0.0,
             };
             sweep(level, &mut self.unit, work, 0..level.grid.nodes[2], &mut op);
             self.unit[component][node] = T::ZERO;

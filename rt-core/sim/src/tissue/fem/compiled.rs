@@ -5,9 +5,10 @@ use super::batch::{BatchModel, BatchState, Progress};
 use super::material::{FemProblem, FemSettings};
 use super::model::FemModel;
 use super::real::Real;
-use super::solve::{self, FemReport, SolveSettings, TipPatch};
+use super::solve::{self, FemReport, SolveSettings};
 use super::state::FemState;
 use crate::scene::Lattice;
+use crate::tissue::Held;
 use std::sync::Arc;
 
 /// Declares a trait of these functions with one type, and implements it for each number type by functions of this
@@ -44,13 +45,13 @@ compiled! {
     fn step(
         model: &FemModel<Self>,
         state: &mut FemState<Self>,
-        held: Option<TipPatch>,
+        held: Option<Held>,
         settings: &SolveSettings
     ) -> FemReport = solve::step_held;
     fn prepare(
         model: &FemModel<Self>,
         state: &mut FemState<Self>,
-        next: Option<TipPatch>,
+        next: Option<Held>,
         settings: &SolveSettings
     ) -> () = solve::prepare_next;
     fn batch_model(model: &FemModel<Self>) -> BatchModel<Self> = BatchModel::of_model;
@@ -85,7 +86,7 @@ impl<T: Compiled> FemModel<T> {
 pub fn step<T: Compiled>(
     model: &FemModel<T>,
     state: &mut FemState<T>,
-    held: Option<TipPatch>,
+    held: Option<Held>,
     settings: &SolveSettings,
 ) -> FemReport {
     T::step(model, state, held, settings)
@@ -96,7 +97,7 @@ pub fn step<T: Compiled>(
 pub fn prepare<T: Compiled>(
     model: &FemModel<T>,
     state: &mut FemState<T>,
-    next: Option<TipPatch>,
+    next: Option<Held>,
     settings: &SolveSettings,
 ) {
     T::prepare(model, state, next, settings);

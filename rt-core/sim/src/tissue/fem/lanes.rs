@@ -39,39 +39,21 @@ pub(super) fn add_products<T: Real>(a: &[T], x: &[T], y: &mut [T]) {
     }
 }
 
-/// Computes `y += a x`.
+/// Computes `y = f(x, y)`.
 #[inline(always)]
-pub(super) fn add_scaled<T: Real>(a: T, x: &[T], y: &mut [T]) {
+pub(super) fn update<T: Real>(x: &[T], y: &mut [T], f: impl Fn(T, T) -> T) {
     for (y, x) in lanes_mut(y).iter_mut().zip(lanes(x)) {
         let (y0, x) = (*y, *x);
-        *y = each(|n| y0[n] + a * x[n]);
+        *y = each(|n| f(x[n], y0[n]));
     }
 }
 
-/// Computes `y = x + a y`.
+/// Computes `y = f(x)` where `inverse` is not zero, zero elsewhere.
 #[inline(always)]
-pub(super) fn scale_and_add<T: Real>(a: T, x: &[T], y: &mut [T]) {
-    for (y, x) in lanes_mut(y).iter_mut().zip(lanes(x)) {
-        let (y0, x) = (*y, *x);
-        *y = each(|n| x[n] + a * y0[n]);
-    }
-}
-
-/// Copies `x` where `inverse` is not zero, zero elsewhere.
-#[inline(always)]
-pub(super) fn keep_free<T: Real>(inverse: &[T], x: &[T], y: &mut [T]) {
+pub(super) fn where_free<T: Real>(inverse: &[T], x: &[T], y: &mut [T], f: impl Fn(T) -> T) {
     for ((y, x), inverse) in lanes_mut(y).iter_mut().zip(lanes(x)).zip(lanes(inverse)) {
         let (x, inverse) = (*x, *inverse);
-        *y = each(|n| if inverse[n] == T::ZERO { T::ZERO } else { x[n] });
-    }
-}
-
-/// Copies `-x` where `inverse` is not zero, zero elsewhere.
-#[inline(always)]
-pub(super) fn keep_opposite<T: Real>(inverse: &[T], x: &[T], y: &mut [T]) {
-    for ((y, x), inverse) in lanes_mut(y).iter_mut().zip(lanes(x)).zip(lanes(inverse)) {
-        let (x, inverse) = (*x, *inverse);
-        *y = each(|n| if inverse[n] == T::ZERO { T::ZERO } else { -x[n] });
+        *y = each(|n| if inverse[n] == T::ZERO { T::ZERO } else { f(x[n]) });
     }
 }
 

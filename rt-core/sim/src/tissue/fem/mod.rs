@@ -20,7 +20,8 @@
 //!
 //! ```
 //! use stylet_sim::scene::Scene;
-//! use stylet_sim::tissue::fem::{FemModel, FemSettings, FemState, Material, SolveSettings, TipPatch, step};
+//! use stylet_sim::tissue::Held;
+//! use stylet_sim::tissue::fem::{FemModel, FemSettings, FemState, Material, SolveSettings, step};
 //!
 //! let lattice = Scene::builtin("paper").unwrap().lattice;
 //! let model = FemModel::<f32>::new(&lattice, &FemSettings::homogeneous(Material::PROSTATE, 3e5)).unwrap();
@@ -29,7 +30,7 @@
 //! let element = lattice.element_of_cell(53, 31, 80).unwrap();
 //! let mut position_m = lattice.rest_m(element);
 //! position_m[2] += 2e-3;
-//! let held = TipPatch { element, position_m, edge_m: 4e-3 };
+//! let held = Held { element, position_m, patch_m: 4e-3 };
 //! let settings = SolveSettings { relative_tolerance: 1e-3, max_cycles: 50 };
 //! let report = step(&model, &mut state, Some(held), &settings);
 //! assert!(report.converged && report.tip_force_n[2] > 0.0);
@@ -67,7 +68,7 @@ pub use model::FemModel;
 pub use real::Real;
 #[cfg(test)]
 pub(in crate::tissue) use solve::hold_cells;
-pub use solve::{FemReport, SolveSettings, TipPatch};
+pub use solve::{FemReport, SolveSettings};
 pub use state::FemState;
 pub use tissue::FemTissue;
 

@@ -95,11 +95,6 @@ impl<T: Real> FemModel<T> {
     pub fn element_count(&self) -> usize {
         self.lattice.element_count()
     }
-
-    /// Returns the number of nodes that touch an element.
-    pub fn node_count(&self) -> usize {
-        self.part.iter().filter(|&&part| part != NO_PART).count()
-    }
 }
 
 struct Body {

@@ -91,12 +91,7 @@ impl<T: Real> Multigrid<T> {
                 r,
                 ..
             } = &mut fine[n];
-            let mut op = Residual {
-                b,
-                r,
-                inverse_diagonal,
-                square: 0.0,
-            };
+            let mut op = Residual { b, r, inverse_diagonal };
             let level = &levels[n];
             sweep(level, x, &mut self.work, 0..level.grid.nodes[2], &mut op);
             let (to, line) = (&levels[n + 1].grid, &mut self.line);

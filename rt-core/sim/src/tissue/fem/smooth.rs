@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::chebyshev;
-use super::lanes::{chebyshev_step, difference_where_free, dot, first_chebyshev, keep_free};
+use super::lanes::{chebyshev_step, difference_where_free, dot, first_chebyshev, where_free};
 use super::level::Level;
 use super::real::Real;
 use super::sweep::{Field, LineOp, Planes, sweep};
@@ -79,7 +79,6 @@ pub(super) struct Residual<'a, T> {
     pub b: &'a Field<T>,
     pub r: &'a mut Field<T>,
     pub inverse_diagonal: &'a [T],
-    pub square: f64,
 }
 
 impl<T: Real> LineOp<T> for Residual<'_, T> {
@@ -87,19 +86,17 @@ impl<T: Real> LineOp<T> for Residual<'_, T> {
     fn line(&mut self, at: Range<usize>, forces: [&[T]; 3], _: [&mut [T]; 3]) {
         let inverse = &self.inverse_diagonal[at.clone()];
         for (c, forces) in forces.into_iter().enumerate() {
-            let r = &mut self.r[c][at.clone()];
-            difference_where_free(inverse, &self.b[c][at.clone()], forces, r);
-            self.square += dot(r, r);
+            let b = &self.b[c][at.clone()];
+            difference_where_free(inverse, b, forces, &mut self.r[c][at.clone()]);
         }
     }
 }
 
-/// `q = A p` where nodes are free, zero elsewhere; `p . q`, and `q . q`.
+/// `q = A p` where nodes are free, zero elsewhere; `p . q`.
 pub(super) struct Product<'a, T> {
     pub q: &'a mut Field<T>,
     pub inverse_diagonal: &'a [T],
     pub dot: f64,
-    pub square: f64,
 }
 
 impl<T: Real> LineOp<T> for Product<'_, T> {
@@ -108,9 +105,8 @@ impl<T: Real> LineOp<T> for Product<'_, T> {
         let inverse = &self.inverse_diagonal[at.clone()];
         for (c, p) in p.into_iter().enumerate() {
             let q = &mut self.q[c][at.clone()];
-            keep_free(inverse, forces[c], q);
+            where_free(inverse, forces[c], q, |force| force);
             self.dot += dot(q, p);
-            self.square += dot(q, q);
         }
     }
 }

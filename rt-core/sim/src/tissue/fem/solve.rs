@@ -7,25 +7,13 @@ use super::multigrid::FEW_CYCLES;
 use super::output;
 use super::real::Real;
 use super::state::FemState;
-use crate::tissue::{HeldOutcome, REACH};
+use crate::tissue::{Held, HeldOutcome, REACH};
 
 /// Part of the displacement outside the known directions, from which a direction to come is prepared.
 const EXPECTED_DIRECTION: f64 = 0.02;
 /// Tolerances of residual above which cycles after the first are done where few are allowed: the rest is then a few
 /// thousandths of the displacement, and can wait for the next ticks.
 const ROUGH: f64 = 10.0;
-
-/// A cube of tissue around an element that moves as one piece with the needle's tip: a single node would be ill-posed,
-/// as its force goes to zero with the lattice's spacing.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TipPatch {
-    /// The element in the middle.
-    pub element: u32,
-    /// Position where the element's centre is held, in the scene frame.
-    pub position_m: [f64; 3],
-    /// Elements whose centres are within half of this of the held element's, along each axis, are held with it.
-    pub edge_m: f64,
-}
 
 /// Tolerance and budget of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,7 +46,7 @@ pub struct FemReport {
 pub(super) fn step_held<T: Real>(
     model: &FemModel<T>,
     state: &mut FemState<T>,
-    held: Option<TipPatch>,
+    held: Option<Held>,
     settings: &SolveSettings,
 ) -> FemReport {
     if !state.fits(model) {
@@ -104,9 +92,9 @@ fn report<T: Real>(
 }
 
 /// Returns the cells of the finest grid that a patch holds, and how far it moves them.
-fn cells_of<T: Real>(model: &FemModel<T>, held: &TipPatch) -> Option<([[usize; 2]; 3], [f64; 3])> {
+fn cells_of<T: Real>(model: &FemModel<T>, held: &Held) -> Option<([[usize; 2]; 3], [f64; 3])> {
     let (lattice, grid) = (&model.lattice, &model.levels[0].grid);
-    if held.element as usize >= model.element_count() || !(0.0..f64::INFINITY).contains(&held.edge_m) {
+    if held.element as usize >= model.element_count() || !(0.0..f64::INFINITY).contains(&held.patch_m) {
         return None;
     }
     let rest = lattice.rest_m(held.element);
@@ -115,7 +103,7 @@ fn cells_of<T: Real>(model: &FemModel<T>, held: &TipPatch) -> Option<([[usize; 2
         return None;
     }
     let cell = lattice.cell(held.element);
-    let reach = (0.5 * held.edge_m / lattice.spacing_m + 1e-9).floor() as usize;
+    let reach = (0.5 * held.patch_m / lattice.spacing_m + 1e-9).floor() as usize;
     let cells = [0, 1, 2].map(|a| {
         let centre = cell[a] - model.low_cell[a];
         [
@@ -158,7 +146,7 @@ pub(in crate::tissue) fn hold_cells<T: Real>(
 pub(super) fn prepare_next<T: Real>(
     model: &FemModel<T>,
     state: &mut FemState<T>,
-    next: Option<TipPatch>,
+    next: Option<Held>,
     settings: &SolveSettings,
 ) {
     if !state.fits(model) || !std::mem::take(&mut state.has_time) {

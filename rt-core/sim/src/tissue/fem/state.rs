@@ -37,14 +37,6 @@ impl<T: Real> FemState<T> {
         self.displacement.get(axis).map_or(&[], Vec::as_slice)
     }
 
-    /// Returns the centre of an element in the scene frame; the last element's for a number past the end.
-    pub fn position_m(&self, model: &FemModel<T>, element: u32) -> [f64; 3] {
-        let rest = model.lattice.rest_m(element);
-        let e = (element as usize).min(self.displacement[0].len().saturating_sub(1));
-        let u = [0, 1, 2].map(|a| self.displacement[a].get(e).copied().map_or(0.0, f64::from));
-        [0, 1, 2].map(|a| rest[a] + model.lattice.spacing_m * u[a])
-    }
-
     /// Returns the elastic energy, in body and springs.
     #[cfg(test)]
     pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {

@@ -7,7 +7,7 @@ use super::*;
 use stylet_random::Random;
 
 use crate::scene::{Labels, Lattice, Scene, test_bodies};
-use crate::tissue::HeldOutcome;
+use crate::tissue::{Held, HeldOutcome};
 
 mod ahead;
 mod coarser;
@@ -64,11 +64,11 @@ fn two_materials(lattice: &Lattice, contrast: f64, foundation_pa_per_m: f64) -> 
     }
 }
 
-fn patch(lattice: &Lattice, element: u32, by_m: [f64; 3], edge_m: f64) -> TipPatch {
+fn patch(lattice: &Lattice, element: u32, by_m: [f64; 3], patch_m: f64) -> Held {
     let rest = lattice.rest_m(element);
-    TipPatch {
+    Held {
         element,
         position_m: [0, 1, 2].map(|a| rest[a] + by_m[a]),
-        edge_m,
+        patch_m,
     }
 }

@@ -3,7 +3,7 @@
 use super::compiled::{Compiled, prepare, step};
 use super::material::{FemProblem, FemSettings, Integration, Material, Structure};
 use super::model::FemModel;
-use super::solve::{SolveSettings, TipPatch};
+use super::solve::SolveSettings;
 use super::state::FemState;
 use crate::scene::Scene;
 use crate::tissue::{
@@ -61,14 +61,6 @@ impl<T: Compiled> FemTissue<T> {
     }
 }
 
-fn patch(held: Held) -> TipPatch {
-    TipPatch {
-        element: held.element,
-        position_m: held.position_m,
-        edge_m: held.patch_m,
-    }
-}
-
 impl<T: Compiled> FemTissue<T> {
     /// Returns the report of a step that added answers up.
     fn displaced(&self, moved: u32) -> StepReport {
@@ -89,7 +81,7 @@ impl<T: Compiled> FemTissue<T> {
 impl<T: Compiled> TissueModel for FemTissue<T> {
     /// Solves the quasi-static problem: `dt_s` plays no part, and tissue that nothing holds is at rest at once.
     fn step(&mut self, held: Option<Held>, _dt_s: f64) -> StepReport {
-        let report = step(&self.model, &mut self.state, held.map(patch), &self.settings);
+        let report = step(&self.model, &mut self.state, held, &self.settings);
         StepReport {
             passes: report.cycles,
             residual: report.relative_residual,
@@ -108,7 +100,7 @@ impl<T: Compiled> TissueModel for FemTissue<T> {
     }
 
     fn prepare(&mut self, next: Option<Held>) {
-        prepare(&self.model, &mut self.state, next.map(patch), &self.settings);
+        prepare(&self.model, &mut self.state, next, &self.settings);
     }
 
     fn displace(&mut self, columns: &[PackedField], loads_n: &[f64], shift: Shift<'_>) -> Option<StepReport> {

@@ -5,8 +5,8 @@ use super::precondition::Laplacian;
 use super::*;
 use crate::scene::TissueKind;
 use crate::simd::Simd;
-use crate::tissue::fem::{FemModel, FemSettings, FemState, Material, SolveSettings, TipPatch, step};
-use crate::tissue::{Carried, Deformed, least_corner};
+use crate::tissue::fem::{FemModel, FemSettings, FemState, Material, SolveSettings, step};
+use crate::tissue::{Carried, Deformed, Held, least_corner};
 
 mod reference;
 
@@ -32,10 +32,10 @@ impl Pushed {
         let mut state = FemState::at_rest(&model);
         let mut position_m = lattice.rest_m(element);
         position_m[2] += 1e-3;
-        let patch = TipPatch {
+        let patch = Held {
             element,
             position_m,
-            edge_m: 4e-3,
+            patch_m: 4e-3,
         };
         let exact = SolveSettings {
             relative_tolerance: 1e-6,

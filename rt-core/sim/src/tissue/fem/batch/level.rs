@@ -85,7 +85,6 @@ pub struct BatchModel<T = f32> {
     /// Shear modulus and Poisson's ratio of each element; zero where it is rigid.
     materials: Vec<[f32; 2]>,
     low_m: [f64; 3],
-    spacing_m: f64,
     nodes: [usize; 3],
     stride: usize,
 }
@@ -137,7 +136,6 @@ impl<T: Real> BatchModel<T> {
                 .flat_map(|run| (run.cell..run.cell + run.len).map(material))
                 .collect(),
             low_m: model.low_cell.map(|c| c as f64 * spacing_m),
-            spacing_m,
             nodes: grid.nodes,
             stride: grid.stride,
             coarsest: Vec::new(),
@@ -166,28 +164,20 @@ impl<T: Real> BatchModel<T> {
 
     /// Returns the edge of a cell, m.
     pub fn spacing_m(&self) -> f64 {
-        self.spacing_m
+        self.lattice.spacing_m
     }
 
     /// Returns shear modulus in pascals and Poisson's ratio at a point; `None` where nothing elastic is.
     pub fn material(&self, point_m: [f64; 3]) -> Option<[f64; 2]> {
-        if !point_m.iter().all(|c| *c >= 0.0) {
-            return None;
-        }
-        let [i, j, k] = point_m.map(|c| (c / self.spacing_m) as usize);
-        let element = self.lattice.element_of_cell(i, j, k)?;
+        let is_number = point_m.iter().all(|c| *c >= 0.0);
+        let element = self.lattice.element_at_rest(point_m).filter(|_| is_number)?;
         let [shear_pa, poisson] = self.materials.get(element as usize)?.map(f64::from);
         (shear_pa > 0.0).then_some([shear_pa, poisson])
     }
 
-    /// Returns the element at a point of the scene frame while the body is at rest.
-    pub fn element_at(&self, point_m: [f64; 3]) -> Option<u32> {
-        self.lattice.element_at_rest(point_m)
-    }
-
     /// Returns the nodes around a point in the scene frame with their trilinear weights; `None` where no element is.
     pub fn trilinear(&self, point_m: [f64; 3]) -> Option<[(u32, f64); 8]> {
-        let place = [0, 1, 2].map(|a| (point_m[a] - self.low_m[a]) / self.spacing_m);
+        let place = [0, 1, 2].map(|a| (point_m[a] - self.low_m[a]) / self.spacing_m());
         if !place.iter().all(|p| *p >= 0.0) {
             return None;
         }

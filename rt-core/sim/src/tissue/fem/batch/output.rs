@@ -1,7 +1,7 @@
 //! Output of an answer: displacements of element centres, values under weights, and the force of the foundation.
 
 use super::level::{BatchModel, NodeWeight};
-use super::solve::{BatchState, finest};
+use super::solve::BatchState;
 use crate::tissue::ElementField;
 use crate::tissue::fem::real::Real;
 
@@ -18,7 +18,7 @@ impl<T: Real> BatchState<T> {
     /// Returns the force of the foundation on the body, N: that of the springs to rest.
     pub fn foundation_n(&self, model: &BatchModel<T>, load: usize) -> [f64; 3] {
         let mut force = [0.0; 3];
-        for (u, &spring) in self.u.iter().zip(&finest(model).springs) {
+        for (u, &spring) in self.u.iter().zip(&model.levels[0].springs) {
             for c in 0..3 {
                 force[c] -= spring.to_f64() * u[c].0[load].to_f64();
             }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::cycle::{Stage, prolong, restrict, smooth, smooth_down, solve_coarsest};
 use super::kernel::{PlaneOp, TwoPlanes, answer, nothing, sweep};
-use super::level::{BatchLevel, BatchModel, NodeWeight};
+use super::level::{BatchModel, NodeWeight};
 use super::{LOADS, Node};
 use crate::simd::{Eight, Vector, in_vectors};
 use crate::tissue::fem::real::Real;
@@ -289,9 +289,4 @@ fn advance_fields<T: Real, V>(
     }
     total
 }
-}
-
-/// Returns the finest level, whose nodes answers are read at.
-pub(super) fn finest<T>(model: &BatchModel<T>) -> &BatchLevel<T> {
-    &model.levels[0]
 }

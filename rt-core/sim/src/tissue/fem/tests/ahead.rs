@@ -10,12 +10,12 @@ const LIVE: SolveSettings = SolveSettings {
     max_cycles: LIVE_CYCLES,
 };
 
-fn patch(lattice: &Lattice, element: u32, by_m: [f64; 3]) -> TipPatch {
+fn patch(lattice: &Lattice, element: u32, by_m: [f64; 3]) -> Held {
     let rest = lattice.rest_m(element);
-    TipPatch {
+    Held {
         element,
         position_m: [0, 1, 2].map(|a| rest[a] + by_m[a]),
-        edge_m: 4e-3,
+        patch_m: 4e-3,
     }
 }
 
@@ -25,7 +25,7 @@ fn hard_body() -> FemModel<f64> {
 }
 
 /// Returns two neighbouring patches in the body with a hole, pushed the same way.
-fn two_patches(model: &FemModel<f64>) -> [TipPatch; 2] {
+fn two_patches(model: &FemModel<f64>) -> [Held; 2] {
     let lattice = model.lattice();
     let [i, j, k] = lattice.cell(300);
     let beside = lattice.element_of_cell(i, j, k + 1).expect("inside");
@@ -35,7 +35,7 @@ fn two_patches(model: &FemModel<f64>) -> [TipPatch; 2] {
     ]
 }
 
-fn assert_is_converged_answer(model: &FemModel<f64>, state: &FemState<f64>, held: TipPatch, report: &FemReport) {
+fn assert_is_converged_answer(model: &FemModel<f64>, state: &FemState<f64>, held: Held, report: &FemReport) {
     let mut fresh = FemState::at_rest(model);
     let cold = step(model, &mut fresh, Some(held), &EXACT);
     assert!(cold.converged && report.converged, "{report:?}");
@@ -66,7 +66,7 @@ fn prepared_patch_answers_as_the_converged_solution() {
             let mut state = FemState::at_rest(&model);
             for _ in 0..ticks + 1 {
                 step(&model, &mut state, Some(first), &EXACT);
-                prepare(&model, &mut state, Some(TipPatch { position_m, ..second }), &EXACT);
+                prepare(&model, &mut state, Some(Held { position_m, ..second }), &EXACT);
             }
             let report = step(&model, &mut state, Some(second), &EXACT);
             println!("guess {guess}, {ticks} ticks ahead: {} cycles", report.cycles);
@@ -212,28 +212,28 @@ fn guess_that_cannot_be_held_is_passed_over() {
     );
     let other = other.expect("valid");
     let bad = [
-        TipPatch {
+        Held {
             element: u32::MAX,
             ..second
         },
-        TipPatch {
-            edge_m: f64::NAN,
+        Held {
+            patch_m: f64::NAN,
             ..second
         },
-        TipPatch {
+        Held {
             position_m: [f64::NAN; 3],
             ..second
         },
-        TipPatch {
+        Held {
             position_m: [0.0, 0.0, 10.0],
             ..second
         },
-        TipPatch {
+        Held {
             position_m: model.lattice().rest_m(second.element),
             ..second
         },
     ];
-    let run = |guesses: &[Option<TipPatch>]| {
+    let run = |guesses: &[Option<Held>]| {
         let mut state = FemState::at_rest(&model);
         for &guess in guesses {
             step(&model, &mut state, Some(first), &EXACT);

@@ -74,10 +74,10 @@ fn cycles_towards_incompressibility() {
         let element = scene.lattice.element_of_cell(53, 31, 88).expect("in the gland");
         let mut position_m = scene.lattice.rest_m(element);
         position_m[2] += 2e-3;
-        let held = TipPatch {
+        let held = Held {
             element,
             position_m,
-            edge_m: 4e-3,
+            patch_m: 4e-3,
         };
         let report = step(&model, &mut state, Some(held), &settings);
         println!(

@@ -65,7 +65,6 @@ fn apply(model: &FemModel<f64>, x: &Field<f64>) -> Field<f64> {
         q: &mut q,
         inverse_diagonal: &vec![1.0; level.grid.len()],
         dot: 0.0,
-        square: 0.0,
     };
     let mut work = Planes::new(level.grid.stride * level.grid.nodes[1]);
     sweep(level, &mut x, &mut work, 0..level.grid.nodes[2], &mut op);

@@ -15,25 +15,25 @@ fn what_cannot_be_followed_is_refused_and_changes_nothing() {
     assert!(step(&model, &mut state, Some(good), &settings).converged);
     let before: Vec<Vec<f32>> = (0..3).map(|a| state.displacement(a).to_vec()).collect();
     let bad = [
-        TipPatch { element: 216, ..good },
-        TipPatch {
-            edge_m: f64::NAN,
+        Held { element: 216, ..good },
+        Held {
+            patch_m: f64::NAN,
             ..good
         },
-        TipPatch { edge_m: -1.0, ..good },
-        TipPatch {
-            edge_m: f64::INFINITY,
+        Held { patch_m: -1.0, ..good },
+        Held {
+            patch_m: f64::INFINITY,
             ..good
         },
-        TipPatch {
+        Held {
             position_m: [f64::NAN, 0.0, 0.0],
             ..good
         },
-        TipPatch {
+        Held {
             position_m: [0.0, f64::INFINITY, 0.0],
             ..good
         },
-        TipPatch {
+        Held {
             position_m: [0.0, 0.0, 10.0],
             ..good
         },

@@ -21,7 +21,6 @@ fn dense(model: &FemModel<f64>) -> (Vec<usize>, DMatrix<f64>) {
             q: &mut q,
             inverse_diagonal: &level.inverse_diagonal,
             dot: 0.0,
-            square: 0.0,
         };
         sweep(level, &mut x, &mut work, 0..level.grid.nodes[2], &mut op);
         x[column % 3][nodes[column / 3]] = 0.0;
