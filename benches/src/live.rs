@@ -147,23 +147,20 @@ impl Theatre {
         }
     }
 
-    /// Returns the body of the converged line, at rest.
+    /// Returns what the line `like` that ships in that tissue is compared with: `fem`, and ChainMail's own twin, whose
+    /// columns are solved to a residual.
     ///
     /// # Panics
     ///
     /// If the scene has no finite elements.
-    pub fn near_tip(&self) -> Unfolded {
-        Unfolded::new(&self.source.build().expect("built in").for_tissue(TissueKind::Fem))
-    }
-
-    /// Solves ChainMail's own converged twin of the line that ships in it, to a residual of its columns.
-    pub fn own_twin(&self, like: &HandLine, tolerance: f64) -> OwnTwin {
-        OwnTwin::of(
-            &self.source,
-            like,
-            tolerance,
-            HAPTIC_TICKS_PER_TISSUE_TICK as f64 * 1e-3,
-        )
+    pub fn twins<'a>(&self, tissue: TissueKind, fem: &'a mut Twin, like: &HandLine, tolerance: f64) -> Twins<'a> {
+        let period_s = HAPTIC_TICKS_PER_TISSUE_TICK as f64 * 1e-3;
+        let is_own = tissue == TissueKind::ChainMail;
+        Twins {
+            fem,
+            near_tip: Unfolded::new(&self.source.build().expect("built in").for_tissue(TissueKind::Fem)),
+            own: is_own.then(|| OwnTwin::of(&self.source, like, tolerance, period_s)),
+        }
     }
 
     /// Returns the insertion: in, half a second of rest, half the way out, rest. The first round is compared with the

@@ -25,7 +25,7 @@ pub fn describe() -> Vec<(String, String)> {
         ("processor", model.map_or("not known", |(_, name)| name).to_owned()),
         ("cores", cores.to_string()),
         ("commit", output("git", &["rev-parse", "--short=12", "HEAD"])),
-        ("command", command()),
+        ("command", std::env::args().collect::<Vec<_>>().join(" ")),
     ];
     pairs.map(|(name, value)| (name.to_owned(), value)).into()
 }
@@ -36,18 +36,4 @@ pub fn run_folder(machine: &[(String, String)]) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
         .join("runs")
         .join(format!("{}-{}", of("date"), of("host")))
-}
-
-/// Returns the command as typed, without the folder of the program.
-fn command() -> String {
-    let mut words = std::env::args();
-    let program = words.next().unwrap_or_default();
-    let name = std::path::Path::new(&program)
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy();
-    std::iter::once(name.into_owned())
-        .chain(words)
-        .collect::<Vec<_>>()
-        .join(" ")
 }

@@ -1,4 +1,4 @@
-//! The error of the needle's line in the paper's gland, divided into its causes: solver, mesh, boundary, linearity.
+//! The error of the needle's line in the paper's gland, divided into its causes: solver, mesh, boundary.
 
 use serde::Serialize;
 use std::sync::Arc;
@@ -40,9 +40,6 @@ const COMPARED: usize = 20;
 const EXACT: f64 = 1e-8;
 /// Tolerance for bodies with seven times as many elements, in f32.
 const LARGE: f64 = 1e-4;
-
-/// Linear and neo-Hookean, by CalculiX: `tests/oracles/gland_neo_hooke.py`.
-const NEO_HOOKE: &str = include_str!("../../../tests/oracles/neo_hooke/neo_hooke.csv");
 
 /// The insertion through one body: loads, forces and fields of the ticks compared.
 struct Path {
@@ -105,7 +102,6 @@ pub fn causes() -> Vec<Cause> {
             &through(&mut twin, Some(&mean)),
         ));
     }
-    causes.extend(linearity());
     causes
 }
 
@@ -248,28 +244,6 @@ fn near(lattice: &Lattice, reach_m: f64) -> Vec<u8> {
     labels
 }
 
-/// Not of this line: a patch of the tip's size that is pushed by so much, in another solver.
-fn linearity() -> impl Iterator<Item = Cause> {
-    let rows = NEO_HOOKE.lines().filter(|line| !line.starts_with(['#', 't']));
-    rows.map(|line| {
-        let numbers: Vec<f64> = line.split(',').map(|n| n.parse().expect("a number")).collect();
-        let [by_mm, linear_n, large_n, rms_mm, worst_mm] = numbers[..] else {
-            panic!("five numbers in {line}");
-        };
-        let force = 100.0 * (linear_n / large_n - 1.0).abs();
-        Cause {
-            cause: "linearity",
-            between: format!("linear; neo-Hookean, a patch of 4.4 mm moved by {by_mm:.0} mm (CalculiX)"),
-            field_percent: 100.0 * rms_mm / by_mm,
-            field_worst_percent: 100.0 * worst_mm / by_mm,
-            tip_percent: force,
-            tip_worst_percent: force,
-            hand_percent: force,
-            hand_worst_percent: force,
-        }
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -290,12 +264,5 @@ mod tests {
         let along: Vec<u8> = (0..30).map(|i| near[i + 30 * (15 + 30 * 15)]).collect();
         assert_eq!(along.iter().filter(|&&l| l == 1).count(), 4);
         assert_eq!(along.iter().filter(|&&l| l == 2).count(), 10);
-    }
-
-    #[test]
-    fn the_kept_figures_of_calculix_are_read() {
-        let causes: Vec<Cause> = linearity().collect();
-        assert_eq!(causes.len(), 3);
-        assert!(causes.windows(2).all(|w| w[0].tip_percent < w[1].tip_percent));
     }
 }

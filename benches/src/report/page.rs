@@ -65,8 +65,7 @@ pub fn write(found: &Findings) -> Result<String, Box<dyn Error>> {
         "Causes of error",
         "One needle through the middle of `paper` to 45 mm and half the way out, on one path, through one body and another that \
          differ in one thing. Field: mean and worst of the ticks, in percent of the tick's largest displacement. Forces: RMS and \
-         worst, in percent of the largest. Linearity is of a patch that is pushed, not of a line, and of CalculiX alone: its worst \
-         is one node, and its force that of the patch.",
+         worst, in percent of the largest. The error of linearity is in `tests/oracles/neo_hooke`.",
         found.causes,
     )?;
     section(

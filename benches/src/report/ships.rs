@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use stylet_benches::error::quantile;
-use stylet_benches::live::{Live, LiveCase, LiveTick, OwnTick, Theatre, Twins};
+use stylet_benches::live::{Live, LiveCase, LiveTick, OwnTick, Theatre};
 use stylet_sim::scene::TissueKind;
 
 /// One insertion in one tissue.
@@ -30,9 +30,7 @@ pub struct Ships {
     pub hand_worst_percent: f64,
     /// Errors against the model's own converged answer: as `field_*`, `tip_*`. Finite elements are their own.
     pub own_field_percent: f64,
-    pub own_field_p99_percent: f64,
     pub own_field_worst_percent: f64,
-    pub own_tip_p99_percent: f64,
     pub own_tip_worst_percent: f64,
     pub haptic_p50_us: f64,
     pub haptic_p999_us: f64,
@@ -45,31 +43,21 @@ pub struct Ships {
     pub twin_residual: f64,
 }
 
+/// Distance from the axis and depth, m; speed, m/s.
+const fn case(scene: &'static str, [beside_m, depth_m, speed_m_per_s]: [f64; 3]) -> LiveCase {
+    LiveCase {
+        scene,
+        beside_m,
+        depth_m,
+        speed_m_per_s,
+    }
+}
+
 const CASES: [LiveCase; 4] = [
-    LiveCase {
-        scene: "paper",
-        beside_m: 0.0,
-        depth_m: 45e-3,
-        speed_m_per_s: 0.05,
-    },
-    LiveCase {
-        scene: "paper",
-        beside_m: 10e-3,
-        depth_m: 40e-3,
-        speed_m_per_s: 0.05,
-    },
-    LiveCase {
-        scene: "paper",
-        beside_m: 0.0,
-        depth_m: 45e-3,
-        speed_m_per_s: 0.28,
-    },
-    LiveCase {
-        scene: "pelvis",
-        beside_m: 0.0,
-        depth_m: 90e-3,
-        speed_m_per_s: 0.05,
-    },
+    case("paper", [0.0, 45e-3, 0.05]),
+    case("paper", [10e-3, 40e-3, 0.05]),
+    case("paper", [0.0, 45e-3, 0.28]),
+    case("pelvis", [0.0, 90e-3, 0.05]),
 ];
 /// Residual over load of the converged columns; what ships has 4.5e-2.
 const CONVERGED: f64 = 1e-7;
@@ -91,12 +79,7 @@ pub fn measure(rounds: usize) -> Vec<Ships> {
         let mut twin = theatre.twin(&fem.0.hand, [CONVERGED, CONVERGED_SINGLE]);
         let chainmail = theatre.line(TissueKind::ChainMail);
         for (kind, (line, prepared_s)) in [(TissueKind::Fem, fem), (TissueKind::ChainMail, chainmail)] {
-            let own = (kind == TissueKind::ChainMail).then(|| theatre.own_twin(&line.hand, CONVERGED));
-            let mut twins = Twins {
-                fem: &mut twin,
-                near_tip: theatre.near_tip(),
-                own,
-            };
+            let mut twins = theatre.twins(kind, &mut twin, &line.hand, CONVERGED);
             let live = theatre.run(kind, &line, &mut twins, rounds);
             let left_mm = twins.near_tip.left_m * 1e3;
             let row = row(case, kind, &live, prepared_s, twin.residual);
@@ -115,23 +98,22 @@ fn row(case: LiveCase, kind: TissueKind, live: &Live, prepared_s: f64, twin_resi
     let share = |of: &dyn Fn(&LiveTick) -> f64| ticks.iter().map(|t| 100.0 * of(t) / t.largest_m).collect::<Vec<_>>();
     let field = share(&|t| t.rms_m[0]);
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-    let force = |of: fn(&LiveTick) -> [f64; 2]| {
-        let peak_n = ticks.iter().map(|t| of(t)[1].abs()).fold(0.0, f64::max);
-        ticks
+    let force = |pairs: Vec<[f64; 2]>| -> Vec<f64> {
+        let peak_n = pairs.iter().map(|pair| pair[1].abs()).fold(0.0, f64::max);
+        pairs
             .iter()
-            .map(|t| 100.0 * (of(t)[0] - of(t)[1]).abs() / peak_n)
-            .collect::<Vec<_>>()
+            .map(|[n, of_n]| 100.0 * (n - of_n).abs() / peak_n)
+            .collect()
     };
-    let (tip, hand) = (force(|t| t.tip_n), force(|t| t.hand_n));
+    let tip = force(ticks.iter().map(|t| t.tip_n).collect());
+    let hand = force(ticks.iter().map(|t| t.hand_n).collect());
     let own: Vec<OwnTick> = ticks.iter().filter_map(|t| t.own).collect();
     let (own_field, own_tip) = if own.is_empty() {
         (field.clone(), tip.clone())
     } else {
-        let peak_n = own.iter().map(|t| t.tip_n[1].abs()).fold(0.0, f64::max);
-        let off = own.iter().map(|t| 100.0 * (t.tip_n[0] - t.tip_n[1]).abs() / peak_n);
         (
             own.iter().map(|t| 100.0 * t.rms_m / t.largest_m).collect(),
-            off.collect(),
+            force(own.iter().map(|t| t.tip_n).collect()),
         )
     };
     Ships {
@@ -153,9 +135,7 @@ fn row(case: LiveCase, kind: TissueKind, live: &Live, prepared_s: f64, twin_resi
         hand_p99_percent: quantile(&hand, 0.99),
         hand_worst_percent: quantile(&hand, 1.0),
         own_field_percent: mean(&own_field),
-        own_field_p99_percent: quantile(&own_field, 0.99),
         own_field_worst_percent: quantile(&own_field, 1.0),
-        own_tip_p99_percent: quantile(&own_tip, 0.99),
         own_tip_worst_percent: quantile(&own_tip, 1.0),
         haptic_p50_us: quantile(&live.haptic_us, 0.5),
         haptic_p999_us: quantile(&live.haptic_us, 0.999),

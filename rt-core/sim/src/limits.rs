@@ -96,12 +96,14 @@ impl Limits {
 
 impl TissueParameters {
     fn active(&self) -> Limits {
-        let links = |shear_deg: f64| LinkLimits {
-            low: (self.min_stretch - 1.0) as f32,
-            high: (self.max_stretch - 1.0) as f32,
-            tan: shear_deg.to_radians().tan() as f32,
-        };
-        let (horizontal, vertical) = (links(self.shear_deg), links(self.shear_vert_deg));
+        let (min_stretch, max_stretch) = (self.min_stretch, self.max_stretch);
+        let [horizontal, vertical] = [self.shear_deg, self.shear_vert_deg].map(|shear_deg| {
+            LinkLimits::of(&AxisLimits {
+                min_stretch,
+                max_stretch,
+                shear_deg,
+            })
+        });
         Limits {
             links: [horizontal, vertical, vertical],
             recovery_time_s: self.recovery_time_s,

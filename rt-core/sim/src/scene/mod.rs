@@ -26,7 +26,7 @@ pub use problem::{SceneError, SceneProblem};
 pub use source::SceneSource;
 pub use structure::{Material, Role, Structure, Surroundings};
 pub use stylet_settings::MAX_STRUCTURES;
-pub use surface::{Surface, SurfacePart, surface_elements};
+pub use surface::{Surface, SurfacePart};
 pub use tissue_kind::TissueKind;
 
 /// Most cells along one axis.

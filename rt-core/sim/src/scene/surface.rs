@@ -37,11 +37,6 @@ pub struct SurfacePart {
     pub triangles: Range<usize>,
 }
 
-/// Returns the elements with at least one of their six neighbours missing.
-pub fn surface_elements(lattice: &Lattice) -> Vec<u32> {
-    boundary(lattice, |_| true)
-}
-
 /// Returns the elements of a part of the body with at least one of their six neighbours not in it.
 fn boundary(lattice: &Lattice, is_in: impl Fn(u32) -> bool) -> Vec<u32> {
     let inner = |neighbour: &Option<u32>| neighbour.is_some_and(&is_in);

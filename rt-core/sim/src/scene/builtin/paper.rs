@@ -51,7 +51,7 @@ pub(super) fn labels() -> Labels {
 
 #[cfg(test)]
 mod tests {
-    use crate::scene::{Scene, surface_elements};
+    use crate::scene::Scene;
 
     fn within(actual: usize, paper: usize, fraction: f64) -> bool {
         (actual as f64 - paper as f64).abs() <= fraction * paper as f64
@@ -61,7 +61,7 @@ mod tests {
     fn paper_scene_has_the_paper_s_numbers() {
         let scene = Scene::builtin("paper").expect("built in");
         let elements = scene.lattice.element_count();
-        let on_surface = surface_elements(&scene.lattice).len();
+        let on_surface = scene.surface.body_elements;
         let triangles = scene.surface.triangles.len();
         println!("elements {elements}, surface {on_surface}, triangles {triangles}");
         assert_eq!(scene.lattice.dims, [107, 62, 176]);
