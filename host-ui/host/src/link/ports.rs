@@ -1,5 +1,6 @@
 //! Every port that a host holds, made together and dropped together.
 
+use super::SceneModel;
 use stylet_ports::{self as service, Node, Publisher, ServiceError, SliceSubscriber, Subscriber};
 use stylet_shm_schema::*;
 
@@ -41,5 +42,12 @@ impl Ports {
             stops: service::stops::publisher(&node)?,
             node,
         })
+    }
+
+    /// Returns each scene that arrived; `None` for an inconsistent one.
+    pub fn scenes(&self) -> Vec<Option<SceneModel>> {
+        std::iter::from_fn(|| self.scene.receive())
+            .map(|sample| SceneModel::of_words(sample.header(), sample.values()))
+            .collect()
     }
 }

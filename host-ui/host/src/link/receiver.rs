@@ -228,7 +228,7 @@ impl Passes {
     fn receive(&mut self, ports: &Ports) {
         self.receive_session(ports);
         let snapshot = self.receive_snapshot(ports);
-        let scene = receive_scene(ports);
+        let scene = ports.scenes();
         let id = self.session.map(|s| s.session_id);
         let mut invalid = 0;
         let inbox = &mut *lock(&self.inbox);
@@ -386,14 +386,6 @@ impl Passes {
             }
         }
     }
-}
-
-/// Returns each scene; `None` for an inconsistent one.
-fn receive_scene(ports: &Ports) -> Vec<Option<SceneModel>> {
-    let scenes = std::iter::from_fn(|| ports.scene.receive());
-    scenes
-        .map(|sample| SceneModel::of_words(sample.header(), sample.values()))
-        .collect()
 }
 
 /// Returns the valid ones of all that arrived; counts the others.

@@ -121,7 +121,7 @@ mod tests {
     const WORKSPACE: &str = r#"
         [workspace.dependencies]
         core = { package = "rt-core", path = "rt-core" }
-        dose = { path = "host-ui/dose" }
+        host = { path = "host-ui/host" }
         egui = "1"
     "#;
 
@@ -137,7 +137,7 @@ mod tests {
     fn what_goes_up_or_across_is_found() {
         let found = of(&[
             ("host-ui", "[dependencies]\ncore.workspace = true"),
-            ("host-ui/dose", "[dependencies]\nfiles = { path = '../files' }"),
+            ("host-ui/host", "[dependencies]\nfiles = { path = '../files' }"),
             (
                 "host-ui/files",
                 "[dependencies]\nwin = { package = 'wgpu', version = '1' }\niceoryx2 = '0.10'",
@@ -152,9 +152,9 @@ mod tests {
             found,
             [
                 "host-ui -> rt-core: not among what it may use",
-                "host-ui/dose -> wgpu (in host-ui/files): not in this crate or below it",
                 "host-ui/files -> iceoryx2: not in this crate itself",
                 "host-ui/files -> wgpu (in host-ui/files): not in this crate or below it",
+                "host-ui/host -> wgpu (in host-ui/files): not in this crate or below it",
                 "hw -> tests: not among what it may use",
                 "sounds: has no row in the table of layers",
             ]
@@ -166,11 +166,11 @@ mod tests {
         let found = of(&[
             (
                 "host-ui",
-                "[dependencies]\negui.workspace = true\ndose.workspace = true",
+                "[dependencies]\negui.workspace = true\nhost.workspace = true",
             ),
-            ("host-ui/dose", "[dependencies]\nfiles = { path = '../files' }"),
+            ("host-ui/host", "[dependencies]\nfiles = { path = '../files' }"),
             ("host-ui/files", "[dependencies]\nnifti = '0.18'"),
-            ("tests", "[dependencies]\ncore.workspace = true\ndose.workspace = true"),
+            ("tests", "[dependencies]\ncore.workspace = true\nhost.workspace = true"),
         ]);
         assert_eq!(found, Vec::<String>::new());
     }
