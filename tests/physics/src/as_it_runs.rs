@@ -10,7 +10,7 @@ use stylet_sim::line::{HandLine, StationSettings};
 use stylet_sim::scene::{Labels, Role, Scene, SceneSource, Structure, TissueKind};
 use stylet_sim::tissue::fem::batch::{BatchModel, BatchState, NodeWeight};
 use stylet_sim::tissue::fem::{FemModel, FemSettings, Integration, Material, SolveSettings};
-use stylet_sim::tissue::{FemTissue, Held, TissueModel};
+use stylet_sim::tissue::{FemTissue, TissueModel};
 
 /// Largest error of a tick that is accepted.
 const FIELD_PERCENT: f64 = 1.0;

@@ -8,7 +8,7 @@ use super::motion::Renewals;
 use super::ports::Ports;
 use super::second::SecondEnds;
 use super::thread::lock;
-use super::{ABSENT_AFTER, Answer, SceneModel, Snapshot, UNANSWERED};
+use super::{ABSENT_AFTER, Answer, Snapshot, UNANSWERED};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 use stylet_ports::{self as service, Node, ServiceError, SlicePublisher, StateReader};
