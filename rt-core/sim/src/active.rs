@@ -58,7 +58,6 @@ fn tissue(set: &ParameterSet) -> TissueParameters {
         shear_vert_deg: set.get(P::ShearVertical).to_degrees(),
         recovery_time_s: set.get(P::RecoveryTime),
         residual_tolerance: set.get(P::ResidualTolerance),
-        ..TissueParameters::default()
     }
 }
 

@@ -205,8 +205,9 @@ impl Control {
             // A ring that is full leaves its loop out.
             let _ = loops.haptic_orders.push((0, HapticOrder::HandOverTape));
             let _ = loops.tissue_orders.push(TissueOrder::HandOverTape);
-            let second = second.as_mut().map(|second| &mut second.orders);
-            let _ = second.map(|orders| orders.push((0, HapticOrder::HandOverTape)));
+            if let Some(second) = second {
+                let _ = second.orders.push((0, HapticOrder::HandOverTape));
+            }
         });
         let Some(saved) = saved else { return };
         let result = saved.result.map_err(|why| why.to_string());

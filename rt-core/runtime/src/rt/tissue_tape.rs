@@ -226,10 +226,10 @@ impl TissueTape {
     pub fn left_loads(&mut self, loads: &LeftLoads) {
         let tick = self.ticks.next();
         if let Some(left) = &mut self.left
-            && !left
+            && left
                 .0
                 .newest()
-                .is_some_and(|(_, newest)| bytes_of(newest) == bytes_of(loads))
+                .is_none_or(|(_, newest)| bytes_of(newest) != bytes_of(loads))
         {
             left.0.push((tick, *loads));
         }
