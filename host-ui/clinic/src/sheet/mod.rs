@@ -59,15 +59,6 @@ pub struct State {
     pub fit: Option<RigidFit>,
 }
 
-/// Structure with its histogram.
-#[derive(Clone, Debug)]
-pub struct Histogram {
-    /// Name of the structure.
-    pub name: String,
-    /// Its histogram.
-    pub dvh: Dvh,
-}
-
 /// A state with its dose.
 #[derive(Clone, Debug)]
 pub struct Column {
@@ -75,8 +66,8 @@ pub struct Column {
     pub state: State,
     /// Name, with the effects considered.
     pub name: String,
-    /// Histograms, in the order of the structures.
-    pub histograms: Vec<Histogram>,
+    /// Histogram of each structure; `None` for one without volume.
+    pub histograms: Vec<Option<Dvh>>,
     /// Whole volume at the prescription, in m³: the basis of indices.
     pub at_prescription_m3: Result<f64, NotComputed>,
     /// Sectors of the target.
@@ -104,11 +95,7 @@ impl Column {
             if n == state.target {
                 sectors = sectors::of(structure, &dose_gy, implant.prescription_gy);
             }
-            let dvh = Dvh::new(&dose_gy, &structure.volumes_m3);
-            histograms.extend(dvh.map(|dvh| Histogram {
-                name: structure.name.clone(),
-                dvh,
-            }));
+            histograms.push(Dvh::new(&dose_gy, &structure.volumes_m3));
         }
         Self {
             name: match edema {
@@ -128,19 +115,18 @@ impl Column {
 
     /// Returns the histogram of the target.
     pub fn target(&self) -> Option<&Dvh> {
-        let name = self.state.structures.get(self.state.target).map(|s| s.name.as_str());
-        self.histograms
-            .iter()
-            .find(|h| Some(h.name.as_str()) == name)
-            .map(|h| &h.dvh)
+        self.histograms.get(self.state.target)?.as_ref()
     }
 
     /// Returns the histogram of the first structure named like an organ; the wall of the rectum
     /// replaces it if it is drawn alone.
     pub fn organ(&self, organ: Organ) -> Option<&Dvh> {
-        let called = |organ: Organ| self.histograms.iter().find(|h| organ.is_mentioned_in(&h.name));
+        let called = |organ: Organ| {
+            let mut all = self.state.structures.iter().zip(&self.histograms);
+            all.find_map(|(s, dvh)| dvh.as_ref().filter(|_| organ.is_mentioned_in(&s.name)))
+        };
         let wall = || (organ == Organ::Rectum).then(|| called(Organ::RectalWall)).flatten();
-        called(organ).or_else(wall).map(|h| &h.dvh)
+        called(organ).or_else(wall)
     }
 }
 
