@@ -1,6 +1,6 @@
 //! The template: 13 x 13 holes for needles, columns A to M, rows 1 to 13.
 
-use crate::patient::patient_axis;
+use crate::patient::{Box3, patient_axis};
 use nalgebra::Vector3;
 use stylet_shm_schema::SceneHeader;
 
@@ -103,18 +103,8 @@ impl Template {
         let columns = across(left).or_else(|| across(Vector3::x())).unwrap_or_else(Vector3::y);
         // Right-handed: left and anterior, seen from the perineum.
         let rows = inwards.cross(&-columns);
-        let middle = middle(scene.target_lower_m, scene.target_upper_m);
-        let below = (0..3)
-            .filter(|&a| inwards[a].abs() > 1e-9)
-            .map(|a| {
-                let face = if inwards[a] > 0.0 {
-                    scene.lower_m[a]
-                } else {
-                    scene.upper_m[a]
-                };
-                (middle[a] - face) / inwards[a]
-            })
-            .fold(f64::INFINITY, f64::min);
+        let middle = Box3::of(scene.target_lower_m, scene.target_upper_m).middle();
+        let below = Box3::of(scene.lower_m, scene.upper_m).way_out_m(middle, -inwards);
         Self {
             middle_m: (middle - inwards * (below + CLEARANCE_M)).into(),
             columns: columns.into(),
@@ -143,10 +133,6 @@ impl Template {
             row: v as u8,
         })
     }
-}
-
-fn middle(lower_m: [f64; 3], upper_m: [f64; 3]) -> Vector3<f64> {
-    (Vector3::from(lower_m) + Vector3::from(upper_m)) / 2.0
 }
 
 #[cfg(test)]

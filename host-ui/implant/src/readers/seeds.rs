@@ -4,10 +4,12 @@ use super::columns::Mapped;
 use super::declared::Declared;
 pub use super::table::PLACE;
 use super::table::{self, LineError, Row, shown};
+use std::num::NonZeroU32;
 use std::path::Path;
+use std::str::FromStr;
 use stylet_dose::Seed;
 use stylet_files::dicom;
-use stylet_files::dicom::plan::{Date, PlanSeed, SeedPlan};
+use stylet_files::dicom::plan::{PlanSeed, SeedPlan};
 use stylet_files::{FileError, bytes};
 
 const MAX_U: f64 = 1e5;
@@ -62,9 +64,9 @@ pub fn read_seeds(path: &Path, defaults: SeedDefaults) -> Result<SeedFile, FileE
             position_m: row.position_m()?,
             axis: axis(row)?,
             strength_u: strength_u(row, &defaults)?,
-            needle: needle(row)?,
+            needle: parsed(row, "needle", "not a whole number from 1")?.map(NonZeroU32::get),
             hole: row.text("hole").unwrap_or_default().to_owned(),
-            strength_on: strength_on(row)?,
+            strength_on: parsed(row, "strength_date", "not a day like 2026-10-31")?,
         })
     };
     let (rows, notes) = table::read(path, &known, &defaults.columns, row)?;
@@ -116,27 +118,11 @@ fn axis(row: &Row) -> Result<Option<[f64; 3]>, LineError> {
     }
 }
 
-fn needle(row: &Row) -> Result<Option<u32>, LineError> {
-    let number = row.text("needle").map(|text| match text.parse() {
-        Ok(number @ 1..) => Ok(number),
-        _ => Err(LineError::new(format!(
-            "needle is \"{}\", not a whole number from 1",
-            shown(text)
-        ))),
-    });
-    number.transpose()
-}
-
-fn strength_on(row: &Row) -> Result<Option<Date>, LineError> {
-    let date = row.text("strength_date").map(|text| {
-        text.parse().map_err(|_| {
-            LineError::new(format!(
-                "strength_date is \"{}\", not a day like 2026-10-31",
-                shown(text)
-            ))
-        })
-    });
-    date.transpose()
+/// Reads a field of another type; `what` follows a field that cannot be read.
+fn parsed<T: FromStr>(row: &Row, column: &str, what: &str) -> Result<Option<T>, LineError> {
+    let refused = |text: &str| LineError::new(format!("{column} is \"{}\", {what}", shown(text)));
+    let parse = |text: &str| text.parse().map_err(|_| refused(text));
+    row.text(column).map(parse).transpose()
 }
 
 fn strength_u(row: &Row, defaults: &SeedDefaults) -> Result<f64, LineError> {

@@ -1,6 +1,6 @@
 //! One needle through the gland and the seeds along it (paper fig. 6).
 
-use crate::patient::patient_axis;
+use crate::patient::{Box3, patient_axis};
 use nalgebra::Vector3;
 use stylet_shm_schema::{HandMove, MAX_SEEDS, PlannedNeedle, Prescribed, Request, SceneHeader, StructureInfo, role};
 
@@ -26,7 +26,7 @@ pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> PlannedNeedle {
     let direction = patient_axis(scene, 2, Vector3::z());
     let target = Box3::of(scene.target_lower_m, scene.target_upper_m);
     let body = Box3::of(scene.lower_m, scene.upper_m);
-    let half = target.way_from_middle_m(direction);
+    let half = target.way_out_m(target.middle(), direction);
     let (first, last) = SEEDED_SHARE;
     let deepest_m = half * (2.0 * last - 1.0);
     let out_m = body.way_out_m(target.middle(), -direction) + ENTRY_CLEARANCE_M;
@@ -34,7 +34,7 @@ pub fn plan_with_seeds(scene: &SceneHeader, seeds: usize) -> PlannedNeedle {
     let is_clear = |through: &Vector3<f64>| {
         let spared = scene.structures().iter().filter(|s| s.role & role::SPARE != 0);
         spared
-            .map(Box3::around)
+            .map(around)
             .all(|b| !b.is_met(*through, direction, [-out_m, deepest_m]))
     };
     let centre = candidates.into_iter().find(is_clear).unwrap_or(target.middle());
@@ -64,7 +64,7 @@ fn candidate_centres(scene: &SceneHeader, target: &Box3, direction: Vector3<f64>
     let Some(aside) = (right - direction * right.dot(&direction)).try_normalize(1e-3) else {
         return vec![target.middle()];
     };
-    let farthest_m = 0.5 * target.way_from_middle_m(aside);
+    let farthest_m = 0.5 * target.way_out_m(target.middle(), aside);
     // Slightly more, because the quotient may be an integer.
     let steps = (farthest_m / ASIDE_M + 1e-6).clamp(0.0, 100.0) as usize;
     let each = (1..=steps).flat_map(|n| [n as f64, -(n as f64)]);
@@ -74,69 +74,12 @@ fn candidate_centres(scene: &SceneHeader, target: &Box3, direction: Vector3<f64>
         .collect()
 }
 
-/// Box along the axes of the scene.
-struct Box3 {
-    lower: Vector3<f64>,
-    upper: Vector3<f64>,
-}
-
-impl Box3 {
-    fn of(lower_m: [f64; 3], upper_m: [f64; 3]) -> Self {
-        Self {
-            lower: lower_m.into(),
-            upper: upper_m.into(),
-        }
-    }
-
-    /// Returns the box that the needle must avoid for a structure.
-    fn around(structure: &StructureInfo) -> Self {
-        let margin = Vector3::repeat(SPARED_M);
-        Self {
-            lower: Vector3::from(structure.lower_m) - margin,
-            upper: Vector3::from(structure.upper_m) + margin,
-        }
-    }
-
-    fn middle(&self) -> Vector3<f64> {
-        (self.lower + self.upper) / 2.0
-    }
-
-    /// Returns the distance of a line from the centre to the box's surface: the nearest pair of
-    /// faces ends it.
-    fn way_from_middle_m(&self, direction: Vector3<f64>) -> f64 {
-        self.way_out_m(self.middle(), direction)
-    }
-
-    fn way_out_m(&self, from: Vector3<f64>, direction: Vector3<f64>) -> f64 {
-        (0..3)
-            .filter(|&a| direction[a].abs() > 1e-9)
-            .map(|a| {
-                let face = if direction[a] > 0.0 {
-                    self.upper[a]
-                } else {
-                    self.lower[a]
-                };
-                (face - from[a]) / direction[a]
-            })
-            .fold(f64::INFINITY, f64::min)
-    }
-
-    /// Returns whether the piece of a line between two distances from `through` enters the box.
-    fn is_met(&self, through: Vector3<f64>, direction: Vector3<f64>, [from_m, to_m]: [f64; 2]) -> bool {
-        let (mut enter, mut leave) = (from_m, to_m);
-        for a in 0..3 {
-            let (lower, upper) = (self.lower[a] - through[a], self.upper[a] - through[a]);
-            if direction[a].abs() < 1e-9 {
-                if lower > 0.0 || upper < 0.0 {
-                    return false;
-                }
-                continue;
-            }
-            let (one, other) = (lower / direction[a], upper / direction[a]);
-            (enter, leave) = (enter.max(one.min(other)), leave.min(one.max(other)));
-        }
-        enter <= leave
-    }
+/// Returns the box that the needle must avoid for a structure.
+fn around(structure: &StructureInfo) -> Box3 {
+    Box3::of(
+        structure.lower_m.map(|v| v - SPARED_M),
+        structure.upper_m.map(|v| v + SPARED_M),
+    )
 }
 
 /// Returns the request that moves the simulated hand to `tip_m`; m/s and m/s².
