@@ -212,7 +212,7 @@ fn scripts_are_valid_and_the_question_about_rights_begins_with_none() {
     let script = text(&repository("rt-core/package/scripts/postinst"));
     assert!(script.contains("RET=none") && script.contains("group) grant_group") && script.contains("= program ]"));
     let limits = text(&repository("rt-core/runtime/src/rt/arm.rs"));
-    for line in ["rtprio 90", "memlock unlimited"] {
+    for line in ["rtprio 90", "nice -11", "memlock unlimited"] {
         assert!(
             script.contains(&format!("@stylet - {line}")) && limits.contains(line),
             "{line}"

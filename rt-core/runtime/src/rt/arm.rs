@@ -28,8 +28,9 @@ pub struct Refused(pub String);
 pub fn advice(missing: &str) -> String {
     let program = std::env::current_exe().map_or_else(|_| "rt-core".into(), |p| p.display().to_string());
     format!(
-        "{missing}. Either: sudo setcap cap_sys_nice,cap_ipc_lock=ep {program}   or put these two lines into \
-         /etc/security/limits.d/stylet.conf and log in again: '@users - rtprio 90' and '@users - memlock unlimited'"
+        "{missing}. Either: sudo setcap cap_sys_nice,cap_ipc_lock=ep {program}   or put these three lines into \
+         /etc/security/limits.d/stylet.conf and log in again: '@users - rtprio 90', '@users - nice -11' and \
+         '@users - memlock unlimited'"
     )
 }
 
