@@ -27,7 +27,7 @@ VARIANTS = {
     "oblique": {"refuse": True, "oblique": True}, "uneven frames": {"refuse": True, "uneven": True},
     "relative": {"refuse": True, "DoseUnits": "RELATIVE"}, "no offsets": {"refuse": True, "offsets": False},
     "absolute offsets, coronal": {"refuse": True, "turn": CORONAL, "absolute": True}, "one offset short": {"refuse": True, "short": True},
-    "offsets of neither kind": {"refuse": True, "shift": 7.0}, "8 bits": {"refuse": True, "bits": 8},
+    "offsets of neither kind": {"refuse": True, "shift": 7.0}, "8 bits": {"may": True, "bits": 8},
     "absolute offsets, feet first": {"refuse": True, "turn": FEET, "absolute": True},
     "big endian, 32 bits as numpy orders them": {"refuse": True, "syntax": 2, "bits": 32, "numpy": True}, "absolute offsets, again": {"absolute": True},
 }

@@ -191,6 +191,7 @@ def second(found, path, kind, how, frame, labels):
 def check(stylet, rng, root, kind, n, variant, how):
     found = Object(kind, f"{kind}{n:02}", variant)
     frame, labels = volume(rng, how.get("mirror"))
+    found.must_refuse = how.get("encoding") == "hex"
     found.may_refuse = "letters" in how
     if found.may_refuse:  # the sides at which the axes begin, as ITK writes them; MetaIO's own page says where they end
         frame.directions = np.diag([-1.0, -1.0, 1.0])
