@@ -32,7 +32,11 @@ pub fn program(name: &str) -> PathBuf {
         .and_then(|deps| deps.parent())
         .expect("tests live in <target>/<profile>/deps");
     let path = folder.join(name);
-    assert!(path.exists(), "{} is missing: run `make products` first", path.display());
+    assert!(
+        path.exists(),
+        "{} is missing: run `make products` first",
+        path.display()
+    );
     path
 }
 

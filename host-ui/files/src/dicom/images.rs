@@ -221,9 +221,13 @@ pub fn grid(mut slices: Vec<Slice>) -> Result<Option<Grid>, ContentError> {
     }
     let is_rounded = most_off <= ROUNDED_MM && most_off < step / 4.0;
     if most_off > UNEVEN * step && !is_rounded {
+        // Coordinates rounded to 0.1 mm put an oblique slice off by up to twice that.
+        let why = match most_off < 2.0 * ROUNDED_MM && most_off < step / 4.0 {
+            true => "their positions seem to be rounded; export them with more decimals",
+            false => "some are missing, or their distances differ",
+        };
         return Err(invalid!(
-            "the {count} images of its series do not lie at even distances (on average {step:.3} mm, off by up to {most_off:.3} mm): \
-             some are missing, or their distances differ"
+            "the {count} images of its series do not lie at even distances (on average {step:.3} mm, off by up to {most_off:.3} mm): {why}"
         ));
     }
     let across = (slices[count - 1].corner - slices[0].corner) / (count - 1) as f64;

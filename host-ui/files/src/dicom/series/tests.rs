@@ -142,6 +142,19 @@ fn a_series_has_its_place_and_rescaled_values() {
     );
 }
 
+/// Rounded positions used to be refused with the words for a missing slice.
+#[test]
+fn positions_that_are_rounded_too_coarsely_are_refused_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    write_series(folder.path(), "2.25.11", &[0, 1, 3]);
+    let mut moved = slice("2.25.11", 2);
+    let place_mm = place_mm(0, 0, 2) + Vector3::new(0.0, 0.0, 0.1);
+    moved.put(decimals(tags::IMAGE_POSITION_PATIENT, place_mm.as_slice()));
+    put(folder.path(), "moved.dcm", moved);
+    let why = read(folder.path(), &Progress::default()).unwrap_err().to_string();
+    assert!(why.contains("seem to be rounded"), "{why}");
+}
+
 #[test]
 fn missing_and_duplicate_slices_are_reported() {
     for slices in [&[0, 1, 3][..], &[0][..]] {
