@@ -153,7 +153,7 @@ pub fn load(path: &Path, progress: &Progress) -> Result<(SceneFile, LabelVolume)
 
 /// Parses the text of a scene file.
 pub fn parse(text: &str) -> Result<SceneFile, ContentError> {
-    let tables: Tables = toml::from_str(text).map_err(|e| format!("it is no scene file: {e}"))?;
+    let tables: Tables = toml::from_str(text).map_err(|e| format!("it is not a valid scene file: {e}"))?;
     let mut problems = Vec::new();
     let mut check = |name: &str, value: Option<f64>, least: f64, most: f64| {
         if value.is_some_and(|v| !(least..=most).contains(&v)) {

@@ -185,7 +185,7 @@ fn what_is_missing_is_said_in_words_that_help() {
         why.contains("/nonexistent/libHD.so: cannot open shared object file"),
         "{why}"
     );
-    let program = Some(stylet_tests::program("libhost_ui.rlib"));
+    let program = Some(stylet_tests::program("rt-core"));
     let why = open(PhantomConfig {
         library: program,
         ..config()
@@ -193,7 +193,7 @@ fn what_is_missing_is_said_in_words_that_help() {
     .map(drop)
     .unwrap_err()
     .to_string();
-    assert!(why.contains("libhost_ui.rlib"), "{why}");
+    assert!(why.contains("/rt-core: "), "{why}");
 
     fake.control.unplugged.store(1, Relaxed);
     let why = open(config()).map(drop).unwrap_err().to_string();

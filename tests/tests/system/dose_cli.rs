@@ -286,7 +286,7 @@ fn what_is_wrong_is_reported_once_with_its_file_and_line() {
         (good, &["--spacing-mm", "0"], "--spacing-mm 0: give 0.05 to 100"),
     ] {
         let (went_well, said) = run_with(seeds, more);
-        if went_well || !said.contains(reported) || said.matches("host-ui:").count() != 1 {
+        if went_well || !said.contains(reported) || said.matches("stylet-clinic:").count() != 1 {
             wrong.push(format!(
                 "{seeds:?} {more:?}, taken {went_well}: not {reported:?} once in {said:?}"
             ));

@@ -180,7 +180,7 @@ fn a_scene_file_that_cannot_be_used_is_refused_and_the_scene_goes_on() {
             .expect("host-ui runs");
         let said = String::from_utf8_lossy(&run.stderr).into_owned();
         assert!(
-            !run.status.success() && said.contains("[needle] speed is not known"),
+            !run.status.success() && said.contains("unknown field `speed`"),
             "{said}"
         );
         link.poll();
