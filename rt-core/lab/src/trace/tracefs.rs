@@ -264,7 +264,7 @@ fn remove_dead(root: &Root) {
 /// itself.
 fn keeper(name: &str) -> Result<Option<Child>, TraceError> {
     let program = std::env::current_exe().map_err(TraceError::Keeper)?;
-    if program.file_name().is_none_or(|n| n != "rt-core") {
+    if program.file_name().is_none_or(|n| n != "stylet-lab") {
         return Ok(None);
     }
     let child = Command::new(program)
