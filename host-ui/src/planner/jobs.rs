@@ -15,7 +15,7 @@ use stylet_host::link::{Link, SceneModel};
 use stylet_implant::intraoperative::Reviewed;
 use stylet_implant::linked::scene as study;
 use stylet_implant::plan::first::{self, FirstPlan};
-use stylet_implant::plan::optimise::Objectives;
+use stylet_implant::plan::optimise::{self, Objectives};
 use stylet_implant::plan::{Compensation, ImplantPlan, Limits, LinkRehearser, Needle, compensate, exchange};
 use stylet_implant::workflow::Pace;
 use stylet_shm_schema::Instance;
@@ -130,7 +130,10 @@ impl Planner {
                 let objectives = Objectives::new(&source, prescription_gy);
                 let report = |share| reporter.report(share);
                 let (template, anatomy) = (outlines.template, &outlines.anatomy);
-                let found = first::proposals(template, anatomy, &kernel, &source, &objectives, PROPOSALS, report)?;
+                // Without a urethra there is little to choose between, and the window's steps need the room.
+                let [_, urethra, _] = optimise::bodies(anatomy);
+                let count = if urethra.is_some() { PROPOSALS } else { 1 };
+                let found = first::proposals(template, anatomy, &kernel, &source, &objectives, count, report)?;
                 Ok(JobMessage::First(found))
             })
         });
