@@ -43,11 +43,6 @@ pub const PRODUCTS: [Product; 2] = [
     },
 ];
 
-const AFTER_HELP: &str = "\
-Commands of other programs, which `host-ui COMMAND` starts:
-  stylet-clinic  scene, convert, dicom, plan, dose, find-seeds, post-implant, compare, perturb, study, class
-  stylet-igtl    igtl";
-
 /// Operator's program of Stylet, a haptic simulator of prostate brachytherapy.
 ///
 /// Start `rt-core` first, then `host-ui` for the window. `host-ui procedure` implants the seeds of
@@ -55,7 +50,7 @@ Commands of other programs, which `host-ui COMMAND` starts:
 /// or a 3D mouse hold the needle: F1 lists their functions, `host-ui controllers` lists the
 /// connected ones.
 #[derive(Parser, Debug)]
-#[command(name = "host-ui", version, args_conflicts_with_subcommands = true, after_help = AFTER_HELP)]
+#[command(name = "host-ui", version, args_conflicts_with_subcommands = true, after_help = stylet_manual::list("host-ui", &PRODUCTS))]
 pub struct Cli {
     #[command(flatten)]
     window: CoreArgs,

@@ -31,17 +31,12 @@ pub const PRODUCTS: [Product; 2] = [
     },
 ];
 
-const AFTER_HELP: &str = "\
-Commands of other programs, which `rt-core COMMAND` starts:
-  stylet-lab    latency, campaign, verify, fleet, credibility, doctor, cost
-  stylet-study  study";
-
 /// Real-time process of Stylet: owns the haptic device, the 1 kHz force loop and the 200 Hz tissue step.
 ///
 /// Start it first; any number of hosts may connect and disconnect. It asks for SCHED_FIFO and locked memory and refuses
 /// to run without them, unless started with --no-rt. With a subcommand it carries out that task instead.
 #[derive(Parser, Debug)]
-#[command(name = "rt-core", version, args_conflicts_with_subcommands = true, after_help = AFTER_HELP)]
+#[command(name = "rt-core", version, args_conflicts_with_subcommands = true, after_help = stylet_manual::list("rt-core", &PRODUCTS))]
 pub struct Cli {
     /// Carried out instead of a run.
     #[command(subcommand)]

@@ -46,6 +46,13 @@ pub fn hand_over(products: &[Product]) -> Result<(), HandOverError> {
     })
 }
 
+/// Lists the products' commands, for the help of program `own`.
+pub fn list(own: &str, products: &[Product]) -> String {
+    let line = |product: &Product| format!("\n  {:<14} {}", product.program, product.commands.join(", "));
+    let lines: String = products.iter().map(line).collect();
+    format!("Commands of other programs, which `{own} COMMAND` starts:{lines}")
+}
+
 fn owner(products: &[Product], word: &OsStr) -> Option<Product> {
     let has = |product: &&Product| product.commands.iter().any(|command| word == *command);
     products.iter().find(has).copied()

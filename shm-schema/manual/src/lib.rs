@@ -13,7 +13,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use stylet_write::{WriteError, write_whole};
 
-pub use hand_over::{HandOverError, Product, hand_over};
+pub use hand_over::{HandOverError, Product, hand_over, list};
 
 /// The subcommand that writes them.
 #[derive(Args, Debug)]

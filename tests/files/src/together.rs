@@ -5,11 +5,13 @@ use clap::{Command, CommandFactory};
 use std::any::TypeId;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use stylet_dose::Source;
 use stylet_files::dicom::Identity;
 use stylet_files::dicom::dose::{self, DoseImage, DoseKind, DoseOf};
-use stylet_files::dicom::plan::{self, PlanSeed, PlanSource, SeedPlan};
+use stylet_files::dicom::plan::{self, PlanSeed, SeedPlan};
 use stylet_files::dicom::structures::write::{self as structures, Outlined, Written};
 use stylet_host::core_args::SceneChoice;
+use stylet_implant::plan::exchange::seeds_of_source;
 use stylet_test_kit::{program, repository, scratch};
 
 /// Names of the definitions; the window is a command of the first.
@@ -139,22 +141,10 @@ impl Files {
             strength_u: 0.5,
             strength_on: None,
         };
+        let source = Source::known("6711").unwrap();
         let seeds = SeedPlan {
-            label: "test".to_owned(),
-            identity: identity.clone(),
             uid: "2.25.12".to_owned(),
-            structure_set: None,
-            prescription_gy: Some(145.0),
-            planned_on: None,
-            source: PlanSource {
-                model: "6711".to_owned(),
-                manufacturer: String::new(),
-                isotope: "I-125".to_owned(),
-                half_life_days: 59.4,
-                active_length_m: 3e-3,
-            },
-            seeds: (0..12).map(seed).collect(),
-            notes: Vec::new(),
+            ..seeds_of_source(&source, (0..12).map(seed).collect(), Some(145.0), identity.clone())
         };
         put(Kind::Seeds, plan::bytes(&seeds).unwrap());
         let image = DoseImage {

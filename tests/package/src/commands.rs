@@ -79,3 +79,26 @@ fn the_page_of_commands_says_what_the_programs_say() {
         "docs/commands.md is not what the programs say: run the command at its head; {differs:?}"
     );
 }
+
+/// A command that a product gained or renamed would be unknown to the program that users type.
+#[test]
+fn every_command_of_a_product_is_typed_with_the_simulators_program() {
+    let started = [
+        ("rt-core", ["stylet-lab", "stylet-study"]),
+        ("host-ui", ["stylet-clinic", "stylet-igtl"]),
+    ];
+    let mut checked = 0;
+    for (simulator, products) in started {
+        for product in products {
+            for (command, _) in Help::short(product).subcommands() {
+                if command == "manual" {
+                    continue;
+                }
+                checked += 1;
+                let help = |program: &str| Help::of(vec![program.to_owned(), command.clone()], "-h").text;
+                assert_eq!(help(simulator), help(product), "{simulator} {command}");
+            }
+        }
+    }
+    assert!(checked > 15, "only {checked} commands found");
+}

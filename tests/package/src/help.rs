@@ -12,7 +12,8 @@ pub struct Help {
 }
 
 impl Help {
-    fn of(words: Vec<String>, option: &str) -> Self {
+    /// Runs the command with `-h` or `--help`.
+    pub fn of(words: Vec<String>, option: &str) -> Self {
         let shown = Command::new(program(&words[0])).args(&words[1..]).arg(option).output();
         let text = String::from_utf8(shown.expect("it starts").stdout).expect("UTF-8");
         Self { words, text }

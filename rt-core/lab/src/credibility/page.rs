@@ -20,7 +20,7 @@ pub fn page(c: &Credibility) -> String {
         (hazards(c))
         h2 { "Requirements, hazards, tests, runs" }
         p class="faint" {
-            "A test is named by its file in the repository and its function; all of them run in " code { "make test" } ". "
+            "A test is named by its file in the repository and its function; all of them run in " code { "make test-all" } ". "
             "The last column has the outcomes of the runs below, by their number."
         }
         (requirements(c))

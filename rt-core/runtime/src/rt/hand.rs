@@ -90,13 +90,13 @@ impl HandDevice {
         self.answer.read
     }
 
-    /// Writes the wrench and ends that stage; true if the device rejected it.
+    /// Writes the wrench; true if the device rejected it.
     pub(super) fn write(&mut self, wrench: &Wrench) -> bool {
         self.answer.write_failed = self.device.write(wrench).is_err();
         self.answer.write_failed
     }
 
-    /// Ends the stage of the write, in a measurement.
+    /// Ends the stage of the write and takes the time since the read began, in a measurement.
     pub(super) fn mark_output(&mut self) {
         if let Some(probe) = &mut self.probe {
             probe.mark();
@@ -104,12 +104,11 @@ impl HandDevice {
         }
     }
 
-    /// Leaves zero force.
+    /// Writes zero force.
     pub(super) fn end(&mut self) {
         let _ = self.device.write(&Wrench::zero());
     }
 
-    /// Brakes a simulated hand, if a motion of it is under way.
     fn brake(&mut self, goal: &HandGoal, sample: Option<Sample>, velocity_m_per_s: &Vector3<f64>) {
         motion_lease::brake(self.device.as_mut(), goal, sample, velocity_m_per_s);
     }
@@ -143,12 +142,12 @@ impl HandMemory {
         promise: Option<Promise>,
     ) {
         (self.goal, self.up) = (Some(goal), up);
-        self.go_on(hand);
+        self.follow_goal(hand);
         let promise = promise.filter(|_| hand.info.simulated);
         self.motion = MotionLease::begin(promise, hand.period_s);
     }
 
-    fn go_on(&self, hand: &mut HandDevice) {
+    fn follow_goal(&self, hand: &mut HandDevice) {
         if let Some(goal) = &self.goal {
             hand.device.set_hand_up(self.up);
             hand.device.set_hand_goal(goal);
@@ -172,9 +171,9 @@ impl HandMemory {
 
     /// Takes a promise, which may resume a lapsed motion.
     pub(super) fn keep_moving(&mut self, hand: &mut HandDevice, promise: &Promise) {
-        let promise = promise.within_5_mm(self.goal.map_or(0.0, |goal| goal.speed_m_per_s));
+        let promise = promise.limited_to_travel(self.goal.map_or(0.0, |goal| goal.speed_m_per_s));
         if self.motion.renew(&promise, hand.period_s) {
-            self.go_on(hand);
+            self.follow_goal(hand);
         }
     }
 

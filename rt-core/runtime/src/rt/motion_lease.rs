@@ -12,7 +12,7 @@ const FIRST_VALID_S: f64 = 0.02;
 const GRACE_S: f64 = 0.3;
 /// Deceleration so hard that the mass of the hand, not its path, decides the stopping distance: 1.6 mm from 123 mm/s.
 const BRAKE_M_PER_S2: f64 = 20.0;
-/// Farthest motion after the last renewal, of which [`brake`] takes a part.
+/// Farthest motion after the last renewal, [`brake`] included.
 const MOST_TRAVEL_M: f64 = 4.8e-3;
 /// Deceleration of the tip when the hand brakes: less than that of its path, by its mass on its spring.
 const TIP_BRAKES_M_PER_S2: f64 = 4.7;
@@ -37,8 +37,9 @@ impl Promise {
         }
     }
 
-    /// Returns the promise as far as a hand of that speed comes to rest within 5 mm, but at least the initial lease.
-    pub fn within_5_mm(self, speed_m_per_s: f64) -> Self {
+    /// Shortens the promise so that a hand at the ordered speed comes to rest within [`MOST_TRAVEL_M`]; never below the
+    /// initial lease.
+    pub fn limited_to_travel(self, speed_m_per_s: f64) -> Self {
         let speed_m_per_s = speed_m_per_s.max(1e-3);
         let braking_m = speed_m_per_s.powi(2) / (2.0 * TIP_BRAKES_M_PER_S2);
         let valid_s = (MOST_TRAVEL_M - braking_m) / speed_m_per_s;
@@ -182,12 +183,12 @@ mod tests {
     }
 
     #[test]
-    fn a_fast_hand_is_promised_no_more_than_5_mm() {
+    fn a_promise_is_shortened_for_a_fast_hand() {
         for (speed_m_per_s, ticks_left) in [(0.01, 300.0), (0.05, 90.7), (0.123, 25.9), (0.2, 20.0)] {
-            let valid_s = promise(MINE, 300).within_5_mm(speed_m_per_s).valid_s;
+            let valid_s = promise(MINE, 300).limited_to_travel(speed_m_per_s).valid_s;
             assert!((valid_s * 1e3 - ticks_left).abs() < 0.1, "{speed_m_per_s}: {valid_s}");
         }
-        assert_eq!(promise(MINE, 5).within_5_mm(0.123), promise(MINE, 5));
+        assert_eq!(promise(MINE, 5).limited_to_travel(0.123), promise(MINE, 5));
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Seeds of a plan keep their needles.
 
 use super::*;
-use stylet_files::dicom::plan::{PlanSource, SeedPlan};
-use stylet_files::dicom::{Identity, new_uid};
+use crate::plan::exchange::seeds_of_source;
+use stylet_dose::Source;
+use stylet_files::dicom::Identity;
 
 fn plan() -> Vec<u8> {
     let seed = |(needle, hole, z_m): (Option<u32>, &str, f64)| PlanSeed {
@@ -14,23 +15,9 @@ fn plan() -> Vec<u8> {
         strength_on: None,
     };
     let seeds = [(Some(3), "D4", 0.01), (Some(3), "D4", 0.02), (Some(1), "", 0.03)];
-    let plan = SeedPlan {
-        label: "test".to_owned(),
-        identity: Identity::new(),
-        uid: new_uid(),
-        structure_set: None,
-        prescription_gy: Some(145.0),
-        planned_on: None,
-        source: PlanSource {
-            model: "6711".to_owned(),
-            manufacturer: String::new(),
-            isotope: "I-125".to_owned(),
-            half_life_days: 59.4,
-            active_length_m: 3e-3,
-        },
-        seeds: seeds.into_iter().map(seed).collect(),
-        notes: Vec::new(),
-    };
+    let seeds = seeds.into_iter().map(seed).collect();
+    let source = Source::known("6711").unwrap();
+    let plan = seeds_of_source(&source, seeds, Some(145.0), Identity::new());
     dicom::plan::bytes(&plan).unwrap()
 }
 
