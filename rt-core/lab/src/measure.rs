@@ -211,6 +211,7 @@ pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, Meas
         let host = threads.spawn(|| {
             let warm_up = warm_up_ticks(options.haptic_period_ns);
             let host = Host::new(&options.instance, script, pose_times, warm_up, options.second.is_some());
+            // SYNC: set by a signal handler; nothing but the flag is carried.
             let report = host.and_then(|h| h.run(setup.duration_ns, || interrupted.load(Ordering::Acquire), stop));
             // SYNC: pairs with the acquire loads of bridge and watches; nothing but the flag is carried.
             stop.store(true, Ordering::Release);
