@@ -1,12 +1,12 @@
 //! The laboratory, a study with its page, commands on files, and OpenIGTLink.
 
-use crate::{json, typed};
+use crate::{command, json, typed};
 use std::io::Read;
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
-use std::process::{Child, Command};
+use std::process::Child;
 use std::time::Duration;
-use stylet_test_kit::{program, repository, scratch, until};
+use stylet_test_kit::{repository, scratch, until};
 
 #[test]
 fn the_laboratory_measures_two_seconds_and_verifies_its_report() {
@@ -22,10 +22,7 @@ fn the_laboratory_measures_two_seconds_and_verifies_its_report() {
         "report",
     ];
     // The exit code tells the verdict, which depends on the machine.
-    let measured = Command::new(program("rt-core"))
-        .args(words)
-        .current_dir(&folder)
-        .output();
+    let measured = command("rt-core", &words, &folder).output();
     let said = measured.expect("rt-core starts").stderr;
     let report = folder.join("report/report.json");
     assert!(report.exists(), "{}", String::from_utf8_lossy(&said));
@@ -85,8 +82,7 @@ struct Running(Child);
 
 impl Running {
     fn start(name: &str, words: &[&str], folder: &Path) -> Self {
-        let started = Command::new(program(name)).args(words).current_dir(folder).spawn();
-        Self(started.expect("it starts"))
+        Self(command(name, words, folder).spawn().expect("it starts"))
     }
 }
 
@@ -105,7 +101,7 @@ fn a_client_of_openigtlink_receives_the_needle() {
         .and_then(|free| free.local_addr())
         .expect("a port");
     let address = port.to_string();
-    let core = ["--instance", &instance, "--rt-if-allowed", "--flight-dir", "flights"];
+    let core = ["--instance", &instance, "--rt-if-allowed"];
     let _core = Running::start("rt-core", &core, &folder);
     let _server = Running::start(
         "host-ui",
