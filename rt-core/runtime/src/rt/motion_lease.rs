@@ -37,8 +37,8 @@ impl Promise {
         }
     }
 
-    /// Shortens the promise so that a hand at the ordered speed comes to rest within [`MOST_TRAVEL_M`]; never below the
-    /// initial lease.
+    /// Shortens the promise so that a hand at the ordered speed comes to rest within 4.8 mm; never below the initial
+    /// lease.
     pub fn limited_to_travel(self, speed_m_per_s: f64) -> Self {
         let speed_m_per_s = speed_m_per_s.max(1e-3);
         let braking_m = speed_m_per_s.powi(2) / (2.0 * TIP_BRAKES_M_PER_S2);
