@@ -7,7 +7,6 @@ use crate::command::picture::PictureArgs;
 use crate::command::record::RecordArgs;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::PathBuf;
-use stylet_base::interrupt;
 use stylet_controllers as controller;
 use stylet_files::dicom::Shared;
 use stylet_files::together;
@@ -161,7 +160,7 @@ impl Cli {
     /// The text for the terminal: the failure and its remedy.
     pub fn run(self) -> Result<(), CommandError> {
         if self.task.is_some() {
-            interrupt::end_with_reader();
+            stylet_manual::end_with_reader();
         }
         match self.task {
             None => {

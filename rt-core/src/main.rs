@@ -15,6 +15,10 @@ fn main() -> ExitCode {
         return failed(&why);
     }
     let cli = Cli::parse();
+    // The force loop outlives its output; so does what is left half done in a file.
+    if matches!(cli.task, Some(Task::Devices(_) | Task::Replay(_))) {
+        stylet_manual::end_with_reader();
+    }
     limits::raise();
     match carry_out(&cli) {
         Ok(code) => ExitCode::from(code),

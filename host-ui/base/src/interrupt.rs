@@ -1,5 +1,5 @@
 //! Ctrl-C, termination requests and a closing terminal: the first asks for an orderly end, the
-//! second ends at once. Also the end of output.
+//! second ends at once.
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag;
@@ -52,10 +52,4 @@ fn is_ignored(signal: i32) -> bool {
         let mut now: libc::sigaction = std::mem::zeroed();
         libc::sigaction(signal, std::ptr::null(), &raw mut now) == 0 && now.sa_sigaction == libc::SIG_IGN
     }
-}
-
-/// Lets a command end silently once its output is no longer read, as `head` expects; by default Rust panics.
-pub fn end_with_reader() {
-    // SAFETY: the default action runs no code of ours, and no other thread has started.
-    unsafe { libc::signal(libc::SIGPIPE, libc::SIG_DFL) };
 }

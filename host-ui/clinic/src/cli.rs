@@ -14,7 +14,6 @@ use crate::scene;
 use crate::study::StudyArgs;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::path::PathBuf;
-use stylet_base::interrupt;
 use stylet_manual::ManualArgs;
 
 /// Plans, doses, images and results of Stylet as files.
@@ -78,7 +77,7 @@ impl Cli {
     ///
     /// The text for the terminal: the failure and its remedy.
     pub fn run(self) -> Result<(), CommandError> {
-        interrupt::end_with_reader();
+        stylet_manual::end_with_reader();
         match self.task {
             Task::Scene(SceneTask::Check { file, label }) => scene::check(&file, label),
             Task::Convert(args) => args.run(),

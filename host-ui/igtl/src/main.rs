@@ -4,7 +4,6 @@ use clap::{CommandFactory, Parser, Subcommand};
 use std::error::Error;
 use std::net::SocketAddr;
 use std::process::ExitCode;
-use stylet_base::interrupt;
 use stylet_igtl::hand::HandOptions;
 use stylet_igtl::serve;
 use stylet_manual::ManualArgs;
@@ -61,7 +60,7 @@ fn main() -> ExitCode {
 }
 
 fn carry_out(task: Task) -> Result<(), Box<dyn Error>> {
-    interrupt::end_with_reader();
+    stylet_manual::end_with_reader();
     match task {
         Task::Igtl {
             instance,

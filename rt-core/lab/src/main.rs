@@ -72,6 +72,12 @@ enum Task {
 fn main() -> ExitCode {
     stylet_runtime::environment::cleanse();
     let cli = Cli::parse();
+    if matches!(
+        cli.task,
+        Task::Verify(_) | Task::Fleet(_) | Task::Credibility(_) | Task::Cost { .. }
+    ) {
+        stylet_manual::end_with_reader();
+    }
     limits::raise();
     match carry_out(&cli.task) {
         Ok(code) => ExitCode::from(code),

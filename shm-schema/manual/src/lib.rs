@@ -1,4 +1,5 @@
-//! Command lines of several programs: their man pages and completions, and commands that another program carries out.
+//! Command lines of several programs: their man pages and completions, commands that another
+//! program carries out, and output that nobody reads.
 
 #![warn(missing_docs)]
 
@@ -14,6 +15,13 @@ use std::path::{Path, PathBuf};
 use stylet_write::{WriteError, write_whole};
 
 pub use hand_over::{HandOverError, Product, hand_over, list};
+
+/// Lets a command end silently once its output is no longer read, as `head` expects; by default Rust panics. Call it
+/// before any thread starts.
+pub fn end_with_reader() {
+    // SAFETY: the default action runs no code of ours, and no other thread has started.
+    unsafe { libc::signal(libc::SIGPIPE, libc::SIG_DFL) };
+}
 
 /// The subcommand that writes them.
 #[derive(Args, Debug)]

@@ -301,23 +301,24 @@ fn what_is_wrong_is_reported_once_with_its_file_and_line() {
     assert_eq!(grid.lines().count(), 1 + 9 * 9 * 9);
 }
 
-/// It used to panic: `host-ui scene check FILE | head -1`.
+/// They used to panic: `host-ui scene check FILE | head -1`, `rt-core cost | head -1`.
 #[test]
 fn a_command_whose_output_nobody_reads_ends_without_a_word() {
     use std::os::unix::process::ExitStatusExt;
     let folder = stylet_test_kit::repository("tests/files/corpus/nifti");
-    let (reader, writer) = std::io::pipe().expect("a pipe");
-    drop(reader);
-    let mut command = host(&["scene", "check"], &[]);
-    let ended = command
-        .arg(folder.join("itk_u8.nii.gz"))
-        .stdout(writer)
-        .output()
-        .expect("host-ui runs");
-    let said = String::from_utf8_lossy(&ended.stderr);
-    assert!(
-        said.is_empty() && ended.status.signal() == Some(libc::SIGPIPE),
-        "{:?}: {said}",
-        ended.status
-    );
+    let mut check = host(&["scene", "check"], &[]);
+    check.arg(folder.join("itk_u8.nii.gz"));
+    let mut cost = Command::new(program("rt-core"));
+    cost.arg("cost");
+    for mut command in [check, cost] {
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        let ended = command.stdout(writer).output().expect("the program runs");
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(
+            said.is_empty() && ended.status.signal() == Some(libc::SIGPIPE),
+            "{:?}: {said}",
+            ended.status
+        );
+    }
 }
