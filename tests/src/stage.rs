@@ -7,6 +7,9 @@ use stylet_implant::workflow::{default_plan, move_request};
 use stylet_random::Random;
 use stylet_shm_schema::{Request, flags};
 
+/// Distance from the goal, on each axis, within which the needle has arrived, m.
+const NEAR_M: f64 = 2e-3;
+
 /// A core with an observing host that takes the hand back between trials.
 pub struct Stage {
     pub core: Core,
@@ -37,7 +40,13 @@ impl Stage {
         let is_there = until(Duration::from_secs(20), || {
             self.observer.poll();
             self.observer.take_records();
-            self.observer.state().is_some_and(|s| s.flags & flags::AT_GOAL != 0)
+            // A state from before the request is at the goal of the motion before.
+            self.observer.state().is_some_and(|s| {
+                let away_m = (0..3)
+                    .map(|axis| (s.tip_in_scene_m[axis] - to[axis]).abs())
+                    .fold(0.0, f64::max);
+                s.flags & flags::AT_GOAL != 0 && away_m < NEAR_M
+            })
         });
         assert!(is_there, "the hand does not arrive: {:?}", self.observer.state());
     }
