@@ -1,11 +1,11 @@
 //! The C interface of `libHD.so`, OpenHaptics 3.00 to 3.30, loaded at run time.
 //!
-//! Types, numbers and the 36 functions are facts of the vendor's interface (HDAPI reference; names
+//! Types, numbers and the 22 functions are facts of the vendor's interface (HDAPI reference; names
 //! checked against the symbols of `libHD.so.3.0.0`).
 
 #![allow(non_snake_case)]
 
-use core::ffi::{c_char, c_int, c_long, c_ulong, c_ushort, c_void};
+use core::ffi::{c_char, c_int, c_ulong, c_ushort, c_void};
 
 use crate::library::{Driver, functions};
 
@@ -46,8 +46,6 @@ pub const PRIORITY_MAX: c_ushort = 0xFFFF;
 pub mod parameter {
     /// 1 int, a bit mask.
     pub const BUTTONS: u32 = 0x2000;
-    /// 6 long.
-    pub const ENCODERS: u32 = 0x2010;
     /// 3, mm/s, smoothed by the driver.
     pub const VELOCITY: u32 = 0x2051;
     /// 16, column-major, mm.
@@ -121,39 +119,25 @@ functions! {
         fn hdInitDevice(*const c_char) -> Handle;
         fn hdDisableDevice(Handle);
         fn hdMakeCurrentDevice(Handle);
-        fn hdGetCurrentDevice() -> Handle;
         fn hdBeginFrame(Handle);
         fn hdEndFrame(Handle);
         fn hdGetError() -> ErrorInfo;
-        fn hdGetErrorString(u32) -> *const c_char;
         fn hdEnable(Enum);
         fn hdDisable(Enum);
         fn hdIsEnabled(Enum) -> u8;
-        fn hdGetBooleanv(Enum, *mut u8);
         fn hdGetIntegerv(Enum, *mut c_int);
-        fn hdGetFloatv(Enum, *mut f32);
         fn hdGetDoublev(Enum, *mut f64);
-        fn hdGetLongv(Enum, *mut c_long);
         fn hdGetString(Enum) -> *const c_char;
-        fn hdSetBooleanv(Enum, *const u8);
-        fn hdSetIntegerv(Enum, *const c_int);
-        fn hdSetFloatv(Enum, *const f32);
         fn hdSetDoublev(Enum, *const f64);
-        fn hdSetLongv(Enum, *const c_long);
         fn hdCheckCalibration() -> Enum;
         fn hdCheckCalibrationStyle() -> Enum;
-        fn hdUpdateCalibrationMessage(Enum);
         fn hdUpdateCalibration(Enum);
-        fn hdScaleGimbalAngles(f64, f64, f64, *mut f64);
-        fn hdDeploymentLicense(*const c_char, *const c_char, *const c_char) -> u8;
         fn hdStartScheduler();
         fn hdStopScheduler();
         fn hdSetSchedulerRate(c_ulong);
-        fn hdScheduleSynchronous(Callback, *mut c_void, c_ushort);
         fn hdScheduleAsynchronous(Callback, *mut c_void, c_ushort) -> Schedule;
         fn hdUnschedule(Schedule);
         fn hdWaitForCompletion(Schedule, u32) -> u8;
-        fn hdGetSchedulerTimeStamp() -> f64;
     }
     optional {}
 }

@@ -4,7 +4,7 @@
 //! process: it cannot unwind out of a C function.
 #![allow(non_snake_case)]
 
-use core::ffi::{CStr, c_char, c_int, c_long, c_ulong, c_ushort, c_void};
+use core::ffi::{CStr, c_char, c_int, c_ulong, c_ushort, c_void};
 // SYNC: relaxed throughout; see `Control`.
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, Instant};
@@ -101,15 +101,6 @@ extern "C" fn hdMakeCurrentDevice(handle: u32) {
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn hdGetCurrentDevice() -> u32 {
-    if fails("hdGetCurrentDevice") {
-        0xFFFF_FFFF
-    } else {
-        HANDLE
-    }
-}
-
-#[unsafe(no_mangle)]
 extern "C" fn hdBeginFrame(handle: u32) {
     let failed = fails("hdBeginFrame");
     let mut d = driver();
@@ -155,16 +146,6 @@ extern "C" fn hdGetError() -> ErrorInfo {
         code,
         internal: -(code as c_int),
         device: HANDLE,
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn hdGetErrorString(code: u32) -> *const c_char {
-    fails("hdGetErrorString");
-    match code {
-        0 => c"Success".as_ptr(),
-        0x0302 => c"Communication error".as_ptr(),
-        _ => c"Error".as_ptr(),
     }
 }
 
@@ -223,17 +204,6 @@ unsafe fn give<T: Copy>(to: *mut T, values: &[T]) {
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn hdGetBooleanv(parameter: u32, values: *mut u8) {
-    let failed = fails("hdGetBooleanv");
-    let mut d = driver();
-    if !failed && count_of(&mut d, parameter, &[Kind::Bools], values.is_null()).is_some() {
-        let inkwell = parameter == 0x2002 && control().in_inkwell.load(Relaxed) != 0;
-        // SAFETY: the caller provides room for as many as the interface states.
-        unsafe { give(values, &[u8::from(inkwell)]) };
-    }
-}
-
-#[unsafe(no_mangle)]
 unsafe extern "C" fn hdGetIntegerv(parameter: u32, values: *mut c_int) {
     let failed = fails("hdGetIntegerv");
     let mut d = driver();
@@ -244,34 +214,12 @@ unsafe extern "C" fn hdGetIntegerv(parameter: u32, values: *mut c_int) {
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn hdGetFloatv(parameter: u32, values: *mut f32) {
-    let failed = fails("hdGetFloatv");
-    let mut d = driver();
-    if !failed && count_of(&mut d, parameter, &[Kind::Reals, Kind::Floats], values.is_null()).is_some() {
-        let reals = d.reals(parameter).unwrap_or_default();
-        // SAFETY: the caller provides room for as many as the interface states.
-        unsafe { give(values, &reals.iter().map(|x| *x as f32).collect::<Vec<_>>()) };
-    }
-}
-
-#[unsafe(no_mangle)]
 unsafe extern "C" fn hdGetDoublev(parameter: u32, values: *mut f64) {
     let failed = fails("hdGetDoublev");
     let mut d = driver();
     if !failed && count_of(&mut d, parameter, &[Kind::Reals], values.is_null()).is_some() {
         // SAFETY: the caller provides room for as many as the interface states.
         unsafe { give(values, &d.reals(parameter).unwrap_or_default()) };
-    }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn hdGetLongv(parameter: u32, values: *mut c_long) {
-    let failed = fails("hdGetLongv");
-    let mut d = driver();
-    if !failed && let Some(count) = count_of(&mut d, parameter, &[Kind::Longs], values.is_null()) {
-        let counts: Vec<c_long> = (1..=count as c_long).map(|i| 1000 * i).collect();
-        // SAFETY: the caller provides room for as many as the interface states.
-        unsafe { give(values, &counts) };
     }
 }
 
@@ -294,21 +242,6 @@ extern "C" fn hdGetString(parameter: u32) -> *const c_char {
     text.as_ptr()
 }
 
-#[unsafe(no_mangle)]
-unsafe extern "C" fn hdSetBooleanv(_parameter: u32, _values: *const u8) {
-    if !fails("hdSetBooleanv") {
-        // The interface has no bool that can be set.
-        driver().raise(0x0100);
-    }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn hdSetIntegerv(parameter: u32, _values: *const c_int) {
-    if !fails("hdSetIntegerv") && parameter != 0x2900 {
-        driver().raise(0x0100);
-    }
-}
-
 fn set_reals(parameter: u32, values: [f64; 3]) {
     let mut d = driver();
     if !d.in_frame {
@@ -323,26 +256,10 @@ fn set_reals(parameter: u32, values: [f64; 3]) {
 }
 
 #[unsafe(no_mangle)]
-unsafe extern "C" fn hdSetFloatv(parameter: u32, values: *const f32) {
-    if !fails("hdSetFloatv") {
-        // SAFETY: three numbers, as the interface states.
-        set_reals(parameter, [0, 1, 2].map(|i| f64::from(unsafe { *values.add(i) })));
-    }
-}
-
-#[unsafe(no_mangle)]
 unsafe extern "C" fn hdSetDoublev(parameter: u32, values: *const f64) {
     if !fails("hdSetDoublev") {
         // SAFETY: three numbers, as the interface states.
         set_reals(parameter, [0, 1, 2].map(|i| unsafe { *values.add(i) }));
-    }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn hdSetLongv(parameter: u32, _values: *const c_long) {
-    if !fails("hdSetLongv") {
-        // Motor values and Cartesian forces exclude each other.
-        driver().raise(if parameter == 0x2750 { 0x0204 } else { 0x0100 });
     }
 }
 
@@ -360,11 +277,6 @@ extern "C" fn hdCheckCalibration() -> u32 {
 extern "C" fn hdCheckCalibrationStyle() -> u32 {
     fails("hdCheckCalibrationStyle");
     style()
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn hdUpdateCalibrationMessage(_style: u32) {
-    fails("hdUpdateCalibrationMessage");
 }
 
 #[unsafe(no_mangle)]
@@ -386,28 +298,6 @@ extern "C" fn hdUpdateCalibration(requested: u32) {
             .store(u32::from(c.in_neutral_pose.load(Relaxed) == 0), Relaxed);
     }
     c.uncalibrated.store(0, Relaxed);
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn hdScaleGimbalAngles(x: f64, y: f64, z: f64, transform: *mut f64) {
-    if !fails("hdScaleGimbalAngles") {
-        let mut scaled = [0.0; 16];
-        (scaled[0], scaled[5], scaled[10], scaled[15]) = (x, y, z, 1.0);
-        // SAFETY: the caller provides room for as many as the interface states.
-        unsafe { give(transform, &scaled) };
-    }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn hdDeploymentLicense(vendor: *const c_char, product: *const c_char, key: *const c_char) -> u8 {
-    if fails("hdDeploymentLicense") {
-        return 0;
-    }
-    let complete = !vendor.is_null() && !product.is_null() && !key.is_null();
-    if !complete {
-        driver().raise(0x0600);
-    }
-    u8::from(complete)
 }
 
 #[unsafe(no_mangle)]
@@ -434,20 +324,6 @@ extern "C" fn hdSetSchedulerRate(rate_hz: c_ulong) {
         d.rate_hz = rate_hz;
     } else {
         d.raise(0x0101);
-    }
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn hdScheduleSynchronous(function: ServoFunction, context: *mut c_void, _priority: c_ushort) {
-    if fails("hdScheduleSynchronous") {
-        return;
-    }
-    if scheduler::is_running() {
-        let id = driver().schedule(function, context as usize);
-        wait_for(id);
-    } else {
-        // SAFETY: the caller promises that both are valid.
-        unsafe { function(context) };
     }
 }
 
@@ -496,10 +372,4 @@ extern "C" fn hdWaitForCompletion(id: c_ulong, code: u32) -> u8 {
         wait_for(id);
     }
     u8::from(is_scheduled(id))
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn hdGetSchedulerTimeStamp() -> f64 {
-    fails("hdGetSchedulerTimeStamp");
-    driver().tick_began.elapsed().as_secs_f64()
 }

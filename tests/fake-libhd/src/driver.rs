@@ -1,7 +1,6 @@
 //! State of the faked driver and its device: a simulated Phantom in the frame and the units of the vendor.
 
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::Instant;
 
 use nalgebra::{UnitQuaternion, Vector3};
 use stylet_hw::{Device, HandGoal, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
@@ -29,7 +28,6 @@ pub struct Driver {
     pub rate_hz: u64,
     pub callbacks: Vec<Callback>,
     pub next_id: u64,
-    pub tick_began: Instant,
     pub force_n: [f64; 3],
     pub torque_mnm: [f64; 3],
     hand: SimulatedPhantom,
@@ -59,7 +57,6 @@ impl Driver {
             rate_hz: 1000,
             callbacks: Vec::new(),
             next_id: 1,
-            tick_began: Instant::now(),
             force_n: [0.0; 3],
             torque_mnm: [0.0; 3],
             hand: SimulatedPhantom::new(SimulatedPhantomConfig::default()),
@@ -180,7 +177,6 @@ impl Driver {
             0x2150 => spoilt(&c.gimbal_rad.each_ref().map(get), 3),
             0x2505 => vec![1.5],
             0x2550 | 0x2551 => vec![-190.0, -133.0, -95.0, 190.0, 133.0, 95.0],
-            0x2552 => vec![-100.0],
             0x2601 => vec![self.rate_hz as f64],
             0x2602 => vec![0.5],
             0x2603 => vec![self.max_force_n()],

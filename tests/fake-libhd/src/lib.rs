@@ -1,4 +1,4 @@
-//! A `libHD.so` for tests: the 36 functions of the driver's ABI over a simulated Phantom, with errors on command.
+//! A `libHD.so` for tests: 22 functions of the driver's ABI over a simulated Phantom, with errors on command.
 //!
 //! Numbers and units are typed independently here ([`table`]), which reveals a wrong number in the code under test. The
 //! test and the fake share a [`Control`] block: in one process through `fake_control`, in two through the file named by

@@ -66,7 +66,6 @@ fn run() {
 fn tick() {
     let scheduled: Vec<_> = {
         let mut driver = driver();
-        driver.tick_began = Instant::now();
         driver.advance();
         driver.callbacks.iter().map(|c| (c.id, c.function, c.context)).collect()
     };
