@@ -32,6 +32,6 @@ pub use placement::{Axes, Placement};
 pub use replay::ReplayDevice;
 pub use sim::hand::{Effort, Hand};
 pub use sim::link::{BadLink, LinkFaults};
-pub use sim::path::{HandPath, ScriptedPath, Waypoint};
+pub use sim::path::HandPath;
 pub use sim::phantom::{SimulatedPhantom, SimulatedPhantomConfig};
 pub use stylet_device::{self as device, Device, DeviceFault, DeviceInfo, HandGoal, Sample, Wrench};

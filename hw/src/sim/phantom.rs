@@ -29,8 +29,6 @@ pub struct SimulatedPhantomConfig {
     pub start_direction: Vector3<f64>,
     /// Rate at which the tool turns to the direction of the goal.
     pub turn_rate_rad_per_s: f64,
-    /// Lower and upper corner of the box that the tip cannot leave.
-    pub workspace_m: Option<(Vector3<f64>, Vector3<f64>)>,
 }
 
 impl Default for SimulatedPhantomConfig {
@@ -47,7 +45,6 @@ impl Default for SimulatedPhantomConfig {
             start_tip_in_world: Vector3::zeros(),
             start_direction: Vector3::z(),
             turn_rate_rad_per_s: 2.0,
-            workspace_m: None,
         }
     }
 }
@@ -148,20 +145,6 @@ impl SimulatedPhantom {
         };
         self.tip_in_world += self.velocity_m_per_s * h;
         self.work_j += self.wrench.force_n.dot(&self.velocity_m_per_s) * h;
-        if let Some((lower, upper)) = self.config.workspace_m {
-            self.stop_at_walls(&lower, &upper);
-        }
-    }
-
-    fn stop_at_walls(&mut self, lower: &Vector3<f64>, upper: &Vector3<f64>) {
-        let inside = self.tip_in_world.sup(lower).inf(upper);
-        self.velocity_m_per_s
-            .zip_zip_apply(&self.tip_in_world, &inside, |v, at, allowed| {
-                if at != allowed {
-                    *v = 0.0;
-                }
-            });
-        self.tip_in_world = inside;
     }
 
     fn sample(&self) -> Sample {

@@ -1,9 +1,7 @@
 //! The simulated operator: the path of the hand, and the insertion of a needle against resistance.
 
 use nalgebra::Vector3;
-use stylet_hw::{
-    Device, Hand, HandGoal, HandPath, ScriptedPath, SimulatedPhantom, SimulatedPhantomConfig, Waypoint, Wrench,
-};
+use stylet_hw::{Device, Hand, HandGoal, HandPath, SimulatedPhantom, SimulatedPhantomConfig, Wrench};
 
 use crate::DT_S;
 
@@ -211,37 +209,6 @@ fn the_push_of_an_operator_is_bounded() {
         push = hand.push_n(&push, &Vector3::new(1.0, 1.0, 0.0), DT_S);
     }
     assert!((push.norm() - 12.0).abs() < 1e-9);
-}
-
-#[test]
-fn a_script_visits_its_waypoints_in_order_and_ends() {
-    let stop = |z| Waypoint {
-        goal: goal(0.0, 0.0, z),
-        dwell_s: 0.1,
-        timeout_s: 5.0,
-    };
-    let mut script = ScriptedPath::new(vec![stop(0.01), stop(0.03), stop(0.0)], 3e-4);
-    let mut device = SimulatedPhantom::new(SimulatedPhantomConfig::default());
-    let mut goals = Vec::new();
-    for _ in 0..6000 {
-        let tip = device.read(DT_S).unwrap().tip_in_world;
-        if let Some(next) = script.step(DT_S, &tip) {
-            goals.push(next.tip_in_world.z);
-            device.set_hand_goal(&next);
-        }
-    }
-    assert_eq!(goals, [0.01, 0.03, 0.0]);
-    assert!(script.finished());
-
-    // A goal that cannot be reached is abandoned.
-    let mut script = ScriptedPath::new(vec![stop(1.0)], 3e-4);
-    let ticks = (0..10_000)
-        .take_while(|_| {
-            script.step(DT_S, &Vector3::zeros());
-            !script.finished()
-        })
-        .count();
-    assert!((ticks as f64 * DT_S - 5.0).abs() < 0.01);
 }
 
 /// Checks the roll: the tool lies along the +z of its frame, and its +y follows the hand's request.

@@ -170,21 +170,6 @@ fn every_hand_is_stable_against_a_sampled_wall() {
 }
 
 #[test]
-fn the_tip_does_not_leave_its_workspace() {
-    let corner = Vector3::repeat(0.01);
-    let mut device = SimulatedPhantom::new(SimulatedPhantomConfig {
-        workspace_m: Some((-corner, corner)),
-        ..config(Hand::absent())
-    });
-    push(&mut device, Vector3::new(8.0, -1.0, 0.0));
-    for _ in 0..1000 {
-        device.read(DT_S).unwrap();
-        assert!(device.true_tip_in_world().amax() <= 0.01);
-    }
-    assert_eq!(device.true_velocity_m_per_s().x, 0.0);
-}
-
-#[test]
 fn invalid_periods_are_refused_or_shortened() {
     let mut device = SimulatedPhantom::new(config(Hand::passive()));
     for bad in [f64::NAN, -1e-3, f64::INFINITY] {
