@@ -23,7 +23,7 @@ pub use backend::BackendKind;
 pub use drd::{ForceDimension, ForceDimensionConfig};
 pub use driver_thread::arm::{Arm, ArmError};
 pub use driver_thread::keeper::Report;
-pub use driver_thread::served::{Described, Readings, Served};
+pub use driver_thread::served::{Described, Served};
 pub use finding::{Finding, Severity};
 pub use haply::{Haply, HaplyConfig};
 pub use libhd::{Phantom, PhantomConfig};

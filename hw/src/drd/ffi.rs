@@ -22,8 +22,6 @@ pub type Id = c_char;
 pub const GOOD: c_int = 0;
 /// Answer for a repeated pose: the calls came too fast for the SDK.
 pub const TIMEGUARD: c_int = 1;
-/// Answer when the motors cannot render the full force.
-pub const MOTOR_SATURATED: c_int = 2;
 
 /// Room for the status array.
 pub const STATUS_ROOM: usize = 32;

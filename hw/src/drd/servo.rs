@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::convert::orientation_from_matrix;
 use crate::device::{DeviceFault, Sample, Wrench};
 use crate::drd::errors::{self, Response};
-use crate::drd::ffi::{Api, Id, MOTOR_SATURATED, STATUS_ROOM, TIMEGUARD};
+use crate::drd::ffi::{Api, Id, STATUS_ROOM, TIMEGUARD};
 use crate::drd::session::last_error;
 use crate::drd::status::{Health, health};
 use crate::driver_thread::arm::{Arm, ArmError};
@@ -81,7 +81,8 @@ impl Servo {
     pub fn tick(&mut self, shared: &Shared) {
         shared.count_tick();
         let wrench = self.hold.wrench(self.end.commands.read(), self.servo_hz);
-        self.exert(shared, &wrench);
+        let answer = self.send(&wrench);
+        self.note_answer(shared, answer);
         self.read_pose(shared);
         if self.ticks.is_multiple_of(TICKS_BETWEEN_CHECKS) {
             self.check_state(shared);
@@ -93,13 +94,6 @@ impl Servo {
             self.send(&Wrench::zero());
         }
         shared.fault.set(self.hold.end_tick(self.servo_hz));
-    }
-
-    fn exert(&mut self, shared: &Shared, wrench: &Wrench) {
-        match self.send(wrench) {
-            MOTOR_SATURATED => shared.count_saturated(),
-            answer => self.note_answer(shared, answer),
-        }
     }
 
     fn send(&self, wrench: &Wrench) -> c_int {

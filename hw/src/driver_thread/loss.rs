@@ -49,14 +49,9 @@ impl Errors {
 
     /// Returns the driver's error behind a lost connection, if the connection is lost.
     pub fn lost(&self) -> Option<u32> {
-        // SYNC: acquire pairs with the release in `set_lost`: the error that caused the loss is visible.
-        self.lost.load(Ordering::Acquire).then(|| self.last())
-    }
-
-    /// Returns the last error of the driver by number; 0 for none.
-    pub fn last(&self) -> u32 {
-        // SYNC: relaxed; one value for display, or ordered by `lost`.
-        self.last.load(Ordering::Relaxed)
+        // SYNC: acquire pairs with the release in `set_lost`: the error that caused the loss is visible to the load after
+        // it.
+        self.lost.load(Ordering::Acquire).then(|| self.last.load(Ordering::Relaxed))
     }
 
     /// Returns the number of errors so far.

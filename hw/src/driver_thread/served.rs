@@ -14,21 +14,6 @@ pub trait Described: Send + 'static {
     fn info(&self) -> DeviceInfo;
 }
 
-/// State of the driver, without the pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Readings {
-    /// Servo ticks so far.
-    pub ticks: u64,
-    /// Present fault.
-    pub fault: Option<DeviceFault>,
-    /// Last error of the driver by number; 0 for none.
-    pub error: u32,
-    /// Number of errors so far.
-    pub errors: u64,
-    /// Ticks in which the motors could not render the full force, where the driver reports it.
-    pub saturated: u64,
-}
-
 /// Device that a servo thread serves and a keeper connects. Dropping it leaves zero force and a
 /// closed connection.
 pub struct Served<D> {
@@ -68,16 +53,9 @@ impl<D: Described> Served<D> {
         &self.description
     }
 
-    /// Returns the state of the driver, without the pose.
-    pub fn readings(&self) -> Readings {
-        let shared = &self.shared;
-        Readings {
-            ticks: shared.ticks(),
-            fault: shared.fault.get(),
-            error: shared.errors.last(),
-            errors: shared.errors.count(),
-            saturated: shared.saturated(),
-        }
+    /// Returns how many errors the driver has reported.
+    pub fn error_count(&self) -> u64 {
+        self.shared.errors.count()
     }
 }
 

@@ -14,8 +14,6 @@ pub struct Shared {
     serve: AtomicBool,
     /// Servo: ticks so far.
     ticks: AtomicU64,
-    /// Servo: ticks in which the motors could not render the full force.
-    saturated: AtomicU64,
     /// Servo, and the keeper while no servo thread runs.
     pub fault: FaultCell,
     /// Servo, and the keeper when the servo loop is silent.
@@ -65,18 +63,5 @@ impl Shared {
     pub fn ticks(&self) -> u64 {
         // SYNC: relaxed; readers only look for a change. Its partner is `count_tick`.
         self.ticks.load(Ordering::Relaxed)
-    }
-
-    /// Counts a tick in which the motors could not render the full force. Called by the servo
-    /// thread.
-    pub fn count_saturated(&self) {
-        // SYNC: relaxed; a counter for display. Its partner is `saturated`.
-        self.saturated.fetch_add(1, Ordering::Relaxed);
-    }
-
-    /// Returns the number of ticks in which the motors could not render the full force.
-    pub fn saturated(&self) -> u64 {
-        // SYNC: relaxed; one value for display. Its partner is `count_saturated`.
-        self.saturated.load(Ordering::Relaxed)
     }
 }

@@ -49,8 +49,6 @@ pub struct Control {
     pub late_us: AtomicU32,
     /// 1: each pose repeats the one before.
     pub time_guard: AtomicU32,
-    /// 1: the motors cannot reach the full force.
-    pub saturated: AtomicU32,
     /// 1: the device has no watchdog.
     pub no_watchdog: AtomicU32,
     /// One bit per button.

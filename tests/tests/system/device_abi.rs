@@ -137,6 +137,6 @@ fn every_interface_error_turns_the_force_off_and_the_device_recovers() {
         println!("0x{code:04x} {name:30} -> {:?}, {:?}", known.fault, known.response);
     }
     assert_eq!(ERRORS.len(), errors::KNOWN.len() + 1, "all but success");
-    assert!(device.readings().errors >= 21);
+    assert!(device.error_count() >= 21);
     assert_eq!(device.write(&Wrench::zero()), Ok(()));
 }

@@ -148,7 +148,7 @@ fn a_device_without_torque_gets_none_and_its_smaller_limit_counts() {
         .abs()
         < 1e-9));
     assert_eq!(fake.control.torque_mnm.each_ref().map(get), [0.0; 3]);
-    assert_eq!(device.readings().errors, 0, "the driver had nothing to complain of");
+    assert_eq!(device.error_count(), 0, "the driver had nothing to complain of");
 }
 
 #[test]

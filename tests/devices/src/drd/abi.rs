@@ -170,7 +170,7 @@ fn the_device_recovers_from_every_error_of_the_interface() {
         let anew = fake.control.opens.load(Relaxed) > opens;
         assert_eq!(anew, known.response == Response::Reconnect, "{name}");
     }
-    assert_eq!(device.readings().errors, ERRORS.len() as u64);
+    assert_eq!(device.error_count(), ERRORS.len() as u64);
 }
 
 #[test]
