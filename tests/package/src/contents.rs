@@ -160,15 +160,12 @@ fn the_unit_is_exposed_to_no_more_than_a_real_time_process_must_be() {
 fn rules_for_devices_name_the_vendors_that_the_programs_look_for() {
     let files = installed(&manual("package-rules"));
     for (rules, source, vendors) in [
-        (
-            "70-stylet-haptic.rules",
-            "rt-core/lab/src/doctor/devices.rs",
-            &["2988", "0x000b99", "1451"][..],
-        ),
+        ("70-stylet-haptic.rules", "hw/src/libhd/diagnose/port.rs", &["2988"][..]),
+        ("70-stylet-haptic.rules", "hw/src/drd/diagnose.rs", &["1451"]),
         (
             "70-stylet.rules",
             "host-ui/controllers/src/found.rs",
-            &["256f", "046d"][..],
+            &["256f", "046d"],
         ),
     ] {
         let rules = text(&files[&format!("/usr/lib/udev/rules.d/{rules}")]);

@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use super::Surroundings;
 use crate::finding::{Finding, Severity};
 
+/// USB vendor of 3D Systems: Touch and Touch X, as in the udev rules of its driver.
+const USB_VENDOR: &str = "2988";
 const LINKS: [(&str, &str); 2] = [
     ("dev/phnepp", "/dev/parport0"),
     ("dev/phnepp_modes", "/proc/sys/dev/parport/parport0/modes"),
@@ -135,5 +137,35 @@ pub fn of_other_ports(root: &Path, here: &Surroundings) -> Vec<Finding> {
     let names = names.iter().filter_map(|n| n.to_str()).filter(|n| port(n));
     names
         .map(|name| device_file(root, &format!("dev/{name}"), "", here))
+        .chain(of_hid(root))
+        .collect()
+}
+
+/// Checks the newer Touch, a HID device: its file belongs to root at first.
+fn of_hid(root: &Path) -> Vec<Finding> {
+    let entries = fs::read_dir(root.join("sys/class/hidraw")).into_iter().flatten().flatten();
+    let touches = entries.filter(|entry| {
+        let event = fs::read_to_string(entry.path().join("device/uevent")).unwrap_or_default();
+        // HID_ID=0003:00002988:00000302
+        let vendor = event.lines().find_map(|l| l.strip_prefix("HID_ID=")?.split(':').nth(1));
+        vendor.is_some_and(|vendor| vendor.ends_with(USB_VENDOR))
+    });
+    let check = |name: String| {
+        // Opened, for the rule gives its right through an access list.
+        match fs::File::options().read(true).write(true).open(root.join(&name)) {
+            Ok(_) => Finding::good(format!("/{name} can be read and written")),
+            Err(_) => Finding::new(
+                Severity::Problem,
+                format!("a Touch is connected as a HID device, but /{name} cannot be read and written by this user"),
+                format!(
+                    "echo 'SUBSYSTEM==\"hidraw\", ATTRS{{idVendor}}==\"{USB_VENDOR}\", TAG+=\"uaccess\"' | sudo tee \
+                     /etc/udev/rules.d/70-stylet-haptic.rules && sudo udevadm control --reload && sudo udevadm trigger   (the package of \
+                     rt-core installs this rule)"
+                ),
+            ),
+        }
+    };
+    touches
+        .map(|entry| check(format!("dev/{}", entry.file_name().to_string_lossy())))
         .collect()
 }

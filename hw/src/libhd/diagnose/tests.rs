@@ -182,6 +182,22 @@ fn usb_and_firewire_ports_are_checked_if_present() {
 }
 
 #[test]
+fn a_touch_on_hidraw_must_be_usable() {
+    let faked = Faked::fit();
+    let id = |id: &str| {
+        let event = format!("DRIVER=hid-generic\nHID_ID={id}\n");
+        faked.write("sys/class/hidraw/hidraw3/device/uevent", &event);
+    };
+    id("0003:0000046D:0000C31C");
+    assert!(faked.findings().iter().all(|f| !f.what.contains("hidraw3")));
+    id("0003:00002988:00000302");
+    faked.bad(Severity::Problem, "/dev/hidraw3 ", "ATTRS{idVendor}==\"2988\"");
+    faked.write("dev/hidraw3", "");
+    assert!(faked.findings().iter().all(|f| f.severity == Severity::Good));
+    assert!(faked.findings().iter().any(|f| f.what.contains("/dev/hidraw3 can be")));
+}
+
+#[test]
 fn each_missing_library_is_named_with_its_remedy() {
     let missing = |name: &str| format!("{name}: cannot open shared object file: No such file or directory");
     for (why, cure) in [

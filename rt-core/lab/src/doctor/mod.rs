@@ -4,7 +4,6 @@
 //! tests can present any machine to them.
 
 mod cores;
-mod devices;
 mod display;
 mod kernel;
 mod mend;
@@ -18,7 +17,6 @@ pub use mend::{DoctorArgs, MendError, run};
 
 use crate::machine::Machine;
 use serde::Serialize;
-use stylet_hw::libhd::diagnose::Surroundings;
 
 /// Severity of a finding, least first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -86,7 +84,7 @@ impl Finding {
 }
 
 /// Returns all findings, in the order of their remedies.
-pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Vec<Finding> {
+pub fn examine(machine: &Machine, haptic_core: usize) -> Vec<Finding> {
     let mut findings = vec![
         kernel::hypervisor(machine),
         kernel::preemption(machine),
@@ -104,13 +102,10 @@ pub fn examine(machine: &Machine, haptic_core: usize, here: &Surroundings) -> Ve
         shared::swap(machine),
         shared::space(machine, shared::free_bytes),
         shared::stale_services(machine),
-        devices::haptic(machine),
-        devices::hidraw(machine, devices::may_use),
         tunable::turbo(machine),
         tunable::tuned(machine),
     ];
     findings.extend(tunable::findings(machine, haptic_core));
-    findings.extend(devices::driver(machine, here));
     findings
 }
 
@@ -125,8 +120,7 @@ fn verdict(findings: &[Finding]) -> &'static str {
 
 /// Examines this PC and prints the findings; returns 1 if there is a blocker.
 fn print(json: bool, core: usize) -> u8 {
-    let (here, _) = Surroundings::of_this_process(None);
-    let findings = examine(&Machine::this(), core, &here);
+    let findings = examine(&Machine::this(), core);
     if json {
         let all = serde_json::json!({ "haptic_core": core, "verdict": verdict(&findings), "findings": findings });
         println!("{all:#}");
