@@ -87,16 +87,8 @@ pub struct RunArgs {
     device: DeviceChoice,
     #[command(flatten)]
     second: SecondArgs,
-    /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
-    #[arg(long, value_name = "PATH")]
-    libhd: Option<PathBuf>,
-    /// The library of the Force Dimension SDK, libdrd.so or libdhd.so [default: STYLET_LIBDRD, else where the system
-    /// has it]
-    #[arg(long, value_name = "PATH")]
-    libdrd: Option<PathBuf>,
-    /// The Inverse service of Haply [default: STYLET_HAPLY_URL, else ws://localhost:10001]
-    #[arg(long, value_name = "URL")]
-    haply_url: Option<String>,
+    #[command(flatten)]
+    libraries: Libraries,
     /// On exit write to FILE, as JSON, what each loop cost
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
@@ -109,8 +101,7 @@ impl RunArgs {
         options.tissue = self.tissue.into();
         options.device = self.device.clone();
         self.second.add_to(&mut options)?;
-        options.libraries =
-            Libraries::or_of_environment(self.libhd.as_deref(), self.libdrd.as_deref(), self.haply_url.as_deref());
+        options.libraries = self.libraries.clone().or_of_environment();
         if let Some(folder) = &self.flight_dir {
             options.flight_folder = folder.clone();
         }

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc;
 use std::time::Duration;
 use stylet_hw::backend::{BACKENDS, Backend, BackendKind, forms_of};
@@ -28,16 +28,8 @@ pub struct DevicesArgs {
     /// Look at files and cables only: open no device
     #[arg(long)]
     look_only: bool,
-    /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
-    #[arg(long, value_name = "PATH")]
-    libhd: Option<PathBuf>,
-    /// The library of the Force Dimension SDK, libdrd.so or libdhd.so [default: STYLET_LIBDRD, else where the system
-    /// has it]
-    #[arg(long, value_name = "PATH")]
-    libdrd: Option<PathBuf>,
-    /// The Inverse service of Haply [default: STYLET_HAPLY_URL, else ws://localhost:10001]
-    #[arg(long, value_name = "URL")]
-    haply_url: Option<String>,
+    #[command(flatten)]
+    libraries: Libraries,
 }
 
 /// One back end.
@@ -55,8 +47,7 @@ struct Listed {
 
 /// Prints the list; returns 0.
 pub fn run(args: &DevicesArgs) -> u8 {
-    let libraries =
-        Libraries::or_of_environment(args.libhd.as_deref(), args.libdrd.as_deref(), args.haply_url.as_deref());
+    let libraries = args.libraries.clone().or_of_environment();
     let listed: Vec<_> = BACKENDS
         .iter()
         .map(|b| list(b, Path::new("/"), &libraries, !args.look_only))

@@ -3,6 +3,7 @@
 mod motion;
 
 use crate::rt::arm::{self, Ask};
+use clap::Args;
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -62,30 +63,29 @@ pub fn help() -> String {
 }
 
 /// Vendor libraries and addresses of their services, if not the defaults.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Args, Clone, Debug, Default, PartialEq, Eq)]
 pub struct Libraries {
-    /// OpenHaptics.
+    /// The driver's library libHD.so [default: STYLET_LIBHD, else where the system has it]
+    #[arg(long, value_name = "PATH")]
     pub libhd: Option<PathBuf>,
-    /// The SDK of Force Dimension.
+    /// The library of the Force Dimension SDK, libdrd.so or libdhd.so [default: STYLET_LIBDRD, else where the system
+    /// has it]
+    #[arg(long, value_name = "PATH")]
     pub libdrd: Option<PathBuf>,
-    /// The Inverse service of Haply.
+    /// The Inverse service of Haply [default: STYLET_HAPLY_URL, else ws://localhost:10001]
+    #[arg(long, value_name = "URL")]
     pub haply_url: Option<String>,
 }
 
 impl Libraries {
     /// Returns the command line's values, else those of the environment: `STYLET_LIBHD`, `STYLET_LIBDRD`,
     /// `STYLET_HAPLY_URL`.
-    pub fn or_of_environment(libhd: Option<&Path>, libdrd: Option<&Path>, haply_url: Option<&str>) -> Self {
-        let or = |named: Option<&Path>, variable| {
-            let from_environment = || std::env::var_os(variable).map(PathBuf::from);
-            named.map(Path::to_owned).or_else(from_environment)
-        };
+    pub fn or_of_environment(self) -> Self {
+        let path = |variable| std::env::var_os(variable).map(PathBuf::from);
         Self {
-            libhd: or(libhd, "STYLET_LIBHD"),
-            libdrd: or(libdrd, "STYLET_LIBDRD"),
-            haply_url: haply_url
-                .map(str::to_owned)
-                .or_else(|| std::env::var("STYLET_HAPLY_URL").ok()),
+            libhd: self.libhd.or_else(|| path("STYLET_LIBHD")),
+            libdrd: self.libdrd.or_else(|| path("STYLET_LIBDRD")),
+            haply_url: self.haply_url.or_else(|| std::env::var("STYLET_HAPLY_URL").ok()),
         }
     }
 
