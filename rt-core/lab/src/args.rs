@@ -65,10 +65,7 @@ pub struct LatencyArgs {
     /// well, from motion to photon and from motion to force
     #[arg(long, value_name = "INPUT", requires = "external")]
     pub motion: Option<String>,
-    /// Limits in a TOML file, one `name = value` a line
-    #[arg(long, value_name = "FILE")]
-    pub limits: Option<PathBuf>,
-    /// One limit; wins over the file
+    /// One limit other than its default
     #[arg(long, value_name = "NAME=VALUE")]
     pub limit: Vec<String>,
     /// Folder for report.json, report.html and histograms.hlog

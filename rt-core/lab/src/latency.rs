@@ -57,7 +57,7 @@ pub fn run(args: &LatencyArgs, interrupted: &AtomicBool) -> Result<u8, LatencyEr
     }
     let mut options = args.options()?;
     let whose = args.whose.read()?;
-    let limits = verdict::limits(options.haptic_period_ns, args.limits.as_deref(), &args.limit)?;
+    let limits = verdict::limits(options.haptic_period_ns, &args.limit)?;
     disk::make(&args.out)?;
     let mut spin_search = None;
     if args.spin_us == Spin::Auto {

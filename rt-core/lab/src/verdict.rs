@@ -7,7 +7,6 @@ use crate::summary::{needed, quantile_us};
 use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::Path;
 use stylet_runtime::process::LoopReport;
 
 /// Reading that a limit applies to.
@@ -106,36 +105,23 @@ impl LimitSpec {
 /// A limit by its name, with the value in force.
 pub type Limits = BTreeMap<&'static str, f64>;
 
-/// Unknown or non-numeric limits, each with its origin; the existing ones follow.
+/// Unknown or non-numeric limits; the existing ones follow.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .0.join("\n"))]
 pub struct LimitsError(Vec<String>);
 
-/// Returns the defaults, overridden by the file, then by the command line.
-pub fn limits(period_ns: u64, file: Option<&Path>, given: &[String]) -> Result<Limits, LimitsError> {
+/// Returns the defaults, overridden by the command line.
+pub fn limits(period_ns: u64, given: &[String]) -> Result<Limits, LimitsError> {
     let mut limits: Limits = LIMITS.iter().map(|l| (l.name, l.default_for(period_ns))).collect();
     let mut problems = Vec::new();
-    let mut set = |name: &str, value: Option<f64>, place: &str| {
-        let known = LIMITS.iter().find(|l| l.name == name);
-        match (known, value.filter(|v| v.is_finite() && *v >= 0.0)) {
-            (Some(spec), Some(value)) => drop(limits.insert(spec.name, value)),
-            (Some(_), None) => problems.push(format!("{place}: {name} needs a number of 0 or more")),
-            (None, _) => problems.push(format!("{place}: no limit is called {name:?}")),
-        }
-    };
-    if let Some(path) = file {
-        let place = path.display().to_string();
-        let unreadable = |why: &dyn std::fmt::Display| LimitsError(vec![format!("{place}: {why}")]);
-        let text = std::fs::read_to_string(path).map_err(|e| unreadable(&e))?;
-        let table: toml::Table = text.parse().map_err(|e: toml::de::Error| unreadable(&e))?;
-        for (name, value) in &table {
-            let number = value.as_float().or_else(|| value.as_integer().map(|i| i as f64));
-            set(name, number, &place);
-        }
-    }
     for word in given {
         let (name, value) = word.split_once('=').unwrap_or((word, ""));
-        set(name, value.parse().ok(), "--limit");
+        let known = LIMITS.iter().find(|l| l.name == name);
+        match (known, value.parse().ok().filter(|v: &f64| v.is_finite() && *v >= 0.0)) {
+            (Some(spec), Some(value)) => drop(limits.insert(spec.name, value)),
+            (Some(_), None) => problems.push(format!("--limit: {name} needs a number of 0 or more")),
+            (None, _) => problems.push(format!("--limit: no limit is called {name:?}")),
+        }
     }
     if problems.is_empty() {
         return Ok(limits);
@@ -306,19 +292,16 @@ mod tests {
 
     #[test]
     fn limits_scale_with_the_period_and_the_command_line_wins() {
-        let file = std::env::temp_dir().join(format!("stylet-limits-{}.toml", std::process::id()));
-        std::fs::write(&file, "wake_p50_us = 11\nwake_p99_us = 33.5\n").expect("written");
         let given = ["wake_p50_us=7".to_owned()];
-        let l = limits(500_000, Some(&file), &given).expect("all are known");
-        std::fs::remove_file(&file).expect("removed");
-        assert_eq!((l["wake_p50_us"], l["wake_p99_us"]), (7.0, 33.5));
+        let l = limits(500_000, &given).expect("all are known");
+        assert_eq!((l["wake_p50_us"], l["wake_p99_us"]), (7.0, 100.0));
         assert_eq!((l["wake_max_us"], l["recording_p99_us"]), (500.0, 1.0));
     }
 
     #[test]
     fn every_bad_limit_is_named() {
         let given = ["wake_p50=7", "wake_p99_us=-1", "faults", "wake_max_us=nan"].map(str::to_owned);
-        let why = limits(1_000_000, None, &given)
+        let why = limits(1_000_000, &given)
             .expect_err("all four are wrong")
             .to_string();
         assert_eq!(why.lines().count(), 5);
