@@ -6,7 +6,6 @@ pub mod insertions;
 pub mod live;
 pub mod machine;
 pub mod own;
-pub mod rig;
 pub mod session;
 pub mod twin;
 pub mod unfolded;

@@ -1,6 +1,5 @@
 //! The real loops under a simulated hand, on one thread and one clock: a session that can be repeated.
 
-use crate::rig::Tick;
 use nalgebra::Vector3;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use stylet_hw::{
@@ -58,6 +57,16 @@ impl Device for SharedPhantom {
     }
 }
 
+/// Outcome of one tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Tick {
+    pub output: ChainOutput,
+    pub true_tip_m: f64,
+    pub true_speed_m_per_s: f64,
+    /// Work of the device on the hand since the start.
+    pub work_j: f64,
+}
+
 /// An insertion along z. Ticks of the force loop are 1 ms apart.
 pub struct Session {
     loops: SteppedLoops,
@@ -70,22 +79,11 @@ impl Session {
     /// Makes a session, engaged, the tip at `start`, the needle along +z; the tissue answers every `tissue_every`th
     /// tick.
     pub fn new(world: World, start: Vector3<f64>, hand: Hand, tissue_every: u64) -> Self {
-        Self::with_force(world, start, hand, tissue_every, ForceParameters::default())
+        let hand = (hand, LinkFaults::default());
+        Self::over_link(Box::new(world), start, hand, ForceParameters::default(), tissue_every)
     }
 
-    /// Makes a session as [`new`](Self::new), with other parameters of the force.
-    pub fn with_force(
-        world: World,
-        start: Vector3<f64>,
-        hand: Hand,
-        tissue_every: u64,
-        force: ForceParameters,
-    ) -> Self {
-        let faults = LinkFaults::default();
-        Self::over_link(Box::new(world), start, (hand, faults), force, tissue_every)
-    }
-
-    /// Returns the same over a link with faults.
+    /// Makes a session as [`new`](Self::new), with other parameters of the force and over a link with faults.
     pub fn over_link(
         world: Box<World>,
         start: Vector3<f64>,

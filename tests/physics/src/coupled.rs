@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use stylet_benches::session::{Session, axis_start};
-use stylet_hw::Hand;
+use stylet_hw::{Hand, LinkFaults};
 use stylet_runtime::rt::world::World;
 use stylet_sim::force::ForceParameters;
 use stylet_sim::limits::TissueParameters;
@@ -33,7 +33,8 @@ fn forces(fem: bool, tissue_every: u64, seconds: f64) -> Vec<(f64, f64, f64)> {
         coupling: 1.0,
         ..ForceParameters::default()
     };
-    let mut session = Session::with_force(world, start, GUIDED, tissue_every, coupled);
+    let hand = (GUIDED, LinkFaults::default());
+    let mut session = Session::over_link(Box::new(world), start, hand, coupled, tissue_every);
     session.go_to(start + Vector3::z() * 0.04, 0.048);
     let ticks = (seconds * 1e3) as usize;
     (0..ticks)

@@ -3,7 +3,8 @@
 mod coupled;
 mod on_line;
 
-use stylet_benches::rig::{Rig, Tick, hand_envelope};
+use crate::rig::{Rig, hand_envelope};
+use stylet_benches::session::Tick;
 use stylet_hw::{Hand, LinkFaults};
 use stylet_sim::needle::LayerKind;
 

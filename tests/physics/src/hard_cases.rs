@@ -1,6 +1,7 @@
 //! The hard cases of force and needle, each with its figure: underflow, rest, quantisation, bad samples.
 
-use stylet_benches::rig::{Rig, Tick};
+use crate::rig::Rig;
+use stylet_benches::session::Tick;
 use stylet_hw::{Hand, LinkFaults};
 use stylet_sim::needle::{LayerKind, NeedleInput, NeedleParameters, NeedleState, Phase, step, transmission};
 

@@ -17,6 +17,8 @@ mod outside;
 #[cfg(test)]
 mod patch;
 #[cfg(test)]
+mod rig;
+#[cfg(test)]
 mod rows;
 #[cfg(test)]
 mod stability;

@@ -1,8 +1,7 @@
 //! Hard cases of a needle on its line, as shipped: both loops, the paper's gland, ChainMail and finite elements.
 
 use nalgebra::Vector3;
-use stylet_benches::rig::Tick;
-use stylet_benches::session::{Session, axis_start, gland_shift_m};
+use stylet_benches::session::{Session, Tick, axis_start, gland_shift_m};
 use stylet_hw::{Hand, LinkFaults};
 use stylet_runtime::lines::LineBody;
 use stylet_runtime::rt::world::World;

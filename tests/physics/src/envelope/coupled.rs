@@ -2,10 +2,10 @@
 //! both models.
 
 use super::{Case, SINGING_M, excess, to_and_fro, worst};
+use crate::rig::hand_envelope;
 use crate::rows::{Row, keep};
 use nalgebra::Vector3;
-use stylet_benches::rig::{Tick, hand_envelope};
-use stylet_benches::session::{Session, axis_start};
+use stylet_benches::session::{Session, Tick, axis_start};
 use stylet_hw::{Hand, LinkFaults};
 use stylet_runtime::rt::world::World;
 use stylet_runtime::stepped::HAPTIC_TICKS_PER_TISSUE_TICK;

@@ -2,9 +2,9 @@
 //! elements.
 
 use super::{Case, excess, to_and_fro, worst};
+use crate::rig::hand_envelope;
 use nalgebra::Vector3;
-use stylet_benches::rig::{Tick, hand_envelope};
-use stylet_benches::session::{Session, axis_start};
+use stylet_benches::session::{Session, Tick, axis_start};
 use stylet_hw::{Hand, LinkFaults};
 use stylet_runtime::lines::LineBody;
 use stylet_runtime::rt::world::World;

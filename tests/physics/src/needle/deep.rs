@@ -1,8 +1,8 @@
 //! A needle in tissue that is pushed aside, reversed, weighed and slowed: whole-loop cases that write their own rows.
 
 use super::*;
+use crate::rig::hand_envelope;
 use crate::rows::{Row, keep};
-use stylet_benches::rig::hand_envelope;
 
 /// Two steps of the encoders: an oscillation that they can resolve.
 const SEEN_M: f64 = 6e-5;

@@ -1,8 +1,9 @@
 //! A hand, a device, a link and the force chain, without processes or tissue: membranes are planes across the way.
 
 use nalgebra::Vector3;
+use stylet_benches::session::Tick;
 use stylet_hw::{BadLink, Device, DeviceInfo, Hand, HandGoal, LinkFaults, SimulatedPhantom, SimulatedPhantomConfig};
-use stylet_sim::force::chain::{self, ChainOutput, ChainParameters, ChainState, Touch};
+use stylet_sim::force::chain::{self, ChainParameters, ChainState, Touch};
 use stylet_sim::force::{ForceParameters, LocalResponse, PassivityParameters};
 use stylet_sim::needle::{LayerKind, NeedleParameters};
 
@@ -20,16 +21,6 @@ pub struct Rig {
     /// Innermost layer met, and the number it was given.
     met: Option<(usize, u64)>,
     numbers: u64,
-}
-
-/// Outcome of one tick.
-#[derive(Clone, Copy, Debug)]
-pub struct Tick {
-    pub output: ChainOutput,
-    pub true_tip_m: f64,
-    pub true_speed_m_per_s: f64,
-    /// Work of the device on the hand since the start.
-    pub work_j: f64,
 }
 
 impl Rig {
