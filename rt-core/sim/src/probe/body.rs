@@ -12,11 +12,11 @@ use crate::tissue::{ElementField, PackedField};
 #[derive(Clone, Debug)]
 pub struct BodyProbe {
     ready: ReadyProbe,
-    state: ProbeState,
+    pub(super) state: ProbeState,
     response: ProbeResponse,
     /// Needle lines in the same body, and how far they displace each pad, along x, y, z, m.
     lines: LinesBeside,
-    beside_m: Vec<f64>,
+    pub(super) beside_m: Vec<f64>,
     share: ElementField,
     /// Loads that the share was made from.
     shared_n: Vec<f64>,
@@ -93,16 +93,6 @@ impl BodyProbe {
     /// the number of rows.
     pub fn displace_line(&self, generation: u64, rows_m: &mut [f64]) -> usize {
         self.lines.displace_line(generation, self.state.loads_n(), rows_m)
-    }
-
-    /// Returns the displacement of each pad by needles in this tick, along x, y, z, m.
-    pub fn beside_m(&self) -> &[f64] {
-        &self.beside_m
-    }
-
-    /// Loads of the probe on the pads, along x, y, z, N.
-    pub fn loads_n(&self) -> &[f64] {
-        self.state.loads_n()
     }
 
     /// Keeps what this tick leaves to the next. Allocates nothing where the room is of this probe; else there is no

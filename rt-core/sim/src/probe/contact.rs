@@ -45,7 +45,7 @@ pub struct ProbeState {
     /// Forces on the tissue at each pad, along x, y, z, N.
     loads_n: Vec<f64>,
     /// Displacement of each point by them, and by others, m.
-    moved_m: Vec<[f64; 3]>,
+    pub(super) moved_m: Vec<[f64; 3]>,
     beside_m: Vec<[f64; 3]>,
     /// Work space for the displacement of the pads by others.
     pads_m: Vec<f64>,
@@ -105,11 +105,6 @@ impl ProbeState {
         &self.loads_n
     }
 
-    /// Returns the displacements of the points of the wall by these loads, along x, y, z, m.
-    pub fn moved_m(&self) -> &[[f64; 3]] {
-        &self.moved_m
-    }
-
     /// Iterates over the force of the probe on each point of the wall, N, and its direction; no direction without a
     /// force.
     pub fn pressed(&self) -> impl Iterator<Item = (f64, [f64; 3])> {
@@ -152,11 +147,6 @@ impl ProbeState {
         self.report
     }
 
-    /// Returns whether nothing is pressed.
-    pub fn is_at_rest(&self) -> bool {
-        self.pressed_n.iter().all(|p| *p == 0.0)
-    }
-
     /// Brings the tissue to rest, and the probe out of it.
     pub fn reset(&mut self) {
         self.pose = None;
@@ -185,11 +175,6 @@ pub fn step(probe: &ReadyProbe, state: &mut ProbeState, pose: &ProbePose, beside
         state.pose = Some(pose);
     }
     respond(state, probe, &pose)
-}
-
-/// Adds up the displacement of the body by the loads; to be called where they have changed. Does not allocate.
-pub fn displace(probe: &ReadyProbe, state: &mut ProbeState) {
-    state.share.load(&probe.solved.columns, &state.loads_n);
 }
 
 /// Returns the number of steps, by the point of the probe in the wall that moves the farthest.

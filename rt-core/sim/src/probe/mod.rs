@@ -37,7 +37,7 @@ mod wall;
 
 pub use body::BodyProbe;
 pub use columns::{BatchAnswers, BatchRoom, ProbeQueue, ReadyProbe, SolvedProbe};
-pub use contact::{ContactReport, ProbeState, displace, step};
+pub use contact::{ContactReport, ProbeState, step};
 pub use memory::ProbeMemory;
 pub use response::{ProbeResponse, Wrench};
 pub use shape::{ProbePose, ProbeShape};

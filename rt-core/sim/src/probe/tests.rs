@@ -15,6 +15,12 @@ mod oracle;
 mod pelvis;
 mod reference;
 
+/// Adds up the displacement of the body by the loads.
+fn displace(probe: &ReadyProbe, state: &mut ProbeState) {
+    let loads_n = state.loads_n().to_vec();
+    state.share.load(&probe.solved.columns, &loads_n);
+}
+
 /// A scene, the body that is solved for, and a probe in it.
 pub(super) struct Fixture {
     pub scene: Scene,

@@ -17,11 +17,6 @@ impl ElementField {
         }))
     }
 
-    /// Returns the number of elements.
-    pub fn elements(&self) -> usize {
-        self.0[0].len()
-    }
-
     /// Becomes the sum of answers times loads, m. Does not allocate.
     pub fn load(&mut self, columns: &[PackedField], loads_n: &[f64]) {
         add_up(Simd::detect(), columns, loads_n, 1.0, &mut self.0);

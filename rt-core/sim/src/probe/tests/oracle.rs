@@ -1,7 +1,7 @@
 //! The probe in a small body against felupe's elements and SciPy's solvers (`tests/oracles/probe_felupe.py`).
 
-use super::finely;
-use crate::probe::{ProbePose, ProbeState, displace, step};
+use super::{displace, finely};
+use crate::probe::{ProbePose, ProbeState, step};
 use nalgebra::Vector3;
 
 const PRESSED: &str = include_str!("../../../../../tests/oracles/probe_pressed.csv");

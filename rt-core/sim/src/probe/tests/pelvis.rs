@@ -1,9 +1,9 @@
 //! The pelvis under a probe that is pressed 10 mm: against the reference, between the pads, and how long it takes.
 
-use super::Fixture;
+use super::{Fixture, displace};
 use super::reference::{Reference, beside_reference};
 use crate::probe::wall::Wall;
-use crate::probe::{PADS_APART_M, ProbeState, displace, step};
+use crate::probe::{PADS_APART_M, ProbeState, step};
 use crate::scene::{Labels, Role, Scene, TissueKind};
 use nalgebra::Vector3;
 use std::sync::OnceLock;

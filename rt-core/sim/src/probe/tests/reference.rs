@@ -3,9 +3,9 @@
 //!
 //! Nothing is condensed and nothing packed: each product with the compliance is a solution for the whole body.
 
-use super::{Fixture, finely};
+use super::{Fixture, displace, finely};
 use crate::probe::wall::Wall;
-use crate::probe::{ProbePose, ProbeState, displace};
+use crate::probe::{ProbePose, ProbeState};
 use crate::tissue::ElementField;
 use crate::tissue::fem::batch::{BatchState, NodeWeight};
 use nalgebra::Vector3;

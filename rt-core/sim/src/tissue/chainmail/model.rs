@@ -80,13 +80,6 @@ impl ChainMail {
         self.limits = limits;
     }
 
-    /// Runs the portable kernels, whatever the processor has.
-    #[cfg(test)]
-    pub fn without_vectors(mut self) -> Self {
-        self.simd = Simd::Portable;
-        self
-    }
-
     pub(crate) fn is_fixed(&self, element: u32) -> bool {
         self.classes.any_fixed() && self.classes.is_fixed(self.lattice.structure(element))
     }

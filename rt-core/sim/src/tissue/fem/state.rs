@@ -37,36 +37,6 @@ impl<T: Real> FemState<T> {
         self.displacement.get(axis).map_or(&[], Vec::as_slice)
     }
 
-    /// Returns the elastic energy, in body and springs.
-    #[cfg(test)]
-    pub fn strain_energy_j(&mut self, model: &FemModel<T>) -> f64 {
-        self.grip.strain_energy_j(model)
-    }
-
-    /// Returns the displacement of the node at `corner`, counted in cells from the scene's origin, in metres; `None`
-    /// without a node.
-    #[cfg(test)]
-    pub fn node_displacement_m(&self, model: &FemModel<T>, corner: [usize; 3]) -> Option<[f64; 3]> {
-        let grid = &model.levels[0].grid;
-        let mut place = [0; 3];
-        for axis in 0..3 {
-            place[axis] = corner[axis].checked_sub(model.low_cell[axis])?;
-            if place[axis] >= grid.nodes[axis] {
-                return None;
-            }
-        }
-        let node = grid.index(place);
-        (model.part[node] != u32::MAX).then(|| {
-            [0, 1, 2].map(|a| {
-                self.grip
-                    .used()
-                    .iter()
-                    .map(|r| r.weight_m * r.u[a][node].to_f64())
-                    .sum()
-            })
-        })
-    }
-
     /// Lets loose and forgets what is held, and displaces every element by the sum of loads times answers (m/N) and by
     /// `shift`; how many moved.
     pub fn displace(&mut self, model: &FemModel<T>, columns: &[PackedField], loads_n: &[f64], shift: Shift<'_>) -> u32 {

@@ -24,6 +24,23 @@ const EXACT: SolveSettings = SolveSettings {
     max_cycles: 400,
 };
 
+/// Returns the displacement of the node at `corner`, counted in cells from the scene's origin, in metres; `None`
+/// without a node.
+fn node_displacement_m<T: Real>(state: &FemState<T>, model: &FemModel<T>, corner: [usize; 3]) -> Option<[f64; 3]> {
+    let grid = &model.levels[0].grid;
+    let mut place = [0; 3];
+    for axis in 0..3 {
+        place[axis] = corner[axis].checked_sub(model.low_cell[axis])?;
+        if place[axis] >= grid.nodes[axis] {
+            return None;
+        }
+    }
+    let node = grid.index(place);
+    let used = state.grip.used().iter();
+    let along = |a: usize| used.clone().map(|r| r.weight_m * r.u[a][node].to_f64()).sum();
+    (model.part[node] != u32::MAX).then(|| [0, 1, 2].map(along))
+}
+
 fn lattice_of(labels: &Labels) -> Arc<Lattice> {
     Scene::from_labels("test", labels).expect("valid labels").lattice
 }

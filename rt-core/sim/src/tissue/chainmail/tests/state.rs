@@ -3,6 +3,7 @@
 use super::{held_at, model_of, paper, reference::Reference, violation::largest_violation};
 use crate::limits::TissueParameters;
 use crate::scene::test_bodies;
+use crate::simd::Simd;
 use crate::tissue::HeldOutcome;
 use crate::tissue::chainmail::*;
 use stylet_heap as heap;
@@ -51,7 +52,8 @@ fn vectors_and_portable_loops_give_the_same_bytes() {
         test_bodies::bone(),
     ] {
         let vectors = model_of(&labels);
-        let portable = vectors.clone().without_vectors();
+        let mut portable = vectors.clone();
+        portable.simd = Simd::Portable;
         let mut states = [TissueState::at_rest(&vectors), TissueState::at_rest(&portable)];
         let mut walk = Walk::new(3);
         for tick in 0..400 {
