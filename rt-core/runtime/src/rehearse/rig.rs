@@ -119,16 +119,6 @@ impl Rig {
         let _ = self.loops.control.haptic_orders.push((0, HapticOrder::Engage));
     }
 
-    #[cfg(test)]
-    pub fn reset(&mut self) {
-        let _ = self.loops.control.haptic_orders.push((0, HapticOrder::Reset));
-        let _ = self
-            .loops
-            .control
-            .tissue_orders
-            .push(TissueOrder::Step(0, TissueStep::Reset));
-    }
-
     pub fn leave_needle(&mut self) {
         let _ = self.loops.control.haptic_orders.push((0, HapticOrder::LeaveNeedle));
     }
@@ -160,40 +150,6 @@ impl Rig {
         self.loops.tissue.seeds_at_rest().collect()
     }
 
-    #[cfg(test)]
-    pub fn draw_needle(&mut self, number: u64) {
-        let order = HapticOrder::DrawNeedle {
-            number,
-            speed_m_per_s: 0.05,
-            promise: None,
-        };
-        let _ = self.loops.control.haptic_orders.push((0, order));
-    }
-
-    #[cfg(test)]
-    pub fn forget_carry(&mut self) {
-        self.loops.tissue.forget_carry();
-    }
-
-    #[cfg(test)]
-    pub fn tissue(&mut self) -> &mut crate::rt::tissue::TissueLoop {
-        &mut self.loops.tissue
-    }
-
-    #[cfg(test)]
-    pub fn take_probe(&mut self, probe: Box<stylet_sim::probe::BodyProbe>) {
-        let _ = self.loops.control.tissue_orders.push(TissueOrder::Probe {
-            generation: 1,
-            room: crate::rt::probe_tape::ProbeTape::new(&probe),
-            probe,
-        });
-    }
-
-    #[cfg(test)]
-    pub fn response(&self) -> &crate::rt::response::TissueResponse {
-        self.loops.tissue.response()
-    }
-
     pub fn deformed(&self) -> Deformed<'_> {
         self.loops.tissue.world().tissue.deformed()
     }
@@ -210,3 +166,6 @@ impl Rig {
         self.loops.tissue.into_world()
     }
 }
+
+#[cfg(test)]
+mod tests;
