@@ -7,7 +7,7 @@ pub use assemble::{Parts, report, window_rows};
 use crate::bound::MissBound;
 use crate::compare::Comparison;
 use crate::load::Load;
-use crate::provenance::{Fact, Package, ProgramDigest, Setting};
+use crate::provenance::{Fact, ProgramDigest, Setting};
 use crate::spin::SpinSearch;
 use crate::stationary::Stationarity;
 use crate::summary::Summary;
@@ -182,6 +182,4 @@ pub struct Report {
     pub spin_search: Option<SpinSearch>,
     pub settings: Vec<Setting>,
     pub facts: Vec<Fact>,
-    /// Foreign packages of `rt-core`, as locked.
-    pub dependencies: Vec<Package>,
 }

@@ -1,4 +1,4 @@
-//! Basis of the figures: counters of the kernel, settings, machine, packages, method.
+//! Basis of the figures: counters of the kernel, settings, machine, method.
 
 use crate::bound::MissBound;
 use crate::report::{LoopCounts, Report};
@@ -97,20 +97,11 @@ pub fn provenance(r: &Report) -> Markup {
     let facts: Vec<_> = facts
         .map(|f| vec![cell(&f.group), cell(&f.name), cell(&f.value)])
         .collect();
-    let packages = r.dependencies.iter();
-    let packages: Vec<_> = packages
-        .map(|d| vec![cell(d.name), cell(d.version), cell(d.known_anomalies.join(" "))])
-        .collect();
-    let last_wide = [Column::Text, Column::Text, Column::Wide];
     html! {
         h2 { "Settings, asked and read back" }
         (table(&["setting", "asked", "got", "met"], &settings, &[]))
         h2 { "Machine" }
-        (table(&["", "what", "reported value"], &facts, &last_wide))
-        details {
-            summary { (packages.len()) " packages that rt-core is built from, with what we know to be wrong with them" }
-            (table(&["package", "version", "known anomalies"], &packages, &last_wide))
-        }
+        (table(&["", "what", "reported value"], &facts, &[Column::Text, Column::Text, Column::Wide]))
     }
 }
 

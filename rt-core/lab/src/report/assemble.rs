@@ -124,10 +124,6 @@ pub fn report(parts: &Parts) -> Report {
         spin_search: parts.spin_search.clone(),
         settings: provenance::settings(parts.machine, options, &measured.run),
         facts: provenance::facts(parts.machine, options),
-        dependencies: provenance::packages()
-            .into_iter()
-            .filter(|package| package.of != "host-ui")
-            .collect(),
     }
 }
 
