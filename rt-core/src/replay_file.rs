@@ -187,19 +187,13 @@ fn print_result(what: &str, found: Option<&Repeated>) -> bool {
         r.ticks - r.different,
         r.ticks
     );
-    if r.positions > 0 {
-        println!(
-            "         {} of {} element positions the same",
-            r.positions - r.different_positions,
-            r.positions
-        );
-    }
-    if r.lines > 0 {
-        println!(
-            "         {} of {} needle lines the same",
-            r.lines - r.different_lines,
-            r.lines
-        );
+    for (what, all, different) in [
+        ("element positions", r.positions, r.different_positions),
+        ("needle lines", r.lines, r.different_lines),
+    ] {
+        if all > 0 {
+            println!("         {} of {all} {what} the same", all - different);
+        }
     }
     if let Some(first) = r.first_different {
         println!("         the first that differs is tick {} of the recording", first + 1);
