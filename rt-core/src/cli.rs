@@ -124,7 +124,7 @@ mod tests {
     }
 
     fn refused(options: &[&str]) -> String {
-        let cli = Cli::parse_from([&["rt-core", "probe", "--folder", "/nowhere"], options].concat());
+        let cli = Cli::parse_from([&["rt-core", "probe", "--again"], options].concat());
         let Some(Task::Probe(args)) = cli.task else {
             panic!("another task")
         };

@@ -30,7 +30,7 @@ pub enum ProbeTaskError {
     #[error(transparent)]
     File(#[from] KeptError),
     /// There is no folder for it.
-    #[error("neither XDG_CACHE_HOME nor HOME is set: say where to keep it (--folder)")]
+    #[error("neither XDG_CACHE_HOME nor HOME is set: set one, for the folder of the answers")]
     NoFolder,
 }
 
@@ -52,17 +52,12 @@ pub struct ProbeArgs {
     /// Solve again although the answers are there
     #[arg(long)]
     again: bool,
-    /// Where to keep them; runs look in the default folder [default: $XDG_CACHE_HOME/stylet/probes or
-    /// ~/.cache/stylet/probes]
-    #[arg(long, value_name = "DIR")]
-    folder: Option<PathBuf>,
 }
 
 impl ProbeArgs {
     /// Solves, prints a line for each tenth, and saves the answers.
     pub fn run(&self, stop: &AtomicBool) -> Result<(), ProbeTaskError> {
-        let folder = self.folder.clone().or_else(kept_probe::default_folder);
-        let folder = folder.ok_or(ProbeTaskError::NoFolder)?;
+        let folder = kept_probe::default_folder().ok_or(ProbeTaskError::NoFolder)?;
         let (source, recorded) = self.source()?;
         let tissue = self.tissue.or(recorded).unwrap_or_default();
         let body = LineBody::of_source(&source, tissue)?.ok_or(NoProbe::from(NoWall::NoForces))?;
