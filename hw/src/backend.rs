@@ -1,9 +1,10 @@
 //! Names of the back ends: the one table that command lines, scene files and help texts share.
 
 /// A kind of device that can be chosen by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum BackendKind {
     /// A simulated Phantom in the grip of a simulated hand.
+    #[default]
     Simulated,
     /// A Phantom through OpenHaptics.
     Phantom,

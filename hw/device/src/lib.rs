@@ -138,7 +138,7 @@ impl Sample {
 }
 
 /// Force and torque on the operator's hand, in the world frame.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wrench {
     /// Force, N.
     pub force_n: Vector3<f64>,
@@ -149,10 +149,7 @@ pub struct Wrench {
 impl Wrench {
     /// Returns zero force and torque.
     pub fn zero() -> Self {
-        Self {
-            force_n: Vector3::zeros(),
-            torque_nm: Vector3::zeros(),
-        }
+        Self::default()
     }
 
     /// Creates a force without torque.
@@ -174,12 +171,6 @@ impl Wrench {
     /// Returns whether force and torque are finite.
     pub fn is_finite(&self) -> bool {
         self.force_n.iter().chain(self.torque_nm.iter()).all(|x| x.is_finite())
-    }
-}
-
-impl Default for Wrench {
-    fn default() -> Self {
-        Self::zero()
     }
 }
 

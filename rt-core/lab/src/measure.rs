@@ -144,7 +144,7 @@ fn watch_core(options: &Options) -> Option<usize> {
 pub fn measure(setup: &Setup, interrupted: &AtomicBool) -> Result<Measured, MeasureError> {
     process::limits::check().map_err(RunError::from)?;
     let script = Script::of(&Scene::builtin(&setup.options.scene)?);
-    let pose_times = Arc::new(PoseTimes::new());
+    let pose_times = Arc::new(PoseTimes::default());
     let options = setup.options;
     let ring = |period_ns| rtrb::RingBuffer::new((RING_NS / period_ns) as usize);
     let (haptic_in, haptic_ring) = ring(options.haptic_period_ns);

@@ -23,19 +23,10 @@ const SERVO_AHEAD: u32 = 5;
 
 /// A back end of [`backend::BACKENDS`] as the operator named it, with the text after the colon: the name of a Phantom
 /// in the driver's configuration, or the file of a recorded motion.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DeviceChoice {
     kind: BackendKind,
     argument: Option<String>,
-}
-
-impl Default for DeviceChoice {
-    fn default() -> Self {
-        Self {
-            kind: BackendKind::Simulated,
-            argument: None,
-        }
-    }
 }
 
 impl DeviceChoice {

@@ -58,11 +58,6 @@ pub struct PoseTimes([(AtomicU64, AtomicU64); PoseTimes::KEPT]);
 impl PoseTimes {
     const KEPT: usize = 1024;
 
-    /// Returns an empty table.
-    pub fn new() -> Self {
-        Self(std::array::from_fn(|_| (AtomicU64::new(0), AtomicU64::new(0))))
-    }
-
     fn note(&self, tick: u64, time_ns: u64) {
         let (slot_tick, slot_time) = &self.0[tick as usize % Self::KEPT];
         slot_time.store(time_ns, Ordering::Relaxed);
@@ -81,7 +76,7 @@ impl PoseTimes {
 
 impl Default for PoseTimes {
     fn default() -> Self {
-        Self::new()
+        Self(std::array::from_fn(|_| Default::default()))
     }
 }
 
@@ -203,7 +198,7 @@ mod tests {
 
     #[test]
     fn pose_times_are_known_until_they_are_overwritten() {
-        let times = PoseTimes::new();
+        let times = PoseTimes::default();
         times.note(3, 77);
         assert_eq!((times.of(3), times.of(4)), (Some(77), None));
         times.note(3 + PoseTimes::KEPT as u64, 78);

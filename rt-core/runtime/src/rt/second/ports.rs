@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use stylet_shm_schema::SecondRecord;
 
 /// The newest pose of the second device, once in each tick of its loop.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SecondPose {
     /// When the pose was read, `CLOCK_MONOTONIC`, ns; 0 for no pose yet.
     pub time_ns: u64,
@@ -20,17 +20,6 @@ pub struct SecondPose {
     pub world_from_tool: UnitQuaternion<f64>,
     /// Filtered velocity of the tip.
     pub velocity_m_per_s: Vector3<f64>,
-}
-
-impl Default for SecondPose {
-    fn default() -> Self {
-        Self {
-            time_ns: 0,
-            tip_in_scene: Vector3::zeros(),
-            world_from_tool: UnitQuaternion::identity(),
-            velocity_m_per_s: Vector3::zeros(),
-        }
-    }
 }
 
 /// Ends of the second device's loop.

@@ -10,7 +10,7 @@ const FARTHEST_M: f64 = 5e-3;
 const FARTHEST_RAD: f64 = 0.2;
 
 /// A contact and its derivative at one pose, once in each tissue tick.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct ProbeResponse {
     /// When the tissue tick began, `CLOCK_MONOTONIC`, ns.
     pub time_ns: u64,
@@ -33,25 +33,8 @@ pub struct ProbeResponse {
     pub stiffness: SMatrix<f64, 6, 6>,
 }
 
-impl Default for ProbeResponse {
-    /// No contact.
-    fn default() -> Self {
-        Self {
-            time_ns: 0,
-            tick: 0,
-            edge_um: 0,
-            touches: false,
-            unsolved: false,
-            tip_in_scene: Vector3::zeros(),
-            world_from_tool: UnitQuaternion::identity(),
-            wrench: Wrench::zero(),
-            stiffness: SMatrix::zeros(),
-        }
-    }
-}
-
 /// The contact extrapolated to another pose.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Felt {
     /// Wrench on the hand.
     pub wrench: Wrench,
@@ -59,23 +42,12 @@ pub struct Felt {
     pub stored_j: f64,
 }
 
-impl Felt {
-    /// No contact.
-    pub const NOTHING: Self = Self {
-        wrench: Wrench {
-            force_n: Vector3::new(0.0, 0.0, 0.0),
-            torque_nm: Vector3::new(0.0, 0.0, 0.0),
-        },
-        stored_j: 0.0,
-    };
-}
-
 impl ProbeResponse {
     /// Extrapolates to the device's pose. The contact pushes and never pulls, and is no stiffer than the device can
     /// render.
     pub fn at(&self, tip: &Vector3<f64>, world_from_tool: &UnitQuaternion<f64>, max_stiffness_n_per_m: f64) -> Felt {
         if !self.touches {
-            return Felt::NOTHING;
+            return Felt::default();
         }
         let moved_m = no_longer(tip - self.tip_in_scene, FARTHEST_M);
         let turned_rad = no_longer(
@@ -94,11 +66,11 @@ impl ProbeResponse {
         let force_n = self.wrench.force_n - fall.fixed_rows::<3>(0);
         let torque_nm = self.wrench.torque_nm - fall.fixed_rows::<3>(3);
         let Some(outward) = self.wrench.force_n.try_normalize(1e-9) else {
-            return Felt::NOTHING;
+            return Felt::default();
         };
         // Values that are not numbers reach the gate, which turns the force off.
         if force_n.dot(&outward) <= 0.0 {
-            return Felt::NOTHING;
+            return Felt::default();
         }
         Felt {
             stored_j: stored_j(&(along * share), &outward, &force_n),
@@ -165,7 +137,7 @@ mod tests {
         };
         assert_eq!(
             apart.at(&Vector3::zeros(), &UnitQuaternion::identity(), 1e4),
-            Felt::NOTHING
+            Felt::default()
         );
     }
 
