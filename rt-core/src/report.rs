@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use stylet_runtime::process::{LoopReport, RunReport};
+use stylet_runtime::rt::arm::Usage;
 
 /// Every loop.
 #[derive(Serialize)]
@@ -29,11 +30,8 @@ struct Loop {
     missed_deadlines_since_armed: u64,
     /// Since then, to a tenth.
     worst_wake_since_armed_us: f64,
-    heap_calls: u64,
-    minor_faults: i64,
-    major_faults: i64,
-    voluntary_switches: i64,
-    involuntary_switches: i64,
+    #[serde(flatten)]
+    usage: Usage,
 }
 
 fn tenths_us(ns: u64) -> f64 {
@@ -61,11 +59,7 @@ impl From<&LoopReport> for Loop {
             worst_wake_us: tenths_us(r.since_start.worst_wake_ns),
             missed_deadlines_since_armed: r.since_armed.missed,
             worst_wake_since_armed_us: tenths_us(r.since_armed.worst_wake_ns),
-            heap_calls: r.usage.heap_calls,
-            minor_faults: r.usage.minor_faults,
-            major_faults: r.usage.major_faults,
-            voluntary_switches: r.usage.voluntary_switches,
-            involuntary_switches: r.usage.involuntary_switches,
+            usage: r.usage,
         }
     }
 }

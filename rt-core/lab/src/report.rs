@@ -16,6 +16,7 @@ use crate::verdict::{LimitResult, Outcome};
 use crate::watch::CoreWatch;
 use crate::whose::Whose;
 use serde::{Deserialize, Serialize};
+use stylet_runtime::rt::arm::Usage;
 
 /// Version of the format: incremented when a field changes its meaning, or one that `saved` reads is removed.
 pub const SCHEMA: &str = "stylet.latency/1";
@@ -57,12 +58,9 @@ pub struct LoopCounts {
     pub overruns: u64,
     /// Ticks that the measurement itself lost.
     pub unmeasured: u64,
-    pub heap_calls: u64,
-    pub minor_faults: i64,
-    pub major_faults: i64,
-    pub voluntary_switches: i64,
+    #[serde(flatten)]
+    pub usage: Usage,
     pub voluntary_switches_beyond_sleep: i64,
-    pub involuntary_switches: i64,
 }
 
 #[derive(Clone, Debug, Serialize)]

@@ -15,14 +15,14 @@ pub fn counters(r: &Report) -> Markup {
         ("missed deadlines", |c| c.missed_deadlines as f64),
         ("overruns", |c| c.overruns as f64),
         ("ticks not measured", |c| c.unmeasured as f64),
-        ("heap calls", |c| c.heap_calls as f64),
-        ("minor page faults", |c| c.minor_faults as f64),
-        ("major page faults", |c| c.major_faults as f64),
-        ("voluntary context switches", |c| c.voluntary_switches as f64),
+        ("heap calls", |c| c.usage.heap_calls as f64),
+        ("minor page faults", |c| c.usage.minor_faults as f64),
+        ("major page faults", |c| c.usage.major_faults as f64),
+        ("voluntary context switches", |c| c.usage.voluntary_switches as f64),
         ("... beyond one for each sleep", |c| {
             c.voluntary_switches_beyond_sleep as f64
         }),
-        ("involuntary context switches", |c| c.involuntary_switches as f64),
+        ("involuntary context switches", |c| c.usage.involuntary_switches as f64),
     ];
     let loops = [&r.haptic, &r.tissue].into_iter().chain(&r.second);
     let loops: Vec<_> = loops.map(|section| &section.counts).collect();

@@ -1,5 +1,6 @@
 //! Requests real-time properties from the kernel for a thread, and reads back what was granted.
 
+use serde::Serialize;
 use std::marker::PhantomData;
 use stylet_shm_schema::ThreadReport;
 
@@ -178,8 +179,10 @@ fn flush_denormals() {
 }
 
 /// Cost of a thread since it was armed.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Usage {
+    /// Allocations, frees and reallocations.
+    pub heap_calls: u64,
     /// Page faults without a disk.
     pub minor_faults: i64,
     /// Page faults that read a disk.
@@ -188,8 +191,6 @@ pub struct Usage {
     pub voluntary_switches: i64,
     /// Context switches because another thread was preferred.
     pub involuntary_switches: i64,
-    /// Allocations, frees and reallocations.
-    pub heap_calls: u64,
 }
 
 impl Usage {
