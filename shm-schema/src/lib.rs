@@ -114,7 +114,8 @@ pub use snapshot::{LeftNeedlePose, MAX_BEND_POINTS, SeedPose, SnapshotHeader, Ve
 pub use state::{Fault, HapticState, Phase, flags};
 pub use stylet_settings::{
     BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_LEFT_NEEDLES, MAX_NODES, MAX_STRUCTURES, PARAMETER_COUNT,
-    PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet, ParameterSpec, folding,
+    PARAMETERS, ParameterGroup, ParameterId, ParameterProblem, ParameterProblems, ParameterSet, ParameterSpec,
+    ProblemList, folding,
 };
 pub use text::Text;
 

@@ -12,7 +12,7 @@ use std::time::Instant;
 use stylet_controllers::Wish;
 use stylet_implant::workflow::{default_plan, move_request};
 use stylet_shm_schema::{
-    PARAMETERS, ParameterChange, ParameterProblems, ParameterSet, PlannedNeedle, Refusal, Request,
+    PARAMETERS, ParameterChange, ParameterProblems, ParameterSet, PlannedNeedle, ProblemList, Refusal, Request,
 };
 
 /// Farthest goal ahead of the tip for a hand that pulls it.
@@ -271,10 +271,7 @@ fn changed(mut set: ParameterSet, changes: &[ParameterChange]) -> Result<Paramet
     for change in changes {
         set.set(change.id, change.value);
     }
-    match set.problems() {
-        problems if problems.is_empty() => Ok(set),
-        problems => Err(ParameterProblems(problems)),
-    }
+    ProblemList::check(set.problems()).map(|()| set)
 }
 
 /// Returns a name for those requests that panels and keys send as they are.

@@ -8,6 +8,7 @@ mod probe;
 use probe::Pressed;
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
+use stylet_shm_schema::ProblemList;
 use stylet_sim::limits::TissueParameters;
 use stylet_sim::scene::{Scene, TissueKind};
 use stylet_sim::settings::Problem;
@@ -30,15 +31,11 @@ const ROUND_LIMIT: Duration = Duration::from_secs(5);
 #[derive(Debug, thiserror::Error)]
 pub enum CostError {
     /// Parameters of the tissue that are out of range.
-    #[error("{}", lines(.0))]
-    Tissue(Vec<Problem>),
+    #[error(transparent)]
+    Tissue(ProblemList<Problem>),
     /// The scene has no finite elements.
-    #[error("{}", lines(.0))]
-    FiniteElements(Vec<FemProblem>),
-}
-
-fn lines(problems: &[impl ToString]) -> String {
-    problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+    #[error(transparent)]
+    FiniteElements(#[from] ProblemList<FemProblem>),
 }
 
 /// Microseconds of every tick of one part, in each round; finally the minimum for each tick, in order.
@@ -157,7 +154,9 @@ struct Timed {
 
 /// Returns the models that the scene is timed with.
 fn models(scene: &Scene) -> Result<Vec<Timed>, CostError> {
-    let limits = TissueParameters::default().validate().map_err(CostError::Tissue)?;
+    let limits = TissueParameters::default()
+        .validate()
+        .map_err(|p| CostError::Tissue(ProblemList(p)))?;
     let mut models = vec![Timed {
         name: "tissue step, as the scene is".to_owned(),
         model: Box::new(ChainMailTissue::new(scene, limits)),
@@ -166,7 +165,7 @@ fn models(scene: &Scene) -> Result<Vec<Timed>, CostError> {
     // In a coarser body the ticks below, in elements of the scene, would differ.
     let elastic = scene.clone().for_tissue(TissueKind::Fem);
     if elastic.coarseness() == 1 {
-        let fem = FemTissue::<f32>::new(&elastic).map_err(CostError::FiniteElements)?;
+        let fem = FemTissue::<f32>::new(&elastic)?;
         models.push(Timed {
             name: "  FEM in its place (--tissue fem)".to_owned(),
             model: Box::new(fem),

@@ -8,6 +8,7 @@ use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stylet_runtime::process::LoopReport;
+use stylet_shm_schema::ProblemList;
 
 /// Reading that a limit applies to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,10 +106,21 @@ impl LimitSpec {
 /// A limit by its name, with the value in force.
 pub type Limits = BTreeMap<&'static str, f64>;
 
-/// Unknown or non-numeric limits; the existing ones follow.
+/// Limits that cannot be used; the existing ones follow.
 #[derive(Debug, thiserror::Error)]
-#[error("{}", .0.join("\n"))]
-pub struct LimitsError(Vec<String>);
+#[error("{0}\nthe limits are: {names}", names = LIMITS.iter().map(|l| l.name).collect::<Vec<_>>().join(", "))]
+pub struct LimitsError(#[from] ProblemList<LimitProblem>);
+
+/// Problem with one `--limit`.
+#[derive(Debug, thiserror::Error)]
+pub enum LimitProblem {
+    /// Its value is not a number of 0 or more.
+    #[error("--limit: {0} needs a number of 0 or more")]
+    NoNumber(&'static str),
+    /// No limit has that name.
+    #[error("--limit: no limit is called {0:?}")]
+    Unknown(String),
+}
 
 /// Returns the defaults, overridden by the command line.
 pub fn limits(period_ns: u64, given: &[String]) -> Result<Limits, LimitsError> {
@@ -119,16 +131,11 @@ pub fn limits(period_ns: u64, given: &[String]) -> Result<Limits, LimitsError> {
         let known = LIMITS.iter().find(|l| l.name == name);
         match (known, value.parse().ok().filter(|v: &f64| v.is_finite() && *v >= 0.0)) {
             (Some(spec), Some(value)) => drop(limits.insert(spec.name, value)),
-            (Some(_), None) => problems.push(format!("--limit: {name} needs a number of 0 or more")),
-            (None, _) => problems.push(format!("--limit: no limit is called {name:?}")),
+            (Some(spec), None) => problems.push(LimitProblem::NoNumber(spec.name)),
+            (None, _) => problems.push(LimitProblem::Unknown(name.to_owned())),
         }
     }
-    if problems.is_empty() {
-        return Ok(limits);
-    }
-    let names: Vec<&str> = LIMITS.iter().map(|l| l.name).collect();
-    problems.push(format!("the limits are: {}", names.join(", ")));
-    Err(LimitsError(problems))
+    Ok(ProblemList::check(problems).map(|()| limits)?)
 }
 
 /// Result of one limit, or of all together; the worst is the greatest.

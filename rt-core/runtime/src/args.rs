@@ -10,8 +10,7 @@ use crate::rt::arm::{self, Refused};
 use crate::rt::clock::{HAPTIC_PERIOD_NS, Wait};
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use stylet_shm_schema::BUILTIN_SCENES;
-use stylet_shm_schema::Instance;
+use stylet_shm_schema::{BUILTIN_SCENES, Instance, InstanceError, ProblemList};
 use stylet_sim::scene::TissueKind;
 
 /// Options that a run and a measurement share.
@@ -75,8 +74,8 @@ impl SecondArgs {
         };
         let cores = cores();
         if let Some(core) = self.device_2_core.filter(|core| !cores.contains(core)) {
-            let problem = no_such_core("--device-2-core", core, &cores);
-            return Err(OptionsError(vec![problem]));
+            let option = "--device-2-core";
+            return Err(OptionsProblem::NoSuchCore { option, core, cores }.into());
         }
         Ok(Some(SecondOptions {
             device,
@@ -98,14 +97,49 @@ fn tissue_core(cores: &[usize]) -> Option<&usize> {
     cores.iter().rev().nth(1).or(cores.last())
 }
 
-fn no_such_core(option: &str, core: usize, cores: &[usize]) -> String {
-    format!("{option} {core}: this process may use cores {cores:?}")
+/// Problems with the options of a run.
+pub type OptionsError = ProblemList<OptionsProblem>;
+
+/// Problem with the options of a run.
+#[derive(Debug, thiserror::Error)]
+pub enum OptionsProblem {
+    /// A core that this process may not use.
+    #[error("{option} {core}: this process may use cores {cores:?}")]
+    NoSuchCore {
+        /// Option that names the core.
+        option: &'static str,
+        /// The core.
+        core: usize,
+        /// Cores of this process.
+        cores: Vec<usize>,
+    },
+    /// The name of the instance.
+    #[error(transparent)]
+    Instance(#[from] InstanceError),
+    /// A priority with which one loop would starve another.
+    #[error(
+        "{} {}: {} shares core {core} with {}, which would wait for it; give it less than {} {}, or another core",
+        .other.option, .other.priority, .other.name, .first.name, .first.option, .first.priority
+    )]
+    Starves {
+        /// Core of both loops.
+        core: usize,
+        /// Loop that would wait.
+        first: Asked,
+        /// Loop that it would wait for.
+        other: Asked,
+    },
 }
 
-/// Settings that cannot be used: every problem, one a line.
-#[derive(Debug, thiserror::Error)]
-#[error("{}", .0.join("\n"))]
-pub struct OptionsError(pub Vec<String>);
+/// Core and priority requested for a loop.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked {
+    name: &'static str,
+    core: Option<usize>,
+    priority: u32,
+    /// Option that sets the priority.
+    option: &'static str,
+}
 
 /// Names of the tissue models, with a line of help for each.
 pub fn tissue_kinds() -> impl TypedValueParser<Value = TissueKind> {
@@ -144,10 +178,11 @@ impl RealTimeArgs {
         let mut problems = Vec::new();
         for (option, core) in [("--haptic-core", self.haptic_core), ("--tissue-core", self.tissue_core)] {
             if let Some(core) = core.filter(|c| !cores.contains(c)) {
-                problems.push(no_such_core(option, core, &cores));
+                let cores = cores.clone();
+                problems.push(OptionsProblem::NoSuchCore { option, core, cores });
             }
         }
-        let instance = Instance::new(instance).map_err(|e| problems.push(e.to_string()));
+        let instance = Instance::new(instance).map_err(|e| problems.push(e.into()));
         let refused = if self.rt_if_allowed {
             try_real_time().err().map(|why| why.to_string())
         } else {
@@ -173,7 +208,7 @@ impl RealTimeArgs {
                 second: None,
                 libraries: Libraries::default(),
             },
-            _ => return Err(OptionsError(problems)),
+            _ => return Err(ProblemList(problems)),
         };
         priorities::check(&options)?;
         Ok(options)
@@ -189,12 +224,12 @@ fn try_real_time() -> Result<(), Refused> {
     // Otherwise this thread would leave its own heap to later threads.
     arm::keep_one_heap();
     let armed = std::thread::spawn(move || arm::arm(ask).map(drop)).join();
-    armed.unwrap_or_else(|_| Err(Refused("the trial of real-time scheduling ended by itself".to_owned())))?;
+    armed.unwrap_or_else(|_| Err(Refused::Trial))?;
     // SAFETY: both calls have no preconditions; what is locked now is unlocked again.
     let lockable = unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) == 0 && libc::munlockall() == 0 };
     if lockable {
         Ok(())
     } else {
-        Err(Refused(arm::advice("the kernel does not lock memory")))
+        Err(Refused::MemoryLock(None))
     }
 }

@@ -13,7 +13,7 @@ use stylet_sim::tissue::fem::batch::BatchModel;
 use stylet_sim::tissue::{FemTissue, MaterialPoint, TissueError, TissueSpec};
 
 /// Reason why there is no line; the text is for people.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 pub enum NoLine {
     /// The scene cannot be built again.
     #[error(transparent)]
@@ -60,8 +60,7 @@ impl LineBody {
         let Some(scene) = source.build()?.for_lines(tissue) else {
             return Ok(None);
         };
-        let body = FemTissue::<f32>::new(&scene)
-            .map_err(|problems| TissueError(problems.iter().map(ToString::to_string).collect()))?;
+        let body = FemTissue::<f32>::new(&scene).map_err(TissueError::from)?;
         Ok(Some(Self {
             adds_columns: tissue.adds_columns,
             layers: scene
@@ -137,7 +136,7 @@ impl LineBody {
         let rows = 3 * wall.loads();
         let body = FemTissue::<f32>::new(&self.scene.clone().in_cells())
             .map(|fem| BatchModel::new(&fem.model))
-            .map_err(|problems| NoLine::World(TissueError(problems.iter().map(ToString::to_string).collect())))?;
+            .map_err(|problems| NoLine::World(problems.into()))?;
         let queue = ProbeQueue::new(&body, &self.scene.body, wall, shape)?;
         let (next, is_stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         let solved = Mutex::new(Vec::new());

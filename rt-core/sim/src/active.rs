@@ -6,7 +6,7 @@ use crate::line::{NeedleBending, PronyTerm};
 use crate::migration::Migration;
 use crate::needle::{Layer, Layers, NeedleParameters};
 use stylet_device::DeviceInfo;
-use stylet_settings::{ParameterId, ParameterProblem, ParameterProblems, ParameterSet};
+use stylet_settings::{ParameterId, ParameterProblem, ParameterProblems, ParameterSet, ProblemList};
 
 /// Everything that a change of parameters brings to both threads.
 #[derive(Clone, Debug)]
@@ -24,10 +24,7 @@ pub struct Active {
 /// Validates `set` for `device` by the table of parameters; lists every problem. The models verify their own structures
 /// once more, which a set that passed the table never fails.
 pub fn activate(set: &ParameterSet, device: &DeviceInfo) -> Result<Active, ParameterProblems> {
-    let problems = set.problems_on(device.max_stiffness_n_per_m);
-    if !problems.is_empty() {
-        return Err(ParameterProblems(problems));
-    }
+    ProblemList::check(set.problems_on(device.max_stiffness_n_per_m))?;
     let (needle, force) = (needle(set), force(set, device));
     let limits = tissue(set).validate().map_err(unusable)?;
     needle.validate().map_err(unusable)?;
@@ -46,7 +43,7 @@ pub fn activate(set: &ParameterSet, device: &DeviceInfo) -> Result<Active, Param
 
 fn unusable(problems: Vec<impl ToString>) -> ParameterProblems {
     let all = problems.iter().map(|p| ParameterProblem::Unusable(p.to_string()));
-    ParameterProblems(all.collect())
+    ProblemList(all.collect())
 }
 
 fn tissue(set: &ParameterSet) -> TissueParameters {

@@ -1,5 +1,6 @@
 //! Parameters that are valid one by one may not be together: the device holds only so stiff a membrane.
 
+use crate::problem::StudyProblem;
 use crate::quantity::has_no_part;
 use crate::spread::Spread;
 use stylet_hw::DeviceInfo;
@@ -11,16 +12,16 @@ use stylet_sim::scene::TissueKind;
 const MOST: usize = 12;
 
 /// Returns the problem of one of the corners of what varies, if there is one.
-pub fn problem(parameters: &[(&'static ParameterSpec, Spread)], tissue: TissueKind) -> Option<String> {
+pub fn problem(parameters: &[(&'static ParameterSpec, Spread)], tissue: TissueKind) -> Option<StudyProblem> {
     let varied: Vec<_> = parameters
         .iter()
         .filter(|(spec, _)| !has_no_part(spec, tissue))
         .collect();
     if varied.len() > MOST {
-        return Some(format!(
-            "vary: {} parameters of the core; at most {MOST} can vary at once",
-            varied.len()
-        ));
+        return Some(StudyProblem::TooManyParameters {
+            given: varied.len(),
+            most: MOST,
+        });
     }
     (0..1_usize << varied.len()).find_map(|corner| {
         let mut set = ParameterSet::default();
@@ -31,6 +32,7 @@ pub fn problem(parameters: &[(&'static ParameterSpec, Spread)], tissue: TissueKi
             names.push(format!("{} = {value}", spec.key));
         }
         let why = activate(&set, &DeviceInfo::phantom_premium_1_5()).err()?;
-        Some(format!("vary: {} cannot be together: {why}", names.join(", ")))
+        let values = names.join(", ");
+        Some(StudyProblem::Together { values, why })
     })
 }

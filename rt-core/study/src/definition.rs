@@ -1,20 +1,18 @@
 //! STUDY.toml: read strictly, with every problem at once.
 
 use crate::corners;
-use crate::error::{Problems, StudyError};
+use crate::error::StudyError;
 use crate::plan::{self, Plan};
+use crate::problem::{GLAND_KEYS, GlandProblem, KEYS, LONGEST_NAME, QuantityProblem, StudyProblem};
 use crate::quantity::{self, QUANTITIES};
 use crate::spread::Spread;
 use sha2::{Digest, Sha256};
-use std::path::{Path, PathBuf};
-use stylet_shm_schema::{BUILTIN_SCENES, ParameterSpec};
+use std::path::Path;
+use stylet_shm_schema::{BUILTIN_SCENES, ParameterSpec, ProblemList};
 use stylet_sim::scene::TissueKind;
 use toml::{Table, Value};
 
-const KEYS: [&str; 6] = ["name", "seed", "implants", "tissue", "gland", "vary"];
-const GLAND_KEYS: [&str; 2] = ["scene", "plan"];
 const MOST_IMPLANTS: i64 = 1_000_000;
-const LONGEST_NAME: usize = 60;
 
 /// A study, validated.
 #[derive(Clone, Debug)]
@@ -67,12 +65,10 @@ impl Study {
     }
 
     /// Reads a study as [`read`](Self::read) does; the plans are searched in `folder`.
-    pub(crate) fn of_text(text: &str, folder: &Path) -> Result<Self, Problems> {
-        let table: Table = text
-            .parse()
-            .map_err(|e: toml::de::Error| Problems(vec![format!("it is no TOML: {e}")]))?;
+    pub(crate) fn of_text(text: &str, folder: &Path) -> Result<Self, ProblemList<StudyProblem>> {
+        let table: Table = text.parse().map_err(StudyProblem::Toml)?;
         let mut problems = Vec::new();
-        unknown(&table, "", &KEYS, &mut problems);
+        problems.extend(unknown(&table, &KEYS).map(StudyProblem::UnknownKey));
         let name = name(&table, &mut problems);
         let seed = whole(&table, "seed", [0, i64::MAX], Some(1), &mut problems) as u64;
         let implants = whole(&table, "implants", [1, MOST_IMPLANTS], None, &mut problems) as u32;
@@ -87,9 +83,7 @@ impl Study {
         if problems.is_empty() {
             problems.extend(corners::problem(&parameters, tissue));
         }
-        if !problems.is_empty() {
-            return Err(Problems(problems));
-        }
+        ProblemList::check(problems)?;
         Ok(Self {
             name,
             seed,
@@ -117,88 +111,86 @@ impl Study {
     }
 }
 
-fn unknown(table: &Table, place: &str, known: &[&str], problems: &mut Vec<String>) {
-    for key in table.keys().filter(|key| !known.contains(&key.as_str())) {
-        problems.push(format!(
-            "{place}{key}: there is no such key; there are {}",
-            known.join(", ")
-        ));
-    }
+fn unknown(table: &Table, known: &[&str]) -> impl Iterator<Item = String> {
+    table.keys().filter(|key| !known.contains(&key.as_str())).cloned()
 }
 
-fn name(table: &Table, problems: &mut Vec<String>) -> String {
+fn name(table: &Table, problems: &mut Vec<StudyProblem>) -> String {
     let fits = |name: &&str| {
         let letters = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c));
         letters && (1..=LONGEST_NAME).contains(&name.len())
     };
     match table.get("name").map(|name| name.as_str().filter(fits)) {
         Some(Some(name)) => return name.to_owned(),
-        Some(None) => problems.push(format!(
-            "name is {}; give 1 to {LONGEST_NAME} letters, digits, '-', '_' or '.'",
-            table["name"]
-        )),
-        None => problems.push("name is missing: it begins the id of every insertion".to_owned()),
+        Some(None) => problems.push(StudyProblem::Name(table["name"].clone())),
+        None => problems.push(StudyProblem::NoName),
     }
     String::new()
 }
 
-fn whole(table: &Table, key: &str, [least, most]: [i64; 2], default: Option<i64>, problems: &mut Vec<String>) -> i64 {
+fn whole(
+    table: &Table,
+    key: &'static str,
+    [least, most]: [i64; 2],
+    default: Option<i64>,
+    problems: &mut Vec<StudyProblem>,
+) -> i64 {
     match (table.get(key), default) {
         (None, Some(default)) => return default,
-        (None, None) => problems.push(format!("{key} is missing: a whole number from {least} to {most}")),
+        (None, None) => problems.push(StudyProblem::NoNumber { key, least, most }),
         (Some(value), _) => match value.as_integer().filter(|n| (least..=most).contains(n)) {
             Some(n) => return n,
-            None => problems.push(format!(
-                "{key} is {value}; it must be a whole number from {least} to {most}"
-            )),
+            None => problems.push(StudyProblem::Number {
+                key,
+                value: value.clone(),
+                least,
+                most,
+            }),
         },
     }
     0
 }
 
-fn tissue(table: &Table, problems: &mut Vec<String>) -> TissueKind {
+fn tissue(table: &Table, problems: &mut Vec<StudyProblem>) -> TissueKind {
     let Some(value) = table.get("tissue") else {
         return TissueKind::default();
     };
     value.as_str().and_then(TissueKind::of_name).unwrap_or_else(|| {
-        let names = TissueKind::ALL.map(TissueKind::name).join(", ");
-        problems.push(format!("tissue is {value}; there are {names}"));
+        problems.push(StudyProblem::Tissue(value.clone()));
         TissueKind::default()
     })
 }
 
-fn glands(table: &Table, folder: &Path, sum: &mut Sha256, problems: &mut Vec<String>) -> Vec<Gland> {
+fn glands(table: &Table, folder: &Path, sum: &mut Sha256, problems: &mut Vec<StudyProblem>) -> Vec<Gland> {
     let list = table
         .get("gland")
         .and_then(Value::as_array)
         .filter(|list| !list.is_empty());
     let Some(list) = list else {
-        problems.push("gland is missing: give [[gland]] with scene and plan once or several times".to_owned());
+        problems.push(StudyProblem::NoGland);
         return Vec::new();
     };
     let mut glands: Vec<Gland> = Vec::new();
     for (n, gland) in list.iter().enumerate() {
-        let place = format!("gland {}: ", n + 1);
+        let number = n + 1;
+        let mut report = |problem| problems.push(StudyProblem::Gland { number, problem });
         let Some(gland) = gland.as_table() else {
-            problems.push(format!("{place}it must be a table: [[gland]]"));
+            report(GlandProblem::NoTable);
             continue;
         };
-        unknown(gland, &place, &GLAND_KEYS, problems);
+        unknown(gland, &GLAND_KEYS)
+            .map(GlandProblem::UnknownKey)
+            .for_each(&mut report);
         let scene = gland.get("scene").and_then(Value::as_str).unwrap_or_default();
         if !BUILTIN_SCENES.contains(&scene) {
-            problems.push(format!(
-                "{place}scene is \"{scene}\"; there are {}",
-                BUILTIN_SCENES.join(", ")
-            ));
+            report(GlandProblem::Scene(scene.to_owned()));
         }
         let Some(file) = gland.get("plan").and_then(Value::as_str) else {
-            problems.push(format!(
-                "{place}plan is missing: a file of `host-ui plan`, relative to this one"
-            ));
+            report(GlandProblem::NoPlan);
             continue;
         };
         let path = folder.join(file);
-        let Some(plan) = read_plan(&path, &place, sum, problems) else {
+        let Some(plan) = read_plan(&path, sum, &mut report) else {
             continue;
         };
         let stem = path
@@ -207,9 +199,8 @@ fn glands(table: &Table, folder: &Path, sum: &mut Sha256, problems: &mut Vec<Str
             .unwrap_or_default();
         let same = |other: &&Gland| other.scene == scene && other.plan_name == stem;
         if glands.iter().any(|other| same(&other)) {
-            problems.push(format!(
-                "{place}there is a gland of scene {scene} with plan {stem} already: their ids would be the same"
-            ));
+            let (scene, plan) = (scene.to_owned(), stem.clone());
+            report(GlandProblem::Twice { scene, plan });
         }
         glands.push(Gland {
             scene: scene.to_owned(),
@@ -220,28 +211,29 @@ fn glands(table: &Table, folder: &Path, sum: &mut Sha256, problems: &mut Vec<Str
     glands
 }
 
-fn read_plan(path: &PathBuf, place: &str, sum: &mut Sha256, problems: &mut Vec<String>) -> Option<Plan> {
-    let text = match std::fs::read_to_string(path) {
+fn read_plan(path: &Path, sum: &mut Sha256, report: &mut impl FnMut(GlandProblem)) -> Option<Plan> {
+    let path = path.to_owned();
+    let text = match std::fs::read_to_string(&path) {
         Ok(text) => text,
         Err(why) => {
-            problems.push(format!("{place}plan {}: it cannot be read ({why})", path.display()));
+            report(GlandProblem::Unreadable { path, why });
             return None;
         }
     };
     sum.update(&text);
-    let listed = |Problems(found): Problems| {
-        problems.extend(
-            found
-                .into_iter()
-                .map(|what| format!("{place}plan {}: {what}", path.display())),
-        );
+    let listed = |ProblemList(found)| {
+        let of_plan = |problem| GlandProblem::Plan {
+            path: path.clone(),
+            problem,
+        };
+        found.into_iter().map(of_plan).for_each(report);
     };
     plan::of_text(&text).map_err(listed).ok()
 }
 
 type Spreads = (Vec<Spread>, Vec<(&'static ParameterSpec, Spread)>);
 
-fn vary(table: &Table, tissue: TissueKind, problems: &mut Vec<String>) -> Spreads {
+fn vary(table: &Table, tissue: TissueKind, problems: &mut Vec<StudyProblem>) -> Spreads {
     let mut quantities: Vec<Spread> = QUANTITIES.iter().map(|q| Spread::Fixed(q.default)).collect();
     let mut parameters = Vec::new();
     let empty = Table::new();
@@ -249,26 +241,28 @@ fn vary(table: &Table, tissue: TissueKind, problems: &mut Vec<String>) -> Spread
         None => &empty,
         Some(Value::Table(given)) => given,
         Some(other) => {
-            problems.push(format!("vary is {other}; it must be a table: [vary]"));
+            problems.push(StudyProblem::NoTable(other.clone()));
             &empty
         }
     };
     for (key, value) in given {
+        let mut report = |problem| {
+            problems.push(StudyProblem::Quantity {
+                key: key.clone(),
+                problem,
+            });
+        };
         let known = QUANTITIES.iter().position(|q| q.key == key);
         let spec = quantity::parameter(key);
         let limits = known.map(|n| QUANTITIES[n].limits).or(spec.map(quantity::limits));
         let Some(limits) = limits else {
-            let all: Vec<&str> = quantity::keys().collect();
-            problems.push(format!(
-                "vary.{key}: there is no such quantity; there are {}",
-                all.join(", ")
-            ));
+            report(QuantityProblem::Unknown);
             continue;
         };
         let spread = match Spread::of_toml(value) {
             Ok(spread) => spread,
             Err(why) => {
-                problems.push(format!("vary.{key}: {why}"));
+                report(why.into());
                 continue;
             }
         };
@@ -276,18 +270,14 @@ fn vary(table: &Table, tissue: TissueKind, problems: &mut Vec<String>) -> Spread
         // Limits that were scaled to a person's unit differ in their last bit.
         let slack = 1e-12 * low.abs().max(high.abs());
         if least < low - slack || most > high + slack {
-            problems.push(format!(
-                "vary.{key}: it reaches from {least} to {most}; the limits are {low} to {high}"
-            ));
+            let reach = [least, most];
+            report(QuantityProblem::Reach { reach, limits });
         }
         if let Some(n) = known {
             quantities[n] = spread;
         } else if let Some(spec) = spec {
             if quantity::has_no_part(spec, tissue) {
-                problems.push(format!(
-                    "vary.{key}: it does nothing in tissue \"{}\", where needles slip by force; leave it out, or take tissue = \"paper\"",
-                    tissue.name()
-                ));
+                report(QuantityProblem::NoPart(tissue));
             }
             parameters.push((spec, spread));
         }

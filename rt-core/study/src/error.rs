@@ -1,15 +1,12 @@
 //! Why a study cannot be run.
 
+use crate::problem::StudyProblem;
 use std::path::PathBuf;
 use stylet_insertions::TableError;
 use stylet_runtime::rehearse::RehearseError;
+use stylet_shm_schema::ProblemList;
 use stylet_sim::scene::SceneError;
 use stylet_write::WriteError;
-
-/// Everything that is wrong with a file: each with its key, what it is and what it may be.
-#[derive(Debug, thiserror::Error)]
-#[error("problems:\n  {}", .0.join("\n  "))]
-pub struct Problems(pub Vec<String>);
 
 /// Error that stops a study; an insertion that fails is a result and does not.
 #[derive(Debug, thiserror::Error)]
@@ -23,12 +20,12 @@ pub enum StudyError {
         source: std::io::Error,
     },
     /// Everything that is wrong with the study file and its plans.
-    #[error("{}: nothing was run; {problems}", .path.display())]
+    #[error("{}: nothing was run; problems:\n  {}", .path.display(), .problems.to_string().replace('\n', "\n  "))]
     Invalid {
         /// The study file.
         path: PathBuf,
         /// Problems of the file.
-        problems: Problems,
+        problems: ProblemList<StudyProblem>,
     },
     /// The folder.
     #[error("{}: it cannot be used ({source}); check the path and its rights", .path.display())]

@@ -14,6 +14,7 @@ mod error;
 mod insert;
 mod parts;
 mod plan;
+mod problem;
 mod progress;
 mod quantity;
 mod run;

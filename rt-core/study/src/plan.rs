@@ -1,9 +1,8 @@
 //! The needles of a plan file, as far as insertions need them; `host-ui` writes such files and checks all of them.
 
-use crate::error::Problems;
 use nalgebra::{Unit, Vector3};
 use serde::Deserialize;
-use stylet_shm_schema::MAX_SEEDS;
+use stylet_shm_schema::{MAX_SEEDS, ProblemList};
 
 const FORMAT: &str = "stylet plan, mm, RAS";
 /// Length from end to end of a seed; with a spacer the pitch of a strand.
@@ -61,32 +60,87 @@ pub struct Needle {
     pub seeds: Vec<(f64, f64)>,
 }
 
-/// Reads a plan, or lists what is wrong with it.
-pub fn of_text(text: &str) -> Result<Plan, Problems> {
-    let file: PlanFile = toml::from_str(text).map_err(|e| Problems(vec![format!("it is no plan of host-ui: {e}")]))?;
+/// Problem of a plan.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanProblem {
+    /// Not the TOML of a plan.
+    #[error("it is no plan of host-ui: {0}")]
+    Toml(#[from] toml::de::Error),
+    /// Another format, or another version of it.
+    #[error("format is \"{0}\"; it must be \"{FORMAT}\"")]
+    Format(String),
+    /// A dose that nobody prescribes.
+    #[error("prescription_gy is {0}; it must be 0.001 to 10000")]
+    Prescription(f64),
+    /// No needle.
+    #[error("it has no needle")]
+    NoNeedle,
+    /// Problem of a needle.
+    #[error("needle {number}: {problem}")]
+    Needle {
+        /// Number of the needle, from 1.
+        number: usize,
+        /// Its problem.
+        problem: NeedleProblem,
+    },
+}
+
+/// Problem of a needle in a plan.
+#[derive(Debug, thiserror::Error)]
+pub enum NeedleProblem {
+    /// An entry far away, or not a place.
+    #[error("entry_mm is {0:?}; coordinates must be within {FARTHEST_MM} mm")]
+    Entry([f64; 3]),
+    /// A direction of another length than 1.
+    #[error("direction is {0:?}, no unit vector")]
+    Direction([f64; 3]),
+    /// A retraction beyond the needle.
+    #[error("retract_to_mm is {0}; it must be 0 to {LONGEST_MM}")]
+    Retraction(f64),
+    /// A spacer that no strand has.
+    #[error("spacer_mm is {0}; it must be 0.1 to 50")]
+    Spacer(f64),
+    /// Not one strength for each seed.
+    #[error("{places} seeds in seed_along_mm and {strengths} in strength_u")]
+    Strengths {
+        /// Seeds with a place.
+        places: usize,
+        /// Seeds with a strength.
+        strengths: usize,
+    },
+    /// More seeds than the core takes.
+    #[error("{0} seeds; at most {MAX_SEEDS}")]
+    TooManySeeds(usize),
+    /// No seed.
+    #[error("it has no seed, and an insertion ends with its last seed: leave the needle out")]
+    NoSeed,
+    /// A seed beyond the needle.
+    #[error("seed_along_mm has {0}; it must be 0 to {LONGEST_MM}")]
+    Place(f64),
+}
+
+/// Reads a plan, or lists every problem with it.
+pub fn of_text(text: &str) -> Result<Plan, ProblemList<PlanProblem>> {
+    let file: PlanFile = toml::from_str(text).map_err(PlanProblem::from)?;
     let mut problems = Vec::new();
     if file.format != FORMAT {
-        problems.push(format!("format is \"{}\"; it must be \"{FORMAT}\"", file.format));
+        problems.push(PlanProblem::Format(file.format));
     }
     if !(1e-3..=1e4).contains(&file.prescription_gy) {
-        problems.push(format!(
-            "prescription_gy is {}; it must be 0.001 to 10000",
-            file.prescription_gy
-        ));
+        problems.push(PlanProblem::Prescription(file.prescription_gy));
     }
     if file.needles.is_empty() {
-        problems.push("it has no needle".to_owned());
+        problems.push(PlanProblem::NoNeedle);
     }
     let needles = file.needles.into_iter().enumerate().map(|(n, needle)| {
         let mut found = Vec::new();
         let needle = checked(needle, &mut found);
-        problems.extend(found.into_iter().map(|what| format!("needle {}: {what}", n + 1)));
+        let number = n + 1;
+        problems.extend(found.into_iter().map(|problem| PlanProblem::Needle { number, problem }));
         needle
     });
     let needles = needles.collect();
-    if !problems.is_empty() {
-        return Err(Problems(problems));
-    }
+    ProblemList::check(problems)?;
     Ok(Plan {
         source: file.source,
         prescription_gy: file.prescription_gy,
@@ -94,44 +148,36 @@ pub fn of_text(text: &str) -> Result<Plan, Problems> {
     })
 }
 
-fn checked(file: NeedleFile, problems: &mut Vec<String>) -> Needle {
+fn checked(file: NeedleFile, problems: &mut Vec<NeedleProblem>) -> Needle {
     let direction = Vector3::from(file.direction);
     // NaN compares false.
     if !file.entry_mm.iter().all(|c| c.abs() <= FARTHEST_MM) {
-        problems.push(format!(
-            "entry_mm is {:?}; coordinates must be within {FARTHEST_MM} mm",
-            file.entry_mm
-        ));
+        problems.push(NeedleProblem::Entry(file.entry_mm));
     }
     if !(0.999..1.001).contains(&direction.norm()) {
-        problems.push(format!("direction is {:?}, no unit vector", file.direction));
+        problems.push(NeedleProblem::Direction(file.direction));
     }
     if !(0.0..=LONGEST_MM).contains(&file.retract_to_mm) {
-        problems.push(format!(
-            "retract_to_mm is {}; it must be 0 to {LONGEST_MM}",
-            file.retract_to_mm
-        ));
+        problems.push(NeedleProblem::Retraction(file.retract_to_mm));
     }
     if let Some(spacer) = file.spacer_mm.filter(|s| !(0.1..=50.0).contains(s)) {
-        problems.push(format!("spacer_mm is {spacer}; it must be 0.1 to 50"));
+        problems.push(NeedleProblem::Spacer(spacer));
     }
     let (places, strengths) = (file.seed_along_mm, file.strength_u);
     if places.len() != strengths.len() {
-        problems.push(format!(
-            "{} seeds in seed_along_mm and {} in strength_u",
-            places.len(),
-            strengths.len()
-        ));
+        problems.push(NeedleProblem::Strengths {
+            places: places.len(),
+            strengths: strengths.len(),
+        });
     }
     if places.len() > MAX_SEEDS {
-        problems.push(format!("{} seeds; at most {MAX_SEEDS}", places.len()));
+        problems.push(NeedleProblem::TooManySeeds(places.len()));
     }
     if places.is_empty() {
-        problems.push("it has no seed, and an insertion ends with its last seed: leave the needle out".to_owned());
+        problems.push(NeedleProblem::NoSeed);
     }
-    for along in places.iter().filter(|a| !(0.0..=LONGEST_MM).contains(*a)) {
-        problems.push(format!("seed_along_mm has {along}; it must be 0 to {LONGEST_MM}"));
-    }
+    let is_beyond = |along: &&f64| !(0.0..=LONGEST_MM).contains(*along);
+    problems.extend(places.iter().filter(is_beyond).copied().map(NeedleProblem::Place));
     let mut seeds: Vec<(f64, f64)> = places.into_iter().zip(strengths).collect();
     seeds.sort_by(|a, b| b.0.total_cmp(&a.0));
     Needle {

@@ -5,7 +5,6 @@ mod file;
 mod shards;
 
 use crate::Study;
-use crate::error::Problems;
 use std::path::Path;
 
 /// Two needles, one of them with a strand, in the middle of the gland of `paper`.
@@ -40,7 +39,8 @@ pub fn text(keys: &str) -> String {
     format!("name = \"t\"\n{keys}\n[[gland]]\nscene = \"paper\"\nplan = \"plan.toml\"\n")
 }
 
-pub fn study_in(folder: &Path, text: &str) -> Result<Study, Problems> {
+/// Returns the study of a text and the plan above, or each problem with it.
+pub fn study_in(folder: &Path, text: &str) -> Result<Study, Vec<String>> {
     std::fs::write(folder.join("plan.toml"), PLAN).expect("a folder of the test");
-    Study::of_text(text, folder)
+    Study::of_text(text, folder).map_err(|problems| problems.0.iter().map(ToString::to_string).collect())
 }

@@ -14,11 +14,13 @@
 #![warn(missing_docs)]
 
 mod problem;
+mod problem_list;
 mod scene;
 mod set;
 mod table;
 
 pub use problem::{ParameterProblem, ParameterProblems, folding};
+pub use problem_list::ProblemList;
 pub use scene::{BUILTIN_SCENES, GridInfo, MAX_LABEL_CELLS, MAX_LEFT_NEEDLES, MAX_NODES, MAX_STRUCTURES};
 pub use set::ParameterSet;
 pub use table::{PARAMETER_COUNT, PARAMETERS, ParameterId};

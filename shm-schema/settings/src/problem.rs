@@ -1,6 +1,6 @@
 //! Validates a set of parameters: one function for the core and for the window.
 
-use super::{PARAMETERS, ParameterId, ParameterSet};
+use super::{PARAMETERS, ParameterId, ParameterSet, ProblemList};
 use ParameterId as P;
 
 /// A problem with a set of parameters; each names the parameters involved.
@@ -43,9 +43,7 @@ pub enum ParameterProblem {
 }
 
 /// All problems of one set; at least one.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{}", lines(.0))]
-pub struct ParameterProblems(pub Vec<ParameterProblem>);
+pub type ParameterProblems = ProblemList<ParameterProblem>;
 
 const SHEARS: [P; 2] = [P::ShearHorizontal, P::ShearVertical];
 const GLAND: &[P] = &[P::MembranePeak, P::PunctureDepth, P::MembraneGain, P::ForceScale];
@@ -148,9 +146,4 @@ fn out_of_limits(id: ParameterId, value: f64) -> String {
 fn keys(parameters: &[ParameterId]) -> String {
     let keys: Vec<_> = parameters.iter().map(|id| id.spec().key).collect();
     keys.join(", ")
-}
-
-fn lines(problems: &[ParameterProblem]) -> String {
-    let lines: Vec<String> = problems.iter().map(ToString::to_string).collect();
-    lines.join("\n")
 }

@@ -15,7 +15,7 @@ use crate::disk::{self, DiskError};
 use crate::measure::{Checkpoints, MeasureError, Setup, measure, period_ns};
 use crate::plots::DrawError;
 use clap::Args;
-use plan::{Plan, PlanError};
+use plan::{Plan, PlanProblem};
 use session::{FORCE, Store};
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -24,6 +24,7 @@ use std::time::Duration;
 use stylet_runtime::args::{OptionsError, RealTimeArgs};
 use stylet_runtime::process::Options;
 use stylet_runtime::rt::clock::Wait;
+use stylet_shm_schema::ProblemList;
 use stylet_write::write_whole;
 
 const COPY: &str = "campaign.toml";
@@ -59,7 +60,7 @@ pub enum CampaignError {
     Disk(#[from] DiskError),
     /// All problems with the file.
     #[error(transparent)]
-    Plan(#[from] PlanError),
+    Plan(#[from] ProblemList<PlanProblem>),
     /// The folder belongs to another campaign.
     #[error("{} holds another campaign: its {COPY} differs from {}; expected the same file, or a new folder", .folder.display(), .file.display())]
     Other {

@@ -5,6 +5,7 @@ use crate::load::Load;
 use crate::machine::Machine;
 use crate::measure::period_ns;
 use serde::{Deserialize, Deserializer, Serialize};
+use stylet_shm_schema::ProblemList;
 
 /// One part: a load at a rate for a time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,33 +57,54 @@ fn time<'de, D: Deserializer<'de>>(from: D) -> Result<u64, D::Error> {
     duration_ns(&String::deserialize(from)?).map_err(serde::de::Error::custom)
 }
 
-/// Every problem with a file of a campaign, one per line.
+/// Problem with a file of a campaign.
 #[derive(Debug, thiserror::Error)]
-#[error("{}", .0.join("\n"))]
-pub struct PlanError(pub Vec<String>);
+pub enum PlanProblem {
+    /// Not the TOML of a campaign.
+    #[error(transparent)]
+    Toml(#[from] toml::de::Error),
+    /// No part, or too many repetitions of all.
+    #[error("expected at least one [[part]], and repeat between 1 and 1000")]
+    Parts,
+    /// A rate that the loop cannot have.
+    #[error("part {part}: rate = {hz}: expected 500 to 10000 Hz")]
+    Rate {
+        /// Number of the part.
+        part: usize,
+        /// Its rate.
+        hz: u32,
+    },
+    /// A spin that the kernel would interrupt.
+    #[error("part {part}: spin_us = {spin_us}: at most {most_us}")]
+    Spin {
+        /// Number of the part.
+        part: usize,
+        /// Its spin.
+        spin_us: u64,
+        /// Longest spin at that rate.
+        most_us: u64,
+    },
+}
 
 impl Plan {
     /// Returns the plan, or the problems with the file.
-    pub fn of(text: &str) -> Result<Self, PlanError> {
-        let once: Self = toml::from_str(text).map_err(|e| PlanError(vec![e.to_string()]))?;
+    pub fn of(text: &str) -> Result<Self, ProblemList<PlanProblem>> {
+        let once: Self = toml::from_str(text).map_err(PlanProblem::from)?;
         let mut problems = Vec::new();
         if once.parts.is_empty() || !(1..=1_000).contains(&once.repeat) {
-            problems.push("expected at least one [[part]], and repeat between 1 and 1000".to_owned());
+            problems.push(PlanProblem::Parts);
         }
-        for (i, part) in (1..).zip(&once.parts) {
-            let (rate, spin_us) = (part.rate, part.spin_us);
-            if !(500..=10_000).contains(&rate) {
-                problems.push(format!("part {i}: rate = {rate}: expected 500 to 10000 Hz"));
+        for (part, &Part { rate: hz, spin_us, .. }) in (1..).zip(&once.parts) {
+            if !(500..=10_000).contains(&hz) {
+                problems.push(PlanProblem::Rate { part, hz });
                 continue;
             }
-            let longest_us = longest_spin_ns(period_ns(rate), Machine::this().throttle()) / 1_000;
-            if spin_us > longest_us {
-                problems.push(format!("part {i}: spin_us = {spin_us}: at most {longest_us}"));
+            let most_us = longest_spin_ns(period_ns(hz), Machine::this().throttle()) / 1_000;
+            if spin_us > most_us {
+                problems.push(PlanProblem::Spin { part, spin_us, most_us });
             }
         }
-        if !problems.is_empty() {
-            return Err(PlanError(problems));
-        }
+        ProblemList::check(problems)?;
         Ok(Self {
             parts: once.parts.repeat(once.repeat),
             ..once

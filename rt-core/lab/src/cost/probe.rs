@@ -28,7 +28,7 @@ impl Pressed {
         let Ok(wall) = Wall::of(&scene, PADS_APART_M) else {
             return Ok(None);
         };
-        let fem = FemTissue::<f32>::new(&scene).map_err(CostError::FiniteElements)?;
+        let fem = FemTissue::<f32>::new(&scene)?;
         let body = BatchModel::new(&fem.model);
         let pressed_m = |tick: usize| {
             let jump_m = if tick % JUMP_EVERY == JUMP_EVERY / 2 {

@@ -1,10 +1,8 @@
 //! Checks that no loop's priority can starve another loop on the same core.
 
-use super::OptionsError;
+use super::{Asked, OptionsError, OptionsProblem};
 use crate::process::Options;
-
-/// A loop as requested: its name, core and priority, and the option that sets the priority.
-type Asked = (&'static str, Option<usize>, u32, &'static str);
+use stylet_shm_schema::ProblemList;
 
 /// Refuses priorities that let a loop starve another on a shared core. Order: force loop, second device, tissue.
 /// Without real-time scheduling every priority passes.
@@ -12,53 +10,37 @@ pub(super) fn check(options: &Options) -> Result<(), OptionsError> {
     if options.no_rt {
         return Ok(());
     }
-    let force = (
-        "the force loop",
-        options.haptic_core,
-        options.haptic_priority,
-        "--haptic-priority",
-    );
-    let second = options.second.as_ref().map(|second| {
-        (
-            "the loop of the second device",
-            second.core,
-            second.priority,
-            "--device-2-priority",
-        )
+    let force = Asked {
+        name: "the force loop",
+        core: options.haptic_core,
+        priority: options.haptic_priority,
+        option: "--haptic-priority",
+    };
+    let second = options.second.as_ref().map(|second| Asked {
+        name: "the loop of the second device",
+        core: second.core,
+        priority: second.priority,
+        option: "--device-2-priority",
     });
-    let tissue = (
-        "the tissue step",
-        options.tissue_core,
-        options.tissue_priority,
-        "--tissue-priority",
-    );
+    let tissue = Asked {
+        name: "the tissue step",
+        core: options.tissue_core,
+        priority: options.tissue_priority,
+        option: "--tissue-priority",
+    };
     let pairs = [
         Some((force, tissue)),
         second.map(|second| (force, second)),
         second.map(|second| (second, tissue)),
     ];
-    let problems: Vec<String> = pairs
-        .into_iter()
-        .flatten()
-        .filter_map(|(first, other)| problem(first, other))
-        .collect();
-    match problems.is_empty() {
-        true => Ok(()),
-        false => Err(OptionsError(problems)),
-    }
+    let problems = pairs.into_iter().flatten();
+    ProblemList::check(problems.filter_map(|(first, other)| problem(first, other)).collect())
 }
 
 /// Returns the problem if `other` can keep `first` from their shared core.
-fn problem(first: Asked, other: Asked) -> Option<String> {
-    let (name, core, priority, option) = first;
-    let (other_name, other_core, other_priority, other_option) = other;
-    let core = core.filter(|core| other_core == Some(*core))?;
-    (other_priority >= priority).then(|| {
-        format!(
-            "{other_option} {other_priority}: {other_name} shares core {core} with {name}, which would wait for it; give it less than \
-             {option} {priority}, or another core"
-        )
-    })
+fn problem(first: Asked, other: Asked) -> Option<OptionsProblem> {
+    let core = first.core.filter(|core| other.core == Some(*core))?;
+    (other.priority >= first.priority).then_some(OptionsProblem::Starves { core, first, other })
 }
 
 #[cfg(test)]
@@ -81,7 +63,8 @@ mod tests {
             core: options.haptic_core,
             priority: second,
         });
-        check(&options).err().map_or(Vec::new(), |problems| problems.0)
+        let problems = check(&options).err().map_or(Vec::new(), |problems| problems.0);
+        problems.iter().map(ToString::to_string).collect()
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::rt::world::World;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use stylet_anatomy::PatientFrame;
-use stylet_shm_schema::{BUILTIN_SCENES, Event, EventKind, Refusal, RefusalCode, Text, UploadHeader};
+use stylet_shm_schema::{BUILTIN_SCENES, Event, EventKind, ProblemList, Refusal, RefusalCode, Text, UploadHeader};
 use stylet_sim::active::activate;
 use stylet_sim::scene::{Scene, SceneSource};
 use stylet_wall::packet::Kind;
@@ -87,10 +87,8 @@ impl Control {
         };
         let loading = self.load(wanted, move || {
             let source = SceneSource::of_labels(&name, &labels);
-            let scene = Scene::from_labels(&name, &labels).map_err(|problems| {
-                let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
-                Refusal::new(RefusalCode::InvalidVolume, lines.join("\n"))
-            })?;
+            let scene = Scene::from_labels(&name, &labels)
+                .map_err(|problems| Refusal::new(RefusalCode::InvalidVolume, ProblemList(problems).to_string()))?;
             Ok((scene, source))
         });
         if let Err(refusal) = loading {

@@ -1,35 +1,73 @@
 //! Validates the header of a volume that a host sends, and makes labels for a scene.
 
-use stylet_shm_schema::{MAX_STRUCTURES, UploadHeader, UploadStructure, check, role};
+use stylet_shm_schema::{MAX_STRUCTURES, ProblemList, UploadHeader, UploadStructure, check, role};
 use stylet_sim::limits::AxisLimits;
 use stylet_sim::scene::{Labels, Material, Role, Structure, Surroundings};
 
-/// Every problem with the header of an upload, one per line.
+/// Problem with the header of an upload.
 #[derive(Debug, thiserror::Error)]
-#[error("{}", .0.join("\n"))]
-pub struct InvalidUpload(Vec<String>);
+pub enum UploadProblem {
+    /// Not one label for each cell.
+    #[error("the volume has {dims:?} cells by its header but {received} were received")]
+    Cells {
+        /// Cells along each axis.
+        dims: [u32; 3],
+        /// Labels received.
+        received: usize,
+    },
+    /// Not a transform of a patient.
+    #[error("the transform to the patient is not finite or farther than 20 m")]
+    Transform,
+    /// More structures than a scene has.
+    #[error("{0} structures, at most {MAX_STRUCTURES}")]
+    TooManyStructures(u32),
+    /// A label that no cell can have.
+    #[error("structure \"{name}\" has label {label}, at most 255")]
+    Label {
+        /// Name of the structure.
+        name: String,
+        /// Its label.
+        label: u32,
+    },
+    /// A role of another version.
+    #[error(
+        "structure \"{name}\" has role {role} and own_limits {own_limits}, which host and core understand differently"
+    )]
+    Role {
+        /// Name of the structure.
+        name: String,
+        /// Its role.
+        role: u32,
+        /// Whether it has its own limits.
+        own_limits: u32,
+    },
+    /// Surroundings of another version.
+    #[error("structure \"{name}\" has surroundings {bits:#x}, which host and core understand differently")]
+    Surroundings {
+        /// Name of the structure.
+        name: String,
+        /// Its surroundings.
+        bits: u32,
+    },
+}
 
 /// Lists every problem with the header. The scene checks labels, materials and their combination.
-pub fn labels(header: &UploadHeader, cells: &[u8]) -> Result<Labels, InvalidUpload> {
+pub fn labels(header: &UploadHeader, cells: &[u8]) -> Result<Labels, ProblemList<UploadProblem>> {
     let mut problems = Vec::new();
     let expected = header.dims.iter().try_fold(1_u64, |n, &d| n.checked_mul(u64::from(d)));
     if expected != Some(cells.len() as u64) {
-        problems.push(format!(
-            "the volume has {:?} cells by its header but {} were received",
-            header.dims,
-            cells.len()
-        ));
+        problems.push(UploadProblem::Cells {
+            dims: header.dims,
+            received: cells.len(),
+        });
     }
     let within = |v: &f64| v.abs() <= check::MAX_COORDINATE_M;
     if !header.patient_from_scene.iter().all(within) {
-        problems.push("the transform to the patient is not finite or farther than 20 m".to_owned());
+        problems.push(UploadProblem::Transform);
     }
     let mut structures = Vec::new();
     match header.structures.get(..header.structure_count as usize) {
-        None => problems.push(format!(
-            "{} structures, at most {MAX_STRUCTURES}",
-            header.structure_count
-        )),
+        None => problems.push(UploadProblem::TooManyStructures(header.structure_count)),
         Some(sent) => {
             for structure in sent {
                 match read(structure) {
@@ -39,9 +77,7 @@ pub fn labels(header: &UploadHeader, cells: &[u8]) -> Result<Labels, InvalidUplo
             }
         }
     }
-    if !problems.is_empty() {
-        return Err(InvalidUpload(problems));
-    }
+    ProblemList::check(problems)?;
     Ok(Labels {
         dims: header.dims.map(|d| d as usize),
         spacing_m: header.spacing_m,
@@ -50,23 +86,23 @@ pub fn labels(header: &UploadHeader, cells: &[u8]) -> Result<Labels, InvalidUplo
     })
 }
 
-fn read(sent: &UploadStructure) -> Result<Structure, String> {
+fn read(sent: &UploadStructure) -> Result<Structure, UploadProblem> {
     let name = sent.name.read();
     let Ok(label) = u8::try_from(sent.label) else {
-        return Err(format!("structure \"{name}\" has label {}, at most 255", sent.label));
+        let label = sent.label;
+        return Err(UploadProblem::Label { name, label });
     };
     let both = role::TARGET | role::SPARE;
     if sent.role & !role::ALL != 0 || sent.role & both == both || sent.own_limits > 1 {
-        return Err(format!(
-            "structure \"{name}\" has role {} and own_limits {}, which host and core understand differently",
-            sent.role, sent.own_limits
-        ));
+        return Err(UploadProblem::Role {
+            name,
+            role: sent.role,
+            own_limits: sent.own_limits,
+        });
     }
     let Some(surroundings) = Surroundings::of_wire(sent.surroundings) else {
         let bits = sent.surroundings;
-        return Err(format!(
-            "structure \"{name}\" has surroundings {bits:#x}, which host and core understand differently"
-        ));
+        return Err(UploadProblem::Surroundings { name, bits });
     };
     let limits = sent.limits.map(|[min_stretch, max_stretch, shear_rad]| AxisLimits {
         min_stretch,

@@ -10,8 +10,38 @@ const SHARED_MEMORY: &CStr = c"/dev/shm";
 
 /// A limit that prevents the run; the text says what to change.
 #[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct LimitError(String);
+pub enum LimitError {
+    /// Too few open files.
+    #[error(
+        "this process may open {0} files and needs {FILES}: raise the hard limit, ulimit -Hn {FILES} or more (nofile in \
+         /etc/security/limits.d), and start again"
+    )]
+    Files(u64),
+    /// Too short files.
+    #[error(
+        "files of this process may be {} KiB long, and shared memory needs up to {} KiB: raise the hard limit, ulimit -Hf unlimited \
+         (fsize in /etc/security/limits.d), and start again",
+        .bytes >> 10, LARGEST_FILE >> 10
+    )]
+    FileSize {
+        /// Longest file.
+        bytes: u64,
+    },
+    /// No shared memory.
+    #[error("there is no shared memory at {folder} ({why}): sudo mount -t tmpfs tmpfs {folder}")]
+    NoSharedMemory {
+        /// Its folder.
+        folder: String,
+        /// Error of the system.
+        why: std::io::Error,
+    },
+    /// Shared memory that nobody may write.
+    #[error("shared memory at {0} is read-only: sudo mount -o remount,rw {0}")]
+    ReadOnly(String),
+    /// Shared memory that this user may not write.
+    #[error("this user may not write to shared memory at {0}: sudo chmod 1777 {0}")]
+    NotWritable(String),
+}
 
 /// Raises the soft limits of this process to the hard ones, and ignores SIGXFSZ: a write beyond the file-size limit
 /// then fails, and its writer reports the file.
@@ -44,43 +74,29 @@ fn of(resource: libc::__rlimit_resource_t) -> libc::rlimit {
 
 fn enough(files: libc::rlim_t, file_bytes: libc::rlim_t) -> Result<(), LimitError> {
     if files < FILES {
-        return Err(LimitError(format!(
-            "this process may open {files} files and needs {FILES}: raise the hard limit, ulimit -Hn {FILES} or more (nofile in \
-             /etc/security/limits.d), and start again"
-        )));
+        return Err(LimitError::Files(files));
     }
     if file_bytes < LARGEST_FILE {
-        return Err(LimitError(format!(
-            "files of this process may be {} KiB long, and shared memory needs up to {} KiB: raise the hard limit, ulimit -Hf unlimited \
-             (fsize in /etc/security/limits.d), and start again",
-            file_bytes >> 10,
-            LARGEST_FILE >> 10
-        )));
+        return Err(LimitError::FileSize { bytes: file_bytes });
     }
     Ok(())
 }
 
 fn shared_memory(folder: &CStr) -> Result<(), LimitError> {
-    let name = folder.to_string_lossy();
+    let name = || folder.to_string_lossy().into_owned();
     // SAFETY: an all-zero statvfs is valid.
     let mut stat: libc::statvfs = unsafe { std::mem::zeroed() };
     // SAFETY: the path ends in a zero byte and `stat` is valid for writes.
     if unsafe { libc::statvfs(folder.as_ptr(), &mut stat) } != 0 {
         let why = std::io::Error::last_os_error();
-        return Err(LimitError(format!(
-            "there is no shared memory at {name} ({why}): sudo mount -t tmpfs tmpfs {name}"
-        )));
+        return Err(LimitError::NoSharedMemory { folder: name(), why });
     }
     if stat.f_flag & libc::ST_RDONLY != 0 {
-        return Err(LimitError(format!(
-            "shared memory at {name} is read-only: sudo mount -o remount,rw {name}"
-        )));
+        return Err(LimitError::ReadOnly(name()));
     }
     // SAFETY: the path ends in a zero byte.
     if unsafe { libc::access(folder.as_ptr(), libc::W_OK | libc::X_OK) } != 0 {
-        return Err(LimitError(format!(
-            "this user may not write to shared memory at {name}: sudo chmod 1777 {name}"
-        )));
+        return Err(LimitError::NotWritable(name()));
     }
     Ok(())
 }

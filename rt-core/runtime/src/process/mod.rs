@@ -18,6 +18,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use stylet_shm_schema::{DeadlineTotals, Instance, InstanceError, ParameterProblems, ThreadReport, affinity};
+use stylet_sim::scene::SceneError;
 use stylet_sim::tissue::{TissueError, TissueSpec};
 use threads::Threads;
 
@@ -110,8 +111,8 @@ pub struct LoopReport {
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// There is no such scene.
-    #[error("{0}")]
-    Scene(String),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// The device could not be opened.
     #[error(transparent)]
     Device(#[from] DeviceError),

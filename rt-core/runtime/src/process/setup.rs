@@ -63,7 +63,7 @@ pub(super) struct KernelGrants {
 
 impl Setup {
     pub fn new(options: &Options) -> Result<Self, RunError> {
-        let scene = Scene::builtin(&options.scene).map_err(|e| RunError::Scene(e.to_string()))?;
+        let scene = Scene::builtin(&options.scene)?;
         let force_loop = Ask {
             priority: (!options.no_rt).then_some(options.haptic_priority),
             core: options.haptic_core,

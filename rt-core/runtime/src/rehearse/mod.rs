@@ -28,18 +28,18 @@ use stylet_shm_schema::{
 };
 use stylet_sim::active::{Active, activate};
 use stylet_sim::line::{LineError, LineStations, ReadyLine};
-use stylet_sim::scene::SceneSource;
+use stylet_sim::scene::{SceneError, SceneSource};
 use stylet_sim::tissue::{TissueError, TissueSpec};
 
 /// Longest rehearsal in simulated time; a longer one has failed.
 const LONGEST_S: f64 = 900.0;
 
 /// Failure of a rehearsal; the text is for people.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 pub enum RehearseError {
     /// The scene cannot be built again.
-    #[error("{0}")]
-    Scene(String),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// Its tissue cannot be set up.
     #[error(transparent)]
     World(#[from] TissueError),
@@ -137,7 +137,7 @@ impl Stage {
         device: DeviceInfo,
     ) -> Result<Self, RehearseError> {
         let tissue = tissue.into();
-        let scene = source.build().map_err(|e| RehearseError::Scene(e.to_string()))?;
+        let scene = source.build()?;
         let lines = LineBody::of_source(source, tissue)?;
         let active = activate(&ParameterSet::default(), &device)?;
         let world = World::new(scene, tissue, active.limits, 1)?;

@@ -20,6 +20,7 @@ use std::sync::Arc;
 use stylet_hw::{Device, DeviceFault, DeviceInfo, Sample, Wrench};
 use stylet_shm_schema::{DeadlineTotals, TickRecord};
 use stylet_sim::line::LeftNeedles;
+use stylet_sim::scene::SceneError;
 use stylet_sim::tissue::{Held, TissueError};
 
 /// The result of repeating one loop.
@@ -192,8 +193,8 @@ fn is_same(record: &TickRecord, entry: &HapticEntry) -> bool {
 #[derive(Debug, thiserror::Error)]
 pub enum RepeatError {
     /// The scene of the recording cannot be built again.
-    #[error("{0}")]
-    Scene(String),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// Its tissue cannot be set up.
     #[error(transparent)]
     World(#[from] TissueError),
@@ -223,7 +224,7 @@ pub enum RepeatError {
 /// Repeats the tissue chain: response and held element of each tick, and every element's position at each checkpoint.
 /// `lines` comes from [`solve_again`](super::lines::solve_again).
 pub fn tissue(flight: &Flight, recorded: &TissueFlight, mut lines: LinesAgain) -> Result<Repeated, RepeatError> {
-    let scene = recorded.scene.build().map_err(|e| RepeatError::Scene(e.to_string()))?;
+    let scene = recorded.scene.build()?;
     let world = || World::new(scene.clone(), recorded.tissue, recorded.memory.limits.clone(), 1).map(Box::new);
     let reference = world()?;
     if reference.tissue.memory_len() != recorded.memory.body.len() {

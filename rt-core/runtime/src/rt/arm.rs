@@ -1,6 +1,7 @@
 //! Requests real-time properties from the kernel for a thread, and reads back what was granted.
 
 use serde::Serialize;
+use std::io;
 use std::marker::PhantomData;
 use stylet_shm_schema::ThreadReport;
 
@@ -22,8 +23,31 @@ pub struct Armed {
 
 /// The missing right, and how to grant it.
 #[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct Refused(pub String);
+pub enum Refused {
+    /// A priority that the kernel does not grant.
+    #[error("{}", advice(&format!("the kernel does not grant SCHED_FIFO priority {priority} ({why})")))]
+    Priority {
+        /// The priority.
+        priority: u32,
+        /// Error of the kernel.
+        why: io::Error,
+    },
+    /// A priority that the kernel granted, but does not report.
+    #[error(
+        "the kernel granted SCHED_FIFO priority {}, but reports policy {} and priority {}",
+        .0.asked_priority, .0.policy, .0.priority
+    )]
+    NotConfirmed(ThreadReport),
+    /// Memory that the kernel does not lock, with its error if there is one.
+    #[error("{}", advice(&match .0 {
+        Some(why) => format!("the kernel does not lock memory ({why})"),
+        None => "the kernel does not lock memory".to_owned(),
+    }))]
+    MemoryLock(Option<io::Error>),
+    /// The thread of the trial panicked.
+    #[error("the trial of real-time scheduling ended by itself")]
+    Trial,
+}
 
 /// Returns the commands that grant real-time rights.
 pub fn advice(missing: &str) -> String {
@@ -46,14 +70,12 @@ pub fn arm(ask: Ask) -> Result<Armed, Refused> {
         };
         // SAFETY: `parameters` is valid for reads; 0 names the calling thread.
         if unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameters) } != 0 {
-            let why = std::io::Error::last_os_error();
-            return Err(Refused(advice(&format!(
-                "the kernel does not grant SCHED_FIFO priority {priority} ({why})"
-            ))));
+            let why = io::Error::last_os_error();
+            return Err(Refused::Priority { priority, why });
         }
     }
     let report = read_back(ask);
-    confirm(&report).map_err(Refused)?;
+    confirm(&report)?;
     touch_stack();
     flush_denormals();
     Ok(Armed {
@@ -79,8 +101,7 @@ pub fn lock_memory() -> Result<(), Refused> {
         keep_one_heap();
         return Ok(());
     }
-    let why = std::io::Error::last_os_error();
-    Err(Refused(advice(&format!("the kernel does not lock memory ({why})"))))
+    Err(Refused::MemoryLock(Some(io::Error::last_os_error())))
 }
 
 /// A request to the kernel, in force until dropped.
@@ -110,15 +131,12 @@ pub fn keep_cores_awake() -> Option<CoresAwake> {
 }
 
 /// Checks that the kernel reports what was requested: [`stylet_shm_schema::flags::REAL_TIME`] relies on it.
-fn confirm(report: &ThreadReport) -> Result<(), String> {
+fn confirm(report: &ThreadReport) -> Result<(), Refused> {
     let asked = report.asked_priority;
     if asked == 0 || (report.is_fifo() && report.priority == asked) {
         return Ok(());
     }
-    Err(format!(
-        "the kernel granted SCHED_FIFO priority {asked}, but reports policy {} and priority {}",
-        report.policy, report.priority
-    ))
+    Err(Refused::NotConfirmed(*report))
 }
 
 fn read_back(ask: Ask) -> ThreadReport {

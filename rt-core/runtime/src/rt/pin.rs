@@ -3,7 +3,7 @@
 //! One instruction writes it, without a system call, so the contract of the loops holds. The right to the register is
 //! acquired before the threads start, and they inherit it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use stylet_random::Random;
 
@@ -23,19 +23,39 @@ const OUT2: u8 = 8;
 /// Shortest time between two edges in ticks; up to 63 more are added.
 const FEWEST_TICKS: u32 = 20;
 
-/// Reason why a pin cannot be toggled; for people.
+/// Reason why a pin cannot be toggled.
 #[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct PinError(String);
+pub enum PinError {
+    /// A text that names no pin.
+    #[error("{0:?}: expected serial:0x3F8:rts, serial:0x3F8:dtr, /dev/ttyS0:rts or parallel:0x378")]
+    NoPin(String),
+    /// A serial device without a register.
+    #[error(
+        "{}: no serial port of this PC. Adapters on USB and terminals have no register that the force loop could write by one \
+         instruction, and it makes no system call for a pin",
+        .0.display()
+    )]
+    NoRegister(PathBuf),
+    /// A port that the kernel does not allow to write.
+    #[error("the port {port:#x} may not be written ({why}): run as root")]
+    Refused {
+        /// The port.
+        port: u16,
+        /// Error of the kernel.
+        why: std::io::Error,
+    },
+    /// A processor without ports.
+    #[error("this processor has no ports that a program can write")]
+    NoPorts,
+}
 
 impl FromStr for Pin {
-    type Err = String;
+    type Err = PinError;
 
     /// Parses `serial:0x3F8:rts`, `serial:0x3F8:dtr`, `/dev/ttyS0:rts`, which names the same port, or `parallel:0x378`,
     /// which toggles pin 2.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let expected =
-            || format!("{text:?}: expected serial:0x3F8:rts, serial:0x3F8:dtr, /dev/ttyS0:rts or parallel:0x378");
+    fn from_str(text: &str) -> Result<Self, PinError> {
+        let expected = || PinError::NoPin(text.to_owned());
         let address = |word: &str| {
             let digits = word
                 .strip_prefix("0x")
@@ -63,15 +83,11 @@ impl FromStr for Pin {
 /// Returns the port of a serial device, as its driver reports it. Read with the command line, before any loop.
 // Read with the command line, before any loop.
 #[allow(clippy::disallowed_methods)]
-fn register_of(device: &Path) -> Result<String, String> {
+fn register_of(device: &Path) -> Result<String, PinError> {
     let name = device.file_name().unwrap_or_default();
     let port = std::fs::read_to_string(Path::new("/sys/class/tty").join(name).join("port")).unwrap_or_default();
     match port.trim() {
-        "" | "0x0" => Err(format!(
-            "{}: no serial port of this PC. Adapters on USB and terminals have no register that the force loop could write by one \
-             instruction, and it makes no system call for a pin",
-            device.display()
-        )),
+        "" | "0x0" => Err(PinError::NoRegister(device.to_owned())),
         port => Ok(port.to_owned()),
     }
 }
@@ -94,10 +110,8 @@ impl Pin {
         // SAFETY: numbers only.
         if unsafe { libc::ioperm(libc::c_ulong::from(self.port), 1, 1) } != 0 {
             let why = std::io::Error::last_os_error();
-            return Err(PinError(format!(
-                "the port {:#x} may not be written ({why}): run as root",
-                self.port
-            )));
+            let port = self.port;
+            return Err(PinError::Refused { port, why });
         }
         Ok(Toggle {
             pin: self,
@@ -113,9 +127,7 @@ impl Pin {
     /// The processor has no such registers.
     #[cfg(not(target_arch = "x86_64"))]
     pub fn acquire(self) -> Result<Toggle, PinError> {
-        Err(PinError(
-            "this processor has no ports that a program can write".to_owned(),
-        ))
+        Err(PinError::NoPorts)
     }
 }
 
@@ -163,11 +175,17 @@ mod tests {
     fn ports_are_read_and_what_is_none_is_refused() {
         let pin = |text: &str| text.parse::<Pin>();
         assert_eq!(
-            pin("serial:0x3F8:rts").map(|p| (p.port, p.values)),
-            Ok((0x3fc, [8, 10]))
+            pin("serial:0x3F8:rts").ok().map(|p| (p.port, p.values)),
+            Some((0x3fc, [8, 10]))
         );
-        assert_eq!(pin("serial:0x2f8:dtr").map(|p| (p.port, p.values)), Ok((0x2fc, [8, 9])));
-        assert_eq!(pin("parallel:0x378").map(|p| (p.port, p.values)), Ok((0x378, [0, 1])));
+        assert_eq!(
+            pin("serial:0x2f8:dtr").ok().map(|p| (p.port, p.values)),
+            Some((0x2fc, [8, 9]))
+        );
+        assert_eq!(
+            pin("parallel:0x378").ok().map(|p| (p.port, p.values)),
+            Some((0x378, [0, 1]))
+        );
         for none in [
             "",
             "serial:0x3F8",
@@ -193,12 +211,15 @@ mod tests {
             .expect("ends")
             .to_str()
             .expect("ASCII");
-        let why = format!("{name}:rts").parse::<Pin>().expect_err("no modem lines");
+        let why = format!("{name}:rts")
+            .parse::<Pin>()
+            .expect_err("no modem lines")
+            .to_string();
         assert!(why.contains(name) && why.contains("no register"), "{why}");
         // SAFETY: opened above.
         unsafe { libc::close(master) };
         if std::fs::read_to_string("/sys/class/tty/ttyS0/port").is_ok_and(|p| p.trim() == "0x3F8") {
-            assert_eq!("/dev/ttyS0:dtr".parse::<Pin>(), "serial:0x3F8:dtr".parse());
+            assert_eq!("/dev/ttyS0:dtr".parse::<Pin>().ok(), "serial:0x3F8:dtr".parse().ok());
         }
     }
 

@@ -6,7 +6,7 @@ use super::columns::{ColumnQueue, QueueProgress, TOLERANCE};
 use super::compliance::Compliance;
 use super::contact::{LineInput, Scratch, step_in};
 use super::cross::{Cross, LineStations};
-use super::model::{LineModel, LineSettings, MAX_STATIONS};
+use super::model::{LineModel, LineProblem, LineSettings, MAX_STATIONS};
 use super::prony::PronyTerm;
 use super::state::{LineOutput, LineState};
 use super::stations::{Line, StationSettings, Stations};
@@ -15,6 +15,7 @@ use crate::scene::Lattice;
 use crate::tissue::fem::batch::BatchModel;
 use nalgebra::Vector3;
 use std::sync::Arc;
+use stylet_settings::ProblemList;
 
 mod bend;
 mod body;
@@ -99,7 +100,7 @@ impl Default for LayerForces {
 }
 
 /// Why a line could not be made.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LineError {
     /// No tissue on the way.
     #[error("the needle's line does not pass through tissue that gives way")]
@@ -107,9 +108,15 @@ pub enum LineError {
     /// Work that is no longer wanted.
     #[error("the needle's line was given up before it was ready")]
     Stopped,
-    /// The layers of the scene give no line: every problem, one a line.
+    /// Settings that no line can have.
     #[error("the needle's line cannot be used: {0}")]
-    Unusable(String),
+    Unusable(ProblemList<LineProblem>),
+    /// Answers of other lines that do not fit this one.
+    #[error("the needle's line cannot be used: what it knows of other lines is not whole")]
+    OtherLines,
+    /// A compliance with missing rows, or for too many stations.
+    #[error("the needle's line cannot be used: its compliance is not whole")]
+    Compliance,
 }
 
 impl ReadyLine {
@@ -170,10 +177,8 @@ impl HandLine {
     fn new(generation: u64, line: Line, way: LineLayers, compliance: Compliance) -> Result<Self, LineError> {
         let layers = way.layers(&LayerForces::default());
         let bending = Bending::new(&compliance);
-        let model = LineModel::new(compliance, &layers, LineSettings::default()).map_err(|problems| {
-            let lines: Vec<_> = problems.iter().map(ToString::to_string).collect();
-            LineError::Unusable(lines.join("\n"))
-        })?;
+        let model = LineModel::new(compliance, &layers, LineSettings::default())
+            .map_err(|problems| LineError::Unusable(ProblemList(problems)))?;
         Ok(Self {
             generation,
             line,

@@ -1,13 +1,23 @@
 //! Specification of a tissue model: what a run must know of it before there is a body.
 
+use super::fem::FemProblem;
 use super::{ChainMailTissue, FemTissue, TissueModel};
 use crate::limits::Limits;
 use crate::scene::{Scene, TissueKind};
+use std::error::Error;
+use std::sync::Arc;
+use stylet_settings::ProblemList;
 
-/// Why a tissue model cannot be set up: every problem, one a line.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}", .0.join("\n"))]
-pub struct TissueError(pub Vec<String>);
+/// Reason why a tissue model cannot be set up.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum TissueError {
+    /// Materials that the finite elements cannot have.
+    #[error(transparent)]
+    FiniteElements(#[from] ProblemList<FemProblem>),
+    /// Error of a model from another crate.
+    #[error(transparent)]
+    Other(Arc<dyn Error + Send + Sync>),
+}
 
 /// Constructor of a model of `scene.body`, at rest.
 pub type BuildTissue = fn(scene: &Scene, limits: &Limits) -> Result<Box<dyn TissueModel>, TissueError>;
@@ -71,12 +81,7 @@ impl From<TissueKind> for TissueSpec {
                 // The force on a single node goes to zero with the spacing.
                 tip_patch_m: 4e-3,
                 prepares: true,
-                ..Self::new(|scene, _| {
-                    let texts = |problems: Vec<_>| problems.iter().map(ToString::to_string).collect();
-                    Ok(Box::new(
-                        FemTissue::<f32>::new(scene).map_err(|p| TissueError(texts(p)))?,
-                    ))
-                })
+                ..Self::new(|scene, _| Ok(Box::new(FemTissue::<f32>::new(scene)?)))
             },
         };
         Self {

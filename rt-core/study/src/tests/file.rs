@@ -41,7 +41,7 @@ entry_right_mm = { normal = [5.0, 1.0], within = [-1.0, 1.0] }
 "needle.depth_coefficient" = 100.0
 "force.cutting" = -1.0
 "#;
-    let problems = study_in(folder.path(), wrong).expect_err("it is wrong all over").0;
+    let problems = study_in(folder.path(), wrong).expect_err("it is wrong all over");
     let expected = [
         "sead: there is no such key; there are name, seed, implants",
         "name is \"a b\"",
@@ -75,9 +75,7 @@ fn parameters_that_the_device_does_not_hold_together_are_refused_with_their_valu
     let folder = tempfile::tempdir().unwrap();
     let keys =
         "[vary]\n\"force.membrane_peak\" = { uniform = [4.0, 9.0] }\n\"force.cutting\" = { uniform = [1.0, 2.0] }";
-    let problems = study_in(folder.path(), &(text("implants = 1") + keys))
-        .expect_err("refused")
-        .0;
+    let problems = study_in(folder.path(), &(text("implants = 1") + keys)).expect_err("refused");
     assert_eq!(problems.len(), 1, "{problems:#?}");
     assert!(
         problems[0].contains("force.membrane_peak = 9") && problems[0].contains("the device holds at most"),
@@ -98,6 +96,7 @@ fn a_plan_without_sense_is_refused_with_the_number_of_its_needle() {
         .expect_err("refused")
         .0;
     assert_eq!(problems.len(), 2, "{problems:#?}");
+    let problems: Vec<_> = problems.iter().map(ToString::to_string).collect();
     assert!(problems[0].contains("needle 1: 2 seeds in seed_along_mm and 1 in strength_u"));
     assert!(problems[1].contains("needle 2: spacer_mm is -1"));
 }

@@ -73,29 +73,54 @@ fn setting(path: &str) -> Option<Setting> {
     Some(Setting { check, values, wanted })
 }
 
-/// Returns why the doctor cannot have made this change; `None` if it may have.
-pub fn refusal(change: &Change) -> Option<String> {
-    let named = change.path.escape_default();
-    let Some(setting) = setting(&change.path) else {
-        return Some(format!("/{named} is not a setting that the doctor makes"));
+/// Change that the doctor does not make.
+#[derive(Debug, thiserror::Error)]
+pub enum ForeignChange {
+    /// Another setting.
+    #[error("/{} is not a setting that the doctor makes", .0.escape_default())]
+    Setting(String),
+    /// A setting of another check.
+    #[error("the doctor makes /{} in another check", .0.escape_default())]
+    Check(String),
+    /// Another value.
+    #[error(
+        "the doctor does not change /{} from \"{}\" to \"{}\"",
+        .path.escape_default(), .before.escape_default(), .after.escape_default()
+    )]
+    Values {
+        /// The setting.
+        path: String,
+        /// Value before.
+        before: String,
+        /// Value after.
+        after: String,
+    },
+    /// Another text for its state.
+    #[error("/{} has a state that the doctor does not write", .0.escape_default())]
+    State(String),
+}
+
+/// Refuses a change that the doctor cannot have made.
+pub fn check(change: &Change) -> Result<(), ForeignChange> {
+    let path = change.path.clone();
+    let Some(setting) = setting(&path) else {
+        return Err(ForeignChange::Setting(path));
     };
     if change.check != setting.check {
-        return Some(format!("the doctor makes /{named} in another check"));
+        return Err(ForeignChange::Check(path));
     }
     let other = |value: &str| setting.wanted.is_some_and(|wanted| wanted != value);
     if !setting.values.has(&change.before) || !setting.values.has(&change.after) || other(&change.after) {
-        let (before, after) = (change.before.escape_default(), change.after.escape_default());
-        return Some(format!(
-            "the doctor does not change /{named} from \"{before}\" to \"{after}\""
-        ));
+        let (before, after) = (change.before.clone(), change.after.clone());
+        return Err(ForeignChange::Values { path, before, after });
     }
     match &change.state {
         State::Refused(text) | State::Foreign(text)
             if text.len() > LONGEST_STATE || text.chars().any(char::is_control) =>
         {
-            Some(format!("/{named} has a state that the doctor does not write"))
+            Err(ForeignChange::State(path))
         }
-        _ => None,
+        _ => Ok(()),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Changed settings, as the file from which they are undone.
 
-use super::{MendError, allowed};
+use super::MendError;
+use super::allowed::{self, ForeignChange};
 use crate::doctor::tunable::{self, Tunable};
 use crate::machine::Machine;
 use serde::{Deserialize, Serialize};
@@ -12,6 +13,23 @@ use std::path::Path;
 const SCHEMA: &str = "stylet.settings/1";
 /// Most bytes read; a PC of 1,000 cores needs a tenth.
 const MOST_BYTES: u64 = 4 << 20;
+
+/// Problem with the file of an undo.
+#[derive(Debug, thiserror::Error)]
+pub enum UndoProblem {
+    /// It cannot be read or written, or others can write it.
+    #[error(transparent)]
+    File(#[from] io::Error),
+    /// Not a list of settings.
+    #[error("not a file of settings: {0}")]
+    Json(#[from] serde_json::Error),
+    /// A list of another version.
+    #[error("expected schema {SCHEMA}, found {0:?}")]
+    Schema(String),
+    /// A change that the doctor does not make.
+    #[error(transparent)]
+    Foreign(#[from] ForeignChange),
+}
 
 /// State of a change.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -83,19 +101,7 @@ impl Changes {
     }
 
     fn open(path: &Path, is_written: bool) -> Result<(Self, File), MendError> {
-        let failed = |why: String| MendError::Undo {
-            path: path.to_owned(),
-            why,
-        };
-        let (text, file) = own_text(path, is_written).map_err(|e| failed(e.to_string()))?;
-        let read: Self = serde_json::from_str(&text).map_err(|e| failed(format!("not a file of settings: {e}")))?;
-        if read.schema != SCHEMA {
-            return Err(failed(format!("expected schema {SCHEMA}, found {:?}", read.schema)));
-        }
-        match read.changes.iter().find_map(allowed::refusal) {
-            Some(why) => Err(failed(why)),
-            None => Ok((read, file)),
-        }
+        checked(path, is_written).map_err(|why| MendError::of_undo(path, why))
     }
 
     /// Rewrites the list into its file.
@@ -103,10 +109,7 @@ impl Changes {
         let text = self.text();
         let written = file.write_all_at(text.as_bytes(), 0);
         let written = written.and_then(|()| file.set_len(text.len() as u64));
-        written.map_err(|e| MendError::Undo {
-            path: path.to_owned(),
-            why: e.to_string(),
-        })
+        written.map_err(|why| MendError::of_undo(path, why.into()))
     }
 
     pub fn text(&self) -> String {
@@ -178,6 +181,16 @@ impl Changes {
         };
         self.changes.iter().map(line).collect()
     }
+}
+
+fn checked(path: &Path, is_written: bool) -> Result<(Changes, File), UndoProblem> {
+    let (text, file) = own_text(path, is_written)?;
+    let read: Changes = serde_json::from_str(&text)?;
+    if read.schema != SCHEMA {
+        return Err(UndoProblem::Schema(read.schema));
+    }
+    read.changes.iter().try_for_each(allowed::check)?;
+    Ok((read, file))
 }
 
 /// Reads the text of a regular file that no other user could have written; returns file and text.

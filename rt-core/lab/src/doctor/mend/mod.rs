@@ -14,7 +14,7 @@ use crate::machine::Machine;
 use crate::measure::{MeasureError, Setup, measure};
 use crate::summary::{QUANTILES, quantile_us};
 use clap::Args;
-use file::Changes;
+use file::{Changes, UndoProblem};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use stylet_runtime::args::{OptionsError, RealTimeArgs};
@@ -63,7 +63,7 @@ pub enum MendError {
         /// The file.
         path: PathBuf,
         /// Problem with it.
-        why: String,
+        why: UndoProblem,
     },
     /// The folder holds the data for undoing an earlier change.
     #[error("{} is there already: undo it first, or name another folder", .0.display())]
@@ -77,6 +77,13 @@ pub enum MendError {
     /// The measurement did not run.
     #[error(transparent)]
     Measure(#[from] MeasureError),
+}
+
+impl MendError {
+    fn of_undo(path: &Path, why: UndoProblem) -> Self {
+        let path = path.to_owned();
+        Self::Undo { path, why }
+    }
 }
 
 /// Examines, shows, changes or undoes; 0 when all was done, 1 when there is a blocker or a setting was refused.

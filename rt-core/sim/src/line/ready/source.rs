@@ -136,7 +136,7 @@ impl HandLine {
     ///
     /// # Errors
     ///
-    /// [`LineError::Unusable`]: numbers that are no line's.
+    /// Numbers that are no line's.
     pub fn of_source(source: LineSource) -> Result<Self, LineError> {
         let LineSource {
             generation,
@@ -148,9 +148,7 @@ impl HandLine {
             stiffness: _,
         } = source;
         if !beside.iter().all(|cross| cross.is_whole(2 * compliance.stations)) {
-            return Err(LineError::Unusable(
-                "what it knows of other lines is not whole".to_owned(),
-            ));
+            return Err(LineError::OtherLines);
         }
         let [first, second] = &compliance.across;
         let across = first.size();
@@ -158,7 +156,7 @@ impl HandLine {
             && (across == 0
                 || (first.is_whole(across) && second.is_whole(across) && compliance.across_spacing_m > 0.0));
         if compliance.stations > MAX_STATIONS || across > MAX_ACROSS || !is_whole {
-            return Err(LineError::Unusable("its compliance is not whole".to_owned()));
+            return Err(LineError::Compliance);
         }
         let mut line = Self {
             beside,

@@ -10,6 +10,7 @@ use super::state::FemState;
 use crate::scene::Lattice;
 use crate::tissue::Held;
 use std::sync::Arc;
+use stylet_settings::ProblemList;
 
 /// Declares a trait of these functions with one type, and implements it for each number type by functions of this
 /// crate.
@@ -41,7 +42,7 @@ compiled! {
         of: &Arc<Lattice>,
         settings: &FemSettings,
         is_fixed: &dyn Fn([f64; 3]) -> bool
-    ) -> Result<FemModel<Self>, Vec<FemProblem>> = FemModel::of_lattice;
+    ) -> Result<FemModel<Self>, ProblemList<FemProblem>> = FemModel::of_lattice;
     fn step(
         model: &FemModel<Self>,
         state: &mut FemState<Self>,
@@ -60,7 +61,7 @@ compiled! {
 
 impl<T: Compiled> FemModel<T> {
     /// Makes the body of a lattice, or returns every problem with the settings.
-    pub fn new(lattice: &Arc<Lattice>, settings: &FemSettings) -> Result<Self, Vec<FemProblem>> {
+    pub fn new(lattice: &Arc<Lattice>, settings: &FemSettings) -> Result<Self, ProblemList<FemProblem>> {
         Self::with_fixed_nodes(lattice, settings, |_| false)
     }
 
@@ -69,13 +70,17 @@ impl<T: Compiled> FemModel<T> {
         lattice: &Arc<Lattice>,
         settings: &FemSettings,
         is_fixed: impl Fn([f64; 3]) -> bool,
-    ) -> Result<Self, Vec<FemProblem>> {
+    ) -> Result<Self, ProblemList<FemProblem>> {
         T::model(lattice, lattice, settings, &is_fixed)
     }
 
     /// Makes the body of `lattice` in the elements of `of`, a lattice some times [`Lattice::coarser`] than it: each as
     /// stiff as the cells in it are on average, also where part of it is no tissue.
-    pub fn coarser(lattice: &Lattice, of: &Arc<Lattice>, settings: &FemSettings) -> Result<Self, Vec<FemProblem>> {
+    pub fn coarser(
+        lattice: &Lattice,
+        of: &Arc<Lattice>,
+        settings: &FemSettings,
+    ) -> Result<Self, ProblemList<FemProblem>> {
         T::model(lattice, of, settings, &|_| false)
     }
 }

@@ -9,6 +9,7 @@ use super::real::Real;
 use crate::scene::Lattice;
 use std::sync::Arc;
 use stylet_anatomy::Beyond;
+use stylet_settings::ProblemList;
 
 /// A node that touches no element.
 pub(super) const NO_PART: u32 = u32::MAX;
@@ -44,11 +45,8 @@ impl<T: Real> FemModel<T> {
         of: &Arc<Lattice>,
         settings: &FemSettings,
         is_fixed: &dyn Fn([f64; 3]) -> bool,
-    ) -> Result<Self, Vec<FemProblem>> {
-        let problems = problems_of(settings, lattice.element_count());
-        if !problems.is_empty() {
-            return Err(problems);
-        }
+    ) -> Result<Self, ProblemList<FemProblem>> {
+        ProblemList::check(problems_of(settings, lattice.element_count()))?;
         let halvings = (of.spacing_m / lattice.spacing_m).log2().round() as u32;
         let mut body = Body::new(lattice, settings, is_fixed, 1 << halvings);
         for _ in 0..halvings {

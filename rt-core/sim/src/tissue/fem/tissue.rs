@@ -9,6 +9,7 @@ use crate::scene::Scene;
 use crate::tissue::{
     Carried, Deformed, ElementField, Held, HeldOutcome, LargeStrain, PackedField, Shift, Solve, StepReport, TissueModel,
 };
+use stylet_settings::ProblemList;
 
 /// Stiffness of the surroundings of a body: 20 mm of fat of 5 kPa, per surface area (assumed).
 pub const SURROUNDINGS_PA_PER_M: f64 = 5e3 / 20e-3;
@@ -33,7 +34,7 @@ pub struct FemTissue<T = f32> {
 
 impl<T: Compiled> FemTissue<T> {
     /// Makes the scene's materials in its surroundings, solved as far as the loop has time for.
-    pub fn new(scene: &Scene) -> Result<Self, Vec<FemProblem>> {
+    pub fn new(scene: &Scene) -> Result<Self, ProblemList<FemProblem>> {
         let structures = scene.structures.iter().map(|s| match s.material.fixed {
             true => Structure::Fixed,
             false => Structure::Elastic(Material {

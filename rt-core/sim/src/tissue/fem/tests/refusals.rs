@@ -67,13 +67,13 @@ fn every_problem_with_the_settings_is_listed() {
         foundation_pa_per_m: -1.0,
         surroundings: Vec::new(),
     };
-    let problems = FemModel::<f32>::new(&lattice, &settings).expect_err("five problems");
+    let problems = FemModel::<f32>::new(&lattice, &settings).expect_err("five problems").0;
     assert_eq!(problems.len(), 5, "{problems:?}");
     let none = FemSettings {
         structures: Vec::new(),
         ..FemSettings::homogeneous(Material::PROSTATE, 0.0)
     };
-    let problems = FemModel::<f32>::new(&lattice, &none).expect_err("no structure");
+    let problems = FemModel::<f32>::new(&lattice, &none).expect_err("no structure").0;
     assert_eq!(problems, [FemProblem::NoStructures]);
     assert!(problems[0].to_string().contains("at least 1"));
 }
