@@ -64,7 +64,10 @@ impl Orders {
     pub fn listen(instance: &Instance) -> Result<Self, RelayError> {
         instance.make_folder()?;
         let path = path(instance);
-        let failed = |e: std::io::Error| RelayError(format!("{}: {e}", path.display()));
+        let failed = |why| RelayError::File {
+            path: path.clone(),
+            why,
+        };
         let _ = std::fs::remove_file(&path);
         let listener = UnixListener::bind(&path).map_err(failed)?;
         std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o600)).map_err(failed)?;
@@ -101,11 +104,9 @@ impl Drop for Orders {
 
 /// Sends an order to the relay of `instance` and returns its answer.
 pub fn ask(instance: &Instance, order: &Order) -> Result<String, RelayError> {
-    let failed = |e: std::io::Error| {
-        RelayError(format!(
-            "no relay answers for instance \"{}\" ({e}): start 'relay serve' or 'relay join' first",
-            instance.name()
-        ))
+    let failed = |why| RelayError::NoRelay {
+        instance: instance.name().to_owned(),
+        why,
     };
     let mut stream = UnixStream::connect(path(instance)).map_err(failed)?;
     stream.set_read_timeout(Some(PATIENCE)).map_err(failed)?;

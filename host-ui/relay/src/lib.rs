@@ -8,6 +8,7 @@
 
 pub mod class;
 pub mod control;
+mod error;
 #[cfg(feature = "net")]
 pub mod join;
 pub mod keys;
@@ -20,22 +21,7 @@ pub mod serve;
 pub mod slice;
 pub mod wire;
 
-/// Reason why the relay ended or did not begin; the text says what to do.
-#[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct RelayError(pub String);
-
-impl From<stylet_shm_schema::InstanceError> for RelayError {
-    fn from(why: stylet_shm_schema::InstanceError) -> Self {
-        Self(why.to_string())
-    }
-}
-
-impl From<stylet_ports::ServiceError> for RelayError {
-    fn from(why: stylet_ports::ServiceError) -> Self {
-        Self(why.to_string())
-    }
-}
+pub use error::RelayError;
 
 /// `CLOCK_MONOTONIC` of this machine.
 pub fn now_ns() -> u64 {

@@ -147,7 +147,7 @@ fn on_signals() -> Result<Arc<AtomicBool>, RelayError> {
         if signal == SIGHUP && is_ignored(signal) {
             continue;
         }
-        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(|e| RelayError(format!("signals: {e}")))?;
+        signal_hook::flag::register(signal, Arc::clone(&stop)).map_err(RelayError::Signals)?;
     }
     Ok(stop)
 }
@@ -175,7 +175,7 @@ fn code() -> Result<String, RelayError> {
         unsafe { libc::tcsetattr(libc::STDIN_FILENO, libc::TCSANOW, &raw const shown) };
         let _ = writeln!(std::io::stderr());
     }
-    read.map_err(|e| RelayError(format!("the code of the invitation cannot be read: {e}")))?;
+    read.map_err(RelayError::Code)?;
     Ok(line)
 }
 
@@ -244,7 +244,7 @@ fn run(task: Task) -> Result<(), RelayError> {
             let stop = on_signals()?;
             join::run(&options, &stop)
         }
-        Task::Manual(args) => args.run(Cli::command()).map_err(|e| RelayError(e.to_string())),
+        Task::Manual(args) => Ok(args.run(Cli::command())?),
         Task::Keys { task, keys } => keys_task(task, &Lab::new(&keys)),
         Task::Lease { task, instance } => {
             let order = match task {

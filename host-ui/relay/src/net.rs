@@ -101,11 +101,9 @@ pub fn serve(listen: &[String], identity: &Identity) -> Result<Session, RelayErr
     let endpoints: Vec<String> = listen.iter().map(|at| endpoint(at)).collect();
     config["listen"] = json!({ "endpoints": endpoints, "exit_on_failure": true });
     config["access_control"] = access();
-    open(&config).map_err(|e| {
-        RelayError(format!(
-            "cannot listen on {}: {e}. Is another relay running, or does 'relay keys new' still have to make this machine's certificate?",
-            listen.join(", ")
-        ))
+    open(&config).map_err(|why| RelayError::Listen {
+        addresses: listen.join(", "),
+        why,
     })
 }
 
@@ -125,7 +123,10 @@ pub fn join(server: &str, identity: &Identity) -> Result<Session, RelayError> {
         "endpoints": [endpoint(server)], "timeout_ms": -1, "exit_on_failure": false,
         "retry": { "period_init_ms": 100, "period_max_ms": 200, "period_increase_factor": 1.5 },
     });
-    open(&config).map_err(|e| RelayError(format!("cannot connect to {server}: {e}")))
+    open(&config).map_err(|why| RelayError::Connect {
+        server: server.to_owned(),
+        why,
+    })
 }
 
 fn open(config: &Value) -> Result<Session, zenoh::Error> {
@@ -209,7 +210,10 @@ pub fn hear(
         .callback(move |sample| take(sample.key_expr().as_str(), &sample.payload().to_bytes()))
         .background()
         .wait()
-        .map_err(|e| RelayError(format!("cannot hear {key}: {e}")))
+        .map_err(|why| RelayError::Hear {
+            key: key.to_owned(),
+            why,
+        })
 }
 
 /// Closes a session. It may wait for a peer that does not answer, and is abandoned after two seconds.

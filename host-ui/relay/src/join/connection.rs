@@ -55,7 +55,7 @@ impl Connection {
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => {
-                    return Err(RelayError("the connection ended by itself".to_owned()));
+                    return Err(RelayError::ConnectionEnded);
                 }
             }
         }

@@ -31,9 +31,10 @@ impl Last {
         let path = folder.join("relay.last");
         let mut options = File::options();
         options.read(true).write(true).create(true).truncate(false).mode(0o600);
-        let file = options
-            .open(&path)
-            .map_err(|e| RelayError(format!("{}: {e}", path.display())))?;
+        let file = options.open(&path).map_err(|why| RelayError::File {
+            path: path.clone(),
+            why,
+        })?;
         let last = Self { file, path };
         let noted = last.noted(now_ns);
         Ok((last, noted))

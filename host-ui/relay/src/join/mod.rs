@@ -267,5 +267,5 @@ fn spawn(
     std::thread::Builder::new()
         .name(name.to_owned())
         .spawn(move || run(&member))
-        .map_err(|e| RelayError(format!("no thread could be started: {e}")))
+        .map_err(RelayError::Thread)
 }

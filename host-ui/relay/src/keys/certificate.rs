@@ -60,12 +60,8 @@ pub struct Authority {
     pub key: String,
 }
 
-fn failed(why: rcgen::Error) -> RelayError {
-    RelayError(format!("no certificate could be made: {why}"))
-}
-
 fn named(hosts: &[String], name: &str) -> Result<CertificateParams, RelayError> {
-    let mut params = CertificateParams::new(hosts.to_vec()).map_err(failed)?;
+    let mut params = CertificateParams::new(hosts.to_vec())?;
     params.distinguished_name = DistinguishedName::new();
     params.distinguished_name.push(DnType::CommonName, name);
     Ok(params)
@@ -82,11 +78,11 @@ fn authority() -> Result<CertificateParams, RelayError> {
 impl Authority {
     /// Makes a new one, valid for twenty years.
     pub fn make() -> Result<Self, RelayError> {
-        let key = KeyPair::generate().map_err(failed)?;
+        let key = KeyPair::generate()?;
         let mut params = authority()?;
         let now = OffsetDateTime::now_utc();
         (params.not_before, params.not_after) = (now - Duration::days(3), now + Duration::days(7300));
-        let certificate = params.self_signed(&key).map_err(failed)?;
+        let certificate = params.self_signed(&key)?;
         Ok(Self {
             certificate: certificate.pem(),
             key: key.serialize_pem(),
@@ -112,9 +108,9 @@ impl Authority {
         params.extended_key_usages = vec![usage];
         params.use_authority_key_identifier_extension = true;
         (params.not_before, params.not_after) = (validity.from, validity.until + after);
-        let signer = Issuer::new(authority()?, KeyPair::from_pem(&self.key).map_err(failed)?);
-        let key = KeyPair::generate().map_err(failed)?;
-        let certificate = params.signed_by(&key, &signer).map_err(failed)?;
+        let signer = Issuer::new(authority()?, KeyPair::from_pem(&self.key)?);
+        let key = KeyPair::generate()?;
+        let certificate = params.signed_by(&key, &signer)?;
         Ok((certificate.pem(), key.serialize_pem()))
     }
 }

@@ -18,7 +18,7 @@ const ROUNDS: NonZeroU32 = NonZeroU32::new(100_000).expect("not zero");
 fn random<const N: usize>() -> Result<[u8; N], RelayError> {
     let mut bytes = [0; N];
     let filled = SystemRandom::new().fill(&mut bytes);
-    filled.map_err(|_| RelayError("this machine gives no random numbers".to_owned()))?;
+    filled.map_err(|_| RelayError::NoRandom)?;
     Ok(bytes)
 }
 
@@ -41,13 +41,7 @@ fn key(code: &str, salt: &[u8]) -> Result<LessSafeKey, RelayError> {
         &mut bytes,
     );
     let key = UnboundKey::new(&CHACHA20_POLY1305, &bytes);
-    key.map(LessSafeKey::new).map_err(|_| wrong())
-}
-
-fn wrong() -> RelayError {
-    RelayError(
-        "the code does not open this invitation: 'relay keys invite' printed it when it made the file".to_owned(),
-    )
+    key.map(LessSafeKey::new).map_err(|_| RelayError::WrongCode)
 }
 
 /// Encrypts text with the code, for a file.
@@ -56,21 +50,21 @@ pub fn seal(words: &str, code: &str) -> Result<String, RelayError> {
     let mut sealed = words.as_bytes().to_vec();
     let nonce = Nonce::assume_unique_for_key([0; NONCE_LEN]);
     let closed = key(code, &salt)?.seal_in_place_append_tag(nonce, Aad::empty(), &mut sealed);
-    closed.map_err(|_| wrong())?;
+    closed.map_err(|_| RelayError::WrongCode)?;
     Ok(STANDARD.encode([&salt[..], &sealed].concat()))
 }
 
 /// Decrypts text that was sealed with the code.
 pub fn open(sealed: &str, code: &str) -> Result<String, RelayError> {
-    let bytes = STANDARD.decode(sealed).map_err(|_| wrong())?;
-    let (salt, sealed) = bytes.split_at_checked(SALT_BYTES).ok_or_else(wrong)?;
+    let bytes = STANDARD.decode(sealed).map_err(|_| RelayError::WrongCode)?;
+    let (salt, sealed) = bytes.split_at_checked(SALT_BYTES).ok_or(RelayError::WrongCode)?;
     let mut sealed = sealed.to_vec();
     let nonce = Nonce::assume_unique_for_key([0; NONCE_LEN]);
     let key = key(code, salt)?;
     let words = key
         .open_in_place(nonce, Aad::empty(), &mut sealed)
-        .map_err(|_| wrong())?;
-    String::from_utf8(words.to_vec()).map_err(|_| wrong())
+        .map_err(|_| RelayError::WrongCode)?;
+    String::from_utf8(words.to_vec()).map_err(|_| RelayError::WrongCode)
 }
 
 #[cfg(test)]

@@ -135,19 +135,11 @@ impl Invitation {
     /// Reads a file written by `relay keys invite`.
     pub fn read(path: &Path) -> Result<Self, RelayError> {
         let text = read(path)?;
-        let invitation: Self = serde_json::from_str(&text).map_err(|e| {
-            RelayError(format!(
-                "{}: not an invitation of 'relay keys invite': {e}",
-                path.display()
-            ))
-        })?;
-        match (1..=SEATS).contains(&invitation.seat) {
-            true => Ok(invitation),
-            false => Err(RelayError(format!(
-                "{}: there is no seat {}",
-                path.display(),
-                invitation.seat
-            ))),
+        let path = path.to_owned();
+        match serde_json::from_str::<Self>(&text) {
+            Ok(invitation) if (1..=SEATS).contains(&invitation.seat) => Ok(invitation),
+            Ok(Self { seat, .. }) => Err(RelayError::NoSeat { path, seat }),
+            Err(why) => Err(RelayError::NoInvitation { path, why }),
         }
     }
 
@@ -167,12 +159,13 @@ pub struct Lab {
     folder: PathBuf,
 }
 
-fn failed(path: &Path, why: impl fmt::Display) -> RelayError {
-    RelayError(format!("{}: {why}", path.display()))
+fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> RelayError {
+    let path = path.to_owned();
+    move |why| RelayError::File { path, why }
 }
 
 fn read(path: &Path) -> Result<String, RelayError> {
-    fs::read_to_string(path).map_err(|e| failed(path, e))
+    fs::read_to_string(path).map_err(failed(path))
 }
 
 /// Writes atomically to a file readable only by its owner.
@@ -185,9 +178,15 @@ fn write(path: &Path, text: &str) -> Result<(), RelayError> {
         .mode(0o600)
         .open(&beside);
     let written = file.and_then(|mut file| file.write_all(text.as_bytes()).and_then(|()| file.sync_all()));
-    written
-        .and_then(|()| fs::rename(&beside, path))
-        .map_err(|e| failed(path, e))
+    written.and_then(|()| fs::rename(&beside, path)).map_err(failed(path))
+}
+
+fn write_json(path: &Path, content: &impl Serialize) -> Result<(), RelayError> {
+    let text = serde_json::to_string_pretty(content).map_err(|why| RelayError::Json {
+        path: path.to_owned(),
+        why,
+    })?;
+    write(path, &text)
 }
 
 impl Lab {
@@ -205,10 +204,9 @@ impl Lab {
     /// Makes an authority, and the certificate of the machine with the core under the names and addresses in `hosts`.
     pub fn make(&self, hosts: &[String]) -> Result<(), RelayError> {
         if self.file("authority.key").exists() {
-            let why = "there is a lab here already; its members would be shut out. Choose another folder with --keys";
-            return Err(failed(&self.folder, why));
+            return Err(RelayError::LabExists(self.folder.clone()));
         }
-        fs::create_dir_all(&self.folder).map_err(|e| failed(&self.folder, e))?;
+        fs::create_dir_all(&self.folder).map_err(failed(&self.folder))?;
         let authority = Authority::make()?;
         let (certificate, key) = authority.sign(&Subject::Machine(hosts), Validity::days(3650))?;
         write(&self.file("authority.pem"), &authority.certificate)?;
@@ -220,9 +218,9 @@ impl Lab {
 
     /// Returns certificate, key and authority of the machine with the core.
     pub fn identity(&self) -> Result<Identity, RelayError> {
-        let hint = |e: RelayError| RelayError(format!("{e}. 'relay keys new --host ADDRESS' makes a lab's keys"));
+        let path = self.file("authority.pem");
         Ok(Identity {
-            authority: read(&self.file("authority.pem")).map_err(hint)?,
+            authority: fs::read_to_string(&path).map_err(|why| RelayError::NoLab { path, why })?,
             certificate: read(&self.file("relay.pem"))?,
             key: read(&self.file("relay.key"))?,
         })
@@ -231,12 +229,11 @@ impl Lab {
     /// Returns all persons with a certificate.
     pub fn members(&self) -> Result<Members, RelayError> {
         let path = self.file("members.json");
-        serde_json::from_str(&read(&path)?).map_err(|e| failed(&path, e))
+        serde_json::from_str(&read(&path)?).map_err(|why| RelayError::Json { path, why })
     }
 
     fn keep(&self, members: &Members) -> Result<(), RelayError> {
-        let text = serde_json::to_string_pretty(members).map_err(|e| RelayError(e.to_string()))?;
-        write(&self.file("members.json"), &text)
+        write_json(&self.file("members.json"), members)
     }
 
     /// Makes a member's key and certificate, and the code that opens the key. Names, like seats, are used once.
@@ -249,16 +246,14 @@ impl Lab {
     ) -> Result<(Invitation, String), RelayError> {
         let mut members = self.members()?;
         if name.is_empty() || name.chars().count() > 40 || name.chars().any(char::is_control) {
-            return Err(RelayError("a name has 1 to 40 characters".to_owned()));
+            return Err(RelayError::Name);
         }
         if members.members.iter().any(|m| m.name == name && !m.revoked) {
-            return Err(RelayError(format!(
-                "{name} has a certificate; revoke it first ('relay keys revoke'), or use another name"
-            )));
+            return Err(RelayError::NameTaken(name.to_owned()));
         }
         let seat = members.members.iter().map(|m| m.seat).max().unwrap_or(0) + 1;
         if seat > SEATS {
-            return Err(RelayError(format!("all {SEATS} seats have been given: make a new lab")));
+            return Err(RelayError::NoSeatLeft(SEATS));
         }
         let (authority, key) = (read(&self.file("authority.pem"))?, read(&self.file("authority.key"))?);
         let signer = Authority {
@@ -298,9 +293,7 @@ impl Lab {
             (member.revoked, count) = (true, count + 1);
         }
         match count {
-            0 => Err(RelayError(format!(
-                "nobody of the name {name} has a certificate: see 'relay keys list'"
-            ))),
+            0 => Err(RelayError::NoMember(name.to_owned())),
             _ => self.keep(&members).map(|()| count),
         }
     }
@@ -308,8 +301,7 @@ impl Lab {
 
 /// Writes an invitation readable only by its owner.
 pub fn write_invitation(path: &Path, invitation: &Invitation) -> Result<(), RelayError> {
-    let text = serde_json::to_string_pretty(invitation).map_err(|e| RelayError(e.to_string()))?;
-    write(path, &text)
+    write_json(path, invitation)
 }
 
 #[cfg(test)]

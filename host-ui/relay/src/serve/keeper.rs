@@ -67,7 +67,7 @@ impl Beat {
 
 /// Runs this program with `arguments` and `--kept`, restarting it until `stop`.
 pub fn keep(instance: &Instance, arguments: &[OsString], stop: &AtomicBool) -> Result<(), RelayError> {
-    let failed = |e: std::io::Error| RelayError(format!("the server cannot be started: {e}"));
+    let failed = RelayError::Server;
     let mut tape = Tape::new(instance);
     loop {
         let begun = Instant::now();
@@ -81,7 +81,7 @@ pub fn keep(instance: &Instance, arguments: &[OsString], stop: &AtomicBool) -> R
         match (stop.load(Ordering::Relaxed), status.code()) {
             (true, _) | (_, Some(0)) => return Ok(()),
             (_, Some(code)) if code == i32::from(CANNOT) => {
-                return Err(RelayError("the server ended; what it printed says why".to_owned()));
+                return Err(RelayError::ServerEnded);
             }
             _ => {
                 say(format!("the server ended with {status}; it is started again"));
