@@ -306,8 +306,7 @@ impl Link {
     /// Sends a request and returns its command id; its [`Answer`] comes later.
     pub fn send(&mut self, request: &Request) -> Result<u64, LinkError> {
         let id = self.next_id()?;
-        let command = request.encode(self.host_id, id);
-        let command = command.map_err(|errors| LinkError(errors.to_string()))?;
+        let command = request.encode(self.host_id, id)?;
         let id = self.ask(id, Outgoing::Command(Box::new(command)))?;
         let now = Instant::now();
         if self.motions.sent(request, id, now) {
@@ -321,10 +320,11 @@ impl Link {
     pub fn upload(&mut self, volume: &LabelVolume) -> Result<u64, LinkError> {
         let expected: usize = volume.dims.iter().product();
         if volume.cells.len() != expected || !(1..=MAX_UPLOAD_CELLS).contains(&expected) {
-            return Err(LinkError(format!(
-                "the volume has {} cells; it must have {expected} for its size, and 1 to {MAX_UPLOAD_CELLS} can be sent",
-                volume.cells.len()
-            )));
+            return Err(LinkError::Volume {
+                cells: volume.cells.len(),
+                expected,
+                most: MAX_UPLOAD_CELLS,
+            });
         }
         let id = self.next_id()?;
         let mut header = UploadHeader {
@@ -347,20 +347,18 @@ impl Link {
     fn ask(&self, id: u64, outgoing: Outgoing) -> Result<u64, LinkError> {
         match self.receiver.send(outgoing) {
             true => Ok(id),
-            false => Err(LinkError(
-                "too many requests wait to be sent to rt-core; try again".to_owned(),
-            )),
+            false => Err(LinkError::Busy),
         }
     }
 
     fn next_id(&mut self) -> Result<u64, LinkError> {
         if self.playback.is_some() {
-            return Err(LinkError("a recording is shown; close it first".to_owned()));
+            return Err(LinkError::Playback);
         }
         // A host that did not poll for seconds must not conclude that the core has stopped.
         self.pulse = self.receiver.pulse();
         if let LinkStatus::Absent { why } = self.status() {
-            return Err(LinkError(why));
+            return Err(LinkError::Absent(why));
         }
         let id = self.next_command_id;
         self.next_command_id += 1;

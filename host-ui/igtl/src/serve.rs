@@ -12,7 +12,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_anatomy::PatientFrame;
-use stylet_base::interrupt::Interrupt;
+use stylet_base::interrupt::{Interrupt, InterruptError};
 use stylet_base::lines::Lines;
 use stylet_host::link::{Link, LinkStatus, SceneModel, Snapshot};
 use stylet_shm_schema::Instance;
@@ -50,12 +50,12 @@ pub enum ServeError {
     Codec(#[from] CodecError),
     /// Ctrl-C cannot be caught.
     #[error("signals cannot be taken: {0}")]
-    Signals(String),
+    Signals(#[from] InterruptError),
 }
 
 /// Serves until interrupted, including cores that start later or again.
 pub fn run(options: &Options) -> Result<(), ServeError> {
-    let interrupted = Interrupt::on_signals().map_err(|e| ServeError::Signals(e.to_string()))?;
+    let interrupted = Interrupt::on_signals()?;
     // A terminal that is stopped or closed must not block the loop that watches for silent clients.
     let lines = Arc::new(Lines::to_stdout());
     let log = Arc::clone(&lines);

@@ -1,5 +1,6 @@
 //! A graphics device, and operations common to all passes.
 
+use std::error::Error;
 use wgpu::util::DeviceExt;
 
 /// A device and its queue.
@@ -14,9 +15,19 @@ pub struct Gpu {
 /// No device can compute pictures here.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "no graphics device can compute pictures: {0}; install a Vulkan driver, such as Mesa's in software (mesa-vulkan-drivers)"
+    "no graphics device can compute pictures: {why}; install a Vulkan driver, such as Mesa's in software (mesa-vulkan-drivers)"
 )]
-pub struct NoGpu(String);
+pub struct NoGpu {
+    /// Error of the adapter or of its device.
+    #[source]
+    why: Box<dyn Error + Send + Sync>,
+}
+
+impl NoGpu {
+    fn of(why: impl Error + Send + Sync + 'static) -> Self {
+        Self { why: Box::new(why) }
+    }
+}
 
 impl Gpu {
     /// Creates a device without a window. `software` selects the driver that computes on the
@@ -33,13 +44,12 @@ impl Gpu {
             force_fallback_adapter: software,
             ..Default::default()
         };
-        let adapter = pollster::block_on(instance.request_adapter(&options)).map_err(|e| NoGpu(e.to_string()))?;
+        let adapter = pollster::block_on(instance.request_adapter(&options)).map_err(NoGpu::of)?;
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("stylet imaging"),
             ..Default::default()
         };
-        let (device, queue) =
-            pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| NoGpu(e.to_string()))?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(NoGpu::of)?;
         Ok(Self { device, queue })
     }
 

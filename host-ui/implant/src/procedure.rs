@@ -66,11 +66,10 @@ impl Live {
         let volume = asked
             .file()
             .map(|path| files::watched(path, |progress| files::read(path, asked.label, progress)));
-        let volume = volume.transpose().map_err(|e| ProcedureError::Input(e.to_string()))?;
+        let volume = volume.transpose()?;
         let scene_file = asked.file().filter(|path| files::scene::is_scene(path));
-        let said = scene_file.map(files::scene::read).transpose();
-        let said = said.map_err(|e| ProcedureError::Input(e.to_string()))?;
-        let interrupted = Interrupt::on_signals().map_err(|e| ProcedureError::Input(e.to_string()))?;
+        let said = scene_file.map(files::scene::read).transpose()?;
+        let interrupted = Interrupt::on_signals()?;
         let mut link = Link::new(asked.instance.clone());
         let mut core = None;
         let device = said.as_ref().and_then(|s| s.device.as_deref());
@@ -143,7 +142,7 @@ struct Observations {
 /// Runs the procedure; returns an error if a step was not completed.
 pub fn run(options: Options) -> Result<(), ProcedureError> {
     if let Some(out) = &options.out {
-        new_folder(out).map_err(|e| ProcedureError::Input(e.to_string()))?;
+        new_folder(out)?;
     }
     let Live {
         mut link,
@@ -172,7 +171,7 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
         ("--source", options.source.as_deref()),
     ];
     let inputs: Vec<(&str, &Path)> = inputs.into_iter().filter_map(|(o, p)| Some((o, p?))).collect();
-    let made = provenance::made(&inputs).map_err(|e| ProcedureError::Input(e.to_string()))?;
+    let made = provenance::made(&inputs)?;
     let mut job = match plan {
         Some(path) => Job::from_file(path, &scene, file_of_scene)?,
         None => Job::suggested(&scene, options.seeds),
@@ -258,15 +257,9 @@ fn find_core(
     }
     let missing = match link.status() {
         LinkStatus::Absent { why } => why,
-        _ => {
-            let why = "rt-core runs but does not answer; end it and start it again";
-            return Err(ProcedureError::NoCore(why.to_owned()));
-        }
+        _ => return Err(ProcedureError::NoAnswer),
     };
-    let Some(path) = &options.core else {
-        let why = format!("{missing}, or add --core PATH to have it started");
-        return Err(ProcedureError::NoCore(why));
-    };
+    let path = options.core.as_ref().ok_or(ProcedureError::NoCore(missing))?;
     let child = core.insert(Core::start(path, &options.asked.instance, device)?);
     let found = wait(link, interrupted, START_LIMIT, |link| match child.ended() {
         Some(status) => Err(ProcedureError::CoreEnded(status)),
@@ -275,9 +268,7 @@ fn find_core(
     if found {
         return Ok(());
     }
-    Err(ProcedureError::NoCore(
-        "the rt-core that was started does not answer".to_owned(),
-    ))
+    Err(ProcedureError::NoAnswerOfStarted)
 }
 
 fn load(

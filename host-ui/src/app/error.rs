@@ -25,8 +25,8 @@ pub enum WindowError {
     #[error(
         "no graphics driver can draw the window ({0}). Install mesa-vulkan-drivers, or use `host-ui procedure`, which needs no window"
     )]
-    Driver(String),
+    Driver(eframe::egui_wgpu::WgpuError),
     /// Any other error, as the library reports it.
     #[error("the window cannot be opened: {0}. `host-ui procedure` needs no window")]
-    Other(String),
+    Other(eframe::Error),
 }

@@ -164,8 +164,8 @@ pub fn run(options: Options) -> Result<(), WindowError> {
     let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options))));
     eframe::run_native("Stylet", native, create).map_err(|why| match why {
         eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => WindowError::Display(error::shown_on()),
-        eframe::Error::Wgpu(why) => WindowError::Driver(why.to_string()),
-        other => WindowError::Other(other.to_string()),
+        eframe::Error::Wgpu(why) => WindowError::Driver(why),
+        other => WindowError::Other(other),
     })
 }
 

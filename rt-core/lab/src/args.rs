@@ -162,16 +162,22 @@ pub(crate) fn longest_spin_ns(period_ns: u64, throttle: Option<Throttle>) -> u64
 
 /// An invalid duration.
 #[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct DurationError(String);
+pub enum DurationError {
+    /// Not a duration.
+    #[error(transparent)]
+    Text(#[from] jiff::Error),
+    /// A duration that no measurement has.
+    #[error("between 1s and 48h")]
+    Range,
+}
 
 pub(crate) fn duration_ns(text: &str) -> Result<u64, DurationError> {
-    let duration: jiff::SignedDuration = text.parse().map_err(|e: jiff::Error| DurationError(e.to_string()))?;
+    let duration: jiff::SignedDuration = text.parse()?;
     let ns = u64::try_from(duration.as_nanos()).unwrap_or(0);
     if (1_000_000_000..=172_800_000_000_000).contains(&ns) {
         Ok(ns)
     } else {
-        Err(DurationError("between 1s and 48h".to_owned()))
+        Err(DurationError::Range)
     }
 }
 

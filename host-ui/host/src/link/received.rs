@@ -206,5 +206,27 @@ impl Answer {
 
 /// Reason why something could not be sent.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct LinkError(pub String);
+pub enum LinkError {
+    /// There is no core, for this reason.
+    #[error("{0}")]
+    Absent(String),
+    /// The request itself is wrong.
+    #[error(transparent)]
+    Request(#[from] Refusal),
+    /// A volume of another size than its header says, or of more cells than can be sent.
+    #[error("the volume has {cells} cells; it must have {expected} for its size, and 1 to {most} can be sent")]
+    Volume {
+        /// Cells of the volume.
+        cells: usize,
+        /// Cells for its size.
+        expected: usize,
+        /// Most cells that can be sent.
+        most: usize,
+    },
+    /// The queue is full.
+    #[error("too many requests wait to be sent to rt-core; try again")]
+    Busy,
+    /// A recording takes the place of a core.
+    #[error("a recording is shown; close it first")]
+    Playback,
+}

@@ -3,13 +3,17 @@
 use crate::link::LinkError;
 use std::path::{Path, PathBuf};
 use stylet_base::WriteError;
+use stylet_base::interrupt::InterruptError;
 
 /// Failure to record a session or to use a recording; each text says what to do if there is a remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// No core was found, or it does not answer; the text says what to do.
+    /// No core was found; the text says what to do.
     #[error("{0}")]
     NoCore(String),
+    /// A core was found that does not answer.
+    #[error("rt-core runs but does not answer; end it and start it again")]
+    NoAnswer,
     /// A request could not be sent.
     #[error(transparent)]
     Link(#[from] LinkError),
@@ -20,8 +24,8 @@ pub enum RecordError {
     #[error("the core did not write its flight recording in time")]
     NoFlight,
     /// The signals that end a recording cannot be handled.
-    #[error("{0}")]
-    Signals(String),
+    #[error(transparent)]
+    Signals(#[from] InterruptError),
     /// The recording lacks ticks or events.
     #[error(
         "{ticks} ticks are missing in {gaps} gaps, {in_core} of them lost in the core; {events} events are missing. \
@@ -45,9 +49,15 @@ pub enum RecordError {
         /// Problem with the file.
         why: String,
     },
-    /// The program that serves viewers cannot be used; the text says why.
-    #[error("stylet-live: {0}")]
-    Live(String),
+    /// The program that serves viewers cannot be started.
+    #[error("stylet-live: cannot be started ({0}): 'make live' builds it; it belongs beside host-ui")]
+    NoLive(std::io::Error),
+    /// The program that serves viewers has no input.
+    #[error("stylet-live: it has no input")]
+    LiveInput,
+    /// The program that serves viewers reads no more.
+    #[error("stylet-live: it ended, or reads no more: {0}")]
+    LiveEnded(mcap::McapError),
     /// An exported file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),

@@ -15,11 +15,7 @@ pub fn start(address: &str) -> Result<Child, RecordError> {
         .args(["--listen", address])
         .stdin(Stdio::piped())
         .spawn();
-    started.map_err(|e| {
-        RecordError::Live(format!(
-            "cannot be started ({e}): 'make live' builds it; it belongs beside host-ui"
-        ))
-    })
+    started.map_err(RecordError::NoLive)
 }
 
 /// Returns the program's path: in this program's folder, or found by the shell.

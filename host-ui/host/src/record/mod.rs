@@ -62,7 +62,7 @@ pub struct Options {
 
 /// Records until the time is up or it is interrupted; fails if a tick was lost on the way.
 pub fn run(options: &Options) -> Result<(), RecordError> {
-    let interrupted = Interrupt::on_signals().map_err(|e| RecordError::Signals(e.to_string()))?;
+    let interrupted = Interrupt::on_signals()?;
     let stop = || interrupted.asked();
     let mut link = Link::with_snapshots_every(options.instance.clone(), Duration::ZERO);
     find_core(&mut link, stop)?;
@@ -77,13 +77,11 @@ pub fn run(options: &Options) -> Result<(), RecordError> {
             (path.display().to_string(), totals)
         }
         To::Viewers(address) => {
-            let failed = |why: mcap::McapError| RecordError::Live(format!("it ended, or reads no more: {why}"));
             let mut server = live::start(address)?;
-            let input = server.stdin.take();
-            let input = input.ok_or_else(|| RecordError::Live("it has no input".to_owned()))?;
+            let input = server.stdin.take().ok_or(RecordError::LiveInput)?;
             let totals = Writer::of_program(input).and_then(|writer| take(&mut link, options, stop, writer));
             let _ended = server.wait();
-            (address.clone(), totals.map_err(failed)?)
+            (address.clone(), totals.map_err(RecordError::LiveEnded)?)
         }
     };
     println!("{name}: {}", totals.words());
@@ -108,9 +106,7 @@ fn find_core(link: &mut Link, stop: impl Fn() -> bool) -> Result<(), RecordError
     }
     match link.status() {
         LinkStatus::Absent { why } => Err(RecordError::NoCore(why)),
-        _ => Err(RecordError::NoCore(
-            "rt-core runs but does not answer; end it and start it again".to_owned(),
-        )),
+        _ => Err(RecordError::NoAnswer),
     }
 }
 

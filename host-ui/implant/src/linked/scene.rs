@@ -9,7 +9,7 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
-use stylet_base::output::new_folder;
+use stylet_base::output::{OutputError, new_folder};
 use stylet_dose::decay::Interval;
 use stylet_dose::report::Judge;
 use stylet_dose::{DoseGrid, DoseKernel, Dvh, Seed, Source, structure};
@@ -48,8 +48,8 @@ pub enum SceneStudyError {
     #[error("the dose of the plan: {0}")]
     Dose(#[from] stylet_dose::DoseError),
     /// The folder exists and is not empty, or cannot be created.
-    #[error("{0}")]
-    Folder(String),
+    #[error(transparent)]
+    Folder(#[from] OutputError),
     /// The work was cancelled.
     #[error("the study was cancelled; nothing was written")]
     Cancelled,
@@ -128,7 +128,7 @@ pub fn write(
     if target.is_none() {
         notes.push(format!("the target {} is not among the contours", anatomy.target.name));
     }
-    new_folder(folder).map_err(|why| SceneStudyError::Folder(why.to_string()))?;
+    new_folder(folder)?;
     let text = file::to_text(plan, &patient)?;
     let record = json!({
         "scene": scene.header.name.read(),
@@ -155,8 +155,7 @@ pub fn write(
 }
 
 fn known(plan: &ImplantPlan) -> Result<Source, PlanError> {
-    let missing = || PlanError::Source(format!("source {} is not known", plan.source));
-    Source::known(&plan.source).ok_or_else(missing)
+    Source::known(&plan.source).ok_or_else(|| PlanError::UnknownSource(plan.source.clone()))
 }
 
 /// Structures with their images and identity.

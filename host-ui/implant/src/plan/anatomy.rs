@@ -39,7 +39,7 @@ impl Body {
             name: name.to_owned(),
             mesh: Mesh::new(points_m, triangles).map_err(|why| PlanError::Surface {
                 name: name.to_owned(),
-                why: why.to_string(),
+                why,
             })?,
             corners_m: points_m.to_vec(),
             faces: triangles.to_vec(),

@@ -1,10 +1,15 @@
 //! Reasons why a plan cannot be made, changed, read or written.
 
 use super::needle::SEED_LENGTH_M;
+use super::problem::FileProblem;
 use super::template::{Hole, NotAHole};
+use std::error::Error;
 use std::path::{Path, PathBuf};
 use stylet_base::WriteError;
+use stylet_base::format::printable;
+use stylet_dose::DoseError;
 use stylet_files::FileError;
+use stylet_shm_schema::ProblemList;
 
 /// Reason why a plan cannot be made, changed, read or written; the text gives the remedy if there
 /// is one.
@@ -37,7 +42,7 @@ pub enum PlanError {
         /// Name of the structure.
         name: String,
         /// Problem of the surface.
-        why: String,
+        why: DoseError,
     },
     /// No needle fits.
     #[error("no hole of the template reaches the target past the structures to be spared; plan by hand")]
@@ -51,19 +56,44 @@ pub enum PlanError {
     /// The search was cancelled.
     #[error("the search was cancelled")]
     Cancelled,
-    /// Seeds need a known source.
-    #[error("{0}")]
-    Source(String),
-    /// A text is not a plan; every problem, one a line.
-    #[error("{}", .0.join("\n"))]
-    Invalid(Vec<String>),
+    /// A source of another name than those that come with the program.
+    #[error("source {0} is not known")]
+    UnknownSource(String),
+    /// The source for files that name none.
+    #[error("the usual source is not known")]
+    NoUsualSource,
+    /// The prescription for files that name none.
+    #[error("the usual source has no prescription")]
+    NoUsualPrescription,
+    /// Seeds of another nuclide than those of the known sources.
+    #[error(
+        "its seeds are {}, and no source of that comes with the program; compute their dose with host-ui dose --source FILE",
+        printable(.0)
+    )]
+    UnknownIsotope(String),
+    /// An RT Plan holds more of the source than its name.
+    #[error("an RT Plan contains isotope and half-life, and those of source {0} are unknown; write .toml")]
+    SourceOfRtPlan(String),
+    /// A text is not a plan.
+    #[error(transparent)]
+    Invalid(#[from] ProblemList<FileProblem>),
+    /// A plan cannot be written as TOML.
+    #[error("the plan cannot be written as TOML: {0}")]
+    ToToml(#[from] toml::ser::Error),
+    /// A plan without seeds gives none.
+    #[error("the plan has no seed; load its needles first")]
+    NoSeeds,
+    /// The name of a file has another ending.
+    #[error("its name must end in .toml, .csv or .dcm")]
+    Ending,
     /// A file cannot be read as a plan, or a plan cannot be written in its format.
     #[error("{}: {why}", path.display())]
     File {
         /// The file.
         path: PathBuf,
         /// Problem of the file.
-        why: String,
+        #[source]
+        why: Box<dyn Error + Send + Sync>,
     },
     /// A file was refused, or belongs to another patient.
     #[error(transparent)]
@@ -75,10 +105,10 @@ pub enum PlanError {
 
 impl PlanError {
     /// Creates an error about a file, which it names.
-    pub(super) fn of_file(path: &Path, why: impl ToString) -> Self {
+    pub(super) fn of_file(path: &Path, why: impl Error + Send + Sync + 'static) -> Self {
         Self::File {
             path: path.to_owned(),
-            why: why.to_string(),
+            why: Box::new(why),
         }
     }
 }

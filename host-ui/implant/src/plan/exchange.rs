@@ -4,7 +4,6 @@ use super::{ImplantPlan, PlanError, Template, file, seeds};
 use crate::readers::{Declared, SeedDefaults};
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
-use stylet_base::format::printable;
 use stylet_dose::Source;
 use stylet_dose::decay::s_to_days;
 use stylet_files::agreed;
@@ -17,11 +16,8 @@ pub const USUAL_SOURCE: &str = "6711";
 
 /// Returns the usual source and its prescription, Gy, for plans that name none.
 pub fn usual() -> Result<(Source, f64), PlanError> {
-    let missing = |what: &str| PlanError::Source(what.to_owned());
-    let source = Source::known(USUAL_SOURCE).ok_or_else(|| missing("the usual source is not known"))?;
-    let prescription_gy = source
-        .prescription_gy
-        .ok_or_else(|| missing("the usual source has no prescription"))?;
+    let source = Source::known(USUAL_SOURCE).ok_or(PlanError::NoUsualSource)?;
+    let prescription_gy = source.prescription_gy.ok_or(PlanError::NoUsualPrescription)?;
     Ok((source, prescription_gy))
 }
 
@@ -66,10 +62,7 @@ fn source_of(declared: &Declared) -> Result<Source, PlanError> {
     if place < fitting.len() {
         return Ok(fitting.swap_remove(place));
     }
-    Err(PlanError::Source(format!(
-        "its seeds are {}, and no source of that comes with the program; compute their dose with host-ui dose --source FILE",
-        printable(&declared.isotope)
-    )))
+    Err(PlanError::UnknownIsotope(declared.isotope.clone()))
 }
 
 /// Writes all of the plan as .toml, its seeds as .csv or .dcm, with the patient and frame of the
@@ -88,24 +81,18 @@ pub fn write(
     } else if has_ending(path, "csv") {
         (comments + &file::seeds_to_csv(plan, patient)).into_bytes()
     } else if has_ending(path, "dcm") {
-        let of_file = |why: String| PlanError::of_file(path, why);
-        let mut seeds = seed_plan(plan, patient).map_err(|e| of_file(e.to_string()))?;
+        let mut seeds = seed_plan(plan, patient).map_err(|e| PlanError::of_file(path, e))?;
         seeds.identity = identity.unwrap_or_default().completed();
-        plan::bytes(&seeds).map_err(|e| of_file(e.to_string()))?
+        plan::bytes(&seeds).map_err(|e| PlanError::of_file(path, e))?
     } else {
-        return Err(PlanError::of_file(path, "its name must end in .toml, .csv or .dcm"));
+        return Err(PlanError::of_file(path, PlanError::Ending));
     };
     Ok(stylet_base::write_whole(path, &bytes)?)
 }
 
 /// Returns the seeds of a plan in the form of an RT Plan; an error if its source is unknown.
 pub fn seed_plan(plan: &ImplantPlan, patient: &PatientFrame) -> Result<SeedPlan, PlanError> {
-    let source = Source::known(&plan.source).ok_or_else(|| {
-        PlanError::Source(format!(
-            "an RT Plan contains isotope and half-life, and those of source {} are unknown; write .toml",
-            plan.source
-        ))
-    })?;
+    let source = Source::known(&plan.source).ok_or_else(|| PlanError::SourceOfRtPlan(plan.source.clone()))?;
     let prescription_gy = Some(plan.prescription_gy);
     Ok(seeds_of_source(
         &source,

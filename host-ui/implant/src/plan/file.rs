@@ -1,18 +1,17 @@
 //! Plans in files: TOML for the whole plan, CSV for the seeds alone; mm, patient frame (RAS).
 
-use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, NotAHole, PlanError, Template};
+use super::problem::{FORMAT, FileProblem, MAX_MM, SeedsProblem};
+use super::{Hole, ImplantPlan, Loading, Needle, NeedleSeed, PlanError, Template};
 use crate::readers::SeedFile;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use stylet_anatomy::PatientFrame;
 use stylet_base::input;
-use stylet_shm_schema::MAX_SEEDS;
+use stylet_shm_schema::{MAX_SEEDS, ProblemList};
 
-const FORMAT: &str = "stylet plan, mm, RAS";
 const MAX_BYTES: u64 = 4 << 20;
 const MAX_NEEDLES: usize = 169;
-const MAX_MM: f64 = 10_000.0;
 /// Distance below which the lines of seeds are one needle.
 const SAME_LINE_M: f64 = 0.5e-3;
 const HEADER: &str = "x_mm,y_mm,z_mm,axis_x,axis_y,axis_z,strength_u,needle,hole";
@@ -89,41 +88,37 @@ pub fn to_text(plan: &ImplantPlan, patient: &PatientFrame) -> Result<String, Pla
         },
         needles: plan.needles.iter().map(needle).collect(),
     };
-    toml::to_string(&file).map_err(|e| PlanError::Invalid(vec![format!("the plan cannot be written as TOML: {e}")]))
+    Ok(toml::to_string(&file)?)
 }
 
 /// Parses TOML; lists every problem.
-pub fn from_text(text: &str, patient: &PatientFrame) -> Result<ImplantPlan, PlanError> {
-    let file: PlanFile =
-        toml::from_str(text).map_err(|e| PlanError::Invalid(vec![format!("it is not a plan: {e}")]))?;
+pub fn from_text(text: &str, patient: &PatientFrame) -> Result<ImplantPlan, ProblemList<FileProblem>> {
+    let file: PlanFile = toml::from_str(text).map_err(FileProblem::from)?;
     let mut problems = Vec::new();
     if file.format != FORMAT {
-        problems.push(format!("format is \"{}\"; it must be \"{FORMAT}\"", file.format));
+        problems.push(FileProblem::Format(file.format));
     }
-    if !(1e-3..=1e4).contains(&file.prescription_gy) {
-        problems.push(format!(
-            "prescription_gy is {}; it must be 0.001 to 10000",
-            file.prescription_gy
-        ));
-    }
+    within("prescription_gy", file.prescription_gy, 1e-3, 1e4, &mut problems);
     let template = template(&file.template, patient, &mut problems);
     if file.needles.len() > MAX_NEEDLES {
-        problems.push(format!("{} needles; at most {MAX_NEEDLES}", file.needles.len()));
+        problems.push(FileProblem::TooManyNeedles {
+            given: file.needles.len(),
+            most: MAX_NEEDLES,
+        });
     }
     let seeds: usize = file.needles.iter().map(|n| n.seed_along_mm.len()).sum();
-    if seeds > MAX_SEEDS {
-        problems.push(format!("{seeds} seeds; at most {MAX_SEEDS} can be placed"));
-    }
+    problems.extend(too_many_seeds(seeds));
     let needles = file.needles.iter().enumerate().map(|(number, n)| {
         let mut found = Vec::new();
         let needle = needle(n, patient, &mut found);
-        problems.extend(found.into_iter().map(|what| format!("needle {}: {what}", number + 1)));
+        problems.extend(found.into_iter().map(|problem| FileProblem::Needle {
+            number: number + 1,
+            problem: Box::new(problem),
+        }));
         needle.in_order_of_file()
     });
     let needles = needles.collect();
-    if !problems.is_empty() {
-        return Err(PlanError::Invalid(problems));
-    }
+    ProblemList::check(problems)?;
     Ok(ImplantPlan {
         template,
         source: file.source,
@@ -143,14 +138,14 @@ impl Needle {
     }
 }
 
-fn template(file: &TemplateFile, patient: &PatientFrame, problems: &mut Vec<String>) -> Template {
+fn template(file: &TemplateFile, patient: &PatientFrame, problems: &mut Vec<FileProblem>) -> Template {
     place("template: middle_hole_mm", file.middle_hole_mm, problems);
     for (name, axis) in [
-        ("columns", file.columns),
-        ("rows", file.rows),
-        ("inwards", file.inwards),
+        ("template: columns", file.columns),
+        ("template: rows", file.rows),
+        ("template: inwards", file.inwards),
     ] {
-        unit(&format!("template: {name}"), axis, problems);
+        unit(name, axis, problems);
     }
     within("template: pitch_mm", file.pitch_mm, 1.0, 20.0, problems);
     Template {
@@ -162,7 +157,7 @@ fn template(file: &TemplateFile, patient: &PatientFrame, problems: &mut Vec<Stri
     }
 }
 
-fn needle(file: &NeedleFile, patient: &PatientFrame, problems: &mut Vec<String>) -> Needle {
+fn needle(file: &NeedleFile, patient: &PatientFrame, problems: &mut Vec<FileProblem>) -> Needle {
     let hole = file.hole.as_deref().map(str::parse::<Hole>).transpose();
     place("entry_mm", file.entry_mm, problems);
     unit("direction", file.direction, problems);
@@ -172,11 +167,10 @@ fn needle(file: &NeedleFile, patient: &PatientFrame, problems: &mut Vec<String>)
         within("spacer_mm", spacer, 0.1, 50.0, problems);
     }
     if file.seed_along_mm.len() != file.strength_u.len() {
-        problems.push(format!(
-            "{} seeds in seed_along_mm and {} in strength_u",
-            file.seed_along_mm.len(),
-            file.strength_u.len()
-        ));
+        problems.push(FileProblem::Strengths {
+            places: file.seed_along_mm.len(),
+            strengths: file.strength_u.len(),
+        });
     }
     for &along in &file.seed_along_mm {
         within("seed_along_mm", along, 0.0, 500.0, problems);
@@ -190,7 +184,7 @@ fn needle(file: &NeedleFile, patient: &PatientFrame, problems: &mut Vec<String>)
     };
     Needle {
         hole: hole.unwrap_or_else(|why| {
-            problems.push(why.to_string());
+            problems.push(why.into());
             None
         }),
         entry_m: patient.scene_from_patient(file.entry_mm.map(|c| c * 1e-3)),
@@ -204,23 +198,32 @@ fn needle(file: &NeedleFile, patient: &PatientFrame, problems: &mut Vec<String>)
     }
 }
 
-fn place(what: &str, mm: [f64; 3], problems: &mut Vec<String>) {
+fn place(key: &'static str, mm: [f64; 3], problems: &mut Vec<FileProblem>) {
     // NaN compares false.
     if !mm.iter().all(|c| c.abs() <= MAX_MM) {
-        problems.push(format!("{what} is {mm:?}; coordinates must be within {MAX_MM} mm"));
+        problems.push(FileProblem::Place { key, mm });
     }
 }
 
-fn unit(what: &str, axis: [f64; 3], problems: &mut Vec<String>) {
+fn unit(key: &'static str, axis: [f64; 3], problems: &mut Vec<FileProblem>) {
     if !(0.999..1.001).contains(&Vector3::from(axis).norm()) {
-        problems.push(format!("{what} is {axis:?}, not a unit vector"));
+        problems.push(FileProblem::Direction { key, axis });
     }
 }
 
-fn within(what: &str, value: f64, least: f64, most: f64, problems: &mut Vec<String>) {
+fn within(key: &'static str, value: f64, least: f64, most: f64, problems: &mut Vec<FileProblem>) {
     if !(least..=most).contains(&value) {
-        problems.push(format!("{what} is {value}; it must be {least} to {most}"));
+        problems.push(FileProblem::Range {
+            key,
+            value,
+            least,
+            most,
+        });
     }
+}
+
+fn too_many_seeds(given: usize) -> Option<FileProblem> {
+    (given > MAX_SEEDS).then_some(FileProblem::TooManySeeds { given, most: MAX_SEEDS })
 }
 
 /// Reads a plan file; the error names it.
@@ -255,12 +258,8 @@ pub fn import(
     // A plan names holes of its own template, and its needles may be curved.
     let is_table = file.declared.is_none();
     let rows = file.rows;
-    if rows.len() > MAX_SEEDS {
-        let count = rows.len();
-        return Err(PlanError::of_file(
-            path,
-            format!("{count} seeds; at most {MAX_SEEDS} can be placed"),
-        ));
+    if let Some(problem) = too_many_seeds(rows.len()) {
+        return Err(PlanError::of_file(path, problem));
     }
     let mut needles: Vec<(Option<u32>, Needle)> = Vec::new();
     let mut problems = Vec::new();
@@ -278,9 +277,14 @@ pub fn import(
         });
         let (number, needle) = &mut needles[at];
         let hole = Some(row.hole.as_str()).filter(|hole| is_table && !hole.is_empty());
-        if let Err(why) = fits(needle, hole, place_m, direction, &template) {
-            let needle = number.map_or_else(String::new, |n| format!("needle {n}: "));
-            problems.push(format!("{needle}{why}"));
+        if let Err(problem) = fits(needle, hole, place_m, direction, &template) {
+            problems.push(match *number {
+                None => problem,
+                Some(number) => SeedsProblem::Needle {
+                    number,
+                    problem: Box::new(problem),
+                },
+            });
         }
         let along_m = needle.along_m(place_m);
         needle.seeds.push(NeedleSeed {
@@ -289,9 +293,7 @@ pub fn import(
         });
     }
     problems.dedup();
-    if !problems.is_empty() {
-        return Err(PlanError::of_file(path, problems.join("\n")));
-    }
+    ProblemList::check(problems).map_err(|e| PlanError::of_file(path, e))?;
     Ok(ImplantPlan {
         template,
         source: source.to_owned(),
@@ -312,20 +314,18 @@ fn fits(
     place_m: [f64; 3],
     direction: [f64; 3],
     template: &Template,
-) -> Result<(), String> {
+) -> Result<(), SeedsProblem> {
     if !is_on_line(needle, place_m, direction) {
-        return Err("its seeds are not on one line; correct them, or leave the column needle out".to_owned());
+        return Err(SeedsProblem::NotOnLine);
     }
     let Some(hole) = hole else { return Ok(()) };
-    let off = Vector3::from(template.hole_m(hole.parse().map_err(|e: NotAHole| e.to_string())?))
-        - Vector3::from(needle.entry_m);
-    if off.norm() < SAME_LINE_M {
+    let hole: Hole = hole.parse()?;
+    let off_m = (Vector3::from(template.hole_m(hole)) - Vector3::from(needle.entry_m)).norm();
+    if off_m < SAME_LINE_M {
         return Ok(());
     }
-    Err(format!(
-        "its seeds are {:.1} mm off hole {hole} of this scene's template; correct them, or leave the column hole out",
-        off.norm() * 1e3
-    ))
+    let off_mm = off_m * 1e3;
+    Err(SeedsProblem::OffHole { off_mm, hole })
 }
 
 /// Returns the seed's axis in the direction of the needles; a seed has no front.

@@ -22,7 +22,7 @@ fn of_plan_file(path: &Path) -> Result<SeedFile, PlanError> {
     let plan = file::read(path, &PatientFrame::default())?;
     let rows = plan.rows(&PatientFrame::default());
     if rows.is_empty() {
-        return Err(PlanError::of_file(path, "the plan has no seed; load its needles first"));
+        return Err(PlanError::of_file(path, PlanError::NoSeeds));
     }
     let source = Source::known(&plan.source);
     Ok(SeedFile {

@@ -81,21 +81,17 @@ pub fn write(
 pub fn source_of(implant: &ImplantPlan, asked: Option<&Path>) -> Result<Source, ProcedureError> {
     let of_plan = Source::known(&implant.source);
     let Some(path) = asked else {
-        return of_plan.ok_or_else(|| {
-            let model = &implant.source;
-            ProcedureError::Input(format!("unknown source \"{model}\"; give --source FILE"))
-        });
+        return of_plan.ok_or_else(|| ProcedureError::UnknownSource(implant.source.clone()));
     };
-    let source = read_source(path).map_err(|e| ProcedureError::Input(e.to_string()))?;
+    let source = read_source(path)?;
     let is_other = |planned: &Source| Nuclide::parse(&planned.nuclide) != Nuclide::parse(&source.nuclide);
     match of_plan.filter(is_other) {
-        Some(planned) => Err(ProcedureError::Input(format!(
-            "{}: it is {} and the plan is for {} (model \"{}\"); leave --source out, or choose one of that isotope",
-            path.display(),
-            source.nuclide,
-            planned.nuclide,
-            planned.model
-        ))),
+        Some(planned) => Err(ProcedureError::OtherIsotope {
+            path: path.to_owned(),
+            isotope: source.nuclide,
+            planned: planned.nuclide,
+            model: planned.model,
+        }),
         None => Ok(source),
     }
 }

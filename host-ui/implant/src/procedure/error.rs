@@ -1,11 +1,16 @@
 //! Reasons why a headless procedure ends early.
 
 use crate::plan::{PlanError, RehearsalError};
+use crate::provenance::DigestError;
 use crate::score::ScoreError;
 use crate::workflow::RunError;
 use std::path::PathBuf;
 use stylet_base::WriteError;
+use stylet_base::interrupt::InterruptError;
+use stylet_base::output::OutputError;
+use stylet_files::FileError;
 use stylet_host::link::LinkError;
+use stylet_shm_schema::MAX_SEEDS;
 
 /// Reason why a procedure ends early; the text gives the remedy if there is one.
 #[derive(Debug, thiserror::Error)]
@@ -13,9 +18,15 @@ pub enum ProcedureError {
     /// The user ended it.
     #[error("interrupted")]
     Interrupted,
-    /// No core was found, or it does not answer; the text says what to do.
-    #[error("{0}")]
+    /// No core was found, for this reason.
+    #[error("{0}, or add --core PATH to have it started")]
     NoCore(String),
+    /// A core was found that does not answer.
+    #[error("rt-core runs but does not answer; end it and start it again")]
+    NoAnswer,
+    /// The core that was started does not answer.
+    #[error("the rt-core that was started does not answer")]
+    NoAnswerOfStarted,
     /// The core cannot be started.
     #[error("{} cannot be started ({why}); check --core", path.display())]
     CoreNotStarted {
@@ -36,9 +47,44 @@ pub enum ProcedureError {
     /// The core did not send data that the procedure needs.
     #[error("{0}")]
     NothingReceived(&'static str),
-    /// A file of the scene, the plan's seeds or the source cannot be used; the text names it.
-    #[error("{0}")]
-    Input(String),
+    /// A file of the scene or the source cannot be used.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A file of the inputs cannot be read again.
+    #[error(transparent)]
+    Digest(#[from] DigestError),
+    /// The folder of the results cannot be used.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The signals that end a program cannot be received.
+    #[error(transparent)]
+    Signals(#[from] InterruptError),
+    /// The source of the plan is unknown.
+    #[error("unknown source \"{0}\"; give --source FILE")]
+    UnknownSource(String),
+    /// The source is of another isotope than the plan's.
+    #[error(
+        "{}: it is {} and the plan is for {} (model \"{}\"); leave --source out, or choose one of that isotope",
+        .path.display(), .isotope, .planned, .model
+    )]
+    OtherIsotope {
+        /// File of the source.
+        path: PathBuf,
+        /// Its isotope.
+        isotope: String,
+        /// Isotope of the plan.
+        planned: String,
+        /// Model of the plan's source.
+        model: String,
+    },
+    /// A plan without seeds, or with more than the core takes.
+    #[error("{}: {seeds} seeds; 1 to {MAX_SEEDS} can be placed", .path.display())]
+    SeedCount {
+        /// File of the plan.
+        path: PathBuf,
+        /// Its seeds.
+        seeds: usize,
+    },
     /// A request could not be sent.
     #[error(transparent)]
     Link(#[from] LinkError),

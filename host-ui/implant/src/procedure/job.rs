@@ -80,11 +80,10 @@ impl Job {
         let (plan, notes) = exchange::read(path, &scene.header, scene_file)?;
         seeds::report(path, &notes);
         if plan.seed_count() == 0 || plan.seed_count() > MAX_SEEDS {
-            return Err(ProcedureError::Input(format!(
-                "{}: {} seeds; 1 to {MAX_SEEDS} can be placed",
-                path.display(),
-                plan.seed_count()
-            )));
+            return Err(ProcedureError::SeedCount {
+                path: path.to_owned(),
+                seeds: plan.seed_count(),
+            });
         }
         for problem in check::problems(&plan, &Anatomy::of(scene)?) {
             println!(

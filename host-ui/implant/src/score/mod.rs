@@ -16,7 +16,7 @@ use crate::plan::{Anatomy, Hole};
 pub use dose_cost::{Cost, costs};
 pub use motion::Motion;
 use stylet_dose::report::{Judge, Verdict};
-use stylet_dose::{DoseKernel, Seed};
+use stylet_dose::{DoseError, DoseKernel, Seed};
 use stylet_host::moments::Moment;
 use stylet_report::picture::DrawError;
 use stylet_shm_schema::{SeedPose, TickRecord};
@@ -73,9 +73,9 @@ pub enum ScoreError {
     /// There is nothing to score.
     #[error("no seed was placed; there is nothing to score")]
     NoSeed,
-    /// The dose cannot be computed; the text says why.
-    #[error("{0}")]
-    Dose(String),
+    /// The dose cannot be computed.
+    #[error(transparent)]
+    Dose(#[from] DoseError),
     /// The drawing library failed.
     #[error("the debrief: {0}")]
     Picture(#[from] DrawError),
@@ -146,8 +146,7 @@ impl<'a> Score<'a> {
             &delivered,
         );
         let all = [planned.clone(), delivered.clone()].concat();
-        let judge = Judge::new(structures, Some(&target), &[], implant.prescription_gy, &all, POINTS)
-            .map_err(|e| ScoreError::Dose(e.to_string()))?;
+        let judge = Judge::new(structures, Some(&target), &[], implant.prescription_gy, &all, POINTS)?;
         Ok(Self {
             planned: judge.judge(implant.kernel, &planned),
             delivered: judge.judge(implant.kernel, &delivered),
