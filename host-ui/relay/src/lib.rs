@@ -22,11 +22,4 @@ pub mod slice;
 pub mod wire;
 
 pub use error::RelayError;
-
-/// `CLOCK_MONOTONIC` of this machine.
-pub fn now_ns() -> u64 {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: `time` is valid for writes; this clock always exists.
-    unsafe { libc::clock_gettime(libc::CLOCK_MONOTONIC, &mut time) };
-    time.tv_sec as u64 * 1_000_000_000 + time.tv_nsec as u64
-}
+pub use stylet_shm_schema::affinity::now_ns;

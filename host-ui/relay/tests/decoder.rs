@@ -5,8 +5,8 @@ mod decoders;
 use bytemuck::Zeroable;
 use std::path::Path;
 use stylet_relay::control::Order;
-use stylet_relay::wire::{self, Hello, Kind, MAX_THIN_BYTES, Present, Rest, Stamp, Thin, Ticks, Who, encode};
-use stylet_shm_schema::{HandMove, HapticState, Request, SceneHeader, SnapshotHeader, TickRecord, Vertex};
+use stylet_relay::wire::{self, Hello, Kind, MAX_THIN_BYTES, Rest, Stamp, Thin, Ticks, encode};
+use stylet_shm_schema::{Class, HandMove, HapticState, Request, SceneHeader, SnapshotHeader, Text, TickRecord, Vertex};
 
 /// One accepted message of each kind, except the large plain ones.
 fn examples() -> Vec<(&'static str, Vec<u8>)> {
@@ -27,11 +27,10 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
         acceleration_m_per_s2: 1.0,
     });
     let command = hand.encode(1, 2).expect("fits");
-    let who = Who {
-        operator: Some("Otto".to_owned()),
-        local: false,
-        asked: None,
-        present: vec![Present::default()],
+    let class = Class {
+        count: 1,
+        operator: Text::new("Otto"),
+        ..Class::zeroed()
     };
     vec![
         ("state", message(Kind::State, &[bytemuck::bytes_of(&state)])),
@@ -41,7 +40,7 @@ fn examples() -> Vec<(&'static str, Vec<u8>)> {
             message(Kind::Newest, &[bytemuck::bytes_of(&state), &wire::pack(&records)]),
         ),
         ("snapshot", message(Kind::Snapshot, &[&snapshot])),
-        ("who", message(Kind::Who, &[&who.to_bytes()])),
+        ("class", message(Kind::Class, &[wire::class_bytes(&class)])),
         ("hello", message(Kind::Hello, &[bytemuck::bytes_of(&Hello::default())])),
         ("command", message(Kind::Command, &[bytemuck::bytes_of(&command)])),
         (

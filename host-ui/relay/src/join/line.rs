@@ -2,10 +2,9 @@
 
 use super::{Member, Options};
 use crate::now_ns;
-use crate::wire::Who;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
-use stylet_shm_schema::{Relayed, Text};
+use stylet_shm_schema::{Class, Relayed, Text};
 
 const EVERY: Duration = Duration::from_millis(200);
 
@@ -35,7 +34,7 @@ impl Line {
     }
 
     /// Returns the report for hosts, five times a second.
-    pub fn due(&mut self, member: &Member, who: &Who, is_heard: bool, round_trip_ns: u64) -> Option<Relayed> {
+    pub fn due(&mut self, member: &Member, class: &Class, is_heard: bool, round_trip_ns: u64) -> Option<Relayed> {
         if self.said.is_some_and(|said| said.elapsed() < EVERY) {
             return None;
         }
@@ -44,7 +43,7 @@ impl Line {
             0 => now_ns(),
             made_ns => made_ns,
         };
-        let operator = who.operator.as_deref().unwrap_or_default();
+        let name = Text::new(&self.name);
         Some(Relayed {
             session_id: self.session_id,
             round_trip_ns,
@@ -52,10 +51,10 @@ impl Line {
             records_lost: member.lost.load(Ordering::Relaxed),
             snapshots_lost: member.snapshots_lost.load(Ordering::Relaxed),
             is_heard: u32::from(is_heard),
-            operates: u32::from(is_heard && operator == self.name),
+            operates: u32::from(is_heard && class.operator == name),
             server: Text::new(&self.server),
-            name: Text::new(&self.name),
-            operator: Text::new(operator),
+            name,
+            operator: class.operator,
             role: Text::new(&self.role),
         })
     }

@@ -8,7 +8,7 @@ use super::{Member, Options, SILENCE};
 use crate::control::{Order, Orders};
 use crate::ports::Far;
 use crate::say::say;
-use crate::wire::{self, Hello, Kind, Rest, Who};
+use crate::wire::{self, Hello, Kind, Rest};
 use crate::{RelayError, now_ns};
 use bytemuck::Zeroable;
 use std::sync::atomic::Ordering;
@@ -18,7 +18,7 @@ use stylet_ports::StateWriter;
 use stylet_shm_schema::affinity::Left;
 use stylet_shm_schema::check::{self, Invalid};
 use stylet_shm_schema::{
-    CommandKind, Event, EventKind, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, ReplyStatus,
+    Class, CommandKind, Event, EventKind, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, ReplyStatus,
     SCHEMA_VERSION, Session, Text,
 };
 
@@ -55,7 +55,7 @@ pub(super) struct Rounds {
     refused: Option<String>,
     /// Time since which an event before the next one is missing.
     event_missed: Option<Instant>,
-    who: Who,
+    class: Class,
     line: Line,
     hello: Instant,
     epoch: u64,
@@ -84,7 +84,7 @@ impl Rounds {
             volume: None,
             refused: None,
             event_missed: None,
-            who: Who::default(),
+            class: Class::zeroed(),
             line: Line::new(options),
             hello: now,
             epoch: 0,
@@ -154,7 +154,7 @@ impl Rounds {
             };
             self.member.say(Kind::Hello, self.process, bytemuck::bytes_of(&hello));
         }
-        if let Some(relayed) = self.line.due(&self.member, &self.who, has_server, self.round_trip_ns) {
+        if let Some(relayed) = self.line.due(&self.member, &self.class, has_server, self.round_trip_ns) {
             let _ = self.far.relayed.send(relayed);
         }
         self.take_orders();
@@ -196,7 +196,7 @@ impl Rounds {
         let pictures = self.member.snapshots_lost.load(Ordering::Relaxed);
         format!(
             "{state}, {lost} records lost, {pictures} snapshots lost\n{}",
-            self.who.words()
+            wire::class_words(&self.class)
         )
     }
 
@@ -258,9 +258,10 @@ impl Rounds {
             Kind::Plan => self.take_plan(message.body),
             Kind::Reply => self.take_reply(message.body),
             Kind::Rehearsal => self.take_rehearsal(message.body),
-            Kind::Who => Who::of_bytes(message.body).map(|who| {
-                self.far.class.show(&who, self.line.session_id, false);
-                self.who = who;
+            Kind::Class => wire::class_of(message.body).map(|class| {
+                let session_id = self.line.session_id;
+                self.class = Class { session_id, ..class };
+                self.far.class.show(self.class);
             }),
             Kind::Echo => wire::one::<u64>(message.body).map(|sent_ns| {
                 let now_ns = now_ns();

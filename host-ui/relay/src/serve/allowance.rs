@@ -1,4 +1,4 @@
-//! Rate limit of a seat: a burst, and a rate after that.
+//! Rate limits of a seat: a burst, and a rate after that.
 
 use std::time::Instant;
 
@@ -32,6 +32,25 @@ impl Allowance {
             self.left -= amount;
         }
         fits
+    }
+}
+
+/// Limits of a seat on the server's log and on greetings, however often it connects.
+pub struct Patience {
+    pub lines: Allowance,
+    pub unsaid: u64,
+    pub refusals: Allowance,
+    pub greetings: Allowance,
+}
+
+impl Patience {
+    pub fn new(now: Instant) -> Self {
+        Self {
+            lines: Allowance::new(20.0, 1.0, now),
+            unsaid: 0,
+            refusals: Allowance::new(1.0, 0.1, now),
+            greetings: Allowance::new(4.0, 0.5, now),
+        }
     }
 }
 

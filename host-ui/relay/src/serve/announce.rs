@@ -5,13 +5,13 @@ use super::{Server, lock};
 use crate::class::ClassPorts;
 use crate::net::Bytes;
 use crate::ports::Near;
-use crate::wire::{Hello, Kind, Who, encode};
+use crate::wire::{Hello, Kind, class_bytes, encode};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_ports::Node;
 use stylet_shm_schema::affinity::Left;
-use stylet_shm_schema::{Event, ParametersInForce, PlanInForce, Reply, SCHEMA_VERSION, Session, check};
+use stylet_shm_schema::{Class, Event, ParametersInForce, PlanInForce, Reply, SCHEMA_VERSION, Session, check};
 
 const OPEN_EVERY: Duration = Duration::from_millis(20);
 /// Silence after which the ports are recreated: another core may have swept their folder.
@@ -69,11 +69,15 @@ impl Announcements {
     }
 
     /// Sends the class to all members and to hosts next to the core.
-    pub fn show(&self, who: &Who) {
-        self.send(Kind::Who, &[&who.to_bytes()]);
-        if let Some(class) = &self.class {
-            class.connect();
-            class.show(who, self.session_id(), true);
+    pub fn show(&self, class: Class) {
+        self.send(Kind::Class, &[class_bytes(&class)]);
+        if let Some(ports) = &self.class {
+            ports.connect();
+            ports.show(Class {
+                session_id: self.session_id(),
+                is_beside_core: 1,
+                ..class
+            });
         }
     }
 

@@ -1,6 +1,6 @@
 //! Passes of the server: the core's publications, living members, the operator, and stops of the hand.
 
-use super::allowance::Allowance;
+use super::allowance::Patience;
 use super::announce::Announcements;
 use super::lease::{Held, Holder, Lease};
 use super::outlet::Outlet;
@@ -11,15 +11,16 @@ use crate::control::{Order, Orders};
 use crate::keys::{Lab, Member, Members, Role, now_s};
 use crate::net::{Place, Priority, put};
 use crate::say::say;
-use crate::wire::{Kind, Present, Who, encode};
+use crate::wire::{Kind, class_words, encode};
 use crate::{RelayError, now_ns};
+use bytemuck::Zeroable;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use stylet_ports::SlicePublisher;
-use stylet_shm_schema::{Request, UploadHeader};
+use stylet_shm_schema::{Class, ClassMember, MAX_CLASS, Request, Text, UploadHeader};
 
-const WHO_EVERY: Duration = Duration::from_millis(200);
+const CLASS_EVERY: Duration = Duration::from_millis(200);
 const MEMBERS_EVERY: Duration = Duration::from_millis(500);
 /// Shortest interval at which the list is read for an unlisted seat.
 const UNKNOWN_EVERY: Duration = Duration::from_millis(20);
@@ -31,25 +32,6 @@ const LIST_PATIENCE: Duration = Duration::from_secs(2);
 const TURNED_AWAY_EVERY: Duration = Duration::from_secs(10);
 /// The server's name for a host next to the core.
 const LOCAL: &str = "a window beside the core";
-
-/// Limits of a seat on the server's log and on greetings, however often it connects.
-struct Patience {
-    lines: Allowance,
-    unsaid: u64,
-    refusals: Allowance,
-    greetings: Allowance,
-}
-
-impl Patience {
-    fn new(now: Instant) -> Self {
-        Self {
-            lines: Allowance::new(20.0, 1.0, now),
-            unsaid: 0,
-            refusals: Allowance::new(1.0, 0.1, now),
-            greetings: Allowance::new(4.0, 0.5, now),
-        }
-    }
-}
 
 /// A connected member.
 pub(super) struct Presence {
@@ -75,7 +57,7 @@ pub(super) struct Rounds {
     lab: Lab,
     host_id: u64,
     stops: u64,
-    who_sent: Instant,
+    class_sent: Instant,
     members_read: Instant,
     /// Time at which the list was last read without an error.
     members_known: Instant,
@@ -100,7 +82,7 @@ impl Rounds {
             // No host takes the answers to the server's own requests.
             host_id: server.run ^ 0x5354_5954_4c45_5400,
             stops: 0,
-            who_sent: now,
+            class_sent: now,
             members_read: now,
             members_known: now,
             members_due: false,
@@ -131,9 +113,9 @@ impl Rounds {
         for seat in silent.map(|(seat, _)| *seat).collect::<Vec<_>>() {
             self.forget(seat);
         }
-        if self.who_sent.elapsed() >= WHO_EVERY {
-            self.who_sent = now;
-            self.announcements.show(&self.who());
+        if self.class_sent.elapsed() >= CLASS_EVERY {
+            self.class_sent = now;
+            self.announcements.show(self.class());
         }
         self.take_orders(now);
         if self.turned_away.elapsed() >= TURNED_AWAY_EVERY {
@@ -312,29 +294,35 @@ impl Rounds {
         }
     }
 
-    fn who(&self) -> Who {
+    fn class(&self) -> Class {
         let name = |seat| {
             self.members
                 .at(seat)
                 .map_or_else(|| format!("seat {seat}"), |m| m.name.clone())
         };
-        let present = self.present.iter().map(|(seat, presence)| Present {
-            name: name(*seat),
-            role: self.members.at(*seat).filter(|m| !m.revoked).map(|m| m.role),
-            round_trip_ms: presence.round_trip_ns as f64 * 1e-6,
-            lost: presence.lost,
-            silent_ms: presence.heard.elapsed().as_secs_f64() * 1e3,
-        });
-        Who {
-            operator: match self.lease.holder() {
-                Holder::Nobody => None,
-                Holder::Local => Some(LOCAL.to_owned()),
-                Holder::Seat(seat) => Some(name(seat)),
-            },
-            local: self.lease.holder() == Holder::Local,
-            asked: self.lease.asked().map(name),
-            present: present.collect(),
+        let mut class = Class {
+            count: self.present.len().min(MAX_CLASS) as u32,
+            unlisted: self.present.len().saturating_sub(MAX_CLASS) as u32,
+            local_operates: u32::from(self.lease.holder() == Holder::Local),
+            operator: Text::new(&match self.lease.holder() {
+                Holder::Nobody => String::new(),
+                Holder::Local => LOCAL.to_owned(),
+                Holder::Seat(seat) => name(seat),
+            }),
+            asked: Text::new(&self.lease.asked().map_or_else(String::new, name)),
+            ..Class::zeroed()
+        };
+        for (member, (&seat, presence)) in class.members.iter_mut().zip(&self.present) {
+            let role = self.members.at(seat).filter(|m| !m.revoked).map(|m| m.role);
+            *member = ClassMember {
+                name: Text::new(&name(seat)),
+                role: Text::new(&role.map_or_else(String::new, |role| role.to_string())),
+                round_trip_ns: presence.round_trip_ns,
+                records_lost: presence.lost,
+                silent_ns: presence.heard.elapsed().as_nanos() as u64,
+            };
         }
+        class
     }
 
     /// Takes orders of this machine's terminals and windows: its user decides who operates.
@@ -356,7 +344,7 @@ impl Rounds {
     /// Returns the answer, and the new holder.
     fn decide(&self, order: &Order) -> (String, Option<Holder>) {
         match order {
-            Order::Status => (self.who().words(), None),
+            Order::Status => (class_words(&self.class()), None),
             Order::Take => ("a window here operates now".to_owned(), Some(Holder::Local)),
             Order::Release => (
                 "the first operator who asks may operate".to_owned(),

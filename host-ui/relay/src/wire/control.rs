@@ -1,9 +1,8 @@
 //! Small control payloads of both sides of the relay: signs of life, missing records, members.
 
-use crate::keys::Role;
 use bytemuck::{Pod, Zeroable};
-use serde::{Deserialize, Serialize};
 use stylet_shm_schema::check::Invalid;
+use stylet_shm_schema::{Class, ClassMember, MAX_CLASS};
 
 /// A member's sign of life, twenty times a second.
 #[repr(C)]
@@ -33,61 +32,60 @@ pub struct Ticks {
     pub to: u64,
 }
 
-/// One connected member.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Present {
-    /// Name for people.
-    pub name: String,
-    /// Its role; `None` for a member no longer in the list.
-    pub role: Option<Role>,
-    /// Round trip, ms.
-    pub round_trip_ms: f64,
-    /// Records that it lost for good.
-    pub lost: u64,
-    /// Time since it was last heard, ms.
-    pub silent_ms: f64,
+/// Encodes the connected members, without the unused places of the list.
+pub fn class_bytes(class: &Class) -> &[u8] {
+    let unused = size_of::<ClassMember>() * (MAX_CLASS - class.members().len());
+    let all = bytemuck::bytes_of(class);
+    &all[..all.len() - unused]
 }
 
-/// Connected members and the operator.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Who {
-    /// Name of the operator; "the window beside the core", or `None`.
-    pub operator: Option<String>,
-    /// The operator is a host next to the core.
-    #[serde(default)]
-    pub local: bool,
-    /// Name of the member who asked to operate.
-    pub asked: Option<String>,
-    /// All connected members.
-    pub present: Vec<Present>,
+/// Decodes the connected members.
+pub fn class_of(body: &[u8]) -> Result<Class, Invalid> {
+    let mut class = Class::zeroed();
+    let filled = bytemuck::bytes_of_mut(&mut class).get_mut(..body.len());
+    filled.ok_or(Invalid("list of members"))?.copy_from_slice(body);
+    Ok(class)
 }
 
-impl Who {
-    /// Encodes as JSON.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        serde_json::to_vec(self).unwrap_or_default()
-    }
+/// Formats the connected members for a terminal, one line each.
+pub fn class_words(class: &Class) -> String {
+    let (operator, asked) = (class.operator.read(), class.asked.read());
+    let or = |word: String, other: &str| if word.is_empty() { other.to_owned() } else { word };
+    let mut lines = vec![format!("operates: {}", or(operator, "nobody"))];
+    lines.extend((!asked.is_empty()).then(|| format!("asks to operate: {asked}")));
+    lines.extend(class.members().iter().map(|member| {
+        format!(
+            "{} ({}): round trip {:.1} ms, {} records lost, heard {:.0} ms ago",
+            member.name.read(),
+            or(member.role.read(), "revoked"),
+            member.round_trip_ns as f64 * 1e-6,
+            member.records_lost,
+            member.silent_ns as f64 * 1e-6
+        )
+    }));
+    lines.extend((class.unlisted > 0).then(|| format!("and {} more", class.unlisted)));
+    lines.join("\n")
+}
 
-    /// Decodes JSON of bounded size.
-    pub fn of_bytes(bytes: &[u8]) -> Result<Self, Invalid> {
-        const MOST: usize = 128 << 10;
-        match bytes.len() <= MOST {
-            true => serde_json::from_slice(bytes).map_err(|_| Invalid("list of members")),
-            false => Err(Invalid("list of members")),
-        }
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stylet_shm_schema::Text;
 
-    /// Formats for a terminal, one line per member.
-    pub fn words(&self) -> String {
-        let mut lines = vec![format!("operates: {}", self.operator.as_deref().unwrap_or("nobody"))];
-        lines.extend(self.asked.as_ref().map(|name| format!("asks to operate: {name}")));
-        lines.extend(self.present.iter().map(|p| {
-            let role = p.role.map_or("revoked".to_owned(), |role| role.to_string());
-            format!(
-                "{} ({role}): round trip {:.1} ms, {} records lost, heard {:.0} ms ago",
-                p.name, p.round_trip_ms, p.lost, p.silent_ms
-            )
-        }));
-        lines.join("\n")
+    #[test]
+    fn a_class_survives_and_its_revoked_and_unlisted_members_are_named() {
+        let mut class = Class::zeroed();
+        (class.count, class.unlisted, class.operator) = (2, 8, Text::new("Otto"));
+        (class.members[0].name, class.members[0].role) = (Text::new("Otto"), Text::new("operator"));
+        (class.members[1].name, class.members[1].round_trip_ns) = (Text::new("Ina"), 1_500_000);
+        let bytes = class_bytes(&class);
+        assert!(bytes.len() < size_of::<Class>() / 2);
+        let words = class_words(&class_of(bytes).expect("valid"));
+        assert!(words.starts_with("operates: Otto\nOtto (operator): "), "{words}");
+        assert!(
+            words.contains("Ina (revoked): round trip 1.5 ms") && words.ends_with("and 8 more"),
+            "{words}"
+        );
+        assert!(class_of(&[0; size_of::<Class>() + 1]).is_err());
     }
 }

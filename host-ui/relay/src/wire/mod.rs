@@ -5,7 +5,7 @@ mod control;
 mod packed;
 mod thin;
 
-pub use control::{Hello, Present, Ticks, Who};
+pub use control::{Hello, Ticks, class_bytes, class_of, class_words};
 pub use packed::{pack, unpack};
 pub use thin::{Displacements, MAX_THIN_BYTES, Rest, Thin, decode_snapshot};
 
@@ -15,7 +15,7 @@ use stylet_shm_schema::check::Invalid;
 use stylet_shm_schema::{HapticState, SCHEMA_VERSION, SceneHeader, UploadHeader};
 
 /// First word of every message: changes with the format of messages and with the schema.
-const MAGIC: u32 = u32::from_le_bytes(*b"st6\0") ^ (SCHEMA_VERSION << 24);
+const MAGIC: u32 = u32::from_le_bytes(*b"st7\0") ^ (SCHEMA_VERSION << 24);
 
 /// Content of a message, by stable number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, TryFromPrimitive)]
@@ -41,8 +41,8 @@ pub enum Kind {
     Reply = 9,
     /// A `Rehearsal`.
     Rehearsal = 10,
-    /// Members and operator, as JSON.
-    Who = 11,
+    /// A `Class` without the unused places of its list.
+    Class = 11,
     /// Answer to a [`Kind::Hello`]: its `sent_ns`.
     Echo = 12,
     /// `Ticks` whose records are not kept any more.

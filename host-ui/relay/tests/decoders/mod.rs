@@ -3,7 +3,7 @@
 
 use bytemuck::Zeroable;
 use stylet_relay::control::Order;
-use stylet_relay::wire::{self, Displacements, Hello, Kind, Rest, Ticks, Who};
+use stylet_relay::wire::{self, Displacements, Hello, Kind, Rest, Ticks};
 use stylet_shm_schema::{
     Command, Event, HapticState, ParametersInForce, PlanInForce, Rehearsal, Reply, Request, SceneHeader, Session,
     SnapshotHeader, check,
@@ -30,7 +30,7 @@ pub fn take(bytes: &[u8]) -> bool {
         Kind::Plan => wire::one::<PlanInForce>(body).is_ok_and(|plan| check::plan(&plan).is_ok()),
         Kind::Reply => wire::one::<Reply>(body).is_ok_and(|reply| !reply.text.read().contains('\0')),
         Kind::Rehearsal => wire::one::<Rehearsal>(body).is_ok_and(|r| check::rehearsal(&r).is_ok()),
-        Kind::Who => Who::of_bytes(body).is_ok_and(|who| !who.words().is_empty()),
+        Kind::Class => wire::class_of(body).is_ok_and(|class| !wire::class_words(&class).is_empty()),
         Kind::Echo => wire::one::<u64>(body).is_ok(),
         Kind::Missing | Kind::Again => wire::one::<Ticks>(body).is_ok(),
         Kind::Hello => wire::one::<Hello>(body).is_ok(),
