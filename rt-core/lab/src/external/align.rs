@@ -29,12 +29,11 @@ const SHARE: f64 = 0.8;
 /// Aligns `edges_s` with `toggles_s`; fails with a reason if they are not of one run.
 pub fn align(toggles_s: &[f64], edges_s: &[f64]) -> Result<Alignment, CaptureError> {
     if edges_s.len() < FEWEST || toggles_s.len() < FEWEST {
-        return Err(format!(
-            "{} edges and {} toggles; expected at least {FEWEST} of each",
-            edges_s.len(),
-            toggles_s.len()
-        )
-        .into());
+        return Err(CaptureError::TooFew {
+            edges: edges_s.len(),
+            toggles: toggles_s.len(),
+            fewest: FEWEST,
+        });
     }
     let (ours, theirs) = (gaps(toggles_s), gaps(edges_s));
     let agrees = |a: f64, b: f64| (a - b).abs() < JITTER_S + DRIFT * a;
@@ -56,10 +55,7 @@ pub fn align(toggles_s: &[f64], edges_s: &[f64]) -> Result<Alignment, CaptureErr
     }
     let (same, of, shift) = best;
     if same + 1 < FEWEST || (same as f64) < SHARE * of as f64 {
-        return Err(format!(
-            "not a capture of this run: at best {same} of {of} times between edges agree with those between toggles"
-        )
-        .into());
+        return Err(CaptureError::OtherRun { same, of });
     }
     let pair = |edge: usize| {
         let toggle = edge as isize + shift;

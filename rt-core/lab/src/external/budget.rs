@@ -90,14 +90,13 @@ pub fn delay(
         }
     }
     if delays.len() < FEWEST || 2 * delays.len() < from.edges_s.len() {
-        return Err(format!(
-            "{}: {} answers to {} edges of {}; expected one to most of them, and {FEWEST} at least",
-            channel.name,
-            delays.len(),
-            from.edges_s.len(),
-            from.channel.name
-        )
-        .into());
+        return Err(CaptureError::NoAnswer {
+            to: channel.name.clone(),
+            answers: delays.len(),
+            from: from.channel.name.clone(),
+            edges: from.edges_s.len(),
+            fewest: FEWEST,
+        });
     }
     let n = delays.len() as f64;
     let mean_s = delays.iter().sum::<f64>() / n;

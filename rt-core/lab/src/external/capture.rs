@@ -18,31 +18,84 @@ pub struct Capture {
     pub channels: Vec<Channel>,
 }
 
-/// Reason why a capture cannot be used; for people.
+/// Reason why a capture cannot be used.
 #[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub struct CaptureError(String);
-
-impl From<String> for CaptureError {
-    fn from(why: String) -> Self {
-        Self(why)
-    }
-}
-
-impl From<&str> for CaptureError {
-    fn from(why: &str) -> Self {
-        Self(why.to_owned())
-    }
+pub enum CaptureError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] std::io::Error),
+    /// The file does not tell the rate of its rows.
+    #[error("no line `; Samplerate: 1 MHz`: sigrok-cli writes it into its CSV")]
+    NoRate,
+    /// A row that holds other than levels.
+    #[error("{0:?} is no row of 0 and 1")]
+    NoRow(String),
+    /// A row of another length than the first.
+    #[error("row {row} has {values} values, expected {inputs}")]
+    RowLength {
+        /// Number of the row, from 1.
+        row: u64,
+        /// Its values.
+        values: usize,
+        /// Inputs of the capture.
+        inputs: usize,
+    },
+    /// No input changes.
+    #[error("no input ever changes")]
+    NoEdge,
+    /// Too short a capture or run.
+    #[error("{edges} edges and {toggles} toggles; expected at least {fewest} of each")]
+    TooFew {
+        /// Edges of the input.
+        edges: usize,
+        /// Toggles of the loop.
+        toggles: usize,
+        /// Smallest number of each.
+        fewest: usize,
+    },
+    /// The capture is of another run.
+    #[error("not a capture of this run: at best {same} of {of} times between edges agree with those between toggles")]
+    OtherRun {
+        /// Times that agree.
+        same: usize,
+        /// Times compared.
+        of: usize,
+    },
+    /// No input is the pin; the reason for each.
+    #[error("{}", .0.iter().map(|(name, why)| format!("{name}: {why}")).collect::<Vec<_>>().join("; "))]
+    NoPin(Vec<(String, CaptureError)>),
+    /// No other input has that name.
+    #[error("{name:?} is no input beside the pin; there are {}", .inputs.join(", "))]
+    NoInput {
+        /// The name.
+        name: String,
+        /// Names of all inputs.
+        inputs: Vec<String>,
+    },
+    /// An input that does not follow another.
+    #[error("{to}: {answers} answers to {edges} edges of {from}; expected one to most of them, and {fewest} at least")]
+    NoAnswer {
+        /// Name of the input.
+        to: String,
+        /// Its edges that follow one of the other.
+        answers: usize,
+        /// Name of the other input.
+        from: String,
+        /// Edges of the other input.
+        edges: usize,
+        /// Smallest number of answers.
+        fewest: usize,
+    },
 }
 
 /// Most channels of a capture.
 const MOST_CHANNELS: usize = 64;
 
 pub fn read(path: &Path) -> Result<Capture, CaptureError> {
-    let text = std::fs::read_to_string(path).map_err(|e| e.to_string())?;
+    let text = std::fs::read_to_string(path)?;
     let capture = csv(&text)?;
     if capture.channels.iter().all(|c| c.edges_s.is_empty()) {
-        return Err("no input ever changes".into());
+        return Err(CaptureError::NoEdge);
     }
     Ok(capture)
 }
@@ -53,7 +106,7 @@ pub fn csv(text: &str) -> Result<Capture, CaptureError> {
     let rate_hz = comments
         .filter_map(|c| c.trim().split_once("amplerate:"))
         .find_map(|(_, rate)| frequency(rate.trim()))
-        .ok_or("no line `; Samplerate: 1 MHz`: sigrok-cli writes it into its CSV")?;
+        .ok_or(CaptureError::NoRate)?;
     let mut channels: Vec<Channel> = Vec::new();
     let mut levels: Vec<bool> = Vec::new();
     let mut row = 0_u64;
@@ -65,7 +118,7 @@ pub fn csv(text: &str) -> Result<Capture, CaptureError> {
         let Some(now) = cells.iter().map(|c| level(c)).collect::<Option<Vec<bool>>>() else {
             // The head names the channels.
             if row > 0 || !channels.is_empty() {
-                return Err(format!("{line:?} is no row of 0 and 1").into());
+                return Err(CaptureError::NoRow(line.to_owned()));
             }
             channels = cells.iter().take(MOST_CHANNELS).map(|name| channel(name)).collect();
             continue;
@@ -76,7 +129,11 @@ pub fn csv(text: &str) -> Result<Capture, CaptureError> {
                 .collect();
         }
         if now.len() != channels.len() {
-            return Err(format!("row {} has {} values, expected {}", row + 1, now.len(), channels.len()).into());
+            return Err(CaptureError::RowLength {
+                row: row + 1,
+                values: now.len(),
+                inputs: channels.len(),
+            });
         }
         for (i, channel) in channels.iter_mut().enumerate() {
             if levels.get(i).is_some_and(|before| *before != now[i]) {

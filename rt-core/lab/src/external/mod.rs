@@ -157,11 +157,11 @@ fn evaluate(
         match align(&ours, &channel.edges_s) {
             Ok(found) if best.as_ref().is_none_or(|(_, b)| deviation(&found) < deviation(b)) => best = Some((i, found)),
             Ok(_) => {}
-            Err(why) => refused.push(format!("{}: {why}", channel.name)),
+            Err(why) => refused.push((channel.name.clone(), why)),
         }
     }
     let Some((pin, alignment)) = best else {
-        return Err(refused.join("; ").into());
+        return Err(CaptureError::NoPin(refused));
     };
     let pin_channel = &capture.channels[pin];
     let (delays, without) = delays(capture, pin, &alignment, motion)?;
@@ -205,8 +205,10 @@ fn delays(
     let pin = &capture.channels[pin];
     let named = |name: &str| {
         let found = capture.channels.iter().find(|c| c.name == name && c.name != pin.name);
-        let names: Vec<&str> = capture.channels.iter().map(|c| c.name.as_str()).collect();
-        found.ok_or_else(|| format!("{name:?} is no input beside the pin; there are {}", names.join(", ")))
+        found.ok_or_else(|| CaptureError::NoInput {
+            name: name.to_owned(),
+            inputs: capture.channels.iter().map(|c| c.name.clone()).collect(),
+        })
     };
     let motion = motion.map(named).transpose()?.map(Begins::at_motion);
     let from_pin = Begins::at_pin(pin, alignment);
