@@ -21,7 +21,7 @@ use stylet_implant::plan::first::{self, FirstPlan};
 use stylet_implant::plan::optimise::{Objectives, Statistic};
 use stylet_implant::plan::{Anatomy, ImplantPlan, Template, check};
 use stylet_implant::plan::{file, seeds};
-use stylet_implant::procedure::{Connect, Live};
+use stylet_implant::procedure::Live;
 use stylet_implant::provenance;
 use stylet_implant::readers::{Mapped, SeedDefaults, SeedFile, read_source};
 use stylet_population as population;
@@ -145,10 +145,7 @@ impl PlanArgs {
                 "{file} names no prescription_gy, or --prescription-gy is not 0.001 to 10000; give --prescription-gy"
             )
         })?;
-        let live = Live::connect(&Connect {
-            asked: self.asked.clone(),
-            core: self.core.clone(),
-        })?;
+        let live = Live::connect(&self.asked, self.core.as_deref())?;
         let (anatomy, template) = (Anatomy::of(&live.scene)?, Template::before(&live.scene.header));
         let frames = anatomy.patient;
         let kernel = DoseKernel::new(&source, Interval::ALL);

@@ -6,7 +6,7 @@ use stylet_shm_schema::BUILTIN_SCENES;
 use stylet_shm_schema::Instance;
 
 /// Options of every command that uses a core.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct CoreArgs {
     /// Name that rt-core was started under
     #[arg(long, default_value = "main", value_parser = Instance::new)]

@@ -3,9 +3,9 @@
 use crate::link::{Link, LinkError};
 use crate::moments::STOPPED;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Instant;
-use stylet_shm_schema::Instance;
-use stylet_shm_schema::{HapticState, Mark, PlanInForce, Relayed, Request, Session};
+use stylet_shm_schema::{HapticState, Instance, InstanceError, Mark, PlanInForce, Relayed, Request, Session};
 
 /// A trainee and their core.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,17 +16,43 @@ pub struct Trainee {
     pub instance: Instance,
 }
 
+/// Problem of a name or a trainee on the command line.
+#[derive(Debug, thiserror::Error)]
+pub enum RosterError {
+    /// The name cannot be that of a folder.
+    #[error("a name is 1 to {LONGEST_NAME} letters, digits, spaces, '-', '_' or '.', and begins with no '.'")]
+    Name,
+    /// No name and instance.
+    #[error("give NAME=INSTANCE, such as Otto=seat-1")]
+    NoPair,
+    /// The instance.
+    #[error(transparent)]
+    Instance(#[from] InstanceError),
+}
+
+impl FromStr for Trainee {
+    type Err = RosterError;
+
+    fn from_str(text: &str) -> Result<Self, RosterError> {
+        let (who, instance) = text.split_once('=').ok_or(RosterError::NoPair)?;
+        Ok(Self {
+            name: name(who)?,
+            instance: Instance::new(instance)?,
+        })
+    }
+}
+
 /// Longest name of a trainee, in bytes.
 const LONGEST_NAME: usize = 60;
 
-/// Returns whether a name is valid for a folder inside a class: not empty, not hidden, no path.
-pub fn is_name(name: &str) -> bool {
+/// Parses a name that is valid for a folder inside a class: not empty, not hidden, no path.
+pub fn name(text: &str) -> Result<String, RosterError> {
     let is_plain = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_' | '.');
-    !name.is_empty()
-        && name.len() <= LONGEST_NAME
-        && name.trim() == name
-        && !name.starts_with('.')
-        && name.chars().all(is_plain)
+    let is_name = (1..=LONGEST_NAME).contains(&text.len())
+        && text.trim() == text
+        && !text.starts_with('.')
+        && text.chars().all(is_plain);
+    is_name.then(|| text.to_owned()).ok_or(RosterError::Name)
 }
 
 /// Returns the folder for a debrief that is written now.
@@ -79,10 +105,10 @@ mod tests {
     #[test]
     fn a_name_is_valid_for_a_folder() {
         for name in ["Otto", "Ida Ö.", "group_2-b"] {
-            assert!(is_name(name), "{name}");
+            assert!(super::name(name).is_ok(), "{name}");
         }
         for name in ["", ".hidden", "..", "a/b", " a", "a\nb", &"x".repeat(61)] {
-            assert!(!is_name(name), "{name:?}");
+            assert!(super::name(name).is_err(), "{name:?}");
         }
     }
 }

@@ -6,6 +6,7 @@ use crate::frame::{needle, place_mm};
 use crate::hand::HandOptions;
 use crate::requests::Requests;
 use crate::server::{Server, ServerError};
+use clap::Args;
 use std::collections::HashMap;
 use std::net::SocketAddr;
 use std::ops::Range;
@@ -26,22 +27,39 @@ const PASS: Duration = Duration::from_millis(10);
 const SLOW_EVERY: Duration = Duration::from_millis(500);
 
 /// Options of the service.
+#[derive(Args, Debug)]
 pub struct Options {
-    /// Instance of the core.
+    /// Name under which rt-core was started
+    #[arg(long, default_value = "main", value_parser = Instance::new)]
     pub instance: Instance,
-    /// Address to listen on.
+    /// Address and port to listen on
+    #[arg(long, default_value = "127.0.0.1:18944", value_name = "ADDRESS")]
     pub listen: SocketAddr,
-    /// Transforms of the needle per second.
-    pub rate_hz: f64,
-    /// Clients that may move the needle, if any.
-    pub hand: Option<HandOptions>,
-    /// Clients that may move the probe, if any.
-    pub probe: Option<HandOptions>,
+    /// Transforms of the needle per second, 1 to 200
+    #[arg(long, default_value_t = 60.0, value_name = "HZ")]
+    pub hz: f64,
+    /// Let transforms of this name move the simulated hand: a tracker or a stepper behind PLUS. Anyone who reaches
+    /// the address can send them
+    #[arg(long, value_name = "NAME")]
+    pub hand: Option<String>,
+    /// Let transforms of this name, such as ProbeToScene, move the simulated hand with the ultrasound probe
+    /// (rt-core --device-2)
+    #[arg(long, value_name = "NAME")]
+    pub probe: Option<String>,
+    /// Maximum speed of both hands, 0.1 to 1000 mm/s
+    #[arg(long, default_value_t = 100.0, value_name = "MM/S")]
+    pub hand_speed: f64,
 }
 
 /// Error that ended the service.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
+    /// A rate beyond its limits.
+    #[error("--hz {0}: 1 to 200 Hz are possible")]
+    Rate(f64),
+    /// A speed beyond its limits.
+    #[error("--hand-speed {0}: 0.1 to 1000 mm/s are possible")]
+    Speed(f64),
     /// The server could not start.
     #[error(transparent)]
     Server(#[from] ServerError),
@@ -55,6 +73,12 @@ pub enum ServeError {
 
 /// Serves until interrupted, including cores that start later or again.
 pub fn run(options: &Options) -> Result<(), ServeError> {
+    if !(1.0..=200.0).contains(&options.hz) {
+        return Err(ServeError::Rate(options.hz));
+    }
+    if !(0.1..=1000.0).contains(&options.hand_speed) {
+        return Err(ServeError::Speed(options.hand_speed));
+    }
     let interrupted = Interrupt::on_signals()?;
     // A terminal that is stopped or closed must not block the loop that watches for silent clients.
     let lines = Arc::new(Lines::to_stdout());
@@ -64,8 +88,14 @@ pub fn run(options: &Options) -> Result<(), ServeError> {
     })?;
     lines.say(format!("OpenIGTLink on {}; end with Ctrl-C", server.address()));
     let mut link = Link::new(options.instance.clone());
-    let every = Duration::from_secs_f64(1.0 / options.rate_hz);
-    let mut requests = Requests::new(options.hand.clone(), options.probe.clone());
+    let every = Duration::from_secs_f64(1.0 / options.hz);
+    let moved_by = |device: &Option<String>| {
+        device.clone().map(|device| HandOptions {
+            device,
+            speed_m_per_s: options.hand_speed * 1e-3,
+        })
+    };
+    let mut requests = Requests::new(moved_by(&options.hand), moved_by(&options.probe));
     let mut slow: Option<Instant> = None;
     let mut next = Instant::now();
     while !interrupted.asked() {

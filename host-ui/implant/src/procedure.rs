@@ -12,6 +12,7 @@ mod report;
 use crate::provenance;
 use crate::workflow::{Pace, Patience, Run, RunStatus, Step};
 use child::Core;
+use clap::Args;
 pub use error::ProcedureError;
 use gland::TargetMotion;
 use job::Job;
@@ -37,14 +38,6 @@ const APPEAR_LIMIT: Duration = Duration::from_secs(1);
 const START_LIMIT: Duration = Duration::from_secs(20);
 const LOAD_LIMIT: Duration = Duration::from_secs(60);
 
-/// Choice of a core, and of its scene.
-pub struct Connect {
-    /// Core and scene requested by the user.
-    pub asked: CoreArgs,
-    /// Program to start if no core is running.
-    pub core: Option<PathBuf>,
-}
-
 /// Core that answers, with the requested scene.
 pub struct Live {
     /// The link to the core.
@@ -60,9 +53,8 @@ pub struct Live {
 }
 
 impl Live {
-    /// Finds or starts the core and loads the scene; returns an error if that fails.
-    pub fn connect(options: &Connect) -> Result<Self, ProcedureError> {
-        let asked = &options.asked;
+    /// Finds the core, or starts `program`, and loads the scene; returns an error if that fails.
+    pub fn connect(asked: &CoreArgs, program: Option<&Path>) -> Result<Self, ProcedureError> {
         let volume = asked
             .file()
             .map(|path| files::watched(path, |progress| files::read(path, asked.label, progress)));
@@ -73,7 +65,7 @@ impl Live {
         let mut link = Link::new(asked.instance.clone());
         let mut core = None;
         let device = said.as_ref().and_then(|s| s.device.as_deref());
-        find_core(&mut link, &mut core, options, device, &interrupted)?;
+        find_core(&mut link, &mut core, program, device, &interrupted)?;
         if let Some(volume) = &volume {
             for note in &volume.warnings {
                 println!("note: {}", stylet_base::format::printable_line(note));
@@ -101,28 +93,47 @@ impl Live {
     }
 }
 
-/// Options of a headless procedure.
+/// Options of `host-ui procedure`.
+#[derive(Args, Debug)]
 pub struct Options {
     /// Core and scene.
-    pub connect: Connect,
-    /// Folder of the results; otherwise one named after the time.
+    #[command(flatten)]
+    pub core: CoreArgs,
+    /// Folder for the results [default: out/procedure-<UTC time>]
+    #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Speed of insertion; otherwise that of the scene file, or the usual one.
-    pub insert_m_per_s: Option<f64>,
-    /// Number of seeds of the suggested needle, without a plan.
-    pub seeds: usize,
-    /// File with many needles; otherwise one needle through the middle.
+    /// Start this rt-core when none is running, and end it afterwards
+    #[arg(long = "core", value_name = "PATH")]
+    pub program: Option<PathBuf>,
+    /// Speed of insertion in mm/s [default: that of the scene file, or 50]
+    #[arg(long, value_name = "MM/S")]
+    pub insert_speed: Option<f64>,
+    /// Plan of many needles (TOML) from 'host-ui plan' [default: that of the scene file, or one
+    /// needle through the middle]
+    #[arg(long, value_name = "FILE")]
     pub plan: Option<PathBuf>,
-    /// True to rehearse each needle first and shift its drops.
+    /// Rehearse every needle first, and shift the drops so that each seed comes to rest on plan
+    #[arg(long)]
     pub compensate: bool,
-    /// Number of needles that go in first and stay until the others have left their seeds.
-    pub stabilise: usize,
-    /// Source for the score; otherwise the one that the plan names.
+    /// Insert this many stabilising needles first, 0 to 4; they leave no seed, hold the gland
+    /// during the implant, and are withdrawn at the end
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=MAX_LEFT_NEEDLES as i64))]
+    pub stabilise: u8,
+    /// Source file for the score [default: the source that the plan names, 6711 or 200]
+    #[arg(long, value_name = "FILE")]
     pub source: Option<PathBuf>,
-    /// True to turn the force on although a fault stands.
-    pub rearm: bool,
-    /// Parameters set before anything else; they stay in force.
+    /// Set a parameter before anything else, in the window's unit, such as
+    /// needle.bending_stiffness=0.016; may be given several times, and stays in force in the
+    /// core
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = parameter)]
     pub parameters: Vec<ParameterChange>,
+    /// Turn the force on although a fault stands; without this the procedure does not begin,
+    /// because only a person re-arms after a fault
+    #[arg(long)]
+    pub rearm: bool,
+    /// Seeds along the needle, 1 to 128, if no plan is given
+    #[arg(long, default_value_t = 5, conflicts_with = "plan", value_parser = clap::value_parser!(u16).range(1..=128))]
+    pub seeds: u16,
 }
 
 /// Observations while the script ran.
@@ -141,6 +152,9 @@ struct Observations {
 
 /// Runs the procedure; returns an error if a step was not completed.
 pub fn run(options: Options) -> Result<(), ProcedureError> {
+    if let Some(speed) = options.insert_speed.filter(|s| !(0.1..=500.0).contains(s)) {
+        return Err(ProcedureError::InsertSpeed(speed));
+    }
     if let Some(out) = &options.out {
         new_folder(out)?;
     }
@@ -150,18 +164,19 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
         scene,
         said,
         interrupted,
-    } = Live::connect(&options.connect)?;
+    } = Live::connect(&options.core, options.program.as_deref())?;
     let usual = Pace::default();
     let of_file = |speed: fn(&SceneFile) -> Option<f64>| said.as_ref().and_then(speed);
     let pace = Pace {
         insert_m_per_s: options
-            .insert_m_per_s
+            .insert_speed
+            .map(|mm_per_s| mm_per_s / 1e3)
             .or(of_file(|s| s.insert_m_per_s))
             .unwrap_or(usual.insert_m_per_s),
         retract_m_per_s: of_file(|s| s.retract_m_per_s).unwrap_or(usual.retract_m_per_s),
         ..usual
     };
-    let file_of_scene = options.connect.asked.file();
+    let file_of_scene = options.core.file();
     let of_scene = file_of_scene.zip(said.as_ref().and_then(|s| s.plan.as_deref()));
     let of_scene = of_scene.map(|(scene, plan)| scene.with_file_name(plan));
     let plan = options.plan.as_deref().or(of_scene.as_deref());
@@ -174,7 +189,7 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
     let made = provenance::made(&inputs)?;
     let mut job = match plan {
         Some(path) => Job::from_file(path, &scene, file_of_scene)?,
-        None => Job::suggested(&scene, options.seeds),
+        None => Job::suggested(&scene, usize::from(options.seeds)),
     };
     if let Some(implant) = &job.implant {
         debrief::source_of(implant, options.source.as_deref())?;
@@ -191,7 +206,7 @@ pub fn run(options: Options) -> Result<(), ProcedureError> {
     );
     parameters::set(&mut link, &options.parameters, &interrupted)?;
     if options.stabilise > 0 {
-        job.stabilise(&scene, options.stabilise)?;
+        job.stabilise(&scene, usize::from(options.stabilise))?;
     }
     if options.compensate {
         job.compensate(&mut link, &pace, &interrupted)?;
@@ -245,7 +260,7 @@ fn is_ready(link: &Link) -> bool {
 fn find_core(
     link: &mut Link,
     core: &mut Option<Core>,
-    options: &Connect,
+    program: Option<&Path>,
     device: Option<&str>,
     interrupted: &Interrupt,
 ) -> Result<(), ProcedureError> {
@@ -259,8 +274,8 @@ fn find_core(
         LinkStatus::Absent { why } => why,
         _ => return Err(ProcedureError::NoAnswer),
     };
-    let path = options.core.as_ref().ok_or(ProcedureError::NoCore(missing))?;
-    let child = core.insert(Core::start(path, &options.asked.instance, device)?);
+    let path = program.ok_or(ProcedureError::NoCore(missing))?;
+    let child = core.insert(Core::start(path, link.instance(), device)?);
     let found = wait(link, interrupted, START_LIMIT, |link| match child.ended() {
         Some(status) => Err(ProcedureError::CoreEnded(status)),
         None => Ok(is_ready(link)),

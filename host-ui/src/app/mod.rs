@@ -31,18 +31,18 @@ use crate::settings::Settings;
 use crate::shown::{FrameCost, Note, Shown};
 use crate::view::middle::Middle;
 use crate::{cpu_time, keyboard, theme};
+use clap::Args;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use stylet_base::format;
 use stylet_base::job::Job;
 use stylet_base::lines::Lines;
 use stylet_controllers::{Controllers, ProbeWish, SLOW, System, Wish};
-use stylet_host::core_args::SceneChoice;
+use stylet_host::core_args::CoreArgs;
 use stylet_host::link::{Link, LinkStatus};
-use stylet_host::roster::Trainee;
+use stylet_host::roster::{self, Trainee};
 use stylet_implant::received::ReceivedProcedure;
 use stylet_implant::workflow::{Pace, Run};
-use stylet_shm_schema::Instance;
 use stylet_shm_schema::affinity::Left;
 
 const LIVE_FRAME: Duration = Duration::from_millis(16);
@@ -51,32 +51,43 @@ const ABSENT_FRAME: Duration = Duration::from_millis(250);
 pub use error::WindowError;
 
 /// Options of the window.
-#[derive(Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct Options {
-    /// Name under which rt-core was started.
-    pub instance: Instance,
-    /// Scene to read and send as soon as a core is found.
-    pub scene: Option<SceneChoice>,
-    /// Label of the gland in the file; all labels if none is given.
-    pub label: Option<u8>,
-    /// Image for the slices, of the scene file's patient.
+    /// Core and scene.
+    #[command(flatten)]
+    pub core: CoreArgs,
+    /// Image for the slices instead of simulated ultrasound, of the patient of --scene FILE: a
+    /// DICOM series (its folder, or one of its files), NIfTI-1, NRRD, MetaImage
+    #[arg(long, value_name = "FILE", requires = "scene")]
     pub image: Option<PathBuf>,
-    /// Recording that is shown instead of a core.
+    /// Show a recording made by 'host-ui record' instead of a running rt-core; nothing in it can be
+    /// moved
+    #[arg(long, value_name = "FILE.mcap", conflicts_with = "scene")]
     pub watch: Option<PathBuf>,
-    /// Permission for gamepads and 3D mice to hold the needle.
-    pub controllers: bool,
-    /// Frame rate limited to what the eye needs; otherwise frames follow at once.
-    pub pause: bool,
-    /// Report of frame rate and cost, printed each second.
+    /// Ignore gamepads and 3D mice: only keys and mouse move the needle
+    #[arg(long)]
+    pub no_controllers: bool,
+    /// Draw frames without a pause, for measurements
+    #[arg(long)]
+    pub without_pause: bool,
+    /// Print each second how many frames were drawn and their cost
+    #[arg(long)]
     pub count_frames: bool,
-    /// Patch that changes when the tip moves.
+    /// Show a square in the lower right corner that switches between dark and light when the tip
+    /// has moved by 0.5 mm, for a photodiode
+    #[arg(long)]
     pub patch: bool,
-    /// Trainees of a list; the window follows the first.
+    /// Show a trainee in a list, with the instance of their rt-core or of a 'relay join'; may be
+    /// given several times; the window follows the first
+    #[arg(long = "trainee", value_name = "NAME=INSTANCE")]
     pub trainees: Vec<Trainee>,
-    /// Folder for the debriefs of a class.
+    /// Write a debrief into DIR/NAME/DATE at the end of each procedure, for 'host-ui class'
+    #[arg(long, value_name = "DIR")]
     pub class: Option<PathBuf>,
-    /// Name of the operator at this window.
-    pub name: String,
+    /// Name of the operator at this window, for --class [default: the instance; with a list, the
+    /// followed trainee]
+    #[arg(long, value_name = "NAME", requires = "class", value_parser = roster::name)]
+    pub name: Option<String>,
 }
 
 /// Command without an answer so far.
@@ -158,7 +169,7 @@ pub fn run(options: Options) -> Result<(), WindowError> {
         renderer: eframe::Renderer::Wgpu,
         ..Default::default()
     };
-    if !options.pause {
+    if options.without_pause {
         native.wgpu_options.surface.present_mode = eframe::wgpu::PresentMode::AutoNoVsync;
     }
     let create: eframe::AppCreator<'_> = Box::new(|cc| Ok(Box::new(App::new(cc, options))));
@@ -197,15 +208,17 @@ impl App {
             cc.egui_ctx.add_plugin(Redraw::new(state.clone()));
         }
         let settings = Settings::read(cc.storage);
-        let shown = Shown::empty(options.instance.name());
+        let CoreArgs { instance, scene, label } = options.core;
+        let shown = Shown::empty(instance.name());
         // A kept plan belongs to this window's core. A window that follows a trainee receives the
         // trainee's plan from the core.
         let planner = match options.trainees.is_empty() {
-            true => Planner::default().keeping_in(options.instance.folder()),
+            true => Planner::default().keeping_in(instance.folder()),
             false => Planner::default(),
         };
+        let name = options.name.unwrap_or_else(|| instance.name().to_owned());
         Self {
-            link: Link::new(options.instance),
+            link: Link::new(instance),
             started_core: None,
             shown,
             middle: Middle::new(cc.wgpu_render_state.clone()),
@@ -219,8 +232,8 @@ impl App {
             loader: Loader::default(),
             dialogs: Dialogs::default(),
             files: files::SceneFiles {
-                label: options.label,
-                first_scene: options.scene,
+                label,
+                first_scene: scene,
                 first_image: options.image,
                 ..Default::default()
             },
@@ -233,12 +246,11 @@ impl App {
             recording: watch::Recording::beginning_with(options.watch),
             pace: Pace::default(),
             waiting: Vec::new(),
-            controllers: if options.controllers {
-                Controllers::start(System::default())
-            } else {
-                Controllers::none()
+            controllers: match options.no_controllers {
+                true => Controllers::none(),
+                false => Controllers::start(System::default()),
             },
-            pause: options.pause,
+            pause: !options.without_pause,
             frame_lines: options.count_frames.then(Lines::to_stderr),
             patch: options.patch.then(patch::Patch::default),
             frames: frames::Frames::new(Instant::now()),
@@ -255,7 +267,7 @@ impl App {
             help: false,
             class: false,
             instructor: InstructorState::default(),
-            trainees: trainees::Trainees::new(options.trainees, options.class, options.name),
+            trainees: trainees::Trainees::new(options.trainees, options.class, name),
             narrow: layout::Narrow::default(),
         }
     }

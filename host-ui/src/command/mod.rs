@@ -3,6 +3,4 @@
 /// Error of a command, of any type, printed on the terminal.
 pub type CommandError = Box<dyn std::error::Error>;
 
-pub mod export;
 pub mod picture;
-pub mod record;

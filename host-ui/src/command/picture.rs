@@ -15,7 +15,7 @@ use stylet_imaging::fluoroscopy::{CArm, Exposure, Fluoroscope};
 use stylet_imaging::ultrasound::{Plane, Pose, Probe, Scanner, Settings, View};
 use stylet_imaging::{Body, Gpu, Metal};
 use stylet_implant::plan::{Hole, Template};
-use stylet_implant::procedure::{Connect, Live};
+use stylet_implant::procedure::Live;
 use stylet_surfaces::field::Field;
 
 /// Longest wait for a snapshot; a core sends one at least every 30 ms.
@@ -97,10 +97,7 @@ impl PictureArgs {
                 return Err(format!("{option} {value}: give {least} to {most}").into());
             }
         }
-        let mut live = Live::connect(&Connect {
-            asked: self.asked.clone(),
-            core: self.core.clone(),
-        })?;
+        let mut live = Live::connect(&self.asked, self.core.as_deref())?;
         let scene = live.scene.clone();
         let (field, metal) = now(&mut live, &scene)?;
         let body = Body::of_scene(&scene.header, &scene.labels).ok_or("the scene has no labels to draw")?;

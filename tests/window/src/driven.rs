@@ -6,6 +6,7 @@ use egui_kittest::kittest::{NodeT, Queryable, by};
 use host_ui::app::{App, Options};
 use host_ui::view::orientation::Orientation;
 use std::time::{Duration, Instant};
+use stylet_host::core_args::CoreArgs;
 use stylet_shm_schema::{Instance, flags};
 use stylet_test_kit::scratch;
 use stylet_tests::Core;
@@ -179,22 +180,21 @@ impl Driven {
     }
 }
 
+/// Returns the options of a window on a core, or without one, that no gamepad moves.
+pub fn options_of(instance: Instance) -> Options {
+    Options {
+        core: CoreArgs {
+            instance,
+            ..CoreArgs::default()
+        },
+        no_controllers: true,
+        ..Options::default()
+    }
+}
+
 /// Returns the window on a core that runs.
 pub fn window_on(instance: &Instance, size: [f32; 2]) -> Harness<'static, App> {
-    let options = Options {
-        instance: instance.clone(),
-        scene: None,
-        label: None,
-        image: None,
-        watch: None,
-        controllers: false,
-        pause: true,
-        count_frames: false,
-        patch: false,
-        trainees: Vec::new(),
-        class: None,
-        name: String::new(),
-    };
+    let options = options_of(instance.clone());
     let window = Harness::builder()
         .with_size(size)
         .wgpu()

@@ -1,7 +1,7 @@
 //! An instructor's window and a trainee's: the same debrief, received over the link, and the
 //! display of exercises in both.
 
-use crate::driven::{Driven, misplaced};
+use crate::driven::{Driven, misplaced, options_of};
 use crate::kept::{assert_like_kept, tolerant};
 use crate::plan::{SMALL, header, open, plan_through, put};
 use egui::Key;
@@ -20,21 +20,13 @@ use stylet_tests::{ask, scratch, until};
 /// Opens the window of an instructor who follows one trainee, on a live core.
 fn instructor(instance: &Instance, class: Option<PathBuf>) -> Harness<'static, App> {
     let options = Options {
-        instance: instance.clone(),
-        scene: None,
-        label: None,
-        image: None,
-        watch: None,
-        controllers: false,
-        pause: true,
-        count_frames: false,
-        patch: false,
         trainees: vec![Trainee {
             name: "Otto".to_owned(),
             instance: instance.clone(),
         }],
         class,
-        name: "Ina".to_owned(),
+        name: Some("Ina".to_owned()),
+        ..options_of(instance.clone())
     };
     let mut window = Harness::builder()
         .with_size(SMALL)

@@ -2,10 +2,10 @@
 //!
 //! Its picture is the README's; `make picture` keeps it.
 
-use crate::driven::{Driven, keep_for_docs};
+use crate::driven::{Driven, keep_for_docs, options_of};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
-use host_ui::app::{App, Options};
+use host_ui::app::App;
 use host_ui::view::orientation::Orientation;
 use nalgebra::Vector3;
 use std::time::Duration;
@@ -71,20 +71,7 @@ fn a_new_window_moves_nothing() {
     let mut driven = Driven::open([1280.0, 800.0]);
     driven.plan_and_place();
     let tip = |app: &App| app.link().state().map(|s| s.tip_in_scene_m).expect("live");
-    let options = Options {
-        instance: driven.core.instance.clone(),
-        scene: None,
-        label: None,
-        image: None,
-        watch: None,
-        controllers: false,
-        pause: true,
-        count_frames: false,
-        patch: false,
-        trainees: Vec::new(),
-        class: None,
-        name: String::new(),
-    };
+    let options = options_of(driven.core.instance.clone());
     let mut second = Harness::builder()
         .with_size([1280.0, 800.0])
         .wgpu()

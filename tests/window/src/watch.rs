@@ -1,10 +1,10 @@
 //! A recording in the window: the example opens with one click if no core runs, and can be closed
 //! again.
 
-use crate::driven::misplaced;
+use crate::driven::{misplaced, options_of};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
-use host_ui::app::{App, Options};
+use host_ui::app::App;
 use std::time::{Duration, Instant};
 use stylet_shm_schema::Instance;
 use stylet_tests::Alone;
@@ -21,20 +21,7 @@ fn until(window: &mut Harness<'_, App>, what: &str, mut holds: impl FnMut(&Harne
 #[test]
 fn the_example_opens_with_one_click_without_a_core_and_shows_an_insertion() {
     let alone = Alone(Instance::new("ui-watch").expect("a valid name"));
-    let options = Options {
-        instance: alone.0.clone(),
-        scene: None,
-        label: None,
-        image: None,
-        watch: None,
-        controllers: false,
-        pause: true,
-        count_frames: false,
-        patch: false,
-        trainees: Vec::new(),
-        class: None,
-        name: String::new(),
-    };
+    let options = options_of(alone.0.clone());
     let mut window = Harness::builder()
         .with_size([1280.0, 800.0])
         .wgpu()

@@ -1,10 +1,10 @@
 //! The window without a core: it names the command to type, and its dialogs open.
 
-use crate::driven::{assert_drawn_by_changes, misplaced};
+use crate::driven::{assert_drawn_by_changes, misplaced, options_of};
 use crate::kept::tolerant;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
-use host_ui::app::{App, Options};
+use host_ui::app::App;
 use std::ops::{Deref, DerefMut};
 use stylet_shm_schema::Instance;
 use stylet_shm_schema::PARAMETERS;
@@ -36,20 +36,7 @@ fn window(instance: &str) -> Window {
 
 fn window_of(instance: &str, size: [f32; 2]) -> Window {
     let alone = Alone(Instance::new(instance).expect("a valid name"));
-    let options = Options {
-        instance: alone.0.clone(),
-        scene: None,
-        label: None,
-        image: None,
-        watch: None,
-        controllers: false,
-        pause: true,
-        count_frames: false,
-        patch: false,
-        trainees: Vec::new(),
-        class: None,
-        name: String::new(),
-    };
+    let options = options_of(alone.0.clone());
     Window {
         harness: Harness::builder()
             .with_size(size)

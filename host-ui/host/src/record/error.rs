@@ -8,6 +8,12 @@ use stylet_base::interrupt::InterruptError;
 /// Failure to record a session or to use a recording; each text says what to do if there is a remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
+    /// A duration or a rate beyond its limits.
+    #[error("--duration needs seconds above 0, --snapshot-rate 0 to 60 Hz")]
+    Options,
+    /// Neither a file nor viewers.
+    #[error("give --out or --live for the session")]
+    NoDestination,
     /// No core was found; the text says what to do.
     #[error("{0}")]
     NoCore(String),

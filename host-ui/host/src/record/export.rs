@@ -2,6 +2,7 @@
 
 use super::error::RecordError;
 use super::read::read;
+use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use stylet_base::{write_streamed, write_whole};
@@ -11,18 +12,24 @@ use stylet_shm_schema::{SecondRecord, TickRecord};
 /// The period of the force loop's ideal grid.
 const PERIOD_NS: u64 = 1_000_000;
 
-/// Export settings.
+/// Options of `host-ui export`: tables and motions of a recording.
+#[derive(Args, Debug)]
+#[group(id = "made", required = true, multiple = true, args = ["csv", "motion", "csv_2", "motion_2"])]
 pub struct Export {
-    /// The recording, MCAP.
-    pub recording: PathBuf,
-    /// Table of the ticks.
-    pub csv: Option<PathBuf>,
-    /// Motion for the core's replay device.
-    pub motion: Option<PathBuf>,
-    /// Table of the ticks of the second device.
-    pub csv_2: Option<PathBuf>,
-    /// Motion of the second device.
-    pub motion_2: Option<PathBuf>,
+    /// Recording made by 'host-ui record'
+    recording: PathBuf,
+    /// Table with one row per tick
+    #[arg(long, value_name = "FILE.csv")]
+    csv: Option<PathBuf>,
+    /// Motion of the hand, for 'rt-core --device replay:FILE'
+    #[arg(long, value_name = "FILE")]
+    motion: Option<PathBuf>,
+    /// Table with one row per tick of the second device
+    #[arg(long = "csv-2", value_name = "FILE.csv")]
+    csv_2: Option<PathBuf>,
+    /// Motion of the second hand, for 'rt-core --device-2 replay:FILE'
+    #[arg(long = "motion-2", value_name = "FILE")]
+    motion_2: Option<PathBuf>,
 }
 
 /// Writes the requested exports, and prints the contents of the recording.

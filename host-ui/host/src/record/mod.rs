@@ -23,6 +23,7 @@ pub use played::{played, played_of};
 pub use read::{Recording, read};
 
 use crate::link::{Link, LinkStatus};
+use clap::Args;
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
 use std::path::PathBuf;
@@ -40,34 +41,40 @@ const APPEAR_LIMIT: Duration = Duration::from_secs(1);
 const SNAPSHOT_LATE_S: f64 = 0.1;
 const PRINT_EVERY: Duration = Duration::from_secs(10);
 
-/// Destination of a session.
-pub enum To {
-    /// Into a file, MCAP.
-    File(PathBuf),
-    /// To viewers that connect to this address and port: Foxglove's app.
-    Viewers(String),
-}
-
-/// Recording settings.
+/// Options of `host-ui record`: a session to a file, or to viewers while it runs.
+#[derive(Args, Debug)]
 pub struct Options {
-    /// Instance of the core.
+    /// Name under which rt-core was started
+    #[arg(long, default_value = "main", value_parser = Instance::new)]
     pub instance: Instance,
-    /// Destination.
-    pub to: To,
-    /// Duration; if `None`, until interrupted or until the core ends.
-    pub duration: Option<Duration>,
-    /// Snapshots of the gland kept per second; 0 for none.
-    pub snapshots_hz: f64,
+    /// File to write
+    #[arg(long, value_name = "FILE.mcap", required_unless_present = "live")]
+    out: Option<PathBuf>,
+    /// Serve the messages of a recording to Foxglove's app instead, on this address and port
+    /// [default: 127.0.0.1:8765]; needs 'make live'
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:8765", conflicts_with = "out")]
+    live: Option<String>,
+    /// Seconds to record [default: until interrupted or until rt-core ends]
+    #[arg(long, value_name = "S")]
+    duration: Option<f64>,
+    /// Snapshots of the gland per second, 0 to 60; the core sends 67 while the needle moves, 33
+    /// while it rests, and 17 while the gland is undisturbed
+    #[arg(long, default_value_t = 20.0, value_name = "HZ")]
+    snapshot_rate: f64,
 }
 
 /// Records until the time is up or it is interrupted; fails if a tick was lost on the way.
 pub fn run(options: &Options) -> Result<(), RecordError> {
+    let fits = options.duration.is_none_or(|s| s > 0.0 && s < 1e6) && (0.0..=60.0).contains(&options.snapshot_rate);
+    if !fits {
+        return Err(RecordError::Options);
+    }
     let interrupted = Interrupt::on_signals()?;
     let stop = || interrupted.asked();
     let mut link = Link::with_snapshots_every(options.instance.clone(), Duration::ZERO);
     find_core(&mut link, stop)?;
-    let (name, totals) = match &options.to {
-        To::File(path) => {
+    let (name, totals) = match (&options.out, &options.live) {
+        (Some(path), _) => {
             let failed = |why: mcap::McapError| RecordError::of_file(path, why);
             let file = File::create(path)
                 .map_err(|e| RecordError::of_file(path, format!("{e}; choose another file with --out")))?;
@@ -76,13 +83,14 @@ pub fn run(options: &Options) -> Result<(), RecordError> {
             totals.bytes = std::fs::metadata(path).map_or(0, |m| m.len());
             (path.display().to_string(), totals)
         }
-        To::Viewers(address) => {
+        (None, Some(address)) => {
             let mut server = live::start(address)?;
             let input = server.stdin.take().ok_or(RecordError::LiveInput)?;
             let totals = Writer::of_program(input).and_then(|writer| take(&mut link, options, stop, writer));
             let _ended = server.wait();
             (address.clone(), totals.map_err(RecordError::LiveEnded)?)
         }
+        (None, None) => return Err(RecordError::NoDestination),
     };
     println!("{name}: {}", totals.words());
     totals.missing_words().iter().for_each(|line| println!("{line}"));
@@ -135,9 +143,9 @@ fn take<W: Write + Seek>(
     let begun = Instant::now();
     let mut printed = begun;
     let mut handed = Handed::default();
-    while !stop() && options.duration.is_none_or(|d| begun.elapsed() < d) {
+    while !stop() && options.duration.is_none_or(|s| begun.elapsed().as_secs_f64() < s) {
         link.poll();
-        handed.hand_over(link, options.snapshots_hz, &mut to)?;
+        handed.hand_over(link, options.snapshot_rate, &mut to)?;
         to.flush()?;
         if matches!(link.status(), LinkStatus::Absent { .. }) && options.duration.is_none() {
             break;

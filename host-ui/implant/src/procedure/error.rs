@@ -15,6 +15,9 @@ use stylet_shm_schema::MAX_SEEDS;
 /// Reason why a procedure ends early; the text gives the remedy if there is one.
 #[derive(Debug, thiserror::Error)]
 pub enum ProcedureError {
+    /// A speed beyond its limits.
+    #[error("--insert-speed {0}: give 0.1 to 500 mm/s")]
+    InsertSpeed(f64),
     /// The user ended it.
     #[error("interrupted")]
     Interrupted,

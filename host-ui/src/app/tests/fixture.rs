@@ -12,6 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use stylet_dose::Metric;
 use stylet_dose::criteria::{Figure, Limit};
+use stylet_host::core_args::CoreArgs;
 use stylet_host::link::LinkStatus;
 use stylet_implant::plan::check::Problem;
 use stylet_implant::plan::compensate::edges::Sensitive;
@@ -30,19 +31,16 @@ pub fn options() -> Options {
     static WINDOWS: AtomicU64 = AtomicU64::new(0);
     // SYNC: relaxed; no other memory depends on the number.
     let number = WINDOWS.fetch_add(1, Ordering::Relaxed);
+    let name = format!("ui-drawn-{}-{number}", std::process::id());
+    let core = CoreArgs {
+        instance: Instance::new(&name).expect("a valid name"),
+        ..CoreArgs::default()
+    };
     Options {
-        instance: Instance::new(&format!("ui-drawn-{}-{number}", std::process::id())).expect("a valid name"),
-        scene: None,
-        label: None,
-        image: None,
-        watch: None,
-        controllers: false,
-        pause: true,
-        count_frames: false,
-        patch: false,
-        trainees: Vec::new(),
-        class: None,
-        name: "Otto".to_owned(),
+        core,
+        no_controllers: true,
+        name: Some("Otto".to_owned()),
+        ..Options::default()
     }
 }
 
@@ -71,7 +69,7 @@ impl Drawn {
         let ctx = egui::Context::default();
         ctx.enable_accesskit();
         let options = options();
-        let swept = SharedMemoryCleanup(options.instance.clone());
+        let swept = SharedMemoryCleanup(options.core.instance.clone());
         let app = App::new(&eframe::CreationContext::_new_kittest(ctx.clone()), options);
         ctx.all_styles_mut(|style| style.interaction.tooltip_delay = 1e9);
         Self {
