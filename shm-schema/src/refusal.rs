@@ -106,7 +106,7 @@ impl Reason {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{text}")]
 pub struct Refusal {
-    /// Reasons; at least one.
+    /// Reasons; none for a request that did not reach the core.
     pub reasons: Vec<Reason>,
     /// All reasons as text, one per line.
     pub text: String,
@@ -119,6 +119,11 @@ impl Refusal {
             reasons: vec![Reason::new(code, Reason::NO_SUBJECT)],
             text: text.into(),
         }
+    }
+
+    /// Returns whether this is one of the reasons.
+    pub fn is_for(&self, code: RefusalCode) -> bool {
+        self.reasons.iter().any(|reason| reason.code() == Some(code))
     }
 }
 

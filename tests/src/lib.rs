@@ -215,11 +215,7 @@ fn ask_within(link: &mut Link, request: &Request, limit: Duration) -> Result<u64
         answer.is_some()
     });
     let answer = answer.ok_or_else(|| format!("no answer to {:?}", request.kind()))?;
-    if answer.accepted {
-        Ok(answer.effective_tick)
-    } else {
-        Err(answer.text)
-    }
+    answer.map_err(|refusal| refusal.text)
 }
 
 /// Reads the clock of the records.

@@ -100,15 +100,15 @@ pub fn stop(link: &mut Link) -> Result<(), LinkError> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::name;
 
     #[test]
     fn a_name_is_valid_for_a_folder() {
-        for name in ["Otto", "Ida Ö.", "group_2-b"] {
-            assert!(super::name(name).is_ok(), "{name}");
+        for text in ["Otto", "Ida Ö.", "group_2-b"] {
+            assert!(name(text).is_ok(), "{text}");
         }
-        for name in ["", ".hidden", "..", "a/b", " a", "a\nb", &"x".repeat(61)] {
-            assert!(super::name(name).is_err(), "{name:?}");
+        for text in ["", ".hidden", "..", "a/b", " a", "a\nb", &"x".repeat(61)] {
+            assert!(name(text).is_err(), "{text:?}");
         }
     }
 }

@@ -43,8 +43,8 @@ impl Requests {
             }
         }
         self.awaited.retain(|(id, received)| match link.reply(*id) {
-            Some(answer) if !answer.accepted => {
-                server.refuse(received.from, &received.device, not_ready(answer.text));
+            Some(Err(refusal)) => {
+                server.refuse(received.from, &received.device, not_ready(refusal.text));
                 false
             }
             answer => answer.is_none(),

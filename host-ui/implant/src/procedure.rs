@@ -296,9 +296,7 @@ fn load(
     let mut accepted = false;
     let shown = wait(link, interrupted, LOAD_LIMIT, |link| {
         if let Some(answer) = link.reply(id) {
-            if !answer.accepted {
-                return Err(ProcedureError::SceneRefused(answer.text));
-            }
+            answer.map_err(ProcedureError::SceneRefused)?;
             accepted = true;
         }
         Ok(accepted && link.scene().map(|s| s.header.id()) != before && link.snapshot().is_some())

@@ -12,7 +12,7 @@ use std::time::Instant;
 use stylet_controllers::Wish;
 use stylet_implant::workflow::{default_plan, move_request};
 use stylet_shm_schema::{
-    PARAMETERS, ParameterChange, ParameterProblems, ParameterSet, PlannedNeedle, ProblemList, Refusal, Request,
+    PARAMETERS, ParameterChange, ParameterProblems, ParameterSet, PlannedNeedle, ProblemList, Request,
 };
 
 /// Farthest goal ahead of the tip for a hand that pulls it.
@@ -257,7 +257,7 @@ impl App {
         let changes: Vec<_> = pairs.iter().filter_map(change).collect();
         let in_force = self.shown.parameters.map(|p| p.set);
         if let Err(problems) = changed(in_force.unwrap_or_default(), &changes) {
-            return self.parameters.refused(pairs, &Refusal::from(problems).into());
+            return self.parameters.refused(pairs, problems.into());
         }
         match self.link.send(&Request::SetParameters(changes)) {
             Ok(id) => self.parameters.sent(id, pairs),
@@ -295,7 +295,7 @@ fn request_name(request: &Request) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stylet_shm_schema::ParameterId;
+    use stylet_shm_schema::{ParameterId, Refusal};
 
     #[test]
     fn the_window_refuses_what_the_core_would_refuse_and_names_both_angles() {

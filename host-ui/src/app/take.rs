@@ -151,13 +151,10 @@ impl App {
         }
         let (link, note) = (&mut self.link, &mut self.shown.note);
         self.waiting.retain(|w| match link.reply(w.id) {
-            Some(answer) if answer.accepted => {
-                // An old refusal is obsolete once a request was accepted.
-                *note = None;
-                false
-            }
             Some(answer) => {
-                *note = Some(Note::refusal(format!("{} refused: {}", w.what, answer.text)));
+                // An old refusal is obsolete once a request was accepted.
+                let refused = |why| Note::refusal(format!("{} refused: {why}", w.what));
+                *note = answer.err().map(refused);
                 false
             }
             None => {
@@ -173,14 +170,13 @@ impl App {
         if let (Some(answer), Some((_, name))) = (answer, self.files.uploading.clone()) {
             self.files.uploading = None;
             let image = self.files.image_to_come.take();
-            if answer.accepted {
-                self.files.scene_file = self.files.scene_to_come.take();
+            if let Err(why) = answer {
+                self.shown.load = LoadState::Refused(format!("{name} refused: {why}"));
+                return;
             }
-            self.shown.load = match answer.accepted {
-                true => LoadState::Loaded(format!("{name} is the scene now")),
-                false => LoadState::Refused(format!("{name} refused: {}", answer.text)),
-            };
-            if let (true, Some((image, scene))) = (answer.accepted, image) {
+            self.files.scene_file = self.files.scene_to_come.take();
+            self.shown.load = LoadState::Loaded(format!("{name} is the scene now"));
+            if let Some((image, scene)) = image {
                 self.show_image(image, &scene);
             }
         }

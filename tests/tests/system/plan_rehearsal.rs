@@ -176,11 +176,12 @@ fn one_rehearsal_at_a_time_and_the_run_does_not_notice() {
             one.is_some() && other.is_some()
         });
         let (one, other) = (one.expect("answered"), other.expect("answered"));
-        assert!(one.accepted, "{}", one.text);
+        assert!(one.is_ok(), "{one:?}");
         assert!(
-            !other.accepted && other.is_refused_for(RefusalCode::RehearsalRunning),
-            "{}",
-            other.text
+            other
+                .as_ref()
+                .is_err_and(|why| why.is_for(RefusalCode::RehearsalRunning)),
+            "{other:?}"
         );
         assert_eq!(link.rehearsal(first).map(|r| r.seed_count), Some(5));
         assert!(link.rehearsal(second).is_none());

@@ -310,7 +310,7 @@ fn two_changes_of_parameters_sent_at_once_are_both_in_force() {
             accepted.extend(
                 sent.iter()
                     .filter_map(|&id| link.reply(id))
-                    .map(|answer| answer.accepted),
+                    .map(|answer| answer.is_ok()),
             );
             accepted.len() == 2
         });

@@ -74,9 +74,9 @@ impl Motions {
     pub fn answered(&mut self, command_id: u64, answer: &Answer) {
         for ordered in &mut self.ordered {
             if let Some(motion) = ordered.as_mut().filter(|motion| motion.command_id == command_id) {
-                motion.from_tick = Some(answer.effective_tick);
-                if !answer.accepted {
-                    *ordered = None;
+                match answer {
+                    Ok(tick) => motion.from_tick = Some(*tick),
+                    Err(_) => *ordered = None,
                 }
             }
         }
@@ -170,7 +170,7 @@ impl Renewals {
 mod tests {
     use super::*;
     use bytemuck::Zeroable;
-    use stylet_shm_schema::HandMove;
+    use stylet_shm_schema::{HandMove, RefusalCode};
 
     fn move_hand() -> Request {
         Request::MoveHand(HandMove {
@@ -179,15 +179,6 @@ mod tests {
             speed_m_per_s: 0.1,
             acceleration_m_per_s2: 1.0,
         })
-    }
-
-    fn accepted(effective_tick: u64) -> Answer {
-        Answer {
-            accepted: true,
-            text: String::new(),
-            reasons: Vec::new(),
-            effective_tick,
-        }
     }
 
     /// A host that polls with these pauses.
@@ -259,8 +250,8 @@ mod tests {
         let mut host = Host::moves();
         host.motions.seen([Some((99, false)), None]);
         assert!(host.renews(), "that was before it");
-        host.motions.answered(4, &accepted(50));
-        host.motions.answered(5, &accepted(100));
+        host.motions.answered(4, &Ok(50));
+        host.motions.answered(5, &Ok(100));
         for state in [(100, false), (200, true)] {
             host.motions.seen([Some(state), Some((200, false))]);
             assert!(host.renews());
@@ -286,14 +277,14 @@ mod tests {
 
     #[test]
     fn a_motion_that_was_stopped_refused_or_given_up_is_not_renewed() {
-        let refused = Answer::unsent("full".to_owned());
+        let refused = Err(RefusalCode::TooManyRequests.into());
         let mut event = Event::zeroed();
         (event.kind, event.tick) = (EventKind::MotionGivenUp as u32, 300);
         let ends: [&dyn Fn(&mut Motions); 4] = [
             &|motions| motions.answered(5, &refused),
             &|motions| assert!(!motions.sent(&Request::StopHand, 6, Instant::now())),
             &|motions| {
-                motions.answered(5, &accepted(100));
+                motions.answered(5, &Ok(100));
                 motions.take(&event);
             },
             &|motions| motions.forget(),

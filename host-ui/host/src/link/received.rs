@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 use std::time::Duration;
-use stylet_shm_schema::{Reason, Refusal, RefusalCode, Reply, ReplyStatus, SceneHeader, SnapshotHeader, Vertex, check};
+use stylet_shm_schema::{Refusal, Reply, ReplyStatus, SceneHeader, SnapshotHeader, Vertex, check};
 use stylet_surfaces::bodies::{Bodies, Segmentation};
 
 /// Status of the core.
@@ -152,56 +152,18 @@ impl Snapshot {
     }
 }
 
-/// The core's answer to a command or an upload.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Answer {
-    /// The request was carried out.
-    pub accepted: bool,
-    /// Text for people.
-    pub text: String,
-    /// Reasons for programs; empty if accepted.
-    pub reasons: Vec<Reason>,
-    /// First tick of the force loop that ran with the change.
-    pub effective_tick: u64,
-}
+/// The core's answer to a command or an upload: the first tick of the force loop that ran with the change.
+pub type Answer = Result<u64, Refusal>;
 
-impl From<Refusal> for Answer {
-    fn from(refusal: Refusal) -> Self {
-        Self {
-            accepted: false,
-            text: refusal.text,
-            reasons: refusal.reasons,
-            effective_tick: 0,
-        }
-    }
-}
-
-impl Answer {
-    /// Decodes the core's data; `None` if it is inconsistent.
-    pub(super) fn of_reply(reply: &Reply) -> Option<Self> {
-        let status = ReplyStatus::from_number(reply.status)?;
-        Some(Self {
-            accepted: status == ReplyStatus::Accepted,
-            text: reply.text.read(),
+/// Decodes an answer; `None` if it is inconsistent.
+pub(super) fn answer_of(reply: &Reply) -> Option<Answer> {
+    Some(match ReplyStatus::from_number(reply.status)? {
+        ReplyStatus::Accepted => Ok(reply.effective_tick),
+        _ => Err(Refusal {
             reasons: reply.reasons().to_vec(),
-            effective_tick: reply.effective_tick,
-        })
-    }
-
-    /// Answers a request that never reached the core.
-    pub(super) fn unsent(why: String) -> Self {
-        Self {
-            accepted: false,
-            text: why,
-            reasons: Vec::new(),
-            effective_tick: 0,
-        }
-    }
-
-    /// True if it was refused for this reason.
-    pub fn is_refused_for(&self, code: RefusalCode) -> bool {
-        self.reasons.iter().any(|reason| reason.code() == Some(code))
-    }
+            text: reply.text.read(),
+        }),
+    })
 }
 
 /// Reason why something could not be sent.

@@ -6,9 +6,10 @@
 use super::inbox::Inbox;
 use super::motion::Renewals;
 use super::ports::Ports;
+use super::received::answer_of;
 use super::second::SecondEnds;
 use super::thread::lock;
-use super::{ABSENT_AFTER, Answer, Snapshot, UNANSWERED};
+use super::{ABSENT_AFTER, Snapshot, UNANSWERED};
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::{Duration, Instant};
 use stylet_ports::{self as service, Node, ServiceError, SlicePublisher, StateReader};
@@ -184,8 +185,9 @@ impl Passes {
                     continue;
                 }
             };
-            if let Err(why) = sent {
-                lock(&self.inbox).put_answer(id, Answer::unsent(why));
+            if let Err(text) = sent {
+                let reasons = Vec::new();
+                lock(&self.inbox).put_answer(id, Err(Refusal { reasons, text }));
             }
         }
         let renewal = self.renewals.due(Instant::now());
@@ -263,7 +265,7 @@ impl Passes {
             }
         }
         while let Some(reply) = ports.replies.receive() {
-            match Answer::of_reply(&reply) {
+            match answer_of(&reply) {
                 _ if !is_own(reply.session_id, reply.host_id) => {}
                 Some(answer) => inbox.put_answer(reply.command_id, answer),
                 None => invalid += 1,

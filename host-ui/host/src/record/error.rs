@@ -4,6 +4,7 @@ use crate::link::LinkError;
 use std::path::{Path, PathBuf};
 use stylet_base::WriteError;
 use stylet_base::interrupt::InterruptError;
+use stylet_shm_schema::Refusal;
 
 /// Failure to record a session or to use a recording; each text says what to do if there is a remedy.
 #[derive(Debug, thiserror::Error)]
@@ -24,8 +25,8 @@ pub enum RecordError {
     #[error(transparent)]
     Link(#[from] LinkError),
     /// The core refused to save its flight recording; the text says why.
-    #[error("{0}")]
-    Refused(String),
+    #[error(transparent)]
+    Refused(#[from] Refusal),
     /// The core did not do what it accepted.
     #[error("the core did not write its flight recording in time")]
     NoFlight,

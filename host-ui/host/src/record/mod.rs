@@ -241,9 +241,7 @@ pub fn save_flight(instance: &Instance) -> Result<String, RecordError> {
     while begun.elapsed() < Duration::from_secs(10) {
         link.poll();
         if let Some(answer) = link.reply(id) {
-            if !answer.accepted {
-                return Err(RecordError::Refused(answer.text));
-            }
+            answer?;
             accepted = true;
         }
         let kind = stylet_shm_schema::EventKind::FlightSaved as u32;

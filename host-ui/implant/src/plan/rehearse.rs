@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 use stylet_base::interrupt::Interrupt;
 use stylet_host::link::{Link, LinkError, LinkStatus};
 use stylet_procedure::{NeedleWay, Pace};
-use stylet_shm_schema::{MAX_EARLIER_NEEDLES, NeedleRehearsal, Reason, RefusalCode, Request, StabilisingNeedle};
+use stylet_shm_schema::{
+    MAX_EARLIER_NEEDLES, NeedleRehearsal, Reason, Refusal, RefusalCode, Request, StabilisingNeedle,
+};
 
 const POLL_EVERY: Duration = Duration::from_millis(2);
 /// Time limit of a rehearsal; the largest scene takes a second for a second.
@@ -179,14 +181,11 @@ impl Rehearser for LinkRehearser<'_> {
                 return Err(RehearsalError::Absent(why));
             }
             match link.reply(id) {
-                Some(answer) if !answer.accepted => {
-                    let drop = answer.reasons.first().and_then(|reason| refused_drop(reason, drops));
-                    return Err(RehearsalError::Refused {
-                        text: answer.text,
-                        drop,
-                    });
+                Some(Err(Refusal { reasons, text })) => {
+                    let drop = reasons.first().and_then(|reason| refused_drop(reason, drops));
+                    return Err(RehearsalError::Refused { text, drop });
                 }
-                Some(_) => {
+                Some(Ok(_)) => {
                     let rehearsal = link.rehearsal(id).ok_or(RehearsalError::NoResult)?;
                     if Some(rehearsal.scene_id()) != scene || rehearsal.seed_count as usize != drops.along_m.len() {
                         return Err(RehearsalError::OtherScene);

@@ -10,7 +10,7 @@ use stylet_base::interrupt::InterruptError;
 use stylet_base::output::OutputError;
 use stylet_files::FileError;
 use stylet_host::link::LinkError;
-use stylet_shm_schema::MAX_SEEDS;
+use stylet_shm_schema::{MAX_SEEDS, Refusal};
 
 /// Reason why a procedure ends early; the text gives the remedy if there is one.
 #[derive(Debug, thiserror::Error)]
@@ -41,12 +41,12 @@ pub enum ProcedureError {
     /// The core that was started has ended.
     #[error("the rt-core that was started has ended ({0}); see its message above")]
     CoreEnded(std::process::ExitStatus),
-    /// The core refused the scene; the text says why.
+    /// The core refused the scene.
     #[error("the core refused the scene: {0}")]
-    SceneRefused(String),
-    /// The core refused parameters; the text says why.
+    SceneRefused(Refusal),
+    /// The core refused parameters.
     #[error("the core refused the parameters: {0}")]
-    ParametersRefused(String),
+    ParametersRefused(Refusal),
     /// The core did not send data that the procedure needs.
     #[error("{0}")]
     NothingReceived(&'static str),

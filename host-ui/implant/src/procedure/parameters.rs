@@ -67,8 +67,8 @@ pub(super) fn set(link: &mut Link, changes: &[ParameterChange], interrupted: &In
     }
     let id = link.send(&Request::SetParameters(changes.to_vec()))?;
     let are_set = wait(link, interrupted, LIMIT, |link| {
-        if let Some(answer) = link.reply(id).filter(|answer| !answer.accepted) {
-            return Err(ProcedureError::ParametersRefused(answer.text));
+        if let Some(Err(refusal)) = link.reply(id) {
+            return Err(ProcedureError::ParametersRefused(refusal));
         }
         let now = link.parameters().map(|p| p.set);
         Ok(now.is_some_and(|set| changes.iter().all(|c| set.get(c.id).to_bits() == c.value.to_bits())))

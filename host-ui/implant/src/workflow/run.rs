@@ -361,9 +361,9 @@ impl Run {
         if self.effective_tick.is_none() {
             match link.reply(id) {
                 None => return Reply::Pending,
-                Some(answer) if answer.accepted => self.effective_tick = Some(answer.effective_tick),
-                Some(answer) if answer.is_refused_for(RefusalCode::TipOutsideTissue) => return Reply::TipOutsideTissue,
-                Some(answer) => return Reply::Refused(answer.text),
+                Some(Ok(tick)) => self.effective_tick = Some(tick),
+                Some(Err(why)) if why.is_for(RefusalCode::TipOutsideTissue) => return Reply::TipOutsideTissue,
+                Some(Err(why)) => return Reply::Refused(why.text),
             }
         }
         if self.effective_tick.is_some_and(|tick| state.tick > tick) {

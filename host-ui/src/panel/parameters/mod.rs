@@ -8,7 +8,7 @@ use egui::{Button, DragValue, RichText};
 use std::path::Path;
 use stylet_base::format;
 use stylet_host::link::Answer;
-use stylet_shm_schema::{PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterSpec};
+use stylet_shm_schema::{PARAMETER_COUNT, PARAMETERS, ParameterGroup, ParameterSpec, Refusal};
 
 /// Note under a row.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -87,9 +87,9 @@ impl ParametersState {
     }
 
     /// Takes changes that were not sent because the core would refuse them.
-    pub fn refused(&mut self, pairs: Vec<(usize, f64)>, answer: &Answer) {
+    pub fn refused(&mut self, pairs: Vec<(usize, f64)>, refusal: Refusal) {
         self.unsent = false;
-        self.note(pairs, answer);
+        self.note(pairs, &Err(refusal));
     }
 
     fn note(&mut self, pairs: Vec<(usize, f64)>, answer: &Answer) {
@@ -100,17 +100,14 @@ impl ParametersState {
             if *draft == Some(value) {
                 *draft = None;
             }
-            self.notes[index] = match answer.accepted {
-                true => RowNote::InForce(answer.effective_tick),
-                false => RowNote::Refused(reason_for(spec, answer)),
+            self.notes[index] = match answer {
+                Ok(tick) => RowNote::InForce(*tick),
+                Err(refusal) => RowNote::Refused(reason_for(spec, refusal)),
             };
         }
-        self.foot = Some(match answer.accepted {
-            true => (
-                false,
-                format!("In force since tick {}", format::count(answer.effective_tick)),
-            ),
-            false => (true, format!("Refused, nothing changed: {}", answer.text)),
+        self.foot = Some(match answer {
+            Ok(tick) => (false, format!("In force since tick {}", format::count(*tick))),
+            Err(refusal) => (true, format!("Refused, nothing changed: {refusal}")),
         });
     }
 
@@ -145,8 +142,11 @@ impl ParametersState {
     }
 }
 
-fn reason_for(spec: &ParameterSpec, answer: &Answer) -> &'static str {
-    let own = answer.reasons.iter().find(|reason| reason.parameter() == Some(spec.id));
+fn reason_for(spec: &ParameterSpec, refusal: &Refusal) -> &'static str {
+    let own = refusal
+        .reasons
+        .iter()
+        .find(|reason| reason.parameter() == Some(spec.id));
     own.and_then(|reason| reason.code())
         .map_or("refused with others, see below", |code| code.message())
 }

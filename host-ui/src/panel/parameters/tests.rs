@@ -3,23 +3,12 @@
 use super::*;
 use stylet_shm_schema::{ParameterId, Reason, RefusalCode};
 
-fn accepted(effective_tick: u64) -> Answer {
-    Answer {
-        accepted: true,
-        text: String::new(),
-        reasons: Vec::new(),
-        effective_tick,
-    }
-}
-
 fn refused(reasons: &[(RefusalCode, ParameterId)]) -> Answer {
     let reason = |&(code, id): &(RefusalCode, ParameterId)| Reason::new(code, id as u32);
-    Answer {
-        accepted: false,
+    Err(Refusal {
         text: "force.cutting_gain = 3.000000; it must be 0.000000 to 1.000000".to_owned(),
         reasons: reasons.iter().map(reason).collect(),
-        effective_tick: 0,
-    }
+    })
 }
 
 #[test]
@@ -39,7 +28,7 @@ fn edits_made_during_a_change_are_sent_after_it() {
     state.sent(7, pairs);
     state.edit(0, 0.7);
     assert_eq!(state.request(), None);
-    state.answered(&accepted(100));
+    state.answered(&Ok(100));
     assert_eq!(state.request(), Some(vec![(0, 0.7)]));
 }
 
