@@ -41,8 +41,6 @@ def said(message):
     kind = message.message_type
     if kind == "TRANSFORM":
         return message.matrix.tolist()
-    if kind == "IMAGE":
-        return [message.image.ravel().tolist(), message.ijk_to_world_matrix.tolist()]
     if kind == "POINT":
         return [np.asarray(message.positions).tolist(), list(message.names)]
     if kind == "POLYDATA":

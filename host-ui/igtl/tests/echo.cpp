@@ -4,7 +4,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <vector>
-#include <igtlImageMessage.h>
 #include <igtlMessageHeader.h>
 #include <igtlPointMessage.h>
 #include <igtlPolyDataMessage.h>
@@ -42,28 +41,6 @@ static void transform(igtl::MessageHeader* header, const std::vector<unsigned ch
     igtl::Matrix4x4 m;
     in->GetMatrix(m);
     out->SetMatrix(m);
-    write(header, out);
-}
-
-static void image(igtl::MessageHeader* header, const std::vector<unsigned char>& body) {
-    igtl::ImageMessage::Pointer in = read<igtl::ImageMessage>(header, body), out = igtl::ImageMessage::New();
-    int size[3], part[3], offset[3];
-    float spacing[3];
-    igtl::Matrix4x4 m;
-    in->GetDimensions(size);
-    in->GetSubVolume(part, offset);
-    in->GetSpacing(spacing);
-    in->GetMatrix(m);
-    out->SetDimensions(size);
-    out->SetSubVolume(part, offset);
-    out->SetSpacing(spacing);
-    out->SetScalarType(in->GetScalarType());
-    out->SetNumComponents(in->GetNumComponents());
-    out->SetEndian(in->GetEndian());
-    out->SetCoordinateSystem(in->GetCoordinateSystem());
-    out->SetMatrix(m);
-    out->AllocateScalars();
-    memcpy(out->GetScalarPointer(), in->GetScalarPointer(), in->GetImageSize());
     write(header, out);
 }
 
@@ -133,7 +110,6 @@ int main() {
         if (fread(body.data(), 1, body.size(), stdin) != body.size()) fail("a body that ends too early");
         const std::string type = header->GetDeviceType();
         if (type == "TRANSFORM") transform(header, body);
-        else if (type == "IMAGE") image(header, body);
         else if (type == "POINT") points(header, body);
         else if (type == "POLYDATA") polydata(header, body);
         else if (type == "STATUS") status(header, body);

@@ -1,9 +1,7 @@
 // Writes the example messages with libOpenIGTLink into the folder given: the bytes that the codec must produce.
 // Build: g++ -I/usr/include/openigtlink goldens.cpp -lOpenIGTLink -lpthread
 #include <cstdio>
-#include <cstring>
 #include <string>
-#include <igtlImageMessage.h>
 #include <igtlPointMessage.h>
 #include <igtlPolyDataMessage.h>
 #include <igtlStatusMessage.h>
@@ -37,20 +35,6 @@ int main(int, char** argv) {
     igtl::Matrix4x4 m = {{0, -1, 0, 1.5f}, {1, 0, 0, -2.25f}, {0, 0, 1, 30.125f}, {0, 0, 0, 1}};
     transform->SetMatrix(m);
     write(transform, folder, "transform");
-
-    igtl::ImageMessage::Pointer image = igtl::ImageMessage::New();
-    image->SetDimensions(3, 2, 1);
-    image->SetSpacing(0.5f, 0.25f, 2.0f);
-    image->SetScalarTypeToUint8();
-    image->SetEndian(igtl::ImageMessage::ENDIAN_BIG);
-    image->SetCoordinateSystem(igtl::ImageMessage::COORDINATE_RAS);
-    image->SetSubVolume(3, 2, 1, 0, 0, 0);
-    igtl::Matrix4x4 at = {{1, 0, 0, 10.0f}, {0, 1, 0, -20.0f}, {0, 0, 1, 5.5f}, {0, 0, 0, 1}};
-    image->SetMatrix(at);
-    image->AllocateScalars();
-    const unsigned char pixels[6] = {0, 1, 2, 128, 254, 255};
-    memcpy(image->GetScalarPointer(), pixels, 6);
-    write(image, folder, "image");
 
     igtl::PointMessage::Pointer points = igtl::PointMessage::New();
     igtl::PointElement::Pointer one = point("Seed 1", 1, 2, 3), two = point("Seed 2", -4, 5.5f, 6.25f);

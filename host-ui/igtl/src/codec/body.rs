@@ -1,30 +1,13 @@
-//! Content of a message, of six types.
+//! Content of a message, of five types.
 
 use super::CodecError;
 use super::polydata::PolyData;
-use super::reader::{Reader, put_f32s, put_text, put_u16s};
+use super::reader::{Reader, put_f32s, put_text};
 
 /// US-ASCII in IANA's table of character sets; UTF-8 is sent under its own number.
 const ASCII: u16 = 3;
 const UTF8: u16 = 106;
 const POINT_BYTES: usize = 136;
-const IMAGE_VERSION: u16 = 1;
-const UINT8: u8 = 3;
-const BIG_ENDIAN: u8 = 1;
-const RAS: u8 = 1;
-
-/// Picture of one byte a pixel, in RAS.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Image {
-    /// Pixels along i, j and k.
-    pub size: [u16; 3],
-    /// Steps from pixel to pixel along i, j and k, mm: direction times spacing.
-    pub steps_mm: [[f32; 3]; 3],
-    /// Centre of the picture, mm; not its corner.
-    pub centre_mm: [f32; 3],
-    /// Brightness, i fastest.
-    pub pixels: Vec<u8>,
-}
 
 /// Named place.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,8 +56,6 @@ impl Status {
 pub enum Body {
     /// Columns of a matrix: three axes, and the origin in mm.
     Transform([[f32; 3]; 4]),
-    /// A picture.
-    Image(Image),
     /// Named places.
     Points(Vec<Point>),
     /// A surface.
@@ -90,7 +71,6 @@ impl Body {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Transform(_) => "TRANSFORM",
-            Self::Image(_) => "IMAGE",
             Self::Points(_) => "POINT",
             Self::PolyData(_) => "POLYDATA",
             Self::Status(_) => "STATUS",
@@ -102,7 +82,6 @@ impl Body {
         let mut bytes = Vec::new();
         match self {
             Self::Transform(columns) => columns.iter().for_each(|column| put_f32s(&mut bytes, column)),
-            Self::Image(image) => image.encode(&mut bytes)?,
             Self::Points(points) => points.iter().try_for_each(|point| point.encode(&mut bytes))?,
             Self::PolyData(surface) => surface.encode(&mut bytes)?,
             Self::Status(status) => {
@@ -115,7 +94,9 @@ impl Body {
             Self::Text(text) => {
                 let length = u16::try_from(text.len())
                     .map_err(|_| CodecError::Field("STRING: a text of more than 65535 bytes"))?;
-                put_u16s(&mut bytes, &[if text.is_ascii() { ASCII } else { UTF8 }, length]);
+                let character_set = if text.is_ascii() { ASCII } else { UTF8 };
+                bytes.extend(character_set.to_be_bytes());
+                bytes.extend(length.to_be_bytes());
                 bytes.extend(text.as_bytes());
             }
         }
@@ -132,7 +113,6 @@ impl Body {
                 }
                 Self::Transform(columns)
             }
-            "IMAGE" => Self::Image(Image::decode(&mut reader)?),
             "POINT" => {
                 if !body.len().is_multiple_of(POINT_BYTES) {
                     return Err(CodecError::Field("POINT: the length is no multiple of 136 bytes"));
@@ -156,53 +136,6 @@ impl Body {
         };
         reader.end()?;
         Ok(decoded)
-    }
-}
-
-impl Image {
-    fn pixels_expected(size: [u16; 3]) -> Option<usize> {
-        size.iter().try_fold(1usize, |all, n| all.checked_mul(usize::from(*n)))
-    }
-
-    fn encode(&self, bytes: &mut Vec<u8>) -> Result<(), CodecError> {
-        if Self::pixels_expected(self.size) != Some(self.pixels.len()) {
-            return Err(CodecError::Field("IMAGE: the number of pixels is not that of its size"));
-        }
-        bytes.extend(IMAGE_VERSION.to_be_bytes());
-        bytes.extend([1, UINT8, BIG_ENDIAN, RAS]);
-        put_u16s(bytes, &self.size);
-        self.steps_mm.iter().for_each(|step| put_f32s(bytes, step));
-        put_f32s(bytes, &self.centre_mm);
-        put_u16s(bytes, &[0; 3]);
-        put_u16s(bytes, &self.size);
-        bytes.extend(&self.pixels);
-        Ok(())
-    }
-
-    fn decode(reader: &mut Reader) -> Result<Self, CodecError> {
-        let version = reader.u16()?;
-        // Byte order does not matter to pixels of one byte.
-        let (components, scalar, _order, axes) = (reader.u8()?, reader.u8()?, reader.u8()?, reader.u8()?);
-        if (version, components, scalar, axes) != (IMAGE_VERSION, 1, UINT8, RAS) {
-            return Err(CodecError::Field(
-                "IMAGE: only version 1 with one unsigned byte a pixel in RAS is accepted",
-            ));
-        }
-        let size = reader.u16s()?;
-        let steps_mm = [reader.f32s()?, reader.f32s()?, reader.f32s()?];
-        let centre_mm = reader.f32s()?;
-        let (offset, part) = (reader.u16s::<3>()?, reader.u16s::<3>()?);
-        if offset != [0; 3] || part != size || Self::pixels_expected(size) != Some(reader.rest()) {
-            return Err(CodecError::Field(
-                "IMAGE: its pixels are not those of the whole picture",
-            ));
-        }
-        Ok(Self {
-            size,
-            steps_mm,
-            centre_mm,
-            pixels: reader.take(reader.rest())?.to_vec(),
-        })
     }
 }
 

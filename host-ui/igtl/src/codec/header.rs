@@ -14,9 +14,8 @@ const EXTENDED_VERSION: u16 = 2;
 const EXTENSION_AT_MOST: u64 = 4096;
 
 /// Types and the largest bodies of them that are accepted or sent, in bytes.
-const LIMITS: [(&str, u64); 6] = [
+const LIMITS: [(&str, u64); 5] = [
     ("TRANSFORM", 48),
-    ("IMAGE", 16 << 20),
     ("POINT", 136 * 4096),
     ("POLYDATA", 16 << 20),
     ("STATUS", 30 + 4096),
@@ -50,7 +49,7 @@ impl Timestamp {
 /// Header of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Header {
-    /// Type, one of six.
+    /// Type, one of five.
     pub kind: &'static str,
     /// True for version 2, as protocol 3 sends it.
     pub is_extended: bool,

@@ -10,7 +10,7 @@ mod header;
 mod polydata;
 mod reader;
 
-pub use body::{Body, Image, Point, Status};
+pub use body::{Body, Point, Status};
 pub use crc::crc64;
 pub use header::{HEADER_BYTES, Header, Timestamp};
 pub use polydata::PolyData;
@@ -31,10 +31,8 @@ pub enum CodecError {
     /// The version of the header is unknown.
     #[error("header version 1 or 2 expected, {0} found")]
     Version(u16),
-    /// The type of message is not among the six.
-    #[error(
-        "message type {kind:?} is not supported; supported are TRANSFORM, IMAGE, POINT, POLYDATA, STATUS and STRING"
-    )]
+    /// The type of message is not among the five.
+    #[error("message type {kind:?} is not supported; supported are TRANSFORM, POINT, POLYDATA, STATUS and STRING")]
     Type {
         /// Name of the type.
         kind: String,

@@ -61,14 +61,6 @@ impl<'a> Reader<'a> {
         Ok(values)
     }
 
-    pub fn u16s<const N: usize>(&mut self) -> Result<[u16; N], CodecError> {
-        let mut values = [0; N];
-        for value in &mut values {
-            *value = self.u16()?;
-        }
-        Ok(values)
-    }
-
     /// Reads a text in a field of fixed length, up to its first zero.
     pub fn text(&mut self, count: usize) -> Result<String, CodecError> {
         let field = self.take(count)?;
@@ -85,10 +77,6 @@ impl<'a> Reader<'a> {
 }
 
 pub fn put_f32s(bytes: &mut Vec<u8>, values: &[f32]) {
-    values.iter().for_each(|value| bytes.extend(value.to_be_bytes()));
-}
-
-pub fn put_u16s(bytes: &mut Vec<u8>, values: &[u16]) {
     values.iter().for_each(|value| bytes.extend(value.to_be_bytes()));
 }
 

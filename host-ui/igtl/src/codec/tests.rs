@@ -21,15 +21,6 @@ pub fn examples() -> Vec<(&'static str, Message)> {
             Body::Transform([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.5, -2.25, 30.125]]),
         ),
         (
-            "image",
-            Body::Image(Image {
-                size: [3, 2, 1],
-                steps_mm: [[0.5, 0.0, 0.0], [0.0, 0.25, 0.0], [0.0, 0.0, 2.0]],
-                centre_mm: [10.0, -20.0, 5.5],
-                pixels: vec![0, 1, 2, 128, 254, 255],
-            }),
-        ),
-        (
             "point",
             Body::Points(vec![
                 point("Seed 1", [1.0, 2.0, 3.0]),
@@ -139,7 +130,7 @@ fn a_length_beyond_the_limit_is_refused_by_the_header_alone() {
     bytes[42..50].copy_from_slice(&u64::MAX.to_be_bytes());
     let refused = Header::decode(&bytes[..HEADER_BYTES]);
     assert!(
-        matches!(refused, Err(CodecError::TooLong { kind: "IMAGE", .. })),
+        matches!(refused, Err(CodecError::TooLong { kind: "POINT", .. })),
         "{refused:?}"
     );
 }
