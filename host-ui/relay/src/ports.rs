@@ -61,7 +61,8 @@ impl Near {
             let _ = self.stops.send(command);
         }
         let sent = self.commands.send(command);
-        sent.map_err(|e| ServiceError::Port(format!("commands: {e}")))?;
+        let service = "commands";
+        sent.map_err(|why| ServiceError::Send { service, why })?;
         let mut all = self.sent.borrow_mut();
         all.push_back((command.host_id, command.command_id));
         if all.len() > SENT_AT_MOST {
@@ -89,8 +90,9 @@ impl Near {
         cells: &[u8],
     ) -> Result<SlicePublisher<u8, UploadHeader>, ServiceError> {
         let port = service::uploads::publisher(&self.node, cells.len())?;
+        let service = "uploads";
         port.send(header, cells)
-            .map_err(|e| ServiceError::Port(format!("uploads: {e}")))?;
+            .map_err(|why| ServiceError::Send { service, why })?;
         Ok(port)
     }
 }

@@ -32,12 +32,43 @@ pub enum ServiceError {
     /// No core runs under that name.
     #[error("no rt-core is running (instance \"{0}\"). Start it in another terminal: rt-core{flag}", flag = flag(.0))]
     Absent(String),
-    /// The maximum number of programs is connected.
-    #[error("{0}")]
-    Full(String),
-    /// A port or its memory failed.
-    #[error("{0}")]
-    Port(String),
+    /// A port of a host cannot be made: the maximum number of programs is connected, or memory is full.
+    #[error(
+        "{service}: {why}. At most {MAX_HOSTS} hosts can watch one core; close another window, or check the room in /dev/shm"
+    )]
+    Full {
+        /// Name of the service.
+        service: String,
+        /// Error of iceoryx2.
+        why: String,
+    },
+    /// A port of the core, or of a relay in its role, cannot be made.
+    #[error(
+        "cannot use shared memory: {service}: {why}. Is another rt-core or relay running under this instance name? Choose another with \
+         --instance"
+    )]
+    Core {
+        /// Name of the service.
+        service: String,
+        /// Error of iceoryx2.
+        why: String,
+    },
+    /// A service or its memory failed.
+    #[error("{service}: {why}. Both programs must come from the same build, and /dev/shm needs room (df -h /dev/shm)")]
+    Port {
+        /// Name of the service.
+        service: String,
+        /// Error of iceoryx2.
+        why: String,
+    },
+    /// A value cannot be sent.
+    #[error("{service}: {why}")]
+    Send {
+        /// Name of the service.
+        service: &'static str,
+        /// Reason.
+        why: SendError,
+    },
 }
 
 impl ServiceError {
@@ -54,9 +85,10 @@ fn flag(name: &str) -> String {
 }
 
 fn failed(what: &str, why: impl std::fmt::Debug) -> ServiceError {
-    ServiceError::Port(format!(
-        "{what}: {why:?}. Both programs must come from the same build, and /dev/shm needs room (df -h /dev/shm)"
-    ))
+    ServiceError::Port {
+        service: what.to_owned(),
+        why: format!("{why:?}"),
+    }
 }
 
 fn name(service: &str) -> Result<ServiceName, ServiceError> {
@@ -96,17 +128,18 @@ impl By {
 
 /// Error for a port of the core, or of a relay in its role.
 fn core_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
-    ServiceError::Port(format!(
-        "cannot use shared memory: {service}: {why:?}. Is another rt-core or relay running under this instance name? Choose another with \
-         --instance"
-    ))
+    ServiceError::Core {
+        service: service.to_owned(),
+        why: format!("{why:?}"),
+    }
 }
 
 /// Error for a port of a host.
 fn host_failed(service: &str, why: impl std::fmt::Debug) -> ServiceError {
-    ServiceError::Full(format!(
-        "{service}: {why:?}. At most {MAX_HOSTS} hosts can watch one core; close another window, or check the room in /dev/shm"
-    ))
+    ServiceError::Full {
+        service: service.to_owned(),
+        why: format!("{why:?}"),
+    }
 }
 
 // `history`: number of past values that a joining host receives; `again`: the same for a host that rejoins after the

@@ -141,7 +141,7 @@ impl Passes {
             }
             Err(why) => {
                 self.connect_failed = Some(now);
-                let is_damaged = matches!(why, ServiceError::Port(_));
+                let is_damaged = matches!(why, ServiceError::Port { .. });
                 let since = *self.failing.get_or_insert(now);
                 if is_damaged && now - since > DEAF_AFTER {
                     self.failing = None;
