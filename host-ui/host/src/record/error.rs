@@ -3,6 +3,7 @@
 use crate::link::LinkError;
 use std::path::{Path, PathBuf};
 use stylet_base::WriteError;
+use stylet_base::input::InputError;
 use stylet_base::interrupt::InterruptError;
 use stylet_shm_schema::Refusal;
 
@@ -48,13 +49,13 @@ pub enum RecordError {
         /// Missing events.
         events: u64,
     },
-    /// A file cannot be created, read or written; the text says why.
+    /// A file cannot be created, read or written.
     #[error("{}: {why}", path.display())]
     File {
         /// The file.
         path: PathBuf,
         /// Problem with the file.
-        why: String,
+        why: FileProblem,
     },
     /// The program that serves viewers cannot be started.
     #[error("stylet-live: cannot be started ({0}): 'make live' builds it; it belongs beside host-ui")]
@@ -68,6 +69,32 @@ pub enum RecordError {
     /// An exported file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+}
+
+/// Problem with the file of a recording.
+#[derive(Debug, thiserror::Error)]
+pub enum FileProblem {
+    /// It cannot be created.
+    #[error("{0}; choose another file with --out")]
+    Create(std::io::Error),
+    /// It cannot be read at all.
+    #[error(transparent)]
+    Io(std::io::Error),
+    /// It cannot be read to be shown.
+    #[error(transparent)]
+    Read(#[from] InputError),
+    /// It cannot be written.
+    #[error(transparent)]
+    Write(#[from] mcap::McapError),
+    /// It is not a recording.
+    #[error(transparent)]
+    Show(#[from] ShowError),
+    /// It holds no tick.
+    #[error("holds no tick of Stylet")]
+    NoTick,
+    /// It holds no tick of a second device.
+    #[error("the recording holds no tick of a second device: it is of a run without --device-2")]
+    NoSecond,
 }
 
 /// Reason why the bytes of a recording cannot be shown; the text follows the name of the file.
@@ -86,10 +113,10 @@ pub enum ShowError {
 
 impl RecordError {
     /// Returns an error about a file, which it names.
-    pub(super) fn of_file(path: &Path, why: impl ToString) -> Self {
+    pub(super) fn of_file(path: &Path, why: impl Into<FileProblem>) -> Self {
         Self::File {
             path: path.to_owned(),
-            why: why.to_string(),
+            why: why.into(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Exports of a recording: a table, and a motion for the core's replay device.
 
-use super::error::RecordError;
+use super::error::{FileProblem, RecordError};
 use super::read::read;
 use clap::Args;
 use std::io::Write;
@@ -60,8 +60,7 @@ pub fn export(options: &Export) -> Result<(), RecordError> {
     let has_second = !recording.second.is_empty();
     let wanted = options.csv_2.as_ref().or(options.motion_2.as_ref());
     if let Some(path) = wanted.filter(|_| !has_second) {
-        let why = "the recording holds no tick of a second device: it is of a run without --device-2";
-        return Err(RecordError::of_file(path, why));
+        return Err(RecordError::of_file(path, FileProblem::NoSecond));
     }
     if let Some(path) = &options.csv_2 {
         write_streamed(path, |file| csv_of_second(&recording.second, file))?;

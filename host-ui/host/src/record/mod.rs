@@ -16,7 +16,7 @@ mod read;
 mod stream;
 mod writer;
 
-pub use error::{RecordError, ShowError};
+pub use error::{FileProblem, RecordError, ShowError};
 pub use export::{Export, export};
 pub use gaps::{Gap, Gaps};
 pub use played::{played, played_of};
@@ -76,8 +76,7 @@ pub fn run(options: &Options) -> Result<(), RecordError> {
     let (name, totals) = match (&options.out, &options.live) {
         (Some(path), _) => {
             let failed = |why: mcap::McapError| RecordError::of_file(path, why);
-            let file = File::create(path)
-                .map_err(|e| RecordError::of_file(path, format!("{e}; choose another file with --out")))?;
+            let file = File::create(path).map_err(|e| RecordError::of_file(path, FileProblem::Create(e)))?;
             let writer = Writer::of_file(BufWriter::new(file)).map_err(failed)?;
             let mut totals = take(&mut link, options, stop, writer).map_err(failed)?;
             totals.bytes = std::fs::metadata(path).map_or(0, |m| m.len());

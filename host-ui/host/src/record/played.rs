@@ -15,9 +15,8 @@ const MOST_BYTES: usize = 1 << 30;
 
 /// Reads a recording of `host-ui record` for a window; refuses one without a scene.
 pub fn played(path: &Path, interrupt: &Interrupt) -> Result<Played, RecordError> {
-    let invalid = |why: String| RecordError::of_file(path, why);
-    let bytes = stylet_base::input::read(path, MOST_BYTES as u64).map_err(|why| invalid(why.to_string()))?;
-    played_of(&bytes, interrupt).map_err(|why| invalid(why.to_string()))
+    let bytes = stylet_base::input::read(path, MOST_BYTES as u64).map_err(|why| RecordError::of_file(path, why))?;
+    played_of(&bytes, interrupt).map_err(|why| RecordError::of_file(path, why))
 }
 
 /// As [`played`], for the bytes of a file; the text of an error follows the name of the file.

@@ -1,7 +1,7 @@
 //! Reads a recording for an export.
 
 use super::channels::Kind;
-use super::error::RecordError;
+use super::error::{FileProblem, RecordError};
 use super::gaps::Gaps;
 use super::stream;
 use std::path::Path;
@@ -21,8 +21,7 @@ pub struct Recording {
 
 /// Reads the ticks; refuses a file that holds none.
 pub fn read(path: &Path) -> Result<Recording, RecordError> {
-    let invalid = |why: String| RecordError::of_file(path, why);
-    let bytes = std::fs::read(path).map_err(|e| invalid(e.to_string()))?;
+    let bytes = std::fs::read(path).map_err(|e| RecordError::of_file(path, FileProblem::Io(e)))?;
     let mut recording = Recording {
         ticks: Vec::new(),
         second: Vec::new(),
@@ -44,9 +43,9 @@ pub fn read(path: &Path) -> Result<Recording, RecordError> {
         }
         Ok(())
     });
-    recording.cut_off = cut_off.map_err(|why| invalid(why.to_string()))?;
+    recording.cut_off = cut_off.map_err(|why| RecordError::of_file(path, why))?;
     if recording.ticks.is_empty() {
-        return Err(invalid("holds no tick of Stylet".to_owned()));
+        return Err(RecordError::of_file(path, FileProblem::NoTick));
     }
     Ok(recording)
 }
