@@ -16,13 +16,10 @@ pub enum RecordError {
     /// Neither a file nor viewers.
     #[error("give --out or --live for the session")]
     NoDestination,
-    /// No core was found; the text says what to do.
-    #[error("{0}")]
-    NoCore(String),
     /// A core was found that does not answer.
     #[error("rt-core runs but does not answer; end it and start it again")]
     NoAnswer,
-    /// A request could not be sent.
+    /// There is no core, or a request could not be sent.
     #[error(transparent)]
     Link(#[from] LinkError),
     /// The core refused to save its flight recording; the text says why.

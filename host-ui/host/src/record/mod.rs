@@ -22,7 +22,7 @@ pub use gaps::{Gap, Gaps};
 pub use played::{played, played_of};
 pub use read::{Recording, read};
 
-use crate::link::{Link, LinkStatus};
+use crate::link::{Link, LinkError, LinkStatus};
 use clap::Args;
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
@@ -112,7 +112,7 @@ fn find_core(link: &mut Link, stop: impl Fn() -> bool) -> Result<(), RecordError
         std::thread::sleep(POLL_EVERY);
     }
     match link.status() {
-        LinkStatus::Absent { why } => Err(RecordError::NoCore(why)),
+        LinkStatus::Absent { why } => Err(LinkError::Absent(why).into()),
         _ => Err(RecordError::NoAnswer),
     }
 }

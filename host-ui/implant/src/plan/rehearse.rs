@@ -122,10 +122,7 @@ pub enum RehearsalError {
     /// The user cancelled it.
     #[error("interrupted")]
     Interrupted,
-    /// The core is absent; the text says what to do.
-    #[error("{0}")]
-    Absent(String),
-    /// The request could not be sent.
+    /// There is no core, or the request could not be sent.
     #[error(transparent)]
     Link(#[from] LinkError),
     /// The core refused, or the rehearsal did not finish; the text says why.
@@ -178,7 +175,7 @@ impl Rehearser for LinkRehearser<'_> {
             }
             link.poll();
             if let LinkStatus::Absent { why } = link.status() {
-                return Err(RehearsalError::Absent(why));
+                return Err(LinkError::Absent(why).into());
             }
             match link.reply(id) {
                 Some(Err(Refusal { reasons, text })) => {

@@ -289,7 +289,7 @@ impl Run {
         if let LinkStatus::Absent { why } = link.status() {
             let since = *self.absent_since.get_or_insert_with(Instant::now);
             return match since.elapsed() > ABSENT_LIMIT || self.session_id.is_none() {
-                true => Err(RunFailure::Absent(why)),
+                true => Err(LinkError::Absent(why).into()),
                 false => Ok(false),
             };
         }

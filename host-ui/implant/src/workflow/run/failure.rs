@@ -34,16 +34,13 @@ impl RunError {
 /// Reason why a step could not be completed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RunFailure {
-    /// The core is absent; the text says what to do.
-    #[error("{0}")]
-    Absent(String),
     /// Another run of the core has begun.
     #[error("rt-core was restarted during the procedure; start the procedure again")]
     Restarted,
     /// The program was silent, and the core stopped its motion.
     #[error("this program stood still for {0:.1} s, and the core stopped the needle; continue when you are ready")]
     StoodStill(f64),
-    /// A request could not be sent.
+    /// There is no core, or a request could not be sent.
     #[error(transparent)]
     Link(#[from] LinkError),
     /// The procedure itself cannot continue.
