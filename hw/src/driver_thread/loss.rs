@@ -51,7 +51,9 @@ impl Errors {
     pub fn lost(&self) -> Option<u32> {
         // SYNC: acquire pairs with the release in `set_lost`: the error that caused the loss is visible to the load after
         // it.
-        self.lost.load(Ordering::Acquire).then(|| self.last.load(Ordering::Relaxed))
+        self.lost
+            .load(Ordering::Acquire)
+            .then(|| self.last.load(Ordering::Relaxed))
     }
 
     /// Returns the number of errors so far.

@@ -308,9 +308,7 @@ mod tests {
     #[test]
     fn every_bad_limit_is_named() {
         let given = ["wake_p50=7", "wake_p99_us=-1", "faults", "wake_max_us=nan"].map(str::to_owned);
-        let why = limits(1_000_000, &given)
-            .expect_err("all four are wrong")
-            .to_string();
+        let why = limits(1_000_000, &given).expect_err("all four are wrong").to_string();
         assert_eq!(why.lines().count(), 5);
         assert!(
             why.contains("\"wake_p50\"") && why.contains("wake_p99_us needs"),

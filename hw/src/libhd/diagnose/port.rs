@@ -143,7 +143,10 @@ pub fn of_other_ports(root: &Path, here: &Surroundings) -> Vec<Finding> {
 
 /// Checks the newer Touch, a HID device: its file belongs to root at first.
 fn of_hid(root: &Path) -> Vec<Finding> {
-    let entries = fs::read_dir(root.join("sys/class/hidraw")).into_iter().flatten().flatten();
+    let entries = fs::read_dir(root.join("sys/class/hidraw"))
+        .into_iter()
+        .flatten()
+        .flatten();
     let touches = entries.filter(|entry| {
         let event = fs::read_to_string(entry.path().join("device/uevent")).unwrap_or_default();
         // HID_ID=0003:00002988:00000302

@@ -47,7 +47,12 @@ fn probe_and_line_displace_each_other_reciprocally() {
     let at_line_j: f64 = rows_m.iter().zip(&loads_n).map(|(m, n)| m * n).sum();
     probe.nothing_beside(|generation| generation == NUMBER);
     probe.beside(NUMBER, columns, &loads_n);
-    let at_pads_j: f64 = probe.beside_m.iter().zip(probe.state.loads_n()).map(|(m, n)| m * n).sum();
+    let at_pads_j: f64 = probe
+        .beside_m
+        .iter()
+        .zip(probe.state.loads_n())
+        .map(|(m, n)| m * n)
+        .sum();
     assert!(
         (at_line_j - at_pads_j).abs() < 1e-12 * at_pads_j.abs() && at_pads_j.abs() > 1e-7,
         "{at_line_j} {at_pads_j}"

@@ -1,7 +1,7 @@
 //! The pelvis under a probe that is pressed 10 mm: against the reference, between the pads, and how long it takes.
 
-use super::{Fixture, displace};
 use super::reference::{Reference, beside_reference};
+use super::{Fixture, displace};
 use crate::probe::wall::Wall;
 use crate::probe::{PADS_APART_M, ProbeState, step};
 use crate::scene::{Labels, Role, Scene, TissueKind};
