@@ -1,39 +1,35 @@
 //! The tissue models under test, and their bodies.
 
 use stylet_sim::limits::TissueParameters;
-use stylet_sim::scene::{Labels, Scene, Structure};
-use stylet_sim::tissue::{ChainMailTissue, FemTissue, TissueModel};
+use stylet_sim::scene::{Labels, Scene, Structure, TissueKind};
+use stylet_sim::tissue::{FemTissue, TissueModel, TissueSpec};
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    ChainMail,
-    Fem,
+/// Returns every built-in model but `Paper`, whose needle alone differs from that of ChainMail.
+pub fn kinds() -> Vec<TissueKind> {
+    TissueKind::ALL
+        .into_iter()
+        .filter(|kind| *kind != TissueKind::Paper)
+        .collect()
 }
 
-impl Kind {
-    pub const ALL: [Kind; 2] = [Kind::ChainMail, Kind::Fem];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::ChainMail => "ChainMail",
-            Kind::Fem => "FEM",
-        }
+/// Returns the name of a model on the page.
+pub fn name(kind: TissueKind) -> &'static str {
+    match kind {
+        TissueKind::ChainMail => "ChainMail",
+        TissueKind::Fem => "FEM",
+        other => other.name(),
     }
+}
 
-    pub fn on(self, scene: &Scene, parameters: &TissueParameters) -> Box<dyn TissueModel> {
-        match self {
-            Kind::Fem => {
-                let mut fem = FemTissue::<f32>::new(scene).expect("the case gives valid materials");
-                // The solver's capability, not its time in the loop.
-                fem.settings.max_cycles = 40;
-                Box::new(fem)
-            }
-            Kind::ChainMail => {
-                let limits = parameters.validate().expect("the case gives valid settings");
-                Box::new(ChainMailTissue::new(scene, limits))
-            }
-        }
+pub fn on(kind: TissueKind, scene: &Scene, parameters: &TissueParameters) -> Box<dyn TissueModel> {
+    if kind == TissueKind::Fem {
+        let mut fem = FemTissue::<f32>::new(scene).expect("the case gives valid materials");
+        // The solver's capability, not its time in the loop.
+        fem.settings.max_cycles = 40;
+        return Box::new(fem);
     }
+    let limits = parameters.validate().expect("the case gives valid settings");
+    (TissueSpec::from(kind).build)(scene, &limits).expect("the case gives a valid scene")
 }
 
 /// Builds a body from a formula; its label numbers the structure, 0 is no tissue.

@@ -1,9 +1,10 @@
 //! The table of hard cases, as it stands in `docs/stability.md`.
 
 use super::cases::SHORT;
-use super::models::Kind;
+use super::models::name;
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use stylet_sim::scene::TissueKind;
 
 /// One case met by one model.
 pub struct Row {
@@ -60,14 +61,14 @@ fn shortfalls(rows: &[Row]) -> String {
     let mut text = String::from("\nWhy some cases are not met:\n\n");
     for (number, kind, why) in SHORT {
         if rows.iter().any(|row| is(row, number, kind) && !row.met) {
-            writeln!(text, "- ({number}) {}: {why}.", kind.name()).expect("a string takes all");
+            writeln!(text, "- ({number}) {}: {why}.", name(kind)).expect("a string takes all");
         }
     }
     text
 }
 
-pub fn is(row: &Row, number: u32, kind: Kind) -> bool {
-    row.number == number && row.model == kind.name()
+pub fn is(row: &Row, number: u32, kind: TissueKind) -> bool {
+    row.number == number && row.model == name(kind)
 }
 
 fn table(rows: &[Row]) -> String {
