@@ -40,6 +40,8 @@ pub struct Backend {
     pub argument: Argument,
     /// One line for help texts.
     pub help: &'static str,
+    /// True if a program, not a device, gives the samples. Both hands can use such a back end at once.
+    pub simulated: bool,
     /// True if the back end has run only against a fake of its driver, never on the device.
     pub untried: bool,
 }
@@ -52,6 +54,7 @@ pub const BACKENDS: &[Backend] = &[
         aliases: &["sim"],
         argument: Argument::None,
         help: "a simulated Phantom Premium 1.5 in the grip of a simulated hand",
+        simulated: true,
         untried: false,
     },
     Backend {
@@ -60,6 +63,7 @@ pub const BACKENDS: &[Backend] = &[
         aliases: &[],
         argument: Argument::Optional("NAME"),
         help: "a Phantom through OpenHaptics: the driver's default device, or the one called NAME",
+        simulated: false,
         untried: true,
     },
     Backend {
@@ -68,6 +72,7 @@ pub const BACKENDS: &[Backend] = &[
         aliases: &[],
         argument: Argument::Required("FILE"),
         help: "a recorded motion (from 'host-ui export --motion')",
+        simulated: true,
         untried: false,
     },
     Backend {
@@ -76,6 +81,7 @@ pub const BACKENDS: &[Backend] = &[
         aliases: &["drd"],
         argument: Argument::Optional("NUMBER"),
         help: "an omega, delta or sigma of Force Dimension, or a Falcon: the first one, or the one with this number, from 0",
+        simulated: false,
         untried: true,
     },
     Backend {
@@ -84,6 +90,7 @@ pub const BACKENDS: &[Backend] = &[
         aliases: &["inverse3"],
         argument: Argument::Optional("NUMBER"),
         help: "an Inverse3 of Haply through its Inverse service: the first one, the one with this number, from 0, or with this id",
+        simulated: false,
         untried: true,
     },
 ];

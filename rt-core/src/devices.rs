@@ -196,6 +196,7 @@ fn text(listed: &Listed) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use stylet_hw::backend::Argument;
 
     fn nowhere() -> Libraries {
         Libraries {
@@ -215,7 +216,8 @@ mod tests {
             assert!(listed.forms.iter().all(|form| text.contains(form.as_str())), "{text}");
             assert_eq!(text.contains("Not tried on the device"), backend.untried, "{text}");
             assert!(!listed.findings.is_empty());
-            assert_eq!(listed.usable, backend.kind == BackendKind::Simulated, "{text}");
+            let needs_nothing = backend.simulated && !matches!(backend.argument, Argument::Required(_));
+            assert_eq!(listed.usable, needs_nothing, "{text}");
         }
     }
 

@@ -33,7 +33,7 @@ impl DeviceChoice {
     /// True if both hands cannot use these two. A recorded motion or a simulation can be used twice. OpenHaptics serves
     /// all its devices in one loop, which this program does not support for two.
     pub fn excludes(&self, other: &Self) -> bool {
-        let is_hardware = !matches!(self.kind, BackendKind::Simulated | BackendKind::Replay);
+        let is_hardware = backend::BACKENDS.iter().any(|b| b.kind == self.kind && !b.simulated);
         is_hardware && self.kind == other.kind && (self == other || self.kind == BackendKind::Phantom)
     }
 }
